@@ -1,0 +1,136 @@
+"""The airframe: every number of a multicopter, declared once.
+
+The stabiliser designs itself from these numbers and the simulator makes its JSBSim model from them, so a
+new drone is a new YAML file in `firmware_py/airframes/`.
+"""
+
+from __future__ import annotations
+
+from functools import cached_property
+from importlib import resources
+from pathlib import Path
+from typing import Literal, Self
+
+import yaml
+from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
+
+from firmware_py.types import Vec3
+
+GRAVITY_M_S2 = 9.80665
+
+
+class AirframeError(ValueError):
+    """An airframe that cannot be used; the message is one line for people."""
+
+
+class _Part(BaseModel):
+    model_config = ConfigDict(frozen=True, extra="forbid")
+
+
+class Rotor(_Part):
+    """One rotor: where it is and which way it turns."""
+
+    position_frd_m: Vec3 = Field(description="hub relative to the centre of mass: forward, right, down")
+    spin: Literal["cw", "ccw"] = Field(description="seen from above; its drag turns the body the other way")
+
+    @property
+    def yaw_sign(self) -> float:
+        """Sign of its drag torque about body down (clockwise from above is positive)."""
+        return -1.0 if self.spin == "cw" else 1.0
+
+
+class Motor(_Part):
+    """What every motor with its propeller does."""
+
+    thrust_n_s2: float = Field(gt=0, description="thrust per squared rotor speed, N/(rad/s)^2")
+    torque_nm_s2: float = Field(gt=0, description="drag torque per squared rotor speed, N m/(rad/s)^2")
+    max_speed_rad_s: float = Field(gt=0)
+    time_constant_s: float = Field(0.03, ge=0, le=1, description="first-order lag of the speed; 0: none")
+    radius_m: float = Field(0.05, gt=0)
+
+
+class Drag(_Part):
+    """Quadratic drag in body axes: F = -k v|v|, M = -k w|w|."""
+
+    force_n_s2_m2: Vec3 = Field((0.0, 0.0, 0.0), description="N/(m/s)^2: forward, right, down")
+    moment_nm_s2: Vec3 = Field((0.0, 0.0, 0.0), description="N m/(rad/s)^2: roll, pitch, yaw")
+
+
+class Contact(_Part):
+    """How the body touches things: a spring and a damper with friction at each touching point."""
+
+    stiffness_n_m: float = Field(300.0, gt=0)
+    damping_n_s_m: float = Field(6.0, ge=0)
+    friction: float = Field(0.8, ge=0)
+
+
+class Limits(_Part):
+    """What the stabiliser never asks for more of."""
+
+    tilt_rad: float = Field(0.52, gt=0, lt=1.3)
+    roll_pitch_rate_rad_s: float = Field(4.0, gt=0)
+    yaw_rate_rad_s: float = Field(2.0, gt=0)
+    speed_horizontal_m_s: float = Field(2.0, gt=0)
+    speed_up_m_s: float = Field(1.5, gt=0)
+    speed_down_m_s: float = Field(1.0, gt=0)
+
+
+class Airframe(_Part):
+    """A multicopter."""
+
+    name: str = Field(pattern=r"^[a-z0-9][a-z0-9_-]*$")
+    mass_kg: float = Field(gt=0)
+    inertia_kg_m2: Vec3 = Field(description="principal moments about forward, right, down")
+    rotors: tuple[Rotor, ...] = Field(min_length=4)
+    motor: Motor
+    drag: Drag = Drag()
+    contact: Contact = Contact()
+    limits: Limits = Limits()
+    envelope_m: Vec3 = Field(description="length, width, height of the box around it, centred on the mass")
+
+    @model_validator(mode="after")
+    def _can_fly(self) -> Self:
+        if self.hover_speed_rad_s >= self.motor.max_speed_rad_s:
+            raise ValueError("motor.max_speed_rad_s: the rotors cannot carry the mass; raise it")
+        if abs(sum(rotor.yaw_sign for rotor in self.rotors)) > 0:
+            raise ValueError("rotors: as many must spin cw as ccw, or yaw cannot be balanced")
+        return self
+
+    @property
+    def weight_n(self) -> float:
+        """Weight at standard gravity."""
+        return self.mass_kg * GRAVITY_M_S2
+
+    @cached_property
+    def hover_speed_rad_s(self) -> float:
+        """Rotor speed at which thrust carries the weight."""
+        return float((self.weight_n / (len(self.rotors) * self.motor.thrust_n_s2)) ** 0.5)
+
+
+def load_airframe(name_or_path: str) -> Airframe:
+    """Load an airframe by its name in `firmware_py/airframes/` or by the path of a YAML file.
+
+    Raises:
+        AirframeError: there is none of that name, or the file is not a valid airframe.
+    """
+    folder = resources.files("firmware_py") / "airframes"
+    if name_or_path.endswith((".yaml", ".yml")):
+        path = Path(name_or_path)
+        if not path.is_file():
+            raise AirframeError(f"airframe: no file '{name_or_path}'")
+        text = path.read_text(encoding="utf-8")
+    else:
+        known = sorted(entry.name[:-5] for entry in folder.iterdir() if entry.name.endswith(".yaml"))
+        if name_or_path not in known:
+            raise AirframeError(f"airframe: no '{name_or_path}'; there are {', '.join(known)}, or give a file")
+        text = (folder / f"{name_or_path}.yaml").read_text(encoding="utf-8")
+    try:
+        return Airframe.model_validate(yaml.safe_load(text))
+    except yaml.YAMLError as error:
+        raise AirframeError(f"airframe {name_or_path}: not YAML: {str(error).splitlines()[0]}") from error
+    except ValidationError as error:
+        first = error.errors()[0]
+        where = ".".join(str(part) for part in first["loc"]) or "airframe"
+        raise AirframeError(
+            f"airframe {name_or_path}: {where}: {first['msg']} (got {first['input']!r:.60})"
+        ) from error
