@@ -1,0 +1,71 @@
+"""Modes, states and results of the autopilot, with PX4's and MAVLink's numbers."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from enum import Enum, IntEnum
+
+from firmware_py.types import GeodeticPoint, Setpoint, Vec3
+
+
+class FlightMode(Enum):
+    """Flight modes with PX4's numbers; the value is (main mode, sub mode)."""
+
+    HOLD = (4, 3)
+    TAKEOFF = (4, 2)
+    LAND = (4, 6)
+    OFFBOARD = (6, 0)
+
+    @property
+    def custom_mode(self) -> int:
+        """HEARTBEAT.custom_mode as PX4 packs it: main << 16 | sub << 24."""
+        main, sub = self.value
+        return int(main) << 16 | int(sub) << 24
+
+
+class LandedState(IntEnum):
+    """MAV_LANDED_STATE."""
+
+    ON_GROUND = 1
+    IN_AIR = 2
+    TAKEOFF = 3
+    LANDING = 4
+
+
+class CommandResult(IntEnum):
+    """MAV_RESULT."""
+
+    ACCEPTED = 0
+    TEMPORARILY_REJECTED = 1
+    DENIED = 2
+    UNSUPPORTED = 3
+    FAILED = 4
+
+
+@dataclass(slots=True)
+class VehicleStatus:
+    """What the commander says of the vehicle.
+
+    Attributes:
+        armed: motors may turn.
+        mode: the mode flown now (a failsafe may have chosen it).
+        intended_mode: the mode last asked for by a person or an app.
+        landed_state: for EXTENDED_SYS_STATE.
+        failsafe: a failsafe is in charge (system status CRITICAL).
+        ready: pre-arm checks of the intended mode pass (system status STANDBY).
+        home: where it was armed (first: where it booted); None before the first position.
+        home_ned_m: the same in the local frame, shape (3,).
+        origin: the local frame's origin on Earth; None before the first position.
+        setpoint: what is being followed now, for POSITION_TARGET_LOCAL_NED.
+    """
+
+    armed: bool = False
+    mode: FlightMode = FlightMode.HOLD
+    intended_mode: FlightMode = FlightMode.HOLD
+    landed_state: LandedState = LandedState.ON_GROUND
+    failsafe: bool = False
+    ready: bool = False
+    home: GeodeticPoint | None = None
+    home_ned_m: Vec3 = (0.0, 0.0, 0.0)
+    origin: GeodeticPoint | None = None
+    setpoint: Setpoint = field(default_factory=lambda: Setpoint(0))
