@@ -1,0 +1,165 @@
+"""Solid boxes (bars of the frames, the base) and how the drone's box touches them.
+
+A touch is found by the separating axis theorem on two boxes (Gottschalk, Lin, Manocha, "OBBTree", 1996):
+they overlap if and only if their projections overlap on all of 15 axes; the axis of least overlap is the
+direction that pushes them apart. Plain scalars: this runs at the physics rate while something is near.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from math import cos, hypot, sin, sqrt
+
+from scenarios.axes import Vec3
+from scenarios.models import Frame, Scenario
+
+Matrix = tuple[Vec3, Vec3, Vec3]
+
+
+@dataclass(frozen=True, slots=True)
+class Solid:
+    """An upright box that does not move.
+
+    Attributes:
+        name: what the referee calls it.
+        centre_arena_m: shape (3,).
+        yaw_rad: its heading, counter-clockwise.
+        half_extents_m: along its own axes, shape (3,).
+        reach_m: radius of the ball around it.
+    """
+
+    name: str
+    centre_arena_m: Vec3
+    yaw_rad: float
+    half_extents_m: Vec3
+
+    @property
+    def reach_m(self) -> float:
+        """Radius of the ball that holds it."""
+        return hypot(*self.half_extents_m)
+
+
+@dataclass(frozen=True, slots=True)
+class Touch:
+    """Two boxes overlap.
+
+    Attributes:
+        depth_m: how far along the normal.
+        normal_arena: unit vector from the solid to the drone.
+        point_arena_m: where they touch.
+    """
+
+    depth_m: float
+    normal_arena: Vec3
+    point_arena_m: Vec3
+
+
+def frame_solids(frame: Frame) -> tuple[Solid, ...]:
+    """Return the four bars of a frame: top, bottom, left, right (right and left between the others)."""
+    half_bar = frame.bar_m / 2
+    half_width, half_height = frame.outer_width_m / 2, frame.outer_height_m / 2
+    level = half_height - half_bar
+    side = half_width - half_bar
+    left_y, left_x = cos(frame.yaw_rad) * side, -sin(frame.yaw_rad) * side
+    x, y, z = frame.position_arena_m
+    lying: Vec3 = (half_bar, half_width, half_bar)
+    standing: Vec3 = (half_bar, half_bar, half_height - frame.bar_m)
+    return (
+        Solid(frame.colour, (x, y, z + level), frame.yaw_rad, lying),
+        Solid(frame.colour, (x, y, z - level), frame.yaw_rad, lying),
+        Solid(frame.colour, (x + left_x, y + left_y, z), frame.yaw_rad, standing),
+        Solid(frame.colour, (x - left_x, y - left_y, z), frame.yaw_rad, standing),
+    )
+
+
+def base_solid(scenario: Scenario) -> Solid:
+    """Return the base's cube, from the floor to its top."""
+    base = scenario.base
+    half = base.edge_m / 2
+    return Solid("base", (base.x_m, base.y_m, base.top_m / 2), 0.0, (half, half, base.top_m / 2))
+
+
+def touch(solid: Solid, centre_m: Vec3, rotation: Matrix, half_extents_m: Vec3) -> Touch | None:
+    """Tell whether and how a box overlaps a solid.
+
+    Args:
+        solid: what stands still.
+        centre_m: centre of the moving box, arena axes.
+        rotation: rows of the matrix that turns the box's own axes into arena axes.
+        half_extents_m: of the moving box.
+
+    Returns:
+        The touch, or None while they are apart.
+    """
+    c, s = cos(solid.yaw_rad), sin(solid.yaw_rad)
+    dx, dy, dz = (centre_m[i] - solid.centre_arena_m[i] for i in range(3))
+    offset = (c * dx + s * dy, -s * dx + c * dy, dz)
+    r0, r1, r2 = rotation
+    # The moving box's axes seen from the solid, as rows of the relative rotation.
+    turn: Matrix = (
+        (c * r0[0] + s * r1[0], c * r0[1] + s * r1[1], c * r0[2] + s * r1[2]),
+        (c * r1[0] - s * r0[0], c * r1[1] - s * r0[1], c * r1[2] - s * r0[2]),
+        r2,
+    )
+    least = _least_overlap(offset, turn, solid.half_extents_m, half_extents_m)
+    if least is None:
+        return None
+    depth, (nx, ny, nz) = least
+    point = _touching_point(offset, turn, solid.half_extents_m, half_extents_m)
+    to_arena = (c * point[0] - s * point[1], s * point[0] + c * point[1], point[2])
+    sx, sy, sz = solid.centre_arena_m
+    return Touch(
+        depth,
+        (c * nx - s * ny, s * nx + c * ny, nz),
+        (sx + to_arena[0], sy + to_arena[1], sz + to_arena[2]),
+    )
+
+
+def _least_overlap(offset: Vec3, turn: Matrix, a: Vec3, b: Vec3) -> tuple[float, Vec3] | None:
+    """Return depth and normal (from the solid outwards, in its axes) of least overlap; None when apart."""
+    # Faces of the solid first: they part the boxes in nearly every case.
+    best_depth, best_normal = 1e9, (0.0, 0.0, 0.0)
+    for i in range(3):
+        row = turn[i]
+        depth = a[i] + b[0] * abs(row[0]) + b[1] * abs(row[1]) + b[2] * abs(row[2]) - abs(offset[i])
+        if depth <= 0.0:
+            return None
+        if depth < best_depth:
+            sign = 1.0 if offset[i] >= 0 else -1.0
+            best_depth = depth
+            best_normal = (sign if i == 0 else 0.0, sign if i == 1 else 0.0, sign if i == 2 else 0.0)
+    columns = [(turn[0][j], turn[1][j], turn[2][j]) for j in range(3)]
+    axes = list(columns)
+    for x, y, z in columns:  # cross products of the solid's axes with the box's axes
+        axes += [(0.0, -z, y), (z, 0.0, -x), (-y, x, 0.0)]
+    for axis in axes:
+        length = sqrt(axis[0] ** 2 + axis[1] ** 2 + axis[2] ** 2)
+        if length < 1e-3:  # parallel edges: a face axis has covered it
+            continue
+        nx, ny, nz = axis[0] / length, axis[1] / length, axis[2] / length
+        reach = a[0] * abs(nx) + a[1] * abs(ny) + a[2] * abs(nz)
+        for j in range(3):
+            column = columns[j]
+            reach += b[j] * abs(nx * column[0] + ny * column[1] + nz * column[2])
+        along = nx * offset[0] + ny * offset[1] + nz * offset[2]
+        depth = reach - abs(along)
+        if depth <= 0.0:
+            return None
+        if depth < best_depth - 1e-9:
+            sign = 1.0 if along >= 0 else -1.0
+            best_depth, best_normal = depth, (sign * nx, sign * ny, sign * nz)
+    return best_depth, best_normal
+
+
+def _touching_point(offset: Vec3, turn: Matrix, a: Vec3, b: Vec3) -> Vec3:
+    """Return the point of the moving box nearest to the solid's point nearest to the box's centre."""
+    near = [min(max(offset[i], -a[i]), a[i]) - offset[i] for i in range(3)]
+    inside = []
+    for j in range(3):
+        along = near[0] * turn[0][j] + near[1] * turn[1][j] + near[2] * turn[2][j]
+        inside.append(min(max(along, -b[j]), b[j]))
+    return (
+        offset[0] + turn[0][0] * inside[0] + turn[0][1] * inside[1] + turn[0][2] * inside[2],
+        offset[1] + turn[1][0] * inside[0] + turn[1][1] * inside[1] + turn[1][2] * inside[2],
+        offset[2] + turn[2][0] * inside[0] + turn[2][1] * inside[1] + turn[2][2] * inside[2],
+    )
