@@ -1,0 +1,94 @@
+from math import inf, nan
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from pydantic import ValidationError
+
+from firmware_py.parameters import DECLARATIONS, Parameter, ParameterError, Parameters
+
+
+def test_declarations_are_sorted_by_name_without_doubles():
+    names = [declared.name for declared in DECLARATIONS]
+    assert names == sorted(set(names))
+
+
+@pytest.mark.parametrize("declared", DECLARATIONS, ids=lambda declared: declared.name)
+def test_each_declaration_has_words_and_a_unit_when_it_is_a_quantity(declared):
+    assert declared.description
+    assert declared.unit or declared.kind == "int32"
+
+
+def test_starts_from_defaults_and_takes_given_values():
+    parameters = Parameters({"MIS_TAKEOFF_ALT": 1.5})
+    assert parameters.value("MIS_TAKEOFF_ALT") == 1.5
+    assert parameters.value("COM_OF_LOSS_T") == 1.0
+    assert parameters.integer("COM_OBL_RC_ACT") == 5
+
+
+def test_set_counts_and_tells_only_changes():
+    parameters = Parameters()
+    heard = []
+    parameters.on_change(lambda name, value: heard.append((name, value)))
+    parameters.set("COM_OF_LOSS_T", 0.5)
+    parameters.set("COM_OF_LOSS_T", 0.5)
+    assert parameters.version == 1
+    assert heard == [("COM_OF_LOSS_T", 0.5)]
+
+
+@pytest.mark.parametrize(
+    ("name", "value", "message"),
+    [
+        ("COM_OF_LOSS_T", nan, "COM_OF_LOSS_T: nan is not a finite number"),
+        ("COM_OF_LOSS_T", inf, "COM_OF_LOSS_T: inf is not a finite number"),
+        ("COM_OF_LOSS_T", -500.0, "COM_OF_LOSS_T: -500 is outside 0.1 to 60 s"),
+        ("COM_OBL_RC_ACT", 4.5, "COM_OBL_RC_ACT: 4.5 is not a whole number"),
+        ("COM_OBL_RC_ACT", 0, "COM_OBL_RC_ACT: 0 is outside 4 to 5"),
+        ("SYS_AUTOSTART", 10040, "SYS_AUTOSTART: stays 4001; it is a fact of this vehicle"),
+        ("NO_SUCH", 1.0, "NO_SUCH: there is no such parameter"),
+    ],
+)
+def test_a_bad_value_is_refused_in_one_line_and_changes_nothing(name, value, message):
+    parameters = Parameters()
+    before = [parameters.value(declared.name) for declared in DECLARATIONS]
+    with pytest.raises(ParameterError) as refused:
+        parameters.set(name, value)
+    assert str(refused.value) == message
+    assert [parameters.value(declared.name) for declared in DECLARATIONS] == before
+    assert parameters.version == 0
+
+
+@given(st.sampled_from(DECLARATIONS), st.floats())
+def test_whatever_is_set_stays_in_range(declared, value):
+    parameters = Parameters()
+    try:
+        parameters.set(declared.name, value)
+    except ParameterError:
+        assert parameters.value(declared.name) == declared.default
+    assert declared.minimum <= parameters.value(declared.name) <= declared.maximum
+
+
+def test_a_declaration_must_hold_together():
+    with pytest.raises(ValidationError, match="outside"):
+        Parameter(name="A", kind="float", default=3, minimum=0, maximum=2, description="x")
+    with pytest.raises(ValidationError, match="whole"):
+        Parameter(name="A", kind="int32", default=1, minimum=0.5, maximum=2, description="x")
+    with pytest.raises(ValidationError, match="name"):
+        Parameter(name="MUCH_TOO_LONG_A_NAME", kind="float", default=1, minimum=0, maximum=2, description="x")
+
+
+def test_hash_follows_values():
+    one, other = Parameters(), Parameters()
+    assert one.hash() == other.hash()
+    other.set("MIS_TAKEOFF_ALT", 2.0)
+    assert one.hash() != other.hash()
+
+
+def test_hash_is_the_plain_crc_over_names_and_bytes():
+    declared = Parameter(name="AB", kind="int32", default=1, minimum=0, maximum=2, description="x")
+    crc = 0
+    for byte in b"AB\x01\x00\x00\x00":
+        crc ^= byte
+        for _ in range(8):
+            crc = crc >> 1 ^ (0xEDB88320 if crc & 1 else 0)
+    assert Parameters(declarations=(declared,)).hash() == crc
