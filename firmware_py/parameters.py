@@ -73,12 +73,14 @@ class Parameter(BaseModel):
         return int(value) if self.kind == "int32" else float(value)
 
 
-def _real(
-    name: str, default: float, minimum: float, maximum: float, unit: str, description: str
-) -> Parameter:
+Span = tuple[float, float, float]  # default, minimum, maximum
+
+
+def _declare(kind: ParameterKind, name: str, span: Span, unit: str, description: str) -> Parameter:
+    default, minimum, maximum = span
     return Parameter(
         name=name,
-        kind="float",
+        kind=kind,
         default=default,
         minimum=minimum,
         maximum=maximum,
@@ -87,24 +89,20 @@ def _real(
     )
 
 
-def _whole(name: str, default: int, minimum: int, maximum: int, unit: str, description: str) -> Parameter:
-    return Parameter(
-        name=name,
-        kind="int32",
-        default=default,
-        minimum=minimum,
-        maximum=maximum,
-        unit=unit,
-        description=description,
-    )
+def _real(name: str, span: Span, unit: str, description: str) -> Parameter:
+    return _declare("float", name, span, unit, description)
+
+
+def _whole(name: str, span: Span, unit: str, description: str) -> Parameter:
+    return _declare("int32", name, span, unit, description)
 
 
 def _fact(name: str, value: int, description: str) -> Parameter:
-    return _whole(name, value, value, value, "", description)
+    return _whole(name, (value, value, value), "", description)
 
 
 _FLOWN = (
-    _real("COM_DISARM_LAND", 2.0, -1.0, 20.0, "s", "disarm this long after landing; zero or less: never"),
+    _real("COM_DISARM_LAND", (2.0, -1.0, 20.0), "s", "disarm this long after landing; zero or less: never"),
     _real(
         "COM_DISARM_PRFLT",
         10.0,
@@ -113,16 +111,16 @@ _FLOWN = (
         "s",
         "disarm this long after arming unless it took off; <= 0: never",
     ),
-    _real("COM_FAIL_ACT_T", 5.0, 0.0, 25.0, "s", "a failsafe holds this long before it lands"),
-    _whole("COM_OBL_RC_ACT", 5, 4, 5, "", "when offboard setpoints stop: 4 land, 5 hold and then land"),
-    _real("COM_OF_LOSS_T", 1.0, 0.1, 60.0, "s", "offboard setpoints older than this count as lost"),
-    _whole("MAV_SYS_ID", 1, 1, 250, "", "MAVLink system id; taken at start"),
-    _real("MIS_TAKEOFF_ALT", 2.5, 0.3, 80.0, "m", "height of a take-off that names no altitude"),
-    _real("MPC_LAND_SPEED", 0.7, 0.1, 3.0, "m/s", "descent when landing; the airframe's limit holds too"),
-    _real("MPC_TKO_SPEED", 1.5, 0.1, 5.0, "m/s", "climb when taking off; the airframe's limit holds too"),
-    _real("MPC_XY_VEL_MAX", 12.0, 0.1, 20.0, "m/s", "horizontal speed; the airframe's limit holds too"),
-    _real("MPC_Z_VEL_MAX_DN", 1.5, 0.1, 4.0, "m/s", "descent; the airframe's limit holds too"),
-    _real("MPC_Z_VEL_MAX_UP", 3.0, 0.1, 8.0, "m/s", "climb; the airframe's limit holds too"),
+    _real("COM_FAIL_ACT_T", (5.0, 0.0, 25.0), "s", "a failsafe holds this long before it lands"),
+    _whole("COM_OBL_RC_ACT", (5, 4, 5), "", "when offboard setpoints stop: 4 land, 5 hold and then land"),
+    _real("COM_OF_LOSS_T", (1.0, 0.1, 60.0), "s", "offboard setpoints older than this count as lost"),
+    _whole("MAV_SYS_ID", (1, 1, 250), "", "MAVLink system id; taken at start"),
+    _real("MIS_TAKEOFF_ALT", (2.5, 0.3, 80.0), "m", "height of a take-off that names no altitude"),
+    _real("MPC_LAND_SPEED", (0.7, 0.1, 3.0), "m/s", "descent when landing; the airframe's limit holds too"),
+    _real("MPC_TKO_SPEED", (1.5, 0.1, 5.0), "m/s", "climb when taking off; the airframe's limit holds too"),
+    _real("MPC_XY_VEL_MAX", (12.0, 0.1, 20.0), "m/s", "horizontal speed; the airframe's limit holds too"),
+    _real("MPC_Z_VEL_MAX_DN", (1.5, 0.1, 4.0), "m/s", "descent; the airframe's limit holds too"),
+    _real("MPC_Z_VEL_MAX_UP", (3.0, 0.1, 8.0), "m/s", "climb; the airframe's limit holds too"),
 )
 
 # What ground stations look for at connect; without them they report a firmware with parts missing.
