@@ -105,11 +105,9 @@ _FLOWN = (
     _real("COM_DISARM_LAND", (2.0, -1.0, 20.0), "s", "disarm this long after landing; zero or less: never"),
     _real(
         "COM_DISARM_PRFLT",
-        10.0,
-        -1.0,
-        60.0,
+        (10.0, -1.0, 60.0),
         "s",
-        "disarm this long after arming unless it took off; <= 0: never",
+        "disarm this long after arming if still down; <= 0: never",
     ),
     _real("COM_FAIL_ACT_T", (5.0, 0.0, 25.0), "s", "a failsafe holds this long before it lands"),
     _whole("COM_OBL_RC_ACT", (5, 4, 5), "", "when offboard setpoints stop: 4 land, 5 hold and then land"),
