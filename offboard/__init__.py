@@ -1,0 +1,1 @@
+"""The navigator: missions, the primitives they call, and the drones they fly."""

@@ -1,0 +1,1 @@
+"""The simulated world: physics, camera, clock and links."""

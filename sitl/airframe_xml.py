@@ -20,6 +20,7 @@ TOUCH_FORCES = ("fcs/touch/force-x-n", "fcs/touch/force-y-n", "fcs/touch/force-z
 TOUCH_MOMENTS = ("fcs/touch/moment-roll-nm", "fcs/touch/moment-pitch-nm", "fcs/touch/moment-yaw-nm")
 
 _AXES = ("x", "y", "z")
+_UNITS = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
 _AIR_VELOCITY_FPS = ("velocities/u-aero-fps", "velocities/v-aero-fps", "velocities/w-aero-fps")
 _RATE_RAD_S = ("velocities/p-aero-rad_sec", "velocities/q-aero-rad_sec", "velocities/r-aero-rad_sec")
 
@@ -49,10 +50,9 @@ def _value(parent: ET.Element, tag: str, content: float | str, **attributes: str
     ET.SubElement(parent, tag, attributes).text = text
 
 
-def _location(parent: ET.Element, name: str | None, x: float, y: float, z: float, unit: str = "M") -> None:
-    attributes = {"unit": unit} if name is None else {"name": name, "unit": unit}
-    location = ET.SubElement(parent, "location", attributes)
-    for axis, value in zip(_AXES, (x, y, z), strict=True):
+def _location(parent: ET.Element, position_m: tuple[float, float, float], **attributes: str) -> None:
+    location = ET.SubElement(parent, "location", attributes, unit="M")
+    for axis, value in zip(_AXES, position_m, strict=True):
         _value(location, axis, value)
 
 
@@ -62,7 +62,7 @@ def _metrics(root: ET.Element) -> None:
     _value(metrics, "wingspan", 1.0, unit="M")
     _value(metrics, "chord", 1.0, unit="M")
     for name in ("AERORP", "EYEPOINT", "VRP"):
-        _location(metrics, name, 0.0, 0.0, 0.0)
+        _location(metrics, (0.0, 0.0, 0.0), name=name)
 
 
 def _mass_balance(root: ET.Element, airframe: Airframe) -> None:
@@ -70,7 +70,7 @@ def _mass_balance(root: ET.Element, airframe: Airframe) -> None:
     for tag, inertia in zip(("ixx", "iyy", "izz"), airframe.inertia_kg_m2, strict=True):
         _value(mass, tag, inertia, unit="KG*M2")
     _value(mass, "emptywt", airframe.mass_kg, unit="KG")
-    _location(mass, "CG", 0.0, 0.0, 0.0)
+    _location(mass, (0.0, 0.0, 0.0), name="CG")
 
 
 def _ground_reactions(root: ET.Element, airframe: Airframe) -> None:
@@ -81,7 +81,7 @@ def _ground_reactions(root: ET.Element, airframe: Airframe) -> None:
     corners = [(x, y, z) for z in (-height, height) for x in (-length, length) for y in (-width, width)]
     for index, (x, y, z) in enumerate(corners):
         point = ET.SubElement(ground, "contact", type="STRUCTURE", name=f"CORNER{index}")
-        _location(point, None, x, y, z)
+        _location(point, (x, y, z))
         _value(point, "static_friction", contact.friction)
         _value(point, "dynamic_friction", contact.friction)
         _value(point, "spring_coeff", contact.stiffness_n_m, unit="N/M")
@@ -113,15 +113,27 @@ def _product(parent: ET.Element, factor: float, *properties: str, magnitude_of: 
         _value(ET.SubElement(product, "abs"), "property", magnitude_of)
 
 
-def _reaction(parent: ET.Element, kind: str, name: str, axis: int, sign: float = 1.0) -> ET.Element:
-    """Add a force or moment along a body axis; returns its `function` element."""
-    reaction = ET.SubElement(parent, kind, name=name, frame="BODY")
+def _reaction(
+    parent: ET.Element,
+    name: str,
+    direction: tuple[float, float, float],
+    at_m: tuple[float, float, float] | None,
+) -> ET.Element:
+    """Add a force at a structural position, or a moment (no position); returns its `function` element.
+
+    Args:
+        parent: the `external_reactions` element.
+        name: of the reaction.
+        direction: unit vector in body FRD.
+        at_m: in structural axes.
+    """
+    reaction = ET.SubElement(parent, "moment" if at_m is None else "force", name=name, frame="BODY")
     function = ET.SubElement(reaction, "function")
-    if kind == "force":
-        _location(reaction, None, 0.0, 0.0, 0.0)
-    direction = ET.SubElement(reaction, "direction")
-    for index, letter in enumerate(_AXES):
-        _value(direction, letter, sign if index == axis else 0.0)
+    if at_m is not None:
+        _location(reaction, at_m)
+    element = ET.SubElement(reaction, "direction")
+    for letter, value in zip(_AXES, direction, strict=True):
+        _value(element, letter, value)
     return function
 
 
@@ -130,22 +142,19 @@ def _external_reactions(root: ET.Element, airframe: Airframe) -> None:
     motor = airframe.motor
     for index, rotor in enumerate(airframe.rotors):
         speed = SPEED_PROPERTY.format(index)
-        function = _reaction(reactions, "force", f"rotor{index}", axis=2, sign=-1.0)
-        _product(function, motor.thrust_n_s2 * POUNDS_PER_NEWTON, speed, speed)
-        force = reactions[-1]
-        force.remove(force.find("location"))  # type: ignore[arg-type]  # _reaction has just made it
         forward, right, down = rotor.position_frd_m
-        _location(force, None, -forward, right, -down)
+        function = _reaction(reactions, f"rotor{index}", (0.0, 0.0, -1.0), (-forward, right, -down))
+        _product(function, motor.thrust_n_s2 * POUNDS_PER_NEWTON, speed, speed)
 
     for axis, letter in enumerate(_AXES):
-        function = _reaction(reactions, "force", f"body-{letter}", axis)
+        function = _reaction(reactions, f"body-{letter}", _UNITS[axis], (0.0, 0.0, 0.0))
         total = ET.SubElement(function, "sum")
         drag = -airframe.drag.force_n_s2_m2[axis] * POUNDS_PER_NEWTON / FEET_PER_METRE**2
         _product(total, drag, _AIR_VELOCITY_FPS[axis], magnitude_of=_AIR_VELOCITY_FPS[axis])
         _product(total, POUNDS_PER_NEWTON, TOUCH_FORCES[axis])
 
     for axis, letter in enumerate(_AXES):
-        function = _reaction(reactions, "moment", f"body-moment-{letter}", axis)
+        function = _reaction(reactions, f"body-moment-{letter}", _UNITS[axis], None)
         total = ET.SubElement(function, "sum")
         drag = -airframe.drag.moment_nm_s2[axis] * POUND_FEET_PER_NEWTON_METRE
         _product(total, drag, _RATE_RAD_S[axis], magnitude_of=_RATE_RAD_S[axis])

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import tempfile
+from collections.abc import Callable
 from math import cos, degrees, sin
 from pathlib import Path
 
@@ -91,11 +92,17 @@ class Dynamics:
     def _cache_nodes(self, airframe: Airframe) -> None:
         manager = self._fdm.get_property_manager()
 
-        def getter(name: str):  # type: ignore[no-untyped-def]  # a bound method of a compiled class
-            return manager.get_node(name).get_double_value
+        def node(name: str) -> jsbsim.FGPropertyNode:
+            found = manager.get_node(name)
+            if found is None:
+                raise DynamicsError(f"airframe {airframe.name}: JSBSim has no property {name}")
+            return found
 
-        def setter(name: str):  # type: ignore[no-untyped-def]
-            return manager.get_node(name).set_double_value
+        def getter(name: str) -> Callable[[], float]:
+            return node(name).get_double_value
+
+        def setter(name: str) -> Callable[[float], bool]:
+            return node(name).set_double_value
 
         self.run = self._fdm.run
         self._north, self._east, self._up = (getter(f"position/from-start-neu-{axis}-ft") for axis in "neu")

@@ -41,7 +41,7 @@ class World:
         self._base = base_solid(scenario)
         self._groups = [frame_solids(frame) for frame in scenario.frames]
         self._group_reach_m = [
-            max(hypot(frame.outer_width_m, frame.outer_height_m, frame.bar_m) / 2, 0.0) + self._reach_m
+            hypot(frame.outer_width_m, frame.outer_height_m, frame.bar_m) / 2 + self._reach_m
             for frame in scenario.frames
         ]
         self._touched: tuple[str, ...] = ()
@@ -131,16 +131,15 @@ class World:
     def _near(self, position_m: Vec3) -> tuple[Solid, ...]:
         """Return the solids that could be touched within the next control period."""
         x, y, z = position_m
-        for frame, reach, solids in zip(
-            self.scenario.frames, self._group_reach_m, self._groups, strict=True
-        ):
+        near: tuple[Solid, ...] = ()
+        for frame, reach, solids in zip(self.scenario.frames, self._group_reach_m, self._groups, strict=True):
             if abs(x - frame.x_m) < reach and abs(y - frame.y_m) < reach and abs(z - frame.z_m) < reach:
-                return solids
+                near += solids
         base = self._base
         bx, by, _ = base.centre_arena_m
         reach = base.half_extents_m[0] + self._reach_m
         beside = z < self.scenario.base.top_m + self._reach_m and abs(x - bx) < reach and abs(y - by) < reach
-        return (base,) if beside and not self._above_base(position_m) else ()
+        return (*near, base) if beside and not self._above_base(position_m) else near
 
     def _push_from(self, near: tuple[Solid, ...]) -> None:
         """Set force and moment of a spring, a damper and friction at each touch (penalty method)."""

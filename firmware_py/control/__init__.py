@@ -1,0 +1,1 @@
+"""The state-space stabiliser: model, design, mixer, control law."""

@@ -1,0 +1,1 @@
+"""MAVLink services of the autopilot, one module each."""
