@@ -1,0 +1,68 @@
+"""Between the local NED frame and latitude, longitude, altitude.
+
+Azimuthal equidistant projection on a sphere, as PX4's `MapProjection` does it, so that both agree about
+where a local position is on the map. Source: Snyder, "Map Projections - A Working Manual", USGS PP 1395,
+equations 20-14, 20-15, 22-4, 22-5 and 25-2.
+"""
+
+from __future__ import annotations
+
+from math import asin, atan2, cos, degrees, hypot, radians, remainder, sin
+
+from firmware_py.types import GeodeticPoint, Vec3
+
+EARTH_RADIUS_M = 6_371_000.0
+
+
+class LocalProjection:
+    """A local NED frame on Earth; distances and bearings from its origin are true."""
+
+    __slots__ = ("_cos_latitude", "_latitude_rad", "_sin_latitude", "origin")
+
+    def __init__(self, origin: GeodeticPoint) -> None:
+        self.origin = origin
+        self._latitude_rad = radians(origin.latitude_deg)
+        self._sin_latitude = sin(self._latitude_rad)
+        self._cos_latitude = cos(self._latitude_rad)
+
+    def to_geodetic(self, position_ned_m: Vec3) -> GeodeticPoint:
+        """Where on Earth a local position is.
+
+        Args:
+            position_ned_m: north, east, down from the origin, shape (3,), metres.
+        """
+        north_m, east_m, down_m = position_ned_m
+        altitude_m = self.origin.altitude_m - down_m
+        distance_m = hypot(north_m, east_m)
+        if distance_m == 0.0:
+            return GeodeticPoint(self.origin.latitude_deg, self.origin.longitude_deg, altitude_m)
+        north, east = north_m / distance_m, east_m / distance_m
+        angle = distance_m / EARTH_RADIUS_M
+        sin_angle, cos_angle = sin(angle), cos(angle)
+        sin_latitude = cos_angle * self._sin_latitude + north * sin_angle * self._cos_latitude
+        turn_rad = atan2(
+            east * sin_angle,
+            self._cos_latitude * cos_angle - north * self._sin_latitude * sin_angle,
+        )
+        longitude_deg = remainder(self.origin.longitude_deg + degrees(turn_rad), 360.0)
+        return GeodeticPoint(degrees(asin(max(-1.0, min(1.0, sin_latitude)))), longitude_deg, altitude_m)
+
+    def to_local(self, point: GeodeticPoint) -> Vec3:
+        """Where a point is in the local frame.
+
+        Returns:
+            North, east, down from the origin, shape (3,), metres. Not defined for the origin's antipode.
+        """
+        latitude_rad = radians(point.latitude_deg)
+        turn_rad = radians(point.longitude_deg - self.origin.longitude_deg)
+        sin_latitude, cos_latitude = sin(latitude_rad), cos(latitude_rad)
+        north = self._cos_latitude * sin_latitude - self._sin_latitude * cos_latitude * cos(turn_rad)
+        east = cos_latitude * sin(turn_rad)
+        down_m = self.origin.altitude_m - point.altitude_m
+        sin_angle = hypot(north, east)
+        if sin_angle == 0.0:
+            return (0.0, 0.0, down_m)
+        # atan2 and not acos: near the origin the cosine alone has lost all its digits.
+        cos_angle = self._sin_latitude * sin_latitude + self._cos_latitude * cos_latitude * cos(turn_rad)
+        scale_m = EARTH_RADIUS_M * atan2(sin_angle, cos_angle) / sin_angle
+        return (north * scale_m, east * scale_m, down_m)
