@@ -1,0 +1,90 @@
+"""The expanded chart in python-statemachine's own words, loaded by its secure loader.
+
+Three things of the library shape this translation (3.2.2, tried):
+- of one list of actions it runs the assignments first, whatever their order; a primitive that stands before
+  an assignment is therefore written as a condition with no consequence, which is called in its place;
+- a superstate is offered an event only if the state within took none, so `during` as a last transition of
+  the inner state would hide the outer ones; hence each leaf carries the transitions around it;
+- an error in a guard is taken as "false" and an event; here it is raised.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import yaml
+from statemachine import StateChart
+from statemachine.exceptions import InvalidDefinition
+from statemachine.io import load
+
+from offboard.chart.problems import MissionError, Problem
+from offboard.chart.spec import Action, Leaf, MissionFile, State, leaves
+
+TICK = "tick"
+
+
+def native_yaml(mission: MissionFile) -> str:
+    """The expanded mission as a native document of python-statemachine.
+
+    Args:
+        mission: expanded and checked.
+    """
+    by_leaf = {leaf.state.id: leaf for leaf in leaves(mission.states)}
+    states = {s.id: _state(s, s.name == mission.initial, by_leaf) for s in mission.states}
+    document = {"name": mission.name, "states": states}
+    return yaml.safe_dump(document, sort_keys=False, width=110)
+
+
+def load_chart(mission: MissionFile, text: str) -> type[StateChart]:
+    """Build the chart's class, never trusting the document.
+
+    Raises:
+        MissionError: the library refuses what the checker let pass.
+    """
+    try:
+        chart: type[StateChart] = load(text, format="yaml", validate=True)
+    except (InvalidDefinition, ValueError) as error:
+        raise MissionError([Problem(mission.place, " ".join(str(error).split()))]) from None
+    chart.catch_errors_as_events = False
+    return chart
+
+
+def _state(state: State, initial: bool, by_leaf: dict[str, Leaf]) -> dict[str, Any]:
+    native: dict[str, Any] = {}
+    if initial:
+        native["initial"] = True
+    if state.final:
+        native["final"] = True
+    if state.enter:
+        native["enter"] = _actions(state.enter)
+    if state.exit:
+        native["exit"] = _actions(state.exit)
+    if state.states:
+        native["states"] = {s.id: _state(s, s.name == state.initial, by_leaf) for s in state.states}
+        if state.then:
+            native["transitions"] = [{"event": f"done.state.{state.id}", "target": state.then}]
+    elif not state.final:
+        native["transitions"] = _transitions(by_leaf[state.id])
+    return native
+
+
+def _transitions(leaf: Leaf) -> list[dict[str, Any]]:
+    found: list[dict[str, Any]] = []
+    for transition in leaf.transitions:
+        guard = {"cond": transition.when} if transition.when else {}
+        found.append({"event": TICK, "target": transition.to, **guard})
+    if leaf.during:
+        during = _actions(leaf.during)
+        found.append({"event": TICK, "internal": True, "target": leaf.state.id, "on": during})
+    return found
+
+
+def _actions(actions: tuple[Action, ...]) -> list[Any]:
+    last = max((index for index, action in enumerate(actions) if action.location), default=-1)
+    native: list[Any] = []
+    for index, action in enumerate(actions):
+        if action.location:
+            native.append({"assign": {"location": action.location, "expr": action.expression}})
+        else:
+            native.append({"if": {"cond": action.name}} if index < last else action.name)
+    return native

@@ -1,0 +1,115 @@
+"""The names a mission may use, read off the Pilot class: attributes, properties, methods, and their types."""
+
+from __future__ import annotations
+
+import inspect
+from collections.abc import Mapping
+from difflib import get_close_matches
+from typing import Any, get_args, get_origin, get_type_hints
+
+from offboard.pilot import Memory, Pilot
+
+WRITABLE = ("cmd", "colour", "goal_m", "memory")
+"""What of the pilot a mission may assign to; all else is the world's or the engine's."""
+
+
+class UnknownNameError(Exception):
+    """A name that does not exist, with what does, in one line."""
+
+
+class Vocabulary:
+    """Names and types reachable from a pilot."""
+
+    def __init__(self, pilot_class: type[Pilot], variables: Mapping[str, object]) -> None:
+        """Read a pilot class.
+
+        Args:
+            pilot_class: `Pilot` or a subclass with more primitives.
+            variables: the mission's own variables.
+        """
+        self._pilot_class = pilot_class
+        self._variables = variables
+        self.primitives = {
+            name: inspect.getdoc(member) or ""
+            for name, member in inspect.getmembers(pilot_class, inspect.isfunction)
+            if not name.startswith("_")
+        }
+        self.values = {name: kind for name, kind in _typed_names(pilot_class).items()}
+
+    def check_primitive(self, name: str) -> None:
+        """Refuse an action that is no method of the pilot.
+
+        Raises:
+            UnknownNameError: with the nearest name or all of them.
+        """
+        if name in self.primitives:
+            return
+        if name in self.values:
+            raise UnknownNameError(f"'{name}' is a value, not an action; write 'location = expression'")
+        raise UnknownNameError(f"unknown action '{name}'; {_mend(name, list(self.primitives))}")
+
+    def type_of(self, path: tuple[str, ...]) -> Any:
+        """Type at the end of a dotted path such as ("cam", "red", "d"); `Any` where nothing is declared.
+
+        Raises:
+            UnknownNameError: with what the class before the unknown part has.
+        """
+        kind: Any = self._pilot_class
+        for name in path:
+            names = self._names_of(kind)
+            if name not in names:
+                raise UnknownNameError(self._unknown(kind, name, list(names)))
+            kind = names[name]
+        return kind
+
+    def check_assignable(self, path: tuple[str, ...]) -> None:
+        """Refuse an assignment to what the mission does not own.
+
+        Raises:
+            UnknownNameError: unknown, or known but not the mission's to set.
+        """
+        self.type_of(path)
+        if path[0] not in WRITABLE or path in (("cmd",), ("memory",)):
+            text = "cmd.<rate>, goal_m, colour and memory.<variable>"
+            raise UnknownNameError(f"'{'.'.join(path)}' cannot be set; a mission sets {text}")
+
+    def _names_of(self, kind: Any) -> dict[str, Any]:
+        if kind is self._pilot_class:
+            return self.values
+        if kind is Memory:
+            return {name: type(value) for name, value in self._variables.items()}
+        return _typed_names(kind) if inspect.isclass(kind) and get_origin(kind) is None else {}
+
+    def _unknown(self, kind: Any, name: str, names: list[str]) -> str:
+        if kind is self._pilot_class:
+            if name in self.primitives:
+                return f"'{name}' is an action, not a value"
+            return f"unknown name '{name}'; {_mend(name, names)}"
+        if kind is Memory:
+            listed = " ".join(names) or "none"
+            return f"no variable '{name}'; declared under 'variables': {listed}"
+        owner = getattr(kind, "__name__", str(kind))
+        if not names:
+            return f"'{owner}' has no '{name}'; it is a plain value"
+        return f"'{owner}' has no '{name}'; it has {' '.join(names)}"
+
+
+def choices_of(kind: Any) -> tuple[Any, ...]:
+    """Values a type allows, if it is a Literal; else none."""
+    return get_args(kind) if str(get_origin(kind)).endswith("Literal") else ()
+
+
+def _typed_names(kind: type) -> dict[str, Any]:
+    """Public attributes and properties of a class with their declared types, attributes first."""
+    if kind.__module__ == "builtins":
+        return {}
+    names = {name: hint for name, hint in get_type_hints(kind).items() if not name.startswith("_")}
+    for name, member in inspect.getmembers(kind, lambda member: isinstance(member, property)):
+        if not name.startswith("_"):
+            names[name] = get_type_hints(member.fget).get("return", Any)
+    return names
+
+
+def _mend(name: str, names: list[str]) -> str:
+    near = get_close_matches(name, names, 1)
+    return f"did you mean '{near[0]}'?" if near else f"there are {' '.join(names)}"

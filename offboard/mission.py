@@ -1,0 +1,169 @@
+"""Missions: found by name or path, checked, loaded, drawn."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from difflib import get_close_matches
+from functools import cached_property
+from pathlib import Path
+
+from statemachine import StateChart
+
+from offboard.chart.check import check, is_finish
+from offboard.chart.expand import expand, merge_extended
+from offboard.chart.native import load_chart, native_yaml
+from offboard.chart.problems import MissionError, Place, Problem, ProblemList
+from offboard.chart.read import read_mission_file
+from offboard.chart.source import MAX_FILE_BYTES
+from offboard.chart.spec import Action, Leaf, MissionFile, State, all_states, leaves
+from offboard.pilot import Pilot
+
+__all__ = ["Mission", "MissionError", "list_missions", "load_mission", "mermaid"]
+
+MISSIONS = Path(__file__).parent / "missions"
+
+
+@dataclass(frozen=True)
+class Mission:
+    """A checked mission, ready to fly.
+
+    Attributes:
+        name: as its file says.
+        description: one line for people.
+        path: its file.
+        spec: the expanded chart.
+        pilot_class: what the mission was checked against.
+        native: the expanded chart as a document of python-statemachine.
+    """
+
+    name: str
+    description: str
+    path: Path
+    spec: MissionFile = field(repr=False)
+    pilot_class: type[Pilot] = field(repr=False)
+    native: str = field(repr=False)
+
+    @cached_property
+    def chart(self) -> type[StateChart]:
+        """The class whose instances run the chart."""
+        return load_chart(self.spec, self.native)
+
+    @cached_property
+    def leaves(self) -> dict[str, Leaf]:
+        """States without states of their own, by full id."""
+        return {leaf.state.id: leaf for leaf in leaves(self.spec.states)}
+
+    @cached_property
+    def finishes(self) -> frozenset[str]:
+        """States in which the mission is over."""
+        states = {state.id: state for state in all_states(self.spec.states)}
+        return frozenset(leaf_id for leaf_id in self.leaves if is_finish(states, leaf_id))
+
+    def new_pilot(self) -> Pilot:
+        """A pilot with the mission's own variables."""
+        return self.pilot_class(dict(self.spec.variables))
+
+
+def list_missions() -> list[str]:
+    """Names of the missions that come with the package."""
+    return sorted(path.stem for path in MISSIONS.glob("*.yaml"))
+
+
+def load_mission(name_or_path: str | Path, pilot_class: type[Pilot] = Pilot) -> Mission:
+    """Read, expand, check and load a mission.
+
+    Args:
+        name_or_path: a name of `list_missions()` or a YAML file.
+        pilot_class: `Pilot` or a subclass with more primitives.
+
+    Raises:
+        MissionError: every problem, one a line, as `file:line: text`.
+    """
+    path = _find(str(name_or_path), Path.cwd(), Place(str(name_or_path)))
+    written = read_mission_file(_read_text(path), path)
+    problems = ProblemList()
+    spec = expand(merge_extended(written, _open_base), problems)
+    problems.raise_if_any()
+    check(spec, pilot_class, problems)
+    problems.raise_if_any()
+    mission = Mission(spec.name, spec.description, path, spec, pilot_class, native_yaml(spec))
+    mission.chart  # noqa: B018 - loaded now, so that what the library refuses is said now
+    return mission
+
+
+def _open_base(mission: MissionFile) -> MissionFile:
+    path = _find(mission.extends, mission.path.parent, mission.place)
+    return read_mission_file(_read_text(path), path)
+
+
+def _find(name: str, folder: Path, place: Place) -> Path:
+    """A file if it looks like one, else a mission of the package."""
+    if name.endswith((".yaml", ".yml")) or "/" in name:
+        path = (folder / name).resolve()
+        if path.is_file():
+            return path
+        raise MissionError([Problem(place, f"mission file '{name}' does not exist")])
+    known = list_missions()
+    if name in known:
+        return MISSIONS / f"{name}.yaml"
+    near = get_close_matches(name, known, 1)
+    mend = f"did you mean '{near[0]}'?" if near else f"known: {', '.join(known)}; a file ends in .yaml"
+    raise MissionError([Problem(place, f"unknown mission '{name}'; {mend}")])
+
+
+def _read_text(path: Path) -> str:
+    try:
+        if path.stat().st_size > MAX_FILE_BYTES:
+            raise MissionError([Problem(Place(path.name), "is larger than 1 MB; a mission is a page or two")])
+        return path.read_text(encoding="utf-8")
+    except (OSError, UnicodeDecodeError) as error:
+        reason = getattr(error, "strerror", None) or "is not UTF-8 text"
+        raise MissionError([Problem(Place(path.name), f"cannot be read: {reason}")]) from None
+
+
+def mermaid(mission: Mission, active: str | None = None) -> str:
+    """The expanded chart as a Mermaid state diagram.
+
+    Transitions out of one state are numbered in order of priority, as Stateflow does.
+
+    Args:
+        mission: what to draw.
+        active: full id of the state to light, such as "red.turning".
+    """
+    lines = ["stateDiagram-v2", f"    [*] --> {mission.spec.initial}"]
+    for state in mission.spec.states:
+        _draw(state, "    ", lines)
+    for finish in sorted(mission.finishes):
+        if "." not in finish:
+            lines.append(f"    {finish} --> [*]")
+    if active:
+        lines += ["    classDef active fill:#ffd166,stroke:#333", f"    class {active} active"]
+    return "\n".join(lines) + "\n"
+
+
+def _draw(state: State, indent: str, lines: list[str]) -> None:
+    if state.states:
+        lines.append(f'{indent}state "{state.name}" as {state.id} {{')
+        lines.append(f"{indent}    [*] --> {state.id}.{state.initial}")
+        for child in state.states:
+            _draw(child, indent + "    ", lines)
+        lines.append(f"{indent}}}")
+    else:
+        lines.append(f'{indent}state "{state.name}" as {state.id}')
+        if state.final:
+            lines.append(f"{indent}{state.id} --> [*]")
+    for what, actions in (("enter", state.enter), ("during", state.during), ("exit", state.exit)):
+        if actions and not state.states:
+            lines.append(f"{indent}{state.id} : {what} / {_label(actions)}")
+    several = len(state.transitions) > 1
+    for number, transition in enumerate(state.transitions, 1):
+        order = f"{number} " if several else ""
+        guard = f"[{transition.when}]" if transition.when else ""
+        label = f" : {order}{guard}" if order or guard else ""
+        lines.append(f"{indent}{state.id} --> {transition.to}{label}")
+    if state.then:
+        lines.append(f"{indent}{state.id} --> {state.then}")
+
+
+def _label(actions: tuple[Action, ...]) -> str:
+    return ", ".join(str(action) for action in actions)

@@ -1,0 +1,195 @@
+"""What a mission can see and do: the paper's interface `imu`, `cam`, `cmd`, and named primitives.
+
+Everything public in `Pilot` can be used in a mission file: attributes and properties in guards and on the
+right of assignments, `cmd`, `goal_m`, `colour` and `memory` on the left, methods as actions. A subclass may
+add more. Axes are the arena's: x forward, y left, z up, yaw counter-clockwise; commands are forward, left,
+up and yaw rate to the left.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from math import cos, isfinite, isnan, sin, sqrt
+from types import SimpleNamespace
+
+from offboard.drone import VelocityCommand
+from scenarios.axes import Vec3
+from scenarios.models import COLOURS, Colour
+from vision.types import Detection, Detections
+
+MAX_VELOCITY_M_S = 1.0
+MAX_YAW_RATE_RAD_S = 1.0
+LOOK_TURN_PX = 80.0  # pixels aside that make 1 rad/s: the paper's gains, for its image of 320 x 240
+LOOK_CLIMB_PX = 120.0  # pixels above that make 1 m/s
+
+
+class PilotError(Exception):
+    """A mission computed something that must not be flown; the message is one line for people."""
+
+
+@dataclass(frozen=True, slots=True)
+class Imu:
+    """Where the drone is.
+
+    Attributes:
+        x: position in the arena, metres.
+        y: position in the arena, metres.
+        z: height above the floor, metres.
+        yaw: heading, radians, counter-clockwise from x.
+    """
+
+    x: float = 0.0
+    y: float = 0.0
+    z: float = 0.0
+    yaw: float = 0.0
+
+
+@dataclass(slots=True)
+class Command:
+    """What the mission asks of the drone (the paper's on, velX, velY, velZ, rotZ).
+
+    Attributes:
+        on: motors on.
+        vel_x: forward, m/s.
+        vel_y: to the left, m/s.
+        vel_z: up, m/s.
+        rot_z: yaw rate to the left, rad/s.
+        land: with `on` false: land by the vehicle's own means instead of stopping the motors at once.
+    """
+
+    on: bool = False
+    vel_x: float = 0.0
+    vel_y: float = 0.0
+    vel_z: float = 0.0
+    rot_z: float = 0.0
+    land: bool = False
+
+
+class Memory(SimpleNamespace):
+    """The mission's own variables, as declared in its file."""
+
+
+class Pilot:
+    """The paper's interface to missions.
+
+    Attributes:
+        imu: position and heading.
+        cam: what the camera sees: `red`, `green`, `blue`, each with n, s, e, w, d, a.
+        cmd: the command; it stays as it is until changed.
+        colour: which frame is looked for: red, green or blue. Assign it, then read `frame`.
+        goal_m: where `fly_to_goal` flies, (x, y, z) in the arena, metres.
+        memory: the mission's own variables.
+        seconds_in_state: vehicle time since the present state was entered.
+        seconds_in_mission: vehicle time since the mission started.
+    """
+
+    imu: Imu
+    cam: Detections
+    cmd: Command
+    colour: Colour
+    goal_m: Vec3
+    memory: Memory
+    seconds_in_state: float
+    seconds_in_mission: float
+
+    def __init__(self, variables: dict[str, object] | None = None) -> None:
+        """Start with motors off.
+
+        Args:
+            variables: the mission's own variables and their first values.
+        """
+        self.imu = Imu()
+        self.cam = Detections()
+        self.cmd = Command()
+        self.colour = COLOURS[0]
+        self.goal_m = (0.0, 0.0, 0.0)
+        self.memory = Memory(**(variables or {}))
+        self.seconds_in_state = 0.0
+        self.seconds_in_mission = 0.0
+
+    @property
+    def frame(self) -> Detection:
+        """What the camera sees of the frame that is looked for (`cam` at `colour`)."""
+        detection: Detection = getattr(self.cam, self.colour)
+        return detection
+
+    @property
+    def frame_seen(self) -> bool:
+        """The frame that is looked for is wholly in view: its distance is known."""
+        return isfinite(self.frame.d)
+
+    @property
+    def distance_to_goal_m(self) -> float:
+        """From the present position to the goal, metres."""
+        x, y, z = self.goal_m
+        imu = self.imu
+        return sqrt((x - imu.x) ** 2 + (y - imu.y) ** 2 + (z - imu.z) ** 2)
+
+    def hover(self) -> None:
+        """Motors on, all rates zero (the paper's Hover)."""
+        cmd = self.cmd
+        cmd.on = True
+        cmd.vel_x = cmd.vel_y = cmd.vel_z = cmd.rot_z = 0.0
+
+    def fly_to_goal(self) -> None:
+        """Fly straight to the goal at half the distance per second, 1 m/s at most; the yaw rate stays.
+
+        The paper's Fly2: v = e/2 in axes turned with the yaw, scaled down to |v| <= 1.
+        """
+        imu, cmd = self.imu, self.cmd
+        x, y, z = self.goal_m
+        x_m_s, y_m_s, up_m_s = (x - imu.x) / 2, (y - imu.y) / 2, (z - imu.z) / 2
+        speed = sqrt(x_m_s**2 + y_m_s**2 + up_m_s**2)
+        scale = MAX_VELOCITY_M_S / speed if speed > MAX_VELOCITY_M_S else 1.0
+        cos_yaw, sin_yaw = cos(imu.yaw), sin(imu.yaw)
+        cmd.vel_x = scale * (cos_yaw * x_m_s + sin_yaw * y_m_s)
+        cmd.vel_y = scale * (cos_yaw * y_m_s - sin_yaw * x_m_s)
+        cmd.vel_z = scale * up_m_s
+
+    def look_to_frame(self) -> None:
+        """Turn and climb to bring the frame to the image's centre; keep on as before while it is lost.
+
+        The paper's Look2Frame: rot_z = -((e + w) / 2) / 80, vel_z = ((n + s) / 2) / 120.
+        """
+        frame = self.frame
+        if isfinite(frame.d):
+            self.cmd.rot_z = -((frame.e + frame.w) / 2) / LOOK_TURN_PX
+            self.cmd.vel_z = ((frame.n + frame.s) / 2) / LOOK_CLIMB_PX
+
+    def motors_off(self) -> None:
+        """Stop the motors at once, in the air too."""
+        self.hover()
+        self.cmd.on = False
+        self.cmd.land = False
+
+    def land(self) -> None:
+        """Let the vehicle land by its own means and stop its motors when it stands."""
+        self.hover()
+        self.cmd.on = False
+        self.cmd.land = True
+
+
+def velocity_command(cmd: Command) -> VelocityCommand:
+    """The command as it may be flown: each rate held within +-1 m/s and +-1 rad/s.
+
+    An infinite rate becomes the limit, as the paper's stabiliser makes of it: its navigator asks for
+    infinite speed ahead when it loses a frame while shifting, and then flies 1 m/s forward. That is a
+    known fault of that navigator, reproduced here, but nothing that is not finite ever leaves this function.
+
+    Raises:
+        PilotError: a rate is not a number.
+    """
+    return VelocityCommand(
+        _limited("vel_x", cmd.vel_x, MAX_VELOCITY_M_S),
+        _limited("vel_y", cmd.vel_y, MAX_VELOCITY_M_S),
+        _limited("vel_z", cmd.vel_z, MAX_VELOCITY_M_S),
+        _limited("rot_z", cmd.rot_z, MAX_YAW_RATE_RAD_S),
+    )
+
+
+def _limited(name: str, value: float, limit: float) -> float:
+    if -limit <= value <= limit:
+        return value
+    if isnan(value):
+        raise PilotError(f"cmd.{name} is not a number; mend the expression that sets it")
+    return limit if value > 0 else -limit
