@@ -42,7 +42,7 @@ class DroneState:
 
 @dataclass(frozen=True, slots=True)
 class VelocityCommand:
-    """A velocity in level axes that turn with the yaw (forward, left, up; m/s) and a yaw rate (rad/s, left)."""
+    """A velocity in level axes turned with the yaw (forward, left, up; m/s), a yaw rate (rad/s, left)."""
 
     forward_m_s: float = 0.0
     left_m_s: float = 0.0

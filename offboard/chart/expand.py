@@ -14,7 +14,7 @@ from dataclasses import replace
 from difflib import get_close_matches
 
 from offboard.chart.problems import MissionError, Place, Problem, ProblemList
-from offboard.chart.spec import MissionFile, State, Transition, all_states
+from offboard.chart.spec import MissionFile, State, all_states
 
 MAX_EXTENDS = 5
 MAX_STATES = 1000
@@ -35,9 +35,8 @@ def merge_extended(mission: MissionFile, open_base: Callable[[MissionFile], Miss
         base = open_base(chain[-1])
         if base.path in [known.path for known in chain] or len(chain) > MAX_EXTENDS:
             place = chain[-1].place
-            raise MissionError(
-                [Problem(place, f"extends '{chain[-1].extends}': runs in a circle or too deep")]
-            )
+            text = f"extends '{chain[-1].extends}': runs in a circle or too deep"
+            raise MissionError([Problem(place, text)])
         chain.append(base)
     merged = chain.pop()
     while chain:
@@ -86,9 +85,8 @@ def _instance(state: State, templates: dict[str, State], used: set[str], problem
     template = templates.get(state.use)
     if template is None:
         known = ", ".join(templates) or "none"
-        problems.add(
-            state.place, f"state '{state.id}' uses the unknown template '{state.use}'; known: {known}"
-        )
+        text = f"state '{state.id}' uses the unknown template '{state.use}'; known: {known}"
+        problems.add(state.place, text)
         return replace(state, use="")
     used.add(state.use)
     for child in all_states(template.states):
@@ -123,10 +121,7 @@ def _resolved(state: State, ids: set[str], problems: ProblemList) -> State:
         problems.add(place, f"{what} '{name}' of state '{state.id}' is not a state{mend}")
         return name
 
-    transitions = tuple(
-        Transition(t.place, target(t.to, t.place, "target") if t.to else "", t.when)
-        for t in state.transitions
-    )
+    transitions = tuple(replace(t, to=target(t.to, t.place, "target")) for t in state.transitions)
     return replace(
         state,
         then=target(state.then, state.place, "'then'") if state.then else "",

@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import ast
 from collections.abc import Callable
-from typing import Any
 
 from statemachine.spec_parser import parse_expr
 
@@ -18,12 +17,13 @@ from offboard.pilot import Pilot
 
 MAX_EXPRESSION_CHARACTERS = 500
 
-Evaluate = Callable[[Pilot], Any]
+Evaluate = Callable[[Pilot], object]
 
 _ALLOWED = (
     ast.Expression, ast.BoolOp, ast.And, ast.Or, ast.UnaryOp, ast.Not, ast.USub, ast.UAdd,
     ast.Compare, ast.Lt, ast.LtE, ast.Gt, ast.GtE, ast.Eq, ast.NotEq,
-    ast.BinOp, ast.Add, ast.Sub, ast.Mult, ast.Div, ast.Tuple, ast.Load, ast.Name, ast.Attribute, ast.Constant,
+    ast.BinOp, ast.Add, ast.Sub, ast.Mult, ast.Div, ast.Tuple, ast.Load,
+    ast.Name, ast.Attribute, ast.Constant,
 )  # fmt: skip
 
 _REASONS = {
@@ -87,8 +87,9 @@ def compile_value(text: str) -> Evaluate:
 
 
 def _name_of_pilot(name: str) -> Evaluate:
-    def read(pilot: Pilot) -> Any:
-        return getattr(pilot, name)
+    def read(pilot: Pilot) -> object:
+        value: object = getattr(pilot, name)
+        return value
 
     read.__name__ = name
     return read

@@ -72,7 +72,7 @@ def _refuse_aliases_and_depth(text: str, file: str) -> None:
     depth = 0
     try:
         for event in yaml.parse(text, Loader=yaml.SafeLoader):
-            place = Place(file, event.start_mark.line + 1)
+            place = Place(file, event.start_mark.line + 1 if event.start_mark else 0)
             if isinstance(event, yaml.AliasEvent):
                 raise _error(place, f"alias '*{event.anchor}' is not allowed; use a template instead")
             if isinstance(event, yaml.CollectionStartEvent):

@@ -5,7 +5,7 @@ from __future__ import annotations
 import inspect
 from collections.abc import Mapping
 from difflib import get_close_matches
-from typing import Any, get_args, get_origin, get_type_hints
+from typing import get_args, get_origin, get_type_hints
 
 from offboard.pilot import Memory, Pilot
 
@@ -34,7 +34,7 @@ class Vocabulary:
             for name, member in inspect.getmembers(pilot_class, inspect.isfunction)
             if not name.startswith("_")
         }
-        self.values = {name: kind for name, kind in _typed_names(pilot_class).items()}
+        self.values = _typed_names(pilot_class)
 
     def check_primitive(self, name: str) -> None:
         """Refuse an action that is no method of the pilot.
@@ -48,13 +48,13 @@ class Vocabulary:
             raise UnknownNameError(f"'{name}' is a value, not an action; write 'location = expression'")
         raise UnknownNameError(f"unknown action '{name}'; {_mend(name, list(self.primitives))}")
 
-    def type_of(self, path: tuple[str, ...]) -> Any:
-        """Type at the end of a dotted path such as ("cam", "red", "d"); `Any` where nothing is declared.
+    def type_of(self, path: tuple[str, ...]) -> object:
+        """Type at the end of a dotted path such as ("cam", "red", "d"); `object` where nothing is declared.
 
         Raises:
             UnknownNameError: with what the class before the unknown part has.
         """
-        kind: Any = self._pilot_class
+        kind: object = self._pilot_class
         for name in path:
             names = self._names_of(kind)
             if name not in names:
@@ -73,14 +73,14 @@ class Vocabulary:
             text = "cmd.<rate>, goal_m, colour and memory.<variable>"
             raise UnknownNameError(f"'{'.'.join(path)}' cannot be set; a mission sets {text}")
 
-    def _names_of(self, kind: Any) -> dict[str, Any]:
+    def _names_of(self, kind: object) -> dict[str, object]:
         if kind is self._pilot_class:
             return self.values
         if kind is Memory:
             return {name: type(value) for name, value in self._variables.items()}
-        return _typed_names(kind) if inspect.isclass(kind) and get_origin(kind) is None else {}
+        return _typed_names(kind) if isinstance(kind, type) and get_origin(kind) is None else {}
 
-    def _unknown(self, kind: Any, name: str, names: list[str]) -> str:
+    def _unknown(self, kind: object, name: str, names: list[str]) -> str:
         if kind is self._pilot_class:
             if name in self.primitives:
                 return f"'{name}' is an action, not a value"
@@ -94,19 +94,19 @@ class Vocabulary:
         return f"'{owner}' has no '{name}'; it has {' '.join(names)}"
 
 
-def choices_of(kind: Any) -> tuple[Any, ...]:
+def choices_of(kind: object) -> tuple[object, ...]:
     """Values a type allows, if it is a Literal; else none."""
     return get_args(kind) if str(get_origin(kind)).endswith("Literal") else ()
 
 
-def _typed_names(kind: type) -> dict[str, Any]:
+def _typed_names(kind: type) -> dict[str, object]:
     """Public attributes and properties of a class with their declared types, attributes first."""
     if kind.__module__ == "builtins":
         return {}
     names = {name: hint for name, hint in get_type_hints(kind).items() if not name.startswith("_")}
     for name, member in inspect.getmembers(kind, lambda member: isinstance(member, property)):
         if not name.startswith("_"):
-            names[name] = get_type_hints(member.fget).get("return", Any)
+            names[name] = get_type_hints(member.fget).get("return", object)
     return names
 
 
