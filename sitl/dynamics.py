@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import tempfile
 from collections.abc import Callable
-from math import cos, degrees, sin
+from math import cos, degrees, pi, sin
 from pathlib import Path
 
 import jsbsim
@@ -60,8 +60,8 @@ class Dynamics:
         jsbsim.set_logger(jsbsim.DefaultLogger(jsbsim.LogLevel.ERROR))
         self._fdm = fdm = jsbsim.FGFDMExec(None)
         fdm.set_debug_level(0)
+        fdm.set_dt(1.0 / rate_hz)  # before loading: the filters' coefficients are made from it
         self._load(airframe)
-        fdm.set_dt(1.0 / rate_hz)
         self._start_ned_m = position_ned_m
         self._floor_ft = altitude_m / METRES_PER_FOOT
         for name, value in (
@@ -115,7 +115,7 @@ class Dynamics:
         self._speeds = tuple(getter(SPEED_PROPERTY.format(index)) for index in rotors)
         self._touch = tuple(setter(name) for name in (*TOUCH_FORCES, *TOUCH_MOMENTS))
         self._ground = setter("position/terrain-elevation-asl-ft")
-        self._standing = getter("gear/wow")
+        self._corners = tuple(getter(f"contact/unit[{index}]/WOW") for index in range(8))
 
     def command_motors(self, speeds_rad_s: tuple[float, ...]) -> None:
         """Set the speeds the motors run up to, rad/s, in the airframe's order."""
@@ -133,7 +133,7 @@ class Dynamics:
 
     def touches_ground(self) -> bool:
         """Whether any corner of the body presses on the ground."""
-        return bool(self._standing())
+        return any(corner() for corner in self._corners)
 
     def position_ned_m(self) -> Vec3:
         """Centre of mass relative to the arena's centre on the floor."""
@@ -153,7 +153,10 @@ class Dynamics:
     def attitude(self) -> Quaternion:
         """Unit quaternion (w, x, y, z), body FRD to NED, from Z-Y-X Euler angles."""
         roll, pitch, yaw = self._angles
-        half_roll, half_pitch, half_yaw = roll() / 2, pitch() / 2, yaw() / 2
+        heading = yaw()
+        if heading > pi:  # JSBSim counts from 0 to a full turn
+            heading -= 2 * pi
+        half_roll, half_pitch, half_yaw = roll() / 2, pitch() / 2, heading / 2
         cr, sr = cos(half_roll), sin(half_roll)
         cp, sp = cos(half_pitch), sin(half_pitch)
         cy, sy = cos(half_yaw), sin(half_yaw)

@@ -79,7 +79,9 @@ def base_solid(scenario: Scenario) -> Solid:
     return Solid("base", (base.x_m, base.y_m, base.top_m / 2), 0.0, (half, half, base.top_m / 2))
 
 
-def touch(solid: Solid, centre_m: Vec3, rotation: Matrix, half_extents_m: Vec3) -> Touch | None:
+def touch(
+    solid: Solid, centre_m: Vec3, rotation: Matrix, half_extents_m: Vec3, entered: Vec3 | None = None
+) -> Touch | None:
     """Tell whether and how a box overlaps a solid.
 
     Args:
@@ -87,6 +89,8 @@ def touch(solid: Solid, centre_m: Vec3, rotation: Matrix, half_extents_m: Vec3) 
         centre_m: centre of the moving box, arena axes.
         rotation: rows of the matrix that turns the box's own axes into arena axes.
         half_extents_m: of the moving box.
+        entered: normal of the touch while it lasts (arena axes). A thin bar must push back to the side
+            the drone came from, however deep it is; the shortest way out may be the far side.
 
     Returns:
         The touch, or None while they are apart.
@@ -105,6 +109,11 @@ def touch(solid: Solid, centre_m: Vec3, rotation: Matrix, half_extents_m: Vec3) 
     if least is None:
         return None
     depth, (nx, ny, nz) = least
+    if entered is not None:
+        nx, ny, nz = c * entered[0] + s * entered[1], c * entered[1] - s * entered[0], entered[2]
+        along = nx * offset[0] + ny * offset[1] + nz * offset[2]
+        columns = [(turn[0][j], turn[1][j], turn[2][j]) for j in range(3)]
+        depth = max(_reach((nx, ny, nz), columns, solid.half_extents_m, half_extents_m) - along, 0.0)
     point = _touching_point(offset, turn, solid.half_extents_m, half_extents_m)
     to_arena = (c * point[0] - s * point[1], s * point[0] + c * point[1], point[2])
     sx, sy, sz = solid.centre_arena_m
@@ -137,18 +146,23 @@ def _least_overlap(offset: Vec3, turn: Matrix, a: Vec3, b: Vec3) -> tuple[float,
         if length < 1e-3:  # parallel edges: a face axis has covered it
             continue
         nx, ny, nz = axis[0] / length, axis[1] / length, axis[2] / length
-        reach = a[0] * abs(nx) + a[1] * abs(ny) + a[2] * abs(nz)
-        for j in range(3):
-            column = columns[j]
-            reach += b[j] * abs(nx * column[0] + ny * column[1] + nz * column[2])
         along = nx * offset[0] + ny * offset[1] + nz * offset[2]
-        depth = reach - abs(along)
+        depth = _reach((nx, ny, nz), columns, a, b) - abs(along)
         if depth <= 0.0:
             return None
         if depth < best_depth - 1e-9:
             sign = 1.0 if along >= 0 else -1.0
             best_depth, best_normal = depth, (sign * nx, sign * ny, sign * nz)
     return best_depth, best_normal
+
+
+def _reach(normal: Vec3, columns: list[Vec3], a: Vec3, b: Vec3) -> float:
+    """Return the sum of both boxes' extents along a unit vector (in the solid's axes)."""
+    nx, ny, nz = normal
+    reach = a[0] * abs(nx) + a[1] * abs(ny) + a[2] * abs(nz)
+    for half, column in zip(b, columns, strict=True):
+        reach += half * abs(nx * column[0] + ny * column[1] + nz * column[2])
+    return reach
 
 
 def _touching_point(offset: Vec3, turn: Matrix, a: Vec3, b: Vec3) -> Vec3:

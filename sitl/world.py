@@ -44,8 +44,7 @@ class World:
             hypot(frame.outer_width_m, frame.outer_height_m, frame.bar_m) / 2 + self._reach_m
             for frame in scenario.frames
         ]
-        self._touched: tuple[str, ...] = ()
-        self._pushed = False
+        self._touching: dict[Solid, Vec3] = {}  # with the normal of the side it was entered through
         start = scenario.start
         surface_m = self._surface_height(start.x_m, start.y_m)
         self._dynamics = Dynamics(
@@ -68,7 +67,7 @@ class World:
         position = flip_vector(dynamics.position_ned_m())
         near = self._near(position)
         for _ in range(STEPS_PER_CONTROL):
-            if near or self._pushed:
+            if near or self._touching:
                 self._push_from(near)
             dynamics.run()
             self.time_us += _STEP_US
@@ -94,7 +93,7 @@ class World:
             motors_on: whether the autopilot is armed.
         """
         position = flip_vector(sensors.position_ned_m)
-        contacts = self._touched
+        contacts = tuple(dict.fromkeys(solid.name for solid in self._touching))
         if position[2] - self._ground_below(position) < self._reach_m and self._dynamics.touches_ground():
             contacts = (*contacts, "base" if self._above_base(position) else "floor")
         return TrueState(
@@ -147,12 +146,12 @@ class World:
         position = flip_vector(dynamics.position_ned_m())
         rotation = _rotation(flip_quaternion(dynamics.attitude()))
         force, moment = [0.0, 0.0, 0.0], [0.0, 0.0, 0.0]
-        touched = []
+        touching: dict[Solid, Vec3] = {}
         for solid in near:
-            found = touch(solid, position, rotation, self._half_m)
+            found = touch(solid, position, rotation, self._half_m, self._touching.get(solid))
             if found is None:
                 continue
-            touched.append(solid.name)
+            touching[solid] = found.normal_arena
             arm = _minus(found.point_arena_m, position)
             spin = _turn(rotation, flip_vector(dynamics.angular_rate_frd_rad_s()))
             velocity = _plus(flip_vector(dynamics.velocity_ned_m_s()), _cross(spin, arm))
@@ -161,8 +160,7 @@ class World:
             for i in range(3):
                 force[i] += push[i]
                 moment[i] += twist[i]
-        self._touched = tuple(dict.fromkeys(touched))
-        self._pushed = bool(touched)
+        self._touching = touching
         dynamics.push(
             flip_vector(_turn_back(rotation, (force[0], force[1], force[2]))),
             flip_vector(_turn_back(rotation, (moment[0], moment[1], moment[2]))),

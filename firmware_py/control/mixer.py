@@ -68,9 +68,9 @@ class Mixer:
         share = 1.0
         for value, (_, _, _, yaw) in zip(tilt, self._rows, strict=True):
             asked = yaw * yaw_nm
-            room = high - base - value if asked > 0 else base + value - low
+            room = max(high - base - value if asked > 0 else base + value - low, 0.0)
             if abs(asked) > room:
-                share = min(share, max(0.0, room / abs(asked)))
+                share = min(share, room / abs(asked))
         mixed.yaw_cut = share < 1.0
         yaw_nm *= share
         mixed.speeds_rad_s = tuple(

@@ -1,0 +1,134 @@
+"""The linear model and the regulator, checked against python-control and against the published design."""
+
+import control
+import numpy as np
+import pytest
+
+from firmware_py.airframe import GRAVITY_M_S2, load_airframe
+from firmware_py.control.design import Weights, cost_matrices, design
+from firmware_py.control.linear_model import allocation, discretise, hover_model, with_integrals
+
+PERIOD_S = 0.004
+
+
+@pytest.fixture(scope="module")
+def airframe():
+    return load_airframe("abejorro")
+
+
+def test_gains_agree_with_python_control(airframe):
+    a, b = with_integrals(discretise(hover_model(airframe), PERIOD_S), PERIOD_S)
+    q, r = cost_matrices(airframe, Weights())
+    expected, _, poles = control.dlqr(a, b, q, r)
+    gains = design(airframe, PERIOD_S)
+    np.testing.assert_allclose(np.hstack([gains.kx, gains.ki]), expected, rtol=1e-6, atol=1e-9)
+    np.testing.assert_allclose(np.sort_complex(gains.poles), np.sort_complex(poles), rtol=1e-5, atol=1e-6)
+
+
+def test_closed_loop_is_stable_with_margin(airframe):
+    poles = design(airframe, PERIOD_S).poles
+    slowest_s = -PERIOD_S / np.log(np.max(np.abs(poles)))
+    assert np.max(np.abs(poles)) < 1.0
+    assert slowest_s < 2.0
+
+
+def test_closed_loop_stays_stable_with_the_motor_lag_that_the_design_leaves_out(airframe):
+    model = hover_model(airframe)
+    lag = airframe.motor.time_constant_s
+    a = np.block([[model.a, model.b], [np.zeros((4, 8)), -np.eye(4) / lag]])
+    b = np.vstack([np.zeros((8, 4)), np.eye(4) / lag])
+    lagging = control.c2d(control.ss(a, b, np.eye(12), 0), PERIOD_S)
+    gains = design(airframe, PERIOD_S)
+    outputs = np.hstack([model.c, np.zeros((4, 4))])
+    loop = np.block(
+        [
+            [lagging.A - lagging.B @ np.hstack([gains.kx, np.zeros((4, 4))]), -lagging.B @ gains.ki],
+            [outputs * PERIOD_S, np.eye(4)],
+        ]
+    )
+    assert np.max(np.abs(np.linalg.eigvals(loop))) < 0.999
+
+
+def test_discretisation_is_the_exact_zero_order_hold(airframe):
+    model = hover_model(airframe)
+    expected = control.c2d(control.ss(model.a, model.b, model.c, 0), PERIOD_S, method="zoh")
+    exact = discretise(model, PERIOD_S)
+    np.testing.assert_allclose(exact.a, expected.A, atol=1e-12)
+    np.testing.assert_allclose(exact.b, expected.B, atol=1e-12)
+
+
+def test_hover_model_has_the_physics_in_it(airframe):
+    model = hover_model(airframe)
+    state = np.zeros(8)
+    state[1] = -0.1  # nose down
+    assert (model.a @ state)[5] == pytest.approx(0.1 * GRAVITY_M_S2)
+    state = np.zeros(8)
+    state[0] = 0.1  # right side down
+    assert (model.a @ state)[6] == pytest.approx(0.1 * GRAVITY_M_S2)
+    more_thrust = model.b @ np.array([0.3, 0, 0, 0])
+    assert more_thrust[7] == pytest.approx(-1.0)  # 0.3 N on 0.3 kg, upwards
+
+
+def test_allocation_uses_the_true_arms(airframe):
+    matrix = allocation(airframe)
+    hover = np.full(4, airframe.hover_speed_rad_s**2)
+    np.testing.assert_allclose(matrix @ hover, [airframe.weight_n, 0, 0, 0], atol=1e-12)
+    front_right_only = matrix @ np.array([1e6, 0, 0, 0])
+    thrust = 3.9718  # N at 1000 rad/s
+    np.testing.assert_allclose(
+        front_right_only, [thrust, -0.075 * thrust, 0.075 * thrust, -0.13581], rtol=1e-9
+    )
+
+
+def test_the_published_gains_are_a_design_for_the_true_arm(airframe):
+    """The paper's state feedback on the model with 0.075 m arms has its poles at -6 to -9 (facts of [C])."""
+    kx = np.array(  # rows NE NW SE SW, columns roll pitch p q r forward left up (forward-left-up axes)
+        [
+            [-334.1327, -334.1327, -29.9223, -29.9223, 72.7456, -167.9315, 167.9315, 373.1147],
+            [334.1327, -334.1327, 29.9223, -29.9223, -72.7456, -167.9315, -167.9315, 373.1147],
+            [-334.1327, 334.1327, -29.9223, 29.9223, -72.7456, 167.9315, 167.9315, 373.1147],
+            [334.1327, 334.1327, 29.9223, 29.9223, 72.7456, 167.9315, -167.9315, 373.1147],
+        ]
+    )
+    ky = 1000 * np.array(
+        [
+            [-0.3078, 0.3078, 1.5803, 0.3081],
+            [-0.3078, -0.3078, 1.5803, -0.3081],
+            [0.3078, 0.3078, 1.5803, -0.3081],
+            [0.3078, -0.3078, 1.5803, 0.3081],
+        ]
+    )
+    to_ours = np.diag([1, -1, 1, -1, -1, 1, -1, -1.0])  # FRD to FLU
+    model = hover_model(airframe)
+    hover = airframe.hover_speed_rad_s
+    per_speed = allocation(airframe) * 2 * hover  # columns FR RL FL RR
+    per_speed = per_speed[:, [0, 2, 3, 1]]  # NE NW SE SW
+    outputs_ours = np.diag([1, -1, -1, -1.0])
+    a = np.block([[model.a, np.zeros((8, 4))], [model.c, np.zeros((4, 4))]])
+    b = np.vstack([model.b @ per_speed, np.zeros((4, 4))])
+    poles = np.linalg.eigvals(a - b @ np.hstack([kx @ to_ours, ky @ outputs_ours]))
+    assert np.max(np.abs(poles.imag)) < 2.0
+    assert -10.0 < np.min(poles.real) < -7.5
+    assert -7.0 < np.max(poles.real) < -4.5
+
+
+@pytest.mark.parametrize("scale", [0.3, 1.0, 4.0])
+def test_a_heavier_airframe_of_the_same_shape_gets_the_same_poles(airframe, scale):
+    motor = airframe.motor.model_copy(
+        update={
+            "thrust_n_s2": airframe.motor.thrust_n_s2 * scale,
+            "torque_nm_s2": airframe.motor.torque_nm_s2 * scale,
+        }
+    )
+    scaled = airframe.model_copy(
+        update={
+            "mass_kg": airframe.mass_kg * scale,
+            "inertia_kg_m2": tuple(value * scale for value in airframe.inertia_kg_m2),
+            "motor": motor,
+        }
+    )
+    np.testing.assert_allclose(
+        np.sort(np.abs(design(scaled, PERIOD_S).poles)),
+        np.sort(np.abs(design(airframe, PERIOD_S).poles)),
+        rtol=1e-6,
+    )

@@ -1,0 +1,128 @@
+"""The world: standing, bouncing, determinism."""
+
+from math import hypot, pi
+
+import pytest
+
+from firmware_py.airframe import load_airframe
+from firmware_py.control.stabiliser import Stabiliser
+from firmware_py.types import RateCommand
+from scenarios.models import Base, Frame, Scenario, Start
+from sitl.world import CONTROL_PERIOD_US, World
+from tests.flight import state_of
+
+AIRFRAME = load_airframe("abejorro")
+
+
+def world(**parts):
+    return World(Scenario(name="test", **parts), AIRFRAME)
+
+
+class Flight:
+    """A stabiliser flying a world, judged by its true states."""
+
+    def __init__(self, world):
+        self.world = world
+        self.stabiliser = Stabiliser(AIRFRAME, CONTROL_PERIOD_US / 1e6)
+        self.truths = []
+
+    def fly(self, seconds, command):
+        for _ in range(round(seconds * 1e6 / CONTROL_PERIOD_US)):
+            state = state_of(self.world._dynamics, self.world.time_us)
+            self.world.step(self.stabiliser.step(state, command).speeds_rad_s)
+            self.truths.append(self.world.truth(self.world.sensors(), motors_on=True))
+        return self.truths[-1]
+
+
+def test_stands_on_the_base_at_rest_with_the_given_heading():
+    w = world(base=Base(x_m=-3, y_m=-3), start=Start(x_m=-3, y_m=-3, yaw_rad=1.0))
+    truth = w.truth(w.sensors(), motors_on=False)
+    assert w.time_us == 0
+    assert truth.position_arena_m == pytest.approx((-3, -3, 0.51 + 0.0225), abs=3e-3)
+    assert truth.velocity_arena_m_s == pytest.approx((0, 0, 0), abs=1e-3)
+    assert truth.contacts == ("base",)
+    assert truth.attitude_arena[3] == pytest.approx(0.4794, abs=1e-3)  # sin(yaw / 2), left turn positive
+    assert w.sensors().position_ned_m == pytest.approx((-3, 3, -0.5325), abs=3e-3)
+
+
+def test_stands_on_the_floor_beside_the_base():
+    w = world(base=Base(x_m=2), start=Start(x_m=0))
+    truth = w.truth(w.sensors(), motors_on=False)
+    assert truth.position_arena_m[2] == pytest.approx(0.0225, abs=3e-3)
+    assert truth.contacts == ("floor",)
+
+
+def test_time_is_exact():
+    w = world()
+    for _ in range(250):
+        w.step((0.0, 0.0, 0.0, 0.0))
+    assert w.time_us == 1_000_000
+
+
+def test_same_inputs_give_the_same_states_bit_for_bit():
+    def states():
+        flight = Flight(world(frames=(Frame(colour="red", x_m=1.0, y_m=0.1, z_m=1.0),)))
+        flight.fly(1.0, RateCommand((0.0, 0.0, -0.8)))
+        flight.fly(3.0, RateCommand((1.0, 0.1, 0.0), 0.3))
+        return [(t.position_arena_m, t.attitude_arena, t.contacts) for t in flight.truths]
+
+    first = states()
+    assert first == states()
+
+
+def test_flies_through_a_frame_without_touching():
+    flight = Flight(world(frames=(Frame(colour="red", x_m=1.0, y_m=0.0, z_m=1.5),)))
+    flight.fly(3.0, RateCommand((0.0, 0.0, -0.322)))
+    height = flight.fly(1.0, RateCommand()).position_arena_m[2]
+    flight.fly(1.0, RateCommand((0.0, 0.0, height - 1.5)))
+    flight.fly(1.0, RateCommand())
+    last = flight.fly(5.0, RateCommand((0.4, 0.0, 0.0)))
+    assert last.position_arena_m[0] > 1.5
+    assert not any("red" in truth.contacts for truth in flight.truths)
+
+
+@pytest.mark.parametrize("speed_m_s", [0.3, 1.0, 2.0])
+def test_a_frame_is_solid(speed_m_s):
+    """Flown at beside its opening, the drone touches it, loses speed and does not come out behind it."""
+    frame = Frame(colour="blue", x_m=1.2, y_m=0.2, z_m=1.0)
+    flight = Flight(world(base=Base(x_m=-4), frames=(frame,)))
+    flight.fly(1.6, RateCommand((0.0, 0.0, -0.65)))
+    flight.fly(1.0, RateCommand())
+    before = len(flight.truths)
+    flight.fly(1.0 + 1.2 / speed_m_s, RateCommand((speed_m_s, 0.0, 0.0)))
+    touched = [truth for truth in flight.truths if "blue" in truth.contacts]
+    assert touched
+    # The drone's front face stays short of the bar's far side (it gives by a spring's travel).
+    assert max(truth.position_arena_m[0] for truth in touched) < 1.2 - 0.01 - 0.125 + 0.025
+    assert all(hypot(*truth.velocity_arena_m_s) < speed_m_s * 1.3 for truth in flight.truths[before:])
+
+
+def test_the_side_of_the_base_is_solid():
+    flight = Flight(world(base=Base(x_m=1.5), start=Start(x_m=0)))
+    flight.fly(1.0, RateCommand((0.0, 0.0, -0.3)))
+    flight.fly(3.0, RateCommand((0.6, 0.0, 0.0)))
+    assert any("base" in truth.contacts for truth in flight.truths)
+    assert max(truth.position_arena_m[0] for truth in flight.truths) < 1.5 - 0.25 - 0.125 + 0.03
+    assert max(truth.position_arena_m[2] for truth in flight.truths) < 0.6
+
+
+def test_motors_off_above_the_base_falls_onto_it_and_stays():
+    w = world(base=Base(), start=Start())
+    flight = Flight(w)
+    flight.fly(1.0, RateCommand((0.0, 0.0, -0.2)))
+    for _ in range(500):
+        w.step((0.0, 0.0, 0.0, 0.0))
+    truth = w.truth(w.sensors(), motors_on=False)
+    assert truth.contacts == ("base",)
+    assert truth.position_arena_m[2] == pytest.approx(0.5325, abs=4e-3)
+    assert truth.velocity_arena_m_s == pytest.approx((0, 0, 0), abs=5e-3)
+
+
+def test_a_drone_past_the_edge_falls_off():
+    w = world(base=Base(x_m=0.0), start=Start(x_m=0.24, yaw_rad=pi / 4))
+    flight = Flight(w)
+    flight.fly(1.0, RateCommand((0.0, 0.0, -0.2)))
+    flight.fly(1.0, RateCommand((0.1, 0.1, 0.0)))
+    for _ in range(750):
+        w.step((0.0, 0.0, 0.0, 0.0))
+    assert w.truth(w.sensors(), motors_on=False).position_arena_m[2] < 0.3
