@@ -8,13 +8,6 @@ from firmware_py.commander_table import FAILSAFE_STATES, FLOWN_MODE, RULES, Even
 from firmware_py.parameters import Parameters
 from firmware_py.status import FlightMode
 
-_MODE_EVENT = {
-    FlightMode.HOLD: Event.SET_HOLD,
-    FlightMode.TAKEOFF: Event.SET_TAKEOFF,
-    FlightMode.LAND: Event.SET_LAND,
-    FlightMode.OFFBOARD: Event.SET_OFFBOARD,
-}
-
 
 class Commander:
     """Arming, modes and failsafes.
@@ -100,10 +93,6 @@ class Commander:
             raise LookupError(f"commander: no rule for {event.value} in {self.state.value}")
         self._follow(row)
         return row
-
-    def handle_mode(self, mode: FlightMode) -> Row:
-        """Take the command to change the mode."""
-        return self.handle(_MODE_EVENT[mode])
 
     def setpoint_came(self, time_us: int) -> None:
         """Note a usable offboard setpoint; a time ahead of the vehicle's counts as now."""

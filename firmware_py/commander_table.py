@@ -51,6 +51,14 @@ FLOWN_MODE: dict[State, FlightMode] = {
 }
 """The flight mode of each armed state."""
 
+MODE_EVENT: dict[FlightMode, Event] = {
+    FlightMode.HOLD: Event.SET_HOLD,
+    FlightMode.TAKEOFF: Event.SET_TAKEOFF,
+    FlightMode.LAND: Event.SET_LAND,
+    FlightMode.OFFBOARD: Event.SET_OFFBOARD,
+}
+"""The event that asks for each mode."""
+
 
 @dataclass(frozen=True, slots=True)
 class Row:

@@ -14,7 +14,7 @@ class Estimator:
 
     Attributes:
         state: the estimate, updated in place; it keeps its last value while samples are unusable.
-        origin_ned_m: the local frame's origin in the sensors' frame, shape (3,); None before the first sample.
+        origin_ned_m: the local frame's origin in the sensors' frame, shape (3,); None before a first sample.
     """
 
     __slots__ = ("origin_ned_m", "state")
