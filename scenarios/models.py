@@ -16,15 +16,16 @@ Metres = Annotated[float, Field(ge=-1000, le=1000, allow_inf_nan=False)]
 Radians = Annotated[float, Field(ge=-6.3, le=6.3, allow_inf_nan=False)]
 
 
-def refusal(message: str, *at: str | int) -> PydanticCustomError:
+def refusal(value: float | str, message: str, *at: str | int) -> PydanticCustomError:
     """A validation error that knows where below the validated part the bad value stands.
 
     Args:
-        message: what is wrong and how to mend it, one line.
+        value: the bad value, which may be a default.
+        message: what is wrong and how to mend it, one line that goes on from the value.
         *at: keys and indices from the validated part to the value; the loader finds its line with them.
     """
-    context = {"field": field_path(at), "message": message, "at": at}
-    return PydanticCustomError("refused", "{field} {message}", context)
+    context = {"field": field_path(at), "value": value, "message": message, "at": at}
+    return PydanticCustomError("refused", "{field} {value} {message}", context)
 
 
 def field_path(at: tuple[str | int, ...]) -> str:
@@ -89,9 +90,11 @@ class Frame(Part):
     @model_validator(mode="after")
     def _has_opening_above_floor(self) -> Self:
         if min(self.opening_m) <= 0:
-            raise refusal("leaves no opening; make it thinner or the frame larger", "bar_m")
+            raise refusal(self.bar_m, "leaves no opening; make it thinner or the frame larger", "bar_m")
         if self.z_m < self.outer_height_m / 2:
-            raise refusal(f"sinks the frame into the floor; use {self.outer_height_m / 2} or more", "z_m")
+            raise refusal(
+                self.z_m, f"sinks the frame into the floor; use {self.outer_height_m / 2} or more", "z_m"
+            )
         return self
 
 
@@ -109,7 +112,7 @@ class Camera(Part):
     @model_validator(mode="after")
     def _sees_something(self) -> Self:
         if self.near_m >= self.far_m:
-            raise refusal(f"must be below far_m {self.far_m}", "near_m")
+            raise refusal(self.near_m, f"must be below far_m {self.far_m}", "near_m")
         return self
 
 
@@ -122,7 +125,9 @@ class Light(Part):
     @model_validator(mode="after")
     def _sun_has_direction(self) -> Self:
         if not any(self.sun_direction_arena):
-            raise refusal("has no direction; one component must differ from 0", "sun_direction_arena")
+            raise refusal(
+                "[0, 0, 0]", "has no direction; one number must differ from 0", "sun_direction_arena"
+            )
         return self
 
 
@@ -156,7 +161,9 @@ class Scenario(Part):
         seen: set[str] = set()
         for index, frame in enumerate(self.frames):
             if frame.colour in seen:
-                raise refusal("stands twice; give each frame its own colour", "frames", index, "colour")
+                raise refusal(
+                    frame.colour, "stands twice; give each frame its own colour", "frames", index, "colour"
+                )
             seen.add(frame.colour)
         return self
 
@@ -167,12 +174,16 @@ class Scenario(Part):
         placed += [(frame, ("frames", index)) for index, frame in enumerate(self.frames)]
         for part, at in placed:
             for field, limit_m in (("x_m", half_x_m), ("y_m", half_y_m)):
-                if abs(getattr(part, field)) > limit_m:
+                value_m: float = getattr(part, field)
+                if abs(value_m) > limit_m:
                     raise refusal(
-                        f"is outside the arena; keep within ±{limit_m} or enlarge the arena", *at, field
+                        value_m,
+                        f"is outside the arena; keep within ±{limit_m} or enlarge the arena",
+                        *at,
+                        field,
                     )
         for index, frame in enumerate(self.frames):
             if frame.z_m > self.arena.height_m:
                 limit_m = self.arena.height_m
-                raise refusal(f"is above the arena; use {limit_m} or less", "frames", index, "z_m")
+                raise refusal(frame.z_m, f"is above the arena; use {limit_m} or less", "frames", index, "z_m")
         return self

@@ -1,0 +1,125 @@
+"""Scenarios by name or from files, with faults told by file, line and field."""
+
+from __future__ import annotations
+
+import difflib
+import stat
+from importlib import resources
+from pathlib import Path
+from typing import Any
+
+from pydantic import ValidationError
+
+from scenarios.complaints import Fault, describe_faults, shorten, show
+from scenarios.models import Scenario
+from scenarios.yaml_tree import YamlError, parse_yaml, to_yaml
+
+MAX_BYTES = 1_000_000
+SUFFIXES = (".yaml", ".yml")
+
+
+class ScenarioError(ValueError):
+    """A scenario that cannot be used; the message is one line for people."""
+
+
+def list_scenarios() -> list[str]:
+    """Names of the scenarios that come with the package, sorted."""
+    files = resources.files("scenarios") / "files"
+    return sorted(
+        entry.name.removesuffix(".yaml") for entry in files.iterdir() if entry.name.endswith(".yaml")
+    )
+
+
+def load_scenario(name_or_path: str | Path) -> Scenario:
+    """Load a scenario that comes with the package, or any YAML file.
+
+    Args:
+        name_or_path: a name of `list_scenarios`, or a path: it has a directory or ends in .yaml or .yml.
+
+    Raises:
+        ScenarioError: there is no such scenario, or the file is not a valid one.
+    """
+    text = str(name_or_path)
+    if isinstance(name_or_path, Path) or text.endswith(SUFFIXES) or "/" in text or "\\" in text:
+        return parse_scenario(_read(Path(text)), source=shorten(text))
+    names = list_scenarios()
+    if text not in names:
+        raise ScenarioError(_unknown_name(text, names))
+    entry = resources.files("scenarios") / "files" / f"{text}.yaml"
+    return parse_scenario(entry.read_bytes(), source=entry.name)
+
+
+def parse_scenario(content: bytes | str, source: str = "scenario") -> Scenario:
+    """Check the content of a scenario file.
+
+    Args:
+        content: YAML, as UTF-8 when bytes.
+        source: what to call it in messages, usually the file's path.
+
+    Raises:
+        ScenarioError: it is not a valid scenario; the message names source, line, field, value and mend.
+    """
+    if len(content) > MAX_BYTES:
+        raise ScenarioError(
+            f"{source}: {len(content)} bytes is too large for a scenario; {MAX_BYTES} at most"
+        )
+    try:
+        tree = parse_yaml(content if isinstance(content, str) else content.decode("utf-8-sig"))
+    except UnicodeDecodeError as error:
+        line = error.object.count(b"\n", 0, error.start) + 1
+        raise ScenarioError(f"{source}:{line}: not UTF-8 text; save the file as UTF-8") from None
+    except YamlError as error:
+        where = f"{error.line}" if error.column is None else f"{error.line}:{error.column}"
+        raise ScenarioError(f"{source}:{where}: {' '.join(str(error).split())}") from None
+    if tree.value is None:
+        raise ScenarioError(f"{source}:1: empty; a scenario needs at least `name: my-scenario`")
+    if not isinstance(tree.value, dict):
+        what = show(tree.value)
+        raise ScenarioError(
+            f"{source}:{tree.line(())}: must hold fields like `name: my-scenario`, not {what}"
+        )
+    try:
+        return Scenario.model_validate(tree.value, strict=True)
+    except ValidationError as error:
+        faults = [Fault.from_pydantic(detail) for detail in error.errors(include_url=False)]
+        raise ScenarioError(describe_faults(source, tree, faults)) from None
+
+
+def dump_yaml(scenario: Scenario) -> str:
+    """Write a scenario as YAML, every field included; `parse_scenario` gives an equal scenario back."""
+    return to_yaml(scenario.model_dump(mode="json"))
+
+
+def json_schema() -> dict[str, Any]:
+    """JSON Schema of a scenario file, for editors and other tools."""
+    return {"$schema": "https://json-schema.org/draft/2020-12/schema", **Scenario.model_json_schema()}
+
+
+def _unknown_name(name: str, names: list[str]) -> str:
+    nearest = difflib.get_close_matches(name.lower(), names, n=1, cutoff=0.5)
+    hint = f"; did you mean {nearest[0]}?" if nearest else ";"
+    return f"unknown scenario {show(name)}{hint} Known: {', '.join(names)}; or give the path of a .yaml file"
+
+
+def _read(path: Path) -> bytes:
+    """Read a file that may be anything, but never more than is allowed."""
+    name = shorten(str(path))
+    try:
+        status = path.stat()
+        if stat.S_ISDIR(status.st_mode):
+            raise ScenarioError(f"{name}: is a directory; give a scenario file")
+        if not stat.S_ISREG(status.st_mode):
+            raise ScenarioError(f"{name}: is not a regular file; give a scenario file")
+        if status.st_size > MAX_BYTES:
+            size = status.st_size
+            raise ScenarioError(f"{name}: {size} bytes is too large for a scenario; {MAX_BYTES} at most")
+        with path.open("rb") as file:
+            return file.read(MAX_BYTES + 1)
+    except FileNotFoundError:
+        known = ", ".join(list_scenarios())
+        raise ScenarioError(f"{name}: no such file; give a path or one of: {known}") from None
+    except (OSError, ValueError) as error:
+        if isinstance(error, ScenarioError):
+            raise
+        reason = error.strerror if isinstance(error, OSError) else str(error)
+        raise ScenarioError(f"{name}: cannot be read: {reason}") from None
