@@ -1,0 +1,70 @@
+"""World, autopilot, referee and camera joined into one thing that advances by ticks.
+
+Still no clock, socket or thread: the real-time server and lockstep flights both drive it.
+"""
+
+from __future__ import annotations
+
+from firmware_py.airframe import Airframe, load_airframe
+from firmware_py.autopilot import Autopilot
+from firmware_py.types import GeodeticPoint
+from scenarios.models import Scenario
+from scenarios.referee import Referee
+from sitl.world import CONTROL_PERIOD_US, World
+
+
+class Simulation:
+    """One drone in one scenario.
+
+    Args:
+        scenario: what is flown.
+        airframe: the drone; by default the one that the scenario names.
+
+    Attributes:
+        world: the physics.
+        autopilot: what flies.
+        referee: what judges, fed with the truth of every control tick.
+        truth: the true state now.
+    """
+
+    def __init__(self, scenario: Scenario, airframe: Airframe | None = None) -> None:
+        self.scenario = scenario
+        airframe = airframe or load_airframe(scenario.airframe)
+        origin = scenario.origin
+        self.world = World(scenario, airframe)
+        self.autopilot = Autopilot(
+            airframe,
+            GeodeticPoint(origin.latitude_deg, origin.longitude_deg, origin.altitude_m),
+            control_period_s=CONTROL_PERIOD_US / 1e6,
+        )
+        self.referee = Referee(scenario, airframe.envelope_m)
+        self._sensors = self.world.sensors()
+        self.truth = self.world.truth(self._sensors, motors_on=False)
+        self.referee.update(self.truth)
+        self._camera_period_us = 1e6 / scenario.camera.rate_hz
+        self._images_taken = 0
+
+    @property
+    def time_us(self) -> int:
+        """Simulated time, microseconds since the drone was switched on."""
+        return self.world.time_us
+
+    def tick(self) -> None:
+        """Advance by one control period: sense, control, move, judge."""
+        motors = self.autopilot.step(self._sensors)
+        self.world.step(motors)
+        self._sensors = self.world.sensors()
+        self.truth = self.world.truth(self._sensors, motors_on=self.autopilot.status.armed)
+        self.referee.update(self.truth)
+
+    def due_image_us(self) -> int | None:
+        """Return the time stamp of the image that is due at this tick, or None.
+
+        Images are taken on a grid of the camera's period, each once; a rate above the control rate gives
+        one image a tick.
+        """
+        index = int(self.time_us / self._camera_period_us)
+        if index < self._images_taken:
+            return None
+        self._images_taken = index + 1
+        return self.time_us

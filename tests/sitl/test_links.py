@@ -1,0 +1,88 @@
+"""UDP links over real sockets."""
+
+import asyncio
+import socket
+
+import pytest
+
+from sitl.links import LinkError, UdpAddresses, UdpLink, open_udp
+
+
+def peer():
+    sock = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
+    sock.bind(("127.0.0.1", 0))
+    sock.settimeout(2.0)
+    return sock
+
+
+async def test_speaks_unasked_and_hears_the_answer():
+    got = []
+    with peer() as station:
+        link = await open_udp(UdpAddresses(("127.0.0.1", 0), station.getsockname()), got.append)
+        link.send(b"hello")
+        data, address = await asyncio.to_thread(station.recvfrom, 100)
+        assert data == b"hello"
+        station.sendto(b"answer", address)
+        for _ in range(100):
+            await asyncio.sleep(0.01)
+            if got:
+                break
+        link.close()
+    assert got == [b"answer"]
+
+
+async def test_nobody_there_does_no_harm():
+    with peer() as station:
+        nobody = station.getsockname()
+    link = await open_udp(UdpAddresses(("127.0.0.1", 0), nobody), lambda data: None)
+    for _ in range(5):
+        link.send(b"x")
+        await asyncio.sleep(0.01)
+    link.close()
+    link.send(b"after close")
+
+
+async def test_a_taken_port_is_said_in_one_line():
+    with peer() as station:
+        with pytest.raises(LinkError) as error:
+            await open_udp(UdpAddresses(station.getsockname(), ("127.0.0.1", 9)), lambda data: None)
+        assert str(station.getsockname()[1]) in str(error.value)
+        assert "--instance" in str(error.value)
+        assert "\n" not in str(error.value)
+
+
+class FakeTransport(asyncio.DatagramTransport):
+    def __init__(self):
+        super().__init__()
+        self.sent = []
+
+    def is_closing(self):
+        return False
+
+    def sendto(self, data, addr=None):
+        self.sent.append(addr)
+
+
+def test_keeps_to_its_partner_until_that_is_silent():
+    now = [0.0]
+    link = UdpLink(("home", 1), lambda data: None, clock=lambda: now[0])
+    transport = FakeTransport()
+    link.connection_made(transport)
+
+    def target():
+        link.send(b"")
+        return transport.sent[-1]
+
+    assert target() == ("home", 1)
+    link.datagram_received(b"", ("a", 1))
+    assert target() == ("a", 1)
+    link.datagram_received(b"", ("b", 2))
+    assert target() == ("a", 1)
+    now[0] = 4.0
+    link.datagram_received(b"", ("a", 1))
+    now[0] = 8.0
+    link.datagram_received(b"", ("b", 2))
+    assert target() == ("a", 1)
+    now[0] = 9.5
+    link.datagram_received(b"", ("b", 2))
+    assert target() == ("b", 2)
