@@ -1,0 +1,58 @@
+"""STATUSTEXT: what the autopilot says, to the links where a ground station was heard, as PX4.
+
+Texts said before that wait for it, the latest few and five seconds long. Longer ones go in pieces of 50. PX4
+ends texts with a tab when it sends the same as an event; there are no events here, so there are no tabs.
+"""
+
+from __future__ import annotations
+
+from collections import deque
+
+from firmware_py.mavlink.dialect import Message, mavlink
+from firmware_py.mavlink.exchange import Exchange
+from firmware_py.types import StatusText
+
+_PIECE = 50
+_KEPT = 8
+_STALE_US = 5_000_000
+
+
+class StatusTextService:
+    """Brings the autopilot's texts to people."""
+
+    __slots__ = ("_exchange", "_last_id", "_waiting")
+
+    def __init__(self, exchange: Exchange) -> None:
+        self._exchange = exchange
+        self._last_id = 0
+        self._waiting: dict[str, deque[tuple[int, list[Message]]]] = {
+            name: deque(maxlen=_KEPT) for name in exchange.links
+        }
+
+    def update(self) -> None:
+        """Take the autopilot's new texts and send what can be sent."""
+        exchange = self._exchange
+        for text in exchange.autopilot.take_texts():
+            pieces = self._pieces(text)
+            for waiting in self._waiting.values():
+                waiting.append((exchange.time_us, pieces))
+        for name, waiting in self._waiting.items():
+            link = exchange.links[name]
+            while waiting and link.gcs_heard:
+                said_us, pieces = waiting.popleft()
+                if exchange.time_us - said_us <= _STALE_US:
+                    for piece in pieces:
+                        exchange.send(link, piece)
+
+    def _pieces(self, text: StatusText) -> list[Message]:
+        data = text.text.encode("ascii", "replace")
+        severity = min(max(text.severity, 0), mavlink.MAV_SEVERITY_DEBUG)
+        if len(data) <= _PIECE:
+            return [mavlink.MAVLink_statustext_message(severity, data, 0, 0)]
+        self._last_id = self._last_id % 0xFFFF + 1
+        # One that fills its last piece needs an empty one after it, or the receiver waits for more.
+        starts = range(0, len(data) + 1, _PIECE)
+        return [
+            mavlink.MAVLink_statustext_message(severity, data[start : start + _PIECE], self._last_id, place)
+            for place, start in enumerate(starts)
+        ]

@@ -1,0 +1,94 @@
+"""AUTOPILOT_VERSION, PROTOCOL_VERSION and AVAILABLE_MODES: what this vehicle is and can do.
+
+The flight software version names the PX4 release whose behaviour on the wire is followed, because ground
+stations switch features on by it; the middleware version is this project's own. Capabilities claim only what
+exists, so QGroundControl asks for no missions, fences or files.
+"""
+
+from __future__ import annotations
+
+from struct import Struct
+
+from firmware_py.mavlink.dialect import Message, mavlink
+from firmware_py.status import FlightMode
+
+FOLLOWED_PX4_VERSION = (1, 17, 0)
+OWN_VERSION = (0, 1, 0)
+_RELEASE = 0xFF  # FIRMWARE_VERSION_TYPE_OFFICIAL
+_UID_PREFIX = 0x66726D72  # "frmr"; the system id follows
+
+CAPABILITIES = (
+    mavlink.MAV_PROTOCOL_CAPABILITY_PARAM_FLOAT
+    | mavlink.MAV_PROTOCOL_CAPABILITY_COMMAND_INT
+    | mavlink.MAV_PROTOCOL_CAPABILITY_PARAM_ENCODE_BYTEWISE
+    | mavlink.MAV_PROTOCOL_CAPABILITY_SET_POSITION_TARGET_LOCAL_NED
+    | mavlink.MAV_PROTOCOL_CAPABILITY_MAVLINK2
+)
+
+_MODES = (
+    (FlightMode.HOLD, mavlink.MAV_STANDARD_MODE_NON_STANDARD, b"Hold"),
+    (FlightMode.TAKEOFF, mavlink.MAV_STANDARD_MODE_TAKEOFF, b"Takeoff"),
+    (FlightMode.LAND, mavlink.MAV_STANDARD_MODE_LAND, b"Land"),
+    (FlightMode.OFFBOARD, mavlink.MAV_STANDARD_MODE_NON_STANDARD, b"Offboard"),
+)
+
+
+class ProtocolVersionMessage(mavlink.MAVLink_message):  # type: ignore[misc]  # pymavlink has no types
+    """PROTOCOL_VERSION (300), which pymavlink's dialects have dropped and MAVLink's `common` has kept."""
+
+    id = 300
+    msgname = "PROTOCOL_VERSION"
+    crc_extra = 217
+    unpacker = Struct("<HHH8s8s")
+
+    def __init__(self, version: int, minimum: int, maximum: int) -> None:
+        """Versions times 100."""
+        mavlink.MAVLink_message.__init__(self, self.id, self.msgname)
+        self.version, self.minimum, self.maximum = version, minimum, maximum
+
+    def pack(self, mav: Message, force_mavlink1: bool = False) -> bytes:
+        """The packet."""
+        payload = self.unpacker.pack(self.version, self.minimum, self.maximum, bytes(8), bytes(8))
+        return bytes(self._pack(mav, self.crc_extra, payload, force_mavlink1=force_mavlink1))
+
+
+def packed_version(version: tuple[int, int, int]) -> int:
+    """A release's version as AUTOPILOT_VERSION packs it."""
+    major, minor, patch = version
+    return major << 24 | minor << 16 | patch << 8 | _RELEASE
+
+
+def autopilot_version(system_id: int) -> Message:
+    """AUTOPILOT_VERSION."""
+    no_hash = [0] * 8
+    return mavlink.MAVLink_autopilot_version_message(
+        CAPABILITIES,
+        packed_version(FOLLOWED_PX4_VERSION),
+        packed_version(OWN_VERSION),
+        0,
+        0,
+        no_hash,
+        no_hash,
+        no_hash,
+        0,
+        0,
+        _UID_PREFIX << 32 | system_id,
+    )
+
+
+def protocol_version() -> Message:
+    """PROTOCOL_VERSION with PX4's figures."""
+    return ProtocolVersionMessage(200, 100, 203)
+
+
+def available_modes(index: int) -> list[Message]:
+    """AVAILABLE_MODES of the mode with that index from 1, or of all for 0; none for a wrong index."""
+    messages = [
+        mavlink.MAVLink_available_modes_message(
+            len(_MODES), place, standard, mode.custom_mode, 0, name.ljust(35, b"\0")
+        )
+        for place, (mode, standard, name) in enumerate(_MODES, start=1)
+    ]
+    if index == 0:
+        return messages
+    return messages[index - 1 : index] if index > 0 else []

@@ -1,0 +1,167 @@
+"""From what an offboard controller asks for to a `Setpoint`: PX4's rules for frames, masks and refusals.
+
+Pure functions, shared by the MAVLink service and by an adapter that flies in the same process.
+
+Two rules of PX4 seen from outside: a request with nothing finite in it is refused and counts as no setpoint;
+a request that leaves an axis open, or gives only one of the horizontal pair, is taken but braked, because its
+position controller cannot fly it. So one NaN or infinity among three velocities stops the vehicle in the air.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from enum import IntEnum, IntFlag
+from math import cos, isfinite, nan, sin
+
+from firmware_py.types import NAN3, Quaternion, Setpoint, Vec3, VehicleState
+
+ZERO3: Vec3 = (0.0, 0.0, 0.0)
+
+
+class TargetFrame(IntEnum):
+    """The MAV_FRAMEs that PX4 accepts for a local target."""
+
+    LOCAL_NED = 1
+    BODY_NED = 8
+
+
+class TargetMask(IntFlag):
+    """POSITION_TARGET_TYPEMASK: a set bit takes the component out."""
+
+    X = 1
+    Y = 2
+    Z = 4
+    VX = 8
+    VY = 16
+    VZ = 32
+    AX = 64
+    AY = 128
+    AZ = 256
+    FORCE = 512
+    YAW = 1024
+    YAW_RATE = 2048
+
+
+@dataclass(frozen=True, slots=True)
+class LocalTarget:
+    """The fields of SET_POSITION_TARGET_LOCAL_NED; vectors of shape (3,), metres, seconds, radians."""
+
+    frame: int
+    type_mask: int
+    position_m: Vec3 = ZERO3
+    velocity_m_s: Vec3 = ZERO3
+    acceleration_m_s2: Vec3 = ZERO3
+    yaw_rad: float = 0.0
+    yaw_rate_rad_s: float = 0.0
+
+
+def setpoint_from_target(target: LocalTarget, state: VehicleState, time_us: int) -> Setpoint | str:
+    """Turn a target message into a setpoint.
+
+    Args:
+        target: the message.
+        state: the vehicle now; its yaw and attitude turn body targets into the world.
+        time_us: vehicle time of reception.
+
+    Returns:
+        The setpoint, or the reason for refusing it, in PX4's words.
+    """
+    mask = target.type_mask
+    if target.frame == TargetFrame.LOCAL_NED:
+        position = _kept(target.position_m, mask, TargetMask.X)
+        velocity = _kept(target.velocity_m_s, mask, TargetMask.VX)
+        acceleration = _kept(target.acceleration_m_s2, mask, TargetMask.AX)
+    elif target.frame == TargetFrame.BODY_NED:
+        position = velocity = acceleration = NAN3
+        if not mask & (TargetMask.VX | TargetMask.VY | TargetMask.VZ):
+            velocity = _level_to_ned(target.velocity_m_s, state.yaw_rad)
+        if not mask & (TargetMask.AX | TargetMask.AY | TargetMask.AZ):
+            acceleration = _body_to_ned(target.acceleration_m_s2, state.attitude)
+    else:
+        return f"SET_POSITION_TARGET_LOCAL_NED coordinate frame {target.frame} unsupported"
+    if mask & TargetMask.FORCE and _any_finite(acceleration):
+        return "SET_POSITION_TARGET_LOCAL_NED force not supported"
+    return _settled(
+        Setpoint(
+            time_us,
+            position,
+            velocity,
+            acceleration,
+            nan if mask & TargetMask.YAW else _finite(target.yaw_rad),
+            nan if mask & TargetMask.YAW_RATE else _finite(target.yaw_rate_rad_s),
+        )
+    )
+
+
+def setpoint_from_body_velocity(
+    velocity_level_m_s: Vec3, yaw_rate_rad_s: float, heading_rad: float, time_us: int
+) -> Setpoint | str:
+    """The setpoint for a velocity in level axes that turn with the yaw, and a yaw rate.
+
+    The same as `setpoint_from_target` with BODY_NED and mask 0x5C7, without the packet.
+
+    Args:
+        velocity_level_m_s: forward, right, down; shape (3,).
+        yaw_rate_rad_s: clockwise from above.
+        heading_rad: yaw of the vehicle now.
+        time_us: vehicle time now.
+
+    Returns:
+        The setpoint, or the reason for refusing it.
+    """
+    velocity_ned_m_s = _level_to_ned(velocity_level_m_s, heading_rad)
+    return _settled(
+        Setpoint(time_us, velocity_ned_m_s=velocity_ned_m_s, yaw_rate_rad_s=_finite(yaw_rate_rad_s))
+    )
+
+
+def _settled(setpoint: Setpoint) -> Setpoint | str:
+    """Refuse it without anything to follow, brake where an axis is open or the horizontal pair is half."""
+    groups = (setpoint.position_ned_m, setpoint.velocity_ned_m_s, setpoint.acceleration_ned_m_s2)
+    if not any(_any_finite(group) for group in groups):
+        return "SET_POSITION_TARGET_LOCAL_NED invalid"
+    pairs_whole = all(isfinite(group[0]) == isfinite(group[1]) for group in groups)
+    axes_held = all(any(isfinite(group[axis]) for group in groups) for axis in range(3))
+    if pairs_whole and axes_held:
+        return setpoint
+    return Setpoint(
+        setpoint.time_us,
+        velocity_ned_m_s=ZERO3,
+        yaw_rad=setpoint.yaw_rad,
+        yaw_rate_rad_s=setpoint.yaw_rate_rad_s,
+    )
+
+
+def _finite(value: float) -> float:
+    return value if isfinite(value) else nan
+
+
+def _any_finite(vector: Vec3) -> bool:
+    return isfinite(vector[0]) or isfinite(vector[1]) or isfinite(vector[2])
+
+
+def _kept(vector: Vec3, mask: int, first_bit: int) -> Vec3:
+    x, y, z = vector
+    return (
+        nan if mask & first_bit else _finite(x),
+        nan if mask & first_bit << 1 else _finite(y),
+        nan if mask & first_bit << 2 else _finite(z),
+    )
+
+
+def _level_to_ned(vector: Vec3, yaw_rad: float) -> Vec3:
+    forward, right, down = vector
+    c, s = cos(yaw_rad), sin(yaw_rad)
+    return (_finite(c * forward - s * right), _finite(s * forward + c * right), _finite(down))
+
+
+def _body_to_ned(vector: Vec3, attitude: Quaternion) -> Vec3:
+    """Rotate by the unit quaternion (w, x, y, z): v' = v + 2w (q × v) + 2 q × (q × v)."""
+    w, qx, qy, qz = attitude
+    x, y, z = vector
+    tx, ty, tz = 2 * (qy * z - qz * y), 2 * (qz * x - qx * z), 2 * (qx * y - qy * x)
+    return (
+        _finite(x + w * tx + qy * tz - qz * ty),
+        _finite(y + w * ty + qz * tx - qx * tz),
+        _finite(z + w * tz + qx * ty - qy * tx),
+    )
