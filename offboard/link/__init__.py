@@ -1,0 +1,1 @@
+"""The parts of the MAVLink adapter: addresses, telemetry, axes, watchdog, recording."""

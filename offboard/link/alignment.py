@@ -1,0 +1,60 @@
+"""Between the vehicle's local axes and the arena's: a turn about the vertical and a shift."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from math import cos, pi, remainder, sin
+
+from scenarios.axes import Vec3, flip_vector, flip_yaw
+
+
+@dataclass(frozen=True, slots=True)
+class Pose:
+    """A place and a heading.
+
+    Attributes:
+        position_m: in whatever axes the name of the variable says, shape (3,).
+        yaw_rad: heading in the same axes.
+    """
+
+    position_m: Vec3
+    yaw_rad: float
+
+
+class Alignment:
+    """Turns the vehicle's local NED into arena axes.
+
+    The drone is known to stand on its start when the alignment is made. Its telemetry there and the known
+    pose give the turn and the shift; roll and pitch need none, as both axes are upright. The same holds for
+    real hardware, whose north is not the arena's x: put it on the start, looking the known way.
+    """
+
+    __slots__ = ("_cos", "_shift", "_sin", "_turn_rad")
+
+    def __init__(self, start_arena: Pose, start_ned: Pose) -> None:
+        """Fix turn and shift.
+
+        Args:
+            start_arena: where the drone stands, arena axes.
+            start_ned: what its telemetry says there, local NED.
+        """
+        self._turn_rad = start_arena.yaw_rad - flip_yaw(start_ned.yaw_rad)
+        self._cos, self._sin = cos(self._turn_rad), sin(self._turn_rad)
+        turned = self._turned(flip_vector(start_ned.position_m))
+        x, y, z = start_arena.position_m
+        self._shift = (x - turned[0], y - turned[1], z - turned[2])
+
+    def pose(self, ned: Pose) -> Pose:
+        """A local NED pose in arena axes, yaw in -pi..pi."""
+        x, y, z = self._turned(flip_vector(ned.position_m))
+        shift = self._shift
+        yaw_rad = remainder(flip_yaw(ned.yaw_rad) + self._turn_rad, 2 * pi)
+        return Pose((x + shift[0], y + shift[1], z + shift[2]), yaw_rad)
+
+    def vector(self, vector_ned: Vec3) -> Vec3:
+        """A local NED velocity in arena axes."""
+        return self._turned(flip_vector(vector_ned))
+
+    def _turned(self, vector: Vec3) -> Vec3:
+        x, y, z = vector
+        return (self._cos * x - self._sin * y, self._sin * x + self._cos * y, z)

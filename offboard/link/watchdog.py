@@ -1,0 +1,88 @@
+"""Two guards against a hung app, whose native MAVLink thread would go on sending the last setpoint.
+
+1. A thread: if the event loop has not turned for half a second, it stops the setpoints and asks for hold.
+2. A timer that needs no interpreter (`faulthandler`): a hang that holds the GIL stops that thread, too; then
+   the process is ended, and with the setpoints gone the vehicle's own offboard-loss failsafe acts.
+
+Both run only while the drone is being commanded. The loop shows that it turns by a task of its own.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+import faulthandler
+import sys
+import threading
+import time
+from collections.abc import Callable
+from typing import TextIO
+
+HANG_S = 0.5
+GIL_HANG_S = 2.0
+BEAT_S = 0.1
+
+
+class Watchdog:
+    """Watches the event loop it is started on."""
+
+    def __init__(self, stop_commanding: Callable[[], None], report: TextIO | None = None) -> None:
+        """Prepare.
+
+        Args:
+            stop_commanding: called once, on the watchdog's thread, when the loop hangs.
+            report: where the second guard writes where the app hung; by default standard error. It needs a
+                real file.
+        """
+        self._stop_commanding = stop_commanding
+        self._report = report
+        self._beat_s = 0.0
+        self._tripped_after_s = 0.0
+        self._stop = threading.Event()
+        self._thread: threading.Thread | None = None
+        self._task: asyncio.Task[None] | None = None
+
+    @property
+    def tripped_after_s(self) -> float:
+        """How long the loop had hung when the watchdog acted; 0 if it never did."""
+        return self._tripped_after_s
+
+    def start(self) -> None:
+        """Watch from now on. Call on the event loop."""
+        if self._thread is not None:
+            return
+        self._stop.clear()
+        self._beat()
+        self._task = asyncio.create_task(self._beating(), name="watchdog beat")
+        self._thread = threading.Thread(target=self._watch, name="watchdog", daemon=True)
+        self._thread.start()
+
+    def stop(self) -> None:
+        """Watch no more."""
+        self._stop.set()
+        if self._task is not None:
+            self._task.cancel()
+            self._task = None
+        if self._thread is not None:
+            faulthandler.cancel_dump_traceback_later()
+            self._thread = None
+
+    async def _beating(self) -> None:
+        while not self._tripped_after_s:
+            self._beat()
+            await asyncio.sleep(BEAT_S)
+
+    def _beat(self) -> None:
+        self._beat_s = time.monotonic()
+        with contextlib.suppress(OSError, ValueError, RuntimeError):  # no real standard error: guard 1 only
+            file = sys.stderr if self._report is None else self._report
+            faulthandler.dump_traceback_later(GIL_HANG_S, exit=True, file=file)
+
+    def _watch(self) -> None:
+        while not self._stop.wait(BEAT_S):
+            hung_s = time.monotonic() - self._beat_s
+            if hung_s > HANG_S:
+                self._tripped_after_s = hung_s
+                faulthandler.cancel_dump_traceback_later()  # this thread runs, so the GIL is free
+                self._stop_commanding()
+                return
