@@ -1,0 +1,85 @@
+# Two commands do everything: `make fly` and `make test`. Both set up what they need first, once.
+# They need Python 3.11 or later with venv and pip, and reach for nothing outside this folder.
+
+PYTHON ?= python3
+VENV := .venv
+MAVPROXY_VENV := .venv-mavproxy
+BIN := $(VENV)/bin
+ROOMS := scenarios firmware_py sitl vision offboard framerunner
+LOCK := uv pip compile --universal --python-version 3.11 --quiet --custom-compile-command 'make lock'
+
+.DEFAULT_GOAL := help
+.DELETE_ON_ERROR:
+.NOTPARALLEL:
+
+.PHONY: help
+help: ## say what can be made
+	@awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "  make %-14s %s\n", $$1, $$2 }' $(MAKEFILE_LIST)
+
+.PHONY: fly
+fly: $(VENV)/installed ## set up and fly test case 1; the result is left in runs/
+	$(BIN)/framerunner fly test-case-1
+
+.PHONY: setup
+setup: $(VENV)/installed-dev $(MAVPROXY_VENV)/installed ## set up for development, without running anything
+
+.PHONY: test
+test: setup lint test-fast test-realtime ## set up, then run all checks and all tests
+
+.PHONY: lint
+lint: $(VENV)/installed-dev ## ruff, mypy and the rules between the rooms
+	$(BIN)/ruff check .
+	$(BIN)/ruff format --check .
+	$(BIN)/mypy
+	$(BIN)/lint-imports
+
+.PHONY: test-fast
+test-fast: $(VENV)/installed-dev ## the tests that need no real time, in parallel
+	$(BIN)/pytest -n 2 -m "not realtime"
+
+.PHONY: test-realtime
+test-realtime: setup ## the tests that fly in real time, one after another
+	FRAMERUNNER_MAVPROXY=$(abspath $(MAVPROXY_VENV)/bin/mavproxy.py) $(BIN)/pytest -m realtime
+
+.PHONY: format
+format: $(VENV)/installed-dev ## write the code as the checks want it
+	$(BIN)/ruff format .
+	$(BIN)/ruff check --fix .
+
+.PHONY: hooks
+hooks: $(VENV)/installed-dev ## check every commit before it is made
+	$(BIN)/pre-commit install
+
+.PHONY: lock
+lock: ## choose newer versions of everything installed (needs uv)
+	$(LOCK) --upgrade pyproject.toml --extra dev -o locks/framerunner.txt
+	$(LOCK) --upgrade locks/mavproxy.in --override locks/mavproxy-without.txt -o locks/mavproxy.txt
+
+.PHONY: clean
+clean: ## remove what was installed and built; runs/ is kept
+	rm -rf $(VENV) $(MAVPROXY_VENV) build dist *.egg-info
+	rm -rf .mypy_cache .ruff_cache .pytest_cache .import_linter_cache .hypothesis
+	find $(ROOMS) tests -name __pycache__ -type d -prune -exec rm -rf {} +
+
+# Set-up is repeated when what it was made from has changed; the stamp files remember when it was done.
+
+$(BIN)/python:
+	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11))' || { \
+		echo "framerunner needs Python 3.11 or later; this is $$($(PYTHON) --version). Try: make PYTHON=python3.12 $(MAKECMDGOALS)"; \
+		exit 1; }
+	@$(PYTHON) -m venv $(VENV) || { rm -rf $(VENV); \
+		echo "Python could not make a virtual environment. On Debian and Ubuntu: sudo apt install python3-venv"; \
+		exit 1; }
+
+$(VENV)/installed: $(BIN)/python pyproject.toml locks/framerunner.txt
+	$(BIN)/pip install --constraint locks/framerunner.txt --editable .
+	@touch $@
+
+$(VENV)/installed-dev: $(BIN)/python pyproject.toml locks/framerunner.txt
+	$(BIN)/pip install --constraint locks/framerunner.txt --editable '.[dev]'
+	@touch $@ $(VENV)/installed
+
+$(MAVPROXY_VENV)/installed: $(BIN)/python locks/mavproxy.txt
+	$(BIN)/python -m venv $(MAVPROXY_VENV)
+	$(MAVPROXY_VENV)/bin/pip install --no-deps --requirement locks/mavproxy.txt
+	@touch $@
