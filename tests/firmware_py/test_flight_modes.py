@@ -1,0 +1,150 @@
+from math import cos, hypot, inf, isfinite, nan, pi, sin
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from firmware_py.airframe import load_airframe
+from firmware_py.flight_modes import Guidance, SpeedLimits, bounded, speed_limits, usable
+from firmware_py.parameters import Parameters
+from firmware_py.types import Setpoint, VehicleState
+
+LIMITS = SpeedLimits(2.0, 1.5, 1.0, 2.0, 1.2, 0.7)
+
+any_float = st.floats(allow_nan=True, allow_infinity=True)
+any_vec3 = st.tuples(any_float, any_float, any_float)
+
+
+def at(north=0.0, east=0.0, down=0.0, yaw=0.0, velocity=(0.0, 0.0, 0.0)):
+    return VehicleState(position_ned_m=(north, east, down), velocity_ned_m_s=velocity, yaw_rad=yaw)
+
+
+def offboard(**setpoint):
+    guidance = Guidance(LIMITS)
+    guidance.enter_offboard()
+    guidance.accept(Setpoint(0, **setpoint))
+    return guidance
+
+
+def test_limits_are_the_smaller_of_airframe_and_parameters():
+    airframe = load_airframe("abejorro")
+    limits = speed_limits(airframe, Parameters())
+    assert limits.horizontal_m_s == airframe.limits.speed_horizontal_m_s
+    assert limits.up_m_s == airframe.limits.speed_up_m_s
+    assert limits.land_m_s == 0.7
+    slow = speed_limits(airframe, Parameters({"MPC_XY_VEL_MAX": 0.5, "MPC_Z_VEL_MAX_DN": 0.3}))
+    assert slow.horizontal_m_s == 0.5
+    assert slow.down_m_s == slow.land_m_s == 0.3
+
+
+@given(yaw=st.floats(-pi, pi))
+def test_a_velocity_north_is_seen_from_the_turned_body(yaw):
+    forward, right, down = offboard(velocity_ned_m_s=(1.0, 0.0, 0.2)).step(at(yaw=yaw)).velocity_level_m_s
+    assert (forward, right, down) == pytest.approx((cos(yaw), -sin(yaw), 0.2))
+
+
+def test_an_axis_without_a_velocity_brakes():
+    command = offboard(velocity_ned_m_s=(nan, 0.4, nan)).step(at(velocity=(1.0, 0.0, 0.0)))
+    assert command.velocity_level_m_s == (0.0, 0.4, 0.0)
+
+
+def test_a_position_pulls_and_a_velocity_beside_it_pushes():
+    guidance = offboard(position_ned_m=(1.0, nan, -1.0), velocity_ned_m_s=(0.3, 0.5, nan))
+    assert guidance.step(at(0.5, 7.0, -0.6)).velocity_level_m_s == pytest.approx((0.8, 0.5, -0.4))
+
+
+def test_speeds_are_limited_and_keep_their_direction():
+    velocity = offboard(velocity_ned_m_s=(30.0, 40.0, -9.0)).step(at()).velocity_level_m_s
+    assert velocity == pytest.approx((1.2, 1.6, -1.5))
+    assert offboard(position_ned_m=(0.0, 0.0, 99.0)).step(at()).velocity_level_m_s[2] == 1.0
+
+
+@pytest.mark.parametrize(
+    ("yaw", "target", "sign"), [(3.0, -3.0, 1), (-3.0, 3.0, -1), (0.1, 0.2, 1), (0.0, 2 * pi - 0.1, -1)]
+)
+def test_yaw_turns_the_shortest_way(yaw, target, sign):
+    rate = offboard(velocity_ned_m_s=(0.0, 0.0, 0.0), yaw_rad=target).step(at(yaw=yaw)).yaw_rate_rad_s
+    assert rate * sign > 0
+    assert abs(rate) <= LIMITS.yaw_rate_rad_s
+
+
+def test_yaw_rate_alone_with_yaw_and_neither():
+    still = (0.0, 0.0, 0.0)
+    assert offboard(velocity_ned_m_s=still, yaw_rate_rad_s=0.7).step(at()).yaw_rate_rad_s == 0.7
+    assert offboard(velocity_ned_m_s=still, yaw_rate_rad_s=9.0).step(at()).yaw_rate_rad_s == 2.0
+    assert offboard(velocity_ned_m_s=still).step(at(yaw=1.0)).yaw_rate_rad_s == 0.0
+    both = offboard(velocity_ned_m_s=still, yaw_rad=0.1, yaw_rate_rad_s=0.5).step(at())
+    assert both.yaw_rate_rad_s == pytest.approx(0.75)
+
+
+@given(position=any_vec3, velocity=any_vec3, yaw=any_float, rate=any_float)
+def test_whatever_is_asked_the_command_is_finite_and_limited(position, velocity, yaw, rate):
+    guidance = offboard(position_ned_m=position, velocity_ned_m_s=velocity, yaw_rad=yaw, yaw_rate_rad_s=rate)
+    command = guidance.step(at(1.0, -2.0, -3.0, yaw=0.5))
+    forward, right, down = command.velocity_level_m_s
+    assert all(map(isfinite, (forward, right, down, command.yaw_rate_rad_s)))
+    assert hypot(forward, right) <= LIMITS.horizontal_m_s * (1 + 1e-9)
+    assert -LIMITS.up_m_s <= down <= LIMITS.down_m_s
+    assert abs(command.yaw_rate_rad_s) <= LIMITS.yaw_rate_rad_s
+    assert all(map(isfinite, guidance.setpoint.velocity_ned_m_s))
+
+
+def test_what_counts_as_a_setpoint():
+    assert usable(Setpoint(0, velocity_ned_m_s=(nan, 0.0, nan)))
+    assert usable(Setpoint(0, position_ned_m=(nan, nan, -1.0)))
+    assert not usable(Setpoint(0, yaw_rad=1.0))
+    assert not usable(Setpoint(0, acceleration_ned_m_s2=(1.0, 0.0, 0.0)))
+
+
+def test_infinity_is_not_controlled_and_so_brakes():
+    safe = bounded(Setpoint(0, position_ned_m=(inf, nan, 1.0), velocity_ned_m_s=(inf, 1.0, -inf)), LIMITS)
+    assert safe.position_ned_m[0] != safe.position_ned_m[0]
+    assert safe.velocity_ned_m_s == (0.0, 1.0, 0.0)
+
+
+def test_hold_brakes_first_and_then_keeps_the_place():
+    guidance = Guidance(LIMITS)
+    guidance.enter_hold(at(velocity=(1.0, 0.0, 0.0), yaw=0.3))
+    assert guidance.step(at(0.5, velocity=(1.0, 0.0, 0.0), yaw=0.3)).velocity_level_m_s[:2] == (0.0, 0.0)
+    guidance.step(at(1.0, velocity=(0.1, 0.0, 0.0), yaw=0.3))
+    assert guidance.setpoint.position_ned_m == (1.0, 0.0, 0.0)
+    command = guidance.step(at(1.5, 0.0, 0.2, yaw=0.0))
+    assert command.velocity_level_m_s == pytest.approx((-0.5, 0.0, -0.2))
+    assert command.yaw_rate_rad_s > 0
+
+
+def test_takeoff_climbs_straight_up_says_when_it_is_there_and_hold_keeps_its_height():
+    guidance = Guidance(LIMITS)
+    guidance.enter_takeoff(at(1.0, 2.0, 0.0), -2.5)
+    command = guidance.step(at(1.1, 2.0, 0.0))
+    assert command.velocity_level_m_s == pytest.approx((-0.1, 0.0, -1.2))
+    assert not guidance.target_reached
+    guidance.step(at(1.0, 2.0, -2.4))
+    assert guidance.target_reached
+    guidance.enter_hold(at(1.0, 2.0, -2.4), keep_target=True)
+    assert guidance.step(at(1.0, 2.0, -2.4)).velocity_level_m_s[2] == pytest.approx(-0.1)
+
+
+def test_takeoff_to_below_stays():
+    guidance = Guidance(LIMITS)
+    guidance.enter_takeoff(at(down=-5.0), -2.5)
+    assert guidance.step(at(down=-5.0)).velocity_level_m_s == (0.0, 0.0, 0.0)
+    assert guidance.target_reached
+
+
+def test_land_descends_and_keeps_its_place():
+    guidance = Guidance(LIMITS)
+    guidance.enter_land(at(1.0, 1.0, -3.0))
+    guidance.step(at(1.0, 1.0, -3.0))
+    command = guidance.step(at(0.8, 1.0, -2.0))
+    assert command.velocity_level_m_s == pytest.approx((0.2, 0.0, 0.7))
+    assert guidance.command_down_m_s == 0.7
+
+
+def test_setpoints_are_shown_only_while_followed():
+    guidance = Guidance(LIMITS)
+    guidance.enter_hold(at())
+    guidance.accept(Setpoint(7, velocity_ned_m_s=(9.0, 0.0, 0.0)))
+    assert guidance.setpoint.time_us == 0
+    guidance.enter_offboard()
+    assert guidance.setpoint.velocity_ned_m_s == (2.0, 0.0, 0.0)
