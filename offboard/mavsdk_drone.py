@@ -334,7 +334,7 @@ class MavsdkDrone:
     async def _until(self, condition: Callable[[], bool], limit_s: float) -> None:
         async with asyncio.timeout(limit_s):
             while not condition():
-                await asyncio.sleep(0.02)
+                await self._feed.next_tick(0.05)
 
     async def _start_recorder(self) -> None:
         if self._tlog_path is None or self._mavsdk is None:

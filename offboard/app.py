@@ -1,0 +1,220 @@
+"""Flies a mission: drone and camera in, an outcome with its reason out. Whatever happens, it ends safely."""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import AsyncIterator, Callable
+from dataclasses import dataclass
+from typing import Literal
+
+from offboard.drone import Drone, DroneError, DroneState, VelocityCommand
+from offboard.engine import MissionEngine, MissionRunError
+from offboard.eyes import Camera, CameraEyes, CameraLostError, ClosedEyes, Eyes
+from offboard.mission import Mission
+from offboard.pilot import Imu
+from vision.types import Detections
+
+INTERRUPTED = "interrupted"
+MICROSECONDS = 1_000_000
+
+
+@dataclass(frozen=True, slots=True)
+class Moment:
+    """One tick of a flight, for displays and records.
+
+    Attributes:
+        state: of the drone.
+        command: as sent.
+        detections: of the latest image.
+        mission_state: such as "red.turning".
+        flight_time_s: vehicle time since motors on; 0 before.
+    """
+
+    state: DroneState
+    command: VelocityCommand
+    detections: Detections
+    mission_state: str
+    flight_time_s: float
+
+
+Observer = Callable[[Moment], None]
+
+
+@dataclass(frozen=True, slots=True)
+class Outcome:
+    """How a flight ended.
+
+    Attributes:
+        ended: "finished" if the mission reached its end.
+        reason: why it did not; empty if it did.
+        mission_state: the state it was in.
+        flight_time_s: vehicle time from motors on to its end.
+        ticks: how many were flown.
+    """
+
+    ended: Literal["finished", "timed out", "aborted"]
+    reason: str
+    mission_state: str
+    flight_time_s: float
+    ticks: int
+
+    @property
+    def interrupted(self) -> bool:
+        """Somebody stopped it with Ctrl-C."""
+        return self.reason.startswith(INTERRUPTED)
+
+
+async def fly_mission(
+    drone: Drone,
+    camera: Camera | None,
+    mission: Mission,
+    *,
+    limit_s: float = 180.0,
+    observer: Observer | None = None,
+    eyes: Eyes | None = None,
+) -> Outcome:
+    """Connect, fly the mission, let go.
+
+    If anything goes wrong after the start (drone, camera, mission, time limit, Ctrl-C), commanding stops,
+    hold is asked for, and the outcome says why.
+
+    Args:
+        drone: not yet connected; closed at the end.
+        camera: source of images; None for a mission that does not look.
+        mission: checked.
+        limit_s: vehicle time from motors on, seconds.
+        observer: called at every tick; must be quick.
+        eyes: instead of `camera`: other means to see, such as those of a lockstep simulation.
+
+    Returns:
+        How it ended.
+
+    Raises:
+        DroneError: the drone cannot be reached or is not ready.
+        CameraLostError: the camera gives no image at the start.
+    """
+    if eyes is None:
+        eyes = ClosedEyes() if camera is None else CameraEyes(camera)
+    flight = _Flight(drone, eyes, MissionEngine(mission), limit_s, observer)
+    try:
+        await drone.connect()
+        await eyes.open()
+        await drone.ready()
+        return await flight.run()
+    finally:
+        await eyes.close()
+        await drone.close()
+
+
+class _Flight:
+    """One flight under way."""
+
+    def __init__(
+        self, drone: Drone, eyes: Eyes, engine: MissionEngine, limit_s: float, observer: Observer | None
+    ) -> None:
+        self._drone = drone
+        self._eyes = eyes
+        self._engine = engine
+        self._limit_us = round(limit_s * MICROSECONDS)
+        self._observer = observer
+        self._flying = False
+        self._motors_asked = False
+        self._first_us: int | None = None
+        self._started_us: int | None = None
+        self._now_us = 0
+        self._ticks = 0
+
+    async def run(self) -> Outcome:
+        """Fly to the end, whichever it is."""
+        try:
+            timed_out = await self._fly()
+        except (DroneError, CameraLostError, MissionRunError) as error:
+            return await self._stop("aborted", str(error))
+        except asyncio.CancelledError:
+            task = asyncio.current_task()
+            if task is not None:
+                task.uncancel()  # the outcome tells of it
+            return await self._stop("aborted", INTERRUPTED)
+        except BaseException:
+            await self._stop("aborted", "unexpected error")
+            raise
+        if timed_out:
+            return await self._stop("timed out", f"not finished within {self._limit_us / MICROSECONDS:g} s")
+        return self._outcome("finished", "")
+
+    async def _fly(self) -> bool:
+        """Tick until the mission is finished; True if time was up before."""
+        ticks = self._drone.ticks()
+        try:
+            async for state in ticks:
+                if self._time_is_up(state.time_us):
+                    return True
+                await self._tick(state)
+                if self._engine.finished:
+                    await self._come_down()
+                    return False
+        finally:
+            await _close(ticks)
+        raise DroneError("the drone's ticks ended")
+
+    async def _tick(self, state: DroneState) -> None:
+        detections = self._eyes.latest(state.time_us)
+        imu = Imu(state.x, state.y, state.z, state.yaw)
+        command = self._engine.tick(imu, detections, state.time_us)
+        wanted = self._engine.pilot.cmd.on
+        if wanted and not self._flying:
+            self._motors_asked = True
+            await self._drone.motors_on()
+            self._flying = True
+            self._started_us = None  # counts from the next tick, the first with motors on
+        elif self._flying and not wanted:
+            await self._come_down()
+        if self._flying:
+            self._drone.command(command)
+        self._ticks += 1
+        if self._observer is not None:
+            flight_time_s = self._flight_time_s()
+            self._observer(Moment(state, command, detections, self._engine.state, flight_time_s))
+
+    def _time_is_up(self, time_us: int) -> bool:
+        """Whether the limit is over; it counts from motors on, and before that from the first tick."""
+        self._now_us = time_us
+        if self._first_us is None:
+            self._first_us = time_us
+        if self._flying and self._started_us is None:
+            self._started_us = time_us
+        since_us = self._first_us if self._started_us is None else self._started_us
+        return time_us - since_us > self._limit_us
+
+    async def _come_down(self) -> None:
+        """Motors off or, if the mission says so or ends in the air, land."""
+        if not self._flying:
+            return
+        cmd = self._engine.pilot.cmd
+        self._flying = False
+        if cmd.land or cmd.on:
+            await self._drone.land()
+        else:
+            await self._drone.motors_off()
+
+    async def _stop(self, ended: Literal["timed out", "aborted"], reason: str) -> Outcome:
+        """Stop commanding and ask for hold."""
+        if self._motors_asked:
+            self._flying = False
+            try:
+                await self._drone.hold()
+            except DroneError as error:
+                reason = f"{reason}; hold: {error}"
+        return self._outcome(ended, reason)
+
+    def _outcome(self, ended: Literal["finished", "timed out", "aborted"], reason: str) -> Outcome:
+        return Outcome(ended, reason, self._engine.state, self._flight_time_s(), self._ticks)
+
+    def _flight_time_s(self) -> float:
+        return 0.0 if self._started_us is None else (self._now_us - self._started_us) / MICROSECONDS
+
+
+async def _close(ticks: AsyncIterator[DroneState]) -> None:
+    close = getattr(ticks, "aclose", None)
+    if close is not None:
+        await close()
