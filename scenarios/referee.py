@@ -1,0 +1,304 @@
+"""The referee: watches true states, and says what a try was worth."""
+
+from __future__ import annotations
+
+from enum import Enum
+from math import dist, isfinite
+
+from scenarios.axes import Vec3
+from scenarios.boundary import Boundary
+from scenarios.crossing import Gate, Passage
+from scenarios.ground import ground_height
+from scenarios.models import COLOURS, Scenario
+from scenarios.report import Crossing, RefereeReport, RefereeSnapshot
+from scenarios.touchdown import (
+    HARD_HIT_M_S,
+    TIPPED_OVER,
+    CrashWatch,
+    Landing,
+    find_landing,
+    is_resting,
+    up_component,
+)
+from scenarios.truth import TrueState
+from scenarios.verdict import TryFacts, judge
+
+PENALTY_S_PER_S = 1.0  # outside the arena time counts double
+CONTACT_GAP_US = 500_000  # a frame touched again sooner is still the same contact
+TAKEN_OFF_M = 0.1  # rise that makes a take-off
+IN_AIR_M = 0.3  # height above ground at which a try that begins is already a flight
+REST_US = 300_000  # how long the drone must be still; a fall passes through zero speed for less
+SETTLE_LIMIT_US = 2_000_000  # after this it counts as settled however it moves
+MAX_GAP_US = 1_000_000  # across a longer hole in the states no crossing is believed
+
+
+class _Phase(Enum):
+    WAITING = "the motors have not been on"
+    FLYING = "motors on"
+    STOPPED = "motors off, coming to rest"
+    SETTLED = "motors off and at rest"
+
+
+class Referee:
+    """Watches one try.
+
+    Feed it with `update` at any rate, from the simulated truth or a real drone's telemetry (contacts empty).
+    Between two states the drone is taken to fly straight. A try runs from motors on to motors off; motors on
+    again before the drone has come to rest goes on with the same try, and motors off without a take-off lets
+    a new one begin. It is over with a crash, past the limit, or at rest after a flight: later states change
+    nothing.
+
+    Crossings count while the motors are on. A frame crossed again is harmless; one crossed before its turn
+    makes the order wrong for good. The frames' turns are red, green, blue, those that the scenario has.
+
+    Args:
+        scenario: what is flown.
+        envelope_m: length, width and height of the drone.
+    """
+
+    def __init__(self, scenario: Scenario, envelope_m: Vec3) -> None:
+        self._scenario = scenario
+        self._envelope_m = envelope_m
+        self._limit_us = round(scenario.try_limit_s * 1e6)
+        self._boundary = Boundary(scenario.arena)
+        frames = {frame.colour: frame for frame in scenario.frames}
+        self._expected = tuple(colour for colour in COLOURS if colour in frames)
+        self._gates = tuple((colour, Gate(frames[colour])) for colour in self._expected)
+        self._ignored = 0
+        self._over = False
+        self._time_us = -1
+        self._position_m: Vec3 = (0.0, 0.0, 0.0)
+        self._phase = _Phase.WAITING
+        self._reset()
+
+    def _reset(self) -> None:
+        """Forget the try, if there was one."""
+        self._crash_watch = CrashWatch(self._scenario, self._envelope_m)
+        self._start_us = 0
+        self._start_height_m = 0.0
+        self._stop_us: int | None = None
+        self._still_since_us: int | None = None
+        self._taken_off = False
+        self._crossings: list[Crossing] = []
+        self._contacts: list[str] = []
+        self._touched_us: dict[str, int] = {}
+        self._outside_us = 0.0
+        self._path_m = 0.0
+        self._longest_gap_us = 0
+        self._wrong_order = ""
+        self._crash = ""
+        self._timed_out = False
+        self._landing: Landing | None = None
+
+    def update(self, state: TrueState) -> None:
+        """Look at the next state. States that are not finite or go back in time are counted and ignored."""
+        if self._over:
+            return
+        if state.time_us < self._time_us or not _is_finite(state):
+            self._ignored += 1
+            return
+        phase = self._phase
+        if phase is _Phase.FLYING:
+            self._fly(state)
+        elif phase is _Phase.STOPPED:
+            self._come_to_rest(state)
+        elif state.motors_on:
+            self._begin(state)
+        self._time_us = state.time_us
+        self._position_m = state.position_arena_m
+
+    def _begin(self, state: TrueState) -> None:
+        """Start a try: the motors have come on."""
+        self._reset()
+        self._phase = _Phase.FLYING
+        self._start_us = state.time_us
+        x_m, y_m, z_m = state.position_arena_m
+        self._start_height_m = z_m
+        underside_m = z_m - self._envelope_m[2] / 2
+        self._taken_off = underside_m - ground_height(self._scenario, x_m, y_m) > IN_AIR_M
+        self._restart_path(state)
+        self._watch(state)
+
+    def _restart_path(self, state: TrueState) -> None:
+        """Do not join the next point to the points before this one."""
+        for _, gate in self._gates:
+            gate.forget()
+            gate.follow(state.position_arena_m, state.position_arena_m)
+
+    def _fly(self, state: TrueState) -> None:
+        """Take the step from the last state, at which the motors were on."""
+        start_m, end_m = self._position_m, state.position_arena_m
+        step_us = state.time_us - self._time_us
+        self._longest_gap_us = max(self._longest_gap_us, step_us)
+        if step_us > MAX_GAP_US:
+            self._restart_path(state)
+        for colour, gate in self._gates:
+            passage = gate.follow(start_m, end_m)
+            if passage is not None:
+                self._cross(colour, passage, step_us)
+        self._outside_us += self._boundary.outside_share(start_m, end_m) * step_us
+        self._path_m += dist(start_m, end_m)
+        if end_m[2] - self._start_height_m > TAKEN_OFF_M:
+            self._taken_off = True
+        self._watch(state)
+        if self._over:
+            return
+        if state.time_us - self._start_us > self._limit_us:
+            self._timed_out = self._over = True
+        elif not state.motors_on:
+            self._phase = _Phase.STOPPED
+            self._stop_us = state.time_us
+            self._still_since_us = None
+
+    def _cross(self, colour: str, passage: Passage, step_us: int) -> None:
+        """Note a passage, if it is the first one through this frame."""
+        if any(crossing.colour == colour for crossing in self._crossings):
+            return
+        time_s = (self._time_us - self._start_us + passage.fraction * step_us) * 1e-6
+        turn = self._next_colour()
+        if colour != turn and not self._wrong_order:
+            self._wrong_order = f"crossed {colour} before {turn} at {time_s:.1f} s"
+        self._crossings.append(Crossing(colour, time_s, passage.offset_m, passage.side))
+
+    def _next_colour(self) -> str | None:
+        """The frame whose turn it is."""
+        crossed = {crossing.colour for crossing in self._crossings}
+        return next((colour for colour in self._expected if colour not in crossed), None)
+
+    def _watch(self, state: TrueState) -> None:
+        """Look for contacts with frames and for crashes."""
+        for name in state.contacts:
+            if name not in self._expected:
+                continue
+            last_us = self._touched_us.get(name)
+            if last_us is None or state.time_us - last_us >= CONTACT_GAP_US:
+                self._contacts.append(name)
+            self._touched_us[name] = state.time_us
+        crash = self._crash_watch.follow(state, self._taken_off)
+        if crash is not None:
+            self._crash = crash
+            self._over = True
+
+    def _come_to_rest(self, state: TrueState) -> None:
+        """Follow the drone after motors off until it lies still, or the motors come on again."""
+        self._watch(state)
+        if self._over or self._stop_us is None:
+            return
+        if state.motors_on:
+            self._phase = _Phase.FLYING
+            self._stop_us = None
+            self._restart_path(state)
+            return
+        if not is_resting(state.velocity_arena_m_s):
+            self._still_since_us = None
+        elif self._still_since_us is None:
+            self._still_since_us = state.time_us
+        still_us = 0 if self._still_since_us is None else state.time_us - self._still_since_us
+        if still_us >= REST_US or state.time_us - self._stop_us >= SETTLE_LIMIT_US:
+            self._settle(state)
+
+    def _settle(self, state: TrueState) -> None:
+        """Judge where and how the drone lies; without a take-off a new try may begin."""
+        self._phase = _Phase.SETTLED
+        if not self._taken_off:
+            return
+        self._over = True
+        if up_component(state.attitude_arena) < TIPPED_OVER:
+            self._crash = "came to rest tipped over"
+        elif -state.velocity_arena_m_s[2] > HARD_HIT_M_S:
+            self._crash = "fell with its motors off"
+        else:
+            self._landing = find_landing(self._scenario, self._envelope_m, state.position_arena_m)
+
+    @property
+    def settled(self) -> bool:
+        """Whether the motors are off and the drone at rest, within 2 s of vehicle time."""
+        return self._phase is _Phase.SETTLED
+
+    @property
+    def over(self) -> bool:
+        """Whether nothing that comes can change the verdict: crashed, past the limit, or landed."""
+        return self._over
+
+    @property
+    def try_time_s(self) -> float:
+        """Vehicle time from motors on to motors off or, until then, to the last state; at most the limit."""
+        if self._phase is _Phase.WAITING:
+            return 0.0
+        end_us = self._time_us if self._stop_us is None else self._stop_us
+        return min(end_us - self._start_us, self._limit_us) * 1e-6
+
+    @property
+    def crossings(self) -> tuple[Crossing, ...]:
+        """First crossings so far, in order of time."""
+        return tuple(self._crossings)
+
+    def snapshot(self) -> RefereeSnapshot:
+        """How the try stands now."""
+        crossed = tuple(crossing.colour for crossing in self._crossings)
+        return RefereeSnapshot(
+            try_time_s=self.try_time_s,
+            penalty_s=self._outside_us * 1e-6 * PENALTY_S_PER_S,
+            crossed=crossed,
+            next_colour=self._next_colour(),
+            contacts=len(self._contacts),
+            inside=self._boundary.holds(self._position_m),
+            motors_on=self._phase is _Phase.FLYING,
+            settled=self.settled,
+            over=self.over,
+        )
+
+    def report(self, mission_state: str = "", ended: str | None = None) -> RefereeReport:
+        """Judge what was seen so far.
+
+        Args:
+            mission_state: state the mission is in, such as "red.turning".
+            ended: why the flight was broken off, in a few words ("link lost"), when it was.
+        """
+        facts = self._facts()
+        verdict, reason = judge(facts, mission_state, ended)
+        penalty_s = facts.outside_s * PENALTY_S_PER_S
+        return RefereeReport(
+            verdict=verdict,
+            reason=reason,
+            frames_crossed=facts.crossed,
+            crossing_times_s=tuple(crossing.time_s for crossing in self._crossings),
+            crossing_offsets_m=tuple(crossing.offset_m for crossing in self._crossings),
+            crossing_sides=tuple(crossing.side for crossing in self._crossings),
+            contacts=len(self._contacts),
+            contact_frames=facts.contact_frames,
+            outside_s=facts.outside_s,
+            try_time_s=facts.try_time_s,
+            penalty_s=penalty_s,
+            total_time_s=facts.try_time_s + penalty_s,
+            landed_on_base=self._landing is not None and self._landing.surface == "base",
+            landing_error_m=self._landing.error_m if self._landing else None,
+            path_length_m=self._path_m,
+            ignored_states=self._ignored,
+            longest_gap_s=self._longest_gap_us * 1e-6,
+        )
+
+    def _facts(self) -> TryFacts:
+        return TryFacts(
+            expected=self._expected,
+            crossed=tuple(crossing.colour for crossing in self._crossings),
+            contact_frames=tuple(self._contacts),
+            outside_s=self._outside_us * 1e-6,
+            try_time_s=self.try_time_s,
+            began=self._phase is not _Phase.WAITING,
+            taken_off=self._taken_off,
+            motors_on=self._phase is _Phase.FLYING,
+            settled=self.settled,
+            timed_out=self._timed_out,
+            wrong_order=self._wrong_order,
+            crash=self._crash,
+            landing=self._landing,
+        )
+
+
+def _is_finite(state: TrueState) -> bool:
+    """Whether no number of a state is NaN or infinite: either would make the sum so."""
+    x, y, z = state.position_arena_m
+    vx, vy, vz = state.velocity_arena_m_s
+    qw, qx, qy, qz = state.attitude_arena
+    return isfinite(x + y + z + vx + vy + vz + qw + qx + qy + qz)

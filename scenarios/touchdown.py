@@ -1,0 +1,154 @@
+"""How a flight meets the ground: crashes while it lasts, and where the drone stands in the end."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from math import hypot
+from typing import Literal
+
+from scenarios.axes import Quaternion, Vec3
+from scenarios.ground import ground_height, is_over_base
+from scenarios.models import Scenario
+from scenarios.truth import TrueState
+
+HARD_HIT_M_S = 2.0  # a fall of 0.2 m; cutting the motors just above the base gives little over 1 m/s
+UPSIDE_DOWN_US = 500_000
+LYING_US = 5_000_000  # longer than an autopilot takes to disarm by itself after a landing
+RESTING_M_S = 0.05
+TOUCHING_M = 0.02  # how near the ground counts as touching when nobody reports contacts
+TIPPED_OVER = 0.5  # cosine of the tilt at rest: more than 60 degrees
+STANDING_TOLERANCE_M = 0.3  # error of a real drone's height that is forgiven when it stands
+
+Surface = Literal["base", "floor"]
+
+
+@dataclass(frozen=True, slots=True)
+class Landing:
+    """Where the drone came to rest.
+
+    Attributes:
+        surface: what it stands on.
+        error_m: plan distance of its centre from the base's centre.
+    """
+
+    surface: Surface
+    error_m: float
+
+
+def up_component(attitude: Quaternion) -> float:
+    """Cosine of the tilt: the vertical part of the body's up axis; negative when upside-down."""
+    _, x, y, _ = attitude
+    return 1.0 - 2.0 * (x * x + y * y)
+
+
+def is_resting(velocity_m_s: Vec3) -> bool:
+    """Whether a velocity is none, but for noise."""
+    vx, vy, vz = velocity_m_s
+    return vx * vx + vy * vy + vz * vz < RESTING_M_S * RESTING_M_S
+
+
+def find_landing(scenario: Scenario, envelope_m: Vec3, position_m: Vec3) -> Landing | None:
+    """Say what a drone at rest stands on, by its position alone, so that it serves a real drone as well.
+
+    It stands on the base when its centre is over the base's square and its underside nearer to the top than
+    to the floor. The error is measured from the base's centre, since the base is what has to be met; in all
+    challenge scenarios that is the start as well.
+
+    Returns:
+        The landing, or None when there is nothing under it to stand on.
+    """
+    x_m, y_m, z_m = position_m
+    base = scenario.base
+    underside_m = z_m - envelope_m[2] / 2
+    error_m = hypot(x_m - base.x_m, y_m - base.y_m)
+    if is_over_base(base, x_m, y_m) and base.top_m / 2 < underside_m < base.top_m + STANDING_TOLERANCE_M:
+        return Landing("base", error_m)
+    if underside_m < STANDING_TOLERANCE_M:
+        return Landing("floor", error_m)
+    return None
+
+
+class CrashWatch:
+    """Watches one try for crashes.
+
+    A crash is one of:
+    - meeting the floor or the base at more than 2 m/s downward (frames are solid but no crash: a contact);
+    - half a second upside-down;
+    - after take-off, lying still on the floor for 5 s with the motors on, away from the base.
+
+    What is touched comes from `TrueState.contacts` or, when these are empty as for a real drone, from being
+    within 2 cm of the ground.
+    """
+
+    __slots__ = (
+        "_envelope_m",
+        "_inverted_since_us",
+        "_lying_since_us",
+        "_near_m",
+        "_scenario",
+        "_sinking_m_s",
+        "_touched",
+    )
+
+    def __init__(self, scenario: Scenario, envelope_m: Vec3) -> None:
+        self._scenario = scenario
+        self._envelope_m = envelope_m
+        self._near_m = scenario.base.top_m + envelope_m[2] / 2 + TOUCHING_M
+        self._touched = True  # a try begins on the ground: that is no impact
+        self._sinking_m_s = 0.0
+        self._inverted_since_us: int | None = None
+        self._lying_since_us: int | None = None
+
+    def follow(self, state: TrueState, taken_off: bool) -> str | None:
+        """Look at the next state.
+
+        Returns:
+            What happened, to be read after "the drone", if the drone has crashed now.
+        """
+        sinking_before_m_s = self._sinking_m_s
+        self._sinking_m_s = -state.velocity_arena_m_s[2]
+        if self._is_inverted(state):
+            return "was upside-down for 0.5 s"
+        surface = self._touching(state)
+        if surface is None:
+            self._touched = False
+            self._lying_since_us = None
+            return None
+        impact_m_s = max(sinking_before_m_s, self._sinking_m_s)
+        if not self._touched and impact_m_s > HARD_HIT_M_S:
+            return f"hit the {surface} at {impact_m_s:.1f} m/s"
+        self._touched = True
+        if taken_off and surface == "floor" and self._is_lying(state):
+            return "lay on the floor for 5 s with its motors on"
+        return None
+
+    def _is_inverted(self, state: TrueState) -> bool:
+        if up_component(state.attitude_arena) >= 0.0:
+            self._inverted_since_us = None
+            return False
+        if self._inverted_since_us is None:
+            self._inverted_since_us = state.time_us
+        return state.time_us - self._inverted_since_us >= UPSIDE_DOWN_US
+
+    def _is_lying(self, state: TrueState) -> bool:
+        if not (state.motors_on and is_resting(state.velocity_arena_m_s)):
+            self._lying_since_us = None
+            return False
+        if self._lying_since_us is None:
+            self._lying_since_us = state.time_us
+        return state.time_us - self._lying_since_us >= LYING_US
+
+    def _touching(self, state: TrueState) -> Surface | None:
+        if state.contacts:
+            if "base" in state.contacts:
+                return "base"
+            if "floor" in state.contacts:
+                return "floor"
+        x_m, y_m, z_m = state.position_arena_m
+        if z_m > self._near_m:
+            return None
+        underside_m = z_m - self._envelope_m[2] / 2
+        ground_m = ground_height(self._scenario, x_m, y_m)
+        if underside_m > ground_m + TOUCHING_M:
+            return None
+        return "base" if ground_m > 0.0 else "floor"

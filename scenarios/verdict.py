@@ -1,0 +1,142 @@
+"""The verdict on a try: one word, and one sentence that says why."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from enum import StrEnum
+
+from scenarios.touchdown import Landing
+
+
+class Verdict(StrEnum):
+    """What a try was worth."""
+
+    CLEAN = "clean"
+    COMPLETED = "completed"
+    TIMED_OUT = "timed out"
+    CRASHED = "crashed"
+    ABORTED = "aborted"
+    WRONG_ORDER = "wrong order"
+
+
+@dataclass(frozen=True, slots=True)
+class TryFacts:
+    """What the referee saw.
+
+    Attributes:
+        expected: colours to cross, in order.
+        crossed: colours crossed, each once, in order of its first crossing.
+        contact_frames: the frame of each contact.
+        outside_s: time outside the arena.
+        try_time_s: motors on to motors off, or to now.
+        began: the motors were on.
+        taken_off: the drone left the ground.
+        motors_on: the motors are on now.
+        settled: the motors are off and the drone is at rest.
+        timed_out: the try went past its limit.
+        wrong_order: what was crossed too early, or "".
+        crash: what happened to the drone, or "".
+        landing: where it came to rest after a flight.
+    """
+
+    expected: tuple[str, ...]
+    crossed: tuple[str, ...]
+    contact_frames: tuple[str, ...]
+    outside_s: float
+    try_time_s: float
+    began: bool
+    taken_off: bool
+    motors_on: bool
+    settled: bool
+    timed_out: bool
+    wrong_order: str
+    crash: str
+    landing: Landing | None
+
+
+def judge(facts: TryFacts, mission_state: str = "", ended: str | None = None) -> tuple[Verdict, str]:
+    """Give the verdict.
+
+    The first rule that holds decides:
+    1. `wrong order`: a frame was crossed before its turn. It cannot be made good, whatever comes later.
+    2. `crashed`: see `CrashWatch`; lying on its side or back at rest is a crash too.
+    3. `timed out`: the try went past its limit.
+    4. `clean` or `completed`: all frames crossed in order, and standing on the base with the motors off.
+       Clean has neither contacts nor time outside.
+    5. `aborted`: the try stopped short of its task without one of the above. Here belong a mission that was
+       broken off, motors cut in the air that did no harm, landing beside the base (nothing is broken, but
+       the flight gave its task up), and landing with a frame never crossed (no frame came before its turn,
+       so the order is not wrong: the rest is missing).
+
+    Args:
+        facts: what the referee saw.
+        mission_state: state the mission was in at the end, such as "red.turning".
+        ended: why the flight was broken off, in a few words, when it was.
+
+    Returns:
+        The verdict and a sentence without a full stop.
+    """
+    verdict = _verdict(facts)
+    details = _details(verdict, facts, ended)
+    where = f" in {_one_line(mission_state)}" if mission_state.strip() else ""
+    why = f" ({'; '.join(details)})" if details else ""
+    crossed = ", ".join(facts.crossed) or "none"
+    return verdict, f"{verdict} after {facts.try_time_s:.1f} s{where}{why}; crossed: {crossed}"
+
+
+def _verdict(facts: TryFacts) -> Verdict:
+    if facts.wrong_order:
+        return Verdict.WRONG_ORDER
+    if facts.crash:
+        return Verdict.CRASHED
+    if facts.timed_out:
+        return Verdict.TIMED_OUT
+    landed_on_base = facts.landing is not None and facts.landing.surface == "base"
+    if facts.crossed != facts.expected or not landed_on_base:
+        return Verdict.ABORTED
+    clean = not facts.contact_frames and facts.outside_s == 0.0
+    return Verdict.CLEAN if clean else Verdict.COMPLETED
+
+
+def _details(verdict: Verdict, facts: TryFacts, ended: str | None) -> list[str]:
+    if verdict in {Verdict.CLEAN, Verdict.COMPLETED}:
+        return _flaws(facts)
+    details = [facts.wrong_order] if facts.wrong_order else []
+    if facts.crash:
+        details.append(f"the drone {facts.crash}")
+    if verdict is Verdict.ABORTED:
+        details.append(_one_line(ended) if ended and ended.strip() else _shortfall(facts))
+    return details
+
+
+def _flaws(facts: TryFacts) -> list[str]:
+    flaws = []
+    if facts.contact_frames:
+        touched = ", ".join(dict.fromkeys(facts.contact_frames))
+        flaws.append(f"contacts: {len(facts.contact_frames)}, with {touched}")
+    if facts.outside_s > 0.0:
+        flaws.append(f"outside the arena for {facts.outside_s:.2f} s")
+    return flaws
+
+
+def _shortfall(facts: TryFacts) -> str:
+    """Say what a try that nobody broke off lacks; the first that holds."""
+    lacks = (
+        (not facts.began, "the motors were never on"),
+        (facts.motors_on, "the motors were still on"),
+        (not facts.settled, "not yet at rest after the motors stopped"),
+        (not facts.taken_off, "never took off"),
+    )
+    for holds, words in lacks:
+        if holds:
+            return words
+    if facts.landing is None:
+        return "did not come to rest on base or floor"
+    if facts.landing.surface != "base":
+        return f"landed {facts.landing.error_m:.2f} m from the base's centre, not on the base"
+    missing = ", ".join(colour for colour in facts.expected if colour not in facts.crossed)
+    return f"landed on the base without crossing {missing}"
+
+
+def _one_line(text: str) -> str:
+    return " ".join(text.split())
