@@ -120,7 +120,6 @@ class Commander:
         self.state = row.target
         self._tick_rows = RULES[self.state, Event.TICK]
         now.entered_us = now.now_us
-        now.target_reached = False
 
 
 def _microseconds(seconds: float) -> int:

@@ -86,6 +86,12 @@ def test_a_fast_descent_with_low_thrust_is_flight():
     assert bench.run(5.0, down_m_s=0.25, command=0.25, throttle=0.5 * HOVER) is None
 
 
+def test_held_up_by_its_own_thrust_is_flight():
+    bench = Bench()
+    bench.take_off()
+    assert bench.run(2.0, command=0.5, throttle=0.95 * HOVER) is None
+
+
 def test_sliding_is_not_standing():
     bench = Bench()
     bench.take_off()
