@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from firmware_py.mavlink import commands, heartbeat, missions, time_sync
+from firmware_py.mavlink import commands, file_transfer, heartbeat, missions, time_sync
 from firmware_py.mavlink.dialect import AUTOPILOT_COMPONENT_ID, Message, mavlink
 from firmware_py.mavlink.exchange import Exchange, Handler
 from firmware_py.mavlink.framing import Packet
@@ -52,6 +52,7 @@ class MavlinkNode:
         self._handlers: dict[int, Handler] = {
             **heartbeat.HANDLERS,
             **commands.HANDLERS,
+            **file_transfer.HANDLERS,
             **missions.HANDLERS,
             **time_sync.HANDLERS,
             **self._parameters.handlers,
