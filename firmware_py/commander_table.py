@@ -212,7 +212,7 @@ def first_match(rows: tuple[Row, ...], now: Situation) -> Row | None:
 
 def mermaid() -> str:
     """The table as a Mermaid state diagram; refusals and what changes nothing are left out."""
-    lines = ["stateDiagram-v2", "    [*] --> disarmed"]
+    lines = ["stateDiagram-v2", "    [*] --> disarmed", '    state "any armed state" as armed']
     for row in TABLE:
         if row.target is None:
             continue
