@@ -212,14 +212,12 @@ def first_match(rows: tuple[Row, ...], now: Situation) -> Row | None:
 
 def mermaid() -> str:
     """The table as a Mermaid state diagram; refusals and what changes nothing are left out."""
-    lines = ["stateDiagram-v2", "    [*] --> disarmed", '    state "any armed state" as armed']
+    lines = ["stateDiagram-v2", '    state "any armed state" as armed', "    [*] --> disarmed"]
     for row in TABLE:
         if row.target is None:
             continue
         name = "" if row.event is Event.TICK else row.event.value
         guard = f"[{row.guard.__name__.replace('_', ' ')}]" if row.guard is not None else ""
-        label = f"{name} {guard}".strip()
-        lines += [
-            f"    {state.value} --> {row.target.value}: {label}" for state in State if state in row.states
-        ]
+        sources = ["armed"] if row.states == _ARMED else sorted(state.value for state in row.states)
+        lines += [f"    {source} --> {row.target.value}: {f'{name} {guard}'.strip()}" for source in sources]
     return "\n".join(lines) + "\n"

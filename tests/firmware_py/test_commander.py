@@ -309,8 +309,9 @@ def test_a_setpoint_from_the_future_does_not_stay_fresh_for_ever():
 
 def test_the_diagram_shows_every_state_and_every_way_out_of_offboard():
     diagram = mermaid()
-    assert diagram.startswith("stateDiagram-v2\n    [*] --> disarmed\n")
+    assert diagram.startswith("stateDiagram-v2\n")
     for state in State:
         assert f"--> {state.value}:" in diagram
+    assert "    armed --> disarmed: force_disarm\n" in diagram
     assert "    offboard --> loss_hold: [setpoint lost]\n" in diagram
     assert "    takeoff --> hold: [target reached]\n" in diagram
