@@ -30,8 +30,6 @@ class Boundary:
         The arena is convex, so the inside part is one piece: the line clipped by each slab in turn
         (Kay & Kajiya, "Ray tracing complex scenes", 1986).
         """
-        if self.holds(start_m) and self.holds(end_m):
-            return 0.0
         enter, leave = 0.0, 1.0
         limits = (
             (-self._half_x_m, self._half_x_m),

@@ -82,6 +82,7 @@ class Referee:
         self._crossings: list[Crossing] = []
         self._contacts: list[str] = []
         self._touched_us: dict[str, int] = {}
+        self._inside = True
         self._outside_us = 0.0
         self._path_m = 0.0
         self._longest_gap_us = 0
@@ -120,7 +121,12 @@ class Referee:
         self._watch(state)
 
     def _restart_path(self, state: TrueState) -> None:
-        """Do not join the next point to the points before this one."""
+        """Do not join the next point to those before this one."""
+        self._inside = self._boundary.holds(state.position_arena_m)
+        self._forget_sides(state)
+
+    def _forget_sides(self, state: TrueState) -> None:
+        """Let the path past the frames begin here, whatever was crossed before."""
         for _, gate in self._gates:
             gate.forget()
             gate.follow(state.position_arena_m, state.position_arena_m)
@@ -131,12 +137,15 @@ class Referee:
         step_us = state.time_us - self._time_us
         self._longest_gap_us = max(self._longest_gap_us, step_us)
         if step_us > MAX_GAP_US:
-            self._restart_path(state)
+            self._forget_sides(state)
         for colour, gate in self._gates:
             passage = gate.follow(start_m, end_m)
             if passage is not None:
                 self._cross(colour, passage, step_us)
-        self._outside_us += self._boundary.outside_share(start_m, end_m) * step_us
+        inside = self._boundary.holds(end_m)
+        if not (inside and self._inside):
+            self._outside_us += self._boundary.outside_share(start_m, end_m) * step_us
+        self._inside = inside
         self._path_m += dist(start_m, end_m)
         if end_m[2] - self._start_height_m > TAKEN_OFF_M:
             self._taken_off = True

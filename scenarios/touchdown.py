@@ -107,9 +107,15 @@ class CrashWatch:
         """
         sinking_before_m_s = self._sinking_m_s
         self._sinking_m_s = -state.velocity_arena_m_s[2]
-        if self._is_inverted(state):
-            return "was upside-down for 0.5 s"
-        surface = self._touching(state)
+        if up_component(state.attitude_arena) < 0.0:
+            if self._inverted_since_us is None:
+                self._inverted_since_us = state.time_us
+            if state.time_us - self._inverted_since_us >= UPSIDE_DOWN_US:
+                return "was upside-down for 0.5 s"
+        else:
+            self._inverted_since_us = None
+        high = state.position_arena_m[2] > self._near_m and not state.contacts
+        surface = None if high else self._touching(state)
         if surface is None:
             self._touched = False
             self._lying_since_us = None
@@ -122,14 +128,6 @@ class CrashWatch:
             return "lay on the floor for 5 s with its motors on"
         return None
 
-    def _is_inverted(self, state: TrueState) -> bool:
-        if up_component(state.attitude_arena) >= 0.0:
-            self._inverted_since_us = None
-            return False
-        if self._inverted_since_us is None:
-            self._inverted_since_us = state.time_us
-        return state.time_us - self._inverted_since_us >= UPSIDE_DOWN_US
-
     def _is_lying(self, state: TrueState) -> bool:
         if not (state.motors_on and is_resting(state.velocity_arena_m_s)):
             self._lying_since_us = None
@@ -139,14 +137,11 @@ class CrashWatch:
         return state.time_us - self._lying_since_us >= LYING_US
 
     def _touching(self, state: TrueState) -> Surface | None:
-        if state.contacts:
-            if "base" in state.contacts:
-                return "base"
-            if "floor" in state.contacts:
-                return "floor"
+        if "base" in state.contacts:
+            return "base"
+        if "floor" in state.contacts:
+            return "floor"
         x_m, y_m, z_m = state.position_arena_m
-        if z_m > self._near_m:
-            return None
         underside_m = z_m - self._envelope_m[2] / 2
         ground_m = ground_height(self._scenario, x_m, y_m)
         if underside_m > ground_m + TOUCHING_M:
