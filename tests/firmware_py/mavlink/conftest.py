@@ -1,0 +1,133 @@
+from dataclasses import dataclass, field
+from math import nan
+
+import pytest
+
+from firmware_py.airframe import Airframe, load_airframe
+from firmware_py.mavlink import GROUND, ONBOARD, MavlinkNode
+from firmware_py.mavlink.dialect import mavlink
+from firmware_py.mavlink.framing import PacketReader
+from firmware_py.parameters import Parameters
+from firmware_py.status import CommandResult, FlightMode, VehicleStatus
+from firmware_py.types import GeodeticPoint, MotorOutput, StatusText, VehicleState
+
+HOME = GeodeticPoint(47.397742, 8.545594, 489.0)
+
+
+@dataclass
+class FakeAutopilot:
+    """Records what it is asked for and answers `result`."""
+
+    airframe: Airframe
+    parameters: Parameters = field(default_factory=Parameters)
+    state: VehicleState = field(default_factory=VehicleState)
+    status: VehicleStatus = field(default_factory=lambda: VehicleStatus(ready=True, home=HOME, origin=HOME))
+    output: MotorOutput = field(default_factory=MotorOutput)
+    place: GeodeticPoint | None = HOME
+    result: CommandResult = CommandResult.ACCEPTED
+    calls: list[tuple] = field(default_factory=list)
+    setpoints: list = field(default_factory=list)
+    texts: list[StatusText] = field(default_factory=list)
+
+    def _called(self, *call):
+        self.calls.append(call)
+        return self.result
+
+    def arm(self, *, force=False):
+        return self._called("arm", force)
+
+    def disarm(self, *, force=False):
+        return self._called("disarm", force)
+
+    def set_mode(self, mode: FlightMode):
+        return self._called("set_mode", mode)
+
+    def takeoff(self, altitude_amsl_m=nan):
+        return self._called("takeoff", altitude_amsl_m)
+
+    def land(self):
+        return self._called("land")
+
+    def accept_setpoint(self, setpoint):
+        self.setpoints.append(setpoint)
+
+    def say(self, severity, text):
+        self.texts.append(StatusText(severity, text))
+
+    def take_texts(self):
+        taken, self.texts = self.texts, []
+        return taken
+
+    def global_position(self):
+        return self.place
+
+
+class Peer:
+    """A client on both links: sends messages to a node and reads what it answers, streams left out."""
+
+    def __init__(self, autopilot, *, system=245, component=191, links=(ONBOARD, GROUND), node_options=None):
+        self.autopilot = autopilot
+        self.node = MavlinkNode(autopilot, links, **(node_options or {}))
+        self.packer = mavlink.MAVLink(None, system, component)
+        self.time_us = 0
+        self._readers = {profile.name: PacketReader() for profile in links}
+        self.advance(0)
+
+    def advance(self, seconds, *, step_us=4000):
+        """Update the node up to a time; all it sent, as (link, message)."""
+        end_us = self.time_us + round(seconds * 1e6)
+        received = []
+        while True:
+            self.node.update(self.time_us)
+            received += self.take()
+            if self.time_us >= end_us:
+                return received
+            self.time_us = min(self.time_us + step_us, end_us)
+
+    def take(self):
+        return [
+            (link, message)
+            for link, data in self.node.take_output()
+            for message in self._readers[link].feed(data)
+        ]
+
+    def send(self, message, link="onboard", **options):
+        self.node.receive(link, message.pack(self.packer, **options))
+
+    def ask(self, message, link="onboard"):
+        """Send a message and give the answers, sent at once on that link."""
+        self.send(message, link)
+        return [answer for answered, answer in self.take() if answered == link]
+
+    def long(self, command, *params, target=(1, 1)):
+        values = (*params, *[0.0] * (7 - len(params)))
+        return mavlink.MAVLink_command_long_message(*target, command, 0, *values)
+
+    def int(self, command, *params, target=(1, 1), frame=6):
+        p = (*params, *[0.0] * (7 - len(params)))
+        return mavlink.MAVLink_command_int_message(
+            *target, frame, command, 0, 0, p[0], p[1], p[2], p[3], int(p[4]), int(p[5]), p[6]
+        )
+
+    def meet_ground_station(self, link="ground"):
+        self.send(mavlink.MAVLink_heartbeat_message(mavlink.MAV_TYPE_GCS, 8, 0, 0, 4, 3), link)
+
+
+@pytest.fixture(scope="session")
+def airframe():
+    return load_airframe("abejorro")
+
+
+@pytest.fixture
+def autopilot(airframe):
+    return FakeAutopilot(airframe)
+
+
+@pytest.fixture
+def peer(autopilot):
+    return Peer(autopilot)
+
+
+@pytest.fixture
+def make_peer():
+    return Peer

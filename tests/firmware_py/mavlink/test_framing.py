@@ -1,0 +1,91 @@
+import random
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from firmware_py.mavlink.dialect import mavlink
+from firmware_py.mavlink.framing import Packet, PacketReader
+
+PING = mavlink.MAVLink_ping_message(123456, 7, 1, 1)
+
+
+def packed(message=PING, *, version_1=False):
+    return message.pack(mavlink.MAVLink(None, 245, 191), force_mavlink1=version_1)
+
+
+@pytest.mark.parametrize("version_1", [False, True])
+def test_reads_both_versions(version_1):
+    (message,) = PacketReader().feed(packed(version_1=version_1))
+    assert (message.get_type(), message.time_usec, message.get_srcSystem()) == ("PING", 123456, 245)
+
+
+def test_reads_byte_by_byte():
+    reader, messages = PacketReader(), []
+    for byte in packed() * 2:
+        messages += reader.feed(bytes([byte]))
+    assert [message.seq for message in messages] == [7, 7]
+    assert reader.skipped_bytes == 0
+
+
+@pytest.mark.parametrize(
+    "noise", [b"\xfd", b"\xfd\xff", b"\xfd\xff\x00junk", b"\xfe\xfe\xfe", b"hello \xfd\x01\x01"]
+)
+def test_noise_before_a_packet_costs_only_itself(noise):
+    reader = PacketReader()
+    messages = reader.feed(noise) + reader.feed(packed())
+    assert len(messages) == 1
+    assert reader.skipped_bytes == len(noise)
+
+
+def test_a_packet_shut_in_by_a_false_start_comes_out_with_the_next():
+    reader = PacketReader()
+    assert reader.feed(b"\xfd\xff" + packed()) == []  # the false header announces 279 bytes
+    assert len(reader.feed(packed())) == 2
+
+
+def test_a_broken_checksum_is_no_message_and_hurts_none_after_it():
+    broken = bytearray(packed())
+    broken[-1] ^= 0xFF
+    assert len(PacketReader().feed(bytes(broken) + packed())) == 1
+
+
+def test_a_message_of_unknown_id_is_passed_over_whole():
+    unknown = bytearray(packed())
+    unknown[7:10] = b"\x11\x22\x33"
+    messages = PacketReader().feed(bytes(unknown) + packed())
+    assert [message.get_type() for message in messages] == [f"UNKNOWN_{0x332211}", "PING"]
+
+
+def test_an_unknown_flag_drops_the_packet():
+    data = bytearray(packed())
+    data[2] = 0x80
+    assert PacketReader().feed(bytes(data)) == []
+
+
+@settings(deadline=None)
+@given(st.lists(st.one_of(st.binary(max_size=300), st.just(packed()))))
+def test_whatever_the_pieces_nothing_raises_and_every_byte_is_accounted_for(pieces):
+    reader = PacketReader()
+    taken = sum(len(message.get_msgbuf()) for piece in pieces for message in reader.feed(piece))
+    left = sum(map(len, pieces)) - taken - reader.skipped_bytes
+    assert 0 <= left < 300
+
+
+def test_random_splits_lose_nothing():
+    rng = random.Random(5)
+    stream = packed() * 50
+    reader, count = PacketReader(), 0
+    while stream:
+        cut = rng.randint(1, 40)
+        count += len(reader.feed(stream[:cut]))
+        stream = stream[cut:]
+    assert count == 50
+
+
+def test_a_numbered_packet_is_what_pymavlink_would_pack():
+    packet = Packet(PING, 1, 1)
+    for sequence in (0, 1, 255, 3):
+        packer = mavlink.MAVLink(None, 1, 1)
+        packer.seq = sequence
+        assert packet.numbered(sequence) == PING.pack(packer)

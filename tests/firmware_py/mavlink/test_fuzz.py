@@ -1,0 +1,207 @@
+"""Packets that are sound on the wire and senseless in content, at the real autopilot."""
+
+import random
+from math import isfinite
+from struct import pack
+
+import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+
+from firmware_py.autopilot import Autopilot
+from firmware_py.mavlink.dialect import mavlink
+from firmware_py.status import FlightMode
+from firmware_py.types import GeodeticPoint, MotorOutput, Sensors
+
+LINKS = ("onboard", "ground")
+AWKWARD = [
+    0.0,
+    -0.0,
+    1.0,
+    -1.0,
+    5.0,
+    21196.0,
+    0.5,
+    1e-40,
+    3e38,
+    -3e38,
+    float("nan"),
+    float("inf"),
+    -float("inf"),
+]
+
+
+@pytest.fixture
+def real(airframe):
+    autopilot = Autopilot(airframe, GeodeticPoint(47.397742, 8.545594, 489.0))
+    for tick in range(300):
+        autopilot.step(standing(tick * 4000))
+    return autopilot
+
+
+def standing(time_us):
+    return Sensors(time_us, (0.0,) * 3, (0.0,) * 3, (1.0, 0.0, 0.0, 0.0), (0.0,) * 3, (0.0, 0.0, -9.80665))
+
+
+def frame(message_type, payload, sequence, source):
+    """A MAVLink 2 packet with a right checksum, whatever the payload."""
+    number = message_type.id
+    header = pack(
+        "<BBBBBBBHB", 0xFD, len(payload), 0, 0, sequence % 256, *source, number & 0xFFFF, number >> 16
+    )
+    crc = mavlink.x25crc(header[1:] + payload + bytes([message_type.crc_extra])).crc
+    return header + payload + pack("<H", crc)
+
+
+def aimed(message_type, payload, rng):
+    """Half of the packets name us as their target, or all targets."""
+    buffer = bytearray(payload)
+    names = message_type.ordered_fieldnames
+    if "target_system" not in names or rng.random() < 0.5:
+        return bytes(buffer)
+    probe = [bytes(a) if isinstance(a, bytes) else a for a in message_type.unpacker.unpack(bytes(buffer))]
+    place = sum(max(1, length) for length in message_type.lengths[: names.index("target_system")])
+    probe[place] = rng.choice((0, 1))
+    if "target_component" in names:
+        place = sum(max(1, length) for length in message_type.lengths[: names.index("target_component")])
+        probe[place] = rng.choice((0, 1))
+    return message_type.unpacker.pack(*probe)
+
+
+def test_twenty_thousand_sound_packets_of_every_id_with_random_content(real, make_peer):
+    rng = random.Random(20_000)
+    peer = make_peer(real)
+    kinds = sorted(mavlink.mavlink_map.values(), key=lambda kind: kind.id)
+    for count in range(20_000):
+        kind = kinds[count % len(kinds)]
+        payload = aimed(kind, rng.randbytes(kind.unpacker.size), rng)
+        source = (rng.randrange(2, 256), rng.randrange(256))
+        peer.node.receive(LINKS[count % 2], frame(kind, payload, count, source))
+        if count % 50 == 0:
+            peer.time_us += 4000
+            real.step(standing(1_200_000 + peer.time_us))
+            peer.node.update(peer.time_us)
+            peer.take()
+    assert peer.node.failed_messages == 0
+    assert not real.status.armed
+    assert real.status.mode is FlightMode.HOLD
+    assert real.parameters.version == 0
+
+
+HANDLED = [
+    mavlink.MAVLink_command_long_message,
+    mavlink.MAVLink_command_int_message,
+    mavlink.MAVLink_set_mode_message,
+    mavlink.MAVLink_param_request_read_message,
+    mavlink.MAVLink_param_request_list_message,
+    mavlink.MAVLink_param_set_message,
+    mavlink.MAVLink_set_position_target_local_ned_message,
+    mavlink.MAVLink_timesync_message,
+    mavlink.MAVLink_ping_message,
+    mavlink.MAVLink_heartbeat_message,
+    mavlink.MAVLink_mission_request_list_message,
+    mavlink.MAVLink_mission_count_message,
+    mavlink.MAVLink_mission_clear_all_message,
+    mavlink.MAVLink_file_transfer_protocol_message,
+]
+COMMANDS = [20, 21, 22, 176, 262, 300, 400, 401, 410, 510, 511, 512, 519, 520, 31999]
+NAMES = [b"MIS_TAKEOFF_ALT", b"COM_OBL_RC_ACT", b"_HASH_CHECK", b"", b"\xff" * 16, b"A" * 16]
+
+
+def content(kind, field, type_name, array_length):
+    """What to put into one field: often right where rightness leads deeper, awkward elsewhere."""
+    if field == "command":
+        return st.sampled_from(COMMANDS)
+    if field in ("target_system", "target_component"):
+        return st.sampled_from([1, 1, 1, 0, 2])
+    if field == "param_id":
+        return st.sampled_from(NAMES)
+    if field == "param_type":
+        return st.sampled_from([6, 9, 0])
+    if field == "coordinate_frame":
+        return st.sampled_from([1, 8, 7])
+    bits = {
+        "uint8_t": 8,
+        "uint16_t": 16,
+        "uint32_t": 32,
+        "int16_t": -16,
+        "int32_t": -32,
+        "int64_t": -64,
+        "uint64_t": 64,
+    }
+    if type_name == "float":
+        element = st.one_of(st.sampled_from(AWKWARD), st.floats(width=32))
+    else:
+        size = bits[type_name]
+        element = (
+            st.integers(0, 2**size - 1)
+            if size > 0
+            else st.integers(-(2 ** (-size - 1)), 2 ** (-size - 1) - 1)
+        )
+    return st.lists(element, min_size=array_length, max_size=array_length) if array_length else element
+
+
+def messages():
+    return st.one_of(
+        *[
+            st.builds(
+                kind,
+                *[
+                    content(kind, field, type_name, kind.array_lengths[kind.ordered_fieldnames.index(field)])
+                    for field, type_name in zip(kind.fieldnames, kind.fieldtypes, strict=True)
+                ],
+            )
+            for kind in HANDLED
+        ]
+    )
+
+
+@settings(max_examples=300, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@given(st.lists(messages(), min_size=1, max_size=8))
+def test_awkward_content_in_every_handled_message(airframe, make_peer, sent):
+    autopilot = Autopilot(airframe, GeodeticPoint(47.397742, 8.545594, 489.0), stabiliser=Calm())
+    peer = make_peer(autopilot)
+    autopilot.step(standing(0))
+    for place, message in enumerate(sent):
+        peer.send(message, LINKS[place % 2])
+        autopilot.step(standing(4000 * (place + 1)))
+        peer.advance(0.004)
+    assert peer.node.failed_messages == 0
+    assert all(map(isfinite, autopilot.output.speeds_rad_s))
+
+
+class Calm:
+    """A stabiliser that does nothing, quickly built."""
+
+    def reset(self):
+        pass
+
+    def idle(self):
+        return MotorOutput()
+
+    def step(self, state, command, *, grounded=False):
+        return self.idle()
+
+
+@settings(max_examples=200, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@given(st.lists(st.binary(max_size=400), max_size=10))
+def test_random_bytes_are_no_messages(autopilot, make_peer, pieces):
+    peer = make_peer(autopilot)
+    for piece in pieces:
+        peer.node.receive("ground", piece)
+    assert peer.take() == []
+    assert autopilot.calls == []
+    assert peer.node.failed_messages == 0
+
+
+def test_a_fault_inside_is_counted_and_said_and_ends_nothing(autopilot, peer):
+    def broken():
+        raise RuntimeError("worn out")
+
+    autopilot.land = broken
+    peer.send(peer.long(21))
+    assert peer.node.failed_messages == 1
+    assert [said.text for said in autopilot.texts] == [
+        "Internal error on COMMAND_LONG: RuntimeError('worn out')"
+    ]
+    assert peer.ask(peer.long(400, 1))

@@ -1,0 +1,106 @@
+import pytest
+
+from firmware_py.mavlink.dialect import mavlink
+from firmware_py.types import StatusText
+
+
+def texts(received, link="ground"):
+    return [m for on, m in received if on == link and m.get_type() == "STATUSTEXT"]
+
+
+def test_timesync_requests_are_answered_in_nanoseconds(peer):
+    peer.advance(0.1)
+    (answer,) = peer.ask(mavlink.MAVLink_timesync_message(0, 987654321))
+    assert (answer.tc1, answer.ts1) == (100_000_000, 987654321)
+
+
+def test_timesync_answers_are_not_answered(peer):
+    assert peer.ask(mavlink.MAVLink_timesync_message(5, 6)) == []
+
+
+def test_ping_is_answered_to_its_sender_but_an_answer_is_not(peer):
+    (answer,) = peer.ask(mavlink.MAVLink_ping_message(12, 34, 0, 0))
+    assert (answer.time_usec, answer.seq) == (12, 34)
+    assert (answer.target_system, answer.target_component) == (245, 191)
+    assert peer.ask(mavlink.MAVLink_ping_message(12, 34, 1, 1)) == []
+
+
+def test_texts_go_only_where_a_ground_station_was_heard(autopilot, peer):
+    peer.meet_ground_station("ground")
+    peer.send(
+        mavlink.MAVLink_heartbeat_message(mavlink.MAV_TYPE_ONBOARD_CONTROLLER, 8, 0, 0, 4, 3), "onboard"
+    )
+    autopilot.say(6, "Ready for takeoff!")
+    received = peer.advance(0.01)
+    assert [(m.severity, m.text) for m in texts(received)] == [(6, "Ready for takeoff!")]
+    assert texts(received, "onboard") == []
+
+
+def test_a_text_waits_five_seconds_for_a_ground_station(autopilot, peer):
+    autopilot.say(6, "old")
+    peer.advance(4.0)
+    autopilot.say(6, "new")
+    peer.advance(3.0)
+    peer.meet_ground_station()
+    assert [m.text for m in texts(peer.advance(0.01))] == ["new"]
+
+
+@pytest.mark.parametrize(
+    ("length", "pieces"), [(0, 1), (49, 1), (50, 1), (51, 2), (99, 2), (100, 3), (120, 3)]
+)
+def test_long_texts_go_in_pieces_that_a_receiver_can_join(autopilot, peer, length, pieces):
+    peer.meet_ground_station()
+    text = "".join(chr(97 + place % 26) for place in range(length))
+    autopilot.say(4, text)
+    received = texts(peer.advance(0.01))
+    assert [m.chunk_seq for m in received] == list(range(pieces))
+    assert "".join(m.text for m in received) == text
+    assert len({m.id for m in received}) == 1
+    assert (received[0].id == 0) == (length <= 50)
+    assert length <= 50 or len(received[-1].text) < 50
+
+
+def test_a_text_with_strange_letters_and_severity_is_sent(autopilot, peer):
+    peer.meet_ground_station()
+    autopilot.texts.append(StatusText(99, "höhe ✓"))
+    (text,) = texts(peer.advance(0.01))
+    assert (text.severity, text.text) == (7, "h?he ?")
+
+
+@pytest.mark.parametrize("mission_type", [0, 1, 2])
+def test_missions_fences_and_rally_points_are_empty_lists(peer, mission_type):
+    (count,) = peer.ask(mavlink.MAVLink_mission_request_list_message(1, 1, mission_type))
+    assert (count.count, count.mission_type, count.target_system) == (0, mission_type, 245)
+
+
+@pytest.mark.parametrize(
+    ("message", "result"),
+    [
+        (mavlink.MAVLink_mission_count_message(1, 1, 3, 0), mavlink.MAV_MISSION_UNSUPPORTED),
+        (mavlink.MAVLink_mission_count_message(1, 1, 0, 0), mavlink.MAV_MISSION_ACCEPTED),
+        (mavlink.MAVLink_mission_count_message(1, 1, 3, 2), mavlink.MAV_MISSION_UNSUPPORTED),
+        (mavlink.MAVLink_mission_clear_all_message(1, 1, 255), mavlink.MAV_MISSION_ACCEPTED),
+        (mavlink.MAVLink_mission_request_list_message(1, 1, 77), mavlink.MAV_MISSION_UNSUPPORTED),
+    ],
+)
+def test_other_mission_requests_get_one_acknowledgement(peer, message, result):
+    (answer,) = peer.ask(message)
+    assert (answer.get_type(), answer.type, answer.mission_type) == (
+        "MISSION_ACK",
+        result,
+        message.mission_type,
+    )
+
+
+def test_missions_of_others_are_not_ours(peer):
+    assert peer.ask(mavlink.MAVLink_mission_request_list_message(2, 1, 0)) == []
+    assert peer.ask(mavlink.MAVLink_mission_count_message(0, 0, 1, 0)) == []
+
+
+def test_file_transfer_is_refused_at_once(peer):
+    request = [7, 1, 3, 4, 5, 0, 0, 0] + [0] * 243  # sequence 0x0107, session 3, open for reading
+    (answer,) = peer.ask(mavlink.MAVLink_file_transfer_protocol_message(0, 1, 1, request))
+    assert answer.payload[:8] == [8, 1, 3, 129, 1, 4, 0, 0]
+    assert answer.payload[12] == 7
+    refused = mavlink.MAVLink_file_transfer_protocol_message(0, 1, 1, answer.payload)
+    assert peer.ask(refused) == []
