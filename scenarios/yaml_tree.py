@@ -18,6 +18,7 @@ Value = str | int | float | bool | None | dict[str, "Value"] | tuple["Value", ..
 
 MAX_DEPTH = 12
 MAX_VALUES = 20_000
+LONGEST_MESSAGE = 200
 LONGEST_INTEGER = 20  # characters; a longer one is read as a float, which has a range
 
 _NUMBER = r"[-+]?(?:\.[0-9]+|[0-9]+(?:\.[0-9]*)?)(?:[eE][-+]?[0-9]+)?"
@@ -39,7 +40,7 @@ class YamlError(ValueError):
     """
 
     def __init__(self, message: str, line: int, column: int | None = None) -> None:
-        super().__init__(message)
+        super().__init__(message if len(message) <= LONGEST_MESSAGE else message[: LONGEST_MESSAGE - 1] + "…")
         self.line = line
         self.column = column
 

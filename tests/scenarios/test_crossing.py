@@ -1,0 +1,132 @@
+import itertools
+from math import cos, hypot, pi, sin
+
+import pytest
+from hypothesis import assume, given
+from hypothesis import strategies as st
+
+from scenarios.crossing import Gate
+from scenarios.models import Frame
+
+FRAME = Frame(colour="red", x_m=0, y_m=0, z_m=1)  # its plane is x = 0
+
+
+def passages(frame, points):
+    gate = Gate(frame)
+    found = [gate.follow(a, b) for a, b in zip([points[0], *points], points, strict=False)]
+    return [passage for passage in found if passage is not None]
+
+
+def test_through_the_middle_from_both_sides():
+    (back,) = passages(FRAME, [(-1, 0, 1), (3, 0, 1)])
+    assert (back.side, back.offset_m, back.fraction) == ("back", 0.0, 0.25)
+    (front,) = passages(FRAME, [(1, 0, 1), (-1, 0, 1)])
+    assert front.side == "front"
+
+
+def test_offset_is_measured_in_the_plane():
+    (passage,) = passages(FRAME, [(-1, 0.06, 1.08), (1, 0.06, 1.08)])
+    assert passage.offset_m == pytest.approx(0.1)
+
+
+@pytest.mark.parametrize(
+    ("y_m", "z_m", "inside"),
+    [
+        (0.189, 1, True),
+        (0.191, 1, False),
+        (-0.191, 1, False),
+        (0, 1.089, True),
+        (0, 1.091, False),
+        (0, 0.9, False),
+    ],
+)
+def test_only_the_opening_counts(y_m, z_m, inside):
+    assert bool(passages(FRAME, [(-1, y_m, z_m), (1, y_m, z_m)])) is inside
+
+
+@pytest.mark.parametrize("side", [-1, 1])
+def test_touching_the_plane_is_no_passage(side):
+    assert passages(FRAME, [(side, 0, 1), (0, 0, 1), (side, 0, 1)]) == []
+    assert passages(FRAME, [(side, 0, 1), (0, 0, 1)]) == []
+
+
+def test_a_stop_in_the_plane_passes_once_when_left_on_the_other_side():
+    found = passages(FRAME, [(-1, 0, 1), (0, 0.05, 1), (0, 0.05, 1), (0, 0.1, 1), (1, 0.1, 1)])
+    assert [(passage.side, passage.offset_m) for passage in found] == [("back", pytest.approx(0.1))]
+
+
+def test_a_path_that_begins_in_the_plane_has_come_from_nowhere():
+    assert passages(FRAME, [(0, 0, 1), (1, 0, 1)]) == []
+
+
+def test_there_and_back_are_two_passages():
+    sides = [p.side for p in passages(FRAME, [(-1, 0, 1), (1, 0, 1), (1, 0, 1), (-1, 0, 1)])]
+    assert sides == ["back", "front"]
+
+
+def test_after_forgetting_points_are_not_joined():
+    gate = Gate(FRAME)
+    gate.follow((-1, 0, 1), (-1, 0, 1))
+    gate.forget()
+    assert gate.follow((-1, 0, 1), (1, 0, 1)) is None
+    assert gate.follow((1, 0, 1), (-1, 0, 1)) is not None
+
+
+small = st.floats(-0.5, 0.5)
+points = st.lists(st.tuples(st.floats(-2, 2), small, st.floats(0.5, 1.5)), min_size=2, max_size=6)
+
+
+def clear_of_edges(path):
+    """Whether no step meets the plane so near an edge, or a point lies so near it, that rounding decides."""
+    if any(abs(x) < 1e-6 for x, _, _ in path):
+        return False
+    for (x0, y0, z0), (x1, y1, z1) in itertools.pairwise(path):
+        if x0 * x1 < 0:
+            t = x0 / (x0 - x1)
+            y, z = y0 + t * (y1 - y0), z0 + t * (z1 - z0) - 1
+            if abs(abs(y) - 0.19) < 1e-6 or abs(abs(z) - 0.09) < 1e-6:
+                return False
+    return True
+
+
+@given(points, st.floats(-3, 3), st.floats(-3, 3), st.floats(-pi, pi))
+def test_turning_and_shifting_the_scene_changes_nothing(path, dx, dy, turn):
+    assume(clear_of_edges(path))
+
+    def move(x, y):
+        return cos(turn) * x - sin(turn) * y + dx, sin(turn) * x + cos(turn) * y + dy
+
+    moved_frame = Frame(colour="red", x_m=dx, y_m=dy, z_m=1, yaw_rad=turn)
+    moved = passages(moved_frame, [(*move(x, y), z) for x, y, z in path])
+    still = passages(FRAME, path)
+    assert [p.side for p in moved] == [p.side for p in still]
+    assert [p.offset_m for p in moved] == pytest.approx([p.offset_m for p in still], abs=1e-6)
+
+
+@given(points, st.integers(2, 9))
+def test_cutting_a_path_finer_changes_nothing(path, parts):
+    assume(clear_of_edges(path))
+    fine = [path[0]]
+    for a, b in itertools.pairwise(path):
+        fine += [
+            tuple(p + (q - p) * i / parts for p, q in zip(a, b, strict=True)) for i in range(1, parts + 1)
+        ]
+    coarse, finer = passages(FRAME, path), passages(FRAME, fine)
+    assert [p.side for p in finer] == [p.side for p in coarse]
+    assert [p.offset_m for p in finer] == pytest.approx([p.offset_m for p in coarse], abs=1e-6)
+
+
+@given(points)
+def test_the_path_backwards_passes_from_the_other_sides(path):
+    assume(clear_of_edges(path))
+    swap = {"front": "back", "back": "front"}
+    forth = [p.side for p in passages(FRAME, path)]
+    back = [p.side for p in passages(FRAME, path[::-1])]
+    assert back == [swap[side] for side in reversed(forth)]
+
+
+@given(points)
+def test_an_offset_is_within_the_opening(path):
+    for passage in passages(FRAME, path):
+        assert passage.offset_m <= hypot(0.19, 0.09) + 1e-9
+        assert 0 <= passage.fraction <= 1
