@@ -59,6 +59,7 @@ class MavlinkNode:
             **SetpointService().handlers,
         }
         self._origin: GeodeticPoint | None = None
+        self._home: GeodeticPoint | None = None
         self.failed_messages = 0
 
     def receive(self, link: str, data: bytes) -> None:
@@ -106,18 +107,24 @@ class MavlinkNode:
                 packet = packets[message_id]
                 if packet is not None:
                     link.send(packet)
-        self._tell_origin()
+        self._tell_places()
         self._texts.update()
         self._parameters.update()
 
-    def _tell_origin(self) -> None:
-        """GPS_GLOBAL_ORIGIN, whenever it changes."""
-        origin = self._exchange.autopilot.status.origin
-        if origin is not self._origin:
-            self._origin = origin
-            message = stream_message(self._exchange, mavlink.MAVLINK_MSG_ID_GPS_GLOBAL_ORIGIN)
-            if message is not None:
-                self._exchange.broadcast(message)
+    def _tell_places(self) -> None:
+        """GPS_GLOBAL_ORIGIN and HOME_POSITION whenever they change; nobody waits two seconds for home."""
+        status = self._exchange.autopilot.status
+        if status.origin is not self._origin:
+            self._origin = status.origin
+            self._broadcast(mavlink.MAVLINK_MSG_ID_GPS_GLOBAL_ORIGIN)
+        if status.home is not self._home:
+            self._home = status.home
+            self._broadcast(mavlink.MAVLINK_MSG_ID_HOME_POSITION)
+
+    def _broadcast(self, message_id: int) -> None:
+        message = stream_message(self._exchange, message_id)
+        if message is not None:
+            self._exchange.broadcast(message)
 
     def take_output(self) -> list[tuple[str, bytes]]:
         """What is to be sent, as (link name, datagram); a datagram holds one or more whole packets."""

@@ -152,11 +152,12 @@ def test_a_state_that_is_not_finite_ends_nothing(autopilot, peer):
     assert latest(peer, "GLOBAL_POSITION_INT").lat == 0
 
 
-def test_origin_is_told_when_it_changes(autopilot, peer):
-    autopilot.status.origin = GeodeticPoint(10.0, 20.0, 30.0)
-    origins = [(on, m) for on, m in peer.advance(1.0) if m.get_type() == "GPS_GLOBAL_ORIGIN"]
-    assert [on for on, _ in origins] == ["onboard", "ground"]
-    assert origins[0][1].latitude == 100000000
+@pytest.mark.parametrize(("place", "name"), [("origin", "GPS_GLOBAL_ORIGIN"), ("home", "HOME_POSITION")])
+def test_origin_and_home_are_told_when_they_change(autopilot, peer, place, name):
+    setattr(autopilot.status, place, GeodeticPoint(10.0, 20.0, 30.0))
+    told = [(on, m) for on, m in peer.advance(0.1) if m.get_type() == name]
+    assert [on for on, _ in told] == ["onboard", "ground"]
+    assert told[0][1].latitude == 100000000
 
 
 def test_date_only_when_told(autopilot, peer, make_peer):
