@@ -21,7 +21,6 @@ from firmware_py.mavlink.message_requests import request_message, set_interval
 from firmware_py.status import CommandResult, FlightMode
 
 FORCE_MAGIC = 21196.0  # param2 of COMPONENT_ARM_DISARM
-_MAIN_MODE_OFFBOARD = 6
 _RELATIVE_FRAMES = (mavlink.MAV_FRAME_GLOBAL_RELATIVE_ALT, mavlink.MAV_FRAME_GLOBAL_RELATIVE_ALT_INT)
 _TO_EVERYONE = (
     mavlink.MAV_CMD_REQUEST_PROTOCOL_VERSION,
@@ -93,7 +92,7 @@ def _set_mode(exchange: Exchange, command: Command) -> CommandResult:
 
 def choose_mode(exchange: Exchange, main: int, sub: int) -> CommandResult:
     """Ask the autopilot for the mode with PX4's numbers; a mode that is not there is refused in words."""
-    mode = _MODES.get((main, 0 if main == _MAIN_MODE_OFFBOARD else sub))
+    mode = _MODES.get((main, sub))
     if mode is None:
         exchange.autopilot.say(_WARNING, f"Mode change refused: no mode {main}.{sub} here")
         return CommandResult.TEMPORARILY_REJECTED
@@ -185,6 +184,8 @@ def _receive_set_mode(exchange: Exchange, link: Link, message: Message) -> None:
     if message.target_system != exchange.system_id:
         return
     main, sub = message.custom_mode >> 16 & 0xFF, message.custom_mode >> 24 & 0xFF
+    if message.custom_mode & 0xFFFF:
+        main = 0  # reserved bits are set, so this is no custom mode of PX4's
     command = Command(link, float(message.base_mode), float(main), float(sub), nan)
     result = _set_mode(exchange, command)
     _acknowledge(exchange, link, message, mavlink.MAV_CMD_DO_SET_MODE, result)

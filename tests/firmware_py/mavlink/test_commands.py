@@ -32,6 +32,7 @@ TABLE = [
     pytest.param(SET_MODE, [1, 4, 3], ACCEPTED, [("set_mode", FlightMode.HOLD)], id="hold"),
     pytest.param(SET_MODE, [129, 6, 0], ACCEPTED, [("set_mode", FlightMode.OFFBOARD)], id="offboard"),
     pytest.param(SET_MODE, [1, 6, nan], ACCEPTED, [("set_mode", FlightMode.OFFBOARD)], id="offboard-nan-sub"),
+    pytest.param(SET_MODE, [1, 6, 7], REJECTED, [], id="offboard-with-sub-mode"),
     pytest.param(SET_MODE, [29, 4, 6], ACCEPTED, [("set_mode", FlightMode.LAND)], id="land-mode"),
     pytest.param(SET_MODE, [1, 4, 99], REJECTED, [], id="bad-auto-mode"),
     pytest.param(SET_MODE, [1, 99, 0], REJECTED, [], id="bad-main-mode"),
@@ -144,6 +145,13 @@ def test_legacy_set_mode_is_acknowledged_as_do_set_mode(autopilot, peer):
     assert acks(peer.ask(message)) == [(SET_MODE, ACCEPTED)]
     assert autopilot.calls == [("set_mode", FlightMode.LAND)]
     assert peer.ask(mavlink.MAVLink_set_mode_message(0, 1, FlightMode.LAND.custom_mode)) == []
+
+
+@pytest.mark.parametrize("custom_mode", [0x6C066507, 0x06040001, 0, 0xFFFFFFFF])
+def test_legacy_set_mode_takes_whole_mode_numbers_only(autopilot, peer, custom_mode):
+    message = mavlink.MAVLink_set_mode_message(1, 1, custom_mode)
+    assert acks(peer.ask(message)) == [(SET_MODE, REJECTED)]
+    assert autopilot.calls == []
 
 
 def test_autopilot_version_claims_what_exists(peer):
