@@ -1,10 +1,12 @@
 """The expanded chart in python-statemachine's own words, loaded by its secure loader.
 
-Three things of the library shape this translation (3.2.2, tried):
+Four things of the library shape this translation (3.2.2, tried):
 - of one list of actions it runs the assignments first, whatever their order; a primitive that stands before
   an assignment is therefore written as a condition with no consequence, which is called in its place;
 - a superstate is offered an event only if the state within took none, so `during` as a last transition of
   the inner state would hide the outer ones; hence each leaf carries the transitions around it;
+- an "internal" transition of an inner state to itself does its `enter` again; one without a target does not,
+  so `during` is written as that;
 - an error in a guard is taken as "false" and an event; here it is raised.
 """
 
@@ -75,7 +77,7 @@ def _transitions(leaf: Leaf) -> list[dict[str, Any]]:
         found.append({"event": TICK, "target": transition.to, **guard})
     if leaf.during:
         during = _actions(leaf.during)
-        found.append({"event": TICK, "internal": True, "target": leaf.state.id, "on": during})
+        found.append({"event": TICK, "on": during})  # without a target nothing is left or entered
     return found
 
 

@@ -1,0 +1,229 @@
+"""Whatever happens, the flight ends safely and says why."""
+
+from __future__ import annotations
+
+import asyncio
+from textwrap import dedent
+
+import numpy as np
+import pytest
+
+from offboard.app import fly_mission
+from offboard.drone import DroneError
+from offboard.eyes import CameraEyes, CameraLostError
+from offboard.mission import load_mission
+from offboard.pilot import Pilot
+from tests.offboard.fakes import START_1, TEST_CASE_1, GeometricEyes, KinematicDrone
+from vision.types import CameraFrame, Detections
+
+MISSION = load_mission("frame_challenge")
+
+
+def starting():
+    drone = KinematicDrone(*START_1)
+    return drone, GeometricEyes(drone, TEST_CASE_1)
+
+
+@pytest.mark.parametrize(
+    "reason",
+    [
+        "the pilot took over: mode POSCTL",
+        "link lost: no telemetry for 1.0 s",
+        "the vehicle was disarmed by others",
+        "the vehicle's position, velocity or heading is not finite",
+    ],
+)
+async def test_a_drone_error_stops_commanding_and_asks_for_hold(reason):
+    drone, eyes = starting()
+    drone.faults[200] = DroneError(reason)
+    outcome = await fly_mission(drone, None, MISSION, eyes=eyes)
+    assert (outcome.ended, outcome.reason) == ("aborted", reason)
+    assert outcome.mission_state == "red.frame_visible"
+    assert drone.calls == ["connect", "ready", "motors_on", "hold", "close"]
+    assert outcome.ticks == len(drone.commands) == 199
+
+
+async def test_a_hold_that_fails_is_told_as_well():
+    drone, eyes = starting()
+    drone.faults[50] = DroneError("link lost")
+    drone.hold_error = DroneError("no answer")
+    outcome = await fly_mission(drone, None, MISSION, eyes=eyes)
+    assert outcome.reason == "link lost; hold: no answer"
+    assert drone.calls[-1] == "close"
+
+
+async def test_no_hold_is_asked_of_a_drone_that_never_started():
+    drone, eyes = starting()
+    drone.faults[1] = DroneError("link lost")
+    outcome = await fly_mission(drone, None, MISSION, eyes=eyes)
+    assert outcome.ended == "aborted"
+    assert drone.calls == ["connect", "ready", "close"]
+
+
+@pytest.mark.parametrize("step", ["connect", "ready"])
+async def test_an_error_before_the_flight_is_raised_and_all_is_closed(step, monkeypatch):
+    drone, eyes = starting()
+
+    async def fail():
+        raise DroneError("no vehicle")
+
+    monkeypatch.setattr(drone, step, fail)
+    with pytest.raises(DroneError, match="no vehicle"):
+        await fly_mission(drone, None, MISSION, eyes=eyes)
+    assert drone.calls[-1] == "close"
+
+
+async def test_motors_on_refused_is_an_outcome_and_holds(monkeypatch):
+    drone, eyes = starting()
+
+    async def refuse():
+        raise DroneError("arming was refused: COMMAND_DENIED")
+
+    monkeypatch.setattr(drone, "motors_on", refuse)
+    outcome = await fly_mission(drone, None, MISSION, eyes=eyes)
+    assert "COMMAND_DENIED" in outcome.reason
+    assert drone.calls[-2:] == ["hold", "close"]
+    assert drone.commands == []
+
+
+class Breaking(Pilot):
+    def fly_to_goal(self) -> None:
+        """Breaks."""
+        raise RuntimeError("broken wing")
+
+
+async def test_an_error_in_a_mission_aborts_with_its_state():
+    drone, eyes = starting()
+    outcome = await fly_mission(drone, None, load_mission("frame_challenge", Breaking), eyes=eyes)
+    assert outcome.ended == "aborted"
+    assert "state 'take_off.set_base': RuntimeError: broken wing" in outcome.reason
+    assert "hold" in drone.calls
+
+
+async def test_a_position_that_is_not_a_number_aborts():
+    drone = KinematicDrone(*START_1)
+
+    def spoil(moment):
+        if moment.flight_time_s > 1:
+            drone.x = float("nan")
+
+    outcome = await fly_mission(drone, None, MISSION, observer=spoil)
+    assert "not finite" in outcome.reason
+    assert drone.calls[-2:] == ["hold", "close"]
+
+
+async def test_ctrl_c_holds_and_is_told():
+    drone, eyes = starting()
+
+    def stop(moment):
+        if moment.flight_time_s > 5:
+            task.cancel()
+
+    task = asyncio.create_task(fly_mission(yielding(drone), None, MISSION, eyes=eyes, observer=stop))
+    outcome = await task
+    assert outcome.interrupted
+    assert outcome.ended == "aborted"
+    assert outcome.flight_time_s == pytest.approx(5.05, abs=0.06)
+    assert drone.calls[-2:] == ["hold", "close"]
+
+
+async def test_an_observer_s_fault_still_holds_and_is_raised():
+    drone, eyes = starting()
+    with pytest.raises(KeyError):
+        await fly_mission(drone, None, MISSION, eyes=eyes, observer=lambda m: {}["display"])
+    assert drone.calls[-2:] == ["hold", "close"]
+
+
+async def test_the_limit_counts_vehicle_time_from_motors_on():
+    drone, eyes = starting()
+    outcome = await fly_mission(drone, None, MISSION, eyes=eyes, limit_s=2.0)
+    assert (outcome.ended, outcome.mission_state) == ("timed out", "take_off.set_base")
+    assert outcome.flight_time_s == pytest.approx(2.05)
+
+
+async def test_a_mission_that_ends_in_the_air_lands(tmp_path):
+    path = tmp_path / "high.yaml"
+    path.write_text(
+        dedent("""\
+            initial: up
+            states:
+              up:
+                enter:
+                  - hover
+                  - cmd.vel_z = 0.5
+                transitions:
+                  - when: seconds_in_state > 2
+                    to: enough
+              enough:
+                final: true
+            """)
+    )
+    drone, eyes = starting()
+    outcome = await fly_mission(drone, None, load_mission(str(path)), eyes=eyes)
+    assert outcome.ended == "finished"
+    assert drone.calls == ["connect", "ready", "motors_on", "land", "close"]
+
+
+class Film:
+    """A camera that gives some images and then stops, ends or fails."""
+
+    def __init__(self, drone, images, then, timed=True):
+        self.drone, self.images, self.then, self.timed = drone, images, then, timed
+
+    async def frames(self):
+        for _ in range(self.images):
+            time_us = self.drone.time_us if self.timed else None
+            yield CameraFrame(np.zeros((240, 320, 3), np.uint8), time_us, 0.0)
+            await asyncio.sleep(0)
+        if self.then == "fail":
+            raise OSError("connection reset")
+        if self.then == "silence":
+            await asyncio.Event().wait()
+
+
+def yielding(drone):
+    """Let the camera's task run between ticks."""
+    real_ticks = drone.ticks
+
+    async def ticks():
+        async for state in real_ticks():
+            await asyncio.sleep(0)
+            yield state
+
+    drone.ticks = ticks
+    return drone
+
+
+@pytest.mark.parametrize("timed", [True, False])
+@pytest.mark.parametrize(
+    ("then", "reason"),
+    [
+        ("silence", "the camera is dead: no image for 1."),
+        ("fail", "the camera failed: connection reset"),
+        ("end", "the camera's stream ended"),
+    ],
+)
+async def test_a_dead_camera_ends_the_flight(then, reason, timed):
+    drone = yielding(KinematicDrone(*START_1))
+    outcome = await fly_mission(drone, Film(drone, 40, then, timed), MISSION)
+    assert outcome.ended == "aborted"
+    assert outcome.reason.startswith(reason)
+    assert drone.calls[-2:] == ["hold", "close"]
+    assert 25 < outcome.ticks < 75
+
+
+async def test_a_camera_without_a_first_image_is_an_error_before_the_flight():
+    drone = KinematicDrone(*START_1)
+    with pytest.raises(CameraLostError, match="connection reset"):
+        await fly_mission(drone, Film(drone, 0, "fail"), MISSION)
+    assert drone.calls == ["connect", "close"]
+
+
+async def test_old_images_from_a_buffer_count_as_old():
+    drone = KinematicDrone(*START_1)
+    eyes = CameraEyes(Film(drone, 1, "silence"), lambda image, time_us: Detections(time_us=time_us))
+    await eyes.open()
+    assert eyes.latest(drone.time_us + 1_000_000).time_us == drone.time_us
+    with pytest.raises(CameraLostError, match=r"no image for 1\.1 s"):
+        eyes.latest(drone.time_us + 1_100_000)
+    await eyes.close()

@@ -1,0 +1,71 @@
+"""The navigator flies the paper's test case 1 with a kinematic drone, in simulated time."""
+
+from __future__ import annotations
+
+from math import hypot
+
+import pytest
+
+from offboard.app import Moment, fly_mission
+from offboard.engine import MissionEngine
+from offboard.mission import load_mission
+from offboard.pilot import Imu
+from tests.offboard.fakes import START_1, TEST_CASE_1, GeometricEyes, KinematicDrone, Target, crossings
+
+
+async def fly(mission, targets=TEST_CASE_1, limit_s=180.0):
+    drone = KinematicDrone(*START_1)
+    moments: list[Moment] = []
+    eyes = GeometricEyes(drone, targets)
+    flight = fly_mission(drone, None, mission, limit_s=limit_s, observer=moments.append, eyes=eyes)
+    outcome = await flight
+    return drone, moments, outcome
+
+
+async def test_flies_test_case_1_to_its_end():
+    drone, moments, outcome = await fly(load_mission("frame_challenge"))
+    assert (outcome.ended, outcome.reason, outcome.mission_state) == ("finished", "", "landing.stop")
+    assert 70 < outcome.flight_time_s < 115  # the paper's flight: 85 s, a faithful reproduction: 92 s
+    for target in TEST_CASE_1.values():
+        assert min(crossings(drone.path, target)) < 0.05
+    assert hypot(drone.x - drone.start[0], drone.y - drone.start[1]) < 0.06
+    assert drone.calls == ["connect", "ready", "motors_on", "motors_off", "close"]
+    states = list(dict.fromkeys(moment.mission_state for moment in moments))
+    assert states.index("red.crossing") < states.index("green.crossing") < states.index("blue.crossing")
+
+
+async def test_soft_landing_lets_the_vehicle_land():
+    drone, _, outcome = await fly(load_mission("soft_landing"))
+    assert (outcome.ended, outcome.mission_state) == ("finished", "landing.touch_down")
+    assert drone.calls == ["connect", "ready", "motors_on", "land", "close"]
+
+
+async def test_turns_for_ever_at_the_centre_when_a_frame_is_never_seen():
+    far = {**TEST_CASE_1, "red": Target(0, 300, 1, 0)}
+    drone, moments, outcome = await fly(load_mission("frame_challenge"), far, limit_s=60.0)
+    assert (outcome.ended, outcome.mission_state) == ("timed out", "red.turning")
+    assert "60 s" in outcome.reason
+    assert drone.calls[-2:] == ["hold", "close"]
+    assert moments[-1].flight_time_s == pytest.approx(60.0, abs=0.1)
+
+
+async def test_the_quiet_way_flies_exactly_as_the_whole_chart():
+    """Replays a flight's inputs through the engine with and without its shortcut."""
+    mission = load_mission("frame_challenge")
+    _, moments, _ = await fly(mission)
+    quiet, whole = MissionEngine(mission), MissionEngine(mission, quiet_ticks=False)
+    for moment in moments:
+        state = moment.state
+        imu = Imu(state.x, state.y, state.z, state.yaw)
+        expected = (moment.command, moment.mission_state)
+        assert (quiet.tick(imu, moment.detections, state.time_us), quiet.state) == expected
+        assert (whole.tick(imu, moment.detections, state.time_us), whole.state) == expected
+    assert quiet.finished
+    assert whole.finished
+
+
+async def test_two_flights_are_alike_to_the_last_bit():
+    first, _, _ = await fly(load_mission("frame_challenge"))
+    second, _, _ = await fly(load_mission("frame_challenge"))
+    assert first.commands == second.commands
+    assert first.path == second.path

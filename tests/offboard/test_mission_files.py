@@ -1,0 +1,286 @@
+"""What is wrong with a mission file is said by line, all at once, and never by a traceback."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from textwrap import dedent
+
+import pytest
+
+from offboard.engine import MissionEngine, MissionRunError
+from offboard.mission import MissionError, list_missions, load_mission, mermaid
+from offboard.pilot import Imu, Pilot
+from vision.types import Detections
+
+MINIMAL = dedent("""\
+    name: little
+    initial: up
+    variables: {count: 0}
+    states:
+      up:
+        enter:
+          - hover
+        during:
+          - fly_to_goal
+        transitions:
+          - when: seconds_in_state > 1
+            to: done
+      done:
+        enter:
+          - motors_off
+        final: true
+    """)
+
+
+def load(tmp_path: Path, text: str, pilot_class=Pilot):
+    path = tmp_path / "m.yaml"
+    path.write_text(text, encoding="utf-8")
+    return load_mission(str(path), pilot_class)
+
+
+def problems(tmp_path: Path, text: str) -> str:
+    with pytest.raises(MissionError) as caught:
+        load(tmp_path, text)
+    return str(caught.value)
+
+
+def test_the_package_has_its_missions():
+    assert {"frame_challenge", "soft_landing"} <= set(list_missions())
+    for name in list_missions():
+        assert load_mission(name).description
+
+
+def test_the_minimal_mission_is_fine(tmp_path):
+    assert load(tmp_path, MINIMAL).finishes == {"done"}
+
+
+GUARD = "seconds_in_state > 1"
+BAD_GUARDS = [
+    ("cam.red.q < 1", "m.yaml:11: guard 'cam.red.q < 1': 'Detection' has no 'q'; it has n s e w d a seen"),
+    ("cam.rde.d < 1", "'Detections' has no 'rde'"),
+    ("secondsinstate > 4", "unknown name 'secondsinstate'; did you mean 'seconds_in_state'?"),
+    ("hover", "'hover' is an action, not a value"),
+    ("memory.speed > 1", "no variable 'speed'; declared under 'variables': count"),
+    ("fly2(0, 0, 2) < 0.2", "calls are not possible"),
+    ("imu.x.real > 1", "'float' has no 'real'"),
+    ("cam.red.__class__ == 1", "'Detection' has no '__class__'"),
+    ("__import__('os')", "calls are not possible"),
+    ("(lambda:1)", "Lambda is not possible"),
+    ("goal_m[0] > 1", "[...] is not possible"),
+    ("9 ** 9 ** 9 > 1", "** is not possible"),
+    ("1 + 'a'.upper == 1", "must follow a name"),
+    ("frame_seen and", "cannot be understood"),
+    ("frame_seen = True", "cannot be understood"),
+    ("true", "unknown name 'true'"),
+]
+
+
+@pytest.mark.parametrize(("guard", "message"), BAD_GUARDS)
+def test_a_bad_guard_is_refused_at_its_line(tmp_path, guard, message):
+    said = problems(tmp_path, MINIMAL.replace(GUARD, guard))
+    assert message in said
+    assert said.startswith(f"m.yaml:11: guard '{guard}'")
+    assert said.count("\n") == 0
+
+
+BAD_ACTIONS = [
+    ("hoover", "m.yaml:7: unknown action 'hoover'; did you mean 'hover'?"),
+    ("imu", "'imu' is a value, not an action"),
+    ("cmd.velX = 1", "'Command' has no 'velX'; it has on vel_x vel_y vel_z rot_z land"),
+    ("imu.x = 1", "'imu.x' cannot be set"),
+    ("cmd = 1", "'cmd' cannot be set"),
+    ("hover = 1", "'hover' is an action"),
+    ("colour = 'purple'", "colour cannot be 'purple'; it is one of 'red', 'green', 'blue'"),
+    ("memory.total = 1", "no variable 'total'"),
+    ("cmd.vel_x = open", "unknown name 'open'"),
+    ("cmd.vel_x =", "nothing stands here"),
+    ("cmd.__class__ = 1", "has no '__class__'"),
+]
+
+
+@pytest.mark.parametrize(("action", "message"), BAD_ACTIONS)
+def test_a_bad_action_is_refused_at_its_line(tmp_path, action, message):
+    said = problems(tmp_path, MINIMAL.replace("- hover", f"- {action}"))
+    assert message in said
+    assert said.startswith("m.yaml:7: ")
+
+
+BAD_CHARTS = [
+    ("to: done", "to: dune", "m.yaml:11: target 'dune' of state 'up' is not a state; did you mean 'done'?"),
+    ("initial: up\n", "", "has no 'initial'; name the state it starts in, such as 'up'"),
+    ("initial: up", "initial: down", "it has the states up, done"),
+    ("  done:\n", "  up:\n", "m.yaml:13: 'up' stands twice (first in line 5); rename one"),
+    ("transitions:", "transition:", "state 'up' has no 'transition'; did you mean 'transitions'?"),
+    ("name: little", "nam: little", "a mission has no 'nam'; did you mean 'name'?"),
+    ("final: true", "final: maybe", "'final' is true or false, not 'maybe'"),
+    ("        to: done", "        too: done", "transition without 'to'"),
+    ("    final: true", "    # end", "never finishes"),
+    ("  - hover", "  hover", "m.yaml"),
+    ("states:", "states: {a: &x 1, b: *x}\nrest:", "alias '*x' is not allowed"),
+    ("variables: {count: 0}", "variables: {count: open()}", "variable 'count' needs a number"),
+    ("  done:", "  Done:", "'Done' is not a name"),
+    ("    during:", "    use: circle\n    during:", "unknown template 'circle'"),
+    ("    during:", "    then: done\n    during:", "has 'then' or 'initial' but no states of its own"),
+    ("  done:", "  alone:\n    transitions:\n      - to: done\n  done:", "state 'alone' is never reached"),
+    (
+        "      - when: seconds_in_state > 1\n        to: done",
+        "      - to: done\n      - when: frame_seen\n        to: done",
+        "m.yaml:12: this transition of 'up' is never reached: the one above always holds",
+    ),
+    ("name: little", "name: [little", "YAML syntax"),
+    (
+        "name: little",
+        "name: !!python/object:os.system little\nextends: none_such",
+        "unknown mission 'none_such'",
+    ),
+]
+
+
+@pytest.mark.parametrize(("old", "new", "message"), BAD_CHARTS)
+def test_a_bad_chart_is_refused(tmp_path, old, new, message):
+    assert old in MINIMAL
+    assert message in problems(tmp_path, MINIMAL.replace(old, new, 1))
+
+
+def test_all_problems_come_at_once_in_order_of_lines(tmp_path):
+    text = MINIMAL.replace("- hover", "- hoover").replace("seconds_in_state", "second").replace("_off", "_of")
+    lines = problems(tmp_path, text).splitlines()
+    assert [line.split(":")[1] for line in lines] == ["7", "11", "15"]
+
+
+@pytest.mark.parametrize("text", ["", "- a\n- b\n", "just words", "{}", "a: " + "[" * 5000, "\0"])
+def test_what_is_no_mission_is_refused(tmp_path, text):
+    assert "m.yaml" in problems(tmp_path, text)
+
+
+def test_a_huge_file_is_refused(tmp_path):
+    assert "larger than 1 MB" in problems(tmp_path, MINIMAL + "#" * 1_000_001)
+
+
+def test_unknown_name_and_missing_file():
+    with pytest.raises(MissionError, match="did you mean 'frame_challenge'"):
+        load_mission("frame_chalenge")
+    with pytest.raises(MissionError, match="does not exist"):
+        load_mission("no/such/file.yaml")
+
+
+def test_a_mission_cannot_extend_itself(tmp_path):
+    assert "circle" in problems(tmp_path, "name: a\nextends: m.yaml\n")
+
+
+def test_a_template_used_twice_keeps_names_apart(tmp_path):
+    text = dedent("""\
+        initial: a
+        templates:
+          leg:
+            initial: go
+            states:
+              go:
+                transitions:
+                  - to: end
+              end:
+                final: true
+        states:
+          a: {use: leg, then: b}
+          b: {use: leg}
+        """)
+    mission = load(tmp_path, text)
+    assert set(mission.leaves) == {"a.go", "a.end", "b.go", "b.end"}
+    assert mission.finishes == {"b.end"}
+    engine = MissionEngine(mission)
+    states = []
+    for tick in range(4):
+        engine.tick(Imu(), Detections(), tick * 50_000)
+        states.append(engine.state)
+    assert states == ["a.go", "b.go", "b.end", "b.end"]
+
+
+def test_a_superstate_s_transitions_come_after_those_of_its_states(tmp_path):
+    text = dedent("""\
+        initial: out
+        states:
+          out:
+            initial: a
+            transitions:
+              - when: seconds_in_state > 1
+                to: late
+            states:
+              a:
+                during:
+                  - fly_to_goal
+                transitions:
+                  - when: imu.x > 0
+                    to: b
+              b: {}
+          late:
+            final: true
+        """)
+    mission = load(tmp_path, text)
+    for x, expected in ((1.0, "out.b"), (0.0, "late")):
+        engine = MissionEngine(mission)
+        engine.tick(Imu(), Detections(), 0)
+        engine.tick(Imu(x=x), Detections(), 2_000_000)
+        assert engine.state == expected
+
+
+def test_actions_are_done_in_the_order_written(tmp_path):
+    text = MINIMAL.replace(
+        "      - hover\n", "      - cmd.rot_z = 0.5\n      - hover\n      - cmd.vel_z = 0.25\n"
+    )
+    for quiet in (True, False):
+        engine = MissionEngine(load(tmp_path, text), quiet_ticks=quiet)
+        command = engine.tick(Imu(), Detections(), 0)
+        assert (command.yaw_rate_rad_s, command.up_m_s) == (0.0, 0.25)
+
+
+class Acrobat(Pilot):
+    """A contestant's pilot with a primitive of its own."""
+
+    def spin(self) -> None:
+        """Turn as fast as allowed."""
+        self.cmd.rot_z = 9.0
+
+    def fail(self) -> None:
+        """Always breaks."""
+        raise ZeroDivisionError("no spin")
+
+
+def test_a_subclass_adds_primitives(tmp_path):
+    engine = MissionEngine(load(tmp_path, MINIMAL.replace("- hover", "- spin"), Acrobat))
+    assert engine.tick(Imu(), Detections(), 0).yaw_rate_rad_s == 1.0
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "message"),
+    [
+        ("- hover", "- fail", "ZeroDivisionError: no spin"),
+        ("- fly_to_goal", "- fail", "state 'up': ZeroDivisionError: no spin"),
+        ("- fly_to_goal", "- cmd.vel_x = 1 / memory.count", "ZeroDivisionError"),
+        (GUARD, "1 / memory.count > 1", "state 'up': ZeroDivisionError"),
+        (GUARD, "frame < 1", "state 'up': TypeError"),
+        ("- fly_to_goal", "- cmd.vel_x = frame.d - frame.d", "cmd.vel_x is not a number"),
+    ],
+)
+@pytest.mark.parametrize("quiet", [True, False])
+def test_an_error_while_flying_is_raised_with_the_state(tmp_path, old, new, message, quiet):
+    engine = MissionEngine(load(tmp_path, MINIMAL.replace(old, new), Acrobat), quiet_ticks=quiet)
+
+    def fly():
+        for tick in range(3):
+            engine.tick(Imu(), Detections(), tick * 50_000)
+
+    with pytest.raises(MissionRunError, match=message):
+        fly()
+
+
+def test_the_diagram_shows_every_state_and_transition_with_priority():
+    mission = load_mission("frame_challenge")
+    drawn = mermaid(mission, "red.turning")
+    assert drawn.startswith("stateDiagram-v2\n    [*] --> take_off\n")
+    for leaf_id, leaf in mission.leaves.items():
+        assert f" as {leaf_id}\n" in drawn
+        for transition in leaf.state.transitions:
+            assert f"{leaf_id} --> {transition.to}" in drawn
+    assert "red.go_to_center --> red.turning : 2 [distance_to_goal_m < 0.2]" in drawn
+    assert "class red.turning active" in drawn
+    assert "red --> green" in drawn
