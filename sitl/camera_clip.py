@@ -1,56 +1,70 @@
 """Polygons cut to what a camera can see.
 
-Works on projected points before the division by depth, (u w, v w, w), where every cut is a straight line
-between neighbours (Sutherland & Hodgman, "Reentrant polygon clipping", 1974). Plain scalars: few polygons need
-it, those that reach beside or behind the camera.
+The cut goes from corner to corner and keeps what lies on the good side (Sutherland & Hodgman, "Reentrant
+polygon clipping", 1974). Plain scalars: few polygons need it, those that reach beside or behind the camera.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 
-Homogeneous = tuple[float, float, float]
 Point = tuple[float, float]
 
 
-def clip_to_view(points: Iterable[Homogeneous], near_m: float, limit: float) -> list[Point]:
-    """Cut a convex polygon at the near plane and far outside the image, and project it.
+def clip_near(corners: Sequence[Sequence[float]], near_m: float) -> list[Point]:
+    """Cut a convex polygon at the near plane and project what is left of it.
 
     Args:
-        points: corners (u w, v w, w); w is the depth in metres, u and v are image coordinates.
-        near_m: depth of the near plane.
-        limit: the polygon is cut so that no coordinate exceeds this (in units of u and v).
+        corners: (u w, v w, w, ...) each; w is the depth in metres, u and v are image coordinates. Before the
+            division by w, straight lines in space are straight lines here too.
+        near_m: depth of the near plane, above zero.
 
     Returns:
-        Corners (u, v); fewer than three if nothing is left.
+        Corners (u, v); none if it is all behind the plane.
     """
-    corners = _cut(list(points), 0.0, 0.0, 1.0, -near_m)
-    projected = [(u / w, v / w) for u, v, w in corners]
-    if all(-limit <= u <= limit and -limit <= v <= limit for u, v in projected):
-        return projected
-    for u_sign, v_sign in ((1.0, 0.0), (-1.0, 0.0), (0.0, 1.0), (0.0, -1.0)):
-        corners = _cut(corners, u_sign, v_sign, limit, 0.0)
-    return [(u / w, v / w) for u, v, w in corners]
+    kept: list[Point] = []
+    x0, y0, w0 = corners[-1][:3]
+    for corner in corners:
+        x1, y1, w1 = corner[:3]
+        if (w0 < near_m) != (w1 < near_m):
+            t = (near_m - w0) / (w1 - w0)
+            kept.append(((x0 + t * (x1 - x0)) / near_m, (y0 + t * (y1 - y0)) / near_m))
+        if w1 >= near_m:
+            kept.append((x1 / w1, y1 / w1))
+        x0, y0, w0 = x1, y1, w1
+    return kept
 
 
-def clip_half_plane(points: list[Point], a: float, b: float, c: float) -> list[Point]:
+def clip_window(points: list[Point], left: float, top: float, right: float, bottom: float) -> list[Point]:
+    """Cut a convex polygon to a window of the image plane; fewer than three corners if nothing is left.
+
+    OpenCV's drawing takes whole numbers of 32 bits and walks row by row from a polygon's topmost corner, be
+    it ever so far above the image: this keeps it right and quick.
+    """
+    for u, v in points:
+        if not (left <= u <= right and top <= v <= bottom):
+            break
+    else:
+        return points
+    for a, b, c in ((1.0, 0.0, -left), (-1.0, 0.0, right), (0.0, 1.0, -top), (0.0, -1.0, bottom)):
+        points = clip_half_plane(points, a, b, c)
+    return points
+
+
+def clip_half_plane(points: Iterable[Point], a: float, b: float, c: float) -> list[Point]:
     """Keep the part of a convex polygon where a u + b v + c >= 0."""
-    return [(u, v) for u, v, _ in _cut([(u, v, 1.0) for u, v in points], a, b, c, 0.0)]
-
-
-def _cut(points: list[Homogeneous], a: float, b: float, c: float, d: float) -> list[Homogeneous]:
-    """Keep the part of a convex polygon where a x + b y + c z + d >= 0."""
-    kept: list[Homogeneous] = []
-    if not points:
+    corners = list(points)
+    kept: list[Point] = []
+    if not corners:
         return kept
-    x0, y0, z0 = points[-1]
-    before = a * x0 + b * y0 + c * z0 + d
-    for x1, y1, z1 in points:
-        now = a * x1 + b * y1 + c * z1 + d
+    u0, v0 = corners[-1]
+    before = a * u0 + b * v0 + c
+    for u1, v1 in corners:
+        now = a * u1 + b * v1 + c
         if (before < 0.0) != (now < 0.0):
             t = before / (before - now)
-            kept.append((x0 + t * (x1 - x0), y0 + t * (y1 - y0), z0 + t * (z1 - z0)))
+            kept.append((u0 + t * (u1 - u0), v0 + t * (v1 - v0)))
         if now >= 0.0:
-            kept.append((x1, y1, z1))
-        x0, y0, z0, before = x1, y1, z1, now
+            kept.append((u1, v1))
+        u0, v0, before = u1, v1, now
     return kept

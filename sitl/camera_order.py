@@ -1,109 +1,157 @@
-"""What hides what: the order in which upright boxes are painted, from back to front.
+"""What hides what: a tree of planes that gives the faces of a scene from back to front for any eye.
 
-Two convex bodies that do not touch can be parted by a plane; the one on the eye's side may hide the other and
-never the reverse. For upright boxes a plane along one of their faces is always enough (separating axis
-theorem, in plan and in height), so the planes are found once and an image needs one dot product per pair.
+What lies on the eye's side of a plane may hide what lies beyond it and never the reverse, so each plane
+halves the question (Fuchs, Kedem, Naylor, "On visible surface generation by a priori tree structures", 1980). Planes
+that pass between bodies come first: with the few, scattered bodies of an arena they part everything, and
+within one body its own order of faces holds. Only bodies that no plane parts, entangled or intersecting ones,
+are taken apart face by face, and faces cut in two where they must be.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from math import cos, sin
 
+import numpy as np
+import numpy.typing as npt
+
 from scenarios.axes import Vec3
+from sitl.camera_scene import Body, Face
+
+_FLAT_M = 1e-7  # corners nearer to a plane than this lie on it
 
 
 @dataclass(frozen=True, slots=True)
-class Box:
-    """An upright box.
+class _Leaf:
+    """Faces that may be painted one after the other, as numbers in the order of painting."""
 
-    Attributes:
-        centre_arena_m: shape (3,).
-        half_extents_m: along its own axes, shape (3,).
-        yaw_rad: of its first axis, counter-clockwise from arena x.
-    """
-
-    centre_arena_m: Vec3
-    half_extents_m: Vec3
-    yaw_rad: float = 0.0
-
-    def reach(self, axis: Vec3) -> float:
-        """Return how far it extends from its centre along a unit vector, metres."""
-        c, s = cos(self.yaw_rad), sin(self.yaw_rad)
-        x, y, z = self.half_extents_m
-        return x * abs(c * axis[0] + s * axis[1]) + y * abs(c * axis[1] - s * axis[0]) + z * abs(axis[2])
+    faces: tuple[int, ...]
 
 
 @dataclass(frozen=True, slots=True)
-class _Wall:
-    """The plane between two boxes: normal . p = offset, `below` on its negative side, `above` on the other."""
+class _Node:
+    """A plane normal . p = offset, the faces that lie on it and what is on either side of it."""
 
     normal: Vec3
     offset: float
-    below: int
-    above: int
+    behind: _Leaf | _Node
+    faces: tuple[int, ...]
+    before: _Leaf | _Node
 
 
-class PaintOrder:
-    """Sorts boxes for an eye at any place.
+class PaintTree:
+    """The faces of all bodies and their order.
 
-    Boxes that intersect (they should not) are parted at their least overlap; three boxes that hide one another
-    in a ring, which frames in an arena do not, are painted in the order they were given.
+    Attributes:
+        faces: all faces; some may be parts of the faces given.
     """
 
-    def __init__(self, boxes: Sequence[Box]) -> None:
-        self._count = len(boxes)
-        self._walls = tuple(_wall(boxes, i, j) for j in range(self._count) for i in range(j))
-        self._known: dict[int, tuple[int, ...]] = {}
+    def __init__(self, bodies: Sequence[Body]) -> None:
+        self.faces: list[Face] = []
+        self._root = self._part_bodies(bodies)
 
-    def back_to_front(self, eye_arena_m: Vec3) -> tuple[int, ...]:
-        """Return the indices of the boxes, the farthest first."""
-        x, y, z = eye_arena_m
-        key = 0
-        for wall in self._walls:
-            nx, ny, nz = wall.normal
-            key = key << 1 | (nx * x + ny * y + nz * z > wall.offset)
-        order = self._known.get(key)
-        if order is None:
-            order = self._known[key] = self._sort(key)
+    def back_to_front(self, eye_arena_m: Vec3) -> list[int]:
+        """Return the faces as indices of `faces`: none is hidden by one before it."""
+        order: list[int] = []
+        _walk(self._root, eye_arena_m, order)
         return order
 
-    def _sort(self, key: int) -> tuple[int, ...]:
-        behind: list[set[int]] = [set() for _ in range(self._count)]
-        for wall in reversed(self._walls):
-            if key & 1:  # the eye is above the wall
-                behind[wall.above].add(wall.below)
-            else:
-                behind[wall.below].add(wall.above)
-            key >>= 1
-        left = list(range(self._count))
-        order: list[int] = []
-        while left:
-            # Nothing unpainted stands behind the chosen one, unless they form a ring.
-            chosen = min(left, key=lambda i: (len(behind[i].intersection(left)), i))
-            left.remove(chosen)
-            order.append(chosen)
-        return tuple(order)
+    def _part_bodies(self, bodies: Sequence[Body]) -> _Leaf | _Node:
+        if len(bodies) < 2:
+            return _Leaf(self._keep([face for body in bodies for face in body.faces]))
+        plane = _plane_between(bodies)
+        if plane is None:
+            return self._part_faces([face for body in bodies for face in body.faces])
+        normal, offset = plane
+        beyond = [body for body in bodies if np.dot(normal, body.hull.centre_arena_m) < offset]
+        near = [body for body in bodies if body not in beyond]
+        return _Node(normal, offset, self._part_bodies(beyond), (), self._part_bodies(near))
+
+    def _part_faces(self, faces: list[Face]) -> _Leaf | _Node:
+        if not faces:
+            return _Leaf(())
+        chosen = min(faces, key=lambda face: sum(_is_cut(face, other) for other in faces))
+        normal, offset = chosen.normal_arena, float(np.dot(chosen.normal_arena, chosen.corners_arena_m[0]))
+        behind: list[Face] = []
+        on_it: list[Face] = []
+        before: list[Face] = []
+        for face in faces:
+            heights = _heights(chosen, face)
+            if abs(heights).max() <= _FLAT_M:
+                on_it.append(face)
+                continue
+            if heights.min() < -_FLAT_M:
+                behind.append(_below(face, heights))
+            if heights.max() > _FLAT_M:
+                before.append(_below(face, -heights))
+        far_side = self._part_faces(behind)
+        own = self._keep(on_it)
+        return _Node(normal, offset, far_side, own, self._part_faces(before))
+
+    def _keep(self, faces: Sequence[Face]) -> tuple[int, ...]:
+        first = len(self.faces)
+        self.faces.extend(faces)
+        return tuple(range(first, len(self.faces)))
 
 
-def _wall(boxes: Sequence[Box], i: int, j: int) -> _Wall:
-    """Find the plane with the widest gap between two boxes."""
-    a, b = boxes[i], boxes[j]
-    best_gap, best = -1e9, _Wall((0.0, 0.0, 1.0), 0.0, i, j)
+def _walk(tree: _Leaf | _Node, eye: Vec3, order: list[int]) -> None:
+    while isinstance(tree, _Node):
+        normal = tree.normal
+        above = normal[0] * eye[0] + normal[1] * eye[1] + normal[2] * eye[2] > tree.offset
+        _walk(tree.behind if above else tree.before, eye, order)
+        order.extend(tree.faces)
+        tree = tree.before if above else tree.behind
+    order.extend(tree.faces)
+
+
+def _plane_between(bodies: Sequence[Body]) -> tuple[Vec3, float] | None:
+    """Return the plane with the widest gap around it that parts the bodies without touching one, if any.
+
+    For two upright boxes a plane along a face of one of them is enough (separating axis theorem).
+    """
     axes: list[Vec3] = [(0.0, 0.0, 1.0)]
-    for yaw in (a.yaw_rad, b.yaw_rad):
-        axes += [(cos(yaw), sin(yaw), 0.0), (-sin(yaw), cos(yaw), 0.0)]
+    for body in bodies:
+        c, s = cos(body.hull.yaw_rad), sin(body.hull.yaw_rad)
+        axes += [(c, s, 0.0), (-s, c, 0.0)]
+    widest, plane = 0.0, None
     for axis in axes:
-        at_a = sum(n * p for n, p in zip(axis, a.centre_arena_m, strict=True))
-        at_b = sum(n * p for n, p in zip(axis, b.centre_arena_m, strict=True))
-        reach_a, reach_b = a.reach(axis), b.reach(axis)
-        gap = abs(at_b - at_a) - reach_a - reach_b
-        if gap <= best_gap:
-            continue
-        best_gap = gap
-        if at_a <= at_b:
-            best = _Wall(axis, (at_a + reach_a + at_b - reach_b) / 2, i, j)
-        else:
-            best = _Wall(axis, (at_b + reach_b + at_a - reach_a) / 2, j, i)
-    return best
+        spans = []
+        for body in bodies:
+            middle, reach = float(np.dot(axis, body.hull.centre_arena_m)), body.hull.reach_m(axis)
+            spans.append((middle - reach, middle + reach))
+        spans.sort()
+        end = spans[0][1]
+        for low, high in spans[1:]:
+            if low - end > widest:
+                widest, plane = low - end, (axis, (low + end) / 2)
+            end = max(end, high)
+    return plane
+
+
+def _heights(plane: Face, face: Face) -> npt.NDArray[np.float64]:
+    """Return how far a face's corners are before the plane of another, metres, shape (k,)."""
+    heights: npt.NDArray[np.float64] = (face.corners_arena_m - plane.corners_arena_m[0]) @ np.array(
+        plane.normal_arena
+    )
+    return heights
+
+
+def _is_cut(plane: Face, face: Face) -> bool:
+    heights = _heights(plane, face)
+    return bool(heights.min() < -_FLAT_M and heights.max() > _FLAT_M)
+
+
+def _below(face: Face, heights: npt.NDArray[np.float64]) -> Face:
+    """Return the part of a face whose heights are not above zero."""
+    if heights.max() <= _FLAT_M:
+        return face
+    kept = []
+    for i, corner in enumerate(face.corners_arena_m):
+        last, here = heights[i - 1], heights[i]
+        if (last > 0.0) != (here > 0.0):
+            before = face.corners_arena_m[i - 1]
+            kept.append(before + (corner - before) * (last / (last - here)))
+        if here <= 0.0:
+            kept.append(corner)
+    return replace(face, corners_arena_m=np.array(kept))

@@ -16,19 +16,18 @@ import numpy.typing as npt
 
 from scenarios.axes import Vec3
 from scenarios.models import Arena, Base, Frame, Light, Scenario
-from sitl.camera_order import Box
 
 Bgr = tuple[int, int, int]
 Floats = npt.NDArray[np.float64]
 
 FRAME_BGR: dict[str, Bgr] = {"red": (0, 0, 255), "green": (0, 255, 0), "blue": (255, 0, 0)}
 # None of these passes the detector's colour test, lit, shaded or after JPEG.
-SKY_BGR: tuple[Bgr, ...] = ((224, 203, 182), (226, 209, 193), (227, 215, 204), (228, 220, 213))
+SKY_BGR: tuple[Bgr, ...] = ((222, 206, 190), (224, 210, 196), (226, 214, 202), (228, 218, 208))
 """From the zenith down to the horizon."""
 GROUND_BGR: Bgr = (132, 134, 134)
 UNDERGROUND_BGR: Bgr = (28, 30, 32)
 TATAMI_BGR: Bgr = (56, 176, 226)
-TATAMI_CHECK_BGR: Bgr = (48, 164, 213)
+TATAMI_MAT_BGR: Bgr = (48, 164, 213)
 BASE_BGR: Bgr = (168, 170, 172)
 BASE_MARK_BGR: Bgr = (238, 238, 238)
 
@@ -41,6 +40,28 @@ SHADOW = 0.6
 
 
 @dataclass(frozen=True, slots=True)
+class Box:
+    """An upright box.
+
+    Attributes:
+        centre_arena_m: shape (3,).
+        half_extents_m: along its own axes, shape (3,).
+        yaw_rad: of its first axis, counter-clockwise from arena x.
+    """
+
+    centre_arena_m: Vec3
+    half_extents_m: Vec3
+    yaw_rad: float = 0.0
+
+    def reach_m(self, axis: Vec3) -> float:
+        """Return how far it extends from its centre along a unit vector."""
+        c, s = cos(self.yaw_rad), sin(self.yaw_rad)
+        x, y, z = self.half_extents_m
+        along, across = c * axis[0] + s * axis[1], c * axis[1] - s * axis[0]
+        return x * abs(along) + y * abs(across) + z * abs(axis[2])
+
+
+@dataclass(frozen=True, slots=True, eq=False)
 class Face:
     """A convex flat polygon that is seen from one side.
 
@@ -55,7 +76,7 @@ class Face:
     colour: Bgr
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, eq=False)
 class Body:
     """A solid thing.
 
@@ -74,13 +95,13 @@ class Scene:
 
     Attributes:
         tatami: the arena's floor.
-        checks: stripes on it; where just one stripe lies, not none or two, is a darker mat.
+        mats: every second mat of it, darker.
         shadows: on the floor.
         bodies: the base and the frames.
     """
 
     tatami: Face
-    checks: tuple[Face, ...]
+    mats: tuple[Face, ...]
     shadows: tuple[Face, ...]
     bodies: tuple[Body, ...]
 
@@ -94,7 +115,7 @@ def build_scene(scenario: Scenario) -> Scene:
         solids += _bar_corners(frame)
     return Scene(
         tatami=_on_floor(_rectangle(arena, 0.0, 1.0, 0.0, 1.0), _lit(TATAMI_BGR, _UP, light)),
-        checks=_checks(arena, light),
+        mats=_mats(arena, light),
         shadows=tuple(face for solid in solids for face in _shadow(solid, arena, light)),
         bodies=bodies,
     )
@@ -133,14 +154,17 @@ def _rectangle(arena: Arena, x0: float, x1: float, y0: float, y1: float) -> list
     return [(left, near), (right, near), (right, far), (left, far)]
 
 
-def _checks(arena: Arena, light: Light) -> tuple[Face, ...]:
-    """Return every second row and column of mats; at most 20 of each, so that a huge arena stays cheap."""
-    colour = _lit(TATAMI_CHECK_BGR, _UP, light)
+def _mats(arena: Arena, light: Light) -> tuple[Face, ...]:
+    """Return every second mat as on a chessboard; at most 20 by 20 mats, so that a huge arena stays cheap."""
+    colour = _lit(TATAMI_MAT_BGR, _UP, light)
     rows = min(20, max(1, round(arena.length_x_m / MAT_M)))
     columns = min(20, max(1, round(arena.width_y_m / MAT_M)))
-    stripes = [_rectangle(arena, i / rows, (i + 1) / rows, 0.0, 1.0) for i in range(1, rows, 2)]
-    stripes += [_rectangle(arena, 0.0, 1.0, i / columns, (i + 1) / columns) for i in range(1, columns, 2)]
-    return tuple(_on_floor(stripe, colour) for stripe in stripes)
+    return tuple(
+        _on_floor(_rectangle(arena, i / rows, (i + 1) / rows, j / columns, (j + 1) / columns), colour)
+        for i in range(rows)
+        for j in range(columns)
+        if (i + j) % 2
+    )
 
 
 def _placed(box: Box, local: Sequence[Vec3]) -> Floats:

@@ -1,0 +1,395 @@
+"""The painted camera: geometry against cv2.projectPoints and a ray tracer, and its behaviour at odd poses."""
+
+from math import atan2, cos, inf, nan, pi, sin
+
+import cv2
+import numpy as np
+import numpy.typing as npt
+import pytest
+
+from scenarios.axes import Quaternion, Vec3
+from scenarios.models import Arena, Base, Camera, Frame, Light, Scenario
+from sitl.camera import Camera as PaintedCamera
+from sitl.camera import Image
+from sitl.camera_mesh import SUBPIXELS, Mesh, Pinhole
+from sitl.camera_scene import GROUND_BGR, SKY_BGR, build_scene
+from sitl.solids import Solid, base_solid, frame_solids
+
+SKY, GROUND, TATAMI, BASE, RED, GREEN, BLUE = range(7)
+CLASSES = {"base": BASE, "red": RED, "green": GREEN, "blue": BLUE}
+OVERSAMPLING = 3
+
+
+def frame(colour: str, x: float, y: float, z: float, yaw: float) -> Frame:
+    return Frame.model_validate({"colour": colour, "x_m": x, "y_m": y, "z_m": z, "yaw_rad": yaw})
+
+
+FRAMES = (frame("red", 3, 2, 2, 3), frame("green", -2, 1, 0.5, 2), frame("blue", 3, -1, 1, 1))
+SCENARIO = Scenario(name="scene", base=Base(x_m=-3, y_m=-3), frames=FRAMES)
+
+
+def quaternion(yaw: float, pitch: float = 0.0, roll: float = 0.0) -> Quaternion:
+    """Attitude FLU to arena from Z-Y-X angles; positive pitch is nose down."""
+    cy, sy, cp, sp, cr, sr = (f(a / 2) for a in (yaw, pitch, roll) for f in (cos, sin))
+    return (
+        cr * cp * cy + sr * sp * sy,
+        sr * cp * cy - cr * sp * sy,
+        cr * sp * cy + sr * cp * sy,
+        cr * cp * sy - sr * sp * cy,
+    )
+
+
+def rotation(q: Quaternion) -> npt.NDArray[np.float64]:
+    """Rotation matrix by another way than the camera's: turn each axis by q v q*."""
+    w, v = q[0], np.array(q[1:])
+    return np.array([e + 2 * np.cross(v, np.cross(v, e) + w * e) for e in np.eye(3)]).T
+
+
+def eye(scenario: Scenario, position: Vec3, q: Quaternion) -> npt.NDArray[np.float64]:
+    return np.array(position) + rotation(q) @ np.array(scenario.camera.position_flu_m)
+
+
+def focal(camera: Camera) -> float:
+    return float(camera.width_px / 2 / np.tan(camera.horizontal_fov_rad / 2))
+
+
+def outer_corners(one: Frame) -> npt.NDArray[np.float64]:
+    c, s = cos(one.yaw_rad), sin(one.yaw_rad)
+    turn = np.array([[c, -s, 0], [s, c, 0], [0, 0, 1]])
+    half = np.array([one.bar_m, one.outer_width_m, one.outer_height_m]) / 2
+    signs = np.array([(a, b, d) for a in (-1, 1) for b in (-1, 1) for d in (-1, 1)])
+    return np.array(one.position_arena_m) + (signs * half) @ turn.T
+
+
+def projected(
+    scenario: Scenario, points: npt.NDArray[np.float64], position: Vec3, q: Quaternion
+) -> npt.NDArray[np.float64]:
+    """Exact image of arena points by OpenCV, pixels, shape (k, 2)."""
+    camera = scenario.camera
+    f = focal(camera)
+    matrix = np.array([[f, 0, (camera.width_px - 1) / 2], [0, f, (camera.height_px - 1) / 2], [0, 0, 1]])
+    to_camera = np.array([[0, -1, 0], [0, 0, -1], [1, 0, 0]]) @ rotation(q).T
+    rvec, _ = cv2.Rodrigues(to_camera)
+    image, _ = cv2.projectPoints(points, rvec, -to_camera @ eye(scenario, position, q), matrix, None)
+    return image.reshape(-1, 2)
+
+
+def facing(
+    one: Frame, distance: float, turn: float = 0.0, side: float = 0.0, up: float = 0.0
+) -> tuple[Vec3, Quaternion]:
+    """Pose whose camera stands before a frame, `turn` round it, looking at its centre (moved by side, up)."""
+    yaw = one.yaw_rad + turn
+    x = one.x_m - distance * cos(yaw) - side * sin(yaw) - 0.08 * cos(yaw)
+    y = one.y_m - distance * sin(yaw) + side * cos(yaw) - 0.08 * sin(yaw)
+    return (x, y, one.z_m + up), quaternion(yaw)
+
+
+def palette(scenario: Scenario) -> dict[int, int]:
+    """What every painted colour stands for."""
+    scene = build_scene(scenario)
+    names = [BASE, *(CLASSES[one.colour] for one in scenario.frames)]
+    colours = [(colour, SKY) for colour in SKY_BGR] + [(GROUND_BGR, GROUND), (scene.tatami.colour, TATAMI)]
+    colours += [(face.colour, TATAMI) for face in scene.mats]
+    for face in scene.shadows:
+        on_tatami = bool((abs(face.corners_arena_m.mean(axis=0)) <= 5).all())
+        colours.append((face.colour, TATAMI if on_tatami else GROUND))
+    for name, body in zip(names, scene.bodies, strict=True):
+        colours += [(face.colour, name) for face in body.faces]
+    known: dict[int, int] = {}
+    for (b, g, r), name in colours:
+        assert known.setdefault(b << 16 | g << 8 | r, name) == name, "two things of one colour"
+    return known
+
+
+def classes(image: Image, scenario: Scenario) -> npt.NDArray[np.int64]:
+    """Tell by colour what every pixel shows."""
+    codes = image.astype(np.int64) @ np.array([1 << 16, 1 << 8, 1])
+    result = np.full(codes.shape, -1)
+    for code, name in palette(scenario).items():
+        result[codes == code] = name
+    assert (result >= 0).all(), "a colour that nothing has"
+    return result
+
+
+def traced(scenario: Scenario, position: Vec3, q: Quaternion) -> npt.NDArray[np.int64]:
+    """Tell by ray tracing what every part of a pixel shows.
+
+    Shape (height + 2, width + 2) times OVERSAMPLING: with a border of one pixel around the image.
+    """
+    camera, n = scenario.camera, OVERSAMPLING
+    u = (np.arange((camera.width_px + 2) * n) + 0.5) / n - 1.5 - (camera.width_px - 1) / 2
+    v = (np.arange((camera.height_px + 2) * n) + 0.5) / n - 1.5 - (camera.height_px - 1) / 2
+    right, down = (grid.ravel() / focal(camera) for grid in np.meshgrid(u, v))
+    rays = np.stack([np.ones_like(right), -right, -down], axis=1) @ rotation(q).T
+    origin = eye(scenario, position, q)
+    to_floor = np.where(rays[:, 2] < 0, -origin[2] / np.where(rays[:, 2] < 0, rays[:, 2], -1.0), inf)
+    nearest, result = to_floor.copy(), np.where(to_floor < inf, GROUND, SKY)
+    with np.errstate(invalid="ignore", over="ignore"):
+        place = origin[:2] + np.where(to_floor < inf, to_floor, 0.0)[:, None] * rays[:, :2]
+    result[(to_floor < inf) & (abs(place) <= 5).all(axis=1)] = TATAMI
+    solids = [base_solid(scenario)] + [bar for one in scenario.frames for bar in frame_solids(one)]
+    for solid in solids:
+        entry = entry_of_rays(solid, origin, rays)
+        hit = entry < nearest
+        nearest[hit], result[hit] = entry[hit], CLASSES[solid.name]
+    return result.reshape((camera.height_px + 2) * n, (camera.width_px + 2) * n)
+
+
+def entry_of_rays(
+    solid: Solid, origin: npt.NDArray[np.float64], rays: npt.NDArray[np.float64]
+) -> npt.NDArray[np.float64]:
+    """Slab method: depth at which rays enter a box from outside, inf where they do not."""
+    c, s = cos(solid.yaw_rad), sin(solid.yaw_rad)
+    turn = np.array([[c, s, 0], [-s, c, 0], [0, 0, 1]])
+    start, way = turn @ (origin - np.array(solid.centre_arena_m)), rays @ turn.T
+    half = np.array(solid.half_extents_m)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        one, other = (-half - start) / way, (half - start) / way
+    entry, leave = np.minimum(one, other).max(axis=1), np.maximum(one, other).min(axis=1)
+    return np.where((entry < leave) & (entry > 0.01), entry, inf)
+
+
+def wrong_pixels(scenario: Scenario, position: Vec3, q: Quaternion) -> npt.NDArray[np.bool_]:
+    """Pixels that show what is nowhere within a pixel of them by ray tracing."""
+    painted = classes(PaintedCamera(scenario).render(position, q), scenario)
+    truth, n = traced(scenario, position, q), OVERSAMPLING
+    height, width = painted.shape
+    wrong = np.zeros(painted.shape, np.bool_)
+    for name in range(7):
+        around = cv2.dilate((truth == name).astype(np.uint8), np.ones((2 * n + 1, 2 * n + 1), np.uint8))
+        pixels = around.reshape(height + 2, n, width + 2, n).max(axis=(1, 3))
+        wrong |= (painted == name) & (pixels[1:-1, 1:-1] == 0)
+    return wrong
+
+
+SMALL = SCENARIO.model_copy(update={"camera": Camera(width_px=96, height_px=72)})
+WALL = Scenario(
+    name="crowd",
+    camera=Camera(width_px=96, height_px=72),
+    frames=(
+        frame("red", 0.8, -0.15, 1.0, 0.0),
+        frame("green", 0.65, 0.15, 0.95, 1.2),
+        frame("blue", 0.6, 0.1, 1.2, 0.5),
+    ),
+    base=Base(x_m=1.2, y_m=0.2, top_m=0.8),
+)
+
+
+@pytest.mark.parametrize("seed", range(12))
+def test_agrees_with_a_ray_tracer_anywhere(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    x, y, z = rng.uniform((-5, -5, 0.05), (5, 5, 4))
+    yaw, pitch, roll = rng.uniform((-pi, -0.6, -0.6), (pi, 0.6, 0.6))
+    assert not wrong_pixels(SMALL, (x, y, z), quaternion(yaw, pitch, roll)).any()
+
+
+@pytest.mark.parametrize("seed", range(12))
+def test_agrees_with_a_ray_tracer_upside_down_and_close_to_the_floor(seed: int) -> None:
+    rng = np.random.default_rng(100 + seed)
+    x, y, z = rng.uniform((-5, -5, 0.1), (5, 5, 0.3))
+    yaw, pitch, roll = rng.uniform((-pi, -pi / 2, -pi), (pi, pi / 2, pi))
+    assert not wrong_pixels(SMALL, (x, y, z), quaternion(yaw, pitch, roll)).any()
+
+
+@pytest.mark.parametrize("seed", range(24))
+def test_agrees_with_a_ray_tracer_close_to_frames_and_through_them(seed: int) -> None:
+    rng = np.random.default_rng(200 + seed)
+    one = FRAMES[seed % 3]
+    distance, turn, side, up = rng.uniform((-0.05, -0.6, -0.12, -0.05), (0.5, 0.6, 0.12, 0.05))
+    position, q = facing(one, distance, turn, side, up)
+    assert not wrong_pixels(SMALL, position, q).any()
+
+
+@pytest.mark.parametrize("seed", range(36))
+def test_things_before_each_other_hide_rightly(seed: int) -> None:
+    rng = np.random.default_rng(300 + seed)
+    around, distance, height = rng.uniform((-pi, 0.5, 0.3), (pi, 1.5, 1.8))
+    x, y = 0.8 - distance * cos(around), 0.1 - distance * sin(around)
+    assert not wrong_pixels(WALL, (x, y, height), quaternion(around, (height - 1) / distance)).any()
+
+
+def test_nearer_frame_hides_the_farther_one_from_both_sides() -> None:
+    frames = (frame("red", -1, 0, 1, 0), frame("green", 1, 0, 1, 0))
+    camera = PaintedCamera(Scenario(name="two", frames=frames, base=Base(x_m=4, y_m=4)))
+    bar = 0.1  # height of the upper bars above the middle: both are seen along one line
+    from_behind = camera.render((-2.08, 0, 1 + bar), quaternion(0))
+    from_ahead = camera.render((2.08, 0, 1 + bar), quaternion(pi))
+    assert from_behind[119, 160, 2] > 100
+    assert from_behind[119, 160, 1] == 0
+    assert from_ahead[119, 160, 1] > 100
+    assert from_ahead[119, 160, 2] == 0
+
+
+def test_projection_is_that_of_opencv() -> None:
+    rng = np.random.default_rng(1)
+    scene = build_scene(SCENARIO)
+    faces = [face for body in scene.bodies for face in body.faces]
+    corners = np.concatenate([face.corners_arena_m for face in faces])
+    settings = SCENARIO.camera
+    mesh = Mesh(
+        faces,
+        Pinhole(settings.width_px, settings.height_px, focal(settings), settings.near_m, settings.far_m),
+    )
+    compared = 0
+    for _ in range(50):
+        x, y, z = rng.uniform((-5, -5, 0.1), (5, 5, 4))
+        q = quaternion(*rng.uniform((-pi, -1, -1), (pi, 1, 1)))
+        turn, place = rotation(q), eye(SCENARIO, (x, y, z), q)
+        rows = tuple((float(a), float(b), float(c)) for a, b, c in turn)
+        pixels = mesh.project(tuple(place.tolist()), rows).pixels / SUBPIXELS
+        depth = (corners - place) @ turn[:, 0]
+        exact = projected(SCENARIO, corners, (x, y, z), q)
+        usable = (depth > 0.05) & (abs(exact) < 1e4).all(axis=1)
+        compared += int(usable.sum())
+        # The last half sixteenth of a pixel is rounding.
+        assert (abs(pixels - exact)[usable] <= 0.5 / SUBPIXELS + 1e-6).all()
+    assert compared > 1000
+
+
+def test_painted_boxes_are_unbiased() -> None:
+    rng = np.random.default_rng(2)
+    one = frame("green", 0, 0, 2, 0.4)
+    alone = Scenario(name="alone", frames=(one,), base=Base(x_m=-4.5, y_m=4.5))
+    camera, errors = PaintedCamera(alone), []
+    for _ in range(300):
+        distance, turn, side, up = rng.uniform((0.5, -1.3, -0.2, -0.2), (6, 1.3, 0.2, 0.2))
+        position, q = facing(one, distance, turn, side, up)
+        exact = projected(alone, outer_corners(one), position, q)
+        (left, top), (right, bottom) = exact.min(axis=0), exact.max(axis=0)
+        if left < 1 or top < 1 or right > 318 or bottom > 238:
+            continue
+        rows, columns = np.nonzero(classes(camera.render(position, q), alone) == GREEN)
+        errors.append((top - rows.min(), rows.max() - bottom, left - columns.min(), columns.max() - right))
+    outwards = np.array(errors)
+    assert len(outwards) > 250
+    assert abs(outwards).max() < 0.6
+    assert abs(outwards.mean(axis=0)).max() < 0.06
+
+
+def test_thin_bars_far_away_do_not_vanish() -> None:
+    one = frame("red", 0, 0, 1.5, 0)
+    camera = PaintedCamera(Scenario(name="far", frames=(one,), base=Base(x_m=4, y_m=4)))
+    for distance in (6.0, 8.0, 10.0):  # a bar is 0.5 to 0.3 pixels wide
+        red = classes(camera.render(*facing(one, distance)), Scenario(name="far", frames=(one,))) == RED
+        rows, columns = np.nonzero(red)
+        top, bottom, left, right = rows.min(), rows.max(), columns.min(), columns.max()
+        assert red[top, left : right + 1].all()
+        assert red[bottom, left : right + 1].all()
+        assert red[top : bottom + 1, left].all()
+        assert red[top : bottom + 1, right].all()
+
+
+@pytest.mark.parametrize("ambient", [0.0, 0.5, 1.0])
+@pytest.mark.parametrize("sun", [(-0.5, 0.1, -0.9), (0.3, 0.3, 0.1), (0.0, 0.0, -1.0)])
+def test_frames_keep_their_colour_in_light_and_shade(ambient: float, sun: Vec3) -> None:
+    scenario = SCENARIO.model_copy(update={"light": Light(ambient=ambient, sun_direction_arena=sun)})
+    for body, one in zip(build_scene(scenario).bodies[1:], FRAMES, strict=True):
+        shown = ("blue", "green", "red").index(one.colour)
+        for face in body.faces:
+            others = [face.colour[i] for i in range(3) if i != shown]
+            assert others == [0, 0]
+            assert face.colour[shown] > 60
+
+
+@pytest.mark.parametrize("ambient", [0.0, 0.5, 1.0])
+def test_nothing_but_frames_has_a_frame_colour(ambient: float) -> None:
+    bare = SCENARIO.model_copy(update={"frames": (), "light": Light(ambient=ambient)})
+    camera = PaintedCamera(bare)
+    for yaw in (0.5, 2.0, 4.0):
+        image = camera.render((-3.5, -3.5, 1.0), quaternion(yaw, 0.3)).astype(int)
+        b, g, r = image[:, :, 0], image[:, :, 1], image[:, :, 2]
+        for shown, following, other in ((r, g, b), (g, b, r), (b, r, g)):
+            # Well away from the detector's limits, so that compression cannot bring it over them.
+            assert not ((shown - following > 35) & (abs(following - other) < 30)).any()
+
+
+@pytest.mark.parametrize(
+    ("position", "q"),
+    [
+        ((3.0, 2.0, 2.1), quaternion(3)),
+        ((-3.0, -3.0, 0.3), quaternion(0)),
+        ((0.0, 0.0, 1.0), quaternion(0, 0, pi)),
+        ((0.0, 0.0, 1.0), quaternion(0, pi / 2)),
+        ((0.0, 0.0, 1.0), quaternion(0, -pi / 2)),
+        ((0.0, 0.0, -1.0), quaternion(0)),
+        ((0.0, 0.0, 0.0), quaternion(0)),
+        ((0.0, 0.0, 1e-9), quaternion(1)),
+        ((1e4, 1e4, 1e4), quaternion(-2.4, 0.6)),
+        ((-1e300, 1e300, 1e300), quaternion(0)),
+        ((3.0 - 0.08, 2.0, 2.0), (1.0, 0.0, 0.0, 0.0)),
+        ((3.0 - 0.08, 2.0, 2.0), (2.0, 0.0, 0.0, 0.0)),
+    ],
+)
+@pytest.mark.filterwarnings("error")
+def test_odd_poses_give_an_image(position: Vec3, q: Quaternion) -> None:
+    image = PaintedCamera(SCENARIO).render(position, q)
+    assert image.shape == (240, 320, 3)
+    assert image.dtype == np.uint8
+
+
+@pytest.mark.filterwarnings("error")
+def test_corners_exactly_on_the_near_plane_and_on_the_eye() -> None:
+    camera = PaintedCamera(SCENARIO.model_copy(update={"camera": Camera(position_flu_m=(0.0, 0.0, 0.0))}))
+    for corner in outer_corners(FRAMES[2]):
+        for depth in (0.0, 0.01):
+            x, y, z = corner.tolist()
+            camera.render((x - depth, y, z), (1.0, 0.0, 0.0, 0.0))
+
+
+@pytest.mark.filterwarnings("error")
+def test_extreme_settings_give_an_image() -> None:
+    narrow = Camera(width_px=64, height_px=64, horizontal_fov_rad=0.11, near_m=1e-6)
+    wide = Camera(width_px=64, height_px=48, horizontal_fov_rad=2.99)
+    large = Arena(length_x_m=1000, width_y_m=1000)
+    for settings in (narrow, wide):
+        scenario = SCENARIO.model_copy(update={"camera": settings, "arena": large})
+        for yaw in (0.0, 1.0, 2.5):
+            assert PaintedCamera(scenario).render((0.0, 0.0, 1.0), quaternion(yaw, 0.2)).shape[1] == 64
+
+
+@pytest.mark.parametrize("position", [(nan, 0.0, 1.0), (0.0, inf, 1.0), (0.0, 0.0, -inf)])
+def test_position_must_be_finite(position: Vec3) -> None:
+    with pytest.raises(ValueError, match="position_arena_m: every component must be finite"):
+        PaintedCamera(SCENARIO).render(position, quaternion(0))
+
+
+@pytest.mark.parametrize("q", [(nan, 0.0, 0.0, 0.0), (0.0, 0.0, 0.0, 0.0), (inf, 0.0, 0.0, 0.0)])
+def test_attitude_must_be_a_rotation(q: Quaternion) -> None:
+    with pytest.raises(ValueError, match="attitude_arena: need a finite quaternion"):
+        PaintedCamera(SCENARIO).render((0.0, 0.0, 1.0), q)
+
+
+def test_same_pose_same_image_and_a_new_one_each_time() -> None:
+    first, second = PaintedCamera(SCENARIO), PaintedCamera(SCENARIO)
+    pose = facing(FRAMES[0], 1.0, 0.3)
+    image = first.render(*pose)
+    first.render((0.0, 0.0, 1.0), quaternion(1))
+    again = first.render(*pose)
+    assert np.array_equal(image, again)
+    assert np.array_equal(image, second.render(*pose))
+    assert not np.shares_memory(image, again)
+
+
+def test_frames_beyond_the_far_plane_are_not_seen() -> None:
+    one = frame("red", 4, 0, 1, 0)
+    for far, seen in ((20.0, True), (5.0, False)):
+        scenario = Scenario(name="far", frames=(one,), camera=Camera(far_m=far))
+        image = PaintedCamera(scenario).render((-4.0, 0.0, 1.0), quaternion(0))
+        assert (classes(image, scenario) == RED).any() == seen
+
+
+def test_shadow_lies_where_the_sun_throws_it() -> None:
+    one = frame("red", 0, 0, 1, 0)
+    scenario = Scenario(name="sun", frames=(one,), base=Base(x_m=4, y_m=4))
+    down = quaternion(0, pi / 2)
+    # Sun (-0.5, 0.1, -0.9): the middle of the lower bar's shadow lies at its height times (-5, 1) / 9.
+    x, y = 0.9 * -5 / 9, 0.9 / 9
+    image = PaintedCamera(scenario).render((x, y, 0.8), down)
+    lit = PaintedCamera(scenario.model_copy(update={"frames": ()})).render((x, y, 0.8), down)
+    middle = (slice(118, 122), slice(158, 162))
+    assert image[middle].mean() < 0.8 * lit[middle].mean()
+
+
+def test_no_frames_and_empty_floor() -> None:
+    image = PaintedCamera(Scenario(name="empty")).render((-3.0, 0.0, 1.0), quaternion(atan2(0.0, 1.0)))
+    assert set(np.unique(classes(image, Scenario(name="empty")))) == {SKY, GROUND, TATAMI, BASE}
