@@ -1,0 +1,166 @@
+"""The house rules: what a reader of this repository may rely on wherever they look."""
+
+import ast
+import fnmatch
+import re
+import shlex
+import statistics
+import tomllib
+from pathlib import Path
+
+import pytest
+
+from framerunner.cli import build_app
+from scenarios.loader import list_scenarios
+
+ROOT = Path(__file__).parents[1]
+PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))
+ROOMS = ("scenarios", "firmware_py", "sitl", "vision", "offboard", "framerunner")
+MODULES = sorted(path for room in ROOMS for path in (ROOT / room).rglob("*.py"))
+DOCUMENTS = sorted([*ROOT.glob("*.md"), *(ROOT / "docs").rglob("*.md")])
+LOCKS = sorted((ROOT / "locks").glob("*.txt"))
+
+
+def name_of(path):
+    return str(path.relative_to(ROOT))
+
+
+def commands_in(text, program):
+    """Indented lines that start with a program, without the program."""
+    lines = re.findall(rf"^(?: {{4,}}|\t)(?:\.venv/bin/)?{program} (.+)$", text, re.MULTILINE)
+    return [shlex.split(line.partition(">")[0], comments=True) for line in lines]
+
+
+def documented_commands():
+    sources = [*DOCUMENTS, ROOT / "Makefile", *(ROOT / "framerunner" / "commands").glob("*.py")]
+    found = {}
+    for path in sources:
+        text = path.read_text(encoding="utf-8").replace("$(BIN)/", "")
+        for words in commands_in(text, "framerunner"):
+            found.setdefault(" ".join(words), words)
+    return found
+
+
+COMMANDS = documented_commands()
+
+
+def test_the_readme_shows_the_four_uses_in_order():
+    shown = [
+        " ".join(words)
+        for words in commands_in((ROOT / "README.md").read_text(encoding="utf-8"), "framerunner")
+    ]
+    wanted = ["sim", "sim --scenario test-case-1", "fly test-case-1", "mission show frame_challenge"]
+    places = [shown.index(command, 1) for command in wanted]  # the very first is the set-up's
+    assert places == sorted(places)
+    assert any(command.startswith("fly test-case-1 --drone serial://") for command in shown[places[-1] :])
+
+
+@pytest.mark.parametrize("words", COMMANDS.values(), ids=COMMANDS.keys())
+def test_documented_commands_are_understood(words):
+    build_app().parse_args(words, print_error=False, exit_on_error=False)
+
+
+@pytest.mark.parametrize("document", DOCUMENTS, ids=name_of)
+def test_documented_make_targets_exist(document):
+    targets = set(re.findall(r"^([a-z-]+):", (ROOT / "Makefile").read_text(encoding="utf-8"), re.MULTILINE))
+    used = set(re.findall(r"(?:^ {4}|`)make ([a-z-]+)", document.read_text(encoding="utf-8"), re.MULTILINE))
+    assert used <= targets
+
+
+@pytest.mark.parametrize("document", DOCUMENTS, ids=name_of)
+def test_links_between_documents_lead_somewhere(document):
+    links = re.findall(r"\]\(([^)#]+)[^)]*\)", document.read_text(encoding="utf-8"))
+    broken = [link for link in links if "://" not in link and not (document.parent / link).exists()]
+    assert broken == []
+
+
+def test_the_changelog_knows_the_version():
+    changelog = (ROOT / "CHANGELOG.md").read_text(encoding="utf-8")
+    assert f"\n## [{PROJECT['project']['version']}]" in changelog
+
+
+def test_every_yaml_file_is_shipped():
+    patterns = PROJECT["tool"]["setuptools"]["package-data"]
+    forgotten = [
+        name_of(path)
+        for room in ROOMS
+        for path in (ROOT / room).rglob("*.yaml")
+        if not any(
+            fnmatch.fnmatch(str(path.relative_to(ROOT / room)), each) for each in patterns.get(room, [])
+        )
+    ]
+    assert forgotten == []
+
+
+@pytest.mark.parametrize("room", ROOMS)
+def test_every_room_is_a_typed_package_that_is_shipped_and_bound_by_the_rules(room):
+    assert (ROOT / room / "py.typed").exists()
+    assert all((path.parent / "__init__.py").exists() for path in MODULES if path.is_relative_to(ROOT / room))
+    tools = PROJECT["tool"]
+    assert f"{room}*" in tools["setuptools"]["packages"]["find"]["include"]
+    assert room in tools["importlinter"]["root_packages"]
+    assert room in tools["mypy"]["files"]
+    assert room in tools["ruff"]["lint"]["isort"]["known-first-party"]
+
+
+def test_no_package_is_outside_the_rooms():
+    packages = {path.parent.name for path in ROOT.glob("*/__init__.py")}
+    assert packages == set(ROOMS)
+
+
+def test_modules_are_small():
+    lines = {name_of(path): len(path.read_text(encoding="utf-8").splitlines()) for path in MODULES}
+    assert {name: count for name, count in lines.items() if count > 500} == {}
+    assert statistics.median(count for count in lines.values() if count > 1) <= 150
+
+
+def test_functions_are_short():
+    too_long = {
+        f"{name_of(path)}:{node.lineno} {node.name}": node.end_lineno - node.lineno + 1
+        for path in MODULES
+        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8")))
+        if isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef)
+        and node.end_lineno - node.lineno + 1 >= 60
+    }
+    assert too_long == {}
+
+
+def test_nothing_is_decided_by_the_name_of_a_scenario():
+    names = set(list_scenarios()) - {"empty"}
+    decisions = [
+        f"{name_of(path)}:{constant.lineno} {constant.value}"
+        for path in MODULES
+        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8")))
+        if isinstance(node, ast.Compare | ast.Match | ast.Dict)
+        for constant in ast.walk(node)
+        if isinstance(constant, ast.Constant) and constant.value in names
+    ]
+    assert decisions == []
+
+
+@pytest.mark.parametrize("path", LOCKS, ids=name_of)
+def test_locked_versions_name_no_place_to_get_them_from(path):
+    text = path.read_text(encoding="utf-8")
+    assert "://" not in text
+    assert not re.search(r"^\s*--", text, re.MULTILINE)
+
+
+def test_everything_that_is_needed_is_locked():
+    text = (ROOT / "locks" / "framerunner.txt").read_text(encoding="utf-8")
+    locked = {
+        name.replace("_", "-").lower() for name in re.findall(r"^([A-Za-z0-9._-]+)==", text, re.MULTILINE)
+    }
+    project = PROJECT["project"]
+    needed = {
+        re.match(r"[A-Za-z0-9._-]+", line).group().replace("_", "-").lower()
+        for line in [*project["dependencies"], *project["optional-dependencies"]["dev"]]
+    }
+    assert needed <= locked
+
+
+def test_nothing_is_left_half_done():
+    marks = re.compile(r"\b(?:TO" + r"DO|FIX" + r"ME|X" + r"XX|HA" + r"CK)\b|^<{7} |^>{7} ", re.MULTILINE)
+    unfinished = [
+        name_of(path) for path in (*MODULES, *DOCUMENTS) if marks.search(path.read_text(encoding="utf-8"))
+    ]
+    assert unfinished == []
