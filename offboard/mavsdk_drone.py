@@ -197,10 +197,16 @@ class MavsdkDrone:
         while feed.armed:
             came = await feed.next_tick(LINK_LOST_S)
             self._check_alive(came)
-            if feed.mode != "LAND":
+            if feed.mode != "LAND" and not await self._soon_disarmed():
                 raise DroneError(f"landing was broken off: mode {feed.mode}{feed.recent_texts()}")
             if feed.time_us > limit_us:
                 raise DroneError(f"still not landed after {LAND_LIMIT_S:g} s{feed.recent_texts()}")
+
+    async def _soon_disarmed(self) -> bool:
+        """One heartbeat tells of mode and arming, but MAVSDK passes them on one after the other."""
+        with contextlib.suppress(TimeoutError):
+            await self._until(lambda: not self._feed.armed, 0.5)
+        return not self._feed.armed
 
     async def hold(self) -> None:
         """Stop commanding and ask for hold, unless another hand has the vehicle already."""
@@ -241,15 +247,15 @@ class MavsdkDrone:
 
     def _state(self) -> DroneState:
         assert self._alignment is not None, "ready() comes first"
-        feed = self._feed
-        pose = self._alignment.pose(Pose(feed.position_ned_m, feed.yaw_ned_rad))
+        feed, sample = self._feed, self._feed.sample
+        pose = self._alignment.pose(Pose(sample.position_ned_m, sample.yaw_ned_rad))
         return DroneState(
-            time_us=feed.time_us,
+            time_us=sample.time_us,
             x=pose.position_m[0],
             y=pose.position_m[1],
             z=pose.position_m[2],
             yaw=pose.yaw_rad,
-            velocity_arena_m_s=self._alignment.vector(feed.velocity_ned_m_s),
+            velocity_arena_m_s=self._alignment.vector(sample.velocity_ned_m_s),
             armed=bool(feed.armed),
             offboard=feed.mode == "OFFBOARD",
             mode=feed.mode,

@@ -10,6 +10,7 @@ from __future__ import annotations
 import asyncio
 import time
 from collections import deque
+from dataclasses import dataclass
 from math import radians
 from typing import Any
 
@@ -20,10 +21,28 @@ TEXTS_KEPT = 8
 TEXT_AGE_S = 8.0
 
 
+@dataclass(frozen=True, slots=True)
+class Sample:
+    """Where the vehicle was when its clock crossed the 50 ms grid, in its local NED axes.
+
+    Attributes:
+        time_us: of the attitude that crossed, microseconds since boot.
+        yaw_ned_rad: clockwise from north.
+        position_ned_m: latest by then, shape (3,).
+        velocity_ned_m_s: shape (3,).
+    """
+
+    time_us: int
+    yaw_ned_rad: float
+    position_ned_m: Vec3
+    velocity_ned_m_s: Vec3
+
+
 class TelemetryFeed:
     """Latest values; written on MAVSDK's thread, read on the loop's. Each field is replaced whole.
 
     Attributes:
+        sample: of the last tick.
         time_us: vehicle time of the latest attitude, microseconds since its boot.
         yaw_ned_rad: heading, clockwise from north.
         position_ned_m: local position, shape (3,).
@@ -37,6 +56,7 @@ class TelemetryFeed:
     """
 
     def __init__(self) -> None:
+        self.sample = Sample(0, 0.0, (0.0, 0.0, 0.0), (0.0, 0.0, 0.0))
         self.time_us = 0
         self.yaw_ned_rad = 0.0
         self.position_ned_m: Vec3 = (0.0, 0.0, 0.0)
@@ -72,7 +92,7 @@ class TelemetryFeed:
     async def next_tick(self, timeout_s: float) -> bool:
         """Wait for the next crossing of the 50 ms grid of vehicle time.
 
-        Crossings that nobody waited for are passed over; the latest values are read afterwards.
+        Crossings that nobody waited for are passed over; `sample` is the last one's.
 
         Returns:
             False if none came within `timeout_s` of wall time.
@@ -102,6 +122,7 @@ class TelemetryFeed:
         tick = time_us // TICK_US
         if tick != self._tick:
             self._tick = tick
+            self.sample = Sample(time_us, self.yaw_ned_rad, self.position_ned_m, self.velocity_ned_m_s)
             self._wake()
 
     def _on_position(self, sample: Any, _user: object) -> None:  # noqa: ANN401

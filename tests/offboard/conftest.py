@@ -1,0 +1,30 @@
+"""A vehicle on a real UDP socket, for the MAVSDK adapter."""
+
+from __future__ import annotations
+
+import socket
+
+import pytest
+
+from tests.offboard.udp_vehicle import UdpVehicle
+
+
+def free_port() -> int:
+    """A UDP port of this project's test range that nobody has."""
+    for port in range(25100, 25999):
+        with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
+            try:
+                probe.bind(("0.0.0.0", port))
+            except OSError:
+                continue
+            return port
+    raise RuntimeError("no free UDP port in 25100..25999")
+
+
+@pytest.fixture
+def vehicle():
+    """A disarmed vehicle that sends to a free port, `vehicle.port`."""
+    vehicle = UdpVehicle(free_port())
+    vehicle.start()
+    yield vehicle
+    vehicle.stop()

@@ -1,0 +1,241 @@
+"""The MAVSDK adapter against a vehicle on a real UDP socket."""
+
+from __future__ import annotations
+
+import asyncio
+import math
+import socket
+import struct
+from contextlib import asynccontextmanager
+from itertools import pairwise
+
+import pytest
+from pymavlink import mavutil
+
+from offboard.drone import DroneError, VelocityCommand
+from offboard.mavsdk_drone import MavsdkDrone
+from tests.offboard.conftest import free_port
+from tests.offboard.udp_vehicle import POSCTL, UdpVehicle
+
+START = (-3.0, -3.0, 0.53, 1.0)
+
+
+@asynccontextmanager
+async def connected(vehicle, **options):
+    drone = MavsdkDrone(f"udpin://127.0.0.1:{vehicle.port}", start_arena=START, **options)
+    try:
+        await drone.connect()
+        await drone.ready()
+        yield drone
+    finally:
+        await drone.close()
+
+
+async def take(ticks, count):
+    return [await anext(ticks) for _ in range(count)]
+
+
+async def test_flies_as_commanded_in_arena_axes_and_stops_its_motors(vehicle):
+    vehicle.position, vehicle.yaw = [7.0, 8.0, -0.1], 0.4
+    async with connected(vehicle) as drone:
+        ticks = drone.ticks()
+        state = await anext(ticks)
+        assert (state.x, state.y, state.z, state.yaw) == pytest.approx(START, abs=1e-5)
+        assert not state.armed
+        await drone.motors_on()
+        assert vehicle.armed
+        modes = [command[0] for command in vehicle.commands if command[0] in (176, 400)]
+        assert modes[:2] == [176, 400]  # offboard first, then arming
+        drone.command(VelocityCommand(0.8, 0.4, 0.2, 0.0))
+        states = await take(ticks, 21)
+        assert states[-1].armed
+        assert states[-1].offboard
+        assert vehicle.setpoints[-1][1:] == pytest.approx((0.8, -0.4, -0.2, 0.0), abs=1e-6)
+        flown_s = (states[-1].time_us - states[5].time_us) / 1e6
+        expected = (0.8 * math.cos(1) - 0.4 * math.sin(1), 0.8 * math.sin(1) + 0.4 * math.cos(1), 0.2)
+        moved = [getattr(states[-1], axis) - getattr(states[5], axis) for axis in "xyz"]
+        assert moved == pytest.approx([v * flown_s for v in expected], abs=0.05)
+        drone.command(VelocityCommand(yaw_rate_rad_s=0.5))
+        states = await take(ticks, 15)
+        assert states[-1].yaw > states[0].yaw  # to the left
+        assert vehicle.setpoints[-1][4] == pytest.approx(-0.5, abs=1e-6)
+        await drone.motors_off()
+        assert not vehicle.armed
+        assert vehicle.commands[-2][:2] == (400, 0.0) or (400, 0.0, 21196.0) in vehicle.commands
+
+
+@pytest.mark.parametrize("speed", [0.5, 3.0])
+async def test_ticks_keep_to_vehicle_time_at_any_speed(speed):
+    vehicle = UdpVehicle(free_port(), speed=speed)
+    vehicle.start()
+    try:
+        async with connected(vehicle) as drone:
+            states = await take(drone.ticks(), 21)
+    finally:
+        vehicle.stop()
+    assert all(state.time_us % 50_000 == 0 for state in states)  # attitude comes every 10 ms here
+    assert all(later.time_us > earlier.time_us for earlier, later in pairwise(states))
+
+
+async def test_landing_waits_until_disarmed(vehicle):
+    async with connected(vehicle) as drone:
+        ticks = drone.ticks()
+        await drone.motors_on()
+        drone.command(VelocityCommand(up_m_s=1.0))
+        await take(ticks, 20)
+        await drone.land()
+        assert not vehicle.armed
+        assert vehicle.position[2] == 0.0
+
+
+async def until_error(ticks):
+    try:
+        async with asyncio.timeout(8):
+            async for _ in ticks:
+                pass
+    except DroneError as error:
+        return str(error)
+    raise AssertionError("the ticks ended without a reason")
+
+
+async def test_a_pilot_who_takes_over_keeps_the_vehicle(vehicle):
+    async with connected(vehicle) as drone:
+        ticks = drone.ticks()
+        await drone.motors_on()
+        await take(ticks, 5)
+        vehicle.mode = (POSCTL, 0)
+        assert (await until_error(ticks)).startswith("the pilot took over: mode POSCTL")
+        before = len(vehicle.commands)
+        await drone.hold()
+        await asyncio.sleep(0.3)
+        count = len(vehicle.setpoints)
+        await asyncio.sleep(0.5)
+        assert len(vehicle.setpoints) == count  # silent
+        assert 176 not in [command[0] for command in vehicle.commands[before:]]  # no mode was asked for
+        assert vehicle.mode == (POSCTL, 0)
+
+
+async def test_a_lost_link_is_noticed_within_a_second_or_so(vehicle):
+    async with connected(vehicle) as drone:
+        ticks = drone.ticks()
+        await drone.motors_on()
+        await take(ticks, 5)
+        vehicle.mute = True
+        assert (await until_error(ticks)).startswith("link lost: no telemetry for 1.")
+
+
+async def test_disarming_by_others_is_noticed(vehicle):
+    async with connected(vehicle) as drone:
+        ticks = drone.ticks()
+        await drone.motors_on()
+        await take(ticks, 5)
+        vehicle.armed = False
+        assert "disarmed by others" in await until_error(ticks)
+
+
+async def test_positions_that_are_not_finite_are_refused(vehicle):
+    async with connected(vehicle) as drone:
+        ticks = drone.ticks()
+        await take(ticks, 2)
+        vehicle.position = [math.nan, 0.0, 0.0]
+        assert "not finite" in await until_error(ticks)
+
+
+async def test_hold_stops_the_setpoints_and_is_confirmed(vehicle):
+    async with connected(vehicle) as drone:
+        await drone.motors_on()
+        await drone.hold()
+        assert vehicle.mode == (4, 3)
+        count = len(vehicle.setpoints)
+        drone.command(VelocityCommand(forward_m_s=1.0))
+        await asyncio.sleep(0.3)
+        assert len(vehicle.setpoints) == count
+
+
+async def test_a_refused_arming_gives_the_vehicle_s_reason(vehicle):
+    vehicle.refuse_arming = "Arming denied: high throttle"
+    async with connected(vehicle) as drone:
+        with pytest.raises(DroneError, match=r"arming was refused: COMMAND_DENIED.*high throttle"):
+            await drone.motors_on()
+        assert not vehicle.armed
+
+
+async def test_an_acknowledged_mode_that_does_not_come_is_no_success(vehicle, monkeypatch):
+    monkeypatch.setattr("offboard.mavsdk_drone.CONFIRM_S", 0.7)
+    vehicle.ignore_modes = True
+    async with connected(vehicle) as drone:
+        with pytest.raises(
+            DroneError, match="offboard mode was acknowledged, but telemetry still shows mode HOLD"
+        ):
+            await drone.motors_on()
+        assert 400 not in [command[0] for command in vehicle.commands]
+
+
+async def test_not_ready_says_what_is_missing(vehicle):
+    vehicle.armable = False
+    drone = MavsdkDrone(f"udpin://127.0.0.1:{vehicle.port}", ready_limit_s=0.8)
+    try:
+        await drone.connect()
+        with pytest.raises(DroneError, match=r"not ready within 0\.8 s: pre-arm checks not passed"):
+            await drone.ready()
+    finally:
+        await drone.close()
+
+
+async def test_an_armed_vehicle_is_not_taken(vehicle):
+    vehicle.armed = True
+    with pytest.raises(DroneError, match="armed already"):
+        async with connected(vehicle):
+            pass
+
+
+async def test_no_vehicle_is_one_clear_line():
+    drone = MavsdkDrone(f"udpin://127.0.0.1:{free_port()}", connect_limit_s=0.3)
+    with pytest.raises(DroneError, match=r"no vehicle was heard on udpin://127.*within 0\.3 s"):
+        await drone.connect()
+    await drone.close()
+
+
+async def test_a_busy_port_is_told():
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as other:
+        other.bind(("127.0.0.1", free_port()))
+        port = other.getsockname()[1]
+        drone = MavsdkDrone(f"udpin://127.0.0.1:{port}")
+        with pytest.raises(DroneError, match=f"UDP port {port}"):
+            await drone.connect()
+        await drone.close()
+
+
+async def test_the_recording_holds_both_directions(vehicle, tmp_path):
+    drone = MavsdkDrone(f"udpin://127.0.0.1:{vehicle.port}", start_arena=START)
+    drone.record_to(tmp_path / "flight.tlog")
+    await drone.connect()
+    await drone.ready()
+    await drone.motors_on()
+    ticks = drone.ticks()
+    drone.command(VelocityCommand(forward_m_s=0.7))
+    await take(ticks, 20)
+    await drone.motors_off()
+    await drone.close()
+    log = mavutil.mavlink_connection(str(tmp_path / "flight.tlog"))
+    kinds: dict[str, int] = {}
+    speeds = set()
+    while (message := log.recv_match()) is not None:
+        kinds[message.get_type()] = kinds.get(message.get_type(), 0) + 1
+        if message.get_type() == "SET_POSITION_TARGET_LOCAL_NED":
+            speeds.add(round(message.vx, 3))
+    assert kinds["ATTITUDE"] > 100
+    assert kinds["SET_POSITION_TARGET_LOCAL_NED"] > 15
+    assert kinds["COMMAND_LONG"] >= 3
+    assert 0.7 in speeds
+    assert "BAD_DATA" not in kinds
+    stamps = struct.unpack(">Q", (tmp_path / "flight.tlog").read_bytes()[:8])[0]
+    assert stamps > 1_500_000_000_000_000
+
+
+async def test_recording_to_an_impossible_place_is_told(vehicle, tmp_path):
+    drone = MavsdkDrone(f"udpin://127.0.0.1:{vehicle.port}")
+    drone.record_to(tmp_path / "missing" / "flight.tlog")
+    with pytest.raises(DroneError, match="cannot record to"):
+        await drone.connect()
+    await drone.close()

@@ -1,0 +1,96 @@
+"""An app that hangs, in a process of its own, must not go on flying the vehicle."""
+
+from __future__ import annotations
+
+import asyncio
+import subprocess
+import sys
+import time
+from textwrap import dedent
+
+import pytest
+
+from offboard.link.watchdog import HANG_S, Watchdog
+
+APP = dedent("""\
+    import asyncio, ctypes, sys, time
+    from offboard.drone import DroneError, VelocityCommand
+    from offboard.mavsdk_drone import MavsdkDrone
+
+    async def main(port, hang):
+        drone = MavsdkDrone(f"udpin://127.0.0.1:{port}")
+        await drone.connect()
+        await drone.ready()
+        await drone.motors_on()
+        drone.command(VelocityCommand(forward_m_s=0.5))
+        ticks = drone.ticks()
+        for _ in range(10):
+            await anext(ticks)
+        print("hanging", flush=True)
+        if hang == "free":
+            time.sleep(4)  # the event loop stands still, other threads run
+        else:
+            ctypes.PyDLL(None).sleep(20)  # keeps the interpreter's lock: no other thread of Python runs
+        try:
+            await anext(ticks)
+        except DroneError as error:
+            print(error, flush=True)
+        await drone.close()
+
+    asyncio.run(main(int(sys.argv[1]), sys.argv[2]))
+    """)
+
+
+def run_app(vehicle, hang):
+    command = [sys.executable, "-c", APP, str(vehicle.port), hang]
+    app = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+    assert app.stdout is not None
+    assert app.stdout.readline() == "hanging\n"
+    hung_s = time.monotonic()
+    assert vehicle.setpoints[-1][1] == 0.5
+    return app, hung_s
+
+
+def test_a_hung_loop_is_stopped_and_hold_is_asked_for(vehicle):
+    app, hung_s = run_app(vehicle, "free")
+    out, _ = app.communicate(timeout=15)
+    assert app.returncode == 0
+    assert "this app hung for more than 0." in out
+    last_s = max(at for at, *_ in vehicle.setpoints)
+    assert last_s - hung_s < 2.0  # half a second, and time for a busy machine
+    assert (176, 1.0 + 128.0, 4.0) in vehicle.commands  # armed, AUTO (hold) ...
+    assert vehicle.mode == (4, 3)
+
+
+def test_a_hang_that_blocks_the_interpreter_ends_the_process(vehicle):
+    app, hung_s = run_app(vehicle, "locked")
+    _, report = app.communicate(timeout=15)
+    assert app.returncode == 1
+    assert "Timeout" in report
+    last_s = max(at for at, *_ in vehicle.setpoints)
+    assert last_s - hung_s < 5.0
+    deadline_s = time.monotonic() + 5
+    while vehicle.mode != (4, 3) and time.monotonic() < deadline_s:
+        time.sleep(0.05)
+    assert vehicle.mode == (4, 3)  # its own offboard-loss failsafe
+    assert (176, 1.0 + 128.0, 4.0) not in vehicle.commands
+
+
+async def test_a_turning_loop_is_left_alone():
+    trips = []
+    watchdog = Watchdog(lambda: trips.append(1))
+    watchdog.start()
+    await asyncio.sleep(3 * HANG_S)
+    watchdog.stop()
+    assert trips == []
+    assert watchdog.tripped_after_s == 0.0
+
+
+async def test_it_acts_once_and_can_be_stopped():
+    trips = []
+    watchdog = Watchdog(lambda: trips.append(1))
+    watchdog.start()
+    time.sleep(3 * HANG_S)  # noqa: ASYNC251 - the hang
+    watchdog.stop()
+    assert trips == [1]
+    assert watchdog.tripped_after_s == pytest.approx(HANG_S, abs=0.5)
