@@ -26,11 +26,19 @@ setup: $(VENV)/installed-dev $(MAVPROXY_VENV)/installed ## set up for developmen
 .PHONY: test
 test: setup lint test-fast test-realtime ## set up, then run all checks and all tests
 
-.PHONY: lint
-lint: $(VENV)/installed-dev ## ruff, mypy and the rules between the rooms
+.PHONY: lint lint-code lint-format lint-types lint-rooms
+lint: lint-code lint-format lint-types lint-rooms ## ruff, mypy and the rules between the rooms
+
+lint-code: $(VENV)/installed-dev
 	$(BIN)/ruff check .
+
+lint-format: $(VENV)/installed-dev
 	$(BIN)/ruff format --check .
+
+lint-types: $(VENV)/installed-dev
 	$(BIN)/mypy
+
+lint-rooms: $(VENV)/installed-dev
 	$(BIN)/lint-imports
 
 .PHONY: test-fast
