@@ -17,6 +17,8 @@ from offboard.mavsdk_drone import MavsdkDrone
 from tests.offboard.conftest import free_port
 from tests.offboard.udp_vehicle import POSCTL, UdpVehicle
 
+pytestmark = pytest.mark.realtime
+
 START = (-3.0, -3.0, 0.53, 1.0)
 
 

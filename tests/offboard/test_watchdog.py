@@ -12,6 +12,8 @@ import pytest
 
 from offboard.link.watchdog import HANG_S, Watchdog
 
+pytestmark = pytest.mark.realtime
+
 APP = dedent("""\
     import asyncio, ctypes, sys, time
     from offboard.drone import DroneError, VelocityCommand
