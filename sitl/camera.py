@@ -28,6 +28,7 @@ from sitl.camera_scene import GROUND_BGR, SKY_BGR, UNDERGROUND_BGR, build_scene
 Image = npt.NDArray[np.uint8]
 
 _HAZE_BAND = 0.09  # height of a band of haze above the horizon, as a share of the focal length
+_MARGIN_PX = 2  # painted around the image and cut off: OpenCV is not exact at the border of its canvas
 _LOST_M = 1e5  # from farther away nothing but sky and ground is to be seen
 
 
@@ -37,10 +38,9 @@ class Camera:
     def __init__(self, scenario: Scenario) -> None:
         self._settings = settings = scenario.camera
         focal_px = settings.width_px / 2 / tan(settings.horizontal_fov_rad / 2)
-        self._pinhole = Pinhole(
-            settings.width_px, settings.height_px, focal_px, settings.near_m, settings.far_m
-        )
-        shape = (settings.height_px, settings.width_px, 3)
+        width, height = settings.width_px + 2 * _MARGIN_PX, settings.height_px + 2 * _MARGIN_PX
+        self._pinhole = Pinhole(width, height, focal_px, settings.near_m, settings.far_m)
+        shape = (height, width, 3)
         self._sky = np.full(shape, SKY_BGR[0], np.uint8)
         self._underground = np.full(shape, UNDERGROUND_BGR, np.uint8)
 
@@ -71,14 +71,18 @@ class Camera:
         rotation = _rotation(attitude_arena)
         eye = self._eye(position_arena_m, rotation)
         if eye[2] <= 0.0:
-            return self._underground.copy()
-        image = self._sky.copy()
-        self._paint_background(image, rotation)
+            return self._without_margin(self._underground)
+        canvas = self._sky.copy()
+        self._paint_background(canvas, rotation)
         if max(map(abs, eye)) < _LOST_M:
             projection = self._mesh.project(eye, rotation)
-            _paint(image, projection, self._floor)
-            _paint(image, projection, [self._solid[i] for i in self._tree.back_to_front(eye)])
-        return image
+            _paint(canvas, projection, self._floor)
+            _paint(canvas, projection, [self._solid[i] for i in self._tree.back_to_front(eye)])
+        return self._without_margin(canvas)
+
+    @staticmethod
+    def _without_margin(canvas: Image) -> Image:
+        return canvas[_MARGIN_PX:-_MARGIN_PX, _MARGIN_PX:-_MARGIN_PX].copy()
 
     def _eye(self, position: Vec3, rotation: Matrix) -> Vec3:
         if not all(map(isfinite, position)):
@@ -87,7 +91,7 @@ class Camera:
         ex, ey, ez = (p + r[0] * x + r[1] * y + r[2] * z for p, r in zip(position, rotation, strict=True))
         return (ex, ey, ez)
 
-    def _paint_background(self, image: Image, rotation: Matrix) -> None:
+    def _paint_background(self, canvas: Image, rotation: Matrix) -> None:
         """Paint the haze and the ground: half planes below the horizon and lines parallel to it."""
         focal, (cu, cv) = self._pinhole.focal_px, self._pinhole.centre_px
         fwd_z, left_z, up_z = rotation[2]
@@ -101,18 +105,16 @@ class Camera:
         for i, colour in enumerate(colours):
             points = clip_half_plane(corners, a, b, c + band * (len(colours) - 1 - i))
             if len(points) > 2:
-                outline = np.array(
-                    [(round(u * SUBPIXELS), round(v * SUBPIXELS)) for u, v in points], np.int32
-                )
-                cv2.fillConvexPoly(image, outline, colour, cv2.LINE_8, SHIFT)
+                outline = [(round(u * SUBPIXELS), round(v * SUBPIXELS)) for u, v in points]
+                cv2.fillConvexPoly(canvas, np.array(outline, np.int32), colour, cv2.LINE_8, SHIFT)
 
 
-def _paint(image: Image, projection: Projection, faces: Iterable[MeshFace]) -> None:
+def _paint(canvas: Image, projection: Projection, faces: Iterable[MeshFace]) -> None:
     """Paint faces one over the other."""
     for face in faces:
         outline = projection.outline(face)
         if outline is not None:
-            cv2.fillConvexPoly(image, outline, face.colour, cv2.LINE_8, SHIFT)
+            cv2.fillConvexPoly(canvas, outline, face.colour, cv2.LINE_8, SHIFT)
 
 
 def _rotation(attitude: Quaternion) -> Matrix:
