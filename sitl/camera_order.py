@@ -1,10 +1,10 @@
 """What hides what: a tree of planes that gives the faces of a scene from back to front for any eye.
 
 What lies on the eye's side of a plane may hide what lies beyond it and never the reverse, so each plane
-halves the question (Fuchs, Kedem, Naylor, "On visible surface generation by a priori tree structures", 1980). Planes
-that pass between bodies come first: with the few, scattered bodies of an arena they part everything, and
-within one body its own order of faces holds. Only bodies that no plane parts, entangled or intersecting ones,
-are taken apart face by face, and faces cut in two where they must be.
+halves the question (Fuchs, Kedem, Naylor, "On visible surface generation by a priori tree structures", 1980).
+Planes that pass between bodies come first: with the few, scattered bodies of an arena they part everything,
+and within one body its own order of faces holds. Only bodies that no plane parts, entangled or intersecting
+ones, are taken apart face by face, and faces cut in two where they must be.
 """
 
 from __future__ import annotations
