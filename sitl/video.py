@@ -1,0 +1,243 @@
+"""Video out: MJPEG over HTTP, for browsers, for `cv2.VideoCapture` and for the navigator.
+
+`/video` is a stream of JPEG images, each with the vehicle time of its exposure in the header `X-Time-Us`;
+`/image.jpg` is the latest one, `/` a page that shows the stream. An image is compressed when the first
+watcher wants it, and once for all of them. Nobody gets a backlog: whoever is slow misses images.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import json
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from importlib import import_module
+from math import isfinite
+from socket import SO_SNDBUF, SOL_SOCKET
+from typing import TYPE_CHECKING
+
+import cv2
+import numpy as np
+import numpy.typing as npt
+
+if TYPE_CHECKING:
+    from aiohttp import web
+
+Image = npt.NDArray[np.uint8]
+JsonProvider = Callable[[Mapping[str, str]], object]
+
+JPEG_QUALITY = 95
+BOUNDARY = "frame"
+_SEND_BUFFER_BYTES = 1 << 16  # the kernel would buffer seconds of video for a slow watcher
+_CLOSE_S = 1.0
+_PAGE = """<!doctype html>
+<html lang="en">
+<title>framerunner camera</title>
+<style>body{margin:0;background:#222}img{display:block;margin:auto;height:100vh;max-width:100vw;
+object-fit:contain;image-rendering:pixelated}</style>
+<img src="/video" alt="what the drone's camera sees">
+</html>
+"""
+
+
+class VideoError(Exception):
+    """Video cannot be served; the message is one line for people."""
+
+
+@dataclass(slots=True)
+class _Shot:
+    """An image and, once somebody wanted it, the same as JPEG."""
+
+    image: Image
+    time_us: int
+    jpeg: bytes | None = None
+
+    def compressed(self) -> bytes:
+        """Return the JPEG, made on the first call."""
+        if self.jpeg is None:
+            self.jpeg = encode_jpeg(self.image)
+        return self.jpeg
+
+
+def encode_jpeg(image: Image) -> bytes:
+    """Compress an image so that thin coloured bars keep their colour: full chroma resolution, quality 95.
+
+    Args:
+        image: BGR, shape (height, width, 3), uint8.
+    """
+    settings = [
+        cv2.IMWRITE_JPEG_QUALITY,
+        JPEG_QUALITY,
+        cv2.IMWRITE_JPEG_SAMPLING_FACTOR,
+        cv2.IMWRITE_JPEG_SAMPLING_FACTOR_444,
+    ]
+    done, data = cv2.imencode(".jpg", image, settings)
+    if not done:
+        raise VideoError(f"an image of shape {image.shape} cannot be compressed")
+    return bytes(data)
+
+
+class VideoServer:
+    """Serves the images published to it, and JSON documents beside them."""
+
+    def __init__(self, host: str = "127.0.0.1", port: int = 8080) -> None:
+        """Prepare; nothing is opened yet.
+
+        Args:
+            host: address to listen on.
+            port: TCP port; 0 lets the system choose one.
+        """
+        self._host = host
+        self._port = port
+        self._shot: _Shot | None = None
+        self._documents: dict[str, JsonProvider] = {}
+        self._loop: asyncio.AbstractEventLoop | None = None
+        self._runner: web.AppRunner | None = None
+        self._arrived = asyncio.Event()
+        self._closing = False
+
+    @property
+    def port(self) -> int:
+        """The TCP port; after `start`, the one really used."""
+        return self._port
+
+    @property
+    def url(self) -> str:
+        """Where the page is."""
+        host = f"[{self._host}]" if ":" in self._host else self._host
+        return f"http://{host}:{self._port}/"
+
+    def add_json(self, path: str, provider: JsonProvider) -> None:
+        """Serve a document.
+
+        Args:
+            path: begins with "/".
+            provider: is called at each request with the query's parameters and returns what
+                `json.dumps` takes; numbers that are not finite become null.
+        """
+        self._documents[path] = provider
+
+    async def start(self) -> None:
+        """Listen. The HTTP library is only imported here, in a thread: it takes a third of a second.
+
+        Raises:
+            VideoError: the port is taken or the address is not ours.
+        """
+        web = await asyncio.to_thread(import_module, "aiohttp.web")
+        app = web.Application()
+        app.router.add_get("/", self._page)
+        app.router.add_get("/video", self._video, allow_head=False)
+        app.router.add_get("/image.jpg", self._image)
+        app.router.add_get("/{path:.+}", self._document)
+        runner = web.AppRunner(app, access_log=None, shutdown_timeout=_CLOSE_S)
+        await runner.setup()
+        try:
+            await web.TCPSite(runner, self._host, self._port).start()
+        except (OSError, OverflowError) as error:
+            await runner.cleanup()
+            reason = (getattr(error, "strerror", None) or str(error)).split("\n", maxsplit=1)[0]
+            where = f"{self._host} port {self._port}"
+            raise VideoError(f"video: cannot listen on {where}: {reason.lower()}; choose another") from error
+        self._port = runner.addresses[0][1]
+        self._loop, self._runner = asyncio.get_running_loop(), runner
+
+    def publish(self, image: Image, time_us: int) -> None:
+        """Show an image to all who watch. Never blocks; may be called from any thread.
+
+        Args:
+            image: BGR, shape (height, width, 3), uint8; must not be changed afterwards.
+            time_us: vehicle time of its exposure, microseconds.
+        """
+        self._shot = _Shot(image, time_us)
+        if self._loop is not None and not self._closing:
+            self._loop.call_soon_threadsafe(self._wake)
+
+    async def close(self) -> None:
+        """Send all watchers away and stop listening."""
+        self._closing = True
+        self._wake()
+        if self._runner is not None:
+            await self._runner.cleanup()
+            self._runner = None
+
+    def _wake(self) -> None:
+        self._arrived.set()
+        self._arrived.clear()
+
+    async def _next(self, last: _Shot | None) -> _Shot | None:
+        """Wait for another image than the last; None when the server closes."""
+        while not self._closing:
+            if self._shot is not None and self._shot is not last:
+                return self._shot
+            await self._arrived.wait()
+        return None
+
+    async def _video(self, request: web.Request) -> web.StreamResponse:
+        from aiohttp import web
+
+        response = web.StreamResponse(
+            headers={
+                "Content-Type": f"multipart/x-mixed-replace; boundary={BOUNDARY}",
+                "Cache-Control": "no-store",
+                "Connection": "close",
+            }
+        )
+        if request.transport is not None:
+            request.transport.get_extra_info("socket").setsockopt(SOL_SOCKET, SO_SNDBUF, _SEND_BUFFER_BYTES)
+            # Zero: a write waits until all before it has gone to the kernel.
+            request.transport.set_write_buffer_limits(high=0)
+        try:
+            await response.prepare(request)
+            await response.write(f"--{BOUNDARY}\r\n".encode())
+            shot = await self._next(None)
+            while shot is not None:
+                await response.write(_part(shot))
+                shot = await self._next(shot)
+        except ConnectionError:
+            pass  # the watcher has gone
+        return response
+
+    async def _image(self, request: web.Request) -> web.Response:
+        from aiohttp import web
+
+        if self._shot is None:
+            return web.Response(status=503, text="no image yet\n", headers={"Retry-After": "1"})
+        headers = {"X-Time-Us": str(self._shot.time_us), "Cache-Control": "no-store"}
+        return web.Response(body=self._shot.compressed(), content_type="image/jpeg", headers=headers)
+
+    async def _page(self, request: web.Request) -> web.Response:
+        from aiohttp import web
+
+        return web.Response(text=_PAGE, content_type="text/html")
+
+    async def _document(self, request: web.Request) -> web.Response:
+        from aiohttp import web
+
+        provider = self._documents.get(request.path)
+        if provider is None:
+            known = ", ".join(["/video", "/image.jpg", *self._documents])
+            return web.Response(status=404, text=f"not here; there are {known}\n")
+        try:
+            text = json.dumps(_finite(provider(request.query)), allow_nan=False)
+        except Exception as error:  # a fault in a document must not harm the video
+            return web.Response(status=500, text=f"{request.path}: {type(error).__name__}: {error!s:.200}\n")
+        headers = {"Cache-Control": "no-store"}
+        return web.Response(text=text, content_type="application/json", headers=headers)
+
+
+def _part(shot: _Shot) -> bytes:
+    """Return one image of the stream, with the boundary after it: so a browser shows it at once."""
+    jpeg = shot.compressed()
+    head = f"Content-Type: image/jpeg\r\nContent-Length: {len(jpeg)}\r\nX-Time-Us: {shot.time_us}\r\n\r\n"
+    return b"".join((head.encode(), jpeg, f"\r\n--{BOUNDARY}\r\n".encode()))
+
+
+def _finite(value: object) -> object:
+    """Replace numbers that JSON does not know by null, in dictionaries and sequences too."""
+    if isinstance(value, float):
+        return value if isfinite(value) else None
+    if isinstance(value, Mapping):
+        return {str(key): _finite(item) for key, item in value.items()}
+    if isinstance(value, list | tuple):
+        return [_finite(item) for item in value]
+    return value
