@@ -1,0 +1,114 @@
+"""The MJPEG parser: what cameras send, and what they should not."""
+
+import cv2
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from vision.mjpeg import MjpegParser, Part, StreamError, boundary_of, jpeg_size
+
+
+def part(data: bytes, head: str = "", *, length: bool = True) -> bytes:
+    lines = f"Content-Type: image/jpeg\r\n{head}" + (f"Content-Length: {len(data)}\r\n" if length else "")
+    return b"--cut\r\n" + lines.encode() + b"\r\n" + data + b"\r\n"
+
+
+@pytest.mark.parametrize("length", [True, False])
+@pytest.mark.parametrize("size", [1, 2, 7, 1000])
+def test_parts_in_pieces_of_any_size(size: int, *, length: bool) -> None:
+    bodies = [b"\xff\xd8one\xff\xd9", b"t\r\nw\r\n\r\no", b"x" * 300]
+    stream = (
+        b"".join(part(body, f"X-Time-Us: {i}\r\n", length=length) for i, body in enumerate(bodies))
+        + b"--cut--\r\n"
+    )
+    parser = MjpegParser("cut")
+    got = [one for at in range(0, len(stream), size) for one in parser.feed(stream[at : at + size])]
+    assert got == [Part(body, i) for i, body in enumerate(bodies)]
+
+
+def test_boundary_with_dashes_bare_newlines_and_noise() -> None:
+    parser = MjpegParser("--cut")
+    stream = b"noise\n\n--cut\nContent-Length: 3\n\nabc" + b"junk" * 1000 + b"--cut\n\ndef\r\n--cut"
+    assert parser.feed(stream) == [Part(b"abc", None), Part(b"def", None)]
+
+
+@pytest.mark.parametrize(
+    ("line", "time_us"),
+    [
+        ("X-Time-Us: 12", 12),
+        ("x-time-us:  12  ", 12),
+        ("X-Time-Us: -12", None),
+        ("X-Time-Us: 1e9", None),
+        ("X-Time-Us: " + "9" * 19, None),
+        ("X-Time-Us: ١٢", None),
+        ("X-Time-Us:", None),
+        ("Not-X-Time-Us: 12", None),
+    ],
+)
+def test_only_a_sound_time_counts(line: str, time_us: int | None) -> None:
+    assert MjpegParser("cut").feed(part(b"abc", line + "\r\n")) == [Part(b"abc", time_us)]
+
+
+def test_too_large_a_part_is_refused() -> None:
+    with pytest.raises(StreamError, match="a part of 101 bytes is refused; the limit is 100"):
+        MjpegParser("cut", 100).feed(part(b"x" * 101))
+    with pytest.raises(StreamError, match="more than 100 bytes"):
+        MjpegParser("cut", 100).feed(part(b"x" * 200, length=False))
+    with pytest.raises(StreamError, match="999999999999999999 bytes is refused"):
+        MjpegParser("cut").feed(b"--cut\r\nContent-Length: 999999999999999999\r\n\r\n")
+
+
+def test_endless_headers_are_refused() -> None:
+    with pytest.raises(StreamError, match="headers of a part exceed"):
+        MjpegParser("cut").feed(b"--cut\r\n" + b"A: b\r\n" * 4000)
+
+
+def test_noise_is_not_kept() -> None:
+    parser = MjpegParser("cut")
+    for _ in range(100):
+        assert parser.feed(b"-" * 10_000) == []
+    assert len(parser._buffer) < 100
+
+
+@given(
+    st.lists(st.binary(max_size=60) | st.sampled_from([b"--cut\r\n", b"\r\n\r\n", b"Content-Length: 5\r\n"]))
+)
+def test_any_bytes_do_no_harm(chunks: list[bytes]) -> None:
+    parser = MjpegParser("cut")
+    for chunk in chunks:
+        for one in parser.feed(chunk):
+            assert one.data
+    assert len(parser._buffer) <= sum(map(len, chunks))
+
+
+@pytest.mark.parametrize(
+    ("content_type", "boundary"),
+    [
+        ("multipart/x-mixed-replace; boundary=frame", "frame"),
+        ('multipart/x-mixed-replace;boundary="a b"', "a b"),
+        ("Multipart/X-Mixed-Replace; BOUNDARY=--x; charset=y", "--x"),
+        ("multipart/x-mixed-replace", None),
+        ("multipart/x-mixed-replace; boundary=", None),
+        ("text/html; boundary=x", None),
+        ("", None),
+    ],
+)
+def test_boundary_of_a_content_type(content_type: str, boundary: str | None) -> None:
+    assert boundary_of(content_type) == boundary
+
+
+@pytest.mark.parametrize("progressive", [0, 1])
+def test_size_of_a_jpeg(progressive: int) -> None:
+    settings = [cv2.IMWRITE_JPEG_PROGRESSIVE, progressive]
+    data = bytes(cv2.imencode(".jpg", np.zeros((30, 50, 3), np.uint8), settings)[1])
+    assert jpeg_size(data) == (50, 30)
+    for end in range(len(data)):
+        assert jpeg_size(data[:end]) in (None, (50, 30))
+
+
+@pytest.mark.parametrize(
+    "data", [b"", b"GIF89a", b"\xff\xd8", b"\xff\xd8" + b"\xff" * 100_000, b"\xff\xd8\xff\x01" * 9]
+)
+def test_no_size_where_there_is_none(data: bytes) -> None:
+    assert jpeg_size(data) is None

@@ -1,0 +1,383 @@
+"""Camera sources against real servers, honest and hostile, folders and files."""
+
+import asyncio
+from collections.abc import AsyncIterator, Awaitable, Callable
+from contextlib import asynccontextmanager, suppress
+from pathlib import Path
+
+import cv2
+import numpy as np
+import pytest
+from aiohttp import web
+
+from vision.capture_source import CaptureSource
+from vision.folder_source import FolderSource
+from vision.http_source import HttpSource, decode_jpeg
+from vision.latest import Latest, shown
+from vision.sources import CameraError, open_source
+from vision.types import CameraFrame, Image
+
+MULTIPART = {"Content-Type": "multipart/x-mixed-replace; boundary=cut"}
+Write = Callable[[bytes], Awaitable[None]]
+
+
+def picture(value: int = 0) -> Image:
+    return np.full((48, 64, 3), value, np.uint8)
+
+
+def jpeg(value: int = 0) -> bytes:
+    return bytes(cv2.imencode(".jpg", picture(value))[1])
+
+
+def part(data: bytes, head: str = "") -> bytes:
+    return f"--cut\r\nContent-Length: {len(data)}\r\n{head}\r\n".encode() + data + b"\r\n"
+
+
+@asynccontextmanager
+async def streaming(send: Callable[[Write], Awaitable[None]], **headers: str) -> AsyncIterator[str]:
+    """Serve what `send` writes; gives the URL."""
+
+    async def handler(request: web.Request) -> web.StreamResponse:
+        response = web.StreamResponse(headers=MULTIPART | headers)
+        await response.prepare(request)
+        with suppress(ConnectionError):
+            await send(response.write)
+        return response
+
+    async with serving(handler) as url:
+        yield url
+
+
+@asynccontextmanager
+async def serving(handler: Callable[[web.Request], Awaitable[web.StreamResponse]]) -> AsyncIterator[str]:
+    app = web.Application()
+    app.router.add_get("/video", handler)
+    runner = web.AppRunner(app, access_log=None, shutdown_timeout=0.1)
+    await runner.setup()
+    await web.TCPSite(runner, "127.0.0.1", 0).start()
+    try:
+        yield f"http://127.0.0.1:{runner.addresses[0][1]}/video"
+    finally:
+        await runner.cleanup()
+
+
+async def take(source: HttpSource | CaptureSource | FolderSource, count: int) -> list[CameraFrame]:
+    taken = []
+    async with source:
+        async for frame in source.frames():
+            taken.append(frame)
+            if len(taken) == count:
+                break
+    return taken
+
+
+async def failure(source: HttpSource | CaptureSource | FolderSource) -> str:
+    """Take images until the source fails; gives the message, which must be one line."""
+    with pytest.raises(CameraError) as failed:
+        await take(source, 1_000_000)
+    assert "\n" not in str(failed.value)
+    return str(failed.value)
+
+
+async def test_images_with_and_without_times() -> None:
+    async def send(write: Write) -> None:
+        for i in range(1000):
+            await write(part(jpeg(40), f"X-Time-Us: {1000 * i}\r\n" if i % 2 else ""))
+            await asyncio.sleep(0.01)
+
+    async with streaming(send) as url:
+        frames = await take(HttpSource(url), 6)
+    assert {frame.time_us is None for frame in frames} == {True, False}
+    times = [frame.time_us for frame in frames if frame.time_us is not None]
+    assert times == sorted(set(times))
+    assert all(
+        frame.image.shape == (48, 64, 3) and abs(int(frame.image[0, 0, 0]) - 40) < 3 for frame in frames
+    )
+    assert all(frame.jpeg == jpeg(40) for frame in frames)
+    arrivals = [frame.received_s for frame in frames]
+    assert arrivals == sorted(arrivals)
+
+
+async def test_a_slow_consumer_gets_the_latest_image() -> None:
+    done = asyncio.Event()
+
+    async def send(write: Write) -> None:
+        for i in range(200):
+            await write(part(jpeg(i), f"X-Time-Us: {i}\r\n"))
+            await asyncio.sleep(0)
+        done.set()
+        await asyncio.sleep(60)
+
+    async with streaming(send) as url, HttpSource(url) as source:
+        frames = source.frames()
+        await anext(frames)
+        await done.wait()
+        await asyncio.sleep(0.1)
+        assert (await anext(frames)).time_us == 199
+        await frames.aclose()
+
+
+async def test_garbage_is_skipped_and_counted() -> None:
+    bomb = jpeg().replace(b"\x00\x30\x00\x40", b"\xff\xff\xff\xff")
+    assert bomb != jpeg()
+    bad = [
+        b"garbage",
+        b"\xff\xd8\xff\xe0" + b"x" * 50,
+        jpeg()[: len(jpeg()) // 2],
+        bomb,
+        b"\x89PNG\r\n\x1a\n",
+    ]
+    assert [decode_jpeg(data) for data in bad] == [None] * len(bad)
+    taken = asyncio.Event()
+
+    async def send(write: Write) -> None:
+        for data in bad:
+            await write(part(data))
+            await asyncio.sleep(0.03)
+        await write(part(jpeg(7)))
+        await taken.wait()
+
+    async with streaming(send) as url:
+        source = HttpSource(url)
+        assert len(await take(source, 1)) == 1
+        taken.set()
+    assert source.bad_frames == len(bad)
+
+
+async def test_only_garbage_is_no_image() -> None:
+    async def send(write: Write) -> None:
+        while True:
+            await write(part(b"garbage"))
+            await asyncio.sleep(0.01)
+
+    async with streaming(send) as url:
+        message = await failure(HttpSource(url, timeout_s=0.3))
+    assert "no image for 0.3 s" in message
+    assert "could not be decoded" in message
+    assert url in message
+
+
+async def test_silence_is_no_image() -> None:
+    async def send(write: Write) -> None:
+        await write(part(jpeg()))
+        await asyncio.sleep(60)
+
+    async with streaming(send) as url:
+        assert await failure(HttpSource(url, timeout_s=0.2)) == f"camera {url}: no image for 0.2 s"
+
+
+async def test_no_answer() -> None:
+    async def handler(request: web.Request) -> web.Response:
+        await asyncio.sleep(60)
+        return web.Response()
+
+    async with serving(handler) as url:
+        assert await failure(HttpSource(url, timeout_s=0.2)) == f"camera {url}: no answer within 0.2 s"
+
+
+async def test_the_stream_ends_after_its_last_image() -> None:
+    async def send(write: Write) -> None:
+        await write(part(jpeg()))
+
+    async with streaming(send) as url, HttpSource(url) as source:
+        frames = source.frames()
+        assert (await anext(frames)).image.shape == (48, 64, 3)
+        with pytest.raises(CameraError, match="the stream ended"):
+            await anext(frames)
+
+
+async def test_too_large_a_part_breaks_the_stream() -> None:
+    async def send(write: Write) -> None:
+        await write(b"--cut\r\nContent-Length: 9000000\r\n\r\n")
+        await asyncio.sleep(60)
+
+    async with streaming(send) as url:
+        message = await failure(HttpSource(url))
+    assert "a part of 9000000 bytes is refused; the limit is 8388608" in message
+
+
+async def test_endless_bytes_without_boundary_stop_in_time() -> None:
+    async def send(write: Write) -> None:
+        while True:
+            await write(b"\xff" * 10_000)
+            await asyncio.sleep(0)
+
+    async with streaming(send) as url:
+        assert "no image for 0.3 s" in await failure(HttpSource(url, timeout_s=0.3))
+
+
+async def test_a_compressed_stream_is_not_unpacked() -> None:
+    async def send(write: Write) -> None:
+        await write(b"\x1f\x8b" + b"\x00" * 1000)
+
+    async with streaming(send, **{"Content-Encoding": "gzip"}) as url:
+        assert "the stream ended" in await failure(HttpSource(url))
+
+
+async def test_a_page_is_not_a_stream() -> None:
+    async def handler(request: web.Request) -> web.Response:
+        return web.Response(text="hello")
+
+    async with serving(handler) as url:
+        message = await failure(HttpSource(url))
+    assert message.startswith(f"camera {url}: not an MJPEG stream: Content-Type is 'text/plain")
+
+
+async def test_not_found() -> None:
+    async def handler(request: web.Request) -> web.Response:
+        return web.Response()
+
+    async with serving(handler) as url:
+        assert await failure(HttpSource(url + "x")) == f"camera {url}x: HTTP 404 Not Found"
+
+
+async def test_endless_redirects() -> None:
+    async def handler(request: web.Request) -> web.Response:
+        raise web.HTTPFound("/video")
+
+    async with serving(handler) as url:
+        assert (await failure(HttpSource(url))).startswith(f"camera {url}: ")
+
+
+async def test_refused_connection_and_unknown_host() -> None:
+    server = await asyncio.start_server(lambda reader, writer: None, "127.0.0.1", 0)
+    port = server.sockets[0].getsockname()[1]
+    server.close()
+    await server.wait_closed()
+    url = f"http://127.0.0.1:{port}/video"
+    assert await failure(HttpSource(url)) == f"camera {url}: cannot connect: connection refused"
+    assert "camera http://no.such.invalid/" in await failure(HttpSource("http://no.such.invalid/"))
+    assert "not a valid URL" in await failure(HttpSource("http://:x/"))
+
+
+@pytest.mark.parametrize(
+    "answer",
+    [
+        b"",
+        b"\x00\xff" * 1000 + b"\r\n\r\n",
+        b"HTTP/1.1 200 OK\r\nX: " + b"x" * 100_000 + b"\r\n\r\n",
+        b"HTTP/1.1 200 OK\r\nContent-Type: multipart/x; boundary=\xff\xfe\x00\r\n\r\n--x",
+        b"HTTP/1.1 200 \x1b[31mred\r\n\r\n",
+        b"HTTP/1.1 200 OK\r\nContent-Length: -5\r\n\r\n",
+        b"HTTP/1.1 200 OK\r\nTransfer-Encoding: chunked\r\n"
+        b"Content-Type: multipart/x; boundary=a\r\n\r\nzz\r\n",
+    ],
+)
+async def test_hostile_answers_are_one_line(answer: bytes) -> None:
+    async def talk(reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
+        await reader.readuntil(b"\r\n\r\n")
+        writer.write(answer)
+        await writer.drain()
+        writer.close()
+
+    server = await asyncio.start_server(talk, "127.0.0.1", 0)
+    port = server.sockets[0].getsockname()[1]
+    async with server:
+        message = await failure(HttpSource(f"http://127.0.0.1:{port}/", 1.0))
+    assert message.isprintable()
+
+
+async def test_leaving_early_leaves_nothing_running() -> None:
+    async def send(write: Write) -> None:
+        while True:
+            await write(part(jpeg()))
+            await asyncio.sleep(0.005)
+
+    async with streaming(send) as url:
+        before = asyncio.all_tasks()
+        async with HttpSource(url) as source:
+            await anext(source.frames())
+        left = {task.get_name() for task in asyncio.all_tasks() - before}
+        assert not any(name.startswith("camera") for name in left)
+
+
+async def test_folder_in_order_with_times_and_bad_files(tmp_path: Path) -> None:
+    for name, value in (("b_0000002000us", 2), ("a_0000001000us", 1), ("c", 3)):
+        cv2.imwrite(str(tmp_path / f"{name}.png"), picture(value))
+    (tmp_path / "bad.png").write_bytes(b"not an image")
+    (tmp_path / "notes.txt").write_text("not an image either")
+    source = open_source(tmp_path)
+    async with source:
+        frames = [frame async for frame in source.frames()]
+    assert [int(frame.image[0, 0, 0]) for frame in frames] == [1, 2, 3]
+    assert [frame.time_us for frame in frames] == [1000, 2000, None]
+    assert source.bad_frames == 1
+
+
+async def test_folder_without_images(tmp_path: Path) -> None:
+    assert "no images in this folder" in await failure(FolderSource(tmp_path))
+    assert "no such file" in await failure(FolderSource(tmp_path / "gone"))
+
+
+@pytest.fixture
+def clip(tmp_path: Path) -> Path:
+    path = tmp_path / "clip.avi"
+    writer = cv2.VideoWriter(str(path), cv2.VideoWriter_fourcc(*"MJPG"), 50.0, (64, 48))
+    for i in range(10):
+        writer.write(picture(20 * i))
+    writer.release()
+    return path
+
+
+async def test_file_plays_to_its_end(clip: Path) -> None:
+    async with open_source(str(clip)) as source:
+        frames = [frame async for frame in source.frames()]
+    assert 5 <= len(frames) <= 10
+    assert abs(int(frames[-1].image[0, 0, 0]) - 180) < 5
+    assert all(frame.time_us is None for frame in frames)
+
+
+async def test_file_that_is_no_video(tmp_path: Path) -> None:
+    path = tmp_path / "text.mp4"
+    path.write_text("hello")
+    assert "cannot be opened" in await failure(CaptureSource(str(path)))
+
+
+async def test_opencv_reads_a_stream_and_notices_its_end() -> None:
+    async def send(write: Write) -> None:
+        for i in range(30):
+            await write(part(jpeg(i)))
+            await asyncio.sleep(0.005)
+
+    async with streaming(send) as url:
+        assert "the stream ended" in await failure(CaptureSource(url))
+
+
+def test_open_source_chooses(tmp_path: Path, clip: Path) -> None:
+    assert isinstance(open_source("http://127.0.0.1:8080/video"), HttpSource)
+    assert isinstance(open_source("http://127.0.0.1/film.mp4"), CaptureSource)
+    assert isinstance(open_source("rtsp://127.0.0.1/live"), CaptureSource)
+    assert isinstance(open_source("udp://127.0.0.1:5600"), CaptureSource)
+    assert isinstance(open_source("0"), CaptureSource)
+    assert isinstance(open_source(2), CaptureSource)
+    assert isinstance(open_source(tmp_path), FolderSource)
+    assert isinstance(open_source(clip), CaptureSource)
+
+
+@pytest.mark.parametrize("text", ["", "gone.mp4", "no/such/folder", "a\0b", "a\nb", "x" * 5000])
+def test_open_source_says_what_it_cannot_find(text: str) -> None:
+    with pytest.raises(CameraError, match="no such file, folder, device or URL") as refused:
+        open_source(text)
+    assert "\n" not in str(refused.value)
+
+
+def test_a_password_is_never_shown() -> None:
+    assert shown("rtsp://me:secret@host/x") == "rtsp://me:***@host/x"
+    assert shown("http://host/\r\nevil") == "http://host/\\r\\nevil"
+    assert shown("http://[broken") == "http://[broken"
+
+
+async def test_latest_keeps_one_item_and_ends() -> None:
+    latest: Latest[int] = Latest()
+    latest.put(1)
+    latest.put(2)
+    assert await latest.get() == 2
+    waiting = asyncio.create_task(latest.get())
+    await asyncio.sleep(0)
+    latest.put(3)
+    assert await waiting == 3
+    latest.put(4)
+    latest.end(CameraError("gone"))
+    assert await latest.get() == 4
+    with pytest.raises(CameraError, match="gone"):
+        await latest.get()

@@ -1,0 +1,150 @@
+"""MJPEG over HTTP as a camera source, with the vehicle time of each image where the sender gives it."""
+
+from __future__ import annotations
+
+import asyncio
+import os
+import time
+from collections.abc import AsyncIterator
+from contextlib import suppress
+from typing import Self
+
+import aiohttp
+import cv2
+import numpy as np
+
+from vision.latest import CameraError, Latest, first_line, shown
+from vision.mjpeg import MjpegParser, Part, StreamError, boundary_of, jpeg_size
+from vision.types import CameraFrame, Image
+
+MAX_PIXELS = 4096 * 4096
+_JPEG_END = b"\xff\xd9"
+
+
+class HttpSource:
+    """Reads the stream in a task of its own and decodes only what the consumer asks for."""
+
+    def __init__(self, url: str, timeout_s: float = 5.0) -> None:
+        """Prepare; nothing is opened yet.
+
+        Args:
+            url: http:// or https://
+            timeout_s: how long to wait for the connection, and for each image.
+        """
+        self._url = url
+        self._name = f"camera {shown(url)}"
+        self._timeout_s = timeout_s
+        self._latest: Latest[tuple[Part, float]] = Latest()
+        self._session: aiohttp.ClientSession | None = None
+        self._task: asyncio.Task[None] | None = None
+        self._bad_frames = 0
+
+    @property
+    def bad_frames(self) -> int:
+        """Images skipped so far because they could not be decoded."""
+        return self._bad_frames
+
+    async def __aenter__(self) -> Self:
+        """Connect.
+
+        Raises:
+            CameraError: nobody answers, or the answer is not MJPEG.
+        """
+        limits = aiohttp.ClientTimeout(total=None, connect=self._timeout_s, sock_connect=self._timeout_s)
+        self._session = aiohttp.ClientSession(timeout=limits, auto_decompress=False)
+        try:
+            response = await self._connect(self._session)
+            parser = MjpegParser(self._boundary(response))
+        except BaseException:
+            await self._session.close()
+            raise
+        self._task = asyncio.create_task(self._read(response, parser), name=self._name)
+        return self
+
+    async def __aexit__(self, *exc_info: object) -> None:
+        """Disconnect."""
+        if self._task is not None:
+            self._task.cancel()
+            with suppress(asyncio.CancelledError):
+                await self._task
+        if self._session is not None:
+            await self._session.close()
+
+    async def frames(self) -> AsyncIterator[CameraFrame]:
+        """Images as they come, always the latest.
+
+        Raises:
+            CameraError: the stream ended or cannot be read, or no image came in time.
+        """
+        loop = asyncio.get_running_loop()
+        deadline_s = loop.time() + self._timeout_s
+        while True:
+            try:
+                async with asyncio.timeout_at(deadline_s):
+                    taken = await self._latest.get()
+            except TimeoutError:
+                raise CameraError(
+                    f"{self._name}: no image for {self._timeout_s:g} s{self._skipped()}"
+                ) from None
+            if taken is None:
+                return
+            part, received_s = taken
+            image = decode_jpeg(part.data)
+            if image is None:
+                self._bad_frames += 1
+                await asyncio.sleep(0)  # a flood of garbage must not keep others from running
+                continue
+            yield CameraFrame(image, part.time_us, received_s, part.data)
+            deadline_s = loop.time() + self._timeout_s
+
+    async def _connect(self, session: aiohttp.ClientSession) -> aiohttp.ClientResponse:
+        try:
+            async with asyncio.timeout(self._timeout_s):
+                return await session.get(self._url, max_redirects=3)
+        except TimeoutError as error:
+            raise CameraError(f"{self._name}: no answer within {self._timeout_s:g} s") from error
+        except aiohttp.ClientConnectorError as error:
+            number = error.errno or 0
+            reason = os.strerror(number) if number > 0 else first_line(error.strerror)
+            raise CameraError(f"{self._name}: cannot connect: {reason.lower()}") from error
+        except aiohttp.InvalidURL as error:
+            raise CameraError(f"{self._name}: not a valid URL") from error
+        except (aiohttp.ClientError, OSError, ValueError) as error:
+            raise CameraError(f"{self._name}: {first_line(error)}") from error
+
+    def _skipped(self) -> str:
+        return f" ({self._bad_frames} could not be decoded)" if self._bad_frames else ""
+
+    def _boundary(self, response: aiohttp.ClientResponse) -> str:
+        if response.status != 200:
+            raise CameraError(f"{self._name}: HTTP {response.status} {first_line(response.reason)}")
+        content_type = response.headers.get("Content-Type", "")
+        boundary = boundary_of(content_type)
+        if boundary is None:
+            raise CameraError(
+                f"{self._name}: not an MJPEG stream: Content-Type is {content_type[:60]!r}, "
+                "need multipart/x-mixed-replace with a boundary"
+            )
+        return boundary
+
+    async def _read(self, response: aiohttp.ClientResponse, parser: MjpegParser) -> None:
+        try:
+            async for chunk in response.content.iter_any():
+                parts = parser.feed(chunk)
+                if parts:
+                    self._latest.put((parts[-1], time.monotonic()))
+            self._latest.end(CameraError(f"{self._name}: the stream ended"))
+        except (StreamError, aiohttp.ClientError, OSError) as error:
+            self._latest.end(CameraError(f"{self._name}: the stream broke: {first_line(error)}"))
+
+
+def decode_jpeg(data: bytes) -> Image | None:
+    """Decode a JPEG of reasonable size to BGR; None if it is not one."""
+    size = jpeg_size(data)
+    if size is None or size[0] * size[1] > MAX_PIXELS or _JPEG_END not in data:
+        return None  # a cut-off JPEG would decode to half an image
+    try:
+        image: Image | None = cv2.imdecode(np.frombuffer(data, np.uint8), cv2.IMREAD_COLOR)
+    except cv2.error:
+        return None
+    return image

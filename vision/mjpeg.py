@@ -1,0 +1,149 @@
+"""MJPEG over HTTP, the receiving end: from bytes to parts, without sockets.
+
+Cameras are careless with boundaries and lengths, and a stream from a network is not to be trusted, so this
+takes what is common, holds no more than it must, and says what it cannot take.
+"""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass
+
+MAX_PART_BYTES = 8 * 1024 * 1024
+_MAX_HEAD_BYTES = 16 * 1024
+_END_OF_HEAD = re.compile(rb"\r?\n\r?\n")
+_MAX_MARKERS = 1000
+_JPEG_START = b"\xff\xd8"
+# Markers that hold the size of the image: all start-of-frame markers (C4, C8 and CC are something else).
+_SIZE_MARKERS = frozenset(range(0xC0, 0xD0)) - {0xC4, 0xC8, 0xCC}
+
+
+class StreamError(ValueError):
+    """The stream cannot be read any further; the message is one line."""
+
+
+@dataclass(frozen=True, slots=True)
+class Part:
+    """One part of the stream.
+
+    Attributes:
+        data: its body, as received.
+        time_us: the header `X-Time-Us`, if there is a sound one: vehicle time, microseconds.
+    """
+
+    data: bytes
+    time_us: int | None
+
+
+class MjpegParser:
+    """Cuts a multipart stream into its parts."""
+
+    def __init__(self, boundary: str, max_part_bytes: int = MAX_PART_BYTES) -> None:
+        """Begin.
+
+        Args:
+            boundary: from the Content-Type; many cameras wrongly include the two dashes.
+            max_part_bytes: a part that is larger ends the stream.
+        """
+        self._delimiter = b"--" + boundary.removeprefix("--").encode("utf-8", "replace")
+        self._max = max_part_bytes
+        self._buffer = bytearray()
+        self._searched = 0  # so far, the buffer holds no delimiter
+        self._head: tuple[int | None, int | None] | None = None  # length and time of the part being read
+
+    def feed(self, data: bytes) -> list[Part]:
+        """Take bytes and return the parts that are complete with them.
+
+        Raises:
+            StreamError: a part or its headers are too large.
+        """
+        self._buffer += data
+        parts: list[Part] = []
+        while True:
+            if self._head is None and not self._read_head():
+                return parts
+            part = self._read_body()
+            if part is None:
+                return parts
+            if part.data:
+                parts.append(part)
+
+    def _read_head(self) -> bool:
+        """Go past the next delimiter and its headers; False if there is not enough yet."""
+        buffer = self._buffer
+        at = buffer.find(self._delimiter)
+        if at < 0:  # noise between parts is dropped
+            del buffer[: max(0, len(buffer) - len(self._delimiter))]
+            return False
+        del buffer[:at]
+        end = _END_OF_HEAD.search(buffer, 0, _MAX_HEAD_BYTES)
+        if end is None:
+            if len(buffer) > _MAX_HEAD_BYTES:
+                raise StreamError(f"the headers of a part exceed {_MAX_HEAD_BYTES} bytes")
+            return False
+        head = bytes(buffer[: end.start()])
+        del buffer[: end.end()]
+        length = _number(head, b"content-length")
+        if length is not None and length > self._max:
+            raise StreamError(f"a part of {length} bytes is refused; the limit is {self._max}")
+        self._head, self._searched = (length, _number(head, b"x-time-us")), 0
+        return True
+
+    def _read_body(self) -> Part | None:
+        """Return the part whose headers were read; None if it is not complete yet."""
+        assert self._head is not None
+        length, time_us = self._head
+        buffer = self._buffer
+        if length is None:
+            length = buffer.find(self._delimiter, self._searched)
+            if length < 0:
+                if len(buffer) > self._max:
+                    raise StreamError(f"a part of more than {self._max} bytes is refused")
+                self._searched = max(0, len(buffer) - len(self._delimiter))
+                return None
+        elif len(buffer) < length:
+            return None
+        data = bytes(buffer[:length])
+        del buffer[:length]
+        self._head = None
+        return Part(data.removesuffix(b"\r\n"), time_us)
+
+
+def boundary_of(content_type: str) -> str | None:
+    """Return the boundary of a multipart Content-Type; None if it is another type or has none."""
+    if not content_type.lower().lstrip().startswith("multipart/"):
+        return None
+    found = re.search(r"""boundary\s*=\s*(?:"([^"]{1,200})"|([^\s;"]{1,200}))""", content_type, re.IGNORECASE)
+    return (found.group(1) or found.group(2)) if found else None
+
+
+def jpeg_size(data: bytes) -> tuple[int, int] | None:
+    """Return width and height a JPEG claims, from its headers alone; None if it is not a JPEG.
+
+    A few bytes can claim an image of gigabytes; ask before decoding.
+    """
+    if not data.startswith(_JPEG_START):
+        return None
+    at = 2
+    for _ in range(_MAX_MARKERS):
+        if at + 9 > len(data) or data[at] != 0xFF:
+            return None
+        marker = data[at + 1]
+        if marker == 0xFF:  # padding
+            at += 1
+        elif marker in _SIZE_MARKERS:
+            height, width = int.from_bytes(data[at + 5 : at + 7]), int.from_bytes(data[at + 7 : at + 9])
+            return (width, height) if width and height else None
+        elif marker == 0x01 or 0xD0 <= marker <= 0xD8:  # these have no content
+            at += 2
+        else:
+            at += 2 + max(2, int.from_bytes(data[at + 2 : at + 4]))
+    return None
+
+
+def _number(head: bytes, name: bytes) -> int | None:
+    """Return a header's value if it is a whole number of sensible length."""
+    found = re.search(
+        rb"^[ \t]*" + name + rb"[ \t]*:[ \t]*(\d{1,18})[ \t]*\r?$", head, re.IGNORECASE | re.MULTILINE
+    )
+    return int(found.group(1)) if found else None
