@@ -1,1 +1,1 @@
-"""The autopilot: sensors in, motor speeds out, MAVLink bytes both ways. It reads no clock and opens no socket."""
+"""The autopilot: sensors in, motor speeds out, MAVLink bytes both ways. No clock, no socket."""

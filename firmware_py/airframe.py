@@ -122,7 +122,9 @@ def load_airframe(name_or_path: str) -> Airframe:
     else:
         known = sorted(entry.name[:-5] for entry in folder.iterdir() if entry.name.endswith(".yaml"))
         if name_or_path not in known:
-            raise AirframeError(f"airframe: no '{name_or_path}'; there are {', '.join(known)}, or give a file")
+            raise AirframeError(
+                f"airframe: no '{name_or_path}'; there are {', '.join(known)}, or give a file"
+            )
         text = (folder / f"{name_or_path}.yaml").read_text(encoding="utf-8")
     try:
         return Airframe.model_validate(yaml.safe_load(text))

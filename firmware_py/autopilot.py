@@ -34,6 +34,7 @@ _UPRIGHT_COSINE = cos(radians(75.0))  # of the tilt beyond which there is no rec
 _LIFT_M_S = 0.04  # asked to climb faster than this, it leaves the ground
 _LIFT_HELD_TICKS = 125  # half a second: integrals rest while the contact still carries the weight
 _TEXTS_KEPT = 100
+_SETPOINT_GRID_US = 20_000
 
 _GROUND_MODES = frozenset({State.HOLD, State.LOSS_HOLD, State.LAND, State.LOSS_LAND})
 _AIRBORNE_STATES = {
@@ -107,6 +108,8 @@ class Autopilot:
         self._takeoff_altitude_m = nan
         self._texts: deque[StatusText] = deque(maxlen=_TEXTS_KEPT)
         self._refusal_said = False
+        self._next_setpoint: Setpoint | None = None
+        self._setpoint_slot = 0
         self._parameters_version = -1
         self._configure()
 
@@ -131,6 +134,8 @@ class Autopilot:
             self._detect_land()
         else:
             self._now_us += self._period_us
+        if self._next_setpoint is not None and self._now_us // _SETPOINT_GRID_US != self._setpoint_slot:
+            self._take_setpoint()
         _, x, y, _ = state.attitude
         upright = 1.0 - 2.0 * (x * x + y * y) > _UPRIGHT_COSINE
         row = commander.tick(
@@ -201,6 +206,9 @@ class Autopilot:
 
         One with neither a position nor a velocity (acceleration alone is not followed) counts as none
         received; a status text says so, once until a usable one comes.
+
+        Setpoints are flown from the next multiple of 20 ms on. So a few milliseconds that a packet takes
+        more or less change nothing, and a flight over a network repeats as well as one without.
         """
         if not usable(setpoint):
             if not self._refusal_said:
@@ -209,7 +217,8 @@ class Autopilot:
             return
         self._refusal_said = False
         self._commander.setpoint_came(setpoint.time_us)
-        self._guidance.accept(setpoint)
+        self._next_setpoint = setpoint
+        self._setpoint_slot = self._now_us // _SETPOINT_GRID_US
 
     def say(self, severity: int, text: str) -> None:
         """Leave a message for people; the oldest go first when nobody takes them.
@@ -256,9 +265,15 @@ class Autopilot:
             case State.LAND | State.LOSS_LAND:
                 self._guidance.enter_land(self.state)
             case State.OFFBOARD:
+                self._take_setpoint()
                 self._guidance.enter_offboard()
             case State.TAKEOFF:
                 self._enter_takeoff()
+
+    def _take_setpoint(self) -> None:
+        if self._next_setpoint is not None:
+            self._guidance.accept(self._next_setpoint)
+            self._next_setpoint = None
 
     def _enter_takeoff(self) -> None:
         here, home = self.global_position(), self.status.home

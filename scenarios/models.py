@@ -105,6 +105,7 @@ class Camera(Part):
     height_px: int = Field(240, ge=16, le=4096, description="rows of the image")
     horizontal_fov_rad: float = Field(1.57, gt=0.1, lt=3.0, description="angle of view over the width")
     rate_hz: float = Field(10.0, gt=0, le=120, description="images a second of simulated time")
+    latency_s: float = Field(0.05, ge=0, le=2, description="from exposure to the image's way out")
     position_flu_m: Vec3 = Field((0.08, 0.0, 0.0), description="in body axes forward, left, up")
     near_m: float = Field(0.01, gt=0, description="nothing nearer is drawn")
     far_m: float = Field(20.0, gt=0, description="nothing farther is drawn")

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import asyncio
 import time
-from collections.abc import Callable
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping
+from dataclasses import asdict, dataclass
 from importlib import import_module
 from typing import TYPE_CHECKING
 
@@ -17,7 +17,7 @@ from sitl.simulation import Simulation
 from sitl.world import CONTROL_PERIOD_US
 
 if TYPE_CHECKING:
-    from sitl.camera import Camera
+    from sitl.camera_feed import CameraFeed
     from sitl.video import VideoServer
 
 _BURST_TICKS = 25  # at most 0.1 s of simulated time before links and video get their turn
@@ -72,16 +72,22 @@ class SimulatorServer:
     """
 
     def __init__(
-        self, simulation: Simulation, settings: ServerSettings, notice: Callable[[str], None] = lambda line: None
+        self,
+        simulation: Simulation,
+        settings: ServerSettings,
+        notice: Callable[[str], None] = lambda line: None,
     ) -> None:
         self._simulation = simulation
         self._settings = settings
         self._notice = notice
         self._node = MavlinkNode(
-            simulation.autopilot, (ONBOARD, GROUND), system_id=settings.instance + 1
+            simulation.autopilot,
+            (ONBOARD, GROUND),
+            system_id=settings.instance + 1,
+            boot_unix_us=int(time.time() * 1e6),
         )
         self._links: dict[str, UdpLink] = {}
-        self._camera: Camera | None = None
+        self._camera: CameraFeed | None = None
         self._video: VideoServer | None = None
 
     async def run(self) -> None:
@@ -125,21 +131,32 @@ class SimulatorServer:
     async def _open_video(self) -> None:
         """Import what is heavy in a thread: telemetry must not wait for it."""
         await asyncio.to_thread(_import_video)
-        from sitl.camera import Camera
+        from sitl.camera_feed import CameraFeed
         from sitl.video import VideoServer
 
         video = VideoServer(self._settings.bind, self._settings.http_port)
-        video.add_json("/referee.json", self._simulation.referee.snapshot)
+        video.add_json("/referee.json", self._referee_answer)
         await video.start()
-        self._camera, self._video = Camera(self._simulation.scenario), video
+        self._camera, self._video = CameraFeed(self._simulation.scenario), video
+
+    def _referee_answer(self, query: Mapping[str, str]) -> object:
+        """What `/referee.json?state=…&ended=…` tells: how the try stands, and the report if it ended now."""
+        simulation = self._simulation
+        referee = simulation.referee
+        return {
+            "scenario": simulation.scenario.name,
+            "time_us": simulation.time_us,
+            "snapshot": asdict(referee.snapshot()),
+            "report": referee.report(query.get("state", ""), query.get("ended")).as_dict(),
+        }
 
     def _publish_image(self) -> None:
-        time_us = self._simulation.due_image_us()
-        if time_us is None or self._camera is None or self._video is None:
+        if self._camera is None or self._video is None:
             return
-        truth = self._simulation.truth
-        image = self._camera.render(truth.position_arena_m, truth.attitude_arena)
-        self._video.publish(image, time_us)
+        arrived = self._camera.step(self._simulation.truth)
+        if arrived is not None:
+            time_us, image = arrived
+            self._video.publish(image, time_us)
 
     async def _run_paced(self, video_task: asyncio.Task[None]) -> None:
         simulation, node, links = self._simulation, self._node, self._links
@@ -187,5 +204,5 @@ class _Notices:
 
 
 def _import_video() -> None:
-    for module in ("sitl.camera", "aiohttp.web", "sitl.video"):
+    for module in ("sitl.camera_feed", "aiohttp.web", "sitl.video"):
         import_module(module)

@@ -1,4 +1,4 @@
-"""World, autopilot, referee and camera joined into one thing that advances by ticks.
+"""World, autopilot and referee joined into one thing that advances by ticks.
 
 Still no clock, socket or thread: the real-time server and lockstep flights both drive it.
 """
@@ -41,8 +41,6 @@ class Simulation:
         self._sensors = self.world.sensors()
         self.truth = self.world.truth(self._sensors, motors_on=False)
         self.referee.update(self.truth)
-        self._camera_period_us = 1e6 / scenario.camera.rate_hz
-        self._images_taken = 0
 
     @property
     def time_us(self) -> int:
@@ -54,17 +52,8 @@ class Simulation:
         motors = self.autopilot.step(self._sensors)
         self.world.step(motors)
         self._sensors = self.world.sensors()
-        self.truth = self.world.truth(self._sensors, motors_on=self.autopilot.status.armed)
+        armed = self.autopilot.status.armed
+        if armed and not self.truth.motors_on and self.referee.over:
+            self.referee = Referee(self.scenario, self.world.airframe.envelope_m)  # a new try
+        self.truth = self.world.truth(self._sensors, motors_on=armed)
         self.referee.update(self.truth)
-
-    def due_image_us(self) -> int | None:
-        """Return the time stamp of the image that is due at this tick, or None.
-
-        Images are taken on a grid of the camera's period, each once; a rate above the control rate gives
-        one image a tick.
-        """
-        index = int(self.time_us / self._camera_period_us)
-        if index < self._images_taken:
-            return None
-        self._images_taken = index + 1
-        return self.time_us

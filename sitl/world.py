@@ -10,6 +10,7 @@ from math import hypot
 from firmware_py.airframe import Airframe
 from firmware_py.types import MotorSpeeds, Sensors, Vec3
 from scenarios.axes import Quaternion, flip_quaternion, flip_vector, flip_yaw
+from scenarios.ground import is_over_base, start_position
 from scenarios.models import Scenario
 from scenarios.truth import TrueState
 from sitl.dynamics import Dynamics
@@ -45,12 +46,11 @@ class World:
             for frame in scenario.frames
         ]
         self._touching: dict[Solid, Vec3] = {}  # with the normal of the side it was entered through
-        start = scenario.start
-        surface_m = self._surface_height(start.x_m, start.y_m)
+        x_m, y_m, surface_m = start_position(scenario)
         self._dynamics = Dynamics(
             airframe,
-            flip_vector((start.x_m, start.y_m, surface_m + self._half_m[2])),
-            flip_yaw(start.yaw_rad),
+            flip_vector((x_m, y_m, surface_m + self._half_m[2])),
+            flip_yaw(scenario.start.yaw_rad),
             latitude_deg=scenario.origin.latitude_deg,
             longitude_deg=scenario.origin.longitude_deg,
             altitude_m=scenario.origin.altitude_m,
@@ -109,20 +109,15 @@ class World:
         """True speeds of the rotors."""
         return self._dynamics.motor_speeds_rad_s()
 
-    def _surface_height(self, x_m: float, y_m: float) -> float:
-        base = self.scenario.base
-        half = base.edge_m / 2
-        over = abs(x_m - base.x_m) <= half and abs(y_m - base.y_m) <= half
-        return base.top_m if over else 0.0
-
     def _above_base(self, position_m: Vec3) -> bool:
         """Whether the base's top carries the drone: its centre is over the top and not below it.
 
         JSBSim knows one ground height for the whole drone. A drone whose centre of mass is beyond the
         edge would tip off, so the centre decides; the base's sides are a solid of their own.
         """
-        surface_m = self._surface_height(position_m[0], position_m[1])
-        return surface_m > 0.0 and position_m[2] > surface_m - self._half_m[2]
+        base = self.scenario.base
+        above = position_m[2] > base.top_m - self._half_m[2]
+        return above and is_over_base(base, position_m[0], position_m[1])
 
     def _ground_below(self, position_m: Vec3) -> float:
         return self.scenario.base.top_m if self._above_base(position_m) else 0.0

@@ -1,0 +1,82 @@
+"""`framerunner scenario`: what can be flown."""
+
+from __future__ import annotations
+
+import json
+import sys
+from pathlib import Path
+from typing import Annotated
+
+from cyclopts import App, Parameter
+
+app = App(name="scenario", help="List, show and check scenarios.")
+
+
+@app.command(name="list")
+def list_() -> int:
+    """List the scenarios that come with the package.
+
+    Example:
+
+        framerunner scenario list
+    """
+    from scenarios.loader import list_scenarios, load_scenario
+
+    for name in list_scenarios():
+        description = " ".join(load_scenario(name).description.split())
+        print(f"{name:14s} {description}")
+    return 0
+
+
+@app.command
+def show(
+    scenario: Annotated[str, Parameter(help="name or file")],
+    *,
+    out: Annotated[Path | None, Parameter(help="PNG file to write; by default <name>.png")] = None,
+) -> int:
+    """Draw a scenario from above and from the side, and print it.
+
+    Examples:
+
+        framerunner scenario show test-case-1
+
+        framerunner scenario show my.yaml --out my.png
+    """
+    from framerunner.pictures import scenario_picture
+    from scenarios.loader import dump_yaml, load_scenario
+
+    loaded = load_scenario(scenario)
+    path = out or Path(f"{loaded.name}.png")
+    scenario_picture(loaded, path)
+    print(dump_yaml(loaded), end="")
+    print(f"drawn to {path}", file=sys.stderr)
+    return 0
+
+
+@app.command
+def check(file: Annotated[Path, Parameter(help="YAML file")]) -> int:
+    """Say whether a scenario file is good, or what to mend where.
+
+    Example:
+
+        framerunner scenario check my.yaml
+    """
+    from scenarios.loader import load_scenario
+
+    loaded = load_scenario(file)
+    print(f"{file}: good, scenario '{loaded.name}' with {len(loaded.frames)} frames")
+    return 0
+
+
+@app.command
+def schema() -> int:
+    """Print the JSON Schema of scenario files, for editors.
+
+    Example:
+
+        framerunner scenario schema > scenario.schema.json
+    """
+    from scenarios.loader import json_schema
+
+    print(json.dumps(json_schema(), indent=2))
+    return 0

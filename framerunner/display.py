@@ -1,0 +1,97 @@
+"""What the terminal shows during a flight."""
+
+from __future__ import annotations
+
+import asyncio
+import sys
+from math import isfinite
+
+from rich.console import Console
+from rich.live import Live
+from rich.table import Table
+
+from framerunner.judges import Judge, Standing
+from framerunner.recorder import FlightRecorder
+from offboard.app import Moment
+from vision.types import Detection
+
+_REFRESH_S = 0.2
+_LINE_S = 10.0
+
+
+class FlightDisplay:
+    """A live table in a terminal; elsewhere a line at every change of state and every ten seconds.
+
+    Args:
+        title: scenario and mission.
+        limit_s: of the try.
+        recorder: knows the latest tick.
+        judge: knows how the try stands.
+    """
+
+    def __init__(self, title: str, limit_s: float, recorder: FlightRecorder, judge: Judge) -> None:
+        self._title = title
+        self._limit_s = limit_s
+        self._recorder = recorder
+        self._judge = judge
+        self._console = Console(file=sys.stderr)
+        self._line_state = ""
+        self._line_s = -_LINE_S
+
+    async def run(self) -> None:
+        """Show until cancelled."""
+        if not self._console.is_terminal:
+            while True:
+                self._print_line(await self._judge.standing())
+                await asyncio.sleep(_REFRESH_S)
+        with Live(console=self._console, auto_refresh=False, transient=True) as live:
+            while True:
+                live.update(self._table(await self._judge.standing()), refresh=True)
+                await asyncio.sleep(_REFRESH_S)
+
+    def _print_line(self, standing: Standing | None) -> None:
+        moment = self._recorder.latest
+        if moment is None:
+            return
+        time_s = moment.flight_time_s
+        if moment.mission_state == self._line_state and time_s - self._line_s < _LINE_S:
+            return
+        self._line_state, self._line_s = moment.mission_state, time_s
+        crossed = ", ".join(standing.crossed) if standing else ""
+        print(
+            f"{time_s:6.1f} s  {moment.mission_state:22s} {_place(moment)}  crossed: {crossed or 'none'}",
+            file=sys.stderr,
+            flush=True,
+        )
+
+    def _table(self, standing: Standing | None) -> Table:
+        table = Table(title=self._title, show_header=False, min_width=60)
+        table.add_column(style="bold")
+        table.add_column()
+        moment = self._recorder.latest
+        if moment is None:
+            table.add_row("state", "connecting, waiting until the drone is ready")
+            return table
+        table.add_row("state", moment.mission_state)
+        table.add_row("time", f"{moment.flight_time_s:.1f} s of {self._limit_s:g} s")
+        table.add_row("drone", f"{_place(moment)}  {moment.state.mode}")
+        for colour in ("red", "green", "blue"):
+            detection: Detection = getattr(moment.detections, colour)
+            table.add_row(f"[{colour}]{colour}[/]", _seen(detection))
+        if standing is not None:
+            crossed = ", ".join(standing.crossed) or "none"
+            table.add_row("crossed", f"{crossed}   contacts: {standing.contacts}")
+        return table
+
+
+def _place(moment: Moment) -> str:
+    state = moment.state
+    return f"x {state.x:5.2f}  y {state.y:5.2f}  z {state.z:4.2f} m  yaw {state.yaw:5.2f} rad"
+
+
+def _seen(detection: Detection) -> str:
+    if not detection.seen:
+        return "not seen"
+    if not isfinite(detection.d):
+        return "seen in part"
+    return f"{detection.d:.2f} m away, {detection.a:.0f} degrees aside"

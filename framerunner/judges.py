@@ -1,0 +1,174 @@
+"""Where the verdict comes from: the simulator, which knows the truth, or a drone's own telemetry."""
+
+from __future__ import annotations
+
+import asyncio
+from dataclasses import dataclass
+from math import cos, sin
+from typing import Any, Protocol
+from urllib.parse import urlsplit, urlunsplit
+
+import aiohttp
+
+from firmware_py.airframe import load_airframe
+from offboard.app import Moment
+from scenarios.models import Scenario
+from scenarios.referee import Referee
+from scenarios.truth import TrueState
+
+_ANSWER_S = 2.0
+_SETTLING_S = 10.0  # wall time; the referee itself needs at most 2 s of vehicle time
+
+
+@dataclass(frozen=True, slots=True)
+class Standing:
+    """How a try stands, for the display.
+
+    Attributes:
+        try_time_s: since motors on.
+        crossed: colours so far.
+        contacts: with frames, so far.
+        settled: motors off and at rest.
+        motors_on: whether the try is being flown.
+    """
+
+    try_time_s: float
+    crossed: tuple[str, ...]
+    contacts: int
+    settled: bool
+    motors_on: bool
+
+
+class Judge(Protocol):
+    """A referee, wherever it is."""
+
+    source: str
+
+    def see(self, moment: Moment) -> None:
+        """Take a tick of the flight."""
+
+    async def standing(self) -> Standing | None:
+        """How the try stands now; None if it cannot be had."""
+
+    async def report(self, mission_state: str, ended: str | None) -> dict[str, Any]:
+        """The report, when the drone has come to rest."""
+        ...
+
+
+class TruthJudge:
+    """Asks the simulator's referee, which sees the true state of every control tick.
+
+    Args:
+        url: of its `referee.json`.
+        session: for asking.
+    """
+
+    source = "truth"
+
+    def __init__(self, url: str, session: aiohttp.ClientSession) -> None:
+        self._url = url
+        self._session = session
+
+    def see(self, moment: Moment) -> None:
+        """Nothing to do: it sees for itself."""
+
+    async def standing(self) -> Standing | None:
+        """Ask for the snapshot."""
+        answer = await ask_referee(self._url, self._session)
+        if answer is None:
+            return None
+        now = answer["snapshot"]
+        return Standing(
+            now["try_time_s"], tuple(now["crossed"]), now["contacts"], now["settled"], now["motors_on"]
+        )
+
+    async def report(self, mission_state: str, ended: str | None) -> dict[str, Any]:
+        """Ask for the report once the drone is at rest (or goes on flying, in hold)."""
+        await _settle(self)
+        parameters = {"state": mission_state, **({"ended": ended} if ended else {})}
+        answer = await ask_referee(self._url, self._session, parameters)
+        if answer is None:
+            raise ConnectionError("the simulator's referee does not answer any more")
+        report: dict[str, Any] = answer["report"]
+        return report
+
+
+class TelemetryJudge:
+    """Judges by what the drone says of itself; contacts with frames remain unseen.
+
+    Args:
+        scenario: what is flown.
+    """
+
+    source = "telemetry"
+
+    def __init__(self, scenario: Scenario) -> None:
+        self._referee = Referee(scenario, load_airframe(scenario.airframe).envelope_m)
+        self._motors_on = False
+
+    def see(self, moment: Moment) -> None:
+        """Follow the drone's state."""
+        state = moment.state
+        self._motors_on = state.armed
+        half = state.yaw / 2
+        self._referee.update(
+            TrueState(
+                state.time_us,
+                (state.x, state.y, state.z),
+                state.velocity_arena_m_s,
+                (cos(half), 0.0, 0.0, sin(half)),
+                state.armed,
+            )
+        )
+
+    async def standing(self) -> Standing | None:
+        """From the last tick."""
+        now = self._referee.snapshot()
+        return Standing(now.try_time_s, now.crossed, now.contacts, now.settled, now.motors_on)
+
+    async def report(self, mission_state: str, ended: str | None) -> dict[str, Any]:
+        """Judge what was seen."""
+        return self._referee.report(mission_state, ended).as_dict()
+
+
+async def ask_referee(
+    url: str, session: aiohttp.ClientSession, parameters: dict[str, str] | None = None
+) -> dict[str, Any] | None:
+    """Get a simulator's `referee.json`; None if there is none."""
+    timeout = aiohttp.ClientTimeout(total=_ANSWER_S)
+    try:
+        async with session.get(url, params=parameters, timeout=timeout) as response:
+            if response.status != 200:
+                return None
+            answer = await response.json()
+    except (aiohttp.ClientError, TimeoutError, ValueError):
+        return None
+    return answer if isinstance(answer, dict) and "snapshot" in answer else None
+
+
+async def choose_judge(
+    scenario: Scenario, camera_url: str, session: aiohttp.ClientSession
+) -> TruthJudge | TelemetryJudge:
+    """Take the referee of the simulator that the camera belongs to, or judge by telemetry.
+
+    Args:
+        scenario: what is flown; a simulator with another one cannot judge it.
+        camera_url: whatever was given as the camera.
+        session: for asking.
+    """
+    parts = urlsplit(camera_url)
+    if parts.scheme == "http":
+        url = urlunsplit((parts.scheme, parts.netloc, "/referee.json", "", ""))
+        answer = await ask_referee(url, session)
+        if answer is not None and answer.get("scenario") == scenario.name:
+            return TruthJudge(url, session)
+    return TelemetryJudge(scenario)
+
+
+async def _settle(judge: TruthJudge) -> None:
+    """Wait until the drone is at rest, if its motors are off."""
+    for _ in range(int(_SETTLING_S / 0.1)):
+        standing = await judge.standing()
+        if standing is None or standing.settled or standing.motors_on:
+            return
+        await asyncio.sleep(0.1)

@@ -1,0 +1,97 @@
+"""Keeps what a flight shows of itself: its track, its times, its images."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import AsyncIterator
+from pathlib import Path
+from typing import Protocol
+
+import cv2
+
+from framerunner.pictures import Track
+from offboard.app import Moment
+from vision.types import CameraFrame
+
+
+class FrameSource(Protocol):
+    """A camera source, as in `vision.sources`."""
+
+    def frames(self) -> AsyncIterator[CameraFrame]:
+        """Images as they come."""
+        ...
+
+
+class FlightRecorder:
+    """Remembers every tick of a flight."""
+
+    def __init__(self) -> None:
+        self._time_s: list[float] = []
+        self._x: list[float] = []
+        self._y: list[float] = []
+        self._z: list[float] = []
+        self._mission_state: list[str] = []
+        self._first: tuple[float, int] | None = None
+        self._last: tuple[float, int] | None = None
+        self.latest: Moment | None = None
+
+    def see(self, moment: Moment) -> None:
+        """Take a tick."""
+        state = moment.state
+        self._time_s.append(moment.flight_time_s)
+        self._x.append(state.x)
+        self._y.append(state.y)
+        self._z.append(state.z)
+        self._mission_state.append(moment.mission_state)
+        self._last = (time.monotonic(), state.time_us)
+        self._first = self._first or self._last
+        self.latest = moment
+
+    @property
+    def track(self) -> Track:
+        """Where the drone was."""
+        return Track(self._time_s, self._x, self._y, self._z, self._mission_state)
+
+    @property
+    def wall_time_s(self) -> float:
+        """Wall time from the first to the last tick."""
+        return 0.0 if self._first is None or self._last is None else self._last[0] - self._first[0]
+
+    @property
+    def real_time_factor(self) -> float | None:
+        """Vehicle time a wall time; None before two ticks."""
+        if self._first is None or self._last is None or self.wall_time_s <= 0.0:
+            return None
+        return (self._last[1] - self._first[1]) / 1e6 / self.wall_time_s
+
+
+class RecordingCamera:
+    """Hands images on and writes them to a video file (motion JPEG in AVI: every player has it).
+
+    Args:
+        source: where images come from.
+        path: the video; made with the first image.
+        rate_hz: images a second, for players.
+    """
+
+    def __init__(self, source: FrameSource, path: Path, rate_hz: float) -> None:
+        self._source = source
+        self._path = path
+        self._rate_hz = rate_hz
+        self._writer: cv2.VideoWriter | None = None
+
+    async def frames(self) -> AsyncIterator[CameraFrame]:
+        """Images as they come, each written before it is handed on."""
+        async for frame in self._source.frames():
+            if self._writer is None:
+                height, width = frame.image.shape[:2]
+                codec = cv2.VideoWriter.fourcc(*"MJPG")
+                self._writer = cv2.VideoWriter(str(self._path), codec, self._rate_hz, (width, height))
+            self._writer.write(frame.image)
+            yield frame
+
+    def close(self) -> None:
+        """Finish the file."""
+        if self._writer is not None:
+            self._writer.release()
+            self._writer = None

@@ -1,0 +1,64 @@
+"""The folder that a flight leaves behind."""
+
+from __future__ import annotations
+
+import json
+import os
+from datetime import datetime
+from pathlib import Path
+from typing import Any
+
+from framerunner.errors import SettingError
+
+
+class RunFolder:
+    """`<out>/<time>-<scenario>/`, made when a flight begins.
+
+    Args:
+        out: folder of all runs; made if it is not there.
+        scenario: name for people.
+
+    Raises:
+        SettingError: the folder cannot be made.
+    """
+
+    def __init__(self, out: Path, scenario: str) -> None:
+        stamp = datetime.now().astimezone().strftime("%Y%m%d-%H%M%S")
+        path = out / f"{stamp}-{scenario}"
+        try:
+            out.mkdir(parents=True, exist_ok=True)
+            number = 1
+            while True:
+                try:
+                    path.mkdir()
+                    break
+                except FileExistsError:  # two flights within a second
+                    number += 1
+                    path = out / f"{stamp}-{scenario}-{number}"
+        except OSError as error:
+            raise SettingError(
+                f"--out {out}: cannot be written to ({error.strerror}); choose another"
+            ) from None
+        self.path = path
+        self.result = path / "result.json"
+        self.track = path / "track.png"
+        self.tlog = path / "flight.tlog"
+        self.video = path / "video.avi"
+        self.hang_report = path / "hang.txt"
+        self.scenario = path / "scenario.yaml"
+
+    def write_result(self, result: dict[str, Any]) -> None:
+        """Write `result.json` whole or not at all."""
+        part = self.result.with_suffix(".part")
+        part.write_text(json.dumps(result, indent=2, allow_nan=False) + "\n", encoding="utf-8")
+        os.replace(part, self.result)
+
+    def remove_if_empty(self) -> None:
+        """Take away empty files, and the folder if no result and no log remains."""
+        for path in self.path.iterdir():
+            if path.stat().st_size == 0:
+                path.unlink()
+        if not self.result.exists() and not self.tlog.exists():
+            self.scenario.unlink(missing_ok=True)
+            if not any(self.path.iterdir()):
+                self.path.rmdir()

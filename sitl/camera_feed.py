@@ -1,0 +1,49 @@
+"""The camera in time: exposures on a grid, each image out a latency later, as real cameras and links are."""
+
+from __future__ import annotations
+
+from collections import deque
+
+from scenarios.models import Scenario
+from scenarios.truth import TrueState
+from sitl.camera import Camera, Image
+
+FIRST_EXPOSURE_US = 25_000
+
+
+class CameraFeed:
+    """Takes images at the camera's rate and hands each out when its latency is over.
+
+    Exposures are on a grid of the camera's period that begins 25 ms after the clock, each once; a rate
+    above the control rate gives one image a tick. The navigator's ticks, 50 ms apart, begin with the clock:
+    with the default latency an image is out 75 ms after such a tick, half-way between two others, so what
+    a tick sees does not hang on a race between video and telemetry.
+
+    Args:
+        scenario: camera settings and what is to be seen.
+    """
+
+    def __init__(self, scenario: Scenario) -> None:
+        self._camera = Camera(scenario)
+        self._period_us = 1e6 / scenario.camera.rate_hz
+        self._latency_us = round(scenario.camera.latency_s * 1e6)
+        self._taken = 0
+        self._on_its_way: deque[tuple[int, Image]] = deque()
+
+    def step(self, truth: TrueState) -> tuple[int, Image] | None:
+        """Take the image that is due at this tick, and return the one that arrives.
+
+        Args:
+            truth: where the camera is.
+
+        Returns:
+            Time of exposure, microseconds, and the image; None if none arrives at this tick.
+        """
+        index = int((truth.time_us - FIRST_EXPOSURE_US) // self._period_us)
+        if index >= self._taken:
+            self._taken = index + 1
+            image = self._camera.render(truth.position_arena_m, truth.attitude_arena)
+            self._on_its_way.append((truth.time_us, image))
+        if self._on_its_way and self._on_its_way[0][0] + self._latency_us <= truth.time_us:
+            return self._on_its_way.popleft()
+        return None
