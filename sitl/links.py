@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import socket
 import time
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -84,9 +85,10 @@ async def open_udp(addresses: UdpAddresses, receive: Callable[[bytes], None]) ->
     """
     loop = asyncio.get_running_loop()
     host, port = addresses.bind
+    remote = await _resolve(addresses.remote)
     try:
         _, link = await loop.create_datagram_endpoint(
-            lambda: UdpLink(addresses.remote, receive), local_addr=addresses.bind
+            lambda: UdpLink(remote, receive), local_addr=addresses.bind
         )
     except OSError as error:
         raise LinkError(
@@ -94,3 +96,17 @@ async def open_udp(addresses: UdpAddresses, receive: Callable[[bytes], None]) ->
             "if another simulator runs, stop it or choose another --instance"
         ) from error
     return link
+
+
+async def _resolve(remote: Address) -> Address:
+    """Look a host's name up once: a name in `sendto` is looked up, blocking, with every packet."""
+    loop = asyncio.get_running_loop()
+    host, port = remote
+    try:
+        found = await loop.getaddrinfo(host, port, family=socket.AF_INET, type=socket.SOCK_DGRAM)
+    except (OSError, UnicodeError) as error:
+        reason = getattr(error, "strerror", None) or error
+        raise LinkError(
+            f"UDP {host}:{port} cannot be sent to ({reason}); give a host's name or an IPv4 address"
+        ) from error
+    return cast(Address, found[0][4])
