@@ -68,7 +68,7 @@ class SimulatorServer:
     Args:
         simulation: what runs.
         settings: ports and speed.
-        notice: called with lines for people ("running at 0.8 of real time").
+        notice: called with lines for people: where it speaks once all is open, when it cannot keep up.
     """
 
     def __init__(
@@ -138,6 +138,15 @@ class SimulatorServer:
         video.add_json("/referee.json", self._referee_answer)
         await video.start()
         self._camera, self._video = CameraFeed(self._simulation.scenario), video
+        self._notice(self._greeting())
+
+    def _greeting(self) -> str:
+        scenario, settings = self._simulation.scenario, self._settings
+        ports = f"{settings.onboard.remote[1]} and {settings.ground.remote[1]}"
+        page = f"http://{settings.bind}:{settings.http_port}/"
+        return (
+            f"{scenario.airframe} in {scenario.name}: MAVLink to UDP {ports}, video on {page} (Ctrl-C stops)"
+        )
 
     def _referee_answer(self, query: Mapping[str, str]) -> object:
         """What `/referee.json?state=…&ended=…` tells: how the try stands, and the report if it ended now."""

@@ -57,10 +57,6 @@ def sim(
     )
     loaded = load_scenario(scenario)
     server = SimulatorServer(Simulation(loaded), settings, notice=_say)
-    _say(
-        f"{loaded.airframe} in {loaded.name}: MAVLink to UDP {settings.onboard.remote[1]} and "
-        f"{settings.ground.remote[1]}, video on http://{bind}:{settings.http_port}/ (Ctrl-C stops)"
-    )
     asyncio.run(_run(server, lifeline=lifeline))
     return 0
 
