@@ -79,12 +79,14 @@ class SitlProcess:
     async def guard(self, work: asyncio.Task[T]) -> T:
         """Wait for some work, but not longer than the simulator lives.
 
+        When this is cancelled, so is the work; if it ends with a result all the same, that is returned.
+
         Raises:
             SettingError: the simulator could not start or died; its own words are the reason.
         """
         watching = asyncio.create_task(self.failed())
         try:
-            await asyncio.wait({work, watching}, return_when=asyncio.FIRST_COMPLETED)
+            await _wait_or_cancel(work, watching)
             if not work.done():
                 work.cancel()
                 await asyncio.gather(work, return_exceptions=True)
@@ -106,3 +108,17 @@ class SitlProcess:
     def said(self) -> tuple[str, ...]:
         """What it said on standard error, line by line."""
         return tuple(self._said)
+
+
+async def _wait_or_cancel(work: asyncio.Task[T], watching: asyncio.Task[str]) -> None:
+    """Wait for one of two tasks; hand a cancellation on to the work, and wait for the result it may have."""
+    try:
+        await asyncio.wait({work, watching}, return_when=asyncio.FIRST_COMPLETED)
+    except asyncio.CancelledError:
+        work.cancel()
+        await asyncio.wait({work})
+        if work.cancelled():
+            raise
+        task = asyncio.current_task()
+        if task is not None:
+            task.uncancel()  # the work's result tells of it
