@@ -121,7 +121,7 @@ class SimulatorServer:
         return receive
 
     def _speak(self) -> None:
-        self._node.update(self._simulation.time_us)
+        self._node.update(0)
         self._flush()
 
     def _flush(self) -> None:
@@ -179,7 +179,7 @@ class SimulatorServer:
                 if simulation.time_us + CONTROL_PERIOD_US > target_us:
                     break
                 simulation.tick()
-                node.update(simulation.time_us)
+                node.update(simulation.autopilot.state.time_us)
                 for name, data in node.take_output():
                     links[name].send(data)
                 self._publish_image()
