@@ -80,6 +80,8 @@ async def fly_once(settings: FlightSettings) -> int:
             outcome = await (flight if sitl is None else sitl.guard(flight))
             ended = None if outcome.ended == "finished" else outcome.reason
             report = await judge.report(outcome.mission_state, ended)
+            standing = await judge.standing()
+        track = recorder.track(standing.began_us if standing else None)
         result = {
             "scenario": settings.scenario.name,
             "mission": settings.mission.name,
@@ -87,13 +89,15 @@ async def fly_once(settings: FlightSettings) -> int:
             **report,
             "mission_state": outcome.mission_state,
             "ended": outcome.ended,
-            **_times(recorder),
+            "wall_time_s": recorder.wall_time_s,
+            "real_time_factor": recorder.real_time_factor,
+            "seconds_in_state": track.seconds_in_state(),
             "judged_by": judge.source,
             "started": started.isoformat(timespec="seconds"),
             "version": metadata.version("framerunner"),
         }
         folder.write_result(result)
-        track_picture(settings.scenario, recorder.track, JudgedOutcome.from_result(result), folder.track)
+        track_picture(settings.scenario, track, JudgedOutcome.from_result(result), folder.track)
     _say_result(result, folder)
     if outcome.interrupted:
         return 130
@@ -163,14 +167,6 @@ async def _fly(
         finally:
             showing.cancel()
             await asyncio.gather(showing, return_exceptions=True)
-
-
-def _times(recorder: FlightRecorder) -> dict[str, Any]:
-    return {
-        "wall_time_s": recorder.wall_time_s,
-        "real_time_factor": recorder.real_time_factor,
-        "seconds_in_state": recorder.track.seconds_in_state(),
-    }
 
 
 def _say_result(result: dict[str, Any], folder: RunFolder) -> None:

@@ -30,6 +30,7 @@ class Standing:
         contacts: with frames, so far.
         settled: motors off and at rest.
         motors_on: whether the try is being flown.
+        began_us: vehicle time of motors on, microseconds; None before.
     """
 
     try_time_s: float
@@ -37,6 +38,7 @@ class Standing:
     contacts: int
     settled: bool
     motors_on: bool
+    began_us: int | None
 
 
 class Judge(Protocol):
@@ -58,19 +60,23 @@ class Judge(Protocol):
 class TruthJudge:
     """Asks the simulator's referee, which sees the true state of every control tick.
 
+    Should the simulator die, the verdict comes from the telemetry seen so far.
+
     Args:
         url: of its `referee.json`.
         session: for asking.
+        scenario: what is flown.
     """
 
-    source = "truth"
-
-    def __init__(self, url: str, session: aiohttp.ClientSession) -> None:
+    def __init__(self, url: str, session: aiohttp.ClientSession, scenario: Scenario) -> None:
+        self.source = "truth"
         self._url = url
         self._session = session
+        self._substitute = TelemetryJudge(scenario)
 
     def see(self, moment: Moment) -> None:
-        """Nothing to do: it sees for itself."""
+        """The referee sees for itself; the substitute follows."""
+        self._substitute.see(moment)
 
     async def standing(self) -> Standing | None:
         """Ask for the snapshot."""
@@ -79,7 +85,12 @@ class TruthJudge:
             return None
         now = answer["snapshot"]
         return Standing(
-            now["try_time_s"], tuple(now["crossed"]), now["contacts"], now["settled"], now["motors_on"]
+            now["try_time_s"],
+            tuple(now["crossed"]),
+            now["contacts"],
+            now["settled"],
+            now["motors_on"],
+            now["began_us"],
         )
 
     async def report(self, mission_state: str, ended: str | None) -> dict[str, Any]:
@@ -88,7 +99,8 @@ class TruthJudge:
         parameters = {"state": mission_state, **({"ended": ended} if ended else {})}
         answer = await ask_referee(self._url, self._session, parameters)
         if answer is None:
-            raise ConnectionError("the simulator's referee does not answer any more")
+            self.source = self._substitute.source
+            return await self._substitute.report(mission_state, ended)
         report: dict[str, Any] = answer["report"]
         return report
 
@@ -104,12 +116,10 @@ class TelemetryJudge:
 
     def __init__(self, scenario: Scenario) -> None:
         self._referee = Referee(scenario, load_airframe(scenario.airframe).envelope_m)
-        self._motors_on = False
 
     def see(self, moment: Moment) -> None:
         """Follow the drone's state."""
         state = moment.state
-        self._motors_on = state.armed
         half = state.yaw / 2
         self._referee.update(
             TrueState(
@@ -124,7 +134,7 @@ class TelemetryJudge:
     async def standing(self) -> Standing | None:
         """From the last tick."""
         now = self._referee.snapshot()
-        return Standing(now.try_time_s, now.crossed, now.contacts, now.settled, now.motors_on)
+        return Standing(now.try_time_s, now.crossed, now.contacts, now.settled, now.motors_on, now.began_us)
 
     async def report(self, mission_state: str, ended: str | None) -> dict[str, Any]:
         """Judge what was seen."""
@@ -161,7 +171,7 @@ async def choose_judge(
         url = urlunsplit((parts.scheme, parts.netloc, "/referee.json", "", ""))
         answer = await ask_referee(url, session)
         if answer is not None and answer.get("scenario") == scenario.name:
-            return TruthJudge(url, session)
+            return TruthJudge(url, session, scenario)
     return TelemetryJudge(scenario)
 
 

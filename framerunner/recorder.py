@@ -26,7 +26,7 @@ class FlightRecorder:
     """Remembers every tick of a flight."""
 
     def __init__(self) -> None:
-        self._time_s: list[float] = []
+        self._time_us: list[int] = []
         self._x: list[float] = []
         self._y: list[float] = []
         self._z: list[float] = []
@@ -38,7 +38,7 @@ class FlightRecorder:
     def see(self, moment: Moment) -> None:
         """Take a tick."""
         state = moment.state
-        self._time_s.append(moment.flight_time_s)
+        self._time_us.append(state.time_us)
         self._x.append(state.x)
         self._y.append(state.y)
         self._z.append(state.z)
@@ -47,10 +47,16 @@ class FlightRecorder:
         self._first = self._first or self._last
         self.latest = moment
 
-    @property
-    def track(self) -> Track:
-        """Where the drone was."""
-        return Track(self._time_s, self._x, self._y, self._z, self._mission_state)
+    def track(self, began_us: int | None) -> Track:
+        """Return where the drone was.
+
+        Args:
+            began_us: vehicle time from which to count, microseconds; None for the first tick's.
+        """
+        if began_us is None:
+            began_us = self._time_us[0] if self._time_us else 0
+        time_s = [(time_us - began_us) / 1e6 for time_us in self._time_us]
+        return Track(time_s, self._x, self._y, self._z, self._mission_state)
 
     @property
     def wall_time_s(self) -> float:

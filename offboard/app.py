@@ -16,6 +16,7 @@ from vision.types import Detections
 
 INTERRUPTED = "interrupted"
 MICROSECONDS = 1_000_000
+REST_US = 3 * MICROSECONDS  # time to fall onto the base, and to be seen at rest there
 
 
 @dataclass(frozen=True, slots=True)
@@ -140,6 +141,7 @@ class _Flight:
             raise
         if timed_out:
             return await self._stop("timed out", f"not finished within {self._limit_us / MICROSECONDS:g} s")
+        await self._watch_come_to_rest()
         return self._outcome("finished", "")
 
     async def _fly(self) -> bool:
@@ -196,6 +198,24 @@ class _Flight:
             await self._drone.land()
         else:
             await self._drone.motors_off()
+
+    async def _watch_come_to_rest(self) -> None:
+        """Go on observing after motors off, for the records and for a referee who lives on telemetry."""
+        ticks = self._drone.ticks()
+        end_us = self._now_us + REST_US
+        try:
+            async for state in ticks:
+                if self._observer is not None:
+                    since_us = state.time_us if self._started_us is None else self._started_us
+                    flight_time_s = (state.time_us - since_us) / MICROSECONDS
+                    still, blind = VelocityCommand(), Detections()
+                    self._observer(Moment(state, still, blind, self._engine.state, flight_time_s))
+                if state.time_us >= end_us:
+                    break
+        except DroneError:
+            return  # the flight is over; a link lost now changes nothing
+        finally:
+            await _close(ticks)
 
     async def _stop(self, ended: Literal["timed out", "aborted"], reason: str) -> Outcome:
         """Stop commanding and ask for hold."""

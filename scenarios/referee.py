@@ -246,6 +246,7 @@ class Referee:
         """How the try stands now."""
         crossed = tuple(crossing.colour for crossing in self._crossings)
         return RefereeSnapshot(
+            began_us=None if self._phase is _Phase.WAITING else self._start_us,
             try_time_s=self.try_time_s,
             penalty_s=self._outside_us * 1e-6 * PENALTY_S_PER_S,
             crossed=crossed,

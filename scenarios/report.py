@@ -31,6 +31,7 @@ class RefereeSnapshot:
     """How the try stands now, for displays.
 
     Attributes:
+        began_us: vehicle time of motors on, microseconds; None before.
         try_time_s: since motors on; stands still after motors off.
         penalty_s: so far.
         crossed: colours crossed so far.
@@ -42,6 +43,7 @@ class RefereeSnapshot:
         over: nothing that comes can change the verdict.
     """
 
+    began_us: int | None
     try_time_s: float
     penalty_s: float
     crossed: tuple[str, ...]
