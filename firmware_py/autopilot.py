@@ -12,7 +12,6 @@ from typing import Protocol
 from firmware_py.airframe import Airframe
 from firmware_py.commander import Commander
 from firmware_py.commander_table import INFO, MODE_EVENT, WARNING, Event, Row, State
-from firmware_py.control.stabiliser import Stabiliser
 from firmware_py.estimator import Estimator
 from firmware_py.flight_modes import Guidance, speed_limits, usable
 from firmware_py.geodesy import LocalProjection
@@ -59,6 +58,21 @@ class RateStabiliser(Protocol):
         ...
 
 
+class _Undesigned:
+    """Stands in until the stabiliser is designed; never flown."""
+
+    def reset(self) -> None:
+        """Nothing to forget."""
+
+    def idle(self) -> MotorOutput:
+        """Not to be called."""
+        raise RuntimeError("the stabiliser is not designed yet; call prepare()")
+
+    def step(self, state: VehicleState, command: RateCommand, *, grounded: bool = False) -> MotorOutput:
+        """Not to be called."""
+        raise RuntimeError("the stabiliser is not designed yet; call prepare()")
+
+
 class Autopilot:
     """A whole autopilot for one vehicle.
 
@@ -99,7 +113,7 @@ class Autopilot:
         self._now_us = 0
         self._commander = Commander()
         self._guidance = Guidance(speed_limits(airframe, self.parameters))
-        self._stabiliser = stabiliser if stabiliser is not None else Stabiliser(airframe, control_period_s)
+        self._stabiliser: RateStabiliser = _Undesigned() if stabiliser is None else stabiliser
         self._land_detector = LandDetector((airframe.hover_speed_rad_s / airframe.motor.max_speed_rad_s) ** 2)
         self._stopped = MotorOutput((0.0,) * len(airframe.rotors))
         self.output = self._stopped
@@ -112,6 +126,17 @@ class Autopilot:
         self._setpoint_slot = 0
         self._parameters_version = -1
         self._configure()
+
+    def prepare(self) -> None:
+        """Design the stabiliser, if that has not been done; arming does it at the latest.
+
+        It takes some tenths of a second, most of them to import SciPy, so a program in real time does it
+        before its clock runs, and after it has sent its first heartbeat.
+        """
+        if isinstance(self._stabiliser, _Undesigned):
+            from firmware_py.control.stabiliser import Stabiliser
+
+            self._stabiliser = Stabiliser(self.airframe, self._period_us / 1e6)
 
     def step(self, sensors: Sensors) -> MotorSpeeds:
         """Fly one control tick.
@@ -161,6 +186,7 @@ class Autopilot:
             ACCEPTED (also when armed already), or TEMPORARILY_REJECTED with a status text that says why.
         """
         del force
+        self.prepare()
         return self._command(Event.ARM)
 
     def disarm(self, *, force: bool = False) -> CommandResult:

@@ -35,7 +35,9 @@ def build_app() -> App:
 def main() -> None:
     """Run the command line and exit."""
     signal.signal(signal.SIGTERM, _terminate)
-    # Read by OpenCV when it is first imported: a dead URL is reported by us, in one line.
+    # Read by libraries when they are first imported: matrices here are too small to share among threads,
+    # and a dead camera URL is reported by us, in one line.
+    os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     os.environ.setdefault("OPENCV_LOG_LEVEL", "ERROR")
     os.environ.setdefault("OPENCV_FFMPEG_LOGLEVEL", "-8")
     sys.exit(run(sys.argv[1:]))

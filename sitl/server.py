@@ -102,6 +102,7 @@ class SimulatorServer:
             for profile, addresses in ((ONBOARD, self._settings.onboard), (GROUND, self._settings.ground)):
                 self._links[profile.name] = await open_udp(addresses, self._receiver(profile.name))
             self._speak()
+            await asyncio.to_thread(self._simulation.autopilot.prepare)
             video_task = asyncio.create_task(self._open_video())
             await self._run_paced(video_task)
         finally:
