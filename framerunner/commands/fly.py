@@ -8,6 +8,7 @@ from typing import Annotated
 
 from cyclopts import Parameter
 
+from framerunner.commands.options import WholeNumber
 from framerunner.errors import SettingError
 
 
@@ -23,14 +24,14 @@ def fly(
         str | None, Parameter(help="URL, device or folder of its camera; needed with --drone")
     ] = None,
     speed: Annotated[float, Parameter(help="of the simulated drone: simulated seconds a second")] = 1.0,
-    instance: Annotated[int, Parameter(help="of the simulated drone: shifts its ports, 0 to 9")] = 0,
+    instance: Annotated[WholeNumber, Parameter(help="of the simulated drone: shifts its ports, 0 to 9")] = 0,
     out: Annotated[Path, Parameter(help="folder in which this flight's folder is made")] = Path("runs"),
 ) -> int:
-    """Fly a mission, show it live, and leave result, track, log and video in runs/<time>-<scenario>/.
+    """Fly a mission, show it live, and leave result, track, log and video in `runs/<time>-<scenario>/`.
 
     Exit code 0: completed, 1: flown but not completed, 2: bad input.
 
-    Examples:
+    **Examples**
 
         framerunner fly test-case-1
 

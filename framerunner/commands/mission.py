@@ -14,7 +14,7 @@ app = App(name="mission", help="List, show and check missions.")
 def list_() -> int:
     """List the missions that come with the package.
 
-    Example:
+    **Example**
 
         framerunner mission list
     """
@@ -29,7 +29,7 @@ def list_() -> int:
 def show(mission: Annotated[str, Parameter(help="name or file")]) -> int:
     """Print a mission's diagram in Mermaid's language (paste it into any Markdown page or mermaid.live).
 
-    Examples:
+    **Examples**
 
         framerunner mission show frame_challenge
 
@@ -45,7 +45,7 @@ def show(mission: Annotated[str, Parameter(help="name or file")]) -> int:
 def check(file: Annotated[Path, Parameter(help="YAML file")]) -> int:
     """Say whether a mission file is good, or every fault with its line.
 
-    Example:
+    **Example**
 
         framerunner mission check my_mission.yaml
     """

@@ -16,7 +16,7 @@ app = App(name="scenario", help="List, show and check scenarios.")
 def list_() -> int:
     """List the scenarios that come with the package.
 
-    Example:
+    **Example**
 
         framerunner scenario list
     """
@@ -32,11 +32,11 @@ def list_() -> int:
 def show(
     scenario: Annotated[str, Parameter(help="name or file")],
     *,
-    out: Annotated[Path | None, Parameter(help="PNG file to write; by default <name>.png")] = None,
+    out: Annotated[Path | None, Parameter(help="PNG file to write; by default `<name>.png`")] = None,
 ) -> int:
     """Draw a scenario from above and from the side, and print it.
 
-    Examples:
+    **Examples**
 
         framerunner scenario show test-case-1
 
@@ -57,7 +57,7 @@ def show(
 def check(file: Annotated[Path, Parameter(help="YAML file")]) -> int:
     """Say whether a scenario file is good, or what to mend where.
 
-    Example:
+    **Example**
 
         framerunner scenario check my.yaml
     """
@@ -72,7 +72,7 @@ def check(file: Annotated[Path, Parameter(help="YAML file")]) -> int:
 def schema() -> int:
     """Print the JSON Schema of scenario files, for editors.
 
-    Example:
+    **Example**
 
         framerunner scenario schema > scenario.schema.json
     """

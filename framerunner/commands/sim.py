@@ -8,6 +8,7 @@ from typing import Annotated
 
 from cyclopts import Parameter
 
+from framerunner.commands.options import WholeNumber
 from framerunner.errors import SettingError
 
 
@@ -15,20 +16,22 @@ def sim(
     *,
     scenario: Annotated[str, Parameter(help="name or file; without it an empty field with a base")] = "empty",
     speed: Annotated[float, Parameter(help="simulated seconds a second, 0.01 to 1000")] = 1.0,
-    instance: Annotated[int, Parameter(help="shifts all ports and the system id, 0 to 9")] = 0,
+    instance: Annotated[WholeNumber, Parameter(help="shifts all ports and the system id, 0 to 9")] = 0,
     bind: Annotated[str, Parameter(help="address to listen on")] = "127.0.0.1",
     onboard_remote: Annotated[
         str, Parameter(help="host that gets the onboard link, UDP 14540")
     ] = "127.0.0.1",
     ground_remote: Annotated[str, Parameter(help="host that gets the ground link, UDP 14550")] = "127.0.0.1",
-    video_port: Annotated[int | None, Parameter(help="TCP port of the video; 8080 + instance")] = None,
+    video_port: Annotated[
+        WholeNumber | None, Parameter(help="TCP port of the video; 8080 + instance")
+    ] = None,
     lifeline: Annotated[bool, Parameter(show=False, help="stop when standard input ends")] = False,
 ) -> int:
     """Start the simulated drone: MAVLink on UDP 14540 and 14550, video on http://127.0.0.1:8080/.
 
     Stop it with Ctrl-C.
 
-    Examples:
+    **Examples**
 
         framerunner sim
 

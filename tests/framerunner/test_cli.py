@@ -1,0 +1,290 @@
+"""The command line: every foreseen fault is one line and exit code 2; the small commands work."""
+
+import json
+import os
+import signal
+import socket
+import subprocess
+import sys
+from pathlib import Path
+
+import cv2
+import pytest
+
+from framerunner.cli import run
+from offboard.mission import list_missions
+from scenarios.loader import list_scenarios
+from tests.processes import ROOT, bound, free_instance
+
+PAPER = (ROOT / "offboard" / "missions" / "frame_challenge.yaml").read_text(encoding="utf-8")
+COMMANDS = [
+    "sim",
+    "fly",
+    *(f"mission {name}" for name in ("list", "show", "check")),
+    *(f"scenario {name}" for name in ("list", "show", "check", "schema")),
+]
+
+
+@pytest.fixture(autouse=True)
+def _own_folder(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+
+
+@pytest.fixture
+def refused(capsys):
+    """Run a command that must be refused; what its one line says."""
+
+    def refuse(*arguments):
+        signal.alarm(30)  # ends this test run if the command is not refused but goes on
+        code = run([str(argument) for argument in arguments])
+        signal.alarm(0)
+        captured = capsys.readouterr()
+        lines = captured.err.splitlines()
+        assert code == 2
+        assert captured.out == ""
+        assert len(lines) == 1
+        assert lines[0].startswith("error: ")
+        return lines[0]
+
+    return refuse
+
+
+def write(name, text):
+    path = Path(name)
+    path.write_text(text, encoding="utf-8")
+    return path
+
+
+@pytest.mark.parametrize("command", [["fly"], ["sim", "--scenario"], ["scenario", "show"]], ids=" ".join)
+def test_an_unknown_scenario_is_refused_with_the_known_ones(refused, command):
+    line = refused(*command, "no-such-place")
+    assert "no-such-place" in line
+    assert all(name in line for name in list_scenarios())
+
+
+@pytest.mark.parametrize(
+    "command", [["fly"], ["scenario", "check"], ["sim", "--scenario"], ["mission", "check"]], ids=" ".join
+)
+def test_broken_yaml_is_refused_with_its_line(refused, command):
+    path = write("broken.yaml", "name: mine\nframes: [\n  {colour: red\n")
+    assert f"{path}:" in refused(*command, path)
+
+
+def test_a_scenario_with_a_bad_value_is_refused_with_field_value_and_line(refused):
+    path = write("far.yaml", "name: far\nframes:\n  - {colour: red, x_m: 70, y_m: 0, z_m: 1}\n")
+    line = refused("fly", path)
+    assert f"{path}:3" in line
+    assert "x_m" in line
+    assert "70" in line
+
+
+@pytest.mark.parametrize("command", [["mission", "check"], ["mission", "show"], ["fly", "--mission"]])
+def test_a_mission_with_an_unknown_primitive_is_refused(refused, command):
+    path = write("mine.yaml", PAPER.replace("- fly_to_goal", "- flap_wings", 1))
+    line = refused(*command, path)
+    assert "flap_wings" in line
+    assert f"{path}:{1 + PAPER[: PAPER.index('- fly_to_goal')].count(chr(10))}" in line
+
+
+@pytest.mark.parametrize(
+    "expression",
+    [
+        "__import__('os').system('touch harmed')",
+        "().__class__.__bases__[0].__subclasses__()",
+        "open('harmed', 'w')",
+        "(lambda: 1)()",
+        "cmd.__class__",
+    ],
+)
+@pytest.mark.parametrize("command", [["mission", "check"], ["fly", "--mission"]], ids=" ".join)
+def test_an_unsafe_expression_is_refused_and_not_done(refused, command, expression):
+    path = write("mine.yaml", PAPER.replace("- when: frame_seen", f'- when: "{expression}"', 1))
+    assert f"{path}:" in refused(*command, path)
+    assert not Path("harmed").exists()
+    assert not Path("runs").exists()
+
+
+@pytest.mark.parametrize("command", ["fly", "sim"])
+@pytest.mark.parametrize("speed", ["0", "-1", "nan", "inf", "1e9", "fast"])
+def test_a_bad_speed_is_refused(refused, command, speed):
+    line = refused(command, "--speed", speed)
+    assert "--speed" in line
+    assert speed in line or f"{float(speed):g}" in line
+
+
+@pytest.mark.parametrize("command", ["fly", "sim"])
+@pytest.mark.parametrize("instance", ["-1", "10", "1.5", "one"])
+def test_a_bad_instance_is_refused(refused, command, instance):
+    assert "--instance" in refused(command, "--instance", instance)
+
+
+def test_a_drone_needs_a_camera_and_a_camera_a_drone(refused):
+    assert "--camera" in refused("fly", "--drone", "udpin://127.0.0.1:25099")
+    assert "--drone" in refused("fly", "--camera", "http://127.0.0.1:1/video")
+
+
+@pytest.mark.parametrize("option", ["--speed", "--instance"])
+def test_options_of_the_simulator_do_not_go_with_a_drone(refused, option):
+    assert option in refused("fly", "--drone", "udpin://127.0.0.1:25099", "--camera", ".", option, "2")
+
+
+@pytest.mark.parametrize("url", ["foo://x", "udpin://:14540", "serial:///dev/ttyUSB0", "14540"])
+def test_a_bad_drone_address_is_refused_and_leaves_no_folder(refused, url):
+    line = refused("fly", "--drone", url, "--camera", ".")
+    assert url in line
+    assert "udpin://0.0.0.0:14540" in line
+    assert list(Path("runs").iterdir()) == []
+
+
+def test_a_camera_that_is_not_there_is_refused_and_leaves_no_folder(refused):
+    assert "nowhere.avi" in refused("fly", "--drone", "udpin://127.0.0.1:25099", "--camera", "nowhere.avi")
+    assert list(Path("runs").iterdir()) == []
+
+
+def test_an_out_folder_that_cannot_be_made_is_refused(refused):
+    write("file", "")
+    line = refused("fly", "--out", "file/runs")
+    assert "--out file/runs" in line
+
+
+@pytest.mark.skipif(os.geteuid() == 0, reason="root may write everywhere")
+def test_an_out_folder_that_may_not_be_written_to_is_refused(refused):
+    Path("locked").mkdir(mode=0o500)
+    assert "--out locked" in refused("fly", "--out", "locked")
+
+
+@pytest.mark.parametrize("base", [14580, 18570])
+def test_a_busy_udp_port_is_refused_before_anything_is_said(refused, base):
+    instance = free_instance()
+    with bound(base + instance):
+        line = refused("sim", "--instance", instance)
+    assert str(base + instance) in line
+    assert "--instance" in line
+
+
+def test_a_busy_video_port_is_refused_before_anything_is_said(refused):
+    instance = free_instance()
+    with bound(8080 + instance, socket.SOCK_STREAM):
+        assert str(8080 + instance) in refused("sim", "--instance", instance)
+
+
+def test_a_remote_host_without_address_is_refused(refused):
+    line = refused("sim", "--instance", free_instance(), "--ground-remote", "two..dots")
+    assert "two..dots" in line
+
+
+def test_a_bind_address_of_another_machine_is_refused(refused):
+    assert "192.0.2.1" in refused("sim", "--instance", free_instance(), "--bind", "192.0.2.1")
+
+
+def test_a_busy_port_of_the_simulator_is_what_fly_says(refused):
+    instance = free_instance()
+    with bound(14580 + instance):
+        line = refused("fly", "--instance", instance)
+    assert str(14580 + instance) in line
+    assert list(Path("runs").iterdir()) == []
+
+
+@pytest.mark.parametrize(
+    "arguments", [["hover"], ["sim", "--wings", "2"], ["mission", "fly"], ["fly", "a", "b"]]
+)
+def test_what_is_unknown_is_refused_with_a_hint(refused, arguments):
+    line = refused(*arguments)
+    assert any(word in line for word in ("hover", "--wings", "b"))
+    assert "--help" in line
+
+
+def test_a_picture_that_cannot_be_written_is_refused(capsys):
+    assert run(["scenario", "show", "empty", "--out", "missing/empty.png"]) == 2
+    assert "missing/empty.png" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("command", COMMANDS)
+def test_help_shows_examples(capsys, command):
+    assert run([*command.split(), "--help"]) == 0
+    help_text = capsys.readouterr().out
+    assert "Example" in help_text
+    assert f"framerunner {command}" in help_text.partition("Example")[2]
+
+
+def test_without_arguments_help_is_shown(capsys):
+    assert run([]) == 0
+    shown = capsys.readouterr().out
+    assert all(name in shown for name in ("sim", "fly", "mission", "scenario"))
+
+
+def test_scenarios_are_listed_with_what_they_are(capsys):
+    assert run(["scenario", "list"]) == 0
+    lines = capsys.readouterr().out.splitlines()
+    assert [line.split()[0] for line in lines] == list(list_scenarios())
+    assert all(len(line.split()) > 3 for line in lines)
+
+
+def test_a_shown_scenario_is_a_scenario_and_its_picture_a_picture(capsys):
+    assert run(["scenario", "show", "test-case-1"]) == 0
+    shown = capsys.readouterr()
+    picture = cv2.imread("test-case-1.png")
+    assert picture.shape[0] > 300
+    assert "test-case-1.png" in shown.err
+    path = write("copy.yaml", shown.out)
+    assert run(["scenario", "check", str(path)]) == 0
+    assert "3 frames" in capsys.readouterr().out
+
+
+def test_the_schema_of_scenarios_is_json(capsys):
+    assert run(["scenario", "schema"]) == 0
+    schema = json.loads(capsys.readouterr().out)
+    assert {"name", "frames", "camera"} <= set(schema["properties"])
+
+
+def test_missions_are_listed_with_what_they_are(capsys):
+    assert run(["mission", "list"]) == 0
+    lines = capsys.readouterr().out.splitlines()
+    assert [line.split()[0] for line in lines] == list(list_missions())
+    assert all(len(line.split()) > 3 for line in lines)
+
+
+def test_a_shown_mission_is_a_mermaid_diagram_of_its_states(capsys):
+    assert run(["mission", "show", "frame_challenge"]) == 0
+    diagram = capsys.readouterr().out
+    assert "stateDiagram-v2" in diagram
+    assert all(state in diagram for state in ("turning", "frame_visible", "crossing", "shift_left"))
+    assert "-->" in diagram
+
+
+def test_a_good_mission_is_said_to_be_good(capsys):
+    assert run(["mission", "check", str(write("mine.yaml", PAPER))]) == 0
+    assert "good" in capsys.readouterr().out
+
+
+def framerunner(*arguments, **options):
+    command = [sys.executable, "-m", "framerunner", *arguments]
+    environment = {**os.environ, "PYTHONPATH": str(ROOT)}
+    return subprocess.run(command, env=environment, capture_output=True, text=True, check=False, **options)
+
+
+def test_as_a_program_a_fault_is_one_line_and_exit_code_2():
+    done = framerunner("fly", "no-such-place")
+    assert done.returncode == 2
+    assert done.stdout == ""
+    assert done.stderr.startswith("error: ")
+    assert done.stderr.count("\n") == 1
+
+
+def test_a_reader_that_goes_away_is_no_fault():
+    schema = [sys.executable, "-m", "framerunner", "scenario", "schema"]
+    environment = {**os.environ, "PYTHONPATH": str(ROOT)}
+    with subprocess.Popen(schema, env=environment, stdout=subprocess.PIPE, stderr=subprocess.PIPE) as writer:
+        writer.stdout.close()
+        assert writer.stderr.read() == b""
+        assert writer.wait(20) == 0
+
+
+def test_the_version_is_told(capsys):
+    assert run(["--version"]) == 0
+    assert capsys.readouterr().out.strip().count(".") == 2
+
+
+def test_help_keeps_what_stands_in_pointed_brackets(capsys):
+    assert run(["fly", "--help"]) == 0
+    assert "runs/<time>-<scenario>/" in capsys.readouterr().out
