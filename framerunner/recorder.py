@@ -22,8 +22,8 @@ class FrameSource(Protocol):
         ...
 
 
-class FlightRecorder:
-    """Remembers every tick of a flight."""
+class TrackRecorder:
+    """Remembers where the drone was at every tick of a flight."""
 
     def __init__(self) -> None:
         self._time_us: list[int] = []
@@ -31,9 +31,6 @@ class FlightRecorder:
         self._y: list[float] = []
         self._z: list[float] = []
         self._mission_state: list[str] = []
-        self._first: tuple[float, int] | None = None
-        self._last: tuple[float, int] | None = None
-        self.latest: Moment | None = None
 
     def see(self, moment: Moment) -> None:
         """Take a tick."""
@@ -43,9 +40,6 @@ class FlightRecorder:
         self._y.append(state.y)
         self._z.append(state.z)
         self._mission_state.append(moment.mission_state)
-        self._last = (time.monotonic(), state.time_us)
-        self._first = self._first or self._last
-        self.latest = moment
 
     def track(self, began_us: int | None) -> Track:
         """Return where the drone was.
@@ -57,6 +51,23 @@ class FlightRecorder:
             began_us = self._time_us[0] if self._time_us else 0
         time_s = [(time_us - began_us) / 1e6 for time_us in self._time_us]
         return Track(time_s, self._x, self._y, self._z, self._mission_state)
+
+
+class FlightRecorder(TrackRecorder):
+    """Remembers the track, the latest tick and how fast wall time went by."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self._first: tuple[float, int] | None = None
+        self._last: tuple[float, int] | None = None
+        self.latest: Moment | None = None
+
+    def see(self, moment: Moment) -> None:
+        """Take a tick."""
+        super().see(moment)
+        self._last = (time.monotonic(), moment.state.time_us)
+        self._first = self._first or self._last
+        self.latest = moment
 
     @property
     def wall_time_s(self) -> float:
