@@ -1,0 +1,95 @@
+"""What is left when a flight is stopped from outside: nothing running, everything recorded kept."""
+
+import json
+import os
+import signal
+import time
+
+import cv2
+import numpy as np
+import pytest
+from pymavlink import mavutil
+
+from tests.processes import free_instance, is_running, ports_are_free, program, wait_until
+
+pytestmark = pytest.mark.realtime
+
+
+@pytest.fixture
+def flight(tmp_path):
+    """A flight of test case 1 that has left the ground, its instance and the simulator's process id."""
+    instance = free_instance()
+    with program(tmp_path, "fly", "test-case-1", "--instance", str(instance)) as running:
+        running.wait_for("red.", 60.0)
+        (sim,) = running.children()
+        yield running, instance, sim
+
+
+def run_folder(tmp_path):
+    (folder,) = (tmp_path / "runs").iterdir()
+    return folder
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM], ids=lambda number: number.name)
+def test_a_stopped_flight_keeps_everything_and_leaves_nothing_running(tmp_path, flight, number):
+    running, instance, sim = flight
+    time.sleep(1.0)
+    assert running.end(number) == 130
+    assert wait_until(lambda: not is_running(sim), 5.0)
+    assert ports_are_free(instance)
+    assert "Traceback" not in running.err
+
+    folder = run_folder(tmp_path)
+    result = json.loads((folder / "result.json").read_text(encoding="utf-8"))
+    assert result["verdict"] == "aborted"
+    assert "interrupted" in result["reason"]
+    assert result["try_time_s"] > 1.0
+    assert cv2.imread(str(folder / "track.png")).shape[0] > 300
+    assert cv2.VideoCapture(str(folder / "video.avi")).read()[0]
+    log = mavutil.mavlink_connection(str(folder / "flight.tlog"))
+    assert log.recv_match(type="ATTITUDE") is not None
+    assert "aborted" in running.out
+
+
+def test_a_killed_flight_takes_its_simulator_with_it(tmp_path, flight):
+    running, instance, sim = flight
+    assert running.end(signal.SIGKILL) == -signal.SIGKILL
+    assert wait_until(lambda: not is_running(sim), 10.0)
+    assert ports_are_free(instance)
+    assert (run_folder(tmp_path) / "flight.tlog").stat().st_size > 10_000
+
+
+def test_a_simulator_that_dies_ends_the_flight_with_its_reason(tmp_path, flight):
+    running, _, sim = flight
+    os.kill(sim, signal.SIGKILL)
+    assert running.process.wait(30.0) in (1, 2)
+    assert "Traceback" not in running.err
+    assert "simulator ended" in running.err
+    folder = run_folder(tmp_path)
+    assert (folder / "flight.tlog").stat().st_size > 10_000
+    assert cv2.VideoCapture(str(folder / "video.avi")).read()[0]
+
+
+def test_a_drone_that_is_not_there_is_said_in_one_line(tmp_path):
+    pictures = tmp_path / "pictures"
+    pictures.mkdir()
+    cv2.imwrite(str(pictures / "1.png"), np.zeros((240, 320, 3), np.uint8))
+    port = 14540 + free_instance()
+    arguments = ("--drone", f"udpin://127.0.0.1:{port}", "--camera", str(pictures))
+    began_s = time.monotonic()
+    with program(tmp_path, "fly", "test-case-1", *arguments) as running:
+        assert running.process.wait(30.0) == 2
+    assert time.monotonic() - began_s < 20.0  # its own limit is 10 s
+    (line,) = running.err.splitlines()
+    assert line.startswith("error: ")
+    assert str(port) in line
+
+
+def test_a_simulator_stopped_before_the_start_is_interrupted(tmp_path):
+    instance = free_instance()
+    with program(tmp_path, "fly", "test-case-1", "--instance", str(instance)) as running:
+        assert wait_until(running.children, 20.0)
+        assert running.end() == 130
+    assert wait_until(lambda: ports_are_free(instance), 5.0)
+    assert "Traceback" not in running.err
+    assert "interrupted" in running.err
