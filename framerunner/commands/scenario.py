@@ -9,6 +9,8 @@ from typing import Annotated
 
 from cyclopts import App, Parameter
 
+from framerunner.commands.options import WholeNumber
+
 app = App(name="scenario", help="List, show and check scenarios.")
 
 
@@ -79,4 +81,36 @@ def schema() -> int:
     from scenarios.loader import json_schema
 
     print(json.dumps(json_schema(), indent=2))
+    return 0
+
+
+@app.command
+def random(
+    *,
+    level: Annotated[str, Parameter(help="level of difficulty, name or file")],
+    seed: Annotated[WholeNumber, Parameter(help="a whole number; the same seed gives the same scenario")],
+    out: Annotated[Path | None, Parameter(help="YAML file to write; by default it is printed")] = None,
+) -> int:
+    """Draw a scenario at random.
+
+    **Examples**
+
+        framerunner scenario random --level calm --seed 17
+
+        framerunner scenario random --level calm --seed 17 --out calm-17.yaml
+    """
+    from framerunner.errors import SettingError
+    from scenarios.level import load_level
+    from scenarios.loader import dump_yaml
+    from scenarios.random_scenarios import random_scenario
+
+    drawn = random_scenario(load_level(level), seed)
+    if out is None:
+        print(dump_yaml(drawn), end="")
+        return 0
+    try:
+        out.write_text(dump_yaml(drawn), encoding="utf-8")
+    except OSError as error:
+        raise SettingError(f"--out {out}: cannot be written ({error.strerror}); choose another") from None
+    print(f"scenario '{drawn.name}' written to {out}", file=sys.stderr)
     return 0

@@ -1,0 +1,127 @@
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from pydantic import ValidationError
+
+from scenarios.level import Level, LevelError, Range, list_levels, load_level, parse_level
+from scenarios.loader import MAX_BYTES
+from scenarios.yaml_tree import to_yaml
+
+CALM = to_yaml(load_level("calm").model_dump())
+
+
+@pytest.mark.parametrize("name", list_levels())
+def test_each_level_is_named_as_its_file_and_described(name):
+    level = load_level(name)
+    assert level.name == name
+    assert level.description
+
+
+def test_calm_is_as_declared():
+    layout = load_level("calm").layout
+    assert layout.x_m == layout.y_m == Range(low=-4, high=4)
+    assert layout.apart_m == 1.5
+    assert layout.frame_z_m == Range(low=0.5, high=2.5)
+    assert layout.frame_yaw_rad == layout.start_yaw_rad == Range(low=-3.141, high=3.141)
+
+
+def test_a_level_is_frozen():
+    with pytest.raises(ValidationError, match="frozen"):
+        load_level("calm").layout.apart_m = 1.0
+
+
+def test_a_level_loads_by_path(tmp_path):
+    path = tmp_path / "mine.yaml"
+    path.write_bytes(b"\xef\xbb\xbf" + CALM.encode())
+    assert load_level(path) == load_level(str(path)) == load_level("calm")
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("", "f.yaml:1: must hold fields like `name: my-level`, not nothing"),
+        ("- a", 'f.yaml:1: must hold fields like `name: my-level`, not ["a"]'),
+        ("name: a", "f.yaml:1: layout is missing; add it"),
+        ("name: a: b", "f.yaml:1: not valid YAML: mapping values are not allowed here"),
+        (b"name: a\n# \xff", "f.yaml:2: not UTF-8 text; save the file as UTF-8"),
+        ("#" * (MAX_BYTES + 1), "f.yaml: 1000001 bytes is too large for a level; 1000000 at most"),
+        (CALM + "wnd: 1\n", "f.yaml:20: wnd 1 is not a known field; known here: name, description, layout"),
+        (
+            CALM + "  apart: 1\n",
+            "f.yaml:20: layout.apart 1 is not a known field; known here: x_m, y_m, apart_m, frame_z_m, "
+            "frame_yaw_rad, start_yaw_rad",
+        ),
+        (
+            CALM.replace("    high: 4.0", "    high: 4.0\n    hihg: 4.0", 1),
+            "f.yaml:7: layout.x_m.hihg 4.0 is not a known field; known here: low, high",
+        ),
+        (CALM.replace("1.5", "0.0"), "f.yaml:10: layout.apart_m is 0.0: must be above 0.0"),
+        (CALM.replace("1.5", ".nan"), "f.yaml:10: layout.apart_m is NaN: must be a finite number"),
+        (CALM.replace("0.5", "2.6"), "f.yaml:12: layout.frame_z_m.low 2.6 must not be above high 2.5"),
+        (
+            CALM.replace("0.5", "0.5001"),
+            "f.yaml:12: layout.frame_z_m.low 0.5001 is too fine; use at most three decimals",
+        ),
+        (
+            CALM.replace("low: -4.0", "low: -5.1", 1),
+            "f.yaml:5: layout.x_m.low -5.1 cannot be flown; keep within -5 and 5",
+        ),
+        (
+            CALM.replace("low: 0.5", "low: 0.1"),
+            "f.yaml:12: layout.frame_z_m.low 0.1 cannot be flown; keep within 0.11 and 4",
+        ),
+        (
+            CALM.replace("high: 2.5", "high: 4.5"),
+            "f.yaml:13: layout.frame_z_m.high 4.5 cannot be flown; keep within 0.11 and 4",
+        ),
+        (
+            CALM.replace("high: 3.141", "high: 180.0"),
+            "f.yaml:16: layout.frame_yaw_rad.high 180.0 cannot be flown; keep within -6.283 and 6.283",
+        ),
+    ],
+)
+def test_faults_are_told_in_one_line(text, message):
+    with pytest.raises(LevelError) as caught:
+        parse_level(text, "f.yaml")
+    assert str(caught.value) == message
+
+
+@settings(deadline=None)
+@given(st.text(max_size=100) | st.binary(max_size=100))
+def test_any_text_gives_one_line(content):
+    with pytest.raises(LevelError, match=r"\Af\.yaml:.+\Z"):
+        parse_level(content, "f.yaml")
+
+
+json_like = st.recursive(
+    st.none() | st.booleans() | st.floats() | st.integers() | st.text(max_size=5),
+    lambda inner: st.dictionaries(st.sampled_from(["low", "high", "x_m", "apart_m", "x"]), inner, max_size=3),
+    max_leaves=8,
+)
+
+
+@settings(deadline=None)
+@given(st.dictionaries(st.sampled_from([*Level.model_fields, "x"]), json_like, min_size=1))
+def test_wrong_values_in_known_fields_give_one_line(fields):
+    with pytest.raises(LevelError, match=r"\Af\.yaml:.+\Z"):
+        parse_level(to_yaml(fields), "f.yaml")
+
+
+@pytest.mark.parametrize(
+    ("name", "message"),
+    [
+        ("clam", 'unknown level "clam"; did you mean calm? Known: calm'),
+        ("Calm", 'unknown level "Calm"; did you mean calm? Known: calm'),
+        ("zzz", 'unknown level "zzz"; Known: calm'),
+        ("", 'unknown level ""; Known: calm'),
+        ("a\nb", 'unknown level "a\\nb"; '),
+        ("nowhere.yaml", "nowhere.yaml: no such file; give a level file or one of: calm"),
+        ("bad\0.yaml", "bad?.yaml: no such file; "),
+        ("/", "/: no such file; "),
+    ],
+)
+def test_names_that_lead_nowhere(name, message):
+    with pytest.raises(LevelError) as caught:
+        load_level(name)
+    assert str(caught.value).startswith(message)
+    assert len(str(caught.value).splitlines()) == 1
