@@ -10,7 +10,7 @@ from scenarios.level import STEPS_PER_UNIT, Layout, Level, LevelError, Range
 from scenarios.models import COLOURS, Base, Frame, Scenario, Start
 from scenarios.streams import SeedError, random_stream
 
-MAX_DRAWS = 20_000  # about a tenth of a second; level calm needs two draws on average
+MAX_DRAWS = 20_000  # a fifth of a second; level calm needs two draws on average
 
 Steps = tuple[int, int]  # x and y of a place in millimetres
 
