@@ -5,7 +5,7 @@ from __future__ import annotations
 import asyncio
 import sys
 from collections.abc import Iterator
-from contextlib import AsyncExitStack, ExitStack, contextmanager
+from contextlib import AsyncExitStack, ExitStack, closing, contextmanager
 from dataclasses import dataclass
 from datetime import UTC, datetime
 from importlib import metadata
@@ -18,9 +18,11 @@ from firmware_py.airframe import load_airframe
 from framerunner.display import FlightDisplay
 from framerunner.errors import SettingError
 from framerunner.judges import Judge, ask_referee, choose_judge
+from framerunner.lockstep import Flown, lockstep_flight
+from framerunner.lockstep_progress import LockstepProgress
 from framerunner.pictures import Outcome as JudgedOutcome
 from framerunner.pictures import track_picture
-from framerunner.recorder import FlightRecorder, RecordingCamera
+from framerunner.recorder import FlightRecorder, RecordingCamera, VideoFile
 from framerunner.run_folder import RunFolder
 from framerunner.sitl_process import SitlProcess
 from offboard.app import Moment, Outcome, fly_mission
@@ -47,6 +49,7 @@ class FlightSettings:
         speed: of the simulator.
         instance: of the simulator.
         out: folder of all runs.
+        lockstep: simulated in this process, in its own time, instead of in real time.
     """
 
     scenario: Scenario
@@ -56,6 +59,7 @@ class FlightSettings:
     speed: float
     instance: int
     out: Path
+    lockstep: bool = False
 
 
 async def fly_once(settings: FlightSettings) -> int:
@@ -70,38 +74,62 @@ async def fly_once(settings: FlightSettings) -> int:
         SettingError: the simulator cannot be started.
     """
     started = datetime.now(UTC)
+    fly = _fly_in_lockstep if settings.lockstep else _fly_in_real_time
     with _run_folder(settings) as folder:
         recorder = FlightRecorder()
-        async with AsyncExitStack() as stack:
-            session = await stack.enter_async_context(aiohttp.ClientSession())
-            drone_url, camera_url, sitl = await _vehicle(settings, folder, session, stack)
-            judge = await choose_judge(settings.scenario, camera_url, session)
-            flight = asyncio.create_task(_fly(settings, folder, recorder, judge, (drone_url, camera_url)))
-            outcome = await (flight if sitl is None else sitl.guard(flight))
-            ended = None if outcome.ended == "finished" else outcome.reason
-            report = await judge.report(outcome.mission_state, ended)
-            standing = await judge.standing()
-        track = recorder.track(standing.began_us if standing else None)
+        flown = await fly(settings, folder, recorder)
         result = {
-            "scenario": settings.scenario.name,
-            "mission": settings.mission.name,
-            "seed": None,  # nothing is random yet
-            **report,
-            "mission_state": outcome.mission_state,
-            "ended": outcome.ended,
+            **flown.result,
             "wall_time_s": recorder.wall_time_s,
             "real_time_factor": recorder.real_time_factor,
-            "seconds_in_state": track.seconds_in_state(),
-            "judged_by": judge.source,
             "started": started.isoformat(timespec="seconds"),
-            "version": metadata.version("framerunner"),
         }
         folder.write_result(result)
-        track_picture(settings.scenario, track, JudgedOutcome.from_result(result), folder.track)
+        track_picture(settings.scenario, flown.track, JudgedOutcome.from_result(result), folder.track)
     _say_result(result, folder)
-    if outcome.interrupted:
+    if flown.outcome.interrupted:
         return 130
     return 0 if result["verdict"] in COMPLETED else 1
+
+
+async def _fly_in_lockstep(settings: FlightSettings, folder: RunFolder, recorder: FlightRecorder) -> Flown:
+    scenario = settings.scenario
+    folder.scenario.write_text(dump_yaml(scenario), encoding="utf-8")
+    video = VideoFile(folder.video, scenario.camera.rate_hz)
+    with closing(video), LockstepProgress(scenario.try_limit_s) as progress:
+
+        def observe(moment: Moment) -> None:
+            recorder.see(moment)
+            progress.see(moment)
+
+        return await lockstep_flight(
+            scenario, settings.mission, observer=observe, on_image=lambda _time_us, image: video.write(image)
+        )
+
+
+async def _fly_in_real_time(settings: FlightSettings, folder: RunFolder, recorder: FlightRecorder) -> Flown:
+    async with AsyncExitStack() as stack:
+        session = await stack.enter_async_context(aiohttp.ClientSession())
+        drone_url, camera_url, sitl = await _vehicle(settings, folder, session, stack)
+        judge = await choose_judge(settings.scenario, camera_url, session)
+        flight = asyncio.create_task(_fly(settings, folder, recorder, judge, (drone_url, camera_url)))
+        outcome = await (flight if sitl is None else sitl.guard(flight))
+        ended = None if outcome.ended == "finished" else outcome.reason
+        report = await judge.report(outcome.mission_state, ended)
+        standing = await judge.standing()
+    track = recorder.track(standing.began_us if standing else None)
+    result = {
+        "scenario": settings.scenario.name,
+        "mission": settings.mission.name,
+        "seed": None,  # real time has no lockstep's repeatability
+        **report,
+        "mission_state": outcome.mission_state,
+        "ended": outcome.ended,
+        "seconds_in_state": track.seconds_in_state(),
+        "judged_by": judge.source,
+        "version": metadata.version("framerunner"),
+    }
+    return Flown(result, outcome, track)
 
 
 @contextmanager

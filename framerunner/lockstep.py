@@ -25,11 +25,11 @@ from sitl.simulation import Simulation
 
 
 @dataclass(frozen=True, slots=True)
-class LockstepResult:
-    """What a flight gives.
+class Flown:
+    """A flight that is over.
 
     Attributes:
-        result: what stands in `result.json`, without anything of wall time.
+        result: what stands in `result.json`, but for what tells of wall time.
         outcome: how the mission ended.
         track: where the drone was, 20 times a second.
     """
@@ -46,7 +46,7 @@ def fly_lockstep(
     seed: int = 0,
     observer: Observer | None = None,
     on_image: ImageObserver | None = None,
-) -> LockstepResult:
+) -> Flown:
     """Fly a mission as fast as the machine can; see `lockstep_flight`, which does it within an event loop."""
     flight = lockstep_flight(scenario, mission, seed=seed, observer=observer, on_image=on_image)
     return asyncio.run(flight)
@@ -59,7 +59,7 @@ async def lockstep_flight(
     seed: int = 0,
     observer: Observer | None = None,
     on_image: ImageObserver | None = None,
-) -> LockstepResult:
+) -> Flown:
     """Fly a mission as fast as the machine can.
 
     Args:
@@ -104,7 +104,7 @@ async def lockstep_flight(
         "state_sha256": states.hexdigest(),
         "version": metadata.version("framerunner"),
     }
-    return LockstepResult(result, outcome, track)
+    return Flown(result, outcome, track)
 
 
 def _judged(referee: Referee, outcome: Outcome) -> dict[str, Any]:

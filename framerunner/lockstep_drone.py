@@ -16,16 +16,22 @@ from firmware_py.setpoints import setpoint_from_body_velocity
 from firmware_py.status import CommandResult, FlightMode, LandedState
 from offboard.drone import DroneError, DroneState, VelocityCommand
 from offboard.link.alignment import Alignment, Pose
+from scenarios.axes import Vec3
 from scenarios.truth import TrueState
 from sitl.simulation import Simulation
 
 TICK_US = 50_000
 HEARTBEAT_US = 1_000_000
+POSITION_US = 20_000
+"""Between two position messages; a tick, made by an attitude message, has the last one before it."""
+POSITION_PHASE_US = 16_000
+"""Beside the ticks' grid, for the reason that the camera's is."""
 TELEMETRY_DELAY_US = 4_000
 """From a state to the setpoint that answers it: one control tick, as measured over UDP and MAVSDK."""
 STREAM_BEFORE_OFFBOARD_US = 300_000
 RESEND_US = 60_000
 """A velocity holds until changed, so it is sent again; just later than the next tick's would come."""
+LINK_LOST_US = 1_000_000
 READY_LIMIT_US = 30_000_000
 CONFIRM_LIMIT_US = 6_000_000
 LAND_LIMIT_US = 120_000_000
@@ -69,6 +75,11 @@ class LockstepDrone:
         self._delay_us = telemetry_delay_us
         self._alignment: Alignment | None = None
         self._heartbeat_us = 0
+        self._position_us = POSITION_PHASE_US
+        self._position_ned_m: Vec3 = (0.0, 0.0, 0.0)
+        self._velocity_ned_m_s: Vec3 = (0.0, 0.0, 0.0)
+        self._tick_us = TICK_US
+        self._sample: DroneState | None = None
         self._armed = False
         self._mode = FlightMode.HOLD
         self._command = VelocityCommand()
@@ -90,7 +101,9 @@ class LockstepDrone:
         if not self._passes(lambda: status.ready, READY_LIMIT_US):
             limit_s = READY_LIMIT_US / 1e6
             raise DroneError(f"not ready within {limit_s:g} s: pre-arm checks not passed{self._said()}")
-        self._alignment = Alignment(self._start_arena, self._pose_ned())
+        self._alignment = Alignment(
+            self._start_arena, Pose(self._position_ned_m, self._autopilot.state.yaw_rad)
+        )
 
     async def ticks(self) -> AsyncIterator[DroneState]:
         """States at 20 Hz of vehicle time.
@@ -98,15 +111,17 @@ class LockstepDrone:
         Raises:
             DroneError: values not finite, a failsafe took over or disarmed the vehicle.
         """
+        if self._alignment is None:
+            raise DroneError("the drone's ticks were asked for before it was ready; call ready() first")
         task = asyncio.current_task()
-        state = self._autopilot.state
         while True:
             if task is not None and task.cancelling():
                 await asyncio.sleep(0)
-            tick = state.time_us // TICK_US
-            while state.time_us // TICK_US == tick:
-                self._advance()
-            told = self._state()
+            self._sample = None
+            came = self._passes(lambda: self._sample is not None, LINK_LOST_US)
+            told = self._sample
+            if not came or told is None:
+                raise DroneError("link lost: the vehicle's clock stands still")
             self._pass(self._delay_us)
             self._check(told)
             yield told
@@ -200,13 +215,21 @@ class LockstepDrone:
         simulation.tick()
         for observe in self._observers:
             observe(simulation.truth)
-        now_us = self._autopilot.state.time_us
+        state = self._autopilot.state
+        now_us = state.time_us
         if now_us >= self._resend_us:
             self._send(self._command)
         if now_us >= self._heartbeat_us:
             self._heartbeat_us += HEARTBEAT_US
             self._armed = self._autopilot.status.armed
             self._mode = self._autopilot.status.mode
+        if now_us >= self._tick_us:
+            self._tick_us += TICK_US
+            self._sample = self._told()
+        if now_us >= self._position_us:
+            self._position_us += POSITION_US
+            self._position_ned_m = state.position_ned_m
+            self._velocity_ned_m_s = state.velocity_ned_m_s
 
     def _pass(self, duration_us: int) -> None:
         """Let so much time pass."""
@@ -236,15 +259,12 @@ class LockstepDrone:
                 f"after {CONFIRM_LIMIT_US / 1e6:g} s{self._said()}"
             )
 
-    def _pose_ned(self) -> Pose:
-        state = self._autopilot.state
-        return Pose(state.position_ned_m, state.yaw_rad)
-
-    def _state(self) -> DroneState:
+    def _told(self) -> DroneState | None:
+        """What telemetry has told by now; None before the axes are fixed."""
         if self._alignment is None:
-            raise DroneError("the drone's ticks were asked for before it was ready; call ready() first")
+            return None
         state = self._autopilot.state
-        pose = self._alignment.pose(self._pose_ned())
+        pose = self._alignment.pose(Pose(self._position_ned_m, state.yaw_rad))
         x, y, z = pose.position_m
         return DroneState(
             state.time_us,
@@ -252,7 +272,7 @@ class LockstepDrone:
             y,
             z,
             pose.yaw_rad,
-            self._alignment.vector(state.velocity_ned_m_s),
+            self._alignment.vector(self._velocity_ned_m_s),
             self._armed,
             self._mode is FlightMode.OFFBOARD,
             self._mode.name,

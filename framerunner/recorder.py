@@ -11,7 +11,7 @@ import cv2
 
 from framerunner.pictures import Track
 from offboard.app import Moment
-from vision.types import CameraFrame
+from vision.types import CameraFrame, Image
 
 
 class FrameSource(Protocol):
@@ -82,8 +82,36 @@ class FlightRecorder(TrackRecorder):
         return (self._last[1] - self._first[1]) / 1e6 / self.wall_time_s
 
 
+class VideoFile:
+    """Writes images to a video file (motion JPEG in AVI: every player has it).
+
+    Args:
+        path: the video; made with the first image.
+        rate_hz: images a second, for players.
+    """
+
+    def __init__(self, path: Path, rate_hz: float) -> None:
+        self._path = path
+        self._rate_hz = rate_hz
+        self._writer: cv2.VideoWriter | None = None
+
+    def write(self, image: Image) -> None:
+        """Add an image, BGR, of the first one's size."""
+        if self._writer is None:
+            height, width = image.shape[:2]
+            codec = cv2.VideoWriter.fourcc(*"MJPG")
+            self._writer = cv2.VideoWriter(str(self._path), codec, self._rate_hz, (width, height))
+        self._writer.write(image)
+
+    def close(self) -> None:
+        """Finish the file."""
+        if self._writer is not None:
+            self._writer.release()
+            self._writer = None
+
+
 class RecordingCamera:
-    """Hands images on and writes them to a video file (motion JPEG in AVI: every player has it).
+    """Hands images on and writes them to a video file.
 
     Args:
         source: where images come from.
@@ -93,22 +121,14 @@ class RecordingCamera:
 
     def __init__(self, source: FrameSource, path: Path, rate_hz: float) -> None:
         self._source = source
-        self._path = path
-        self._rate_hz = rate_hz
-        self._writer: cv2.VideoWriter | None = None
+        self._video = VideoFile(path, rate_hz)
 
     async def frames(self) -> AsyncIterator[CameraFrame]:
         """Images as they come, each written before it is handed on."""
         async for frame in self._source.frames():
-            if self._writer is None:
-                height, width = frame.image.shape[:2]
-                codec = cv2.VideoWriter.fourcc(*"MJPG")
-                self._writer = cv2.VideoWriter(str(self._path), codec, self._rate_hz, (width, height))
-            self._writer.write(frame.image)
+            self._video.write(frame.image)
             yield frame
 
     def close(self) -> None:
         """Finish the file."""
-        if self._writer is not None:
-            self._writer.release()
-            self._writer = None
+        self._video.close()
