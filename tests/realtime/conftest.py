@@ -1,0 +1,95 @@
+"""A simulator of its own for each test, and a MAVLink peer on its onboard port."""
+
+from __future__ import annotations
+
+import time
+
+import pytest
+from pymavlink import mavutil
+
+from tests.processes import free_instance, simulator
+
+
+class Peer:
+    """A pymavlink script's connection: reads in order, remembers the latest message of each type.
+
+    Args:
+        port: on which the simulator's telemetry arrives.
+    """
+
+    def __init__(self, port):
+        self.link = mavutil.mavlink_connection(f"udpin:127.0.0.1:{port}", source_system=245)
+        self.latest = {}
+
+    def read(self, seconds):
+        """Everything that comes within a time."""
+        end_s = time.monotonic() + seconds
+        came = []
+        while (left_s := end_s - time.monotonic()) > 0:
+            message = self.link.recv_match(blocking=True, timeout=min(left_s, 0.1))
+            if message is not None:
+                self.latest[message.get_type()] = message
+                came.append(message)
+        return came
+
+    def wait(self, kind, condition=lambda message: True, limit_s=10.0):
+        """The next message of a type for which a condition holds."""
+        end_s = time.monotonic() + limit_s
+        while time.monotonic() < end_s:
+            message = self.link.recv_match(blocking=True, timeout=0.1)
+            if message is None:
+                continue
+            self.latest[message.get_type()] = message
+            if message.get_type() == kind and condition(message):
+                return message
+        raise AssertionError(
+            f"no {kind} as wanted within {limit_s:g} s; the latest is {self.latest.get(kind)}"
+        )
+
+    def command(self, number, *params):
+        """Send a COMMAND_LONG; the result of its acknowledgement."""
+        values = (*params, *[0.0] * (7 - len(params)))
+        self.link.mav.command_long_send(self.link.target_system, 1, number, 0, *values)
+        return self.wait("COMMAND_ACK", lambda ack: ack.command == number, 5.0).result
+
+    def velocity(self, forward_m_s=0.0, right_m_s=0.0, down_m_s=0.0, yaw_rate_rad_s=0.0, *, frame=8):
+        """Send one body velocity setpoint, as MAVSDK and PX4's examples do."""
+        self.link.mav.set_position_target_local_ned_send(
+            *(0, self.link.target_system, 1, frame, 0b010111000111),
+            *(0, 0, 0, forward_m_s, right_m_s, down_m_s, 0, 0, 0, 0, yaw_rate_rad_s),
+        )
+
+    def fly(self, seconds, **velocity):
+        """Stream a setpoint at 20 Hz, reading meanwhile; everything that came."""
+        came = []
+        end_s = time.monotonic() + seconds
+        while time.monotonic() < end_s:
+            self.velocity(**velocity)
+            came += self.read(0.05)
+        return came
+
+
+@pytest.fixture
+def instance():
+    """An instance whose ports nobody has."""
+    return free_instance()
+
+
+@pytest.fixture
+def sim(tmp_path, instance):
+    """A running simulator; it must not have complained when the test ends."""
+    with simulator(tmp_path, instance) as running:
+        yield running
+        assert running.process.poll() is None
+        assert "Traceback" not in running.err
+
+
+@pytest.fixture
+def peer(sim, instance):
+    """A peer that has heard the simulator and knows it to be ready."""
+    peer = Peer(14540 + instance)
+    peer.wait("HEARTBEAT", lambda heartbeat: heartbeat.get_srcComponent() == 1)
+    assert peer.link.target_system == instance + 1
+    peer.wait("SYS_STATUS", lambda status: status.onboard_control_sensors_health & 0x10000000, 20.0)
+    yield peer
+    peer.link.close()

@@ -1,0 +1,169 @@
+"""The simulator in paced time, in this process, over real sockets."""
+
+import asyncio
+import socket
+import time
+from contextlib import asynccontextmanager, suppress
+
+import aiohttp
+import pytest
+
+from scenarios.loader import load_scenario
+from sitl.links import LinkError
+from sitl.server import ServerSettings, SimulatorServer, _Notices
+from sitl.simulation import Simulation
+from sitl.video import VideoError
+from sitl.world import CONTROL_PERIOD_US
+from tests.processes import bound, free_instance
+
+GREETING = "Ctrl-C stops"
+
+
+class SlowSimulation(Simulation):
+    """Each tick takes at least two and a half times as long as it should; remembers the time of each."""
+
+    def __init__(self, scenario):
+        super().__init__(scenario)
+        self.ticks_us = [self.time_us]
+
+    def tick(self):
+        super().tick()
+        self.ticks_us.append(self.time_us)
+        time.sleep(0.010)
+
+
+@asynccontextmanager
+async def serving(simulation, *, speed=1.0):
+    """A server with all its ports open: what it says, and its settings."""
+    said = []
+    settings = ServerSettings(instance=free_instance(), speed=speed)
+    task = asyncio.create_task(SimulatorServer(simulation, settings, said.append).run())
+    try:
+        for _ in range(1000):
+            await asyncio.sleep(0.01)
+            if said or task.done():
+                break
+        if task.done():
+            await task
+        assert GREETING in said[0]
+        yield said, settings
+    finally:
+        task.cancel()
+        with suppress(asyncio.CancelledError):
+            await task
+
+
+async def referee(settings, query=""):
+    url = f"http://127.0.0.1:{settings.http_port}/referee.json{query}"
+    async with aiohttp.ClientSession() as session, session.get(url) as response:
+        assert response.status == 200
+        return await response.json()
+
+
+async def test_the_referee_tells_how_the_try_stands():
+    simulation = Simulation(load_scenario("test-case-1"))
+    async with serving(simulation) as (_, settings):
+        answer = await referee(settings)
+        assert answer["scenario"] == "test-case-1"
+        assert answer["time_us"] == pytest.approx(simulation.time_us, abs=1_000_000)
+        assert answer["snapshot"]["next_colour"] == "red"
+        assert answer["snapshot"]["motors_on"] is False
+        assert answer["report"]["verdict"]
+
+        answer = await referee(settings, "?state=red.turning&ended=pulled%20out")
+        assert answer["report"]["verdict"] == "aborted"
+        assert "pulled out" in answer["report"]["reason"]
+        assert "red.turning" in answer["report"]["reason"]
+
+
+async def test_telemetry_goes_out_on_both_links_before_anybody_spoke():
+    instance = free_instance()
+    with bound(14540 + instance) as app, bound(14550 + instance) as station:
+        settings = ServerSettings(instance=instance)
+        task = asyncio.create_task(SimulatorServer(Simulation(load_scenario("empty")), settings).run())
+        for link in (app, station):
+            link.settimeout(5.0)
+            packet, sender = await asyncio.to_thread(link.recvfrom, 300)
+            assert packet[0] == 0xFD
+            assert sender[1] in (14580 + instance, 18570 + instance)
+        task.cancel()
+        with suppress(asyncio.CancelledError):
+            await task
+    await asyncio.sleep(0.05)
+    with bound(14580 + instance), bound(18570 + instance):
+        pass  # free again
+
+
+async def test_a_machine_that_is_too_slow_slows_time_and_skips_nothing(monkeypatch):
+    monkeypatch.setattr("sitl.server._NOTICE_PERIOD_S", 1.0)
+    simulation = SlowSimulation(load_scenario("empty"))
+    async with serving(simulation) as (said, _):
+        began_s, began_us = time.monotonic(), simulation.time_us
+        for _ in range(200):
+            await asyncio.sleep(0.1)
+            if len(said) >= 3:
+                break
+        factor = (simulation.time_us - began_us) / 1e6 / (time.monotonic() - began_s)
+    assert len(said) >= 3
+    assert "cannot keep up" in said[2] and "nothing was skipped" in said[2]
+    assert factor < 0.45  # a tick of 4 ms takes more than 10 ms
+    assert float(said[2].partition("ran at ")[2].split()[0]) == pytest.approx(factor, abs=0.15)
+    steps = {b - a for a, b in zip(simulation.ticks_us, simulation.ticks_us[1:], strict=False)}
+    assert steps == {CONTROL_PERIOD_US}
+
+
+@pytest.mark.parametrize("speed", [0.5, 2.0])
+async def test_time_runs_at_the_wanted_speed(speed):
+    simulation = Simulation(load_scenario("empty"))
+    async with serving(simulation, speed=speed) as (said, _):
+        await asyncio.sleep(0.3)
+        began_s, began_us = time.monotonic(), simulation.time_us
+        await asyncio.sleep(2.0)
+        factor = (simulation.time_us - began_us) / 1e6 / (time.monotonic() - began_s)
+    assert factor < speed * 1.15
+    if len(said) == 1:  # else the machine was too busy, and the server said so
+        assert factor > speed * 0.7
+
+
+@pytest.mark.parametrize("base", [14580, 18570])
+async def test_a_busy_udp_port_is_said_and_nothing_stays_open(base):
+    instance = free_instance()
+    server = SimulatorServer(Simulation(load_scenario("empty")), ServerSettings(instance=instance))
+    with bound(base + instance), pytest.raises(LinkError, match=str(base + instance)):
+        await server.run()
+    await asyncio.sleep(0.05)  # asyncio closes sockets in its next turn
+    with bound(14580 + instance), bound(18570 + instance):
+        pass
+
+
+async def test_a_busy_video_port_ends_it_and_frees_the_links():
+    instance = free_instance()
+    server = SimulatorServer(Simulation(load_scenario("empty")), ServerSettings(instance=instance))
+    with bound(8080 + instance, socket.SOCK_STREAM), pytest.raises(VideoError, match=str(8080 + instance)):
+        await asyncio.wait_for(server.run(), 20.0)
+    await asyncio.sleep(0.05)
+    with bound(14580 + instance), bound(18570 + instance):
+        pass
+
+
+def test_instances_shift_every_port():
+    settings = ServerSettings(instance=3)
+    assert (settings.onboard.bind[1], settings.onboard.remote[1]) == (14583, 14543)
+    assert (settings.ground.bind[1], settings.ground.remote[1]) == (18573, 14553)
+    assert settings.http_port == 8083
+    assert ServerSettings(instance=3, video_port=9000).http_port == 9000
+
+
+def test_notices_come_once_a_period_and_only_with_cause():
+    said = []
+    notices = _Notices(said.append, 2.0)
+    start_s = notices._since_s
+    notices.lag(0.0, start_s + 6.0)
+    assert said == []
+    notices.lag(1.0, start_s + 8.0)
+    assert said == []  # the period is not over
+    notices.lag(0.5, start_s + 12.0)
+    assert len(said) == 1
+    assert "ran at 1.50 of real time (wanted 2) for the last 6 s" in said[0]
+    notices.lag(0.0, start_s + 30.0)
+    assert len(said) == 1
