@@ -1,0 +1,121 @@
+"""Where the verdict comes from, and that a judge which fails ends nothing."""
+
+from contextlib import asynccontextmanager
+
+import aiohttp
+import pytest
+from aiohttp import web
+
+from framerunner.judges import TelemetryJudge, TruthJudge, ask_referee, choose_judge
+from offboard.app import Moment
+from offboard.drone import DroneState, VelocityCommand
+from scenarios.loader import load_scenario
+from vision.types import Detections
+
+SCENARIO = load_scenario("test-case-1")
+SNAPSHOT = {
+    "began_us": 3,
+    "try_time_s": 7.5,
+    "crossed": ["red"],
+    "contacts": 1,
+    "settled": False,
+    "motors_on": False,
+}
+
+
+@asynccontextmanager
+async def referee(*answers):
+    """A server whose last answer comes again and again: its root URL, a session, the queries it got."""
+    queue, queries = list(answers), []
+
+    async def answer(request):
+        queries.append(dict(request.query))
+        body = queue.pop(0) if len(queue) > 1 else queue[0]
+        return web.Response(text=body) if isinstance(body, str) else web.json_response(body)
+
+    app = web.Application()
+    app.router.add_get("/referee.json", answer)
+    runner = web.AppRunner(app)
+    await runner.setup()
+    site = web.TCPSite(runner, "127.0.0.1", 0)
+    await site.start()
+    port = runner.addresses[0][1]
+    try:
+        async with aiohttp.ClientSession() as session:
+            yield f"http://127.0.0.1:{port}", session, queries
+    finally:
+        await runner.cleanup()
+
+
+def answer(scenario=SCENARIO.name, **snapshot):
+    return {"scenario": scenario, "snapshot": {**SNAPSHOT, **snapshot}, "report": {"verdict": "clean"}}
+
+
+async def test_the_simulator_of_the_camera_is_the_judge():
+    async with referee(answer()) as (root, session, _):
+        judge = await choose_judge(SCENARIO, f"{root}/video", session)
+        assert judge.source == "truth"
+        standing = await judge.standing()
+        assert (standing.try_time_s, standing.crossed, standing.contacts) == (7.5, ("red",), 1)
+
+
+@pytest.mark.parametrize("body", [answer("another-place"), "not json", {"weather": "fine"}], ids=str)
+async def test_whoever_is_not_the_referee_of_this_scenario_does_not_judge(body):
+    async with referee(body) as (root, session, _):
+        assert (await choose_judge(SCENARIO, f"{root}/video", session)).source == "telemetry"
+
+
+@pytest.mark.parametrize("url", ["http://127.0.0.1:9/video", "rtsp://127.0.0.1/live", "0", "/tmp/images"])
+async def test_another_camera_leaves_the_verdict_to_telemetry(url):
+    async with aiohttp.ClientSession() as session:
+        assert (await choose_judge(SCENARIO, url, session)).source == "telemetry"
+
+
+async def test_the_report_is_asked_for_when_the_drone_is_at_rest():
+    async with referee(answer(), answer(), answer(settled=True)) as (root, session, queries):
+        judge = TruthJudge(f"{root}/referee.json", session, SCENARIO)
+        assert await judge.report("landing.stop", None) == {"verdict": "clean"}
+    assert queries == [{}, {}, {}, {"state": "landing.stop"}]
+
+
+async def test_a_drone_that_flies_on_is_not_waited_for():
+    async with referee(answer(motors_on=True)) as (root, session, queries):
+        await TruthJudge(f"{root}/referee.json", session, SCENARIO).report("red.turning", "link lost & gone")
+    assert queries == [{}, {"state": "red.turning", "ended": "link lost & gone"}]
+
+
+async def test_a_referee_that_is_gone_has_no_standing():
+    async with aiohttp.ClientSession() as session:
+        assert await ask_referee("http://127.0.0.1:9/referee.json", session) is None
+        assert await TruthJudge("http://127.0.0.1:9/referee.json", session, SCENARIO).standing() is None
+
+
+def moment(time_s, x, z, *, armed=True):
+    state = DroneState(round(time_s * 1e6), x, -3.0, z, 1.0, (0.0, 0.0, 0.0), armed)
+    return Moment(state, VelocityCommand(), Detections(), "take_off.rise", time_s)
+
+
+async def test_telemetry_is_judged_as_it_comes():
+    judge = TelemetryJudge(SCENARIO)
+    judge.see(moment(10.0, -3.0, 0.55, armed=False))
+    for tick in range(100):
+        judge.see(moment(10.05 + 0.05 * tick, -3.0, min(0.55 + 0.05 * tick, 2.0)))
+    standing = await judge.standing()
+    assert standing.try_time_s == pytest.approx(4.95, abs=0.06)
+    assert standing.motors_on
+    report = await judge.report("take_off.rise", "pilot took over")
+    assert report["verdict"] == "aborted"
+    assert "pilot took over" in report["reason"]
+    assert report["path_length_m"] == pytest.approx(1.45, abs=0.1)
+
+
+async def test_telemetry_judges_when_the_simulator_has_died():
+    async with aiohttp.ClientSession() as session:
+        judge = TruthJudge("http://127.0.0.1:9/referee.json", session, SCENARIO)
+        assert judge.source == "truth"
+        for tick in range(40):
+            judge.see(moment(10.0 + 0.05 * tick, -3.0, 0.6 + 0.05 * tick, armed=tick > 0))
+        report = await judge.report("red.turning", "link lost")
+    assert judge.source == "telemetry"
+    assert report["verdict"] == "aborted"
+    assert "link lost" in report["reason"]
