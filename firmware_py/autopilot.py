@@ -118,6 +118,8 @@ class Autopilot:
         self._stopped = MotorOutput((0.0,) * len(airframe.rotors))
         self.output = self._stopped
         self._state_entered = State.DISARMED
+        self._shown_state: State | None = None
+        self._airborne = LandedState.IN_AIR
         self._lift_ticks = 0
         self._takeoff_altitude_m = nan
         self._texts: deque[StatusText] = deque(maxlen=_TEXTS_KEPT)
@@ -363,17 +365,17 @@ class Autopilot:
 
     def _refresh_status(self) -> None:
         status, commander = self.status, self._commander
-        state = commander.state
-        status.armed = state is not State.DISARMED
-        status.mode = commander.mode
-        status.intended_mode = commander.situation.intended
-        status.failsafe = commander.failsafe
+        state, intended = commander.state, commander.situation.intended
+        if state is not self._shown_state or intended is not status.intended_mode:
+            self._shown_state = state
+            self._airborne = _AIRBORNE_STATES.get(state, LandedState.IN_AIR)
+            status.armed = state is not State.DISARMED
+            status.mode = commander.mode
+            status.intended_mode = intended
+            status.failsafe = commander.failsafe
         status.setpoint = self._guidance.setpoint
         ready = commander.ready
         if ready and not status.ready and not status.armed:
             self.say(INFO, "Ready for takeoff!")
         status.ready = ready
-        if self._land_detector.landed:
-            status.landed_state = LandedState.ON_GROUND
-        else:
-            status.landed_state = _AIRBORNE_STATES.get(state, LandedState.IN_AIR)
+        status.landed_state = LandedState.ON_GROUND if self._land_detector.landed else self._airborne

@@ -28,6 +28,7 @@ class CameraFeed:
         self._period_us = 1e6 / scenario.camera.rate_hz
         self._latency_us = round(scenario.camera.latency_s * 1e6)
         self._taken = 0
+        self._next_us = 0  # before this there is nothing to do
         self._on_its_way: deque[tuple[int, Image]] = deque()
 
     def step(self, truth: TrueState) -> tuple[int, Image] | None:
@@ -39,11 +40,17 @@ class CameraFeed:
         Returns:
             Time of exposure, microseconds, and the image; None if none arrives at this tick.
         """
+        if truth.time_us < self._next_us:
+            return None
         index = int((truth.time_us - FIRST_EXPOSURE_US) // self._period_us)
         if index >= self._taken:
             self._taken = index + 1
             image = self._camera.render(truth.position_arena_m, truth.attitude_arena)
             self._on_its_way.append((truth.time_us, image))
+        arrived = None
         if self._on_its_way and self._on_its_way[0][0] + self._latency_us <= truth.time_us:
-            return self._on_its_way.popleft()
-        return None
+            arrived = self._on_its_way.popleft()
+        self._next_us = int(FIRST_EXPOSURE_US + self._taken * self._period_us)
+        if self._on_its_way:
+            self._next_us = min(self._next_us, self._on_its_way[0][0] + self._latency_us)
+        return arrived

@@ -64,6 +64,7 @@ class Dynamics:
         self._load(airframe)
         self._start_ned_m = position_ned_m
         self._floor_ft = altitude_m / METRES_PER_FOOT
+        self._ground_m: float | None = None
         for name, value in (
             ("ic/lat-geod-deg", latitude_deg),
             ("ic/long-gc-deg", longitude_deg),
@@ -129,7 +130,9 @@ class Dynamics:
 
     def set_ground_height(self, height_m: float) -> None:
         """Set the height of what is below, metres above the floor."""
-        self._ground(self._floor_ft + height_m / METRES_PER_FOOT)
+        if height_m != self._ground_m:  # JSBSim keeps it
+            self._ground_m = height_m
+            self._ground(self._floor_ft + height_m / METRES_PER_FOOT)
 
     def touches_ground(self) -> bool:
         """Whether any corner of the body presses on the ground."""

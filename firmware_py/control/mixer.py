@@ -39,7 +39,9 @@ class Mixer:
 
     def __init__(self, airframe: Airframe, idle_fraction: float = 0.25) -> None:
         inverse = np.linalg.pinv(allocation(airframe))
-        self._rows = [(float(t), float(r), float(p), float(y)) for t, r, p, y in inverse]
+        self._thrust = float(inverse[0, 0])  # symmetric rotors share the thrust evenly
+        self._roll_pitch = [(float(r), float(p)) for _, r, p, _ in inverse]
+        self._yaw = [float(y) for _, _, _, y in inverse]
         self._maximum = airframe.motor.max_speed_rad_s**2
         self._minimum = (idle_fraction * airframe.hover_speed_rad_s) ** 2
 
@@ -53,27 +55,27 @@ class Mixer:
             yaw_nm: see roll_nm.
         """
         low, high = self._minimum, self._maximum
-        tilt = [r * roll_nm + p * pitch_nm for _, r, p, _ in self._rows]
+        tilt = [r * roll_nm + p * pitch_nm for r, p in self._roll_pitch]
         least, most = min(tilt), max(tilt)
         if most - least > high - low:  # roll and pitch alone are too much: scale them
             scale = (high - low) / (most - least)
             tilt = [value * scale for value in tilt]
             least, most = least * scale, most * scale
-        base = self._rows[0][0] * thrust_n  # symmetric rotors share the thrust evenly
+        base = self._thrust * thrust_n
         mixed = Mixed(())
         if base + most > high:
             base, mixed.thrust_high = high - most, True
         if base + least < low:
             base, mixed.thrust_low = low - least, True
         share = 1.0
-        for value, (_, _, _, yaw) in zip(tilt, self._rows, strict=True):
+        for value, yaw in zip(tilt, self._yaw, strict=True):
             asked = yaw * yaw_nm
-            room = max(high - base - value if asked > 0 else base + value - low, 0.0)
-            if abs(asked) > room:
-                share = min(share, room / abs(asked))
+            room = high - base - value if asked > 0 else base + value - low
+            if asked and abs(asked) > room:
+                share = min(share, max(room, 0.0) / abs(asked))
         mixed.yaw_cut = share < 1.0
         yaw_nm *= share
         mixed.speeds_rad_s = tuple(
-            sqrt(base + value + row[3] * yaw_nm) for value, row in zip(tilt, self._rows, strict=True)
+            [sqrt(base + value + yaw * yaw_nm) for value, yaw in zip(tilt, self._yaw, strict=True)]
         )
         return mixed

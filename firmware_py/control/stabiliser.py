@@ -120,7 +120,10 @@ class Stabiliser:
         if mixed.yaw_cut and (error_yaw < 0) == (yaw_nm > 0):
             self._xi_yaw -= error_yaw * period_s
         speeds = mixed.speeds_rad_s
-        throttle = sum(speed * speed for speed in speeds) / (len(speeds) * self._max_squared)
+        squares = 0.0
+        for speed in speeds:
+            squares += speed * speed
+        throttle = squares / (len(speeds) * self._max_squared)
         return MotorOutput(speeds, throttle, mixed.thrust_high or mixed.thrust_low or mixed.yaw_cut)
 
 
@@ -149,5 +152,8 @@ class _Tilt:
     def moment(self, angle: float, measured: float, rate: float, rate_limit: float) -> float:
         """Return the moment that turns the body to an angle, N m."""
         wanted_rate = self._k_angle * (angle - measured) / self._k_rate
-        wanted_rate = min(max(wanted_rate, -rate_limit), rate_limit)
+        if wanted_rate > rate_limit:
+            wanted_rate = rate_limit
+        elif wanted_rate < -rate_limit:
+            wanted_rate = -rate_limit
         return self._k_rate * (wanted_rate - rate)

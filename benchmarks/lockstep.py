@@ -1,0 +1,119 @@
+"""What a flight in lockstep costs, part by part, as ratios measured in one run on one core.
+
+    python benchmarks/lockstep.py [SCENARIO]
+
+Absolute times differ from machine to machine and from minute to minute; the ratios to one `run()` of JSBSim
+with this drone's model, measured beside them, do not. Processor time is counted, so that other programs on
+the machine disturb little.
+"""
+
+from __future__ import annotations
+
+import os
+import sys
+import time
+from collections.abc import Callable
+from math import cos, sin
+
+os.environ.update({"OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1"})  # before NumPy is imported
+if hasattr(os, "sched_setaffinity"):
+    os.sched_setaffinity(0, {min(os.sched_getaffinity(0))})
+
+import cv2
+
+from firmware_py.status import FlightMode
+from framerunner.lockstep import fly_lockstep
+from offboard.app import Moment
+from offboard.mission import Mission, load_mission
+from scenarios.loader import load_scenario
+from scenarios.models import Scenario
+from sitl.camera import Camera
+from sitl.simulation import Simulation
+from sitl.world import PHYSICS_RATE_HZ, STEPS_PER_CONTROL
+from vision.detector import detect
+from vision.types import Image
+
+REPEATS = 5
+Pose = tuple[tuple[float, float, float], tuple[float, float, float, float]]
+
+
+def main() -> None:
+    """Measure and print."""
+    cv2.setNumThreads(1)
+    scenario = load_scenario(sys.argv[1] if len(sys.argv) > 1 else "test-case-1")
+    simulation = hovering(scenario)
+    run = simulation.world._dynamics.run
+    raw_s = best(run, 20_000)
+    step_s = best(simulation.tick, 5_000) / STEPS_PER_CONTROL
+    images: list[Image] = []
+    poses: list[Pose] = []
+    flown_s, wall_s, flight_s = fly(scenario, images, poses)
+    camera = Camera(scenario)
+    render_s = best(lambda: [camera.render(*pose) for pose in poses], 1) / len(poses)
+    detect_s = best(lambda: [detect(image) for image in images], 1) / len(images)
+    rows = [
+        ("JSBSim run()", raw_s, f"{1 / raw_s / PHYSICS_RATE_HZ:.0f} x real time"),
+        ("physics, autopilot, referee: a step", step_s, f"{1 / step_s / PHYSICS_RATE_HZ:.0f} x real time"),
+        ("an image: render", render_s, ""),
+        ("an image: detect", detect_s, ""),
+        (
+            "the whole flight",
+            flown_s,
+            f"{flight_s / flown_s:.0f} x real time, by the wall {flight_s / wall_s:.0f}",
+        ),
+    ]
+    print(f"{scenario.name}, camera {scenario.camera.rate_hz:g} Hz, {flight_s:.1f} s simulated, one core\n")
+    for name, cost_s, note in rows:
+        print(f"{name:37s}{cost_s * 1e6:12.1f} us {cost_s / raw_s:12.1f} run()s   {note}")
+
+
+def hovering(scenario: Scenario) -> Simulation:
+    """A simulation in the air, away from everything, in hold."""
+    simulation = Simulation(scenario)
+    while not simulation.autopilot.status.ready:
+        simulation.tick()
+    simulation.autopilot.set_mode(FlightMode.TAKEOFF)
+    simulation.autopilot.arm()
+    for _ in range(2500):
+        simulation.tick()
+    return simulation
+
+
+def fly(scenario: Scenario, images: list[Image], poses: list[Pose]) -> tuple[float, float, float]:
+    """Fly the challenge; processor, wall and simulated time, seconds. The first flight warms up."""
+    mission = load_mission("frame_challenge")
+    moments: list[Moment] = []
+    fly_lockstep(
+        scenario, mission, observer=moments.append, on_image=lambda _time_us, image: images.append(image)
+    )
+    for moment in moments[:: max(1, len(moments) // 500)]:
+        state = moment.state
+        poses.append(((state.x, state.y, state.z), attitude(state.yaw)))
+    simulated_s = moments[-1].state.time_us / 1e6
+    timed = [timed_flight(scenario, mission) for _ in range(REPEATS)]
+    return min(cpu_s for cpu_s, _ in timed), min(wall_s for _, wall_s in timed), simulated_s
+
+
+def timed_flight(scenario: Scenario, mission: Mission) -> tuple[float, float]:
+    wall_s, cpu_s = time.perf_counter(), time.process_time()
+    fly_lockstep(scenario, mission)
+    return time.process_time() - cpu_s, time.perf_counter() - wall_s
+
+
+def attitude(yaw_rad: float) -> tuple[float, float, float, float]:
+    return (cos(yaw_rad / 2), 0.0, 0.0, sin(yaw_rad / 2))
+
+
+def best(work: Callable[[], object], times: int) -> float:
+    """Processor time of one call, the best of several rounds, seconds."""
+    rounds = []
+    for _ in range(REPEATS):
+        started_s = time.process_time()
+        for _ in range(times):
+            work()
+        rounds.append((time.process_time() - started_s) / times)
+    return min(rounds)
+
+
+if __name__ == "__main__":
+    main()
