@@ -19,7 +19,6 @@ from sitl.solids import Matrix, Solid, base_solid, frame_solids, touch
 PHYSICS_RATE_HZ = 500
 STEPS_PER_CONTROL = 2
 CONTROL_PERIOD_US = 1_000_000 * STEPS_PER_CONTROL // PHYSICS_RATE_HZ
-_STEP_US = 1_000_000 // PHYSICS_RATE_HZ
 _SETTLING_STEPS = PHYSICS_RATE_HZ  # one second, to stand at rest before time starts
 _MARGIN_M = 0.05  # how far the drone may come nearer within one control period (12 m/s)
 
@@ -40,9 +39,15 @@ class World:
         self._half_m: Vec3 = tuple(extent / 2 for extent in airframe.envelope_m)  # type: ignore[assignment]
         self._reach_m = hypot(*self._half_m) + _MARGIN_M
         self._base = base_solid(scenario)
-        self._groups = [frame_solids(frame) for frame in scenario.frames]
-        self._group_reach_m = [
-            hypot(frame.outer_width_m, frame.outer_height_m, frame.bar_m) / 2 + self._reach_m
+        self._base_top_m = scenario.base.top_m
+        self._base_level_m = scenario.base.top_m - self._half_m[2]  # a centre on the base is higher than this
+        self._base_reach_m = self._base.half_extents_m[0] + self._reach_m
+        self._groups = [
+            (
+                *frame.position_arena_m,
+                hypot(frame.outer_width_m, frame.outer_height_m, frame.bar_m) / 2 + self._reach_m,
+                frame_solids(frame),
+            )
             for frame in scenario.frames
         ]
         self._touching: dict[Solid, Vec3] = {}  # with the normal of the side it was entered through
@@ -59,26 +64,28 @@ class World:
         self._dynamics.set_ground_height(surface_m)
         for _ in range(_SETTLING_STEPS):
             self._dynamics.run()
+        self._position_ned_m = self._dynamics.position_ned_m()
 
     def step(self, motor_speeds_rad_s: MotorSpeeds) -> None:
         """Advance by one control period with these motor commands (rad/s, the airframe's order)."""
         dynamics = self._dynamics
         dynamics.command_motors(motor_speeds_rad_s)
-        position = flip_vector(dynamics.position_ned_m())
+        position = flip_vector(self._position_ned_m)
         near = self._near(position)
         for _ in range(STEPS_PER_CONTROL):
             if near or self._touching:
                 self._push_from(near)
             dynamics.run()
-            self.time_us += _STEP_US
+        self.time_us += CONTROL_PERIOD_US
         dynamics.set_ground_height(self._ground_below(position))
+        self._position_ned_m = dynamics.position_ned_m()
 
     def sensors(self) -> Sensors:
         """Sample ideal sensors now."""
         dynamics = self._dynamics
         return Sensors(
             self.time_us,
-            dynamics.position_ned_m(),
+            self._position_ned_m,
             dynamics.velocity_ned_m_s(),
             dynamics.attitude(),
             dynamics.angular_rate_frd_rad_s(),
@@ -93,8 +100,15 @@ class World:
             motors_on: whether the autopilot is armed.
         """
         position = flip_vector(sensors.position_ned_m)
-        contacts = tuple(dict.fromkeys(solid.name for solid in self._touching))
-        if position[2] - self._ground_below(position) < self._reach_m and self._dynamics.touches_ground():
+        contacts: tuple[str, ...] = ()
+        if self._touching:
+            contacts = tuple(dict.fromkeys(solid.name for solid in self._touching))
+        low = position[2] < self._base_top_m + self._reach_m
+        if (
+            low
+            and position[2] - self._ground_below(position) < self._reach_m
+            and self._dynamics.touches_ground()
+        ):
             contacts = (*contacts, "base" if self._above_base(position) else "floor")
         return TrueState(
             self.time_us,
@@ -115,25 +129,32 @@ class World:
         JSBSim knows one ground height for the whole drone. A drone whose centre of mass is beyond the
         edge would tip off, so the centre decides; the base's sides are a solid of their own.
         """
-        base = self.scenario.base
-        above = position_m[2] > base.top_m - self._half_m[2]
-        return above and is_over_base(base, position_m[0], position_m[1])
+        x, y, z = position_m
+        return z > self._base_level_m and is_over_base(self.scenario.base, x, y)
 
     def _ground_below(self, position_m: Vec3) -> float:
-        return self.scenario.base.top_m if self._above_base(position_m) else 0.0
+        return self._base_top_m if self._above_base(position_m) else 0.0
 
     def _near(self, position_m: Vec3) -> tuple[Solid, ...]:
         """Return the solids that could be touched within the next control period."""
         x, y, z = position_m
         near: tuple[Solid, ...] = ()
-        for frame, reach, solids in zip(self.scenario.frames, self._group_reach_m, self._groups, strict=True):
-            if abs(x - frame.x_m) < reach and abs(y - frame.y_m) < reach and abs(z - frame.z_m) < reach:
-                near += solids
-        base = self._base
-        bx, by, _ = base.centre_arena_m
-        reach = base.half_extents_m[0] + self._reach_m
-        beside = z < self.scenario.base.top_m + self._reach_m and abs(x - bx) < reach and abs(y - by) < reach
-        return (*near, base) if beside and not self._above_base(position_m) else near
+        for fx, fy, fz, reach, solids in self._groups:
+            if -reach < x - fx < reach and -reach < y - fy < reach and -reach < z - fz < reach:
+                near += tuple([solid for solid in solids if self._reaches(solid, position_m)])
+        if z >= self._base_top_m + self._reach_m:
+            return near
+        bx, by, _ = self._base.centre_arena_m
+        reach = self._base_reach_m
+        beside = -reach < x - bx < reach and -reach < y - by < reach
+        return (*near, self._base) if beside and not self._above_base(position_m) else near
+
+    def _reaches(self, solid: Solid, position_m: Vec3) -> bool:
+        """Whether the balls around a solid and the drone may meet within the next control period."""
+        x, y, z = solid.centre_arena_m
+        dx, dy, dz = position_m[0] - x, position_m[1] - y, position_m[2] - z
+        reach = solid.reach_m + self._reach_m
+        return dx * dx + dy * dy + dz * dz < reach * reach
 
     def _push_from(self, near: tuple[Solid, ...]) -> None:
         """Set force and moment of a spring, a damper and friction at each touch (penalty method)."""
