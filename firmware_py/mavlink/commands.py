@@ -132,8 +132,8 @@ def _requester(message_id: int) -> CommandHandler:
     return request
 
 
-def _set_interval(_exchange: Exchange, command: Command) -> CommandResult:
-    return set_interval(command.link, command.param1, command.param2)
+def _set_interval(exchange: Exchange, command: Command) -> CommandResult:
+    return set_interval(command.link, command.param1, command.param2, exchange.time_us)
 
 
 def _get_interval(exchange: Exchange, command: Command) -> CommandResult:

@@ -34,14 +34,15 @@ def request_message(exchange: Exchange, link: Link, message_id: float, argument:
     return CommandResult.ACCEPTED if messages else CommandResult.DENIED
 
 
-def set_interval(link: Link, message_id: float, interval_us: float) -> CommandResult:
+def set_interval(link: Link, message_id: float, interval_us: float, time_us: int) -> CommandResult:
     """SET_MESSAGE_INTERVAL on this link: 0 default, -1 off. HEARTBEAT and what is unknown fail, as in PX4."""
     wanted = _message_id(message_id)
     if wanted is None or not can_stream(wanted) or wanted == mavlink.MAVLINK_MSG_ID_HEARTBEAT:
         return CommandResult.FAILED
     if not isfinite(interval_us):
         return CommandResult.FAILED
-    link.schedule.set_interval(wanted, -1 if interval_us < 0 else min(round(interval_us), _LONGEST_US))
+    kept_us = -1 if interval_us < 0 else min(round(interval_us), _LONGEST_US)
+    link.schedule.set_interval(wanted, kept_us, time_us)
     return CommandResult.ACCEPTED
 
 

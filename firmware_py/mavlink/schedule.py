@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 _NEVER_US = 1 << 62
+_REQUESTED_PHASE_US = 16_000
 
 
 class _Stream:
@@ -56,8 +57,18 @@ class Schedule:
         stream = self._streams.get(message_id)
         return -1 if stream is None else stream.interval_us
 
-    def set_interval(self, message_id: int, interval_us: int) -> None:
-        """Change a stream: 0 its default, negative off, else the interval in microseconds."""
+    def set_interval(self, message_id: int, interval_us: int, time_us: int) -> None:
+        """Change a stream.
+
+        It runs on a grid of vehicle time whenever the request came, so that flights repeat, and 16 ms beside
+        the streams that nobody asked for, so that a receiver does not depend on which of two messages of one
+        instant it handles first.
+
+        Args:
+            message_id: which.
+            interval_us: microseconds; 0: its default, negative: off.
+            time_us: vehicle time now.
+        """
         if interval_us == 0:
             interval_us = self._defaults_us.get(message_id, -1)
         if interval_us < 0:
@@ -65,5 +76,6 @@ class Schedule:
             return
         stream = self._streams.setdefault(message_id, _Stream(message_id, interval_us))
         stream.interval_us = interval_us
-        stream.due_us = 0
+        phase_us = _REQUESTED_PHASE_US % interval_us
+        stream.due_us = ((time_us - phase_us) // interval_us + 1) * interval_us + phase_us
         self.next_due_us = 0

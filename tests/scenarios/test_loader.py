@@ -45,7 +45,7 @@ def test_published_layouts():
     )
     assert layout(load_scenario("test-case-2")) == (
         (1, 2, 2.5),
-        {"red": (-2, -3, 1, -0.1), "green": (0, -3, 1.5, 0.1), "blue": (2, -3, 2, 0.4)},
+        {"red": (-2, -3, 1, -0.12), "green": (0, -3, 1.5, 0.1), "blue": (2, -3, 2, 0.4)},
     )
     assert layout(load_scenario("round-1")) == (
         (-3, -3, 1),

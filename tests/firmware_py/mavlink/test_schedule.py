@@ -32,11 +32,20 @@ def test_what_was_missed_is_skipped():
 
 def test_intervals_change_turn_off_and_return_to_default():
     schedule = Schedule({1: 10})
-    schedule.set_interval(1, 20_000)
-    schedule.set_interval(2, 500_000)
+    schedule.set_interval(1, 20_000, 0)
+    schedule.set_interval(2, 500_000, 0)
     assert counted(schedule, 1) == {1: 50, 2: 2}
-    schedule.set_interval(1, -1)
-    schedule.set_interval(2, 0)  # off is the default of what the profile does not have
+    schedule.set_interval(1, -1, 0)
+    schedule.set_interval(2, 0, 0)  # off is the default of what the profile does not have
     assert schedule.interval_us(1) == schedule.interval_us(2) == -1
-    schedule.set_interval(1, 0)
+    schedule.set_interval(1, 0, 0)
     assert schedule.interval_us(1) == 100_000
+
+
+@pytest.mark.parametrize("requested_us", [0, 4_000, 12_000, 16_000, 123_456_000])
+def test_a_requested_stream_is_on_the_same_grid_whenever_it_was_asked_for(requested_us):
+    schedule = Schedule({})
+    schedule.set_interval(7, 20_000, requested_us)
+    sent = [t for t in range(requested_us, requested_us + 400_000, 4_000) if schedule.due(t)]
+    assert {t % 20_000 for t in sent} == {16_000}
+    assert 19 <= len(sent) <= 20
