@@ -98,4 +98,6 @@ def _is_foreseen(error: Exception) -> bool:
 
 def _terminate(_signal: int, _frame: object) -> None:
     """Leave by the same way as Ctrl-C: what was recorded is kept and nothing is left running."""
+    if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:  # started in the background by a script
+        raise KeyboardInterrupt
     signal.raise_signal(signal.SIGINT)

@@ -3,6 +3,8 @@
 import json
 import os
 import signal
+import subprocess
+import sys
 import time
 
 import cv2
@@ -10,7 +12,7 @@ import numpy as np
 import pytest
 from pymavlink import mavutil
 
-from tests.processes import free_instance, is_running, ports_are_free, program, wait_until
+from tests.processes import ROOT, free_instance, is_running, ports_are_free, program, wait_until
 
 pytestmark = pytest.mark.realtime
 
@@ -93,3 +95,20 @@ def test_a_simulator_stopped_before_the_start_is_interrupted(tmp_path):
     assert wait_until(lambda: ports_are_free(instance), 5.0)
     assert "Traceback" not in running.err
     assert "interrupted" in running.err
+
+
+@pytest.mark.parametrize("command", ["sim", "fly"])
+def test_a_program_started_in_the_background_of_a_script_can_be_ended(tmp_path, command):
+    """There SIGINT is ignored from the start (POSIX shells do so), SIGTERM must still do."""
+    instance = free_instance()
+    script = f'"{sys.executable}" -m framerunner {command} --instance {instance} & echo $!; wait'
+    environment = {**os.environ, "PYTHONPATH": str(ROOT)}
+    with subprocess.Popen(
+        ["sh", "-c", script], stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, cwd=tmp_path, env=environment
+    ) as shell:
+        pid = int(shell.stdout.readline())
+        assert wait_until(lambda: not ports_are_free(instance), 20.0)
+        time.sleep(2.0)
+        os.kill(pid, signal.SIGTERM)
+        assert wait_until(lambda: not is_running(pid), 10.0)
+    assert ports_are_free(instance)
