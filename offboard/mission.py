@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, fields
 from difflib import get_close_matches
 from functools import cached_property
 from pathlib import Path
@@ -17,6 +17,7 @@ from offboard.chart.read import read_mission_file
 from offboard.chart.source import MAX_FILE_BYTES
 from offboard.chart.spec import Action, Leaf, MissionFile, State, all_states, leaves
 from offboard.pilot import Pilot
+from offboard.pilot_file import PilotFile
 
 __all__ = ["Mission", "MissionError", "list_missions", "load_mission", "mermaid"]
 
@@ -25,14 +26,14 @@ MISSIONS = Path(__file__).parent / "missions"
 
 @dataclass(frozen=True)
 class Mission:
-    """A checked mission, ready to fly.
+    """A checked mission, ready to fly. It can be pickled: another process builds the chart again.
 
     Attributes:
         name: as its file says.
         description: one line for people.
         path: its file.
         spec: the expanded chart.
-        pilot_class: what the mission was checked against.
+        pilot: what the mission was checked against: a contestant's file or a class.
         native: the expanded chart as a document of python-statemachine.
     """
 
@@ -40,8 +41,12 @@ class Mission:
     description: str
     path: Path
     spec: MissionFile = field(repr=False)
-    pilot_class: type[Pilot] = field(repr=False)
+    pilot: PilotFile | type[Pilot] = field(repr=False)
     native: str = field(repr=False)
+
+    def __getstate__(self) -> dict[str, object]:
+        """Leave out what is built from the rest; the chart's class could not be pickled."""
+        return {part.name: getattr(self, part.name) for part in fields(self)}
 
     @cached_property
     def chart(self) -> type[StateChart]:
@@ -60,8 +65,15 @@ class Mission:
         return frozenset(leaf_id for leaf_id in self.leaves if is_finish(states, leaf_id))
 
     def new_pilot(self) -> Pilot:
-        """A pilot with the mission's own variables."""
-        return self.pilot_class(dict(self.spec.variables))
+        """A pilot with the mission's own variables.
+
+        Raises:
+            MissionError: the contestant's class cannot be made.
+        """
+        variables = dict(self.spec.variables)
+        if isinstance(self.pilot, PilotFile):
+            return self.pilot.new_pilot(variables)
+        return self.pilot(variables)
 
 
 def list_missions() -> list[str]:
@@ -69,25 +81,27 @@ def list_missions() -> list[str]:
     return sorted(path.stem for path in MISSIONS.glob("*.yaml"))
 
 
-def load_mission(name_or_path: str | Path, pilot_class: type[Pilot] = Pilot) -> Mission:
+def load_mission(name_or_path: str | Path, pilot: PilotFile | type[Pilot] | None = None) -> Mission:
     """Read, expand, check and load a mission.
 
     Args:
         name_or_path: a name of `list_missions()` or a YAML file.
-        pilot_class: `Pilot` or a subclass with more primitives.
+        pilot: a contestant's file from `read_pilot`, or a subclass of `Pilot`; None for `Pilot` itself.
 
     Raises:
         MissionError: every problem, one a line, as `file:line: text`.
     """
+    pilot = Pilot if pilot is None else pilot
     path = _find(str(name_or_path), Path.cwd(), Place(str(name_or_path)))
     written = read_mission_file(_read_text(path), path)
     problems = ProblemList()
     spec = expand(merge_extended(written, _open_base), problems)
     problems.raise_if_any()
-    check(spec, pilot_class, problems)
+    check(spec, pilot.pilot_class() if isinstance(pilot, PilotFile) else pilot, problems)
     problems.raise_if_any()
-    mission = Mission(spec.name, spec.description, path, spec, pilot_class, native_yaml(spec))
-    mission.chart  # noqa: B018 - loaded now, so that what the library refuses is said now
+    mission = Mission(spec.name, spec.description, path, spec, pilot, native_yaml(spec))
+    mission.new_pilot()  # made once and loaded now, so that what would be refused is refused now
+    mission.chart  # noqa: B018
     return mission
 
 

@@ -1,0 +1,183 @@
+"""A contestant's Python file: one subclass of `Pilot` with primitives and values of its own.
+
+It is code and does whatever it says, so it is read only where a person names it; a mission file never can.
+"""
+
+from __future__ import annotations
+
+import inspect
+import sys
+from dataclasses import dataclass
+from hashlib import sha256
+from pathlib import Path
+from types import ModuleType, TracebackType
+from typing import get_type_hints
+
+from offboard.chart.problems import MissionError, Place, Problem
+from offboard.pilot import Pilot
+
+MAX_FILE_BYTES = 1_000_000
+_CALLED_BY_THE_CHART = ("on_", "before_", "after_", "prepare_")
+"""Beginnings of names that python-statemachine would call of itself at every transition."""
+
+
+@dataclass(frozen=True, slots=True)
+class PilotFile:
+    """A Python file as text, so that it can be sent to another process.
+
+    Attributes:
+        name: the file's, for messages.
+        text: its content.
+    """
+
+    name: str
+    text: str
+
+    def pilot_class(self) -> type[Pilot]:
+        """Execute the text in a module of its own and return the subclass of `Pilot` that it defines.
+
+        Each call gives a new class in a new module: what one flight leaves behind in variables of the
+        module or the class, the next one does not find.
+
+        Raises:
+            MissionError: as `file:line: text`, whatever is wrong with it.
+        """
+        module = self._execute()
+        defined = [
+            kind
+            for kind in dict.fromkeys(each for each in vars(module).values() if isinstance(each, type))
+            if issubclass(kind, Pilot) and kind.__module__ == module.__name__
+        ]
+        defined = [kind for kind in defined if not any(kind in other.__mro__[1:] for other in defined)]
+        if not defined:
+            raise self._refused("has no subclass of Pilot; write 'class MyPilot(Pilot):' with your methods")
+        if len(defined) > 1:
+            names = ", ".join(kind.__name__ for kind in defined)
+            raise self._refused(f"has several subclasses of Pilot: {names}; leave one")
+        self._check(defined[0])
+        return defined[0]
+
+    def _execute(self) -> ModuleType:
+        """Run the text as a module; it is known to Python by a name that stands for its content."""
+        try:
+            code = compile(self.text, self.name, "exec", dont_inherit=True)
+        except (SyntaxError, ValueError) as error:
+            line = getattr(error, "lineno", None) or 0
+            raise self._refused(f"Python syntax: {getattr(error, 'msg', error)}", line) from None
+        digest = sha256(f"{self.name}\n{self.text}".encode()).hexdigest()
+        module = ModuleType(f"pilot_file_{digest[:16]}")
+        module.__file__ = self.name
+        sys.modules[module.__name__] = module  # where typing and dataclasses look for a class's surroundings
+        try:
+            exec(code, vars(module))
+        except (Exception, SystemExit) as error:  # it may raise anything
+            line = last_line_in(error.__traceback__, module.__name__)
+            raise self._refused(f"cannot be imported: {in_words(error)}", line) from None
+        return module
+
+    def _check(self, kind: type[Pilot]) -> None:
+        """Refuse members that would fail, or be misunderstood, only in flight."""
+        try:
+            get_type_hints(kind)
+        except Exception as error:  # an annotation may be any expression
+            raise self._refused(f"a type in class {kind.__name__} is unknown: {in_words(error)}") from None
+        for name, member in inspect.getmembers(kind):
+            if name.startswith("_") or getattr(Pilot, name, None) is member:
+                continue
+            reason = _unfit(name, member)
+            if reason:
+                raise self._refused(reason, _line_of(member))
+
+    def new_pilot(self, variables: dict[str, object]) -> Pilot:
+        """A pilot of the file's class, which is made anew.
+
+        Args:
+            variables: the mission's own variables and their first values.
+
+        Raises:
+            MissionError: the file cannot be used, or its class cannot be made.
+        """
+        kind = self.pilot_class()
+        try:
+            pilot = kind(variables)
+        except (Exception, SystemExit) as error:  # it may raise anything
+            line = last_line_in(error.__traceback__, kind.__module__)
+            raise self._refused(f"{kind.__name__} cannot be made: {in_words(error)}", line) from None
+        if not hasattr(pilot, "memory"):
+            text = f"{kind.__name__}.__init__ must begin with 'super().__init__(variables)'"
+            raise self._refused(text, _line_of(kind.__init__))
+        return pilot
+
+    def _refused(self, text: str, line: int = 0) -> MissionError:
+        return MissionError([Problem(Place(self.name, line), text)])
+
+
+def read_pilot(path: str | Path) -> PilotFile:
+    """Read a contestant's Python file and try whether it can be used.
+
+    Args:
+        path: the file, named by a person: it is executed.
+
+    Raises:
+        MissionError: it cannot be read, or `PilotFile.pilot_class` refuses it; one line.
+    """
+    path = Path(path)
+    try:
+        if path.stat().st_size > MAX_FILE_BYTES:
+            raise _unreadable(path, "is larger than 1 MB; a pilot is a page or two")
+        text = path.read_text(encoding="utf-8")
+    except UnicodeDecodeError:
+        raise _unreadable(path, "is not UTF-8 text; name the Python file") from None
+    except OSError as error:
+        raise _unreadable(path, f"cannot be read: {error.strerror}") from None
+    pilot = PilotFile(path.name, text)
+    pilot.pilot_class()
+    return pilot
+
+
+def in_words(error: BaseException) -> str:
+    """An exception of other people's code in one line."""
+    text = " ".join(str(error).split())
+    return f"{type(error).__name__}: {text}" if text else type(error).__name__
+
+
+def last_line_in(traceback: TracebackType | None, module_name: str) -> int:
+    """Line of the innermost call within a module, 0 if there is none.
+
+    Args:
+        traceback: of the exception.
+        module_name: `__name__` of the module.
+    """
+    line = 0
+    while traceback is not None:
+        if traceback.tb_frame.f_globals.get("__name__") == module_name:
+            line = traceback.tb_lineno
+        traceback = traceback.tb_next
+    return line
+
+
+def _unreadable(path: Path, text: str) -> MissionError:
+    return MissionError([Problem(Place(str(path)), text)])
+
+
+def _unfit(name: str, member: object) -> str:
+    """Why a member of a pilot's class cannot be used by a mission; empty if it can."""
+    if isinstance(member, property):
+        try:
+            get_type_hints(member.fget)
+        except Exception as error:  # an annotation may be any expression
+            return f"the type of '{name}' is unknown: {in_words(error)}"
+        return ""
+    if not inspect.isfunction(member):
+        return ""
+    if name.startswith(_CALLED_BY_THE_CHART):
+        return f"'{name}' would be called at every transition; rename it, without {name.partition('_')[0]}_"
+    if inspect.iscoroutinefunction(member):
+        return f"'{name}' is 'async'; a primitive is a plain function that returns at once"
+    return ""
+
+
+def _line_of(member: object) -> int:
+    function = member.fget if isinstance(member, property) else member
+    code = getattr(function, "__code__", None)
+    return code.co_firstlineno if code is not None else 0
