@@ -1,6 +1,6 @@
 """What a flight in lockstep costs, part by part, as ratios measured in one run on one core.
 
-    python benchmarks/lockstep.py [SCENARIO]
+    python benchmarks/lockstep.py [SCENARIO] [--json]
 
 Absolute times differ from machine to machine and from minute to minute; the ratios to one `run()` of JSBSim
 with this drone's model, measured beside them, do not. Processor time is counted, so that other programs on
@@ -9,10 +9,12 @@ the machine disturb little.
 
 from __future__ import annotations
 
+import json
 import os
 import sys
 import time
 from collections.abc import Callable
+from dataclasses import asdict, dataclass
 from math import cos, sin
 
 os.environ.update({"OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1"})  # before NumPy is imported
@@ -37,13 +39,64 @@ REPEATS = 5
 Pose = tuple[tuple[float, float, float], tuple[float, float, float, float]]
 
 
+@dataclass(frozen=True, slots=True)
+class Parts:
+    """What the parts of a flight cost: processor time, seconds.
+
+    Attributes:
+        scenario: its name.
+        image_rate_hz: of the camera.
+        simulated_s: length of the whole flight.
+        raw_s: one `run()` of JSBSim with this drone's model.
+        step_s: one step of physics with the autopilot, the referee and all else of a control tick.
+        render_s: one image painted, the mean over the flight.
+        detect_s: the same image searched for frames.
+        flight_s: the whole flight with everything.
+        flight_wall_s: the same by the wall clock.
+    """
+
+    scenario: str
+    image_rate_hz: float
+    simulated_s: float
+    raw_s: float
+    step_s: float
+    render_s: float
+    detect_s: float
+    flight_s: float
+    flight_wall_s: float
+
+
 def main() -> None:
     """Measure and print."""
+    words = sys.argv[1:]
+    scenario = load_scenario(next((word for word in words if word != "--json"), "test-case-1"))
+    parts = measure(scenario)
+    if "--json" in words:
+        print(json.dumps(asdict(parts)))
+        return
+    flight_s, raw_s = parts.simulated_s, parts.raw_s
+    by_wall = f"{flight_s / parts.flight_s:.0f} x real time, by the wall {flight_s / parts.flight_wall_s:.0f}"
+    rows = [
+        ("JSBSim run()", raw_s, f"{1 / raw_s / PHYSICS_RATE_HZ:.0f} x real time"),
+        (
+            "physics, autopilot, referee: a step",
+            parts.step_s,
+            f"{1 / parts.step_s / PHYSICS_RATE_HZ:.0f} x real time",
+        ),
+        ("an image: render", parts.render_s, ""),
+        ("an image: detect", parts.detect_s, ""),
+        ("the whole flight", parts.flight_s, by_wall),
+    ]
+    print(f"{parts.scenario}, camera {parts.image_rate_hz:g} Hz, {flight_s:.1f} s simulated, one core\n")
+    for name, cost_s, note in rows:
+        print(f"{name:37s}{cost_s * 1e6:12.1f} us {cost_s / raw_s:12.1f} run()s   {note}")
+
+
+def measure(scenario: Scenario) -> Parts:
+    """Measure all parts, one after another."""
     cv2.setNumThreads(1)
-    scenario = load_scenario(sys.argv[1] if len(sys.argv) > 1 else "test-case-1")
     simulation = hovering(scenario)
-    run = simulation.world._dynamics.run
-    raw_s = best(run, 20_000)
+    raw_s = best(simulation.world._dynamics.run, 20_000)
     step_s = best(simulation.tick, 5_000) / STEPS_PER_CONTROL
     images: list[Image] = []
     poses: list[Pose] = []
@@ -51,20 +104,17 @@ def main() -> None:
     camera = Camera(scenario)
     render_s = best(lambda: [camera.render(*pose) for pose in poses], 1) / len(poses)
     detect_s = best(lambda: [detect(image) for image in images], 1) / len(images)
-    rows = [
-        ("JSBSim run()", raw_s, f"{1 / raw_s / PHYSICS_RATE_HZ:.0f} x real time"),
-        ("physics, autopilot, referee: a step", step_s, f"{1 / step_s / PHYSICS_RATE_HZ:.0f} x real time"),
-        ("an image: render", render_s, ""),
-        ("an image: detect", detect_s, ""),
-        (
-            "the whole flight",
-            flown_s,
-            f"{flight_s / flown_s:.0f} x real time, by the wall {flight_s / wall_s:.0f}",
-        ),
-    ]
-    print(f"{scenario.name}, camera {scenario.camera.rate_hz:g} Hz, {flight_s:.1f} s simulated, one core\n")
-    for name, cost_s, note in rows:
-        print(f"{name:37s}{cost_s * 1e6:12.1f} us {cost_s / raw_s:12.1f} run()s   {note}")
+    return Parts(
+        scenario.name,
+        scenario.camera.rate_hz,
+        flight_s,
+        raw_s,
+        step_s,
+        render_s,
+        detect_s,
+        flown_s,
+        wall_s,
+    )
 
 
 def hovering(scenario: Scenario) -> Simulation:
