@@ -20,6 +20,7 @@ from offboard.chart.spec import Action, Leaf
 from offboard.drone import VelocityCommand
 from offboard.mission import Mission
 from offboard.pilot import Imu, Pilot, PilotError, velocity_command
+from offboard.pilot_file import PilotFile, in_words, place_in
 from vision.types import Detections
 
 Act = Callable[[Pilot], None]
@@ -106,8 +107,11 @@ class MissionEngine:
             raise self._error(str(error)) from None
         except MissionRunError:
             raise
-        except Exception as error:  # whatever an expression or a contestant's primitive may raise
-            raise self._error(f"{type(error).__name__}: {error}") from error
+        except (
+            Exception,
+            SystemExit,
+        ) as error:  # whatever an expression or a contestant's primitive may raise
+            raise self._error(self._place(error) + in_words(error)) from error
 
     def _start(self, time_us: int) -> None:
         self._started_us = time_us
@@ -139,6 +143,11 @@ class MissionEngine:
         self._present = self._states[self._id]
         self._entered_us = time_us
         self.pilot.seconds_in_state = 0.0
+
+    def _place(self, error: BaseException) -> str:
+        """File and line of the contestant's code that an exception came from."""
+        pilot = self.mission.pilot
+        return place_in(pilot, type(self.pilot).__module__, error) if isinstance(pilot, PilotFile) else ""
 
     def _error(self, reason: str) -> MissionRunError:
         return MissionRunError(

@@ -177,7 +177,7 @@ def velocity_command(cmd: Command) -> VelocityCommand:
     known fault of that navigator, reproduced here, but nothing that is not finite ever leaves this function.
 
     Raises:
-        PilotError: a rate is not a number.
+        PilotError: a rate is no number.
     """
     return VelocityCommand(
         _limited("vel_x", cmd.vel_x, MAX_VELOCITY_M_S),
@@ -188,8 +188,11 @@ def velocity_command(cmd: Command) -> VelocityCommand:
 
 
 def _limited(name: str, value: float, limit: float) -> float:
-    if -limit <= value <= limit:
-        return value
+    try:
+        if -limit <= value <= limit:
+            return value
+    except (TypeError, ValueError):  # None, a text, an array: a subclass may assign anything
+        raise PilotError(f"cmd.{name} is {value!r}, which is no number; mend what sets it") from None
     if isnan(value):
         raise PilotError(f"cmd.{name} is not a number; mend the expression that sets it")
     return limit if value > 0 else -limit

@@ -6,6 +6,7 @@ It is code and does whatever it says, so it is read only where a person names it
 from __future__ import annotations
 
 import inspect
+import re
 import sys
 from dataclasses import dataclass
 from hashlib import sha256
@@ -13,12 +14,17 @@ from pathlib import Path
 from types import ModuleType, TracebackType
 from typing import get_type_hints
 
+from statemachine import StateChart
+
 from offboard.chart.problems import MissionError, Place, Problem
 from offboard.pilot import Pilot
 
 MAX_FILE_BYTES = 1_000_000
-_CALLED_BY_THE_CHART = ("on_", "before_", "after_", "prepare_")
-"""Beginnings of names that python-statemachine would call of itself at every transition."""
+_ON_ITS_INSTANCES = "final_states history_values initial_state model prepare_event state state_field tick"
+_THE_CHART_S_OWN = frozenset([*dir(StateChart), *_ON_ITS_INSTANCES.split()])
+"""Names that python-statemachine takes for its own before it asks the pilot, or writes to."""
+_CALLED_BY_THE_CHART = re.compile(r"(before|on|after)_(transition|tick|done_.*)|on_(enter|exit|invoke)_.*")
+"""Names that python-statemachine would call of itself whenever a state changes."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -135,6 +141,18 @@ def read_pilot(path: str | Path) -> PilotFile:
     return pilot
 
 
+def place_in(pilot: PilotFile, module_name: str, error: BaseException) -> str:
+    """Where in a contestant's file an exception came from, as "file:line: "; empty if not from there.
+
+    Args:
+        pilot: the file.
+        module_name: `__module__` of its class.
+        error: as caught.
+    """
+    line = last_line_in(error.__traceback__, module_name)
+    return f"{Place(pilot.name, line)}: " if line else ""
+
+
 def in_words(error: BaseException) -> str:
     """An exception of other people's code in one line."""
     text = " ".join(str(error).split())
@@ -162,16 +180,14 @@ def _unreadable(path: Path, text: str) -> MissionError:
 
 def _unfit(name: str, member: object) -> str:
     """Why a member of a pilot's class cannot be used by a mission; empty if it can."""
+    if name in _THE_CHART_S_OWN or _CALLED_BY_THE_CHART.fullmatch(name):
+        return f"'{name}' is a name that the statechart uses itself; rename it, such as 'my_{name}'"
     if isinstance(member, property):
         try:
             get_type_hints(member.fget)
         except Exception as error:  # an annotation may be any expression
             return f"the type of '{name}' is unknown: {in_words(error)}"
         return ""
-    if not inspect.isfunction(member):
-        return ""
-    if name.startswith(_CALLED_BY_THE_CHART):
-        return f"'{name}' would be called at every transition; rename it, without {name.partition('_')[0]}_"
     if inspect.iscoroutinefunction(member):
         return f"'{name}' is 'async'; a primitive is a plain function that returns at once"
     return ""

@@ -34,7 +34,7 @@ class Vocabulary:
             for name, member in inspect.getmembers(pilot_class, inspect.isfunction)
             if not name.startswith("_")
         }
-        self.values = _typed_names(pilot_class)
+        self.values = _plain_attributes(pilot_class) | _typed_names(pilot_class)
 
     def check_primitive(self, name: str) -> None:
         """Refuse an action that is no method of the pilot.
@@ -43,10 +43,13 @@ class Vocabulary:
             UnknownNameError: with the nearest name or all of them.
         """
         if name in self.primitives:
+            needed = _needed_values(self._pilot_class, name)
+            if needed:
+                raise UnknownNameError(f"'{name}' needs {needed}, but an action is called without values")
             return
         if name in self.values:
             raise UnknownNameError(f"'{name}' is a value, not an action; write 'location = expression'")
-        raise UnknownNameError(f"unknown action '{name}'; {_mend(name, list(self.primitives))}")
+        raise UnknownNameError(f"unknown action '{name}'; {self._mend(name, list(self.primitives))}")
 
     def type_of(self, path: tuple[str, ...]) -> object:
         """Type at the end of a dotted path such as ("cam", "red", "d"); `object` where nothing is declared.
@@ -84,7 +87,7 @@ class Vocabulary:
         if kind is self._pilot_class:
             if name in self.primitives:
                 return f"'{name}' is an action, not a value"
-            return f"unknown name '{name}'; {_mend(name, names)}"
+            return f"unknown name '{name}'; {self._mend(name, names)}"
         if kind is Memory:
             listed = " ".join(names) or "none"
             return f"no variable '{name}'; declared under 'variables': {listed}"
@@ -93,10 +96,34 @@ class Vocabulary:
             return f"'{owner}' has no '{name}'; it is a plain value"
         return f"'{owner}' has no '{name}'; it has {' '.join(names)}"
 
+    def _mend(self, name: str, names: list[str]) -> str:
+        near = get_close_matches(name, names, 1)
+        if near:
+            return f"did you mean '{near[0]}'?"
+        adds = "; what a Python file adds needs --pilot FILE.py" if self._pilot_class is Pilot else ""
+        return f"there are {' '.join(names)}{adds}"
+
 
 def choices_of(kind: object) -> tuple[object, ...]:
     """Values a type allows, if it is a Literal; else none."""
     return get_args(kind) if str(get_origin(kind)).endswith("Literal") else ()
+
+
+def _plain_attributes(pilot_class: type[Pilot]) -> dict[str, object]:
+    """Class attributes that a contestant wrote without a type (`gain = 0.5`), with the type they have."""
+    members = inspect.getmembers(
+        pilot_class, lambda member: isinstance(member, bool | int | float | str | tuple)
+    )
+    return {name: type(member) for name, member in members if not name.startswith("_")}
+
+
+def _needed_values(pilot_class: type[Pilot], name: str) -> str:
+    """Names of the parameters that a method cannot do without, but for `self`."""
+    is_static = isinstance(inspect.getattr_static(pilot_class, name), staticmethod)
+    parameters = list(inspect.signature(getattr(pilot_class, name)).parameters.values())
+    kinds = (inspect.Parameter.VAR_POSITIONAL, inspect.Parameter.VAR_KEYWORD)
+    own = parameters if is_static else parameters[1:]
+    return ", ".join(each.name for each in own if each.default is each.empty and each.kind not in kinds)
 
 
 def _typed_names(kind: type) -> dict[str, object]:
@@ -108,8 +135,3 @@ def _typed_names(kind: type) -> dict[str, object]:
         if not name.startswith("_"):
             names[name] = get_type_hints(member.fget).get("return", object)
     return names
-
-
-def _mend(name: str, names: list[str]) -> str:
-    near = get_close_matches(name, names, 1)
-    return f"did you mean '{near[0]}'?" if near else f"there are {' '.join(names)}"
