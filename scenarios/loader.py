@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import difflib
+import re
 import stat
 from importlib import resources
 from pathlib import Path
@@ -16,6 +17,7 @@ from scenarios.yaml_tree import YamlError, parse_yaml, to_yaml
 
 MAX_BYTES = 1_000_000
 SUFFIXES = (".yaml", ".yml")
+_SOME_SEED = re.compile(r"[0-9]{1,19}")
 
 
 class ScenarioError(ValueError):
@@ -31,10 +33,11 @@ def list_scenarios() -> list[str]:
 
 
 def load_scenario(name_or_path: str | Path) -> Scenario:
-    """Load a scenario that comes with the package, or any YAML file.
+    """Load a scenario that comes with the package, a random one by its name, or any YAML file.
 
     Args:
-        name_or_path: a name of `list_scenarios`, or a path: it has a directory or ends in .yaml or .yml.
+        name_or_path: a name of `list_scenarios`; level and seed of a random one, such as "calm-17"; or a
+            path: it has a directory or ends in .yaml or .yml.
 
     Raises:
         ScenarioError: there is no such scenario, or the file is not a valid one.
@@ -44,7 +47,7 @@ def load_scenario(name_or_path: str | Path) -> Scenario:
         return parse_scenario(_read(Path(text)), source=shorten(text))
     names = list_scenarios()
     if text not in names:
-        raise ScenarioError(_unknown_name(text, names))
+        return _random(text, names)
     entry = resources.files("scenarios") / "files" / f"{text}.yaml"
     return parse_scenario(entry.read_bytes(), source=entry.name)
 
@@ -95,10 +98,30 @@ def json_schema() -> dict[str, Any]:
     return {"$schema": "https://json-schema.org/draft/2020-12/schema", **Scenario.model_json_schema()}
 
 
-def _unknown_name(name: str, names: list[str]) -> str:
+def _random(name: str, known: list[str]) -> Scenario:
+    """The scenario that `random_scenario` gives this name."""
+    from scenarios.level import list_levels, load_level  # noqa: PLC0415 - they import this module
+    from scenarios.random_scenarios import random_scenario  # noqa: PLC0415 - and numpy
+
+    level, _, seed = name.rpartition("-")
+    levels = list_levels()
+    if level not in levels or not re.fullmatch(r"0|[1-9][0-9]{0,30}", seed):
+        raise ScenarioError(_unknown_name(name, known, levels))
+    return random_scenario(load_level(level), int(seed))
+
+
+def _unknown_name(name: str, names: list[str], levels: list[str]) -> str:
     nearest = difflib.get_close_matches(name.lower(), names, n=1, cutoff=0.5)
+    level, _, seed = name.lower().rpartition("-")
+    if _SOME_SEED.fullmatch(seed):
+        near_levels = difflib.get_close_matches(level, levels, n=1, cutoff=0.5)
+        nearest = [f"{near_levels[0]}-{int(seed)}"] if near_levels else nearest
     hint = f"; did you mean {nearest[0]}?" if nearest else ";"
-    return f"unknown scenario {show(name)}{hint} Known: {', '.join(names)}; or give the path of a .yaml file"
+    random = " or ".join(f"{level}-<seed>" for level in levels)
+    return (
+        f"unknown scenario {show(name)}{hint} Known: {', '.join(names)}; a random one is {random}; "
+        "or give the path of a .yaml file"
+    )
 
 
 def _read(path: Path) -> bytes:

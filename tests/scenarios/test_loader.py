@@ -4,6 +4,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from scenarios.level import load_level
 from scenarios.loader import (
     MAX_BYTES,
     ScenarioError,
@@ -14,6 +15,7 @@ from scenarios.loader import (
     parse_scenario,
 )
 from scenarios.models import COLOURS, Base, Frame, Scenario, Start
+from scenarios.random_scenarios import random_scenario
 from scenarios.yaml_tree import to_yaml
 
 NAMES = ["empty", "round-1", "test-case-1", "test-case-2", "test-case-3"]
@@ -232,6 +234,36 @@ def test_names_that_lead_nowhere(name, message):
     with pytest.raises(ScenarioError) as caught:
         load_scenario(name)
     assert str(caught.value).startswith(message)
+    assert len(str(caught.value).splitlines()) == 1
+
+
+def test_a_random_scenario_is_known_by_its_level_and_seed():
+    assert load_scenario("calm-17") == random_scenario(load_level("calm"), 17)
+    assert load_scenario("calm-0").name == "calm-0"
+
+
+@pytest.mark.parametrize(
+    ("name", "message"),
+    [
+        ("calmm-17", 'unknown scenario "calmm-17"; did you mean calm-17? Known: empty,'),
+        ("calm-017", 'unknown scenario "calm-017"; did you mean calm-17? Known: empty,'),
+        ("calm-x", 'unknown scenario "calm-x"; Known: empty,'),
+        ("calm-1.5", 'unknown scenario "calm-1.5"; Known: empty,'),
+        ("calm-²", 'unknown scenario "calm-²"; Known: empty,'),
+        ("calm--1", 'unknown scenario "calm--1"; '),
+        ("calm", 'unknown scenario "calm"; '),
+        (
+            "calm-9223372036854775808",
+            "seed 9223372036854775808 is out of range; use a whole",
+        ),
+        ("calm-" + "9" * 5000, "unknown scenario"),
+    ],
+)
+def test_random_names_that_lead_nowhere(name, message):
+    with pytest.raises(ScenarioError) as caught:
+        load_scenario(name)
+    assert str(caught.value).startswith(message)
+    assert len(str(caught.value)) < 300
     assert len(str(caught.value).splitlines()) == 1
 
 
