@@ -236,7 +236,8 @@ class Autopilot:
         received; a status text says so, once until a usable one comes.
 
         Setpoints are flown from the next multiple of 25 ms on. So a few milliseconds that a packet takes
-        more or less change nothing, and a flight over a network repeats as well as one without.
+        more or less change nothing, nor does one that is sent again, and a flight over a network repeats as
+        well as one without.
         """
         if not usable(setpoint):
             if not self._refusal_said:

@@ -180,24 +180,34 @@ class Guidance:
 
     def _follow_setpoint(self, state: VehicleState) -> RateCommand:
         wanted = self._offboard
+        if not isnan(wanted.velocity_level_m_s[0]):
+            return self._turning(state, wanted)
         velocity_ned_m_s = _towards(wanted.position_ned_m, state.position_ned_m, wanted.velocity_ned_m_s)
         return self._command(state, velocity_ned_m_s, wanted.yaw_rad, wanted.yaw_rate_rad_s)
+
+    def _turning(self, state: VehicleState, wanted: Setpoint) -> RateCommand:
+        """A velocity in level axes, held within its limits when it was accepted."""
+        return RateCommand(
+            wanted.velocity_level_m_s, self._yaw_rate(state, wanted.yaw_rad, wanted.yaw_rate_rad_s)
+        )
 
     def _command(
         self, state: VehicleState, velocity_ned_m_s: Vec3, yaw_rad: float, yaw_rate_rad_s: float = nan
     ) -> RateCommand:
         """Limit a velocity, turn it into level axes, and find the yaw rate that turns the shortest way."""
-        limits = self.limits
-        north_m_s, east_m_s, down_m_s = limits.clip(*velocity_ned_m_s)
-        yaw_now_rad = state.yaw_rad
-        rate_rad_s = 0.0 if isnan(yaw_rate_rad_s) else yaw_rate_rad_s
-        if not isnan(yaw_rad):
-            rate_rad_s += _YAW_GAIN * remainder(yaw_rad - yaw_now_rad, tau)
-        cos_yaw, sin_yaw = cos(yaw_now_rad), sin(yaw_now_rad)
+        north_m_s, east_m_s, down_m_s = self.limits.clip(*velocity_ned_m_s)
+        cos_yaw, sin_yaw = cos(state.yaw_rad), sin(state.yaw_rad)
         return RateCommand(
             (cos_yaw * north_m_s + sin_yaw * east_m_s, cos_yaw * east_m_s - sin_yaw * north_m_s, down_m_s),
-            _clamp(rate_rad_s, -limits.yaw_rate_rad_s, limits.yaw_rate_rad_s),
+            self._yaw_rate(state, yaw_rad, yaw_rate_rad_s),
         )
+
+    def _yaw_rate(self, state: VehicleState, yaw_rad: float, yaw_rate_rad_s: float) -> float:
+        rate_rad_s = 0.0 if isnan(yaw_rate_rad_s) else yaw_rate_rad_s
+        if not isnan(yaw_rad):
+            rate_rad_s += _YAW_GAIN * remainder(yaw_rad - state.yaw_rad, tau)
+        limit_rad_s = self.limits.yaw_rate_rad_s
+        return _clamp(rate_rad_s, -limit_rad_s, limit_rad_s)
 
     def _show_target(self, state: VehicleState) -> None:
         keeper = self._keeper
@@ -218,12 +228,14 @@ def bounded(setpoint: Setpoint, limits: SpeedLimits) -> Setpoint:
     """
     north_m, east_m, down_m = setpoint.position_ned_m
     north_m_s, east_m_s, down_m_s = setpoint.velocity_ned_m_s
+    level = setpoint.velocity_level_m_s
     return Setpoint(
         setpoint.time_us,
         position_ned_m=(_near(north_m), _near(east_m), _near(down_m)),
         velocity_ned_m_s=limits.clip(_or_zero(north_m_s), _or_zero(east_m_s), _or_zero(down_m_s)),
         yaw_rad=setpoint.yaw_rad if isfinite(setpoint.yaw_rad) else nan,
         yaw_rate_rad_s=setpoint.yaw_rate_rad_s if isfinite(setpoint.yaw_rate_rad_s) else nan,
+        velocity_level_m_s=NAN3 if isnan(level[0]) else limits.clip(*level),
     )
 
 

@@ -5,6 +5,9 @@ Pure functions, shared by the MAVLink service and by an adapter that flies in th
 Two rules of PX4 seen from outside: a request with nothing finite in it is refused and counts as no setpoint;
 a request that leaves an axis open, or gives only one of the horizontal pair, is taken but braked, because its
 position controller cannot fly it. So one NaN or infinity among three velocities stops the vehicle in the air.
+
+One difference: PX4 turns a body velocity into the world once, at reception. Here it goes on to turn with the
+vehicle, as the paper's drone does, so a setpoint that is sent again changes nothing.
 """
 
 from __future__ import annotations
@@ -67,6 +70,7 @@ def setpoint_from_target(target: LocalTarget, state: VehicleState, time_us: int)
         The setpoint, or the reason for refusing it, in PX4's words.
     """
     mask = target.type_mask
+    level = NAN3
     if target.frame == TargetFrame.LOCAL_NED:
         position = _kept(target.position_m, mask, TargetMask.X)
         velocity = _kept(target.velocity_m_s, mask, TargetMask.VX)
@@ -74,6 +78,7 @@ def setpoint_from_target(target: LocalTarget, state: VehicleState, time_us: int)
     elif target.frame == TargetFrame.BODY_NED:
         position = velocity = acceleration = NAN3
         if not mask & (TargetMask.VX | TargetMask.VY | TargetMask.VZ):
+            level = _all_finite(target.velocity_m_s)
             velocity = _level_to_ned(target.velocity_m_s, state.yaw_rad)
         if not mask & (TargetMask.AX | TargetMask.AY | TargetMask.AZ):
             acceleration = _body_to_ned(target.acceleration_m_s2, state.attitude)
@@ -89,6 +94,7 @@ def setpoint_from_target(target: LocalTarget, state: VehicleState, time_us: int)
             acceleration,
             nan if mask & TargetMask.YAW else _finite(target.yaw_rad),
             nan if mask & TargetMask.YAW_RATE else _finite(target.yaw_rate_rad_s),
+            level,
         )
     )
 
@@ -111,7 +117,12 @@ def setpoint_from_body_velocity(
     """
     velocity_ned_m_s = _level_to_ned(velocity_level_m_s, heading_rad)
     return _settled(
-        Setpoint(time_us, velocity_ned_m_s=velocity_ned_m_s, yaw_rate_rad_s=_finite(yaw_rate_rad_s))
+        Setpoint(
+            time_us,
+            velocity_ned_m_s=velocity_ned_m_s,
+            yaw_rate_rad_s=_finite(yaw_rate_rad_s),
+            velocity_level_m_s=_all_finite(velocity_level_m_s),
+        )
     )
 
 
@@ -134,6 +145,10 @@ def _settled(setpoint: Setpoint) -> Setpoint | str:
 
 def _finite(value: float) -> float:
     return value if isfinite(value) else nan
+
+
+def _all_finite(vector: Vec3) -> Vec3:
+    return vector if isfinite(vector[0] + vector[1] + vector[2]) else NAN3
 
 
 def _any_finite(vector: Vec3) -> bool:

@@ -71,6 +71,8 @@ class Setpoint:
         acceleration_ned_m_s2: shape (3,).
         yaw_rad: clockwise from north.
         yaw_rate_rad_s: clockwise.
+        velocity_level_m_s: forward, right, down in level axes that turn with the yaw, shape (3,), if the
+            velocity was given so; then it is flown, and velocity_ned_m_s is what it was at reception.
     """
 
     time_us: int
@@ -79,6 +81,7 @@ class Setpoint:
     acceleration_ned_m_s2: Vec3 = NAN3
     yaw_rad: float = nan
     yaw_rate_rad_s: float = nan
+    velocity_level_m_s: Vec3 = NAN3
 
 
 @dataclass(frozen=True, slots=True)

@@ -14,6 +14,7 @@ from math import isfinite
 from firmware_py.commander_table import CRITICAL
 from firmware_py.setpoints import setpoint_from_body_velocity
 from firmware_py.status import CommandResult, FlightMode, LandedState
+from framerunner.link_precision import sent_yaw_rate, single, told_yaw
 from offboard.drone import DroneError, DroneState, VelocityCommand
 from offboard.link.alignment import Alignment, Pose
 from scenarios.axes import Vec3
@@ -102,7 +103,7 @@ class LockstepDrone:
             limit_s = READY_LIMIT_US / 1e6
             raise DroneError(f"not ready within {limit_s:g} s: pre-arm checks not passed{self._said()}")
         self._alignment = Alignment(
-            self._start_arena, Pose(self._position_ned_m, self._autopilot.state.yaw_rad)
+            self._start_arena, Pose(self._position_ned_m, told_yaw(self._autopilot.state.yaw_rad))
         )
 
     async def ticks(self) -> AsyncIterator[DroneState]:
@@ -199,8 +200,8 @@ class LockstepDrone:
         state = self._autopilot.state
         self._resend_us = state.time_us + RESEND_US
         setpoint = setpoint_from_body_velocity(
-            (command.forward_m_s, -command.left_m_s, -command.up_m_s),
-            -command.yaw_rate_rad_s,
+            single((command.forward_m_s, -command.left_m_s, -command.up_m_s)),
+            sent_yaw_rate(-command.yaw_rate_rad_s),
             state.yaw_rad,
             state.time_us,
         )
@@ -228,8 +229,8 @@ class LockstepDrone:
             self._sample = self._told()
         if now_us >= self._position_us:
             self._position_us += POSITION_US
-            self._position_ned_m = state.position_ned_m
-            self._velocity_ned_m_s = state.velocity_ned_m_s
+            self._position_ned_m = single(state.position_ned_m)
+            self._velocity_ned_m_s = single(state.velocity_ned_m_s)
 
     def _pass(self, duration_us: int) -> None:
         """Let so much time pass."""
@@ -264,7 +265,7 @@ class LockstepDrone:
         if self._alignment is None:
             return None
         state = self._autopilot.state
-        pose = self._alignment.pose(Pose(self._position_ned_m, state.yaw_rad))
+        pose = self._alignment.pose(Pose(self._position_ned_m, told_yaw(state.yaw_rad)))
         x, y, z = pose.position_m
         return DroneState(
             state.time_us,
