@@ -147,9 +147,6 @@ def mermaid(mission: Mission, active: str | None = None) -> str:
     lines = ["stateDiagram-v2", f"    [*] --> {mission.spec.initial}"]
     for state in mission.spec.states:
         _draw(state, "    ", lines)
-    for finish in sorted(mission.finishes):
-        if "." not in finish:
-            lines.append(f"    {finish} --> [*]")
     if active:
         lines += ["    classDef active fill:#ffd166,stroke:#333", f"    class {active} active"]
     return "\n".join(lines) + "\n"

@@ -2,12 +2,22 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 from cyclopts import App, Parameter
 
-app = App(name="mission", help="List, show and check missions.")
+if TYPE_CHECKING:
+    from offboard.mission import Mission
+    from offboard.starter import Starter
+
+app = App(name="mission", help="List, show, check and begin missions.")
+
+_NAME = re.compile(r"[a-z][a-z0-9_]{0,59}")
+PilotOption = Annotated[
+    Path | None, Parameter(help="Python file with a subclass of Pilot that the mission uses; it is executed")
+]
 
 
 @app.command(name="list")
@@ -26,7 +36,7 @@ def list_() -> int:
 
 
 @app.command
-def show(mission: Annotated[str, Parameter(help="name or file")]) -> int:
+def show(mission: Annotated[str, Parameter(help="name or file")], *, pilot: PilotOption = None) -> int:
     """Print a mission's diagram in Mermaid's language (paste it into any Markdown page or mermaid.live).
 
     **Examples**
@@ -34,23 +44,86 @@ def show(mission: Annotated[str, Parameter(help="name or file")]) -> int:
         framerunner mission show frame_challenge
 
         framerunner mission show my_mission.yaml > my_mission.mmd
-    """
-    from offboard.mission import load_mission, mermaid
 
-    print(mermaid(load_mission(mission)))
+        framerunner mission show my_mission.yaml --pilot my_mission.py
+    """
+    from offboard.mission import mermaid
+
+    print(mermaid(_load(mission, pilot)))
     return 0
 
 
 @app.command
-def check(file: Annotated[Path, Parameter(help="YAML file")]) -> int:
+def check(file: Annotated[Path, Parameter(help="YAML file")], *, pilot: PilotOption = None) -> int:
     """Say whether a mission file is good, or every fault with its line.
 
-    **Example**
+    **Examples**
 
         framerunner mission check my_mission.yaml
-    """
-    from offboard.mission import load_mission
 
-    loaded = load_mission(file)
-    print(f"{file}: good, mission '{loaded.name}' with {len(loaded.leaves)} states")
+        framerunner mission check my_mission.yaml --pilot my_mission.py
+    """
+    loaded = _load(file, pilot)
+    with_pilot = f" and {pilot}" if pilot is not None else ""
+    print(f"{file}{with_pilot}: good, mission '{loaded.name}' with {len(loaded.leaves)} states")
     return 0
+
+
+@app.command
+def new(
+    name: Annotated[str, Parameter(help="of the mission: small letters, digits and _")],
+    *,
+    python: Annotated[
+        bool, Parameter(negative=(), help="with a Python file that adds words of its own")
+    ] = False,
+    out: Annotated[Path, Parameter(help="folder to write to")] = Path("."),
+) -> int:
+    """Begin a mission: write a small one that flies, with comments that explain it.
+
+    Nothing is ever overwritten.
+
+    **Examples**
+
+        framerunner mission new my_mission
+
+        framerunner mission new my_mission --python --out missions
+    """
+    from framerunner.errors import SettingError
+    from offboard.starter import starter
+
+    if not _NAME.fullmatch(name):
+        mend = "use small letters, digits and _, a letter first, such as 'my_mission'"
+        raise SettingError(f"NAME '{name}': {mend}")
+    files = starter(name, out, python=python)
+    _write(files)
+    print(f"written: {', '.join(map(str, files.texts))}")
+    print()
+    print(f"  framerunner mission check {files.arguments}")
+    print(f"  framerunner fly test-case-1 --lockstep --mission {files.arguments}")
+    print()
+    print("The first says whether it is good, the second flies it. The comments in the file explain it.")
+    return 0
+
+
+def _load(mission: str | Path, pilot: Path | None) -> Mission:
+    from offboard.mission import load_mission
+    from offboard.pilot_file import read_pilot
+
+    return load_mission(mission, None if pilot is None else read_pilot(pilot))
+
+
+def _write(files: Starter) -> None:
+    """Write all files or, if one of them is there already, none."""
+    from framerunner.errors import SettingError
+
+    for path in files.texts:
+        if path.exists():
+            raise SettingError(f"{path} is there already and is left as it is; choose another NAME or --out")
+    path = files.mission.parent
+    try:
+        path.mkdir(parents=True, exist_ok=True)
+        for path, text in files.texts.items():
+            with path.open("x", encoding="utf-8") as file:
+                file.write(text)
+    except OSError as error:
+        raise SettingError(f"{path}: cannot be written ({error.strerror}); choose another --out") from None
