@@ -8,6 +8,7 @@ from math import isfinite
 
 from rich.console import Console
 from rich.live import Live
+from rich.markup import escape
 from rich.table import Table
 
 from framerunner.judges import Judge, Standing
@@ -58,33 +59,53 @@ class FlightDisplay:
             return
         self._line_state, self._line_s = moment.mission_state, time_s
         crossed = ", ".join(standing.crossed) if standing else ""
+        place = place_in_words(moment)
         print(
-            f"{time_s:6.1f} s  {moment.mission_state:22s} {_place(moment)}  crossed: {crossed or 'none'}",
+            f"{time_s:6.1f} s  {moment.mission_state:22s} {place}  crossed: {crossed or 'none'}",
             file=sys.stderr,
             flush=True,
         )
 
     def _table(self, standing: Standing | None) -> Table:
-        table = Table(title=self._title, show_header=False, min_width=60)
-        table.add_column(style="bold")
-        table.add_column()
         moment = self._recorder.latest
         if moment is None:
+            table = _empty_table(self._title)
             table.add_row("state", "connecting, waiting until the drone is ready")
             return table
-        table.add_row("state", moment.mission_state)
-        table.add_row("time", f"{moment.flight_time_s:.1f} s of {self._limit_s:g} s")
-        table.add_row("drone", f"{_place(moment)}  {moment.state.mode}")
-        for colour in ("red", "green", "blue"):
-            detection: Detection = getattr(moment.detections, colour)
-            table.add_row(f"[{colour}]{colour}[/]", _seen(detection))
+        table = moment_table(self._title, moment, f"{moment.flight_time_s:.1f} s of {self._limit_s:g} s")
         if standing is not None:
             crossed = ", ".join(standing.crossed) or "none"
             table.add_row("crossed", f"{crossed}   contacts: {standing.contacts}")
         return table
 
 
-def _place(moment: Moment) -> str:
+def moment_table(title: str, moment: Moment, time: str) -> Table:
+    """A tick of a flight as a table.
+
+    Args:
+        title: scenario and mission.
+        moment: the tick.
+        time: how to say its time.
+    """
+    table = _empty_table(title)
+    table.add_row("state", escape(moment.mission_state))
+    table.add_row("time", time)
+    table.add_row("drone", f"{place_in_words(moment)}  {escape(moment.state.mode)}")
+    for colour in ("red", "green", "blue"):
+        detection: Detection = getattr(moment.detections, colour)
+        table.add_row(f"[{colour}]{colour}[/]", _seen(detection))
+    return table
+
+
+def _empty_table(title: str) -> Table:
+    table = Table(title=escape(title), show_header=False, min_width=60)
+    table.add_column(style="bold")
+    table.add_column()
+    return table
+
+
+def place_in_words(moment: Moment) -> str:
+    """Where the drone is."""
     state = moment.state
     return f"x {state.x:5.2f}  y {state.y:5.2f}  z {state.z:4.2f} m  yaw {state.yaw:5.2f} rad"
 

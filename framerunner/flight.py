@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from datetime import UTC, datetime
 from importlib import metadata
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING
 
 import aiohttp
 
@@ -23,15 +23,19 @@ from framerunner.lockstep_progress import LockstepProgress
 from framerunner.pictures import Outcome as JudgedOutcome
 from framerunner.pictures import track_picture
 from framerunner.recorder import FlightRecorder, RecordingCamera, VideoFile
+from framerunner.result_text import result_lines
 from framerunner.run_folder import RunFolder
 from framerunner.sitl_process import SitlProcess
 from offboard.app import Moment, Outcome, fly_mission
 from offboard.mavsdk_drone import MavsdkDrone
 from offboard.mission import Mission
 from scenarios.ground import start_position
-from scenarios.loader import dump_yaml
 from scenarios.models import Scenario
 from vision.sources import open_source
+from vision.types import CameraFrame, Image
+
+if TYPE_CHECKING:
+    from framerunner.recording.mcap_writer import FlightRecording
 
 _SITL_START_S = 20.0
 COMPLETED = ("clean", "completed")
@@ -50,6 +54,8 @@ class FlightSettings:
         instance: of the simulator.
         out: folder of all runs.
         lockstep: simulated in this process, in its own time, instead of in real time.
+        seed: of everything random in a lockstep flight.
+        record: write everything to an MCAP file, too.
     """
 
     scenario: Scenario
@@ -60,6 +66,44 @@ class FlightSettings:
     instance: int
     out: Path
     lockstep: bool = False
+    seed: int = 0
+    record: bool = False
+
+
+class _Records:
+    """Everything that keeps what a flight shows of itself.
+
+    Attributes:
+        folder: where it is kept.
+        recorder: the track.
+        recording: the MCAP file; None without `--record`.
+    """
+
+    def __init__(self, folder: RunFolder, recording: FlightRecording | None) -> None:
+        self.folder = folder
+        self.recorder = FlightRecorder()
+        self.recording = recording
+
+    def see(self, moment: Moment) -> None:
+        """Take a tick."""
+        self.recorder.see(moment)
+        if self.recording is not None:
+            self.recording.see(moment)
+
+    def see_image(self, time_us: int, image: Image) -> None:
+        """Take a raw image, of the simulated camera."""
+        if self.recording is not None:
+            self.recording.see_image(time_us, image)
+
+    def see_frame(self, frame: CameraFrame) -> None:
+        """Take an image of a camera source."""
+        if self.recording is not None:
+            self.recording.see_frame(frame)
+
+    def finish(self, flown: Flown) -> None:
+        """Add what is known only after the flight."""
+        if self.recording is not None:
+            self.recording.finish(flown.result, flown.track.time_s)
 
 
 async def fly_once(settings: FlightSettings) -> int:
@@ -76,48 +120,54 @@ async def fly_once(settings: FlightSettings) -> int:
     started = datetime.now(UTC)
     fly = _fly_in_lockstep if settings.lockstep else _fly_in_real_time
     with _run_folder(settings) as folder:
-        recorder = FlightRecorder()
-        flown = await fly(settings, folder, recorder)
+        with _recording(settings, folder) as recording:
+            records = _Records(folder, recording)
+            flown = await fly(settings, records)
+            records.finish(flown)
         result = {
             **flown.result,
-            "wall_time_s": recorder.wall_time_s,
-            "real_time_factor": recorder.real_time_factor,
+            "wall_time_s": records.recorder.wall_time_s,
+            "real_time_factor": records.recorder.real_time_factor,
             "started": started.isoformat(timespec="seconds"),
         }
         folder.write_result(result)
         track_picture(settings.scenario, flown.track, JudgedOutcome.from_result(result), folder.track)
-    _say_result(result, folder)
+    print(result_lines(result))
+    print(f"left in {folder.path}/", file=sys.stdout, flush=True)
     if flown.outcome.interrupted:
         return 130
     return 0 if result["verdict"] in COMPLETED else 1
 
 
-async def _fly_in_lockstep(settings: FlightSettings, folder: RunFolder, recorder: FlightRecorder) -> Flown:
+async def _fly_in_lockstep(settings: FlightSettings, records: _Records) -> Flown:
     scenario = settings.scenario
-    folder.scenario.write_text(dump_yaml(scenario), encoding="utf-8")
-    video = VideoFile(folder.video, scenario.camera.rate_hz)
+    video = VideoFile(records.folder.video, scenario.camera.rate_hz)
     with closing(video), LockstepProgress(scenario.try_limit_s) as progress:
 
         def observe(moment: Moment) -> None:
-            recorder.see(moment)
+            records.see(moment)
             progress.see(moment)
 
+        def keep(time_us: int, image: Image) -> None:
+            video.write(image)
+            records.see_image(time_us, image)
+
         return await lockstep_flight(
-            scenario, settings.mission, observer=observe, on_image=lambda _time_us, image: video.write(image)
+            scenario, settings.mission, seed=settings.seed, observer=observe, on_image=keep
         )
 
 
-async def _fly_in_real_time(settings: FlightSettings, folder: RunFolder, recorder: FlightRecorder) -> Flown:
+async def _fly_in_real_time(settings: FlightSettings, records: _Records) -> Flown:
     async with AsyncExitStack() as stack:
         session = await stack.enter_async_context(aiohttp.ClientSession())
-        drone_url, camera_url, sitl = await _vehicle(settings, folder, session, stack)
+        drone_url, camera_url, sitl = await _vehicle(settings, records.folder, session, stack)
         judge = await choose_judge(settings.scenario, camera_url, session)
-        flight = asyncio.create_task(_fly(settings, folder, recorder, judge, (drone_url, camera_url)))
+        flight = asyncio.create_task(_fly(settings, records, judge, (drone_url, camera_url)))
         outcome = await (flight if sitl is None else sitl.guard(flight))
         ended = None if outcome.ended == "finished" else outcome.reason
         report = await judge.report(outcome.mission_state, ended)
         standing = await judge.standing()
-    track = recorder.track(standing.began_us if standing else None)
+    track = records.recorder.track(standing.began_us if standing else None)
     result = {
         "scenario": settings.scenario.name,
         "mission": settings.mission.name,
@@ -137,9 +187,25 @@ def _run_folder(settings: FlightSettings) -> Iterator[RunFolder]:
     """Make the folder; take it away again if the flight did not begin and left nothing."""
     folder = RunFolder(settings.out, settings.scenario.name)
     try:
+        folder.write_plan(settings.scenario, settings.mission)
         yield folder
     finally:
         folder.remove_if_empty()
+
+
+@contextmanager
+def _recording(settings: FlightSettings, folder: RunFolder) -> Iterator[FlightRecording | None]:
+    """Open the recording, if one is wanted, and close it whatever happens."""
+    if not settings.record:
+        yield None
+        return
+    from framerunner.recording.mcap_writer import FlightRecording
+
+    seed = settings.seed if settings.lockstep else None
+    with FlightRecording(folder.recording, settings.scenario, settings.mission, seed) as recording:
+        yield recording
+    if recording.problem:
+        print(f"warning: {recording.problem}", file=sys.stderr)
 
 
 async def _vehicle(
@@ -149,7 +215,6 @@ async def _vehicle(
     if settings.drone_url is not None and settings.camera_url is not None:
         return settings.drone_url, settings.camera_url, None
     # The simulator reads the very scenario that was checked here, whatever becomes of its file.
-    folder.scenario.write_text(dump_yaml(settings.scenario), encoding="utf-8")
     sitl = await stack.enter_async_context(
         SitlProcess(str(folder.scenario), settings.speed, settings.instance)
     )
@@ -166,10 +231,8 @@ async def _wait_for_sitl(url: str, session: aiohttp.ClientSession) -> None:
         await asyncio.sleep(0.05)
 
 
-async def _fly(
-    settings: FlightSettings, folder: RunFolder, recorder: FlightRecorder, judge: Judge, urls: tuple[str, str]
-) -> Outcome:
-    scenario = settings.scenario
+async def _fly(settings: FlightSettings, records: _Records, judge: Judge, urls: tuple[str, str]) -> Outcome:
+    scenario, folder = settings.scenario, records.folder
     x_m, y_m, z_m = start_position(scenario)
     with ExitStack() as files:
         hang_report = files.enter_context(folder.hang_report.open("w", encoding="utf-8"))
@@ -179,15 +242,15 @@ async def _fly(
         drone.record_to(folder.tlog)
 
         def observe(moment: Moment) -> None:
-            recorder.see(moment)
+            records.see(moment)
             judge.see(moment)
 
         title = f"{scenario.name}: {settings.mission.name}"
-        display = FlightDisplay(title, scenario.try_limit_s, recorder, judge)
+        display = FlightDisplay(title, scenario.try_limit_s, records.recorder, judge)
         showing = asyncio.create_task(display.run())
         try:
             async with open_source(urls[1]) as source:
-                camera = RecordingCamera(source, folder.video, scenario.camera.rate_hz)
+                camera = RecordingCamera(source, folder.video, scenario.camera.rate_hz, records.see_frame)
                 files.callback(camera.close)
                 return await fly_mission(
                     drone, camera, settings.mission, limit_s=scenario.try_limit_s, observer=observe
@@ -195,14 +258,3 @@ async def _fly(
         finally:
             showing.cancel()
             await asyncio.gather(showing, return_exceptions=True)
-
-
-def _say_result(result: dict[str, Any], folder: RunFolder) -> None:
-    print(f"{result['verdict']}: {result['reason']}")
-    error_m = result["landing_error_m"]
-    landing = "did not land" if error_m is None else f"landed {100 * error_m:.1f} cm from the base's centre"
-    print(
-        f"try {result['try_time_s']:.1f} s, penalty {result['penalty_s']:.1f} s, "
-        f"path {result['path_length_m']:.1f} m, {landing}, judged by {result['judged_by']}"
-    )
-    print(f"left in {folder.path}/", file=sys.stdout, flush=True)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import AsyncIterator
+from collections.abc import AsyncIterator, Callable
 from pathlib import Path
 from typing import Protocol
 
@@ -117,16 +117,26 @@ class RecordingCamera:
         source: where images come from.
         path: the video; made with the first image.
         rate_hz: images a second, for players.
+        on_frame: called with each image.
     """
 
-    def __init__(self, source: FrameSource, path: Path, rate_hz: float) -> None:
+    def __init__(
+        self,
+        source: FrameSource,
+        path: Path,
+        rate_hz: float,
+        on_frame: Callable[[CameraFrame], None] | None = None,
+    ) -> None:
         self._source = source
+        self._on_frame = on_frame
         self._video = VideoFile(path, rate_hz)
 
     async def frames(self) -> AsyncIterator[CameraFrame]:
         """Images as they come, each written before it is handed on."""
         async for frame in self._source.frames():
             self._video.write(frame.image)
+            if self._on_frame is not None:
+                self._on_frame(frame)
             yield frame
 
     def close(self) -> None:

@@ -9,6 +9,10 @@ from pathlib import Path
 from typing import Any
 
 from framerunner.errors import SettingError
+from offboard.mission import Mission
+from offboard.pilot_file import PilotFile
+from scenarios.loader import dump_yaml
+from scenarios.models import Scenario
 
 
 class RunFolder:
@@ -46,6 +50,16 @@ class RunFolder:
         self.video = path / "video.avi"
         self.hang_report = path / "hang.txt"
         self.scenario = path / "scenario.yaml"
+        self.mission = path / "mission.yaml"
+        self.pilot = path / "pilot.py"
+        self.recording = path / "flight.mcap"
+
+    def write_plan(self, scenario: Scenario, mission: Mission) -> None:
+        """Write what is to be flown, so that the flight can be judged, replayed and flown again."""
+        self.scenario.write_text(dump_yaml(scenario), encoding="utf-8")
+        self.mission.write_bytes(mission.path.read_bytes())
+        if isinstance(mission.pilot, PilotFile):
+            self.pilot.write_text(mission.pilot.text, encoding="utf-8")
 
     def write_result(self, result: dict[str, Any]) -> None:
         """Write `result.json` whole or not at all."""
@@ -54,11 +68,12 @@ class RunFolder:
         os.replace(part, self.result)
 
     def remove_if_empty(self) -> None:
-        """Take away empty files, and the folder if no result and no log remains."""
+        """Take away empty files, and the folder if no result, log or recording remains."""
         for path in self.path.iterdir():
             if path.stat().st_size == 0:
                 path.unlink()
-        if not self.result.exists() and not self.tlog.exists():
-            self.scenario.unlink(missing_ok=True)
+        if not any(path.exists() for path in (self.result, self.tlog, self.recording)):
+            for path in (self.scenario, self.mission, self.pilot):
+                path.unlink(missing_ok=True)
             if not any(self.path.iterdir()):
                 self.path.rmdir()

@@ -11,26 +11,36 @@ from cyclopts import Parameter
 from framerunner.commands.options import WholeNumber
 from framerunner.errors import SettingError
 
+_Drone = Annotated[
+    str | None,
+    Parameter(help="MAVLink URL of a drone that is there; without it a simulated one is started"),
+]
+_Camera = Annotated[str | None, Parameter(help="URL, device or folder of its camera; needed with --drone")]
+_Lockstep = Annotated[
+    bool,
+    Parameter(negative=(), help="in simulated time, as fast as the machine can, the same each time; no log"),
+]
+_Seed = Annotated[
+    WholeNumber | None, Parameter(help="of everything random in a lockstep flight; 0 if not given")
+]
+_Record = Annotated[
+    bool, Parameter(negative=(), help="write flight.mcap as well, for `framerunner replay` and Foxglove")
+]
+_Pilot = Annotated[Path | None, Parameter(help="Python file with primitives of your own; it is executed")]
+
 
 def fly(
     scenario: Annotated[str, Parameter(help="name or file of the scenario")] = "test-case-1",
     *,
     mission: Annotated[str, Parameter(help="name or file of the mission")] = "frame_challenge",
-    drone: Annotated[
-        str | None,
-        Parameter(help="MAVLink URL of a drone that is there; without it a simulated one is started"),
-    ] = None,
-    camera: Annotated[
-        str | None, Parameter(help="URL, device or folder of its camera; needed with --drone")
-    ] = None,
+    drone: _Drone = None,
+    camera: _Camera = None,
     speed: Annotated[float, Parameter(help="of the simulated drone: simulated seconds a second")] = 1.0,
     instance: Annotated[WholeNumber, Parameter(help="of the simulated drone: shifts its ports, 0 to 9")] = 0,
-    lockstep: Annotated[
-        bool,
-        Parameter(
-            negative=(), help="in simulated time, as fast as the machine can, the same each time; no log"
-        ),
-    ] = False,
+    lockstep: _Lockstep = False,
+    seed: _Seed = None,
+    record: _Record = False,
+    pilot: _Pilot = None,
     out: Annotated[Path, Parameter(help="folder in which this flight's folder is made")] = Path("runs"),
 ) -> int:
     """Fly a mission, show it live, and leave result, track, log and video in `runs/<time>-<scenario>/`.
@@ -43,27 +53,31 @@ def fly(
 
         framerunner fly my_scenario.yaml --mission soft_landing --speed 2
 
-        framerunner fly test-case-1 --lockstep
+        framerunner fly test-case-1 --lockstep --record
 
         framerunner fly test-case-1 --drone udpin://0.0.0.0:14540 --camera http://127.0.0.1:8080/video
 
         framerunner fly test-case-1 --drone serial:///dev/ttyUSB0:57600 --camera rtsp://192.168.1.10/live
     """
     _check(drone, camera, speed, instance, lockstep)
+    _check_seed(seed, lockstep)
 
     from framerunner.flight import FlightSettings, fly_once
     from offboard.mission import load_mission
+    from offboard.pilot_file import read_pilot
     from scenarios.loader import load_scenario
 
     settings = FlightSettings(
         scenario=load_scenario(scenario),
-        mission=load_mission(mission),
+        mission=load_mission(mission, None if pilot is None else read_pilot(pilot)),
         drone_url=drone,
         camera_url=camera,
         speed=speed,
         instance=instance,
         out=out,
         lockstep=lockstep,
+        seed=seed or 0,
+        record=record,
     )
     return asyncio.run(fly_once(settings))
 
@@ -82,3 +96,15 @@ def _check(drone: str | None, camera: str | None, speed: float, instance: int, l
         raise SettingError(f"--speed {speed:g}: must be from 0.01 to 100")
     if not 0 <= instance <= 9:
         raise SettingError(f"--instance {instance}: must be from 0 to 9")
+
+
+def _check_seed(seed: int | None, lockstep: bool) -> None:
+    """Refuse a seed that is none, or that has no use."""
+    if seed is None:
+        return
+    if not lockstep:
+        raise SettingError(
+            f"--seed {seed}: only a flight in lockstep repeats; add --lockstep or leave it out"
+        )
+    if not 0 <= seed < 2**63:
+        raise SettingError(f"--seed {seed}: must be from 0 to {2**63 - 1}")

@@ -93,6 +93,7 @@ def test_the_command_leaves_what_a_flight_in_real_time_leaves(tmp_path, capsys, 
     assert code == 1, said.err
     (folder,) = (tmp_path / "runs").iterdir()
     assert {path.name for path in folder.iterdir()} == {
+        "mission.yaml",
         "result.json",
         "scenario.yaml",
         "track.png",

@@ -1,0 +1,73 @@
+"""`framerunner replay`: a recorded flight, shown again."""
+
+from __future__ import annotations
+
+import asyncio
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+from cyclopts import Parameter
+
+from framerunner.commands.options import WholeNumber
+from framerunner.errors import SettingError
+
+if TYPE_CHECKING:
+    from framerunner.recording.events import Recorded
+
+
+def replay(
+    flight: Annotated[Path, Parameter(help="run folder, or an MCAP file of framerunner's")],
+    *,
+    speed: Annotated[float, Parameter(help="simulated seconds a second; 0 as fast as possible")] = 1.0,
+    fast: Annotated[bool, Parameter(negative=(), help="as fast as possible, as --speed 0")] = False,
+    video: Annotated[
+        bool | None, Parameter(help="serve the images; by default if the flight is shown at some speed")
+    ] = None,
+    port: Annotated[WholeNumber, Parameter(help="TCP port of the video; 0 lets the system choose")] = 8090,
+    pilot: Annotated[
+        Path | None, Parameter(help="Python file of a mission that has to be flown again and needs one")
+    ] = None,
+) -> int:
+    """Show a flight again: its states in the terminal, its images at http://127.0.0.1:8090/.
+
+    Shows what `framerunner fly --record` wrote. Without a recording, a lockstep flight is flown again, which
+    gives the very same one, and a real-time flight is shown from its log and video. Stop it with Ctrl-C.
+
+    **Examples**
+
+        framerunner replay runs/20260101-120000-test-case-1
+
+        framerunner replay runs/20260101-120000-test-case-1 --speed 4
+
+        framerunner replay flight.mcap --fast
+    """
+    speed = 0.0 if fast else speed
+    if speed != 0.0 and not 0.01 <= speed <= 1000:
+        raise SettingError(f"--speed {speed:g}: must be from 0.01 to 1000, or 0 for as fast as possible")
+    if not 0 <= port <= 65535:
+        raise SettingError(f"--port {port}: must be from 0 to 65535")
+    with_video = speed > 0.0 if video is None else video
+
+    from framerunner.recording.find import recorded_flight
+    from framerunner.recording.replay import replay as show
+    from offboard.pilot_file import read_pilot
+    from sitl.video import VideoServer
+
+    pilot_file = None if pilot is None else read_pilot(pilot)
+    server = VideoServer(port=port) if with_video else None
+    with recorded_flight(flight, pilot_file) as recorded:
+        asyncio.run(show(recorded, speed, server))
+        _say_result(recorded)
+    return 0
+
+
+def _say_result(recorded: Recorded) -> None:
+    from framerunner.result_text import result_lines
+
+    if recorded.result is None:
+        print("no result: the flight was not judged")
+        return
+    try:
+        print(result_lines(recorded.result))
+    except (KeyError, TypeError, ValueError):
+        raise SettingError("replay: the flight's result is damaged or of another version") from None

@@ -1,0 +1,1 @@
+"""Recordings of flights as MCAP files, and their replay."""

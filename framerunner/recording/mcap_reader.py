@@ -1,0 +1,164 @@
+"""Reads back the recordings that `mcap_writer` writes."""
+
+from __future__ import annotations
+
+import json
+import warnings
+from base64 import b64decode
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any, BinaryIO
+
+import cv2
+import numpy as np
+from mcap.exceptions import McapError
+from mcap.reader import McapReader, SeekingReader
+
+from framerunner.recording.errors import RecordingError
+from framerunner.recording.events import Crossed, Event, Picture
+from framerunner.recording.mcap_writer import METADATA
+from framerunner.recording.schemas import CROSSING, DETECTIONS, IMAGE, MISSION, SETPOINT, TELEMETRY
+from offboard.app import Moment
+from offboard.drone import DroneState, VelocityCommand
+from vision.types import Detection, Detections
+
+RECORD_LIMIT_BYTES = 1 << 28
+Json = dict[str, Any]
+
+
+class McapRecording:
+    """A recording of framerunner's; whoever opened it closes it.
+
+    Args:
+        path: an MCAP file.
+
+    Attributes:
+        title: scenario and mission.
+        result: the attached result; None if the flight did not come to one.
+
+    Raises:
+        RecordingError: it cannot be read, is damaged, or is not one of framerunner's.
+    """
+
+    def __init__(self, path: Path) -> None:
+        self._path = path
+        try:
+            self._file: BinaryIO = path.open("rb")
+        except OSError as error:
+            raise RecordingError(f"recording '{path}': cannot be read: {error.strerror}") from None
+        try:
+            self._reader: McapReader = SeekingReader(
+                self._file, validate_crcs=True, record_size_limit=RECORD_LIMIT_BYTES
+            )
+            about = self._about()
+            attached = {each.name: each.data for each in self._reader.iter_attachments()}
+            result = attached.get("result.json")
+            self.title = f"{about['scenario']}: {about['mission']}"
+            self.result: Json | None = None if result is None else json.loads(result)
+        except Exception as error:
+            self._file.close()
+            raise self._damaged(error) from None
+
+    def close(self) -> None:
+        """Close the file."""
+        self._file.close()
+
+    def events(self) -> Iterator[Event]:
+        """All that happened, in order of vehicle time.
+
+        Raises:
+            RecordingError: the file is damaged.
+        """
+        topics = (TELEMETRY, SETPOINT, DETECTIONS, MISSION, IMAGE, CROSSING)
+        moments = _Moments()
+        try:
+            for _, channel, message in self._reader.iter_messages(topics):
+                event = moments.take(channel.topic, message.log_time // 1000, json.loads(message.data))
+                if event is not None:
+                    yield event
+        except Exception as error:
+            raise self._damaged(error) from None
+
+    def _about(self) -> dict[str, str]:
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")
+            for record in self._reader.iter_metadata():
+                if record.name == METADATA:
+                    return record.metadata
+        raise RecordingError(
+            f"recording '{self._path}': an MCAP file, but not one of framerunner's; open it with Foxglove"
+        )
+
+    def _damaged(self, error: Exception) -> RecordingError:
+        """In one line, whatever a damaged file makes the libraries raise."""
+        if isinstance(error, RecordingError):
+            return error
+        text = " ".join(str(error).split()) if isinstance(error, McapError) else ""
+        said = text or f"{type(error).__name__} while reading"
+        return RecordingError(
+            f"recording '{self._path}': damaged or cut short ({said:.120}); fly it again with --record"
+        )
+
+
+class _Moments:
+    """Puts messages together again to what the flight's observer saw."""
+
+    def __init__(self) -> None:
+        self._state = ""
+        self._command = VelocityCommand()
+        self._detections = Detections()
+
+    def take(self, topic: str, time_us: int, message: Json) -> Event | None:
+        """Take a message; telemetry is the last of a tick."""
+        if topic == TELEMETRY:
+            flight_time_s = float(message["flight_time_s"])
+            state = _drone_state(time_us, message)
+            return Moment(state, self._command, self._detections, self._state, flight_time_s)
+        if topic == IMAGE:
+            return _picture(time_us, message)
+        if topic == CROSSING:
+            return Crossed(time_us, str(message["colour"]))
+        if topic == SETPOINT:
+            names = ("forward_m_s", "left_m_s", "up_m_s", "yaw_rate_rad_s")
+            self._command = VelocityCommand(*(float(message[name]) for name in names))
+        elif topic == DETECTIONS:
+            self._detections = _detections(message)
+        elif topic == MISSION:
+            self._state = str(message["state"])
+        return None
+
+
+def _drone_state(time_us: int, message: Json) -> DroneState:
+    position, velocity = message["position_arena_m"], message["velocity_arena_m_s"]
+    return DroneState(
+        time_us,
+        float(position["x"]),
+        float(position["y"]),
+        float(position["z"]),
+        float(message["yaw_rad"]),
+        (float(velocity["x"]), float(velocity["y"]), float(velocity["z"])),
+        bool(message["armed"]),
+        bool(message["offboard"]),
+        str(message["mode"]),
+        bool(message["landed"]),
+    )
+
+
+def _detections(message: Json) -> Detections:
+    image_time = message.get("image_timestamp")
+    time_us = None if image_time is None else image_time["sec"] * 1_000_000 + image_time["nsec"] // 1000
+    red, green, blue = (_detection(message[colour]) for colour in ("red", "green", "blue"))
+    return Detections(red, green, blue, time_us)
+
+
+def _detection(message: Json) -> Detection:
+    """What is missing is unknown, as `Detection`'s defaults say it."""
+    return Detection(**{name: float(value) for name, value in message.items() if name != "seen"})
+
+
+def _picture(time_us: int, message: Json) -> Picture:
+    data = np.frombuffer(b64decode(message["data"]), np.uint8)
+    image = cv2.imdecode(data, cv2.IMREAD_COLOR)
+    if image is None:
+        raise ValueError("an image cannot be decoded")
+    return Picture(time_us, image)

@@ -1,0 +1,129 @@
+"""Shows a recorded flight again, at the pace it was flown or another."""
+
+from __future__ import annotations
+
+import asyncio
+import sys
+from time import monotonic
+
+from rich.console import Console
+from rich.live import Live
+from rich.table import Table
+
+from framerunner.display import moment_table, place_in_words
+from framerunner.recording.events import Crossed, Picture, Recorded, time_of_event
+from offboard.app import Moment
+from sitl.video import VideoServer
+
+_REFRESH_S = 0.1
+_LINE_S = 10.0
+_AHEAD_S = 0.005  # events due within this are shown now
+
+
+class ReplayDisplay:
+    """A live table in a terminal; elsewhere a line at every change of state, crossing and ten seconds.
+
+    Args:
+        title: what was flown.
+    """
+
+    def __init__(self, title: str) -> None:
+        self._title = title
+        self._console = Console(file=sys.stderr)
+        self._live: Live | None = None
+        self._shown_s = 0.0
+        self._crossed: list[str] = []
+        self._line_state = ""
+        self._line_s = 0.0
+
+    def __enter__(self) -> ReplayDisplay:
+        """Take the terminal, if there is one."""
+        if self._console.is_terminal:
+            self._live = Live(console=self._console, auto_refresh=False, transient=True)
+            self._live.start()
+        return self
+
+    def __exit__(self, *_error: object) -> None:
+        """Give it back."""
+        if self._live is not None:
+            self._live.stop()
+
+    def cross(self, crossed: Crossed) -> None:
+        """A frame was crossed."""
+        self._crossed.append(crossed.colour)
+        self._line_state = ""  # makes the next moment print its line
+
+    def see(self, moment: Moment) -> None:
+        """Show a tick of the flight."""
+        crossed = ", ".join(self._crossed) or "none"
+        if self._live is None:
+            self._print_line(moment, crossed)
+        elif monotonic() - self._shown_s >= _REFRESH_S:
+            self._shown_s = monotonic()
+            self._live.update(self._table(moment, crossed), refresh=True)
+
+    def _print_line(self, moment: Moment, crossed: str) -> None:
+        time_s = moment.flight_time_s
+        if moment.mission_state == self._line_state and time_s - self._line_s < _LINE_S:
+            return
+        self._line_state, self._line_s = moment.mission_state, time_s
+        line = f"{time_s:6.1f} s  {moment.mission_state:22s} {place_in_words(moment)}  crossed: {crossed}"
+        print(line, file=sys.stderr, flush=True)
+
+    def _table(self, moment: Moment, crossed: str) -> Table:
+        table = moment_table(self._title, moment, f"{moment.flight_time_s:.1f} s")
+        table.add_row("crossed", crossed)
+        return table
+
+
+async def replay(recorded: Recorded, speed: float, video: VideoServer | None) -> None:
+    """Show a flight to its end.
+
+    Args:
+        recorded: the flight.
+        speed: vehicle time a wall time; 0 for as fast as possible.
+        video: server for the images; None shows none. It is started and closed here.
+
+    Raises:
+        RecordingError: the recording is damaged; what comes before that is shown.
+        VideoError: the port is taken.
+    """
+    if video is not None:
+        await video.start()
+        print(f"video: {video.url}  (stream: {video.url}video)", file=sys.stderr, flush=True)
+    try:
+        with ReplayDisplay(recorded.title) as display:
+            pace = _Pace(speed)
+            for event in recorded.events():
+                await pace.wait_for(time_of_event(event))
+                if isinstance(event, Moment):
+                    display.see(event)
+                elif isinstance(event, Crossed):
+                    display.cross(event)
+                elif video is not None:
+                    _publish(video, event)
+    finally:
+        if video is not None:
+            await video.close()
+
+
+class _Pace:
+    """Lets vehicle time pass as wall time does, times the speed."""
+
+    def __init__(self, speed: float) -> None:
+        self._speed = speed
+        self._first: tuple[int, float] | None = None
+
+    async def wait_for(self, time_us: int) -> None:
+        """Wait until something is due; give way in any case, so that Ctrl-C is heard."""
+        if self._first is None:
+            self._first = (time_us, monotonic())
+        ahead_s = 0.0
+        if self._speed > 0.0:
+            first_us, started_s = self._first
+            ahead_s = (time_us - first_us) / 1e6 / self._speed - (monotonic() - started_s)
+        await asyncio.sleep(ahead_s if ahead_s > _AHEAD_S else 0.0)
+
+
+def _publish(video: VideoServer, picture: Picture) -> None:
+    video.publish(picture.image, picture.time_us)

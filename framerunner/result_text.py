@@ -1,0 +1,24 @@
+"""A flight's result in words."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+
+def result_lines(result: Mapping[str, Any]) -> str:
+    """A result in two lines for people.
+
+    Args:
+        result: as in `result.json`.
+
+    Raises:
+        KeyError, TypeError, ValueError: it is not such a result.
+    """
+    error_m = result["landing_error_m"]
+    landing = "did not land" if error_m is None else f"landed {100 * error_m:.1f} cm from the base's centre"
+    return (
+        f"{result['verdict']}: {result['reason']}\n"
+        f"try {result['try_time_s']:.1f} s, penalty {result['penalty_s']:.1f} s, "
+        f"path {result['path_length_m']:.1f} m, {landing}, judged by {result['judged_by']}"
+    )
