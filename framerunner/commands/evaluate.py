@@ -1,0 +1,118 @@
+"""`framerunner evaluate`: many flights, counted."""
+
+from __future__ import annotations
+
+import shlex
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Annotated, Literal
+
+from cyclopts import Parameter
+
+from framerunner.commands.options import WholeNumber
+from framerunner.errors import SettingError
+
+_COUNT, _SEED = 100, 1
+
+
+def evaluate(
+    *scenarios: Annotated[str, Parameter(help="names, files or folders of scenarios, instead of --level")],
+    level: Annotated[str | None, Parameter(help="draw scenarios of this level, name or file")] = None,
+    count: Annotated[WholeNumber | None, Parameter(help=f"how many scenarios of the level; {_COUNT}")] = None,
+    seed: Annotated[
+        WholeNumber | None, Parameter(help=f"of the first; the next has the next; {_SEED}")
+    ] = None,
+    mission: Annotated[str, Parameter(help="name or file of the mission")] = "frame_challenge",
+    pilot: Annotated[Path | None, Parameter(help="Python file with a subclass of Pilot")] = None,
+    jobs: Annotated[WholeNumber | None, Parameter(help="flights at once; as many as there are cores")] = None,
+    out: Annotated[
+        Path | None, Parameter(help="folder; by default one in `runs/` that the same command finds again")
+    ] = None,
+    again: Annotated[bool, Parameter(negative=(), help="fly anew what is in the folder already")] = False,
+    compare: Annotated[Path | None, Parameter(help="folder of an earlier evaluation")] = None,
+    backend: Annotated[
+        Literal["loky", "dask", "ray"], Parameter(help="loky: this machine; the others: a cluster")
+    ] = "loky",
+    address: Annotated[str | None, Parameter(help="of the cluster's scheduler")] = None,
+) -> int:
+    """Fly a mission on many scenarios in lockstep, and tell how often it lands, how well, and why it fails.
+
+    Every flight is kept as soon as it is over. Ctrl-C loses none of them: the same command goes on where it
+    stopped, and ends with the same results.
+
+    Exit code 0: all were flown, 1: a fault of the program ended some of them, 2: bad input.
+
+    **Examples**
+
+        framerunner evaluate --level calm --count 200 --seed 1
+
+        framerunner evaluate --level calm --count 200 --mission my_mission.yaml --compare runs/before
+
+        framerunner evaluate my_scenarios/ --out runs/mine
+
+        framerunner evaluate test-case-1 test-case-2 calm-17 --jobs 1
+
+        framerunner evaluate --level calm --backend dask --address tcp://10.0.0.1:8786
+    """
+    _check(scenarios, level, count, seed)
+
+    from joblib import cpu_count
+
+    from framerunner.evaluation.backends import Pool
+    from framerunner.evaluation.evaluate import EvaluationSettings
+    from framerunner.evaluation.evaluate import evaluate as evaluate_all
+    from framerunner.evaluation.plan import plan_files, plan_level
+    from offboard.mission import load_mission
+    from offboard.pilot_file import read_pilot
+
+    loaded = load_mission(mission, None if pilot is None else read_pilot(pilot))
+    if level is None:
+        plan = plan_files(scenarios, loaded)
+    else:
+        plan = plan_level(level, _SEED if seed is None else seed, _COUNT if count is None else count, loaded)
+    options = {
+        "--level": level,
+        "--count": count,
+        "--seed": seed,
+        "--mission": mission,
+        "--pilot": pilot,
+        "--jobs": jobs,
+        "--out": out,
+        "--compare": compare,
+        "--backend": None if backend == "loky" else backend,
+        "--address": address,
+    }
+    settings = EvaluationSettings(
+        plan=plan,
+        pool=Pool(backend, cpu_count() if jobs is None else jobs, address),
+        out=plan.default_out if out is None else out,
+        again=again,
+        against=compare,
+        mission=mission,
+        pilot=None if pilot is None else str(pilot),
+        command=_command(scenarios, options),
+    )
+    return evaluate_all(settings)
+
+
+def _check(scenarios: tuple[str, ...], level: str | None, count: int | None, seed: int | None) -> None:
+    if level is None and not scenarios:
+        raise SettingError(
+            "--level: say what to fly: a level such as calm, or names, files or folders of scenarios"
+        )
+    if level is not None and scenarios:
+        raise SettingError(
+            f"--level {level}: does not go with {scenarios[0]}; give a level or scenarios, not both"
+        )
+    for option, value in (("--count", count), ("--seed", seed)):
+        if level is None and value is not None:
+            raise SettingError(f"{option} {value}: is for scenarios of a level; add --level, or leave it out")
+
+
+def _command(scenarios: tuple[str, ...], options: Mapping[str, object]) -> str:
+    """The command that goes on with this evaluation (--again would begin anew)."""
+    words = ["framerunner", "evaluate", *scenarios]
+    for option, value in options.items():
+        if value is not None:
+            words += [option, str(value)]
+    return shlex.join(words)

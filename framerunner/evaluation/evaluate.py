@@ -1,0 +1,136 @@
+"""An evaluation from its plan to its report."""
+
+from __future__ import annotations
+
+import sys
+from contextlib import closing
+from dataclasses import dataclass
+from pathlib import Path
+
+from rich.console import Console
+
+from framerunner.errors import SettingError
+from framerunner.evaluation.backends import Pool, check_pool
+from framerunner.evaluation.compare import check_comparable, compare
+from framerunner.evaluation.plan import Plan
+from framerunner.evaluation.progress import EvaluationProgress
+from framerunner.evaluation.rows import ERROR
+from framerunner.evaluation.runner import fly_all
+from framerunner.evaluation.statistics import summarise
+from framerunner.evaluation.store import EvaluationFolder, open_folder, read_folder
+from framerunner.evaluation.table_file import csv_text
+from framerunner.evaluation.tables import print_comparison, print_summary
+
+EXIT_INTERRUPTED = 130
+
+
+@dataclass(frozen=True, slots=True)
+class EvaluationSettings:
+    """How to fly a plan, and what to leave behind.
+
+    Attributes:
+        plan: what is flown.
+        pool: who flies.
+        out: folder of the evaluation.
+        again: forget what was flown there before.
+        against: folder of an earlier evaluation to compare with; None for none.
+        mission: name or file, as given on the command line.
+        pilot: a contestant's file, as given; None without one.
+        command: goes on with this evaluation.
+    """
+
+    plan: Plan
+    pool: Pool
+    out: Path
+    again: bool
+    against: Path | None
+    mission: str
+    pilot: str | None
+    command: str
+
+
+def evaluate(settings: EvaluationSettings) -> int:
+    """Fly what is not yet flown, then count, compare and report.
+
+    Returns:
+        0 all were flown, 1 a fault of the program ended some of them, 130 stopped with Ctrl-C.
+
+    Raises:
+        SettingError: a setting or folder that cannot be used, or a cluster that cannot be reached.
+    """
+    check_pool(settings.pool)
+    identity = settings.plan.identity
+    before = None
+    if settings.against is not None:
+        if settings.against.resolve() == settings.out.resolve():
+            raise SettingError(
+                f"--compare {settings.against}: is this evaluation itself; give an earlier one"
+            )
+        before = read_folder(settings.against, "--compare")
+        check_comparable(before, identity)
+    with open_folder(settings.out, identity, again=settings.again) as folder:
+        try:
+            _fly_missing(settings, folder)
+            folder.write(folder.results, csv_text(folder.in_order()))
+            _report(settings, folder, before)
+        except KeyboardInterrupt:
+            _say_interrupted(settings, folder)
+            return EXIT_INTERRUPTED
+        return 1 if any(row.verdict == ERROR for row in folder.rows.values()) else 0
+
+
+def _fly_missing(settings: EvaluationSettings, folder: EvaluationFolder) -> None:
+    plan = settings.plan
+    kept = folder.in_order()
+    if kept:
+        _note(f"{len(kept)} of {len(plan)} flights are in {folder.path} already")
+    if len(kept) == len(plan):
+        return
+    scenarios = {scenario.name: scenario for scenario in plan.scenarios}
+    with (
+        EvaluationProgress(len(plan), kept) as progress,
+        closing(fly_all(plan.tasks(dict(folder.rows)), settings.pool)) as rows,
+    ):
+        for row in rows:
+            if row.version != folder.identity.version:
+                raise SettingError(
+                    f"--address {settings.pool.address}: a worker has framerunner {row.version}, not "
+                    f"{folder.identity.version}; install the same version there"
+                )
+            folder.keep(scenarios[row.scenario], row)
+            progress.add(row)
+
+
+def _report(settings: EvaluationSettings, folder: EvaluationFolder, before: EvaluationFolder | None) -> None:
+    """Print the tables, write the page."""
+    summary = summarise(folder.in_order())
+    comparison = None if before is None else compare(before, folder)
+    title = f"{settings.plan.title}: {folder.identity.mission}"
+    print_summary(summary, title)
+    if comparison is not None:
+        print_comparison(comparison)
+    sys.stdout.flush()
+
+    console = Console(stderr=True)
+    with console.status("drawing the report") as status:
+        from framerunner.evaluation.report import Page, write_report
+
+        page = Page(
+            settings.plan.title, settings.mission, settings.pilot, settings.command, summary, comparison
+        )
+        write_report(
+            folder,
+            page,
+            lambda done, total: status.update(f"drawing the report, picture {done + 1} of {total}"),
+        )
+    print(f"left in {folder.path}/: report.html, results.csv", flush=True)
+
+
+def _say_interrupted(settings: EvaluationSettings, folder: EvaluationFolder) -> None:
+    count = len(folder.rows)
+    _note(f"interrupted; {count} of {len(settings.plan)} flights are kept in {folder.path}; go on with:")
+    _note(f"  {settings.command}")
+
+
+def _note(line: str) -> None:
+    print(line, file=sys.stderr, flush=True)

@@ -1,0 +1,216 @@
+"""What an evaluation is of: which scenarios, which mission; and a sum by which to know it again."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import re
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import asdict, dataclass
+from functools import cached_property
+from importlib import metadata
+from pathlib import Path
+from typing import Any, Self
+
+from firmware_py.airframe import load_airframe
+from framerunner.errors import SettingError
+from framerunner.evaluation.task import FlightTask
+from offboard.mission import Mission
+from offboard.pilot_file import PilotFile
+from scenarios.level import load_level
+from scenarios.loader import SUFFIXES, ScenarioError, load_scenario
+from scenarios.models import Scenario
+from scenarios.random_scenarios import random_scenario
+
+
+@dataclass(frozen=True, slots=True)
+class Identity:
+    """What results depend on. Two evaluations of one identity have the same results.
+
+    Attributes:
+        scenarios: SHA-256 of each scenario's content, by name, in order.
+        mission: its name.
+        mission_sha256: of the expanded chart with its variables.
+        pilot: name of the contestant's file or class.
+        pilot_sha256: of the contestant's file; empty for a class of the package.
+        seed: of everything random in a flight.
+        version: of framerunner.
+    """
+
+    scenarios: Mapping[str, str]
+    mission: str
+    mission_sha256: str
+    pilot: str
+    pilot_sha256: str
+    seed: int
+    version: str
+
+    def as_dict(self) -> dict[str, Any]:
+        """Plain data for JSON."""
+        return asdict(self)
+
+    @classmethod
+    def from_dict(cls, data: Mapping[str, Any]) -> Self:
+        """Read what `as_dict` gave.
+
+        Raises:
+            TypeError: it is something else.
+        """
+        if not isinstance(data.get("scenarios"), Mapping):
+            raise TypeError("scenarios are missing")
+        return cls(**data)
+
+    @property
+    def sha256(self) -> str:
+        """One sum over all of it."""
+        return _sum(json.dumps(self.as_dict()))
+
+    def difference(self, other: Identity) -> str:
+        """In a few words the first thing that is not the same; empty if all is."""
+        for what in ("mission", "pilot", "seed", "version"):
+            mine, theirs = getattr(self, what), getattr(other, what)
+            if mine != theirs:
+                return f"{what} {theirs}, not {mine}"
+        if self.mission_sha256 != other.mission_sha256:
+            return f"another content of mission {self.mission}"
+        if self.pilot_sha256 != other.pilot_sha256:
+            return f"another content of {self.pilot}"
+        if list(self.scenarios.items()) != list(other.scenarios.items()):
+            changed = [
+                name for name, digest in self.scenarios.items() if other.scenarios.get(name, digest) != digest
+            ]
+            if changed:
+                return f"another content of scenario {changed[0]}"
+            return f"other scenarios ({_count(other.scenarios)}, not {_count(self.scenarios)})"
+        return ""
+
+
+@dataclass(frozen=True)
+class Plan:
+    """What is to be flown.
+
+    Attributes:
+        title: what it is called for people, such as "level calm, seeds 1 to 200".
+        label: the same for a folder's name.
+        scenarios: in order; names are unique.
+        mission: checked.
+        seed: of everything random in a flight.
+    """
+
+    title: str
+    label: str
+    scenarios: Sequence[Scenario]
+    mission: Mission
+    seed: int = 0
+
+    def __len__(self) -> int:
+        """Number of flights."""
+        return len(self.scenarios)
+
+    @cached_property
+    def identity(self) -> Identity:
+        """What results depend on."""
+        mission, pilot = self.mission, self.mission.pilot
+        variables = json.dumps(mission.spec.variables, sort_keys=True, default=repr)
+        return Identity(
+            scenarios={each.name: _sum(each.model_dump_json()) for each in self.scenarios},
+            mission=mission.name,
+            mission_sha256=_sum(f"{mission.native}\n{variables}"),
+            pilot=pilot.name if isinstance(pilot, PilotFile) else pilot.__qualname__,
+            pilot_sha256=_sum(pilot.text) if isinstance(pilot, PilotFile) else "",
+            seed=self.seed,
+            version=metadata.version("framerunner"),
+        )
+
+    @property
+    def default_out(self) -> Path:
+        """A folder that the same command finds again, and no other."""
+        return Path("runs") / f"evaluate-{self.label}-{self.mission.name}-{self.identity.sha256[:6]}"
+
+    def tasks(self, done: Mapping[str, object]) -> Iterator[FlightTask]:
+        """Flights that are not yet done, in order."""
+        for scenario in self.scenarios:
+            if scenario.name not in done:
+                yield FlightTask(scenario, self.mission, self.seed)
+
+
+def plan_level(level: str, first_seed: int, count: int, mission: Mission) -> Plan:
+    """Plan random scenarios of a level, seed after seed.
+
+    Args:
+        level: name or file.
+        first_seed: of the first scenario.
+        count: how many.
+        mission: checked.
+
+    Raises:
+        SettingError: the count is not positive.
+        LevelError: the level is not known, or a seed is out of range.
+    """
+    if count < 1:
+        raise SettingError(f"--count {count}: must be 1 or more")
+    loaded = load_level(level)
+    random_scenario(loaded, first_seed + count - 1)  # out of range? said before thousands are drawn
+    scenarios = [random_scenario(loaded, first_seed + number) for number in range(count)]
+    last = f" to {first_seed + count - 1}" if count > 1 else ""
+    title = f"level {loaded.name}, seed{'s' if last else ''} {first_seed}{last}"
+    return Plan(title, f"{loaded.name}-{first_seed}-{count}", _checked(scenarios), mission)
+
+
+def plan_files(places: Sequence[str], mission: Mission) -> Plan:
+    """Plan given scenarios.
+
+    Args:
+        places: names, files, or folders of scenario files.
+        mission: checked.
+
+    Raises:
+        ScenarioError: one of them is not good.
+        SettingError: a folder has none, or two have one name.
+    """
+    named: dict[str, str] = {}
+    scenarios = []
+    for source in [source for place in places for source in _sources(place)]:
+        scenario = load_scenario(source)
+        if scenario.name in named:
+            raise SettingError(
+                f"{source}: its name {scenario.name} is that of {named[scenario.name]} too; give each its own"
+            )
+        named[scenario.name] = str(source)
+        scenarios.append(scenario)
+    title = ", ".join(places) if len(places) <= 4 else f"{len(places)} scenarios"
+    label = re.sub(r"[^a-z0-9_-]+", "-", Path(places[0]).stem.lower()).strip("-") if len(places) == 1 else ""
+    return Plan(title, label[:40] or "scenarios", _checked(scenarios), mission)
+
+
+def _sources(place: str) -> list[str]:
+    path = Path(place)
+    if not path.is_dir():
+        return [place]
+    files = sorted(str(each) for each in path.iterdir() if each.suffix in SUFFIXES)
+    if not files:
+        raise SettingError(f"{place}: has no scenario files; they end in {' or '.join(SUFFIXES)}")
+    return files
+
+
+def _checked(scenarios: list[Scenario]) -> list[Scenario]:
+    """Refuse what would fail at take-off."""
+    known: set[str] = set()
+    for scenario in scenarios:
+        if scenario.airframe in known:
+            continue
+        try:
+            load_airframe(scenario.airframe)
+        except ValueError as error:
+            raise ScenarioError(f"scenario {scenario.name}: {error}") from None
+        known.add(scenario.airframe)
+    return scenarios
+
+
+def _sum(text: str) -> str:
+    return hashlib.sha256(text.encode()).hexdigest()
+
+
+def _count(scenarios: Mapping[str, str]) -> str:
+    first = next(iter(scenarios), "none")
+    return f"{len(scenarios)} from {first}"

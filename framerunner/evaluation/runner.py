@@ -1,0 +1,171 @@
+"""Flies tasks in this process, in others, or on a cluster, and hands each row on as soon as it is there."""
+
+from __future__ import annotations
+
+import pickle
+import signal
+from collections.abc import Generator, Iterable, Iterator
+from contextlib import closing, contextmanager
+from dataclasses import dataclass
+from functools import lru_cache
+from multiprocessing import get_context
+from multiprocessing.connection import Connection
+from typing import Any
+
+from framerunner.evaluation.backends import Pool, Workers, is_lost_worker, open_pool
+from framerunner.evaluation.rows import Row
+from framerunner.evaluation.task import FlightTask, broken_off, fly_task
+from offboard.mission import Mission
+from scenarios.models import Scenario
+
+
+class WorkerDiedError(Exception):
+    """The process that flew was ended, by its own code or from outside."""
+
+
+@dataclass(frozen=True, slots=True)
+class Parcel:
+    """A task on its way: the mission is packed once for all, and unpacked once in each process."""
+
+    scenario: Scenario
+    mission: bytes
+    seed: int
+
+
+def fly_all(tasks: Iterable[FlightTask], pool: Pool) -> Generator[Row, None, None]:
+    """Fly all tasks.
+
+    No more than a few are under way at a time, and nothing is kept here of those that are over. If a
+    worker dies, every flight that was under way is flown once more, each in a process of its own; the one
+    that ends its process again has the verdict "error".
+
+    Args:
+        tasks: flights; their scenarios have different names.
+        pool: who flies.
+
+    Yields:
+        Rows as the flights end, in any order.
+
+    Raises:
+        SettingError: the pool cannot be had.
+    """
+    if pool.in_process:
+        _prepare_process()
+        yield from map(fly_task, tasks)
+        return
+    waiting = iter(tasks)
+    with open_pool(pool) as workers:
+        while True:
+            under_way: dict[str, FlightTask] = {}
+            try:
+                yield from _fly_together(waiting, workers, under_way)
+            except Exception as error:
+                if not is_lost_worker(error):
+                    raise
+            else:
+                return
+            yield from (fly_alone(task) for task in list(under_way.values()))
+
+
+def _fly_together(
+    waiting: Iterator[FlightTask], workers: Workers, under_way: dict[str, FlightTask]
+) -> Iterator[Row]:
+    """Fly in the pool; `under_way` has what has been handed out and has not come back."""
+    from joblib import delayed
+
+    packed = _Packer()
+
+    def parcels() -> Iterator[Any]:
+        for task in waiting:
+            under_way[task.scenario.name] = task
+            yield delayed(_fly_parcel)(packed.parcel(task))
+
+    with _hidden_from_ctrl_c():
+        rows = workers(parcels())
+    with closing(rows):
+        for row in rows:
+            del under_way[row.scenario]
+            yield row
+
+
+class _Packer:
+    """Packs missions; the same one again without work."""
+
+    def __init__(self) -> None:
+        self._mission: Mission | None = None
+        self._packed = b""
+
+    def parcel(self, task: FlightTask) -> Parcel:
+        """Make a task ready to be sent."""
+        if task.mission is not self._mission:
+            self._mission, self._packed = task.mission, pickle.dumps(task.mission)
+        return Parcel(task.scenario, self._packed, task.seed)
+
+
+def fly_alone(task: FlightTask) -> Row:
+    """Fly in a process of its own, which may die."""
+    context = get_context("spawn")
+    receiver, sender = context.Pipe(duplex=False)
+    process = context.Process(target=_send_flight, args=(_Packer().parcel(task), sender), daemon=True)
+    with _hidden_from_ctrl_c():
+        process.start()
+    sender.close()
+    try:
+        row: Row = receiver.recv()
+    except EOFError:
+        process.join()
+        row = broken_off(task, WorkerDiedError(f"the flight ended its process ({_ending(process.exitcode)})"))
+    finally:
+        process.kill()
+        process.join()
+        receiver.close()
+    return row
+
+
+def _ending(exit_code: int | None) -> str:
+    if exit_code is not None and exit_code < 0:
+        return f"signal {signal.Signals(-exit_code).name}"
+    return f"exit code {exit_code}"
+
+
+def _send_flight(parcel: Parcel, sender: Connection) -> None:
+    row = _fly_parcel(parcel)
+    try:
+        sender.send(row)
+    except BrokenPipeError:
+        return  # nobody waits for it any more
+
+
+def _fly_parcel(parcel: Parcel) -> Row:
+    """Fly in a worker."""
+    _prepare_process()
+    return fly_task(FlightTask(parcel.scenario, _unpack(parcel.mission), parcel.seed))
+
+
+@lru_cache(maxsize=1)
+def _unpack(mission: bytes) -> Mission:
+    """The mission with its chart, which takes a while to build; it keeps nothing of a flight."""
+    unpacked = pickle.loads(mission)  # what `_Packer` has packed
+    assert isinstance(unpacked, Mission)
+    return unpacked
+
+
+@lru_cache(maxsize=1)
+def _prepare_process() -> None:
+    """One flight, one core: images and matrices are too small to share among threads."""
+    import cv2
+
+    cv2.setNumThreads(1)
+
+
+@contextmanager
+def _hidden_from_ctrl_c() -> Iterator[None]:
+    """Processes started within do not hear of Ctrl-C; this one hears of it afterwards, and ends them.
+
+    A terminal sends the signal to all of them; whether it is blocked, a child inherits.
+    """
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+    try:
+        yield
+    finally:
+        signal.pthread_sigmask(signal.SIG_SETMASK, before)

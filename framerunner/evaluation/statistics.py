@@ -1,0 +1,174 @@
+"""Counts, rates and spreads of an evaluation's flights."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from statistics import fmean, quantiles
+
+from framerunner.evaluation.rows import ERROR, LANDED, VERDICTS, Row
+from scenarios.models import COLOURS
+
+CONFIDENCE = 0.95
+
+
+@dataclass(frozen=True, slots=True)
+class Rate:
+    """How often something happened, and between what its true rate lies with 95 % confidence.
+
+    Attributes:
+        count: times it happened.
+        total: times it could have.
+        low: lower end of the interval, 0 to 1.
+        high: upper end.
+    """
+
+    count: int
+    total: int
+    low: float
+    high: float
+
+    @property
+    def share(self) -> float:
+        """From 0 to 1; 0 of nothing."""
+        return self.count / self.total if self.total else 0.0
+
+    def __str__(self) -> str:
+        """Such as "78.0 % (71.8 to 83.2)"."""
+        return f"{100 * self.share:.1f} % ({100 * self.low:.1f} to {100 * self.high:.1f})"
+
+
+@dataclass(frozen=True, slots=True)
+class Spread:
+    """How numbers are spread.
+
+    Attributes:
+        count: of numbers.
+        mean: average.
+        p10: a tenth is below.
+        median: half is below.
+        p90: nine tenths are below.
+    """
+
+    count: int
+    mean: float
+    p10: float
+    median: float
+    p90: float
+
+
+@dataclass(frozen=True, slots=True)
+class Cause:
+    """Failures that ended alike.
+
+    Attributes:
+        verdict: of all of them.
+        cause: see `Row.cause`.
+        rows: the flights.
+    """
+
+    verdict: str
+    cause: str
+    rows: tuple[Row, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class Summary:
+    """What an evaluation found.
+
+    Attributes:
+        flights: how many.
+        landed: clean or completed: the whole task within the limit.
+        verdicts: by verdict, best first; only those that occurred.
+        try_time_s: of flights that landed; None if none did.
+        offset_m: of crossings, by the frame's colour; only those that were crossed.
+        landing_error_m: of flights that landed; None if none did.
+        penalised: flights that were outside the arena.
+        seconds_in_state: mean over all flights that were flown, by kind of state, longest first.
+        causes: of failures, most frequent first.
+    """
+
+    flights: int
+    landed: Rate
+    verdicts: dict[str, Rate]
+    try_time_s: Spread | None
+    offset_m: dict[str, Spread]
+    landing_error_m: Spread | None
+    penalised: Rate
+    seconds_in_state: dict[str, float]
+    causes: tuple[Cause, ...]
+
+
+def wilson(count: int, total: int) -> Rate:
+    """A rate with its interval by Wilson's score, which holds for few flights and for rates near 0 and 1.
+
+    Source: E. B. Wilson, Probable inference, the law of succession, and statistical inference (1927).
+
+    Args:
+        count: times it happened.
+        total: times it could have.
+    """
+    from scipy.stats import binomtest
+
+    if total == 0:
+        return Rate(0, 0, 0.0, 1.0)
+    interval = binomtest(count, total).proportion_ci(CONFIDENCE, method="wilson")
+    return Rate(count, total, float(interval.low), float(interval.high))
+
+
+def spread(numbers: Sequence[float]) -> Spread | None:
+    """How numbers are spread; None if there are none."""
+    if not numbers:
+        return None
+    if len(numbers) == 1:
+        return Spread(1, *(float(numbers[0]),) * 4)
+    tenths = quantiles(numbers, n=10, method="inclusive")
+    return Spread(len(numbers), fmean(numbers), tenths[0], tenths[4], tenths[8])
+
+
+def summarise(rows: Sequence[Row]) -> Summary:
+    """Count an evaluation's flights."""
+    counts = Counter(row.verdict for row in rows)
+    landed = [row for row in rows if row.landed]
+    flown = [row for row in rows if row.verdict != ERROR]
+    offsets = {colour: spread(crossing_offsets_m(flown, colour)) for colour in COLOURS}
+    return Summary(
+        flights=len(rows),
+        landed=wilson(sum(counts[verdict] for verdict in LANDED), len(rows)),
+        verdicts={verdict: wilson(counts[verdict], len(rows)) for verdict in VERDICTS if counts[verdict] > 0},
+        try_time_s=spread([row.try_time_s for row in landed]),
+        offset_m={colour: found for colour, found in offsets.items() if found is not None},
+        landing_error_m=spread([row.landing_error_m for row in landed if row.landing_error_m is not None]),
+        penalised=wilson(sum(row.outside_s > 0.0 for row in flown), len(flown)),
+        seconds_in_state=mean_seconds_in_state(flown),
+        causes=causes(rows),
+    )
+
+
+def crossing_offsets_m(rows: Iterable[Row], colour: str) -> list[float]:
+    """How far from the middle of a frame of some colour it was crossed."""
+    return [
+        offset_m
+        for row in rows
+        for crossed, offset_m in zip(row.frames_crossed, row.crossing_offsets_m, strict=True)
+        if crossed == colour
+    ]
+
+
+def mean_seconds_in_state(rows: Sequence[Row]) -> dict[str, float]:
+    """Mean time a flight spends in each kind of state, longest first; flights that never came there count."""
+    sums: Counter[str] = Counter()
+    for row in rows:
+        sums.update(row.seconds_in_state)
+    return {state: seconds / len(rows) for state, seconds in sums.most_common()}
+
+
+def causes(rows: Iterable[Row]) -> tuple[Cause, ...]:
+    """Failures by verdict and cause, most frequent first."""
+    groups: dict[tuple[str, str], list[Row]] = {}
+    for row in rows:
+        if not row.landed:
+            groups.setdefault((row.verdict, row.cause), []).append(row)
+    found = [Cause(verdict, cause, tuple(group)) for (verdict, cause), group in groups.items()]
+    return tuple(sorted(found, key=lambda cause: (-len(cause.rows), cause.verdict, cause.cause)))

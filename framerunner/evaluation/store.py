@@ -1,0 +1,261 @@
+"""The folder of an evaluation: every flight is kept at once, and a stopped evaluation is found again."""
+
+from __future__ import annotations
+
+import fcntl
+import json
+import os
+import shutil
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+from framerunner.errors import SettingError
+from framerunner.evaluation.plan import Identity
+from framerunner.evaluation.rows import Row
+from framerunner.pictures import Track
+from scenarios.loader import dump_yaml
+from scenarios.models import Scenario
+
+FORMAT = 1
+IDENTITY, FLIGHTS, LOCK = "evaluation.json", "flights.jsonl", ".lock"
+_FOLDERS = ("scenarios", "tracks", "errors")
+_FILES = (IDENTITY, FLIGHTS, "results.csv", "report.html")
+
+
+@dataclass(frozen=True, slots=True)
+class EvaluationFolder:
+    """`evaluation.json` says what it is of, `flights.jsonl` has a line for each flight that is over.
+
+    Attributes:
+        path: the folder.
+        identity: what it is of.
+        rows: of all flights that are over, by scenario; without tracks.
+    """
+
+    path: Path
+    identity: Identity
+    rows: dict[str, Row] = field(default_factory=dict)
+
+    @property
+    def results(self) -> Path:
+        """The table."""
+        return self.path / "results.csv"
+
+    @property
+    def report(self) -> Path:
+        """The page."""
+        return self.path / "report.html"
+
+    def scenario_file(self, name: str) -> Path:
+        """The file of a scenario that was flown."""
+        return self.path / "scenarios" / f"{name}.yaml"
+
+    def error_file(self, name: str) -> Path:
+        """The traceback of a flight that was broken off."""
+        return self.path / "errors" / f"{name}.txt"
+
+    def keep(self, scenario: Scenario, row: Row) -> None:
+        """Write a flight so that neither a kill nor a power cut takes it away.
+
+        Its line comes last, so a flight that has one has all its files.
+
+        Raises:
+            SettingError: the disk does not take it.
+        """
+        with _writing(self.path):
+            self.scenario_file(row.scenario).write_text(dump_yaml(scenario), encoding="utf-8")
+            if row.track is not None:
+                text = json.dumps(_track_as_dict(row.track), separators=(",", ":"))
+                self._track_file(row.scenario).write_text(text, encoding="utf-8")
+            if row.traceback:
+                self.error_file(row.scenario).write_text(row.traceback, encoding="utf-8")
+            with (self.path / FLIGHTS).open("ab", buffering=0) as file:
+                file.write(row.to_json().encode() + b"\n")
+                os.fsync(file.fileno())
+        self.rows[row.scenario] = row if row.track is None else Row.from_result(row.as_dict())
+
+    def in_order(self) -> list[Row]:
+        """All rows, in the order of the scenarios."""
+        return [self.rows[name] for name in self.identity.scenarios if name in self.rows]
+
+    def track(self, name: str) -> Track:
+        """Where the drone was in a flight that failed; empty if that is not known."""
+        try:
+            return _track_from_dict(json.loads(self._track_file(name).read_text(encoding="utf-8")))
+        except (OSError, ValueError, KeyError, TypeError):
+            return Track()
+
+    def write(self, path: Path, text: str) -> None:
+        """Write a file of the folder whole or not at all.
+
+        Raises:
+            SettingError: the disk does not take it.
+        """
+        with _writing(self.path):
+            _replace(path, text)
+
+    def _track_file(self, name: str) -> Path:
+        return self.path / "tracks" / f"{name}.json"
+
+
+@contextmanager
+def open_folder(path: Path, identity: Identity, *, again: bool = False) -> Iterator[EvaluationFolder]:
+    """Make an evaluation's folder, or go on with the one that is there; nobody else can meanwhile.
+
+    Args:
+        path: the folder.
+        identity: of what is to be flown.
+        again: forget what was flown before.
+
+    Raises:
+        SettingError: the folder is of something else, is in use, or cannot be written to.
+    """
+    with _writing(path):
+        path.mkdir(parents=True, exist_ok=True)
+        lock = (path / LOCK).open("w")
+    with lock:
+        try:
+            fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except OSError:
+            raise SettingError(
+                f"--out {path}: another evaluation is writing here; wait, or choose another"
+            ) from None
+        is_new = _check(path, identity, again)
+        with _writing(path):
+            if is_new:
+                _clear(path)
+                data = {"format": FORMAT, **identity.as_dict()}
+                _replace(path / IDENTITY, json.dumps(data, indent=2) + "\n")
+            for name in _FOLDERS:
+                (path / name).mkdir(exist_ok=True)
+            rows = _mended(path / FLIGHTS, identity)
+        yield EvaluationFolder(path, identity, rows)
+
+
+def read_folder(path: Path, option: str) -> EvaluationFolder:
+    """Read an evaluation without changing it; it may still be under way.
+
+    Args:
+        path: the folder.
+        option: that named it, for messages.
+
+    Raises:
+        SettingError: there is no evaluation.
+    """
+    identity = _identity(path, option)
+    if identity is None:
+        raise SettingError(f"{option} {path}: holds no evaluation; give a folder that has {IDENTITY}")
+    return EvaluationFolder(path, identity, _read_rows(path / FLIGHTS, identity)[0])
+
+
+def _check(path: Path, identity: Identity, again: bool) -> bool:
+    """Whether the folder is to be begun anew; refuse one that is of something else."""
+    ours = {*_FILES, *_FOLDERS, LOCK}
+    found = {each.name.removesuffix(".part") for each in path.iterdir()}
+    there = _identity(path, "--out")
+    if there is None:
+        if found <= {LOCK, IDENTITY}:
+            return True
+        raise SettingError(f"--out {path}: has other files in it; choose a new folder")
+    if again:
+        if found <= ours:
+            return True
+        strange = sorted(found - ours)[0]
+        raise SettingError(f"--out {path}: {strange} in it is not of an evaluation; choose another")
+    difference = identity.difference(there)
+    if difference:
+        raise SettingError(
+            f"--out {path}: has an evaluation of {difference}; choose another, or --again to fly it anew"
+        )
+    return False
+
+
+def _identity(path: Path, option: str) -> Identity | None:
+    try:
+        data: dict[str, Any] = json.loads((path / IDENTITY).read_text(encoding="utf-8"))
+        if data.pop("format") != FORMAT:
+            raise SettingError(f"{option} {path}: was made by another version of framerunner; choose another")
+        return Identity.from_dict(data)
+    except (FileNotFoundError, NotADirectoryError):
+        return None
+    except (OSError, ValueError, TypeError, KeyError, AttributeError) as error:
+        if isinstance(error, SettingError):
+            raise
+        raise SettingError(f"{option} {path}: its {IDENTITY} cannot be read; choose another") from None
+
+
+def _clear(path: Path) -> None:
+    for name in _FILES:
+        (path / name).unlink(missing_ok=True)
+    for name in _FOLDERS:
+        shutil.rmtree(path / name, ignore_errors=True)
+
+
+def _mended(file: Path, identity: Identity) -> dict[str, Row]:
+    """Read the rows; a line that a kill or a power cut has torn is taken away, its flight is flown again."""
+    rows, is_whole = _read_rows(file, identity)
+    if not is_whole:
+        _replace(file, "".join(row.to_json() + "\n" for row in rows.values()))
+    return rows
+
+
+def _read_rows(file: Path, identity: Identity) -> tuple[dict[str, Row], bool]:
+    """Return the rows, and whether all lines were whole."""
+    rows: dict[str, Row] = {}
+    is_whole = True
+    try:
+        with file.open("r", encoding="utf-8", errors="replace") as lines:
+            for line in lines:
+                try:
+                    row = Row.from_json(line)
+                except ValueError:
+                    is_whole = False
+                    continue
+                is_whole = is_whole and line.endswith("\n")
+                if row.scenario in identity.scenarios:
+                    rows[row.scenario] = row
+    except FileNotFoundError:
+        pass
+    return rows, is_whole
+
+
+def _replace(path: Path, text: str) -> None:
+    part = path.with_name(path.name + ".part")
+    with part.open("w", encoding="utf-8", newline="") as file:
+        file.write(text)
+        file.flush()
+        os.fsync(file.fileno())
+    os.replace(part, path)
+
+
+@contextmanager
+def _writing(path: Path) -> Iterator[None]:
+    try:
+        yield
+    except OSError as error:
+        raise SettingError(
+            f"--out {path}: cannot be written to ({error.strerror}); mend it or choose another; "
+            "what was kept stays"
+        ) from None
+
+
+def _track_as_dict(track: Track) -> dict[str, Any]:
+    """A track as plain data; states by number, for there are few."""
+    states: Sequence[str] = list(dict.fromkeys(track.mission_state))
+    numbers = {state: number for number, state in enumerate(states)}
+    return {
+        "time_s": track.time_s,
+        "x": track.x,
+        "y": track.y,
+        "z": track.z,
+        "states": states,
+        "mission_state": [numbers[state] for state in track.mission_state],
+    }
+
+
+def _track_from_dict(data: dict[str, Any]) -> Track:
+    states = [data["states"][number] for number in data["mission_state"]]
+    return Track(data["time_s"], data["x"], data["y"], data["z"], states)
