@@ -2,7 +2,8 @@
 
 Variants:
     default: MuJoCo's own quality: shadows from a map of 4096 × 4096, four samples a pixel.
-    alike: as plain as our painter: shadows (map of 1024 × 1024), one sample a pixel.
+    alike: as plain as our painter: one sample a pixel, shadows from a map of 1024 × 1024: a pixel is
+        a centimetre, and the bars of the frames are two.
     fastest: one sample a pixel, no shadows, no sky, no ground beyond the floor.
 """
 
@@ -37,8 +38,10 @@ SKY = """<asset>
         <texture type="skybox" builtin="gradient" width="256" height="1536"
                  rgb1="0.7 0.8 0.85" rgb2="0.85 0.9 0.92"/>
       </asset>"""
-GROUND = '<geom type="plane" size="0 0 1" pos="0 0 -0.01" rgba="0.5 0.5 0.5 1" contype="0" conaffinity="0"/>'
-"""To the horizon, a little below the floor, as in our pictures."""
+GROUND = (
+    '<geom type="plane" size="40 40 20" pos="0 0 -0.01" rgba="0.5 0.5 0.5 1" contype="0" conaffinity="0"/>'
+)
+"""Beyond the floor, as in our pictures. Not MuJoCo's infinite plane: that is a fine grid, dear to draw."""
 ROTORS = ((1, -1, 1), (-1, 1, 1), (1, 1, -1), (-1, -1, -1))
 """Signs of x, y and of the torque about z: front right, rear left, front left, rear right."""
 
@@ -62,6 +65,7 @@ def model_xml(job: Job) -> str:
     )
     floor = f'<geom type="plane" size="{job.arena_m[0] / 2} {job.arena_m[1] / 2} 0.1" rgba="0.8 0.65 0.2 1"/>'
     plain = job.variant == "fastest"
+    shadow = "false" if plain else "true"
     return f"""
     <mujoco>
       <compiler angle="radian"/>
@@ -69,7 +73,7 @@ def model_xml(job: Job) -> str:
       <visual>{QUALITY[job.variant]}</visual>
       {"" if plain else SKY}
       <worldbody>
-        <light directional="true" pos="0 0 5" dir="{words(job.sun_direction)}" castshadow="{"false" if plain else "true"}"/>
+        <light directional="true" pos="0 0 5" dir="{words(job.sun_direction)}" castshadow="{shadow}"/>
         {"" if plain else GROUND}
         {floor}
         {boxes}
