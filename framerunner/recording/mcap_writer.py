@@ -1,13 +1,15 @@
 """Writes a flight as an MCAP file that Foxglove opens and `framerunner replay` shows again.
 
 All times are vehicle time since its boot, so two same flights leave the same bytes. Messages go to the file
-in compressed chunks of about a megabyte; no more than one of them is in memory.
+in compressed chunks of about a megabyte; no more than one of them is in memory. Raw images are compressed in
+a thread of their own, beside the flight.
 """
 
 from __future__ import annotations
 
 import json
 from collections.abc import Mapping, Sequence
+from concurrent.futures import Future, ThreadPoolExecutor
 from importlib import metadata
 from pathlib import Path
 from types import TracebackType
@@ -43,6 +45,7 @@ from vision.types import CameraFrame, Detections, Image
 
 METADATA = "framerunner"
 CHUNK_BYTES = 1 << 20
+_encode = json.JSONEncoder(separators=(",", ":"), allow_nan=False).encode
 
 
 class FlightRecording:
@@ -65,6 +68,7 @@ class FlightRecording:
 
     def __init__(self, path: Path, scenario: Scenario, mission: Mission, seed: int | None) -> None:
         self.problem = ""
+        self._path = path
         self._scenario = scenario
         self._size_px = (scenario.camera.width_px, scenario.camera.height_px)
         self._channels: dict[str, int] = {}
@@ -75,6 +79,8 @@ class FlightRecording:
         self._state = ""
         self._state_since_us = 0
         self._detections = Detections()
+        self._compressor = ThreadPoolExecutor(1, "compress images")
+        self._compressing: tuple[int, Future[bytes]] | None = None
         try:
             self._file = path.open("wb")
         except OSError as error:
@@ -111,10 +117,11 @@ class FlightRecording:
 
         Args:
             time_us: vehicle time of its exposure, microseconds.
-            image: BGR, shape (height, width, 3), uint8.
+            image: BGR, shape (height, width, 3), uint8; must not be changed afterwards.
         """
-        _, data = cv2.imencode(".png", image)
-        self._keep_image(time_us, bytes(data), "png", image)
+        self._size_px = (image.shape[1], image.shape[0])
+        self._keep_compressed()
+        self._compressing = (time_us, self._compressor.submit(_png, image))
 
     def see_frame(self, frame: CameraFrame) -> None:
         """Take an image of a camera source, as it was compressed if it was.
@@ -127,7 +134,8 @@ class FlightRecording:
         if frame.jpeg is None:
             self.see_image(time_us, frame.image)
         else:
-            self._keep_image(time_us, frame.jpeg, "jpeg", frame.image)
+            self._size_px = (frame.image.shape[1], frame.image.shape[0])
+            self._write(IMAGE, time_us, messages.image(frame.jpeg, "jpeg", time_us))
 
     def finish(self, result: Mapping[str, Any], track_time_s: Sequence[float]) -> None:
         """Add what is known only after the flight: crossings, the verdict, and the result as an attachment.
@@ -136,6 +144,7 @@ class FlightRecording:
             result: as in `result.json`, without wall times.
             track_time_s: of the ticks seen, since motors on; it tells when the try began.
         """
+        self._keep_compressed()
         end_us = self._now_us or 0
         if self._first_us is not None and track_time_s:
             began_us = self._first_us - round(track_time_s[0] * 1e6)
@@ -145,13 +154,17 @@ class FlightRecording:
         self._attach("result.json", "application/json", text, end_us)
 
     def close(self) -> None:
-        """Finish the file; a second time does nothing."""
+        """Finish the file, or take it away if there was nothing to record; a second time does nothing."""
+        self._compressor.shutdown()
         if self._file.closed:
             return
         try:
+            self._keep_compressed()
             if not self.problem:
                 self._writer.finish()  # type: ignore[no-untyped-call]
             self._file.close()
+            if not self._shown:
+                self._path.unlink()
         except OSError as error:
             self._stop(error)
 
@@ -191,9 +204,15 @@ class FlightRecording:
         image_us = time_us if seen.time_us is None else seen.time_us
         self._write(ANNOTATIONS, image_us, messages.boxes(seen, image_us, self._size_px))
 
-    def _keep_image(self, time_us: int, data: bytes, kind: str, image: Image) -> None:
-        self._size_px = (image.shape[1], image.shape[0])
-        self._write(IMAGE, time_us, messages.image(data, kind, time_us))
+    def _keep_compressed(self) -> None:
+        """Write the last raw image.
+
+        Always when the next one comes, so that the file's bytes do not hang on how quick the thread is.
+        """
+        if self._compressing is not None:
+            time_us, data = self._compressing
+            self._compressing = None
+            self._write(IMAGE, time_us, messages.image(data.result(), "png", time_us))
 
     def _cross_frames(self, result: Mapping[str, Any], began_us: int) -> None:
         rows = zip(
@@ -216,7 +235,7 @@ class FlightRecording:
             return
         if not self._shown:
             self._show(time_us)
-        data = json.dumps(message, separators=(",", ":"), allow_nan=False).encode()
+        data = _encode(message).encode()
         number = self._counts[topic]
         self._counts[topic] = number + 1
         time_ns = time_us * 1000
@@ -240,3 +259,8 @@ class FlightRecording:
             self._file.close()
         except OSError:  # what was buffered does not fit either; the file is closed all the same
             return
+
+
+def _png(image: Image) -> bytes:
+    """Compress without loss; OpenCV's defaults are its quickest."""
+    return bytes(cv2.imencode(".png", image)[1])
