@@ -1,0 +1,119 @@
+"""One try, step by step: a simulation, its drone and its eyes. Knows nothing of Gymnasium."""
+
+from __future__ import annotations
+
+from framerunner.gym.stepped_drone import SteppedDrone, run_through
+from framerunner.lockstep_eyes import LockstepEyes
+from offboard.drone import DroneError, DroneState, VelocityCommand
+from scenarios.ground import is_over_base, start_position
+from scenarios.models import COLOURS, Scenario
+from scenarios.referee import Referee
+from scenarios.report import RefereeReport
+from sitl.simulation import Simulation
+from vision.types import Detections, Image
+
+TAKEN_OFF_M = 0.3
+"""Rise above the start from which on coming down to the base is a landing."""
+STOP_ABOVE_BASE_M = 0.1
+"""Height of the drone's underside above the base at which the motors are stopped."""
+
+
+class SteppedFlight:
+    """A try that has begun: the drone stands on its start with its motors on.
+
+    Args:
+        scenario: what is flown.
+
+    Attributes:
+        state: of the drone, as telemetry told it at the present tick.
+        ended: why the drone can no longer be flown; empty while it can.
+
+    Raises:
+        DroneError: the drone does not get ready.
+    """
+
+    def __init__(self, scenario: Scenario) -> None:
+        self._scenario = scenario
+        self._simulation = Simulation(scenario)
+        self._eyes = LockstepEyes(scenario, self._take)
+        self._image: Image | None = None
+        self._height_m = self._simulation.world.airframe.envelope_m[2]
+        x_m, y_m, surface_m = start_position(scenario)
+        self._start_z_m = surface_m + self._height_m / 2
+        self._drone = SteppedDrone(
+            self._simulation,
+            (x_m, y_m, self._start_z_m, scenario.start.yaw_rad),
+            observers=(self._eyes.follow,),
+        )
+        self._taken_off = False
+        self._colours = tuple(
+            colour for colour in COLOURS if colour in {frame.colour for frame in scenario.frames}
+        )
+        self.ended = ""
+        run_through(self._drone.ready())
+        run_through(self._drone.motors_on())
+        self.state: DroneState = self._drone.next_state()
+
+    def _take(self, _time_us: int, image: Image) -> None:
+        self._image = image
+
+    @property
+    def referee(self) -> Referee:
+        """What judges this try."""
+        return self._simulation.referee
+
+    @property
+    def over(self) -> bool:
+        """Nothing more can be flown."""
+        return bool(self.ended) or self.referee.over
+
+    @property
+    def image(self) -> Image:
+        """The latest image that has arrived: BGR, shape (height, width, 3), uint8. Not to be written to."""
+        assert self._image is not None, "the camera gives its first image while the drone gets ready"
+        return self._image
+
+    def report(self) -> RefereeReport:
+        """What the try was worth; what the vehicle said matters only where the referee has not the last word."""
+        return self.referee.report(ended=None if self.referee.over else self.ended or None)
+
+    def detections(self) -> Detections:
+        """What the latest image showed."""
+        return self._eyes.latest(self.state.time_us)
+
+    def step(self, command: VelocityCommand) -> None:
+        """Fly a velocity for a tick of 50 ms, or land if this is one; see `_is_landing`.
+
+        Args:
+            command: within the limits.
+        """
+        try:
+            if self._is_landing(command):
+                run_through(self._drone.motors_off())
+                self.ended = "landed"
+            else:
+                self._drone.command(command)
+                self.state = self._drone.next_state()
+                self._taken_off = self._taken_off or self.state.z > self._start_z_m + TAKEN_OFF_M
+        except DroneError as error:
+            self.ended = str(error)
+        if self.ended:
+            run_through(self._drone.close())
+            self._drone.settle()
+
+    def _is_landing(self, command: VelocityCommand) -> bool:
+        """Whether to stop the motors now, as the paper's navigator does just above the base.
+
+        That is when all frames are crossed and the drone, which has taken off, is a hand's breadth above the
+        base or lower, and is told to go down.
+        """
+        state = self.state
+        underside_m = state.z - self._height_m / 2
+        base = self._scenario.base
+        return (
+            command.up_m_s < 0.0
+            and self._taken_off
+            and underside_m < base.top_m + STOP_ABOVE_BASE_M
+            and is_over_base(base, state.x, state.y)
+            and len(self.referee.crossings) == len(self._colours)
+        )
