@@ -74,7 +74,7 @@ class SteppedFlight:
         return self._image
 
     def report(self) -> RefereeReport:
-        """What the try was worth; what the vehicle said matters only where the referee has not the last word."""
+        """What the try was worth; what the vehicle said counts where the referee has not the last word."""
         return self.referee.report(ended=None if self.referee.over else self.ended or None)
 
     def detections(self) -> Detections:
