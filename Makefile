@@ -4,6 +4,7 @@
 PYTHON ?= python3
 VENV := .venv
 MAVPROXY_VENV := .venv-mavproxy
+BENCH_VENV := .venv-bench
 BIN := $(VENV)/bin
 ROOMS := scenarios firmware_py sitl vision offboard framerunner
 LOCK := uv pip compile --universal --python-version 3.11 --quiet --custom-compile-command 'make lock'
@@ -49,6 +50,10 @@ test-fast: $(VENV)/installed-dev ## the tests that need no real time, in paralle
 test-realtime: setup ## the tests that fly in real time, one after another
 	FRAMERUNNER_MAVPROXY=$(abspath $(MAVPROXY_VENV)/bin/mavproxy.py) $(BIN)/pytest -m realtime
 
+.PHONY: bench
+bench: $(VENV)/installed ## time our flight, alone and beside MuJoCo and PyFlyt; options in BENCH="--peers none"
+	$(BIN)/python -m benchmarks $(BENCH)
+
 .PHONY: format
 format: $(VENV)/installed-dev ## write the code as the checks want it
 	$(BIN)/ruff format .
@@ -65,9 +70,9 @@ lock: ## choose newer versions of everything installed (needs uv)
 
 .PHONY: clean
 clean: ## remove what was installed and built; runs/ is kept
-	rm -rf $(VENV) $(MAVPROXY_VENV) build dist *.egg-info
+	rm -rf $(VENV) $(MAVPROXY_VENV) $(BENCH_VENV) build dist *.egg-info
 	rm -rf .mypy_cache .ruff_cache .pytest_cache .import_linter_cache .hypothesis
-	find $(ROOMS) tests -name __pycache__ -type d -prune -exec rm -rf {} +
+	find $(ROOMS) benchmarks tests -name __pycache__ -type d -prune -exec rm -rf {} +
 
 # Set-up is repeated when what it was made from has changed; the stamp files remember when it was done.
 

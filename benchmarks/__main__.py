@@ -70,12 +70,12 @@ def measure(options: argparse.Namespace, scenario: Scenario, console: Console) -
     job = job_for(scenario, options.scenario, options.seconds, options.image_rate)
     if options.pictures:
         options.pictures.mkdir(parents=True, exist_ok=True)
-    with console.status("the parts of a flight") as status:
+    with console.status("starting") as status:
 
         def say(words: str) -> None:
             status.update(words[: max(20, console.width - 4)])
 
-        parts = measure_parts(options.scenario)
+        parts = measure_parts(options.scenario, options.repeats, say)
         rows = part_rows(parts, PHYSICS_RATE_HZ)
         length_s, rate_hz = parts["simulated_s"], parts["image_rate_hz"]
         show_parts(

@@ -102,6 +102,15 @@ def last_object(output: str) -> dict[str, Any]:
     return values
 
 
+def least(runs: list[dict[str, Any]]) -> dict[str, Any]:
+    """The least of every number of several runs; what is no number is the same in all."""
+    first = runs[0]
+    return {
+        key: min(run[key] for run in runs) if isinstance(value, int | float) else value
+        for key, value in first.items()
+    }
+
+
 def check_flight(flight: Flight, job: Job) -> None:
     """See that a flight did the job that it was timed for.
 

@@ -17,17 +17,24 @@ class PartRow:
 
     Attributes:
         name: of the part.
-        cost: with its unit.
+        cost_s: of one such thing, seconds.
         runs: the same in `run()`s of JSBSim.
+        share: of the whole flight's cost; None for what is not a part of it by itself.
         real_time: how many times faster than real time, where that means something.
-        verdict: the aim and whether it is reached; empty without an aim.
+        aim_runs: the most it is to cost.
     """
 
     name: str
-    cost: str
+    cost_s: float
     runs: float
+    share: float | None = None
     real_time: float | None = None
-    verdict: str = ""
+    aim_runs: float | None = None
+
+    @property
+    def reached(self) -> bool | None:
+        """Whether it costs no more than it is to; None without an aim."""
+        return None if self.aim_runs is None else self.runs <= self.aim_runs
 
 
 def part_rows(parts: dict[str, Any], physics_rate_hz: float) -> list[PartRow]:
@@ -37,19 +44,23 @@ def part_rows(parts: dict[str, Any], physics_rate_hz: float) -> list[PartRow]:
         parts: what `benchmarks/lockstep.py --json` printed.
         physics_rate_hz: steps of JSBSim in a second of flight.
     """
-    raw_s = parts["raw_s"]
+    raw_s, step_s = parts["raw_s"], parts["step_s"]
+    image_rate_hz = parts["image_rate_hz"]
+    whole_s = parts["flight_s"] / (parts["simulated_s"] * physics_rate_hz)  # a step's share of the flight
+    images_a_step = image_rate_hz / physics_rate_hz
+    rest_s = whole_s - step_s - images_a_step * (parts["render_s"] + parts["detect_s"])
 
-    def row(name: str, cost_s: float, *, whole: bool = False, aim: float | None = None) -> PartRow:
-        runs = cost_s / raw_s
-        verdict = "" if aim is None else f"<= {aim:.1f}: {'reached' if runs <= aim else 'missed'}"
-        real_time = 1 / (cost_s * physics_rate_hz) if whole else None
-        return PartRow(name, f"{cost_s * 1e6:.1f} us", runs, real_time, verdict)
+    def step(name: str, cost_s: float, share: float | None, aim_runs: float | None = None) -> PartRow:
+        return PartRow(name, cost_s, cost_s / raw_s, share, 1 / (cost_s * physics_rate_hz), aim_runs)
 
-    step_of_flight_s = parts["flight_s"] / (parts["simulated_s"] * physics_rate_hz)
+    def image(name: str, cost_s: float) -> PartRow:
+        return PartRow(name, cost_s, cost_s / raw_s, images_a_step * cost_s / whole_s)
+
     return [
-        row("JSBSim run()", raw_s, whole=True),
-        row("physics + autopilot, a step", parts["step_s"], whole=True, aim=STEP_AIM_RUNS),
-        row("an image painted", parts["render_s"]),
-        row("an image searched", parts["detect_s"]),
-        row("the whole challenge, a step", step_of_flight_s, whole=True, aim=FLIGHT_AIM_RUNS),
+        step("JSBSim run()", raw_s, None),
+        step("physics + autopilot, a step", step_s, step_s / whole_s, STEP_AIM_RUNS),
+        image("an image painted", parts["render_s"]),
+        image("an image searched", parts["detect_s"]),
+        PartRow("navigator and all the rest, a step", rest_s, rest_s / raw_s, rest_s / whole_s),
+        step("the whole challenge, a step", whole_s, 1.0, FLIGHT_AIM_RUNS),
     ]

@@ -42,15 +42,27 @@ def processor() -> str:
 def show_parts(console: Console, rows: list[PartRow], title: str) -> None:
     """What the parts of our flight cost."""
     table = Table(title=title, title_justify="left")
-    table.add_column("part of ours")
+    table.add_column("part of ours", no_wrap=True)
     table.add_column("costs", justify="right")
-    table.add_column("in JSBSim run()s", justify="right")
+    table.add_column("x run()", justify="right")
+    table.add_column("aim", no_wrap=True)
+    table.add_column("of the whole", justify="right")
     table.add_column("x real time", justify="right")
-    table.add_column("aim")
     for row in rows:
-        real_time = "" if row.real_time is None else f"{row.real_time:.0f}"
-        table.add_row(row.name, row.cost, f"{row.runs:.1f}", real_time, row.verdict)
+        table.add_row(
+            row.name,
+            f"{row.cost_s * 1e6:.1f} µs",
+            f"{row.runs:.1f}",
+            "" if row.aim_runs is None else f"<= {row.aim_runs:.1f} {verdict(row.reached)}",
+            "" if row.share is None else f"{row.share:.0%}",
+            "" if row.real_time is None else f"{row.real_time:.0f}",
+        )
     console.print(table)
+
+
+def verdict(reached: bool | None) -> str:
+    """Whether an aim is reached, in a word."""
+    return "reached" if reached else "missed"
 
 
 def show_comparison(console: Console, results: Results, job: Job) -> None:
@@ -58,14 +70,12 @@ def show_comparison(console: Console, results: Results, job: Job) -> None:
     image = f"{job.width_px} x {job.height_px} image at {job.image_rate_hz:g} Hz"
     title = f"{job.seconds:g} s of flight, {image}, one core"
     table = Table(title=title, title_justify="left")
-    table.add_column("program")
-    table.add_column("settings")
-    table.add_column("rates")
-    table.add_column("drawn by")
+    for heading in ("program", "settings", "rates", "drawn by"):
+        table.add_column(heading, no_wrap=True)
     table.add_column("x real time", justify="right")
     table.add_column("costs x ours", justify="right")
-    table.add_column("pairs", justify="right")
-    table.add_column("aim")
+    table.add_column("pairs", justify="right", no_wrap=True)
+    table.add_column("aim", no_wrap=True)
     ours = results.ours
     table.add_row(
         f"framerunner {ours.version}",
@@ -97,7 +107,7 @@ def comparison_row(comparison: Comparison) -> tuple[str, ...]:
         f"{1 / cost(peer):.1f}",
         f"{comparison.ratio:.1f}",
         f"{least:.1f} - {greatest:.1f}",
-        f">= {contender.target:g}: {'reached' if comparison.reached else 'missed'}",
+        f">= {contender.target:g} {verdict(comparison.reached)}",
     )
 
 

@@ -19,6 +19,7 @@ from benchmarks.compare import (
     check_flight,
     goals_along,
     last_object,
+    least,
     read_flight,
 )
 from benchmarks.contenders import Contender
@@ -78,9 +79,14 @@ def job_for(scenario: Scenario, name: str, seconds: float, image_rate_hz: float)
     )
 
 
-def measure_parts(scenario: str) -> dict[str, Any]:
-    """What the parts of a flight of ours cost; see `benchmarks/lockstep.py`."""
-    return last_object(_run([sys.executable, "-m", "benchmarks.lockstep", scenario, "--json"], ""))
+def measure_parts(scenario: str, repeats: int, say: Say) -> dict[str, Any]:
+    """What the parts of a flight of ours cost, the least of several runs; see `benchmarks/lockstep.py`."""
+    command = [sys.executable, "-m", "benchmarks.lockstep", scenario, "--json"]
+    runs = []
+    for number in range(1, repeats + 1):
+        say(f"the parts of our flight, {number} of {repeats}")
+        runs.append(last_object(run_program(command, "")))
+    return least(runs)
 
 
 def compare_all(
@@ -139,10 +145,10 @@ def _with_image(job: Job, pictures: Path | None, key: str) -> Job:
 
 
 def _fly(interpreter: str, module: str, job: Job) -> Flight:
-    return read_flight(_run([interpreter, "-m", module], job.to_json()))
+    return read_flight(run_program([interpreter, "-m", module], job.to_json()))
 
 
-def _run(command: list[str], text: str) -> str:
+def run_program(command: list[str], text: str) -> str:
     """Run a program to its end.
 
     Raises:

@@ -121,10 +121,10 @@ class World:
 def make_world(job: Job) -> World:
     """Compile the model and find a way to draw."""
     choose_display()
-    import mujoco
-
-    model = mujoco.MjModel.from_xml_string(model_xml(job))
     try:
+        import mujoco
+
+        model = mujoco.MjModel.from_xml_string(model_xml(job))
         return World(mujoco, model, mujoco.Renderer(model, job.height_px, job.width_px))
     except Exception as error:  # whatever the system's OpenGL throws, one line must say what is missing
         raise CannotFlyError(f"MuJoCo cannot draw without a screen ({error}). {EGL_MEND}") from error
@@ -144,7 +144,7 @@ def fly(job: Job) -> Flight:
         processor_s, wall_s = stopwatch.read()
     return Flight(
         world.mujoco.__version__,
-        f"{1 / TIMESTEP_S:.0f} / {1 / TIMESTEP_S / CONTROL_EVERY:.0f} Hz",
+        f"{1 / TIMESTEP_S:.0f}/{1 / TIMESTEP_S / CONTROL_EVERY:.0f} Hz",
         GL.glGetString(GL.GL_RENDERER).decode(),
         job.seconds,
         processor_s,

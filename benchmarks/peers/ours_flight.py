@@ -65,7 +65,7 @@ def fly(job: Job) -> Flight:
     simulated_s, processor_s, wall_s = timing.result
     return Flight(
         metadata.version("framerunner"),
-        f"{PHYSICS_RATE_HZ} / {PHYSICS_RATE_HZ // STEPS_PER_CONTROL} Hz",
+        f"{PHYSICS_RATE_HZ}/{PHYSICS_RATE_HZ // STEPS_PER_CONTROL} Hz",
         "OpenCV",
         simulated_s,
         processor_s,

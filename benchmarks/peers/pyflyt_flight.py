@@ -10,6 +10,7 @@ default variant, a segmentation with every image; there is no switch for less.
 
 from __future__ import annotations
 
+import ctypes
 import importlib.util
 from functools import partial
 from math import degrees, dist
@@ -42,8 +43,8 @@ def fly(job: Job) -> Flight:
         aviary.disconnect()
     return Flight(
         metadata.version("PyFlyt"),
-        f"{PHYSICS_RATE_HZ} / {CONTROL_RATE_HZ} Hz",
-        "TinyRenderer" if job.variant == "default" else "OpenGL by EGL",
+        f"{PHYSICS_RATE_HZ}/{CONTROL_RATE_HZ} Hz",
+        "TinyRenderer" if job.variant == "default" else "OpenGL",
         job.seconds,
         processor_s,
         wall_s,
@@ -87,9 +88,13 @@ def draw_with_opengl(aviary: Any) -> None:
     """Load PyBullet's plug-in; it draws only what is loaded after it, so the arena is loaded again."""
     import pybullet
 
+    try:
+        ctypes.CDLL("libEGL.so.1")  # without it, the plug-in ends the process
+    except OSError:
+        raise CannotFlyError(f"PyBullet's OpenGL plug-in needs EGL. {EGL_MEND}") from None
     spec = importlib.util.find_spec("eglRenderer")
     if spec is None or aviary.loadPlugin(spec.origin, "_eglRendererPlugin") < 0:
-        raise CannotFlyError(f"PyBullet's EGL plug-in does not load. {EGL_MEND}")
+        raise CannotFlyError(f"PyBullet's OpenGL plug-in does not load. {EGL_MEND}")
     aviary.reset()
     aviary.getCameraImage = partial(
         aviary.getCameraImage,
