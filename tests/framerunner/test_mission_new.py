@@ -8,7 +8,9 @@ import pytest
 
 from framerunner.cli import run
 from framerunner.lockstep import fly_lockstep
+from offboard.chart.vocabulary import Vocabulary
 from offboard.mission import load_mission
+from offboard.pilot import Pilot
 from offboard.pilot_file import read_pilot
 from offboard.starter import starter
 from scenarios.loader import load_scenario
@@ -134,3 +136,22 @@ def test_a_pilot_that_cannot_be_used_is_refused_in_one_line(capsys, command):
         assert message in said.err
         assert said.err.count("\n") == 1
         assert said.out == ""
+
+
+def test_the_documents_name_every_word_of_a_mission():
+    text = (Path(__file__).parents[2] / "docs" / "missions.md").read_text(encoding="utf-8")
+    vocabulary = Vocabulary(Pilot, {})
+    words = [*vocabulary.primitives, *vocabulary.values]
+    assert [word for word in words if not re.search(rf"`{word}\b", text)] == []
+
+
+@pytest.mark.parametrize("kind", ["yaml", "python"])
+def test_the_examples_of_the_documents_are_good(kind):
+    text = (Path(__file__).parents[2] / "docs" / "missions.md").read_text(encoding="utf-8")
+    example = re.search(rf"```{kind}\n(.*?)```", text, re.DOTALL).group(1)
+    if kind == "python":
+        Path("mine.py").write_text(example, encoding="utf-8")
+        assert {"creep", "far_away", "careful_m_s"} <= set(dir(read_pilot("mine.py").pilot_class()))
+    else:
+        Path("mine.yaml").write_text(example, encoding="utf-8")
+        assert fly("empty", "mine.yaml").result["ended"] == "finished"
