@@ -5,9 +5,12 @@ from __future__ import annotations
 import json
 from collections.abc import Iterator
 from contextlib import contextmanager
+from os import SEEK_END
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
+
+from mcap.writer import MCAP0_MAGIC
 
 from framerunner.recording.errors import RecordingError
 from framerunner.recording.events import Recorded
@@ -34,11 +37,11 @@ def recorded_flight(path: Path, pilot: PilotFile | None = None) -> Iterator[Reco
         return
     if not path.is_dir():
         raise RecordingError(f"replay '{path}': does not exist; name a run folder or an .mcap file")
-    if (path / "flight.mcap").is_file():
+    result = read_result(path)
+    if (path / "flight.mcap").is_file() and not _was_killed(path, result):
         with _mcap(path / "flight.mcap") as recorded:
             yield recorded
         return
-    result = read_result(path)
     if result is not None and "state_sha256" in result and (path / "mission.yaml").is_file():
         with (
             TemporaryDirectory(prefix="framerunner-replay-") as folder,
@@ -54,6 +57,15 @@ def recorded_flight(path: Path, pilot: PilotFile | None = None) -> Iterator[Reco
             f"replay '{path}': holds a result, but neither recording nor log; fly it again with --record"
         )
     raise RecordingError(f"replay '{path}': holds no flight; name a folder that `framerunner fly` left")
+
+
+def _was_killed(path: Path, result: dict[str, Any] | None) -> bool:
+    """Whether log and video tell of a real-time flight whose recording was not finished."""
+    if result is not None or not (path / "flight.tlog").is_file():
+        return False
+    with (path / "flight.mcap").open("rb") as file:
+        file.seek(max(0, file.seek(0, SEEK_END) - len(MCAP0_MAGIC)))
+        return file.read() != MCAP0_MAGIC
 
 
 @contextmanager

@@ -6,6 +6,7 @@ import json
 import warnings
 from base64 import b64decode
 from collections.abc import Iterator
+from os import SEEK_END
 from pathlib import Path
 from typing import Any, BinaryIO
 
@@ -13,6 +14,7 @@ import cv2
 import numpy as np
 from mcap.exceptions import McapError
 from mcap.reader import McapReader, SeekingReader
+from mcap.writer import MCAP0_MAGIC
 
 from framerunner.recording.errors import RecordingError
 from framerunner.recording.events import Crossed, Event, Picture
@@ -93,11 +95,30 @@ class McapRecording:
         """In one line, whatever a damaged file makes the libraries raise."""
         if isinstance(error, RecordingError):
             return error
-        text = " ".join(str(error).split()) if isinstance(error, McapError) else ""
-        said = text or f"{type(error).__name__} while reading"
+        first, last = self._ends()
+        if first != MCAP0_MAGIC:
+            return RecordingError(
+                f"recording '{self._path}': not an MCAP file; name a recording or a run folder"
+            )
+        if last != MCAP0_MAGIC:
+            what = "cut short, as if its program had been killed"
+        else:
+            text = " ".join(str(error).split()) if isinstance(error, McapError) else ""
+            what = f"damaged ({text or type(error).__name__:.120})"
         return RecordingError(
-            f"recording '{self._path}': damaged or cut short ({said:.120}); fly it again with --record"
+            f"recording '{self._path}': {what}; `mcap recover` of the MCAP tools may save a part of it"
         )
+
+    def _ends(self) -> tuple[bytes, bytes]:
+        """First and last bytes of the file; a whole one has MCAP's mark at both."""
+        length = len(MCAP0_MAGIC)
+        try:
+            with self._path.open("rb") as file:
+                first = file.read(length)
+                file.seek(max(0, file.seek(0, SEEK_END) - length))
+                return first, file.read()
+        except OSError:
+            return b"", b""
 
 
 class _Moments:

@@ -163,6 +163,13 @@ def test_a_real_time_flight_is_shown_from_its_log_and_video(tmp_path, capsys):
     assert said.out == "no result: the flight was not judged\n"
 
 
+def test_a_killed_real_time_flight_is_shown_from_its_log(tmp_path, recorded):
+    write_log(tmp_path / "flight.tlog")
+    (tmp_path / "flight.mcap").write_bytes(recorded.path.read_bytes()[:5000])
+    with recorded_flight(tmp_path) as flight:
+        assert len([event for event in flight.events() if isinstance(event, Moment)]) > 190
+
+
 def foreign_mcap(path):
     with path.open("wb") as file:
         writer = Writer(file)
@@ -202,10 +209,10 @@ def damage(tmp_path, recorded, how):
 @pytest.mark.parametrize(
     ("how", "words"),
     [
-        ("cut", "damaged or cut short"),
-        ("flipped", "damaged or cut short"),
-        ("text", "damaged or cut short"),
-        ("empty", "damaged or cut short"),
+        ("cut", "cut short, as if its program had been killed; `mcap recover`"),
+        ("flipped", "damaged (CRCValidationError); `mcap recover`"),
+        ("text", "not an MCAP file"),
+        ("empty", "not an MCAP file"),
         ("foreign", "not one of framerunner's; open it with Foxglove"),
         ("result", "result.json': damaged"),
         ("result only", "fly it again with --record"),
