@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from math import nan
 
 Vec3 = tuple[float, float, float]
@@ -121,9 +121,13 @@ class MotorOutput:
     Attributes:
         speeds_rad_s: one per rotor, in the airframe's order.
         throttle: mean of (speed / maximum)^2, 0..1.
-        saturated: whether a motor was at a limit.
+        thrust_high: less thrust than asked for.
+        thrust_low: more thrust than asked for.
+        yaw_cut: less yaw moment than asked for.
     """
 
-    speeds_rad_s: MotorSpeeds = field(default=(0.0, 0.0, 0.0, 0.0))
+    speeds_rad_s: MotorSpeeds = (0.0, 0.0, 0.0, 0.0)
     throttle: float = 0.0
-    saturated: bool = False
+    thrust_high: bool = False
+    thrust_low: bool = False
+    yaw_cut: bool = False

@@ -7,16 +7,18 @@ direction that pushes them apart. Plain scalars: this runs at the physics rate w
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from math import cos, hypot, sin, sqrt
+from dataclasses import dataclass, field
+from math import cos, sin, sqrt
 
 from scenarios.axes import Vec3
 from scenarios.models import Frame, Scenario
 
 Matrix = tuple[Vec3, Vec3, Vec3]
 
+_CYCLES = ((0, 1, 2), (1, 2, 0), (2, 0, 1))
 
-@dataclass(frozen=True, slots=True)
+
+@dataclass(frozen=True, slots=True, eq=False)
 class Solid:
     """An upright box that does not move.
 
@@ -25,18 +27,34 @@ class Solid:
         centre_arena_m: shape (3,).
         yaw_rad: its heading, counter-clockwise.
         half_extents_m: along its own axes, shape (3,).
-        reach_m: radius of the ball around it.
+        turn: cosine and sine of the heading.
     """
 
     name: str
     centre_arena_m: Vec3
     yaw_rad: float
     half_extents_m: Vec3
+    turn: tuple[float, float] = field(init=False)
 
-    @property
-    def reach_m(self) -> float:
-        """Radius of the ball that holds it."""
-        return hypot(*self.half_extents_m)
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "turn", (cos(self.yaw_rad), sin(self.yaw_rad)))
+
+    def is_within(self, reach_m: float, point_m: Vec3) -> bool:
+        """Whether a point (arena axes) is inside it or nearer to it than a distance."""
+        offset = self.offset(point_m)
+        square = 0.0
+        for along, half in zip(offset, self.half_extents_m, strict=True):
+            beyond = abs(along) - half
+            if beyond > 0.0:
+                square += beyond * beyond
+        return square < reach_m * reach_m
+
+    def offset(self, point_m: Vec3) -> Vec3:
+        """From its centre to a point (arena axes), in its own axes, metres."""
+        c, s = self.turn
+        x, y, z = self.centre_arena_m
+        dx, dy = point_m[0] - x, point_m[1] - y
+        return (c * dx + s * dy, c * dy - s * dx, point_m[2] - z)
 
 
 @dataclass(frozen=True, slots=True)
@@ -95,9 +113,8 @@ def touch(
     Returns:
         The touch, or None while they are apart.
     """
-    c, s = cos(solid.yaw_rad), sin(solid.yaw_rad)
-    dx, dy, dz = (centre_m[i] - solid.centre_arena_m[i] for i in range(3))
-    offset = (c * dx + s * dy, -s * dx + c * dy, dz)
+    c, s = solid.turn
+    offset = solid.offset(centre_m)
     r0, r1, r2 = rotation
     # The moving box's axes seen from the solid, as rows of the relative rotation.
     turn: Matrix = (
@@ -137,22 +154,31 @@ def _least_overlap(offset: Vec3, turn: Matrix, a: Vec3, b: Vec3) -> tuple[float,
             sign = 1.0 if offset[i] >= 0 else -1.0
             best_depth = depth
             best_normal = (sign if i == 0 else 0.0, sign if i == 1 else 0.0, sign if i == 2 else 0.0)
-    columns = [(turn[0][j], turn[1][j], turn[2][j]) for j in range(3)]
-    axes = list(columns)
-    for x, y, z in columns:  # cross products of the solid's axes with the box's axes
-        axes += [(0.0, -z, y), (z, 0.0, -x), (-y, x, 0.0)]
-    for axis in axes:
-        length = sqrt(axis[0] ** 2 + axis[1] ** 2 + axis[2] ** 2)
-        if length < 1e-3:  # parallel edges: a face axis has covered it
-            continue
-        nx, ny, nz = axis[0] / length, axis[1] / length, axis[2] / length
-        along = nx * offset[0] + ny * offset[1] + nz * offset[2]
-        depth = _reach((nx, ny, nz), columns, a, b) - abs(along)
+    for j in range(3):  # faces of the moving box
+        x, y, z = turn[0][j], turn[1][j], turn[2][j]
+        along = x * offset[0] + y * offset[1] + z * offset[2]
+        depth = b[j] + a[0] * abs(x) + a[1] * abs(y) + a[2] * abs(z) - abs(along)
         if depth <= 0.0:
             return None
         if depth < best_depth - 1e-9:
             sign = 1.0 if along >= 0 else -1.0
-            best_depth, best_normal = depth, (sign * nx, sign * ny, sign * nz)
+            best_depth, best_normal = depth, (sign * x, sign * y, sign * z)
+    for i, i1, i2 in _CYCLES:  # cross products of the solid's edges with the box's edges
+        for j, j1, j2 in _CYCLES:
+            u, v = turn[i1][j], turn[i2][j]
+            length = sqrt(u * u + v * v)
+            if length < 1e-3:  # parallel edges: a face axis has covered it
+                continue
+            along = u * offset[i2] - v * offset[i1]
+            reach = a[i1] * abs(v) + a[i2] * abs(u) + b[j1] * abs(turn[i][j2]) + b[j2] * abs(turn[i][j1])
+            depth = (reach - abs(along)) / length
+            if depth <= 0.0:
+                return None
+            if depth < best_depth - 1e-9:
+                scale = 1.0 / length if along >= 0 else -1.0 / length
+                normal = [0.0, 0.0, 0.0]
+                normal[i1], normal[i2] = -v * scale, u * scale
+                best_depth, best_normal = depth, (normal[0], normal[1], normal[2])
     return best_depth, best_normal
 
 

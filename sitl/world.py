@@ -5,7 +5,7 @@ No clock, socket or thread: `step` advances simulated time by one control period
 
 from __future__ import annotations
 
-from math import hypot
+from math import dist, hypot
 
 from firmware_py.airframe import Airframe
 from firmware_py.types import MotorSpeeds, Sensors, Vec3
@@ -21,6 +21,8 @@ STEPS_PER_CONTROL = 2
 CONTROL_PERIOD_US = 1_000_000 * STEPS_PER_CONTROL // PHYSICS_RATE_HZ
 _SETTLING_STEPS = PHYSICS_RATE_HZ  # one second, to stand at rest before time starts
 _MARGIN_M = 0.05  # how far the drone may come nearer within one control period (12 m/s)
+_NOTHING: Vec3 = (0.0, 0.0, 0.0)
+_FAR_TICKS = 250  # the longest time for which what is far is not looked at
 
 
 class World:
@@ -37,19 +39,15 @@ class World:
         self.airframe = airframe
         self.time_us = 0
         self._half_m: Vec3 = tuple(extent / 2 for extent in airframe.envelope_m)  # type: ignore[assignment]
-        self._reach_m = hypot(*self._half_m) + _MARGIN_M
-        self._base = base_solid(scenario)
+        self._radius_m = hypot(*self._half_m)
+        self._reach_m = self._radius_m + _MARGIN_M
         self._base_top_m = scenario.base.top_m
         self._base_level_m = scenario.base.top_m - self._half_m[2]  # a centre on the base is higher than this
-        self._base_reach_m = self._base.half_extents_m[0] + self._reach_m
-        self._groups = [
-            (
-                *frame.position_arena_m,
-                hypot(frame.outer_width_m, frame.outer_height_m, frame.bar_m) / 2 + self._reach_m,
-                frame_solids(frame),
-            )
-            for frame in scenario.frames
-        ]
+        self._groups = [_Group(frame.position_arena_m, frame_solids(frame)) for frame in scenario.frames]
+        base = base_solid(scenario)
+        self._base = _Group(base.centre_arena_m, (base,))
+        self._far_ticks = 0  # for so long nothing can be touched
+        self._ground_m = 0.0
         self._touching: dict[Solid, Vec3] = {}  # with the normal of the side it was entered through
         x_m, y_m, surface_m = start_position(scenario)
         self._dynamics = Dynamics(
@@ -61,24 +59,32 @@ class World:
             altitude_m=scenario.origin.altitude_m,
             rate_hz=PHYSICS_RATE_HZ,
         )
+        self._ground_m = surface_m
         self._dynamics.set_ground_height(surface_m)
         for _ in range(_SETTLING_STEPS):
             self._dynamics.run()
         self._position_ned_m = self._dynamics.position_ned_m()
+        self._position_arena_m = flip_vector(self._position_ned_m)
 
     def step(self, motor_speeds_rad_s: MotorSpeeds) -> None:
         """Advance by one control period with these motor commands (rad/s, the airframe's order)."""
         dynamics = self._dynamics
         dynamics.command_motors(motor_speeds_rad_s)
-        position = flip_vector(self._position_ned_m)
-        near = self._near(position)
-        for _ in range(STEPS_PER_CONTROL):
-            if near or self._touching:
-                self._push_from(near)
-            dynamics.run()
+        run = dynamics.run
+        if self._far_ticks > 0:
+            self._far_ticks -= 1
+            for _ in range(STEPS_PER_CONTROL):
+                run()
+        else:
+            near = self._look_around()
+            for _ in range(STEPS_PER_CONTROL):
+                if near or self._touching:
+                    self._push_from(near)
+                run()
+            dynamics.set_ground_height(self._ground_m)
         self.time_us += CONTROL_PERIOD_US
-        dynamics.set_ground_height(self._ground_below(position))
-        self._position_ned_m = dynamics.position_ned_m()
+        self._position_ned_m = position = dynamics.position_ned_m()
+        self._position_arena_m = flip_vector(position)
 
     def sensors(self) -> Sensors:
         """Sample ideal sensors now."""
@@ -99,17 +105,12 @@ class World:
             sensors: the ideal sample of this instant (so that JSBSim is read only once).
             motors_on: whether the autopilot is armed.
         """
-        position = flip_vector(sensors.position_ned_m)
+        position = self._position_arena_m
         contacts: tuple[str, ...] = ()
         if self._touching:
             contacts = tuple(dict.fromkeys(solid.name for solid in self._touching))
-        low = position[2] < self._base_top_m + self._reach_m
-        if (
-            low
-            and position[2] - self._ground_below(position) < self._reach_m
-            and self._dynamics.touches_ground()
-        ):
-            contacts = (*contacts, "base" if self._above_base(position) else "floor")
+        if position[2] < self._base_top_m + self._reach_m and self._touches_ground():
+            contacts = (*contacts, "base" if self._is_above_base() else "floor")
         return TrueState(
             self.time_us,
             position,
@@ -123,44 +124,52 @@ class World:
         """True speeds of the rotors."""
         return self._dynamics.motor_speeds_rad_s()
 
-    def _above_base(self, position_m: Vec3) -> bool:
+    def _is_above_base(self) -> bool:
         """Whether the base's top carries the drone: its centre is over the top and not below it.
 
         JSBSim knows one ground height for the whole drone. A drone whose centre of mass is beyond the
         edge would tip off, so the centre decides; the base's sides are a solid of their own.
         """
-        x, y, z = position_m
+        x, y, z = self._position_arena_m
         return z > self._base_level_m and is_over_base(self.scenario.base, x, y)
 
-    def _ground_below(self, position_m: Vec3) -> float:
-        return self._base_top_m if self._above_base(position_m) else 0.0
+    def _touches_ground(self) -> bool:
+        ground_m = self._base_top_m if self._is_above_base() else 0.0
+        return self._position_arena_m[2] - ground_m < self._reach_m and self._dynamics.touches_ground()
 
-    def _near(self, position_m: Vec3) -> tuple[Solid, ...]:
-        """Return the solids that could be touched within the next control period."""
-        x, y, z = position_m
+    def _look_around(self) -> tuple[Solid, ...]:
+        """Return the solids that could be touched within the next control period; note the ground's height.
+
+        When all are farther away, note for how long they need not be looked at again.
+        """
+        position, reach = self._position_arena_m, self._reach_m
+        above_base = self._is_above_base()
+        self._ground_m = self._base_top_m if above_base else 0.0
+        base_gap_m = self._base.gap_m(position)
+        nearest_m = base_gap_m
         near: tuple[Solid, ...] = ()
-        for fx, fy, fz, reach, solids in self._groups:
-            if -reach < x - fx < reach and -reach < y - fy < reach and -reach < z - fz < reach:
-                near += tuple([solid for solid in solids if self._reaches(solid, position_m)])
-        if z >= self._base_top_m + self._reach_m:
-            return near
-        bx, by, _ = self._base.centre_arena_m
-        reach = self._base_reach_m
-        beside = -reach < x - bx < reach and -reach < y - by < reach
-        return (*near, self._base) if beside and not self._above_base(position_m) else near
-
-    def _reaches(self, solid: Solid, position_m: Vec3) -> bool:
-        """Whether the balls around a solid and the drone may meet within the next control period."""
-        x, y, z = solid.centre_arena_m
-        dx, dy, dz = position_m[0] - x, position_m[1] - y, position_m[2] - z
-        reach = solid.reach_m + self._reach_m
-        return dx * dx + dy * dy + dz * dz < reach * reach
+        for group in self._groups:
+            gap_m = group.gap_m(position)
+            if gap_m < nearest_m:
+                nearest_m = gap_m
+            if gap_m < reach:
+                near += tuple([solid for solid in group.solids if solid.is_within(reach, position)])
+        self._far_ticks = min(int((nearest_m - reach) / _MARGIN_M), _FAR_TICKS)
+        return (*near, *self._base.solids) if base_gap_m < reach and not above_base else near
 
     def _push_from(self, near: tuple[Solid, ...]) -> None:
         """Set force and moment of a spring, a damper and friction at each touch (penalty method)."""
         dynamics = self._dynamics
         position = flip_vector(dynamics.position_ned_m())
+        near = tuple([solid for solid in near if solid.is_within(self._radius_m, position)])
+        if not near:
+            if self._touching:
+                self._touching = {}
+                dynamics.push(_NOTHING, _NOTHING)
+            return
         rotation = _rotation(flip_quaternion(dynamics.attitude()))
+        spin = _turn(rotation, flip_vector(dynamics.angular_rate_frd_rad_s()))
+        motion = flip_vector(dynamics.velocity_ned_m_s())
         force, moment = [0.0, 0.0, 0.0], [0.0, 0.0, 0.0]
         touching: dict[Solid, Vec3] = {}
         for solid in near:
@@ -169,9 +178,7 @@ class World:
                 continue
             touching[solid] = found.normal_arena
             arm = _minus(found.point_arena_m, position)
-            spin = _turn(rotation, flip_vector(dynamics.angular_rate_frd_rad_s()))
-            velocity = _plus(flip_vector(dynamics.velocity_ned_m_s()), _cross(spin, arm))
-            push = self._touch_force(found.depth_m, found.normal_arena, velocity)
+            push = self._touch_force(found.depth_m, found.normal_arena, _plus(motion, _cross(spin, arm)))
             twist = _cross(arm, push)
             for i in range(3):
                 force[i] += push[i]
@@ -191,6 +198,28 @@ class World:
         # Coulomb friction, made steady near standstill by a damper.
         drag = min(contact.friction * pressing / speed, contact.damping_n_s_m) if speed > 1e-9 else 0.0
         return _plus(_scaled(normal, pressing), _scaled(sliding, -drag))
+
+
+class _Group:
+    """Solids that stand together, and the ball around them.
+
+    Args:
+        centre_arena_m: of the ball.
+        solids: what it holds.
+    """
+
+    __slots__ = ("_centre_arena_m", "_radius_m", "solids")
+
+    def __init__(self, centre_arena_m: Vec3, solids: tuple[Solid, ...]) -> None:
+        self.solids = solids
+        self._centre_arena_m = centre_arena_m
+        self._radius_m = max(
+            dist(centre_arena_m, solid.centre_arena_m) + hypot(*solid.half_extents_m) for solid in solids
+        )
+
+    def gap_m(self, point_m: Vec3) -> float:
+        """From a point to the ball, below zero inside."""
+        return dist(point_m, self._centre_arena_m) - self._radius_m
 
 
 def _rotation(quaternion: Quaternion) -> Matrix:

@@ -2,31 +2,15 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from math import sqrt
 
 import numpy as np
 
 from firmware_py.airframe import Airframe
 from firmware_py.control.linear_model import allocation
-from firmware_py.types import MotorSpeeds
+from firmware_py.types import MotorOutput
 
-
-@dataclass(slots=True)
-class Mixed:
-    """Rotor speeds and what had to be given up for them.
-
-    Attributes:
-        speeds_rad_s: one per rotor, in the airframe's order.
-        thrust_high: less thrust than asked for.
-        thrust_low: more thrust than asked for.
-        yaw_cut: less yaw moment than asked for.
-    """
-
-    speeds_rad_s: MotorSpeeds
-    thrust_high: bool = False
-    thrust_low: bool = False
-    yaw_cut: bool = False
+_QUAD = 4
 
 
 class Mixer:
@@ -44,8 +28,10 @@ class Mixer:
         self._yaw = [float(y) for _, _, _, y in inverse]
         self._maximum = airframe.motor.max_speed_rad_s**2
         self._minimum = (idle_fraction * airframe.hover_speed_rad_s) ** 2
+        self._full = len(self._yaw) * self._maximum
+        self._quad = (*self._roll_pitch, *self._yaw) if len(self._yaw) == _QUAD else None
 
-    def mix(self, thrust_n: float, roll_nm: float, pitch_nm: float, yaw_nm: float) -> Mixed:
+    def mix(self, thrust_n: float, roll_nm: float, pitch_nm: float, yaw_nm: float) -> MotorOutput:
         """Return speeds that give this wrench, or the nearest that keeps roll and pitch longest.
 
         Args:
@@ -54,6 +40,25 @@ class Mixer:
             pitch_nm: see roll_nm.
             yaw_nm: see roll_nm.
         """
+        if self._quad is None:
+            return self._mix_within_limits(thrust_n, roll_nm, pitch_nm, yaw_nm)
+        # What nearly every tick of nearly every vehicle needs, without a loop: four rotors, no limit met.
+        (r0, p0), (r1, p1), (r2, p2), (r3, p3), y0, y1, y2, y3 = self._quad
+        base = self._thrust * thrust_n
+        a = base + (r0 * roll_nm + p0 * pitch_nm)
+        b = base + (r1 * roll_nm + p1 * pitch_nm)
+        c = base + (r2 * roll_nm + p2 * pitch_nm)
+        d = base + (r3 * roll_nm + p3 * pitch_nm)
+        y0, y1, y2, y3 = y0 * yaw_nm, y1 * yaw_nm, y2 * yaw_nm, y3 * yaw_nm
+        margin = max(y0, y1, y2, y3, -y0, -y1, -y2, -y3)
+        if min(a, b, c, d) - margin < self._minimum or max(a, b, c, d) + margin > self._maximum:
+            return self._mix_within_limits(thrust_n, roll_nm, pitch_nm, yaw_nm)
+        a, b, c, d = a + y0, b + y1, c + y2, d + y3
+        return MotorOutput((sqrt(a), sqrt(b), sqrt(c), sqrt(d)), (a + b + c + d) / self._full)
+
+    def _mix_within_limits(
+        self, thrust_n: float, roll_nm: float, pitch_nm: float, yaw_nm: float
+    ) -> MotorOutput:
         low, high = self._minimum, self._maximum
         tilt = [r * roll_nm + p * pitch_nm for r, p in self._roll_pitch]
         least, most = min(tilt), max(tilt)
@@ -62,20 +67,24 @@ class Mixer:
             tilt = [value * scale for value in tilt]
             least, most = least * scale, most * scale
         base = self._thrust * thrust_n
-        mixed = Mixed(())
-        if base + most > high:
-            base, mixed.thrust_high = high - most, True
-        if base + least < low:
-            base, mixed.thrust_low = low - least, True
+        thrust_high = base + most > high
+        if thrust_high:
+            base = high - most
+        thrust_low = base + least < low
+        if thrust_low:
+            base = low - least
         share = 1.0
         for value, yaw in zip(tilt, self._yaw, strict=True):
             asked = yaw * yaw_nm
             room = high - base - value if asked > 0 else base + value - low
             if asked and abs(asked) > room:
                 share = min(share, max(room, 0.0) / abs(asked))
-        mixed.yaw_cut = share < 1.0
         yaw_nm *= share
-        mixed.speeds_rad_s = tuple(
-            [sqrt(base + value + yaw * yaw_nm) for value, yaw in zip(tilt, self._yaw, strict=True)]
+        squares = [base + value + yaw * yaw_nm for value, yaw in zip(tilt, self._yaw, strict=True)]
+        return MotorOutput(
+            tuple([sqrt(square) for square in squares]),
+            sum(squares) / self._full,
+            thrust_high,
+            thrust_low,
+            share < 1.0,
         )
-        return mixed

@@ -11,7 +11,7 @@ linearisation), so that stopping from speed behaves as starting does and the int
 
 from __future__ import annotations
 
-from math import cos, hypot, sin
+from math import cos, sin, sqrt
 
 from firmware_py.airframe import GRAVITY_M_S2, Airframe
 from firmware_py.control.design import Weights, design
@@ -48,17 +48,18 @@ class Stabiliser:
         self._period_s = period_s
         self._mixer = Mixer(airframe)
         self._weight_n = airframe.weight_n
-        self._tilt_limit_rad = airframe.limits.tilt_rad
-        self._rate_limit_rad_s = airframe.limits.roll_pitch_rate_rad_s
-        self._max_squared = airframe.motor.max_speed_rad_s**2
+        self._tilt_limit_squared = airframe.limits.tilt_rad**2
         self._idle = MotorOutput(self._mixer.mix(0.0, 0.0, 0.0, 0.0).speeds_rad_s)
-        self._drag = airframe.drag.force_n_s2_m2
-        self._b_horizontal = horizontal_reference_weight
+        forward, right, down = airframe.drag.force_n_s2_m2
+        self._drag_share = (forward / self._weight_n, right / self._weight_n, down / self._weight_n)
         self._b_vertical = vertical_reference_weight
         self._b_yaw = yaw_reference_weight
         # Roll about forward answers v_right, pitch about right answers v_forward (nose down: forward).
-        self._roll = _Tilt(float(kx[1, 0]), float(kx[1, 2]), float(kx[1, 6]), float(ki[1, 1]))
-        self._pitch = _Tilt(float(kx[2, 1]), float(kx[2, 3]), float(kx[2, 5]), float(ki[2, 0]))
+        limit_rad_s = airframe.limits.roll_pitch_rate_rad_s
+        roll = (float(kx[1, 0]), float(kx[1, 2]), float(kx[1, 6]), float(ki[1, 1]))
+        pitch = (float(kx[2, 1]), float(kx[2, 3]), float(kx[2, 5]), float(ki[2, 0]))
+        self._roll = _Tilt(roll, horizontal_reference_weight, limit_rad_s)
+        self._pitch = _Tilt(pitch, horizontal_reference_weight, limit_rad_s)
         self._k_down, self._ki_down = float(kx[0, 7]), float(ki[0, 2])
         self._k_yaw, self._ki_yaw = float(kx[3, 4]), float(ki[3, 3])
         self._xi_down = 0.0
@@ -89,71 +90,77 @@ class Stabiliser:
 
         # The level axes turn with the yaw: to keep a velocity in them takes the centripetal tilt.
         turn = r / GRAVITY_M_S2
-        drag_forward, drag_right, drag_down = self._drag
-        roll = self._roll.angle(right, want_right, self._b_horizontal, period_s) + turn * forward
-        roll += drag_right * right * abs(right) / self._weight_n
-        pitch = self._pitch.angle(forward, want_forward, self._b_horizontal, period_s) + turn * right
-        pitch -= drag_forward * forward * abs(forward) / self._weight_n
-        tilt = hypot(roll, pitch)
-        if tilt > self._tilt_limit_rad:
-            scale = self._tilt_limit_rad / tilt
+        drag_forward, drag_right, drag_down = self._drag_share
+        roll_axis, pitch_axis = self._roll, self._pitch
+        roll = roll_axis.angle(right, want_right, period_s)
+        roll += turn * forward + drag_right * right * abs(right)
+        pitch = pitch_axis.angle(forward, want_forward, period_s)
+        pitch += turn * right - drag_forward * forward * abs(forward)
+        if roll * roll + pitch * pitch > self._tilt_limit_squared:
+            scale = sqrt(self._tilt_limit_squared / (roll * roll + pitch * pitch))
             roll, pitch = roll * scale, pitch * scale
-            self._roll.hold(right - want_right, period_s)
-            self._pitch.hold(forward - want_forward, period_s)
-        limit = self._rate_limit_rad_s
-        roll_nm = self._roll.moment(roll, state.roll_rad, p, limit)
-        pitch_nm = self._pitch.moment(pitch, state.pitch_rad, q, limit)
+            roll_axis.hold(right - want_right, period_s)
+            pitch_axis.hold(forward - want_forward, period_s)
+        roll_rad, pitch_rad = state.roll_rad, state.pitch_rad
+        roll_nm = roll_axis.moment(roll - roll_rad, p)
+        pitch_nm = pitch_axis.moment(pitch - pitch_rad, q)
 
         error_down = down - want_down
         error_yaw = r - command.yaw_rate_rad_s
         self._xi_down += error_down * period_s
         self._xi_yaw += error_yaw * period_s
-        lift_n = self._weight_n - drag_down * down * abs(down)
+        lift_n = self._weight_n * (1.0 - drag_down * down * abs(down))
         lift_n -= self._k_down * (down - self._b_vertical * want_down) + self._ki_down * self._xi_down
-        thrust_n = max(lift_n, 0.0) / max(cos(state.roll_rad) * cos(state.pitch_rad), _LEAST_COSINE)
+        cosine = cos(roll_rad) * cos(pitch_rad)
+        thrust_n = lift_n / (cosine if cosine > _LEAST_COSINE else _LEAST_COSINE) if lift_n > 0.0 else 0.0
         yaw_nm = -self._k_yaw * (r - self._b_yaw * command.yaw_rate_rad_s) - self._ki_yaw * self._xi_yaw
 
-        mixed = self._mixer.mix(thrust_n, roll_nm, pitch_nm, yaw_nm)
+        output = self._mixer.mix(thrust_n, roll_nm, pitch_nm, yaw_nm)
         # Anti-windup: an integral does not grow in the direction the motors cannot follow.
-        if (mixed.thrust_high and error_down > 0) or (mixed.thrust_low and error_down < 0):
+        if (output.thrust_high and error_down > 0) or (output.thrust_low and error_down < 0):
             self._xi_down -= error_down * period_s
-        if mixed.yaw_cut and (error_yaw < 0) == (yaw_nm > 0):
+        if output.yaw_cut and (error_yaw < 0) == (yaw_nm > 0):
             self._xi_yaw -= error_yaw * period_s
-        speeds = mixed.speeds_rad_s
-        squares = 0.0
-        for speed in speeds:
-            squares += speed * speed
-        throttle = squares / (len(speeds) * self._max_squared)
-        return MotorOutput(speeds, throttle, mixed.thrust_high or mixed.thrust_low or mixed.yaw_cut)
+        return output
 
 
 class _Tilt:
-    """One horizontal axis: velocity to angle to rate to moment, with its integral `xi`."""
+    """One horizontal axis: velocity to angle to rate to moment, with its integral `xi`.
 
-    __slots__ = ("_k_angle", "_k_rate", "_k_velocity", "_ki", "xi")
+    Args:
+        gains: of the angle, the rate, the velocity and its integral, as in u = -K x.
+        weight: how much of the reference acts at once (0..1).
+        rate_limit_rad_s: of the rate asked for.
+    """
 
-    def __init__(self, k_angle: float, k_rate: float, k_velocity: float, ki: float) -> None:
-        self._k_angle = k_angle
-        self._k_rate = k_rate
-        self._k_velocity = k_velocity / k_angle
-        self._ki = ki / k_angle
+    __slots__ = ("_k_angle", "_k_rate", "_k_velocity", "_ki", "_limit_nm", "_weight", "xi")
+
+    def __init__(
+        self, gains: tuple[float, float, float, float], weight: float, rate_limit_rad_s: float
+    ) -> None:
+        self._k_angle, self._k_rate, k_velocity, ki = gains
+        self._k_velocity = k_velocity / self._k_angle
+        self._ki = ki / self._k_angle
+        self._weight = weight
+        self._limit_nm = self._k_rate * rate_limit_rad_s  # the moment that a rate at its limit asks for
         self.xi = 0.0
 
-    def angle(self, velocity: float, wanted: float, weight: float, period_s: float) -> float:
+    def angle(self, velocity: float, wanted: float, period_s: float) -> float:
         """Integrate the error and return the angle asked for, rad."""
-        self.xi += (velocity - wanted) * period_s
-        return -self._k_velocity * (velocity - weight * wanted) - self._ki * self.xi
+        self.xi = xi = self.xi + (velocity - wanted) * period_s
+        return -self._k_velocity * (velocity - self._weight * wanted) - self._ki * xi
 
     def hold(self, error: float, period_s: float) -> None:
         """Take the last step of the integral back, unless it leads out of the limit."""
         if (self._ki * self.xi > 0) == (self._ki * error > 0):
             self.xi -= error * period_s
 
-    def moment(self, angle: float, measured: float, rate: float, rate_limit: float) -> float:
-        """Return the moment that turns the body to an angle, N m."""
-        wanted_rate = self._k_angle * (angle - measured) / self._k_rate
-        if wanted_rate > rate_limit:
-            wanted_rate = rate_limit
-        elif wanted_rate < -rate_limit:
-            wanted_rate = -rate_limit
-        return self._k_rate * (wanted_rate - rate)
+    def moment(self, error_rad: float, rate: float) -> float:
+        """Return the moment that turns the body by an angle, N m."""
+        wanted_nm = self._k_angle * error_rad
+        limit_nm = self._limit_nm
+        if wanted_nm > limit_nm:
+            wanted_nm = limit_nm
+        elif wanted_nm < -limit_nm:
+            wanted_nm = -limit_nm
+        return wanted_nm - self._k_rate * rate
