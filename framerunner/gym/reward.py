@@ -35,7 +35,8 @@ class Scorer:
     def reward(self) -> float:
         """For what has happened since the last call."""
         snapshot = self._referee.snapshot()
-        reward = CONTACT * (snapshot.contacts - self._contacts)
+        reward = 0.0  # plus the rest: a reward of -0.0 would puzzle
+        reward += CONTACT * (snapshot.contacts - self._contacts)
         reward += OUTSIDE_PER_S * (snapshot.penalty_s - self._penalty_s)
         self._contacts, self._penalty_s = snapshot.contacts, snapshot.penalty_s
         if len(snapshot.crossed) > self._crossed:

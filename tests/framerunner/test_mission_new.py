@@ -1,7 +1,9 @@
 """`mission new` writes a mission that is good, explains itself and flies, and overwrites nothing."""
 
+import fnmatch
 import re
 import shlex
+import tomllib
 from pathlib import Path
 
 import pytest
@@ -12,8 +14,10 @@ from offboard.chart.vocabulary import Vocabulary
 from offboard.mission import load_mission
 from offboard.pilot import Pilot
 from offboard.pilot_file import read_pilot
-from offboard.starter import starter
+from offboard.starter import TEMPLATES, starter
 from scenarios.loader import load_scenario
+
+ROOT = Path(__file__).parents[2]
 
 
 @pytest.fixture(autouse=True)
@@ -139,7 +143,7 @@ def test_a_pilot_that_cannot_be_used_is_refused_in_one_line(capsys, command):
 
 
 def test_the_documents_name_every_word_of_a_mission():
-    text = (Path(__file__).parents[2] / "docs" / "missions.md").read_text(encoding="utf-8")
+    text = (ROOT / "docs" / "missions.md").read_text(encoding="utf-8")
     vocabulary = Vocabulary(Pilot, {})
     words = [*vocabulary.primitives, *vocabulary.values]
     assert [word for word in words if not re.search(rf"`{word}\b", text)] == []
@@ -147,7 +151,7 @@ def test_the_documents_name_every_word_of_a_mission():
 
 @pytest.mark.parametrize("kind", ["yaml", "python"])
 def test_the_examples_of_the_documents_are_good(kind):
-    text = (Path(__file__).parents[2] / "docs" / "missions.md").read_text(encoding="utf-8")
+    text = (ROOT / "docs" / "missions.md").read_text(encoding="utf-8")
     example = re.search(rf"```{kind}\n(.*?)```", text, re.DOTALL).group(1)
     if kind == "python":
         Path("mine.py").write_text(example, encoding="utf-8")
@@ -155,3 +159,11 @@ def test_the_examples_of_the_documents_are_good(kind):
     else:
         Path("mine.yaml").write_text(example, encoding="utf-8")
         assert fly("empty", "mine.yaml").result["ended"] == "finished"
+
+
+def test_its_templates_are_shipped():
+    patterns = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["tool"]["setuptools"]
+    shipped = patterns["package-data"]["offboard"]
+    templates = [f"templates/{path.name}" for path in TEMPLATES.iterdir()]
+    assert len(templates) == 2
+    assert all(any(fnmatch.fnmatch(path, pattern) for pattern in shipped) for path in templates)

@@ -1,6 +1,7 @@
 """A contestant's Python file: what it may be, what is said if not, and that it travels with a mission."""
 
 import pickle
+import subprocess
 import sys
 from textwrap import dedent
 
@@ -59,6 +60,15 @@ MISSION = dedent("""\
         enter: [land]
         final: true
     """)
+
+FLY_WHAT_IS_SENT = """
+import pickle, sys
+from framerunner.lockstep import fly_lockstep
+from scenarios.loader import load_scenario
+
+result = fly_lockstep(load_scenario("empty"), pickle.load(sys.stdin.buffer)).result
+print(result["state_sha256"], result["try_time_s"])
+"""
 
 
 @pytest.fixture
@@ -236,10 +246,12 @@ def test_a_mission_travels_and_flies_alike(tmp_path, mission_file):
     scenario = load_scenario("empty")
     here = fly_lockstep(scenario, mission)
     sent = pickle.dumps(mission)  # after a flight: what it built must not be sent
-    there = fly_lockstep(scenario, pickle.loads(sent))
+    flown = subprocess.run(
+        [sys.executable, "-c", FLY_WHAT_IS_SENT], input=sent, capture_output=True, check=True
+    )
     assert len(sent) < 10_000
     assert here.outcome.ended == "finished"
-    assert there.result == here.result
+    assert flown.stdout.decode().split() == [here.result["state_sha256"], str(here.result["try_time_s"])]
     assert pickle.loads(sent) == mission
 
 
