@@ -10,6 +10,7 @@ from math import ceil
 import matplotlib as mpl
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from matplotlib.ticker import MaxNLocator
 
 from framerunner.evaluation.rows import ERROR, Row
 from framerunner.evaluation.statistics import crossing_offsets_m, mean_seconds_in_state
@@ -47,6 +48,7 @@ def time_chart(rows: Sequence[Row]) -> str:
         axes.legend(frameon=False, fontsize=8, labelcolor=_INK)
     axes.set_xlabel("try time (s)")
     axes.set_ylabel("flights")
+    axes.yaxis.set_major_locator(MaxNLocator(6, integer=True))
     axes.set_xlim(left=0.0)
     return _svg(figure, "time")
 
@@ -61,13 +63,13 @@ def offset_chart(rows: Sequence[Row]) -> str:
         last_m = max(max(offsets) for offsets in parts.values())
         step_m = 0.01 if last_m > 0.05 else 0.005
         edges = [step_m * number for number in range(ceil(last_m / step_m + 1e-9) + 1)]
-        for colour, offsets in parts.items():
-            ink = _FRAME_INKS[colour]
-            axes.hist(offsets, edges, histtype="stepfilled", fc=ink, alpha=0.16)
-            axes.hist(offsets, edges, histtype="step", color=ink, lw=1.5, label=f"{colour} ({len(offsets)})")
+        inks = [_FRAME_INKS[colour] for colour in parts]
+        labels = [f"{colour} ({len(offsets)})" for colour, offsets in parts.items()]
+        axes.hist(list(parts.values()), edges, stacked=True, color=inks, label=labels, ec="white", lw=0.5)
         axes.legend(frameon=False, fontsize=8, labelcolor=_INK)
-    axes.set_xlabel("from the opening's middle, in its plane (m)")
+    axes.set_xlabel("distance from the opening's middle (m)")
     axes.set_ylabel("crossings")
+    axes.yaxis.set_major_locator(MaxNLocator(6, integer=True))
     axes.set_xlim(left=0.0)
     return _svg(figure, "offset")
 

@@ -33,7 +33,7 @@ class Identity:
         mission_sha256: of the expanded chart with its variables.
         pilot: name of the contestant's file or class.
         pilot_sha256: of the contestant's file; empty for a class of the package.
-        seed: of everything random in a flight.
+        seeds: of everything random in each flight, in the scenarios' order.
         version: of framerunner.
     """
 
@@ -42,7 +42,7 @@ class Identity:
     mission_sha256: str
     pilot: str
     pilot_sha256: str
-    seed: int
+    seeds: tuple[int, ...]
     version: str
 
     def as_dict(self) -> dict[str, Any]:
@@ -54,11 +54,12 @@ class Identity:
         """Read what `as_dict` gave.
 
         Raises:
+            KeyError: a field is missing.
             TypeError: it is something else.
         """
         if not isinstance(data.get("scenarios"), Mapping):
             raise TypeError("scenarios are missing")
-        return cls(**data)
+        return cls(**{**data, "seeds": tuple(data["seeds"])})
 
     @property
     def sha256(self) -> str:
@@ -67,7 +68,7 @@ class Identity:
 
     def difference(self, other: Identity) -> str:
         """In a few words the first thing that is not the same; empty if all is."""
-        for what in ("mission", "pilot", "seed", "version"):
+        for what in ("mission", "pilot", "version"):
             mine, theirs = getattr(self, what), getattr(other, what)
             if mine != theirs:
                 return f"{what} {theirs}, not {mine}"
@@ -82,7 +83,7 @@ class Identity:
             if changed:
                 return f"another content of scenario {changed[0]}"
             return f"other scenarios ({_count(other.scenarios)}, not {_count(self.scenarios)})"
-        return ""
+        return "" if self.seeds == other.seeds else "other seeds"
 
 
 @dataclass(frozen=True)
@@ -94,14 +95,14 @@ class Plan:
         label: the same for a folder's name.
         scenarios: in order; names are unique.
         mission: checked.
-        seed: of everything random in a flight.
+        seeds: of everything random in each flight; that of a random scenario is its own.
     """
 
     title: str
     label: str
     scenarios: Sequence[Scenario]
     mission: Mission
-    seed: int = 0
+    seeds: Sequence[int]
 
     def __len__(self) -> int:
         """Number of flights."""
@@ -118,7 +119,7 @@ class Plan:
             mission_sha256=_sum(f"{mission.native}\n{variables}"),
             pilot=pilot.name if isinstance(pilot, PilotFile) else pilot.__qualname__,
             pilot_sha256=_sum(pilot.text) if isinstance(pilot, PilotFile) else "",
-            seed=self.seed,
+            seeds=tuple(self.seeds),
             version=metadata.version("framerunner"),
         )
 
@@ -129,9 +130,9 @@ class Plan:
 
     def tasks(self, done: Mapping[str, object]) -> Iterator[FlightTask]:
         """Flights that are not yet done, in order."""
-        for scenario in self.scenarios:
+        for scenario, seed in zip(self.scenarios, self.seeds, strict=True):
             if scenario.name not in done:
-                yield FlightTask(scenario, self.mission, self.seed)
+                yield FlightTask(scenario, self.mission, seed)
 
 
 def plan_level(level: str, first_seed: int, count: int, mission: Mission) -> Plan:
@@ -151,10 +152,11 @@ def plan_level(level: str, first_seed: int, count: int, mission: Mission) -> Pla
         raise SettingError(f"--count {count}: must be 1 or more")
     loaded = load_level(level)
     random_scenario(loaded, first_seed + count - 1)  # out of range? said before thousands are drawn
-    scenarios = [random_scenario(loaded, first_seed + number) for number in range(count)]
+    seeds = range(first_seed, first_seed + count)
+    scenarios = [random_scenario(loaded, seed) for seed in seeds]
     last = f" to {first_seed + count - 1}" if count > 1 else ""
     title = f"level {loaded.name}, seed{'s' if last else ''} {first_seed}{last}"
-    return Plan(title, f"{loaded.name}-{first_seed}-{count}", _checked(scenarios), mission)
+    return Plan(title, f"{loaded.name}-{first_seed}-{count}", _checked(scenarios), mission, seeds)
 
 
 def plan_files(places: Sequence[str], mission: Mission) -> Plan:
@@ -180,7 +182,7 @@ def plan_files(places: Sequence[str], mission: Mission) -> Plan:
         scenarios.append(scenario)
     title = ", ".join(places) if len(places) <= 4 else f"{len(places)} scenarios"
     label = re.sub(r"[^a-z0-9_-]+", "-", Path(places[0]).stem.lower()).strip("-") if len(places) == 1 else ""
-    return Plan(title, label[:40] or "scenarios", _checked(scenarios), mission)
+    return Plan(title, label[:40] or "scenarios", _checked(scenarios), mission, [0] * len(scenarios))
 
 
 def _sources(place: str) -> list[str]:

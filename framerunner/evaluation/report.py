@@ -14,7 +14,6 @@ from markupsafe import Markup
 
 from framerunner.evaluation.charts import offset_chart, rate_colours, state_chart, time_chart
 from framerunner.evaluation.compare import Comparison
-from framerunner.evaluation.plan import Identity
 from framerunner.evaluation.rows import ERROR, Row
 from framerunner.evaluation.statistics import Spread, Summary
 from framerunner.evaluation.store import EvaluationFolder
@@ -96,7 +95,7 @@ def write_report(
         comparison_lines=comparison_lines(page.comparison) if page.comparison else [],
         charts=[
             ("Try times", "how long from motors on to motors off", Markup(time_chart(rows))),
-            ("Crossings", "how far off the middle; 0.09 m is half the height", Markup(offset_chart(rows))),
+            ("Crossings", "how far off the opening's middle", Markup(offset_chart(rows))),
             ("Where time goes", "mean seconds in each state of the mission", Markup(state_chart(rows))),
         ],
         colours=rate_colours(),
@@ -106,16 +105,18 @@ def write_report(
     folder.write(folder.report, text)
 
 
-def replay_command(path: Path, mission: str, pilot: str | None) -> str:
+def replay_command(path: Path, mission: str, pilot: str | None, seed: int) -> str:
     """The command that flies one flight of an evaluation again, the same to the last bit.
 
     Args:
         path: the scenario's file.
         mission: name or file.
         pilot: a contestant's file; None without one.
+        seed: of the flight.
     """
     words = ["framerunner", "fly", str(path), "--mission", mission]
     words += ["--pilot", pilot] if pilot else []
+    words += ["--seed", str(seed)] if seed else []
     return shlex.join([*words, "--lockstep"])
 
 
@@ -145,7 +146,7 @@ def _failures(
                 advance(done, len(drawn))
                 picture = _picture(folder, row)
                 done += 1
-            command = replay_command(folder.scenario_file(row.scenario), page.mission, page.pilot)
+            command = replay_command(folder.scenario_file(row.scenario), page.mission, page.pilot, row.seed)
             failures.append(Failure(row, command, picture, _traceback(folder, row)))
         groups.append((cause.verdict, cause.cause, failures))
     return groups
@@ -165,17 +166,7 @@ def _picture(folder: EvaluationFolder, row: Row) -> str | None:
     png = BytesIO()
     outcome = Outcome.from_result(row.as_dict())
     draw_track(scenario, track, outcome).savefig(png, format="png", dpi=_PICTURE_DPI)
-    return f"data:image/png;base64,{b64encode(_in_few_colours(png.getvalue())).decode()}"
-
-
-def _in_few_colours(png: bytes) -> bytes:
-    """Pictures of lines need no more than a palette: a third of the bytes."""
-    from PIL import Image
-
-    small = BytesIO()
-    with Image.open(BytesIO(png)) as image:
-        image.convert("RGB").quantize(128).save(small, format="png", optimize=True)
-    return small.getvalue()
+    return f"data:image/png;base64,{b64encode(png.getvalue()).decode()}"
 
 
 def _traceback(folder: EvaluationFolder, row: Row) -> str:
@@ -192,8 +183,3 @@ def _spread_cells(spread: Spread | None, form: str) -> Sequence[str]:
     if spread is None:
         return ["–"] * 4
     return [format(number, form) for number in (spread.p10, spread.median, spread.p90, spread.mean)]
-
-
-def pilot_in_words(identity: Identity) -> str:
-    """The contestant's file, or nothing if the package's own pilot flew."""
-    return identity.pilot if identity.pilot_sha256 else ""

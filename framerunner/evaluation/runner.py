@@ -2,10 +2,14 @@
 
 from __future__ import annotations
 
+import os
 import pickle
 import signal
+import threading
+import time
+import warnings
 from collections.abc import Generator, Iterable, Iterator
-from contextlib import closing, contextmanager
+from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import lru_cache
 from multiprocessing import get_context
@@ -18,6 +22,8 @@ from framerunner.evaluation.task import FlightTask, broken_off, fly_task
 from offboard.mission import Mission
 from scenarios.models import Scenario
 
+_LOOK_UP_S = 0.5
+
 
 class WorkerDiedError(Exception):
     """The process that flew was ended, by its own code or from outside."""
@@ -25,11 +31,19 @@ class WorkerDiedError(Exception):
 
 @dataclass(frozen=True, slots=True)
 class Parcel:
-    """A task on its way: the mission is packed once for all, and unpacked once in each process."""
+    """A task on its way.
+
+    Attributes:
+        scenario: the layout.
+        mission: packed once for all, and unpacked once in each process.
+        seed: of everything random.
+        sender: process id of who sent it.
+    """
 
     scenario: Scenario
     mission: bytes
     seed: int
+    sender: int
 
 
 def fly_all(tasks: Iterable[FlightTask], pool: Pool) -> Generator[Row, None, None]:
@@ -82,10 +96,14 @@ def _fly_together(
 
     with _hidden_from_ctrl_c():
         rows = workers(parcels())
-    with closing(rows):
+    try:
         for row in rows:
             del under_way[row.scenario]
             yield row
+    finally:
+        with warnings.catch_warnings():  # that flights are broken off is what is wanted
+            warnings.simplefilter("ignore")
+            rows.close()
 
 
 class _Packer:
@@ -99,7 +117,7 @@ class _Packer:
         """Make a task ready to be sent."""
         if task.mission is not self._mission:
             self._mission, self._packed = task.mission, pickle.dumps(task.mission)
-        return Parcel(task.scenario, self._packed, task.seed)
+        return Parcel(task.scenario, self._packed, task.seed, os.getpid())
 
 
 def fly_alone(task: FlightTask) -> Row:
@@ -139,6 +157,8 @@ def _send_flight(parcel: Parcel, sender: Connection) -> None:
 def _fly_parcel(parcel: Parcel) -> Row:
     """Fly in a worker."""
     _prepare_process()
+    if os.getppid() == parcel.sender:
+        _end_with(parcel.sender)
     return fly_task(FlightTask(parcel.scenario, _unpack(parcel.mission), parcel.seed))
 
 
@@ -156,6 +176,18 @@ def _prepare_process() -> None:
     import cv2
 
     cv2.setNumThreads(1)
+
+
+@lru_cache(maxsize=1)
+def _end_with(parent: int) -> None:
+    """See to it that this process does not outlive the one that started it, however that ends."""
+
+    def watch() -> None:
+        while os.getppid() == parent:
+            time.sleep(_LOOK_UP_S)
+        os._exit(1)
+
+    threading.Thread(target=watch, daemon=True).start()
 
 
 @contextmanager

@@ -1,0 +1,151 @@
+"""The page and the table: everything in them, nothing from elsewhere, nothing taken for markup."""
+
+import csv
+import re
+import shlex
+from dataclasses import replace
+from html.parser import HTMLParser
+from io import StringIO
+from pathlib import Path
+
+import pytest
+
+from framerunner.cli import build_app
+from framerunner.evaluation.plan import plan_level
+from framerunner.evaluation.report import Page, picked_for_pictures, replay_command, write_report
+from framerunner.evaluation.rows import COLUMNS
+from framerunner.evaluation.statistics import summarise
+from framerunner.evaluation.store import open_folder
+from framerunner.evaluation.table_file import csv_text
+from framerunner.pictures import Track
+from offboard.mission import load_mission
+from tests.framerunner.evaluation.flights import made_row
+
+EVIL = "<script>alert('$x_{')</script>"
+TRACK = Track([0.0, 9.0], [0.0, 2.0], [0.0, 1.0], [0.5, 1.0], ["red.turning", "red.turning"])
+EMPTY = {"link", "meta", "img", "br", "use", "path", "input", "hr"}
+
+
+class Elements(HTMLParser):
+    """Checks that elements are closed as they were opened, and notes them."""
+
+    def __init__(self):
+        super().__init__()
+        self.open, self.seen, self.ids, self.sources = [], [], [], []
+
+    def handle_starttag(self, tag, attrs):
+        self.seen.append(tag)
+        given = dict(attrs)
+        self.ids += [given["id"]] if "id" in given else []
+        self.sources += [given[name] for name in ("src", "href", "xlink:href") if name in given]
+        if tag not in EMPTY:
+            self.open.append(tag)
+
+    def handle_startendtag(self, tag, attrs):
+        self.handle_starttag(tag, attrs)
+        if tag not in EMPTY:
+            self.open.pop()
+
+    def handle_endtag(self, tag):
+        if tag not in EMPTY:
+            assert self.open.pop() == tag
+
+
+def report(path, rows, **values):
+    plan = plan_level("calm", 1, 6, load_mission("frame_challenge"))
+    with open_folder(path, plan.identity) as folder:
+        for scenario, row in zip(plan.scenarios, rows, strict=False):
+            folder.keep(scenario, replace(row, scenario=scenario.name))
+        drawn = []
+        page = Page("level calm", "frame_challenge", None, "framerunner evaluate", summarise(rows), None)
+        write_report(folder, replace(page, **values), lambda done, total: drawn.append((done, total)))
+        return folder.report.read_text(encoding="utf-8"), drawn
+
+
+def test_the_page_stands_alone_and_shows_each_failure(tmp_path):
+    rows = [
+        made_row("calm-1"),
+        made_row("calm-2", "timed out", track=TRACK, seed=2),
+        made_row("calm-3", "error", reason=f"ValueError: {EVIL}", traceback=f"Traceback {EVIL}"),
+        made_row("calm-4", "crashed", mission_state=EVIL, seconds_in_state={EVIL: 3.0}),
+    ]
+    html, drawn = report(tmp_path / "a b", rows, title=EVIL, command=f"framerunner evaluate {EVIL}")
+    elements = Elements()
+    elements.feed(html)
+    assert elements.open == []
+    assert "script" not in elements.seen
+    assert len(elements.ids) == len(set(elements.ids))
+    assert all(source.startswith(("#", "data:image/png;base64,")) for source in elements.sources)
+    inner = {source[1:] for source in elements.sources if source.startswith("#")}
+    assert inner <= set(elements.ids)
+    assert not re.search(r"url\((?!#)|@import", html)
+    assert elements.seen.count("svg") == 3
+    assert elements.seen.count("img") == 1
+    assert drawn[-1] == (2, 3)
+    command = replay_command(tmp_path / "a b" / "scenarios" / "calm-2.yaml", "frame_challenge", None, 2)
+    assert command.replace("'", "&#39;") in html
+    assert "50" not in re.search(r"<b>(.*?) %</b>landed in time", html).group(1)
+    assert "25.0" in re.search(r"<b>(.*?) %</b>landed in time", html).group(1)
+
+
+def test_a_page_without_failures_and_one_without_flights(tmp_path):
+    html, drawn = report(tmp_path / "good", [made_row("calm-1")])
+    assert "Why flights failed" not in html
+    assert drawn == []
+    bad = [made_row("calm-1", "error", reason="X", frames_crossed=(), crossing_offsets_m=())]
+    html, _ = report(tmp_path / "bad", bad)
+    assert "Why flights failed" in html
+
+
+def test_the_same_flights_make_the_same_page(tmp_path):
+    rows = [made_row("calm-1"), made_row("calm-2", "timed out", track=TRACK)]
+    first, _ = report(tmp_path / "a", rows)
+    second, _ = report(tmp_path / "b", rows)
+    assert first.replace("/a/", "/b/") == second
+
+
+def test_the_replay_is_a_command_that_flies():
+    command = replay_command(Path("runs/my own/scenarios/calm-17.yaml"), "a.yaml", "mine.py", 17)
+    assert command == (
+        "framerunner fly 'runs/my own/scenarios/calm-17.yaml' --mission a.yaml --pilot mine.py "
+        "--seed 17 --lockstep"
+    )
+    build_app().parse_args(shlex.split(command)[1:], print_error=False, exit_on_error=False)
+
+
+def test_every_cause_is_drawn_before_any_is_drawn_often():
+    rows = [made_row(f"a{number}", "timed out") for number in range(50)]
+    rows += [made_row("b", "crashed"), made_row("c", "aborted")]
+    picked = picked_for_pictures(summarise(rows), 4)
+    assert len(picked) == 4
+    assert {"b", "c"} < picked
+    assert len(picked_for_pictures(summarise(rows), 100)) == 52
+
+
+def test_the_table_has_a_row_a_flight_and_gives_the_numbers_back():
+    rows = [
+        made_row("a", seconds_in_state={"turning": 3.1999999999999997, "crossing": 4.0}),
+        made_row("b", "timed out", reason='he said "no", twice'),
+        made_row("c", "error", reason="ValueError: no"),
+    ]
+    text = csv_text(rows)
+    assert text == csv_text(rows)
+    read = list(csv.DictReader(StringIO(text)))
+    assert tuple(read[0]) == COLUMNS
+    assert [line["scenario"] for line in read] == ["a", "b", "c"]
+    assert read[0]["crossing_offsets_m"] == "0.01;0.02;0.03"
+    assert read[0]["seconds_in_state"] == "turning=3.1999999999999997;crossing=4.0"
+    assert (read[0]["landed_on_base"], read[1]["landed_on_base"], read[1]["landing_error_m"]) == (
+        "true",
+        "false",
+        "",
+    )
+    assert read[1]["reason"] == 'he said "no", twice'
+    assert read[2]["verdict"] == "error"
+    assert {read[2][name] for name in ("try_time_s", "contacts", "landed_on_base", "ended")} == {""}
+    assert "wall_time_s" not in read[0]
+
+
+@pytest.mark.parametrize("count", [0, 1])
+def test_a_table_of_little(count):
+    assert len(csv_text([made_row()] * count).splitlines()) == 1 + count

@@ -1,0 +1,156 @@
+"""The folder of an evaluation: what was kept is found again, whatever happened meanwhile."""
+
+import os
+
+import pytest
+
+from framerunner.errors import SettingError
+from framerunner.evaluation.plan import plan_level
+from framerunner.evaluation.store import FLIGHTS, open_folder, read_folder
+from framerunner.pictures import Track
+from offboard.mission import load_mission
+from scenarios.loader import load_scenario
+from tests.framerunner.evaluation.flights import made_row
+
+TRACK = Track([0.0, 0.2], [1.0, 2.0], [3.0, 4.0], [0.5, 0.6], ["red.turning", "red.turning"])
+
+
+@pytest.fixture(scope="module")
+def plan():
+    return plan_level("calm", 1, 4, load_mission("frame_challenge"))
+
+
+def keep(path, plan, *rows):
+    with open_folder(path, plan.identity) as folder:
+        scenarios = {each.name: each for each in plan.scenarios}
+        for row in rows:
+            folder.keep(scenarios[row.scenario], row)
+
+
+def kept(path, plan, **options):
+    with open_folder(path, plan.identity, **options) as folder:
+        return folder.in_order()
+
+
+def test_rows_are_found_again_in_the_order_of_the_scenarios(tmp_path, plan):
+    failed = made_row("calm-3", "timed out", track=TRACK)
+    error = made_row("calm-2", "error", traceback="Traceback: this and that")
+    keep(tmp_path / "a" / "b", plan, failed, made_row("calm-1"))
+    keep(tmp_path / "a" / "b", plan, error)
+    assert kept(tmp_path / "a" / "b", plan) == [made_row("calm-1"), error, failed]
+    folder = read_folder(tmp_path / "a" / "b", "--compare")
+    assert folder.track("calm-3") == TRACK
+    assert folder.track("calm-1") == Track()
+    assert folder.rows["calm-3"].track is None
+    assert folder.error_file("calm-2").read_text(encoding="utf-8") == "Traceback: this and that"
+    assert load_scenario(folder.scenario_file("calm-3")) == plan.scenarios[2]
+
+
+@pytest.mark.parametrize("cut", [1, 2, 40, 10_000])
+def test_a_torn_last_line_is_flown_again_and_does_not_spoil_the_next(tmp_path, plan, cut):
+    rows = [made_row("calm-1"), made_row("calm-2"), made_row("calm-3")]
+    keep(tmp_path, plan, *rows[:2])
+    file = tmp_path / FLIGHTS
+    content = file.read_bytes()
+    last = content.rindex(b"\n", 0, -1) + 1
+    file.write_bytes(content[: max(last, len(content) - cut)])
+    expected = rows[:2] if cut == 1 else rows[:1]  # only the end of the line was missing
+    assert kept(tmp_path, plan) == expected
+    keep(tmp_path, plan, rows[2])
+    assert kept(tmp_path, plan) == [*expected, rows[2]]
+
+
+def test_rubbish_in_between_costs_only_its_own_flight(tmp_path, plan):
+    keep(tmp_path, plan, made_row("calm-1"), made_row("calm-2"), made_row("calm-3"))
+    file = tmp_path / FLIGHTS
+    lines = file.read_bytes().splitlines(keepends=True)
+    file.write_bytes(lines[0] + b"\0" * 30 + b"\xff\n" + lines[2] + b"{}\n")
+    assert [row.scenario for row in kept(tmp_path, plan)] == ["calm-1", "calm-3"]
+    assert len(file.read_bytes().splitlines()) == 2
+
+
+def test_another_evaluation_is_refused_unless_it_shall_be_flown_anew(tmp_path, plan):
+    keep(tmp_path, plan, made_row("calm-1"))
+    other = plan_level("calm", 1, 4, load_mission("soft_landing"))
+    with pytest.raises(SettingError) as caught:
+        kept(tmp_path, other)
+    assert str(caught.value) == (
+        f"--out {tmp_path}: has an evaluation of mission frame_challenge, not soft_landing; "
+        "choose another, or --again to fly it anew"
+    )
+    assert len(kept(tmp_path, plan)) == 1
+    assert kept(tmp_path, other, again=True) == []
+    assert not list((tmp_path / "scenarios").iterdir())
+
+
+def test_again_forgets_the_same_too(tmp_path, plan):
+    keep(tmp_path, plan, made_row("calm-1"))
+    assert kept(tmp_path, plan, again=True) == []
+
+
+def test_other_people_s_files_are_left_alone(tmp_path, plan):
+    (tmp_path / "thesis.tex").write_text("years of work", encoding="utf-8")
+    for again in (False, True):
+        with pytest.raises(SettingError, match="has other files in it; choose a new folder"):
+            kept(tmp_path, plan, again=again)
+    inside = tmp_path / "inside"
+    keep(inside, plan)
+    (inside / "thesis.tex").write_text("years of work", encoding="utf-8")
+    with pytest.raises(SettingError, match=r"thesis\.tex in it is not of an evaluation"):
+        kept(inside, plan, again=True)
+    assert (inside / "thesis.tex").exists()
+    assert kept(inside, plan) == []  # going on beside it does no harm
+
+
+def test_a_folder_that_was_hardly_begun_is_begun_again(tmp_path, plan):
+    (tmp_path / ".lock").touch()
+    (tmp_path / "evaluation.json.part").write_text('{"form', encoding="utf-8")
+    assert kept(tmp_path, plan) == []
+    assert (tmp_path / "evaluation.json").exists()
+
+
+def test_two_evaluations_do_not_write_into_one_folder(tmp_path, plan):
+    with open_folder(tmp_path, plan.identity):  # noqa: SIM117 - one after the other
+        with pytest.raises(SettingError, match="another evaluation is writing here"):
+            kept(tmp_path, plan)
+    assert kept(tmp_path, plan) == []
+
+
+@pytest.mark.parametrize(
+    ("content", "message"),
+    [
+        ('{"format": 99}', "was made by another version"),
+        ("{", "evaluation.json cannot be read"),
+        ("[]", "evaluation.json cannot be read"),
+        ('{"format": 1}', "evaluation.json cannot be read"),
+    ],
+)
+def test_an_identity_that_cannot_be_read_is_refused(tmp_path, plan, content, message):
+    keep(tmp_path, plan)
+    (tmp_path / "evaluation.json").write_text(content, encoding="utf-8")
+    with pytest.raises(SettingError, match=message):
+        kept(tmp_path, plan)
+
+
+def test_a_folder_that_cannot_be_made_is_refused(tmp_path, plan):
+    (tmp_path / "file").touch()
+    with pytest.raises(SettingError, match=r"--out .*file/x: cannot be written to"):
+        kept(tmp_path / "file" / "x", plan)
+
+
+def test_a_disk_that_fails_is_told_and_what_was_kept_stays(tmp_path, plan, monkeypatch):
+    keep(tmp_path, plan, made_row("calm-1"))
+
+    def full(_descriptor):
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr(os, "fsync", full)
+    with pytest.raises(SettingError, match=r"No space left on device.*what was kept stays"):
+        keep(tmp_path, plan, made_row("calm-2"))
+    monkeypatch.undo()
+    assert kept(tmp_path, plan)[0] == made_row("calm-1")
+
+
+def test_there_must_be_something_to_compare_with(tmp_path):
+    with pytest.raises(SettingError, match=r"--compare .*: holds no evaluation"):
+        read_folder(tmp_path / "nothing", "--compare")

@@ -1,0 +1,102 @@
+"""One flight of an evaluation: its row, and that nothing that goes wrong in it comes out of it."""
+
+from dataclasses import replace
+
+import pytest
+
+from framerunner.evaluation import task as task_module
+from framerunner.evaluation.rows import COLUMNS, Row
+from framerunner.evaluation.task import FlightTask, fly_task, thinned
+from framerunner.lockstep import fly_lockstep
+from framerunner.pictures import Track
+from offboard.mission import load_mission
+from offboard.pilot_file import PilotFile
+from tests.framerunner.evaluation.flights import made_row, short_scenario
+
+BAIL = """
+from offboard.pilot import Pilot
+
+class Bail(BaseException):
+    pass
+
+class MyPilot(Pilot):
+    def hover(self):
+        {action}
+"""
+
+
+def task(seed=1, pilot=None):
+    return FlightTask(short_scenario(seed), load_mission("frame_challenge", pilot))
+
+
+def test_a_row_has_the_result_s_fields_and_order():
+    flight = task()
+    result = fly_lockstep(flight.scenario, flight.mission).result
+    row = fly_task(flight)
+    assert tuple(result) == COLUMNS
+    assert row.as_dict() == result
+    assert (row.verdict, row.landed, row.cause) == ("timed out", False, "take_off.set_base")
+    assert row.traceback == ""
+
+
+def test_a_failed_flight_brings_its_track_thinned_out():
+    flight = task()
+    whole = fly_lockstep(flight.scenario, flight.mission).track
+    track = fly_task(flight).track
+    assert len(track) < len(whole) / 2
+    assert (track.time_s[0], track.time_s[-1]) == (round(whole.time_s[0], 3), round(whole.time_s[-1], 3))
+
+
+def test_a_row_survives_json():
+    row = made_row(seconds_in_state={"turning": 3.1999999999999997})
+    assert Row.from_json(row.to_json()) == row
+    for line in ("", "{}", "[]", "1", row.to_json()[:-1]):
+        with pytest.raises(ValueError, match=r".*"):
+            Row.from_json(line)
+
+
+def test_a_fault_of_the_program_is_a_row_with_its_traceback():
+    row = fly_task(replace(task(), scenario=short_scenario(1).model_copy(update={"airframe": "nonesuch"})))
+    assert (row.scenario, row.verdict, row.ended) == ("calm-1", "error", "error")
+    assert row.reason.startswith("AirframeError: ")
+    assert row.cause == "AirframeError"
+    assert "Traceback" in row.traceback and "fly_lockstep" in row.traceback
+
+
+def test_a_contestant_s_code_may_raise_anything():
+    row = fly_task(task(pilot=PilotFile("bail.py", BAIL.format(action="raise Bail('enough')"))))
+    assert (row.verdict, row.reason) == ("error", "Bail: enough")
+    row = fly_task(task(pilot=PilotFile("bail.py", BAIL.format(action="raise SystemExit(3)"))))
+    assert row.verdict == "aborted"
+
+
+def test_a_number_that_cannot_be_kept_is_the_flight_s_fault(monkeypatch):
+    flight = task()
+    flown = fly_lockstep(flight.scenario, flight.mission)
+    broken = replace(flown, result={**flown.result, "path_length_m": float("nan")})
+    monkeypatch.setattr(task_module, "fly_lockstep", lambda *_args, **_options: broken)
+    assert fly_task(flight).verdict == "error"
+
+
+def test_ctrl_c_is_no_verdict(monkeypatch):
+    flight = task()
+    flown = fly_lockstep(flight.scenario, flight.mission)
+    stopped = replace(flown, outcome=replace(flown.outcome, ended="aborted", reason="interrupted"))
+    monkeypatch.setattr(task_module, "fly_lockstep", lambda *_args, **_options: stopped)
+    with pytest.raises(KeyboardInterrupt):
+        fly_task(flight)
+
+
+def test_thinning_keeps_both_ends_and_every_change_of_state():
+    count = 100
+    times = [number * 0.05 for number in range(count)]
+    states = ["a"] * 33 + ["b"] * 1 + ["c"] * 66
+    thin = thinned(Track(times, times, times, times, states))
+    assert thin.time_s[0] == 0.0
+    assert thin.time_s[-1] == 4.95
+    assert len(thin) < 32
+    assert list(thin.seconds_in_state()) == ["a", "b", "c"]
+    assert thin.seconds_in_state() == pytest.approx(
+        Track(times, times, times, times, states).seconds_in_state()
+    )
+    assert len(thinned(Track())) == 0
