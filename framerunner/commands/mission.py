@@ -101,12 +101,8 @@ def new(
     print(f"  framerunner mission check {files.arguments}")
     print(f"  framerunner fly test-case-1 --lockstep --mission {files.arguments}")
     print()
-    print(
-        "The first says whether it is good, the second flies it. It crosses red only, so the referee will call the"
-    )
-    print(
-        "flight aborted: green and blue are the first exercise. The comments in the file explain everything."
-    )
+    print("The first says whether it is good, the second flies it. The comments in the file explain it all.")
+    print("It crosses red only, so the referee will call the flight aborted: green and blue are left to you.")
     return 0
 
 
