@@ -29,6 +29,7 @@ Image = npt.NDArray[np.uint8]
 
 _HAZE_BAND = 0.09  # height of a band of haze above the horizon, as a share of the focal length
 _MARGIN_PX = 2  # painted around the image and cut off: OpenCV is not exact at the border of its canvas
+_OVERLAP_PX = 2.0  # of neighbouring bands of colour, so that no gap is seen between them
 _LOST_M = 1e5  # from farther away nothing but sky and ground is to be seen
 
 
@@ -63,7 +64,7 @@ class Camera:
             attitude_arena: quaternion (w, x, y, z), body FLU to arena; need not have unit length.
 
         Returns:
-            A new image, BGR, shape (height, width, 3), uint8.
+            A new image, BGR, shape (height, width, 3), uint8; its rows do not follow each other in memory.
 
         Raises:
             ValueError: a number is not finite, or the quaternion is zero.
@@ -71,18 +72,21 @@ class Camera:
         rotation = _rotation(attitude_arena)
         eye = self._eye(position_arena_m, rotation)
         if eye[2] <= 0.0:
-            return self._without_margin(self._underground)
+            return self._without_margin(self._underground.copy())
         canvas = self._sky.copy()
         self._paint_background(canvas, rotation)
         if max(map(abs, eye)) < _LOST_M:
             projection = self._mesh.project(eye, rotation)
-            _paint(canvas, projection, self._floor)
-            _paint(canvas, projection, [self._solid[i] for i in self._tree.back_to_front(eye)])
+            seen = projection.seen
+            _paint(canvas, projection, [face for face in self._floor if seen[face.index]])
+            solid, first = self._solid, len(self._floor)
+            order = self._tree.back_to_front(eye)
+            _paint(canvas, projection, [solid[i] for i in order if seen[first + i]])
         return self._without_margin(canvas)
 
     @staticmethod
     def _without_margin(canvas: Image) -> Image:
-        return canvas[_MARGIN_PX:-_MARGIN_PX, _MARGIN_PX:-_MARGIN_PX].copy()
+        return canvas[_MARGIN_PX:-_MARGIN_PX, _MARGIN_PX:-_MARGIN_PX]
 
     def _eye(self, position: Vec3, rotation: Matrix) -> Vec3:
         if not all(map(isfinite, position)):
@@ -104,6 +108,9 @@ class Camera:
         colours = (*SKY_BGR[1:], GROUND_BGR)
         for i, colour in enumerate(colours):
             points = clip_half_plane(corners, a, b, c + band * (len(colours) - 1 - i))
+            if i < len(colours) - 1:  # no farther than a little into the next colour
+                overlap = _OVERLAP_PX * hypot(a, b) - c - band * (len(colours) - 2 - i)
+                points = clip_half_plane(points, -a, -b, overlap)
             if len(points) > 2:
                 outline = [(round(u * SUBPIXELS), round(v * SUBPIXELS)) for u, v in points]
                 cv2.fillConvexPoly(canvas, np.array(outline, np.int32), colour, cv2.LINE_8, SHIFT)

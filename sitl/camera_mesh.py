@@ -23,6 +23,8 @@ Matrix = tuple[Vec3, Vec3, Vec3]
 SHIFT = 4
 """Corners are given to OpenCV in sixteenths of a pixel (its `shift` argument)."""
 SUBPIXELS = float(1 << SHIFT)
+_BITS = 2.0 ** np.arange(10)
+_CUT_BITS = 0b00111101  # beyond the near plane or the window
 _FARTHEST = 2.0**24  # sixteenths of a pixel, well within OpenCV's whole numbers of 32 bits
 
 
@@ -70,7 +72,7 @@ class Mesh:
     def __init__(self, faces: Sequence[Face], pinhole: Pinhole) -> None:
         self.faces = _number(faces)
         corners = np.concatenate([face.corners_arena_m for face in faces])
-        self._corners = np.hstack([corners, np.ones((len(corners), 1))])
+        self._corners = np.vstack([corners.T, np.ones(len(corners))])
         self._starts = np.array([face.start for face in self.faces])
         self._normals = np.array([face.normal_arena for face in faces])
         self._offsets = np.array([np.dot(face.normal_arena, face.corners_arena_m[0]) for face in faces])
@@ -85,31 +87,31 @@ class Mesh:
             eye_arena_m: place of the camera, shape (3,).
             rotation: rows of the matrix from forward, left, up to arena axes.
         """
-        matrix = self._matrix(eye_arena_m, rotation) @ self._borders
+        matrix = self._borders @ self._matrix(eye_arena_m, rotation)
         near_m = self._pinhole.near_m
         matrix[3, 3] -= near_m
-        matrix[3, 4] += self._pinhole.far_m
-        projected = self._corners @ matrix
-        outside = np.packbits(projected[:, 3:] < 0.0, axis=1)
-        somewhere = np.bitwise_or.reduceat(outside, self._starts)
-        everywhere = np.bitwise_and.reduceat(outside, self._starts)
-        facing = self._normals @ eye_arena_m > self._offsets
-        seen = facing & ~everywhere.any(axis=1)
-        to_cut = somewhere[:, 0] & 0b10111100 != 0  # beyond the near plane or the window
-        flat = projected[:, :2] / np.maximum(projected[:, 2:3], near_m)
-        np.clip(flat, -_FARTHEST, _FARTHEST, out=flat)
-        pixels = np.rint(flat, out=flat).astype(np.int32)
-        return Projection(projected, pixels, seen.tolist(), to_cut.tolist(), near_m, self._window)
+        matrix[4, 3] += self._pinhole.far_m
+        projected = matrix @ self._corners
+        # Ten borders are ten bits of one number a corner.
+        outside = (_BITS @ (projected[3:] < 0.0)).astype(np.uint16)
+        hidden = np.bitwise_and.reduceat(outside, self._starts)
+        seen = (self._normals @ eye_arena_m > self._offsets) & (hidden == 0)
+        crossing = np.bitwise_or.reduceat(outside, self._starts) & _CUT_BITS
+        flat = projected[:2] / np.maximum(projected[2], near_m)
+        np.maximum(flat, -_FARTHEST, out=flat)
+        np.minimum(flat, _FARTHEST, out=flat)
+        pixels = np.rint(flat, out=flat).T.astype(np.int32, order="C")
+        return Projection(projected, pixels, seen.tobytes(), crossing.tolist(), near_m, self._window)
 
     def _matrix(self, eye_arena_m: Vec3, rotation: Matrix) -> Floats:
-        """Return the matrix from (x, y, z, 1) to (u w, v w, w), shape (4, 3), u and v in subpixels."""
+        """Return the matrix from (x, y, z, 1) to (u w, v w, w), shape (3, 4), u and v in subpixels."""
         focal = self._pinhole.focal_px * SUBPIXELS
         cu, cv = (centre * SUBPIXELS for centre in self._pinhole.centre_px)
         rows = [(cu * fwd - focal * left, cv * fwd - focal * up, fwd) for fwd, left, up in rotation]
         (a0, b0, c0), (a1, b1, c1), (a2, b2, c2) = rows
         x, y, z = eye_arena_m
         shift = (-a0 * x - a1 * y - a2 * z, -b0 * x - b1 * y - b2 * z, -c0 * x - c1 * y - c2 * z)
-        return np.array([*rows, shift])
+        return np.array([*rows, shift]).T
 
 
 @dataclass(frozen=True, slots=True)
@@ -117,28 +119,26 @@ class Projection:
     """All faces as one pose of the camera sees them.
 
     Attributes:
-        corners: (u w, v w, w, ...) of every corner.
+        corners: columns (u w, v w, w, ...), one for every corner.
         pixels: (u, v) of every corner in sixteenths of a pixel, shape (n, 2); wrong where cuts are needed.
-        seen: per face, whether it faces the eye and is not wholly outside the view.
-        to_cut: per face, whether it must be cut.
+        seen: per face, 1 if it faces the eye and is not wholly outside the view.
+        to_cut: per face, not 0 if it must be cut.
         near_m: depth of the near plane.
         window: left, top, right, bottom to cut at.
     """
 
     corners: Floats
     pixels: Ints
-    seen: list[bool]
-    to_cut: list[bool]
+    seen: bytes
+    to_cut: list[int]
     near_m: float
     window: tuple[float, float, float, float]
 
     def outline(self, face: MeshFace) -> Ints | None:
-        """Return a face's corners in the image, in sixteenths of a pixel, shape (k, 2); None if unseen."""
-        if not self.seen[face.index]:
-            return None
+        """Return a seen face's corners in the image, in sixteenths of a pixel, shape (k, 2); None if cut away."""
         if not self.to_cut[face.index]:
             return self.pixels[face.start : face.stop]
-        points = clip_near(self.corners[face.start : face.stop].tolist(), self.near_m)
+        points = clip_near(self.corners[:3, face.start : face.stop].T.tolist(), self.near_m)
         points = clip_window(points, *self.window)
         if len(points) < 3:
             return None
@@ -155,14 +155,14 @@ def _number(faces: Sequence[Face]) -> tuple[MeshFace, ...]:
 
 
 def _borders(pinhole: Pinhole, window: tuple[float, float, float, float]) -> Floats:
-    """Return the matrix from (u w, v w, w) to itself and the distances from ten borders, shape (3, 13).
+    """Return the matrix from (u w, v w, w) to itself and the distances from ten borders, shape (13, 3).
 
     A distance below zero is outside. Near and far plane (still to be moved to their depths), the window's
     four sides, the image's four sides with a pixel to spare for outlines painted on the nearest pixel.
     """
     left, top, right, bottom = window
     width, height = pinhole.width_px * SUBPIXELS, pinhole.height_px * SUBPIXELS
-    columns = [(1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0), (0.0, 0.0, 1.0), (0.0, 0.0, -1.0)]
+    rows = [(1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0), (0.0, 0.0, 1.0), (0.0, 0.0, -1.0)]
     for x0, y0, x1, y1 in ((left, top, right, bottom), (-SUBPIXELS, -SUBPIXELS, width, height)):
-        columns += [(1.0, 0.0, -x0), (-1.0, 0.0, x1), (0.0, 1.0, -y0), (0.0, -1.0, y1)]
-    return np.array(columns).T.copy()
+        rows += [(1.0, 0.0, -x0), (-1.0, 0.0, x1), (0.0, 1.0, -y0), (0.0, -1.0, y1)]
+    return np.array(rows)

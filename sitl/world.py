@@ -150,8 +150,7 @@ class World:
         near: tuple[Solid, ...] = ()
         for group in self._groups:
             gap_m = group.gap_m(position)
-            if gap_m < nearest_m:
-                nearest_m = gap_m
+            nearest_m = min(nearest_m, gap_m)
             if gap_m < reach:
                 near += tuple([solid for solid in group.solids if solid.is_within(reach, position)])
         self._far_ticks = min(int((nearest_m - reach) / _MARGIN_M), _FAR_TICKS)
