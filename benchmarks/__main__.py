@@ -31,7 +31,7 @@ EXIT_INTERRUPTED = 130
 def main() -> int:
     """Measure, show, write down; return the exit code."""
     options = read_options()
-    console = Console(width=None if sys.stdout.isatty() else 110)
+    console = Console(width=None if sys.stdout.isatty() else 130)
     try:
         scenario = load_scenario(options.scenario)
         return measure(options, scenario, console)

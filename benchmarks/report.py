@@ -70,23 +70,17 @@ def show_comparison(console: Console, results: Results, job: Job) -> None:
     image = f"{job.width_px} x {job.height_px} image at {job.image_rate_hz:g} Hz"
     title = f"{job.seconds:g} s of flight, {image}, one core"
     table = Table(title=title, title_justify="left")
-    for heading in ("program", "settings", "rates", "drawn by"):
-        table.add_column(heading, no_wrap=True)
+    table.add_column("program", no_wrap=True)
+    table.add_column("settings")
     table.add_column("x real time", justify="right")
     table.add_column("costs x ours", justify="right")
-    table.add_column("pairs", justify="right", no_wrap=True)
-    table.add_column("aim", no_wrap=True)
+    table.add_column("aim")
+    table.add_column("pairs", justify="right")
+    table.add_column("rates")
+    table.add_column("drawn by")
     ours = results.ours
-    table.add_row(
-        f"framerunner {ours.version}",
-        "all of it",
-        ours.rates,
-        ours.renderer,
-        f"{1 / cost(ours):.1f}",
-        "1.0",
-        "",
-        "",
-    )
+    program = f"framerunner {ours.version}"
+    table.add_row(program, "all of it", f"{1 / cost(ours):.1f}", "1.0", "", "", ours.rates, ours.renderer)
     for each in results.comparisons:
         table.add_row(*comparison_row(each))
     console.print(table)
@@ -102,12 +96,12 @@ def comparison_row(comparison: Comparison) -> tuple[str, ...]:
     return (
         f"{contender.name} {peer.version}",
         contender.settings,
-        peer.rates,
-        peer.renderer.partition(" (")[0],
         f"{1 / cost(peer):.1f}",
         f"{comparison.ratio:.1f}",
-        f"{least:.1f} - {greatest:.1f}",
         f">= {contender.target:g} {verdict(comparison.reached)}",
+        f"{least:.1f} - {greatest:.1f}",
+        peer.rates,
+        peer.renderer.partition(" (")[0],
     )
 
 
