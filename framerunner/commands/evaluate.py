@@ -5,34 +5,45 @@ from __future__ import annotations
 import shlex
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import TYPE_CHECKING, Annotated, Literal
 
 from cyclopts import Parameter
 
 from framerunner.commands.options import WholeNumber
 from framerunner.errors import SettingError
 
+if TYPE_CHECKING:
+    from framerunner.evaluation.plan import Plan
+    from offboard.mission import Mission
+
 _COUNT, _SEED = 100, 1
+
+
+_Level = Annotated[str | None, Parameter(help="draw scenarios of this level, name or file")]
+_CountOption = Annotated[WholeNumber | None, Parameter(help=f"how many scenarios of the level; {_COUNT}")]
+_SeedOption = Annotated[WholeNumber | None, Parameter(help=f"of the first; the next has the next; {_SEED}")]
+_Jobs = Annotated[WholeNumber | None, Parameter(help="flights at once; as many as there are cores")]
+_Out = Annotated[
+    Path | None, Parameter(help="folder; by default one in `runs/` that the same command finds again")
+]
+_Again = Annotated[bool, Parameter(negative=(), help="fly anew what is in the folder already")]
+_Backend = Annotated[
+    Literal["loky", "dask", "ray"], Parameter(help="loky: this machine; the others: a cluster")
+]
 
 
 def evaluate(
     *scenarios: Annotated[str, Parameter(help="names, files or folders of scenarios, instead of --level")],
-    level: Annotated[str | None, Parameter(help="draw scenarios of this level, name or file")] = None,
-    count: Annotated[WholeNumber | None, Parameter(help=f"how many scenarios of the level; {_COUNT}")] = None,
-    seed: Annotated[
-        WholeNumber | None, Parameter(help=f"of the first; the next has the next; {_SEED}")
-    ] = None,
+    level: _Level = None,
+    count: _CountOption = None,
+    seed: _SeedOption = None,
     mission: Annotated[str, Parameter(help="name or file of the mission")] = "frame_challenge",
     pilot: Annotated[Path | None, Parameter(help="Python file with a subclass of Pilot")] = None,
-    jobs: Annotated[WholeNumber | None, Parameter(help="flights at once; as many as there are cores")] = None,
-    out: Annotated[
-        Path | None, Parameter(help="folder; by default one in `runs/` that the same command finds again")
-    ] = None,
-    again: Annotated[bool, Parameter(negative=(), help="fly anew what is in the folder already")] = False,
+    jobs: _Jobs = None,
+    out: _Out = None,
+    again: _Again = False,
     compare: Annotated[Path | None, Parameter(help="folder of an earlier evaluation")] = None,
-    backend: Annotated[
-        Literal["loky", "dask", "ray"], Parameter(help="loky: this machine; the others: a cluster")
-    ] = "loky",
+    backend: _Backend = "loky",
     address: Annotated[str | None, Parameter(help="of the cluster's scheduler")] = None,
 ) -> int:
     """Fly a mission on many scenarios in lockstep, and tell how often it lands, how well, and why it fails.
@@ -54,6 +65,7 @@ def evaluate(
 
         framerunner evaluate --level calm --backend dask --address tcp://10.0.0.1:8786
     """
+    given = dict(locals())
     _check(scenarios, level, count, seed)
 
     from joblib import cpu_count
@@ -61,27 +73,11 @@ def evaluate(
     from framerunner.evaluation.backends import Pool
     from framerunner.evaluation.evaluate import EvaluationSettings
     from framerunner.evaluation.evaluate import evaluate as evaluate_all
-    from framerunner.evaluation.plan import plan_files, plan_level
     from offboard.mission import load_mission
     from offboard.pilot_file import read_pilot
 
-    loaded = load_mission(mission, None if pilot is None else read_pilot(pilot))
-    if level is None:
-        plan = plan_files(scenarios, loaded)
-    else:
-        plan = plan_level(level, _SEED if seed is None else seed, _COUNT if count is None else count, loaded)
-    options = {
-        "--level": level,
-        "--count": count,
-        "--seed": seed,
-        "--mission": mission,
-        "--pilot": pilot,
-        "--jobs": jobs,
-        "--out": out,
-        "--compare": compare,
-        "--backend": None if backend == "loky" else backend,
-        "--address": address,
-    }
+    own = None if pilot is None else read_pilot(pilot)
+    plan = _plan(scenarios, level, count, seed, load_mission(mission, own))
     settings = EvaluationSettings(
         plan=plan,
         pool=Pool(backend, cpu_count() if jobs is None else jobs, address),
@@ -90,9 +86,19 @@ def evaluate(
         against=compare,
         mission=mission,
         pilot=None if pilot is None else str(pilot),
-        command=_command(scenarios, options),
+        command=_command(scenarios, given),
     )
     return evaluate_all(settings)
+
+
+def _plan(
+    scenarios: tuple[str, ...], level: str | None, count: int | None, seed: int | None, mission: Mission
+) -> Plan:
+    from framerunner.evaluation.plan import plan_files, plan_level
+
+    if level is None:
+        return plan_files(scenarios, mission)
+    return plan_level(level, _SEED if seed is None else seed, _COUNT if count is None else count, mission)
 
 
 def _check(scenarios: tuple[str, ...], level: str | None, count: int | None, seed: int | None) -> None:
@@ -109,10 +115,22 @@ def _check(scenarios: tuple[str, ...], level: str | None, count: int | None, see
             raise SettingError(f"{option} {value}: is for scenarios of a level; add --level, or leave it out")
 
 
-def _command(scenarios: tuple[str, ...], options: Mapping[str, object]) -> str:
+def _command(scenarios: tuple[str, ...], given: Mapping[str, object]) -> str:
     """The command that goes on with this evaluation (--again would begin anew)."""
     words = ["framerunner", "evaluate", *scenarios]
-    for option, value in options.items():
-        if value is not None:
-            words += [option, str(value)]
+    for name in (
+        "level",
+        "count",
+        "seed",
+        "mission",
+        "pilot",
+        "jobs",
+        "out",
+        "compare",
+        "backend",
+        "address",
+    ):
+        value = given[name]
+        if value is not None and (name, value) != ("backend", "loky"):
+            words += [f"--{name}", str(value)]
     return shlex.join(words)
