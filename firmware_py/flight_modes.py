@@ -103,6 +103,7 @@ class Guidance:
         "_keeper",
         "_offboard",
         "_step",
+        "_turning",
         "command_down_m_s",
         "limits",
         "setpoint",
@@ -116,6 +117,7 @@ class Guidance:
         self.command_down_m_s = 0.0
         self._keeper = StationKeeper()
         self._offboard = Setpoint(0)
+        self._turning: RateCommand | None = None  # the same for every tick of a setpoint
         self._step: Callable[[VehicleState], RateCommand] = self._hold
 
     def enter_hold(self, state: VehicleState, *, keep_target: bool = False) -> None:
@@ -147,7 +149,11 @@ class Guidance:
 
     def accept(self, setpoint: Setpoint) -> None:
         """Take the next offboard setpoint; see `usable` and `bounded`."""
-        self._offboard = bounded(setpoint, self.limits)
+        self._offboard = wanted = bounded(setpoint, self.limits)
+        self._turning = None
+        if not isnan(wanted.velocity_level_m_s[0]) and isnan(wanted.yaw_rad):
+            yaw_rate_rad_s = self._yaw_rate(0.0, nan, wanted.yaw_rate_rad_s)
+            self._turning = RateCommand(wanted.velocity_level_m_s, yaw_rate_rad_s)
         if self._step == self._follow_setpoint:
             self.setpoint = self._offboard
 
@@ -179,17 +185,14 @@ class Guidance:
         return self._command(state, (north_m_s, east_m_s, self.limits.land_m_s), keeper.yaw_rad)
 
     def _follow_setpoint(self, state: VehicleState) -> RateCommand:
+        if self._turning is not None:
+            return self._turning
         wanted = self._offboard
         if not isnan(wanted.velocity_level_m_s[0]):
-            return self._turning(state, wanted)
+            yaw_rate_rad_s = self._yaw_rate(state.yaw_rad, wanted.yaw_rad, wanted.yaw_rate_rad_s)
+            return RateCommand(wanted.velocity_level_m_s, yaw_rate_rad_s)
         velocity_ned_m_s = _towards(wanted.position_ned_m, state.position_ned_m, wanted.velocity_ned_m_s)
         return self._command(state, velocity_ned_m_s, wanted.yaw_rad, wanted.yaw_rate_rad_s)
-
-    def _turning(self, state: VehicleState, wanted: Setpoint) -> RateCommand:
-        """A velocity in level axes, held within its limits when it was accepted."""
-        return RateCommand(
-            wanted.velocity_level_m_s, self._yaw_rate(state, wanted.yaw_rad, wanted.yaw_rate_rad_s)
-        )
 
     def _command(
         self, state: VehicleState, velocity_ned_m_s: Vec3, yaw_rad: float, yaw_rate_rad_s: float = nan
@@ -199,13 +202,13 @@ class Guidance:
         cos_yaw, sin_yaw = cos(state.yaw_rad), sin(state.yaw_rad)
         return RateCommand(
             (cos_yaw * north_m_s + sin_yaw * east_m_s, cos_yaw * east_m_s - sin_yaw * north_m_s, down_m_s),
-            self._yaw_rate(state, yaw_rad, yaw_rate_rad_s),
+            self._yaw_rate(state.yaw_rad, yaw_rad, yaw_rate_rad_s),
         )
 
-    def _yaw_rate(self, state: VehicleState, yaw_rad: float, yaw_rate_rad_s: float) -> float:
+    def _yaw_rate(self, yaw_now_rad: float, yaw_rad: float, yaw_rate_rad_s: float) -> float:
         rate_rad_s = 0.0 if isnan(yaw_rate_rad_s) else yaw_rate_rad_s
         if not isnan(yaw_rad):
-            rate_rad_s += _YAW_GAIN * remainder(yaw_rad - state.yaw_rad, tau)
+            rate_rad_s += _YAW_GAIN * remainder(yaw_rad - yaw_now_rad, tau)
         limit_rad_s = self.limits.yaw_rate_rad_s
         return _clamp(rate_rad_s, -limit_rad_s, limit_rad_s)
 

@@ -176,6 +176,14 @@ class Referee:
 
     def _watch(self, state: TrueState) -> None:
         """Look for contacts with frames and for crashes."""
+        if state.contacts:
+            self._note_contacts(state)
+        crash = self._crash_watch.follow(state, self._taken_off)
+        if crash is not None:
+            self._crash = crash
+            self._over = True
+
+    def _note_contacts(self, state: TrueState) -> None:
         for name in state.contacts:
             if name not in self._expected:
                 continue
@@ -183,10 +191,6 @@ class Referee:
             if last_us is None or state.time_us - last_us >= CONTACT_GAP_US:
                 self._contacts.append(name)
             self._touched_us[name] = state.time_us
-        crash = self._crash_watch.follow(state, self._taken_off)
-        if crash is not None:
-            self._crash = crash
-            self._over = True
 
     def _come_to_rest(self, state: TrueState) -> None:
         """Follow the drone after motors off until it lies still, or the motors come on again."""

@@ -29,7 +29,7 @@ class Mixer:
         self._maximum = airframe.motor.max_speed_rad_s**2
         self._minimum = (idle_fraction * airframe.hover_speed_rad_s) ** 2
         self._full = len(self._yaw) * self._maximum
-        self._quad = (*self._roll_pitch, *self._yaw) if len(self._yaw) == _QUAD else None
+        self._is_quad = len(self._yaw) == _QUAD
 
     def mix(self, thrust_n: float, roll_nm: float, pitch_nm: float, yaw_nm: float) -> MotorOutput:
         """Return speeds that give this wrench, or the nearest that keeps roll and pitch longest.
@@ -40,10 +40,11 @@ class Mixer:
             pitch_nm: see roll_nm.
             yaw_nm: see roll_nm.
         """
-        if self._quad is None:
+        if not self._is_quad:
             return self._mix_within_limits(thrust_n, roll_nm, pitch_nm, yaw_nm)
         # What nearly every tick of nearly every vehicle needs, without a loop: four rotors, no limit met.
-        (r0, p0), (r1, p1), (r2, p2), (r3, p3), y0, y1, y2, y3 = self._quad
+        (r0, p0), (r1, p1), (r2, p2), (r3, p3) = self._roll_pitch
+        y0, y1, y2, y3 = self._yaw
         base = self._thrust * thrust_n
         a = base + (r0 * roll_nm + p0 * pitch_nm)
         b = base + (r1 * roll_nm + p1 * pitch_nm)
