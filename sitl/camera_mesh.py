@@ -135,7 +135,7 @@ class Projection:
     window: tuple[float, float, float, float]
 
     def outline(self, face: MeshFace) -> Ints | None:
-        """Return a seen face's corners in the image, in sixteenths of a pixel, shape (k, 2); None if cut away."""
+        """Return a seen face's corners in the image (1/16 pixel), shape (k, 2); None if it is cut away."""
         if not self.to_cut[face.index]:
             return self.pixels[face.start : face.stop]
         points = clip_near(self.corners[:3, face.start : face.stop].T.tolist(), self.near_m)
