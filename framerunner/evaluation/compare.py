@@ -128,7 +128,7 @@ def check_comparable(before: EvaluationFolder, after: Identity) -> None:
             f"--compare {before.path}: no scenario is in both; fly that evaluation's: "
             f"framerunner evaluate {before.path}/scenarios"
         )
-    if not any(name in before.rows for name in common):
+    if before.done.isdisjoint(common):
         raise SettingError(f"--compare {before.path}: has no flight yet of a scenario that is in both")
 
 
@@ -139,10 +139,11 @@ def compare(before: EvaluationFolder, after: EvaluationFolder) -> Comparison:
         before: the earlier one.
         after: this one.
     """
+    theirs, ours = before.rows(), after.rows()
     pairs = tuple(
-        Pair(before.rows[name], after.rows[name])
+        Pair(theirs[name], ours[name])
         for name in common_scenarios(before.identity, after.identity)
-        if name in before.rows and name in after.rows
+        if name in theirs and name in ours
     )
     won = sum(pair.after.landed and not pair.before.landed for pair in pairs)
     lost = sum(pair.before.landed and not pair.after.landed for pair in pairs)
@@ -151,8 +152,8 @@ def compare(before: EvaluationFolder, after: EvaluationFolder) -> Comparison:
         path=before.path,
         mission=before.identity.mission,
         pairs=pairs,
-        only_after=len(after.rows) - len(pairs),
-        only_before=len(before.rows) - len(pairs),
+        only_after=len(ours) - len(pairs),
+        only_before=len(theirs) - len(pairs),
         landed_before=wilson(sum(pair.before.landed for pair in pairs), len(pairs)),
         landed_after=wilson(sum(pair.after.landed for pair in pairs), len(pairs)),
         won=won,

@@ -71,25 +71,23 @@ def evaluate(settings: EvaluationSettings) -> int:
     with open_folder(settings.out, identity, again=settings.again) as folder:
         try:
             _fly_missing(settings, folder)
-            folder.write(folder.results, csv_text(folder.in_order()))
-            _report(settings, folder, before)
+            return _report(settings, folder, before)
         except KeyboardInterrupt:
             _say_interrupted(settings, folder)
             return EXIT_INTERRUPTED
-        return 1 if any(row.verdict == ERROR for row in folder.rows.values()) else 0
 
 
 def _fly_missing(settings: EvaluationSettings, folder: EvaluationFolder) -> None:
     plan = settings.plan
-    kept = folder.in_order()
+    kept = len(folder.done)
     if kept:
-        _note(f"{len(kept)} of {len(plan)} flights are in {folder.path} already")
-    if len(kept) == len(plan):
+        _note(f"{kept} of {len(plan)} flights are in {folder.path} already")
+    if kept == len(plan):
         return
     scenarios = {scenario.name: scenario for scenario in plan.scenarios}
     with (
-        EvaluationProgress(len(plan), kept) as progress,
-        closing(fly_all(plan.tasks(dict(folder.rows)), settings.pool)) as rows,
+        EvaluationProgress(len(plan), list(folder.rows().values())) as progress,
+        closing(fly_all(plan.tasks(frozenset(folder.done)), settings.pool)) as rows,
     ):
         for row in rows:
             if row.version != folder.identity.version:
@@ -101,9 +99,11 @@ def _fly_missing(settings: EvaluationSettings, folder: EvaluationFolder) -> None
             progress.add(row)
 
 
-def _report(settings: EvaluationSettings, folder: EvaluationFolder, before: EvaluationFolder | None) -> None:
-    """Print the tables, write the page."""
-    summary = summarise(folder.in_order())
+def _report(settings: EvaluationSettings, folder: EvaluationFolder, before: EvaluationFolder | None) -> int:
+    """Write and print everything; return the exit code."""
+    rows = list(folder.rows().values())
+    folder.write(folder.results, csv_text(rows))
+    summary = summarise(rows)
     comparison = None if before is None else compare(before, folder)
     title = f"{settings.plan.title}: {folder.identity.mission}"
     print_summary(summary, title)
@@ -124,10 +124,11 @@ def _report(settings: EvaluationSettings, folder: EvaluationFolder, before: Eval
             lambda done, total: status.update(f"drawing the report, picture {done + 1} of {total}"),
         )
     print(f"left in {folder.path}/: report.html, results.csv", flush=True)
+    return 1 if ERROR in summary.verdicts else 0
 
 
 def _say_interrupted(settings: EvaluationSettings, folder: EvaluationFolder) -> None:
-    count = len(folder.rows)
+    count = len(folder.rows())  # as it is on the disk: the signal may have come between writing and noting
     _note(f"interrupted; {count} of {len(settings.plan)} flights are kept in {folder.path}; go on with:")
     _note(f"  {settings.command}")
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import hashlib
 import json
 import re
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass
 from functools import cached_property
 from importlib import metadata
@@ -128,7 +128,7 @@ class Plan:
         """A folder that the same command finds again, and no other."""
         return Path("runs") / f"evaluate-{self.label}-{self.mission.name}-{self.identity.sha256[:6]}"
 
-    def tasks(self, done: Mapping[str, object]) -> Iterator[FlightTask]:
+    def tasks(self, done: Collection[str] = ()) -> Iterator[FlightTask]:
         """Flights that are not yet done, in order."""
         for scenario, seed in zip(self.scenarios, self.seeds, strict=True):
             if scenario.name not in done:

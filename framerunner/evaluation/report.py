@@ -85,7 +85,7 @@ def write_report(
         lstrip_blocks=True,
     )
     environment.filters["spread"] = _spread_cells
-    rows = folder.in_order()
+    rows = list(folder.rows().values())
     failures = _failures(folder, page, advance)
     text = environment.get_template("report.html.j2").render(
         page=page,

@@ -8,7 +8,7 @@ import os
 import shutil
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -32,12 +32,12 @@ class EvaluationFolder:
     Attributes:
         path: the folder.
         identity: what it is of.
-        rows: of all flights that are over, by scenario; without tracks.
+        done: scenarios of all flights that are over; their rows stay on the disk, there may be thousands.
     """
 
     path: Path
     identity: Identity
-    rows: dict[str, Row] = field(default_factory=dict)
+    done: set[str]
 
     @property
     def results(self) -> Path:
@@ -75,11 +75,12 @@ class EvaluationFolder:
             with (self.path / FLIGHTS).open("ab", buffering=0) as file:
                 file.write(row.to_json().encode() + b"\n")
                 os.fsync(file.fileno())
-        self.rows[row.scenario] = row if row.track is None else Row.from_result(row.as_dict())
+        self.done.add(row.scenario)
 
-    def in_order(self) -> list[Row]:
-        """All rows, in the order of the scenarios."""
-        return [self.rows[name] for name in self.identity.scenarios if name in self.rows]
+    def rows(self) -> dict[str, Row]:
+        """All rows by scenario, in the scenarios' order; without tracks."""
+        found, _ = _read_rows(self.path / FLIGHTS, self.identity)
+        return {name: found[name] for name in self.identity.scenarios if name in found}
 
     def track(self, name: str) -> Track:
         """Where the drone was in a flight that failed; empty if that is not known."""
@@ -131,8 +132,8 @@ def open_folder(path: Path, identity: Identity, *, again: bool = False) -> Itera
                 _replace(path / IDENTITY, json.dumps(data, indent=2) + "\n")
             for name in _FOLDERS:
                 (path / name).mkdir(exist_ok=True)
-            rows = _mended(path / FLIGHTS, identity)
-        yield EvaluationFolder(path, identity, rows)
+            done = _mended(path / FLIGHTS, identity)
+        yield EvaluationFolder(path, identity, done)
 
 
 def read_folder(path: Path, option: str) -> EvaluationFolder:
@@ -148,7 +149,7 @@ def read_folder(path: Path, option: str) -> EvaluationFolder:
     identity = _identity(path, option)
     if identity is None:
         raise SettingError(f"{option} {path}: holds no evaluation; give a folder that has {IDENTITY}")
-    return EvaluationFolder(path, identity, _read_rows(path / FLIGHTS, identity)[0])
+    return EvaluationFolder(path, identity, set(_read_rows(path / FLIGHTS, identity)[0]))
 
 
 def _check(path: Path, identity: Identity, again: bool) -> bool:
@@ -194,12 +195,12 @@ def _clear(path: Path) -> None:
         shutil.rmtree(path / name, ignore_errors=True)
 
 
-def _mended(file: Path, identity: Identity) -> dict[str, Row]:
-    """Read the rows; a line that a kill or a power cut has torn is taken away, its flight is flown again."""
+def _mended(file: Path, identity: Identity) -> set[str]:
+    """What is done; a line that a kill or a power cut has torn is taken away, its flight is flown again."""
     rows, is_whole = _read_rows(file, identity)
     if not is_whole:
         _replace(file, "".join(row.to_json() + "\n" for row in rows.values()))
-    return rows
+    return set(rows)
 
 
 def _read_rows(file: Path, identity: Identity) -> tuple[dict[str, Row], bool]:

@@ -1,7 +1,6 @@
 """Who flies makes no difference; whoever dies over it stops nobody else."""
 
 import itertools
-import os
 
 import pytest
 
@@ -45,12 +44,12 @@ def table(rows):
 @pytest.fixture(scope="module")
 def alone(plan):
     """What one process makes of it, flight after flight."""
-    return table(fly_all(plan.tasks({}), Pool(jobs=1)))
+    return table(fly_all(plan.tasks(), Pool(jobs=1)))
 
 
 def test_two_processes_fly_as_one_does(plan, alone):
-    assert table(fly_all(plan.tasks({}), Pool(jobs=2))) == alone
-    backwards = reversed(list(plan.tasks({})))
+    assert table(fly_all(plan.tasks(), Pool(jobs=2))) == alone
+    backwards = reversed(list(plan.tasks()))
     assert table(fly_all(backwards, Pool(jobs=2))) == alone
 
 
@@ -65,7 +64,7 @@ def test_a_dask_cluster_of_processes_flies_as_one_does(plan, alone, tmp_path):
         silence_logs=50,
     ) as cluster:
         pool = Pool("dask", address=cluster.scheduler_address)
-        assert table(fly_all(plan.tasks({}), pool)) == alone
+        assert table(fly_all(plan.tasks(), pool)) == alone
 
 
 @pytest.mark.parametrize("jobs", [1, 2])
@@ -80,30 +79,35 @@ def test_flights_are_handed_out_only_as_others_come_back(jobs):
     assert next(seeds) <= 3 + 4 * jobs
 
 
-@pytest.mark.parametrize(
-    ("end", "words"),
-    [
-        ("os._exit(7)", "exit code 7"),
-        ("os.kill(os.getpid(), signal.SIGKILL)", "signal SIGKILL"),
-    ],
-)
-def test_a_flight_that_ends_its_process_is_found_and_the_others_fly(plan, alone, end, words):
+def deadly(victim, end):
+    """A mission that ends its process when it flies one of the scenarios."""
+    return load_mission(
+        "frame_challenge", PilotFile("deadly.py", DEADLY.format(x_m=victim.start.x_m, end=end))
+    )
+
+
+def test_a_flight_that_ends_its_process_is_found_and_the_others_fly(plan, alone):
     victim = plan.scenarios[1]
-    text = DEADLY.format(x_m=victim.start.x_m, end=end)
-    deadly = load_mission("frame_challenge", PilotFile("deadly.py", text))
-    rows = list(fly_all((FlightTask(each, deadly) for each in plan.scenarios), Pool(jobs=2)))
+    mission = deadly(victim, "os.kill(os.getpid(), signal.SIGKILL)")
+    rows = list(fly_all((FlightTask(each, mission) for each in plan.scenarios), Pool(jobs=2)))
     assert len(rows) == len(plan)
     (dead,) = [row for row in rows if row.verdict == "error"]
     assert dead.scenario == victim.name
-    assert dead.reason == f"WorkerDiedError: the flight ended its process ({words})"
+    assert dead.reason == "WorkerDiedError: the flight ended its process (signal SIGKILL)"
     others = [line for line in alone.splitlines() if not line.startswith(f"{victim.name},")]
     assert [line for line in table(rows).splitlines() if not line.startswith(f"{victim.name},")] == others
 
 
+def test_a_flight_alone_may_end_its_process(plan):
+    victim = plan.scenarios[0]
+    row = fly_alone(FlightTask(victim, deadly(victim, "os._exit(7)")))
+    assert (row.verdict, row.cause) == ("error", "WorkerDiedError")
+    assert row.reason.endswith("(exit code 7)")
+
+
 def test_a_flight_alone_is_the_same_flight(plan, alone):
-    (task,) = itertools.islice(plan.tasks({}), 1)
+    (task,) = itertools.islice(plan.tasks(), 1)
     assert table([fly_alone(task)]).splitlines() == alone.splitlines()[:2]
-    assert os.getpid() != 0  # this process lives on
 
 
 @pytest.mark.parametrize(
@@ -126,7 +130,7 @@ def test_a_scheduler_that_is_not_there_is_told(plan, monkeypatch, address):
     pytest.importorskip("distributed")
     monkeypatch.setattr(backends, "CONNECT_S", 0.5)
     with pytest.raises(SettingError, match=rf"--address {address}: no Dask scheduler there"):
-        next(fly_all(plan.tasks({}), Pool("dask", address=address)))
+        next(fly_all(plan.tasks(), Pool("dask", address=address)))
 
 
 def test_a_package_that_is_missing_is_named(plan, monkeypatch):
@@ -136,4 +140,4 @@ def test_a_package_that_is_missing_is_named(plan, monkeypatch):
     monkeypatch.setitem(sys.modules, "distributed", None)
     for backend in ("ray", "dask"):
         with pytest.raises(SettingError, match=rf"pip install 'framerunner\[{backend}\]'"):
-            next(fly_all(plan.tasks({}), Pool(backend, address="tcp://10.0.0.1:1")))
+            next(fly_all(plan.tasks(), Pool(backend, address="tcp://10.0.0.1:1")))

@@ -8,7 +8,7 @@ from framerunner.evaluation.compare import compare, mcnemar, mean_difference
 from framerunner.evaluation.plan import Identity
 from framerunner.evaluation.rows import ERROR
 from framerunner.evaluation.statistics import spread, summarise, wilson
-from framerunner.evaluation.store import EvaluationFolder
+from framerunner.evaluation.store import FLIGHTS, EvaluationFolder
 from framerunner.evaluation.tables import comparison_lines
 from tests.framerunner.evaluation.flights import made_row
 
@@ -83,12 +83,14 @@ def test_a_mean_difference_has_student_s_interval():
 
 def folder(path, digests, *rows):
     identity = Identity(digests, "m", "", "Pilot", "", tuple(0 for _ in digests), "0.1.0")
-    return EvaluationFolder(path, identity, {row.scenario: row for row in rows})
+    path.mkdir()
+    (path / FLIGHTS).write_text("".join(row.to_json() + "\n" for row in rows), encoding="utf-8")
+    return EvaluationFolder(path, identity, {row.scenario for row in rows})
 
 
 def test_pairs_are_scenarios_with_the_same_content(tmp_path):
     before = folder(
-        tmp_path,
+        tmp_path / "before",
         {"a": "1", "b": "2", "c": "3", "d": "4", "old": "5", "e": "6"},
         made_row("a"),
         made_row("b", "timed out"),
@@ -98,7 +100,7 @@ def test_pairs_are_scenarios_with_the_same_content(tmp_path):
         made_row("e", "aborted", state_sha256="1" * 64),
     )
     after = folder(
-        tmp_path,
+        tmp_path / "after",
         {"a": "1", "b": "2", "c": "3", "d": "other", "e": "6", "new": "7"},
         made_row("a", "timed out", state_sha256="2" * 64),
         made_row("b", try_time_s=80.0, state_sha256="3" * 64),
