@@ -110,22 +110,30 @@ class LockstepDrone:
         """States at 20 Hz of vehicle time.
 
         Raises:
-            DroneError: values not finite, a failsafe took over or disarmed the vehicle.
+            DroneError: as `next_state`.
         """
-        if self._alignment is None:
-            raise DroneError("the drone's ticks were asked for before it was ready; call ready() first")
         task = asyncio.current_task()
         while True:
             if task is not None and task.cancelling():
                 await asyncio.sleep(0)
-            self._sample = None
-            came = self._passes(lambda: self._sample is not None, LINK_LOST_US)
-            told = self._sample
-            if not came or told is None:
-                raise DroneError("link lost: the vehicle's clock stands still")
-            self._pass(self._delay_us)
-            self._check(told)
-            yield told
+            yield self.next_state()
+
+    def next_state(self) -> DroneState:
+        """Let time pass until the next tick, and return its state; for whoever has no event loop.
+
+        Raises:
+            DroneError: not ready yet, values not finite, a failsafe took over or disarmed the vehicle.
+        """
+        if self._alignment is None:
+            raise DroneError("the drone's ticks were asked for before it was ready; call ready() first")
+        self._sample = None
+        came = self._passes(lambda: self._sample is not None, LINK_LOST_US)
+        told: DroneState | None = self._sample
+        if not came or told is None:
+            raise DroneError("link lost: the vehicle's clock stands still")
+        self._pass(self._delay_us)
+        self._check(told)
+        return told
 
     async def motors_on(self) -> None:
         """Enter offboard with zero setpoints, then arm; both count when a heartbeat shows them.

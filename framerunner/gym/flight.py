@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from framerunner.gym.stepped_drone import SteppedDrone, run_through
+from framerunner.gym.run_through import run_through
+from framerunner.lockstep_drone import LockstepDrone
 from framerunner.lockstep_eyes import LockstepEyes
 from offboard.drone import DroneError, DroneState, VelocityCommand
 from scenarios.ground import is_over_base, start_position
@@ -40,7 +41,7 @@ class SteppedFlight:
         self._height_m = self._simulation.world.airframe.envelope_m[2]
         x_m, y_m, surface_m = start_position(scenario)
         self._start_z_m = surface_m + self._height_m / 2
-        self._drone = SteppedDrone(
+        self._drone = LockstepDrone(
             self._simulation,
             (x_m, y_m, self._start_z_m, scenario.start.yaw_rad),
             observers=(self._eyes.follow,),

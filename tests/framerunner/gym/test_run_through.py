@@ -4,7 +4,7 @@ import asyncio
 
 import pytest
 
-from framerunner.gym.stepped_drone import SteppedDrone, run_through
+from framerunner.gym.run_through import run_through
 from framerunner.lockstep_drone import LockstepDrone
 from offboard.drone import VelocityCommand
 from scenarios.loader import load_scenario
@@ -32,7 +32,7 @@ async def flown_by_a_mission():
 
 
 def test_its_states_are_those_of_a_mission_s_ticks():
-    drone = SteppedDrone(Simulation(load_scenario("empty")), START)
+    drone = LockstepDrone(Simulation(load_scenario("empty")), START)
     run_through(drone.ready())
     run_through(drone.motors_on())
     states = [drone.next_state()]
