@@ -55,10 +55,10 @@ def print_comparison(comparison: Comparison) -> None:
 
 def comparison_lines(comparison: Comparison) -> list[str]:
     """What there is to say of two evaluations beside their counts, a sentence each."""
-    lines = [
-        f"McNemar's exact test on landing: p = {comparison.p_value:.3g}"
-        + ("" if comparison.p_value < 0.05 else "; so uneven a split often comes by chance")
-    ]
+    chance = "" if comparison.p_value < 0.05 else "; so uneven a split often comes by chance"
+    lines = [f"McNemar's exact test on landing: p = {comparison.p_value:.3g}{chance}"]
+    if comparison.won + comparison.lost == 0:
+        lines = ["no flight landed in one of the two only"]
     if comparison.try_time_s is not None:
         lines.append(
             f"try time where both landed ({comparison.try_time_s.count} pairs), now minus before: "
