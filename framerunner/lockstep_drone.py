@@ -127,10 +127,11 @@ class LockstepDrone:
         if self._alignment is None:
             raise DroneError("the drone's ticks were asked for before it was ready; call ready() first")
         self._sample = None
-        came = self._passes(lambda: self._sample is not None, LINK_LOST_US)
-        told: DroneState | None = self._sample
-        if not came or told is None:
-            raise DroneError("link lost: the vehicle's clock stands still")
+        lost_us = self._simulation.time_us + LINK_LOST_US
+        while (told := self._sample) is None:
+            if self._simulation.time_us >= lost_us:
+                raise DroneError("link lost: the vehicle's clock stands still")
+            self._advance(lost_us)
         self._pass(self._delay_us)
         self._check(told)
         return told
@@ -218,14 +219,21 @@ class LockstepDrone:
         else:
             self._autopilot.accept_setpoint(setpoint)
 
-    def _advance(self) -> None:
-        """One control tick of the world, and what a link sends by itself."""
-        simulation = self._simulation
-        simulation.tick()
-        for observe in self._observers:
-            observe(simulation.truth)
-        state = self._autopilot.state
-        now_us = state.time_us
+    def _advance(self, until_us: int = 0) -> None:
+        """Let time pass: a control tick, and more until a time or until the link does something by itself."""
+        simulation, observers, state = self._simulation, self._observers, self._autopilot.state
+        until_us = min(until_us, self._resend_us, self._heartbeat_us, self._tick_us, self._position_us)
+        while True:
+            simulation.tick()
+            truth = simulation.truth
+            for observe in observers:
+                observe(truth)
+            if state.time_us >= until_us:
+                break
+        self._exchange(state.time_us)
+
+    def _exchange(self, now_us: int) -> None:
+        """What a link brings by itself at this time."""
         if now_us >= self._resend_us:
             self._send(self._command)
         if now_us >= self._heartbeat_us:
@@ -237,8 +245,8 @@ class LockstepDrone:
             self._sample = self._told()
         if now_us >= self._position_us:
             self._position_us += POSITION_US
-            self._position_ned_m = single(state.position_ned_m)
-            self._velocity_ned_m_s = single(state.velocity_ned_m_s)
+            self._position_ned_m = single(self._autopilot.state.position_ned_m)
+            self._velocity_ned_m_s = single(self._autopilot.state.velocity_ned_m_s)
 
     def _pass(self, duration_us: int) -> None:
         """Let so much time pass."""

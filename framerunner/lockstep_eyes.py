@@ -31,6 +31,8 @@ class LockstepEyes:
 
     def follow(self, truth: TrueState) -> None:
         """Let the camera take the control tick that has just passed."""
+        if truth.time_us < self._feed.next_us:
+            return
         arrived = self._feed.step(truth)
         if arrived is not None:
             self._arrived = arrived

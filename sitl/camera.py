@@ -11,7 +11,7 @@ pixel), and a bar thinner than a pixel does not vanish.
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from math import hypot, isfinite, tan
 
 import cv2
@@ -26,10 +26,13 @@ from sitl.camera_order import PaintTree
 from sitl.camera_scene import GROUND_BGR, SKY_BGR, UNDERGROUND_BGR, build_scene
 
 Image = npt.NDArray[np.uint8]
+Outline = npt.NDArray[np.int32]
 
 _HAZE_BAND = 0.09  # height of a band of haze above the horizon, as a share of the focal length
 _MARGIN_PX = 2  # painted around the image and cut off: OpenCV is not exact at the border of its canvas
+_BANDS_BGR = (*SKY_BGR[1:], GROUND_BGR)
 _OVERLAP_PX = 2.0  # of neighbouring bands of colour, so that no gap is seen between them
+_FAR_HEIGHTS = 4.0  # of the image: lines farther away than this are cut before they are painted
 _LOST_M = 1e5  # from farther away nothing but sky and ground is to be seen
 
 
@@ -44,6 +47,9 @@ class Camera:
         shape = (height, width, 3)
         self._sky = np.full(shape, SKY_BGR[0], np.uint8)
         self._underground = np.full(shape, UNDERGROUND_BGR, np.uint8)
+
+        right, bottom = float(width), float(height)
+        self._corners_px = ((-1.0, -1.0), (right, -1.0), (right, bottom), (-1.0, bottom))
 
         scene = build_scene(scenario)
         self._tree = PaintTree(scene.bodies)
@@ -96,24 +102,49 @@ class Camera:
         return (ex, ey, ez)
 
     def _paint_background(self, canvas: Image, rotation: Matrix) -> None:
-        """Paint the haze and the ground: half planes below the horizon and lines parallel to it."""
+        """Paint the haze and the ground: bands between lines parallel to the horizon."""
         focal, (cu, cv) = self._pinhole.focal_px, self._pinhole.centre_px
         fwd_z, left_z, up_z = rotation[2]
         # A pixel's ray goes down where fwd_z - left_z (u - cu)/f - up_z (v - cv)/f is negative.
         a, b = left_z / focal, up_z / focal
         c = -(fwd_z + a * cu + b * cv)
         band = _HAZE_BAND * hypot(left_z, up_z)
-        right, bottom = float(self._pinhole.width_px), float(self._pinhole.height_px)
-        corners = ((-1.0, -1.0), (right, -1.0), (right, bottom), (-1.0, bottom))
-        colours = (*SKY_BGR[1:], GROUND_BGR)
-        for i, colour in enumerate(colours):
-            points = clip_half_plane(corners, a, b, c + band * (len(colours) - 1 - i))
-            if i < len(colours) - 1:  # no farther than a little into the next colour
-                overlap = _OVERLAP_PX * hypot(a, b) - c - band * (len(colours) - 2 - i)
-                points = clip_half_plane(points, -a, -b, overlap)
-            if len(points) > 2:
-                outline = [(round(u * SUBPIXELS), round(v * SUBPIXELS)) for u, v in points]
-                cv2.fillConvexPoly(canvas, np.array(outline, np.int32), colour, cv2.LINE_8, SHIFT)
+        starts = (c + 3.0 * band, c + 2.0 * band, c + band, c)  # a band is where a u + b v + start >= 0
+        bands = self._upright_bands(a, b, starts) or self._tilted_bands(a, b, starts)
+        for colour, outline in zip(_BANDS_BGR, bands, strict=True):
+            if len(outline) > 2:
+                cv2.fillConvexPoly(canvas, outline, colour, cv2.LINE_8, SHIFT)
+
+    def _upright_bands(self, a: float, b: float, starts: Sequence[float]) -> list[Outline] | None:
+        """The bands from the left to the right border; None if they are too steep for that."""
+        if abs(a) > b:
+            return None
+        (left, _), (right, bottom) = self._corners_px[0], self._corners_px[2]
+        l0, l1, l2, l3 = (-(start + a * left) / b for start in starts)
+        r0, r1, r2, r3 = (-(start + a * right) / b for start in starts)
+        if max(abs(l0), abs(r0), abs(l3), abs(r3)) > _FAR_HEIGHTS * bottom:
+            return None
+        over = _OVERLAP_PX
+        corners = np.array(
+            (
+                ((left, l0), (right, r0), (right, r1 + over), (left, l1 + over)),
+                ((left, l1), (right, r1), (right, r2 + over), (left, l2 + over)),
+                ((left, l2), (right, r2), (right, r3 + over), (left, l3 + over)),
+                ((left, l3), (right, r3), (right, max(bottom, r3)), (left, max(bottom, l3))),
+            )
+        )
+        return list(np.rint(SUBPIXELS * corners).astype(np.int32))
+
+    def _tilted_bands(self, a: float, b: float, starts: Sequence[float]) -> list[Outline]:
+        """The same for any attitude: half planes cut to the image."""
+        overlap = _OVERLAP_PX * hypot(a, b)
+        bands: list[Outline] = []
+        for i, start in enumerate(starts):
+            points = clip_half_plane(self._corners_px, a, b, start)
+            if i + 1 < len(starts):  # no farther than a little into the next colour
+                points = clip_half_plane(points, -a, -b, overlap - starts[i + 1])
+            bands.append(np.rint(SUBPIXELS * np.array(points).reshape(-1, 2)).astype(np.int32))
+        return bands
 
 
 def _paint(canvas: Image, projection: Projection, faces: Iterable[MeshFace]) -> None:

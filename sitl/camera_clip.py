@@ -53,14 +53,15 @@ def clip_window(points: list[Point], left: float, top: float, right: float, bott
 
 def clip_half_plane(points: Iterable[Point], a: float, b: float, c: float) -> list[Point]:
     """Keep the part of a convex polygon where a u + b v + c >= 0."""
-    corners = list(points)
+    corners = points if isinstance(points, Sequence) else list(points)
+    heights = [a * u + b * v + c for u, v in corners]
+    if not heights or min(heights) >= 0.0:
+        return list(corners)
     kept: list[Point] = []
-    if not corners:
+    if max(heights) < 0.0:
         return kept
-    u0, v0 = corners[-1]
-    before = a * u0 + b * v0 + c
-    for u1, v1 in corners:
-        now = a * u1 + b * v1 + c
+    (u0, v0), before = corners[-1], heights[-1]
+    for (u1, v1), now in zip(corners, heights, strict=True):
         if (before < 0.0) != (now < 0.0):
             t = before / (before - now)
             kept.append((u0 + t * (u1 - u0), v0 + t * (v1 - v0)))

@@ -21,6 +21,9 @@ class CameraFeed:
 
     Args:
         scenario: camera settings and what is to be seen.
+
+    Attributes:
+        next_us: before this time there is nothing to do.
     """
 
     def __init__(self, scenario: Scenario) -> None:
@@ -28,7 +31,7 @@ class CameraFeed:
         self._period_us = 1e6 / scenario.camera.rate_hz
         self._latency_us = round(scenario.camera.latency_s * 1e6)
         self._taken = 0
-        self._next_us = 0  # before this there is nothing to do
+        self.next_us = 0
         self._on_its_way: deque[tuple[int, Image]] = deque()
 
     def step(self, truth: TrueState) -> tuple[int, Image] | None:
@@ -40,7 +43,7 @@ class CameraFeed:
         Returns:
             Time of exposure, microseconds, and the image; None if none arrives at this tick.
         """
-        if truth.time_us < self._next_us:
+        if truth.time_us < self.next_us:
             return None
         index = int((truth.time_us - FIRST_EXPOSURE_US) // self._period_us)
         if index >= self._taken:
@@ -50,7 +53,7 @@ class CameraFeed:
         arrived = None
         if self._on_its_way and self._on_its_way[0][0] + self._latency_us <= truth.time_us:
             arrived = self._on_its_way.popleft()
-        self._next_us = int(FIRST_EXPOSURE_US + self._taken * self._period_us)
+        self.next_us = int(FIRST_EXPOSURE_US + self._taken * self._period_us)
         if self._on_its_way:
-            self._next_us = min(self._next_us, self._on_its_way[0][0] + self._latency_us)
+            self.next_us = min(self.next_us, self._on_its_way[0][0] + self._latency_us)
         return arrived

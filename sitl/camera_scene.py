@@ -31,7 +31,7 @@ TATAMI_MAT_BGR: Bgr = (48, 164, 213)
 BASE_BGR: Bgr = (168, 170, 172)
 BASE_MARK_BGR: Bgr = (238, 238, 238)
 
-MAT_M = 1.0
+MAT_M = 2.0
 """Edge of one mat of the tatami."""
 DARKEST = 0.3
 """No face is painted darker than this share of its colour: a frame's colour must stay recognisable."""

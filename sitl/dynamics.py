@@ -65,6 +65,7 @@ class Dynamics:
         self._start_ned_m = position_ned_m
         self._floor_ft = altitude_m / METRES_PER_FOOT
         self._ground_m: float | None = None
+        self._commanded: tuple[float, ...] = ()
         for name, value in (
             ("ic/lat-geod-deg", latitude_deg),
             ("ic/long-gc-deg", longitude_deg),
@@ -120,6 +121,9 @@ class Dynamics:
 
     def command_motors(self, speeds_rad_s: tuple[float, ...]) -> None:
         """Set the speeds the motors run up to, rad/s, in the airframe's order."""
+        if speeds_rad_s is self._commanded:  # JSBSim keeps them
+            return
+        self._commanded = speeds_rad_s
         for command, speed in zip(self._commands, speeds_rad_s, strict=True):
             command(speed)
 
@@ -153,6 +157,23 @@ class Dynamics:
         north, east, down = self._velocity
         return (north() * METRES_PER_FOOT, east() * METRES_PER_FOOT, down() * METRES_PER_FOOT)
 
+    def motion(self) -> tuple[Vec3, Quaternion, Vec3, Vec3]:
+        """Read all of it at once.
+
+        Returns:
+            Velocity NED (m/s), attitude, angular rate FRD (rad/s), and what an accelerometer at the centre
+            of mass reads, FRD (m/s^2).
+        """
+        north, east, down = self._velocity
+        p, q, r = self._rates
+        x, y, z = self._force
+        return (
+            (north() * METRES_PER_FOOT, east() * METRES_PER_FOOT, down() * METRES_PER_FOOT),
+            self.attitude(),
+            (p(), q(), r()),
+            (x() * METRES_PER_FOOT, y() * METRES_PER_FOOT, z() * METRES_PER_FOOT),
+        )
+
     def attitude(self) -> Quaternion:
         """Unit quaternion (w, x, y, z), body FRD to NED, from Z-Y-X Euler angles."""
         roll, pitch, yaw = self._angles
@@ -174,11 +195,6 @@ class Dynamics:
         """Rate of turn relative to the ground."""
         p, q, r = self._rates
         return (p(), q(), r())
-
-    def specific_force_frd_m_s2(self) -> Vec3:
-        """What an accelerometer at the centre of mass reads."""
-        x, y, z = self._force
-        return (x() * METRES_PER_FOOT, y() * METRES_PER_FOOT, z() * METRES_PER_FOOT)
 
     def motor_speeds_rad_s(self) -> tuple[float, ...]:
         """True speeds of the rotors."""

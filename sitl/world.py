@@ -88,15 +88,8 @@ class World:
 
     def sensors(self) -> Sensors:
         """Sample ideal sensors now."""
-        dynamics = self._dynamics
-        return Sensors(
-            self.time_us,
-            self._position_ned_m,
-            dynamics.velocity_ned_m_s(),
-            dynamics.attitude(),
-            dynamics.angular_rate_frd_rad_s(),
-            dynamics.specific_force_frd_m_s2(),
-        )
+        velocity, attitude, rate, force = self._dynamics.motion()
+        return Sensors(self.time_us, self._position_ned_m, velocity, attitude, rate, force)
 
     def truth(self, sensors: Sensors, *, motors_on: bool) -> TrueState:
         """Return the true state for the referee.

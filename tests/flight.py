@@ -37,7 +37,7 @@ def state_of(dynamics: Dynamics, time_us: int) -> VehicleState:
         asin(max(-1.0, min(1.0, 2 * (w * y - z * x)))),
         atan2(2 * (w * z + x * y), 1 - 2 * (y * y + z * z)),
         dynamics.angular_rate_frd_rad_s(),
-        dynamics.specific_force_frd_m_s2(),
+        dynamics.motion()[3],
     )
 
 

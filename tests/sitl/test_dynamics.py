@@ -34,7 +34,7 @@ def test_free_fall_without_drag():
     run(dynamics, 2.0)
     assert dynamics.velocity_ned_m_s()[2] == pytest.approx(G * 2.0, rel=2e-3)
     assert dynamics.position_ned_m()[2] + 100.0 == pytest.approx(G * 2.0**2 / 2, rel=3e-3)
-    assert dynamics.specific_force_frd_m_s2() == pytest.approx((0, 0, 0), abs=1e-6)
+    assert dynamics.motion()[3] == pytest.approx((0, 0, 0), abs=1e-6)
 
 
 def test_fall_with_quadratic_drag_follows_its_closed_form():
@@ -56,7 +56,7 @@ def test_hover_thrust_carries_the_weight():
     run(dynamics, 2.0)
     # Thrust is for standard gravity; what is left is the difference to gravity here.
     assert dynamics.velocity_ned_m_s()[2] == pytest.approx(2.0 * (G - 9.80665), abs=0.01)
-    assert dynamics.specific_force_frd_m_s2()[2] == pytest.approx(-9.80665, rel=1e-5)
+    assert dynamics.motion()[3][2] == pytest.approx(-9.80665, rel=1e-5)
 
 
 def test_motor_lag_is_first_order():
@@ -112,7 +112,7 @@ def test_rests_on_the_ground_with_the_weight_on_its_feet():
     sunk_m = frame.weight_n / (4 * frame.contact.stiffness_n_m)
     assert dynamics.position_ned_m()[2] == pytest.approx(-0.0225 + sunk_m, abs=5e-4)
     assert dynamics.velocity_ned_m_s() == pytest.approx((0, 0, 0), abs=1e-4)
-    assert dynamics.specific_force_frd_m_s2()[2] == pytest.approx(-G, rel=2e-3)
+    assert dynamics.motion()[3][2] == pytest.approx(-G, rel=2e-3)
     assert dynamics.touches_ground()
 
 
