@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import time
+from collections import deque
 from collections.abc import AsyncIterator, Callable
+from concurrent.futures import Future, ThreadPoolExecutor
 from pathlib import Path
 from typing import Protocol
 
@@ -12,6 +14,8 @@ import cv2
 from framerunner.pictures import Track
 from offboard.app import Moment
 from vision.types import CameraFrame, Image
+
+_MOST_UNDER_WAY = 50  # images that wait to be compressed: 12 MB
 
 
 class FrameSource(Protocol):
@@ -83,7 +87,7 @@ class FlightRecorder(TrackRecorder):
 
 
 class VideoFile:
-    """Writes images to a video file (motion JPEG in AVI: every player has it).
+    """Writes images to a video file (motion JPEG in AVI: every player has it), beside the flight.
 
     Args:
         path: the video; made with the first image.
@@ -94,20 +98,28 @@ class VideoFile:
         self._path = path
         self._rate_hz = rate_hz
         self._writer: cv2.VideoWriter | None = None
+        self._worker = ThreadPoolExecutor(1, "video")
+        self._under_way: deque[Future[None]] = deque()
 
     def write(self, image: Image) -> None:
-        """Add an image, BGR, of the first one's size."""
+        """Add an image, BGR, of the first one's size; it must not be changed afterwards."""
+        if len(self._under_way) >= _MOST_UNDER_WAY:
+            self._under_way.popleft().result()
+        self._under_way.append(self._worker.submit(self._compress, image))
+
+    def close(self) -> None:
+        """Finish the file."""
+        self._worker.shutdown()
+        if self._writer is not None:
+            self._writer.release()
+            self._writer = None
+
+    def _compress(self, image: Image) -> None:
         if self._writer is None:
             height, width = image.shape[:2]
             codec = cv2.VideoWriter.fourcc(*"MJPG")
             self._writer = cv2.VideoWriter(str(self._path), codec, self._rate_hz, (width, height))
         self._writer.write(image)
-
-    def close(self) -> None:
-        """Finish the file."""
-        if self._writer is not None:
-            self._writer.release()
-            self._writer = None
 
 
 class RecordingCamera:
