@@ -11,9 +11,9 @@ from typing import Self
 from pydantic import Field, ValidationError, model_validator
 
 from scenarios.complaints import Fault, describe_faults, shorten, show
-from scenarios.loader import MAX_BYTES, SUFFIXES, ScenarioError
+from scenarios.loader import ScenarioError
 from scenarios.models import Arena, Frame, Part, refusal
-from scenarios.yaml_tree import YamlError, parse_yaml
+from scenarios.yaml_file import FileKind, is_path
 
 STEPS_PER_UNIT = 1000  # what is drawn is a whole number of millimetres or milliradians
 
@@ -85,6 +85,9 @@ class Level(Part):
     layout: Layout = Field(description="where things stand")
 
 
+_KIND = FileKind("level", LevelError)
+
+
 def list_levels() -> list[str]:
     """Names of the levels that come with the package, sorted."""
     files = resources.files("scenarios") / "levels"
@@ -103,9 +106,9 @@ def load_level(name_or_path: str | Path) -> Level:
         LevelError: there is no such level, or the file is not a valid one.
     """
     text = str(name_or_path)
-    if isinstance(name_or_path, Path) or text.endswith(SUFFIXES) or "/" in text or "\\" in text:
-        return parse_level(_read(Path(text)), source=shorten(text))
     names = list_levels()
+    if is_path(name_or_path):
+        return parse_level(_KIND.read(Path(text), names), source=shorten(text))
     if text not in names:
         nearest = difflib.get_close_matches(text.lower(), names, n=1, cutoff=0.5)
         hint = f"; did you mean {nearest[0]}?" if nearest else ";"
@@ -126,18 +129,7 @@ def parse_level(content: bytes | str, source: str = "level") -> Level:
     Raises:
         LevelError: it is not a valid level; the message names source, line, field, value and mend.
     """
-    if len(content) > MAX_BYTES:
-        raise LevelError(f"{source}: {len(content)} bytes is too large for a level; {MAX_BYTES} at most")
-    try:
-        tree = parse_yaml(content if isinstance(content, str) else content.decode("utf-8-sig"))
-    except UnicodeDecodeError as error:
-        line = error.object.count(b"\n", 0, error.start) + 1
-        raise LevelError(f"{source}:{line}: not UTF-8 text; save the file as UTF-8") from None
-    except YamlError as error:
-        raise LevelError(f"{source}:{error.line}: {' '.join(str(error).split())}") from None
-    if not isinstance(tree.value, dict):
-        what = "nothing" if tree.value is None else show(tree.value)
-        raise LevelError(f"{source}:{tree.line(())}: must hold fields like `name: my-level`, not {what}")
+    tree = _KIND.parse(content, source)
     try:
         return Level.model_validate(tree.value, strict=True)
     except ValidationError as error:
@@ -153,14 +145,3 @@ def _fault(fault: Fault) -> Fault:
     known = parts[len(fault.path) - 1].model_fields
     message = f"is not a known field; known here: {', '.join(known)}"
     return Fault("refused", fault.path, fault.value, {"value": show(fault.value), "message": message})
-
-
-def _read(path: Path) -> bytes:
-    name = shorten(str(path))
-    if not path.is_file():
-        raise LevelError(f"{name}: no such file; give a level file or one of: {', '.join(list_levels())}")
-    try:
-        with path.open("rb") as file:
-            return file.read(MAX_BYTES + 1)
-    except OSError as error:
-        raise LevelError(f"{name}: cannot be read: {error.strerror}") from None

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import difflib
 import re
-import stat
 from importlib import resources
 from pathlib import Path
 from typing import Any
@@ -13,15 +12,17 @@ from pydantic import ValidationError
 
 from scenarios.complaints import Fault, describe_faults, shorten, show
 from scenarios.models import Scenario
-from scenarios.yaml_tree import YamlError, parse_yaml, to_yaml
+from scenarios.yaml_file import FileKind, is_path
+from scenarios.yaml_tree import to_yaml
 
-MAX_BYTES = 1_000_000
-SUFFIXES = (".yaml", ".yml")
 _SOME_SEED = re.compile(r"[0-9]{1,19}")
 
 
 class ScenarioError(ValueError):
     """A scenario that cannot be used; the message is one line for people."""
+
+
+_KIND = FileKind("scenario", ScenarioError)
 
 
 def list_scenarios() -> list[str]:
@@ -43,9 +44,9 @@ def load_scenario(name_or_path: str | Path) -> Scenario:
         ScenarioError: there is no such scenario, or the file is not a valid one.
     """
     text = str(name_or_path)
-    if isinstance(name_or_path, Path) or text.endswith(SUFFIXES) or "/" in text or "\\" in text:
-        return parse_scenario(_read(Path(text)), source=shorten(text))
     names = list_scenarios()
+    if is_path(name_or_path):
+        return parse_scenario(_KIND.read(Path(text), names), source=shorten(text))
     if text not in names:
         return _random(text, names)
     entry = resources.files("scenarios") / "files" / f"{text}.yaml"
@@ -62,25 +63,7 @@ def parse_scenario(content: bytes | str, source: str = "scenario") -> Scenario:
     Raises:
         ScenarioError: it is not a valid scenario; the message names source, line, field, value and mend.
     """
-    if len(content) > MAX_BYTES:
-        raise ScenarioError(
-            f"{source}: {len(content)} bytes is too large for a scenario; {MAX_BYTES} at most"
-        )
-    try:
-        tree = parse_yaml(content if isinstance(content, str) else content.decode("utf-8-sig"))
-    except UnicodeDecodeError as error:
-        line = error.object.count(b"\n", 0, error.start) + 1
-        raise ScenarioError(f"{source}:{line}: not UTF-8 text; save the file as UTF-8") from None
-    except YamlError as error:
-        where = f"{error.line}" if error.column is None else f"{error.line}:{error.column}"
-        raise ScenarioError(f"{source}:{where}: {' '.join(str(error).split())}") from None
-    if tree.value is None:
-        raise ScenarioError(f"{source}:1: empty; a scenario needs at least `name: my-scenario`")
-    if not isinstance(tree.value, dict):
-        what = show(tree.value)
-        raise ScenarioError(
-            f"{source}:{tree.line(())}: must hold fields like `name: my-scenario`, not {what}"
-        )
+    tree = _KIND.parse(content, source)
     try:
         return Scenario.model_validate(tree.value, strict=True)
     except ValidationError as error:
@@ -122,27 +105,3 @@ def _unknown_name(name: str, names: list[str], levels: list[str]) -> str:
         f"unknown scenario {show(name)}{hint} Known: {', '.join(names)}; a random one is {random}; "
         "or give the path of a .yaml file"
     )
-
-
-def _read(path: Path) -> bytes:
-    """Read a file that may be anything, but never more than is allowed."""
-    name = shorten(str(path))
-    try:
-        status = path.stat()
-        if stat.S_ISDIR(status.st_mode):
-            raise ScenarioError(f"{name}: is a directory; give a scenario file")
-        if not stat.S_ISREG(status.st_mode):
-            raise ScenarioError(f"{name}: is not a regular file; give a scenario file")
-        if status.st_size > MAX_BYTES:
-            size = status.st_size
-            raise ScenarioError(f"{name}: {size} bytes is too large for a scenario; {MAX_BYTES} at most")
-        with path.open("rb") as file:
-            return file.read(MAX_BYTES + 1)
-    except FileNotFoundError:
-        known = ", ".join(list_scenarios())
-        raise ScenarioError(f"{name}: no such file; give a path or one of: {known}") from None
-    except (OSError, ValueError) as error:
-        if isinstance(error, ScenarioError):
-            raise
-        reason = error.strerror if isinstance(error, OSError) else str(error)
-        raise ScenarioError(f"{name}: cannot be read: {reason}") from None

@@ -6,7 +6,6 @@ from hypothesis import strategies as st
 
 from scenarios.level import load_level
 from scenarios.loader import (
-    MAX_BYTES,
     ScenarioError,
     dump_yaml,
     json_schema,
@@ -16,6 +15,7 @@ from scenarios.loader import (
 )
 from scenarios.models import COLOURS, Base, Frame, Scenario, Start
 from scenarios.random_scenarios import random_scenario
+from scenarios.yaml_file import MAX_BYTES
 from scenarios.yaml_tree import to_yaml
 
 NAMES = ["empty", "round-1", "test-case-1", "test-case-2", "test-case-3"]
@@ -47,7 +47,7 @@ def test_published_layouts():
     )
     assert layout(load_scenario("test-case-2")) == (
         (1, 2, 2.5),
-        {"red": (-2, -3, 1, -0.12), "green": (0, -3, 1.5, 0.1), "blue": (2, -3, 2, 0.4)},
+        {"red": (-2, -3, 1, -0.1), "green": (0, -3, 1.5, 0.1), "blue": (2, -3, 2, 0.4)},
     )
     assert layout(load_scenario("round-1")) == (
         (-3, -3, 1),

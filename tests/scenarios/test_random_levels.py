@@ -4,7 +4,7 @@ from hypothesis import strategies as st
 from pydantic import ValidationError
 
 from scenarios.level import Level, LevelError, Range, list_levels, load_level, parse_level
-from scenarios.loader import MAX_BYTES
+from scenarios.yaml_file import MAX_BYTES
 from scenarios.yaml_tree import to_yaml
 
 CALM = to_yaml(load_level("calm").model_dump())
@@ -39,10 +39,10 @@ def test_a_level_loads_by_path(tmp_path):
 @pytest.mark.parametrize(
     ("text", "message"),
     [
-        ("", "f.yaml:1: must hold fields like `name: my-level`, not nothing"),
+        ("", "f.yaml:1: empty; a level needs at least `name: my-level`"),
         ("- a", 'f.yaml:1: must hold fields like `name: my-level`, not ["a"]'),
         ("name: a", "f.yaml:1: layout is missing; add it"),
-        ("name: a: b", "f.yaml:1: not valid YAML: mapping values are not allowed here"),
+        ("name: a: b", "f.yaml:1:8: not valid YAML: mapping values are not allowed here"),
         (b"name: a\n# \xff", "f.yaml:2: not UTF-8 text; save the file as UTF-8"),
         ("#" * (MAX_BYTES + 1), "f.yaml: 1000001 bytes is too large for a level; 1000000 at most"),
         (CALM + "wnd: 1\n", "f.yaml:20: wnd 1 is not a known field; known here: name, description, layout"),
@@ -115,9 +115,9 @@ def test_wrong_values_in_known_fields_give_one_line(fields):
         ("zzz", 'unknown level "zzz"; Known: calm'),
         ("", 'unknown level ""; Known: calm'),
         ("a\nb", 'unknown level "a\\nb"; '),
-        ("nowhere.yaml", "nowhere.yaml: no such file; give a level file or one of: calm"),
-        ("bad\0.yaml", "bad?.yaml: no such file; "),
-        ("/", "/: no such file; "),
+        ("nowhere.yaml", "nowhere.yaml: no such file; give a path or one of: calm"),
+        ("bad\0.yaml", "bad?.yaml: cannot be read:"),
+        ("/", "/: is a directory; give a level file"),
     ],
 )
 def test_names_that_lead_nowhere(name, message):
