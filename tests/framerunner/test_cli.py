@@ -20,8 +20,10 @@ PAPER = (ROOT / "offboard" / "missions" / "frame_challenge.yaml").read_text(enco
 COMMANDS = [
     "sim",
     "fly",
-    *(f"mission {name}" for name in ("list", "show", "check")),
-    *(f"scenario {name}" for name in ("list", "show", "check", "schema")),
+    "replay",
+    "evaluate",
+    *(f"mission {name}" for name in ("list", "show", "check", "new")),
+    *(f"scenario {name}" for name in ("list", "show", "check", "schema", "random")),
 ]
 
 
