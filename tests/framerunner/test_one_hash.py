@@ -1,0 +1,29 @@
+"""A hundred runs of one flight, half of them beside others in other processes: one hash."""
+
+from framerunner.evaluation.backends import Pool
+from framerunner.evaluation.runner import fly_all
+from framerunner.evaluation.task import FlightTask, fly_task
+from offboard.mission import load_mission
+from scenarios.loader import load_scenario
+
+MISSION = load_mission("frame_challenge")
+LIMIT_S = 5.0
+
+
+def task(number, name="test-case-1"):
+    """The same flight under another name: a name is no input of the physics."""
+    update = {"name": f"run-{number}", "try_limit_s": LIMIT_S}
+    return FlightTask(load_scenario(name).model_copy(update=update), MISSION)
+
+
+def test_a_hundred_runs_of_one_flight_have_one_hash():
+    alone = [fly_task(task(number)) for number in range(50)]
+    ours = [task(number) for number in range(50, 100)]
+    others = [task(number, "test-case-3") for number in range(100, 125)]
+    mixed = [each for pair in zip(ours[::2], others, ours[1::2], strict=True) for each in pair]
+    together = list(fly_all(mixed, Pool(jobs=2)))
+    own = {each.scenario.name for each in ours}
+    hashes = {row.state_sha256 for row in alone} | {row.state_sha256 for row in together if row.scenario in own}
+    assert len(together) == 75
+    assert len(hashes) == 1
+    assert {row.state_sha256 for row in together if row.scenario not in own}.isdisjoint(hashes)
