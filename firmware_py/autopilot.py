@@ -33,7 +33,7 @@ _UPRIGHT_COSINE = cos(radians(75.0))  # of the tilt beyond which there is no rec
 _LIFT_M_S = 0.04  # asked to climb faster than this, it leaves the ground
 _LIFT_HELD_TICKS = 125  # half a second: integrals rest while the contact still carries the weight
 _TEXTS_KEPT = 100
-_SETPOINT_GRID_US = 25_000
+_SETPOINT_GRID_US = 10_000
 
 _GROUND_MODES = frozenset({State.HOLD, State.LOSS_HOLD, State.LAND, State.LOSS_LAND})
 _AIRBORNE_STATES = {
@@ -235,7 +235,7 @@ class Autopilot:
         One with neither a position nor a velocity (acceleration alone is not followed) counts as none
         received; a status text says so, once until a usable one comes.
 
-        Setpoints are flown from the next multiple of 25 ms on. So a few milliseconds that a packet takes
+        Setpoints are flown from the next multiple of 10 ms on. So a few milliseconds that a packet takes
         more or less change nothing, nor does one that is sent again, and a flight over a network repeats as
         well as one without.
         """

@@ -228,7 +228,7 @@ class LockstepDrone:
             truth = simulation.truth
             for observe in observers:
                 observe(truth)
-            if state.time_us >= until_us:
+            if state.time_us >= until_us or simulation.time_us >= until_us + TICK_US:  # its clock may stand
                 break
         self._exchange(state.time_us)
 

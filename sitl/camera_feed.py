@@ -8,16 +8,16 @@ from scenarios.models import Scenario
 from scenarios.truth import TrueState
 from sitl.camera import Camera, Image
 
-FIRST_EXPOSURE_US = 25_000
+FIRST_EXPOSURE_US = 36_000
 
 
 class CameraFeed:
     """Takes images at the camera's rate and hands each out when its latency is over.
 
-    Exposures are on a grid of the camera's period that begins 25 ms after the clock, each once; a rate
+    Exposures are on a grid of the camera's period that begins 36 ms after the clock, each once; a rate
     above the control rate gives one image a tick. The navigator's ticks, 50 ms apart, begin with the clock:
-    with the default latency an image is out 75 ms after such a tick, half-way between two others, so what
-    a tick sees does not hang on a race between video and telemetry.
+    with the default latency an image is out 14 ms before one. That is fresh, which the paper's navigator
+    needs to keep its height before a frame, and still no race between video and telemetry.
 
     Args:
         scenario: camera settings and what is to be seen.

@@ -25,7 +25,7 @@ class Weights(BaseModel):
     tilt_rad: float = Field(0.6, gt=0)
     roll_pitch_rate_rad_s: float = Field(4.0, gt=0)
     yaw_rate_rad_s: float = Field(0.5, gt=0)
-    velocity_horizontal_m_s: float = Field(0.4, gt=0)
+    velocity_horizontal_m_s: float = Field(0.6, gt=0)
     velocity_vertical_m_s: float = Field(0.3, gt=0)
     integral_horizontal_m: float = Field(0.3, gt=0)
     integral_vertical_m: float = Field(0.1, gt=0)

@@ -39,7 +39,7 @@ class Stabiliser:
         period_s: float,
         weights: Weights | None = None,
         *,
-        horizontal_reference_weight: float = 0.6,
+        horizontal_reference_weight: float = 0.5,
         vertical_reference_weight: float = 0.8,
         yaw_reference_weight: float = 0.8,
     ) -> None:

@@ -74,11 +74,11 @@ def test_looking_on_changes_nothing():
     )
     assert watched.result == fly(short("test-case-1", 6.0)).result
     times_us = [time_us for time_us, _ in images]
-    assert times_us == [28_000 + 100_000 * number for number in range(len(times_us))]
+    assert times_us == [36_000 + 100_000 * number for number in range(len(times_us))]
     assert {shape for _, shape in images} == {(240, 320, 3)}
     flown = [moment for moment in moments if moment.flight_time_s > 0.0]
     ages_us = {moment.state.time_us - moment.detections.time_us for moment in flown}
-    assert ages_us == {72_000, 124_000}  # as over UDP and HTTP
+    assert ages_us == {64_000, 116_000}  # as over UDP and HTTP
     assert {moment.state.time_us % 50_000 for moment in flown} == {0, 2_000}
 
 

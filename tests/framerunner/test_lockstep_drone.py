@@ -156,6 +156,6 @@ def test_a_camera_without_fresh_images_is_lost(simulation):
     for _ in range(50):
         simulation.tick()
         eyes.follow(simulation.truth)
-    assert eyes.latest(simulation.time_us).time_us == 128_000
+    assert eyes.latest(simulation.time_us).time_us == 136_000
     with pytest.raises(CameraLostError, match=r"no image for 1\.1 s"):
         eyes.latest(1_250_000)

@@ -34,7 +34,7 @@ def images(feed, until_us, begin_us=0):
 
 def grid(period_us, count):
     """The first ticks at or after each exposure."""
-    return [-(-(25_000 + period_us * k) // TICK_US) * TICK_US for k in range(count)]
+    return [-(-(36_000 + period_us * k) // TICK_US) * TICK_US for k in range(count)]
 
 
 def test_exposures_are_a_tenth_of_a_second_apart_from_25_ms_on():
@@ -66,9 +66,9 @@ def test_a_clock_that_begins_late_gives_no_burst_of_old_images():
 
 def test_an_image_shows_the_place_of_its_exposure_not_of_its_arrival():
     feed, wanted = CameraFeed(scenario()), CameraFeed(scenario(latency_s=0.0))
-    (expected,) = images(wanted, 28_000)
+    (expected,) = images(wanted, 36_000)
     came = None
     for time_us in range(0, 120_000, TICK_US):
-        came = came or feed.step(truth(time_us, x_m=0.0 if time_us <= 28_000 else 1.2))
-    assert came[0] == 28_000
+        came = came or feed.step(truth(time_us, x_m=0.0 if time_us <= 36_000 else 1.2))
+    assert came[0] == 36_000
     assert np.array_equal(came[1], expected[2])
