@@ -6,6 +6,9 @@ import cv2
 import pytest
 from pymavlink import mavutil
 
+from framerunner.lockstep import fly_lockstep
+from offboard.mission import load_mission
+from scenarios.loader import load_scenario
 from tests.processes import ports_are_free, program
 
 pytestmark = pytest.mark.realtime
@@ -61,3 +64,10 @@ def test_test_case_3_is_flown_in_real_time(tmp_path, instance):
     assert counts["ATTITUDE"] > 20 * result["try_time_s"]
     assert counts["SET_POSITION_TARGET_LOCAL_NED"] > 15 * result["try_time_s"]
     assert images(folder / "video.avi") > 8 * result["try_time_s"]
+
+    lockstep = fly_lockstep(load_scenario("test-case-3"), load_mission("frame_challenge")).result
+    assert (result["verdict"], tuple(result["crossing_sides"])) == (
+        lockstep["verdict"],
+        lockstep["crossing_sides"],
+    )
+    assert result["try_time_s"] == pytest.approx(lockstep["try_time_s"], rel=0.05)
