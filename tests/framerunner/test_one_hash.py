@@ -23,7 +23,9 @@ def test_a_hundred_runs_of_one_flight_have_one_hash():
     mixed = [each for pair in zip(ours[::2], others, ours[1::2], strict=True) for each in pair]
     together = list(fly_all(mixed, Pool(jobs=2)))
     own = {each.scenario.name for each in ours}
-    hashes = {row.state_sha256 for row in alone} | {row.state_sha256 for row in together if row.scenario in own}
+    hashes = {row.state_sha256 for row in alone} | {
+        row.state_sha256 for row in together if row.scenario in own
+    }
     assert len(together) == 75
     assert len(hashes) == 1
     assert {row.state_sha256 for row in together if row.scenario not in own}.isdisjoint(hashes)
