@@ -33,6 +33,7 @@ _UPRIGHT_COSINE = cos(radians(75.0))  # of the tilt beyond which there is no rec
 _LIFT_M_S = 0.04  # asked to climb faster than this, it leaves the ground
 _LIFT_HELD_TICKS = 125  # half a second: integrals rest while the contact still carries the weight
 _TEXTS_KEPT = 100
+_READY_PERIOD_US = 100_000  # once armed, whether it could be armed again is of little interest
 _SETPOINT_GRID_US = 10_000
 
 _GROUND_MODES = frozenset({State.HOLD, State.LOSS_HOLD, State.LAND, State.LOSS_LAND})
@@ -126,6 +127,7 @@ class Autopilot:
         self._refusal_said = False
         self._next_setpoint: Setpoint | None = None
         self._setpoint_slot = 0
+        self._ready_due_us = 0
         self._parameters_version = -1
         self._configure()
 
@@ -375,8 +377,11 @@ class Autopilot:
             status.intended_mode = intended
             status.failsafe = commander.failsafe
         status.setpoint = self._guidance.setpoint
+        status.landed_state = LandedState.ON_GROUND if self._land_detector.landed else self._airborne
+        if status.armed and self._now_us < self._ready_due_us:
+            return
+        self._ready_due_us = self._now_us + _READY_PERIOD_US
         ready = commander.ready
         if ready and not status.ready and not status.armed:
             self.say(INFO, "Ready for takeoff!")
         status.ready = ready
-        status.landed_state = LandedState.ON_GROUND if self._land_detector.landed else self._airborne

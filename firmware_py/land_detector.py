@@ -79,6 +79,9 @@ class LandDetector:
     def _watch_for_ground(
         self, state: VehicleState, armed: bool, command_down_m_s: float, throttle: float
     ) -> None:
+        if armed and command_down_m_s <= _DESCENT_COMMAND_M_S:
+            self._last_unlike_us = state.time_us
+            return
         north_m_s, east_m_s, down_m_s = state.velocity_ned_m_s
         like_ground = (
             abs(down_m_s) < _MOVING_M_S
@@ -87,8 +90,7 @@ class LandDetector:
             and (
                 not armed
                 or (
-                    command_down_m_s > _DESCENT_COMMAND_M_S
-                    and down_m_s < _DESCENT_SHARE * command_down_m_s
+                    down_m_s < _DESCENT_SHARE * command_down_m_s
                     and throttle < _LOW_THRUST_SHARE * self._hover_throttle
                 )
             )

@@ -24,6 +24,14 @@ class Boundary:
             and point_m[2] <= self._ceiling_m
         )
 
+    def margin(self, point_m: Vec3) -> float:
+        """How far a point is from the nearest side; below zero outside."""
+        return min(
+            self._half_x_m - abs(point_m[0]),
+            self._half_y_m - abs(point_m[1]),
+            self._ceiling_m - point_m[2],
+        )
+
     def outside_share(self, start_m: Vec3, end_m: Vec3) -> float:
         """Share (0..1) of the straight step between two points that is outside.
 

@@ -62,6 +62,11 @@ class Gate:
         """Start a new path: the next point is not joined to the last one."""
         self._side = 0
 
+    @property
+    def distance_m(self) -> float:
+        """From the last point to the frame's plane; as long as the path is shorter, it cannot pass."""
+        return abs(self._distance_m)
+
     def follow(self, start_m: Vec3, end_m: Vec3) -> Passage | None:
         """Go one step on.
 
@@ -72,7 +77,7 @@ class Gate:
         Returns:
             The passage, if this step passes through the opening.
         """
-        before_m = self._distance_m
+        before_m = self._cos * start_m[0] + self._sin * start_m[1] - self._offset_m
         now_m = self._cos * end_m[0] + self._sin * end_m[1] - self._offset_m
         self._distance_m = now_m
         came_from = self._side

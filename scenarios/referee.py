@@ -31,6 +31,8 @@ REST_US = 300_000  # how long the drone must be still; a fall passes through zer
 SETTLE_LIMIT_US = 2_000_000  # after this it counts as settled however it moves
 MAX_GAP_US = 1_000_000  # across a longer hole in the states no crossing is believed
 
+_SLACK_KEPT_M = 0.01  # of the way to the nearest plane, so that rounding cannot lose a passage
+
 
 class _Phase(Enum):
     WAITING = "the motors have not been on"
@@ -85,6 +87,7 @@ class Referee:
         self._inside = True
         self._outside_us = 0.0
         self._path_m = 0.0
+        self._slack_m = 0.0
         self._longest_gap_us = 0
         self._wrong_order = ""
         self._crash = ""
@@ -123,6 +126,7 @@ class Referee:
     def _restart_path(self, state: TrueState) -> None:
         """Do not join the next point to those before this one."""
         self._inside = self._boundary.holds(state.position_arena_m)
+        self._slack_m = 0.0
         self._forget_sides(state)
 
     def _forget_sides(self, state: TrueState) -> None:
@@ -138,15 +142,12 @@ class Referee:
         self._longest_gap_us = max(self._longest_gap_us, step_us)
         if step_us > MAX_GAP_US:
             self._forget_sides(state)
-        for colour, gate in self._gates:
-            passage = gate.follow(start_m, end_m)
-            if passage is not None:
-                self._cross(colour, passage, step_us)
-        inside = self._boundary.holds(end_m)
-        if not (inside and self._inside):
-            self._outside_us += self._boundary.outside_share(start_m, end_m) * step_us
-        self._inside = inside
-        self._path_m += dist(start_m, end_m)
+            self._slack_m = 0.0
+        step_m = dist(start_m, end_m)
+        self._path_m += step_m
+        self._slack_m -= step_m
+        if self._slack_m <= 0.0:
+            self._follow_path(start_m, end_m, step_us)
         if end_m[2] - self._start_height_m > TAKEN_OFF_M:
             self._taken_off = True
         self._watch(state)
@@ -158,6 +159,20 @@ class Referee:
             self._phase = _Phase.STOPPED
             self._stop_us = state.time_us
             self._still_since_us = None
+
+    def _follow_path(self, start_m: Vec3, end_m: Vec3, step_us: int) -> None:
+        """Look at frames and arena, and note how far the drone can go before that is needed again."""
+        nearest_m = self._boundary.margin(end_m)
+        for colour, gate in self._gates:
+            passage = gate.follow(start_m, end_m)
+            if passage is not None:
+                self._cross(colour, passage, step_us)
+            nearest_m = min(nearest_m, gate.distance_m)
+        inside = self._boundary.holds(end_m)
+        if not (inside and self._inside):
+            self._outside_us += self._boundary.outside_share(start_m, end_m) * step_us
+        self._inside = inside
+        self._slack_m = max(nearest_m - _SLACK_KEPT_M, 0.0)
 
     def _cross(self, colour: str, passage: Passage, step_us: int) -> None:
         """Note a passage, if it is the first one through this frame."""

@@ -105,9 +105,9 @@ class CrashWatch:
         Returns:
             What happened, to be read after "the drone", if the drone has crashed now.
         """
-        sinking_before_m_s = self._sinking_m_s
-        self._sinking_m_s = -state.velocity_arena_m_s[2]
-        if up_component(state.attitude_arena) < 0.0:
+        sinking_before_m_s, self._sinking_m_s = self._sinking_m_s, -state.velocity_arena_m_s[2]
+        _, x, y, _ = state.attitude_arena
+        if x * x + y * y > 0.5:  # the body's up axis points down, see `up_component`
             if self._inverted_since_us is None:
                 self._inverted_since_us = state.time_us
             if state.time_us - self._inverted_since_us >= UPSIDE_DOWN_US:
