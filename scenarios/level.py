@@ -13,7 +13,7 @@ from pydantic import Field, ValidationError, model_validator
 from scenarios.complaints import Fault, describe_faults, shorten, show
 from scenarios.loader import ScenarioError
 from scenarios.models import Arena, Frame, Part, refusal
-from scenarios.yaml_file import FileKind, is_path
+from scenarios.yaml_file import FileKind, is_path, packaged
 
 STEPS_PER_UNIT = 1000  # what is drawn is a whole number of millimetres or milliradians
 
@@ -90,10 +90,7 @@ _KIND = FileKind("level", LevelError)
 
 def list_levels() -> list[str]:
     """Names of the levels that come with the package, sorted."""
-    files = resources.files("scenarios") / "levels"
-    return sorted(
-        entry.name.removesuffix(".yaml") for entry in files.iterdir() if entry.name.endswith(".yaml")
-    )
+    return packaged("levels")
 
 
 def load_level(name_or_path: str | Path) -> Level:

@@ -12,7 +12,7 @@ from pydantic import ValidationError
 
 from scenarios.complaints import Fault, describe_faults, shorten, show
 from scenarios.models import Scenario
-from scenarios.yaml_file import FileKind, is_path
+from scenarios.yaml_file import FileKind, is_path, packaged
 from scenarios.yaml_tree import to_yaml
 
 _SOME_SEED = re.compile(r"[0-9]{1,19}")
@@ -27,10 +27,7 @@ _KIND = FileKind("scenario", ScenarioError)
 
 def list_scenarios() -> list[str]:
     """Names of the scenarios that come with the package, sorted."""
-    files = resources.files("scenarios") / "files"
-    return sorted(
-        entry.name.removesuffix(".yaml") for entry in files.iterdir() if entry.name.endswith(".yaml")
-    )
+    return packaged("files")
 
 
 def load_scenario(name_or_path: str | Path) -> Scenario:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import stat
 from dataclasses import dataclass
+from importlib import resources
 from pathlib import Path
 
 from scenarios.complaints import shorten, show
@@ -75,6 +76,12 @@ class FileKind:
             what = show(tree.value)
             raise error(f"{source}:{tree.line(())}: must hold fields like `name: my-{kind}`, not {what}")
         return tree
+
+
+def packaged(folder: str) -> list[str]:
+    """Names of the files in a folder of this package, sorted."""
+    files = resources.files("scenarios") / folder
+    return sorted(each.name.removesuffix(".yaml") for each in files.iterdir() if each.name.endswith(".yaml"))
 
 
 def is_path(name_or_path: str | Path) -> bool:

@@ -42,14 +42,8 @@ def time_chart(rows: Sequence[Row]) -> str:
     if verdicts:
         last_s = max(max(part) for part in times)
         step_s = 5.0 if last_s > 60.0 else max(last_s / 12.0, 0.1)
-        edges = [step_s * number for number in range(ceil(last_s / step_s + 1e-9) + 1)]
-        colours = [VERDICT_COLOURS[verdict] for verdict in verdicts]
-        axes.hist(times, edges, stacked=True, color=colours, label=verdicts, ec="white", lw=0.5)
-        axes.legend(frameon=False, fontsize=8, labelcolor=_INK)
-    axes.set_xlabel("try time (s)")
-    axes.set_ylabel("flights")
-    axes.yaxis.set_major_locator(MaxNLocator(6, integer=True))
-    axes.set_xlim(left=0.0)
+        _stack(axes, times, step_s, verdicts, [VERDICT_COLOURS[verdict] for verdict in verdicts])
+    _name_axes(axes, "try time (s)", "flights")
     return _svg(figure, "time")
 
 
@@ -61,17 +55,29 @@ def offset_chart(rows: Sequence[Row]) -> str:
     parts = {colour: offsets for colour, offsets in parts.items() if offsets}
     if parts:
         last_m = max(max(offsets) for offsets in parts.values())
-        step_m = 0.01 if last_m > 0.05 else 0.005
-        edges = [step_m * number for number in range(ceil(last_m / step_m + 1e-9) + 1)]
-        inks = [_FRAME_INKS[colour] for colour in parts]
         labels = [f"{colour} ({len(offsets)})" for colour, offsets in parts.items()]
-        axes.hist(list(parts.values()), edges, stacked=True, color=inks, label=labels, ec="white", lw=0.5)
-        axes.legend(frameon=False, fontsize=8, labelcolor=_INK)
-    axes.set_xlabel("distance from the opening's middle (m)")
-    axes.set_ylabel("crossings")
+        inks = [_FRAME_INKS[colour] for colour in parts]
+        _stack(axes, list(parts.values()), 0.01 if last_m > 0.05 else 0.005, labels, inks)
+    _name_axes(axes, "distance from the opening's middle (m)", "crossings")
+    return _svg(figure, "offset")
+
+
+def _stack(
+    axes: Axes, parts: Sequence[Sequence[float]], step: float, labels: Sequence[str], colours: Sequence[str]
+) -> None:
+    """Draw a histogram from zero on, its parts one on the other."""
+    last = max(max(part) for part in parts)
+    edges = [step * number for number in range(ceil(last / step + 1e-9) + 1)]
+    axes.hist(list(parts), edges, stacked=True, color=list(colours), label=list(labels), ec="white", lw=0.5)
+    axes.legend(frameon=False, fontsize=8, labelcolor=_INK)
+
+
+def _name_axes(axes: Axes, across: str, up: str) -> None:
+    """Say what stands on the axes of a histogram of things that are counted."""
+    axes.set_xlabel(across)
+    axes.set_ylabel(up)
     axes.yaxis.set_major_locator(MaxNLocator(6, integer=True))
     axes.set_xlim(left=0.0)
-    return _svg(figure, "offset")
 
 
 @_in_plain_words

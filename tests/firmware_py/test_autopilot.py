@@ -385,7 +385,7 @@ def test_a_changed_parameter_acts_in_flight():
     flight.autopilot.parameters.set("MPC_XY_VEL_MAX", 0.5)
     flight.tick()
     flight.feed(NORTH)
-    for _ in range(7):  # setpoints are flown from the next multiple of 10 ms on
+    for _ in range(4):  # setpoints are flown from the next multiple of 10 ms on
         flight.tick()
     assert flight.sensors.velocity_ned_m_s[0] == 0.5
     flight.run(0.3)
