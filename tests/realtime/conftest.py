@@ -68,6 +68,15 @@ class Peer:
             came += self.read(0.05)
         return came
 
+    def fly_until_heartbeat(self, wanted, limit_s=3.0):
+        """Stream a standstill until such a heartbeat comes; in silence offboard is lost after a second."""
+        end_s = time.monotonic() + limit_s
+        while time.monotonic() < end_s:
+            for message in self.fly(0.05):
+                if message.get_type() == "HEARTBEAT" and wanted(message):
+                    return message
+        raise AssertionError(f"no such heartbeat within {limit_s:g} s")
+
 
 @pytest.fixture
 def instance():

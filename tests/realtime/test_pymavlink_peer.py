@@ -21,8 +21,7 @@ def airborne(peer):
     peer.fly(1.0)
     assert peer.command(SET_MODE, 1, 6) == 0
     assert peer.command(ARM, 1) == 0
-    peer.velocity()
-    peer.wait("HEARTBEAT", lambda beat: beat.base_mode & ARMED and beat.custom_mode == OFFBOARD, 3.0)
+    peer.fly_until_heartbeat(lambda beat: beat.base_mode & ARMED and beat.custom_mode == OFFBOARD)
     peer.fly(2.5, down_m_s=-0.6)
     peer.fly(1.5)
     assert peer.latest["LOCAL_POSITION_NED"].z < -1.0
@@ -68,7 +67,7 @@ def test_setpoints_that_are_not_finite_or_in_another_frame_move_nothing(airborne
     after = peer.latest["LOCAL_POSITION_NED"]
     assert all(isfinite(getattr(after, field)) for field in ("x", "y", "z", "vx", "vy", "vz"))
     assert hypot(after.x - before.x, after.y - before.y, after.z - before.z) < 0.3
-    beat = peer.wait("HEARTBEAT", limit_s=3.0)
+    beat = peer.fly_until_heartbeat(lambda beat: beat.get_srcComponent() == 1)
     assert beat.base_mode & ARMED and beat.custom_mode == OFFBOARD
 
 
