@@ -4,12 +4,13 @@ from math import nan
 import pytest
 
 from firmware_py.airframe import Airframe, load_airframe
+from firmware_py.geodesy import LocalProjection
 from firmware_py.mavlink import GROUND, ONBOARD, MavlinkNode
 from firmware_py.mavlink.dialect import mavlink
 from firmware_py.mavlink.framing import PacketReader
 from firmware_py.parameters import Parameters
 from firmware_py.status import CommandResult, FlightMode, VehicleStatus
-from firmware_py.types import GeodeticPoint, MotorOutput, StatusText, VehicleState
+from firmware_py.types import BatteryState, FlightRecord, GeodeticPoint, MotorOutput, StatusText, VehicleState
 
 HOME = GeodeticPoint(47.397742, 8.545594, 489.0)
 
@@ -23,6 +24,8 @@ class FakeAutopilot:
     state: VehicleState = field(default_factory=VehicleState)
     status: VehicleStatus = field(default_factory=lambda: VehicleStatus(ready=True, home=HOME, origin=HOME))
     output: MotorOutput = field(default_factory=MotorOutput)
+    battery: BatteryState = field(default_factory=BatteryState)
+    flight: FlightRecord = field(default_factory=FlightRecord)
     place: GeodeticPoint | None = HOME
     result: CommandResult = CommandResult.ACCEPTED
     calls: list[tuple] = field(default_factory=list)
@@ -60,6 +63,9 @@ class FakeAutopilot:
 
     def global_position(self):
         return self.place
+
+    def local_position(self, point):
+        return LocalProjection(HOME).to_local(point)
 
 
 class Peer:
@@ -131,3 +137,8 @@ def peer(autopilot):
 @pytest.fixture
 def make_peer():
     return Peer
+
+
+@pytest.fixture
+def make_lossy_peer():
+    return LossyPeer
