@@ -19,6 +19,8 @@ from firmware_py.land_detector import LandDetector
 from firmware_py.parameters import Parameters
 from firmware_py.status import CommandResult, FlightMode, LandedState, VehicleStatus
 from firmware_py.types import (
+    BatteryState,
+    FlightRecord,
     GeodeticPoint,
     MotorOutput,
     MotorSpeeds,
@@ -26,6 +28,7 @@ from firmware_py.types import (
     Sensors,
     Setpoint,
     StatusText,
+    Vec3,
     VehicleState,
 )
 
@@ -83,6 +86,8 @@ class Autopilot:
         state: the estimate of the vehicle, updated in place.
         status: arming, mode, home and so on, updated in place.
         output: what the last step sent to the motors.
+        battery: what is known of the battery.
+        flight: times of the flight now or last.
     """
 
     def __init__(
@@ -106,6 +111,8 @@ class Autopilot:
         self.airframe = airframe
         self.parameters = parameters if parameters is not None else Parameters()
         self.status = VehicleStatus()
+        self.battery = BatteryState()
+        self.flight = FlightRecord()
         self._estimator = Estimator()
         self.state = self._estimator.state
         self._sensor_projection = LocalProjection(origin)
@@ -207,6 +214,9 @@ class Autopilot:
         Returns:
             ACCEPTED, or TEMPORARILY_REJECTED with a status text that says why.
         """
+        if mode not in MODE_EVENT:
+            self.say(WARNING, f"Mode change refused: {mode.name.lower()} cannot be flown here")
+            return CommandResult.TEMPORARILY_REJECTED
         if mode is FlightMode.TAKEOFF:
             self._takeoff_altitude_m = nan
         return self._command(MODE_EVENT[mode])
@@ -269,6 +279,10 @@ class Autopilot:
     def global_position(self) -> GeodeticPoint | None:
         """Where on Earth it believes to be; None before the first usable sample."""
         return None if self._projection is None else self._projection.to_geodetic(self.state.position_ned_m)
+
+    def local_position(self, point: GeodeticPoint) -> Vec3 | None:
+        """A place on Earth in the local frame, NED metres; None before the origin is known."""
+        return None if self._projection is None else self._projection.to_local(point)
 
     def _command(self, event: Event) -> CommandResult:
         row = self._commander.handle(event)

@@ -11,10 +11,20 @@ from firmware_py.types import GeodeticPoint, Setpoint, Vec3
 class FlightMode(Enum):
     """Flight modes with PX4's numbers; the value is (main mode, sub mode)."""
 
-    HOLD = (4, 3)
+    MANUAL = (1, 0)
+    ALTITUDE = (2, 0)
+    POSITION = (3, 0)
+    ORBIT = (3, 1)
     TAKEOFF = (4, 2)
+    HOLD = (4, 3)
+    MISSION = (4, 4)
+    RETURN = (4, 5)
     LAND = (4, 6)
+    FOLLOW = (4, 8)
+    ACRO = (5, 0)
     OFFBOARD = (6, 0)
+    STABILIZED = (7, 0)
+    TERMINATION = (10, 0)
 
     @property
     def custom_mode(self) -> int:

@@ -73,6 +73,10 @@ class Setpoint:
         yaw_rate_rad_s: clockwise.
         velocity_level_m_s: forward, right, down in level axes that turn with the yaw, shape (3,), if the
             velocity was given so; then it is flown, and velocity_ned_m_s is what it was at reception.
+        attitude: unit quaternion (w, x, y, z), body FRD to world NED, if an attitude is asked for.
+        rate_frd_rad_s: body rates, shape (3,), if rates are asked for.
+        thrust: 0..1, with an attitude or rates.
+        outputs: motor outputs 0..1, if they are asked for directly; else empty.
     """
 
     time_us: int
@@ -82,6 +86,10 @@ class Setpoint:
     yaw_rad: float = nan
     yaw_rate_rad_s: float = nan
     velocity_level_m_s: Vec3 = NAN3
+    attitude: Quaternion | None = None
+    rate_frd_rad_s: Vec3 | None = None
+    thrust: float = nan
+    outputs: tuple[float, ...] = ()
 
 
 @dataclass(frozen=True, slots=True)
@@ -91,10 +99,129 @@ class RateCommand:
     Attributes:
         velocity_level_m_s: forward, right, down; shape (3,).
         yaw_rate_rad_s: clockwise seen from above.
+        acceleration_level_m_s2: feed-forward beside the velocity, shape (3,).
     """
 
     velocity_level_m_s: Vec3 = (0.0, 0.0, 0.0)
     yaw_rate_rad_s: float = 0.0
+    acceleration_level_m_s2: Vec3 = (0.0, 0.0, 0.0)
+
+
+@dataclass(frozen=True, slots=True)
+class AccelerationCommand:
+    """An acceleration in level axes turned with the yaw, and a yaw rate; velocity is left to whoever asks.
+
+    Attributes:
+        acceleration_level_m_s2: forward, right, down; shape (3,); zeros hover.
+        yaw_rate_rad_s: clockwise seen from above.
+    """
+
+    acceleration_level_m_s2: Vec3
+    yaw_rate_rad_s: float = 0.0
+
+
+@dataclass(frozen=True, slots=True)
+class TiltCommand:
+    """An attitude by its tilt, a yaw rate, and either a thrust or a vertical velocity.
+
+    Attributes:
+        roll_rad: right side down is positive.
+        pitch_rad: nose up is positive.
+        yaw_rate_rad_s: clockwise seen from above.
+        thrust: collective thrust along body up as a share of the most there is, 0..1; NaN: hold `down_m_s`.
+        down_m_s: vertical velocity, positive down.
+    """
+
+    roll_rad: float
+    pitch_rad: float
+    yaw_rate_rad_s: float = 0.0
+    thrust: float = nan
+    down_m_s: float = 0.0
+
+
+@dataclass(frozen=True, slots=True)
+class BodyRateCommand:
+    """Body rates and a thrust.
+
+    Attributes:
+        rate_frd_rad_s: roll, pitch and yaw rate, shape (3,).
+        thrust: collective thrust along body up as a share of the most there is, 0..1.
+    """
+
+    rate_frd_rad_s: Vec3
+    thrust: float
+
+
+@dataclass(frozen=True, slots=True)
+class ActuatorCommand:
+    """Motor outputs straight through.
+
+    Attributes:
+        outputs: one per rotor in the airframe's order, 0..1 of a rotor's full thrust.
+    """
+
+    outputs: tuple[float, ...]
+
+
+Command = RateCommand | AccelerationCommand | TiltCommand | BodyRateCommand | ActuatorCommand
+"""What a stabiliser can be told."""
+
+
+@dataclass(frozen=True, slots=True)
+class ManualInput:
+    """A person's sticks, from MANUAL_CONTROL or RC channels.
+
+    Attributes:
+        time_us: vehicle time of reception.
+        forward: the right stick's up, -1..1 (pitch: nose down).
+        right: the right stick's right, -1..1 (roll).
+        up: the left stick's up, -1..1; -1 is no thrust.
+        yaw: the left stick's right, -1..1 (clockwise).
+    """
+
+    time_us: int
+    forward: float = 0.0
+    right: float = 0.0
+    up: float = 0.0
+    yaw: float = 0.0
+
+
+@dataclass(slots=True)
+class BatteryState:
+    """What is known of the battery.
+
+    Attributes:
+        voltage_v: at its terminals.
+        current_a: drawn now.
+        used_mah: since it was full.
+        remaining: share of the charge left, 0..1.
+        cells: in series.
+        warning: MAV_BATTERY_CHARGE_STATE: 1 ok, 2 low, 3 critical, 4 emergency.
+    """
+
+    voltage_v: float = 16.2
+    current_a: float = 0.0
+    used_mah: float = 0.0
+    remaining: float = 1.0
+    cells: int = 4
+    warning: int = 1
+
+
+@dataclass(slots=True)
+class FlightRecord:
+    """Times of the flight now or last, vehicle time in microseconds; 0: not yet.
+
+    Attributes:
+        armed_us: when it was armed.
+        takeoff_us: when it left the ground.
+        landed_us: when it stood again.
+        number: counts armings from 1; 0 before the first.
+    """
+
+    armed_us: int = 0
+    takeoff_us: int = 0
+    landed_us: int = 0
+    number: int = 0
 
 
 @dataclass(frozen=True, slots=True)

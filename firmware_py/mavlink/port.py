@@ -8,7 +8,16 @@ from typing import Protocol
 from firmware_py.airframe import Airframe
 from firmware_py.parameters import Parameters
 from firmware_py.status import CommandResult, FlightMode, VehicleStatus
-from firmware_py.types import GeodeticPoint, MotorOutput, Setpoint, StatusText, VehicleState
+from firmware_py.types import (
+    BatteryState,
+    FlightRecord,
+    GeodeticPoint,
+    MotorOutput,
+    Setpoint,
+    StatusText,
+    Vec3,
+    VehicleState,
+)
 
 
 class AutopilotPort(Protocol):
@@ -37,6 +46,16 @@ class AutopilotPort(Protocol):
     @property
     def output(self) -> MotorOutput:
         """What was last sent to the motors."""
+        ...
+
+    @property
+    def battery(self) -> BatteryState:
+        """What is known of the battery."""
+        ...
+
+    @property
+    def flight(self) -> FlightRecord:
+        """Times of the flight now or last."""
         ...
 
     def arm(self, *, force: bool = False) -> CommandResult:
@@ -73,4 +92,8 @@ class AutopilotPort(Protocol):
 
     def global_position(self) -> GeodeticPoint | None:
         """Where the vehicle is on Earth; None before it is known."""
+        ...
+
+    def local_position(self, point: GeodeticPoint) -> Vec3 | None:
+        """A place on Earth in the local frame, NED metres; None before the origin is known."""
         ...
