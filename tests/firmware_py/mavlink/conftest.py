@@ -11,6 +11,7 @@ from firmware_py.mavlink.framing import PacketReader
 from firmware_py.parameters import Parameters
 from firmware_py.status import CommandResult, FlightMode, VehicleStatus
 from firmware_py.types import BatteryState, FlightRecord, GeodeticPoint, MotorOutput, StatusText, VehicleState
+from tests.firmware_py.mavlink.lossy import LossyPeer
 
 HOME = GeodeticPoint(47.397742, 8.545594, 489.0)
 
