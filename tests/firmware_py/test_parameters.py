@@ -23,7 +23,7 @@ def test_starts_from_defaults_and_takes_given_values():
     parameters = Parameters({"MIS_TAKEOFF_ALT": 1.5})
     assert parameters.value("MIS_TAKEOFF_ALT") == 1.5
     assert parameters.value("COM_OF_LOSS_T") == 1.0
-    assert parameters.integer("COM_OBL_RC_ACT") == 5
+    assert parameters.integer("COM_OBL_RC_ACT") == 0
 
 
 def test_set_counts_and_tells_only_changes():
@@ -41,9 +41,15 @@ def test_set_counts_and_tells_only_changes():
     [
         ("COM_OF_LOSS_T", nan, "COM_OF_LOSS_T: nan is not a finite number"),
         ("COM_OF_LOSS_T", inf, "COM_OF_LOSS_T: inf is not a finite number"),
-        ("COM_OF_LOSS_T", -500.0, "COM_OF_LOSS_T: -500 is outside 0.1 to 60 s"),
+        ("COM_OF_LOSS_T", -500.0, "COM_OF_LOSS_T: -500 is outside 0 to 60 s"),
         ("COM_OBL_RC_ACT", 4.5, "COM_OBL_RC_ACT: 4.5 is not a whole number"),
-        ("COM_OBL_RC_ACT", 0, "COM_OBL_RC_ACT: 0 is outside 4 to 5"),
+        ("COM_OBL_RC_ACT", 8, "COM_OBL_RC_ACT: 8 is outside 0 to 7"),
+        (
+            "COM_LOW_BAT_ACT",
+            1,
+            "COM_LOW_BAT_ACT: there is no choice 1; there are 0 Warning, 2 Land mode, "
+            "3 Return at critical level, land at emergency level",
+        ),
         ("SYS_AUTOSTART", 10040, "SYS_AUTOSTART: stays 4001; it is a fact of this vehicle"),
         ("NO_SUCH", 1.0, "NO_SUCH: there is no such parameter"),
     ],

@@ -123,7 +123,7 @@ def test_setting_the_same_value_is_answered(peer):
         (TAKEOFF_ALTITUDE, -500.0, REAL32),
         (TAKEOFF_ALTITUDE, nan, REAL32),
         (TAKEOFF_ALTITUDE, float("inf"), REAL32),
-        (b"COM_OBL_RC_ACT", 0, INT32),
+        (b"COM_OBL_RC_ACT", 8, INT32),
         (b"SYS_AUTOSTART", 10040, INT32),
     ],
 )

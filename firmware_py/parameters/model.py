@@ -1,0 +1,87 @@
+"""What a parameter is: its name, kind, range, default and the words that explain it."""
+
+from __future__ import annotations
+
+from math import isfinite
+from typing import Literal, Self
+
+from pydantic import BaseModel, ConfigDict, Field, model_validator
+
+ParameterKind = Literal["int32", "float"]
+
+
+class ParameterError(ValueError):
+    """A parameter that cannot be set so; the message is one line for people."""
+
+
+class Parameter(BaseModel):
+    """The declaration of one parameter. Equal minimum and maximum make it a fact that cannot be changed."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid")
+
+    name: str = Field(pattern=r"^[A-Z][A-Z0-9_]{0,15}$", description="at most 16 characters: MAVLink's limit")
+    kind: ParameterKind
+    default: float = Field(allow_inf_nan=False)
+    minimum: float = Field(allow_inf_nan=False)
+    maximum: float = Field(allow_inf_nan=False)
+    unit: str = ""
+    description: str = Field(min_length=1, description="one line")
+    details: str = Field(default="", description="what else to know, in whole sentences")
+    group: str = "Miscellaneous"
+    category: Literal["Standard", "System", "Developer"] = "Standard"
+    decimals: int | None = Field(default=None, ge=0, le=9, description="how many of them are worth showing")
+    increment: float | None = Field(default=None, gt=0.0, description="a sensible step when adjusting")
+    choices: dict[int, str] = Field(default={}, description="the values there are, with names")
+    bits: dict[int, str] = Field(default={}, description="places of a bit mask, with names")
+    reboot_required: bool = False
+
+    @model_validator(mode="after")
+    def _makes_sense(self) -> Self:
+        if not self.minimum <= self.default <= self.maximum:
+            raise ValueError(
+                f"{self.name}: default {self.default} is outside {self.minimum} to {self.maximum}"
+            )
+        if self.kind == "int32" and any(bound % 1 for bound in (self.minimum, self.default, self.maximum)):
+            raise ValueError(f"{self.name}: an int32 has whole numbers only")
+        if (self.choices or self.bits) and self.kind != "int32":
+            raise ValueError(f"{self.name}: only an int32 has choices or bits")
+        if self.choices and self.default not in self.choices:
+            raise ValueError(f"{self.name}: default {self.default:g} is none of its choices")
+        return self
+
+    @property
+    def constant(self) -> bool:
+        """Whether it states a fact and cannot be changed."""
+        return self.minimum == self.maximum
+
+    def checked(self, value: float) -> float:
+        """The value as it is kept: an int for `int32`, else a float.
+
+        Raises:
+            ParameterError: it is not finite, not whole where it must be, out of range or none of the choices.
+        """
+        if not isfinite(value):
+            raise ParameterError(f"{self.name}: {value} is not a finite number")
+        if self.kind == "int32" and value % 1:
+            raise ParameterError(f"{self.name}: {value:g} is not a whole number")
+        if not self.minimum <= value <= self.maximum:
+            if self.constant:
+                raise ParameterError(f"{self.name}: stays {self.default:.9g}; it is a fact of this vehicle")
+            unit = f" {self.unit}" if self.unit else ""
+            raise ParameterError(
+                f"{self.name}: {value:g} is outside {self.minimum:g} to {self.maximum:g}{unit}"
+            )
+        if self.choices and value not in self.choices:
+            there_are = ", ".join(f"{choice} {text}" for choice, text in sorted(self.choices.items()))
+            raise ParameterError(f"{self.name}: there is no choice {value:g}; there are {there_are}")
+        return int(value) if self.kind == "int32" else float(value)
+
+    def with_default(self, default: float) -> Parameter:
+        """The same with another default; a fact becomes another fact.
+
+        Raises:
+            ParameterError: the value cannot be.
+        """
+        if self.constant and isfinite(default) and not (self.kind == "int32" and default % 1):
+            return self.model_copy(update={"default": default, "minimum": default, "maximum": default})
+        return self.model_copy(update={"default": self.checked(default)})

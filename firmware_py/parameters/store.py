@@ -1,0 +1,138 @@
+"""The values of all parameters, now."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from struct import pack
+from zlib import crc32
+
+from firmware_py.parameters.declarations import DECLARATIONS
+from firmware_py.parameters.model import Parameter, ParameterError
+
+
+class Parameters:
+    """The values now, in the declarations' order (by name, as PX4 lists them).
+
+    Attributes:
+        declarations: what there is, with this vehicle's defaults; the position is the MAVLink index.
+        version: counts changes, so that a reader can tell cheaply whether to look again.
+    """
+
+    __slots__ = ("_index", "_listeners", "_save_listeners", "_values", "declarations", "version")
+
+    def __init__(
+        self,
+        values: Mapping[str, float] | None = None,
+        declarations: tuple[Parameter, ...] = DECLARATIONS,
+        *,
+        defaults: Mapping[str, float] | None = None,
+    ) -> None:
+        """Start from the defaults.
+
+        Args:
+            values: what differs from the defaults.
+            declarations: what there is, sorted by name.
+            defaults: this vehicle's own defaults where they differ from the declared ones. They do not count
+                as changes, and they alone can state another fact (SYS_AUTOSTART of an airframe).
+
+        Raises:
+            ParameterError: a value is unknown or cannot be.
+        """
+        self._index = {declared.name: place for place, declared in enumerate(declarations)}
+        own = list(declarations)
+        for name, default in (defaults or {}).items():
+            place = self._place(name)
+            own[place] = own[place].with_default(default)
+        self.declarations = tuple(own)
+        self.version = 0
+        self._values = {declared.name: declared.checked(declared.default) for declared in own}
+        self._listeners: list[Callable[[str, float], None]] = []
+        self._save_listeners: list[Callable[[], None]] = []
+        for name, value in (values or {}).items():
+            self.set(name, value)
+
+    def value(self, name: str) -> float:
+        """The value of a declared parameter; one dictionary look-up, made for every tick."""
+        return self._values[name]
+
+    def integer(self, name: str) -> int:
+        """The value of a declared `int32`."""
+        return int(self._values[name])
+
+    def __contains__(self, name: object) -> bool:
+        return name in self._values
+
+    def __len__(self) -> int:
+        return len(self.declarations)
+
+    def index(self, name: str) -> int:
+        """MAVLink index of a declared parameter."""
+        return self._index[name]
+
+    def declaration(self, name: str) -> Parameter:
+        """The declaration of that name.
+
+        Raises:
+            ParameterError: there is none.
+        """
+        return self.declarations[self._place(name)]
+
+    def changed(self) -> dict[str, float]:
+        """What differs from this vehicle's defaults, by name, in order."""
+        return {
+            declared.name: self._values[declared.name]
+            for declared in self.declarations
+            if self._values[declared.name] != declared.default
+        }
+
+    def set(self, name: str, value: float) -> None:
+        """Change a value.
+
+        Raises:
+            ParameterError: unknown, not finite, not whole or out of range; nothing has changed then.
+        """
+        kept = self.declaration(name).checked(value)
+        if kept == self._values[name]:
+            return
+        self._values[name] = kept
+        self.version += 1
+        for listener in self._listeners:
+            listener(name, kept)
+
+    def reset(self) -> None:
+        """Give every parameter its default again; listeners hear of each change."""
+        for name in self.changed():
+            self.set(name, self.declaration(name).default)
+
+    def on_change(self, listener: Callable[[str, float], None]) -> None:
+        """Have a function called with name and new value after each change."""
+        self._listeners.append(listener)
+
+    def on_save(self, listener: Callable[[], None]) -> None:
+        """Have a function called when somebody asks to save; who keeps the values in a file asks for it."""
+        self._save_listeners.append(listener)
+
+    def save(self) -> bool:
+        """Ask whoever keeps the values to save them now.
+
+        Returns:
+            Whether anybody keeps them.
+        """
+        for listener in self._save_listeners:
+            listener()
+        return bool(self._save_listeners)
+
+    def hash(self) -> int:
+        """PX4's `_HASH_CHECK`: CRC-32 (start 0, not inverted) over each name and its four bytes, in order."""
+        crc = 0xFFFFFFFF
+        for declared in self.declarations:
+            value = self._values[declared.name]
+            four = pack("<i", int(value)) if declared.kind == "int32" else pack("<f", value)
+            crc = crc32(declared.name.encode() + four, crc)
+        return crc ^ 0xFFFFFFFF
+
+    def _place(self, name: str) -> int:
+        place = self._index.get(name)
+        if place is None:
+            raise ParameterError(f"{name}: there is no such parameter")
+        return place
