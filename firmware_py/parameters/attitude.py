@@ -21,7 +21,7 @@ ATTITUDE.real(
     "MC_YAW_P",
     2.8,
     (0.0, 5.0),
-    "",
+    "1/s",
     "Yaw rate per radian of heading error",
     decimals=2,
     increment=0.1,
