@@ -90,20 +90,43 @@ class PacketReader:
 
 
 class Packet:
-    """A message packed once, to be sent on several links with their own sequence numbers."""
+    """A message packed once, to be sent on several links with their own sequence numbers and signatures.
 
-    __slots__ = ("_crc_extra", "_template")
+    Attributes:
+        length: bytes without a signature.
+        is_heartbeat: the one message that a slow link never leaves out.
+    """
+
+    __slots__ = ("_crc_extra", "_template", "is_heartbeat", "length")
 
     def __init__(self, message: Message, system_id: int, component_id: int) -> None:
         packer = mavlink.MAVLink(None, system_id, component_id)
         self._template = bytearray(message.pack(packer))
         self._crc_extra = bytes((message.crc_extra,))
+        self.length = len(self._template)
+        self.is_heartbeat = message.get_msgId() == mavlink.MAVLINK_MSG_ID_HEARTBEAT
 
-    def numbered(self, sequence: int) -> bytes:
-        """The packet with a sequence number, 0 to 255, and the checksum that goes with it."""
+    def numbered(self, sequence: int, *, signed: bool = False) -> bytes:
+        """The packet with a sequence number, 0 to 255, and the checksum that goes with it.
+
+        Args:
+            sequence: 0 to 255.
+            signed: set the flag for "signed"; the caller adds the signature.
+        """
         packet = self._template
+        packet[2] = _SIGNED if signed else 0
         packet[4] = sequence
         crc = mavlink.x25crc(bytes(packet[1:-_CHECKSUM_LENGTH]) + self._crc_extra).crc
         packet[-2] = crc & 0xFF
         packet[-1] = crc >> 8
         return bytes(packet)
+
+
+def source_of(packet: bytes | bytearray) -> tuple[int, int]:
+    """System id and component id of a whole packet's sender, also of one whose message is unknown."""
+    return (packet[3], packet[4]) if packet[0] == _MARKER_V1 else (packet[5], packet[6])
+
+
+def message_id_of(packet: bytes | bytearray) -> int:
+    """Message id of a whole packet."""
+    return packet[5] if packet[0] == _MARKER_V1 else int.from_bytes(packet[7:10], "little")

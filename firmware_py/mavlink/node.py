@@ -2,19 +2,31 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from typing import Protocol
 
-from firmware_py.mavlink import commands, file_transfer, heartbeat, missions, time_sync
-from firmware_py.mavlink.dialect import AUTOPILOT_COMPONENT_ID, Message, mavlink
+from firmware_py.mavlink import commands, file_transfer, heartbeat, missions, signing_setup, time_sync
+from firmware_py.mavlink.dialect import AUTOPILOT_COMPONENT_ID, BROADCAST, Message, mavlink
 from firmware_py.mavlink.exchange import Exchange, Handler
-from firmware_py.mavlink.framing import Packet
+from firmware_py.mavlink.forwarding import Router
+from firmware_py.mavlink.framing import Packet, source_of
 from firmware_py.mavlink.links import Link, LinkProfile
 from firmware_py.mavlink.offboard_setpoints import SetpointService
 from firmware_py.mavlink.parameter_protocol import ParameterService
 from firmware_py.mavlink.port import AutopilotPort
+from firmware_py.mavlink.signing import Signing, SigningKey
 from firmware_py.mavlink.status_texts import StatusTextService
 from firmware_py.mavlink.streams import stream_message
+from firmware_py.mavlink.video_links import VideoStream
 from firmware_py.types import GeodeticPoint
+
+
+class Service(Protocol):
+    """What sends something by itself."""
+
+    def update(self) -> None:
+        """Send what is due; called at every update of the node, after the streams."""
+        ...
 
 
 class MavlinkNode:
@@ -22,6 +34,7 @@ class MavlinkNode:
 
     Attributes:
         failed_messages: messages whose handling failed inside; it should stay 0, and the texts say why not.
+        refused_packets: sound packets that were not believed for want of a signature.
     """
 
     def __init__(
@@ -31,6 +44,8 @@ class MavlinkNode:
         system_id: int = 1,
         *,
         boot_unix_us: int = 0,
+        signing_key: SigningKey | None = None,
+        video: Sequence[VideoStream] = (),
     ) -> None:
         """Join an autopilot and its links.
 
@@ -39,28 +54,60 @@ class MavlinkNode:
             links: with different names.
             system_id: MAVLink system id, 1 to 250; written to MAV_SYS_ID.
             boot_unix_us: time of boot in microseconds since 1970, for SYSTEM_TIME; 0: not known.
+            signing_key: with which all is signed; None: nothing is.
+            video: the camera's streams, the one to be preferred first.
 
         Raises:
             ParameterError: the system id is out of range.
         """
         autopilot.parameters.set("MAV_SYS_ID", system_id)
+        self._links: dict[str, Link] = {}
+        self._link_number = 0
+        signing = Signing(signing_key, boot_unix_us)
         self._exchange = Exchange(
-            autopilot, {profile.name: Link(profile) for profile in links}, system_id, boot_unix_us
+            autopilot, self._links, system_id, boot_unix_us, signing=signing, video=video
         )
-        self._texts = StatusTextService(self._exchange)
-        self._parameters = ParameterService(self._exchange)
-        self._handlers: dict[int, Handler] = {
-            **heartbeat.HANDLERS,
-            **commands.HANDLERS,
-            **file_transfer.HANDLERS,
-            **missions.HANDLERS,
-            **time_sync.HANDLERS,
-            **self._parameters.handlers,
-            **SetpointService().handlers,
+        for profile in links:
+            self.add_link(profile)
+        texts, parameters = StatusTextService(self._exchange), ParameterService(self._exchange)
+        self._services: tuple[Service, ...] = (
+            texts,
+            parameters,
+        )
+        # By component id; one message may have several handlers.
+        self._handlers: dict[int, dict[int, tuple[Handler, ...]]] = {
+            AUTOPILOT_COMPONENT_ID: _joined(
+                heartbeat.HANDLERS,
+                commands.HANDLERS,
+                file_transfer.HANDLERS,
+                missions.HANDLERS,
+                time_sync.HANDLERS,
+                signing_setup.HANDLERS,
+                parameters.handlers,
+                SetpointService().handlers,
+            ),
         }
+        self._router = Router(self._is_own)
         self._origin: GeodeticPoint | None = None
         self._home: GeodeticPoint | None = None
         self.failed_messages = 0
+        self.refused_packets = 0
+
+    def add_link(self, profile: LinkProfile) -> None:
+        """Speak on one more link, from the next update on.
+
+        Args:
+            profile: with a name that no other link has.
+        """
+        self._links[profile.name] = Link(profile, self._exchange.signing, self._link_number)
+        self._link_number = (self._link_number + 1) % 256
+
+    def remove_link(self, name: str) -> None:
+        """Speak no more on a link; what a service still sends there is lost."""
+        link = self._links.pop(name, None)
+        if link is not None:
+            link.open = False
+            self._router.forget_link(name)
 
     def receive(self, link: str, data: bytes) -> None:
         """Take bytes that came in; never raises, whatever they are.
@@ -69,14 +116,38 @@ class MavlinkNode:
             link: name of the link's profile.
             data: any piece of the stream.
         """
-        source = self._exchange.links[link]
+        source = self._links.get(link)
+        if source is None:
+            return
         for message in source.reader.feed(data):
-            self._dispatch(source, message)
+            self._take(source, message)
+
+    def _take(self, link: Link, message: Message) -> None:
+        exchange = self._exchange
+        packet = message.get_msgbuf()
+        sender = source_of(packet)
+        if self._is_own(*sender):  # an echo, or a lie
+            return
+        if not exchange.signing.accepts(packet, trusted=link.profile.trusted):
+            self.refused_packets += 1
+            return
+        name = link.profile.name
+        self._router.hear(name, sender, exchange.time_us)
+        for other in self._router.destinations(name, sender, message, exchange.time_us):
+            self._links[other].forward(packet)
+        self._dispatch(link, message)
 
     def _dispatch(self, link: Link, message: Message) -> None:
-        handler = self._handlers.get(message.get_msgId())
-        if handler is None or self._is_own(message):
-            return
+        """Ask the handlers: the autopilot's always, as PX4 checks few targets; others' if meant."""
+        message_id = message.get_msgId()
+        target = getattr(message, "target_component", BROADCAST)
+        for component_id, handlers in self._handlers.items():
+            if component_id != AUTOPILOT_COMPONENT_ID and target not in (component_id, BROADCAST):
+                continue
+            for handler in handlers.get(message_id, ()):
+                self._handle(handler, link, message)
+
+    def _handle(self, handler: Handler, link: Link, message: Message) -> None:
         try:
             handler(self._exchange, link, message)
         except Exception as error:  # the last boundary: a packet must never end a flight
@@ -85,10 +156,9 @@ class MavlinkNode:
                 mavlink.MAV_SEVERITY_ERROR, f"Internal error on {message.get_type()}: {error!r}"
             )
 
-    def _is_own(self, message: Message) -> bool:
-        """Whether a packet claims to come from ourselves: an echo, or a lie."""
-        source = (message.get_srcSystem(), message.get_srcComponent())
-        return source == (self._exchange.system_id, AUTOPILOT_COMPONENT_ID)
+    def _is_own(self, system_id: int, component_id: int) -> bool:
+        """Whether ids are those of one of our components."""
+        return system_id == self._exchange.system_id and component_id in self._handlers
 
     def update(self, time_us: int) -> None:
         """Send what is due.
@@ -98,18 +168,21 @@ class MavlinkNode:
         """
         exchange = self._exchange
         exchange.time_us = time_us
+        if exchange.signing.active:
+            exchange.signing.advance(time_us)
         packets: dict[int, Packet | None] = {}
-        for link in exchange.links.values():
+        for link in self._links.values():
+            link.advance(time_us)
             for message_id in link.schedule.due(time_us):
                 if message_id not in packets:
                     message = stream_message(exchange, message_id)
                     packets[message_id] = None if message is None else exchange.packet(message)
                 packet = packets[message_id]
                 if packet is not None:
-                    link.send(packet)
+                    link.send_stream(packet)
         self._tell_places()
-        self._texts.update()
-        self._parameters.update()
+        for service in self._services:
+            service.update()
 
     def _tell_places(self) -> None:
         """GPS_GLOBAL_ORIGIN and HOME_POSITION whenever they change; nobody waits two seconds for home."""
@@ -128,4 +201,13 @@ class MavlinkNode:
 
     def take_output(self) -> list[tuple[str, bytes]]:
         """What is to be sent, as (link name, datagram); a datagram holds one or more whole packets."""
-        return [(name, data) for name, link in self._exchange.links.items() for data in link.take()]
+        return [(name, data) for name, link in self._links.items() for data in link.take()]
+
+
+def _joined(*tables: Mapping[int, Handler]) -> dict[int, tuple[Handler, ...]]:
+    """One table of all, in this order."""
+    joined: dict[int, tuple[Handler, ...]] = {}
+    for table in tables:
+        for message_id, handler in table.items():
+            joined[message_id] = (*joined.get(message_id, ()), handler)
+    return joined

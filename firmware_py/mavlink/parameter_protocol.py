@@ -46,10 +46,16 @@ class ParameterService:
             return
         count = len(self._exchange.autopilot.parameters)
         for name, first in list(self._listing.items()):
+            link = self._exchange.links.get(name)
+            if link is None:
+                del self._listing[name]
+                continue
+            if link.congested:
+                continue
             after = min(first + _PER_UPDATE, count)
             for index in range(first, after):
                 message = self._hash_message() if index < 0 else self._message(index)
-                self._exchange.send(self._exchange.links[name], message)
+                self._exchange.send(link, message)
             if after == count:
                 del self._listing[name]
             else:

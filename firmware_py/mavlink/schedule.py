@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
+from firmware_py.mavlink.dialect import mavlink
+
 _NEVER_US = 1 << 62
 _REQUESTED_PHASE_US = 16_000
 
@@ -22,9 +24,10 @@ class Schedule:
 
     Attributes:
         next_due_us: nothing is due before; makes the common case one comparison.
+        stretch: by how much a slow link makes all intervals longer, but the heartbeat's.
     """
 
-    __slots__ = ("_defaults_us", "_streams", "next_due_us")
+    __slots__ = ("_defaults_us", "_streams", "next_due_us", "stretch")
 
     def __init__(self, rates_hz: Mapping[int, float]) -> None:
         """Start with the default rates, in hertz by message id."""
@@ -35,6 +38,7 @@ class Schedule:
             message_id: _Stream(message_id, interval) for message_id, interval in self._defaults_us.items()
         }
         self.next_due_us = 0
+        self.stretch = 1.0
 
     def due(self, time_us: int) -> list[int]:
         """Message ids due now. Phases are kept, so that rates hold on average; what was missed is skipped."""
@@ -45,9 +49,12 @@ class Schedule:
         for stream in self._streams.values():
             if stream.due_us <= time_us:
                 ids.append(stream.message_id)
-                stream.due_us += stream.interval_us
+                interval_us = stream.interval_us
+                if self.stretch > 1.0 and stream.message_id != mavlink.MAVLINK_MSG_ID_HEARTBEAT:
+                    interval_us = round(interval_us * self.stretch)
+                stream.due_us += interval_us
                 if stream.due_us <= time_us:
-                    stream.due_us = time_us + stream.interval_us
+                    stream.due_us = time_us + interval_us
             next_due_us = min(next_due_us, stream.due_us)
         self.next_due_us = next_due_us
         return ids

@@ -25,19 +25,21 @@ class StatusTextService:
     def __init__(self, exchange: Exchange) -> None:
         self._exchange = exchange
         self._last_id = 0
-        self._waiting: dict[str, deque[tuple[int, list[Message]]]] = {
-            name: deque(maxlen=_KEPT) for name in exchange.links
-        }
+        self._waiting: dict[str, deque[tuple[int, list[Message]]]] = {}
 
     def update(self) -> None:
         """Take the autopilot's new texts and send what can be sent."""
         exchange = self._exchange
         for text in exchange.autopilot.take_texts():
             pieces = self._pieces(text)
-            for waiting in self._waiting.values():
+            for name in exchange.links:
+                waiting = self._waiting.setdefault(name, deque(maxlen=_KEPT))
                 waiting.append((exchange.time_us, pieces))
-        for name, waiting in self._waiting.items():
-            link = exchange.links[name]
+        for name, waiting in list(self._waiting.items()):
+            link = exchange.links.get(name)
+            if link is None:
+                del self._waiting[name]
+                continue
             while waiting and link.gcs_heard:
                 said_us, pieces = waiting.popleft()
                 if exchange.time_us - said_us <= _STALE_US:

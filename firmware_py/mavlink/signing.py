@@ -1,0 +1,154 @@
+"""MAVLink 2 signing: who has the key may speak, and nobody can say again what was said.
+
+https://mavlink.io/en/guide/message_signing.html: the signature is the first 48 bits of the SHA-256 over key,
+packet, link id and a timestamp, which must grow from packet to packet of a (system, component, link id).
+PX4 v1.17 cannot sign; the rules for unsigned packets are those of newer ones: with a key they are refused,
+except on links that cannot be reached from outside (there USB, here loopback), so that companion apps that
+cannot sign, such as MAVSDK's, go on working beside a signed radio.
+"""
+
+from __future__ import annotations
+
+from hashlib import sha256
+
+from firmware_py.mavlink.dialect import Message, mavlink
+from firmware_py.mavlink.framing import message_id_of, source_of
+
+KEY_BYTES = 32
+_SIGNATURE_BYTES = 6
+_BLOCK_BYTES = 13  # link id 1, timestamp 6, signature 6
+_EPOCH_UNIX_US = 1_420_070_400_000_000  # timestamps count 10 us from 2015-01-01
+_MINUTE = 6_000_000  # of timestamps; a new stream may be that late
+_MAX_TIMESTAMP = (1 << 48) - 1
+_MAX_STREAMS = 255
+_ALWAYS = (mavlink.MAVLINK_MSG_ID_RADIO_STATUS,)  # radios cannot sign
+
+
+class SigningKey:
+    """A secret of 32 bytes that never shows itself in a text.
+
+    Attributes:
+        secret: the bytes.
+    """
+
+    __slots__ = ("secret",)
+
+    def __init__(self, secret: bytes) -> None:
+        """Keep a secret.
+
+        Raises:
+            ValueError: it has not 32 bytes, or they are all zero, which means "no signing".
+        """
+        if len(secret) != KEY_BYTES or not any(secret):
+            raise ValueError("a signing key has 32 bytes, not all zero")
+        self.secret = secret
+
+    def __repr__(self) -> str:
+        return "SigningKey(hidden)"
+
+    @classmethod
+    def from_text(cls, text: str) -> SigningKey:
+        """Read a key: 64 hexadecimal digits, or a passphrase, of which the SHA-256 is taken as usual.
+
+        Raises:
+            ValueError: the text is empty or stands for no key.
+        """
+        text = text.strip()
+        if not text:
+            raise ValueError("it is empty; it must hold 64 hexadecimal digits or a passphrase")
+        if len(text) == 2 * KEY_BYTES:
+            try:
+                return cls(bytes.fromhex(text))
+            except ValueError as error:
+                if "32 bytes" in str(error):
+                    raise
+        return cls(sha256(text.encode()).digest())
+
+
+class Signing:
+    """The signing of one vehicle: its key, its clock and whom it heard.
+
+    Attributes:
+        active: whether there is a key.
+    """
+
+    __slots__ = ("_boot_us", "_key", "_streams", "_timestamp", "active")
+
+    def __init__(self, key: SigningKey | None, boot_unix_us: int) -> None:
+        """Begin.
+
+        Args:
+            key: None: sign nothing and believe everybody, until SETUP_SIGNING brings one.
+            boot_unix_us: time of boot in microseconds since 1970.
+        """
+        self._boot_us = boot_unix_us - _EPOCH_UNIX_US
+        self._streams: dict[tuple[int, int, int], int] = {}
+        self._timestamp = 0
+        self._key = b""
+        self.active = False
+        self.set_key(key)
+        self.advance(0)
+
+    def set_key(self, key: SigningKey | None, timestamp: int = 0) -> None:
+        """Change the key.
+
+        Args:
+            key: None ends signing.
+            timestamp: at least which to go on from.
+        """
+        self._key = b"" if key is None else key.secret
+        self._timestamp = max(self._timestamp, timestamp)
+        self._streams.clear()
+        self.active = key is not None
+
+    def advance(self, time_us: int) -> None:
+        """Tell the vehicle's time; the timestamp never goes back."""
+        self._timestamp = max(self._timestamp, (self._boot_us + time_us) // 10)
+
+    def block(self, packet: bytes, link_id: int) -> bytes:
+        """The 13 bytes that make a packet a signed one.
+
+        Args:
+            packet: header, with the flag for "signed", to checksum.
+            link_id: of the link it goes to, 0 to 255.
+        """
+        self._timestamp = min(self._timestamp + 1, _MAX_TIMESTAMP)
+        stamp = bytes((link_id,)) + self._timestamp.to_bytes(6, "little")
+        return stamp + sha256(self._key + packet + stamp).digest()[:_SIGNATURE_BYTES]
+
+    def accepts(self, packet: bytes | bytearray, *, trusted: bool) -> bool:
+        """Whether to believe a packet that came in.
+
+        Args:
+            packet: all of it.
+            trusted: whether its link cannot be reached from outside.
+        """
+        if not self.active or message_id_of(packet) in _ALWAYS:
+            return True
+        if packet[0] != mavlink.PROTOCOL_MARKER_V2 or not packet[2] & mavlink.MAVLINK_IFLAG_SIGNED:
+            return trusted
+        return self._is_sound(packet)
+
+    def _is_sound(self, packet: bytes | bytearray) -> bool:
+        signed = len(packet) - _SIGNATURE_BYTES
+        if sha256(self._key + packet[:signed]).digest()[:_SIGNATURE_BYTES] != packet[signed:]:
+            return False
+        stamp = len(packet) - _BLOCK_BYTES
+        stream = (*source_of(packet), packet[stamp])
+        timestamp = int.from_bytes(packet[stamp + 1 : signed], "little")
+        last = self._streams.get(stream)
+        if last is None and (timestamp + _MINUTE < self._timestamp or len(self._streams) >= _MAX_STREAMS):
+            return False
+        if last is not None and timestamp <= last:
+            return False
+        self._streams[stream] = timestamp
+        self._timestamp = max(self._timestamp, timestamp)
+        return True
+
+    def set_up(self, message: Message) -> bool:
+        """Take the key of SETUP_SIGNING; one of zeros ends signing. False if its timestamp leaves no future."""
+        secret = bytes(message.secret_key)
+        if message.initial_timestamp > _MAX_TIMESTAMP // 2:
+            return False
+        self.set_key(SigningKey(secret) if any(secret) else None, message.initial_timestamp)
+        return True
