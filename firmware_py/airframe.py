@@ -9,14 +9,18 @@ from __future__ import annotations
 from functools import cached_property
 from importlib import resources
 from pathlib import Path
-from typing import Literal, Self
+from typing import Annotated, Literal, Self
 
 import yaml
-from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
+from pydantic import BaseModel, ConfigDict, Field, StringConstraints, ValidationError, model_validator
 
+from firmware_py.control.weights import Weights
 from firmware_py.types import Vec3
 
 GRAVITY_M_S2 = 9.80665
+
+ParameterName = Annotated[str, StringConstraints(pattern=r"^[A-Z][A-Z0-9_]{0,15}$")]
+"""A parameter's name as PX4 and MAVLink have them: 16 characters at most."""
 
 
 class AirframeError(ValueError):
@@ -86,6 +90,10 @@ class Airframe(_Part):
     drag: Drag = Drag()
     contact: Contact = Contact()
     limits: Limits = Limits()
+    stabiliser: Weights = Field(Weights(), description="what its design weighs how much")
+    parameters: dict[ParameterName, int | float] = Field(
+        default_factory=dict, description="the autopilot's parameters that this airframe starts with"
+    )
     envelope_m: Vec3 = Field(description="length, width, height of the box around it, centred on the mass")
 
     @model_validator(mode="after")
@@ -100,6 +108,11 @@ class Airframe(_Part):
     def weight_n(self) -> float:
         """Weight at standard gravity."""
         return self.mass_kg * GRAVITY_M_S2
+
+    @property
+    def full_thrust_n(self) -> float:
+        """Thrust of all rotors at their greatest speed."""
+        return len(self.rotors) * self.motor.thrust_n_s2 * self.motor.max_speed_rad_s**2
 
     @cached_property
     def hover_speed_rad_s(self) -> float:

@@ -1,4 +1,4 @@
-"""Designs the stabiliser: a discrete linear-quadratic regulator with integral action."""
+"""Designs the stabiliser: discrete linear-quadratic regulators, with integral action or as nested loops."""
 
 from __future__ import annotations
 
@@ -6,33 +6,11 @@ from dataclasses import dataclass
 
 import numpy as np
 import numpy.typing as npt
-from pydantic import BaseModel, ConfigDict, Field
 from scipy.linalg import solve_discrete_are
 
-from firmware_py.airframe import Airframe
+from firmware_py.airframe import GRAVITY_M_S2, Airframe
 from firmware_py.control.linear_model import Array, discretise, hover_model, with_integrals
-
-
-class Weights(BaseModel):
-    """What the regulator counts as equally bad (Bryson's rule: each weight is 1 / value^2).
-
-    Torque and thrust weights are in units of angular and linear acceleration, so the same numbers suit
-    airframes of any size.
-    """
-
-    model_config = ConfigDict(frozen=True, extra="forbid")
-
-    tilt_rad: float = Field(0.6, gt=0)
-    roll_pitch_rate_rad_s: float = Field(4.0, gt=0)
-    yaw_rate_rad_s: float = Field(0.5, gt=0)
-    velocity_horizontal_m_s: float = Field(0.6, gt=0)
-    velocity_vertical_m_s: float = Field(0.3, gt=0)
-    integral_horizontal_m: float = Field(0.3, gt=0)
-    integral_vertical_m: float = Field(0.1, gt=0)
-    integral_yaw_rad: float = Field(0.1, gt=0)
-    acceleration_vertical_m_s2: float = Field(3.0, gt=0)
-    acceleration_roll_pitch_rad_s2: float = Field(60.0, gt=0)
-    acceleration_yaw_rad_s2: float = Field(6.0, gt=0)
+from firmware_py.control.weights import Weights
 
 
 @dataclass(frozen=True, slots=True)
@@ -85,10 +63,62 @@ def design(airframe: Airframe, period_s: float, weights: Weights | None = None) 
     Args:
         airframe: its mass and inertia make the model.
         period_s: control period.
-        weights: what to weigh how much.
+        weights: what to weigh how much; by default what the airframe declares.
     """
     a, b = with_integrals(discretise(hover_model(airframe), period_s), period_s)
-    q, r = cost_matrices(airframe, weights or Weights())
-    p = solve_discrete_are(a, b, q, r)
-    k: Array = np.linalg.solve(r + b.T @ p @ b, b.T @ p @ a).astype(np.float64)
+    q, r = cost_matrices(airframe, weights or airframe.stabiliser)
+    k = _regulator(a, b, q, r)
     return Gains(k[:, :8], k[:, 8:], np.linalg.eigvals(a - b @ k).astype(np.complex128))
+
+
+@dataclass(frozen=True, slots=True)
+class Bandwidths:
+    """A regulator without integrals, u = -K x, read as loops within loops, each with its bandwidth in 1/s.
+
+    The velocity error times its bandwidth is the acceleration wanted; that makes an angle; the angle's error
+    times its bandwidth is the body rate wanted; its error times its bandwidth is the angular acceleration.
+
+    Attributes:
+        velocity_level: forward, right, down; shape (3,).
+        attitude: roll, pitch; shape (2,).
+        rate: roll, pitch, yaw; shape (3,).
+        poles: eigenvalues of the closed loop per sample, shape (8,).
+    """
+
+    velocity_level: tuple[float, float, float]
+    attitude: tuple[float, float]
+    rate: tuple[float, float, float]
+    poles: npt.NDArray[np.complex128]
+
+
+def design_bandwidths(airframe: Airframe, period_s: float, weights: Weights | None = None) -> Bandwidths:
+    """Design the nested loops of an airframe, as `design` does but with no integrals.
+
+    Unknown forces and moments are then an observer's task, which by the separation principle moves no pole
+    of this design.
+
+    Args:
+        airframe: its mass and inertia make the model.
+        period_s: control period.
+        weights: what to weigh how much; by default what the airframe declares.
+    """
+    model = discretise(hover_model(airframe), period_s)
+    q, r = cost_matrices(airframe, weights or airframe.stabiliser)
+    k = _regulator(model.a, model.b, q[:8, :8], r)
+    i_roll, i_pitch, i_yaw = airframe.inertia_kg_m2
+    return Bandwidths(
+        (
+            float(-GRAVITY_M_S2 * k[2, 5] / k[2, 1]),
+            float(GRAVITY_M_S2 * k[1, 6] / k[1, 0]),
+            float(-k[0, 7] / airframe.mass_kg),
+        ),
+        (float(k[1, 0] / k[1, 2]), float(k[2, 1] / k[2, 3])),
+        (float(k[1, 2] / i_roll), float(k[2, 3] / i_pitch), float(k[3, 4] / i_yaw)),
+        np.linalg.eigvals(model.a - model.b @ k).astype(np.complex128),
+    )
+
+
+def _regulator(a: Array, b: Array, q: Array, r: Array) -> Array:
+    p = solve_discrete_are(a, b, q, r)
+    gains: Array = np.linalg.solve(r + b.T @ p @ b, b.T @ p @ a).astype(np.float64)
+    return gains
