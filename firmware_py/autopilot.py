@@ -16,6 +16,7 @@ from firmware_py.estimator import Estimator
 from firmware_py.flight_modes import Guidance, speed_limits, usable
 from firmware_py.geodesy import LocalProjection
 from firmware_py.land_detector import LandDetector
+from firmware_py.missions.store import MissionStore
 from firmware_py.parameters import Parameters
 from firmware_py.status import CommandResult, FlightMode, LandedState, VehicleStatus
 from firmware_py.types import (
@@ -88,6 +89,7 @@ class Autopilot:
         output: what the last step sent to the motors.
         battery: what is known of the battery.
         flight: times of the flight now or last.
+        missions: mission, fence and rally points.
     """
 
     def __init__(
@@ -113,6 +115,7 @@ class Autopilot:
         self.status = VehicleStatus()
         self.battery = BatteryState()
         self.flight = FlightRecord()
+        self.missions = MissionStore()
         self._estimator = Estimator()
         self.state = self._estimator.state
         self._sensor_projection = LocalProjection(origin)

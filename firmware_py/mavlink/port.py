@@ -6,6 +6,7 @@ from math import nan
 from typing import Protocol
 
 from firmware_py.airframe import Airframe
+from firmware_py.missions.store import MissionStore
 from firmware_py.parameters import Parameters
 from firmware_py.status import CommandResult, FlightMode, VehicleStatus
 from firmware_py.types import (
@@ -56,6 +57,11 @@ class AutopilotPort(Protocol):
     @property
     def flight(self) -> FlightRecord:
         """Times of the flight now or last."""
+        ...
+
+    @property
+    def missions(self) -> MissionStore:
+        """Mission, fence and rally points."""
         ...
 
     def arm(self, *, force: bool = False) -> CommandResult:

@@ -8,6 +8,7 @@ from firmware_py.geodesy import LocalProjection
 from firmware_py.mavlink import GROUND, ONBOARD, MavlinkNode
 from firmware_py.mavlink.dialect import mavlink
 from firmware_py.mavlink.framing import PacketReader
+from firmware_py.missions.store import MissionStore
 from firmware_py.parameters import Parameters
 from firmware_py.status import CommandResult, FlightMode, VehicleStatus
 from firmware_py.types import BatteryState, FlightRecord, GeodeticPoint, MotorOutput, StatusText, VehicleState
@@ -27,6 +28,7 @@ class FakeAutopilot:
     output: MotorOutput = field(default_factory=MotorOutput)
     battery: BatteryState = field(default_factory=BatteryState)
     flight: FlightRecord = field(default_factory=FlightRecord)
+    missions: MissionStore = field(default_factory=MissionStore)
     place: GeodeticPoint | None = HOME
     result: CommandResult = CommandResult.ACCEPTED
     calls: list[tuple] = field(default_factory=list)
