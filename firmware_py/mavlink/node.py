@@ -5,19 +5,23 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Protocol
 
-from firmware_py.mavlink import commands, file_transfer, heartbeat, missions, signing_setup, time_sync
+from firmware_py.mavlink import commands, heartbeat, missions, signing_setup, time_sync
 from firmware_py.mavlink.dialect import AUTOPILOT_COMPONENT_ID, BROADCAST, Message, mavlink
 from firmware_py.mavlink.exchange import Exchange, Handler
+from firmware_py.mavlink.file_transfer import FileTransferService
 from firmware_py.mavlink.forwarding import Router
 from firmware_py.mavlink.framing import Packet, source_of
 from firmware_py.mavlink.links import Link, LinkProfile
+from firmware_py.mavlink.log_transfer import LogTransferService
 from firmware_py.mavlink.offboard_setpoints import SetpointService
 from firmware_py.mavlink.parameter_protocol import ParameterService
 from firmware_py.mavlink.port import AutopilotPort
+from firmware_py.mavlink.shell import ShellService
 from firmware_py.mavlink.signing import Signing, SigningKey
 from firmware_py.mavlink.status_texts import StatusTextService
 from firmware_py.mavlink.streams import stream_message
 from firmware_py.mavlink.video_links import VideoStream
+from firmware_py.storage import Storage
 from firmware_py.types import GeodeticPoint
 
 
@@ -46,6 +50,9 @@ class MavlinkNode:
         boot_unix_us: int = 0,
         signing_key: SigningKey | None = None,
         video: Sequence[VideoStream] = (),
+        storage: Storage | None = None,
+        firmware_files: Mapping[str, bytes] | None = None,
+        shell: bool = False,
     ) -> None:
         """Join an autopilot and its links.
 
@@ -56,6 +63,9 @@ class MavlinkNode:
             boot_unix_us: time of boot in microseconds since 1970, for SYSTEM_TIME; 0: not known.
             signing_key: with which all is signed; None: nothing is.
             video: the camera's streams, the one to be preferred first.
+            storage: the vehicle's files and logs; None: it keeps none.
+            firmware_files: path to content of files that can only be read, for `mftp://` addresses.
+            shell: whether SERIAL_CONTROL is answered.
 
         Raises:
             ParameterError: the system id is out of range.
@@ -70,16 +80,24 @@ class MavlinkNode:
         for profile in links:
             self.add_link(profile)
         texts, parameters = StatusTextService(self._exchange), ParameterService(self._exchange)
+        files = FileTransferService(self._exchange, storage, firmware_files)
+        logs = LogTransferService(self._exchange, storage)
+        shells = ShellService(self._exchange, enabled=shell)
         self._services: tuple[Service, ...] = (
             texts,
             parameters,
+            files,
+            logs,
+            shells,
         )
         # By component id; one message may have several handlers.
         self._handlers: dict[int, dict[int, tuple[Handler, ...]]] = {
             AUTOPILOT_COMPONENT_ID: _joined(
                 heartbeat.HANDLERS,
                 commands.HANDLERS,
-                file_transfer.HANDLERS,
+                files.handlers,
+                logs.handlers,
+                shells.handlers,
                 missions.HANDLERS,
                 time_sync.HANDLERS,
                 signing_setup.HANDLERS,

@@ -95,12 +95,3 @@ def test_other_mission_requests_get_one_acknowledgement(peer, message, result):
 def test_missions_of_others_are_not_ours(peer):
     assert peer.ask(mavlink.MAVLink_mission_request_list_message(2, 1, 0)) == []
     assert peer.ask(mavlink.MAVLink_mission_count_message(0, 0, 1, 0)) == []
-
-
-def test_file_transfer_is_refused_at_once(peer):
-    request = [7, 1, 3, 4, 5, 0, 0, 0] + [0] * 243  # sequence 0x0107, session 3, open for reading
-    (answer,) = peer.ask(mavlink.MAVLink_file_transfer_protocol_message(0, 1, 1, request))
-    assert answer.payload[:8] == [8, 1, 3, 129, 1, 4, 0, 0]
-    assert answer.payload[12] == 7
-    refused = mavlink.MAVLink_file_transfer_protocol_message(0, 1, 1, answer.payload)
-    assert peer.ask(refused) == []

@@ -1,0 +1,151 @@
+"""Who uses MAVLink FTP now: which files a client has open, and what it asked last, if it asks again."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+from firmware_py.mavlink.file_transfer_wire import FtpError, RefusalError
+from firmware_py.storage import Path
+
+_SESSIONS = 4  # open files of one client; PX4 has one a link
+_CLIENTS = 16
+_IDLE_US = 10_000_000  # PX4 closes a session unused so long
+_TAKEOVER_US = 1_000_000
+_TWIN_US = 2_000_000
+
+ClientKey = tuple[str, int, int]  # link, system, component
+
+
+@dataclass(slots=True)
+class Burst:
+    """A burst under way.
+
+    Attributes:
+        request: header and data of the request that started it.
+        sequence: of the next packet.
+        offset: of the next packet.
+        sent: bytes sent since the request.
+    """
+
+    request: bytes
+    sequence: int
+    offset: int
+    sent: int = 0
+
+
+@dataclass(slots=True)
+class Session:
+    """An open file.
+
+    Attributes:
+        path: of the file.
+        size: when it was opened.
+        writable: opened for writing, else for reading.
+        opening: header and data of the request that opened it.
+        opened_us: vehicle time of that.
+        used_us: vehicle time of the last use.
+        burst: under way, if any.
+    """
+
+    path: Path
+    size: int
+    writable: bool
+    opening: bytes
+    opened_us: int
+    used_us: int
+    burst: Burst | None = None
+
+
+@dataclass(slots=True)
+class Client:
+    """One client.
+
+    Attributes:
+        key: link, system and component it speaks from.
+        sessions: open files by number; numbers are the client's own.
+        used_us: vehicle time of its last request.
+        last_request: header and data of the last request if it changed something, else empty.
+        last_reply: payload of the answer to it.
+    """
+
+    key: ClientKey
+    sessions: dict[int, Session] = field(default_factory=dict)
+    used_us: int = 0
+    last_request: bytes = b""
+    last_reply: bytes = b""
+
+    def session(self, number: int, time_us: int) -> Session:
+        """An open file that is now used.
+
+        Raises:
+            RefusalError: INVALID_SESSION.
+        """
+        session = self.sessions.get(number)
+        if session is None:
+            raise RefusalError(FtpError.INVALID_SESSION)
+        session.used_us = time_us
+        return session
+
+    def twin(self, number: int, opening: bytes, time_us: int) -> Session | None:
+        """A session that the very same request opened a moment ago: the request came twice."""
+        session = self.sessions.get(number)
+        if session is None or session.opening != opening or time_us - session.opened_us > _TWIN_US:
+            return None
+        return session
+
+    def make_room(self, number: int, time_us: int) -> None:
+        """Have a session number free.
+
+        MAVSDK uses number 0 whatever a vehicle answers, pymavlink counts up: so the number asked for is the
+        number opened. One that a client has left open is taken over once it rests.
+
+        Raises:
+            RefusalError: NO_SESSIONS_AVAILABLE.
+        """
+        session = self.sessions.get(number)
+        if session is not None:
+            if time_us - session.used_us < _TAKEOVER_US:
+                raise RefusalError(FtpError.NO_SESSIONS_AVAILABLE)
+            del self.sessions[number]
+        if len(self.sessions) >= _SESSIONS:
+            raise RefusalError(FtpError.NO_SESSIONS_AVAILABLE)
+
+
+class Clients:
+    """All clients, few enough whatever comes over the links."""
+
+    def __init__(self) -> None:
+        self._clients: dict[ClientKey, Client] = {}
+
+    def client(self, key: ClientKey, time_us: int) -> Client:
+        """The client with that key, known or new; the one longest silent makes room."""
+        client = self._clients.get(key)
+        if client is None:
+            if len(self._clients) >= _CLIENTS:
+                del self._clients[min(self._clients.values(), key=lambda each: each.used_us).key]
+            client = self._clients[key] = Client(key)
+        client.used_us = time_us
+        return client
+
+    def bursting(self) -> list[tuple[Client, int, Session]]:
+        """Clients and their sessions with a burst under way."""
+        return [
+            (client, number, session)
+            for client in self._clients.values()
+            for number, session in client.sessions.items()
+            if session.burst is not None
+        ]
+
+    def close_idle(self, time_us: int) -> None:
+        """Forget sessions and clients that rest."""
+        for key, client in list(self._clients.items()):
+            client.sessions = {
+                number: session
+                for number, session in client.sessions.items()
+                if time_us - session.used_us <= _IDLE_US
+            }
+            if not client.sessions and time_us - client.used_us > _IDLE_US:
+                del self._clients[key]
+
+    def __bool__(self) -> bool:
+        return bool(self._clients)
