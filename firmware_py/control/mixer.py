@@ -8,7 +8,7 @@ import numpy as np
 
 from firmware_py.airframe import Airframe
 from firmware_py.control.linear_model import allocation
-from firmware_py.types import MotorOutput
+from firmware_py.types import MotorOutput, MotorSpeeds
 
 _QUAD = 4
 
@@ -22,7 +22,9 @@ class Mixer:
     """
 
     def __init__(self, airframe: Airframe, idle_fraction: float = 0.25) -> None:
-        inverse = np.linalg.pinv(allocation(airframe))
+        forward = allocation(airframe)
+        inverse = np.linalg.pinv(forward)
+        self._columns = [tuple(map(float, column)) for column in forward.T]
         self._thrust = float(inverse[0, 0])  # symmetric rotors share the thrust evenly
         self._roll_pitch = [(float(r), float(p)) for _, r, p, _ in inverse]
         self._yaw = [float(y) for _, _, _, y in inverse]
@@ -56,6 +58,17 @@ class Mixer:
             return self._mix_within_limits(thrust_n, roll_nm, pitch_nm, yaw_nm)
         a, b, c, d = a + y0, b + y1, c + y2, d + y3
         return MotorOutput((sqrt(a), sqrt(b), sqrt(c), sqrt(d)), (a + b + c + d) / self._full)
+
+    def wrench(self, speeds_rad_s: MotorSpeeds) -> tuple[float, float, float, float]:
+        """Return the thrust (N, up) and moments (N m, FRD) that rotor speeds make."""
+        thrust = roll = pitch = yaw = 0.0
+        for (lift, about_x, about_y, about_z), speed in zip(self._columns, speeds_rad_s, strict=True):
+            square = speed * speed
+            thrust += lift * square
+            roll += about_x * square
+            pitch += about_y * square
+            yaw += about_z * square
+        return (thrust, roll, pitch, yaw)
 
     def _mix_within_limits(
         self, thrust_n: float, roll_nm: float, pitch_nm: float, yaw_nm: float

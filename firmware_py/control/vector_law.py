@@ -1,0 +1,232 @@
+"""The vector law: points the thrust where the acceleration wants it, at any tilt.
+
+The regulator's nested loops (`design_bandwidths`) with the true geometry between them: a velocity error asks
+for an acceleration; with gravity, the drag declared and the force learnt it makes the thrust vector, limited
+in tilt with the vertical part kept first (as PX4's position control does); the body's down axis turns there
+by the shortest way; body rates follow. So it is the linear design near hover and right far from it.
+"""
+
+from __future__ import annotations
+
+from math import cos, isnan, sin, sqrt
+
+from firmware_py.airframe import GRAVITY_M_S2, Airframe
+from firmware_py.control.design import design_bandwidths
+from firmware_py.control.geometry import Rotation, rotation, tilt_error, to_body, to_world
+from firmware_py.control.limits import TiltLimit
+from firmware_py.control.mixer import Mixer
+from firmware_py.control.observer import DisturbanceObserver
+from firmware_py.control.weights import Weights
+from firmware_py.types import (
+    AccelerationCommand,
+    ActuatorCommand,
+    BodyRateCommand,
+    Command,
+    MotorOutput,
+    RateCommand,
+    TiltCommand,
+    Vec3,
+    VehicleState,
+)
+
+_NOTHING: Vec3 = (0.0, 0.0, 0.0)
+_LEAST_COSINE = 0.5  # thrust is raised for tilt up to 60 degrees, and fades from there to none on its side
+_LEAST_LIFT = 0.2  # of the weight, so that falling leaves a thrust to steer with; PX4's MPC_THR_MIN
+_MOST_THRUST = 0.92  # of full thrust for following a velocity; the rest steers
+_MOST_FORCE_M_S2 = GRAVITY_M_S2  # unknown acceleration ever learnt: the ground's push at landing
+_MOST_MOMENT_RAD_S2 = 20.0
+
+_Wish = tuple[float, float, float, float]
+"""Thrust in N and body rates in rad/s that a command comes down to."""
+
+
+class VectorLaw:
+    """Holds two observers and the lag of the motors; everything else is `design_bandwidths`.
+
+    Args:
+        airframe: the numbers to design from.
+        period_s: time between calls of `step`.
+        weights: of the design; by default what the airframe declares.
+        limits: what may change in flight.
+        mixer: of that airframe.
+    """
+
+    def __init__(
+        self, airframe: Airframe, period_s: float, weights: Weights | None, limits: TiltLimit, mixer: Mixer
+    ) -> None:
+        weights = weights or airframe.stabiliser
+        loops = design_bandwidths(airframe, period_s, weights)
+        self._k_velocity, self._k_attitude, self._k_rate = loops.velocity_level, loops.attitude, loops.rate
+        self._limits = limits
+        self._mixer = mixer
+        self._mass_kg = mass = airframe.mass_kg
+        self._inertia = airframe.inertia_kg_m2
+        forward, right, down = airframe.drag.force_n_s2_m2
+        self._drag = (forward / mass, right / mass, down / mass)
+        self._full_n = airframe.full_thrust_n
+        self._most_lift = _MOST_THRUST * self._full_n / mass
+        self._rate_limit_rad_s = airframe.limits.roll_pitch_rate_rad_s
+        self._max_speed_rad_s = airframe.motor.max_speed_rad_s
+        self._rotors = len(airframe.rotors)
+        self._force = DisturbanceObserver(weights.observer_force_rad_s, period_s, _MOST_FORCE_M_S2)
+        self._moment = DisturbanceObserver(weights.observer_moment_rad_s, period_s, _MOST_MOMENT_RAD_S2)
+        self._lag = period_s / (period_s + airframe.motor.time_constant_s)
+        self._wrench = (airframe.weight_n, 0.0, 0.0, 0.0)  # thrust and moments now, behind their commands
+        self._hover_n = airframe.weight_n
+
+    def reset(self) -> None:
+        """Forget what was learnt: at arming and on the ground."""
+        self._force.reset()
+        self._moment.reset()
+        self._wrench = (self._hover_n, 0.0, 0.0, 0.0)
+
+    def enter(self, state: VehicleState) -> None:
+        """Take over in flight from another law."""
+        del state
+        self.reset()
+
+    def step(self, state: VehicleState, command: Command, grounded: bool) -> MotorOutput:
+        """Return the motor commands for one control period.
+
+        Args:
+            state: the vehicle now.
+            command: what to follow.
+            grounded: it still stands on something; nothing is learnt, or it would learn the ground.
+        """
+        velocity, rates = state.velocity_ned_m_s, state.angular_rate_frd_rad_s
+        if grounded:
+            self._force.hold(velocity)
+            self._moment.hold(rates)
+        else:
+            self._force.correct(velocity)
+            self._moment.correct(rates)
+        m = rotation(state.attitude)
+        drag = self._drag_ned(m, velocity)
+        p, q, r = rates
+        i_roll, i_pitch, i_yaw = self._inertia
+        gyro_roll = (i_yaw - i_pitch) * q * r
+        gyro_pitch = (i_roll - i_yaw) * p * r
+        gyro_yaw = (i_pitch - i_roll) * p * q
+        if type(command) is ActuatorCommand:
+            output = self._straight_through(command)
+            asked = self._mixer.wrench(output.speeds_rad_s)
+        else:
+            thrust_n, want_p, want_q, want_r = self._wish(state, command, m, drag)
+            k_roll, k_pitch, k_yaw = self._k_rate
+            d_roll, d_pitch, d_yaw = self._moment.d
+            roll_nm = i_roll * (k_roll * (want_p - p) - d_roll) + gyro_roll
+            pitch_nm = i_pitch * (k_pitch * (want_q - q) - d_pitch) + gyro_pitch
+            yaw_nm = i_yaw * (k_yaw * (want_r - r) - d_yaw) + gyro_yaw
+            output = self._mixer.mix(thrust_n, roll_nm, pitch_nm, yaw_nm)
+            asked = (thrust_n, roll_nm, pitch_nm, yaw_nm)
+            if output.thrust_high or output.thrust_low or output.yaw_cut:  # what was left of it
+                asked = self._mixer.wrench(output.speeds_rad_s)
+
+        lag = self._lag
+        thrust, roll, pitch, yaw = self._wrench
+        thrust += lag * (asked[0] - thrust)
+        roll += lag * (asked[1] - roll)
+        pitch += lag * (asked[2] - pitch)
+        yaw += lag * (asked[3] - yaw)
+        self._wrench = (thrust, roll, pitch, yaw)
+        lift = thrust / self._mass_kg
+        self._force.predict(
+            drag[0] - lift * m[2], drag[1] - lift * m[5], drag[2] - lift * m[8] + GRAVITY_M_S2
+        )
+        self._moment.predict(
+            (roll - gyro_roll) / i_roll, (pitch - gyro_pitch) / i_pitch, (yaw - gyro_yaw) / i_yaw
+        )
+        return output
+
+    def _wish(self, state: VehicleState, command: Command, m: Rotation, drag: Vec3) -> _Wish:
+        if type(command) is RateCommand:
+            return self._follow_velocity(state, command, m, drag)
+        if type(command) is AccelerationCommand:
+            forward, right, down = command.acceleration_level_m_s2
+            return self._point(state, (forward, right, GRAVITY_M_S2 - down), m, command.yaw_rate_rad_s)
+        if type(command) is TiltCommand:
+            return self._hold_tilt(state, command, m, drag)
+        if type(command) is BodyRateCommand:
+            p, q, r = command.rate_frd_rad_s
+            return (command.thrust * self._full_n, p, q, r)
+        raise TypeError(f"not a command of the stabiliser: {type(command).__name__}")
+
+    def _follow_velocity(self, state: VehicleState, command: RateCommand, m: Rotation, drag: Vec3) -> _Wish:
+        north, east, down = state.velocity_ned_m_s
+        cos_yaw, sin_yaw = cos(state.yaw_rad), sin(state.yaw_rad)
+        forward, right = cos_yaw * north + sin_yaw * east, cos_yaw * east - sin_yaw * north
+        want_forward, want_right, want_down = command.velocity_level_m_s
+        ahead, aside, below = command.acceleration_level_m_s2
+        k_forward, k_right, k_down = self._k_velocity
+        p, q, r = state.angular_rate_frd_rad_s
+        turn = m[6] * p + m[7] * q + m[8] * r  # about world down: to keep a velocity in turning axes
+        d_north, d_east, d_down = self._force.d
+        push_north, push_east = drag[0] + d_north, drag[1] + d_east
+        ahead += k_forward * (want_forward - forward) - turn * right
+        ahead -= cos_yaw * push_north + sin_yaw * push_east
+        aside += k_right * (want_right - right) + turn * forward
+        aside -= cos_yaw * push_east - sin_yaw * push_north
+        below += k_down * (want_down - down) - drag[2] - d_down
+        return self._point(state, (ahead, aside, GRAVITY_M_S2 - below), m, command.yaw_rate_rad_s)
+
+    def _hold_tilt(self, state: VehicleState, command: TiltCommand, m: Rotation, drag: Vec3) -> _Wish:
+        """Tilt and thrust as asked; the limit of tilt is for what the loops above ask."""
+        cos_roll = cos(command.roll_rad)
+        down_level = (
+            sin(command.pitch_rad) * cos_roll,
+            -sin(command.roll_rad),
+            cos(command.pitch_rad) * cos_roll,
+        )
+        if isnan(command.thrust):
+            error = command.down_m_s - state.velocity_ned_m_s[2]
+            below = self._k_velocity[2] * error - drag[2] - self._force.d[2]
+            thrust_n = self._thrust(self._lift(GRAVITY_M_S2 - below), m)
+        else:
+            thrust_n = command.thrust * self._full_n
+        return (thrust_n, *self._turn_to(state, down_level, m, command.yaw_rate_rad_s))
+
+    def _point(self, state: VehicleState, specific: Vec3, m: Rotation, yaw_rate_rad_s: float) -> _Wish:
+        """Turn to a thrust per mass given as forward, right and up in level axes, m/s^2; up has priority."""
+        ahead, aside, up = specific
+        up = self._lift(up)
+        room = min(up * self._limits.tilt_tangent, sqrt(self._most_lift**2 - up * up))
+        level = sqrt(ahead * ahead + aside * aside)
+        if level > room:
+            ahead, aside, level = ahead * room / level, aside * room / level, room
+        length = sqrt(level * level + up * up)
+        down_level = (-ahead / length, -aside / length, up / length)
+        return (self._thrust(up, m), *self._turn_to(state, down_level, m, yaw_rate_rad_s))
+
+    def _lift(self, up: float) -> float:
+        """Vertical thrust per mass within what there is."""
+        return max(_LEAST_LIFT * GRAVITY_M_S2, min(up, self._most_lift))
+
+    def _thrust(self, up: float, m: Rotation) -> float:
+        """Thrust along the body's axis as it stands that lifts so much, N."""
+        cosine = m[8]
+        if cosine < _LEAST_COSINE:
+            return self._mass_kg * up * max(cosine, 0.0) / _LEAST_COSINE**2
+        return self._mass_kg * up / cosine
+
+    def _turn_to(self, state: VehicleState, down_level: Vec3, m: Rotation, yaw_rate_rad_s: float) -> Vec3:
+        """Body rates that turn body down to a unit vector in level axes, and all about world down."""
+        cos_yaw, sin_yaw = cos(state.yaw_rad), sin(state.yaw_rad)
+        x, y, z = down_level
+        roll, pitch = tilt_error(m, (cos_yaw * x - sin_yaw * y, sin_yaw * x + cos_yaw * y, z))
+        p, q = self._k_attitude[0] * roll, self._k_attitude[1] * pitch
+        rate = sqrt(p * p + q * q)
+        if rate > self._rate_limit_rad_s:
+            p, q = p * self._rate_limit_rad_s / rate, q * self._rate_limit_rad_s / rate
+        return (p + m[6] * yaw_rate_rad_s, q + m[7] * yaw_rate_rad_s, m[8] * yaw_rate_rad_s)
+
+    def _drag_ned(self, m: Rotation, velocity_ned: Vec3) -> Vec3:
+        """Acceleration by the drag declared, in still air, world NED."""
+        forward, right, down = self._drag
+        x, y, z = to_body(m, *velocity_ned)
+        return to_world(m, -forward * x * abs(x), -right * y * abs(y), -down * z * abs(z))
+
+    def _straight_through(self, command: ActuatorCommand) -> MotorOutput:
+        outputs = [min(value, 1.0) if value > 0.0 else 0.0 for value in command.outputs]  # NaN: off
+        outputs = (outputs + [0.0] * self._rotors)[: self._rotors]
+        speeds = tuple([self._max_speed_rad_s * sqrt(value) for value in outputs])
+        return MotorOutput(speeds, sum(outputs) / self._rotors)
