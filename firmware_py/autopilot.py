@@ -7,25 +7,32 @@ from __future__ import annotations
 
 from collections import deque
 from math import cos, isinf, isnan, nan, radians
-from typing import Protocol
 
 from firmware_py.airframe import Airframe
+from firmware_py.battery import BatteryMonitor, battery_settings
 from firmware_py.commander import Commander
 from firmware_py.commander_table import INFO, MODE_EVENT, WARNING, Event, Row, State
 from firmware_py.estimator import Estimator
-from firmware_py.flight_modes import Guidance, speed_limits, usable
-from firmware_py.geodesy import LocalProjection
+from firmware_py.guidance.circles import Orbit, follow_settings
+from firmware_py.guidance.limits import speed_limits
+from firmware_py.guidance.modes import Guidance, Manners
+from firmware_py.guidance.offboard import usable
+from firmware_py.guidance.returning import return_settings
+from firmware_py.guidance.sticks import stick_settings
 from firmware_py.land_detector import LandDetector
+from firmware_py.lift_off import LiftOff, RateStabiliser, goes_straight_through
 from firmware_py.missions.store import MissionStore
 from firmware_py.parameters import Parameters
+from firmware_py.places import Places
 from firmware_py.status import CommandResult, FlightMode, LandedState, VehicleStatus
 from firmware_py.types import (
     BatteryState,
+    Command,
     FlightRecord,
     GeodeticPoint,
+    ManualInput,
     MotorOutput,
     MotorSpeeds,
-    RateCommand,
     Sensors,
     Setpoint,
     StatusText,
@@ -33,34 +40,37 @@ from firmware_py.types import (
     VehicleState,
 )
 
-_UPRIGHT_COSINE = cos(radians(75.0))  # of the tilt beyond which there is no recovery
-_LIFT_M_S = 0.04  # asked to climb faster than this, it leaves the ground
-_LIFT_HELD_TICKS = 125  # half a second: integrals rest while the contact still carries the weight
 _TEXTS_KEPT = 100
 _READY_PERIOD_US = 100_000  # once armed, whether it could be armed again is of little interest
+_SLOW_PERIOD_US = 100_000  # of battery and geofence
 _SETPOINT_GRID_US = 10_000
 
-_GROUND_MODES = frozenset({State.HOLD, State.LOSS_HOLD, State.LAND, State.LOSS_LAND})
+_GROUND_STATES = frozenset(
+    {
+        State.HOLD,
+        State.FAILSAFE_HOLD,
+        State.LAND,
+        State.FAILSAFE_LAND,
+        State.FAILSAFE_DESCEND,
+        State.RETURN,
+        State.FAILSAFE_RETURN,
+    }
+)
 _AIRBORNE_STATES = {
     State.TAKEOFF: LandedState.TAKEOFF,
     State.LAND: LandedState.LANDING,
-    State.LOSS_LAND: LandedState.LANDING,
+    State.FAILSAFE_LAND: LandedState.LANDING,
+    State.FAILSAFE_DESCEND: LandedState.LANDING,
 }
-
-
-class RateStabiliser(Protocol):
-    """What the autopilot needs of a stabiliser."""
-
-    def reset(self) -> None:
-        """Forget all integrals."""
-
-    def idle(self) -> MotorOutput:
-        """Motors turning slowly, standing on the ground."""
-        ...
-
-    def step(self, state: VehicleState, command: RateCommand, *, grounded: bool = False) -> MotorOutput:
-        """Motor commands for one control period."""
-        ...
+_STOPPED_STATES = frozenset({State.DISARMED, State.TERMINATED})
+_BY_HAND = {
+    State.MANUAL: FlightMode.MANUAL,
+    State.STABILIZED: FlightMode.STABILIZED,
+    State.ACRO: FlightMode.ACRO,
+    State.ALTITUDE: FlightMode.ALTITUDE,
+    State.POSITION: FlightMode.POSITION,
+}
+_AUTO_BIT, _OFFBOARD_BIT = 1, 2  # of COM_RC_OVERRIDE
 
 
 class _Undesigned:
@@ -73,7 +83,7 @@ class _Undesigned:
         """Not to be called."""
         raise RuntimeError("the stabiliser is not designed yet; call prepare()")
 
-    def step(self, state: VehicleState, command: RateCommand, *, grounded: bool = False) -> MotorOutput:
+    def step(self, state: VehicleState, command: Command, *, grounded: bool = False) -> MotorOutput:
         """Not to be called."""
         raise RuntimeError("the stabiliser is not designed yet; call prepare()")
 
@@ -106,39 +116,44 @@ class Autopilot:
         Args:
             airframe: what it flies.
             origin: where on Earth the sensors' positions count from.
-            parameters: shared with the MAVLink services; defaults if not given.
+            parameters: shared with the MAVLink services; the airframe's defaults if not given.
             control_period_s: time between calls of `step`.
             stabiliser: another one than the airframe's own design, for tests.
         """
         self.airframe = airframe
-        self.parameters = parameters if parameters is not None else Parameters()
+        self.parameters = parameters if parameters is not None else Parameters(defaults=airframe.parameters)
         self.status = VehicleStatus()
-        self.battery = BatteryState()
         self.flight = FlightRecord()
         self.missions = MissionStore()
+        self._battery_monitor = BatteryMonitor()
+        self.battery: BatteryState = self._battery_monitor.state
         self._estimator = Estimator()
         self.state = self._estimator.state
-        self._sensor_projection = LocalProjection(origin)
-        self._projection: LocalProjection | None = None
+        self._places = Places(self.status, origin)
         self._period_us = round(control_period_s * 1e6)
         self._now_us = 0
         self._commander = Commander()
-        self._guidance = Guidance(speed_limits(airframe, self.parameters))
+        self._guidance = Guidance(
+            speed_limits(airframe, self.parameters), self._manners(), self._period_us / 1e6
+        )
         self._stabiliser: RateStabiliser = _Undesigned() if stabiliser is None else stabiliser
+        self._lift_off = LiftOff()
         self._land_detector = LandDetector((airframe.hover_speed_rad_s / airframe.motor.max_speed_rad_s) ** 2)
         self._stopped = MotorOutput((0.0,) * len(airframe.rotors))
         self.output = self._stopped
         self._state_entered = State.DISARMED
         self._shown_state: State | None = None
         self._airborne = LandedState.IN_AIR
-        self._lift_ticks = 0
         self._takeoff_altitude_m = nan
+        self._orbit = Orbit()
         self._texts: deque[StatusText] = deque(maxlen=_TEXTS_KEPT)
         self._refusal_said = False
         self._next_setpoint: Setpoint | None = None
         self._setpoint_slot = 0
         self._ready_due_us = 0
+        self._slow_due_us = 0
         self._parameters_version = -1
+        self._upright_cosine = 0.0
         self._configure()
 
     def prepare(self) -> None:
@@ -168,26 +183,27 @@ class Autopilot:
         sound = self._estimator.update(sensors)
         if sound:
             self._now_us = max(self._now_us, state.time_us)
-            if self._projection is None:
+            if self._places.projection is None:
                 self._fix_origin()
             self._detect_land()
         else:
             self._now_us += self._period_us
+        if self._now_us >= self._slow_due_us:
+            self._look_around(sensors)
         if self._next_setpoint is not None and self._now_us // _SETPOINT_GRID_US != self._setpoint_slot:
             self._take_setpoint()
         _, x, y, _ = state.attitude
-        upright = 1.0 - 2.0 * (x * x + y * y) > _UPRIGHT_COSINE
         row = commander.tick(
             self._now_us,
             sound=sound,
-            upright=upright,
+            upright=1.0 - 2.0 * (x * x + y * y) > self._upright_cosine,
             landed=self._land_detector.landed,
             target_reached=guidance.target_reached,
         )
         if row is not None:
             self._follow(row)
         self._refresh_status()
-        if commander.state is State.DISARMED:
+        if commander.state in _STOPPED_STATES:
             self.output = self._stopped
         elif sound:
             self.output = self._fly(guidance.step(state))
@@ -211,17 +227,20 @@ class Autopilot:
         """
         return self._command(Event.FORCE_DISARM if force else Event.DISARM)
 
+    def terminate(self) -> CommandResult:
+        """Stop the motors for good, wherever it is; always ACCEPTED."""
+        return self._command(Event.TERMINATE)
+
     def set_mode(self, mode: FlightMode) -> CommandResult:
-        """Change the mode: disarmed always; armed, OFFBOARD only while setpoints come.
+        """Change the mode: disarmed always; armed, only to one that can be flown now.
 
         Returns:
             ACCEPTED, or TEMPORARILY_REJECTED with a status text that says why.
         """
-        if mode not in MODE_EVENT:
-            self.say(WARNING, f"Mode change refused: {mode.name.lower()} cannot be flown here")
-            return CommandResult.TEMPORARILY_REJECTED
         if mode is FlightMode.TAKEOFF:
             self._takeoff_altitude_m = nan
+        if mode is FlightMode.ORBIT:
+            self._orbit = self._orbit_here()
         return self._command(MODE_EVENT[mode])
 
     def takeoff(self, altitude_amsl_m: float = nan) -> CommandResult:
@@ -244,11 +263,75 @@ class Autopilot:
         """Land where it is; always ACCEPTED."""
         return self._command(Event.SET_LAND)
 
+    def reposition(self, target_ned_m: Vec3, yaw_rad: float = nan, speed_m_s: float = nan) -> CommandResult:
+        """Fly to a place and hold there.
+
+        Args:
+            target_ned_m: in the local frame, shape (3,); NaN components: where it is now.
+            yaw_rad: where to look; NaN: along the way.
+            speed_m_s: horizontal; NaN: MPC_XY_CRUISE.
+
+        Returns:
+            ACCEPTED, or TEMPORARILY_REJECTED when hold cannot be entered.
+        """
+        result = self._command(Event.SET_HOLD)
+        if result is CommandResult.ACCEPTED and self.status.armed and not self._land_detector.landed:
+            if all(map(isnan, target_ned_m)):
+                self._guidance.enter_hold(self.state)
+            else:
+                here = self.state.position_ned_m
+                north, east, down = (
+                    place if isnan(wanted) else wanted
+                    for wanted, place in zip(target_ned_m, here, strict=True)
+                )
+                self._guidance.enter_journey(self.state, (north, east, down), yaw_rad, speed_m_s)
+        return result
+
+    def orbit(self, orbit: Orbit) -> CommandResult:
+        """Circle around a point.
+
+        Returns:
+            ACCEPTED, or TEMPORARILY_REJECTED when that cannot be flown now.
+        """
+        self._orbit = orbit
+        return self._command(Event.SET_ORBIT)
+
+    def orbit_here(self) -> Orbit:
+        """The circle that is flown when no other was asked for: PX4's, 1 m around where it is."""
+        return self._orbit_here()
+
+    def change_speed(self, speed_m_s: float) -> CommandResult:
+        """Fly the present journey at another horizontal speed; NaN: MPC_XY_CRUISE again."""
+        self._guidance.traveller.speed_m_s = speed_m_s
+        return CommandResult.ACCEPTED
+
+    def look_at(self, point_ned_m: Vec3 | None) -> CommandResult:
+        """On journeys and in hold, turn the nose to a place, shape (3,); None: no more."""
+        self._guidance.region_ned_m = point_ned_m
+        return CommandResult.ACCEPTED
+
+    def set_home(self, point: GeodeticPoint | None) -> CommandResult:
+        """Set home to a place on Earth, or (None) to where the vehicle is."""
+        if self._places.projection is None:
+            self.say(WARNING, "Set home denied: no position estimate")
+            return CommandResult.TEMPORARILY_REJECTED
+        if point is None:
+            self._places.set_home_here(self.state)
+        elif not self._places.set_home(point):
+            self.say(WARNING, "Set home denied: not a place on Earth")
+            return CommandResult.DENIED
+        self._guidance.home_ned_m = self.status.home_ned_m
+        return CommandResult.ACCEPTED
+
+    def set_origin(self, point: GeodeticPoint) -> CommandResult:
+        """Say where on Earth the local frame's origin is."""
+        return CommandResult.ACCEPTED if self._places.move_origin(point) else CommandResult.DENIED
+
     def accept_setpoint(self, setpoint: Setpoint) -> None:
         """Take an offboard setpoint; it is flown in OFFBOARD and lets OFFBOARD be entered.
 
-        One with neither a position nor a velocity (acceleration alone is not followed) counts as none
-        received; a status text says so, once until a usable one comes.
+        One that says nothing that can be flown counts as none received; a status text says so, once until a
+        usable one comes.
 
         Setpoints are flown from the next multiple of 10 ms on. So a few milliseconds that a packet takes
         more or less change nothing, nor does one that is sent again, and a flight over a network repeats as
@@ -257,12 +340,33 @@ class Autopilot:
         if not usable(setpoint):
             if not self._refusal_said:
                 self._refusal_said = True
-                self.say(WARNING, "Offboard setpoint ignored: no position or velocity")
+                self.say(WARNING, "Offboard setpoint ignored: nothing in it can be flown")
             return
         self._refusal_said = False
         self._commander.setpoint_came(setpoint.time_us)
         self._next_setpoint = setpoint
         self._setpoint_slot = self._now_us // _SETPOINT_GRID_US
+
+    def manual_input(self, sticks: ManualInput) -> None:
+        """Take a pilot's sticks; moved in a mode that flies itself, they take over (COM_RC_OVERRIDE)."""
+        self._guidance.sticks = sticks
+        self._commander.sticks_came()
+        state = self._commander.state
+        if state in _BY_HAND or state in _STOPPED_STATES or self._land_detector.landed:
+            return
+        threshold = self.parameters.value("COM_RC_STICK_OV") / 100.0
+        bit = _OFFBOARD_BIT if state is State.OFFBOARD else _AUTO_BIT
+        moved = max(abs(sticks.forward), abs(sticks.right), abs(sticks.yaw)) > threshold
+        if moved and self.parameters.integer("COM_RC_OVERRIDE") & bit:
+            self._command(Event.PILOT_TAKES_OVER)
+
+    def ground_station_heard(self) -> None:
+        """Note a ground station's heartbeat."""
+        self._commander.ground_station_heard()
+
+    def follow_target(self, position_ned_m: Vec3, velocity_ned_m_s: Vec3) -> None:
+        """Take a report of the target to follow, in the local frame."""
+        self._guidance.follower.report(self._now_us, position_ned_m, velocity_ned_m_s)
 
     def say(self, severity: int, text: str) -> None:
         """Leave a message for people; the oldest go first when nobody takes them.
@@ -281,11 +385,11 @@ class Autopilot:
 
     def global_position(self) -> GeodeticPoint | None:
         """Where on Earth it believes to be; None before the first usable sample."""
-        return None if self._projection is None else self._projection.to_geodetic(self.state.position_ned_m)
+        return self._places.to_geodetic(self.state.position_ned_m)
 
     def local_position(self, point: GeodeticPoint) -> Vec3 | None:
         """A place on Earth in the local frame, NED metres; None before the origin is known."""
-        return None if self._projection is None else self._projection.to_local(point)
+        return self._places.to_local(point)
 
     def _command(self, event: Event) -> CommandResult:
         row = self._commander.handle(event)
@@ -301,22 +405,46 @@ class Autopilot:
             return
         before, self._state_entered = self._state_entered, row.target
         if before is State.DISARMED:
-            self._stabiliser.reset()
-            self._set_home()
+            self._leave_disarmed()
+        self._guidance.home_ned_m = self.status.home_ned_m
         match row.target:
-            case State.DISARMED:
+            case State.DISARMED | State.TERMINATED:
                 self.output = self._stopped
-                self._lift_ticks = 0
-            case State.HOLD | State.LOSS_HOLD:
+                self._lift_off.rest()
+            case State.HOLD | State.FAILSAFE_HOLD:
                 reached = before is State.TAKEOFF and row.event is Event.TICK
                 self._guidance.enter_hold(self.state, keep_target=reached)
-            case State.LAND | State.LOSS_LAND:
-                self._guidance.enter_land(self.state)
             case State.OFFBOARD:
                 self._take_setpoint()
                 self._guidance.enter_offboard()
             case State.TAKEOFF:
                 self._enter_takeoff()
+            case _:
+                self._enter_guided(row.target)
+
+    def _enter_guided(self, state: State) -> None:
+        guidance = self._guidance
+        match state:
+            case State.LAND | State.FAILSAFE_LAND:
+                guidance.enter_land(self.state)
+            case State.FAILSAFE_DESCEND:
+                guidance.enter_descend(self.state)
+            case State.RETURN | State.FAILSAFE_RETURN:
+                guidance.enter_return(self.state)
+            case State.ORBIT:
+                guidance.enter_orbit(self.state, self._orbit)
+            case State.FOLLOW:
+                guidance.enter_follow(self.state)
+            case _:
+                guidance.enter_sticks(self.state, _BY_HAND[state])
+
+    def _leave_disarmed(self) -> None:
+        self._stabiliser.reset()
+        self._places.set_home_here(self.state)
+        self._lift_off.arm(self._now_us)
+        self.flight.armed_us = self._now_us
+        self.flight.takeoff_us = self.flight.landed_us = 0
+        self.flight.number += 1
 
     def _take_setpoint(self) -> None:
         if self._next_setpoint is not None:
@@ -337,51 +465,75 @@ class Autopilot:
         climb_m = altitude_m - here.altitude_m
         self._guidance.enter_takeoff(self.state, self.state.position_ned_m[2] - climb_m)
 
-    def _fly(self, command: RateCommand) -> MotorOutput:
-        """Motors for a command: on the ground they idle until a mode that may take off wants to climb."""
-        if not self._land_detector.landed:
-            self._lift_ticks = 0
-            return self._stabiliser.step(self.state, command)
-        down_m_s = command.velocity_level_m_s[2]
-        if self._commander.state in _GROUND_MODES or down_m_s > -_LIFT_M_S:
-            self._lift_ticks = 0
-            self._stabiliser.reset()
-            return self._stabiliser.idle()
-        self._lift_ticks += 1
-        straight_up = RateCommand((0.0, 0.0, down_m_s), 0.0)
-        return self._stabiliser.step(self.state, straight_up, grounded=self._lift_ticks <= _LIFT_HELD_TICKS)
+    def _orbit_here(self) -> Orbit:
+        return Orbit(self.state.position_ned_m)
+
+    def _fly(self, command: Command) -> MotorOutput:
+        """Motors for a command, with the ground between if it stands."""
+        if not self._land_detector.landed or goes_straight_through(command):
+            return self._lift_off.fly(self._stabiliser, self.state, command)
+        return self._lift_off.stand(
+            self._stabiliser,
+            self.state,
+            command,
+            self._guidance.command_down_m_s,
+            may_lift=self._commander.state not in _GROUND_STATES,
+        )
 
     def _detect_land(self) -> None:
         detector = self._land_detector
         before = detector.landed
-        armed = self._commander.state is not State.DISARMED
+        armed = self._commander.state not in _STOPPED_STATES
         landed = detector.update(
             self.state,
             armed=armed,
-            lifting=self._lift_ticks > 0,
+            lifting=self._lift_off.ticks > 0,
             command_down_m_s=self._guidance.command_down_m_s,
             throttle=self.output.throttle,
         )
-        if armed and landed != before:
+        if landed == before:
+            return
+        if landed:
+            self.flight.landed_us = self._now_us
+        else:
+            self.flight.takeoff_us = self._now_us
+        if armed:
             self.say(INFO, "Landing detected" if landed else "Takeoff detected")
 
     def _fix_origin(self) -> None:
         origin_ned_m = self._estimator.origin_ned_m
-        if origin_ned_m is None:
-            return
-        self.status.origin = self._sensor_projection.to_geodetic(origin_ned_m)
-        self._projection = LocalProjection(self.status.origin)
-        self._set_home()
+        if origin_ned_m is not None:
+            self._places.fix_origin(origin_ned_m, self.state)
+            self._guidance.home_ned_m = self.status.home_ned_m
 
-    def _set_home(self) -> None:
-        self.status.home = self.global_position()
-        self.status.home_ned_m = self.state.position_ned_m
+    def _look_around(self, sensors: Sensors) -> None:
+        """What changes slowly: the battery."""
+        self._slow_due_us = self._now_us + _SLOW_PERIOD_US
+        self._battery_monitor.update(
+            self._now_us, sensors.battery_voltage_v, sensors.battery_current_a, self._battery_settings
+        )
+        self._commander.situation.battery_warning = self.battery.warning
 
     def _configure(self) -> None:
         """Take over the parameters; looked up by name only when one has changed."""
-        self._parameters_version = self.parameters.version
-        self._commander.configure(self.parameters)
-        self._guidance.limits = speed_limits(self.airframe, self.parameters)
+        parameters = self.parameters
+        self._parameters_version = parameters.version
+        self._commander.configure(parameters)
+        self._guidance.configure(speed_limits(self.airframe, parameters), self._manners())
+        self._battery_settings = battery_settings(parameters)
+        self._lift_off.spool_up_us = round(parameters.value("COM_SPOOLUP_TIME") * 1e6)
+        self._lift_off.ramp_us = round(parameters.value("MPC_TKO_RAMP_T") * 1e6)
+        self._land_detector.trigger_us = round(parameters.value("LNDMC_TRIG_TIME") * 1e6)
+        tilt_deg = min(parameters.value("FD_FAIL_P"), parameters.value("FD_FAIL_R")) or 180.0  # 0: never
+        self._upright_cosine = cos(radians(tilt_deg))
+
+    def _manners(self) -> Manners:
+        parameters = self.parameters
+        return Manners(
+            stick_settings(self.airframe, parameters),
+            return_settings(parameters),
+            follow_settings(parameters),
+        )
 
     def _refresh_status(self) -> None:
         status, commander = self.status, self._commander

@@ -1,77 +1,134 @@
-"""The commander: keeps the state of the vehicle and lets the table decide what becomes of it."""
+"""The commander: arming, modes and failsafes. Its behaviour is the table in `firmware_py.commander_table`."""
 
 from __future__ import annotations
 
-from firmware_py import commander_guards
-from firmware_py.commander_guards import Situation, Timeouts
-from firmware_py.commander_table import FAILSAFE_STATES, FLOWN_MODE, RULES, Event, Row, State, first_match
+from firmware_py.commander_guards import (
+    Cause,
+    Choices,
+    Reaction,
+    Situation,
+    Timeouts,
+    setpoint_lost,
+    trouble,
+)
+from firmware_py.commander_table import (
+    CAUSE_EVENT,
+    FLOWN_MODE,
+    RULES,
+    Event,
+    Row,
+    State,
+    first_match,
+)
 from firmware_py.parameters import Parameters
-from firmware_py.status import FlightMode
+from firmware_py.status import CommandResult, FlightMode
+
+_WATCH_PERIOD_US = 40_000  # of what is not urgent
+
+_LINK_LOSS = (  # NAV_DLL_ACT and NAV_RCL_ACT
+    Reaction.NOTHING,
+    Reaction.HOLD,
+    Reaction.RETURN,
+    Reaction.LAND,
+    Reaction.NOTHING,
+    Reaction.TERMINATE,
+    Reaction.DISARM,
+)
+_WITHOUT_STICKS = {
+    2: Reaction.RETURN,
+    3: Reaction.LAND,
+    5: Reaction.TERMINATE,
+    6: Reaction.DISARM,
+}  # the same
+_OFFBOARD_LOSS = (  # COM_OBL_RC_ACT
+    Reaction.POSITION,
+    Reaction.ALTITUDE,
+    Reaction.STABILIZED,
+    Reaction.RETURN,
+    Reaction.LAND,
+    Reaction.HOLD,
+    Reaction.TERMINATE,
+    Reaction.DISARM,
+)
+_FENCE = (  # GF_ACTION
+    Reaction.NOTHING,
+    Reaction.WARN,
+    Reaction.HOLD,
+    Reaction.RETURN,
+    Reaction.TERMINATE,
+    Reaction.LAND,
+)
+_BATTERY_CRITICAL = {0: Reaction.WARN, 2: Reaction.LAND, 3: Reaction.RETURN}  # COM_LOW_BAT_ACT
+_BATTERY_EMERGENCY = {0: Reaction.WARN, 2: Reaction.LAND, 3: Reaction.LAND}
+_EXCEPT = (  # the bits of COM_RCL_EXCEPT
+    frozenset({FlightMode.MISSION}),
+    frozenset({FlightMode.HOLD, FlightMode.TAKEOFF}),
+    frozenset({FlightMode.OFFBOARD}),
+)
+_MANUAL_DISABLED = 4  # COM_RC_IN_MODE
 
 
 class Commander:
-    """Arming, modes and failsafes.
+    """Keeps the state and what is known of the vehicle; the table decides.
 
     Attributes:
-        state: the present state of the table.
-        situation: what the guards look at.
+        state: where in the table it is.
+        situation: what guards look at.
     """
 
-    __slots__ = ("_started", "_tick_rows", "situation", "state")
+    __slots__ = ("_tick_rows", "_watch_us", "situation", "state")
 
     def __init__(self) -> None:
-        self.situation = Situation()
         self.state = State.DISARMED
-        self._tick_rows = RULES[State.DISARMED, Event.TICK]
-        self._started = False
-
-    @property
-    def armed(self) -> bool:
-        """Whether motors may turn."""
-        return self.state is not State.DISARMED
+        self._tick_rows = RULES[self.state, Event.TICK]
+        self._watch_us = 0
+        self.situation = Situation()
 
     @property
     def mode(self) -> FlightMode:
-        """The mode flown; while disarmed, the one it would be armed in."""
+        """The mode flown; disarmed, the one last asked for."""
         return FLOWN_MODE.get(self.state, self.situation.intended)
 
     @property
     def failsafe(self) -> bool:
-        """Whether a failsafe chose the mode."""
-        return self.state in FAILSAFE_STATES
+        """Whether a failsafe chose the state."""
+        return self.situation.cause is not None or self.state is State.TERMINATED
 
     @property
     def ready(self) -> bool:
-        """Whether arming would be accepted; once armed, whether it would be again."""
-        now = self.situation
-        return not (
-            commander_guards.unhealthy(now)
-            or commander_guards.intends_land(now)
-            or commander_guards.intends_offboard_unfed(now)
-        )
+        """Whether it could be armed now."""
+        row = first_match(RULES[State.DISARMED, Event.ARM], self.situation)
+        return row is not None and row.result is CommandResult.ACCEPTED
 
     def tick(
-        self, now_us: int, *, sound: bool, upright: bool, landed: bool, target_reached: bool
+        self,
+        now_us: int,
+        *,
+        sound: bool,
+        upright: bool,
+        landed: bool,
+        target_reached: bool,
+        placed: bool = True,
     ) -> Row | None:
-        """Take one control tick.
+        """Take note of the vehicle and apply the table once.
 
         Args:
-            now_us: vehicle time, microseconds.
-            sound: whether this tick's sensor sample was usable.
-            upright: whether the attitude is one to fly in.
-            landed: whether it stands on something.
-            target_reached: whether a take-off is at its height.
+            now_us: vehicle time.
+            sound: this tick's sample could be used.
+            upright: its attitude is one to fly in.
+            landed: it stands on something.
+            target_reached: the take-off is at its height.
+            placed: the horizontal position is known.
 
         Returns:
-            The rule that fired, if one did.
+            The rule that fired; None when nothing happens.
         """
         now = self.situation
-        if not self._started:
-            self._started = True
-            now.unsound_us = now.sound_us = now.upright_us = now_us
         now.now_us = now_us
         if sound:
             now.sound_us = now_us
+            if placed:
+                now.position_us = now_us
         else:
             now.unsound_us = now_us
         if upright:
@@ -82,6 +139,11 @@ class Commander:
             now.flown = self.state is not State.DISARMED
         now.target_reached = target_reached
         row = first_match(self._tick_rows, now)
+        if row is None and self.state is not State.DISARMED:
+            cause = self._trouble()
+            if cause is not None:
+                now.handled.add(cause)
+                row = first_match(RULES[self.state, CAUSE_EVENT[cause]], now)
         if row is not None:
             self._follow(row)
         return row
@@ -98,15 +160,48 @@ class Commander:
         """Note a usable offboard setpoint; a time ahead of the vehicle's counts as now."""
         self.situation.setpoint_us = min(time_us, self.situation.now_us)
 
+    def ground_station_heard(self) -> None:
+        """Note a ground station's heartbeat."""
+        self.situation.ground_station_us = self.situation.now_us
+
+    def sticks_came(self) -> None:
+        """Note a pilot's input."""
+        now = self.situation
+        now.manual_us = now.now_us
+        now.manual_missed = False
+
     def configure(self, parameters: Parameters) -> None:
         """Take over times and choices from the parameters."""
+        value, whole = parameters.value, parameters.integer
         self.situation.timeouts = Timeouts(
-            setpoint_loss_us=_microseconds(parameters.value("COM_OF_LOSS_T")),
-            failsafe_hold_us=_microseconds(parameters.value("COM_FAIL_ACT_T")),
-            disarm_landed_us=_wait(parameters.value("COM_DISARM_LAND")),
-            disarm_preflight_us=_wait(parameters.value("COM_DISARM_PRFLT")),
-            land_at_loss=parameters.integer("COM_OBL_RC_ACT") == 4,
+            setpoint_loss_us=_microseconds(value("COM_OF_LOSS_T")),
+            failsafe_hold_us=_microseconds(value("COM_FAIL_ACT_T")),
+            disarm_landed_us=_wait(value("COM_DISARM_LAND")),
+            disarm_preflight_us=_wait(value("COM_DISARM_PRFLT")),
+            ground_station_us=_microseconds(value("COM_DL_LOSS_T")),
+            manual_us=_microseconds(value("COM_RC_LOSS_T")),
+            tumble_us=_microseconds(value("FD_FAIL_P_TTRI")),
+            flight_us=_wait(value("COM_FLT_TIME_MAX")),
         )
+        excepted = whole("COM_RCL_EXCEPT")
+        self.situation.choices = Choices(
+            reactions=_chosen(parameters),
+            arm_needs_ground_station=whole("NAV_DLL_ACT") > 0,
+            manual_ignored_in=frozenset().union(
+                *(modes for bit, modes in enumerate(_EXCEPT) if excepted >> bit & 1)
+            ),
+            manual_disabled=whole("COM_RC_IN_MODE") == _MANUAL_DISABLED,
+            without_sticks=_WITHOUT_STICKS.get(whole("NAV_RCL_ACT"), Reaction.HOLD),
+        )
+
+    def _trouble(self) -> Cause | None:
+        now = self.situation
+        if self.state is State.OFFBOARD and setpoint_lost(now):
+            return Cause.SETPOINTS
+        if now.now_us < self._watch_us:
+            return None
+        self._watch_us = now.now_us + _WATCH_PERIOD_US
+        return trouble(now)
 
     def _follow(self, row: Row) -> None:
         now = self.situation
@@ -117,9 +212,34 @@ class Commander:
         if self.state is State.DISARMED:
             now.armed_us = now.now_us
             now.flown = not now.landed
+            now.manual_missed = now.now_us - now.manual_us > now.timeouts.manual_us
+            now.battery_at_arming = now.battery_warning
+            now.handled.clear()
+        if row.event is not Event.TICK or row.target not in _LATER_STEPS:
+            now.cause = row.cause  # a hold that becomes a landing keeps its cause
+        now.follow_up = row.follow_up
         self.state = row.target
         self._tick_rows = RULES[self.state, Event.TICK]
         now.entered_us = now.now_us
+
+
+_LATER_STEPS = frozenset({State.FAILSAFE_RETURN, State.FAILSAFE_LAND})
+
+
+def _chosen(parameters: Parameters) -> dict[Cause, Reaction]:
+    """What parameters choose for each cause; what needs sticks that are absent falls back as in PX4."""
+    whole = parameters.integer
+    battery = whole("COM_LOW_BAT_ACT")
+    return {
+        Cause.SETPOINTS: _OFFBOARD_LOSS[whole("COM_OBL_RC_ACT")],
+        Cause.GROUND_STATION: _LINK_LOSS[whole("NAV_DLL_ACT")],
+        Cause.MANUAL: _LINK_LOSS[whole("NAV_RCL_ACT")],
+        Cause.BATTERY_LOW: Reaction.WARN,
+        Cause.BATTERY_CRITICAL: _BATTERY_CRITICAL.get(battery, Reaction.WARN),
+        Cause.BATTERY_EMERGENCY: _BATTERY_EMERGENCY.get(battery, Reaction.WARN),
+        Cause.FENCE: _FENCE[whole("GF_ACTION")],
+        Cause.FLIGHT_TIME: Reaction.RETURN,
+    }
 
 
 def _microseconds(seconds: float) -> int:

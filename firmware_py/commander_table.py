@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from enum import Enum
 
 from firmware_py import commander_guards as when
-from firmware_py.commander_guards import Guard, Situation
+from firmware_py.commander_guards import MANUAL_MODES, Cause, Guard, Reaction, Situation
 from firmware_py.status import CommandResult, FlightMode
 
 CRITICAL, WARNING, INFO = 2, 4, 6  # MAV_SEVERITY
@@ -20,44 +20,101 @@ class State(Enum):
     """Armed or not, the mode flown, and whether a failsafe chose it."""
 
     DISARMED = "disarmed"
+    MANUAL = "manual"
+    STABILIZED = "stabilized"
+    ACRO = "acro"
+    ALTITUDE = "altitude"
+    POSITION = "position"
     HOLD = "hold"
     TAKEOFF = "takeoff"
+    ORBIT = "orbit"
+    FOLLOW = "follow"
+    MISSION = "mission"
+    RETURN = "return"
     LAND = "land"
     OFFBOARD = "offboard"
-    LOSS_HOLD = "loss_hold"  # offboard setpoints lost: hold
-    LOSS_LAND = "loss_land"  # still lost: land
+    FAILSAFE_HOLD = "failsafe_hold"
+    FAILSAFE_RETURN = "failsafe_return"
+    FAILSAFE_LAND = "failsafe_land"
+    FAILSAFE_DESCEND = "failsafe_descend"  # down without a position
+    TERMINATED = "terminated"  # motors stopped, wherever it is
 
 
 class Event(Enum):
-    """What may happen. Conditions of the vehicle are guards on TICK."""
+    """What may happen. Conditions of the vehicle that need no reaction of choice are guards on TICK."""
 
     TICK = "tick"
     ARM = "arm"
     DISARM = "disarm"
     FORCE_DISARM = "force_disarm"
+    TERMINATE = "terminate"
+    SET_MANUAL = "set_manual"
+    SET_STABILIZED = "set_stabilized"
+    SET_ACRO = "set_acro"
+    SET_ALTITUDE = "set_altitude"
+    SET_POSITION = "set_position"
     SET_HOLD = "set_hold"
     SET_TAKEOFF = "set_takeoff"
+    SET_ORBIT = "set_orbit"
+    SET_FOLLOW = "set_follow"
+    SET_MISSION = "set_mission"
+    SET_RETURN = "set_return"
     SET_LAND = "set_land"
     SET_OFFBOARD = "set_offboard"
+    PILOT_TAKES_OVER = "pilot_takes_over"
+    MISSION_DONE = "mission_done"
+    MISSION_RETURNS = "mission_returns"
+    SETPOINTS_LOST = "setpoints_lost"
+    GROUND_STATION_LOST = "ground_station_lost"
+    MANUAL_LOST = "manual_lost"
+    BATTERY_LOW = "battery_low"
+    BATTERY_CRITICAL = "battery_critical"
+    BATTERY_EMERGENCY = "battery_emergency"
+    FENCE_BREACHED = "fence_breached"
+    POSITION_LOST = "position_lost"
+    FLIGHT_TIME_OVER = "flight_time_over"
 
 
 FLOWN_MODE: dict[State, FlightMode] = {
+    State.MANUAL: FlightMode.MANUAL,
+    State.STABILIZED: FlightMode.STABILIZED,
+    State.ACRO: FlightMode.ACRO,
+    State.ALTITUDE: FlightMode.ALTITUDE,
+    State.POSITION: FlightMode.POSITION,
     State.HOLD: FlightMode.HOLD,
     State.TAKEOFF: FlightMode.TAKEOFF,
+    State.ORBIT: FlightMode.ORBIT,
+    State.FOLLOW: FlightMode.FOLLOW,
+    State.MISSION: FlightMode.MISSION,
+    State.RETURN: FlightMode.RETURN,
     State.LAND: FlightMode.LAND,
     State.OFFBOARD: FlightMode.OFFBOARD,
-    State.LOSS_HOLD: FlightMode.HOLD,
-    State.LOSS_LAND: FlightMode.LAND,
+    State.FAILSAFE_HOLD: FlightMode.HOLD,
+    State.FAILSAFE_RETURN: FlightMode.RETURN,
+    State.FAILSAFE_LAND: FlightMode.LAND,
+    State.FAILSAFE_DESCEND: FlightMode.LAND,
+    State.TERMINATED: FlightMode.TERMINATION,
 }
 """The flight mode of each armed state."""
 
 MODE_EVENT: dict[FlightMode, Event] = {
-    FlightMode.HOLD: Event.SET_HOLD,
-    FlightMode.TAKEOFF: Event.SET_TAKEOFF,
-    FlightMode.LAND: Event.SET_LAND,
-    FlightMode.OFFBOARD: Event.SET_OFFBOARD,
+    mode: Event.TERMINATE if mode is FlightMode.TERMINATION else Event(f"set_{mode.name.lower()}")
+    for mode in FlightMode
 }
 """The event that asks for each mode."""
+
+CAUSE_EVENT: dict[Cause, Event] = {
+    Cause.SETPOINTS: Event.SETPOINTS_LOST,
+    Cause.GROUND_STATION: Event.GROUND_STATION_LOST,
+    Cause.MANUAL: Event.MANUAL_LOST,
+    Cause.BATTERY_LOW: Event.BATTERY_LOW,
+    Cause.BATTERY_CRITICAL: Event.BATTERY_CRITICAL,
+    Cause.BATTERY_EMERGENCY: Event.BATTERY_EMERGENCY,
+    Cause.FENCE: Event.FENCE_BREACHED,
+    Cause.POSITION: Event.POSITION_LOST,
+    Cause.FLIGHT_TIME: Event.FLIGHT_TIME_OVER,
+}
+"""The event by which each cause of a failsafe is told."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -73,6 +130,8 @@ class Row:
         result: the answer to a command.
         severity: MAV_SEVERITY of the text.
         text: what people are told; empty: nothing.
+        cause: why the target is entered, for a failsafe; None: nobody's failsafe.
+        follow_up: what the failsafe's hold turns into.
     """
 
     states: frozenset[State]
@@ -83,6 +142,8 @@ class Row:
     result: CommandResult = CommandResult.ACCEPTED
     severity: int = INFO
     text: str = ""
+    cause: Cause | None = None
+    follow_up: Reaction = Reaction.NOTHING
 
 
 def _at(*states: State) -> frozenset[State]:
@@ -111,84 +172,258 @@ def _refuse(states: frozenset[State], event: Event, guard: Guard | None, text: s
 
 _OFF = _at(State.DISARMED)
 _ARMED = frozenset(FLOWN_MODE)
-_LOSS = _at(State.LOSS_HOLD, State.LOSS_LAND)
+_FLYING = _ARMED - _at(State.TERMINATED)
+_DOWNWARD = _at(State.LAND, State.FAILSAFE_LAND, State.FAILSAFE_DESCEND)
+_HOMEWARD = _at(State.RETURN, State.FAILSAFE_RETURN)
+_LANDING = _DOWNWARD | _HOMEWARD
+_BY_HAND = _at(State.MANUAL, State.STABILIZED, State.ACRO, State.ALTITUDE, State.POSITION)
+_BLIND = _at(State.MANUAL, State.STABILIZED, State.ACRO, State.ALTITUDE)  # no position needed
 
-FAILSAFE_STATES = _LOSS
-
-_FAILSAFES = (
-    _stop(_ARMED, when.sensors_lost, "Sensors lost: motors stopped", severity=CRITICAL),
-    _stop(_ARMED, when.tumbled, "Attitude failure: motors stopped", severity=CRITICAL),
+_HARD_FAILURES = (
+    _stop(_FLYING, when.sensors_lost, "Sensors lost: motors stopped", severity=CRITICAL),
+    _tick(_FLYING, when.tumbled, State.TERMINATED, "Attitude failure: flight terminated", severity=CRITICAL),
     _stop(_ARMED, when.landed_after_flight, "Disarmed by landing"),
-    _stop(_at(State.LAND, State.LOSS_LAND), when.landing_done, "Disarmed by landing"),
-    _stop(_ARMED, when.never_flown, "Disarmed by auto preflight disarming"),
-    _tick(_LOSS, when.setpoint_fresh, State.OFFBOARD, "Offboard setpoints are back: offboard resumed"),
-    _tick(
-        _at(State.OFFBOARD),
-        when.setpoint_lost_land,
-        State.LOSS_LAND,
-        "Failsafe activated: offboard setpoints lost, landing",
-        severity=CRITICAL,
-    ),
-    _tick(
-        _at(State.OFFBOARD),
-        when.setpoint_lost,
-        State.LOSS_HOLD,
-        "Failsafe activated: offboard setpoints lost, hold",
-        severity=CRITICAL,
-    ),
-    _stop(_at(State.LOSS_HOLD), when.hold_over_on_ground, "Disarmed by failsafe", severity=CRITICAL),
-    _tick(_at(State.LOSS_HOLD), when.hold_over, State.LOSS_LAND, "Failsafe: landing", severity=CRITICAL),
+    _stop(_LANDING, when.landing_done, "Disarmed by landing"),
+    _stop(_FLYING, when.never_flown, "Disarmed by auto preflight disarming"),
+    _tick(_ARMED, when.offboard_back, State.OFFBOARD, "Offboard setpoints are back: offboard resumed"),
+    _stop(_at(State.FAILSAFE_HOLD), when.hold_over_on_ground, "Disarmed by failsafe", severity=CRITICAL),
 )
 
-_PROGRESS = (_tick(_at(State.TAKEOFF), when.target_reached, State.HOLD, intends=FlightMode.HOLD),)
+_STEPS = {
+    Reaction.HOLD: (State.FAILSAFE_HOLD, _FLYING - _LANDING - _at(State.FAILSAFE_HOLD)),
+    Reaction.RETURN: (State.FAILSAFE_RETURN, _FLYING - _LANDING),
+    Reaction.LAND: (State.FAILSAFE_LAND, _FLYING - _DOWNWARD),
+    Reaction.TERMINATE: (State.TERMINATED, _FLYING),
+    Reaction.DISARM: (State.DISARMED, _FLYING),
+}
+"""Where a reaction leads, and from where: never back from what is more severe."""
+
+_STICKS = {
+    Reaction.STABILIZED: State.STABILIZED,
+    Reaction.ALTITUDE: State.ALTITUDE,
+    Reaction.POSITION: State.POSITION,
+}
+
+_DELAYED = (Cause.GROUND_STATION, Cause.MANUAL)
+"""Causes that may pass: PX4 holds for COM_FAIL_ACT_T before it acts."""
+
+
+def _hold_ends(reaction: Reaction) -> Row:
+    target, _ = _STEPS[reaction]
+    guard = when.hold_over_then(reaction)
+    return Row(
+        _at(State.FAILSAFE_HOLD),
+        Event.TICK,
+        guard,
+        target,
+        severity=CRITICAL,
+        text=f"Failsafe: {reaction.value}",
+    )
+
+
+def _reactions(cause: Cause, *, from_sticks: bool = False) -> tuple[Row, ...]:
+    """The rows for one cause: what was chosen, from the states in which that is a step further."""
+    event, rows = CAUSE_EVENT[cause], []
+    alarm = f"Failsafe activated: {cause.value}"
+    if from_sticks:
+        rows += [
+            Row(
+                _FLYING - _LANDING,
+                event,
+                when.reacts_with_sticks(cause, reaction),
+                target,
+                severity=CRITICAL,
+                text=f"{alarm}, {reaction.value}",
+                cause=cause,
+            )
+            for reaction, target in _STICKS.items()
+        ]
+    for reaction, (target, states) in _STEPS.items():
+        delayed = cause in _DELAYED and reaction in {Reaction.RETURN, Reaction.LAND}
+        if cause is Cause.SETPOINTS and reaction is Reaction.HOLD:
+            follow_up = Reaction.LAND  # nobody leads it any more; see docs/px4-compatibility.md
+        else:
+            follow_up = reaction if delayed else Reaction.NOTHING
+        rows.append(
+            Row(
+                states - _at(State.FAILSAFE_HOLD) if delayed else states,
+                event,
+                when.reacts(cause, reaction),
+                State.FAILSAFE_HOLD if delayed else target,
+                severity=CRITICAL,
+                text=f"{alarm}, {'hold, then ' if delayed else ''}{reaction.value}",
+                cause=cause,
+                follow_up=follow_up,
+            )
+        )
+    rows.append(
+        Row(
+            _FLYING,
+            event,
+            when.reacts(cause, Reaction.WARN),
+            severity=WARNING,
+            text=f"Warning: {cause.value}",
+        )
+    )
+    rows.append(Row(frozenset(State), event))
+    return tuple(rows)
+
+
+_MANUAL_NOT_THERE = (
+    Row(
+        _BY_HAND,
+        Event.MANUAL_LOST,
+        when.reacts(Cause.MANUAL, Reaction.NOTHING),
+        State.FAILSAFE_HOLD,
+        severity=CRITICAL,
+        text=f"Failsafe activated: {Cause.MANUAL.value}, hold",
+        cause=Cause.MANUAL,
+    ),
+)
+
+_POSITION_LOST = (
+    Row(
+        _at(State.POSITION),
+        Event.POSITION_LOST,
+        when.manual_present,
+        State.ALTITUDE,
+        severity=CRITICAL,
+        text="Position lost: altitude mode",
+        cause=Cause.POSITION,
+    ),
+    Row(
+        _FLYING - _BLIND - _at(State.FAILSAFE_DESCEND),
+        Event.POSITION_LOST,
+        None,
+        State.FAILSAFE_DESCEND,
+        severity=CRITICAL,
+        text="Failsafe activated: position lost, descending",
+        cause=Cause.POSITION,
+    ),
+    Row(frozenset(State), Event.POSITION_LOST),
+)
+
+_FAILSAFES = (
+    _HARD_FAILURES
+    + tuple(_hold_ends(reaction) for reaction in (Reaction.RETURN, Reaction.LAND))
+    + _POSITION_LOST
+    + _reactions(Cause.SETPOINTS, from_sticks=True)
+    + _MANUAL_NOT_THERE
+    + tuple(
+        row for cause in Cause if cause not in {Cause.SETPOINTS, Cause.POSITION} for row in _reactions(cause)
+    )
+)
+
+_PROGRESS = (
+    _tick(_at(State.TAKEOFF), when.target_reached, State.HOLD, intends=FlightMode.HOLD),
+    Row(
+        _at(State.MISSION),
+        Event.MISSION_DONE,
+        None,
+        State.HOLD,
+        FlightMode.HOLD,
+        text="Mission finished, loitering",
+    ),
+    Row(frozenset(State), Event.MISSION_DONE),
+    Row(_at(State.MISSION), Event.MISSION_RETURNS, None, State.RETURN, FlightMode.RETURN),
+    Row(frozenset(State), Event.MISSION_RETURNS),
+    Row(
+        _FLYING - _BY_HAND,
+        Event.PILOT_TAKES_OVER,
+        None,
+        State.POSITION,
+        FlightMode.POSITION,
+        text="Pilot took over using sticks",
+    ),
+    Row(frozenset(State), Event.PILOT_TAKES_OVER),
+)
+
+_DENIED = "Arming denied: "
+_ARMED_TEXT = "Armed by external command"
+_DISARMED_TEXT = "Disarmed by external command"
 
 _ARMING = (
-    _refuse(_OFF, Event.ARM, when.unhealthy, "Arming denied: Resolve system health failures first"),
-    _refuse(_OFF, Event.ARM, when.intends_land, "Arming denied: not in Land mode"),
-    _refuse(_OFF, Event.ARM, when.intends_offboard_unfed, "Arming denied: no offboard setpoints"),
-    Row(_OFF, Event.ARM, when.intends_offboard, State.OFFBOARD, text="Armed by external command"),
-    Row(_OFF, Event.ARM, when.intends_takeoff, State.TAKEOFF, text="Armed by external command"),
-    Row(_OFF, Event.ARM, None, State.HOLD, text="Armed by external command"),
+    _refuse(_OFF, Event.ARM, when.unsettled, _DENIED + "Resolve system health failures first"),
+    _refuse(_OFF, Event.ARM, when.tipped_over, _DENIED + "vehicle is tipped over"),
+    _refuse(_OFF, Event.ARM, when.needs_position_in_vain, _DENIED + "no position estimate"),
+    _refuse(_OFF, Event.ARM, when.battery_too_low, _DENIED + "low battery"),
+    _refuse(_OFF, Event.ARM, when.ground_station_absent, _DENIED + "no connection to the ground station"),
+    _refuse(_OFF, Event.ARM, when.intends_unarmable, _DENIED + "not in this mode"),
+    _refuse(_OFF, Event.ARM, when.intends_offboard_unfed, _DENIED + "no offboard setpoints"),
+    _refuse(_OFF, Event.ARM, when.intends_manual_unmanned, _DENIED + "no manual control input"),
+    _refuse(_OFF, Event.ARM, when.intends_mission_without, _DENIED + "no valid mission"),
+    *(
+        Row(_OFF, Event.ARM, when.intends(mode), state, text=_ARMED_TEXT)
+        for state, mode in FLOWN_MODE.items()
+        if mode not in when.UNARMABLE and state not in {State.HOLD, State.FAILSAFE_HOLD}
+    ),
+    Row(_OFF, Event.ARM, None, State.HOLD, text=_ARMED_TEXT),
     Row(_ARMED, Event.ARM),
     Row(_OFF, Event.DISARM),
-    Row(
-        _ARMED,
-        Event.DISARM,
-        when.landed,
-        State.DISARMED,
-        FlightMode.HOLD,
-        text="Disarmed by external command",
-    ),
+    Row(_ARMED, Event.DISARM, when.landed, State.DISARMED, FlightMode.HOLD, text=_DISARMED_TEXT),
+    Row(_at(State.TERMINATED), Event.DISARM, None, State.DISARMED, FlightMode.HOLD, text=_DISARMED_TEXT),
     _refuse(_ARMED, Event.DISARM, None, "Disarming denied: not landed"),
     Row(_OFF, Event.FORCE_DISARM),
-    Row(
-        _ARMED,
-        Event.FORCE_DISARM,
-        None,
-        State.DISARMED,
-        FlightMode.HOLD,
-        text="Disarmed by external command",
-    ),
+    Row(_ARMED, Event.FORCE_DISARM, None, State.DISARMED, FlightMode.HOLD, text=_DISARMED_TEXT),
+    Row(_OFF, Event.TERMINATE),
+    Row(_at(State.TERMINATED), Event.TERMINATE),
+    Row(_FLYING, Event.TERMINATE, None, State.TERMINATED, severity=CRITICAL, text="Flight terminated"),
+)
+
+
+def _unavailable(mode: FlightMode) -> str:
+    return f"Switching to {mode.name.capitalize()} is currently not available"
+
+
+_TERMINATED_FOR_GOOD = tuple(
+    _refuse(_at(State.TERMINATED), event, None, "Mode change refused: flight terminated")
+    for mode, event in MODE_EVENT.items()
+    if mode is not FlightMode.TERMINATION
+)
+_NEEDS_STICKS = tuple(
+    _refuse(_FLYING, MODE_EVENT[mode], when.manual_lost, f"{_unavailable(mode)}: no manual control")
+    for mode in FlightMode
+    if mode in MANUAL_MODES
+)
+_NEEDS_POSITION = tuple(
+    _refuse(_FLYING, MODE_EVENT[mode], when.position_lost, f"{_unavailable(mode)}: no position")
+    for mode in FlightMode
+    if mode not in when.POSITIONLESS
+    and mode not in {FlightMode.TERMINATION, FlightMode.OFFBOARD, FlightMode.LAND}
+)
+_STAYS = (
+    State.HOLD,
+    State.LAND,
+    State.RETURN,
+    State.MISSION,
+    State.OFFBOARD,
+    *sorted(_BY_HAND, key=lambda s: s.value),
+)
+_SETS = tuple(
+    row
+    for state, mode in FLOWN_MODE.items()
+    if State(mode.name.lower() if mode is not FlightMode.TERMINATION else "terminated") is state
+    and state is not State.TERMINATED
+    for row in (
+        Row(_OFF, MODE_EVENT[mode], intends=mode),
+        *((Row(_at(state), MODE_EVENT[mode], intends=mode),) if state in _STAYS else ()),
+        Row(_FLYING, MODE_EVENT[mode], None, state, mode),
+    )
 )
 
 _MODES = (
-    Row(_OFF, Event.SET_HOLD, intends=FlightMode.HOLD),
-    Row(_OFF, Event.SET_TAKEOFF, intends=FlightMode.TAKEOFF),
-    Row(_OFF, Event.SET_LAND, intends=FlightMode.LAND),
-    Row(_OFF, Event.SET_OFFBOARD, intends=FlightMode.OFFBOARD),
-    Row(_at(State.HOLD), Event.SET_HOLD),
-    Row(_ARMED, Event.SET_HOLD, None, State.HOLD, FlightMode.HOLD),
-    Row(_ARMED, Event.SET_TAKEOFF, None, State.TAKEOFF, FlightMode.TAKEOFF),
-    Row(_at(State.LAND), Event.SET_LAND),
-    Row(_ARMED, Event.SET_LAND, None, State.LAND, FlightMode.LAND),
-    Row(_at(State.OFFBOARD), Event.SET_OFFBOARD),
+    *_TERMINATED_FOR_GOOD,
+    *_NEEDS_STICKS,
+    *_NEEDS_POSITION,
     _refuse(
-        _ARMED,
+        _FLYING - _at(State.OFFBOARD),
         Event.SET_OFFBOARD,
         when.setpoint_lost,
-        "Switching to Offboard is currently not available",
+        _unavailable(FlightMode.OFFBOARD),
     ),
-    Row(_ARMED, Event.SET_OFFBOARD, None, State.OFFBOARD, FlightMode.OFFBOARD),
+    _refuse(_FLYING, Event.SET_MISSION, when.no_mission, "Mission rejected: no valid mission"),
+    Row(_FLYING - _DOWNWARD, Event.SET_LAND, when.position_lost, State.FAILSAFE_DESCEND, FlightMode.LAND),
+    *_SETS,
 )
 
 TABLE: tuple[Row, ...] = _FAILSAFES + _PROGRESS + _ARMING + _MODES
@@ -218,6 +453,10 @@ def mermaid() -> str:
             continue
         name = "" if row.event is Event.TICK else row.event.value
         guard = f"[{row.guard.__name__.replace('_', ' ')}]" if row.guard is not None else ""
-        sources = ["armed"] if row.states == _ARMED else sorted(state.value for state in row.states)
+        many = len(row.states) > _MANY and row.states <= _ARMED
+        sources = ["armed"] if many else sorted(state.value for state in row.states)
         lines += [f"    {source} --> {row.target.value}: {f'{name} {guard}'.strip()}" for source in sources]
     return "\n".join(lines) + "\n"
+
+
+_MANY = 8

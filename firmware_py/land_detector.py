@@ -9,7 +9,6 @@ from __future__ import annotations
 
 from firmware_py.types import VehicleState
 
-_TRIGGER_US = 300_000  # the signs of ground must hold this long
 _FALL_US = 100_000  # unasked motion longer than this is not standing
 _MOVING_M_S = 0.3
 _DESCENT_COMMAND_M_S = 0.05
@@ -24,9 +23,17 @@ class LandDetector:
 
     Attributes:
         landed: whether it stands on something.
+        trigger_us: the signs of ground must hold this long (LNDMC_TRIG_TIME).
     """
 
-    __slots__ = ("_hover_throttle", "_last_still_us", "_last_unlike_us", "_stand_down_m", "landed")
+    __slots__ = (
+        "_hover_throttle",
+        "_last_still_us",
+        "_last_unlike_us",
+        "_stand_down_m",
+        "landed",
+        "trigger_us",
+    )
 
     def __init__(self, hover_throttle: float) -> None:
         """Start on the ground.
@@ -35,6 +42,7 @@ class LandDetector:
             hover_throttle: mean squared share of rotor speed that carries the weight, 0..1.
         """
         self.landed = True
+        self.trigger_us = 300_000
         self._hover_throttle = hover_throttle
         self._stand_down_m = 0.0
         self._last_still_us = 0
@@ -97,7 +105,7 @@ class LandDetector:
         )
         if not like_ground:
             self._last_unlike_us = state.time_us
-        elif state.time_us - self._last_unlike_us > _TRIGGER_US:
+        elif state.time_us - self._last_unlike_us > self.trigger_us:
             self.landed = True
             self._stand_down_m = state.position_ned_m[2]
             self._last_still_us = state.time_us

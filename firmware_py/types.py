@@ -23,6 +23,8 @@ class Sensors:
         attitude: unit quaternion (w, x, y, z), body FRD to world NED.
         angular_rate_frd_rad_s: shape (3,).
         specific_force_frd_m_s2: what an accelerometer reads, shape (3,); at rest (0, 0, -g).
+        battery_voltage_v: at the battery's terminals.
+        battery_current_a: drawn from it.
     """
 
     time_us: int
@@ -31,6 +33,8 @@ class Sensors:
     attitude: Quaternion
     angular_rate_frd_rad_s: Vec3
     specific_force_frd_m_s2: Vec3
+    battery_voltage_v: float = 16.2
+    battery_current_a: float = 0.0
 
 
 @dataclass(slots=True)

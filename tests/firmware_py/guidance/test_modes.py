@@ -5,7 +5,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from firmware_py.airframe import load_airframe
-from firmware_py.flight_modes import Guidance, SpeedLimits, bounded, speed_limits, usable
+from firmware_py.guidance.modes import Guidance, SpeedLimits, bounded, speed_limits, usable
 from firmware_py.parameters import Parameters
 from firmware_py.types import Setpoint, VehicleState
 
@@ -93,7 +93,11 @@ def test_what_counts_as_a_setpoint():
     assert usable(Setpoint(0, velocity_ned_m_s=(nan, 0.0, nan)))
     assert usable(Setpoint(0, position_ned_m=(nan, nan, -1.0)))
     assert not usable(Setpoint(0, yaw_rad=1.0))
-    assert not usable(Setpoint(0, acceleration_ned_m_s2=(1.0, 0.0, 0.0)))
+    assert usable(Setpoint(0, acceleration_ned_m_s2=(1.0, 0.0, 0.0)))
+    assert not usable(Setpoint(0, attitude=(1.0, 0.0, 0.0, 0.0)))  # without a thrust
+    assert not usable(Setpoint(0, attitude=(nan, 0.0, 0.0, 0.0), thrust=0.5))
+    assert usable(Setpoint(0, rate_frd_rad_s=(0.0, 0.0, 0.0), thrust=0.5))
+    assert not usable(Setpoint(0, outputs=(0.5, nan, 0.5, 0.5)))
 
 
 def test_infinity_is_not_controlled_and_so_brakes():

@@ -1,0 +1,94 @@
+"""What the autopilot makes of the battery's voltage and current: charge left, and how worried to be."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from firmware_py.parameters import Parameters
+from firmware_py.types import BatteryState
+
+_OK, _LOW, _CRITICAL, _EMERGENCY = 1, 2, 3, 4  # MAV_BATTERY_CHARGE_STATE
+_MAH_PER_A_S = 1000.0 / 3600.0
+
+
+@dataclass(frozen=True, slots=True)
+class BatterySettings:
+    """Cells, their voltages, the capacity (0: not known) and the shares of charge that warn."""
+
+    cells: int
+    charged_v: float
+    empty_v: float
+    capacity_mah: float
+    low: float
+    critical: float
+    emergency: float
+
+
+def battery_settings(parameters: Parameters) -> BatterySettings:
+    """What the BAT_ parameters say."""
+    value = parameters.value
+    return BatterySettings(
+        parameters.integer("BAT1_N_CELLS"),
+        value("BAT1_V_CHARGED"),
+        value("BAT1_V_EMPTY"),
+        max(value("BAT1_CAPACITY"), 0.0),
+        value("BAT_LOW_THR"),
+        value("BAT_CRIT_THR"),
+        value("BAT_EMERGEN_THR"),
+    )
+
+
+class BatteryMonitor:
+    """Counts what is drawn, and estimates the charge left.
+
+    With a known capacity the charge is what was there at first, by voltage, less what was drawn; without, it
+    is the voltage's share between empty and charged, as PX4's.
+
+    Attributes:
+        state: what is known, updated in place.
+    """
+
+    __slots__ = ("_first", "_time_us", "state")
+
+    def __init__(self) -> None:
+        self.state = BatteryState()
+        self._first = -1.0
+        self._time_us = 0
+
+    def update(self, time_us: int, voltage_v: float, current_a: float, settings: BatterySettings) -> None:
+        """Take a measurement.
+
+        Args:
+            time_us: of the measurement.
+            voltage_v: at the terminals.
+            current_a: drawn.
+            settings: of this battery.
+        """
+        state = self.state
+        period_s = (time_us - self._time_us) / 1e6
+        self._time_us = time_us
+        state.voltage_v, state.current_a, state.cells = voltage_v, current_a, settings.cells
+        by_voltage = _share(voltage_v, settings)
+        if self._first < 0.0:
+            self._first, period_s = by_voltage, 0.0
+        state.used_mah += current_a * period_s * _MAH_PER_A_S
+        if settings.capacity_mah > 0.0:
+            state.remaining = max(self._first - state.used_mah / settings.capacity_mah, 0.0)
+        else:
+            state.remaining = by_voltage
+        state.warning = warning(state.remaining, settings)
+
+
+def warning(remaining: float, settings: BatterySettings) -> int:
+    """MAV_BATTERY_CHARGE_STATE of a share of charge."""
+    if remaining < settings.emergency:
+        return _EMERGENCY
+    if remaining < settings.critical:
+        return _CRITICAL
+    return _LOW if remaining < settings.low else _OK
+
+
+def _share(voltage_v: float, settings: BatterySettings) -> float:
+    cell_v = voltage_v / max(settings.cells, 1)
+    span_v = max(settings.charged_v - settings.empty_v, 1e-3)
+    return min(max((cell_v - settings.empty_v) / span_v, 0.0), 1.0)

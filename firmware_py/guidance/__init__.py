@@ -1,0 +1,1 @@
+"""Guidance: what each flight mode asks of the stabiliser."""

@@ -1,0 +1,104 @@
+"""What guidance never asks for more of, and how eagerly it closes in: airframe and parameters together."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from math import hypot, radians
+
+from firmware_py.airframe import Airframe
+from firmware_py.parameters import Parameters
+from firmware_py.types import Vec3
+
+
+@dataclass(slots=True)
+class SpeedLimits:
+    """Limits and gains of guidance, all positive.
+
+    Attributes:
+        horizontal_m_s: any horizontal velocity.
+        up_m_s: any climb.
+        down_m_s: any descent.
+        yaw_rate_rad_s: any turn.
+        takeoff_m_s: climb of a take-off.
+        land_m_s: descent near the ground.
+        cruise_m_s: of a journey by itself.
+        auto_up_m_s: climb of a journey.
+        auto_down_m_s: descent of a journey, and of a landing high up.
+        acceleration_m_s2: horizontal, of a journey.
+        acceleration_up_m_s2: of a journey.
+        acceleration_down_m_s2: of a journey.
+        auto_yaw_rate_rad_s: turn of a journey.
+        position_gain: horizontal velocity per distance, 1/s.
+        height_gain: vertical velocity per height, 1/s.
+        yaw_gain: turn per angle, 1/s.
+        land_slow_below_m: height above home from which a landing is slow.
+        land_fast_above_m: height above home down to which it is fast.
+    """
+
+    horizontal_m_s: float
+    up_m_s: float
+    down_m_s: float
+    yaw_rate_rad_s: float
+    takeoff_m_s: float
+    land_m_s: float
+    cruise_m_s: float = 5.0
+    auto_up_m_s: float = 3.0
+    auto_down_m_s: float = 1.5
+    acceleration_m_s2: float = 3.0
+    acceleration_up_m_s2: float = 4.0
+    acceleration_down_m_s2: float = 3.0
+    auto_yaw_rate_rad_s: float = 1.0
+    position_gain: float = 1.0
+    height_gain: float = 1.0
+    yaw_gain: float = 2.5
+    land_slow_below_m: float = 5.0
+    land_fast_above_m: float = 10.0
+
+    def clip(self, north_m_s: float, east_m_s: float, down_m_s: float) -> Vec3:
+        """Shorten a velocity to the limits; its horizontal part keeps its direction."""
+        speed_m_s = hypot(north_m_s, east_m_s)
+        if speed_m_s > self.horizontal_m_s:
+            scale = self.horizontal_m_s / speed_m_s
+            north_m_s, east_m_s = north_m_s * scale, east_m_s * scale
+        return (north_m_s, east_m_s, clamp(down_m_s, -self.up_m_s, self.down_m_s))
+
+    def landing_m_s(self, height_m: float) -> float:
+        """Descent of a landing at a height above home: fast high up, slow near the ground, as PX4's."""
+        if height_m <= self.land_slow_below_m or self.auto_down_m_s <= self.land_m_s:
+            return self.land_m_s
+        span_m = max(self.land_fast_above_m - self.land_slow_below_m, 0.1)
+        share = min((height_m - self.land_slow_below_m) / span_m, 1.0)
+        return self.land_m_s + share * (self.auto_down_m_s - self.land_m_s)
+
+
+def speed_limits(airframe: Airframe, parameters: Parameters) -> SpeedLimits:
+    """The smaller of what the airframe can do and what the parameters allow."""
+    can, value = airframe.limits, parameters.value
+    up_m_s = min(can.speed_up_m_s, value("MPC_Z_VEL_MAX_UP"))
+    down_m_s = min(can.speed_down_m_s, value("MPC_Z_VEL_MAX_DN"))
+    horizontal_m_s = min(can.speed_horizontal_m_s, value("MPC_XY_VEL_MAX"))
+    return SpeedLimits(
+        horizontal_m_s=horizontal_m_s,
+        up_m_s=up_m_s,
+        down_m_s=down_m_s,
+        yaw_rate_rad_s=min(can.yaw_rate_rad_s, radians(value("MC_YAWRATE_MAX"))),
+        takeoff_m_s=min(up_m_s, value("MPC_TKO_SPEED")),
+        land_m_s=min(down_m_s, value("MPC_LAND_SPEED")),
+        cruise_m_s=min(horizontal_m_s, value("MPC_XY_CRUISE")),
+        auto_up_m_s=min(up_m_s, value("MPC_Z_V_AUTO_UP")),
+        auto_down_m_s=min(down_m_s, value("MPC_Z_V_AUTO_DN")),
+        acceleration_m_s2=value("MPC_ACC_HOR"),
+        acceleration_up_m_s2=value("MPC_ACC_UP_MAX"),
+        acceleration_down_m_s2=value("MPC_ACC_DOWN_MAX"),
+        auto_yaw_rate_rad_s=radians(value("MPC_YAWRAUTO_MAX")),
+        position_gain=value("MPC_XY_P"),
+        height_gain=value("MPC_Z_P"),
+        yaw_gain=value("MC_YAW_P"),
+        land_slow_below_m=value("MPC_LAND_ALT2"),
+        land_fast_above_m=value("MPC_LAND_ALT1"),
+    )
+
+
+def clamp(value: float, low: float, high: float) -> float:
+    """The nearest value within limits."""
+    return low if value < low else high if value > high else value
