@@ -63,6 +63,7 @@ class VehicleStatus:
         landed_state: for EXTENDED_SYS_STATE.
         failsafe: a failsafe is in charge (system status CRITICAL).
         ready: pre-arm checks of the intended mode pass (system status STANDBY).
+        not_ready: why not, in the words that would refuse to arm it; empty when it is ready.
         home: where it was armed (first: where it booted); None before the first position.
         home_ned_m: the same in the local frame, shape (3,).
         origin: the local frame's origin on Earth; None before the first position.
@@ -75,6 +76,7 @@ class VehicleStatus:
     landed_state: LandedState = LandedState.ON_GROUND
     failsafe: bool = False
     ready: bool = False
+    not_ready: str = ""
     home: GeodeticPoint | None = None
     home_ned_m: Vec3 = (0.0, 0.0, 0.0)
     origin: GeodeticPoint | None = None

@@ -1,7 +1,8 @@
 """The one place that chooses the message definitions.
 
 pymavlink's `development` dialect is `common` and the few newer messages that PX4 sends, such as CURRENT_MODE
-and AVAILABLE_MODES; it loads as quickly as `common`. No other module names a dialect.
+and AVAILABLE_MODES; it loads as quickly as `common`. No other module names a dialect. A few messages of
+`common` that pymavlink has left out are added to it here.
 """
 
 from __future__ import annotations
@@ -9,6 +10,10 @@ from __future__ import annotations
 from typing import Any
 
 from pymavlink.dialects.v20 import development as mavlink
+
+from firmware_py.mavlink import extra_messages
+
+extra_messages.complete(mavlink)
 
 Message = Any  # a pymavlink message; its classes are made at run time and carry no types
 

@@ -15,12 +15,13 @@ class FileTree:
     Args:
         storage: what clients may change; None: nothing can be kept.
         firmware_files: path to content, such as `etc/extras/parameters.json.xz`. Their top folders belong to
-            the firmware whole.
+            the firmware whole. Content is asked for when a client wants it.
     """
 
     def __init__(self, storage: Storage | None, firmware_files: Mapping[str, bytes]) -> None:
         self._storage = storage
-        self._firmware = {parse_path(name.encode()): data for name, data in firmware_files.items()}
+        self._files = firmware_files
+        self._firmware = {parse_path(name.encode()): name for name in firmware_files}
         self._folders = {path[:depth] for path in self._firmware for depth in range(1, len(path))}
         self._tops = {path[0] for path in self._firmware}
 
@@ -29,7 +30,7 @@ class FileTree:
         if not self._is_firmware(path):
             return self._need_storage(path).entry(path)
         if path in self._firmware:
-            return Entry(path[-1], len(self._firmware[path]))
+            return Entry(path[-1], len(self._files[self._firmware[path]]))
         if path in self._folders:
             return Entry(path[-1], 0, True)
         raise refuse(errno.ENOENT, path)
@@ -55,7 +56,7 @@ class FileTree:
             return self._need_storage(path).read(path, offset, count)
         if path not in self._firmware:
             raise refuse(errno.EISDIR if path in self._folders else errno.ENOENT, path)
-        return self._firmware[path][offset : offset + count]
+        return self._files[self._firmware[path]][offset : offset + count]
 
     def writable(self, path: Path) -> Storage:
         """The storage, for a path that a client may change.

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from math import isfinite
 
-from firmware_py.mavlink import version
+from firmware_py.mavlink import component_information, version
 from firmware_py.mavlink.dialect import Message, mavlink
 from firmware_py.mavlink.exchange import Exchange
 from firmware_py.mavlink.links import Link
@@ -57,6 +57,9 @@ def _requested(exchange: Exchange, link: Link, message_id: int, argument: float)
         return [version.autopilot_version(exchange.system_id)]
     if message_id == version.ProtocolVersionMessage.id:
         return [version.protocol_version()]
+    if message_id in component_information.MESSAGE_IDS:
+        autopilot, time_us = exchange.autopilot, exchange.time_us
+        return [component_information.component_message(autopilot, message_id, time_us)]
     number = _message_id(argument)
     if message_id == mavlink.MAVLINK_MSG_ID_AVAILABLE_MODES:
         return version.available_modes(number or 0)

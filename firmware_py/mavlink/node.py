@@ -6,7 +6,9 @@ from collections.abc import Mapping, Sequence
 from typing import Protocol
 
 from firmware_py.mavlink import commands, heartbeat, missions, signing_setup, time_sync
+from firmware_py.mavlink.component_metadata import ExtraFiles
 from firmware_py.mavlink.dialect import AUTOPILOT_COMPONENT_ID, BROADCAST, Message, mavlink
+from firmware_py.mavlink.events import EventService
 from firmware_py.mavlink.exchange import Exchange, Handler
 from firmware_py.mavlink.file_transfer import FileTransferService
 from firmware_py.mavlink.forwarding import Router
@@ -14,6 +16,7 @@ from firmware_py.mavlink.framing import Packet, source_of
 from firmware_py.mavlink.links import Link, LinkProfile
 from firmware_py.mavlink.log_transfer import LogTransferService
 from firmware_py.mavlink.offboard_setpoints import SetpointService
+from firmware_py.mavlink.parameter_extended import ExtendedParameterService
 from firmware_py.mavlink.parameter_protocol import ParameterService
 from firmware_py.mavlink.port import AutopilotPort
 from firmware_py.mavlink.shell import ShellService
@@ -64,7 +67,8 @@ class MavlinkNode:
             signing_key: with which all is signed; None: nothing is.
             video: the camera's streams, the one to be preferred first.
             storage: the vehicle's files and logs; None: it keeps none.
-            firmware_files: path to content of files that can only be read, for `mftp://` addresses.
+            firmware_files: path to content of files that can only be read, for `mftp://` addresses; by
+                default those that explain this vehicle's parameters and events.
             shell: whether SERIAL_CONTROL is answered.
 
         Raises:
@@ -79,13 +83,20 @@ class MavlinkNode:
         )
         for profile in links:
             self.add_link(profile)
-        texts, parameters = StatusTextService(self._exchange), ParameterService(self._exchange)
+        events = EventService(self._exchange)
+        texts = StatusTextService(self._exchange, events.tell)
+        parameters = ParameterService(self._exchange)
+        extended = ExtendedParameterService(self._exchange)
+        if firmware_files is None:
+            firmware_files = ExtraFiles(autopilot.parameters)
         files = FileTransferService(self._exchange, storage, firmware_files)
         logs = LogTransferService(self._exchange, storage)
         shells = ShellService(self._exchange, enabled=shell)
         self._services: tuple[Service, ...] = (
             texts,
+            events,
             parameters,
+            extended,
             files,
             logs,
             shells,
@@ -102,6 +113,8 @@ class MavlinkNode:
                 time_sync.HANDLERS,
                 signing_setup.HANDLERS,
                 parameters.handlers,
+                extended.handlers,
+                events.handlers,
                 SetpointService().handlers,
             ),
         }

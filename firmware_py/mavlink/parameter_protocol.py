@@ -12,13 +12,14 @@ from struct import pack, unpack
 from firmware_py.mavlink.dialect import Message, mavlink
 from firmware_py.mavlink.exchange import Exchange, Handler
 from firmware_py.mavlink.links import Link
-from firmware_py.parameters import Parameter, ParameterError
+from firmware_py.mavlink.parameter_listing import Listings
+from firmware_py.mavlink.parameter_wire import TYPES, from_float, to_float
+from firmware_py.parameters import ParameterError
 
 HASH_NAME = "_HASH_CHECK"
+_HASH_PLACE = -1  # in a list
 _HASH_INDEX = 65535
 _BY_NAME = -1
-_PER_UPDATE = 4  # 1000 a second at 250 updates: PX4's pace, gentle to slow links
-_TYPES = {"int32": mavlink.MAV_PARAM_TYPE_INT32, "float": mavlink.MAV_PARAM_TYPE_REAL32}
 
 
 class ParameterService:
@@ -28,11 +29,11 @@ class ParameterService:
         handlers: by message id.
     """
 
-    __slots__ = ("_exchange", "_listing", "handlers")
+    __slots__ = ("_exchange", "_listings", "handlers")
 
     def __init__(self, exchange: Exchange) -> None:
         self._exchange = exchange
-        self._listing: dict[str, int] = {}  # link name to next index; -1: the hash
+        self._listings = Listings(exchange, self._message, _HASH_PLACE)
         self.handlers: dict[int, Handler] = {
             mavlink.MAVLINK_MSG_ID_PARAM_REQUEST_LIST: self._list,
             mavlink.MAVLINK_MSG_ID_PARAM_REQUEST_READ: self._read,
@@ -42,28 +43,11 @@ class ParameterService:
 
     def update(self) -> None:
         """Send the next few of each list."""
-        if not self._listing:
-            return
-        count = len(self._exchange.autopilot.parameters)
-        for name, first in list(self._listing.items()):
-            link = self._exchange.links.get(name)
-            if link is None:
-                del self._listing[name]
-                continue
-            if link.congested:
-                continue
-            after = min(first + _PER_UPDATE, count)
-            for index in range(first, after):
-                message = self._hash_message() if index < 0 else self._message(index)
-                self._exchange.send(link, message)
-            if after == count:
-                del self._listing[name]
-            else:
-                self._listing[name] = after
+        self._listings.update()
 
     def _list(self, exchange: Exchange, link: Link, message: Message) -> None:
         if exchange.is_for_us(message):
-            self._listing[link.profile.name] = -1
+            self._listings.begin(link)
 
     def _read(self, exchange: Exchange, link: Link, message: Message) -> None:
         if not exchange.is_for_us(message):
@@ -86,13 +70,13 @@ class ParameterService:
         parameters, name = exchange.autopilot.parameters, message.param_id
         if name == HASH_NAME:
             if pack("<f", message.param_value) == pack("<I", parameters.hash()):
-                self._listing.pop(link.profile.name, None)
+                self._listings.end(link)
             return
-        if name not in parameters or message.param_type != _TYPES[parameters.declaration(name).kind]:
+        if name not in parameters or message.param_type != TYPES[parameters.declaration(name).kind]:
             return
         version = parameters.version
         try:
-            parameters.set(name, _decoded(message.param_value, parameters.declaration(name)))
+            parameters.set(name, from_float(parameters.declaration(name), message.param_value))
         except ParameterError as error:
             exchange.autopilot.say(mavlink.MAV_SEVERITY_WARNING, f"Parameter refused: {error}")
         if parameters.version == version:  # nothing changed, so nothing was told yet
@@ -102,13 +86,13 @@ class ParameterService:
         self._exchange.broadcast(self._message(self._exchange.autopilot.parameters.index(name)))
 
     def _message(self, index: int) -> Message:
+        if index == _HASH_PLACE:
+            return self._hash_message()
         parameters = self._exchange.autopilot.parameters
         declared = parameters.declarations[index]
-        value = parameters.value(declared.name)
-        if declared.kind == "int32":
-            value = unpack("<f", pack("<i", int(value)))[0]
+        value = to_float(declared, parameters.value(declared.name))
         return mavlink.MAVLink_param_value_message(
-            declared.name.encode(), value, _TYPES[declared.kind], len(parameters), index
+            declared.name.encode(), value, TYPES[declared.kind], len(parameters), index
         )
 
     def _hash_message(self) -> Message:
@@ -117,7 +101,3 @@ class ParameterService:
         return mavlink.MAVLink_param_value_message(
             HASH_NAME.encode(), value, mavlink.MAV_PARAM_TYPE_UINT32, len(parameters), _HASH_INDEX
         )
-
-
-def _decoded(value: float, declared: Parameter) -> float:
-    return float(unpack("<i", pack("<f", value))[0]) if declared.kind == "int32" else value

@@ -1,12 +1,13 @@
 """STATUSTEXT: what the autopilot says, to the links where a ground station was heard, as PX4.
 
-Texts said before that wait for it, the latest few and five seconds long. Longer ones go in pieces of 50. PX4
-ends texts with a tab when it sends the same as an event; there are no events here, so there are no tabs.
+Texts said before that wait for it, the latest few and five seconds long. Longer ones go in pieces of 50. As
+in PX4, a text that is sent as an event too ends with a tab, so that who reads events leaves it out.
 """
 
 from __future__ import annotations
 
 from collections import deque
+from collections.abc import Callable
 
 from firmware_py.mavlink.dialect import Message, mavlink
 from firmware_py.mavlink.exchange import Exchange
@@ -20,17 +21,26 @@ _STALE_US = 5_000_000
 class StatusTextService:
     """Brings the autopilot's texts to people."""
 
-    __slots__ = ("_exchange", "_last_id", "_waiting")
+    __slots__ = ("_announce", "_exchange", "_last_id", "_waiting")
 
-    def __init__(self, exchange: Exchange) -> None:
+    def __init__(self, exchange: Exchange, announce: Callable[[StatusText], bool] | None = None) -> None:
+        """Speak on an exchange's links.
+
+        Args:
+            exchange: whose texts.
+            announce: tells a text as an event, if there is one that says the same, and answers whether.
+        """
         self._exchange = exchange
+        self._announce = announce
         self._last_id = 0
         self._waiting: dict[str, deque[tuple[int, list[Message]]]] = {}
 
     def update(self) -> None:
         """Take the autopilot's new texts and send what can be sent."""
         exchange = self._exchange
-        for text in exchange.autopilot.take_texts():
+        for said in exchange.autopilot.take_texts():
+            told = self._announce is not None and self._announce(said)
+            text = StatusText(said.severity, f"{said.text}\t") if told else said
             pieces = self._pieces(text)
             for name in exchange.links:
                 waiting = self._waiting.setdefault(name, deque(maxlen=_KEPT))

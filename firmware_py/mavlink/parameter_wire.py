@@ -1,0 +1,37 @@
+"""How values travel: typed, integers as their bytes inside a float (PARAM) or plain bytes (PARAM_EXT)."""
+
+from __future__ import annotations
+
+from struct import pack, unpack
+
+from firmware_py.mavlink.dialect import mavlink
+from firmware_py.parameters import Parameter
+
+TYPES = {"int32": mavlink.MAV_PARAM_TYPE_INT32, "float": mavlink.MAV_PARAM_TYPE_REAL32}
+"""MAV_PARAM_TYPE; MAV_PARAM_EXT_TYPE has the same numbers."""
+
+EXTENDED_BYTES = 128
+
+
+def to_float(declared: Parameter, value: float) -> float:
+    """A value as PARAM_VALUE carries it."""
+    if declared.kind == "float":
+        return value
+    return float(unpack("<f", pack("<i", int(value)))[0])
+
+
+def from_float(declared: Parameter, value: float) -> float:
+    """A value as PARAM_SET brought it."""
+    return value if declared.kind == "float" else float(unpack("<i", pack("<f", value))[0])
+
+
+def to_bytes(declared: Parameter, value: float) -> bytes:
+    """A value as PARAM_EXT_VALUE carries it."""
+    four = pack("<f", value) if declared.kind == "float" else pack("<i", int(value))
+    return four.ljust(EXTENDED_BYTES, b"\0")
+
+
+def from_bytes(declared: Parameter, data: bytes) -> float:
+    """A value as PARAM_EXT_SET brought it; zeros at the end may be missing."""
+    layout = "<f" if declared.kind == "float" else "<i"
+    return float(unpack(layout, data[:4].ljust(4, b"\0"))[0])
