@@ -29,7 +29,6 @@ from firmware_py.types import (
     VehicleState,
 )
 
-_NOTHING: Vec3 = (0.0, 0.0, 0.0)
 _LEAST_COSINE = 0.5  # thrust is raised for tilt up to 60 degrees, and fades from there to none on its side
 _LEAST_LIFT = 0.2  # of the weight, so that falling leaves a thrust to steer with; PX4's MPC_THR_MIN
 _MOST_THRUST = 0.92  # of full thrust for following a velocity; the rest steers
@@ -158,8 +157,7 @@ class VectorLaw:
         want_forward, want_right, want_down = command.velocity_level_m_s
         ahead, aside, below = command.acceleration_level_m_s2
         k_forward, k_right, k_down = self._k_velocity
-        p, q, r = state.angular_rate_frd_rad_s
-        turn = m[6] * p + m[7] * q + m[8] * r  # about world down: to keep a velocity in turning axes
+        turn = command.yaw_rate_rad_s  # to keep a velocity in axes that turn takes the centripetal force
         d_north, d_east, d_down = self._force.d
         push_north, push_east = drag[0] + d_north, drag[1] + d_east
         ahead += k_forward * (want_forward - forward) - turn * right
@@ -217,7 +215,10 @@ class VectorLaw:
         rate = sqrt(p * p + q * q)
         if rate > self._rate_limit_rad_s:
             p, q = p * self._rate_limit_rad_s / rate, q * self._rate_limit_rad_s / rate
-        return (p + m[6] * yaw_rate_rad_s, q + m[7] * yaw_rate_rad_s, m[8] * yaw_rate_rad_s)
+        # With the right side down a pitch rate also turns the heading, by its share of world down; yaw makes
+        # up for it. Else a velocity kept in axes of the heading would feed back into the pitch it asks for.
+        r = -q * m[7] / max(m[8], _LEAST_COSINE)
+        return (p + m[6] * yaw_rate_rad_s, q + m[7] * yaw_rate_rad_s, r + m[8] * yaw_rate_rad_s)
 
     def _drag_ned(self, m: Rotation, velocity_ned: Vec3) -> Vec3:
         """Acceleration by the drag declared, in still air, world NED."""
