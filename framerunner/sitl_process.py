@@ -31,6 +31,7 @@ class SitlProcess:
         self._arguments = [
             *(sys.executable, "-m", "framerunner", "sim", "--lifeline"),
             *("--scenario", scenario, "--speed", f"{speed:g}", "--instance", str(instance)),
+            *("--video-rtp", "off"),
         ]
         self._process: Process | None = None
         self._said: list[str] = []

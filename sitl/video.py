@@ -91,6 +91,7 @@ class VideoServer:
         self._port = port
         self._shot: _Shot | None = None
         self._documents: dict[str, JsonProvider] = {}
+        self._texts: dict[str, tuple[str, str]] = {}
         self._loop: asyncio.AbstractEventLoop | None = None
         self._runner: web.AppRunner | None = None
         self._arrived = asyncio.Event()
@@ -116,6 +117,16 @@ class VideoServer:
                 `json.dumps` takes; numbers that are not finite become null.
         """
         self._documents[path] = provider
+
+    def add_text(self, path: str, content_type: str, text: str) -> None:
+        """Serve a text that does not change.
+
+        Args:
+            path: begins with "/".
+            content_type: what it is, such as "application/sdp".
+            text: the text.
+        """
+        self._texts[path] = (content_type, text)
 
     async def start(self) -> None:
         """Listen. The HTTP library is only imported here, in a thread: it takes a third of a second.
@@ -213,9 +224,12 @@ class VideoServer:
     async def _document(self, request: web.Request) -> web.Response:
         from aiohttp import web
 
+        if request.path in self._texts:
+            content_type, text = self._texts[request.path]
+            return web.Response(text=text, content_type=content_type)
         provider = self._documents.get(request.path)
         if provider is None:
-            known = ", ".join(["/video", "/image.jpg", *self._documents])
+            known = ", ".join(["/video", "/image.jpg", *self._texts, *self._documents])
             return web.Response(status=404, text=f"not here; there are {known}\n")
         try:
             text = json.dumps(_finite(provider(request.query)), allow_nan=False)

@@ -5,7 +5,7 @@ No clock, socket or thread: `step` advances simulated time by one control period
 
 from __future__ import annotations
 
-from math import dist, hypot
+from math import atan2, dist, hypot
 
 from firmware_py.airframe import Airframe
 from firmware_py.types import MotorSpeeds, Sensors, Vec3
@@ -39,6 +39,7 @@ class World:
         self.airframe = airframe
         self.time_us = 0
         self._half_m: Vec3 = tuple(extent / 2 for extent in airframe.envelope_m)  # type: ignore[assignment]
+        self._neighbours: tuple[Solid, ...] = ()
         self._radius_m = hypot(*self._half_m)
         self._reach_m = self._radius_m + _MARGIN_M
         self._base_top_m = scenario.base.top_m
@@ -113,6 +114,33 @@ class World:
             contacts,
         )
 
+    def box(self, name: str) -> Solid:
+        """The drone's own box, upright and as it is headed now, for others to run into."""
+        w, x, y, z = self._dynamics.attitude()
+        yaw_rad = atan2(2 * (w * z + x * y), 1 - 2 * (y * y + z * z))
+        return Solid(name, self._position_arena_m, flip_yaw(yaw_rad), self._half_m)
+
+    def meet(self, neighbours: tuple[Solid, ...]) -> None:
+        """Tell what else is near that moves: the boxes of other drones, until told otherwise."""
+        self._neighbours = neighbours
+        if neighbours:
+            self._far_ticks = 0
+
+    @property
+    def position_arena_m(self) -> Vec3:
+        """Where the drone's centre is."""
+        return self._position_arena_m
+
+    @property
+    def radius_m(self) -> float:
+        """Of the ball around the drone."""
+        return self._radius_m
+
+    @property
+    def touched(self) -> set[str]:
+        """Names of the solids that it touches now."""
+        return {solid.name for solid in self._touching}
+
     def motor_speeds_rad_s(self) -> MotorSpeeds:
         """True speeds of the rotors."""
         return self._dynamics.motor_speeds_rad_s()
@@ -147,6 +175,9 @@ class World:
             if gap_m < reach:
                 near += tuple([solid for solid in group.solids if solid.is_within(reach, position)])
         self._far_ticks = min(int((nearest_m - reach) / _MARGIN_M), _FAR_TICKS)
+        if self._neighbours:
+            self._far_ticks = 0
+            near += self._neighbours
         return (*near, *self._base.solids) if base_gap_m < reach and not above_base else near
 
     def _push_from(self, near: tuple[Solid, ...]) -> None:

@@ -138,7 +138,8 @@ def program(folder: Path, *arguments: str, **options: object) -> Iterator[Progra
 
 @contextmanager
 def simulator(folder: Path, instance: int, *options: str) -> Iterator[Program]:
-    """`framerunner sim`, with all its ports open."""
-    with program(folder, "sim", "--instance", str(instance), *options) as running:
+    """`framerunner sim`, with all its ports open; its ground link goes to a port of its own."""
+    ground = ("--ground-remote", f"127.0.0.1:{14550 + instance}")
+    with program(folder, "sim", "--instance", str(instance), *ground, *options) as running:
         running.wait_for("Ctrl-C stops")
         yield running

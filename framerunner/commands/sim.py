@@ -4,27 +4,56 @@ from __future__ import annotations
 
 import asyncio
 import sys
-from typing import Annotated
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
 
 from cyclopts import Parameter
 
 from framerunner.commands.options import WholeNumber
 from framerunner.errors import SettingError
 
+if TYPE_CHECKING:
+    from firmware_py.mavlink.signing import SigningKey
+    from scenarios.models import Scenario
+    from sitl.server import SimulatorServer
+    from sitl.simulation import Simulation
+
+_MAX_COUNT = 20
+
 
 def sim(
     *,
     scenario: Annotated[str, Parameter(help="name or file; without it an empty field with a base")] = "empty",
     speed: Annotated[float, Parameter(help="simulated seconds a second, 0.01 to 1000")] = 1.0,
-    instance: Annotated[WholeNumber, Parameter(help="shifts all ports and the system id, 0 to 9")] = 0,
+    instance: Annotated[WholeNumber, Parameter(help="shifts ports and the system id, 0 to 9")] = 0,
+    count: Annotated[
+        WholeNumber, Parameter(help="how many drones fly side by side; they have the next instances' ports")
+    ] = 1,
     bind: Annotated[str, Parameter(help="address to listen on")] = "127.0.0.1",
     onboard_remote: Annotated[
-        str, Parameter(help="host that gets the onboard link, UDP 14540")
+        str, Parameter(help="host or host:port that gets the onboard link, UDP 14540 + instance")
     ] = "127.0.0.1",
-    ground_remote: Annotated[str, Parameter(help="host that gets the ground link, UDP 14550")] = "127.0.0.1",
+    ground_remote: Annotated[
+        str, Parameter(help="host or host:port that gets the ground link, UDP 14550")
+    ] = "127.0.0.1",
+    link: Annotated[
+        tuple[str, ...],
+        Parameter(
+            help="one more link: udpout://HOST:PORT, udpin://…, tcpin://…, tcpout://…, serial:///TTY:BAUD, "
+            "behind it ?streams=onboard|ground|normal&rate=BYTES if wanted; may be repeated",
+            negative=(),
+        ),
+    ] = (),
+    signing_key: Annotated[
+        Path | None,
+        Parameter(help="file with 64 hexadecimal digits or a passphrase: sign MAVLink 2 with it"),
+    ] = None,
     video_port: Annotated[
         WholeNumber | None, Parameter(help="TCP port of the video; 8080 + instance")
     ] = None,
+    video_rtp: Annotated[
+        str, Parameter(help="host or host:port that gets the video as H.264 in RTP, UDP 5600, or off")
+    ] = "127.0.0.1",
     lifeline: Annotated[bool, Parameter(show=False, help="stop when standard input ends")] = False,
 ) -> int:
     """Start the simulated drone: MAVLink on UDP 14540 and 14550, video on http://127.0.0.1:8080/.
@@ -38,36 +67,79 @@ def sim(
         framerunner sim --scenario test-case-1 --speed 2
 
         framerunner sim --ground-remote 192.168.1.20
+
+        framerunner sim --count 4 --video-rtp off
+
+        framerunner sim --link tcpin://127.0.0.1:5760 --link serial:///dev/ttyUSB0:57600
     """
     if not 0.01 <= speed <= 1000:
         raise SettingError(f"--speed {speed:g}: must be from 0.01 to 1000")
     if not 0 <= instance <= 9:
         raise SettingError(f"--instance {instance}: must be from 0 to 9")
-    if video_port is not None and not 1 <= video_port <= 65535:
-        raise SettingError(f"--video-port {video_port}: must be from 1 to 65535")
+    if not 1 <= count <= _MAX_COUNT:
+        raise SettingError(f"--count {count}: must be from 1 to {_MAX_COUNT}")
+    if video_port is not None and not 1 <= video_port <= 65536 - count:
+        raise SettingError(f"--video-port {video_port}: must be from 1 to {65536 - count}")
 
     from scenarios.loader import load_scenario
-    from sitl.server import ServerSettings, SimulatorServer
-    from sitl.simulation import Simulation
+    from sitl.link_urls import parse_link
+    from sitl.server import SimulatorServer
+    from sitl.server_settings import ServerSettings, rtp_address
 
+    links = tuple(parse_link(text) for text in link)
+    if count > 1 and any(url.scheme == "serial" for url in links):
+        raise SettingError(f"--count {count}: a serial line serves one drone; leave it out or use --count 1")
     settings = ServerSettings(
         instance=instance,
         bind=bind,
         onboard_remote=onboard_remote,
         ground_remote=ground_remote,
         video_port=video_port,
+        video_rtp=None if video_rtp == "off" else rtp_address(video_rtp, instance),
         speed=speed,
+        links=links,
+        signing_key=_read_key(signing_key),
     )
-    loaded = load_scenario(scenario)
-    server = SimulatorServer(Simulation(loaded), settings, notice=_say)
+    settings.check(count)
+    server = SimulatorServer(_simulations(load_scenario(scenario), count), settings, notice=_say)
     asyncio.run(_run(server, lifeline=lifeline))
     return 0
 
 
-async def _run(server: object, *, lifeline: bool) -> None:
-    from sitl.server import SimulatorServer
+def _simulations(scenario: Scenario, count: int) -> list[Simulation]:
+    from firmware_py.airframe import load_airframe
+    from sitl.fleet import side_by_side
+    from sitl.simulation import Simulation
 
-    assert isinstance(server, SimulatorServer)
+    if count == 1:
+        return [Simulation(scenario)]
+    airframe = load_airframe(scenario.airframe)
+    try:
+        scenarios = side_by_side(scenario, count, max(airframe.envelope_m[:2]))
+    except ValueError as error:
+        raise SettingError(f"--count {count}: {error}") from error
+    return [Simulation(one, airframe) for one in scenarios]
+
+
+def _read_key(path: Path | None) -> SigningKey | None:
+    """Read the key of a file; what is in it is never shown."""
+    if path is None:
+        return None
+    from firmware_py.mavlink.signing import SigningKey
+
+    try:
+        return SigningKey.from_text(path.read_text(encoding="utf-8"))
+    except UnicodeDecodeError:
+        raise SettingError(
+            f"--signing-key {path}: must be text, 64 hexadecimal digits or a passphrase"
+        ) from None
+    except OSError as error:
+        raise SettingError(f"--signing-key {path}: cannot be read ({error.strerror})") from error
+    except ValueError as error:
+        raise SettingError(f"--signing-key {path}: {error}") from None
+
+
+async def _run(server: SimulatorServer, *, lifeline: bool) -> None:
     if not lifeline:
         await server.run()
         return

@@ -5,7 +5,9 @@ import socket
 
 import pytest
 
-from sitl.links import LinkError, UdpAddresses, UdpLink, open_udp
+from sitl.links import MAX_PARTNERS, LinkError, UdpAddresses, UdpLink, open_udp
+
+PACKET = bytes((0xFD, 0, 0))
 
 
 def peer():
@@ -63,26 +65,46 @@ class FakeTransport(asyncio.DatagramTransport):
         self.sent.append(addr)
 
 
-def test_keeps_to_its_partner_until_that_is_silent():
+@pytest.fixture
+def link():
+    """A link that speaks to home, its clock in seconds, and to whom its next datagram goes."""
     now = [0.0]
     link = UdpLink(("home", 1), lambda data: None, clock=lambda: now[0])
     transport = FakeTransport()
     link.connection_made(transport)
 
-    def target():
+    def targets():
+        transport.sent.clear()
         link.send(b"")
-        return transport.sent[-1]
+        return transport.sent
 
-    assert target() == ("home", 1)
-    link.datagram_received(b"", ("a", 1))
-    assert target() == ("a", 1)
-    link.datagram_received(b"", ("b", 2))
-    assert target() == ("a", 1)
-    now[0] = 4.0
-    link.datagram_received(b"", ("a", 1))
-    now[0] = 8.0
-    link.datagram_received(b"", ("b", 2))
-    assert target() == ("a", 1)
-    now[0] = 9.5
-    link.datagram_received(b"", ("b", 2))
-    assert target() == ("b", 2)
+    return link, now, targets
+
+
+def test_speaks_to_home_and_to_all_who_spoke_lately(link):
+    link, now, targets = link
+    assert targets() == [("home", 1)]
+    link.datagram_received(PACKET, ("a", 1))
+    link.datagram_received(PACKET, ("home", 1))
+    assert targets() == [("home", 1), ("a", 1)]
+    now[0] = 3.0
+    link.datagram_received(PACKET, ("b", 2))
+    assert targets() == [("home", 1), ("a", 1), ("b", 2)]
+    now[0] = 5.1
+    assert targets() == [("home", 1), ("b", 2)]
+    now[0] = 8.1
+    assert targets() == [("home", 1)]
+
+
+def test_what_is_not_mavlink_makes_no_partner(link):
+    link, _, targets = link
+    for noise in (b"", b"GET / HTTP/1.1", bytes(20)):
+        link.datagram_received(noise, ("a", 1))
+    assert targets() == [("home", 1)]
+
+
+def test_partners_are_few(link):
+    link, _, targets = link
+    for port in range(20):
+        link.datagram_received(PACKET, ("a", port))
+    assert len(targets()) == 1 + MAX_PARTNERS

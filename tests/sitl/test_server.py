@@ -10,7 +10,8 @@ import pytest
 
 from scenarios.loader import load_scenario
 from sitl.links import LinkError
-from sitl.server import ServerSettings, SimulatorServer, _Notices
+from sitl.server import SimulatorServer, _Notices
+from sitl.server_settings import ServerSettings
 from sitl.simulation import Simulation
 from sitl.video import VideoError
 from sitl.world import CONTROL_PERIOD_US
@@ -79,7 +80,7 @@ async def test_the_referee_tells_how_the_try_stands():
 async def test_telemetry_goes_out_on_both_links_before_anybody_spoke():
     instance = free_instance()
     with bound(14540 + instance) as app, bound(14550 + instance) as station:
-        settings = ServerSettings(instance=instance)
+        settings = ServerSettings(instance=instance, ground_remote=f"127.0.0.1:{14550 + instance}")
         task = asyncio.create_task(SimulatorServer(Simulation(load_scenario("empty")), settings).run())
         for link in (app, station):
             link.settimeout(5.0)
@@ -149,7 +150,7 @@ async def test_a_busy_video_port_ends_it_and_frees_the_links():
 def test_instances_shift_every_port():
     settings = ServerSettings(instance=3)
     assert (settings.onboard.bind[1], settings.onboard.remote[1]) == (14583, 14543)
-    assert (settings.ground.bind[1], settings.ground.remote[1]) == (18573, 14553)
+    assert (settings.ground.bind[1], settings.ground.remote[1]) == (18573, 14550)  # the same for all
     assert settings.http_port == 8083
     assert ServerSettings(instance=3, video_port=9000).http_port == 9000
 

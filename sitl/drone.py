@@ -1,0 +1,159 @@
+"""One drone of the server: its simulation, its links and its video."""
+
+from __future__ import annotations
+
+import asyncio
+import socket
+from collections.abc import Mapping
+from dataclasses import asdict
+from importlib import import_module
+from math import degrees
+from typing import TYPE_CHECKING
+
+from firmware_py.mavlink.node import MavlinkNode
+from firmware_py.mavlink.video_links import VideoEncoding, VideoStream
+from sitl.link_hub import LinkHub
+from sitl.link_urls import is_loopback
+from sitl.server_settings import ServerSettings
+from sitl.simulation import Simulation
+
+if TYPE_CHECKING:
+    from sitl.camera_feed import CameraFeed
+    from sitl.rtp import RtpSender
+    from sitl.video import VideoServer
+
+
+class ServedDrone:
+    """Puts one simulation on MAVLink and video; somebody else says when it advances.
+
+    Args:
+        simulation: what flies.
+        settings: of this drone.
+        boot_unix_us: what time it is, microseconds since 1970.
+
+    Attributes:
+        simulation: what flies.
+        node: what speaks for it.
+    """
+
+    def __init__(self, simulation: Simulation, settings: ServerSettings, boot_unix_us: int) -> None:
+        self.simulation = simulation
+        self._settings = settings
+        self.node = MavlinkNode(
+            simulation.autopilot,
+            (),
+            system_id=settings.instance + 1,
+            boot_unix_us=boot_unix_us,
+            signing_key=settings.signing_key,
+            video=self._streams(),
+        )
+        self._hub = LinkHub(self.node)
+        self._camera: CameraFeed | None = None
+        self._video: VideoServer | None = None
+        self._rtp: RtpSender | None = None
+
+    async def open_links(self) -> None:
+        """Open the links and speak at once.
+
+        Raises:
+            LinkError: one cannot be opened.
+        """
+        for profile, addresses in self._settings.standing_links:
+            await self._hub.open_udp(profile, addresses)
+        self._hub.update(0)
+        await self._hub.open_all(self._settings.links)
+
+    async def open_video(self) -> None:
+        """Import what is heavy in a thread, telemetry must not wait for it, then serve the camera's images.
+
+        Raises:
+            VideoError: a port is taken or an address is wrong.
+        """
+        await asyncio.to_thread(_import_video, rtp=self._settings.video_rtp is not None)
+        from sitl.camera_feed import CameraFeed
+        from sitl.video import VideoServer
+
+        scenario = self.simulation.scenario
+        video = VideoServer(self._settings.bind, self._settings.http_port)
+        video.add_json("/referee.json", self._referee_answer)
+        if self._settings.video_rtp is not None:
+            from sitl.rtp import RtpSender
+
+            self._rtp = RtpSender(self._settings.video_rtp, scenario.camera, self._settings.speed)
+            video.add_text("/video.sdp", "application/sdp", self._rtp.description())
+        self._video = video
+        await video.start()
+        self._camera = CameraFeed(scenario)
+
+    def tick(self) -> None:
+        """Advance by one control period: fly, speak, look."""
+        simulation = self.simulation
+        simulation.tick()
+        self._hub.update(simulation.autopilot.state.time_us)
+        if self._camera is None or self._video is None:
+            return
+        arrived = self._camera.step(simulation.truth)
+        if arrived is not None:
+            time_us, image = arrived
+            self._video.publish(image, time_us)
+            if self._rtp is not None:
+                self._rtp.send(image, time_us)
+
+    async def close(self) -> None:
+        """Stop the video and close the links."""
+        if self._video is not None:
+            await self._video.close()
+        if self._rtp is not None:
+            await asyncio.to_thread(self._rtp.close)
+        self._hub.close()
+
+    def greeting(self) -> str:
+        """Where to find it, one line for people."""
+        scenario, settings = self.simulation.scenario, self._settings
+        assert settings.onboard.remote is not None
+        assert settings.ground.remote is not None
+        ports = f"{settings.onboard.remote[1]} and {settings.ground.remote[1]}"
+        page = f"http://{settings.bind}:{settings.http_port}/"
+        rtp = "" if settings.video_rtp is None else f" and as RTP to UDP {settings.video_rtp[1]}"
+        return f"{scenario.airframe} in {scenario.name}: MAVLink to UDP {ports}, video on {page}{rtp}"
+
+    def _streams(self) -> tuple[VideoStream, ...]:
+        """What the camera component tells of the video; QGroundControl takes the first it can show."""
+        settings, camera = self._settings, self.simulation.scenario.camera
+        common = (camera.width_px, camera.height_px, camera.rate_hz, degrees(camera.horizontal_fov_rad))
+        host = _seen_from_outside(settings)
+        page = VideoStream(f"http://{host}:{settings.http_port}/video", VideoEncoding.MJPEG_HTTP, *common)
+        if settings.video_rtp is None:
+            return (page,)
+        return (VideoStream(str(settings.video_rtp[1]), VideoEncoding.H264_RTP, *common), page)
+
+    def _referee_answer(self, query: Mapping[str, str]) -> object:
+        """What `/referee.json?state=…&ended=…` tells: how the try stands, and the report if it ended now."""
+        simulation = self.simulation
+        referee = simulation.referee
+        return {
+            "scenario": simulation.scenario.name,
+            "time_us": simulation.time_us,
+            "snapshot": asdict(referee.snapshot()),
+            "report": referee.report(query.get("state", ""), query.get("ended")).as_dict(),
+        }
+
+
+def _seen_from_outside(settings: ServerSettings) -> str:
+    """The address under which a ground station finds this machine, when all addresses are listened on."""
+    if settings.bind != "0.0.0.0":
+        return settings.bind
+    remote = settings.ground.remote
+    if remote is None or is_loopback(remote[0]):
+        return "127.0.0.1"
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
+        try:
+            probe.connect(remote)  # sends nothing; the system chooses the way out
+            return str(probe.getsockname()[0])
+        except OSError:
+            return "127.0.0.1"
+
+
+def _import_video(*, rtp: bool) -> None:
+    for module in ("sitl.camera_feed", "aiohttp.web", "sitl.video", *(("sitl.rtp",) if rtp else ())):
+        import_module(module)

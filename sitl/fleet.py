@@ -1,0 +1,122 @@
+"""Several drones in one world: where they start, and that they touch each other.
+
+Each drone has its own physics; they meet as boxes. While two are near, each sees the other as a solid that
+stands where the other is in this control period, so they push each other away and cannot pass through.
+The air behind one's rotors does not disturb another.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from math import dist
+
+from scenarios.ground import is_over_base
+from scenarios.models import Scenario, Start
+from sitl.world import World
+
+_SPACING_M = 1.5  # between starting places, more where a drone is large
+_NEAR_M = 1.0  # of the centres, beyond the drones' own size
+_APART_TICKS = 5  # how often drones that are not near are looked at; 0.02 s
+
+
+class Fleet:
+    """Tells the drones of one world where the others are.
+
+    Args:
+        worlds: one a drone.
+        notice: called with a line for people when two drones touch.
+    """
+
+    def __init__(self, worlds: Sequence[World], notice: Callable[[str], None] = lambda line: None) -> None:
+        self._worlds = worlds
+        self._notice = notice
+        self._reach_m = _NEAR_M + 2 * max(world.radius_m for world in worlds)
+        self._ticks = 0
+        self._touching: set[tuple[int, int]] = set()
+        self._near = False
+
+    def tick(self) -> None:
+        """Look around; to be called after all have advanced."""
+        if len(self._worlds) < 2:
+            return
+        self._ticks += 1
+        if not self._near and self._ticks % _APART_TICKS:
+            return
+        worlds = self._worlds
+        places = [world.position_arena_m for world in worlds]
+        pairs = [
+            (i, j) for i in range(len(worlds)) for j in range(i) if dist(places[i], places[j]) < self._reach_m
+        ]
+        if not pairs and not self._near:
+            return
+        self._near = bool(pairs)
+        boxes = [world.box(_name(number)) for number, world in enumerate(worlds)]
+        for i, world in enumerate(worlds):
+            world.meet(tuple(boxes[a + b - i] for a, b in pairs if i in (a, b)))
+        self._tell(pairs)
+
+    def _tell(self, pairs: list[tuple[int, int]]) -> None:
+        touching = {
+            (i, j)
+            for i, j in pairs
+            if _name(j) in self._worlds[i].touched or _name(i) in self._worlds[j].touched
+        }
+        for i, j in sorted(touching - self._touching):
+            self._notice(f"{_name(j)} and {_name(i)} touch each other")
+        self._touching = touching
+
+
+def _name(number: int) -> str:
+    return f"drone {number + 1}"
+
+
+def side_by_side(scenario: Scenario, count: int, width_m: float) -> list[Scenario]:
+    """The scenario once for each drone; the first starts where it says, the others around it on the floor.
+
+    Places are those of a square grid around the start, the nearest first, inside the arena, beside the base
+    and the frames, 1.5 m or more apart; all have the heading of the scenario.
+
+    Args:
+        scenario: what is flown.
+        count: how many drones.
+        width_m: of a drone.
+
+    Raises:
+        ValueError: so many have no room in the arena.
+    """
+    spacing_m = max(_SPACING_M, 2 * width_m)
+    places = [(scenario.start.x_m, scenario.start.y_m)]
+    reach = int(max(scenario.arena.length_x_m, scenario.arena.width_y_m) / spacing_m) + 1
+    steps = range(-reach, reach + 1)
+    grid = sorted(((i, j) for i in steps for j in steps if (i, j) != (0, 0)), key=_farness)
+    for i, j in grid:
+        if len(places) == count:
+            break
+        place = (places[0][0] + i * spacing_m, places[0][1] + j * spacing_m)
+        if _has_room(scenario, place, width_m):
+            places.append(place)
+    if len(places) < count:
+        raise ValueError(f"{scenario.name} has room for {len(places)} drones, not for {count}")
+    yaw_rad = scenario.start.yaw_rad
+    return [
+        scenario.model_copy(update={"start": Start(x_m=x_m, y_m=y_m, yaw_rad=yaw_rad)}) for x_m, y_m in places
+    ]
+
+
+def _farness(cell: tuple[int, int]) -> tuple[int, int, int]:
+    """Order of starting places: near ones first, then to the left and right before fore and aft."""
+    i, j = cell
+    return (i * i + j * j, abs(i), -j * 10 - i)
+
+
+def _has_room(scenario: Scenario, place: tuple[float, float], width_m: float) -> bool:
+    x_m, y_m = place
+    arena = scenario.arena
+    if abs(x_m) > arena.length_x_m / 2 - width_m or abs(y_m) > arena.width_y_m / 2 - width_m:
+        return False
+    base = scenario.base.model_copy(update={"edge_m": scenario.base.edge_m + 2 * width_m})
+    if is_over_base(base, x_m, y_m):
+        return False
+    return all(
+        dist(place, (frame.x_m, frame.y_m)) > frame.outer_width_m / 2 + width_m for frame in scenario.frames
+    )

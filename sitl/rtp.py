@@ -1,0 +1,155 @@
+"""Video out as H.264 in RTP over UDP, as QGroundControl and GStreamer want it (PX4's Gazebo sends the same).
+
+Images are compressed in a thread of their own, the newest only: when the encoder is late, images are left
+out and the flight does not notice. Every second begins anew with a key frame that carries the stream's
+headers, so whoever starts listening sees something within a second.
+"""
+
+from __future__ import annotations
+
+import socket
+import threading
+from fractions import Fraction
+
+import av
+import numpy as np
+import numpy.typing as npt
+from av.video.frame import PictureType
+from av.video.stream import VideoStream
+
+from scenarios.models import Camera
+from sitl.links import Address
+from sitl.video import VideoError
+
+Image = npt.NDArray[np.uint8]
+
+PAYLOAD_TYPE = 96  # the first of those that a description must explain
+_CLOCK_HZ = 90_000  # RTP's, for video
+_PACKET_BYTES = 1200
+_BITS_PER_PIXEL = 0.8  # of an image: thin coloured bars stay recognisable
+_PRESET = {
+    "preset": "ultrafast",
+    "tune": "zerolatency",
+    "profile": "baseline",
+    "x264-params": "repeat-headers=1:scenecut=0",
+}
+
+
+class RtpSender:
+    """Sends a camera's images to one address; lost without a word if nobody listens.
+
+    Args:
+        remote: host and port; the port after it gets RTCP.
+        camera: size and rate of the images.
+        speed: simulated seconds a second; stamps of the images count the watcher's seconds.
+
+    Raises:
+        VideoError: the address is wrong, or the encoder cannot work with such images.
+    """
+
+    def __init__(self, remote: Address, camera: Camera, speed: float = 1.0) -> None:
+        self._host, self._port = _resolved(remote), remote[1]
+        self._speed = speed
+        self._newest: tuple[Image, int] | None = None
+        self._wanted = threading.Condition()
+        self._closing = False
+        # The usual H.264 has half as many colours each way, so sizes are even; a last odd line goes.
+        self._width_px, self._height_px = camera.width_px // 2 * 2, camera.height_px // 2 * 2
+        try:
+            url = f"rtp://{self._host}:{self._port}?pkt_size={_PACKET_BYTES}"
+            self._container = av.open(url, "w", format="rtp")
+            self._stream = self._make_stream(camera.rate_hz)
+        except (av.FFmpegError, OSError, ValueError) as error:
+            raise VideoError(f"RTP to {self._host}:{self._port} cannot be sent ({error})") from error
+        self._thread = threading.Thread(target=self._run, name="rtp", daemon=True)
+        self._thread.start()
+
+    def description(self) -> str:
+        """The stream in SDP (RFC 8866), for `ffplay`, VLC and PyAV: `/video.sdp`."""
+        lines = (
+            "v=0",
+            f"o=- 0 0 IN IP4 {self._host}",
+            "s=framerunner camera",
+            f"c=IN IP4 {self._host}",
+            "t=0 0",
+            f"m=video {self._port} RTP/AVP {PAYLOAD_TYPE}",
+            f"a=rtpmap:{PAYLOAD_TYPE} H264/{_CLOCK_HZ}",
+            f"a=fmtp:{PAYLOAD_TYPE} packetization-mode=1",
+        )
+        return "\r\n".join(lines) + "\r\n"
+
+    def send(self, image: Image, time_us: int) -> None:
+        """Give an image to the encoder; never blocks.
+
+        Args:
+            image: BGR, shape (height, width, 3), uint8; must not be changed afterwards.
+            time_us: vehicle time of its exposure, microseconds.
+        """
+        with self._wanted:
+            self._newest = (image, time_us)
+            self._wanted.notify()
+
+    def close(self) -> None:
+        """Send what is left and stop."""
+        with self._wanted:
+            self._closing = True
+            self._wanted.notify()
+        self._thread.join()
+
+    def _make_stream(self, rate_hz: float) -> VideoStream:
+        rate = Fraction(rate_hz).limit_denominator(1000)
+        stream = self._container.add_stream("libx264", rate=rate, options=_PRESET)
+        stream.width, stream.height = self._width_px, self._height_px
+        stream.pix_fmt = "yuv420p"
+        stream.bit_rate = int(self._width_px * self._height_px * rate_hz * _BITS_PER_PIXEL)
+        context = stream.codec_context
+        context.time_base = Fraction(1, _CLOCK_HZ)
+        context.gop_size = max(1, round(rate_hz))
+        context.max_b_frames = 0
+        context.thread_count = 1
+        return stream
+
+    def _run(self) -> None:
+        while True:
+            with self._wanted:
+                self._wanted.wait_for(lambda: self._newest is not None or self._closing)
+                newest, self._newest = self._newest, None
+                closing = self._closing
+            if newest is not None:
+                self._encode(*newest)
+            if closing:
+                self._finish()
+                return
+
+    def _encode(self, image: Image, time_us: int) -> None:
+        cut = np.ascontiguousarray(image[: self._height_px, : self._width_px])
+        frame = av.VideoFrame.from_ndarray(cut, format="bgr24")
+        frame.pts = round(time_us * _CLOCK_HZ / 1e6 / self._speed)
+        frame.time_base = Fraction(1, _CLOCK_HZ)
+        frame.pict_type = PictureType.NONE
+        try:
+            for packet in self._stream.encode(frame):
+                self._container.mux(packet)
+        except (av.FFmpegError, OSError):
+            pass  # nobody can be reached now; the next image may
+
+    def _finish(self) -> None:
+        try:
+            for packet in self._stream.encode(None):
+                self._container.mux(packet)
+            self._container.close()
+        except (av.FFmpegError, OSError):
+            pass
+
+
+def _resolved(remote: Address) -> str:
+    """The IPv4 address of a host."""
+    host, port = remote
+    try:
+        found = socket.getaddrinfo(host, port, family=socket.AF_INET, type=socket.SOCK_DGRAM)
+    except (OSError, UnicodeError) as error:
+        reason = getattr(error, "strerror", None) or error
+        raise VideoError(
+            f"RTP to {host}:{port} cannot be sent ({reason}); give a host's name or an IPv4 address"
+        ) from error
+    return str(found[0][4][0])

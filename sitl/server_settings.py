@@ -1,0 +1,118 @@
+"""Where the simulator listens and speaks: PX4's ports, shifted by instance as PX4 shifts them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+from firmware_py.mavlink.links import GROUND, ONBOARD, LinkProfile
+from firmware_py.mavlink.signing import SigningKey
+from sitl.link_urls import LinkError, LinkUrl, host_and_port, is_loopback
+from sitl.links import Address, UdpAddresses
+
+_LAST_ONBOARD_PORT = 14549  # PX4 sends all instances beyond the tenth there
+_GROUND_PORT = 14550  # of every instance, so that one ground station sees them all
+_VIDEO_PORT = 8080
+_RTP_PORT = 5600  # where QGroundControl listens; the one after it is for RTCP
+_LAST_PORT = 65535
+_PORT_SCHEMES = ("udpin", "tcpin")
+
+
+def rtp_address(text: str, instance: int) -> Address:
+    """Where an instance sends its H.264, from HOST or HOST:PORT; by default two ports each from 5600.
+
+    Raises:
+        LinkError: the port is no port.
+    """
+    return host_and_port(text, _RTP_PORT + 2 * instance)
+
+
+@dataclass(frozen=True, slots=True)
+class ServerSettings:
+    """Where the simulator listens and speaks, and how fast it runs.
+
+    Attributes:
+        instance: shifts ports and the system id, as PX4's instances do.
+        bind: address of all sockets.
+        onboard_remote: host, or host:port, to which the onboard link (14540) speaks unasked.
+        ground_remote: host, or host:port, to which the ground link (14550) speaks unasked.
+        video_port: TCP port of the video; None for port 8080 plus instance.
+        video_rtp: to which H.264 in RTP goes; None: nowhere.
+        speed: simulated seconds a second.
+        links: more links.
+        signing_key: with which MAVLink is signed; None: it is not.
+    """
+
+    instance: int = 0
+    bind: str = "127.0.0.1"
+    onboard_remote: str = "127.0.0.1"
+    ground_remote: str = "127.0.0.1"
+    video_port: int | None = None
+    video_rtp: Address | None = None
+    speed: float = 1.0
+    links: tuple[LinkUrl, ...] = ()
+    signing_key: SigningKey | None = None
+
+    @property
+    def onboard(self) -> UdpAddresses:
+        """The link for companion apps: PX4's 14580 to 14540."""
+        remote = host_and_port(self.onboard_remote, min(14540 + self.instance, _LAST_ONBOARD_PORT))
+        return UdpAddresses((self._from(remote[0]), 14580 + self.instance), remote)
+
+    @property
+    def ground(self) -> UdpAddresses:
+        """The link for ground stations: PX4's 18570 to 14550, which is the same for all instances."""
+        remote = host_and_port(self.ground_remote, _GROUND_PORT)
+        return UdpAddresses((self._from(remote[0]), 18570 + self.instance), remote)
+
+    @property
+    def standing_links(self) -> tuple[tuple[LinkProfile, UdpAddresses], ...]:
+        """The two links that are always there."""
+        return tuple(
+            (replace(profile, trusted=is_loopback(addresses.bind[0])), addresses)
+            for profile, addresses in ((ONBOARD, self.onboard), (GROUND, self.ground))
+        )
+
+    @property
+    def http_port(self) -> int:
+        """TCP port of the video."""
+        return _VIDEO_PORT + self.instance if self.video_port is None else self.video_port
+
+    @property
+    def is_open(self) -> bool:
+        """Whether somebody on another machine can command the drone without a key."""
+        links = [profile for profile, _ in self.standing_links] + [url.profile for url in self.links]
+        return self.signing_key is None and not all(link.trusted for link in links)
+
+    def check(self, count: int) -> None:
+        """See that addresses make sense, for so many drones.
+
+        Raises:
+            LinkError: one does not.
+        """
+        for by in range(count):
+            drone = self.shifted(by)
+            ports = [addresses.remote for _, addresses in drone.standing_links]
+            ports += [drone.video_rtp, *((link.text, link.number) for link in drone.links)]
+            for place in ports:
+                if place is not None and place[1] > _LAST_PORT and not place[0].startswith("serial"):
+                    raise LinkError(f"{place[0]}: port {place[1]} of drone {by + 1} is above {_LAST_PORT}")
+
+    def shifted(self, by: int) -> ServerSettings:
+        """Settings of another drone of the same program: every port it opens is higher by so much."""
+        if by == 0:
+            return self
+        return replace(
+            self,
+            instance=self.instance + by,
+            video_port=None if self.video_port is None else self.video_port + by,
+            video_rtp=None if self.video_rtp is None else (self.video_rtp[0], self.video_rtp[1] + 2 * by),
+            links=tuple(_shifted(link, by) for link in self.links),
+        )
+
+    def _from(self, remote: str) -> str:
+        """What to listen on: from the loopback address nothing goes out to another machine."""
+        return self.bind if is_loopback(remote) or not is_loopback(self.bind) else "0.0.0.0"
+
+
+def _shifted(link: LinkUrl, by: int) -> LinkUrl:
+    return replace(link, number=link.number + by) if link.scheme in _PORT_SCHEMES else link
