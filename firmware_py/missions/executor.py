@@ -1,33 +1,419 @@
-"""Flies the mission of the store, item by item; skeleton."""
+"""Flies the mission of the store, item by item, as PX4's navigator does it for a multicopter."""
 
 from __future__ import annotations
 
+from dataclasses import replace
+from enum import Enum
+from math import hypot, isfinite, isnan, nan, radians, remainder, tau
+
+from firmware_py.missions import route
+from firmware_py.missions.arrival import Arrival, hold_us, is_behind
 from firmware_py.missions.flight import IssuedCommand, Leg, LegKind, View
+from firmware_py.missions.items import Do, MissionItem
+from firmware_py.missions.pictures import Pictures
+from firmware_py.missions.regions import Gaze
 from firmware_py.missions.store import MissionStore
 from firmware_py.parameters import Parameters
-from firmware_py.types import StatusText
+from firmware_py.types import StatusText, Vec3
+
+_CRITICAL, _WARNING, _INFO = 2, 4, 6  # MAV_SEVERITY
+_LEAST_CLIMB_M = 0.5  # a first place no higher than this is no take-off: it climbs to MIS_TAKEOFF_ALT
+_SAME_YAW_RAD = 0.01
+_CAMERA = frozenset(
+    {
+        Do.CONTROL_VIDEO,
+        Do.DIGICAM_CONTROL,
+        Do.GIMBAL_CONFIGURE,
+        Do.GIMBAL_PITCHYAW,
+        Do.IMAGE_START_CAPTURE,
+        Do.IMAGE_STOP_CAPTURE,
+        Do.MOUNT_CONFIGURE,
+        Do.MOUNT_CONTROL,
+        Do.SET_CAMERA_FOCUS,
+        Do.SET_CAMERA_MODE,
+        Do.SET_CAMERA_SOURCE,
+        Do.TRIGGER_CONTROL,
+        Do.VIDEO_START_CAPTURE,
+        Do.VIDEO_STOP_CAPTURE,
+    }
+)
+_ABSENT = frozenset({Do.GRIPPER, Do.WINCH, Do.SET_ACTUATOR, Do.OBLIQUE_SURVEY, Do.VTOL_TRANSITION})
+_REGIONS = frozenset({Do.NAV_ROI, Do.SET_ROI, Do.SET_ROI_LOCATION, Do.SET_ROI_NONE, Do.SET_ROI_WPNEXT_OFFSET})
+_YAWING = frozenset({Do.WAYPOINT, Do.LOITER_UNLIM, Do.LOITER_TIME})
+
+
+class _Phase(Enum):
+    CLIMB = "climb"  # straight up, before the item
+    APPROACH = "approach"  # to above the landing place, or to a loiter before its height is taken
+    ITEM = "item"
+    WAIT = "wait"  # the item is done and does not let go on
+    OVER = "over"
 
 
 class MissionExecutor:
-    """Decides what to fly next. `enter` at mode entry, `step` each tick, `leave` at mode exit."""
+    """Decides what to fly next. `enter` at mode entry, `step` each tick, `leave` at mode exit.
+
+    A step in which nothing changes costs a few comparisons and gives the same `Leg` again. One item is begun
+    or ended per step.
+    """
+
+    __slots__ = (
+        "_arrival",
+        "_climb_first",
+        "_events",
+        "_gate_ned_m",
+        "_gaze",
+        "_home_ned_m",
+        "_item",
+        "_jumps",
+        "_left_at",
+        "_leg",
+        "_parameters",
+        "_phase",
+        "_pictures",
+        "_replay",
+        "_restart",
+        "_seen",
+        "_speed_m_s",
+        "_store",
+    )
 
     def __init__(self, store: MissionStore, parameters: Parameters) -> None:
         self._store = store
         self._parameters = parameters
+        self._arrival = Arrival(parameters)
+        self._events: list[IssuedCommand | StatusText] = []
+        self._pictures = Pictures()
+        self._gaze = Gaze()
+        self._jumps: dict[int, int] = {}
+        self._leg = Leg(LegKind.DONE, (0.0, 0.0, 0.0))
+        self._item: MissionItem | None = None
+        self._phase = _Phase.OVER
+        self._seen = (-1, -1)
+        self._home_ned_m: Vec3 | None = None
+        self._speed_m_s = nan
+        self._gate_ned_m: Vec3 | None = None
+        self._climb_first = False
+        self._restart = False
+        self._left_at = 0
+        self._replay: tuple[int, MissionItem] | None = None  # after which item to trigger again, and how
 
     def enter(self, view: View) -> None:
-        """Begin, or go on at the current item."""
+        """Begin, or go on at the current item; from below the first place, climb to its height first."""
+        store = self._store
+        self._arrival.configure(self._parameters)
+        if store.mission.version != self._seen[0]:
+            self._jumps.clear()
+            self._left_at = 0
+        items = store.mission.items
+        if self._restart and items and store.current == len(items) - 1:
+            store.current = 0
+            self._left_at = 0
+            self._jumps.clear()
+        self._restart = False
+        self._climb_first = True
+        self._leg = Leg(LegKind.HOLD, view.position_ned_m)
+        if self._begin_mission(view):
+            self._resume()
+            self._begin_item(view)
 
     def step(self, view: View) -> Leg:
         """What to fly now."""
-        return Leg(LegKind.DONE, view.position_ned_m)
+        store = self._store
+        if self._seen != (store.mission.version, store.selections):
+            self._change(view)
+        elif view.home_ned_m is not self._home_ned_m:
+            self._move_home(view)
+        if self._phase is _Phase.OVER or self._phase is _Phase.WAIT or self._item is None:
+            return self._leg
+        self._arrival.configure(self._parameters)
+        self._pictures.move(view.position_ned_m)
+        self._look(view)
+        if self._is_done(self._item, view):
+            self._go_on(self._item, view)
+        return self._leg
 
     def leave(self) -> None:
-        """The mode has ended: stop what the mission had switched on."""
+        """The mode has ended: no more pictures; the current item begins anew when it is entered again."""
+        self._pictures.stop()
+        self._left_at = self._store.current
+        self._item = None
+        self._phase = _Phase.OVER
 
     def disarmed(self) -> None:
-        """The motors have stopped: a mission that is done begins again from its first item."""
+        """The motors have stopped: a mission at its last item begins again from its first."""
+        self._restart = self._store.started
 
     def take_events(self) -> list[IssuedCommand | StatusText]:
-        """What happened since the last call, oldest first."""
-        return []
+        """Texts and commands to others since the last call."""
+        if not self._events and not self._pictures.commands:
+            return []
+        events = [*self._events, *self._pictures.commands]
+        self._events.clear()
+        self._pictures.commands.clear()
+        return events
+
+    # Beginning and changing the mission
+
+    def _begin_mission(self, view: View) -> bool:
+        """Whether there is a mission to fly; if not, it stays where it is."""
+        store = self._store
+        self._seen = (store.mission.version, store.selections)
+        self._home_ned_m = view.home_ned_m
+        self._gaze.release()
+        self._item = None
+        if not store.valid or view.projection is None:
+            wish = "refusing takeoff" if view.landed else "loitering"
+            self._say(_CRITICAL, f"No valid mission available, {wish}")
+            self._end(view)
+            return False
+        found = route.behind_jumps(store.mission.items, store.current, self._jumps, follow=True)
+        if found is None:
+            self._finish(view)
+            return False
+        store.current = found
+        store.started, store.finished = True, False
+        return True
+
+    def _resume(self) -> None:
+        """Restore what items before the current one have set; take no picture less than without a pause."""
+        store, items = self._store, self._store.mission.items
+        self._say(_INFO, "Executing Mission")
+        self._speed_m_s = route.speed_before(items, store.current)
+        for item in route.settings_before(items, store.current):
+            self._pictures.pass_on(item)
+        trigger = route.trigger_before(items, store.current)
+        self._replay = None
+        if trigger is not None:
+            if self._left_at > 0:
+                before = route.place_before(items, store.current)
+                store.current = store.current if before is None else before
+            self._replay = (store.current, trigger)
+        self._left_at = 0
+
+    def _change(self, view: View) -> None:
+        """Another mission, or another item, while this one is flown."""
+        if self._store.mission.version != self._seen[0]:
+            self._jumps.clear()
+            self._replay = None
+        self._left_at = 0
+        if self._begin_mission(view):
+            self._begin_item(view)
+
+    def _move_home(self, view: View) -> None:
+        """Heights above home have moved with it."""
+        before, self._home_ned_m = self._home_ned_m, view.home_ned_m
+        if before is None or view.home_ned_m is None or self._item is None or not self._item.is_relative:
+            return
+        north_m, east_m, down_m = self._leg.target_ned_m
+        target_ned_m = (north_m, east_m, down_m + view.home_ned_m[2] - before[2])
+        self._leg = replace(self._leg, target_ned_m=target_ned_m)
+
+    # Beginning an item
+
+    def _begin_item(self, view: View) -> None:
+        item = self._item = self._store.mission.items[self._store.current]
+        self._arrival.begin()
+        self._phase = _Phase.ITEM
+        if self._replay is not None and self._store.current > self._replay[0]:
+            self._issue(self._replay[1], view)
+            self._replay = None
+        if item.has_place:
+            self._begin_place(item, view)
+        elif item.command == Do.CONDITION_GATE:
+            self._begin_gate(item, view)
+        else:
+            self._issue(item, view)
+
+    def _begin_place(self, item: MissionItem, view: View) -> None:
+        """Climb first if need be, else fly to the item's place."""
+        climb_first, self._climb_first = self._climb_first, False
+        here_ned_m, target_ned_m = view.position_ned_m, self._target_of(item, view)
+        if item.command == Do.LAND:
+            if not view.landed:
+                self._begin_landing(target_ned_m, view)
+            return
+        climb_m = here_ned_m[2] - target_ned_m[2]
+        if view.landed or (climb_first and climb_m > self._arrival.height_m):
+            if climb_m < _LEAST_CLIMB_M:
+                climb_m = self._arrival.takeoff_m
+            down_m = here_ned_m[2] - climb_m
+            above_home_m = -down_m if view.home_ned_m is None else view.home_ned_m[2] - down_m
+            self._say(_INFO, f"Climb to {above_home_m:.1f} meters above home")
+            kind = LegKind.TAKEOFF if view.landed else LegKind.FLY
+            self._phase = _Phase.CLIMB
+            self._leg = Leg(
+                kind, (here_ned_m[0], here_ned_m[1], down_m), nan, self._speed_m_s, self._arrival.radius_m
+            )
+            return
+        self._fly_to(item, target_ned_m, view)
+
+    def _fly_to(self, item: MissionItem, target_ned_m: Vec3, view: View) -> None:
+        yaw_deg = item.params[3] if item.command in _YAWING else nan
+        if item.command == Do.LOITER_TO_ALT and view.position_ned_m[2] != target_ned_m[2]:
+            self._phase = _Phase.APPROACH  # the height is taken at the place only
+            target_ned_m = (target_ned_m[0], target_ned_m[1], view.position_ned_m[2])
+        self._leg = Leg(
+            LegKind.FLY,
+            target_ned_m,
+            remainder(radians(yaw_deg), tau) if isfinite(yaw_deg) else nan,
+            self._speed_m_s,
+            self._arrival.radius_of(item),
+            self._next_of(item, target_ned_m, view),
+        )
+
+    def _begin_landing(self, target_ned_m: Vec3, view: View) -> None:
+        """Land there; from farther away, fly there first at the present height."""
+        here_ned_m = view.position_ned_m
+        north_m, east_m, _ = target_ned_m
+        if hypot(north_m - here_ned_m[0], east_m - here_ned_m[1]) > self._arrival.radius_m:
+            down_m = self._leg.target_ned_m[2] if self._leg.kind is LegKind.FLY else here_ned_m[2]
+            self._phase = _Phase.APPROACH
+            place_ned_m = (north_m, east_m, down_m)
+            self._leg = Leg(LegKind.FLY, place_ned_m, nan, self._speed_m_s, self._arrival.radius_m)
+        else:
+            self._phase = _Phase.ITEM
+            self._leg = Leg(LegKind.LAND, (north_m, east_m, here_ned_m[2]))
+
+    def _begin_gate(self, item: MissionItem, view: View) -> None:
+        """Fly to what comes after the gate; without anything there the gate is passed already."""
+        onward = self._place_after(item)
+        self._gate_ned_m = None if onward is None else self._target_of(item, view)
+        if onward is not None:
+            target_ned_m = self._target_of(onward, view)
+            self._leg = Leg(LegKind.FLY, target_ned_m, nan, self._speed_m_s, self._arrival.radius_m)
+
+    def _issue(self, item: MissionItem, view: View) -> None:
+        """Do what an item without a place says."""
+        command = item.command
+        if command == Do.CHANGE_SPEED:
+            self._speed_m_s = route.commanded_speed(item)
+            self._leg = replace(self._leg, speed_m_s=self._speed_m_s)
+        elif command in _REGIONS:
+            self._gaze.turn(item, view)
+        elif command in _CAMERA:
+            self._pictures.pass_on(item)
+        elif command == Do.SET_CAM_TRIGG_DIST:
+            self._pictures.start_by_distance(item, view.position_ned_m)
+        elif command == Do.SET_CAM_TRIGG_INTERVAL:
+            self._pictures.start_by_time(item)
+        elif command in (Do.SET_HOME, Do.ARM_DISARM):
+            self._events.append(IssuedCommand(command, (*item.params, item.x, item.y, item.z)))
+        elif command in _ABSENT:
+            self._say(_WARNING, f"Mission item {item.seq + 1} does nothing: no such device here")
+
+    # Ending an item
+
+    def _is_done(self, item: MissionItem, view: View) -> bool:
+        """Whether the present phase of the item is over."""
+        if self._phase is _Phase.CLIMB:
+            return self._arrival.has_climbed(self._leg, view)
+        if self._phase is _Phase.APPROACH:
+            return self._arrival.is_there(self._leg, view)
+        match item.command:
+            case Do.LAND:
+                done = view.landed
+            case Do.DELAY:
+                done = self._arrival.has_waited(item, view)
+            case Do.CONDITION_GATE:
+                done = self._gate_ned_m is None or is_behind(self._gate_ned_m, self._leg, view)
+            case Do.LOITER_UNLIM:
+                done = False
+            case _ if item.has_place:
+                done = self._arrival.has_arrived(self._leg, view) and self._arrival.has_waited(item, view)
+            case _:
+                done = True
+        return done
+
+    def _go_on(self, item: MissionItem, view: View) -> None:
+        """The next phase of the item, or the next item."""
+        if self._phase is _Phase.CLIMB:
+            self._phase = _Phase.ITEM
+            self._fly_to(item, self._target_of(item, view), view)
+            return
+        if self._phase is _Phase.APPROACH:
+            self._phase = _Phase.ITEM
+            target_ned_m = self._target_of(item, view)
+            if item.command == Do.LAND:
+                self._leg = Leg(LegKind.LAND, (target_ned_m[0], target_ned_m[1], view.position_ned_m[2]))
+            else:
+                self._leg = replace(self._leg, target_ned_m=target_ned_m)
+            return
+        self._store.report_reached(item.seq)
+        if not item.autocontinue:
+            self._phase = _Phase.WAIT
+            return
+        self._begin_next(item, view)
+
+    def _begin_next(self, item: MissionItem, view: View) -> None:
+        store = self._store
+        found = None
+        if store.current + 1 < len(store.mission.items):
+            found = route.behind_jumps(store.mission.items, store.current + 1, self._jumps, follow=True)
+        if item.command == Do.RETURN_TO_LAUNCH:
+            store.finished = found is None
+            store.current = store.current if found is None else found
+            self._item, self._phase = None, _Phase.OVER
+            self._leg = Leg(LegKind.RETURN, view.position_ned_m)
+        elif found is None:
+            self._finish(view)
+        else:
+            store.current = found
+            self._begin_item(view)
+
+    def _finish(self, view: View) -> None:
+        self._say(_INFO, f"Mission finished, {'landed' if view.landed else 'loitering'}")
+        self._jumps.clear()
+        self._store.finished = True
+        self._end(view)
+
+    def _end(self, view: View) -> None:
+        """Stay: at the place flown to, else here."""
+        flown_to = self._leg.kind is LegKind.FLY and not view.landed
+        target_ned_m = self._leg.target_ned_m if flown_to else view.position_ned_m
+        self._item, self._phase = None, _Phase.OVER
+        self._leg = Leg(LegKind.DONE, target_ned_m, self._leg.yaw_rad, self._speed_m_s)
+
+    # Small things
+
+    def _look(self, view: View) -> None:
+        """Yaw towards the region of interest; not while climbing, taking off or landing."""
+        if self._phase is not _Phase.ITEM or self._leg.kind is not LegKind.FLY:
+            return
+        yaw_rad = self._gaze.yaw_rad(view, self._leg.target_ned_m, self._arrival.radius_m)
+        if isnan(yaw_rad):
+            return
+        if not abs(remainder(yaw_rad - self._leg.yaw_rad, tau)) <= _SAME_YAW_RAD:  # also when it was NaN
+            self._leg = replace(self._leg, yaw_rad=yaw_rad)
+
+    def _target_of(self, item: MissionItem, view: View) -> Vec3:
+        """The item's place; what it leaves open is where the vehicle is, or the height it flies at."""
+        north_m, east_m, down_m = view.place_of(item)
+        if isnan(north_m):
+            north_m, east_m, _ = view.position_ned_m
+        if not isfinite(down_m):
+            down_m = self._leg.target_ned_m[2] if self._leg.kind is LegKind.FLY else view.position_ned_m[2]
+        return (north_m, east_m, down_m)
+
+    def _place_after(self, item: MissionItem, *, without_stop: bool = False) -> MissionItem | None:
+        items = self._store.mission.items
+        return route.next_place(items, item.seq + 1, self._jumps, without_stop=without_stop)
+
+    def _next_of(self, item: MissionItem, target_ned_m: Vec3, view: View) -> Vec3 | None:
+        """Where it goes on to without a stop at the target."""
+        if self._phase is not _Phase.ITEM or not item.autocontinue or hold_us(item) > 0:
+            return None
+        if item.command == Do.LOITER_UNLIM:
+            return None
+        onward = self._place_after(item, without_stop=True)
+        if onward is None:
+            return None
+        north_m, east_m, down_m = view.place_of(onward)
+        return (
+            target_ned_m[0] if isnan(north_m) else north_m,
+            target_ned_m[1] if isnan(east_m) else east_m,
+            down_m if isfinite(down_m) else target_ned_m[2],
+        )
+
+    def _say(self, severity: int, text: str) -> None:
+        self._events.append(StatusText(severity, text))
