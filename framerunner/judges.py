@@ -66,10 +66,13 @@ class TruthJudge:
         url: of its `referee.json`.
         session: for asking.
         scenario: what is flown.
+        source: what its referee sees by, as it says itself.
     """
 
-    def __init__(self, url: str, session: aiohttp.ClientSession, scenario: Scenario) -> None:
-        self.source = "truth"
+    def __init__(
+        self, url: str, session: aiohttp.ClientSession, scenario: Scenario, source: str = "truth"
+    ) -> None:
+        self.source = source
         self._url = url
         self._session = session
         self._substitute = TelemetryJudge(scenario)
@@ -171,7 +174,8 @@ async def choose_judge(
         url = urlunsplit((parts.scheme, parts.netloc, "/referee.json", "", ""))
         answer = await ask_referee(url, session)
         if answer is not None and answer.get("scenario") == scenario.name:
-            return TruthJudge(url, session, scenario)
+            # The virtual camera's referee lives on telemetry, and says so.
+            return TruthJudge(url, session, scenario, str(answer.get("source", "truth")))
     return TelemetryJudge(scenario)
 
 

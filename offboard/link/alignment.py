@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from math import cos, pi, remainder, sin
 
-from scenarios.axes import Vec3, flip_vector, flip_yaw
+from scenarios.axes import Quaternion, Vec3, flip_quaternion, flip_vector, flip_yaw
 
 
 @dataclass(frozen=True, slots=True)
@@ -54,6 +54,12 @@ class Alignment:
     def vector(self, vector_ned: Vec3) -> Vec3:
         """A local NED velocity in arena axes."""
         return self._turned(flip_vector(vector_ned))
+
+    def attitude(self, attitude_ned: Quaternion) -> Quaternion:
+        """An attitude, body FRD to NED, as body FLU to arena: quaternions (w, x, y, z)."""
+        w, x, y, z = flip_quaternion(attitude_ned)
+        c, s = cos(self._turn_rad / 2), sin(self._turn_rad / 2)
+        return (c * w - s * z, c * x - s * y, c * y + s * x, c * z + s * w)
 
     def _turned(self, vector: Vec3) -> Vec3:
         x, y, z = vector

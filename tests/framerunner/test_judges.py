@@ -59,6 +59,13 @@ async def test_the_simulator_of_the_camera_is_the_judge():
         assert (standing.try_time_s, standing.crossed, standing.contacts) == (7.5, ("red",), 1)
 
 
+async def test_a_referee_that_lives_on_telemetry_is_not_taken_for_the_truth():
+    async with referee({**answer(), "source": "telemetry"}) as (root, session, _):
+        judge = await choose_judge(SCENARIO, f"{root}/video", session)
+        assert isinstance(judge, TruthJudge)
+        assert judge.source == "telemetry"
+
+
 @pytest.mark.parametrize("body", [answer("another-place"), "not json", {"weather": "fine"}], ids=str)
 async def test_whoever_is_not_the_referee_of_this_scenario_does_not_judge(body):
     async with referee(body) as (root, session, _):

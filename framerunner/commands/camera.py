@@ -1,0 +1,56 @@
+"""`framerunner camera`: the arena's camera image for any drone that tells its pose."""
+
+from __future__ import annotations
+
+import asyncio
+import sys
+from typing import Annotated
+
+from cyclopts import Parameter
+
+from framerunner.commands.options import WholeNumber
+from framerunner.errors import SettingError
+
+
+def camera(
+    *,
+    drone: Annotated[
+        str, Parameter(help="MAVLink URL on which the drone is heard")
+    ] = "udpin://127.0.0.1:14550",
+    scenario: Annotated[
+        str, Parameter(help="name or file of the scenario whose frames are seen")
+    ] = "test-case-1",
+    bind: Annotated[str, Parameter(help="address to serve the video on")] = "127.0.0.1",
+    port: Annotated[WholeNumber, Parameter(help="TCP port of the video")] = 8080,
+) -> int:
+    """Paint what a camera on a drone would see of the arena, from the pose that the drone reports.
+
+    For a drone without frames around it: a genuine PX4 SITL, or a real drone in an empty hall. Put it on
+    its start and start this while it is disarmed: the arena is laid so that the drone stands on the
+    scenario's start, looking the start's way, whatever its compass says. Video and `/referee.json` are
+    those of `framerunner sim`. Stop it with Ctrl-C.
+
+    **Examples**
+
+        framerunner camera --scenario test-case-1
+
+        framerunner camera --drone udpin://127.0.0.1:14550 --scenario test-case-1 --port 8081
+
+        framerunner camera --drone serial:///dev/ttyUSB1:921600 --scenario my_hall.yaml --bind 0.0.0.0
+    """
+    if not 1 <= port <= 65535:
+        raise SettingError(f"--port {port}: must be from 1 to 65535")
+
+    from framerunner.vehicle_link import VehicleLink
+    from framerunner.virtual_camera.server import COMPONENT_ID, SYSTEM_ID, CameraServer
+    from scenarios.loader import load_scenario
+    from sitl.video import VideoServer
+
+    loaded = load_scenario(scenario)
+    link = VehicleLink(drone, system_id=SYSTEM_ID, component_id=COMPONENT_ID)
+    asyncio.run(CameraServer(loaded, link, VideoServer(bind, port), _say).run())
+    return 0
+
+
+def _say(line: str) -> None:
+    print(line, file=sys.stderr, flush=True)

@@ -1,0 +1,186 @@
+"""From a vehicle's telemetry to the arena's images and the referee's view of the flight.
+
+No clock and no socket: time is the vehicle's, messages come in, images come out.
+"""
+
+from __future__ import annotations
+
+from dataclasses import asdict
+from math import isfinite
+
+from firmware_py.airframe import load_airframe
+from framerunner.vehicle_link import Message
+from framerunner.virtual_camera.history import (
+    AHEAD_US,
+    AttitudeReport,
+    PoseHistory,
+    PositionReport,
+    quaternion_from_euler,
+)
+from framerunner.virtual_camera.placement import Placement
+from offboard.link.alignment import Pose
+from scenarios.ground import start_position
+from scenarios.models import Scenario
+from scenarios.referee import Referee
+from scenarios.truth import TrueState
+from sitl.camera import Camera, Image
+from sitl.camera_feed import FIRST_EXPOSURE_US
+
+REFEREE_STEP_US = 20_000
+ARMED_FLAG = 128  # MAV_MODE_FLAG_SAFETY_ARMED
+
+
+def start_pose(scenario: Scenario) -> Pose:
+    """Where the drone's centre is at first, arena axes."""
+    x_m, y_m, z_m = start_position(scenario)
+    height_m = load_airframe(scenario.airframe).envelope_m[2]
+    return Pose((x_m, y_m, z_m + height_m / 2), scenario.start.yaw_rad)
+
+
+class VirtualCamera:
+    """Paints what a camera on the vehicle would see of the arena, and referees by the same poses.
+
+    Exposures are on the grid of the simulated camera, on the vehicle's clock. An image is handed out when
+    that clock is past its exposure by the camera's latency and the pose there is known: by then the next
+    reports have come, so that nothing is guessed at usual rates.
+
+    Args:
+        scenario: what is to be seen.
+
+    Attributes:
+        placement: of the arena at the vehicle.
+        history: of the vehicle's reports.
+        attitudes: reports of attitude so far.
+        positions: reports of position so far.
+        images: painted so far.
+        restarts: how often the vehicle began anew.
+    """
+
+    def __init__(self, scenario: Scenario) -> None:
+        self._scenario = scenario
+        self._camera = Camera(scenario)
+        self._envelope_m = load_airframe(scenario.airframe).envelope_m
+        self._period_us = 1e6 / scenario.camera.rate_hz
+        self._latency_us = round(scenario.camera.latency_s * 1e6)
+        self.attitudes = self.positions = self.images = self.restarts = 0
+        self._begin()
+
+    def _begin(self) -> None:
+        """Know nothing of the vehicle."""
+        self.history = PoseHistory()
+        self.placement = Placement(start_pose(self._scenario))
+        self._referee = Referee(self._scenario, self._envelope_m)
+        self._judged_us = 0
+        self._next = 0
+        self._motors_on = False
+
+    def take(self, message: Message) -> None:
+        """Take one of the vehicle's messages; those that tell nothing of its pose are passed over."""
+        kind = message.get_type()
+        if kind == "ATTITUDE_QUATERNION":
+            self.attitudes += 1
+            self.history.add_attitude(
+                AttitudeReport(
+                    message.time_boot_ms * 1000,
+                    (message.q1, message.q2, message.q3, message.q4),
+                    (message.rollspeed, message.pitchspeed, message.yawspeed),
+                )
+            )
+        elif kind == "ATTITUDE":
+            self.attitudes += 1
+            self._take_angles(message)
+        elif kind == "LOCAL_POSITION_NED":
+            self.positions += 1
+            self.history.add_position(
+                PositionReport(
+                    message.time_boot_ms * 1000,
+                    (message.x, message.y, message.z),
+                    (message.vx, message.vy, message.vz),
+                )
+            )
+        elif kind == "HEARTBEAT":
+            armed = bool(message.base_mode & ARMED_FLAG)
+            self.placement.see_heartbeat(self.history.newest_us or 0, armed)
+            return
+        else:
+            return
+        self._follow()
+
+    def step(self) -> tuple[int, Image] | None:
+        """Paint the image that is due.
+
+        After a hole in the telemetry only the latest exposure is made up for.
+
+        Returns:
+            Time of exposure, microseconds of vehicle time, and the image; None if none is due.
+        """
+        now_us, covered_us = self.history.newest_us, self.history.covered_us
+        if now_us is None or covered_us is None:
+            return None
+        index = int((now_us - self._latency_us - FIRST_EXPOSURE_US) // self._period_us)
+        if index < self._next:
+            return None
+        exposure_us = round(FIRST_EXPOSURE_US + index * self._period_us)
+        if exposure_us > covered_us + AHEAD_US:
+            return None
+        pose = self.history.pose(exposure_us)
+        where = None if pose is None else self.placement.arena_pose(pose)
+        if where is None:
+            return None
+        self._next = index + 1
+        self.images += 1
+        return exposure_us, self._camera.render(where.position_arena_m, where.attitude_arena)
+
+    def standing(self, state: str = "", ended: str | None = None) -> dict[str, object]:
+        """What `/referee.json` tells, in the simulator's form.
+
+        Args:
+            state: the mission's, for the report.
+            ended: why the flight was broken off, if it was.
+        """
+        return {
+            "scenario": self._scenario.name,
+            "source": "telemetry",
+            "time_us": self.history.newest_us or 0,
+            "snapshot": asdict(self._referee.snapshot()),
+            "report": self._referee.report(state, ended).as_dict(),
+        }
+
+    def _take_angles(self, message: Message) -> None:
+        angles = (message.roll, message.pitch, message.yaw)
+        if not all(map(isfinite, angles)):
+            return
+        self.history.add_attitude(
+            AttitudeReport(
+                message.time_boot_ms * 1000,
+                quaternion_from_euler(*angles),
+                (message.rollspeed, message.pitchspeed, message.yawspeed),
+            )
+        )
+
+    def _follow(self) -> None:
+        """Let placement and referee see the vehicle where both kinds of reports have come to."""
+        if self.history.restarts:
+            self.restarts += 1
+            self._begin()
+            return
+        covered_us = self.history.covered_us
+        if covered_us is None or covered_us < self._judged_us + REFEREE_STEP_US:
+            return
+        pose = self.history.pose(covered_us)
+        if pose is None:
+            return
+        self._judged_us = covered_us
+        self.placement.see_pose(pose)
+        where = self.placement.arena_pose(pose)
+        if where is None:
+            return
+        armed = bool(self.placement.armed)
+        if armed and not self._motors_on and self._referee.over:
+            self._referee = Referee(self._scenario, self._envelope_m)  # a new try
+        self._motors_on = armed
+        self._referee.update(
+            TrueState(
+                covered_us, where.position_arena_m, where.velocity_arena_m_s, where.attitude_arena, armed
+            )
+        )
