@@ -1,0 +1,221 @@
+"""Writes a log of each flight, from arming to disarming (PX4's SDLOG_MODE 0), into the vehicle's storage.
+
+What was flown so far can be read and downloaded at any time; it reaches the storage once a second.
+"""
+
+from __future__ import annotations
+
+import errno
+from collections.abc import Callable
+from dataclasses import dataclass
+
+from firmware_py.mavlink.port import AutopilotPort
+from firmware_py.mavlink.version import FOLLOWED_PX4_VERSION, OWN_VERSION, packed_version
+from firmware_py.storage import Path, Storage
+from firmware_py.ulog import messages
+from firmware_py.ulog.topics import LOGGED, STATUS_TOPIC, Logged, Sample
+
+_FLUSH_US = 1_000_000
+_WARNING = 4
+_LOG_FOLDER: Path = ("log",)
+_GPS_DATA_FORMAT = 2  # vehicle_gps_position in degrees: Flight Review asks
+
+NameLog = Callable[[int], Path]
+"""Vehicle time in microseconds to the path of a log that begins then."""
+
+
+def name_by_time(time_us: int) -> Path:
+    """A log's path where the time of day is not known, in the manner of PX4's sess001/log001.ulg."""
+    return ("log", "sess001", f"log{time_us // 1_000_000:06d}.ulg")
+
+
+@dataclass(slots=True)
+class _Due:
+    """Topics of one rate and when they are due."""
+
+    period_us: int
+    topics: tuple[Logged, ...]
+    next_us: int = 0
+
+
+class UlogRecorder:
+    """Records flights.
+
+    Args:
+        storage: where logs go; the oldest make room when it is full.
+        name_log: how they are called.
+        boot_unix_us: time of boot in microseconds since 1970; 0: not known.
+
+    Attributes:
+        path: of the log being written; None between flights.
+    """
+
+    def __init__(self, storage: Storage, name_log: NameLog = name_by_time, *, boot_unix_us: int = 0) -> None:
+        self._storage = storage
+        self._name_log = name_log
+        self._boot_unix_us = boot_unix_us
+        self.path: Path | None = None
+        self._buffer = bytearray()
+        self._size = 0
+        self._paused = False  # until the next flight
+        self._groups = _by_rate()
+        self._due_us = 0
+        self._flush_us = 0
+        self._heard: AutopilotPort | None = None
+        self._nav: tuple[object, ...] = ()
+
+    def update(self, autopilot: AutopilotPort) -> None:
+        """Log what is due; called every control tick, after the autopilot's step."""
+        status = autopilot.status
+        if self.path is None:
+            if not status.armed:
+                self._paused = False
+                return
+            if self._paused:
+                return
+            self._begin(autopilot)
+        time_us = autopilot.state.time_us
+        if not status.armed:
+            self._end(autopilot, time_us)
+            return
+        nav = (status.mode, status.intended_mode, status.failsafe)
+        if nav != self._nav:
+            self._nav = nav
+            self._log(STATUS_TOPIC, self._sample(autopilot, time_us))
+        if time_us >= self._due_us:
+            self._log_due(autopilot, time_us)
+        if time_us >= self._flush_us:
+            self._flush_us = time_us + _FLUSH_US
+            self._flush(autopilot)
+
+    def hear_text(self, time_us: int, severity: int, text: str) -> None:
+        """Log what was said to people (STATUSTEXT); nothing happens between flights."""
+        if self.path is not None:
+            self._buffer += messages.logged_text(time_us, severity, text)
+
+    def _hear_parameter(self, name: str, value: float) -> None:
+        if self.path is not None and self._heard is not None:
+            self._buffer += messages.parameter(self._heard.parameters.declaration(name), value)
+
+    def _begin(self, autopilot: AutopilotPort) -> None:
+        if self._heard is None:
+            self._heard = autopilot
+            autopilot.parameters.on_change(self._hear_parameter)
+        time_us = autopilot.state.time_us
+        self.path = self._name_log(time_us)
+        self._size = 0
+        self._nav = ()
+        self._due_us = self._flush_us = time_us
+        for group in self._groups:
+            group.next_us = time_us
+        self._buffer = bytearray(self._definitions(autopilot, time_us))
+
+    def _definitions(self, autopilot: AutopilotPort, time_us: int) -> bytes:
+        """All that comes before the data."""
+        parameters = autopilot.parameters
+        own = ".".join(map(str, OWN_VERSION))
+        system_id = parameters.integer("MAV_SYS_ID")
+        parts = [messages.file_header(time_us)]
+        parts += [
+            messages.text_information("sys_name", "PX4"),
+            messages.text_information("ver_hw", "PX4_SITL"),
+            messages.text_information("ver_hw_subtype", f"framerunner {autopilot.airframe.name}"),
+            messages.text_information("ver_sw", f"framerunner {own}"),
+            messages.number_information("ver_sw_release", packed_version(FOLLOWED_PX4_VERSION)),
+            messages.text_information("sys_os_name", "framerunner"),
+            messages.number_information("sys_os_ver_release", packed_version(OWN_VERSION)),
+            messages.text_information("sys_uuid", f"66726d72{system_id:08x}"),
+            messages.number_information("ver_data_format", _GPS_DATA_FORMAT),
+            messages.number_information("time_ref_utc", 0, "int32_t"),
+        ]
+        parts += [each.topic.definition() for each in LOGGED]
+        for declared in parameters.declarations:
+            value = parameters.value(declared.name)
+            parts.append(messages.parameter(declared, value))
+            if value != declared.default:
+                parts.append(messages.parameter_default(declared))
+        parts += [each.topic.subscription() for each in LOGGED]
+        return b"".join(parts)
+
+    def _end(self, autopilot: AutopilotPort, time_us: int) -> None:
+        sample = self._sample(autopilot, time_us)
+        for each in LOGGED:
+            self._log(each, sample)
+        self._flush(autopilot)
+        self.path = None
+
+    def _sample(self, autopilot: AutopilotPort, time_us: int) -> Sample:
+        unix_us = self._boot_unix_us + time_us if self._boot_unix_us else 0
+        return Sample(autopilot, time_us, unix_us, autopilot.global_position())
+
+    def _log_due(self, autopilot: AutopilotPort, time_us: int) -> None:
+        sample = self._sample(autopilot, time_us)
+        for group in self._groups:
+            if time_us >= group.next_us:
+                group.next_us = max(group.next_us + group.period_us, time_us - group.period_us)
+                for each in group.topics:
+                    self._log(each, sample)
+        self._due_us = min(group.next_us for group in self._groups)
+
+    def _log(self, logged: Logged, sample: Sample) -> None:
+        values = logged.collect(sample)
+        if values is not None:
+            self._buffer += logged.topic.header
+            self._buffer += logged.topic.values.pack(*values)
+
+    def _flush(self, autopilot: AutopilotPort) -> None:
+        """Hand over what was gathered; a log that was erased meanwhile begins anew."""
+        path = self.path
+        if path is None:
+            return
+        try:
+            self._append(path)
+        except FileNotFoundError:
+            self._size = 0
+            self._buffer = bytearray(self._definitions(autopilot, autopilot.state.time_us))
+        except OSError as error:
+            autopilot.say(_WARNING, f"Logging stopped: {error.strerror or error}")
+            self.path = None
+            self._paused = True
+
+    def _append(self, path: Path) -> None:
+        while True:
+            try:
+                if self._size == 0:
+                    self._make(path)
+                self._storage.write(path, self._size, bytes(self._buffer))
+            except OSError as error:
+                if error.errno != errno.ENOSPC or not self._remove_oldest(path):
+                    raise
+            else:
+                self._size += len(self._buffer)
+                self._buffer.clear()
+                return
+
+    def _remove_oldest(self, current: Path) -> bool:
+        """Remove the oldest log but the one being written; whether there was one."""
+        for folder in self._storage.entries(_LOG_FOLDER):
+            if not folder.is_folder:
+                continue
+            where = (*_LOG_FOLDER, folder.name)
+            for log in self._storage.entries(where):
+                path = (*where, log.name)
+                if path != current and not log.is_folder:
+                    self._storage.remove(path)
+                    return True
+        return False
+
+    def _make(self, path: Path) -> None:
+        for depth in range(1, len(path)):
+            try:
+                self._storage.make_folder(path[:depth])
+            except FileExistsError:
+                continue
+        self._storage.create(path)
+
+
+def _by_rate() -> tuple[_Due, ...]:
+    periods = sorted({each.period_us for each in LOGGED})
+    return tuple(
+        _Due(period, tuple(each for each in LOGGED if each.period_us == period)) for period in periods
+    )

@@ -1,0 +1,424 @@
+"""What is logged: PX4's topics, with the fields of PX4 v1.17's messages that this vehicle has something for.
+
+A log describes itself, and its readers look for fields by name; so what does not exist here (reset counters,
+airspeed, a second anything) is left out instead of filled with zeros.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from math import atan2, hypot, nan
+
+from firmware_py.mavlink.port import AutopilotPort
+from firmware_py.mavlink.sensing import EARTH_FIELD_NED_GAUSS, pressure_hpa, temperature_k, to_body
+from firmware_py.status import FlightMode, LandedState
+from firmware_py.types import GeodeticPoint
+from firmware_py.ulog.messages import Topic
+
+Values = tuple[float, ...]
+
+_MOTORS = 12
+_OUTPUTS = 16
+_PWM_DISARMED_US, _PWM_LOW_US, _PWM_SPAN_US = 900.0, 1000.0, 1000.0
+_FAST_US = 20_000  # 50 Hz
+_USUAL_US = 100_000
+_SLOW_US = 500_000
+_ARMED, _DISARMED = 2, 1  # vehicle_status.arming_state
+_ROTARY_WING = 1
+# vehicle_status.nav_state
+_NAV_STATES = {
+    FlightMode.MANUAL: 0,
+    FlightMode.ALTITUDE: 1,
+    FlightMode.POSITION: 2,
+    FlightMode.MISSION: 3,
+    FlightMode.HOLD: 4,
+    FlightMode.RETURN: 5,
+    FlightMode.ACRO: 10,
+    FlightMode.TERMINATION: 13,
+    FlightMode.OFFBOARD: 14,
+    FlightMode.STABILIZED: 15,
+    FlightMode.TAKEOFF: 17,
+    FlightMode.LAND: 18,
+    FlightMode.FOLLOW: 19,
+    FlightMode.ORBIT: 21,
+}
+# estimator_status.control_mode_flags: tilt and yaw aligned, GNSS position, magnetic heading, barometer
+# height, GNSS velocity; the bit in between says that it flies.
+_ESTIMATOR_MODE = 1 << 0 | 1 << 1 | 1 << 2 | 1 << 4 | 1 << 9 | 1 << 44
+_ESTIMATOR_IN_AIR = 1 << 7
+_SOLUTION_GOOD = 0x033F  # attitude, velocities and positions; no height above ground, not standing still
+
+
+@dataclass(frozen=True, slots=True)
+class Sample:
+    """One moment, with what several topics need worked out once.
+
+    Attributes:
+        autopilot: whose moment.
+        time_us: vehicle time.
+        unix_us: the same since 1970; 0: not known.
+        place: where on Earth; None: not known.
+    """
+
+    autopilot: AutopilotPort
+    time_us: int
+    unix_us: int
+    place: GeodeticPoint | None
+
+
+Collector = Callable[[Sample], Values | None]
+"""Values of one sample in the topic's order; None: there is nothing to log."""
+
+
+def _attitude(sample: Sample) -> Values:
+    time_us = sample.time_us
+    return (time_us, time_us, *sample.autopilot.state.attitude, 0.0, 0.0, 0.0, 0.0, 0)
+
+
+def _attitude_setpoint(sample: Sample) -> Values | None:
+    followed = sample.autopilot.status.setpoint
+    if followed.attitude is None:
+        return None
+    yaw_rate_rad_s = followed.yaw_rate_rad_s
+    return (sample.time_us, yaw_rate_rad_s, *followed.attitude, 0.0, 0.0, -followed.thrust)
+
+
+def _rates_setpoint(sample: Sample) -> Values | None:
+    followed = sample.autopilot.status.setpoint
+    if followed.rate_frd_rad_s is None:
+        return None
+    return (sample.time_us, *followed.rate_frd_rad_s, 0.0, 0.0, -followed.thrust)
+
+
+def _angular_velocity(sample: Sample) -> Values:
+    return (sample.time_us, sample.time_us, *sample.autopilot.state.angular_rate_frd_rad_s)
+
+
+def _sensor_combined(sample: Sample) -> Values:
+    state = sample.autopilot.state
+    turning, pulling = state.angular_rate_frd_rad_s, state.specific_force_frd_m_s2
+    return (sample.time_us, *turning, 4000, 0, *pulling, 4000, 0, 0, 0, 0)
+
+
+def _thrust_setpoint(sample: Sample) -> Values:
+    return (sample.time_us, sample.time_us, 0.0, 0.0, -sample.autopilot.output.throttle)
+
+
+def _actuator_motors(sample: Sample) -> Values:
+    """Thrust of each motor as a share of the most; NaN while it must not turn, as PX4's."""
+    autopilot = sample.autopilot
+    speeds, full_rad_s = autopilot.output.speeds_rad_s, autopilot.airframe.motor.max_speed_rad_s
+    turning = speeds[:_MOTORS] if autopilot.status.armed else ()
+    shares = [(speed / full_rad_s) ** 2 for speed in turning]
+    return (sample.time_us, sample.time_us, *shares, *[nan] * (_MOTORS - len(shares)), 0)
+
+
+def _actuator_outputs(sample: Sample) -> Values:
+    """Pulses in microseconds, as SERVO_OUTPUT_RAW."""
+    autopilot = sample.autopilot
+    speeds, full_rad_s = autopilot.output.speeds_rad_s, autopilot.airframe.motor.max_speed_rad_s
+    count = min(len(speeds), _OUTPUTS)
+    if autopilot.status.armed:
+        pulses = [_PWM_LOW_US + _PWM_SPAN_US * speed / full_rad_s for speed in speeds[:count]]
+    else:
+        pulses = [_PWM_DISARMED_US] * count
+    return (sample.time_us, count, *pulses, *[0.0] * (_OUTPUTS - count))
+
+
+def _local_position(sample: Sample) -> Values | None:
+    state, origin = sample.autopilot.state, sample.autopilot.status.origin
+    if origin is None:
+        return None
+    return (
+        sample.time_us,
+        sample.time_us,
+        0,
+        origin.latitude_deg,
+        origin.longitude_deg,
+        *state.position_ned_m,
+        *state.velocity_ned_m_s,
+        state.velocity_ned_m_s[2],
+        state.yaw_rad,
+        origin.altitude_m,
+        nan,
+        0.0,
+        0.0,
+        *(True, True, True, True, True, True, True, False, False),
+    )
+
+
+def _local_position_setpoint(sample: Sample) -> Values:
+    followed = sample.autopilot.status.setpoint
+    return (
+        sample.time_us,
+        *followed.position_ned_m,
+        *followed.velocity_ned_m_s,
+        *followed.acceleration_ned_m_s2,
+        nan,
+        nan,
+        -sample.autopilot.output.throttle,
+        followed.yaw_rad,
+        followed.yaw_rate_rad_s,
+    )
+
+
+def _global_position(sample: Sample) -> Values | None:
+    place = sample.place
+    if place is None:
+        return None
+    return (
+        sample.time_us,
+        sample.time_us,
+        place.latitude_deg,
+        place.longitude_deg,
+        place.altitude_m,
+        place.altitude_m,
+        0.0,
+        0.0,
+        nan,
+        *(True, True, False, False),
+    )
+
+
+def _gps(sample: Sample) -> Values | None:
+    """With the figures of GPS_RAW_INT, which are PX4's simulated ones."""
+    place = sample.place
+    if place is None:
+        return None
+    north_m_s, east_m_s, down_m_s = sample.autopilot.state.velocity_ned_m_s
+    return (
+        sample.time_us,
+        sample.time_us,
+        sample.unix_us,
+        place.latitude_deg,
+        place.longitude_deg,
+        place.altitude_m,
+        place.altitude_m,
+        0.4,
+        0.1,
+        0.9,
+        1.78,
+        0.7,
+        1.1,
+        0,
+        0,
+        hypot(north_m_s, east_m_s),
+        north_m_s,
+        east_m_s,
+        down_m_s,
+        atan2(east_m_s, north_m_s),
+        nan,
+        *(3, 1, 1, True, 10),
+    )
+
+
+def _air_data(sample: Sample) -> Values | None:
+    place = sample.place
+    if place is None:
+        return None
+    altitude_m = place.altitude_m
+    temperature = temperature_k(altitude_m)
+    pressure_pa = pressure_hpa(altitude_m) * 100.0
+    density_kg_m3 = pressure_pa / (287.05 * temperature)  # ideal gas, dry air
+    return (
+        sample.time_us,
+        sample.time_us,
+        altitude_m,
+        pressure_pa,
+        temperature - 273.15,
+        density_kg_m3,
+    )
+
+
+def _magnetometer(sample: Sample) -> Values:
+    field_gauss = to_body(EARTH_FIELD_NED_GAUSS, sample.autopilot.state.attitude)
+    return (sample.time_us, sample.time_us, *field_gauss)
+
+
+def _land_detected(sample: Sample) -> Values:
+    landed = sample.autopilot.status.landed_state is LandedState.ON_GROUND
+    low_throttle = sample.autopilot.output.throttle < 0.1
+    return (sample.time_us, False, landed, landed, landed, low_throttle)
+
+
+def _battery(sample: Sample) -> Values:
+    battery = sample.autopilot.battery
+    warning = max(battery.warning - 1, 0)  # MAV_BATTERY_CHARGE_STATE counts from 1
+    return (
+        sample.time_us,
+        battery.voltage_v,
+        battery.current_a,
+        battery.current_a,
+        battery.used_mah,
+        battery.remaining,
+        1.0,
+        nan,
+        nan,
+        *(True, battery.cells, 1, warning),
+    )
+
+
+def _vehicle_status(sample: Sample) -> Values:
+    autopilot = sample.autopilot
+    status, flight = autopilot.status, autopilot.flight
+    return (
+        sample.time_us,
+        flight.armed_us if status.armed else 0,
+        flight.takeoff_us,
+        _ARMED if status.armed else _DISARMED,
+        _NAV_STATES[status.intended_mode],
+        _NAV_STATES[status.mode],
+        0,
+        _ROTARY_WING,
+        status.failsafe,
+        *(False, False, False, False, False),
+        2,
+        autopilot.parameters.integer("MAV_SYS_ID"),
+        1,
+        status.ready,
+    )
+
+
+def _estimator_status(sample: Sample) -> Values:
+    flying = sample.autopilot.status.landed_state is not LandedState.ON_GROUND
+    return (
+        sample.time_us,
+        sample.time_us,
+        _ESTIMATOR_MODE | (_ESTIMATOR_IN_AIR if flying else 0),
+        0,
+        *[0.0] * 11,
+        0,
+        _SOLUTION_GOOD,
+        0,
+        0,
+    )
+
+
+@dataclass(frozen=True, slots=True)
+class Logged:
+    """A topic, how often it is logged, and where its values come from."""
+
+    topic: Topic
+    period_us: int
+    collect: Collector
+
+
+_T = "uint64_t timestamp; "
+_TT = _T + "uint64_t timestamp_sample; "
+
+_LAYOUTS: tuple[tuple[str, int, Collector, str], ...] = (
+    (
+        "vehicle_attitude",
+        _FAST_US,
+        _attitude,
+        _TT + "float[4] q; float[4] delta_q_reset; uint8_t quat_reset_counter",
+    ),
+    (
+        "vehicle_attitude_setpoint",
+        _FAST_US,
+        _attitude_setpoint,
+        _T + "float yaw_sp_move_rate; float[4] q_d; float[3] thrust_body",
+    ),
+    (
+        "vehicle_rates_setpoint",
+        _FAST_US,
+        _rates_setpoint,
+        _T + "float roll; float pitch; float yaw; float[3] thrust_body",
+    ),
+    ("vehicle_angular_velocity", _FAST_US, _angular_velocity, _TT + "float[3] xyz"),
+    (
+        "sensor_combined",
+        _FAST_US,
+        _sensor_combined,
+        _T + "float[3] gyro_rad; uint32_t gyro_integral_dt; int32_t accelerometer_timestamp_relative; "
+        "float[3] accelerometer_m_s2; uint32_t accelerometer_integral_dt; uint8_t accelerometer_clipping; "
+        "uint8_t gyro_clipping; uint8_t accel_calibration_count; uint8_t gyro_calibration_count",
+    ),
+    ("vehicle_thrust_setpoint", _FAST_US, _thrust_setpoint, _TT + "float[3] xyz"),
+    ("actuator_motors", _FAST_US, _actuator_motors, _TT + "float[12] control; uint16_t reversible_flags"),
+    ("actuator_outputs", _USUAL_US, _actuator_outputs, _T + "uint32_t noutputs; float[16] output"),
+    (
+        "vehicle_local_position",
+        _USUAL_US,
+        _local_position,
+        _TT + "uint64_t ref_timestamp; double ref_lat; double ref_lon; float x; float y; float z; float vx; "
+        "float vy; float vz; float z_deriv; float heading; float ref_alt; float dist_bottom; float eph; "
+        "float epv; bool xy_valid; bool z_valid; bool v_xy_valid; bool v_z_valid; "
+        "bool heading_good_for_control; bool xy_global; bool z_global; bool dist_bottom_valid; "
+        "bool dead_reckoning",
+    ),
+    (
+        "vehicle_local_position_setpoint",
+        _USUAL_US,
+        _local_position_setpoint,
+        _T
+        + "float x; float y; float z; float vx; float vy; float vz; float[3] acceleration; float[3] thrust; "
+        "float yaw; float yawspeed",
+    ),
+    (
+        "vehicle_global_position",
+        _USUAL_US,
+        _global_position,
+        _TT
+        + "double lat; double lon; float alt; float alt_ellipsoid; float eph; float epv; float terrain_alt; "
+        "bool lat_lon_valid; bool alt_valid; bool terrain_alt_valid; bool dead_reckoning",
+    ),
+    (
+        "vehicle_gps_position",
+        _USUAL_US,
+        _gps,
+        _TT + "uint64_t time_utc_usec; double latitude_deg; double longitude_deg; double altitude_msl_m; "
+        "double altitude_ellipsoid_m; float s_variance_m_s; float c_variance_rad; float eph; float epv; "
+        "float hdop; float vdop; int32_t noise_per_ms; int32_t jamming_indicator; float vel_m_s; "
+        "float vel_n_m_s; float vel_e_m_s; float vel_d_m_s; float cog_rad; float heading; uint8_t fix_type; "
+        "uint8_t jamming_state; uint8_t spoofing_state; bool vel_ned_valid; uint8_t satellites_used",
+    ),
+    (
+        "vehicle_air_data",
+        _USUAL_US,
+        _air_data,
+        _TT + "float baro_alt_meter; float baro_pressure_pa; float ambient_temperature; float rho",
+    ),
+    ("vehicle_magnetometer", _USUAL_US, _magnetometer, _TT + "float[3] magnetometer_ga"),
+    (
+        "vehicle_land_detected",
+        _USUAL_US,
+        _land_detected,
+        _T + "bool freefall; bool ground_contact; bool maybe_landed; bool landed; bool has_low_throttle",
+    ),
+    (
+        "battery_status",
+        _SLOW_US,
+        _battery,
+        _T + "float voltage_v; float current_a; float current_average_a; float discharged_mah; "
+        "float remaining; float scale; float time_remaining_s; float temperature; bool connected; "
+        "uint8_t cell_count; uint8_t id; uint8_t warning",
+    ),
+    (
+        "vehicle_status",
+        _SLOW_US,
+        _vehicle_status,
+        _T + "uint64_t armed_time; uint64_t takeoff_time; uint8_t arming_state; "
+        "uint8_t nav_state_user_intention; uint8_t nav_state; uint8_t hil_state; uint8_t vehicle_type; "
+        "bool failsafe; bool failsafe_and_user_took_over; bool gcs_connection_lost; bool is_vtol; "
+        "bool in_transition_mode; bool in_transition_to_fw; uint8_t system_type; uint8_t system_id; "
+        "uint8_t component_id; bool pre_flight_checks_pass",
+    ),
+    (
+        "estimator_status",
+        _SLOW_US,
+        _estimator_status,
+        _TT + "uint64_t control_mode_flags; uint32_t filter_fault_flags; float[3] output_tracking_error; "
+        "float pos_horiz_accuracy; float pos_vert_accuracy; float hdg_test_ratio; float vel_test_ratio; "
+        "float pos_test_ratio; float hgt_test_ratio; float tas_test_ratio; float time_slip; "
+        "uint16_t gps_check_fail_flags; uint16_t solution_status_flags; uint8_t health_flags; "
+        "uint8_t timeout_flags",
+    ),
+)
+
+LOGGED = tuple(
+    Logged(Topic(name, fields, number), period_us, collect)
+    for number, (name, period_us, collect, fields) in enumerate(_LAYOUTS)
+)
+STATUS_TOPIC = next(each for each in LOGGED if each.topic.name == "vehicle_status")
