@@ -21,17 +21,24 @@ _STALE_US = 5_000_000
 class StatusTextService:
     """Brings the autopilot's texts to people."""
 
-    __slots__ = ("_announce", "_exchange", "_last_id", "_waiting")
+    __slots__ = ("_announce", "_exchange", "_last_id", "_log", "_waiting")
 
-    def __init__(self, exchange: Exchange, announce: Callable[[StatusText], bool] | None = None) -> None:
+    def __init__(
+        self,
+        exchange: Exchange,
+        announce: Callable[[StatusText], bool] | None = None,
+        log: Callable[[int, StatusText], None] | None = None,
+    ) -> None:
         """Speak on an exchange's links.
 
         Args:
             exchange: whose texts.
             announce: tells a text as an event, if there is one that says the same, and answers whether.
+            log: called with vehicle time and each text, heard by anybody or not.
         """
         self._exchange = exchange
         self._announce = announce
+        self._log = log
         self._last_id = 0
         self._waiting: dict[str, deque[tuple[int, list[Message]]]] = {}
 
@@ -39,6 +46,8 @@ class StatusTextService:
         """Take the autopilot's new texts and send what can be sent."""
         exchange = self._exchange
         for said in exchange.autopilot.take_texts():
+            if self._log is not None:
+                self._log(exchange.time_us, said)
             told = self._announce is not None and self._announce(said)
             text = StatusText(said.severity, f"{said.text}\t") if told else said
             pieces = self._pieces(text)

@@ -12,6 +12,7 @@ from dataclasses import dataclass
 from firmware_py.mavlink.port import AutopilotPort
 from firmware_py.mavlink.version import FOLLOWED_PX4_VERSION, OWN_VERSION, packed_version
 from firmware_py.storage import Path, Storage
+from firmware_py.types import StatusText
 from firmware_py.ulog import messages
 from firmware_py.ulog.topics import LOGGED, STATUS_TOPIC, Logged, Sample
 
@@ -88,10 +89,10 @@ class UlogRecorder:
             self._flush_us = time_us + _FLUSH_US
             self._flush(autopilot)
 
-    def hear_text(self, time_us: int, severity: int, text: str) -> None:
-        """Log what was said to people (STATUSTEXT); nothing happens between flights."""
+    def hear_text(self, time_us: int, said: StatusText) -> None:
+        """Log what was said to people at a vehicle time; nothing happens between flights."""
         if self.path is not None:
-            self._buffer += messages.logged_text(time_us, severity, text)
+            self._buffer += messages.logged_text(time_us, said.severity, said.text)
 
     def _hear_parameter(self, name: str, value: float) -> None:
         if self.path is not None and self._heard is not None:

@@ -12,7 +12,7 @@ from firmware_py.airframe import load_airframe
 from firmware_py.autopilot import Autopilot
 from firmware_py.parameters import Parameters
 from firmware_py.status import CommandResult
-from firmware_py.types import GeodeticPoint
+from firmware_py.types import GeodeticPoint, StatusText
 from firmware_py.ulog import UlogRecorder
 from scenarios.models import Scenario
 from sitl.storage import MemoryStorage, StorageLimits
@@ -73,7 +73,7 @@ class Flight:
     def fly(self):
         self.take_off(1.5).run(7.0)
         self.autopilot.parameters.set("MPC_LAND_SPEED", 0.7)
-        self.recorder.hear_text(self.autopilot.state.time_us, 4, "something to worry about")
+        self.recorder.hear_text(self.autopilot.state.time_us, StatusText(4, "something to worry about"))
         self.autopilot.land()
         while self.autopilot.status.armed:
             self.tick()
