@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from math import isfinite
+from struct import pack
 from typing import Literal, Self
 
 from pydantic import BaseModel, ConfigDict, Field, model_validator
@@ -75,6 +76,10 @@ class Parameter(BaseModel):
             there_are = ", ".join(f"{choice} {text}" for choice, text in sorted(self.choices.items()))
             raise ParameterError(f"{self.name}: there is no choice {value:g}; there are {there_are}")
         return int(value) if self.kind == "int32" else float(value)
+
+    def same(self, one: float, other: float) -> bool:
+        """Whether two values are one on MAVLink, which carries floats in four bytes."""
+        return one == other or (self.kind == "float" and pack("<f", one) == pack("<f", other))
 
     def with_default(self, default: float) -> Parameter:
         """The same with another default; a fact becomes another fact.

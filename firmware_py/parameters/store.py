@@ -82,7 +82,7 @@ class Parameters:
         return {
             declared.name: self._values[declared.name]
             for declared in self.declarations
-            if self._values[declared.name] != declared.default
+            if not declared.same(self._values[declared.name], declared.default)
         }
 
     def set(self, name: str, value: float) -> None:
@@ -91,9 +91,12 @@ class Parameters:
         Raises:
             ParameterError: unknown, not finite, not whole or out of range; nothing has changed then.
         """
-        kept = self.declaration(name).checked(value)
-        if kept == self._values[name]:
+        declared = self.declaration(name)
+        kept = declared.checked(value)
+        if declared.same(kept, self._values[name]):
             return
+        if declared.same(kept, declared.default):
+            kept = declared.checked(declared.default)  # as it was declared, with all its digits
         self._values[name] = kept
         self.version += 1
         for listener in self._listeners:

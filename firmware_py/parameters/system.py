@@ -9,7 +9,15 @@ from firmware_py.parameters.declare import Group
 
 MAVLINK = Group("MAVLink")
 
-MAVLINK.whole("MAV_SYS_ID", 1, (1, 250), "", "MAVLink system id", details="Taken at start.", reboot=True)
+MAVLINK.whole(
+    "MAV_SYS_ID",
+    1,
+    (1, 250),
+    "",
+    "MAVLink system id",
+    details="One more than the instance, taken at start.",
+    reboot=True,
+)
 MAVLINK.fact("MAV_COMP_ID", 1, "MAVLink component id of the autopilot")
 MAVLINK.fact("MAV_TYPE", 2, "MAV_TYPE of the vehicle", "2: a quadrotor.")
 MAVLINK.fact("MAV_PROTO_VER", 2, "It speaks MAVLink 2")

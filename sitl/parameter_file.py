@@ -1,0 +1,193 @@
+"""Parameters in a file: what differs from the defaults, a line each, as ground stations write them too.
+
+A line is `vehicle component NAME value type`, separated by tabs (QGroundControl's .params), or `NAME value`
+(MAVProxy's .parm); `#` begins a comment. MAV_SYS_ID is left out both ways: the instance decides it.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import os
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from struct import pack, unpack
+from tempfile import NamedTemporaryFile
+
+from firmware_py.parameters import Parameter, ParameterError, Parameters
+
+SAVE_DELAY_S = 0.5
+"""Changes that follow each other this closely are saved at once."""
+
+_TYPES = {"int32": 6, "float": 9}  # MAV_PARAM_TYPE
+_DECIDED_BY_INSTANCE = "MAV_SYS_ID"
+_NAMED_IN_NOTICE = 5
+
+
+class ParameterFileError(Exception):
+    """A file that cannot be read or written; the message is one line for people."""
+
+
+@dataclass(slots=True)
+class LoadedParameters:
+    """What a file holds.
+
+    Attributes:
+        values: by name; each one can be.
+        unknown: names that this drone has no parameter for, and facts that it cannot change.
+    """
+
+    values: dict[str, float] = field(default_factory=dict)
+    unknown: list[str] = field(default_factory=list)
+
+    def notice(self) -> str:
+        """One line about what was left out; empty when nothing was."""
+        if not self.unknown:
+            return ""
+        some = ", ".join(self.unknown[:_NAMED_IN_NOTICE])
+        more = len(self.unknown) - _NAMED_IN_NOTICE
+        return f"parameters left out, as this drone cannot set them: {some}{f' and {more} more' * (more > 0)}"
+
+
+def load_parameters(path: Path, parameters: Parameters) -> LoadedParameters:
+    """Read a file; one that is not there yet is empty.
+
+    Args:
+        path: of the file.
+        parameters: what there is and can be; it is not changed.
+
+    Raises:
+        ParameterFileError: it cannot be read, or a line is wrong; the message names the line.
+    """
+    try:
+        text = path.read_text(encoding="utf-8")
+    except FileNotFoundError:
+        if not path.parent.is_dir():
+            raise ParameterFileError(f"{path}: there is no folder {path.parent}") from None
+        return LoadedParameters()
+    except UnicodeDecodeError:
+        raise ParameterFileError(f"{path}: is not a text") from None
+    except OSError as error:
+        raise ParameterFileError(f"{path}: cannot be read ({error.strerror})") from error
+    loaded = LoadedParameters()
+    for number, line in enumerate(text.splitlines(), start=1):
+        words = line.partition("#")[0].split()
+        if not words:
+            continue
+        try:
+            _take(loaded, words, parameters)
+        except ParameterError as error:
+            raise ParameterFileError(f"{path}: line {number}: {error}") from None
+    return loaded
+
+
+def _take(loaded: LoadedParameters, words: list[str], parameters: Parameters) -> None:
+    name, value = _name_and_value(words)
+    if name == _DECIDED_BY_INSTANCE:
+        return
+    if name not in parameters:
+        loaded.unknown.append(name)
+        return
+    declared = parameters.declaration(name)
+    if declared.constant:
+        if value != declared.default:
+            loaded.unknown.append(name)
+        return
+    loaded.values[name] = declared.checked(value)
+
+
+def _name_and_value(words: list[str]) -> tuple[str, float]:
+    match words:
+        case [_, _, name, value, _] | [name, value]:
+            pass
+        case _:
+            raise ParameterError(
+                f"{' '.join(words)}: must be `vehicle component NAME value type` or `NAME value`"
+            )
+    try:
+        return name, float(value)
+    except ValueError:
+        raise ParameterError(f"{name}: {value} is not a number") from None
+
+
+def save_parameters(path: Path, changed: Mapping[str, float], parameters: Parameters) -> None:
+    """Write a file, whole or not at all.
+
+    Args:
+        path: of the file; what was in it is gone.
+        changed: values by name.
+        parameters: for the types.
+
+    Raises:
+        ParameterFileError: it cannot be written; what was there is still there.
+    """
+    lines = ["# Parameters that differ from their defaults.", "# Vehicle\tComponent\tName\tValue\tType"]
+    system_id = parameters.integer(_DECIDED_BY_INSTANCE)
+    for name, value in changed.items():
+        if name != _DECIDED_BY_INSTANCE:
+            declared = parameters.declaration(name)
+            lines.append(f"{system_id}\t1\t{name}\t{_shortest(declared, value)}\t{_TYPES[declared.kind]}")
+    temporary: Path | None = None
+    try:
+        with NamedTemporaryFile(
+            "w", encoding="utf-8", dir=path.parent, prefix=f".{path.name}.", delete=False
+        ) as file:
+            temporary = Path(file.name)
+            file.write("\n".join(lines) + "\n")
+            file.flush()
+            os.fsync(file.fileno())
+        temporary.replace(path)
+    except OSError as error:
+        if temporary is not None:
+            temporary.unlink(missing_ok=True)
+        raise ParameterFileError(f"{path}: cannot be written ({error.strerror})") from error
+
+
+def _shortest(declared: Parameter, value: float) -> str:
+    """The fewest digits that mean the same four bytes."""
+    if declared.kind == "int32":
+        return str(int(value))
+    four = pack("<f", value)
+    (value,) = unpack("<f", four)
+    texts = (f"{value:.{digits}g}" for digits in range(1, 10))
+    return next(text for text in texts if pack("<f", float(text)) == four)  # nine always do
+
+
+class ParameterKeeper:
+    """Saves parameters whenever they have changed, a moment later and in a thread.
+
+    Args:
+        parameters: whose; to be changed on the event loop's thread only.
+        path: of the file.
+        notice: called with a line for people when saving fails.
+    """
+
+    def __init__(self, parameters: Parameters, path: Path, notice: Callable[[str], None]) -> None:
+        self._parameters = parameters
+        self._path = path
+        self._notice = notice
+        self._changed = asyncio.Event()
+        parameters.on_change(self._note)
+        parameters.on_save(self._changed.set)
+
+    async def run(self) -> None:
+        """Save until cancelled, and then what is not saved yet."""
+        try:
+            while True:
+                await self._changed.wait()
+                await asyncio.sleep(SAVE_DELAY_S)
+                self._changed.clear()
+                await asyncio.to_thread(self._save, self._parameters.changed())
+        finally:
+            if self._changed.is_set():
+                self._save(self._parameters.changed())
+
+    def _note(self, name: str, _value: float) -> None:
+        if name != _DECIDED_BY_INSTANCE:
+            self._changed.set()
+
+    def _save(self, changed: Mapping[str, float]) -> None:
+        try:
+            save_parameters(self._path, changed, self._parameters)
+        except ParameterFileError as error:
+            self._notice(f"parameters are not saved: {error}")
