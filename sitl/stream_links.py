@@ -211,4 +211,5 @@ def _make_raw(line: int, speed: int) -> None:
 
 
 def _reason(error: OSError) -> str:
-    return (error.strerror or str(error)).split("\n", maxsplit=1)[0]
+    """Why, in few words; asyncio's own texts repeat the address."""
+    return os.strerror(error.errno) if error.errno and error.errno > 0 else str(error.strerror or error)

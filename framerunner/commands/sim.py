@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import sys
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -16,9 +17,40 @@ if TYPE_CHECKING:
     from firmware_py.mavlink.signing import SigningKey
     from scenarios.models import Scenario
     from sitl.server import SimulatorServer
+    from sitl.server_settings import ServerSettings
     from sitl.simulation import Simulation
 
 _MAX_COUNT = 20
+
+
+@Parameter(name="*")
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Connections:
+    """Where the simulator listens and to whom it speaks."""
+
+    bind: Annotated[str, Parameter(help="address to listen on")] = "127.0.0.1"
+    onboard_remote: Annotated[
+        str, Parameter(help="host or host:port that gets the onboard link, UDP 14540 + instance")
+    ] = "127.0.0.1"
+    ground_remote: Annotated[
+        str, Parameter(help="host or host:port that gets the ground link, UDP 14550")
+    ] = "127.0.0.1"
+    link: Annotated[
+        tuple[str, ...],
+        Parameter(
+            help="one more link: udpout://HOST:PORT, udpin://…, tcpin://…, tcpout://…, serial:///TTY:BAUD, "
+            "behind it ?streams=onboard|ground|normal&rate=BYTES if wanted; may be repeated",
+            negative=(),
+        ),
+    ] = ()
+    signing_key: Annotated[
+        Path | None,
+        Parameter(help="file with 64 hexadecimal digits or a passphrase: sign MAVLink 2 with it"),
+    ] = None
+    video_port: Annotated[WholeNumber | None, Parameter(help="TCP port of the video; 8080 + instance")] = None
+    video_rtp: Annotated[
+        str, Parameter(help="host or host:port that gets the video as H.264 in RTP, UDP 5600, or off")
+    ] = "127.0.0.1"
 
 
 def sim(
@@ -29,31 +61,7 @@ def sim(
     count: Annotated[
         WholeNumber, Parameter(help="how many drones fly side by side; they have the next instances' ports")
     ] = 1,
-    bind: Annotated[str, Parameter(help="address to listen on")] = "127.0.0.1",
-    onboard_remote: Annotated[
-        str, Parameter(help="host or host:port that gets the onboard link, UDP 14540 + instance")
-    ] = "127.0.0.1",
-    ground_remote: Annotated[
-        str, Parameter(help="host or host:port that gets the ground link, UDP 14550")
-    ] = "127.0.0.1",
-    link: Annotated[
-        tuple[str, ...],
-        Parameter(
-            help="one more link: udpout://HOST:PORT, udpin://…, tcpin://…, tcpout://…, serial:///TTY:BAUD, "
-            "behind it ?streams=onboard|ground|normal&rate=BYTES if wanted; may be repeated",
-            negative=(),
-        ),
-    ] = (),
-    signing_key: Annotated[
-        Path | None,
-        Parameter(help="file with 64 hexadecimal digits or a passphrase: sign MAVLink 2 with it"),
-    ] = None,
-    video_port: Annotated[
-        WholeNumber | None, Parameter(help="TCP port of the video; 8080 + instance")
-    ] = None,
-    video_rtp: Annotated[
-        str, Parameter(help="host or host:port that gets the video as H.264 in RTP, UDP 5600, or off")
-    ] = "127.0.0.1",
+    connections: Connections | None = None,
     lifeline: Annotated[bool, Parameter(show=False, help="stop when standard input ends")] = False,
 ) -> int:
     """Start the simulated drone: MAVLink on UDP 14540 and 14550, video on http://127.0.0.1:8080/.
@@ -78,32 +86,43 @@ def sim(
         raise SettingError(f"--instance {instance}: must be from 0 to 9")
     if not 1 <= count <= _MAX_COUNT:
         raise SettingError(f"--count {count}: must be from 1 to {_MAX_COUNT}")
-    if video_port is not None and not 1 <= video_port <= 65536 - count:
-        raise SettingError(f"--video-port {video_port}: must be from 1 to {65536 - count}")
+    settings = _settings(connections or Connections(), speed, instance, count)
 
     from scenarios.loader import load_scenario
-    from sitl.link_urls import parse_link
     from sitl.server import SimulatorServer
-    from sitl.server_settings import ServerSettings, rtp_address
 
-    links = tuple(parse_link(text) for text in link)
-    if count > 1 and any(url.scheme == "serial" for url in links):
-        raise SettingError(f"--count {count}: a serial line serves one drone; leave it out or use --count 1")
-    settings = ServerSettings(
-        instance=instance,
-        bind=bind,
-        onboard_remote=onboard_remote,
-        ground_remote=ground_remote,
-        video_port=video_port,
-        video_rtp=None if video_rtp == "off" else rtp_address(video_rtp, instance),
-        speed=speed,
-        links=links,
-        signing_key=_read_key(signing_key),
-    )
-    settings.check(count)
     server = SimulatorServer(_simulations(load_scenario(scenario), count), settings, notice=_say)
     asyncio.run(_run(server, lifeline=lifeline))
     return 0
+
+
+def _settings(chosen: Connections, speed: float, instance: int, count: int) -> ServerSettings:
+    port = chosen.video_port
+    if port is not None and not 1 <= port <= 65536 - count:
+        raise SettingError(f"--video-port {port}: must be from 1 to {65536 - count}")
+
+    from sitl.link_urls import parse_link
+    from sitl.server_settings import ServerSettings, rtp_address
+
+    links = tuple(parse_link(text) for text in chosen.link)
+    if count > 1 and any(url.scheme == "serial" for url in links):
+        raise SettingError(f"--count {count}: a serial line serves one drone; leave it out or use --count 1")
+    twice = next((url.text for number, url in enumerate(links) if url in links[:number]), None)
+    if twice is not None:
+        raise SettingError(f"--link {twice}: given twice; leave one out")
+    settings = ServerSettings(
+        instance=instance,
+        bind=chosen.bind,
+        onboard_remote=chosen.onboard_remote,
+        ground_remote=chosen.ground_remote,
+        video_port=port,
+        video_rtp=None if chosen.video_rtp == "off" else rtp_address(chosen.video_rtp, instance),
+        speed=speed,
+        links=links,
+        signing_key=_read_key(chosen.signing_key),
+    )
+    settings.check(count)
+    return settings
 
 
 def _simulations(scenario: Scenario, count: int) -> list[Simulation]:
