@@ -1,33 +1,140 @@
-"""The fence: polygons, circles and distances from home that the vehicle must not leave; skeleton."""
+"""The fence: polygons, circles and distances from home that the vehicle must not leave."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from enum import Enum
+from math import hypot
 
+from firmware_py.geodesy import LocalProjection
+from firmware_py.missions.fence_shapes import Shape, shapes_of
 from firmware_py.missions.flight import View
 from firmware_py.missions.store import MissionStore
 from firmware_py.parameters import Parameters
-from firmware_py.types import Vec3
+from firmware_py.types import StatusText, Vec3
+
+_CRITICAL = 2  # MAV_SEVERITY
+
+
+class BreachKind(Enum):
+    """Which limit was passed."""
+
+    DISTANCE = "distance"
+    HEIGHT = "height"
+    SHAPE = "shape"
 
 
 @dataclass(frozen=True, slots=True)
 class Breach:
-    """The fence was left; `text` names which."""
+    """The fence is left.
 
+    Attributes:
+        kind: which limit.
+        text: for people; it names what was left.
+    """
+
+    kind: BreachKind
     text: str
 
 
 class Geofence:
-    """The store's fence and the GF_ parameters, prepared for quick checks."""
+    """The store's fence and the GF_ parameters, prepared once for quick checks.
+
+    As in PX4 a shape that home breaks from the start is left out, with a text; so is one that the vehicle in
+    flight would break at the moment of the upload, unless GF_ACTION is 0.
+    """
+
+    __slots__ = (
+        "_braking",
+        "_height_m",
+        "_parameters",
+        "_parameters_version",
+        "_prepared",
+        "_radius_m",
+        "_shapes",
+        "_store",
+        "_texts",
+    )
 
     def __init__(self, store: MissionStore, parameters: Parameters) -> None:
         self._store = store
         self._parameters = parameters
+        self._parameters_version = -1
+        self._prepared: tuple[int, LocalProjection | None] = (-1, None)
+        self._shapes: tuple[Shape, ...] = ()
+        self._texts: list[StatusText] = []
 
     def check(self, view: View) -> Breach | None:
-        """Whether the vehicle is outside (with GF_PREDICT: will be before it can stop)."""
-        return self.breach_at(view.position_ned_m, view)
+        """Whether the vehicle is outside; with GF_PREDICT, whether it will be before it can stop."""
+        self._prepare(view)
+        if self._braking is None:
+            return self._breach(view.position_ned_m, view)
+        return self._breach(_stopping_place(view, *self._braking), view)
 
     def breach_at(self, position_ned_m: Vec3, view: View) -> Breach | None:
-        """Whether a place is outside, for a place to go to."""
+        """Whether a place in the local frame is outside: to be asked before flying there."""
+        self._prepare(view)
+        return self._breach(position_ned_m, view)
+
+    def take_texts(self) -> list[StatusText]:
+        """What is wrong with the fence, since the last call."""
+        texts, self._texts = self._texts, []
+        return texts
+
+    def _breach(self, position_ned_m: Vec3, view: View) -> Breach | None:
+        home_ned_m = view.home_ned_m
+        if home_ned_m is not None:
+            north_m, east_m, down_m = position_ned_m
+            if 0.0 < self._radius_m <= hypot(north_m - home_ned_m[0], east_m - home_ned_m[1]):
+                return Breach(BreachKind.DISTANCE, f"farther from home than {self._radius_m:g} m")
+            if 0.0 < self._height_m <= home_ned_m[2] - down_m:
+                return Breach(BreachKind.HEIGHT, f"higher above home than {self._height_m:g} m")
+        for shape in self._shapes:
+            if not shape.allows(position_ned_m):
+                return Breach(BreachKind.SHAPE, f"{'outside' if shape.keep_in else 'inside'} {shape.name}")
         return None
+
+    def _prepare(self, view: View) -> None:
+        """Take over the plan and the parameters when they have changed."""
+        if self._parameters.version != self._parameters_version:
+            self._configure()
+        state = (self._store.fence.version, view.projection)
+        if state == self._prepared:
+            return
+        self._prepared = state
+        flying = not view.landed and self._parameters.integer("GF_ACTION") != 0
+        kept = []
+        for shape in shapes_of(self._store.fence.items, view):
+            if view.home_ned_m is not None and not shape.allows(view.home_ned_m):
+                self._reject(shape, "Home position")
+            elif flying and not shape.allows(view.position_ned_m):
+                self._reject(shape, "current vehicle position")
+            else:
+                kept.append(shape)
+        self._shapes = tuple(kept)
+
+    def _reject(self, shape: Shape, whom: str) -> None:
+        verb = "doesn't contain" if shape.keep_in else "excludes"
+        self._texts.append(StatusText(_CRITICAL, f"Geofence invalid, {verb} {whom}: {shape.name}"))
+
+    def _configure(self) -> None:
+        value = self._parameters.value
+        self._parameters_version = self._parameters.version
+        self._radius_m = value("GF_MAX_HOR_DIST")
+        self._height_m = value("GF_MAX_VER_DIST")
+        self._braking: tuple[float, float, float] | None = None
+        if value("GF_PREDICT"):
+            self._braking = (value("MPC_ACC_HOR"), value("MPC_ACC_DOWN_MAX"), value("MPC_JERK_AUTO"))
+
+
+def _stopping_place(view: View, horizontal_m_s2: float, downward_m_s2: float, jerk_m_s3: float) -> Vec3:
+    """Where the vehicle comes to rest when it brakes now; a descent is left out, nothing ends below.
+
+    The way is v^2 / (2 a) and, for the time that the acceleration takes to build up, v a / j.
+    """
+    north_m_s, east_m_s, down_m_s = view.velocity_ned_m_s
+    north_m, east_m, down_m = view.position_ned_m
+    speed_m_s, climb_m_s = hypot(north_m_s, east_m_s), max(0.0, -down_m_s)
+    time_s = speed_m_s / (2.0 * horizontal_m_s2) + horizontal_m_s2 / jerk_m_s3
+    climb_m = climb_m_s * (climb_m_s / (2.0 * downward_m_s2) + downward_m_s2 / jerk_m_s3)
+    return (north_m + time_s * north_m_s, east_m + time_s * east_m_s, down_m - climb_m)
