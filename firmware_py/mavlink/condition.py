@@ -1,42 +1,69 @@
-"""Telemetry of the vehicle's condition: health, landed or not, battery, home, motors, mode.
+"""Telemetry of the vehicle's condition: health, landed or not, battery, home, mode, flight times.
 
-Differences from PX4: no battery exists yet, so voltage and charge are said to be unknown (PX4 simulates a 4S
-pack). FLIGHT_INFORMATION carries no times. Innovation ratios are 0, because the state is exact.
+Differences from PX4: innovation ratios and vibration are 0, because the state is exact, and so is the load,
+because the autopilot reads no clock.
 """
 
 from __future__ import annotations
 
+from math import ceil, isfinite
+
 from firmware_py.mavlink.dialect import Message, mavlink
 from firmware_py.mavlink.port import AutopilotPort
 from firmware_py.mavlink.scaling import boot_ms, degrees_e7, millimetres, whole
-from firmware_py.status import FlightMode, LandedState
-from firmware_py.types import MotorSpeeds
+from firmware_py.mavlink.standard_modes import standard_mode
+from firmware_py.status import LandedState
 
-_IMU = (
+_POSITION = mavlink.MAV_SYS_STATUS_SENSOR_GPS | mavlink.MAV_SYS_STATUS_SENSOR_XY_POSITION_CONTROL
+_PRESENT = (
     mavlink.MAV_SYS_STATUS_SENSOR_3D_GYRO
     | mavlink.MAV_SYS_STATUS_SENSOR_3D_ACCEL
     | mavlink.MAV_SYS_STATUS_SENSOR_3D_MAG
     | mavlink.MAV_SYS_STATUS_SENSOR_ABSOLUTE_PRESSURE
+    | mavlink.MAV_SYS_STATUS_SENSOR_BATTERY
+    | _POSITION
 )
-_POSITION = mavlink.MAV_SYS_STATUS_SENSOR_GPS | mavlink.MAV_SYS_STATUS_SENSOR_XY_POSITION_CONTROL
+# PX4 calls healthy what nothing is wrong with, there or not; but a remote control it misses.
+_HEALTHY = (
+    _PRESENT
+    | mavlink.MAV_SYS_STATUS_SENSOR_DIFFERENTIAL_PRESSURE
+    | mavlink.MAV_SYS_STATUS_SENSOR_ATTITUDE_STABILIZATION
+    | mavlink.MAV_SYS_STATUS_SENSOR_MOTOR_OUTPUTS
+    | mavlink.MAV_SYS_STATUS_AHRS
+    | mavlink.MAV_SYS_STATUS_LOGGING
+)
+_CHECKED = _HEALTHY | mavlink.MAV_SYS_STATUS_SENSOR_RC_RECEIVER
 _UNKNOWN_16 = 0xFFFF
-_STANDARD_MODES = {
-    FlightMode.LAND: mavlink.MAV_STANDARD_MODE_LAND,
-    FlightMode.TAKEOFF: mavlink.MAV_STANDARD_MODE_TAKEOFF,
-}
-_PWM_DISARMED_US, _PWM_LOW_US, _PWM_SPAN_US = 900, 1000, 1000
-_SERVOS = 16
+_TEMPERATURE_UNKNOWN = 0x7FFF
 
 
 def sys_status(autopilot: AutopilotPort, _time_us: int) -> Message:
-    """SYS_STATUS: the health bits that clients wait for."""
-    status = autopilot.status
-    working = _IMU | (_POSITION if status.origin is not None else 0)
-    healthy = working | mavlink.MAV_SYS_STATUS_AHRS
+    """SYS_STATUS: the health bits that clients wait for, and the battery in short."""
+    status, battery = autopilot.status, autopilot.battery
+    missing = 0 if status.origin is not None else _POSITION
+    present = _PRESENT & ~missing
+    healthy = _HEALTHY & ~missing
+    if battery.warning > mavlink.MAV_BATTERY_CHARGE_STATE_OK:
+        healthy &= ~mavlink.MAV_SYS_STATUS_SENSOR_BATTERY
     if status.ready:
         healthy |= mavlink.MAV_SYS_STATUS_PREARM_CHECK
     return mavlink.MAVLink_sys_status_message(
-        working, working, healthy, 0, _UNKNOWN_16, -1, -1, 0, 0, 0, 0, 0, 0
+        present,
+        present | _CHECKED & ~healthy,
+        healthy,
+        0,
+        whole(battery.voltage_v * 1e3, 16, signed=False),
+        whole(battery.current_a * 100, 16),
+        min(100, whole(ceil(battery.remaining * 100) if isfinite(battery.remaining) else -1, 8)),
+        0,
+        0,
+        0,
+        0,
+        0,
+        0,
+        0,
+        0,
+        mavlink.MAV_SYS_STATUS_RECOVERY_SYSTEM,
     )
 
 
@@ -47,18 +74,21 @@ def extended_sys_state(autopilot: AutopilotPort, _time_us: int) -> Message:
     )
 
 
-def battery_status(_autopilot: AutopilotPort, _time_us: int) -> Message:
-    """BATTERY_STATUS with everything unknown."""
+def battery_status(autopilot: AutopilotPort, _time_us: int) -> Message:
+    """BATTERY_STATUS: one pack, whose whole voltage stands where the first cell's would, as PX4 tells it."""
+    battery = autopilot.battery
     return mavlink.MAVLink_battery_status_message(
         0,
         mavlink.MAV_BATTERY_FUNCTION_ALL,
-        mavlink.MAV_BATTERY_TYPE_UNKNOWN,
-        0x7FFF,
-        [_UNKNOWN_16] * 10,
+        mavlink.MAV_BATTERY_TYPE_LIPO,
+        _TEMPERATURE_UNKNOWN,
+        [min(whole(battery.voltage_v * 1e3, 16, signed=False), _UNKNOWN_16 - 1)] + [_UNKNOWN_16] * 9,
+        whole(battery.current_a * 100, 16),
+        whole(battery.used_mah, 32),
         -1,
-        -1,
-        -1,
-        -1,
+        min(100, whole(battery.remaining * 100, 8)),
+        0,
+        battery.warning,
     )
 
 
@@ -97,14 +127,14 @@ def current_mode(autopilot: AutopilotPort, _time_us: int) -> Message:
     """CURRENT_MODE: the mode flown and the one asked for."""
     status = autopilot.status
     return mavlink.MAVLink_current_mode_message(
-        _STANDARD_MODES.get(status.mode, mavlink.MAV_STANDARD_MODE_NON_STANDARD),
+        standard_mode(status.mode),
         status.mode.custom_mode,
         status.intended_mode.custom_mode,
     )
 
 
 def estimator_status(autopilot: AutopilotPort, _time_us: int) -> Message:
-    """ESTIMATOR_STATUS: the flags PX4 shows, 831 in flight and 959 standing."""
+    """ESTIMATOR_STATUS: the flags PX4 shows, 895 in flight and 959 standing."""
     status = autopilot.status
     flags = mavlink.ESTIMATOR_ATTITUDE
     if status.origin is not None:
@@ -119,27 +149,11 @@ def estimator_status(autopilot: AutopilotPort, _time_us: int) -> Message:
         )
     if status.landed_state is LandedState.ON_GROUND:
         flags |= mavlink.ESTIMATOR_CONST_POS_MODE
+    elif status.origin is not None:
+        flags |= mavlink.ESTIMATOR_POS_VERT_AGL
     return mavlink.MAVLink_estimator_status_message(
         autopilot.state.time_us, flags, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
     )
-
-
-def servo_output_raw(autopilot: AutopilotPort, _time_us: int) -> Message:
-    """SERVO_OUTPUT_RAW: motor speeds as pulses, 900 µs disarmed, 1000 to 2000 µs from rest to full speed."""
-    pulses = _pulses(
-        autopilot.output.speeds_rad_s, autopilot.airframe.motor.max_speed_rad_s, autopilot.status.armed
-    )
-    return mavlink.MAVLink_servo_output_raw_message(autopilot.state.time_us & 0xFFFFFFFF, 0, *pulses)
-
-
-def _pulses(speeds_rad_s: MotorSpeeds, full_rad_s: float, armed: bool) -> list[int]:
-    pulses = [
-        whole(_PWM_LOW_US + _PWM_SPAN_US * speed / full_rad_s, 16, signed=False)
-        if armed
-        else _PWM_DISARMED_US
-        for speed in speeds_rad_s[:_SERVOS]
-    ]
-    return pulses + [0] * (_SERVOS - len(pulses))
 
 
 def mission_current(_autopilot: AutopilotPort, _time_us: int) -> Message:
@@ -153,5 +167,13 @@ def vibration(autopilot: AutopilotPort, _time_us: int) -> Message:
 
 
 def flight_information(autopilot: AutopilotPort, _time_us: int) -> Message:
-    """FLIGHT_INFORMATION; only the time since boot is known."""
-    return mavlink.MAVLink_flight_information_message(boot_ms(autopilot.state.time_us), 0, 0, 0)
+    """FLIGHT_INFORMATION: since when it is armed and in the air, in vehicle time as PX4; 0: it is not."""
+    status, flight = autopilot.status, autopilot.flight
+    flying = status.armed and flight.takeoff_us > flight.landed_us
+    return mavlink.MAVLink_flight_information_message(
+        boot_ms(autopilot.state.time_us),
+        flight.armed_us if status.armed else 0,
+        flight.takeoff_us if flying else 0,
+        flight.number,
+        boot_ms(flight.landed_us),
+    )

@@ -23,9 +23,21 @@ class Exchange:
         boot_unix_us: what time it was at boot, for SYSTEM_TIME; 0: not known.
         signing: of all links.
         video: the camera's streams, the one to be preferred first.
+        sources: of messages that services make, by message id; for streams and requests.
+        claimed: commands that another component answers when they are meant for all.
     """
 
-    __slots__ = ("autopilot", "boot_unix_us", "links", "signing", "system_id", "time_us", "video")
+    __slots__ = (
+        "autopilot",
+        "boot_unix_us",
+        "claimed",
+        "links",
+        "signing",
+        "sources",
+        "system_id",
+        "time_us",
+        "video",
+    )
 
     def __init__(
         self,
@@ -44,6 +56,8 @@ class Exchange:
         self.signing = Signing(None, boot_unix_us) if signing is None else signing
         self.video = tuple(video)
         self.time_us = 0
+        self.sources: dict[int, Callable[[], Message | None]] = {}
+        self.claimed: frozenset[int] = frozenset()
 
     def packet(self, message: Message, component_id: int = AUTOPILOT_COMPONENT_ID) -> Packet:
         """Pack a message as one of our components."""

@@ -15,6 +15,7 @@ from firmware_py.mavlink.dialect import mavlink
 from firmware_py.mavlink.framing import Packet, PacketReader
 from firmware_py.mavlink.schedule import Schedule
 from firmware_py.mavlink.signing import Signing
+from firmware_py.mavlink.traffic import Traffic
 
 _ADAPT_US = 1_000_000
 _MAX_STRETCH = 20.0  # PX4 slows streams down to a twentieth at most
@@ -52,24 +53,32 @@ ONBOARD = _profile(
         "ALTITUDE": 10,
         "ATTITUDE": 100,
         "ATTITUDE_QUATERNION": 50,
+        "ATTITUDE_TARGET": 10,
         "BATTERY_STATUS": 0.5,
         "CURRENT_MODE": 0.5,
+        "DISTANCE_SENSOR": 10,
         "ESTIMATOR_STATUS": 1,
         "EXTENDED_SYS_STATE": 5,
         "GLOBAL_POSITION_INT": 50,
+        "GNSS_INTEGRITY": 1,
         "GPS_RAW_INT": 8,
         "HIGHRES_IMU": 50,
         "HOME_POSITION": 0.5,
+        "LINK_NODE_STATUS": 1,
         "LOCAL_POSITION_NED": 30,
         "MISSION_CURRENT": 1,
         "ODOMETRY": 30,
+        "OPEN_DRONE_ID_LOCATION": 1,
+        "OPEN_DRONE_ID_SYSTEM": 1,
         "PING": 1,
+        "POSITION_TARGET_GLOBAL_INT": 10,
         "POSITION_TARGET_LOCAL_NED": 10,
         "SCALED_PRESSURE": 1,
         "SERVO_OUTPUT_RAW": 10,
         "SYSTEM_TIME": 1,
         "SYS_STATUS": 5,
         "TIMESYNC": 10,
+        "TIME_ESTIMATE_TO_TARGET": 0.5,
         "VFR_HUD": 10,
         "VIBRATION": 0.5,
     },
@@ -82,20 +91,28 @@ GROUND = _profile(
         "ALTITUDE": 1,
         "ATTITUDE": 50,
         "ATTITUDE_QUATERNION": 50,
+        "ATTITUDE_TARGET": 50,
         "BATTERY_STATUS": 0.5,
         "CURRENT_MODE": 0.5,
+        "DISTANCE_SENSOR": 0.5,
         "ESTIMATOR_STATUS": 0.5,
         "EXTENDED_SYS_STATE": 1,
         "GLOBAL_POSITION_INT": 50,
+        "GNSS_INTEGRITY": 1,
         "GPS_RAW_INT": 5,
         "HOME_POSITION": 0.5,
+        "LINK_NODE_STATUS": 1,
         "LOCAL_POSITION_NED": 50,
         "MISSION_CURRENT": 1,
+        "OPEN_DRONE_ID_LOCATION": 1,
+        "OPEN_DRONE_ID_SYSTEM": 1,
         "PING": 0.1,
+        "POSITION_TARGET_GLOBAL_INT": 1,
         "POSITION_TARGET_LOCAL_NED": 50,
         "SCALED_PRESSURE": 1,
         "SERVO_OUTPUT_RAW": 50,
         "SYS_STATUS": 1,
+        "TIME_ESTIMATE_TO_TARGET": 0.5,
         "VFR_HUD": 4,
         "VIBRATION": 0.1,
     },
@@ -109,20 +126,28 @@ NORMAL = _profile(
         "ALTITUDE": 1,
         "ATTITUDE": 15,
         "ATTITUDE_QUATERNION": 10,
+        "ATTITUDE_TARGET": 2,
         "BATTERY_STATUS": 0.5,
         "CURRENT_MODE": 0.5,
+        "DISTANCE_SENSOR": 0.5,
         "ESTIMATOR_STATUS": 0.5,
         "EXTENDED_SYS_STATE": 1,
         "GLOBAL_POSITION_INT": 5,
+        "GNSS_INTEGRITY": 1,
         "GPS_RAW_INT": 5,
         "HOME_POSITION": 0.5,
+        "LINK_NODE_STATUS": 1,
         "LOCAL_POSITION_NED": 1,
         "MISSION_CURRENT": 1,
+        "OPEN_DRONE_ID_LOCATION": 1,
+        "OPEN_DRONE_ID_SYSTEM": 1,
         "PING": 0.1,
+        "POSITION_TARGET_GLOBAL_INT": 1,
         "POSITION_TARGET_LOCAL_NED": 1.5,
         "SCALED_PRESSURE": 1,
         "SERVO_OUTPUT_RAW": 1,
         "SYS_STATUS": 1,
+        "TIME_ESTIMATE_TO_TARGET": 0.5,
         "VFR_HUD": 4,
         "VIBRATION": 0.1,
     },
@@ -184,6 +209,7 @@ class Link:
         reader: bytes in.
         schedule: which messages are due when.
         budget: of a slow link.
+        traffic: what it has carried.
         gcs_heard: a ground station's heartbeat came in here, so people read its texts.
         sequence: of the next packet.
         open: False once it is gone; what is sent then is lost without a word.
@@ -195,6 +221,7 @@ class Link:
     reader: PacketReader = field(default_factory=PacketReader)
     schedule: Schedule = field(init=False)
     budget: Budget | None = field(init=False)
+    traffic: Traffic = field(default_factory=Traffic)
     gcs_heard: bool = False
     sequence: int = 0
     open: bool = True
@@ -241,6 +268,8 @@ class Link:
         """Queue a whole packet as it is."""
         if not self.open:
             return
+        self.traffic.messages_sent += 1
+        self.traffic.bytes_sent += len(data)
         if self.budget is not None:
             self.budget.spend(len(data))
         if self._datagrams and len(self._datagrams[-1]) + len(data) <= _DATAGRAM_BYTES:

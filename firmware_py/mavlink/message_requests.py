@@ -11,6 +11,7 @@ from firmware_py.mavlink import component_information, version
 from firmware_py.mavlink.dialect import Message, mavlink
 from firmware_py.mavlink.exchange import Exchange
 from firmware_py.mavlink.links import Link
+from firmware_py.mavlink.standard_modes import available_modes
 from firmware_py.mavlink.streams import can_stream, stream_message
 from firmware_py.status import CommandResult
 
@@ -62,10 +63,10 @@ def _requested(exchange: Exchange, link: Link, message_id: int, argument: float)
         return [component_information.component_message(autopilot, message_id, time_us)]
     number = _message_id(argument)
     if message_id == mavlink.MAVLINK_MSG_ID_AVAILABLE_MODES:
-        return version.available_modes(number or 0)
+        return available_modes(number or 0)
     if message_id == mavlink.MAVLINK_MSG_ID_MESSAGE_INTERVAL:
         return [_interval(link, number or 0)]
-    message = stream_message(exchange, message_id)
+    message = stream_message(exchange, message_id, link)
     return [] if message is None else [message]
 
 

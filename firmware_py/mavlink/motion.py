@@ -1,14 +1,15 @@
-"""Telemetry of motion: attitude, positions, velocities and the setpoint followed."""
+"""Telemetry of motion: attitude, positions, velocities."""
 
 from __future__ import annotations
 
-from math import degrees, hypot, isnan, nan
+from math import degrees, hypot, nan
 
 from firmware_py.mavlink.dialect import Message, mavlink
 from firmware_py.mavlink.port import AutopilotPort
 from firmware_py.mavlink.scaling import boot_ms, degrees_e7, millimetres, whole
 
 _COVARIANCE_UNKNOWN = [nan] + [0.0] * 20
+_MILLI_G = 1000.0 / 9.80665  # of 1 m/s²
 
 
 def attitude(autopilot: AutopilotPort, _time_us: int) -> Message:
@@ -110,20 +111,20 @@ def odometry(autopilot: AutopilotPort, _time_us: int) -> Message | None:
     )
 
 
-def position_target_local_ned(autopilot: AutopilotPort, _time_us: int) -> Message:
-    """POSITION_TARGET_LOCAL_NED: what is followed now. A component not controlled is NaN and masked out."""
-    followed = autopilot.status.setpoint
-    components = (*followed.position_ned_m, *followed.velocity_ned_m_s, *followed.acceleration_ned_m_s2)
-    mask = sum(1 << bit for bit, value in enumerate(components) if isnan(value))
-    if isnan(followed.yaw_rad):
-        mask |= mavlink.POSITION_TARGET_TYPEMASK_YAW_IGNORE
-    if isnan(followed.yaw_rate_rad_s):
-        mask |= mavlink.POSITION_TARGET_TYPEMASK_YAW_RATE_IGNORE
-    return mavlink.MAVLink_position_target_local_ned_message(
-        boot_ms(autopilot.state.time_us),
-        mavlink.MAV_FRAME_LOCAL_NED,
-        mask,
-        *components,
-        followed.yaw_rad,
-        followed.yaw_rate_rad_s,
+def hil_state_quaternion(autopilot: AutopilotPort, _time_us: int) -> Message | None:
+    """HIL_STATE_QUATERNION, the true state; the same as the estimate, whose sensors are exact."""
+    state, place = autopilot.state, autopilot.global_position()
+    if place is None:
+        return None
+    return mavlink.MAVLink_hil_state_quaternion_message(
+        state.time_us,
+        state.attitude,
+        *state.angular_rate_frd_rad_s,
+        degrees_e7(place.latitude_deg),
+        degrees_e7(place.longitude_deg),
+        millimetres(place.altitude_m),
+        *[whole(velocity_m_s * 100, 16) for velocity_m_s in state.velocity_ned_m_s],
+        0,
+        0,
+        *[whole(force * _MILLI_G, 16) for force in state.specific_force_frd_m_s2],
     )

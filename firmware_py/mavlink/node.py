@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import Protocol
 
 from firmware_py.mavlink import commands, heartbeat, missions, signing_setup, time_sync
@@ -22,10 +22,12 @@ from firmware_py.mavlink.port import AutopilotPort
 from firmware_py.mavlink.shell import ShellService
 from firmware_py.mavlink.signing import Signing, SigningKey
 from firmware_py.mavlink.status_texts import StatusTextService
-from firmware_py.mavlink.streams import stream_message
+from firmware_py.mavlink.streams import is_shared, stream_message
 from firmware_py.mavlink.video_links import VideoStream
 from firmware_py.storage import Storage
-from firmware_py.types import GeodeticPoint
+from firmware_py.types import GeodeticPoint, StatusText
+
+HandlerTable = dict[int, tuple[Handler, ...]]  # by message id; one message may have several
 
 
 class Service(Protocol):
@@ -56,6 +58,7 @@ class MavlinkNode:
         storage: Storage | None = None,
         firmware_files: Mapping[str, bytes] | None = None,
         shell: bool = False,
+        log_text: Callable[[int, StatusText], None] | None = None,
     ) -> None:
         """Join an autopilot and its links.
 
@@ -70,6 +73,7 @@ class MavlinkNode:
             firmware_files: path to content of files that can only be read, for `mftp://` addresses; by
                 default those that explain this vehicle's parameters and events.
             shell: whether SERIAL_CONTROL is answered.
+            log_text: called with vehicle time and all that is said to people.
 
         Raises:
             ParameterError: the system id is out of range.
@@ -83,41 +87,9 @@ class MavlinkNode:
         )
         for profile in links:
             self.add_link(profile)
-        events = EventService(self._exchange)
-        texts = StatusTextService(self._exchange, events.tell)
-        parameters = ParameterService(self._exchange)
-        extended = ExtendedParameterService(self._exchange)
-        if firmware_files is None:
-            firmware_files = ExtraFiles(autopilot.parameters)
-        files = FileTransferService(self._exchange, storage, firmware_files)
-        logs = LogTransferService(self._exchange, storage)
-        shells = ShellService(self._exchange, enabled=shell)
-        self._services: tuple[Service, ...] = (
-            texts,
-            events,
-            parameters,
-            extended,
-            files,
-            logs,
-            shells,
+        self._services, self._handlers = _services(
+            self._exchange, storage, firmware_files, log_text, shell=shell
         )
-        # By component id; one message may have several handlers.
-        self._handlers: dict[int, dict[int, tuple[Handler, ...]]] = {
-            AUTOPILOT_COMPONENT_ID: _joined(
-                heartbeat.HANDLERS,
-                commands.HANDLERS,
-                files.handlers,
-                logs.handlers,
-                shells.handlers,
-                missions.HANDLERS,
-                time_sync.HANDLERS,
-                signing_setup.HANDLERS,
-                parameters.handlers,
-                extended.handlers,
-                events.handlers,
-                SetpointService().handlers,
-            ),
-        }
         self._router = Router(self._is_own)
         self._origin: GeodeticPoint | None = None
         self._home: GeodeticPoint | None = None
@@ -162,6 +134,7 @@ class MavlinkNode:
         if not exchange.signing.accepts(packet, trusted=link.profile.trusted):
             self.refused_packets += 1
             return
+        link.traffic.hear(sender, packet[2 if packet[0] == mavlink.PROTOCOL_MARKER_V1 else 4], len(packet))
         name = link.profile.name
         self._router.hear(name, sender, exchange.time_us)
         for other in self._router.destinations(name, sender, message, exchange.time_us):
@@ -205,8 +178,8 @@ class MavlinkNode:
         for link in self._links.values():
             link.advance(time_us)
             for message_id in link.schedule.due(time_us):
-                if message_id not in packets:
-                    message = stream_message(exchange, message_id)
+                if message_id not in packets or not is_shared(message_id):
+                    message = stream_message(exchange, message_id, link)
                     packets[message_id] = None if message is None else exchange.packet(message)
                 packet = packets[message_id]
                 if packet is not None:
@@ -235,9 +208,55 @@ class MavlinkNode:
         return [(name, data) for name, link in self._links.items() for data in link.take()]
 
 
-def _joined(*tables: Mapping[int, Handler]) -> dict[int, tuple[Handler, ...]]:
+def _services(
+    exchange: Exchange,
+    storage: Storage | None,
+    firmware_files: Mapping[str, bytes] | None,
+    log_text: Callable[[int, StatusText], None] | None,
+    *,
+    shell: bool,
+) -> tuple[tuple[Service, ...], dict[int, HandlerTable]]:
+    """What sends by itself, in the order in which it is asked, and who is told of what, by component id."""
+    events = EventService(exchange)
+    texts = StatusTextService(exchange, events.tell, log_text)
+    parameters = ParameterService(exchange)
+    extended = ExtendedParameterService(exchange)
+    if firmware_files is None:
+        firmware_files = ExtraFiles(exchange.autopilot.parameters)
+    files = FileTransferService(exchange, storage, firmware_files)
+    logs = LogTransferService(exchange, storage)
+    shells = ShellService(exchange, enabled=shell)
+    services: tuple[Service, ...] = (
+        texts,
+        events,
+        parameters,
+        extended,
+        files,
+        logs,
+        shells,
+    )
+    handlers = {
+        AUTOPILOT_COMPONENT_ID: _joined(
+            heartbeat.HANDLERS,
+            commands.HANDLERS,
+            files.handlers,
+            logs.handlers,
+            shells.handlers,
+            missions.HANDLERS,
+            time_sync.HANDLERS,
+            signing_setup.HANDLERS,
+            parameters.handlers,
+            extended.handlers,
+            events.handlers,
+            SetpointService().handlers,
+        ),
+    }
+    return services, handlers
+
+
+def _joined(*tables: Mapping[int, Handler]) -> HandlerTable:
     """One table of all, in this order."""
-    joined: dict[int, tuple[Handler, ...]] = {}
+    joined: HandlerTable = {}
     for table in tables:
         for message_id, handler in table.items():
             joined[message_id] = (*joined.get(message_id, ()), handler)

@@ -15,6 +15,10 @@ _SEA_LEVEL_HPA = 1013.25
 _SEA_LEVEL_K = 288.15
 _LAPSE_K_M = 0.0065
 _EXPONENT = 5.25588  # g M / (R L)
+_MILLI_G = 1000.0 / 9.80665  # of 1 m/s²
+_RANGE_M = 100.0
+_LEAST_DOWN = 0.01
+_UNKNOWN_8, _UNKNOWN_16 = 0xFF, 0xFFFF
 _IMU_FIELDS = 0b1_1011_1111_1111  # all but differential pressure
 
 
@@ -54,6 +58,54 @@ def highres_imu(autopilot: AutopilotPort, _time_us: int) -> Message:
         altitude_m,
         temperature_k(altitude_m) - 273.15,
         _IMU_FIELDS,
+    )
+
+
+def scaled_imu(autopilot: AutopilotPort, _time_us: int) -> Message:
+    """SCALED_IMU: thousandths of g, rad/s and gauss, hundredths of a degree (0 would be unknown)."""
+    state, place = autopilot.state, autopilot.global_position()
+    field_gauss = to_body(EARTH_FIELD_NED_GAUSS, state.attitude)
+    celsius = temperature_k(place.altitude_m if place else 0.0) - 273.15
+    return mavlink.MAVLink_scaled_imu_message(
+        boot_ms(state.time_us),
+        *[whole(force * _MILLI_G, 16) for force in state.specific_force_frd_m_s2],
+        *[whole(rate * 1e3, 16) for rate in state.angular_rate_frd_rad_s],
+        *[whole(component * 1e3, 16) for component in field_gauss],
+        whole(celsius * 100, 16) or 1,
+    )
+
+
+def distance_sensor(autopilot: AutopilotPort, _time_us: int) -> Message | None:
+    """DISTANCE_SENSOR: the range along body down to flat ground at the height where the vehicle booted.
+
+    PX4's own physics makes it from the state too. Beyond its range, or turned away, it says 0, as PX4.
+    """
+    state = autopilot.state
+    if autopilot.status.origin is None:
+        return None
+    _, qx, qy, _ = state.attitude
+    down = 1.0 - 2.0 * (qx * qx + qy * qy)  # of the body's down axis, in the world
+    range_m = -state.position_ned_m[2] / down if down > _LEAST_DOWN else 0.0
+    if not 0.0 < range_m < _RANGE_M:
+        range_m = 0.0
+    return mavlink.MAVLink_distance_sensor_message(
+        boot_ms(state.time_us),
+        0,
+        round(_RANGE_M * 100),
+        round(range_m * 100),
+        mavlink.MAV_DISTANCE_SENSOR_LASER,
+        0,
+        mavlink.MAV_SENSOR_ROTATION_PITCH_270,
+        0,
+    )
+
+
+def gnss_integrity(autopilot: AutopilotPort, _time_us: int) -> Message | None:
+    """GNSS_INTEGRITY: nothing watches for jamming or spoofing, and it says so."""
+    if autopilot.status.origin is None:
+        return None
+    return mavlink.MAVLink_gnss_integrity_message(
+        0, 0, 0, 0, 0, 0, _UNKNOWN_16, _UNKNOWN_16, _UNKNOWN_8, _UNKNOWN_8, _UNKNOWN_8, _UNKNOWN_8
     )
 
 

@@ -1,7 +1,7 @@
 """TIMESYNC, PING and SYSTEM_TIME.
 
-Difference from PX4: an autopilot without a clock does not know the date; SYSTEM_TIME says 0 for it unless the
-node was told the time of boot.
+Difference from PX4: an autopilot without a clock does not know the date; SYSTEM_TIME says 0 for it until
+somebody tells it, at boot or by the same message.
 """
 
 from __future__ import annotations
@@ -11,6 +11,10 @@ from firmware_py.mavlink.exchange import Exchange, Handler
 from firmware_py.mavlink.links import Link
 from firmware_py.mavlink.port import AutopilotPort
 from firmware_py.mavlink.scaling import boot_ms
+
+_LEAST_UNIX_US = 1_234_567_890_000_000  # what is earlier is no date, in PX4's view
+_MOST_UNIX_US = 1 << 62
+_LATE_US = 60_000_000
 
 
 def timesync_request(_autopilot: AutopilotPort, time_us: int) -> Message:
@@ -23,10 +27,18 @@ def ping_request(_autopilot: AutopilotPort, time_us: int) -> Message:
     return mavlink.MAVLink_ping_message(time_us, time_us // 1_000_000 & 0xFFFFFFFF, BROADCAST, BROADCAST)
 
 
-def system_time(boot_unix_us: int, time_us: int) -> Message:
-    """SYSTEM_TIME; a time of boot of 0 means that the date is unknown."""
-    unix_us = boot_unix_us + time_us if boot_unix_us else 0
-    return mavlink.MAVLink_system_time_message(unix_us, boot_ms(time_us))
+def system_time(exchange: Exchange) -> Message:
+    """SYSTEM_TIME; 0 while the date is unknown."""
+    unix_us = exchange.boot_unix_us + exchange.time_us if exchange.boot_unix_us else 0
+    return mavlink.MAVLink_system_time_message(unix_us, boot_ms(exchange.time_us))
+
+
+def _learn_date(exchange: Exchange, _link: Link, message: Message) -> None:
+    """Take the date from whoever knows it, if it is later than ours by a minute, as PX4."""
+    unix_us = message.time_unix_usec
+    ours_us = exchange.boot_unix_us + exchange.time_us if exchange.boot_unix_us else 0
+    if unix_us > _LEAST_UNIX_US and unix_us > ours_us + _LATE_US and unix_us < _MOST_UNIX_US:
+        exchange.boot_unix_us = unix_us - exchange.time_us
 
 
 def _answer_timesync(exchange: Exchange, link: Link, message: Message) -> None:
@@ -43,6 +55,7 @@ def _answer_ping(exchange: Exchange, link: Link, message: Message) -> None:
 
 
 HANDLERS: dict[int, Handler] = {
+    mavlink.MAVLINK_MSG_ID_SYSTEM_TIME: _learn_date,
     mavlink.MAVLINK_MSG_ID_TIMESYNC: _answer_timesync,
     mavlink.MAVLINK_MSG_ID_PING: _answer_ping,
 }

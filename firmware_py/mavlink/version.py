@@ -1,8 +1,8 @@
-"""AUTOPILOT_VERSION, PROTOCOL_VERSION and AVAILABLE_MODES: what this vehicle is and can do.
+"""AUTOPILOT_VERSION and PROTOCOL_VERSION: what this vehicle is and can do.
 
 The flight software version names the PX4 release whose behaviour on the wire is followed, because ground
-stations switch features on by it; the middleware version is this project's own. Capabilities claim only what
-exists, so QGroundControl asks for no missions, fences or files.
+stations switch features on by it; the middleware version is this project's own. Capabilities are PX4's, and
+SET_POSITION_TARGET_GLOBAL_INT, which PX4 understands too without saying so.
 """
 
 from __future__ import annotations
@@ -10,7 +10,6 @@ from __future__ import annotations
 from struct import Struct
 
 from firmware_py.mavlink.dialect import Message, mavlink
-from firmware_py.status import FlightMode
 
 FOLLOWED_PX4_VERSION = (1, 17, 0)
 OWN_VERSION = (0, 1, 0)
@@ -18,18 +17,19 @@ _RELEASE = 0xFF  # FIRMWARE_VERSION_TYPE_OFFICIAL
 _UID_PREFIX = 0x66726D72  # "frmr"; the system id follows
 
 CAPABILITIES = (
-    mavlink.MAV_PROTOCOL_CAPABILITY_PARAM_FLOAT
+    mavlink.MAV_PROTOCOL_CAPABILITY_MISSION_FLOAT
+    | mavlink.MAV_PROTOCOL_CAPABILITY_PARAM_FLOAT
+    | mavlink.MAV_PROTOCOL_CAPABILITY_MISSION_INT
     | mavlink.MAV_PROTOCOL_CAPABILITY_COMMAND_INT
     | mavlink.MAV_PROTOCOL_CAPABILITY_PARAM_ENCODE_BYTEWISE
+    | mavlink.MAV_PROTOCOL_CAPABILITY_FTP
+    | mavlink.MAV_PROTOCOL_CAPABILITY_SET_ATTITUDE_TARGET
     | mavlink.MAV_PROTOCOL_CAPABILITY_SET_POSITION_TARGET_LOCAL_NED
+    | mavlink.MAV_PROTOCOL_CAPABILITY_SET_POSITION_TARGET_GLOBAL_INT
+    | mavlink.MAV_PROTOCOL_CAPABILITY_FLIGHT_TERMINATION
     | mavlink.MAV_PROTOCOL_CAPABILITY_MAVLINK2
-)
-
-_MODES = (
-    (FlightMode.HOLD, mavlink.MAV_STANDARD_MODE_NON_STANDARD, b"Hold"),
-    (FlightMode.TAKEOFF, mavlink.MAV_STANDARD_MODE_TAKEOFF, b"Takeoff"),
-    (FlightMode.LAND, mavlink.MAV_STANDARD_MODE_LAND, b"Land"),
-    (FlightMode.OFFBOARD, mavlink.MAV_STANDARD_MODE_NON_STANDARD, b"Offboard"),
+    | mavlink.MAV_PROTOCOL_CAPABILITY_MISSION_FENCE
+    | mavlink.MAV_PROTOCOL_CAPABILITY_MISSION_RALLY
 )
 
 
@@ -79,16 +79,3 @@ def autopilot_version(system_id: int) -> Message:
 def protocol_version() -> Message:
     """PROTOCOL_VERSION with PX4's figures."""
     return ProtocolVersionMessage(200, 100, 203)
-
-
-def available_modes(index: int) -> list[Message]:
-    """AVAILABLE_MODES of the mode with that index from 1, or of all for 0; none for a wrong index."""
-    messages = [
-        mavlink.MAVLink_available_modes_message(
-            len(_MODES), place, standard, mode.custom_mode, 0, name.ljust(35, b"\0")
-        )
-        for place, (mode, standard, name) in enumerate(_MODES, start=1)
-    ]
-    if index == 0:
-        return messages
-    return messages[index - 1 : index] if index > 0 else []

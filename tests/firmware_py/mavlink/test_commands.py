@@ -130,7 +130,7 @@ def test_takeoff_above_home_in_a_relative_frame(autopilot, peer):
     ("command", "params", "text"),
     [
         (ARM, [5], "Unsupported ARM_DISARM param: 5"),
-        (SET_MODE, [1, 4, 5], "Mode change refused: no mode 4.5 here"),
+        (SET_MODE, [1, 4, 9], "Mode change refused: no mode 4.9 here"),
         (SET_MODE, [0, 4, 3], "Mode change refused: only PX4 custom modes are understood"),
         (262, [2], "Mode change refused: no standard mode 2 here"),
     ],
@@ -154,12 +154,12 @@ def test_legacy_set_mode_takes_whole_mode_numbers_only(autopilot, peer, custom_m
     assert autopilot.calls == []
 
 
-def test_autopilot_version_claims_what_exists(peer):
+def test_autopilot_version_claims_what_px4_claims_and_global_targets(peer):
     answers = peer.ask(peer.long(REQUEST, 148))
     assert acks(answers) == [(REQUEST, ACCEPTED)]
     (version,) = [message for message in answers if message.get_type() == "AUTOPILOT_VERSION"]
     assert version.flight_sw_version == 0x011100FF
-    assert version.capabilities == 2 | 8 | 16 | 128 | 8192
+    assert version.capabilities == 0xE8FF | mavlink.MAV_PROTOCOL_CAPABILITY_SET_POSITION_TARGET_GLOBAL_INT
     assert version.uid & 0xFF == 1
 
 
@@ -193,11 +193,22 @@ def test_what_is_not_known_yet_is_denied(autopilot, peer):
 
 def test_available_modes_all_and_one(peer):
     modes = [m for m in peer.ask(peer.long(REQUEST, 435, 0)) if m.get_type() == "AVAILABLE_MODES"]
-    assert [(m.mode_index, m.number_modes) for m in modes] == [(place, 4) for place in range(1, 5)]
+    total = len(FlightMode)
+    assert [m.mode_index for m in modes] == list(range(1, total + 1))
+    assert {m.number_modes for m in modes} == {total}
     assert {m.custom_mode for m in modes} == {mode.custom_mode for mode in FlightMode}
-    (one, _) = peer.ask(peer.long(REQUEST, 435, 4))
-    assert one.mode_name == "Offboard"
-    assert acks(peer.ask(peer.long(REQUEST, 435, 5))) == [(REQUEST, DENIED)]
+    (one, _) = peer.ask(peer.long(REQUEST, 435, 5))
+    assert (one.custom_mode, one.mode_name) == (FlightMode.HOLD.custom_mode, "Hold")
+    assert acks(peer.ask(peer.long(REQUEST, 435, total + 1))) == [(REQUEST, DENIED)]
+
+
+def test_available_modes_have_a_standard_mode_or_a_name(peer):
+    modes = {m.custom_mode: m for m in peer.ask(peer.long(REQUEST, 435)) if m.get_type() == "AVAILABLE_MODES"}
+    assert all((m.standard_mode == 0) == bool(m.mode_name) for m in modes.values())
+    assert modes[FlightMode.RETURN.custom_mode].standard_mode == mavlink.MAV_STANDARD_MODE_SAFE_RECOVERY
+    assert modes[FlightMode.POSITION.custom_mode].properties == 0
+    assert modes[FlightMode.OFFBOARD.custom_mode].properties == mavlink.MAV_MODE_PROPERTY_ADVANCED
+    assert modes[FlightMode.TERMINATION.custom_mode].properties & 2  # not to be chosen by a person
 
 
 def test_intervals_belong_to_the_link_that_asked(peer):

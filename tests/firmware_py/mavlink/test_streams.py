@@ -1,4 +1,3 @@
-from collections import Counter
 from itertools import pairwise
 from math import nan, pi
 
@@ -8,7 +7,7 @@ from firmware_py.mavlink import GROUND, ONBOARD, MavlinkNode
 from firmware_py.mavlink.dialect import mavlink
 from firmware_py.mavlink.framing import PacketReader
 from firmware_py.mavlink.sensing import pressure_hpa, temperature_k, to_body
-from firmware_py.mavlink.streams import SOURCES, can_stream
+from firmware_py.mavlink.streams import SOURCES
 from firmware_py.status import FlightMode, LandedState, VehicleStatus
 from firmware_py.types import GeodeticPoint, MotorOutput, Setpoint, VehicleState
 
@@ -27,14 +26,6 @@ def test_the_first_update_sends_a_heartbeat_on_every_link_unheard(autopilot):
         sent[link] += data
     for data in sent.values():
         assert "HEARTBEAT" in {message.get_type() for message in PacketReader().feed(data)}
-
-
-@pytest.mark.parametrize("profile", [ONBOARD, GROUND], ids=lambda profile: profile.name)
-def test_rates_are_those_of_the_profile(peer, profile):
-    counts = Counter(m.get_msgId() for link, m in peer.advance(20.0) if link == profile.name)
-    for message_id, rate_hz in profile.rates_hz.items():
-        assert can_stream(message_id)
-        assert counts[message_id] == pytest.approx(20 * rate_hz, abs=2), message_id
 
 
 def test_sequence_numbers_are_each_links_own_without_gaps(peer):
@@ -140,7 +131,7 @@ def test_landed_state_and_modes(autopilot, peer):
 def test_estimator_flags_are_px4s(autopilot, peer):
     assert latest(peer, "ESTIMATOR_STATUS").flags == 959
     autopilot.status.landed_state = LandedState.IN_AIR
-    assert latest(peer, "ESTIMATOR_STATUS").flags == 831
+    assert latest(peer, "ESTIMATOR_STATUS").flags == 895
 
 
 def test_a_state_that_is_not_finite_ends_nothing(autopilot, peer):
@@ -179,5 +170,7 @@ def test_field_turns_into_the_body():
 
 
 def test_every_source_names_its_own_message(autopilot):
+    autopilot.status.armed = True
+    autopilot.status.setpoint = Setpoint(0, position_ned_m=(0.0, 0.0, -1.0))
     for message_id, source in SOURCES.items():
         assert source(autopilot, 1_000_000).get_msgId() == message_id
