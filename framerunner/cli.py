@@ -94,6 +94,7 @@ def _is_foreseen(error: Exception) -> bool:
         "PictureError",
         "ScenarioError",
         "SettingError",
+        "StorageFolderError",
         "VideoError",
     }
     return any(kind.__name__ in foreseen for kind in type(error).__mro__)

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING
 
 from firmware_py.mavlink.node import MavlinkNode
 from firmware_py.mavlink.video_links import VideoEncoding, VideoStream
+from sitl.drone_files import flight_recorder, open_storage
 from sitl.link_hub import LinkHub
 from sitl.link_urls import is_loopback
 from sitl.server_settings import ServerSettings
@@ -31,6 +32,9 @@ class ServedDrone:
         settings: of this drone.
         boot_unix_us: what time it is, microseconds since 1970.
 
+    Raises:
+        StorageFolderError: the folder for its files cannot be used.
+
     Attributes:
         simulation: what flies.
         node: what speaks for it.
@@ -39,6 +43,8 @@ class ServedDrone:
     def __init__(self, simulation: Simulation, settings: ServerSettings, boot_unix_us: int) -> None:
         self.simulation = simulation
         self._settings = settings
+        storage = open_storage(settings.storage, settings.instance)
+        self._recorder = flight_recorder(storage, boot_unix_us)
         self.node = MavlinkNode(
             simulation.autopilot,
             (),
@@ -46,6 +52,9 @@ class ServedDrone:
             boot_unix_us=boot_unix_us,
             signing_key=settings.signing_key,
             video=self._streams(),
+            storage=storage,
+            shell=settings.shell,
+            log_text=self._recorder.hear_text,
         )
         self._hub = LinkHub(self.node)
         self._camera: CameraFeed | None = None
@@ -89,6 +98,7 @@ class ServedDrone:
         """Advance by one control period: fly, speak, look."""
         simulation = self.simulation
         simulation.tick()
+        self._recorder.update(simulation.autopilot)
         self._hub.update(simulation.autopilot.state.time_us)
         if self._camera is None or self._video is None:
             return
@@ -100,7 +110,8 @@ class ServedDrone:
                 self._rtp.send(image, time_us)
 
     async def close(self) -> None:
-        """Stop the video and close the links."""
+        """Finish the log, stop the video and close the links."""
+        self._recorder.finish(self.simulation.autopilot)
         if self._video is not None:
             await self._video.close()
         if self._rtp is not None:

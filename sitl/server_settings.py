@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from pathlib import Path
 
 from firmware_py.mavlink.links import GROUND, ONBOARD, LinkProfile
 from firmware_py.mavlink.signing import SigningKey
@@ -40,6 +41,8 @@ class ServerSettings:
         speed: simulated seconds a second.
         links: more links.
         signing_key: with which MAVLink is signed; None: it is not.
+        storage: folder for the drones' files and logs; None: they are kept in memory.
+        shell: whether the drones have a shell over MAVLink.
     """
 
     instance: int = 0
@@ -51,6 +54,8 @@ class ServerSettings:
     speed: float = 1.0
     links: tuple[LinkUrl, ...] = ()
     signing_key: SigningKey | None = None
+    storage: Path | None = None
+    shell: bool = False
 
     @property
     def onboard(self) -> UdpAddresses:

@@ -89,6 +89,11 @@ class UlogRecorder:
             self._flush_us = time_us + _FLUSH_US
             self._flush(autopilot)
 
+    def finish(self, autopilot: AutopilotPort) -> None:
+        """Hand over what is left of a log, when the program ends in flight."""
+        if self.path is not None:
+            self._end(autopilot, autopilot.state.time_us)
+
     def hear_text(self, time_us: int, said: StatusText) -> None:
         """Log what was said to people at a vehicle time; nothing happens between flights."""
         if self.path is not None:

@@ -25,6 +25,20 @@ _MAX_COUNT = 20
 
 @Parameter(name="*")
 @dataclass(frozen=True, slots=True, kw_only=True)
+class Onboard:
+    """What the drone has besides flying."""
+
+    storage: Annotated[
+        Path | None,
+        Parameter(help="folder for its files and flight logs, DIR/0 for instance 0; else kept in memory"),
+    ] = None
+    shell: Annotated[
+        bool, Parameter(help="answer MAVLink's shell (SERIAL_CONTROL), about the drone only", negative=())
+    ] = False
+
+
+@Parameter(name="*")
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Connections:
     """Where the simulator listens and to whom it speaks."""
 
@@ -62,6 +76,7 @@ def sim(
         WholeNumber, Parameter(help="how many drones fly side by side; they have the next instances' ports")
     ] = 1,
     connections: Connections | None = None,
+    onboard: Onboard | None = None,
     lifeline: Annotated[bool, Parameter(show=False, help="stop when standard input ends")] = False,
 ) -> int:
     """Start the simulated drone: MAVLink on UDP 14540 and 14550, video on http://127.0.0.1:8080/.
@@ -78,6 +93,8 @@ def sim(
 
         framerunner sim --count 4 --video-rtp off
 
+        framerunner sim --storage drone-files
+
         framerunner sim --link tcpin://127.0.0.1:5760 --link serial:///dev/ttyUSB0:57600
     """
     if not 0.01 <= speed <= 1000:
@@ -86,7 +103,7 @@ def sim(
         raise SettingError(f"--instance {instance}: must be from 0 to 9")
     if not 1 <= count <= _MAX_COUNT:
         raise SettingError(f"--count {count}: must be from 1 to {_MAX_COUNT}")
-    settings = _settings(connections or Connections(), speed, instance, count)
+    settings = _settings(connections or Connections(), onboard or Onboard(), speed, instance, count)
 
     from scenarios.loader import load_scenario
     from sitl.server import SimulatorServer
@@ -96,7 +113,9 @@ def sim(
     return 0
 
 
-def _settings(chosen: Connections, speed: float, instance: int, count: int) -> ServerSettings:
+def _settings(
+    chosen: Connections, onboard: Onboard, speed: float, instance: int, count: int
+) -> ServerSettings:
     port = chosen.video_port
     if port is not None and not 1 <= port <= 65536 - count:
         raise SettingError(f"--video-port {port}: must be from 1 to {65536 - count}")
@@ -120,6 +139,8 @@ def _settings(chosen: Connections, speed: float, instance: int, count: int) -> S
         speed=speed,
         links=links,
         signing_key=_read_key(chosen.signing_key),
+        storage=onboard.storage,
+        shell=onboard.shell,
     )
     settings.check(count)
     return settings
