@@ -113,7 +113,8 @@ class Dynamics:
         self._rates = tuple(getter(f"velocities/{axis}-rad_sec") for axis in "pqr")
         self._force = tuple(getter(f"accelerations/a-pilot-{axis}-ft_sec2") for axis in "xyz")
         rotors = range(len(airframe.rotors))
-        self._commands = tuple(setter(COMMAND_PROPERTY.format(index)) for index in rotors)
+        self._motors = tuple(setter(COMMAND_PROPERTY.format(index)) for index in rotors)
+        self._commands = list(self._motors)
         self._speeds = tuple(getter(SPEED_PROPERTY.format(index)) for index in rotors)
         self._touch = tuple(setter(name) for name in (*TOUCH_FORCES, *TOUCH_MOMENTS))
         self._ground = setter("position/terrain-elevation-asl-ft")
@@ -126,6 +127,22 @@ class Dynamics:
         self._commanded = speeds_rad_s
         for command, speed in zip(self._commands, speeds_rad_s, strict=True):
             command(speed)
+
+    def fail_motor(self, index: int, *, stuck: bool = False) -> None:
+        """Cut a motor off from its commands.
+
+        Args:
+            index: in the airframe's order.
+            stuck: it goes on at the speed last commanded; else it stops.
+        """
+        if not stuck:
+            self._motors[index](0.0)
+        self._commands[index] = _unheard
+
+    def repair_motor(self, index: int) -> None:
+        """Let a motor follow its commands again."""
+        self._commands[index] = self._motors[index]
+        self._commanded = ()
 
     def push(self, force_frd_n: Vec3, moment_frd_nm: Vec3) -> None:
         """Set the force and moment from touching things, in body axes, until set anew."""
@@ -199,3 +216,9 @@ class Dynamics:
     def motor_speeds_rad_s(self) -> tuple[float, ...]:
         """True speeds of the rotors."""
         return tuple(speed() for speed in self._speeds)
+
+
+def _unheard(speed_rad_s: float) -> bool:
+    """Take the command of a motor that has failed."""
+    del speed_rad_s
+    return False

@@ -114,8 +114,9 @@ class LevelLaw:
         roll += turn * forward + drag_right * right * abs(right)
         pitch = pitch_axis.angle(forward, want_forward, period_s)
         pitch += turn * right - drag_forward * forward * abs(forward)
+        below = 0.0
         if command.acceleration_level_m_s2 != _NOTHING:
-            ahead, aside, _ = command.acceleration_level_m_s2
+            ahead, aside, below = command.acceleration_level_m_s2
             roll += aside / GRAVITY_M_S2
             pitch -= ahead / GRAVITY_M_S2
         tilt_squared = self._limits.tilt_squared
@@ -129,15 +130,16 @@ class LevelLaw:
         pitch_nm = pitch_axis.moment(pitch - pitch_rad, q)
 
         error_down = down - want_down
-        error_yaw = r - command.yaw_rate_rad_s
+        want_yaw = command.yaw_rate_rad_s
+        error_yaw = r - want_yaw
         self._xi_down += error_down * period_s
         self._xi_yaw += error_yaw * period_s
         lift_n = self._weight_n * (1.0 - drag_down * down * abs(down))
         lift_n -= self._k_down * (down - self._b_vertical * want_down) + self._ki_down * self._xi_down
-        lift_n -= self._mass_kg * command.acceleration_level_m_s2[2]
+        lift_n -= self._mass_kg * below
         cosine = cos(roll_rad) * cos(pitch_rad)
         thrust_n = lift_n / (cosine if cosine > _LEAST_COSINE else _LEAST_COSINE) if lift_n > 0.0 else 0.0
-        yaw_nm = -self._k_yaw * (r - self._b_yaw * command.yaw_rate_rad_s) - self._ki_yaw * self._xi_yaw
+        yaw_nm = -self._k_yaw * (r - self._b_yaw * want_yaw) - self._ki_yaw * self._xi_yaw
 
         output = self._mixer.mix(thrust_n, roll_nm, pitch_nm, yaw_nm)
         # Anti-windup: an integral does not grow in the direction the motors cannot follow.

@@ -34,6 +34,8 @@ _LEAST_LIFT = 0.2  # of the weight, so that falling leaves a thrust to steer wit
 _MOST_THRUST = 0.92  # of full thrust for following a velocity; the rest steers
 _MOST_FORCE_M_S2 = GRAVITY_M_S2  # unknown acceleration ever learnt: the ground's push at landing
 _MOST_MOMENT_RAD_S2 = 20.0
+_TURN_LEARNT = 0.04  # per step: within a tenth of a second
+_TURN_NOTICED = 1e-5  # speed^2 x turn^2 x period: below a centripetal acceleration of 0.05 m/s^2
 
 _Wish = tuple[float, float, float, float]
 """Thrust in N and body rates in rad/s that a command comes down to."""
@@ -62,6 +64,7 @@ class VectorLaw:
         self._inertia = airframe.inertia_kg_m2
         forward, right, down = airframe.drag.force_n_s2_m2
         self._drag = (forward / mass, right / mass, down / mass)
+        self._drag_moment = airframe.drag.moment_nm_s2
         self._full_n = airframe.full_thrust_n
         self._most_lift = _MOST_THRUST * self._full_n / mass
         self._rate_limit_rad_s = airframe.limits.roll_pitch_rate_rad_s
@@ -72,12 +75,16 @@ class VectorLaw:
         self._lag = period_s / (period_s + airframe.motor.time_constant_s)
         self._wrench = (airframe.weight_n, 0.0, 0.0, 0.0)  # thrust and moments now, behind their commands
         self._hover_n = airframe.weight_n
+        self._period_s = period_s
+        self._wanted = (0.0, 0.0)  # velocity wanted in the last step, north and east
+        self._turning = 0.0  # how much of the commanded turn it takes part in, 0..1
 
     def reset(self) -> None:
         """Forget what was learnt: at arming and on the ground."""
         self._force.reset()
         self._moment.reset()
         self._wrench = (self._hover_n, 0.0, 0.0, 0.0)
+        self._turning = 0.0
 
     def enter(self, state: VehicleState) -> None:
         """Take over in flight from another law."""
@@ -103,9 +110,11 @@ class VectorLaw:
         drag = self._drag_ned(m, velocity)
         p, q, r = rates
         i_roll, i_pitch, i_yaw = self._inertia
-        gyro_roll = (i_yaw - i_pitch) * q * r
-        gyro_pitch = (i_roll - i_yaw) * p * r
-        gyro_yaw = (i_pitch - i_roll) * p * q
+        # What the turning body itself takes, by Euler's equations and the drag declared, N m.
+        drag_roll, drag_pitch, drag_yaw = self._drag_moment
+        own_roll = (i_yaw - i_pitch) * q * r + drag_roll * p * abs(p)
+        own_pitch = (i_roll - i_yaw) * p * r + drag_pitch * q * abs(q)
+        own_yaw = (i_pitch - i_roll) * p * q + drag_yaw * r * abs(r)
         if type(command) is ActuatorCommand:
             output = self._straight_through(command)
             asked = self._mixer.wrench(output.speeds_rad_s)
@@ -113,9 +122,9 @@ class VectorLaw:
             thrust_n, want_p, want_q, want_r = self._wish(state, command, m, drag)
             k_roll, k_pitch, k_yaw = self._k_rate
             d_roll, d_pitch, d_yaw = self._moment.d
-            roll_nm = i_roll * (k_roll * (want_p - p) - d_roll) + gyro_roll
-            pitch_nm = i_pitch * (k_pitch * (want_q - q) - d_pitch) + gyro_pitch
-            yaw_nm = i_yaw * (k_yaw * (want_r - r) - d_yaw) + gyro_yaw
+            roll_nm = i_roll * (k_roll * (want_p - p) - d_roll) + own_roll
+            pitch_nm = i_pitch * (k_pitch * (want_q - q) - d_pitch) + own_pitch
+            yaw_nm = i_yaw * (k_yaw * (want_r - r) - d_yaw) + own_yaw
             output = self._mixer.mix(thrust_n, roll_nm, pitch_nm, yaw_nm)
             asked = (thrust_n, roll_nm, pitch_nm, yaw_nm)
             if output.thrust_high or output.thrust_low or output.yaw_cut:  # what was left of it
@@ -133,7 +142,7 @@ class VectorLaw:
             drag[0] - lift * m[2], drag[1] - lift * m[5], drag[2] - lift * m[8] + GRAVITY_M_S2
         )
         self._moment.predict(
-            (roll - gyro_roll) / i_roll, (pitch - gyro_pitch) / i_pitch, (yaw - gyro_yaw) / i_yaw
+            (roll - own_roll) / i_roll, (pitch - own_pitch) / i_pitch, (yaw - own_yaw) / i_yaw
         )
         return output
 
@@ -157,7 +166,11 @@ class VectorLaw:
         want_forward, want_right, want_down = command.velocity_level_m_s
         ahead, aside, below = command.acceleration_level_m_s2
         k_forward, k_right, k_down = self._k_velocity
-        turn = command.yaw_rate_rad_s  # to keep a velocity in axes that turn takes the centripetal force
+        turn = self._turn_of(
+            cos_yaw * want_forward - sin_yaw * want_right,
+            sin_yaw * want_forward + cos_yaw * want_right,
+            command.yaw_rate_rad_s,
+        )
         d_north, d_east, d_down = self._force.d
         push_north, push_east = drag[0] + d_north, drag[1] + d_east
         ahead += k_forward * (want_forward - forward) - turn * right
@@ -166,6 +179,22 @@ class VectorLaw:
         aside -= cos_yaw * push_east - sin_yaw * push_north
         below += k_down * (want_down - down) - drag[2] - d_down
         return self._point(state, (ahead, aside, GRAVITY_M_S2 - below), m, command.yaw_rate_rad_s)
+
+    def _turn_of(self, north: float, east: float, yaw_rate_rad_s: float) -> float:
+        """How fast the velocity wanted turns with the yaw, rad/s: what its centripetal acceleration is for.
+
+        A velocity that is constant in level axes turns with them; one that is constant in the world does not,
+        and its components in level axes are only how it was told. Which of the two it is shows in how it
+        changes in the world: the part that the commanded turn explains, none to all.
+        """
+        before_north, before_east = self._wanted
+        self._wanted = (north, east)
+        size = (north * north + east * east) * yaw_rate_rad_s * self._period_s
+        if size * yaw_rate_rad_s < _TURN_NOTICED:
+            return 0.0
+        part = (north * (east - before_east) - east * (north - before_north)) / size
+        self._turning += _TURN_LEARNT * (max(0.0, min(part, 1.0)) - self._turning)
+        return self._turning * yaw_rate_rad_s
 
     def _hold_tilt(self, state: VehicleState, command: TiltCommand, m: Rotation, drag: Vec3) -> _Wish:
         """Tilt and thrust as asked; the limit of tilt is for what the loops above ask."""
