@@ -41,7 +41,7 @@ def test_a_key_is_hexadecimal_or_the_hash_of_a_passphrase():
 
 @pytest.mark.parametrize("text", ["", " \n", "00" * 32])
 def test_what_is_no_key_is_refused(text):
-    with pytest.raises(ValueError, match="zero|empty"):
+    with pytest.raises(ValueError, match=r"zero|empty"):
         SigningKey.from_text(text)
 
 
