@@ -54,6 +54,10 @@ test-realtime: setup ## the tests that fly in real time, one after another
 bench: $(VENV)/installed ## time our flight, alone and beside MuJoCo and PyFlyt; options in BENCH="--peers none"
 	$(BIN)/python -m benchmarks $(BENCH)
 
+.PHONY: parameters
+parameters: $(VENV)/installed-dev ## write docs/parameters.md anew from the declarations
+	$(BIN)/python -m firmware_py.parameters.reference > docs/parameters.md
+
 .PHONY: format
 format: $(VENV)/installed-dev ## write the code as the checks want it
 	$(BIN)/ruff format .

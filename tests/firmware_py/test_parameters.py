@@ -99,3 +99,56 @@ def test_hash_is_the_plain_crc_over_names_and_bytes():
         for _ in range(8):
             crc = crc >> 1 ^ (0xEDB88320 if crc & 1 else 0)
     assert Parameters(declarations=(declared,)).hash() == crc
+
+
+def test_a_vehicles_own_defaults_are_no_changes():
+    parameters = Parameters({"NAV_DLL_ACT": 3}, defaults={"MPC_THR_HOVER": 0.6, "SYS_AUTOSTART": 10040})
+    assert parameters.value("MPC_THR_HOVER") == 0.6
+    assert parameters.integer("SYS_AUTOSTART") == 10040
+    assert parameters.declaration("SYS_AUTOSTART").constant
+    assert parameters.changed() == {"NAV_DLL_ACT": 3}
+    assert Parameters().value("MPC_THR_HOVER") == 0.5
+
+
+@pytest.mark.parametrize("defaults", [{"MPC_THR_HOVER": 7.0}, {"NO_SUCH": 1.0}, {"SYS_AUTOSTART": nan}])
+def test_a_default_that_cannot_be_is_refused(defaults):
+    with pytest.raises(ParameterError, match=next(iter(defaults))):
+        Parameters(defaults=defaults)
+
+
+def test_a_default_that_came_in_four_bytes_is_the_default():
+    parameters = Parameters({"MPC_LAND_SPEED": 1.0})
+    parameters.set("MPC_LAND_SPEED", 0.699999988079071)  # 0.7 as MAVLink carries it
+    assert parameters.value("MPC_LAND_SPEED") == 0.7
+    assert parameters.changed() == {}
+    parameters.set("MPC_LAND_SPEED", 0.699999988079071)
+    assert parameters.version == 2
+
+
+def test_reset_tells_each_change():
+    parameters = Parameters({"MIS_TAKEOFF_ALT": 1.5, "COM_OBL_RC_ACT": 4})
+    heard = []
+    parameters.on_change(lambda name, value: heard.append((name, value)))
+    parameters.reset()
+    assert heard == [("COM_OBL_RC_ACT", 0), ("MIS_TAKEOFF_ALT", 2.5)]
+    assert parameters.changed() == {}
+
+
+def test_choices_and_bits_hold_together():
+    with pytest.raises(ValidationError, match="none of its choices"):
+        Parameter(
+            name="A", kind="int32", default=1, minimum=0, maximum=2, description="x", choices={0: "a", 2: "b"}
+        )
+    with pytest.raises(ValidationError, match="only an int32"):
+        Parameter(name="A", kind="float", default=1, minimum=0, maximum=2, description="x", bits={0: "a"})
+
+
+@pytest.mark.parametrize("declared", DECLARATIONS, ids=lambda declared: declared.name)
+def test_each_declaration_reads_well(declared):
+    assert declared.description[0].isupper() or declared.description[0].isdigit()
+    assert not declared.description.endswith(".")
+    assert not declared.details or declared.details.endswith(".")
+    if declared.choices:
+        assert (declared.minimum, declared.maximum) == (min(declared.choices), max(declared.choices))
+    if declared.bits:
+        assert declared.maximum == sum(1 << place for place in declared.bits)

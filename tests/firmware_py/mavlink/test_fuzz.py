@@ -95,6 +95,10 @@ HANDLED = [
     mavlink.MAVLink_param_request_read_message,
     mavlink.MAVLink_param_request_list_message,
     mavlink.MAVLink_param_set_message,
+    mavlink.MAVLink_param_ext_request_read_message,
+    mavlink.MAVLink_param_ext_request_list_message,
+    mavlink.MAVLink_param_ext_set_message,
+    mavlink.MAVLink_request_event_message,
     mavlink.MAVLink_set_position_target_local_ned_message,
     mavlink.MAVLink_timesync_message,
     mavlink.MAVLink_ping_message,
@@ -114,8 +118,8 @@ def content(kind, field, type_name, array_length):
         return st.sampled_from(COMMANDS)
     if field in ("target_system", "target_component"):
         return st.sampled_from([1, 1, 1, 0, 2])
-    if field == "param_id":
-        return st.sampled_from(NAMES)
+    if type_name == "char":
+        return st.sampled_from(NAMES) if field == "param_id" else st.binary(max_size=8)
     if field == "param_type":
         return st.sampled_from([6, 9, 0])
     if field == "coordinate_frame":
