@@ -9,19 +9,19 @@ from collections import deque
 from math import cos, isinf, isnan, nan, radians
 
 from firmware_py.airframe import Airframe
-from firmware_py.battery import BatteryMonitor, battery_settings
 from firmware_py.commander import Commander
 from firmware_py.commander_table import INFO, MODE_EVENT, WARNING, Event, Row, State
 from firmware_py.estimator import Estimator
-from firmware_py.guidance.circles import Orbit, follow_settings
+from firmware_py.guidance.circles import Orbit
 from firmware_py.guidance.limits import speed_limits
-from firmware_py.guidance.modes import Guidance, Manners
+from firmware_py.guidance.modes import Guidance, manners
 from firmware_py.guidance.offboard import usable
-from firmware_py.guidance.returning import return_settings
-from firmware_py.guidance.sticks import stick_settings
 from firmware_py.land_detector import LandDetector
-from firmware_py.lift_off import LiftOff, RateStabiliser, goes_straight_through
+from firmware_py.lift_off import LiftOff, RateStabiliser, Undesigned, goes_straight_through
+from firmware_py.missions.flight import IssuedCommand
 from firmware_py.missions.store import MissionStore
+from firmware_py.mode_entry import ModeEntry
+from firmware_py.navigator import Navigator
 from firmware_py.parameters import Parameters
 from firmware_py.places import Places
 from firmware_py.status import CommandResult, FlightMode, LandedState, VehicleStatus
@@ -37,12 +37,11 @@ from firmware_py.types import (
     Setpoint,
     StatusText,
     Vec3,
-    VehicleState,
 )
+from firmware_py.watch import Watch
 
 _TEXTS_KEPT = 100
 _READY_PERIOD_US = 100_000  # once armed, whether it could be armed again is of little interest
-_SLOW_PERIOD_US = 100_000  # of battery and geofence
 _SETPOINT_GRID_US = 10_000
 
 _GROUND_STATES = frozenset(
@@ -63,29 +62,8 @@ _AIRBORNE_STATES = {
     State.FAILSAFE_DESCEND: LandedState.LANDING,
 }
 _STOPPED_STATES = frozenset({State.DISARMED, State.TERMINATED})
-_BY_HAND = {
-    State.MANUAL: FlightMode.MANUAL,
-    State.STABILIZED: FlightMode.STABILIZED,
-    State.ACRO: FlightMode.ACRO,
-    State.ALTITUDE: FlightMode.ALTITUDE,
-    State.POSITION: FlightMode.POSITION,
-}
+_BY_HAND = frozenset({State.MANUAL, State.STABILIZED, State.ACRO, State.ALTITUDE, State.POSITION})
 _AUTO_BIT, _OFFBOARD_BIT = 1, 2  # of COM_RC_OVERRIDE
-
-
-class _Undesigned:
-    """Stands in until the stabiliser is designed; never flown."""
-
-    def reset(self) -> None:
-        """Nothing to forget."""
-
-    def idle(self) -> MotorOutput:
-        """Not to be called."""
-        raise RuntimeError("the stabiliser is not designed yet; call prepare()")
-
-    def step(self, state: VehicleState, command: Command, *, grounded: bool = False) -> MotorOutput:
-        """Not to be called."""
-        raise RuntimeError("the stabiliser is not designed yet; call prepare()")
 
 
 class Autopilot:
@@ -125,8 +103,6 @@ class Autopilot:
         self.status = VehicleStatus()
         self.flight = FlightRecord()
         self.missions = MissionStore()
-        self._battery_monitor = BatteryMonitor()
-        self.battery: BatteryState = self._battery_monitor.state
         self._estimator = Estimator()
         self.state = self._estimator.state
         self._places = Places(self.status, origin)
@@ -134,24 +110,35 @@ class Autopilot:
         self._now_us = 0
         self._commander = Commander()
         self._guidance = Guidance(
-            speed_limits(airframe, self.parameters), self._manners(), self._period_us / 1e6
+            speed_limits(airframe, self.parameters),
+            manners(self.airframe, self.parameters),
+            self._period_us / 1e6,
         )
-        self._stabiliser: RateStabiliser = _Undesigned() if stabiliser is None else stabiliser
+        self._stabiliser: RateStabiliser = Undesigned() if stabiliser is None else stabiliser
         self._lift_off = LiftOff()
+        self._navigator = Navigator(self.missions, self.parameters)
+        self._watch = Watch(self._navigator, self._commander.situation, self.say, self.parameters)
+        self.battery: BatteryState = self._watch.battery.state
+        self._entry = ModeEntry(
+            self.state,
+            self.status,
+            places=self._places,
+            guidance=self._guidance,
+            navigator=self._navigator,
+            parameters=self.parameters,
+            say=self.say,
+        )
         self._land_detector = LandDetector((airframe.hover_speed_rad_s / airframe.motor.max_speed_rad_s) ** 2)
         self._stopped = MotorOutput((0.0,) * len(airframe.rotors))
         self.output = self._stopped
         self._state_entered = State.DISARMED
         self._shown_state: State | None = None
         self._airborne = LandedState.IN_AIR
-        self._takeoff_altitude_m = nan
-        self._orbit = Orbit()
         self._texts: deque[StatusText] = deque(maxlen=_TEXTS_KEPT)
         self._refusal_said = False
         self._next_setpoint: Setpoint | None = None
         self._setpoint_slot = 0
         self._ready_due_us = 0
-        self._slow_due_us = 0
         self._parameters_version = -1
         self._upright_cosine = 0.0
         self._configure()
@@ -162,7 +149,7 @@ class Autopilot:
         It takes some tenths of a second, most of them to import SciPy, so a program in real time does it
         before its clock runs, and after it has sent its first heartbeat.
         """
-        if isinstance(self._stabiliser, _Undesigned):
+        if isinstance(self._stabiliser, Undesigned):
             from firmware_py.control.stabiliser import Stabiliser
 
             self._stabiliser = Stabiliser(self.airframe, self._period_us / 1e6)
@@ -188,20 +175,24 @@ class Autopilot:
             self._detect_land()
         else:
             self._now_us += self._period_us
-        if self._now_us >= self._slow_due_us:
-            self._look_around(sensors)
+        if self._now_us >= self._watch.due_us:
+            self._update_view()
+            self._watch.look(self._now_us, sensors, armed=self.status.armed)
         if self._next_setpoint is not None and self._now_us // _SETPOINT_GRID_US != self._setpoint_slot:
             self._take_setpoint()
         _, x, y, _ = state.attitude
         row = commander.tick(
             self._now_us,
             sound=sound,
+            placed=self._estimator.placed,
             upright=1.0 - 2.0 * (x * x + y * y) > self._upright_cosine,
             landed=self._land_detector.landed,
             target_reached=guidance.target_reached,
         )
         if row is not None:
             self._follow(row)
+        if commander.state is State.MISSION:
+            self._fly_mission()
         self._refresh_status()
         if commander.state in _STOPPED_STATES:
             self.output = self._stopped
@@ -238,9 +229,9 @@ class Autopilot:
             ACCEPTED, or TEMPORARILY_REJECTED with a status text that says why.
         """
         if mode is FlightMode.TAKEOFF:
-            self._takeoff_altitude_m = nan
+            self._entry.takeoff_altitude_m = nan
         if mode is FlightMode.ORBIT:
-            self._orbit = self._orbit_here()
+            self._entry.orbit = self.orbit_here()
         return self._command(MODE_EVENT[mode])
 
     def takeoff(self, altitude_amsl_m: float = nan) -> CommandResult:
@@ -256,7 +247,7 @@ class Autopilot:
         if isinf(altitude_amsl_m):
             self.say(WARNING, "Takeoff denied: altitude is infinite")
             return CommandResult.DENIED
-        self._takeoff_altitude_m = altitude_amsl_m
+        self._entry.takeoff_altitude_m = altitude_amsl_m
         return self._command(Event.SET_TAKEOFF)
 
     def land(self) -> CommandResult:
@@ -274,6 +265,10 @@ class Autopilot:
         Returns:
             ACCEPTED, or TEMPORARILY_REJECTED when hold cannot be entered.
         """
+        breach = self._navigator.breach_at(target_ned_m) if not any(map(isnan, target_ned_m)) else None
+        if breach is not None:
+            self.say(WARNING, f"Reposition denied: {breach.text}")
+            return CommandResult.DENIED
         result = self._command(Event.SET_HOLD)
         if result is CommandResult.ACCEPTED and self.status.armed and not self._land_detector.landed:
             if all(map(isnan, target_ned_m)):
@@ -293,12 +288,27 @@ class Autopilot:
         Returns:
             ACCEPTED, or TEMPORARILY_REJECTED when that cannot be flown now.
         """
-        self._orbit = orbit
+        self._entry.orbit = orbit
         return self._command(Event.SET_ORBIT)
 
     def orbit_here(self) -> Orbit:
         """The circle that is flown when no other was asked for: PX4's, 1 m around where it is."""
-        return self._orbit_here()
+        return Orbit(self.state.position_ned_m)
+
+    def start_mission(self) -> CommandResult:
+        """Fly the mission; disarmed, arm for it.
+
+        Returns:
+            ACCEPTED, DENIED without a mission, or TEMPORARILY_REJECTED when it cannot be armed now.
+        """
+        if not self.missions.valid:
+            self.say(WARNING, "Mission start denied: no valid mission")
+            return CommandResult.DENIED
+        self.prepare()
+        result = self._command(Event.SET_MISSION)
+        if result is CommandResult.ACCEPTED and not self.status.armed:
+            result = self._command(Event.ARM)
+        return result
 
     def change_speed(self, speed_m_s: float) -> CommandResult:
         """Fly the present journey at another horizontal speed; NaN: MPC_XY_CRUISE again."""
@@ -391,6 +401,10 @@ class Autopilot:
         """A place on Earth in the local frame, NED metres; None before the origin is known."""
         return self._places.to_local(point)
 
+    def take_issued_commands(self) -> list[IssuedCommand]:
+        """What the mission commands others, such as the camera, since the last call."""
+        return self._navigator.take_issued()
+
     def _command(self, event: Event) -> CommandResult:
         row = self._commander.handle(event)
         self._follow(row)
@@ -406,37 +420,13 @@ class Autopilot:
         before, self._state_entered = self._state_entered, row.target
         if before is State.DISARMED:
             self._leave_disarmed()
-        self._guidance.home_ned_m = self.status.home_ned_m
-        match row.target:
-            case State.DISARMED | State.TERMINATED:
-                self.output = self._stopped
-                self._lift_off.rest()
-            case State.HOLD | State.FAILSAFE_HOLD:
-                reached = before is State.TAKEOFF and row.event is Event.TICK
-                self._guidance.enter_hold(self.state, keep_target=reached)
-            case State.OFFBOARD:
-                self._take_setpoint()
-                self._guidance.enter_offboard()
-            case State.TAKEOFF:
-                self._enter_takeoff()
-            case _:
-                self._enter_guided(row.target)
-
-    def _enter_guided(self, state: State) -> None:
-        guidance = self._guidance
-        match state:
-            case State.LAND | State.FAILSAFE_LAND:
-                guidance.enter_land(self.state)
-            case State.FAILSAFE_DESCEND:
-                guidance.enter_descend(self.state)
-            case State.RETURN | State.FAILSAFE_RETURN:
-                guidance.enter_return(self.state)
-            case State.ORBIT:
-                guidance.enter_orbit(self.state, self._orbit)
-            case State.FOLLOW:
-                guidance.enter_follow(self.state)
-            case _:
-                guidance.enter_sticks(self.state, _BY_HAND[state])
+        if row.target in _STOPPED_STATES:
+            self.output = self._stopped
+            self._lift_off.rest()
+        self._update_view()
+        if row.target is State.OFFBOARD:
+            self._take_setpoint()
+        self._entry.enter(row.target, before, row.event)
 
     def _leave_disarmed(self) -> None:
         self._stabiliser.reset()
@@ -450,23 +440,6 @@ class Autopilot:
         if self._next_setpoint is not None:
             self._guidance.accept(self._next_setpoint)
             self._next_setpoint = None
-
-    def _enter_takeoff(self) -> None:
-        here, home = self.global_position(), self.status.home
-        if here is None or home is None:  # cannot be: it is armed, so a position has come
-            return
-        altitude_m = self._takeoff_altitude_m
-        if isnan(altitude_m):
-            height_m = self.parameters.value("MIS_TAKEOFF_ALT")
-            altitude_m = home.altitude_m + height_m
-            self.say(INFO, f"Using default takeoff altitude: {height_m:.1f} m")
-        if altitude_m < here.altitude_m:
-            self.say(WARNING, "Already higher than takeoff altitude")
-        climb_m = altitude_m - here.altitude_m
-        self._guidance.enter_takeoff(self.state, self.state.position_ned_m[2] - climb_m)
-
-    def _orbit_here(self) -> Orbit:
-        return Orbit(self.state.position_ned_m)
 
     def _fly(self, command: Command) -> MotorOutput:
         """Motors for a command, with the ground between if it stands."""
@@ -506,34 +479,30 @@ class Autopilot:
             self._places.fix_origin(origin_ned_m, self.state)
             self._guidance.home_ned_m = self.status.home_ned_m
 
-    def _look_around(self, sensors: Sensors) -> None:
-        """What changes slowly: the battery."""
-        self._slow_due_us = self._now_us + _SLOW_PERIOD_US
-        self._battery_monitor.update(
-            self._now_us, sensors.battery_voltage_v, sensors.battery_current_a, self._battery_settings
-        )
-        self._commander.situation.battery_warning = self.battery.warning
+    def _fly_mission(self) -> None:
+        self._update_view()
+        ended = self._navigator.fly_mission(self.state, self._guidance)
+        if ended is not None:
+            self._follow(self._commander.handle(ended))
+
+    def _update_view(self) -> None:
+        landed = self._land_detector.landed
+        self._navigator.look(self.state, self.status, self._places, landed=landed)
 
     def _configure(self) -> None:
         """Take over the parameters; looked up by name only when one has changed."""
         parameters = self.parameters
         self._parameters_version = parameters.version
         self._commander.configure(parameters)
-        self._guidance.configure(speed_limits(self.airframe, parameters), self._manners())
-        self._battery_settings = battery_settings(parameters)
+        self._guidance.configure(
+            speed_limits(self.airframe, parameters), manners(self.airframe, self.parameters)
+        )
+        self._watch.configure(parameters)
         self._lift_off.spool_up_us = round(parameters.value("COM_SPOOLUP_TIME") * 1e6)
         self._lift_off.ramp_us = round(parameters.value("MPC_TKO_RAMP_T") * 1e6)
         self._land_detector.trigger_us = round(parameters.value("LNDMC_TRIG_TIME") * 1e6)
         tilt_deg = min(parameters.value("FD_FAIL_P"), parameters.value("FD_FAIL_R")) or 180.0  # 0: never
         self._upright_cosine = cos(radians(tilt_deg))
-
-    def _manners(self) -> Manners:
-        parameters = self.parameters
-        return Manners(
-            stick_settings(self.airframe, parameters),
-            return_settings(parameters),
-            follow_settings(parameters),
-        )
 
     def _refresh_status(self) -> None:
         status, commander = self.status, self._commander
@@ -551,6 +520,7 @@ class Autopilot:
             return
         self._ready_due_us = self._now_us + _READY_PERIOD_US
         ready = commander.ready
+        status.not_ready = "" if ready else commander.refusal
         if ready and not status.ready and not status.armed:
             self.say(INFO, "Ready for takeoff!")
         status.ready = ready

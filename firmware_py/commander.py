@@ -76,12 +76,13 @@ class Commander:
         situation: what guards look at.
     """
 
-    __slots__ = ("_tick_rows", "_watch_us", "situation", "state")
+    __slots__ = ("_started", "_tick_rows", "_watch_us", "situation", "state")
 
     def __init__(self) -> None:
         self.state = State.DISARMED
         self._tick_rows = RULES[self.state, Event.TICK]
         self._watch_us = 0
+        self._started = False
         self.situation = Situation()
 
     @property
@@ -97,8 +98,13 @@ class Commander:
     @property
     def ready(self) -> bool:
         """Whether it could be armed now."""
+        return not self.refusal
+
+    @property
+    def refusal(self) -> str:
+        """Why it could not be armed now; empty if it could."""
         row = first_match(RULES[State.DISARMED, Event.ARM], self.situation)
-        return row is not None and row.result is CommandResult.ACCEPTED
+        return "" if row is None or row.result is CommandResult.ACCEPTED else row.text
 
     def tick(
         self,
@@ -124,6 +130,9 @@ class Commander:
             The rule that fired; None when nothing happens.
         """
         now = self.situation
+        if not self._started:
+            self._started = True
+            now.unsound_us = now.sound_us = now.position_us = now.upright_us = now_us
         now.now_us = now_us
         if sound:
             now.sound_us = now_us

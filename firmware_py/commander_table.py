@@ -204,6 +204,7 @@ _STICKS = {
     Reaction.POSITION: State.POSITION,
 }
 
+_DOING = {Reaction.RETURN: "returning home", Reaction.LAND: "landing"}
 _DELAYED = (Cause.GROUND_STATION, Cause.MANUAL)
 """Causes that may pass: PX4 holds for COM_FAIL_ACT_T before it acts."""
 
@@ -217,7 +218,7 @@ def _hold_ends(reaction: Reaction) -> Row:
         guard,
         target,
         severity=CRITICAL,
-        text=f"Failsafe: {reaction.value}",
+        text=f"Failsafe: {_DOING[reaction]}",
     )
 
 
@@ -246,7 +247,7 @@ def _reactions(cause: Cause, *, from_sticks: bool = False) -> tuple[Row, ...]:
             follow_up = reaction if delayed else Reaction.NOTHING
         rows.append(
             Row(
-                states - _at(State.FAILSAFE_HOLD) if delayed else states,
+                states - _HOMEWARD - _at(State.FAILSAFE_HOLD) if delayed else states,
                 event,
                 when.reacts(cause, reaction),
                 State.FAILSAFE_HOLD if delayed else target,
@@ -316,14 +317,7 @@ _FAILSAFES = (
 
 _PROGRESS = (
     _tick(_at(State.TAKEOFF), when.target_reached, State.HOLD, intends=FlightMode.HOLD),
-    Row(
-        _at(State.MISSION),
-        Event.MISSION_DONE,
-        None,
-        State.HOLD,
-        FlightMode.HOLD,
-        text="Mission finished, loitering",
-    ),
+    Row(_at(State.MISSION), Event.MISSION_DONE, None, State.HOLD, FlightMode.HOLD),
     Row(frozenset(State), Event.MISSION_DONE),
     Row(_at(State.MISSION), Event.MISSION_RETURNS, None, State.RETURN, FlightMode.RETURN),
     Row(frozenset(State), Event.MISSION_RETURNS),

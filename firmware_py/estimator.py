@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
-from math import asin, atan2, copysign, isfinite, pi
+from dataclasses import replace
+from math import asin, atan2, copysign, isfinite, isnan, pi
 
 from firmware_py.types import Quaternion, Sensors, Vec3, VehicleState
 
+_LONGEST_S = 0.1  # between samples that can be counted on
 _NORM_TOLERANCE = 0.05  # of the attitude quaternion's squared length; more than rounding, so it is a fault
 
 
@@ -15,13 +17,15 @@ class Estimator:
     Attributes:
         state: the estimate, updated in place; it keeps its last value while samples are unusable.
         origin_ned_m: the local frame's origin in the sensors' frame, shape (3,); None before a first sample.
+        placed: whether the last sample told the horizontal position; else it is counted on from the last.
     """
 
-    __slots__ = ("origin_ned_m", "state")
+    __slots__ = ("origin_ned_m", "placed", "state")
 
     def __init__(self) -> None:
         self.state = VehicleState()
         self.origin_ned_m: Vec3 | None = None
+        self.placed = False
 
     def update(self, sensors: Sensors) -> bool:
         """Take one sample.
@@ -31,7 +35,14 @@ class Estimator:
         """
         state = self.state
         origin = self.origin_ned_m
-        if not _is_sound(sensors) or (origin is not None and sensors.time_us <= state.time_us):
+        if not _is_sound(sensors):
+            sensors = self._without_place(sensors)
+            if not _is_sound(sensors):
+                return False
+            self.placed = False
+        else:
+            self.placed = True
+        if origin is not None and sensors.time_us <= state.time_us:
             return False
         position = sensors.position_ned_m
         if origin is None:
@@ -44,6 +55,33 @@ class Estimator:
         state.angular_rate_frd_rad_s = sensors.angular_rate_frd_rad_s
         state.specific_force_frd_m_s2 = sensors.specific_force_frd_m_s2
         return True
+
+    def _without_place(self, sensors: Sensors) -> Sensors:
+        """A sample without satellites, horizontal position and velocity NaN, made whole by dead reckoning.
+
+        The accelerometer is integrated from the last state: v += (R f + g) dt, p += v dt. It drifts, but the
+        commander needs it for a second only.
+        """
+        origin, state = self.origin_ned_m, self.state
+        lost = (*sensors.position_ned_m[:2], *sensors.velocity_ned_m_s[:2])
+        period_s = (sensors.time_us - state.time_us) / 1e6
+        if origin is None or not all(map(isnan, lost)) or not 0.0 < period_s < _LONGEST_S:
+            return sensors
+        w, x, y, z = sensors.attitude
+        fx, fy, fz = sensors.specific_force_frd_m_s2
+        north_m_s2 = (1 - 2 * (y * y + z * z)) * fx + 2 * (x * y - w * z) * fy + 2 * (x * z + w * y) * fz
+        east_m_s2 = 2 * (x * y + w * z) * fx + (1 - 2 * (x * x + z * z)) * fy + 2 * (y * z - w * x) * fz
+        north_m_s = state.velocity_ned_m_s[0] + north_m_s2 * period_s
+        east_m_s = state.velocity_ned_m_s[1] + east_m_s2 * period_s
+        return replace(
+            sensors,
+            position_ned_m=(
+                origin[0] + state.position_ned_m[0] + north_m_s * period_s,
+                origin[1] + state.position_ned_m[1] + east_m_s * period_s,
+                sensors.position_ned_m[2],
+            ),
+            velocity_ned_m_s=(north_m_s, east_m_s, sensors.velocity_ned_m_s[2]),
+        )
 
 
 def euler_angles(attitude: Quaternion) -> Vec3:

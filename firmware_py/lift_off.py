@@ -125,3 +125,18 @@ def _straight_up(command: Command) -> Command:
 def goes_straight_through(command: Command) -> bool:
     """Whether a command is for the motors themselves, on the ground as in the air."""
     return isinstance(command, ActuatorCommand)
+
+
+class Undesigned:
+    """Stands in until the stabiliser is designed; never flown."""
+
+    def reset(self) -> None:
+        """Nothing to forget."""
+
+    def idle(self) -> MotorOutput:
+        """Not to be called."""
+        raise RuntimeError("the stabiliser is not designed yet; call prepare()")
+
+    def step(self, state: VehicleState, command: Command, *, grounded: bool = False) -> MotorOutput:
+        """Not to be called."""
+        raise RuntimeError("the stabiliser is not designed yet; call prepare()")

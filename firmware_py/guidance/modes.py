@@ -8,16 +8,19 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from math import atan2, cos, hypot, isnan, nan, remainder, sin, tau
+from math import atan2, cos, hypot, isnan, nan, pi, remainder, sin, tau
 
+from firmware_py.airframe import Airframe
 from firmware_py.estimator import euler_angles
-from firmware_py.guidance.circles import FollowSettings, Orbit, TargetFollower
+from firmware_py.guidance.circles import FollowSettings, Orbit, TargetFollower, follow_settings
 from firmware_py.guidance.limits import SpeedLimits, clamp, speed_limits
 from firmware_py.guidance.offboard import acceleration_or_zero, bounded, is_acceleration_only, usable
-from firmware_py.guidance.returning import Phase, ReturnHome, ReturnSettings
+from firmware_py.guidance.returning import Phase, ReturnHome, ReturnSettings, return_settings
 from firmware_py.guidance.station import StationKeeper, towards
-from firmware_py.guidance.sticks import StickFlight, StickSettings
-from firmware_py.guidance.travel import Traveller
+from firmware_py.guidance.sticks import StickFlight, StickSettings, stick_settings
+from firmware_py.guidance.travel import Traveller, passing_speed
+from firmware_py.missions.flight import Leg, LegKind
+from firmware_py.parameters import Parameters
 from firmware_py.status import FlightMode
 from firmware_py.types import (
     AccelerationCommand,
@@ -38,6 +41,8 @@ _REACHED_M = 0.15
 _FACING_M = 0.5  # nearer than this, a region of interest says nothing about where to look
 _TARGET_LOST_US = 3_000_000
 _CENTRED = ManualInput(0)
+_TO_HOME, _FROM_HOME = 1, 2  # MPC_YAW_MODE
+_HOME_YAW = (_TO_HOME, _FROM_HOME)
 
 
 @dataclass(slots=True)
@@ -48,11 +53,23 @@ class Manners:
         sticks: what full sticks mean.
         returning: heights and distances of a return.
         following: how a target is followed.
+        yaw_mode: MPC_YAW_MODE: 1 towards home, 2 away from it, else along the way.
     """
 
     sticks: StickSettings
     returning: ReturnSettings
     following: FollowSettings
+    yaw_mode: int = 0
+
+
+def manners(airframe: Airframe, parameters: Parameters) -> Manners:
+    """What airframe and parameters say."""
+    return Manners(
+        stick_settings(airframe, parameters),
+        return_settings(parameters),
+        follow_settings(parameters),
+        parameters.integer("MPC_YAW_MODE"),
+    )
 
 
 class Guidance:
@@ -179,14 +196,30 @@ class Guidance:
         """Change where the journey goes; the velocity goes on smoothly."""
         traveller = self.traveller
         traveller.target_ned_m, traveller.yaw_rad, traveller.speed_m_s = target_ned_m, yaw_rad, speed_m_s
+        traveller.pass_m_s = 0.0
         self._show_journey(state)
 
-    def enter_return(self, state: VehicleState) -> None:
-        """Climb, come home, land."""
+    def follow_leg(self, state: VehicleState, leg: Leg) -> None:
+        """Fly a leg of a mission."""
+        if leg.kind is LegKind.TAKEOFF:
+            self.enter_takeoff(state, leg.target_ned_m[2])
+        elif leg.kind is LegKind.LAND:
+            self.enter_land(state)
+            self._keeper.target_ned_m = (leg.target_ned_m[0], leg.target_ned_m[1], nan)
+        else:
+            self.enter_journey(state, leg.target_ned_m, leg.yaw_rad, leg.speed_m_s)
+            if leg.next_ned_m is not None:
+                cruise_m_s = self.limits.cruise_m_s if isnan(leg.speed_m_s) else leg.speed_m_s
+                self.traveller.pass_m_s = passing_speed(
+                    state.position_ned_m, leg.target_ned_m, leg.next_ned_m, cruise_m_s
+                )
+
+    def enter_return(self, state: VehicleState, place_ned_m: Vec3 | None = None) -> None:
+        """Climb, come home or to another place, shape (3,), land."""
         if self._manners is None:
             raise RuntimeError("guidance is not configured; call configure()")
         self._step = self._return
-        self.returning.start(state, self.home_ned_m, self._manners.returning)
+        self.returning.start(state, place_ned_m or self.home_ned_m, self._manners.returning)
         self._show_journey(state)
 
     def enter_orbit(self, state: VehicleState, orbit: Orbit) -> None:
@@ -270,7 +303,22 @@ class Guidance:
 
     def _travel(self, state: VehicleState) -> Command:
         velocity_ned_m_s, yaw_rad = self.traveller.step(state, self.limits, self._period_s)
+        if (
+            self._manners is not None
+            and self._manners.yaw_mode in _HOME_YAW
+            and isnan(self.traveller.yaw_rad)
+        ):
+            yaw_rad = self._yaw_by_home(state, yaw_rad)
         return self._command(state, velocity_ned_m_s, self._look(state, yaw_rad), slow=True)
+
+    def _yaw_by_home(self, state: VehicleState, yaw_rad: float) -> float:
+        """Towards home or away from it, as MPC_YAW_MODE says."""
+        north_m = self.home_ned_m[0] - state.position_ned_m[0]
+        east_m = self.home_ned_m[1] - state.position_ned_m[1]
+        mode = 0 if self._manners is None else self._manners.yaw_mode
+        if mode not in _HOME_YAW or hypot(north_m, east_m) < _FACING_M:
+            return yaw_rad
+        return atan2(east_m, north_m) + (0.0 if mode == _TO_HOME else pi)
 
     def _return(self, state: VehicleState) -> Command:
         before = self.returning.phase

@@ -17,14 +17,16 @@ class Traveller:
         target_ned_m: where to, shape (3,).
         speed_m_s: horizontal speed on the way; NaN: the cruising speed.
         yaw_rad: where to look; NaN: along the way.
+        pass_m_s: speed with which the target may be passed; 0: stop there.
     """
 
-    __slots__ = ("_velocity_ned_m_s", "_yaw_rad", "speed_m_s", "target_ned_m", "yaw_rad")
+    __slots__ = ("_velocity_ned_m_s", "_yaw_rad", "pass_m_s", "speed_m_s", "target_ned_m", "yaw_rad")
 
     def __init__(self) -> None:
         self.target_ned_m: Vec3 = (0.0, 0.0, 0.0)
         self.speed_m_s = nan
         self.yaw_rad = nan
+        self.pass_m_s = 0.0
         self._velocity_ned_m_s: Vec3 = (0.0, 0.0, 0.0)
         self._yaw_rad = 0.0
 
@@ -51,7 +53,8 @@ class Traveller:
         cruise_m_s = (
             limits.cruise_m_s if isnan(self.speed_m_s) else min(self.speed_m_s, limits.horizontal_m_s)
         )
-        speed_m_s = min(cruise_m_s, braking_speed(distance_m, limits.position_gain, limits.acceleration_m_s2))
+        stopping_m_s = braking_speed(distance_m, limits.position_gain, limits.acceleration_m_s2)
+        speed_m_s = min(cruise_m_s, hypot(stopping_m_s, self.pass_m_s))
         share = speed_m_s / distance_m if distance_m > 0.0 else 0.0
         climb_m = self.climb_m(state)
         if climb_m > 0.0:
@@ -69,6 +72,16 @@ class Traveller:
         elif distance_m > _FACING_M:
             self._yaw_rad = atan2(east_m, north_m)
         return velocity, self._yaw_rad
+
+
+def passing_speed(here: Vec3, target: Vec3, onward: Vec3, cruise_m_s: float) -> float:
+    """Speed to pass a place with on the way to the next: full straight on, none round a corner."""
+    north_m, east_m = target[0] - here[0], target[1] - here[1]
+    next_north_m, next_east_m = onward[0] - target[0], onward[1] - target[1]
+    length_m = hypot(north_m, east_m) * hypot(next_north_m, next_east_m)
+    if length_m == 0.0:
+        return 0.0
+    return cruise_m_s * max(0.0, (north_m * next_north_m + east_m * next_east_m) / length_m)
 
 
 def braking_speed(distance_m: float, gain: float, acceleration_m_s2: float) -> float:

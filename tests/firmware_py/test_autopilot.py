@@ -45,7 +45,8 @@ class Obedient:
 class Flight:
     """An autopilot on a point mass over a flat ground."""
 
-    def __init__(self, parameters=None):
+    def __init__(self, changed=None):
+        parameters = Parameters(changed, defaults=AIRFRAME.parameters)
         self.stabiliser = Obedient()
         self.autopilot = Autopilot(AIRFRAME, ORIGIN, parameters, stabiliser=self.stabiliser)
         self.sensors = Sensors(0, BASE, STILL, (1.0, 0.0, 0.0, 0.0), STILL, (0.0, 0.0, -9.8))
@@ -360,7 +361,7 @@ def test_another_mode_ends_the_failsafe_for_good():
 
 
 def test_setpoints_lost_on_the_ground_end_disarmed():
-    flight = Flight(Parameters({"COM_DISARM_PRFLT": 30.0})).run(1.0, STILL)
+    flight = Flight({"COM_DISARM_PRFLT": 30.0}).run(1.0, STILL)
     flight.autopilot.set_mode(FlightMode.OFFBOARD)
     flight.autopilot.arm()
     flight.run(6.5)
@@ -368,13 +369,12 @@ def test_setpoints_lost_on_the_ground_end_disarmed():
     assert flight.texts[-2:] == ["Disarmed by failsafe", "Ready for takeoff!"]
 
 
-def test_acceleration_alone_is_refused_once_and_counts_as_no_setpoint():
+def test_what_cannot_be_flown_is_refused_once_and_counts_as_no_setpoint():
     flight = Flight().in_offboard()
-    acceleration = (1.0, 0.0, 0.0)
-    flight.run(1.5, (nan, nan, nan), acceleration_ned_m_s2=acceleration)
+    flight.run(1.5, (nan, nan, nan), attitude=(1.0, 0.0, 0.0, 0.0))  # an attitude without a thrust
     assert flight.status.failsafe
     assert flight.texts == [
-        "Offboard setpoint ignored: no position or velocity",
+        "Offboard setpoint ignored: nothing in it can be flown",
         "Failsafe activated: offboard setpoints lost, hold",
     ]
 
@@ -398,7 +398,10 @@ def test_a_tumbling_vehicle_stops_its_motors():
         flight.sensors = replace(flight.sensors, attitude=(0.5**0.5, 0.5**0.5, 0.0, 0.0))
         speeds = flight.tick()
     assert speeds == OFF
-    assert flight.texts[-1] == "Attitude failure: motors stopped"
+    assert flight.texts[-1] == "Attitude failure: flight terminated"
+    assert flight.status.mode is FlightMode.TERMINATION
+    assert flight.autopilot.set_mode(FlightMode.HOLD) is NO
+    assert flight.autopilot.disarm() is OK
     assert flight.autopilot.arm() is NO
 
 

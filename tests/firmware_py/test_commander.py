@@ -5,8 +5,18 @@ import pytest
 
 from firmware_py import commander_guards as when
 from firmware_py.commander import Commander
-from firmware_py.commander_guards import NEVER_US, Situation, Timeouts
-from firmware_py.commander_table import FLOWN_MODE, RULES, TABLE, Event, State, first_match, mermaid
+from firmware_py.commander_guards import NEVER_US, Cause, Choices, Reaction, Situation, Timeouts
+from firmware_py.commander_table import (
+    CAUSE_EVENT,
+    FLOWN_MODE,
+    MODE_EVENT,
+    RULES,
+    TABLE,
+    Event,
+    State,
+    first_match,
+    mermaid,
+)
 from firmware_py.parameters import Parameters
 from firmware_py.status import CommandResult, FlightMode
 
@@ -14,12 +24,16 @@ NOW = 100_000_000
 LONG_AGO = 1_000_000
 ARMED = set(FLOWN_MODE)
 COMMANDS = [event for event in Event if event is not Event.TICK]
+REQUESTS = COMMANDS[: COMMANDS.index(Event.PILOT_TAKES_OVER)]
 OK, NO = CommandResult.ACCEPTED, CommandResult.TEMPORARILY_REJECTED
 
 FLYING = Situation(
     now_us=NOW,
     unsound_us=0,
     sound_us=NOW,
+    position_us=NOW,
+    manual_us=NOW,
+    has_mission=True,
     upright_us=NOW,
     airborne_us=NOW,
     landed=False,
@@ -31,36 +45,83 @@ FLYING = Situation(
 STANDING = replace(FLYING, airborne_us=NEVER_US, landed=True, flown=False, armed_us=NOW)
 
 
+CHOICES = (
+    Choices(),
+    Choices(dict.fromkeys(Cause, Reaction.WARN), arm_needs_ground_station=True),
+    *(
+        Choices(dict.fromkeys(Cause, reaction), without_sticks=Reaction.RETURN)
+        for reaction in Reaction
+        if reaction not in {Reaction.NOTHING, Reaction.WARN}
+    ),
+)
+
+
+def _flights():
+    """Combinations of what makes a flight well or ill, the vehicle's own side."""
+    for unsound_us, sound_us, upright_us, airborne_us, flown in product(
+        (LONG_AGO, NOW - 100_000),
+        (NOW, LONG_AGO),
+        (NOW, NOW - 4000, LONG_AGO),
+        (NOW, LONG_AGO),
+        (False, True),
+    ):
+        for entered_us, armed_us, reached in product((NOW, LONG_AGO), (NOW, LONG_AGO), (False, True)):
+            yield {
+                "unsound_us": unsound_us,
+                "sound_us": sound_us,
+                "upright_us": upright_us,
+                "airborne_us": airborne_us,
+                "landed": airborne_us < NOW,
+                "flown": flown,
+                "entered_us": entered_us,
+                "armed_us": armed_us,
+                "target_reached": reached,
+            }
+
+
+def _circumstances():
+    """Combinations of what comes from outside."""
+    for setpoint_us, position_us, manual_us, has_mission, intended in product(
+        (NOW, NEVER_US), (NOW, LONG_AGO), (NOW, NEVER_US), (False, True), FlightMode
+    ):
+        yield {
+            "setpoint_us": setpoint_us,
+            "position_us": position_us,
+            "manual_us": manual_us,
+            "has_mission": has_mission,
+            "intended": intended,
+        }
+
+
 def situations():
-    """Every combination of what guards can tell apart."""
-    return [
-        Situation(
-            now_us=NOW,
-            unsound_us=unsound_us,
-            sound_us=sound_us,
-            upright_us=upright_us,
-            airborne_us=airborne_us,
-            landed=airborne_us < NOW,
-            flown=flown,
-            target_reached=reached,
-            setpoint_us=setpoint_us,
-            entered_us=entered_us,
-            armed_us=armed_us,
-            intended=intended,
-            timeouts=Timeouts(land_at_loss=land),
-        )
-        for (unsound_us, sound_us, upright_us, airborne_us, setpoint_us, entered_us, armed_us) in product(
-            (LONG_AGO, NOW - 100_000),
-            (NOW, LONG_AGO),
-            (NOW, NOW - 4000, LONG_AGO),
-            (NOW, NOW - 4000, LONG_AGO),
-            (NOW, NEVER_US),
-            (NOW, LONG_AGO),
-            (NOW, LONG_AGO),
-        )
-        for flown, reached, land in product((False, True), repeat=3)
-        for intended in FlightMode
+    """Every flight with an ordinary day around it, and an ordinary flight with everything around it."""
+    outside = {"setpoint_us": NOW, "position_us": NOW, "manual_us": NOW, "has_mission": True}
+    found = [
+        Situation(now_us=NOW, **flight, **outside, intended=intended)
+        for flight in _flights()
+        for intended in (FlightMode.OFFBOARD, FlightMode.LAND)
     ]
+    ordinary = {"now_us": NOW, "sound_us": NOW, "upright_us": NOW, "armed_us": NOW, "entered_us": LONG_AGO}
+    found += [
+        Situation(
+            **ordinary, landed=landed, flown=True, **around, choices=choices, cause=cause, follow_up=then
+        )
+        for around in _circumstances()
+        for choices in CHOICES
+        for landed, cause, then in (
+            (False, None, Reaction.NOTHING),
+            (True, None, Reaction.NOTHING),
+            (False, Cause.SETPOINTS, Reaction.LAND),
+            (False, Cause.MANUAL, Reaction.RETURN),
+            (True, Cause.MANUAL, Reaction.RETURN),
+        )
+    ]
+    found += [
+        replace(STANDING, battery_warning=3),
+        replace(STANDING, entered_us=LONG_AGO, follow_up=Reaction.LAND),
+        replace(STANDING, choices=CHOICES[1]),
+    ]
+    return found
 
 
 SITUATIONS = situations()
@@ -89,17 +150,43 @@ def test_every_row_of_the_table_is_reached():
     assert [row for row in TABLE if id(row) not in fired] == []
 
 
-# What a healthy vehicle does, flying with setpoints, row by row; "-" stays, "!" is refused.
-#          ARM    DISARM   FORCE     HOLD   TAKEOFF  LAND   OFFBOARD
+# What a healthy vehicle does in flight, with setpoints, sticks and a mission: where each request leads; "-"
+# stays, "!" is refused. Asking for a mode is alike in all states that fly, so that is swept below.
+#              ARM  DISARM   FORCE    TERMINATE
 IN_FLIGHT = """
-disarmed   hold   -        -         -      -        -      -
-hold       -      !        disarmed  -      takeoff  land   offboard
-takeoff    -      !        disarmed  hold   takeoff  land   offboard
-land       -      !        disarmed  hold   takeoff  -      offboard
-offboard   -      !        disarmed  hold   takeoff  land   -
-loss_hold  -      !        disarmed  hold   takeoff  land   offboard
-loss_land  -      !        disarmed  hold   takeoff  land   offboard
+disarmed         hold -        -        -
+manual           -    !        disarmed terminated
+stabilized       -    !        disarmed terminated
+acro             -    !        disarmed terminated
+altitude         -    !        disarmed terminated
+position         -    !        disarmed terminated
+hold             -    !        disarmed terminated
+takeoff          -    !        disarmed terminated
+orbit            -    !        disarmed terminated
+follow           -    !        disarmed terminated
+mission          -    !        disarmed terminated
+return           -    !        disarmed terminated
+land             -    !        disarmed terminated
+offboard         -    !        disarmed terminated
+failsafe_hold    -    !        disarmed terminated
+failsafe_return  -    !        disarmed terminated
+failsafe_land    -    !        disarmed terminated
+failsafe_descend -    !        disarmed terminated
+terminated       -    disarmed disarmed -
 """
+GOES_ON = {
+    State.HOLD,
+    State.LAND,
+    State.RETURN,
+    State.MISSION,
+    State.OFFBOARD,
+    State.MANUAL,
+    State.STABILIZED,
+    State.ACRO,
+    State.ALTITUDE,
+    State.POSITION,
+}
+MODES = [mode for mode in FlightMode if mode is not FlightMode.TERMINATION]
 
 
 def _expected():
@@ -108,7 +195,7 @@ def _expected():
     return [
         (State(state), event, cell)
         for state, *cells in rows
-        for event, cell in zip(COMMANDS, cells, strict=True)
+        for event, cell in zip(REQUESTS[:4], cells, strict=True)
     ]
 
 
@@ -120,14 +207,108 @@ def test_commands_in_flight(state, event, cell):
     assert row.target is (None if cell in "-!" else State(cell))
 
 
+@pytest.mark.parametrize("mode", MODES)
+@pytest.mark.parametrize("state", State)
+def test_every_mode_can_be_asked_for_in_every_state(state, mode):
+    row = first_match(RULES[state, MODE_EVENT[mode]], FLYING)
+    assert row is not None
+    if state is State.TERMINATED:
+        assert row.result is NO
+        return
+    assert (row.result, row.intends) == (OK, mode)
+    own = State(mode.name.lower())
+    stays = state is State.DISARMED or (state is own and own in GOES_ON)
+    assert row.target is (None if stays else own)
+
+
+@pytest.mark.parametrize("state", sorted(ARMED - {State.TERMINATED}, key=lambda state: state.value))
+@pytest.mark.parametrize("mode", MODES)
+def test_a_mode_that_cannot_be_flown_is_refused_in_flight(state, mode):
+    blind = replace(FLYING, position_us=LONG_AGO, manual_us=NEVER_US, has_mission=False, setpoint_us=NEVER_US)
+    row = first_match(RULES[state, MODE_EVENT[mode]], blind)
+    assert row is not None
+    if mode is FlightMode.LAND:
+        assert row.target in {State.FAILSAFE_DESCEND, State.LAND, None}
+        assert row.result is OK
+    elif state is State.OFFBOARD and mode is FlightMode.OFFBOARD:
+        assert (row.result, row.target) == (OK, None)
+    else:
+        assert row.result is NO
+        assert row.text
+
+
 @pytest.mark.parametrize("state", State)
 def test_nothing_happens_by_itself_when_all_is_well(state):
-    row = first_match(RULES[state, Event.TICK], replace(FLYING))
-    if state in {State.LOSS_HOLD, State.LOSS_LAND}:
+    assert first_match(RULES[state, Event.TICK], replace(FLYING)) is None
+
+
+@pytest.mark.parametrize("state", sorted(ARMED, key=lambda state: state.value))
+def test_offboard_resumes_from_wherever_its_loss_led(state):
+    row = first_match(RULES[state, Event.TICK], replace(FLYING, cause=Cause.SETPOINTS))
+    assert row is not None
+    assert row.target is State.OFFBOARD
+
+
+SEVERITY = [State.FAILSAFE_HOLD, State.FAILSAFE_RETURN, State.FAILSAFE_LAND, State.TERMINATED]
+REACTIONS = {
+    Reaction.HOLD: State.FAILSAFE_HOLD,
+    Reaction.RETURN: State.FAILSAFE_RETURN,
+    Reaction.LAND: State.FAILSAFE_LAND,
+    Reaction.TERMINATE: State.TERMINATED,
+    Reaction.DISARM: State.DISARMED,
+}
+CHOSEN = [cause for cause in Cause if cause is not Cause.POSITION]
+LATER = {Cause.GROUND_STATION, Cause.MANUAL}
+
+
+@pytest.mark.parametrize("reaction", REACTIONS)
+@pytest.mark.parametrize("cause", CHOSEN)
+def test_every_cause_has_every_reaction(cause, reaction):
+    now = replace(FLYING, choices=Choices({cause: reaction}))
+    row = first_match(RULES[State.MISSION, CAUSE_EVENT[cause]], now)
+    assert row is not None
+    delayed = cause in LATER and reaction in {Reaction.RETURN, Reaction.LAND}
+    assert row.target is (State.FAILSAFE_HOLD if delayed else REACTIONS[reaction])
+    assert row.cause is cause
+    assert cause.value in row.text
+    assert row.follow_up is (
+        reaction
+        if delayed
+        else Reaction.LAND
+        if (cause, reaction) == (Cause.SETPOINTS, Reaction.HOLD)
+        else Reaction.NOTHING
+    )
+
+
+@pytest.mark.parametrize("event", [CAUSE_EVENT[cause] for cause in Cause])
+@pytest.mark.parametrize("state", State)
+def test_a_failsafe_never_leads_back_to_a_milder_one(state, event):
+    for now in SITUATIONS:
+        row = first_match(RULES[state, event], now)
         assert row is not None
-        assert row.target is State.OFFBOARD  # setpoints come: resumed
-    else:
-        assert row is None
+        if row.target in SEVERITY and state in SEVERITY:
+            assert SEVERITY.index(row.target) >= SEVERITY.index(state)
+        if state in {State.DISARMED, State.TERMINATED}:
+            assert row.target is None
+
+
+@pytest.mark.parametrize(
+    ("reaction", "state"),
+    [
+        (Reaction.POSITION, State.POSITION),
+        (Reaction.ALTITUDE, State.ALTITUDE),
+        (Reaction.STABILIZED, State.STABILIZED),
+    ],
+)
+def test_lost_setpoints_leave_it_to_the_pilot_if_there_is_one(reaction, state):
+    choices = Choices({Cause.SETPOINTS: reaction}, without_sticks=Reaction.LAND)
+    row = first_match(RULES[State.OFFBOARD, Event.SETPOINTS_LOST], replace(FLYING, choices=choices))
+    assert row is not None
+    assert row.target is state
+    alone = replace(FLYING, choices=choices, manual_us=NEVER_US)
+    row = first_match(RULES[State.OFFBOARD, Event.SETPOINTS_LOST], alone)
+    assert row is not None
+    assert row.target is State.FAILSAFE_LAND
 
 
 @pytest.mark.parametrize("state", State)
@@ -136,9 +317,12 @@ def test_only_arming_arms_and_only_when_checks_pass(state):
         row = first_match(RULES[state, event], now)
         if state is State.DISARMED and row is not None and row.target in ARMED:
             assert event is Event.ARM
-            assert not when.unhealthy(now)
-            assert now.intended is not FlightMode.LAND
+            assert not when.unsettled(now)
+            assert not when.tipped_over(now)
+            assert now.intended not in when.UNARMABLE
             assert now.intended is not FlightMode.OFFBOARD or now.setpoint_us == NOW
+            assert now.intended not in when.MANUAL_MODES or now.manual_us == NOW
+            assert now.intended is not FlightMode.MISSION or now.has_mission
             assert FLOWN_MODE[row.target] is now.intended
 
 
@@ -148,21 +332,28 @@ def test_in_the_air_only_force_or_a_hopeless_failure_stops_the_motors(state):
         row = first_match(RULES[state, event], now)
         if row is None or row.target is not State.DISARMED or now.landed:
             continue
-        hopeless = event is Event.TICK and (when.sensors_lost(now) or when.tumbled(now))
+        hopeless = event is Event.TICK and when.sensors_lost(now)
+        chosen = row.cause is not None and now.choices.reaction(row.cause) is Reaction.DISARM
+        terminated = state is State.TERMINATED and event is Event.DISARM
         # "never flown" in the air cannot be: the commander sets `flown` with `landed` false.
-        assert event is Event.FORCE_DISARM or hopeless or not now.flown
+        assert event is Event.FORCE_DISARM or hopeless or chosen or terminated or not now.flown
 
 
-@pytest.mark.parametrize("state", sorted(ARMED, key=lambda state: state.value))
+@pytest.mark.parametrize("state", sorted(ARMED - {State.TERMINATED}, key=lambda state: state.value))
 def test_failsafes_stand_before_all_else(state):
     for now in SITUATIONS:
-        if when.sensors_lost(now) or when.tumbled(now):
-            row = first_match(RULES[state, Event.TICK], now)
+        row = first_match(RULES[state, Event.TICK], now)
+        if when.sensors_lost(now):
             assert row is not None
             assert row.target is State.DISARMED
+        elif when.tumbled(now):
+            assert row is not None
+            assert row.target is State.TERMINATED
 
 
-@pytest.mark.parametrize("state", sorted(ARMED - {State.OFFBOARD}, key=lambda state: state.value))
+@pytest.mark.parametrize(
+    "state", sorted(ARMED - {State.OFFBOARD, State.TERMINATED}, key=lambda state: state.value)
+)
 def test_offboard_is_entered_only_with_setpoints(state):
     row = first_match(RULES[state, Event.SET_OFFBOARD], replace(FLYING, setpoint_us=NEVER_US))
     assert row is not None
@@ -175,7 +366,12 @@ def test_offboard_is_entered_only_with_setpoints(state):
     [
         (State.HOLD, {"sound_us": NOW - 300_001}, State.DISARMED, "Sensors lost: motors stopped"),
         (State.HOLD, {"sound_us": NOW - 300_000}, None, ""),
-        (State.LAND, {"upright_us": NOW - 300_001}, State.DISARMED, "Attitude failure: motors stopped"),
+        (
+            State.LAND,
+            {"upright_us": NOW - 300_001},
+            State.TERMINATED,
+            "Attitude failure: flight terminated",
+        ),
         (State.LAND, {"upright_us": NOW - 300_000}, None, ""),
         (State.HOLD, {"landed": True, "airborne_us": NOW - 2_000_000}, State.DISARMED, "Disarmed by landing"),
         (State.HOLD, {"landed": True, "airborne_us": NOW - 1_999_999}, None, ""),
@@ -197,29 +393,24 @@ def test_offboard_is_entered_only_with_setpoints(state):
             State.DISARMED,
             "Disarmed by landing",
         ),
-        (State.OFFBOARD, {"setpoint_us": NOW - 1_000_000}, None, ""),
+        (State.OFFBOARD, {"setpoint_us": NEVER_US}, None, ""),  # told by an event, not by the tick
+        (State.FAILSAFE_HOLD, {"entered_us": NOW - 4_999_999, "follow_up": Reaction.LAND}, None, ""),
         (
-            State.OFFBOARD,
-            {"setpoint_us": NOW - 1_000_001},
-            State.LOSS_HOLD,
-            "Failsafe activated: offboard setpoints lost, hold",
-        ),
-        (
-            State.OFFBOARD,
-            {"setpoint_us": NOW - 1_000_001, "timeouts": Timeouts(land_at_loss=True)},
-            State.LOSS_LAND,
-            "Failsafe activated: offboard setpoints lost, landing",
-        ),
-        (State.LOSS_HOLD, {"setpoint_us": NEVER_US, "entered_us": NOW - 4_999_999}, None, ""),
-        (
-            State.LOSS_HOLD,
-            {"setpoint_us": NEVER_US, "entered_us": NOW - 5_000_000},
-            State.LOSS_LAND,
+            State.FAILSAFE_HOLD,
+            {"entered_us": NOW - 5_000_000, "follow_up": Reaction.LAND},
+            State.FAILSAFE_LAND,
             "Failsafe: landing",
         ),
         (
-            State.LOSS_HOLD,
-            {"setpoint_us": NEVER_US, "entered_us": NOW - 5_000_000, "landed": True},
+            State.FAILSAFE_HOLD,
+            {"entered_us": NOW - 5_000_000, "follow_up": Reaction.RETURN},
+            State.FAILSAFE_RETURN,
+            "Failsafe: returning home",
+        ),
+        (State.FAILSAFE_HOLD, {"entered_us": LONG_AGO}, None, ""),  # hold was chosen for good
+        (
+            State.FAILSAFE_HOLD,
+            {"entered_us": NOW - 5_000_000, "landed": True, "follow_up": Reaction.LAND},
             State.DISARMED,
             "Disarmed by failsafe",
         ),
@@ -236,8 +427,16 @@ def test_what_a_tick_does(state, change, target, text):
     ("change", "text"),
     [
         ({"unsound_us": NOW - 700_000}, "Arming denied: Resolve system health failures first"),
-        ({"upright_us": NOW - 4000}, "Arming denied: Resolve system health failures first"),
-        ({"intended": FlightMode.LAND}, "Arming denied: not in Land mode"),
+        ({"upright_us": NOW - 4000}, "Arming denied: vehicle is tipped over"),
+        ({"position_us": LONG_AGO}, "Arming denied: no position estimate"),
+        ({"battery_warning": 3}, "Arming denied: low battery"),
+        ({"choices": CHOICES[1]}, "Arming denied: no connection to the ground station"),
+        ({"intended": FlightMode.LAND}, "Arming denied: not in this mode"),
+        (
+            {"intended": FlightMode.POSITION, "manual_us": NEVER_US},
+            "Arming denied: no manual control input",
+        ),
+        ({"intended": FlightMode.MISSION, "has_mission": False}, "Arming denied: no valid mission"),
         (
             {"intended": FlightMode.OFFBOARD, "setpoint_us": NEVER_US},
             "Arming denied: no offboard setpoints",
@@ -266,10 +465,108 @@ def test_automatic_disarming_can_be_turned_off(wait):
         assert first_match(RULES[state, Event.TICK], replace(now, flown=flown)) is None
 
 
-def test_parameters_set_the_times():
+def test_parameters_set_times_and_choices():
     commander = Commander()
-    commander.configure(Parameters({"COM_OF_LOSS_T": 0.5, "COM_FAIL_ACT_T": 3.0, "COM_OBL_RC_ACT": 4}))
-    assert commander.situation.timeouts == Timeouts(500_000, 3_000_000, 2_000_000, 10_000_000, True)
+    commander.configure(
+        Parameters({"COM_OF_LOSS_T": 0.5, "COM_FAIL_ACT_T": 3.0, "COM_OBL_RC_ACT": 4, "NAV_DLL_ACT": 2})
+    )
+    assert commander.situation.timeouts == Timeouts(setpoint_loss_us=500_000, failsafe_hold_us=3_000_000)
+    choices = commander.situation.choices
+    assert choices.reactions[Cause.SETPOINTS] is Reaction.LAND
+    assert choices.reactions[Cause.GROUND_STATION] is Reaction.RETURN
+    assert choices.reactions[Cause.FENCE] is Reaction.HOLD  # PX4's default
+    assert choices.arm_needs_ground_station
+
+
+def test_defaults_return_home_when_setpoints_stop_and_nobody_holds_sticks():
+    commander = Commander()
+    commander.configure(Parameters())
+    assert commander.situation.choices.reaction(Cause.SETPOINTS) is Reaction.RETURN
+
+
+def _flying_commander():
+    commander = Commander()
+    commander.configure(Parameters())
+    now_us = _ticks(commander, 0, 300)
+    commander.handle(Event.ARM)
+    return commander, _ticks(commander, now_us, 10, landed=False)
+
+
+def _until(commander, now_us, condition, limit_s=30, **conditions):
+    """Time until something happens, s."""
+    start_us = now_us
+    while not condition():
+        assert now_us - start_us < limit_s * 1e6, "it never happened"
+        now_us = _ticks(commander, now_us, 1, landed=False, **conditions)
+    return (now_us - start_us) / 1e6
+
+
+def test_a_lost_ground_station_holds_and_then_returns_with_px4s_timing():
+    commander, now_us = _flying_commander()
+    commander.configure(Parameters({"NAV_DLL_ACT": 2}))
+    commander.ground_station_heard()
+    held_s = _until(commander, now_us, lambda: commander.state is State.FAILSAFE_HOLD)
+    assert held_s == pytest.approx(12.28, abs=0.06)
+    assert commander.failsafe
+    now_us += round(held_s * 1e6)
+    returned_s = _until(commander, now_us, lambda: commander.state is State.FAILSAFE_RETURN)
+    assert returned_s == pytest.approx(5.0, abs=0.02)
+    commander.ground_station_heard()  # it does not come back by itself
+    _ticks(commander, now_us + 5_100_000, 100, landed=False)
+    assert commander.state is State.FAILSAFE_RETURN
+
+
+def test_a_failsafe_that_was_overruled_comes_again_only_after_it_was_over():
+    commander, now_us = _flying_commander()
+    commander.configure(Parameters({"NAV_DLL_ACT": 2, "COM_DL_LOSS_T": 5}))
+    commander.ground_station_heard()
+    _until(commander, now_us, lambda: commander.state is State.FAILSAFE_HOLD)
+    commander.handle(Event.SET_HOLD)
+    now_us = _ticks(commander, commander.situation.now_us + 4000, 500, landed=False)
+    assert commander.state is State.HOLD
+    commander.ground_station_heard()
+    _until(commander, now_us, lambda: commander.state is State.FAILSAFE_HOLD)
+
+
+@pytest.mark.parametrize(
+    ("level", "state"), [(2, State.HOLD), (3, State.FAILSAFE_RETURN), (4, State.FAILSAFE_LAND)]
+)
+def test_an_emptying_battery_warns_returns_and_lands(level, state):
+    commander, now_us = _flying_commander()
+    for warning in range(1, level + 1):
+        commander.situation.battery_warning = warning
+        now_us = _ticks(commander, now_us, 30, landed=False)
+    assert commander.state is state
+
+
+def test_sticks_that_stop_in_a_manual_mode_hold_and_then_return():
+    commander, now_us = _flying_commander()
+    commander.sticks_came()
+    commander.handle(Event.SET_POSITION)
+    lost_s = _until(commander, now_us, lambda: commander.state is State.FAILSAFE_HOLD)
+    assert lost_s == pytest.approx(0.5, abs=0.05)
+    now_us += round(lost_s * 1e6)
+    assert _until(commander, now_us, lambda: commander.state is State.FAILSAFE_RETURN) == pytest.approx(
+        5, abs=0.02
+    )
+
+
+def test_nobody_misses_sticks_that_were_never_there():
+    commander, now_us = _flying_commander()
+    _ticks(commander, now_us, 1000, landed=False)
+    assert commander.state is State.HOLD
+
+
+def test_a_lost_position_descends():
+    commander, now_us = _flying_commander()
+    lost_s = _until(commander, now_us, lambda: commander.state is State.FAILSAFE_DESCEND, placed=False)
+    assert lost_s == pytest.approx(1.0, abs=0.05)
+
+
+def test_a_broken_fence_holds():
+    commander, now_us = _flying_commander()
+    commander.situation.fence_breached = True
+    _until(commander, now_us, lambda: commander.state is State.FAILSAFE_HOLD, limit_s=0.1)
 
 
 def _ticks(commander, start_us, count, **conditions):
@@ -313,5 +610,8 @@ def test_the_diagram_shows_every_state_and_every_way_out_of_offboard():
     for state in State:
         assert f"--> {state.value}:" in diagram
     assert "    armed --> disarmed: force_disarm\n" in diagram
-    assert "    offboard --> loss_hold: [setpoint lost]\n" in diagram
+    assert (
+        "    offboard --> failsafe_hold: setpoints_lost [chosen hold]\n" in diagram
+        or "armed --> failsafe_hold: setpoints_lost [chosen hold]" in diagram
+    )
     assert "    takeoff --> hold: [target reached]\n" in diagram
