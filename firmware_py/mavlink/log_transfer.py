@@ -36,6 +36,7 @@ class _Transfer:
     """What one link is owed.
 
     Attributes:
+        asked: first and last number of a list that was asked for.
         entries: LOG_ENTRY messages to be sent.
         log: whose data is sent.
         number: of that log.
@@ -43,6 +44,7 @@ class _Transfer:
         end: where to stop.
     """
 
+    asked: tuple[int, int] | None = None
     entries: deque[Message] = field(default_factory=deque)
     log: _Log | None = None
     number: int = 0
@@ -82,6 +84,9 @@ class LogTransferService:
 
     def _go_on(self, link: Link, transfer: _Transfer) -> bool:
         """Send a few packets; whether more are owed."""
+        if transfer.asked is not None:
+            self._make_list(transfer, *transfer.asked)
+            transfer.asked = None
         for _ in range(_PACKETS):
             if link.congested:
                 break
@@ -111,15 +116,17 @@ class LogTransferService:
     def _list(self, exchange: Exchange, link: Link, message: Message) -> None:
         if not exchange.is_for_us(message, or_everyone=True):
             return
-        self._logs = logs = self._find()
         transfer = self._transfers.setdefault(link.profile.name, _Transfer())
+        transfer.asked, transfer.log = (message.start, message.end), None
+
+    def _make_list(self, transfer: _Transfer, first: int, end: int) -> None:
+        """At the next update, not at once: a flight that has just ended is then written down."""
+        self._logs = logs = self._find()
         transfer.entries.clear()
-        transfer.log = None
         if not logs:
             transfer.entries.append(mavlink.MAVLink_log_entry_message(0, 0, 0, 0, 0))
-            return
-        last = len(logs) if message.end == _LAST else message.end  # PX4's way to fill last_log_num
-        for number in range(message.start, min(message.end, len(logs) - 1) + 1):
+        last = len(logs) if end == _LAST else end  # PX4's way to fill last_log_num
+        for number in range(first, min(end, len(logs) - 1) + 1):
             log = logs[number]
             transfer.entries.append(
                 mavlink.MAVLink_log_entry_message(
