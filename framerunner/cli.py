@@ -91,6 +91,7 @@ def _is_foreseen(error: Exception) -> bool:
         "DynamicsError",
         "LinkError",
         "MissionError",
+        "ParameterFileError",
         "PictureError",
         "ScenarioError",
         "SettingError",

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import socket
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import asdict
 from importlib import import_module
 from math import degrees
@@ -15,6 +15,7 @@ from firmware_py.mavlink.video_links import VideoEncoding, VideoStream
 from sitl.drone_files import flight_recorder, open_storage
 from sitl.link_hub import LinkHub
 from sitl.link_urls import is_loopback
+from sitl.parameter_file import ParameterKeeper, open_parameters
 from sitl.server_settings import ServerSettings
 from sitl.simulation import Simulation
 
@@ -31,18 +32,29 @@ class ServedDrone:
         simulation: what flies.
         settings: of this drone.
         boot_unix_us: what time it is, microseconds since 1970.
+        notice: called with lines for people.
 
     Raises:
         StorageFolderError: the folder for its files cannot be used.
+        ParameterFileError: the file of its parameters cannot be read, or a line is wrong.
 
     Attributes:
         simulation: what flies.
         node: what speaks for it.
     """
 
-    def __init__(self, simulation: Simulation, settings: ServerSettings, boot_unix_us: int) -> None:
+    def __init__(
+        self,
+        simulation: Simulation,
+        settings: ServerSettings,
+        boot_unix_us: int,
+        notice: Callable[[str], None] = lambda line: None,
+    ) -> None:
         self.simulation = simulation
         self._settings = settings
+        self._keeper: ParameterKeeper | None = None
+        if settings.parameters is not None:
+            self._keeper = open_parameters(simulation.autopilot.parameters, settings.parameters, notice)
         storage = open_storage(settings.storage, settings.instance)
         self._recorder = flight_recorder(storage, boot_unix_us)
         self.node = MavlinkNode(
@@ -70,6 +82,8 @@ class ServedDrone:
         for profile, addresses in self._settings.standing_links:
             await self._hub.open_udp(profile, addresses)
         self._hub.update(0)
+        if self._keeper is not None:
+            self._keeper.start()
         await self._hub.open_all(self._settings.links)
 
     async def open_video(self) -> None:
@@ -110,8 +124,10 @@ class ServedDrone:
                 self._rtp.send(image, time_us)
 
     async def close(self) -> None:
-        """Finish the log, stop the video and close the links."""
+        """Finish the log, save the parameters, stop the video and close the links."""
         self._recorder.finish(self.simulation.autopilot)
+        if self._keeper is not None:
+            await self._keeper.close()
         if self._video is not None:
             await self._video.close()
         if self._rtp is not None:

@@ -153,6 +153,25 @@ def _shortest(declared: Parameter, value: float) -> str:
     return next(text for text in texts if pack("<f", float(text)) == four)  # nine always do
 
 
+def open_parameters(parameters: Parameters, path: Path, notice: Callable[[str], None]) -> ParameterKeeper:
+    """Take over what a file holds, and keep in it what changes from now on.
+
+    Args:
+        parameters: of the drone.
+        path: of the file.
+        notice: called with lines for people.
+
+    Raises:
+        ParameterFileError: the file cannot be read, or a line is wrong; nothing has changed then.
+    """
+    loaded = load_parameters(path, parameters)
+    for name, value in loaded.values.items():
+        parameters.set(name, value)
+    if loaded.unknown:
+        notice(f"{path}: {loaded.notice()}")
+    return ParameterKeeper(parameters, path, notice)
+
+
 class ParameterKeeper:
     """Saves parameters whenever they have changed, a moment later and in a thread.
 
@@ -167,11 +186,21 @@ class ParameterKeeper:
         self._path = path
         self._notice = notice
         self._changed = asyncio.Event()
+        self._running: asyncio.Task[None] | None = None
         parameters.on_change(self._note)
         parameters.on_save(self._changed.set)
 
-    async def run(self) -> None:
-        """Save until cancelled, and then what is not saved yet."""
+    def start(self) -> None:
+        """Save from now on; to be called where an event loop runs."""
+        self._running = asyncio.create_task(self._run())
+
+    async def close(self) -> None:
+        """Save what is not saved yet, and nothing more."""
+        if self._running is not None:
+            self._running.cancel()
+            await asyncio.gather(self._running, return_exceptions=True)
+
+    async def _run(self) -> None:
         try:
             while True:
                 await self._changed.wait()

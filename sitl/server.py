@@ -37,7 +37,7 @@ class SimulatorServer:
         self._notice = notice
         boot_unix_us = int(time.time() * 1e6)
         self._drones = [
-            ServedDrone(flown, settings.shifted(number), boot_unix_us)
+            ServedDrone(flown, settings.shifted(number), boot_unix_us, notice)
             for number, flown in enumerate(simulations)
         ]
         self._fleet = Fleet([flown.world for flown in simulations], notice)

@@ -43,6 +43,7 @@ class ServerSettings:
         signing_key: with which MAVLink is signed; None: it is not.
         storage: folder for the drones' files and logs; None: they are kept in memory.
         shell: whether the drones have a shell over MAVLink.
+        parameters: file that keeps changed parameters (drone 2: NAME-2.params); None: nothing does.
     """
 
     instance: int = 0
@@ -56,6 +57,7 @@ class ServerSettings:
     signing_key: SigningKey | None = None
     storage: Path | None = None
     shell: bool = False
+    parameters: Path | None = None
 
     @property
     def onboard(self) -> UdpAddresses:
@@ -112,11 +114,16 @@ class ServerSettings:
             video_port=None if self.video_port is None else self.video_port + by,
             video_rtp=None if self.video_rtp is None else (self.video_rtp[0], self.video_rtp[1] + 2 * by),
             links=tuple(_shifted(link, by) for link in self.links),
+            parameters=_own_file(self.parameters, self.instance + by + 1),
         )
 
     def _from(self, remote: str) -> str:
         """What to listen on: from the loopback address nothing goes out to another machine."""
         return self.bind if is_loopback(remote) or not is_loopback(self.bind) else "0.0.0.0"
+
+
+def _own_file(path: Path | None, system_id: int) -> Path | None:
+    return None if path is None else path.with_stem(f"{path.stem}-{system_id}")
 
 
 def _shifted(link: LinkUrl, by: int) -> LinkUrl:

@@ -32,6 +32,10 @@ class Onboard:
         Path | None,
         Parameter(help="folder for its files and flight logs, DIR/0 for instance 0; else kept in memory"),
     ] = None
+    parameters: Annotated[
+        Path | None,
+        Parameter(help="file of changed parameters (.params), read at start and saved when one changes"),
+    ] = None
     shell: Annotated[
         bool, Parameter(help="answer MAVLink's shell (SERIAL_CONTROL), about the drone only", negative=())
     ] = False
@@ -93,7 +97,7 @@ def sim(
 
         framerunner sim --count 4 --video-rtp off
 
-        framerunner sim --storage drone-files
+        framerunner sim --storage drone-files --parameters drone.params
 
         framerunner sim --link tcpin://127.0.0.1:5760 --link serial:///dev/ttyUSB0:57600
     """
@@ -141,6 +145,7 @@ def _settings(
         signing_key=_read_key(chosen.signing_key),
         storage=onboard.storage,
         shell=onboard.shell,
+        parameters=onboard.parameters,
     )
     settings.check(count)
     return settings

@@ -6,7 +6,14 @@ from hypothesis import strategies as st
 
 from firmware_py.parameters import DECLARATIONS, Parameters
 from sitl import parameter_file
-from sitl.parameter_file import ParameterFileError, ParameterKeeper, load_parameters, save_parameters
+from sitl.parameter_file import (
+    ParameterFileError,
+    ParameterKeeper,
+    load_parameters,
+    open_parameters,
+    save_parameters,
+)
+from sitl.server_settings import ServerSettings
 
 
 @pytest.fixture
@@ -118,7 +125,7 @@ async def test_changes_are_saved_a_moment_later_and_the_last_at_the_end(path, mo
     monkeypatch.setattr(parameter_file, "SAVE_DELAY_S", 0.0)
     parameters, notices = Parameters(), []
     keeper = ParameterKeeper(parameters, path, notices.append)
-    running = asyncio.create_task(keeper.run())
+    keeper.start()
     await asyncio.sleep(0)
     assert not path.exists()
     parameters.set("MAV_SYS_ID", 2)
@@ -131,8 +138,7 @@ async def test_changes_are_saved_a_moment_later_and_the_last_at_the_end(path, mo
     monkeypatch.setattr(parameter_file, "SAVE_DELAY_S", 60.0)
     parameters.set("MIS_TAKEOFF_ALT", 3.0)
     await asyncio.sleep(0)
-    running.cancel()
-    await asyncio.gather(running, return_exceptions=True)
+    await keeper.close()
     assert load_parameters(path, Parameters()).values == {"MIS_TAKEOFF_ALT": 3.0}
     assert notices == []
 
@@ -141,10 +147,28 @@ async def test_saving_is_done_on_request_and_a_failure_is_said(path):
     parameters, notices = Parameters(), []
     assert not parameters.save()
     path.mkdir()
-    running = asyncio.create_task(ParameterKeeper(parameters, path, notices.append).run())
+    keeper = ParameterKeeper(parameters, path, notices.append)
+    keeper.start()
     await asyncio.sleep(0)
     assert parameters.save()
-    running.cancel()
-    await asyncio.gather(running, return_exceptions=True)
+    await keeper.close()
     (said,) = notices
     assert said.startswith(f"parameters are not saved: {path}: cannot be written")
+
+
+def test_opening_takes_over_what_is_there_and_says_what_is_not(path):
+    path.write_text("RTL_RETURN_ALT 20\nEKF2_EN 1\n")
+    parameters, notices = Parameters(), []
+    open_parameters(parameters, path, notices.append)
+    assert parameters.changed() == {"RTL_RETURN_ALT": 20.0}
+    assert notices == [f"{path}: parameters left out, as this drone cannot set them: EKF2_EN"]
+
+
+def test_each_drone_of_a_fleet_has_its_own_file(path):
+    settings = ServerSettings(parameters=path)
+    assert [settings.shifted(by).parameters.name for by in (0, 1, 3)] == [
+        "drone.params",
+        "drone-2.params",
+        "drone-4.params",
+    ]
+    assert ServerSettings().shifted(1).parameters is None
