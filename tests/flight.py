@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from math import asin, atan2, cos, hypot, sin
 
 from firmware_py.airframe import Airframe, load_airframe
 from firmware_py.control.stabiliser import Stabiliser
-from firmware_py.types import RateCommand, Vec3, VehicleState
+from firmware_py.types import Command, MotorOutput, Vec3, VehicleState
 from sitl.dynamics import Dynamics
 
 PERIOD_S = 0.004
@@ -24,6 +24,8 @@ class Sample:
     yaw_rate_rad_s: float
     tilt_rad: float
     position_ned_m: Vec3
+    state: VehicleState
+    output: MotorOutput
 
 
 def state_of(dynamics: Dynamics, time_us: int) -> VehicleState:
@@ -41,23 +43,40 @@ def state_of(dynamics: Dynamics, time_us: int) -> VehicleState:
     )
 
 
-def fly(
-    commands: Sequence[tuple[float, RateCommand]], *, airframe: Airframe | None = None, yaw_rad: float = 0.3
-) -> list[Sample]:
-    """Fly (seconds, command) pairs one after another from hover at 20 m; one sample a control period."""
-    airframe = airframe or load_airframe("abejorro")
-    dynamics = Dynamics(airframe, (0.0, 0.0, -20.0), yaw_rad, rate_hz=500, **ORIGIN)
-    stabiliser = Stabiliser(airframe, PERIOD_S)
-    samples, step = [], 0
-    for seconds, command in commands:
+Told = Command | Callable[[VehicleState], Command]
+"""A command, or what makes one of the state."""
+
+
+class Hover:
+    """A body in the air with its stabiliser, flown piece by piece.
+
+    Attributes:
+        airframe: what flies.
+        dynamics: the body.
+        stabiliser: told what to do by `fly`.
+        samples: one a control period, since the start.
+    """
+
+    def __init__(self, airframe: Airframe, yaw_rad: float = 0.3, height_m: float = 20.0) -> None:
+        self.airframe = airframe
+        self.dynamics = Dynamics(airframe, (0.0, 0.0, -height_m), yaw_rad, rate_hz=500, **ORIGIN)
+        self.stabiliser = Stabiliser(airframe, PERIOD_S)
+        self.samples: list[Sample] = []
+
+    def fly(self, seconds: float, told: Told) -> list[Sample]:
+        """Go on for a time; returns the samples of it."""
+        start = len(self.samples)
         for _ in range(round(seconds / PERIOD_S)):
-            state = state_of(dynamics, step * 4000)
-            dynamics.command_motors(stabiliser.step(state, command).speeds_rad_s)
-            dynamics.run()
-            dynamics.run()
+            step = len(self.samples)
+            state = state_of(self.dynamics, step * 4000)
+            command = told(state) if callable(told) else told
+            output = self.stabiliser.step(state, command)
+            self.dynamics.command_motors(output.speeds_rad_s)
+            self.dynamics.run()
+            self.dynamics.run()
             north, east, down = state.velocity_ned_m_s
             c, s = cos(state.yaw_rad), sin(state.yaw_rad)
-            samples.append(
+            self.samples.append(
                 Sample(
                     step * PERIOD_S,
                     c * north + s * east,
@@ -66,7 +85,18 @@ def fly(
                     state.angular_rate_frd_rad_s[2],
                     hypot(state.roll_rad, state.pitch_rad),
                     state.position_ned_m,
+                    state,
+                    output,
                 )
             )
-            step += 1
-    return samples
+        return self.samples[start:]
+
+
+def fly(
+    commands: Sequence[tuple[float, Told]], *, airframe: Airframe | None = None, yaw_rad: float = 0.3
+) -> list[Sample]:
+    """Fly (seconds, command) pairs one after another from hover at 20 m; one sample a control period."""
+    hover = Hover(airframe or load_airframe("abejorro"), yaw_rad)
+    for seconds, told in commands:
+        hover.fly(seconds, told)
+    return hover.samples

@@ -79,17 +79,26 @@ class LevelLaw:
         self._roll.xi = self._pitch.xi = self._xi_down = self._xi_yaw = 0.0
 
     def enter(self, state: VehicleState) -> None:
-        """Take over in flight: set the integrals to where they would rest at the velocity now.
+        """Take over in flight, with what was learnt before leaving and at rest at the velocity now."""
+        self._shift(state, 1.0)
 
-        At rest at a velocity v the integral makes up for the part of the reference that does not act at
-        once: 0 = k (v - b v) + ki xi. So it goes on from there as if it had flown here itself.
+    def leave(self, state: VehicleState) -> None:
+        """Give over in flight: keep of the integrals what was learnt."""
+        self._shift(state, -1.0)
+
+    def _shift(self, state: VehicleState, sign: float) -> None:
+        """Add to the integrals what they are at a steady velocity without anything learnt, or take it off.
+
+        There they make up for the part of the reference that does not act at once:
+        0 = k (v - b v) + ki xi.
         """
         north, east, down = state.velocity_ned_m_s
         cos_yaw, sin_yaw = cos(state.yaw_rad), sin(state.yaw_rad)
-        self._roll.rest_at(cos_yaw * east - sin_yaw * north)
-        self._pitch.rest_at(cos_yaw * north + sin_yaw * east)
-        self._xi_down = -self._k_down * (1.0 - self._b_vertical) * down / self._ki_down
-        self._xi_yaw = -self._k_yaw * (1.0 - self._b_yaw) * state.angular_rate_frd_rad_s[2] / self._ki_yaw
+        self._roll.xi += sign * self._roll.rest(cos_yaw * east - sin_yaw * north)
+        self._pitch.xi += sign * self._pitch.rest(cos_yaw * north + sin_yaw * east)
+        self._xi_down -= sign * self._k_down * (1.0 - self._b_vertical) * down / self._ki_down
+        r = state.angular_rate_frd_rad_s[2]
+        self._xi_yaw -= sign * self._k_yaw * (1.0 - self._b_yaw) * r / self._ki_yaw
 
     def step(self, state: VehicleState, command: RateCommand, grounded: bool) -> MotorOutput:
         """Return the motor commands for one control period.
@@ -171,9 +180,9 @@ class _Tilt:
         self._limit_nm = self._k_rate * rate_limit_rad_s  # the moment that a rate at its limit asks for
         self.xi = 0.0
 
-    def rest_at(self, velocity: float) -> None:
-        """Set the integral so that this velocity, if wanted, asks for no angle."""
-        self.xi = -self._k_velocity * (1.0 - self._weight) * velocity / self._ki
+    def rest(self, velocity: float) -> float:
+        """The integral with which this velocity, if wanted, asks for no angle."""
+        return -self._k_velocity * (1.0 - self._weight) * velocity / self._ki
 
     def angle(self, velocity: float, wanted: float, period_s: float) -> float:
         """Integrate the error and return the angle asked for, rad."""

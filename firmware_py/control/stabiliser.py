@@ -40,11 +40,13 @@ class Stabiliser:
         self._rate_law: LevelLaw | VectorLaw = self._vector
         if airframe.limits.tilt_rad <= LEVEL_LAW_TILT_RAD:
             self._rate_law = LevelLaw(airframe, period_s, weights, self.limits, mixer)
-        self._law = self._rate_law
+        self._law = self._rate_law  # which flies now
 
     def reset(self) -> None:
         """Forget all that was learnt: at arming and on the ground."""
-        self._law.reset()
+        self._rate_law.reset()
+        if self._law is not self._rate_law:
+            self._law.reset()
 
     def idle(self) -> MotorOutput:
         """Return motors turning slowly, as an armed drone's do on the ground."""
@@ -58,8 +60,15 @@ class Stabiliser:
             command: what to follow.
             grounded: it still stands on something; what is learnt in flight is held.
         """
-        law = self._rate_law if type(command) is RateCommand else self._vector
-        if law is not self._law:
-            law.enter(state)
-            self._law = law
-        return law.step(state, command, grounded)  # type: ignore[arg-type]
+        if type(command) is RateCommand:
+            if self._law is not self._rate_law:
+                self._change(self._rate_law, state)
+            return self._rate_law.step(state, command, grounded)
+        if self._law is not self._vector:
+            self._change(self._vector, state)
+        return self._vector.step(state, command, grounded)
+
+    def _change(self, law: LevelLaw | VectorLaw, state: VehicleState) -> None:
+        self._law.leave(state)
+        law.enter(state)
+        self._law = law

@@ -87,9 +87,12 @@ class VectorLaw:
         self._turning = 0.0
 
     def enter(self, state: VehicleState) -> None:
-        """Take over in flight from another law."""
+        """Take over in flight from another law: begin to learn."""
         del state
         self.reset()
+
+    def leave(self, state: VehicleState) -> None:
+        """Give over in flight; what was learnt will be stale."""
 
     def step(self, state: VehicleState, command: Command, grounded: bool) -> MotorOutput:
         """Return the motor commands for one control period.
