@@ -14,7 +14,7 @@ from dataclasses import dataclass
 from math import floor, isfinite, isinf, isnan, nan
 
 from firmware_py.mavlink import version
-from firmware_py.mavlink.dialect import Message, mavlink
+from firmware_py.mavlink.dialect import BROADCAST, Message, mavlink
 from firmware_py.mavlink.exchange import Exchange, Handler
 from firmware_py.mavlink.links import Link
 from firmware_py.mavlink.message_requests import request_message, set_interval
@@ -172,6 +172,8 @@ def _receive_int(exchange: Exchange, link: Link, message: Message) -> None:
 def _run(exchange: Exchange, message: Message, command: Command) -> None:
     """Silence for a wrong target, else run it and acknowledge."""
     if not exchange.is_for_us(message, or_everyone=message.command in _TO_EVERYONE):
+        return
+    if message.target_component == BROADCAST and message.command in exchange.claimed:
         return
     handler = COMMANDS.get(message.command)
     result = CommandResult.UNSUPPORTED if handler is None else handler(exchange, command)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 
+from firmware_py.mavlink.camera_model import CameraControl
 from firmware_py.mavlink.dialect import AUTOPILOT_COMPONENT_ID, BROADCAST, Message
 from firmware_py.mavlink.framing import Packet
 from firmware_py.mavlink.links import Link
@@ -24,12 +25,14 @@ class Exchange:
         signing: of all links.
         video: the camera's streams, the one to be preferred first.
         sources: of messages that services make, by message id; for streams and requests.
+        camera: on the vehicle; None: there is none.
         claimed: commands that another component answers when they are meant for all.
     """
 
     __slots__ = (
         "autopilot",
         "boot_unix_us",
+        "camera",
         "claimed",
         "links",
         "signing",
@@ -57,6 +60,7 @@ class Exchange:
         self.video = tuple(video)
         self.time_us = 0
         self.sources: dict[int, Callable[[], Message | None]] = {}
+        self.camera: CameraControl | None = None
         self.claimed: frozenset[int] = frozenset()
 
     def packet(self, message: Message, component_id: int = AUTOPILOT_COMPONENT_ID) -> Packet:

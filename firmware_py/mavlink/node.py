@@ -6,6 +6,8 @@ from collections.abc import Callable, Mapping, Sequence
 from typing import Protocol
 
 from firmware_py.mavlink import commands, heartbeat, missions, signing_setup, time_sync
+from firmware_py.mavlink.camera_component import CameraComponent
+from firmware_py.mavlink.camera_model import CAMERA_COMPONENT_ID, CameraModel, CaptureSink
 from firmware_py.mavlink.component_metadata import ExtraFiles
 from firmware_py.mavlink.dialect import AUTOPILOT_COMPONENT_ID, BROADCAST, Message, mavlink
 from firmware_py.mavlink.events import EventService
@@ -59,6 +61,8 @@ class MavlinkNode:
         firmware_files: Mapping[str, bytes] | None = None,
         shell: bool = False,
         log_text: Callable[[int, StatusText], None] | None = None,
+        camera: CameraModel | None = None,
+        captures: CaptureSink | None = None,
     ) -> None:
         """Join an autopilot and its links.
 
@@ -74,6 +78,8 @@ class MavlinkNode:
                 default those that explain this vehicle's parameters and events.
             shell: whether SERIAL_CONTROL is answered.
             log_text: called with vehicle time and all that is said to people.
+            camera: on the vehicle, a component of its own; None: there is none.
+            captures: takes and keeps its pictures; by default they are only counted.
 
         Raises:
             ParameterError: the system id is out of range.
@@ -90,11 +96,18 @@ class MavlinkNode:
         self._services, self._handlers = _services(
             self._exchange, storage, firmware_files, log_text, shell=shell
         )
+        if camera is not None:
+            self._add_camera(CameraComponent(self._exchange, camera, captures))
         self._router = Router(self._is_own)
         self._origin: GeodeticPoint | None = None
         self._home: GeodeticPoint | None = None
         self.failed_messages = 0
         self.refused_packets = 0
+
+    def _add_camera(self, component: CameraComponent) -> None:
+        self._services = (*self._services, component)
+        self._handlers[CAMERA_COMPONENT_ID] = _joined(component.handlers)
+        self._exchange.camera, self._exchange.claimed = component, component.claimed
 
     def add_link(self, profile: LinkProfile) -> None:
         """Speak on one more link, from the next update on.

@@ -1,0 +1,230 @@
+"""The camera: a component of its own beside the autopilot (https://mavlink.io/en/services/camera.html).
+
+It takes pictures and tells where its video is. It does not record, zoom, focus or track, and says so. Its
+video always runs, so it cannot be stopped.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from math import isfinite, isnan
+
+from firmware_py.mavlink import camera_messages
+from firmware_py.mavlink.camera_captures import Captures, whole_count
+from firmware_py.mavlink.camera_model import (
+    CAMERA_COMPONENT_ID,
+    CameraModel,
+    CaptureSink,
+    CountingSink,
+    SevenParams,
+)
+from firmware_py.mavlink.dialect import BROADCAST, Message, mavlink
+from firmware_py.mavlink.exchange import Exchange, Handler
+from firmware_py.mavlink.links import Link
+from firmware_py.status import CommandResult
+
+_HEARTBEAT_US = 1_000_000
+
+_REQUESTS: dict[int, tuple[int, int]] = {
+    # The elders of REQUEST_MESSAGE: the message, and which of their parameters holds its index (0: none).
+    mavlink.MAV_CMD_REQUEST_CAMERA_INFORMATION: (mavlink.MAVLINK_MSG_ID_CAMERA_INFORMATION, 0),
+    mavlink.MAV_CMD_REQUEST_CAMERA_SETTINGS: (mavlink.MAVLINK_MSG_ID_CAMERA_SETTINGS, 0),
+    mavlink.MAV_CMD_REQUEST_STORAGE_INFORMATION: (mavlink.MAVLINK_MSG_ID_STORAGE_INFORMATION, 1),
+    mavlink.MAV_CMD_REQUEST_CAMERA_CAPTURE_STATUS: (mavlink.MAVLINK_MSG_ID_CAMERA_CAPTURE_STATUS, 0),
+    mavlink.MAV_CMD_REQUEST_CAMERA_IMAGE_CAPTURE: (mavlink.MAVLINK_MSG_ID_CAMERA_IMAGE_CAPTURED, 1),
+    mavlink.MAV_CMD_REQUEST_VIDEO_STREAM_INFORMATION: (mavlink.MAVLINK_MSG_ID_VIDEO_STREAM_INFORMATION, 1),
+    mavlink.MAV_CMD_REQUEST_VIDEO_STREAM_STATUS: (mavlink.MAVLINK_MSG_ID_VIDEO_STREAM_STATUS, 1),
+}
+
+
+class CameraComponent:
+    """Answers for the camera, sends its heartbeat and takes its pictures.
+
+    Args:
+        exchange: of the vehicle it sits on.
+        camera: which.
+        sink: who takes and keeps pictures; by default they are only counted.
+
+    Attributes:
+        handlers: of messages to this component.
+        claimed: commands to all components that this one answers, and the autopilot does not.
+    """
+
+    def __init__(self, exchange: Exchange, camera: CameraModel, sink: CaptureSink | None = None) -> None:
+        self._exchange = exchange
+        self._camera = camera
+        self._sink: CaptureSink = sink if sink is not None else CountingSink()
+        self._captures = Captures(exchange, camera, self._sink)
+        self._heartbeat_due_us = 0
+        self._last_single: tuple[int, int, float] | None = None
+        self._commands: dict[int, Callable[[SevenParams], CommandResult]] = {
+            mavlink.MAV_CMD_DO_DIGICAM_CONTROL: self._digicam,
+            mavlink.MAV_CMD_DO_SET_CAM_TRIGG_DIST: self._trigger_distance,
+            mavlink.MAV_CMD_DO_SET_CAM_TRIGG_INTERVAL: self._trigger_interval,
+            mavlink.MAV_CMD_RESET_CAMERA_SETTINGS: self._reset,
+            mavlink.MAV_CMD_SET_CAMERA_MODE: self._set_mode,
+            mavlink.MAV_CMD_IMAGE_START_CAPTURE: self._start_images,
+            mavlink.MAV_CMD_IMAGE_STOP_CAPTURE: self._stop_images,
+            mavlink.MAV_CMD_VIDEO_START_CAPTURE: _cannot,
+            mavlink.MAV_CMD_VIDEO_STOP_CAPTURE: _cannot,
+            mavlink.MAV_CMD_VIDEO_START_STREAMING: self._start_streaming,
+            mavlink.MAV_CMD_VIDEO_STOP_STREAMING: _cannot,
+            mavlink.MAV_CMD_STORAGE_FORMAT: _cannot,
+            mavlink.MAV_CMD_SET_CAMERA_ZOOM: _cannot,
+            mavlink.MAV_CMD_SET_CAMERA_FOCUS: _cannot,
+        }
+        self.handlers: dict[int, Handler] = {
+            mavlink.MAVLINK_MSG_ID_COMMAND_LONG: self._receive_long,
+            mavlink.MAVLINK_MSG_ID_COMMAND_INT: self._receive_int,
+        }
+        self.claimed = frozenset({*self._commands, *_REQUESTS})
+
+    def update(self) -> None:
+        """Send the heartbeat and take pictures that are due."""
+        time_us = self._exchange.time_us
+        if time_us >= self._heartbeat_due_us:
+            self._heartbeat_due_us = time_us - time_us % _HEARTBEAT_US + _HEARTBEAT_US
+            self._exchange.broadcast(camera_messages.heartbeat(), CAMERA_COMPONENT_ID)
+        self._captures.update()
+
+    def start_capture(self, interval_s: float, count: int) -> CommandResult:
+        """Take pictures: `count` of them (0: until stopped), `interval_s` apart."""
+        return self._captures.start(interval_s, count)
+
+    def stop_capture(self) -> None:
+        """Take no more pictures."""
+        self._captures.stop()
+
+    def run(self, command: int, params: SevenParams) -> CommandResult:
+        """Do what a MAV_CMD to the camera says, from a mission for one; UNSUPPORTED if it is none of ours."""
+        handler = self._commands.get(command)
+        return CommandResult.UNSUPPORTED if handler is None else handler(params)
+
+    def _receive_long(self, _exchange: Exchange, link: Link, message: Message) -> None:
+        params = (
+            message.param1,
+            message.param2,
+            message.param3,
+            message.param4,
+            message.param5,
+            message.param6,
+            message.param7,
+        )
+        self._receive(link, message, params, repeated=message.confirmation > 0)
+
+    def _receive_int(self, _exchange: Exchange, link: Link, message: Message) -> None:
+        params = (
+            message.param1,
+            message.param2,
+            message.param3,
+            message.param4,
+            float(message.x),
+            float(message.y),
+            message.z,
+        )
+        self._receive(link, message, params, repeated=False)
+
+    def _receive(self, link: Link, message: Message, params: SevenParams, *, repeated: bool) -> None:
+        """Run a command and acknowledge it; one to all components only if it is a camera's."""
+        exchange, command = self._exchange, message.command
+        if not exchange.is_for_us(message, component_id=CAMERA_COMPONENT_ID):
+            return
+        if message.target_component == BROADCAST and command not in self.claimed:
+            return
+        sender = (message.get_srcSystem(), message.get_srcComponent())
+        if command == mavlink.MAV_CMD_REQUEST_MESSAGE:
+            result = self._request(link, params[0], params[1])
+        elif command in _REQUESTS:
+            wanted, place = _REQUESTS[command]
+            result = self._request(link, float(wanted), params[place - 1] if place else 0.0)
+        elif repeated and self._is_same_picture(command, sender, params):
+            result = CommandResult.ACCEPTED
+        else:
+            result = self.run(command, params)
+            if command == mavlink.MAV_CMD_IMAGE_START_CAPTURE and result is CommandResult.ACCEPTED:
+                self._last_single = (*sender, params[3])
+        acknowledgement = mavlink.MAVLink_command_ack_message(command, int(result), 0, 0, *sender)
+        exchange.send(link, acknowledgement, CAMERA_COMPONENT_ID)
+
+    def _is_same_picture(self, command: int, sender: tuple[int, int], params: SevenParams) -> bool:
+        """Whether a repeated command asks for the picture it has already got: its number tells."""
+        return bool(
+            command == mavlink.MAV_CMD_IMAGE_START_CAPTURE
+            and params[2] == 1.0
+            and self._last_single == (*sender, params[3])
+        )
+
+    def _request(self, link: Link, message_id: float, argument: float) -> CommandResult:
+        index = int(argument) if isfinite(argument) and 0 <= argument < 1 << 31 else 0
+        messages = self._requested(int(message_id) if isfinite(message_id) else -1, index)
+        for message in messages:
+            self._exchange.send(link, message, CAMERA_COMPONENT_ID)
+        return CommandResult.ACCEPTED if messages else CommandResult.DENIED
+
+    def _requested(self, message_id: int, index: int) -> list[Message]:
+        time_us, captures = self._exchange.time_us, self._captures
+        match message_id:
+            case mavlink.MAVLINK_MSG_ID_CAMERA_INFORMATION:
+                streams = bool(self._exchange.video)
+                message = camera_messages.information(self._camera, streams=streams, time_us=time_us)
+            case mavlink.MAVLINK_MSG_ID_CAMERA_SETTINGS:
+                message = camera_messages.settings(time_us)
+            case mavlink.MAVLINK_MSG_ID_STORAGE_INFORMATION if index <= 1:
+                message = camera_messages.storage_information(self._sink.space(), time_us)
+            case mavlink.MAVLINK_MSG_ID_CAMERA_CAPTURE_STATUS:
+                space = self._sink.space()
+                message = camera_messages.capture_status(captures.interval_s, captures.count, space, time_us)
+            case mavlink.MAVLINK_MSG_ID_CAMERA_IMAGE_CAPTURED:
+                message = captures.told(index)
+            case _:
+                return self._of_streams(message_id, index)
+        return [] if message is None else [message]
+
+    def _of_streams(self, message_id: int, index: int) -> list[Message]:
+        """What is asked about a stream, numbered from 1, or about all, 0."""
+        streams = self._exchange.video
+        wanted = [(n, stream) for n, stream in enumerate(streams, start=1) if index in (0, n)]
+        if message_id == mavlink.MAVLINK_MSG_ID_VIDEO_STREAM_STATUS:
+            return [camera_messages.stream_status(stream, n) for n, stream in wanted]
+        if message_id == mavlink.MAVLINK_MSG_ID_VIDEO_STREAM_INFORMATION:
+            return [camera_messages.stream_information(stream, n, len(streams)) for n, stream in wanted]
+        return []
+
+    def _start_images(self, params: SevenParams) -> CommandResult:
+        interval_s = 0.0 if isnan(params[1]) else params[1]
+        return self._captures.start(interval_s, 1 if isnan(params[2]) else whole_count(params[2]))
+
+    def _stop_images(self, _params: SevenParams) -> CommandResult:
+        self._captures.stop()
+        return CommandResult.ACCEPTED
+
+    def _digicam(self, params: SevenParams) -> CommandResult:
+        return self._captures.start(0.0, 1) if params[4] == 1.0 else CommandResult.UNSUPPORTED
+
+    def _trigger_distance(self, params: SevenParams) -> CommandResult:
+        result = self._captures.every(max(0.0, params[0]))
+        if result is CommandResult.ACCEPTED and params[2] == 1.0 and params[0] <= 0.0:
+            return self._captures.start(0.0, 1)
+        return result
+
+    def _trigger_interval(self, params: SevenParams) -> CommandResult:
+        if params[0] <= 0.0:
+            return self._stop_images(params)
+        return self._captures.start(params[0] / 1e3, 0)
+
+    def _set_mode(self, params: SevenParams) -> CommandResult:
+        image = params[1] == mavlink.CAMERA_MODE_IMAGE
+        return CommandResult.ACCEPTED if image else CommandResult.DENIED
+
+    def _reset(self, _params: SevenParams) -> CommandResult:
+        self._captures.stop()
+        return CommandResult.ACCEPTED
+
+    def _start_streaming(self, params: SevenParams) -> CommandResult:
+        """It runs already, if it is there: stream 0 means all."""
+        there = isnan(params[0]) or 0 <= params[0] <= len(self._exchange.video)
+        return CommandResult.ACCEPTED if there and self._exchange.video else CommandResult.DENIED
+
+
+def _cannot(_params: SevenParams) -> CommandResult:
+    return CommandResult.UNSUPPORTED
