@@ -10,7 +10,7 @@ from firmware_py.mavlink.dialect import Message, mavlink
 from firmware_py.mavlink.exchange import Exchange, Handler
 from firmware_py.mavlink.links import Link
 from firmware_py.mavlink.parameter_listing import Listings
-from firmware_py.mavlink.parameter_wire import TYPES, from_bytes, to_bytes
+from firmware_py.mavlink.parameter_wire import TYPES, Refusals, from_bytes, to_bytes
 from firmware_py.parameters import ParameterError
 
 _BY_NAME = -1
@@ -23,11 +23,12 @@ class ExtendedParameterService:
         handlers: by message id.
     """
 
-    __slots__ = ("_exchange", "_listings", "handlers")
+    __slots__ = ("_exchange", "_listings", "_refusals", "handlers")
 
     def __init__(self, exchange: Exchange) -> None:
         self._exchange = exchange
         self._listings = Listings(exchange, self._message)
+        self._refusals = Refusals(exchange)
         self.handlers: dict[int, Handler] = {
             mavlink.MAVLINK_MSG_ID_PARAM_EXT_REQUEST_LIST: self._list,
             mavlink.MAVLINK_MSG_ID_PARAM_EXT_REQUEST_READ: self._read,
@@ -65,7 +66,7 @@ class ExtendedParameterService:
                 parameters.set(name, from_bytes(declared, message._param_value_raw))
             except ParameterError as error:
                 result = mavlink.PARAM_ACK_VALUE_UNSUPPORTED
-                exchange.autopilot.say(mavlink.MAV_SEVERITY_WARNING, f"Parameter refused: {error}")
+                self._refusals.say(error)
         kept = to_bytes(declared, parameters.value(name))
         answer = mavlink.MAVLink_param_ext_ack_message(name.encode(), kept, TYPES[declared.kind], result)
         exchange.send(link, answer)

@@ -13,7 +13,7 @@ from firmware_py.mavlink.dialect import Message, mavlink
 from firmware_py.mavlink.exchange import Exchange, Handler
 from firmware_py.mavlink.links import Link
 from firmware_py.mavlink.parameter_listing import Listings
-from firmware_py.mavlink.parameter_wire import TYPES, from_float, to_float
+from firmware_py.mavlink.parameter_wire import TYPES, Refusals, from_float, to_float
 from firmware_py.parameters import ParameterError
 
 HASH_NAME = "_HASH_CHECK"
@@ -29,11 +29,12 @@ class ParameterService:
         handlers: by message id.
     """
 
-    __slots__ = ("_exchange", "_listings", "handlers")
+    __slots__ = ("_exchange", "_listings", "_refusals", "handlers")
 
     def __init__(self, exchange: Exchange) -> None:
         self._exchange = exchange
         self._listings = Listings(exchange, self._message, _HASH_PLACE)
+        self._refusals = Refusals(exchange)
         self.handlers: dict[int, Handler] = {
             mavlink.MAVLINK_MSG_ID_PARAM_REQUEST_LIST: self._list,
             mavlink.MAVLINK_MSG_ID_PARAM_REQUEST_READ: self._read,
@@ -78,7 +79,7 @@ class ParameterService:
         try:
             parameters.set(name, from_float(parameters.declaration(name), message.param_value))
         except ParameterError as error:
-            exchange.autopilot.say(mavlink.MAV_SEVERITY_WARNING, f"Parameter refused: {error}")
+            self._refusals.say(error)
         if parameters.version == version:  # nothing changed, so nothing was told yet
             exchange.broadcast(self._message(parameters.index(name)))
 

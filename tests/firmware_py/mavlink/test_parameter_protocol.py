@@ -138,3 +138,14 @@ def test_what_cannot_be_is_answered_with_what_is_kept_and_a_reason(autopilot, pe
 def test_a_change_by_the_vehicle_itself_is_told_too(autopilot, peer):
     autopilot.parameters.set("COM_OF_LOSS_T", 0.5)
     assert [m.param_value for m in values(peer.take(), "ground")] == [0.5]
+
+
+def test_a_refusal_repeated_is_said_once_but_answered_each_time(autopilot, peer):
+    bad = set_(TAKEOFF_ALTITUDE, -1.0)
+    assert [len(peer.ask(bad)) for _ in range(6)] == [1] * 6
+    assert [said.severity for said in autopilot.texts] == [4]
+    peer.ask(set_(TAKEOFF_ALTITUDE, -2.0))
+    assert len(autopilot.texts) == 2
+    peer.advance(6.0)
+    peer.ask(set_(TAKEOFF_ALTITUDE, -2.0))
+    assert len(autopilot.texts) == 1  # the update took the others away
