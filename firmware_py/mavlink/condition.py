@@ -156,11 +156,6 @@ def estimator_status(autopilot: AutopilotPort, _time_us: int) -> Message:
     )
 
 
-def mission_current(_autopilot: AutopilotPort, _time_us: int) -> Message:
-    """MISSION_CURRENT: there is no mission."""
-    return mavlink.MAVLink_mission_current_message(0, 0xFFFF, mavlink.MISSION_STATE_NO_MISSION, 2)
-
-
 def vibration(autopilot: AutopilotPort, _time_us: int) -> Message:
     """VIBRATION: none."""
     return mavlink.MAVLink_vibration_message(autopilot.state.time_us, 0.0, 0.0, 0.0, 0, 0, 0)

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from typing import Protocol
 
-from firmware_py.mavlink import commands, heartbeat, missions, signing_setup, time_sync
+from firmware_py.mavlink import commands, heartbeat, signing_setup, time_sync
 from firmware_py.mavlink.camera_component import CameraComponent
 from firmware_py.mavlink.camera_model import CAMERA_COMPONENT_ID, CameraModel, CaptureSink
 from firmware_py.mavlink.component_metadata import ExtraFiles
@@ -17,6 +17,7 @@ from firmware_py.mavlink.forwarding import Router
 from firmware_py.mavlink.framing import Packet, source_of
 from firmware_py.mavlink.links import Link, LinkProfile
 from firmware_py.mavlink.log_transfer import LogTransferService
+from firmware_py.mavlink.missions import MissionService
 from firmware_py.mavlink.offboard_setpoints import SetpointService
 from firmware_py.mavlink.parameter_extended import ExtendedParameterService
 from firmware_py.mavlink.parameter_protocol import ParameterService
@@ -238,6 +239,7 @@ def _services(
         firmware_files = ExtraFiles(exchange.autopilot.parameters)
     files = FileTransferService(exchange, storage, firmware_files)
     logs = LogTransferService(exchange, storage)
+    missions = MissionService(exchange)
     shells = ShellService(exchange, enabled=shell)
     services: tuple[Service, ...] = (
         texts,
@@ -246,6 +248,7 @@ def _services(
         extended,
         files,
         logs,
+        missions,
         shells,
     )
     handlers = {
@@ -255,7 +258,7 @@ def _services(
             files.handlers,
             logs.handlers,
             shells.handlers,
-            missions.HANDLERS,
+            missions.handlers,
             time_sync.HANDLERS,
             signing_setup.HANDLERS,
             parameters.handlers,

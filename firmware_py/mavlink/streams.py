@@ -14,6 +14,7 @@ from firmware_py.mavlink.dialect import Message, mavlink
 from firmware_py.mavlink.exchange import Exchange
 from firmware_py.mavlink.heartbeat import heartbeat
 from firmware_py.mavlink.links import Link
+from firmware_py.mavlink.mission_progress import mission_current
 from firmware_py.mavlink.port import AutopilotPort
 from firmware_py.mavlink.traffic import link_node_status
 
@@ -44,7 +45,7 @@ SOURCES: Mapping[int, Source] = MappingProxyType(
         mavlink.MAVLINK_MSG_ID_HIL_STATE_QUATERNION: motion.hil_state_quaternion,
         mavlink.MAVLINK_MSG_ID_HOME_POSITION: condition.home_position,
         mavlink.MAVLINK_MSG_ID_LOCAL_POSITION_NED: motion.local_position_ned,
-        mavlink.MAVLINK_MSG_ID_MISSION_CURRENT: condition.mission_current,
+        mavlink.MAVLINK_MSG_ID_MISSION_CURRENT: mission_current,
         mavlink.MAVLINK_MSG_ID_ODOMETRY: motion.odometry,
         mavlink.MAVLINK_MSG_ID_PING: time_sync.ping_request,
         mavlink.MAVLINK_MSG_ID_POSITION_TARGET_GLOBAL_INT: targets.position_target_global_int,

@@ -11,7 +11,7 @@ from firmware_py.missions.flight import View
 from firmware_py.missions.items import CIRCLES, POLYGONS, Do, MissionItem
 from firmware_py.types import Vec3
 
-_FEWEST_VERTICES = 3
+FEWEST_VERTICES = 3
 _KEEP_IN = frozenset({Do.POLYGON_INCLUSION, Do.CIRCLE_INCLUSION})
 
 Edge = tuple[float, float, float, float]  # north and east of one end, then of the other
@@ -63,8 +63,8 @@ def fence_fault(items: Sequence[MissionItem]) -> str | None:
             index += 1
             continue
         first, count = items[index], vertex_count(items[index])
-        if count < _FEWEST_VERTICES:
-            return f"Fence item {index + 1}: a polygon of {count} vertices, it needs {_FEWEST_VERTICES}"
+        if count < FEWEST_VERTICES:
+            return f"Fence item {index + 1}: a polygon of {count} vertices, it needs {FEWEST_VERTICES}"
         vertices = items[index : index + count]
         alike = [
             vertex for vertex in vertices if vertex.command == first.command and vertex_count(vertex) == count

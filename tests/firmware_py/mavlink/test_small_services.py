@@ -65,33 +65,3 @@ def test_a_text_with_strange_letters_and_severity_is_sent(autopilot, peer):
     autopilot.texts.append(StatusText(99, "höhe ✓"))
     (text,) = texts(peer.advance(0.01))
     assert (text.severity, text.text) == (7, "h?he ?")
-
-
-@pytest.mark.parametrize("mission_type", [0, 1, 2])
-def test_missions_fences_and_rally_points_are_empty_lists(peer, mission_type):
-    (count,) = peer.ask(mavlink.MAVLink_mission_request_list_message(1, 1, mission_type))
-    assert (count.count, count.mission_type, count.target_system) == (0, mission_type, 245)
-
-
-@pytest.mark.parametrize(
-    ("message", "result"),
-    [
-        (mavlink.MAVLink_mission_count_message(1, 1, 3, 0), mavlink.MAV_MISSION_UNSUPPORTED),
-        (mavlink.MAVLink_mission_count_message(1, 1, 0, 0), mavlink.MAV_MISSION_ACCEPTED),
-        (mavlink.MAVLink_mission_count_message(1, 1, 3, 2), mavlink.MAV_MISSION_UNSUPPORTED),
-        (mavlink.MAVLink_mission_clear_all_message(1, 1, 255), mavlink.MAV_MISSION_ACCEPTED),
-        (mavlink.MAVLink_mission_request_list_message(1, 1, 77), mavlink.MAV_MISSION_UNSUPPORTED),
-    ],
-)
-def test_other_mission_requests_get_one_acknowledgement(peer, message, result):
-    (answer,) = peer.ask(message)
-    assert (answer.get_type(), answer.type, answer.mission_type) == (
-        "MISSION_ACK",
-        result,
-        message.mission_type,
-    )
-
-
-def test_missions_of_others_are_not_ours(peer):
-    assert peer.ask(mavlink.MAVLink_mission_request_list_message(2, 1, 0)) == []
-    assert peer.ask(mavlink.MAVLink_mission_count_message(0, 0, 1, 0)) == []
