@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from math import atan2, sqrt
+from math import atan2, pi, sqrt
 
 from firmware_py.types import Quaternion, Vec3
 
@@ -64,6 +64,6 @@ def tilt_error(m: Rotation, down_ned: Vec3) -> tuple[float, float]:
     x, y, z = to_body(m, *down_ned)
     sine = sqrt(x * x + y * y)
     if sine < 1e-9:
-        return (0.0, 0.0) if z > 0.0 else (3.14159, 0.0)
+        return (0.0, 0.0) if z > 0.0 else (pi, 0.0)
     scale = atan2(sine, z) / sine
     return (-y * scale, x * scale)

@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 from firmware_py.airframe import GRAVITY_M_S2, load_airframe
-from firmware_py.control.design import Weights, cost_matrices, design
+from firmware_py.control.design import cost_matrices, design, design_bandwidths
 from firmware_py.control.linear_model import allocation, discretise, hover_model, with_integrals
 
 PERIOD_S = 0.004
@@ -18,7 +18,7 @@ def airframe():
 
 def test_gains_agree_with_python_control(airframe):
     a, b = with_integrals(discretise(hover_model(airframe), PERIOD_S), PERIOD_S)
-    q, r = cost_matrices(airframe, Weights())
+    q, r = cost_matrices(airframe, airframe.stabiliser)
     expected, _, poles = control.dlqr(a, b, q, r)
     gains = design(airframe, PERIOD_S)
     np.testing.assert_allclose(np.hstack([gains.kx, gains.ki]), expected, rtol=1e-6, atol=1e-9)
@@ -132,3 +132,56 @@ def test_a_heavier_airframe_of_the_same_shape_gets_the_same_poles(airframe, scal
         np.sort(np.abs(design(airframe, PERIOD_S).poles)),
         rtol=1e-6,
     )
+
+
+@pytest.fixture(scope="module", params=["abejorro", "x500"])
+def any_airframe(request):
+    return load_airframe(request.param)
+
+
+def test_bandwidths_are_python_controls_regulator_without_integrals(any_airframe):
+    model = discretise(hover_model(any_airframe), PERIOD_S)
+    q, r = cost_matrices(any_airframe, any_airframe.stabiliser)
+    k, _, poles = control.dlqr(model.a, model.b, q[:8, :8], r)
+    loops = design_bandwidths(any_airframe, PERIOD_S)
+    i_roll, i_pitch, i_yaw = any_airframe.inertia_kg_m2
+    forward, right, down = loops.velocity_level
+    roll, pitch = loops.attitude
+    p, q_rate, yaw = loops.rate
+    expected = np.zeros((4, 8))
+    expected[0, 7] = -down * any_airframe.mass_kg
+    expected[1, [0, 2, 6]] = i_roll * p * np.array([roll, 1.0, roll * right / GRAVITY_M_S2])
+    expected[2, [1, 3, 5]] = i_pitch * q_rate * np.array([pitch, 1.0, -pitch * forward / GRAVITY_M_S2])
+    expected[3, 4] = i_yaw * yaw
+    np.testing.assert_allclose(k, expected, rtol=1e-6, atol=1e-9)
+    np.testing.assert_allclose(np.sort(np.abs(loops.poles)), np.sort(np.abs(poles)), rtol=1e-6)
+
+
+def roll_loop(airframe, lag_s):
+    """Open loop of the nested design from the roll moment's error to itself, with the motors' lag."""
+    loops = design_bandwidths(airframe, PERIOD_S)
+    rate, attitude, velocity = loops.rate[0], loops.attitude[0], loops.velocity_level[1]
+    s = control.tf("s")
+    motor = 1 / (lag_s * s + 1)
+    hold = control.tf(*control.pade(1.5 * PERIOD_S, 2))  # a sample's age and the hold, on average
+    feedback = rate * (1 + attitude * (1 + velocity / s) / s)
+    plant = 1 / s
+    return hold * motor * feedback * plant
+
+
+@pytest.mark.parametrize(("name", "least_deg"), [("abejorro", 20.0), ("x500", 40.0)])  # its drag not counted
+def test_nested_loops_keep_a_margin_with_lag_and_sampling(name, least_deg):
+    airframe = load_airframe(name)
+    loop = roll_loop(airframe, airframe.motor.time_constant_s)
+    gains, phases_deg, _, _, _, _ = control.stability_margins(loop, returnall=True)
+    assert all(gain > 1.9 or gain < 0.5 for gain in gains if gain > 0)
+    assert np.min(np.abs(phases_deg)) > least_deg
+
+
+def test_the_x500_yaws_within_what_its_rotors_can_turn():
+    x500 = load_airframe("x500")
+    hover, full = x500.hover_speed_rad_s**2, x500.motor.max_speed_rad_s**2
+    at_hover = 4 * x500.motor.torque_nm_s2 * (full - hover) / x500.inertia_kg_m2[2]
+    assert at_hover == pytest.approx(5.1, abs=0.3)
+    asked = design_bandwidths(x500, PERIOD_S).rate[2] * x500.limits.yaw_rate_rad_s
+    assert asked < 4 * at_hover  # a full step saturates, but not by so much that it takes long to leave

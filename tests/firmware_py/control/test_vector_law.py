@@ -34,8 +34,8 @@ def hover():
 @pytest.mark.parametrize(
     ("field", "target", "command", "limit_s"),
     [
-        ("forward_m_s", 1.0, RateCommand((1.0, 0.0, 0.0)), 0.7),
-        ("right_m_s", -1.0, RateCommand((0.0, -1.0, 0.0)), 0.7),
+        ("forward_m_s", 1.0, RateCommand((1.0, 0.0, 0.0)), 0.8),
+        ("right_m_s", -1.0, RateCommand((0.0, -1.0, 0.0)), 0.8),
         ("down_m_s", -3.0, RateCommand((0.0, 0.0, -3.0)), 0.7),
         ("down_m_s", 1.5, RateCommand((0.0, 0.0, 1.5)), 0.6),
         ("yaw_rate_rad_s", 1.57, RateCommand(yaw_rate_rad_s=1.57), 0.6),
