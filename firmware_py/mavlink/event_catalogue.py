@@ -13,6 +13,7 @@ from firmware_py.mavlink.event_model import EventKind
 from firmware_py.status import CommandResult
 
 _LONGEST_MESSAGE = 120  # libevents' limit
+_REFUSAL = "Arming denied: "
 
 MODE_CHANGED = EventKind("mode_changed", "Mode: {1}", arguments=(("flight_mode_t", "mode"),))
 
@@ -87,11 +88,15 @@ def _checks() -> dict[str, EventKind]:
         if row.event is Event.ARM and row.text and row.result is not CommandResult.ACCEPTED
     ]
     return {
-        text: EventKind(
-            f"check_{_slug(text)}", _escaped(text)[:_LONGEST_MESSAGE], "arming_check", _CHECK_ARGUMENTS
-        )
+        text: EventKind(f"check_{_slug(text)}", _reason(text), "arming_check", _CHECK_ARGUMENTS)
         for text in reasons
     }
+
+
+def _reason(refusal: str) -> str:
+    """A refusal without the words that each begins with, as reports show it below a heading."""
+    reason = refusal.removeprefix(_REFUSAL)
+    return _escaped(reason[:1].upper() + reason[1:])[:_LONGEST_MESSAGE]
 
 
 TEXTS: dict[str, EventKind] = _texts()

@@ -1,4 +1,5 @@
 from math import inf, nan
+from pathlib import Path
 
 import pytest
 from hypothesis import given, settings
@@ -152,3 +153,54 @@ def test_each_declaration_reads_well(declared):
         assert (declared.minimum, declared.maximum) == (min(declared.choices), max(declared.choices))
     if declared.bits:
         assert declared.maximum == sum(1 << place for place in declared.bits)
+
+
+ROOT = Path(__file__).parents[2]
+NOT_USED_YET = {
+    "BAT1_R_INTERNAL",
+    "BAT1_SOURCE",
+    "CBRK_FLIGHTTERM",
+    "CBRK_SUPPLY_CHK",
+    "COM_ARM_BAT_MIN",
+    "COM_ARM_WO_GPS",
+    "COM_DLL_EXCEPT",
+    "COM_LKDOWN_TKO",
+    "COM_TAKEOFF_ACT",
+    "FD_FAIL_R_TTRI",
+    "FLW_TGT_ALT_M",
+    "FLW_TGT_MAX_VEL",
+    "FLW_TGT_RS",
+    "LNDMC_ROT_MAX",
+    "LNDMC_XY_VEL_MAX",
+    "LNDMC_Z_VEL_MAX",
+    "MAN_DEADZONE",
+    "MC_ORBIT_RAD_MAX",
+    "MC_ORBIT_YAW_MOD",
+    "MC_PITCHRATE_MAX",
+    "MC_ROLLRATE_MAX",
+    "MPC_ACC_HOR_MAX",
+    "MPC_HOLD_MAX_XY",
+    "MPC_HOLD_MAX_Z",
+    "MPC_JERK_MAX",
+    "MPC_THR_HOVER",
+    "MPC_THR_MAX",
+    "MPC_THR_MIN",
+    "MPC_TILTMAX_AIR",
+    "MPC_VEL_MAN_BACK",
+    "MPC_VEL_MAN_SIDE",
+    "SDLOG_MODE",
+    "SIM_BAT_DRAIN",
+    "SIM_BAT_MIN_PCT",
+    "SYS_FAILURE_EN",
+}
+
+
+def test_what_can_be_changed_is_used_somewhere():
+    code = "".join(
+        path.read_text(encoding="utf-8")
+        for room in ("firmware_py", "sitl")
+        for path in (ROOT / room).rglob("*.py")
+        if path.parent.name != "parameters"
+    )
+    unused = {each.name for each in DECLARATIONS if not each.constant and f'"{each.name}"' not in code}
+    assert unused <= NOT_USED_YET
