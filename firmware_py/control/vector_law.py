@@ -159,7 +159,7 @@ class VectorLaw:
             return self._hold_tilt(state, command, m, drag)
         if type(command) is BodyRateCommand:
             p, q, r = command.rate_frd_rad_s
-            return (command.thrust * self._full_n, p, q, r)
+            return (command.thrust * self._full_n if command.thrust > 0.0 else 0.0, p, q, r)  # NaN: none
         raise TypeError(f"not a command of the stabiliser: {type(command).__name__}")
 
     def _follow_velocity(self, state: VehicleState, command: RateCommand, m: Rotation, drag: Vec3) -> _Wish:

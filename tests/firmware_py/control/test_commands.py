@@ -115,6 +115,13 @@ def test_odd_actuator_outputs_stop_the_motors(outputs):
     assert stabiliser.step(VehicleState(), ActuatorCommand(outputs)).speeds_rad_s == (0.0,) * 4
 
 
+@pytest.mark.parametrize("thrust", [nan, -1.0, 0.0])
+def test_no_thrust_with_body_rates_idles_the_motors(thrust):
+    stabiliser = Stabiliser(load_airframe("x500"), PERIOD_S)
+    output = stabiliser.step(VehicleState(), BodyRateCommand((0.0, 0.0, 0.0), thrust))
+    assert output.speeds_rad_s == pytest.approx(stabiliser.idle().speeds_rad_s)
+
+
 def others(airframe):
     share = hover_share(airframe)
     return [
