@@ -10,12 +10,14 @@ from importlib import import_module
 from math import degrees
 from typing import TYPE_CHECKING
 
+from firmware_py.mavlink.camera_model import CameraModel
 from firmware_py.mavlink.node import MavlinkNode
 from firmware_py.mavlink.video_links import VideoEncoding, VideoStream
 from sitl.drone_files import flight_recorder, open_storage
 from sitl.link_hub import LinkHub
 from sitl.link_urls import is_loopback
 from sitl.parameter_file import ParameterKeeper, open_parameters
+from sitl.picture_album import PictureAlbum
 from sitl.server_settings import ServerSettings
 from sitl.simulation import Simulation
 
@@ -56,6 +58,7 @@ class ServedDrone:
         if settings.parameters is not None:
             self._keeper = open_parameters(simulation.autopilot.parameters, settings.parameters, notice)
         storage = open_storage(settings.storage, settings.instance)
+        self._album = PictureAlbum(storage, boot_unix_us)
         self._recorder = flight_recorder(storage, boot_unix_us)
         self.node = MavlinkNode(
             simulation.autopilot,
@@ -67,6 +70,8 @@ class ServedDrone:
             storage=storage,
             shell=settings.shell,
             log_text=self._recorder.hear_text,
+            camera=_camera_model(simulation) if settings.camera else None,
+            captures=self._album,
         )
         self._hub = LinkHub(self.node)
         self._camera: CameraFeed | None = None
@@ -120,6 +125,7 @@ class ServedDrone:
         if arrived is not None:
             time_us, image = arrived
             self._video.publish(image, time_us)
+            self._album.show(image)
             if self._rtp is not None:
                 self._rtp.send(image, time_us)
 
@@ -164,6 +170,11 @@ class ServedDrone:
             "snapshot": asdict(referee.snapshot()),
             "report": referee.report(query.get("state", ""), query.get("ended")).as_dict(),
         }
+
+
+def _camera_model(simulation: Simulation) -> CameraModel:
+    camera = simulation.scenario.camera
+    return CameraModel(camera.width_px, camera.height_px, camera.horizontal_fov_rad, camera.rate_hz)
 
 
 def _seen_from_outside(settings: ServerSettings) -> str:

@@ -11,7 +11,7 @@ from sitl.storage import MemoryStorage
 from sitl.storage_folder import FolderStorage
 
 
-def open_storage(folder: DiskPath | None, instance: int) -> Storage:
+def open_storage(folder: DiskPath | None, instance: int) -> MemoryStorage | FolderStorage:
     """Where an instance keeps its files.
 
     Args:

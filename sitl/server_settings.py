@@ -43,6 +43,7 @@ class ServerSettings:
         signing_key: with which MAVLink is signed; None: it is not.
         storage: folder for the drones' files and logs; None: they are kept in memory.
         shell: whether the drones have a shell over MAVLink.
+        camera: whether the drones tell of their camera over MAVLink.
         parameters: file that keeps changed parameters (drone 2: NAME-2.params); None: nothing does.
     """
 
@@ -57,6 +58,7 @@ class ServerSettings:
     signing_key: SigningKey | None = None
     storage: Path | None = None
     shell: bool = False
+    camera: bool = True
     parameters: Path | None = None
 
     @property

@@ -43,6 +43,11 @@ class Usage:
         self.files = 0
         self.bytes = 0
 
+    @property
+    def space(self) -> tuple[int, int]:
+        """Bytes kept, and bytes that can be kept."""
+        return self.bytes, self._limits.total_bytes
+
     def one_more(self, path: Path) -> None:
         """Refuse a file or folder beyond the limit."""
         if self.files >= self._limits.files:
@@ -75,6 +80,10 @@ class MemoryStorage:
         self._now = now
         self._files: dict[Path, _File] = {}
         self._folders: dict[Path, int] = {(): 0}  # with their time of birth
+
+    def space(self) -> tuple[int, int]:
+        """Bytes kept, and bytes that can be kept."""
+        return self._usage.space
 
     def entry(self, path: Path) -> Entry:
         """What is there."""

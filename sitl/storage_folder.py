@@ -53,6 +53,10 @@ class FolderStorage:
         """Let the folder go."""
         os.close(self._root)
 
+    def space(self) -> tuple[int, int]:
+        """Bytes kept, and bytes that can be kept."""
+        return self._usage.space
+
     def entry(self, path: Path) -> Entry:
         """What is there."""
         if not path:

@@ -39,6 +39,9 @@ class Onboard:
     shell: Annotated[
         bool, Parameter(help="answer MAVLink's shell (SERIAL_CONTROL), about the drone only", negative=())
     ] = False
+    camera: Annotated[
+        bool, Parameter(help="tell of the camera over MAVLink, as a component of its own, and take pictures")
+    ] = True
 
 
 @Parameter(name="*")
@@ -145,6 +148,7 @@ def _settings(
         signing_key=_read_key(chosen.signing_key),
         storage=onboard.storage,
         shell=onboard.shell,
+        camera=onboard.camera,
         parameters=onboard.parameters,
     )
     settings.check(count)
