@@ -12,7 +12,7 @@ pixel), and a bar thinner than a pixel does not vanish.
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from math import hypot, isfinite, tan
+from math import dist, hypot, isfinite, tan
 
 import cv2
 import numpy as np
@@ -21,9 +21,11 @@ import numpy.typing as npt
 from scenarios.axes import Quaternion, Vec3
 from scenarios.models import Scenario
 from sitl.camera_clip import clip_half_plane
+from sitl.camera_drones import DRONE_BGR, outlines
 from sitl.camera_mesh import SHIFT, SUBPIXELS, Matrix, Mesh, MeshFace, Pinhole, Projection
 from sitl.camera_order import PaintTree
 from sitl.camera_scene import GROUND_BGR, SKY_BGR, UNDERGROUND_BGR, build_scene
+from sitl.solids import Solid
 
 Image = npt.NDArray[np.uint8]
 Outline = npt.NDArray[np.int32]
@@ -54,7 +56,9 @@ class Camera:
         scene = build_scene(scenario)
         self._tree = PaintTree(scene.bodies)
         floor = (scene.tatami, *scene.mats, *scene.shadows)
-        self._mesh = Mesh([*floor, *self._tree.faces], self._pinhole)
+        faces = [*floor, *self._tree.faces]
+        self._mesh = Mesh(faces, self._pinhole)
+        self._centres_m = [tuple(face.corners_arena_m.mean(axis=0).tolist()) for face in faces]
         self._floor, self._solid = self._mesh.faces[: len(floor)], self._mesh.faces[len(floor) :]
 
     @property
@@ -62,12 +66,15 @@ class Camera:
         """Focal length, pixels."""
         return self._pinhole.focal_px
 
-    def render(self, position_arena_m: Vec3, attitude_arena: Quaternion) -> Image:
+    def render(
+        self, position_arena_m: Vec3, attitude_arena: Quaternion, drones: Sequence[Solid] = ()
+    ) -> Image:
         """Paint what the camera sees.
 
         Args:
             position_arena_m: centre of the drone, shape (3,); the scenario says where on it the camera is.
             attitude_arena: quaternion (w, x, y, z), body FLU to arena; need not have unit length.
+            drones: boxes of other drones.
 
         Returns:
             A new image, BGR, shape (height, width, 3), uint8; its rows do not follow each other in memory.
@@ -87,8 +94,21 @@ class Camera:
             _paint(canvas, projection, [face for face in self._floor if seen[face.index]])
             solid, first = self._solid, len(self._floor)
             order = self._tree.back_to_front(eye)
-            _paint(canvas, projection, [solid[i] for i in order if seen[first + i]])
+            faces = [solid[i] for i in order if seen[first + i]]
+            for distance_m, outline in outlines(drones, eye, rotation, self._pinhole) if drones else ():
+                behind = self._count_farther(faces, eye, distance_m)
+                _paint(canvas, projection, faces[:behind])
+                cv2.fillConvexPoly(canvas, outline, DRONE_BGR, cv2.LINE_8, SHIFT)
+                faces = faces[behind:]
+            _paint(canvas, projection, faces)
         return self._without_margin(canvas)
+
+    def _count_farther(self, faces: Sequence[MeshFace], eye: Vec3, distance_m: float) -> int:
+        """How many faces, in the order of painting, come before the first that is nearer than a distance."""
+        for count, face in enumerate(faces):
+            if dist(eye, self._centres_m[face.index]) < distance_m:
+                return count
+        return len(faces)
 
     @staticmethod
     def _without_margin(canvas: Image) -> Image:

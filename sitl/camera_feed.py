@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 from collections import deque
+from collections.abc import Callable, Sequence
 
 from scenarios.models import Scenario
 from scenarios.truth import TrueState
 from sitl.camera import Camera, Image
+from sitl.solids import Solid
 
 FIRST_EXPOSURE_US = 36_000
 
@@ -21,13 +23,15 @@ class CameraFeed:
 
     Args:
         scenario: camera settings and what is to be seen.
+        drones: asked at each exposure for the boxes of other drones.
 
     Attributes:
         next_us: before this time there is nothing to do.
     """
 
-    def __init__(self, scenario: Scenario) -> None:
+    def __init__(self, scenario: Scenario, drones: Callable[[], Sequence[Solid]] = tuple) -> None:
         self._camera = Camera(scenario)
+        self._drones = drones
         self._period_us = 1e6 / scenario.camera.rate_hz
         self._latency_us = round(scenario.camera.latency_s * 1e6)
         self._taken = 0
@@ -48,7 +52,7 @@ class CameraFeed:
         index = int((truth.time_us - FIRST_EXPOSURE_US) // self._period_us)
         if index >= self._taken:
             self._taken = index + 1
-            image = self._camera.render(truth.position_arena_m, truth.attitude_arena)
+            image = self._camera.render(truth.position_arena_m, truth.attitude_arena, self._drones())
             self._on_its_way.append((truth.time_us, image))
         arrived = None
         if self._on_its_way and self._on_its_way[0][0] + self._latency_us <= truth.time_us:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import socket
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict
 from importlib import import_module
 from math import degrees
@@ -20,6 +20,7 @@ from sitl.parameter_file import ParameterKeeper, open_parameters
 from sitl.picture_album import PictureAlbum
 from sitl.server_settings import ServerSettings
 from sitl.simulation import Simulation
+from sitl.solids import Solid
 
 if TYPE_CHECKING:
     from sitl.camera_feed import CameraFeed
@@ -91,8 +92,11 @@ class ServedDrone:
             self._keeper.start()
         await self._hub.open_all(self._settings.links)
 
-    async def open_video(self) -> None:
+    async def open_video(self, others: Callable[[], Sequence[Solid]] = tuple) -> None:
         """Import what is heavy in a thread, telemetry must not wait for it, then serve the camera's images.
+
+        Args:
+            others: asked at each exposure for the boxes of other drones.
 
         Raises:
             VideoError: a port is taken or an address is wrong.
@@ -111,7 +115,7 @@ class ServedDrone:
             video.add_text("/video.sdp", "application/sdp", self._rtp.description())
         self._video = video
         await video.start()
-        self._camera = CameraFeed(scenario)
+        self._camera = CameraFeed(scenario, others)
 
     def tick(self) -> None:
         """Advance by one control period: fly, speak, look."""

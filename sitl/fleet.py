@@ -12,6 +12,7 @@ from math import dist
 
 from scenarios.ground import is_over_base
 from scenarios.models import Scenario, Start
+from sitl.solids import Solid
 from sitl.world import World
 
 _SPACING_M = 1.5  # between starting places, more where a drone is large
@@ -54,6 +55,10 @@ class Fleet:
         for i, world in enumerate(worlds):
             world.meet(tuple(boxes[a + b - i] for a, b in pairs if i in (a, b)))
         self._tell(pairs)
+
+    def others(self, number: int) -> list[Solid]:
+        """The boxes of all drones but one, for its camera."""
+        return [world.box(_name(i)) for i, world in enumerate(self._worlds) if i != number]
 
     def _tell(self, pairs: list[tuple[int, int]]) -> None:
         touching = {

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import functools
 import time
 from collections.abc import Callable, Sequence
 
@@ -65,8 +66,8 @@ class SimulatorServer:
                 await drone.close()
 
     async def _open_video(self) -> None:
-        for drone in self._drones:
-            await drone.open_video()
+        for number, drone in enumerate(self._drones):
+            await drone.open_video(functools.partial(self._fleet.others, number))
         if self._settings.is_open:
             self._notice("other machines can command the drone: MAVLink is unsigned; see --signing-key")
         for drone in self._drones:
@@ -88,7 +89,9 @@ class SimulatorServer:
                     drone.tick()
                 fleet.tick()
             now_s = time.monotonic()
-            notices.lag(pacer.give_up_lag(now_s, simulation.time_us), now_s)
+            lost_s = pacer.give_up_lag(now_s, simulation.time_us)
+            if video_task.done():  # until then much is loaded
+                notices.lag(lost_s, now_s)
             await asyncio.sleep(pacer.wait_s(now_s, simulation.time_us + CONTROL_PERIOD_US))
 
 

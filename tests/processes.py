@@ -44,12 +44,12 @@ def ports_are_free(instance: int) -> bool:
     return True
 
 
-def free_instance() -> int:
-    """An instance whose ports nobody has; parallel test workers begin to look at different ones."""
+def free_instance(count: int = 1) -> int:
+    """An instance whose ports nobody has, and so the next ones; parallel workers begin at different ones."""
     worker = int(os.environ.get("PYTEST_XDIST_WORKER", "gw0")[2:])
     for offset in range(9):
         instance = (4 * worker + offset) % 9 + 1
-        if ports_are_free(instance):
+        if all(ports_are_free(instance + number) for number in range(count)):
             return instance
     raise RuntimeError("no instance of 1 to 9 has all its ports free")
 

@@ -8,8 +8,10 @@ from contextlib import asynccontextmanager, suppress
 import aiohttp
 import pytest
 
+from firmware_py.mavlink.signing import SigningKey
 from scenarios.loader import load_scenario
-from sitl.links import LinkError
+from sitl.fleet import side_by_side
+from sitl.link_urls import LinkError, parse_link
 from sitl.server import SimulatorServer, _Notices
 from sitl.server_settings import ServerSettings
 from sitl.simulation import Simulation
@@ -34,10 +36,12 @@ class SlowSimulation(Simulation):
 
 
 @asynccontextmanager
-async def serving(simulation, *, speed=1.0):
+async def serving(simulation, *, count=1, **options):
     """A server with all its ports open: what it says, and its settings."""
     said = []
-    settings = ServerSettings(instance=free_instance(), speed=speed)
+    instance = free_instance(count)
+    options = {"ground_remote": f"127.0.0.1:{14550 + instance}", **options}
+    settings = ServerSettings(instance=instance, **options)
     task = asyncio.create_task(SimulatorServer(simulation, settings, said.append).run())
     try:
         for _ in range(1000):
@@ -46,7 +50,7 @@ async def serving(simulation, *, speed=1.0):
                 break
         if task.done():
             await task
-        assert GREETING in said[0]
+        assert GREETING in said[-1]
         yield said, settings
     finally:
         task.cancel()
@@ -145,6 +149,57 @@ async def test_a_busy_video_port_ends_it_and_frees_the_links():
     await asyncio.sleep(0.05)
     with bound(14580 + instance), bound(18570 + instance):
         pass
+
+
+async def test_three_drones_in_one_process_have_their_own_links_and_video():
+    scenarios = side_by_side(load_scenario("empty"), 3, 0.3)
+    async with serving([Simulation(one) for one in scenarios], count=3) as (said, settings):
+        for _ in range(500):
+            await asyncio.sleep(0.01)
+            if len(said) >= 3:
+                break
+        times_us = []
+        for number in range(3):
+            answer = await referee(settings.shifted(number))
+            times_us.append(answer["time_us"])
+            assert str(14540 + settings.instance + number) in said[number]
+    assert min(times_us) > 0
+    assert max(times_us) - min(times_us) < 5_000_000
+
+
+async def test_the_description_of_the_rtp_stream_is_served():
+    with bound(0) as listener:
+        port = listener.getsockname()[1]
+        rtp = {"video_rtp": ("127.0.0.1", port)}
+        async with serving(Simulation(load_scenario("empty")), **rtp) as (said, settings):
+            assert f"RTP to UDP {port}" in said[0]
+            url = f"http://127.0.0.1:{settings.http_port}/video.sdp"
+            async with aiohttp.ClientSession() as session, session.get(url) as response:
+                assert response.content_type == "application/sdp"
+                assert f"m=video {port} RTP/AVP 96" in await response.text()
+            listener.settimeout(5.0)
+            packet = await asyncio.to_thread(listener.recv, 2000)
+            assert packet[1] & 127 == 96
+
+
+async def test_an_open_drone_without_a_key_says_so():
+    async with serving(Simulation(load_scenario("empty")), ground_remote="192.0.2.1") as (said, _):
+        assert said[0] == "other machines can command the drone: MAVLink is unsigned; see --signing-key"
+
+
+def test_ports_beyond_the_last_are_refused():
+    settings = ServerSettings(links=(parse_link("tcpin://127.0.0.1:65534"),))
+    settings.check(2)
+    with pytest.raises(LinkError, match="65536 of drone 3"):
+        settings.check(3)
+
+
+def test_who_listens_on_loopback_only_is_not_open():
+    assert not ServerSettings().is_open
+    assert ServerSettings(bind="0.0.0.0").is_open
+    assert ServerSettings(links=(parse_link("tcpin://0.0.0.0:5760"),)).is_open
+    assert ServerSettings(ground_remote="192.0.2.1").ground.bind[0] == "0.0.0.0"
+    assert not ServerSettings(bind="0.0.0.0", signing_key=SigningKey.from_text("a")).is_open
 
 
 def test_instances_shift_every_port():
