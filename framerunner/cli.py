@@ -9,7 +9,7 @@ from importlib import metadata
 
 from cyclopts import App, CycloptsError
 
-from framerunner.commands import camera, evaluate, fly, mission, replay, scenario, sim
+from framerunner.commands import camera, doctor, evaluate, fly, mission, replay, scenario, sim
 
 EXIT_BAD_INPUT = 2
 EXIT_INTERRUPTED = 130
@@ -28,6 +28,7 @@ def build_app() -> App:
     app.command(sim.sim)
     app.command(fly.fly)
     app.command(camera.camera)
+    app.command(doctor.doctor)
     app.command(evaluate.evaluate)
     app.command(replay.replay)
     app.command(mission.app)

@@ -14,8 +14,7 @@ import tty
 from collections.abc import Callable
 from typing import Any, Protocol
 
-from pymavlink.dialects.v20 import common as mavlink
-
+from firmware_py.mavlink.dialect import mavlink
 from offboard.drone import DroneError
 from offboard.link.url import VehicleUrl, check_free, parse_url
 

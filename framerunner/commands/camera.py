@@ -20,6 +20,9 @@ def camera(
     scenario: Annotated[
         str, Parameter(help="name or file of the scenario whose frames are seen")
     ] = "test-case-1",
+    no_base: Annotated[
+        bool, Parameter(negative=(), help="the drone starts from the floor: there is no base under it")
+    ] = False,
     bind: Annotated[str, Parameter(help="address to serve the video on")] = "127.0.0.1",
     port: Annotated[WholeNumber, Parameter(help="TCP port of the video")] = 8080,
 ) -> int:
@@ -34,7 +37,7 @@ def camera(
 
         framerunner camera --scenario test-case-1
 
-        framerunner camera --drone udpin://127.0.0.1:14550 --scenario test-case-1 --port 8081
+        framerunner camera --scenario test-case-1 --no-base --drone udpin://127.0.0.1:14550 --port 8081
 
         framerunner camera --drone serial:///dev/ttyUSB1:921600 --scenario my_hall.yaml --bind 0.0.0.0
     """
@@ -42,11 +45,14 @@ def camera(
         raise SettingError(f"--port {port}: must be from 1 to 65535")
 
     from framerunner.vehicle_link import VehicleLink
+    from framerunner.virtual_camera.painter import without_base
     from framerunner.virtual_camera.server import COMPONENT_ID, SYSTEM_ID, CameraServer
     from scenarios.loader import load_scenario
     from sitl.video import VideoServer
 
     loaded = load_scenario(scenario)
+    if no_base:
+        loaded = without_base(loaded)
     link = VehicleLink(drone, system_id=SYSTEM_ID, component_id=COMPONENT_ID)
     asyncio.run(CameraServer(loaded, link, VideoServer(bind, port), _say).run())
     return 0

@@ -37,6 +37,18 @@ def start_pose(scenario: Scenario) -> Pose:
     return Pose((x_m, y_m, z_m + height_m / 2), scenario.start.yaw_rad)
 
 
+def without_base(scenario: Scenario) -> Scenario:
+    """The same layout for a drone that starts from the floor, where the base would be.
+
+    Heights count from where the drone stands, which the app takes for the base's top: so what hangs above
+    the floor is raised by the height of the base that is not there.
+    """
+    lift_m = scenario.base.top_m
+    frames = tuple(frame.model_copy(update={"z_m": frame.z_m + lift_m}) for frame in scenario.frames)
+    arena = scenario.arena.model_copy(update={"height_m": scenario.arena.height_m + lift_m})
+    return scenario.model_copy(update={"frames": frames, "arena": arena})
+
+
 class VirtualCamera:
     """Paints what a camera on the vehicle would see of the arena, and referees by the same poses.
 

@@ -7,8 +7,7 @@ import threading
 import time
 from collections.abc import Callable, Mapping
 
-from pymavlink.dialects.v20 import common as mavlink
-
+from firmware_py.mavlink.dialect import mavlink
 from framerunner.vehicle_link import Message, VehicleLink, command, companion_heartbeat, is_vehicle
 from framerunner.virtual_camera.painter import VirtualCamera
 from offboard.drone import DroneError

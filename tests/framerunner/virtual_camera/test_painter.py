@@ -1,5 +1,6 @@
 """From telemetry to images: the simulator's own drone gives the simulator's own images."""
 
+from itertools import pairwise
 from math import cos, pi, sin
 
 import numpy as np
@@ -8,7 +9,7 @@ from pymavlink.dialects.v20 import common as mavlink
 
 from firmware_py.mavlink.links import GROUND
 from firmware_py.mavlink.node import MavlinkNode
-from framerunner.virtual_camera.painter import VirtualCamera, start_pose
+from framerunner.virtual_camera.painter import VirtualCamera, start_pose, without_base
 from scenarios.loader import load_scenario
 from sitl.camera import Camera
 from sitl.camera_feed import CameraFeed
@@ -112,7 +113,7 @@ def test_euler_angles_serve_where_no_quaternion_comes():
 
 
 def test_the_referee_follows_a_flight_through_a_frame_and_back():
-    """Straight through red, back over it, down on the start: crossed and landed, but the order is not done."""
+    """Straight through red, back over it, down on the start: crossed and landed."""
     camera = ready_camera()
     red = SCENARIO.frames[0]
     x, y, z = START.position_m
@@ -121,7 +122,7 @@ def test_the_referee_follows_a_flight_through_a_frame_and_back():
     stations += [(red.x_m + ahead[0], red.y_m + ahead[1], red.z_m), (x, y, 3.0), (x, y, z)]
     time_us = 1_020_000
     tell(camera, reports(time_us, armed=True))
-    for start, end in zip(stations, stations[1:], strict=False):
+    for start, end in pairwise(stations):
         for step in range(1, 151):
             time_us += 20_000
             px, py, pz = (a + (b - a) * step / 150 for a, b in zip(start, end, strict=True))
@@ -140,6 +141,15 @@ def test_the_referee_follows_a_flight_through_a_frame_and_back():
     assert standing["report"]["landed_on_base"]
     assert standing["report"]["landing_error_m"] == pytest.approx(0.0, abs=1e-3)
     assert standing["report"]["frames_crossed"] == ("red",)
+
+
+def test_without_a_base_all_hangs_as_high_above_where_the_drone_stands_as_above_the_floor():
+    lifted = without_base(SCENARIO)
+    assert lifted.name == SCENARIO.name
+    for frame, raised in zip(SCENARIO.frames, lifted.frames, strict=True):
+        assert raised.z_m - lifted.base.top_m == pytest.approx(frame.z_m)
+    assert lifted.arena.height_m - lifted.base.top_m == pytest.approx(SCENARIO.arena.height_m)
+    assert start_pose(lifted) == START
 
 
 def fly_simulation(scenario, seconds):
