@@ -101,7 +101,7 @@ def side_by_side(scenario: Scenario, count: int, width_m: float) -> list[Scenari
         if _has_room(scenario, place, width_m):
             places.append(place)
     if len(places) < count:
-        raise ValueError(f"{scenario.name} has room for {len(places)} drones, not for {count}")
+        raise ValueError(f"{scenario.name} has room for {len(places)}, not for {count} drones")
     yaw_rad = scenario.start.yaw_rad
     return [
         scenario.model_copy(update={"start": Start(x_m=x_m, y_m=y_m, yaw_rad=yaw_rad)}) for x_m, y_m in places

@@ -1,0 +1,73 @@
+"""Options of `framerunner sim` that cannot be: one line each, and nothing is opened."""
+
+import pytest
+
+from framerunner.cli import run
+
+
+@pytest.fixture
+def refused(capsys):
+    """Run the simulator with options that it must refuse; the one line it says."""
+
+    def ask(*options):
+        assert run(["sim", *map(str, options)]) == 2
+        said = capsys.readouterr()
+        assert said.out == ""
+        assert len(said.err.strip().splitlines()) == 1
+        return said.err
+
+    return ask
+
+
+@pytest.mark.parametrize(
+    ("link", "said"),
+    [
+        ("nonsense", "examples: udpout://"),
+        ("udpout://station:99999", "port 99999 must be from 1 to 65535"),
+        ("tcpin://127.0.0.1:5760?streams=some", "streams=onboard|ground|normal"),
+        ("serial://ttyUSB0:57600", "serial:///dev/ttyUSB0:57600"),
+    ],
+)
+def test_a_bad_link(refused, link, said):
+    line = refused("--link", link)
+    assert f"--link {link}" in line
+    assert said in line
+
+
+def test_a_link_given_twice(refused):
+    link = "tcpin://127.0.0.1:5760"
+    assert f"--link {link}: given twice" in refused("--link", link, "--link", link)
+
+
+@pytest.mark.parametrize("count", ["0", "21", "-1", "1.5", "many"])
+def test_a_bad_count(refused, count):
+    assert "--count" in refused("--count", count)
+
+
+def test_more_drones_than_the_arena_has_room_for(refused, tmp_path):
+    small = tmp_path / "small.yaml"
+    small.write_text("name: small\narena: {length_x_m: 2, width_y_m: 2}\n", encoding="utf-8")
+    line = refused("--count", 9, "--scenario", small)
+    assert "--count 9: small has room for 1, not for 9 drones" in line
+
+
+def test_a_serial_line_serves_one_drone(refused):
+    assert "--count 1" in refused("--count", 2, "--link", "serial:///dev/ttyS0:57600")
+
+
+@pytest.mark.parametrize("option", ["--ground-remote", "--onboard-remote", "--video-rtp"])
+def test_a_bad_port_behind_a_host(refused, option):
+    assert "station:port: must be a host, or host:port" in refused(option, "station:port")
+
+
+def test_a_key_that_is_none(refused, tmp_path):
+    key = tmp_path / "key"
+    assert f"--signing-key {key}: cannot be read" in refused("--signing-key", key)
+    key.write_text("\n", encoding="utf-8")
+    assert "64 hexadecimal digits or a passphrase" in refused("--signing-key", key)
+    key.write_bytes(b"\xff\xfe\x00")
+    assert "64 hexadecimal digits or a passphrase" in refused("--signing-key", key)
+    key.write_text("00" * 32, encoding="utf-8")
+    line = refused("--signing-key", key)
+    assert "not all zero" in line
+    assert "00" * 32 not in line
