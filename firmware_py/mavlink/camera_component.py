@@ -184,11 +184,14 @@ class CameraComponent:
         """What is asked about a stream, numbered from 1, or about all, 0."""
         streams = self._exchange.video
         wanted = [(n, stream) for n, stream in enumerate(streams, start=1) if index in (0, n)]
-        if message_id == mavlink.MAVLINK_MSG_ID_VIDEO_STREAM_STATUS:
-            return [camera_messages.stream_status(stream, n) for n, stream in wanted]
+        told = [camera_messages.stream_information(stream, n, len(streams)) for n, stream in wanted]
         if message_id == mavlink.MAVLINK_MSG_ID_VIDEO_STREAM_INFORMATION:
-            return [camera_messages.stream_information(stream, n, len(streams)) for n, stream in wanted]
-        return []
+            return told
+        if message_id != mavlink.MAVLINK_MSG_ID_VIDEO_STREAM_STATUS:
+            return []
+        # MAVSDK 4.1 asks for nothing but the status, yet shows the last information that it hears: so that
+        # comes too, the preferred stream's last.
+        return [*reversed(told), *(camera_messages.stream_status(stream, n) for n, stream in wanted)]
 
     def _start_images(self, params: SevenParams) -> CommandResult:
         interval_s = 0.0 if isnan(params[1]) else params[1]

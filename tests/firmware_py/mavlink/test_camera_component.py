@@ -113,6 +113,17 @@ def test_streams_tell_where_they_are(viewer):
     assert acks(viewer.ask(viewer.long(REQUEST, 269, 3, target=CAMERA))) == [(100, REQUEST, DENIED)]
 
 
+def test_the_status_of_streams_brings_their_information_the_preferred_last(viewer):
+    answers = viewer.ask(viewer.long(REQUEST, 270, nan, target=CAMERA))
+    told = [(m.get_type(), m.stream_id) for m in answers[:-1]]
+    assert told == [
+        ("VIDEO_STREAM_INFORMATION", 2),
+        ("VIDEO_STREAM_INFORMATION", 1),
+        ("VIDEO_STREAM_STATUS", 1),
+        ("VIDEO_STREAM_STATUS", 2),
+    ]
+
+
 def test_storage_has_room_or_is_not_there(viewer, autopilot, make_peer):
     (storage,) = named(viewer.ask(viewer.long(REQUEST, 261, target=CAMERA)), "STORAGE_INFORMATION")
     assert (storage.status, storage.total_capacity, storage.available_capacity) == (2, 100.0, 75.0)
