@@ -167,11 +167,11 @@ class FileTransferService:
 
     def _terminate(self, client: Client, request: Request) -> Answer:
         client.session(request.session, self._exchange.time_us)
-        del client.sessions[request.session]
+        client.close([request.session], request.raw, self._exchange.time_us)
         return Answer(session=request.session)
 
     def _reset(self, client: Client, request: Request) -> Answer:
-        client.sessions.clear()
+        client.close(list(client.sessions), request.raw, self._exchange.time_us)
         return Answer(session=request.session)
 
     def _list(self, _client: Client, request: Request) -> Answer:

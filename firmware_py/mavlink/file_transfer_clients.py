@@ -12,6 +12,7 @@ _CLIENTS = 16
 _IDLE_US = 10_000_000  # PX4 closes a session unused so long
 _TAKEOVER_US = 1_000_000
 _TWIN_US = 2_000_000
+_LATE_US = 1_000_000
 
 ClientKey = tuple[str, int, int]  # link, system, component
 
@@ -45,6 +46,7 @@ class Session:
         opened_us: vehicle time of that.
         used_us: vehicle time of the last use.
         burst: under way, if any.
+        closing: asked to be closed, perhaps by an old request that came late: it can be read, or replaced.
     """
 
     path: Path
@@ -54,6 +56,7 @@ class Session:
     opened_us: int
     used_us: int
     burst: Burst | None = None
+    closing: bool = False
 
 
 @dataclass(slots=True)
@@ -66,6 +69,8 @@ class Client:
         used_us: vehicle time of its last request.
         last_request: header and data of the last request if it changed something, else empty.
         last_reply: payload of the answer to it.
+        last_closing: header and data of the last request that closed a session.
+        closed_us: vehicle time of that.
     """
 
     key: ClientKey
@@ -73,6 +78,8 @@ class Client:
     used_us: int = 0
     last_request: bytes = b""
     last_reply: bytes = b""
+    last_closing: bytes = b""
+    closed_us: int = 0
 
     def session(self, number: int, time_us: int) -> Session:
         """An open file that is now used.
@@ -89,9 +96,24 @@ class Client:
     def twin(self, number: int, opening: bytes, time_us: int) -> Session | None:
         """A session that the very same request opened a moment ago: the request came twice."""
         session = self.sessions.get(number)
-        if session is None or session.opening != opening or time_us - session.opened_us > _TWIN_US:
+        if session is None or session.closing or session.opening != opening:
             return None
-        return session
+        return session if time_us - session.opened_us <= _TWIN_US else None
+
+    def close(self, numbers: list[int], request: bytes, time_us: int) -> None:
+        """Close sessions.
+
+        The same request a moment later may be the first one that took a detour, while the client has opened
+        the next file by that number; or MAVSDK, which counts from 0 for each file, and means it. So it leaves
+        the session to be read or replaced.
+        """
+        late = request == self.last_closing and time_us - self.closed_us <= _LATE_US
+        self.last_closing, self.closed_us = request, time_us
+        for number in numbers:
+            if late:
+                self.sessions[number].closing = True
+            else:
+                del self.sessions[number]
 
     def make_room(self, number: int, time_us: int) -> None:
         """Have a session number free.
@@ -104,7 +126,7 @@ class Client:
         """
         session = self.sessions.get(number)
         if session is not None:
-            if time_us - session.used_us < _TAKEOVER_US:
+            if not session.closing and time_us - session.used_us < _TAKEOVER_US:
                 raise RefusalError(FtpError.NO_SESSIONS_AVAILABLE)
             del self.sessions[number]
         if len(self.sessions) >= _SESSIONS:

@@ -10,10 +10,20 @@ from mavsdk.asyncio.plugins.action import ActionAsync
 from mavsdk.asyncio.plugins.ftp import FtpAsync, FtpError, FtpResult
 from mavsdk.asyncio.plugins.log_files import LogFilesAsync, LogFilesError, LogFilesResult
 from mavsdk.asyncio.plugins.telemetry import TelemetryAsync
-from pymavlink.mavftp import MAVFTP
+from pymavlink.mavftp import MAVFTP, MAVFTPSettings
 from pyulog import ULog
 
 pytestmark = pytest.mark.realtime
+
+
+# pymavlink's own, but it need not wait for 3.7 s to see that nothing more comes.
+QUICK = MAVFTPSettings(
+    [
+        *(("debug", int, 0), ("pkt_loss_tx", int, 0), ("pkt_loss_rx", int, 0), ("max_backlog", int, 5)),
+        *(("burst_read_size", int, 80), ("write_size", int, 80), ("write_qsize", int, 5)),
+        *(("idle_detection_time", float, 0.6), ("read_retry_time", float, 0.5), ("retry_time", float, 0.3)),
+    ]
+)
 
 
 async def until(condition, tries=200):
@@ -113,7 +123,7 @@ async def test_mavsdk_downloads_the_log_of_a_flight_and_erases_it(drone, tmp_pat
 
 
 def test_pymavlinks_client_puts_gets_lists_and_removes(peer, document, tmp_path):
-    ftp = MAVFTP(peer.link, peer.link.target_system, 1)
+    ftp = MAVFTP(peer.link, peer.link.target_system, 1, QUICK)
 
     def done(answer):
         assert answer.error_code == 0, answer.error_code
