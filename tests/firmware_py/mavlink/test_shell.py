@@ -68,11 +68,11 @@ def test_other_devices_replies_and_other_vehicles_are_left_alone(peer):
     assert typed(peer, "help\n", flags=0) == ""  # nobody listens
 
 
-@given(
-    st.lists(
-        st.one_of(st.binary(max_size=70), st.sampled_from([b"param set\n", b"param show [\n"])), max_size=10
-    )
-)
+LINES = st.one_of(st.binary(max_size=70), st.sampled_from([b"param set", b"param show ["]))
+
+
+@settings(max_examples=60, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@given(st.lists(LINES, max_size=10))
 def test_anything_typed_breaks_nothing(autopilot, make_peer, lines):
     peer = make_peer(autopilot, links=LINKS, node_options={"shell": True})
     for line in lines:
