@@ -1,7 +1,7 @@
 """The shell over SERIAL_CONTROL: silent unless switched on, and about the vehicle only."""
 
 import pytest
-from hypothesis import given
+from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from firmware_py.mavlink.dialect import mavlink
