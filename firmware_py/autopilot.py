@@ -153,6 +153,7 @@ class Autopilot:
             from firmware_py.control.stabiliser import Stabiliser
 
             self._stabiliser = Stabiliser(self.airframe, self._period_us / 1e6)
+            self._parameters_version = -1  # it is told of its limits with the next tick
 
     def step(self, sensors: Sensors) -> MotorSpeeds:
         """Fly one control tick.
@@ -294,21 +295,6 @@ class Autopilot:
     def orbit_here(self) -> Orbit:
         """The circle that is flown when no other was asked for: PX4's, 1 m around where it is."""
         return Orbit(self.state.position_ned_m)
-
-    def start_mission(self) -> CommandResult:
-        """Fly the mission; disarmed, arm for it.
-
-        Returns:
-            ACCEPTED, DENIED without a mission, or TEMPORARILY_REJECTED when it cannot be armed now.
-        """
-        if not self.missions.valid:
-            self.say(WARNING, "Mission start denied: no valid mission")
-            return CommandResult.DENIED
-        self.prepare()
-        result = self._command(Event.SET_MISSION)
-        if result is CommandResult.ACCEPTED and not self.status.armed:
-            result = self._command(Event.ARM)
-        return result
 
     def change_speed(self, speed_m_s: float) -> CommandResult:
         """Fly the present journey at another horizontal speed; NaN: MPC_XY_CRUISE again."""
@@ -498,6 +484,7 @@ class Autopilot:
             speed_limits(self.airframe, parameters), manners(self.airframe, self.parameters)
         )
         self._watch.configure(parameters)
+        self._stabiliser.limits.tilt_rad = radians(parameters.value("MPC_TILTMAX_AIR"))
         self._lift_off.spool_up_us = round(parameters.value("COM_SPOOLUP_TIME") * 1e6)
         self._lift_off.ramp_us = round(parameters.value("MPC_TKO_RAMP_T") * 1e6)
         self._land_detector.trigger_us = round(parameters.value("LNDMC_TRIG_TIME") * 1e6)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import Protocol
 
+from firmware_py.control.limits import TiltLimit
 from firmware_py.types import (
     AccelerationCommand,
     ActuatorCommand,
@@ -20,7 +21,13 @@ _LIFT_HELD_TICKS = 125  # half a second: integrals rest while the contact still 
 
 
 class RateStabiliser(Protocol):
-    """What the autopilot needs of a stabiliser."""
+    """What the autopilot needs of a stabiliser.
+
+    Attributes:
+        limits: of the tilt; may be set in flight.
+    """
+
+    limits: TiltLimit
 
     def reset(self) -> None:
         """Forget all integrals."""
@@ -129,6 +136,9 @@ def goes_straight_through(command: Command) -> bool:
 
 class Undesigned:
     """Stands in until the stabiliser is designed; never flown."""
+
+    def __init__(self) -> None:
+        self.limits = TiltLimit(1.0)
 
     def reset(self) -> None:
         """Nothing to forget."""

@@ -16,9 +16,12 @@ from dataclasses import dataclass
 from enum import IntEnum, IntFlag
 from math import cos, isfinite, nan, sin
 
+from firmware_py.airframe import Airframe
 from firmware_py.types import NAN3, Quaternion, Setpoint, Vec3, VehicleState
 
 ZERO3: Vec3 = (0.0, 0.0, 0.0)
+_LOCAL = "SET_POSITION_TARGET_LOCAL_NED"
+_SHORTEST = 1e-3  # of a quaternion that still has a direction
 
 
 class TargetFrame(IntEnum):
@@ -83,9 +86,9 @@ def setpoint_from_target(target: LocalTarget, state: VehicleState, time_us: int)
         if not mask & (TargetMask.AX | TargetMask.AY | TargetMask.AZ):
             acceleration = _body_to_ned(target.acceleration_m_s2, state.attitude)
     else:
-        return f"SET_POSITION_TARGET_LOCAL_NED coordinate frame {target.frame} unsupported"
+        return f"{_LOCAL} coordinate frame {target.frame} unsupported"
     if mask & TargetMask.FORCE and _any_finite(acceleration):
-        return "SET_POSITION_TARGET_LOCAL_NED force not supported"
+        return f"{_LOCAL} force not supported"
     return _settled(
         Setpoint(
             time_us,
@@ -97,6 +100,70 @@ def setpoint_from_target(target: LocalTarget, state: VehicleState, time_us: int)
             level,
         )
     )
+
+
+def setpoint_from_attitude(
+    attitude: Quaternion | None,
+    rate_frd_rad_s: Vec3 | None,
+    yaw_rate_rad_s: float,
+    thrust: float,
+    time_us: int,
+) -> Setpoint | str:
+    """The setpoint for an attitude or for body rates, with a thrust.
+
+    Args:
+        attitude: unit quaternion (w, x, y, z), body FRD to world NED; None: not asked for.
+        rate_frd_rad_s: body rates, shape (3,); None: not asked for. Flown only without an attitude.
+        yaw_rate_rad_s: clockwise, beside an attitude.
+        thrust: 0..1 of the most there is.
+        time_us: vehicle time now.
+
+    Returns:
+        The setpoint, or the reason for refusing it.
+    """
+    if not isfinite(thrust):
+        return "SET_ATTITUDE_TARGET invalid: thrust is not a number"
+    if attitude is not None:
+        length = sum(component * component for component in attitude) ** 0.5
+        if not isfinite(length) or length < _SHORTEST:
+            return "SET_ATTITUDE_TARGET invalid: attitude is no quaternion"
+        w, x, y, z = (component / length for component in attitude)
+        return Setpoint(time_us, yaw_rate_rad_s=_finite(yaw_rate_rad_s), attitude=(w, x, y, z), thrust=thrust)
+    if rate_frd_rad_s is not None:
+        roll, pitch, yaw = (0.0 if not isfinite(rate) else rate for rate in rate_frd_rad_s)
+        return Setpoint(time_us, rate_frd_rad_s=(roll, pitch, yaw), thrust=thrust)
+    return "SET_ATTITUDE_TARGET invalid: neither attitude nor rates"
+
+
+def setpoint_from_controls(
+    airframe: Airframe, torque_frd: Vec3, thrust: float, time_us: int
+) -> Setpoint | str:
+    """The setpoint for normalised torques and thrust, mixed straight to the motors.
+
+    Each rotor gets the thrust plus its lever's share of roll and pitch and its spin's of yaw.
+
+    Args:
+        airframe: where the rotors are.
+        torque_frd: roll, pitch, yaw, each -1..1; shape (3,).
+        thrust: 0..1.
+        time_us: vehicle time now.
+
+    Returns:
+        The setpoint, or the reason for refusing it.
+    """
+    if not isfinite(sum(torque_frd) + thrust):
+        return "SET_ACTUATOR_CONTROL_TARGET invalid: a control is not a number"
+    roll, pitch, yaw = torque_frd
+    arm_x_m = max(abs(rotor.position_frd_m[0]) for rotor in airframe.rotors) or 1.0
+    arm_y_m = max(abs(rotor.position_frd_m[1]) for rotor in airframe.rotors) or 1.0
+    outputs = [
+        thrust
+        - roll * rotor.position_frd_m[1] / arm_y_m
+        + pitch * rotor.position_frd_m[0] / arm_x_m
+        + yaw * rotor.yaw_sign
+        for rotor in airframe.rotors
+    ]
+    return Setpoint(time_us, outputs=tuple([min(max(output, 0.0), 1.0) for output in outputs]))
 
 
 def setpoint_from_body_velocity(
@@ -130,7 +197,7 @@ def _settled(setpoint: Setpoint) -> Setpoint | str:
     """Refuse it without anything to follow, brake where an axis is open or the horizontal pair is half."""
     groups = (setpoint.position_ned_m, setpoint.velocity_ned_m_s, setpoint.acceleration_ned_m_s2)
     if not any(_any_finite(group) for group in groups):
-        return "SET_POSITION_TARGET_LOCAL_NED invalid"
+        return f"{_LOCAL} invalid"
     pairs_whole = all(isfinite(group[0]) == isfinite(group[1]) for group in groups)
     axes_held = all(any(isfinite(group[axis]) for group in groups) for axis in range(3))
     if pairs_whole and axes_held:

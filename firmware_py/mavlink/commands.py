@@ -9,111 +9,23 @@ Differences from PX4, on purpose:
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import dataclass
-from math import floor, isfinite, isinf, isnan, nan
+from math import nan
 
 from firmware_py.mavlink import version
+from firmware_py.mavlink.calibration import calibrate
+from firmware_py.mavlink.command import Command, CommandHandler, from_int, from_long
 from firmware_py.mavlink.dialect import BROADCAST, Message, mavlink
 from firmware_py.mavlink.exchange import Exchange, Handler
+from firmware_py.mavlink.flight_commands import FLIGHT_COMMANDS, set_mode
 from firmware_py.mavlink.links import Link
 from firmware_py.mavlink.message_requests import request_message, set_interval
-from firmware_py.status import CommandResult, FlightMode
+from firmware_py.mavlink.parameter_storage import preflight_storage
+from firmware_py.status import CommandResult
 
-FORCE_MAGIC = 21196.0  # param2 of COMPONENT_ARM_DISARM
-_RELATIVE_FRAMES = (mavlink.MAV_FRAME_GLOBAL_RELATIVE_ALT, mavlink.MAV_FRAME_GLOBAL_RELATIVE_ALT_INT)
 _TO_EVERYONE = (
     mavlink.MAV_CMD_REQUEST_PROTOCOL_VERSION,
     mavlink.MAV_CMD_REQUEST_AUTOPILOT_CAPABILITIES,
 )
-_STANDARD_MODES = {
-    mavlink.MAV_STANDARD_MODE_LAND: FlightMode.LAND,
-    mavlink.MAV_STANDARD_MODE_TAKEOFF: FlightMode.TAKEOFF,
-}
-_MODES = {mode.value: mode for mode in FlightMode}
-_WARNING = mavlink.MAV_SEVERITY_WARNING
-_CRITICAL = mavlink.MAV_SEVERITY_CRITICAL
-
-
-@dataclass(frozen=True, slots=True)
-class Command:
-    """A command, whichever message brought it.
-
-    Attributes:
-        link: it came by.
-        param1: NaN means "not given", as in the others.
-        altitude_m: param7 or z; above mean sea level unless the frame says above home.
-        frame: MAV_FRAME of COMMAND_INT.
-    """
-
-    link: Link
-    param1: float
-    param2: float
-    param3: float
-    altitude_m: float
-    frame: int = mavlink.MAV_FRAME_GLOBAL
-
-
-def _arm_disarm(exchange: Exchange, command: Command) -> CommandResult | None:
-    autopilot = exchange.autopilot
-    if isnan(command.param1):
-        return CommandResult.ACCEPTED  # PX4's odd answer: nothing happens
-    action = floor(command.param1 + 0.5) if isfinite(command.param1) else -1
-    force = command.param2 == FORCE_MAGIC
-    if action == 1:
-        return autopilot.arm(force=force)
-    if action == 0:
-        return autopilot.disarm(force=force)
-    autopilot.say(_CRITICAL, f"Unsupported ARM_DISARM param: {command.param1:g}")
-    return None  # PX4 does not acknowledge this either
-
-
-def _takeoff(exchange: Exchange, command: Command) -> CommandResult:
-    altitude_m = command.altitude_m
-    if isinf(altitude_m):
-        return CommandResult.DENIED
-    if command.frame in _RELATIVE_FRAMES:
-        home = exchange.autopilot.status.home
-        altitude_m = altitude_m + home.altitude_m if home else nan
-    return exchange.autopilot.takeoff(altitude_m)
-
-
-def _land(exchange: Exchange, _command: Command) -> CommandResult:
-    return exchange.autopilot.land()
-
-
-def _set_mode(exchange: Exchange, command: Command) -> CommandResult:
-    if not isfinite(command.param1) or not int(command.param1) & mavlink.MAV_MODE_FLAG_CUSTOM_MODE_ENABLED:
-        exchange.autopilot.say(_WARNING, "Mode change refused: only PX4 custom modes are understood")
-        return CommandResult.TEMPORARILY_REJECTED
-    main, sub = _small(command.param2), _small(command.param3)
-    return choose_mode(exchange, main, sub)
-
-
-def choose_mode(exchange: Exchange, main: int, sub: int) -> CommandResult:
-    """Ask the autopilot for the mode with PX4's numbers; a mode that is not there is refused in words."""
-    mode = _MODES.get((main, sub))
-    if mode is None:
-        exchange.autopilot.say(_WARNING, f"Mode change refused: no mode {main}.{sub} here")
-        return CommandResult.TEMPORARILY_REJECTED
-    return exchange.autopilot.set_mode(mode)
-
-
-def _set_standard_mode(exchange: Exchange, command: Command) -> CommandResult:
-    mode = _STANDARD_MODES.get(_small(command.param1))
-    if mode is None:
-        exchange.autopilot.say(_WARNING, f"Mode change refused: no standard mode {command.param1:g} here")
-        return CommandResult.TEMPORARILY_REJECTED
-    return exchange.autopilot.set_mode(mode)
-
-
-def _small(number: float) -> int:
-    """A mode number; what cannot be one is 0, which is no mode."""
-    return int(number) if isfinite(number) and 0 <= number <= 255 else 0
-
-
-def _start_mission(_exchange: Exchange, _command: Command) -> CommandResult:
-    return CommandResult.DENIED  # as PX4 without a mission; there never is one
 
 
 def _run_checks(exchange: Exchange, _command: Command) -> CommandResult:
@@ -121,8 +33,29 @@ def _run_checks(exchange: Exchange, _command: Command) -> CommandResult:
     return CommandResult.TEMPORARILY_REJECTED if armed else CommandResult.ACCEPTED  # they run all the time
 
 
+def _storage(exchange: Exchange, command: Command) -> CommandResult:
+    return preflight_storage(exchange, command.params[0])
+
+
+def _reboot(exchange: Exchange, command: Command) -> CommandResult:
+    """A simulator is started anew by whoever started it; PX4's SITL ends."""
+    if exchange.autopilot.status.armed:
+        return CommandResult.DENIED
+    if command.params[0] > 0:
+        exchange.autopilot.say(mavlink.MAV_SEVERITY_WARNING, "No reboot here: start the simulator again")
+    return CommandResult.UNSUPPORTED
+
+
+def _test_actuator(exchange: Exchange, _command: Command) -> CommandResult:
+    return CommandResult.DENIED if exchange.autopilot.status.armed else CommandResult.UNSUPPORTED
+
+
+def _set_actuator(_exchange: Exchange, _command: Command) -> CommandResult:
+    return CommandResult.ACCEPTED  # as PX4 to which no such actuator is connected
+
+
 def _request(exchange: Exchange, command: Command) -> CommandResult:
-    return request_message(exchange, command.link, command.param1, command.param2)
+    return request_message(exchange, command.link, command.params[0], command.params[1])
 
 
 def _requester(message_id: int) -> CommandHandler:
@@ -133,22 +66,20 @@ def _requester(message_id: int) -> CommandHandler:
 
 
 def _set_interval(exchange: Exchange, command: Command) -> CommandResult:
-    return set_interval(command.link, command.param1, command.param2, exchange.time_us)
+    return set_interval(command.link, command.params[0], command.params[1], exchange.time_us)
 
 
 def _get_interval(exchange: Exchange, command: Command) -> CommandResult:
-    return request_message(exchange, command.link, mavlink.MAVLINK_MSG_ID_MESSAGE_INTERVAL, command.param1)
+    return request_message(exchange, command.link, mavlink.MAVLINK_MSG_ID_MESSAGE_INTERVAL, command.params[0])
 
-
-CommandHandler = Callable[[Exchange, Command], "CommandResult | None"]
 
 COMMANDS: dict[int, CommandHandler] = {
-    mavlink.MAV_CMD_NAV_LAND: _land,
-    mavlink.MAV_CMD_NAV_TAKEOFF: _takeoff,
-    mavlink.MAV_CMD_DO_SET_MODE: _set_mode,
-    mavlink.MAV_CMD_DO_SET_STANDARD_MODE: _set_standard_mode,
-    mavlink.MAV_CMD_MISSION_START: _start_mission,
-    mavlink.MAV_CMD_COMPONENT_ARM_DISARM: _arm_disarm,
+    **FLIGHT_COMMANDS,
+    mavlink.MAV_CMD_DO_SET_ACTUATOR: _set_actuator,
+    mavlink.MAV_CMD_PREFLIGHT_CALIBRATION: calibrate,
+    mavlink.MAV_CMD_PREFLIGHT_STORAGE: _storage,
+    mavlink.MAV_CMD_PREFLIGHT_REBOOT_SHUTDOWN: _reboot,
+    mavlink.MAV_CMD_ACTUATOR_TEST: _test_actuator,
     mavlink.MAV_CMD_RUN_PREARM_CHECKS: _run_checks,
     mavlink.MAV_CMD_GET_HOME_POSITION: _requester(mavlink.MAVLINK_MSG_ID_HOME_POSITION),
     mavlink.MAV_CMD_GET_MESSAGE_INTERVAL: _get_interval,
@@ -160,13 +91,11 @@ COMMANDS: dict[int, CommandHandler] = {
 
 
 def _receive_long(exchange: Exchange, link: Link, message: Message) -> None:
-    command = Command(link, message.param1, message.param2, message.param3, message.param7)
-    _run(exchange, message, command)
+    _run(exchange, message, from_long(link, message))
 
 
 def _receive_int(exchange: Exchange, link: Link, message: Message) -> None:
-    command = Command(link, message.param1, message.param2, message.param3, message.z, message.frame)
-    _run(exchange, message, command)
+    _run(exchange, message, from_int(link, message))
 
 
 def _run(exchange: Exchange, message: Message, command: Command) -> None:
@@ -188,8 +117,7 @@ def _receive_set_mode(exchange: Exchange, link: Link, message: Message) -> None:
     main, sub = message.custom_mode >> 16 & 0xFF, message.custom_mode >> 24 & 0xFF
     if message.custom_mode & 0xFFFF:
         main = 0  # reserved bits are set, so this is no custom mode of PX4's
-    command = Command(link, float(message.base_mode), float(main), float(sub), nan)
-    result = _set_mode(exchange, command)
+    result = set_mode(exchange, float(message.base_mode), float(main), float(sub))
     _acknowledge(exchange, link, message, mavlink.MAV_CMD_DO_SET_MODE, result)
 
 

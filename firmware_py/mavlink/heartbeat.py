@@ -10,22 +10,34 @@ from firmware_py.status import FlightMode, VehicleStatus
 
 _CUSTOM = mavlink.MAV_MODE_FLAG_CUSTOM_MODE_ENABLED
 _ARMED = mavlink.MAV_MODE_FLAG_SAFETY_ARMED
+_MANUAL = mavlink.MAV_MODE_FLAG_MANUAL_INPUT_ENABLED
 _STABILISED = mavlink.MAV_MODE_FLAG_STABILIZE_ENABLED
 _AUTO = (
     mavlink.MAV_MODE_FLAG_AUTO_ENABLED
     | mavlink.MAV_MODE_FLAG_GUIDED_ENABLED
     | mavlink.MAV_MODE_FLAG_STABILIZE_ENABLED
 )
+_FLAGS = {
+    FlightMode.ACRO: _MANUAL,
+    FlightMode.MANUAL: _MANUAL | _STABILISED,
+    FlightMode.STABILIZED: _MANUAL | _STABILISED,
+    FlightMode.ALTITUDE: _MANUAL | _STABILISED,
+    FlightMode.POSITION: _MANUAL | _STABILISED,
+    FlightMode.ORBIT: _STABILISED,
+    FlightMode.OFFBOARD: _STABILISED,
+    FlightMode.TERMINATION: 0,
+}
 
 
 def base_mode(status: VehicleStatus) -> int:
     """HEARTBEAT.base_mode as PX4 sets it: 29 disarmed and 157 armed in auto modes, 17 and 145 in offboard."""
-    flags = _STABILISED if status.mode is FlightMode.OFFBOARD else _AUTO
-    return int(_CUSTOM | flags | (_ARMED if status.armed else 0))
+    return int(_CUSTOM | _FLAGS.get(status.mode, _AUTO) | (_ARMED if status.armed else 0))
 
 
 def system_status(status: VehicleStatus) -> int:
     """HEARTBEAT.system_status (MAV_STATE)."""
+    if status.armed and status.mode is FlightMode.TERMINATION:
+        return int(mavlink.MAV_STATE_FLIGHT_TERMINATION)
     if status.failsafe:
         return int(mavlink.MAV_STATE_CRITICAL)
     if status.armed:
@@ -49,6 +61,7 @@ def heartbeat(autopilot: AutopilotPort, _time_us: int) -> Message:
 def _hear(exchange: Exchange, link: Link, message: Message) -> None:
     if message.type == mavlink.MAV_TYPE_GCS:
         link.gcs_heard = True
+        exchange.autopilot.ground_station_heard()
 
 
 HANDLERS: dict[int, Handler] = {mavlink.MAVLINK_MSG_ID_HEARTBEAT: _hear}

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from typing import Protocol
 
-from firmware_py.mavlink import commands, heartbeat, signing_setup, time_sync
+from firmware_py.mavlink import commands, heartbeat, places, signing_setup, sticks, time_sync
 from firmware_py.mavlink.camera_component import CameraComponent
 from firmware_py.mavlink.camera_model import CAMERA_COMPONENT_ID, CameraModel, CaptureSink
 from firmware_py.mavlink.component_metadata import ExtraFiles
@@ -255,6 +255,8 @@ def _services(
         AUTOPILOT_COMPONENT_ID: _joined(
             heartbeat.HANDLERS,
             commands.HANDLERS,
+            places.HANDLERS,
+            sticks.HANDLERS,
             files.handlers,
             logs.handlers,
             shells.handlers,

@@ -6,6 +6,8 @@ from math import nan
 from typing import Protocol
 
 from firmware_py.airframe import Airframe
+from firmware_py.guidance.circles import Orbit
+from firmware_py.missions.flight import IssuedCommand
 from firmware_py.missions.store import MissionStore
 from firmware_py.parameters import Parameters
 from firmware_py.status import CommandResult, FlightMode, VehicleStatus
@@ -13,6 +15,7 @@ from firmware_py.types import (
     BatteryState,
     FlightRecord,
     GeodeticPoint,
+    ManualInput,
     MotorOutput,
     Setpoint,
     StatusText,
@@ -86,6 +89,50 @@ class AutopilotPort(Protocol):
 
     def accept_setpoint(self, setpoint: Setpoint) -> None:
         """Take an offboard setpoint just received."""
+        ...
+
+    def terminate(self) -> CommandResult:
+        """Stop the motors for good, wherever it is."""
+        ...
+
+    def reposition(self, target_ned_m: Vec3, yaw_rad: float = nan, speed_m_s: float = nan) -> CommandResult:
+        """Fly to a place and hold there; NaN components: as they are."""
+        ...
+
+    def orbit(self, orbit: Orbit) -> CommandResult:
+        """Circle around a point."""
+        ...
+
+    def change_speed(self, speed_m_s: float) -> CommandResult:
+        """Fly the present journey at another horizontal speed; NaN: the usual one."""
+        ...
+
+    def look_at(self, point_ned_m: Vec3 | None) -> CommandResult:
+        """Turn the nose to a place on journeys and in hold; None: no more."""
+        ...
+
+    def set_home(self, point: GeodeticPoint | None) -> CommandResult:
+        """Set home to a place, or (None) to where the vehicle is."""
+        ...
+
+    def set_origin(self, point: GeodeticPoint) -> CommandResult:
+        """Say where on Earth the local frame's origin is."""
+        ...
+
+    def manual_input(self, sticks: ManualInput) -> None:
+        """Take a pilot's sticks."""
+        ...
+
+    def ground_station_heard(self) -> None:
+        """Note a ground station's heartbeat."""
+        ...
+
+    def follow_target(self, position_ned_m: Vec3, velocity_ned_m_s: Vec3) -> None:
+        """Take a report of the target to follow, in the local frame."""
+        ...
+
+    def take_issued_commands(self) -> list[IssuedCommand]:
+        """What the mission commands others since the last call."""
         ...
 
     def say(self, severity: int, text: str) -> None:

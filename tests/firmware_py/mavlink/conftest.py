@@ -10,6 +10,7 @@ from firmware_py.mavlink.dialect import mavlink
 from firmware_py.mavlink.framing import PacketReader
 from firmware_py.missions.store import MissionStore
 from firmware_py.parameters import Parameters
+from firmware_py.places import is_on_earth
 from firmware_py.status import CommandResult, FlightMode, VehicleStatus
 from firmware_py.types import BatteryState, FlightRecord, GeodeticPoint, MotorOutput, StatusText, VehicleState
 from tests.firmware_py.mavlink.lossy import LossyPeer
@@ -34,6 +35,7 @@ class FakeAutopilot:
     calls: list[tuple] = field(default_factory=list)
     setpoints: list = field(default_factory=list)
     texts: list[StatusText] = field(default_factory=list)
+    ground_station_heard_count: int = 0
 
     def _called(self, *call):
         self.calls.append(call)
@@ -54,6 +56,39 @@ class FakeAutopilot:
     def land(self):
         return self._called("land")
 
+    def terminate(self):
+        return self._called("terminate")
+
+    def reposition(self, target_ned_m, yaw_rad=nan, speed_m_s=nan):
+        return self._called("reposition", target_ned_m, yaw_rad, speed_m_s)
+
+    def orbit(self, orbit):
+        return self._called("orbit", orbit)
+
+    def change_speed(self, speed_m_s):
+        return self._called("change_speed", speed_m_s)
+
+    def look_at(self, point_ned_m):
+        return self._called("look_at", point_ned_m)
+
+    def set_home(self, point):
+        return self._called("set_home", point)
+
+    def set_origin(self, point):
+        return self._called("set_origin", point)
+
+    def manual_input(self, sticks):
+        self.calls.append(("manual_input", sticks))
+
+    def ground_station_heard(self):
+        self.ground_station_heard_count += 1
+
+    def follow_target(self, position_ned_m, velocity_ned_m_s):
+        self.calls.append(("follow_target", position_ned_m, velocity_ned_m_s))
+
+    def take_issued_commands(self):
+        return []
+
     def accept_setpoint(self, setpoint):
         self.setpoints.append(setpoint)
 
@@ -68,7 +103,7 @@ class FakeAutopilot:
         return self.place
 
     def local_position(self, point):
-        return LocalProjection(HOME).to_local(point)
+        return LocalProjection(HOME).to_local(point) if is_on_earth(point) else None
 
 
 class Peer:

@@ -2,8 +2,11 @@ from math import inf, isnan, nan
 
 import pytest
 
+from firmware_py.guidance.circles import OrbitYaw
 from firmware_py.mavlink.dialect import mavlink
 from firmware_py.status import CommandResult, FlightMode, VehicleStatus
+from firmware_py.types import GeodeticPoint
+from tests.firmware_py.mavlink.conftest import HOME
 
 ACCEPTED, REJECTED, DENIED, UNSUPPORTED, FAILED = range(5)
 ARM, SET_MODE, TAKEOFF, LAND = 400, 176, 22, 21
@@ -42,16 +45,32 @@ TABLE = [
     pytest.param(SET_MODE, [nan, 4, 3], REJECTED, [], id="mode-nan"),
     pytest.param(SET_MODE, [1, 1e30, -1e30], REJECTED, [], id="mode-huge"),
     pytest.param(262, [7], ACCEPTED, [("set_mode", FlightMode.LAND)], id="standard-land"),
-    pytest.param(262, [2], REJECTED, [], id="standard-orbit"),
+    pytest.param(262, [2], ACCEPTED, [("set_mode", FlightMode.ORBIT)], id="standard-orbit"),
+    pytest.param(262, [3], REJECTED, [], id="standard-cruise"),
     pytest.param(300, [], DENIED, [], id="mission-start-without-mission"),
     pytest.param(401, [], ACCEPTED, [], id="run-prearm-checks"),
     pytest.param(31999, [], UNSUPPORTED, [], id="unknown"),
     pytest.param(2000, [], UNSUPPORTED, [], id="image-start-capture"),
     pytest.param(209, [], UNSUPPORTED, [], id="motor-test"),
     pytest.param(115, [], UNSUPPORTED, [], id="condition-yaw"),
-    pytest.param(20, [], UNSUPPORTED, [], id="return"),
+    pytest.param(20, [], ACCEPTED, [("set_mode", FlightMode.RETURN)], id="return-to-launch"),
+    pytest.param(178, [1, 7.0, -1], ACCEPTED, [("change_speed", 7.0)], id="change-speed"),
+    pytest.param(179, [1], ACCEPTED, [("set_home", None)], id="set-home-here"),
+    pytest.param(185, [0], DENIED, [], id="no-termination"),
+    pytest.param(185, [1], DENIED, [], id="termination-disarmed"),
+    pytest.param(192, [-1, 0, 0, nan], UNSUPPORTED, [], id="reposition-without-mode-change"),
+    pytest.param(192, [-1, 3, 0, nan], UNSUPPORTED, [], id="reposition-unknown-flag"),
+    pytest.param(197, [], ACCEPTED, [("look_at", None)], id="look-ahead"),
+    pytest.param(34, [0.5, 2.0, 0, nan], DENIED, [], id="orbit-too-small"),
+    pytest.param(34, [2000.0, 2.0, 0, nan], DENIED, [], id="orbit-too-large"),
+    pytest.param(187, [0.5], ACCEPTED, [], id="set-actuator"),
+    pytest.param(241, [1], ACCEPTED, [], id="calibrate-gyroscope"),
+    pytest.param(241, [], ACCEPTED, [], id="stop-calibrating"),
+    pytest.param(241, [0, 0, 0, 1], UNSUPPORTED, [], id="calibrate-remote-control"),
+    pytest.param(245, [2], ACCEPTED, [], id="reset-parameters"),
+    pytest.param(245, [9], DENIED, [], id="storage-unknown"),
     pytest.param(246, [1], UNSUPPORTED, [], id="reboot"),
-    pytest.param(179, [1], UNSUPPORTED, [], id="set-home"),
+    pytest.param(310, [0.5], UNSUPPORTED, [], id="actuator-test"),
     pytest.param(REQUEST, [9999], DENIED, [], id="request-unknown"),
     pytest.param(REQUEST, [259], DENIED, [], id="request-camera-information"),
     pytest.param(REQUEST, [410], DENIED, [], id="request-event"),
@@ -132,7 +151,7 @@ def test_takeoff_above_home_in_a_relative_frame(autopilot, peer):
         (ARM, [5], "Unsupported ARM_DISARM param: 5"),
         (SET_MODE, [1, 4, 9], "Mode change refused: no mode 4.9 here"),
         (SET_MODE, [0, 4, 3], "Mode change refused: only PX4 custom modes are understood"),
-        (262, [2], "Mode change refused: no standard mode 2 here"),
+        (262, [3], "Mode change refused: no standard mode 3 here"),
     ],
 )
 def test_a_refusal_is_said_in_words(autopilot, peer, command, params, text):
@@ -238,3 +257,70 @@ def test_mavsdks_slow_extended_state_and_back(peer):
         peer.ask(peer.long(SET_INTERVAL, extended, interval_us))
         count = sum(link == "onboard" and m.get_msgId() == extended for link, m in peer.advance(4.0))
         assert count == pytest.approx(expected, abs=1)
+
+
+PLACE = GeodeticPoint(HOME.latitude_deg + 1e-4, HOME.longitude_deg - 2e-4, HOME.altitude_m + 30.0)
+PLACE_NED_M = pytest.approx((11.12, -15.05, -30.0), abs=0.05)
+
+
+def command_int(command, params, point, *, frame=mavlink.MAV_FRAME_GLOBAL):
+    x, y = round(point.latitude_deg * 1e7), round(point.longitude_deg * 1e7)
+    return mavlink.MAVLink_command_int_message(1, 1, frame, command, 0, 0, *params, x, y, point.altitude_m)
+
+
+def test_a_place_to_go_to_is_found_in_the_local_frame(autopilot, peer):
+    answers = peer.ask(command_int(192, [3.0, 1, 0, 0.5], PLACE))
+    assert acks(answers) == [(192, ACCEPTED)]
+    assert autopilot.calls == [("reposition", PLACE_NED_M, 0.5, 3.0)]
+
+
+def test_a_height_above_home_counts_from_home(autopilot, peer):
+    point = GeodeticPoint(PLACE.latitude_deg, PLACE.longitude_deg, 30.0)
+    peer.ask(command_int(192, [-1, 1, 0, 0.5], point, frame=mavlink.MAV_FRAME_GLOBAL_RELATIVE_ALT_INT))
+    ((_, target, _, speed_m_s),) = autopilot.calls
+    assert target == PLACE_NED_M
+    assert isnan(speed_m_s)
+
+
+def test_what_a_reposition_leaves_open_stays_open(autopilot, peer):
+    peer.ask(peer.long(192, -1, 1, 0, nan, nan, nan, HOME.altitude_m + 5))
+    ((_, (north_m, east_m, down_m), yaw_rad, _),) = autopilot.calls
+    assert isnan(north_m + yaw_rad)
+    assert isnan(east_m)
+    assert down_m == pytest.approx(-5.0)
+
+
+@pytest.mark.parametrize("number", [192, 34, 195])
+def test_nowhere_on_earth_is_denied(autopilot, peer, number):
+    assert acks(peer.ask(peer.long(number, 5, 1, 0, 0, 200.0, 0.0, 0.0))) == [(number, DENIED)]
+    assert autopilot.calls == []
+
+
+def test_an_orbit_keeps_its_direction(autopilot, peer):
+    peer.ask(command_int(34, [-20.0, 3.0, 3, nan], PLACE))
+    ((_, orbit),) = autopilot.calls
+    assert orbit.centre_ned_m == PLACE_NED_M
+    assert (orbit.radius_m, orbit.speed_m_s) == (20.0, -3.0)
+    assert orbit.yaw is OrbitYaw.TANGENT
+
+
+def test_a_region_of_interest_and_home_are_places(autopilot, peer):
+    peer.ask(command_int(195, [0, 0, 0, 0], PLACE))
+    peer.ask(command_int(179, [0, 0, 0, 0], PLACE))
+    (looked, homed) = autopilot.calls
+    assert looked == ("look_at", PLACE_NED_M)
+    assert homed[0] == "set_home"
+    assert homed[1].latitude_deg == pytest.approx(PLACE.latitude_deg, abs=1e-7)
+
+
+def test_termination_needs_an_armed_vehicle(autopilot, peer):
+    autopilot.status.armed = True
+    assert acks(peer.ask(peer.long(185, 1))) == [(185, ACCEPTED)]
+    assert autopilot.calls == [("terminate",)]
+
+
+def test_calibration_is_told_in_the_words_that_stations_follow(autopilot, peer):
+    peer.ask(peer.long(241, 0, 0, 0, 0, 1))
+    said = [text.text for text in autopilot.texts]
+    assert said[0] == "[cal] calibration started: 2 accel"
+    assert said[-1] == "[cal] calibration done: accel"

@@ -9,6 +9,7 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from firmware_py.autopilot import Autopilot
+from firmware_py.control.limits import TiltLimit
 from firmware_py.mavlink.dialect import mavlink
 from firmware_py.status import FlightMode
 from firmware_py.types import GeodeticPoint, MotorOutput, Sensors
@@ -176,6 +177,9 @@ def test_awkward_content_in_every_handled_message(airframe, make_peer, sent):
 
 class Calm:
     """A stabiliser that does nothing, quickly built."""
+
+    def __init__(self):
+        self.limits = TiltLimit(1.0)
 
     def reset(self):
         pass
