@@ -22,6 +22,7 @@ from offboard.drone import DroneError, DroneState, VelocityCommand
 from offboard.link.alignment import Alignment, Pose
 from offboard.link.telemetry import TelemetryFeed
 from offboard.link.tlog import TlogRecorder
+from offboard.link.tracking import CommandTracker
 from offboard.link.url import check_free, parse_url
 from offboard.link.watchdog import Watchdog
 
@@ -31,8 +32,11 @@ CONFIRM_S = (
 )
 LAND_LIMIT_S = 120.0  # vehicle time
 STREAM_BEFORE_OFFBOARD_S = 0.3  # PX4 enters offboard only with fresh setpoints
+PRESENT_MODE_S = 8.0
 WANTED_RATE_HZ = 50.0
 PILOT_MODES = ("MANUAL", "ALTCTL", "POSCTL", "ACRO", "STABILIZED", "RATTITUDE")
+
+_CHECKS = "pre-arm checks not passed"
 
 logger = logging.getLogger(__name__)
 
@@ -84,6 +88,8 @@ class MavsdkDrone:
         self._offboard: Any = None
         self._telemetry: Any = None
         self._setpoint = VelocityBodyYawspeed(0.0, 0.0, 0.0, 0.0)
+        self._tracker = CommandTracker()
+        self._latest: DroneState | None = None
         self._commanding = False
         self._tlog_path: Path | None = None
         self._recorder: TlogRecorder | None = None
@@ -129,9 +135,10 @@ class MavsdkDrone:
             DroneError: with what is missing; or the vehicle is armed already.
         """
         try:
-            await self._until(lambda: not self._missing(), self._ready_limit_s)
+            await self._wait_for_checks()
         except TimeoutError:
             missing = ", ".join(self._missing())
+            await self._leave_offboard()
             raise DroneError(
                 f"not ready within {self._ready_limit_s:g} s: {missing}{self._feed.recent_texts()}"
             ) from None
@@ -140,6 +147,19 @@ class MavsdkDrone:
         await self._ask_for_rates()
         feed = self._feed
         self._alignment = Alignment(self._start_arena, Pose(feed.position_ned_m, feed.yaw_ned_rad))
+
+    async def _wait_for_checks(self) -> None:
+        """Wait until nothing is missing.
+
+        PX4's checks are those of the mode it is in. At first that is hold, which wants a global position:
+        in a hall, without GPS, it never passes, while offboard does. So that is tried when all else is there.
+        """
+        with contextlib.suppress(TimeoutError):
+            await self._until(lambda: not self._missing(), min(PRESENT_MODE_S, self._ready_limit_s / 2))
+        if self._missing() == [_CHECKS] and not self._feed.armed:
+            await self._stream_before_offboard()
+            await self._ask("offboard mode", self._offboard.start())
+        await self._until(lambda: not self._missing(), self._ready_limit_s)
 
     async def ticks(self) -> AsyncIterator[DroneState]:
         """States at 20 Hz of vehicle time; ticks that were not waited for are passed over.
@@ -152,6 +172,7 @@ class MavsdkDrone:
             self._check_alive(came)
             state = self._state()
             self._check_state(state)
+            self._latest = state
             yield state
 
     async def motors_on(self) -> None:
@@ -160,10 +181,7 @@ class MavsdkDrone:
         Offboard first, while disarmed: so the motors never run in another mode.
         """
         feed = self._feed
-        self._send(VelocityCommand())
-        for _ in range(int(STREAM_BEFORE_OFFBOARD_S / 0.05)):
-            await asyncio.sleep(0.05)
-            self._send(VelocityCommand())
+        await self._stream_before_offboard()
         self._watchdog.start()
         try:
             await self._ask("offboard mode", self._offboard.start())
@@ -172,10 +190,21 @@ class MavsdkDrone:
             await self._confirm("arming", lambda: bool(feed.armed))
         except BaseException:
             self._watchdog.stop()
-            with contextlib.suppress(MavsdkError, asyncio.CancelledError):
-                await self._offboard.stop()
+            await self._leave_offboard()
             raise
+        self._tracker.reset()
         self._commanding = True
+
+    async def _stream_before_offboard(self) -> None:
+        self._send(VelocityCommand())
+        for _ in range(int(STREAM_BEFORE_OFFBOARD_S / 0.05)):
+            await asyncio.sleep(0.05)
+            self._send(VelocityCommand())
+
+    async def _leave_offboard(self) -> None:
+        """On the ground, when there will be no flight."""
+        with contextlib.suppress(MavsdkError, asyncio.CancelledError):
+            await self._offboard.stop()
 
     async def motors_off(self) -> None:
         """Stop the motors at once (forced disarm), in the air too."""
@@ -223,7 +252,7 @@ class MavsdkDrone:
     def command(self, command: VelocityCommand) -> None:
         """Set the velocity to fly from now on. Without motors on it is passed over."""
         if self._commanding and not self._watchdog.tripped_after_s:
-            self._send(command)
+            self._send(command if self._latest is None else self._tracker.correct(command, self._latest))
 
     async def close(self) -> None:
         """Let go of the vehicle and finish the recording."""
@@ -299,10 +328,8 @@ class MavsdkDrone:
         if health is None:
             missing.append("no health (SYS_STATUS)")
             return missing
-        if not health.is_local_position_ok:
-            missing.append("local position estimate not healthy")
         if not health.is_armable:
-            missing.append("pre-arm checks not passed")
+            missing.append(_CHECKS)
         return missing
 
     async def _ask_for_rates(self) -> None:

@@ -181,11 +181,10 @@ _TAKERS = {
 
 def parameter_value(message: Message) -> float:
     """The number in a PARAM_VALUE: PX4 sends whole numbers by their bytes, in the place of a float's."""
-    whole = {
-        mavlink.MAV_PARAM_TYPE_INT32: "<i",
-        mavlink.MAV_PARAM_TYPE_UINT32: "<I",
-    }.get(message.param_type)
+    whole = {mavlink.MAV_PARAM_TYPE_INT32: "<i", mavlink.MAV_PARAM_TYPE_UINT32: "<I"}.get(message.param_type)
     if whole is None:
         return float(message.param_value)
-    # NaN survives the way into a float and back only on the wire; there is no other place for the bytes.
-    return float(struct.unpack(whole, struct.pack("<f", message.param_value))[0])
+    # From the packet itself: -1 would be a NaN, whose bytes need not survive the way through a float.
+    packet = message.get_msgbuf()
+    header = 10 if packet[0] == mavlink.PROTOCOL_MARKER_V2 else 6
+    return float(struct.unpack_from(whole, packet, header)[0])

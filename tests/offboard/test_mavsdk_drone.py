@@ -184,6 +184,34 @@ async def test_not_ready_says_what_is_missing(vehicle):
         await drone.close()
 
 
+async def test_a_vehicle_that_can_only_be_armed_in_offboard_is_taken_there(vehicle):
+    """PX4 checks for the mode it is in; hold wants a global position, which there is none of in a hall."""
+    vehicle.armable_modes = {6}
+    drone = MavsdkDrone(f"udpin://127.0.0.1:{vehicle.port}", ready_limit_s=6.0)
+    try:
+        await drone.connect()
+        await drone.ready()
+        assert vehicle.mode[0] == 6
+        await drone.motors_on()
+        assert vehicle.armed
+    finally:
+        await drone.close()
+
+
+async def test_a_vehicle_that_drifts_is_brought_back(vehicle):
+    async with connected(vehicle) as drone:
+        await drone.motors_on()
+        vehicle.drift_m_s = -0.1  # up, as PX4's height does under velocity setpoints
+        heights = []
+        async for state in drone.ticks():
+            drone.command(VelocityCommand())
+            heights.append(state.z)
+            if len(heights) == 80:
+                break
+        assert heights[-1] - heights[0] < 0.2
+        assert vehicle.setpoints[-1][3] > 0.05  # told to go down
+
+
 async def test_an_armed_vehicle_is_not_taken(vehicle):
     vehicle.armed = True
     with pytest.raises(DroneError, match="armed already"):

@@ -27,6 +27,8 @@ class UdpVehicle(threading.Thread):
         self.armed = False
         self.mode = (AUTO, LOITER)
         self.armable = True
+        self.armable_modes: set[int] = set()  # main modes; empty: any
+        self.drift_m_s = 0.0  # downwards, in offboard
         self.refuse_arming = ""
         self.ignore_modes = False
         self.mute = False
@@ -73,6 +75,7 @@ class UdpVehicle(threading.Thread):
         if self.armed and self.mode[0] == OFFBOARD:
             forward, right, down = self._velocity
             cos_yaw, sin_yaw = math.cos(self.yaw), math.sin(self.yaw)
+            down += self.drift_m_s
             velocity = [cos_yaw * forward - sin_yaw * right, sin_yaw * forward + cos_yaw * right, down]
             self.yaw = math.remainder(self.yaw + self._yaw_rate * STEP_S, 2 * math.pi)
             if self.time_s - self._last_setpoint_s > 1.0:
@@ -95,7 +98,8 @@ class UdpVehicle(threading.Thread):
         if step % 2 == 0:
             self._mav.local_position_ned_send(now_ms, *self.position, *self._moving)
         if step % 20 == 0:
-            sensors = 0x2F | (0x10000000 if self.armable else 0)
+            armable = self.armable and (not self.armable_modes or self.mode[0] in self.armable_modes)
+            sensors = 0x2F | (0x10000000 if armable else 0)
             self._mav.sys_status_send(sensors, sensors, sensors, 0, 12000, -1, -1, 0, 0, 0, 0, 0, 0)
             self._mav.extended_sys_state_send(0, 1 if self.position[2] > -0.02 else 2)
 

@@ -1,0 +1,113 @@
+"""Makes a vehicle go where its velocity commands lead, whatever its own velocity control lets slip.
+
+A mission flies by velocities: 0.3 m/s for four seconds are 1.2 m through a frame, and none are a stand. The
+simulated drone of this project does just that. An ordinary one lags by a second, stays behind against drag,
+and drifts in height while it is told to stand, as PX4 does under velocity setpoints. So here the commands
+are summed up to the place where they lead, and what the vehicle is off it is added to them, once it is off
+by more than a lag of a quarter of a second explains: a vehicle that obeys well gets its commands unchanged.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from math import cos, exp, hypot, pi, remainder, sin
+
+from offboard.drone import DroneState, VelocityCommand
+
+LAG_S = 0.3  # of a vehicle that needs no help
+MEMORY_S = 0.5  # a lag is made up for about so long after the command has changed
+DEAD_BAND_M = 0.04
+DEAD_BAND_RAD = 0.05
+LEASH_M = 0.5  # how far the place may be from the vehicle
+LEASH_RAD = 0.5
+PULL_PER_S = 1.2
+TURN_PER_S = 1.5
+MOST_M_S = 0.5
+MOST_RAD_S = 0.5
+_LONGEST_STEP_S = 0.2  # after a longer gap the vehicle is taken from where it is
+
+
+@dataclass(slots=True)
+class _Reference:
+    """Where the commands lead.
+
+    Attributes:
+        time_us: vehicle time.
+        off_m: from the vehicle to the place, arena axes.
+        at_m: the vehicle's own place when that was so.
+        yaw_rad: heading, not wrapped to the vehicle's.
+        speed_m_s: of late, at most.
+        turn_rad_s: of late, at most.
+    """
+
+    time_us: int
+    off_m: tuple[float, float, float]
+    at_m: tuple[float, float, float]
+    yaw_rad: float
+    speed_m_s: float = 0.0
+    turn_rad_s: float = 0.0
+
+
+class CommandTracker:
+    """Adds to velocity commands what brings the vehicle to where they lead."""
+
+    def __init__(self) -> None:
+        self._reference: _Reference | None = None
+        self._flown = VelocityCommand()
+
+    def reset(self) -> None:
+        """Begin anew at the next state."""
+        self._reference = None
+
+    def correct(self, command: VelocityCommand, state: DroneState) -> VelocityCommand:
+        """The command to send.
+
+        Args:
+            command: as the mission wants it from now on.
+            state: of the vehicle now; once a tick.
+        """
+        reference, flown = self._reference, self._flown
+        self._flown = command
+        step_s = 0.0 if reference is None else (state.time_us - reference.time_us) * 1e-6
+        if reference is None or not 0.0 <= step_s <= _LONGEST_STEP_S:
+            here = (state.x, state.y, state.z)
+            self._reference = _Reference(state.time_us, (0.0, 0.0, 0.0), here, state.yaw)
+            return command
+        _advance(reference, flown, state, step_s)
+        return _pulled(command, reference, state)
+
+
+def _advance(reference: _Reference, flown: VelocityCommand, state: DroneState, step_s: float) -> None:
+    """Go on along the command of the last step, but not farther from the vehicle than the leash."""
+    decay = exp(-step_s / MEMORY_S)
+    forward, left, up = flown.forward_m_s, flown.left_m_s, flown.up_m_s
+    reference.speed_m_s = max(hypot(forward, left, up), decay * reference.speed_m_s)
+    reference.turn_rad_s = max(abs(flown.yaw_rate_rad_s), decay * reference.turn_rad_s)
+    c, s = cos(state.yaw), sin(state.yaw)
+    (off_x, off_y, off_z), (at_x, at_y, at_z) = reference.off_m, reference.at_m
+    x = off_x + at_x - state.x + (c * forward - s * left) * step_s
+    y = off_y + at_y - state.y + (s * forward + c * left) * step_s
+    z = off_z + at_z - state.z + up * step_s
+    distance_m = hypot(x, y, z)
+    scale = LEASH_M / distance_m if distance_m > LEASH_M else 1.0
+    reference.off_m, reference.at_m = (scale * x, scale * y, scale * z), (state.x, state.y, state.z)
+    off_rad = remainder(reference.yaw_rad + flown.yaw_rate_rad_s * step_s - state.yaw, 2 * pi)
+    reference.yaw_rad = state.yaw + max(-LEASH_RAD, min(LEASH_RAD, off_rad))
+    reference.time_us = state.time_us
+
+
+def _pulled(command: VelocityCommand, reference: _Reference, state: DroneState) -> VelocityCommand:
+    x, y, z = reference.off_m
+    distance_m = hypot(x, y, z)
+    beyond_m = distance_m - DEAD_BAND_M - LAG_S * reference.speed_m_s
+    pull = min(PULL_PER_S * beyond_m, MOST_M_S) / distance_m if beyond_m > 0.0 else 0.0
+    off_rad = reference.yaw_rad - state.yaw
+    beyond_rad = abs(off_rad) - DEAD_BAND_RAD - LAG_S * reference.turn_rad_s
+    turn = min(TURN_PER_S * beyond_rad, MOST_RAD_S) if beyond_rad > 0.0 else 0.0
+    c, s = cos(state.yaw), sin(state.yaw)
+    return VelocityCommand(
+        command.forward_m_s + pull * (c * x + s * y),
+        command.left_m_s + pull * (c * y - s * x),
+        command.up_m_s + pull * z,
+        command.yaw_rate_rad_s + (turn if off_rad >= 0.0 else -turn),
+    )
