@@ -146,7 +146,7 @@ class Signing:
         return True
 
     def set_up(self, message: Message) -> bool:
-        """Take the key of SETUP_SIGNING; one of zeros ends signing. False if its timestamp leaves no future."""
+        """Take the key of SETUP_SIGNING, zeros end signing; False if its timestamp leaves no future."""
         secret = bytes(message.secret_key)
         if message.initial_timestamp > _MAX_TIMESTAMP // 2:
             return False
