@@ -1,7 +1,8 @@
 """SERIAL_CONTROL: a shell on the vehicle, as PX4's on device 10. Only where somebody switched it on.
 
 It knows a few commands of its own, about the vehicle only: nothing of the computer that it runs on can be
-reached. Lines are echoed and followed by a prompt, as nsh does.
+reached. Lines are echoed and followed by a prompt, as nsh does. Different from PX4: what comes without the
+flag that asks for an answer is answered too, because MAVSDK 4.1 never sets it.
 """
 
 from __future__ import annotations
@@ -96,7 +97,7 @@ class ShellService:
         if not meant or message.device != mavlink.SERIAL_CONTROL_DEV_SHELL or message.flags & _REPLY:
             return
         key = (link.profile.name, message.get_srcSystem(), message.get_srcComponent())
-        if not message.flags & _RESPOND:  # nobody reads any more: PX4 closes the shell
+        if not message.flags & _RESPOND and not message.count:  # goodbye: nobody reads any more
             self._shells.pop(key, None)
             return
         if key not in self._shells:

@@ -65,7 +65,12 @@ def test_a_line_may_come_in_pieces_and_be_corrected(peer):
 def test_other_devices_replies_and_other_vehicles_are_left_alone(peer):
     assert typed(peer, "help\n", device=0) == ""
     assert typed(peer, "help\n", flags=REPLY | RESPOND) == ""
-    assert typed(peer, "help\n", flags=0) == ""  # nobody listens
+    typed(peer, "\n")
+    assert typed(peer, "", flags=0) == ""  # goodbye
+
+
+def test_mavsdk_asks_for_no_answer_and_wants_one(peer):
+    assert "speaks as PX4" in typed(peer, "ver all\n", flags=0)
 
 
 LINES = st.one_of(st.binary(max_size=70), st.sampled_from([b"param set", b"param show ["]))
