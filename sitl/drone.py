@@ -73,6 +73,7 @@ class ServedDrone:
             log_text=self._recorder.hear_text,
             camera=_camera_model(simulation) if settings.camera else None,
             captures=self._album,
+            failures=simulation.failures,
         )
         self._hub = LinkHub(self.node)
         self._camera: CameraFeed | None = None

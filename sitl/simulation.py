@@ -10,6 +10,7 @@ from firmware_py.autopilot import Autopilot
 from firmware_py.types import GeodeticPoint
 from scenarios.models import Scenario
 from scenarios.referee import Referee
+from sitl.failures import Failures
 from sitl.world import CONTROL_PERIOD_US, World
 
 
@@ -23,6 +24,7 @@ class Simulation:
     Attributes:
         world: the physics.
         autopilot: what flies.
+        failures: what is broken on purpose.
         referee: what judges, fed with the truth of every control tick.
         truth: the true state now.
     """
@@ -38,6 +40,7 @@ class Simulation:
             control_period_s=CONTROL_PERIOD_US / 1e6,
         )
         self.referee = Referee(scenario, airframe.envelope_m)
+        self.failures = Failures(self.world, len(airframe.rotors))
         self._sensors = self.world.sensors()
         self.truth = self.world.truth(self._sensors, motors_on=False)
         self.referee.update(self.truth)
@@ -49,7 +52,9 @@ class Simulation:
 
     def tick(self) -> None:
         """Advance by one control period: sense, control, move, judge."""
-        motors = self.autopilot.step(self._sensors)
+        falsify = self.failures.falsify
+        sensors = self._sensors if falsify is None else falsify(self._sensors)
+        motors = self.autopilot.step(sensors)
         self.world.step(motors)
         self._sensors = self.world.sensors()
         armed = self.autopilot.status.armed

@@ -87,6 +87,14 @@ class World:
         self._position_ned_m = position = dynamics.position_ned_m()
         self._position_arena_m = flip_vector(position)
 
+    def fail_motor(self, index: int, *, stuck: bool = False) -> None:
+        """Cut a motor off from its commands: it stops, or goes on at the speed last commanded (`stuck`)."""
+        self._dynamics.fail_motor(index, stuck=stuck)
+
+    def repair_motor(self, index: int) -> None:
+        """Let a motor follow its commands again."""
+        self._dynamics.repair_motor(index)
+
     def sensors(self) -> Sensors:
         """Sample ideal sensors now."""
         velocity, attitude, rate, force = self._dynamics.motion()

@@ -6,6 +6,7 @@ from collections.abc import Callable, Mapping, Sequence
 
 from firmware_py.mavlink.camera_model import CameraControl
 from firmware_py.mavlink.dialect import AUTOPILOT_COMPONENT_ID, BROADCAST, Message
+from firmware_py.mavlink.failure_sink import FailureSink
 from firmware_py.mavlink.framing import Packet
 from firmware_py.mavlink.links import Link
 from firmware_py.mavlink.port import AutopilotPort
@@ -26,6 +27,7 @@ class Exchange:
         video: the camera's streams, the one to be preferred first.
         sources: of messages that services make, by message id; for streams and requests.
         camera: on the vehicle; None: there is none.
+        failures: breaks parts of the vehicle on purpose; None: nothing can be broken.
         claimed: commands that another component answers when they are meant for all.
     """
 
@@ -34,6 +36,7 @@ class Exchange:
         "boot_unix_us",
         "camera",
         "claimed",
+        "failures",
         "links",
         "signing",
         "sources",
@@ -61,6 +64,7 @@ class Exchange:
         self.time_us = 0
         self.sources: dict[int, Callable[[], Message | None]] = {}
         self.camera: CameraControl | None = None
+        self.failures: FailureSink | None = None
         self.claimed: frozenset[int] = frozenset()
 
     def packet(self, message: Message, component_id: int = AUTOPILOT_COMPONENT_ID) -> Packet:

@@ -12,6 +12,7 @@ from firmware_py.mavlink.component_metadata import ExtraFiles
 from firmware_py.mavlink.dialect import AUTOPILOT_COMPONENT_ID, BROADCAST, Message, mavlink
 from firmware_py.mavlink.events import EventService
 from firmware_py.mavlink.exchange import Exchange, Handler
+from firmware_py.mavlink.failure_sink import FailureSink
 from firmware_py.mavlink.file_transfer import FileTransferService
 from firmware_py.mavlink.forwarding import Router
 from firmware_py.mavlink.framing import Packet, source_of
@@ -22,6 +23,7 @@ from firmware_py.mavlink.offboard_setpoints import SetpointService
 from firmware_py.mavlink.parameter_extended import ExtendedParameterService
 from firmware_py.mavlink.parameter_protocol import ParameterService
 from firmware_py.mavlink.port import AutopilotPort
+from firmware_py.mavlink.rc_channels import RcChannels
 from firmware_py.mavlink.shell import ShellService
 from firmware_py.mavlink.signing import Signing, SigningKey
 from firmware_py.mavlink.status_texts import StatusTextService
@@ -64,6 +66,7 @@ class MavlinkNode:
         log_text: Callable[[int, StatusText], None] | None = None,
         camera: CameraModel | None = None,
         captures: CaptureSink | None = None,
+        failures: FailureSink | None = None,
     ) -> None:
         """Join an autopilot and its links.
 
@@ -81,6 +84,7 @@ class MavlinkNode:
             log_text: called with vehicle time and all that is said to people.
             camera: on the vehicle, a component of its own; None: there is none.
             captures: takes and keeps its pictures; by default they are only counted.
+            failures: breaks parts on purpose; None: nothing can be broken.
 
         Raises:
             ParameterError: the system id is out of range.
@@ -97,6 +101,7 @@ class MavlinkNode:
         self._services, self._handlers = _services(
             self._exchange, storage, firmware_files, log_text, shell=shell
         )
+        self._exchange.failures = failures
         if camera is not None:
             self._add_camera(CameraComponent(self._exchange, camera, captures))
         self._router = Router(self._is_own)
@@ -267,6 +272,7 @@ def _services(
             extended.handlers,
             events.handlers,
             SetpointService().handlers,
+            RcChannels(exchange).handlers,
         ),
     }
     return services, handlers

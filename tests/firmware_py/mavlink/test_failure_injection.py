@@ -1,0 +1,84 @@
+from math import inf, nan
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from firmware_py.mavlink.exchange import Exchange
+from firmware_py.mavlink.failure_injection import inject_failure
+from firmware_py.parameters import Parameters
+from firmware_py.status import CommandResult
+
+ACCEPTED, DENIED, UNSUPPORTED = CommandResult.ACCEPTED, CommandResult.DENIED, CommandResult.UNSUPPORTED
+
+
+class Breaker:
+    """Breaks motors only."""
+
+    def __init__(self):
+        self.injected = []
+
+    def inject(self, unit, kind, instance):
+        if unit != 101:
+            return False
+        self.injected.append((unit, kind, instance))
+        return True
+
+
+@pytest.fixture
+def exchange(autopilot):
+    exchange = Exchange(autopilot, {}, 1)
+    exchange.failures = Breaker()
+    return exchange
+
+
+def test_it_is_denied_until_a_parameter_allows_it(exchange):
+    assert inject_failure(exchange, 101, 1, 1) is DENIED
+    assert exchange.failures.injected == []
+    exchange.autopilot.parameters.set("SYS_FAILURE_EN", 1)
+    assert inject_failure(exchange, 101, 1, 1) is ACCEPTED
+    assert exchange.failures.injected == [(101, 1, 1)]
+    assert [text.text for text in exchange.autopilot.texts] == ["Injected: unit 101.1 failure 1"]
+
+
+def test_mending_and_all_of_a_unit(exchange):
+    exchange.autopilot.parameters.set("SYS_FAILURE_EN", 1)
+    assert inject_failure(exchange, 101, 0, nan) is ACCEPTED
+    assert exchange.failures.injected == [(101, 0, 0)]
+
+
+@pytest.mark.parametrize(
+    "numbers", [(4, 1, 0), (nan, 1, 0), (101, nan, 0), (101, -1, 0), (101, 1, -1), (1e9, 1, 0), (inf, inf, 0)]
+)
+def test_what_cannot_be_done_is_unsupported(exchange, numbers):
+    exchange.autopilot.parameters.set("SYS_FAILURE_EN", 1)
+    assert inject_failure(exchange, *numbers) is UNSUPPORTED
+    assert exchange.failures.injected == []
+
+
+def test_without_somebody_to_break_it_nothing_can_be_broken(exchange):
+    exchange.autopilot.parameters.set("SYS_FAILURE_EN", 1)
+    exchange.failures = None
+    assert inject_failure(exchange, 101, 1, 1) is UNSUPPORTED
+
+
+class Vehicle:
+    """Has parameters and listens."""
+
+    def __init__(self):
+        self.parameters = Parameters()
+        self.parameters.set("SYS_FAILURE_EN", 1)
+
+    def say(self, severity, text):
+        assert text.isascii()
+
+
+VEHICLE = Vehicle()
+
+
+@given(st.floats(), st.floats(), st.floats())
+def test_any_numbers_get_an_answer(unit, kind, instance):
+    exchange = Exchange(VEHICLE, {}, 1)
+    exchange.failures = Breaker()
+    assert inject_failure(exchange, unit, kind, instance) in (ACCEPTED, UNSUPPORTED)
+    assert all(0 <= number <= 0xFFFF for call in exchange.failures.injected for number in call)
