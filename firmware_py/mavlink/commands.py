@@ -16,6 +16,7 @@ from firmware_py.mavlink.calibration import calibrate
 from firmware_py.mavlink.command import Command, CommandHandler, from_int, from_long
 from firmware_py.mavlink.dialect import BROADCAST, Message, mavlink
 from firmware_py.mavlink.exchange import Exchange, Handler
+from firmware_py.mavlink.failure_injection import inject_failure
 from firmware_py.mavlink.flight_commands import FLIGHT_COMMANDS, set_mode
 from firmware_py.mavlink.links import Link
 from firmware_py.mavlink.message_requests import request_message, set_interval
@@ -54,6 +55,10 @@ def _set_actuator(_exchange: Exchange, _command: Command) -> CommandResult:
     return CommandResult.ACCEPTED  # as PX4 to which no such actuator is connected
 
 
+def _inject(exchange: Exchange, command: Command) -> CommandResult:
+    return inject_failure(exchange, *command.params[:3])
+
+
 def _request(exchange: Exchange, command: Command) -> CommandResult:
     return request_message(exchange, command.link, command.params[0], command.params[1])
 
@@ -79,6 +84,7 @@ COMMANDS: dict[int, CommandHandler] = {
     mavlink.MAV_CMD_PREFLIGHT_CALIBRATION: calibrate,
     mavlink.MAV_CMD_PREFLIGHT_STORAGE: _storage,
     mavlink.MAV_CMD_PREFLIGHT_REBOOT_SHUTDOWN: _reboot,
+    mavlink.MAV_CMD_INJECT_FAILURE: _inject,
     mavlink.MAV_CMD_ACTUATOR_TEST: _test_actuator,
     mavlink.MAV_CMD_RUN_PREARM_CHECKS: _run_checks,
     mavlink.MAV_CMD_GET_HOME_POSITION: _requester(mavlink.MAVLINK_MSG_ID_HOME_POSITION),

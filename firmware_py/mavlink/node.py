@@ -18,6 +18,7 @@ from firmware_py.mavlink.forwarding import Router
 from firmware_py.mavlink.framing import Packet, source_of
 from firmware_py.mavlink.links import Link, LinkProfile
 from firmware_py.mavlink.log_transfer import LogTransferService
+from firmware_py.mavlink.mission_orders import MissionOrders
 from firmware_py.mavlink.missions import MissionService
 from firmware_py.mavlink.offboard_setpoints import SetpointService
 from firmware_py.mavlink.parameter_extended import ExtendedParameterService
@@ -254,6 +255,7 @@ def _services(
         files,
         logs,
         missions,
+        MissionOrders(exchange),
         shells,
     )
     handlers = {

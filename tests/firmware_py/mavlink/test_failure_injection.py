@@ -62,6 +62,15 @@ def test_without_somebody_to_break_it_nothing_can_be_broken(exchange):
     assert inject_failure(exchange, 101, 1, 1) is UNSUPPORTED
 
 
+def test_the_command_reaches_who_breaks(autopilot, make_peer):
+    breaker = Breaker()
+    peer = make_peer(autopilot, node_options={"failures": breaker})
+    autopilot.parameters.set("SYS_FAILURE_EN", 1)
+    (answer,) = peer.ask(peer.long(420, 101, 1, 3))
+    assert (answer.get_type(), answer.result) == ("COMMAND_ACK", 0)
+    assert breaker.injected == [(101, 1, 3)]
+
+
 class Vehicle:
     """Has parameters and listens."""
 
