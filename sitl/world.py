@@ -20,7 +20,8 @@ PHYSICS_RATE_HZ = 500
 STEPS_PER_CONTROL = 2
 CONTROL_PERIOD_US = 1_000_000 * STEPS_PER_CONTROL // PHYSICS_RATE_HZ
 _SETTLING_STEPS = PHYSICS_RATE_HZ  # one second, to stand at rest before time starts
-_MARGIN_M = 0.05  # how far the drone may come nearer within one control period (12 m/s)
+_LEAST_MARGIN_M = 0.05  # how far the drone may come nearer within one control period (12 m/s)
+_SPEED_MARGIN = 1.25  # of the airframe's greatest speed, for one that is faster
 _NOTHING: Vec3 = (0.0, 0.0, 0.0)
 _FAR_TICKS = 250  # the longest time for which what is far is not looked at
 
@@ -41,7 +42,9 @@ class World:
         self._half_m: Vec3 = tuple(extent / 2 for extent in airframe.envelope_m)  # type: ignore[assignment]
         self._neighbours: tuple[Solid, ...] = ()
         self._radius_m = hypot(*self._half_m)
-        self._reach_m = self._radius_m + _MARGIN_M
+        fastest_m_s = _SPEED_MARGIN * airframe.limits.speed_horizontal_m_s
+        self._margin_m = max(_LEAST_MARGIN_M, fastest_m_s * CONTROL_PERIOD_US / 1e6)
+        self._reach_m = self._radius_m + self._margin_m
         self._base_top_m = scenario.base.top_m
         self._base_level_m = scenario.base.top_m - self._half_m[2]  # a centre on the base is higher than this
         self._groups = [_Group(frame.position_arena_m, frame_solids(frame)) for frame in scenario.frames]
@@ -182,7 +185,7 @@ class World:
             nearest_m = min(nearest_m, gap_m)
             if gap_m < reach:
                 near += tuple([solid for solid in group.solids if solid.is_within(reach, position)])
-        self._far_ticks = min(int((nearest_m - reach) / _MARGIN_M), _FAR_TICKS)
+        self._far_ticks = min(int((nearest_m - reach) / self._margin_m), _FAR_TICKS)
         if self._neighbours:
             self._far_ticks = 0
             near += self._neighbours
