@@ -23,6 +23,9 @@ def camera(
     no_base: Annotated[
         bool, Parameter(negative=(), help="the drone starts from the floor: there is no base under it")
     ] = False,
+    level: Annotated[
+        bool, Parameter(negative=(), help="held level, as by a gimbal, however the drone leans")
+    ] = False,
     bind: Annotated[str, Parameter(help="address to serve the video on")] = "127.0.0.1",
     port: Annotated[WholeNumber, Parameter(help="TCP port of the video")] = 8080,
 ) -> int:
@@ -45,7 +48,7 @@ def camera(
         raise SettingError(f"--port {port}: must be from 1 to 65535")
 
     from framerunner.vehicle_link import VehicleLink
-    from framerunner.virtual_camera.painter import without_base
+    from framerunner.virtual_camera.painter import VirtualCamera, without_base
     from framerunner.virtual_camera.server import COMPONENT_ID, SYSTEM_ID, CameraServer
     from scenarios.loader import load_scenario
     from sitl.video import VideoServer
@@ -54,7 +57,8 @@ def camera(
     if no_base:
         loaded = without_base(loaded)
     link = VehicleLink(drone, system_id=SYSTEM_ID, component_id=COMPONENT_ID)
-    asyncio.run(CameraServer(loaded, link, VideoServer(bind, port), _say).run())
+    painter = VirtualCamera(loaded, level=level)
+    asyncio.run(CameraServer(painter, link, VideoServer(bind, port), _say).run())
     return 0
 
 

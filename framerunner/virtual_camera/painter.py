@@ -6,7 +6,7 @@ No clock and no socket: time is the vehicle's, messages come in, images come out
 from __future__ import annotations
 
 from dataclasses import asdict
-from math import isfinite
+from math import cos, isfinite, sin
 
 from firmware_py.airframe import load_airframe
 from framerunner.vehicle_link import Message
@@ -17,8 +17,9 @@ from framerunner.virtual_camera.history import (
     PositionReport,
     quaternion_from_euler,
 )
-from framerunner.virtual_camera.placement import Placement
+from framerunner.virtual_camera.placement import Placement, yaw_of
 from offboard.link.alignment import Pose
+from scenarios.axes import Quaternion
 from scenarios.ground import start_position
 from scenarios.models import Scenario
 from scenarios.referee import Referee
@@ -27,6 +28,7 @@ from sitl.camera import Camera, Image
 from sitl.camera_feed import FIRST_EXPOSURE_US
 
 REFEREE_STEP_US = 20_000
+REPORT_GAP_US = 20_000  # between two reports: the one that shows that a time is over comes so much later
 ARMED_FLAG = 128  # MAV_MODE_FLAG_SAFETY_ARMED
 
 
@@ -35,6 +37,12 @@ def start_pose(scenario: Scenario) -> Pose:
     x_m, y_m, z_m = start_position(scenario)
     height_m = load_airframe(scenario.airframe).envelope_m[2]
     return Pose((x_m, y_m, z_m + height_m / 2), scenario.start.yaw_rad)
+
+
+def levelled(attitude_arena: Quaternion) -> Quaternion:
+    """The heading of an attitude, without roll and pitch: quaternions (w, x, y, z) of unit length."""
+    half = yaw_of(attitude_arena) / 2  # the formula is the same in arena axes
+    return (cos(half), 0.0, 0.0, sin(half))
 
 
 def without_base(scenario: Scenario) -> Scenario:
@@ -53,13 +61,15 @@ class VirtualCamera:
     """Paints what a camera on the vehicle would see of the arena, and referees by the same poses.
 
     Exposures are on the grid of the simulated camera, on the vehicle's clock. An image is handed out when
-    that clock is past its exposure by the camera's latency and the pose there is known: by then the next
-    reports have come, so that nothing is guessed at usual rates.
+    that clock is past its exposure by the camera's latency, less the time between two reports, and the pose
+    there is known: at usual rates the reports around it have come by then, so that nothing is guessed.
 
     Args:
         scenario: what is to be seen.
+        level: whether the camera is held level, as by a gimbal, and turns with the heading only.
 
     Attributes:
+        scenario: what is to be seen.
         placement: of the arena at the vehicle.
         history: of the vehicle's reports.
         attitudes: reports of attitude so far.
@@ -68,20 +78,21 @@ class VirtualCamera:
         restarts: how often the vehicle began anew.
     """
 
-    def __init__(self, scenario: Scenario) -> None:
-        self._scenario = scenario
+    def __init__(self, scenario: Scenario, *, level: bool = False) -> None:
+        self.scenario = scenario
+        self._level = level
         self._camera = Camera(scenario)
         self._envelope_m = load_airframe(scenario.airframe).envelope_m
         self._period_us = 1e6 / scenario.camera.rate_hz
-        self._latency_us = round(scenario.camera.latency_s * 1e6)
+        self._wait_us = max(0, round(scenario.camera.latency_s * 1e6) - REPORT_GAP_US)
         self.attitudes = self.positions = self.images = self.restarts = 0
         self._begin()
 
     def _begin(self) -> None:
         """Know nothing of the vehicle."""
         self.history = PoseHistory()
-        self.placement = Placement(start_pose(self._scenario))
-        self._referee = Referee(self._scenario, self._envelope_m)
+        self.placement = Placement(start_pose(self.scenario))
+        self._referee = Referee(self.scenario, self._envelope_m)
         self._judged_us = 0
         self._next = 0
         self._motors_on = False
@@ -129,7 +140,7 @@ class VirtualCamera:
         now_us, covered_us = self.history.newest_us, self.history.covered_us
         if now_us is None or covered_us is None:
             return None
-        index = int((now_us - self._latency_us - FIRST_EXPOSURE_US) // self._period_us)
+        index = int((now_us - self._wait_us - FIRST_EXPOSURE_US) // self._period_us)
         if index < self._next:
             return None
         exposure_us = round(FIRST_EXPOSURE_US + index * self._period_us)
@@ -141,7 +152,8 @@ class VirtualCamera:
             return None
         self._next = index + 1
         self.images += 1
-        return exposure_us, self._camera.render(where.position_arena_m, where.attitude_arena)
+        attitude = levelled(where.attitude_arena) if self._level else where.attitude_arena
+        return exposure_us, self._camera.render(where.position_arena_m, attitude)
 
     def standing(self, state: str = "", ended: str | None = None) -> dict[str, object]:
         """What `/referee.json` tells, in the simulator's form.
@@ -151,7 +163,7 @@ class VirtualCamera:
             ended: why the flight was broken off, if it was.
         """
         return {
-            "scenario": self._scenario.name,
+            "scenario": self.scenario.name,
             "source": "telemetry",
             "time_us": self.history.newest_us or 0,
             "snapshot": asdict(self._referee.snapshot()),
@@ -189,7 +201,7 @@ class VirtualCamera:
             return
         armed = bool(self.placement.armed)
         if armed and not self._motors_on and self._referee.over:
-            self._referee = Referee(self._scenario, self._envelope_m)  # a new try
+            self._referee = Referee(self.scenario, self._envelope_m)  # a new try
         self._motors_on = armed
         self._referee.update(
             TrueState(

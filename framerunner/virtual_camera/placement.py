@@ -93,9 +93,9 @@ class Placement:
         self.alignment = Alignment(self._start, self._rest)
 
 
-def yaw_of(attitude_ned: Quaternion) -> float:
-    """Heading of an attitude, clockwise from north, radians."""
-    w, x, y, z = attitude_ned
+def yaw_of(attitude: Quaternion) -> float:
+    """Heading of an attitude in its own upright axes, from their x towards their y, radians."""
+    w, x, y, z = attitude
     return atan2(2 * (w * z + x * y), 1 - 2 * (y * y + z * z))
 
 

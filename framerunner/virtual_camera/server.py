@@ -11,7 +11,6 @@ from firmware_py.mavlink.dialect import mavlink
 from framerunner.vehicle_link import Message, VehicleLink, command, companion_heartbeat, is_vehicle
 from framerunner.virtual_camera.painter import VirtualCamera
 from offboard.drone import DroneError
-from scenarios.models import Scenario
 from sitl.video import VideoServer
 
 STALE_S = 0.5  # wall time without attitude or position, after which no image is served
@@ -32,15 +31,14 @@ class CameraServer:
     """Reads a vehicle's telemetry, paints, serves.
 
     Args:
-        scenario: what is to be seen.
+        camera: paints.
         link: to the vehicle; closed at the end.
         video: where images are shown.
         say: called with lines for people.
     """
 
-    def __init__(self, scenario: Scenario, link: VehicleLink, video: VideoServer, say: Say) -> None:
-        self._camera = VirtualCamera(scenario)
-        self._scenario = scenario
+    def __init__(self, camera: VirtualCamera, link: VehicleLink, video: VideoServer, say: Say) -> None:
+        self._camera = camera
         self._link = link
         self._video = video
         self._say = say
@@ -66,7 +64,7 @@ class CameraServer:
         try:
             await self._video.start()
             self._say(
-                f"camera of {self._scenario.name}: video on {self._video.url} (Ctrl-C stops); "
+                f"camera of {self._camera.scenario.name}: video on {self._video.url} (Ctrl-C stops); "
                 f"listening for a vehicle on {self._link.url}"
             )
             reader.start()
