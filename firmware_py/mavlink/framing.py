@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from struct import Struct
+
 from firmware_py.mavlink.dialect import Message, mavlink
 
 _MARKER_V1 = mavlink.PROTOCOL_MARKER_V1
@@ -10,6 +12,7 @@ _MARKERS = (_MARKER_V1, _MARKER_V2)
 _SIGNED = mavlink.MAVLINK_IFLAG_SIGNED
 _SIGNATURE_LENGTH = 13
 _CHECKSUM_LENGTH = 2
+_HEADER = Struct("<BBBBBBBHB")
 
 
 class PacketReader:
@@ -89,6 +92,12 @@ class PacketReader:
         return message
 
 
+def _payload_only(_packer: Message, _crc_extra: int, payload: bytes, force_mavlink1: bool = False) -> bytes:
+    """In place of a message's own framing: only its fields, as they are on the wire."""
+    del force_mavlink1
+    return payload
+
+
 class Packet:
     """A message packed once, to be sent on several links with their own sequence numbers and signatures.
 
@@ -100,8 +109,17 @@ class Packet:
     __slots__ = ("_crc_extra", "_template", "is_heartbeat", "length")
 
     def __init__(self, message: Message, system_id: int, component_id: int) -> None:
-        packer = mavlink.MAVLink(None, system_id, component_id)
-        self._template = bytearray(message.pack(packer))
+        # pymavlink's own way makes two objects and two checksums more, of which none would be used.
+        message._pack = _payload_only
+        payload = message.pack(None).rstrip(b"\0") or b"\0"
+        del message._pack
+        number = message.get_msgId()
+        self._template = bytearray(
+            _HEADER.pack(
+                _MARKER_V2, len(payload), 0, 0, 0, system_id, component_id, number & 0xFFFF, number >> 16
+            )
+        )
+        self._template += payload + b"\0\0"
         self._crc_extra = bytes((message.crc_extra,))
         self.length = len(self._template)
         self.is_heartbeat = message.get_msgId() == mavlink.MAVLINK_MSG_ID_HEARTBEAT
