@@ -99,7 +99,7 @@ def _fence_faults(items: Sequence[MissionItem], view: View, fence: Geofence) -> 
             continue  # where the vehicle is then
         breach = fence.breach_at((north_m, east_m, down_m), view)
         if breach is not None:
-            yield f"Geofence violation for waypoint {item.seq + 1}: {breach.text}"
+            yield f"Geofence violation for waypoint {item.seq + 1}: {breach.where}"
             return
 
 

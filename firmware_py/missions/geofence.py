@@ -30,11 +30,16 @@ class Breach:
 
     Attributes:
         kind: which limit.
-        text: for people; it names what was left.
+        where: names what was left, as "outside circle of item 1".
     """
 
     kind: BreachKind
-    text: str
+    where: str
+
+    @property
+    def text(self) -> str:
+        """For people."""
+        return f"Geofence violation: {self.where}"
 
 
 class Geofence:

@@ -46,7 +46,10 @@ def test_an_inclusion_polygon_is_named_when_left():
     fence, view, _ = fence_of(*polygon(Do.POLYGON_INCLUSION, SQUARE))
     assert breach_at(fence, view, 19.9, -19.9, 1000) is None
     breach = breach_at(fence, view, 20.1, 0)
-    assert (breach.kind, breach.text) == (BreachKind.SHAPE, "outside polygon of items 1 to 4")
+    assert (breach.kind, breach.text) == (
+        BreachKind.SHAPE,
+        "Geofence violation: outside polygon of items 1 to 4",
+    )
 
 
 def test_all_shapes_count():
@@ -54,15 +57,15 @@ def test_all_shapes_count():
         circle(Do.CIRCLE_INCLUSION, 0, 0, 50), *polygon(Do.POLYGON_EXCLUSION, [(10, 10), (10, 20), (20, 15)])
     )
     assert breach_at(fence, view, 0, 30) is None
-    assert breach_at(fence, view, 13, 15).text == "inside polygon of items 2 to 4"
-    assert breach_at(fence, view, 0, 51).text == "outside circle of item 1"
+    assert breach_at(fence, view, 13, 15).where == "inside polygon of items 2 to 4"
+    assert breach_at(fence, view, 0, 51).where == "outside circle of item 1"
 
 
 def test_distance_and_height_from_home():
     fence, view, _ = fence_of(GF_MAX_HOR_DIST=30.0, GF_MAX_VER_DIST=20.0)
     assert breach_at(fence, view, 20, 20, 19.9) is None
-    assert breach_at(fence, view, 30, 0).text == "farther from home than 30 m"
-    assert breach_at(fence, view, 0, 0, 20).text == "higher above home than 20 m"
+    assert breach_at(fence, view, 30, 0).where == "farther from home than 30 m"
+    assert breach_at(fence, view, 0, 0, 20).where == "higher above home than 20 m"
     view.home_ned_m = (100.0, 0.0, -100.0)
     assert breach_at(fence, view, 100, 20, 110) is None
 
