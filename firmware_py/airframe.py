@@ -68,6 +68,16 @@ class Contact(_Part):
     friction: float = Field(0.8, ge=0)
 
 
+class Battery(_Part):
+    """What feeds the motors."""
+
+    cells: int = Field(4, ge=1, le=16, description="in series")
+    capacity_mah: float = Field(5000.0, gt=0)
+    resistance_ohm: float = Field(0.02, ge=0, description="of the whole battery with its leads")
+    efficiency: float = Field(0.75, gt=0, le=1, description="mechanical over electrical power of the motors")
+    electronics_a: float = Field(0.5, ge=0, description="drawn by all but the motors")
+
+
 class Limits(_Part):
     """What the stabiliser never asks for more of."""
 
@@ -90,6 +100,7 @@ class Airframe(_Part):
     drag: Drag = Drag()
     contact: Contact = Contact()
     limits: Limits = Limits()
+    battery: Battery = Battery()
     stabiliser: Weights = Field(Weights(), description="what its design weighs how much")
     parameters: dict[ParameterName, int | float] = Field(
         default_factory=dict, description="the autopilot's parameters that this airframe starts with"

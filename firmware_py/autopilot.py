@@ -15,13 +15,13 @@ from firmware_py.estimator import Estimator
 from firmware_py.guidance.circles import Orbit
 from firmware_py.guidance.limits import speed_limits
 from firmware_py.guidance.modes import Guidance, manners
-from firmware_py.guidance.offboard import usable
 from firmware_py.land_detector import LandDetector
 from firmware_py.lift_off import LiftOff, RateStabiliser, Undesigned, goes_straight_through
 from firmware_py.missions.flight import IssuedCommand
 from firmware_py.missions.store import MissionStore
 from firmware_py.mode_entry import ModeEntry
 from firmware_py.navigator import Navigator
+from firmware_py.offboard_intake import OffboardIntake
 from firmware_py.parameters import Parameters
 from firmware_py.places import Places
 from firmware_py.status import CommandResult, FlightMode, LandedState, VehicleStatus
@@ -42,7 +42,6 @@ from firmware_py.watch import Watch
 
 _TEXTS_KEPT = 100
 _READY_PERIOD_US = 100_000  # once armed, whether it could be armed again is of little interest
-_SETPOINT_GRID_US = 10_000
 
 _GROUND_STATES = frozenset(
     {
@@ -69,6 +68,13 @@ _AUTO_BIT, _OFFBOARD_BIT = 1, 2  # of COM_RC_OVERRIDE
 class Autopilot:
     """A whole autopilot for one vehicle.
 
+    Args:
+        airframe: what it flies.
+        origin: where on Earth the sensors' positions count from.
+        parameters: shared with the MAVLink services; the airframe's defaults if not given.
+        control_period_s: time between calls of `step`.
+        stabiliser: another one than the airframe's own design, for tests.
+
     Attributes:
         airframe: what it flies.
         parameters: what a ground station may change; changes act at the next tick.
@@ -89,15 +95,7 @@ class Autopilot:
         *,
         stabiliser: RateStabiliser | None = None,
     ) -> None:
-        """Boot, disarmed.
-
-        Args:
-            airframe: what it flies.
-            origin: where on Earth the sensors' positions count from.
-            parameters: shared with the MAVLink services; the airframe's defaults if not given.
-            control_period_s: time between calls of `step`.
-            stabiliser: another one than the airframe's own design, for tests.
-        """
+        """Boot, disarmed; see the class for the arguments."""
         self.airframe = airframe
         self.parameters = parameters if parameters is not None else Parameters(defaults=airframe.parameters)
         self.status = VehicleStatus()
@@ -110,14 +108,18 @@ class Autopilot:
         self._now_us = 0
         self._commander = Commander()
         self._guidance = Guidance(
-            speed_limits(airframe, self.parameters),
-            manners(self.airframe, self.parameters),
-            self._period_us / 1e6,
+            speed_limits(airframe, self.parameters), manners(airframe, self.parameters), control_period_s
         )
         self._stabiliser: RateStabiliser = Undesigned() if stabiliser is None else stabiliser
         self._lift_off = LiftOff()
         self._navigator = Navigator(self.missions, self.parameters)
-        self._watch = Watch(self._navigator, self._commander.situation, self.say, self.parameters)
+        self._watch = Watch(
+            self._navigator,
+            self._commander.situation,
+            self.say,
+            airframe=airframe,
+            parameters=self.parameters,
+        )
         self.battery: BatteryState = self._watch.battery.state
         self._entry = ModeEntry(
             self.state,
@@ -135,9 +137,7 @@ class Autopilot:
         self._shown_state: State | None = None
         self._airborne = LandedState.IN_AIR
         self._texts: deque[StatusText] = deque(maxlen=_TEXTS_KEPT)
-        self._refusal_said = False
-        self._next_setpoint: Setpoint | None = None
-        self._setpoint_slot = 0
+        self._intake = OffboardIntake(self._guidance, self.say)
         self._ready_due_us = 0
         self._parameters_version = -1
         self._upright_cosine = 0.0
@@ -179,8 +179,8 @@ class Autopilot:
         if self._now_us >= self._watch.due_us:
             self._update_view()
             self._watch.look(self._now_us, sensors, armed=self.status.armed)
-        if self._next_setpoint is not None and self._now_us // _SETPOINT_GRID_US != self._setpoint_slot:
-            self._take_setpoint()
+        if self._intake.waiting is not None:
+            self._intake.pass_on(self._now_us)
         _, x, y, _ = state.attitude
         row = commander.tick(
             self._now_us,
@@ -328,20 +328,9 @@ class Autopilot:
 
         One that says nothing that can be flown counts as none received; a status text says so, once until a
         usable one comes.
-
-        Setpoints are flown from the next multiple of 10 ms on. So a few milliseconds that a packet takes
-        more or less change nothing, nor does one that is sent again, and a flight over a network repeats as
-        well as one without.
         """
-        if not usable(setpoint):
-            if not self._refusal_said:
-                self._refusal_said = True
-                self.say(WARNING, "Offboard setpoint ignored: nothing in it can be flown")
-            return
-        self._refusal_said = False
-        self._commander.setpoint_came(setpoint.time_us)
-        self._next_setpoint = setpoint
-        self._setpoint_slot = self._now_us // _SETPOINT_GRID_US
+        if self._intake.offer(setpoint, self._now_us):
+            self._commander.setpoint_came(setpoint.time_us)
 
     def manual_input(self, sticks: ManualInput) -> None:
         """Take a pilot's sticks; moved in a mode that flies itself, they take over (COM_RC_OVERRIDE)."""
@@ -392,6 +381,7 @@ class Autopilot:
         return self._navigator.take_issued()
 
     def _command(self, event: Event) -> CommandResult:
+        self._commander.situation.has_mission = self.missions.valid  # an upload may have come this moment
         row = self._commander.handle(event)
         self._follow(row)
         self._refresh_status()
@@ -411,7 +401,7 @@ class Autopilot:
             self._lift_off.rest()
         self._update_view()
         if row.target is State.OFFBOARD:
-            self._take_setpoint()
+            self._intake.pass_on_now()
         self._entry.enter(row.target, before, row.event)
 
     def _leave_disarmed(self) -> None:
@@ -421,11 +411,6 @@ class Autopilot:
         self.flight.armed_us = self._now_us
         self.flight.takeoff_us = self.flight.landed_us = 0
         self.flight.number += 1
-
-    def _take_setpoint(self) -> None:
-        if self._next_setpoint is not None:
-            self._guidance.accept(self._next_setpoint)
-            self._next_setpoint = None
 
     def _fly(self, command: Command) -> MotorOutput:
         """Motors for a command, with the ground between if it stands."""

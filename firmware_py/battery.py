@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from firmware_py.airframe import Airframe
 from firmware_py.parameters import Parameters
 from firmware_py.types import BatteryState
 
@@ -13,25 +14,29 @@ _MAH_PER_A_S = 1000.0 / 3600.0
 
 @dataclass(frozen=True, slots=True)
 class BatterySettings:
-    """Cells, their voltages, the capacity (0: not known) and the shares of charge that warn."""
+    """Cells, their voltages at rest, capacity, resistance, and the shares of charge that warn."""
 
     cells: int
     charged_v: float
     empty_v: float
     capacity_mah: float
+    resistance_ohm: float
     low: float
     critical: float
     emergency: float
 
 
-def battery_settings(parameters: Parameters) -> BatterySettings:
-    """What the BAT_ parameters say."""
-    value = parameters.value
+def battery_settings(airframe: Airframe, parameters: Parameters) -> BatterySettings:
+    """What the BAT_ parameters say; what they leave open is the airframe's."""
+    value, own = parameters.value, airframe.battery
+    cells = parameters.integer("BAT1_N_CELLS") or own.cells
+    capacity_mah, cell_ohm = value("BAT1_CAPACITY"), value("BAT1_R_INTERNAL")
     return BatterySettings(
-        parameters.integer("BAT1_N_CELLS"),
+        cells,
         value("BAT1_V_CHARGED"),
         value("BAT1_V_EMPTY"),
-        max(value("BAT1_CAPACITY"), 0.0),
+        capacity_mah if capacity_mah > 0.0 else own.capacity_mah,
+        cell_ohm * cells if cell_ohm >= 0.0 else own.resistance_ohm,
         value("BAT_LOW_THR"),
         value("BAT_CRIT_THR"),
         value("BAT_EMERGEN_THR"),
@@ -39,20 +44,17 @@ def battery_settings(parameters: Parameters) -> BatterySettings:
 
 
 class BatteryMonitor:
-    """Counts what is drawn, and estimates the charge left.
-
-    With a known capacity the charge is what was there at first, by voltage, less what was drawn; without, it
-    is the voltage's share between empty and charged, as PX4's.
+    """Counts what is drawn, and estimates the charge left by the voltage at rest, as PX4's does.
 
     Attributes:
         state: what is known, updated in place.
     """
 
-    __slots__ = ("_first", "_time_us", "state")
+    __slots__ = ("_started", "_time_us", "state")
 
     def __init__(self) -> None:
         self.state = BatteryState()
-        self._first = -1.0
+        self._started = False
         self._time_us = 0
 
     def update(self, time_us: int, voltage_v: float, current_a: float, settings: BatterySettings) -> None:
@@ -65,17 +67,11 @@ class BatteryMonitor:
             settings: of this battery.
         """
         state = self.state
-        period_s = (time_us - self._time_us) / 1e6
-        self._time_us = time_us
+        period_s = (time_us - self._time_us) / 1e6 if self._started else 0.0
+        self._started, self._time_us = True, time_us
         state.voltage_v, state.current_a, state.cells = voltage_v, current_a, settings.cells
-        by_voltage = _share(voltage_v, settings)
-        if self._first < 0.0:
-            self._first, period_s = by_voltage, 0.0
         state.used_mah += current_a * period_s * _MAH_PER_A_S
-        if settings.capacity_mah > 0.0:
-            state.remaining = max(self._first - state.used_mah / settings.capacity_mah, 0.0)
-        else:
-            state.remaining = by_voltage
+        state.remaining = _share(voltage_v + settings.resistance_ohm * current_a, settings)
         state.warning = warning(state.remaining, settings)
 
 
@@ -89,6 +85,7 @@ def warning(remaining: float, settings: BatterySettings) -> int:
 
 
 def _share(voltage_v: float, settings: BatterySettings) -> float:
+    """Share of the full charge that belongs to a voltage at rest."""
     cell_v = voltage_v / max(settings.cells, 1)
     span_v = max(settings.charged_v - settings.empty_v, 1e-3)
     return min(max((cell_v - settings.empty_v) / span_v, 0.0), 1.0)

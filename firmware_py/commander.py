@@ -60,12 +60,13 @@ _FENCE = (  # GF_ACTION
 )
 _BATTERY_CRITICAL = {0: Reaction.WARN, 2: Reaction.LAND, 3: Reaction.RETURN}  # COM_LOW_BAT_ACT
 _BATTERY_EMERGENCY = {0: Reaction.WARN, 2: Reaction.LAND, 3: Reaction.LAND}
-_EXCEPT = (  # the bits of COM_RCL_EXCEPT
+_EXCEPT = (  # the bits of COM_RCL_EXCEPT and COM_DLL_EXCEPT
     frozenset({FlightMode.MISSION}),
     frozenset({FlightMode.HOLD, FlightMode.TAKEOFF}),
     frozenset({FlightMode.OFFBOARD}),
 )
 _MANUAL_DISABLED = 4  # COM_RC_IN_MODE
+_TERMINATION_OFF = 121_212
 
 
 class Commander:
@@ -192,13 +193,13 @@ class Commander:
             tumble_us=_microseconds(value("FD_FAIL_P_TTRI")),
             flight_us=_wait(value("COM_FLT_TIME_MAX")),
         )
-        excepted = whole("COM_RCL_EXCEPT")
         self.situation.choices = Choices(
             reactions=_chosen(parameters),
             arm_needs_ground_station=whole("NAV_DLL_ACT") > 0,
-            manual_ignored_in=frozenset().union(
-                *(modes for bit, modes in enumerate(_EXCEPT) if excepted >> bit & 1)
-            ),
+            manual_ignored_in=_excepted(whole("COM_RCL_EXCEPT")),
+            ground_station_ignored_in=_excepted(whole("COM_DLL_EXCEPT")) | {FlightMode.LAND},
+            mission_after_takeoff=whole("COM_TAKEOFF_ACT") == 1,
+            tumbling_ends=whole("CBRK_FLIGHTTERM") != _TERMINATION_OFF,
             manual_disabled=whole("COM_RC_IN_MODE") == _MANUAL_DISABLED,
             without_sticks=_WITHOUT_STICKS.get(whole("NAV_RCL_ACT"), Reaction.HOLD),
         )
@@ -249,6 +250,11 @@ def _chosen(parameters: Parameters) -> dict[Cause, Reaction]:
         Cause.FENCE: _FENCE[whole("GF_ACTION")],
         Cause.FLIGHT_TIME: Reaction.RETURN,
     }
+
+
+def _excepted(bits: int) -> frozenset[FlightMode]:
+    """The modes that COM_RCL_EXCEPT and COM_DLL_EXCEPT name."""
+    return frozenset().union(*(modes for bit, modes in enumerate(_EXCEPT) if bits >> bit & 1))
 
 
 def _microseconds(seconds: float) -> int:

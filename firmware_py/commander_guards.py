@@ -74,6 +74,9 @@ class Choices:
         arm_needs_ground_station: no arming unless a ground station is heard.
         manual_ignored_in: modes in which the loss of manual control is of no interest.
         manual_disabled: there is no manual control at all.
+        ground_station_ignored_in: modes in which the loss of the ground station is of no interest.
+        mission_after_takeoff: a take-off goes on with the mission if there is one.
+        tumbling_ends: a failed attitude ends the flight.
         without_sticks: instead of a reaction that leaves the vehicle to sticks, when none come.
     """
 
@@ -81,6 +84,9 @@ class Choices:
     arm_needs_ground_station: bool = False
     manual_ignored_in: frozenset[FlightMode] = frozenset()
     manual_disabled: bool = False
+    ground_station_ignored_in: frozenset[FlightMode] = frozenset({FlightMode.LAND})
+    mission_after_takeoff: bool = False
+    tumbling_ends: bool = True
     without_sticks: Reaction = Reaction.RETURN
 
     def reaction(self, cause: Cause) -> Reaction:
@@ -108,7 +114,8 @@ class Situation:
         manual_us: when the last sticks came.
         manual_missed: sticks were absent at arming, so nobody waits for them.
         battery_warning: MAV_BATTERY_CHARGE_STATE, 1 ok to 4 emergency.
-        battery_at_arming: the same when it was armed; only what is worse counts.
+        battery_arms: there is charge enough to arm.
+        battery_at_arming: the warning when it was armed; only what is worse counts.
         fence_breached: it is outside the geofence.
         has_mission: there is a mission that can be flown.
         entered_us: when the present state was entered.
@@ -135,6 +142,7 @@ class Situation:
     manual_us: int = NEVER_US
     manual_missed: bool = True
     battery_warning: int = 1
+    battery_arms: bool = True
     battery_at_arming: int = 1
     fence_breached: bool = False
     has_mission: bool = False
@@ -168,7 +176,7 @@ def sensors_lost(now: Situation) -> bool:
 
 def tumbled(now: Situation) -> bool:
     """Its attitude is beyond recovery."""
-    return now.now_us - now.upright_us > now.timeouts.tumble_us
+    return now.choices.tumbling_ends and now.now_us - now.upright_us > now.timeouts.tumble_us
 
 
 def position_lost(now: Situation) -> bool:
@@ -226,7 +234,7 @@ def manual_present(now: Situation) -> bool:
 
 def battery_too_low(now: Situation) -> bool:
     """The battery is too low to take off with."""
-    return now.battery_warning >= _BATTERY_CRITICAL
+    return not now.battery_arms
 
 
 def hold_over(now: Situation) -> bool:
@@ -272,6 +280,11 @@ def reacts_with_sticks(cause: Cause, reaction: Reaction) -> Guard:
 def target_reached(now: Situation) -> bool:
     """The take-off is at its height."""
     return now.target_reached
+
+
+def target_reached_with_mission(now: Situation) -> bool:
+    """The same, and a mission is to follow."""
+    return now.target_reached and now.choices.mission_after_takeoff and now.has_mission
 
 
 def landed(now: Situation) -> bool:
@@ -364,6 +377,8 @@ def _battery_at(level: int) -> Guard:
 
 
 def _ground_station_went(now: Situation) -> bool:
+    if now.intended in now.choices.ground_station_ignored_in:
+        return False
     return now.ground_station_us > NEVER_US and ground_station_lost(now)
 
 

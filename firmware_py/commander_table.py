@@ -316,6 +316,7 @@ _FAILSAFES = (
 )
 
 _PROGRESS = (
+    _tick(_at(State.TAKEOFF), when.target_reached_with_mission, State.MISSION, intends=FlightMode.MISSION),
     _tick(_at(State.TAKEOFF), when.target_reached, State.HOLD, intends=FlightMode.HOLD),
     Row(_at(State.MISSION), Event.MISSION_DONE, None, State.HOLD, FlightMode.HOLD),
     Row(frozenset(State), Event.MISSION_DONE),

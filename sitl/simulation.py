@@ -10,8 +10,11 @@ from firmware_py.autopilot import Autopilot
 from firmware_py.types import GeodeticPoint
 from scenarios.models import Scenario
 from scenarios.referee import Referee
+from sitl.battery import Battery
 from sitl.failures import Failures
 from sitl.world import CONTROL_PERIOD_US, World
+
+_BATTERY_PERIOD_US = 100_000
 
 
 class Simulation:
@@ -26,6 +29,7 @@ class Simulation:
         autopilot: what flies.
         failures: what is broken on purpose.
         referee: what judges, fed with the truth of every control tick.
+        battery: what feeds the drone.
         truth: the true state now.
     """
 
@@ -41,6 +45,8 @@ class Simulation:
         )
         self.referee = Referee(scenario, airframe.envelope_m)
         self.failures = Failures(self.world, len(airframe.rotors))
+        self.battery = Battery(airframe, self.autopilot.parameters)
+        self._battery_due_us = 0
         self._sensors = self.world.sensors()
         self.truth = self.world.truth(self._sensors, motors_on=False)
         self.referee.update(self.truth)
@@ -53,7 +59,12 @@ class Simulation:
     def tick(self) -> None:
         """Advance by one control period: sense, control, move, judge."""
         falsify = self.failures.falsify
-        sensors = self._sensors if falsify is None else falsify(self._sensors)
+        sensors = self._sensors
+        if sensors.time_us >= self._battery_due_us:
+            self._discharge(sensors.time_us)
+        sensors.battery_voltage_v, sensors.battery_current_a = self.battery.voltage_v, self.battery.current_a
+        if falsify is not None:
+            sensors = falsify(sensors)
         motors = self.autopilot.step(sensors)
         self.world.step(motors)
         self._sensors = self.world.sensors()
@@ -62,3 +73,9 @@ class Simulation:
             self.referee = Referee(self.scenario, self.world.airframe.envelope_m)  # a new try
         self.truth = self.world.truth(self._sensors, motors_on=armed)
         self.referee.update(self.truth)
+
+    def _discharge(self, time_us: int) -> None:
+        period_us = _BATTERY_PERIOD_US if self._battery_due_us else 0
+        self._battery_due_us = time_us + _BATTERY_PERIOD_US
+        armed = self.autopilot.status.armed
+        self.battery.step(period_us / 1e6, self.world.motor_speeds_rad_s(), armed=armed)

@@ -99,8 +99,7 @@ def assess(autopilot: AutopilotPort) -> HealthReport:
         present |= _PLACED
     else:
         failing |= Part.LOCAL_POSITION_ESTIMATE
-    if autopilot.parameters.integer("SIM_BAT_ENABLE"):
-        present |= Part.BATTERY
+    present |= Part.BATTERY
     warning = Part.BATTERY if autopilot.battery.warning >= _LOW_BATTERY else Part(0)
     check = None if status.ready else _check(status.not_ready, status.intended_mode)
     return HealthReport(present, failing, warning, check)

@@ -54,13 +54,7 @@ BATTERY.real(
     increment=0.0005,
     reboot=True,
 )
-BATTERY.choice(
-    "BAT1_SOURCE",
-    0,
-    {-1: "Disabled", 0: "Power module", 1: "External", 2: "ESCs"},
-    "Where the battery's figures come from",
-    "Here: the simulated power module, or nowhere.",
-)
+BATTERY.fact("BAT1_SOURCE", 0, "Its figures come from the power module")
 BATTERY.real(
     "BAT_LOW_THR",
     0.15,
@@ -94,15 +88,13 @@ BATTERY.real(
 
 SIMULATED_BATTERY = Group("SITL")
 
-SIMULATED_BATTERY.switch(
-    "SIM_BAT_ENABLE", 1, "Simulate a battery", "Disabled: charge and voltage are not known."
-)
 SIMULATED_BATTERY.real(
     "SIM_BAT_DRAIN",
-    60.0,
-    (1.0, 86_400.0),
+    0.0,
+    (0.0, 86_400.0),
     "s",
     "The simulated battery empties in this time while armed",
+    details="0: by the current that the motors draw.",
     increment=1,
 )
 SIMULATED_BATTERY.real(

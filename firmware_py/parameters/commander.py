@@ -33,21 +33,6 @@ COMMANDER.real(
     increment=0.1,
 )
 COMMANDER.real(
-    "COM_LKDOWN_TKO",
-    3.0,
-    (-1.0, 5.0),
-    "s",
-    "An attitude failure this soon after take-off disarms at once",
-    details="Later ones terminate the flight, unless CBRK_FLIGHTTERM forbids it. Zero or less: never.",
-    decimals=3,
-)
-COMMANDER.choice(
-    "COM_ARM_WO_GPS",
-    1,
-    {0: "Deny arming", 1: "Warning only", 2: "Disabled"},
-    "Arming without a good satellite position",
-)
-COMMANDER.real(
     "COM_ARM_BAT_MIN",
     -1.0,
     (-1.0, 0.9),

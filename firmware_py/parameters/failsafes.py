@@ -95,14 +95,6 @@ FAILURES = Group("Failure Detector")
 FAILURES.whole(
     "FD_FAIL_R", 60, (0, 180), "deg", "Rolled further than this it has tumbled", details="0: no such check."
 )
-FAILURES.real(
-    "FD_FAIL_R_TTRI",
-    0.3,
-    (0.02, 5.0),
-    "s",
-    "For this long it may be rolled further than FD_FAIL_R",
-    decimals=2,
-)
 FAILURES.whole(
     "FD_FAIL_P", 60, (0, 180), "deg", "Pitched further than this it has tumbled", details="0: no such check."
 )
@@ -119,11 +111,11 @@ BREAKERS = Group("Circuit Breaker")
 
 BREAKERS.whole(
     "CBRK_FLIGHTTERM",
-    121_212,
+    0,
     (0, 121_212),
     "",
     "121212 keeps a failed attitude from terminating the flight",
-    details="Termination on command, by a fence or by a lost link happens all the same.",
+    details="PX4's default. Termination on command, by a fence or by a lost link happens all the same.",
     reboot=True,
 )
 BREAKERS.whole(

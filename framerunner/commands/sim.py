@@ -76,7 +76,9 @@ class Connections:
 
 def sim(
     *,
-    scenario: Annotated[str, Parameter(help="name or file; without it an open field and an x500")] = "field",
+    scenario: Annotated[
+        str, Parameter(help="name or file; without it an open field and an x500")
+    ] = "open-field",
     speed: Annotated[float, Parameter(help="simulated seconds a second, 0.01 to 1000")] = 1.0,
     instance: Annotated[WholeNumber, Parameter(help="shifts ports and the system id, 0 to 9")] = 0,
     count: Annotated[

@@ -117,9 +117,10 @@ def situations():
         )
     ]
     found += [
-        replace(STANDING, battery_warning=3),
+        replace(STANDING, battery_arms=False),
         replace(STANDING, entered_us=LONG_AGO, follow_up=Reaction.LAND),
         replace(STANDING, choices=CHOICES[1]),
+        replace(FLYING, target_reached=True, choices=Choices(mission_after_takeoff=True)),
     ]
     return found
 
@@ -429,7 +430,7 @@ def test_what_a_tick_does(state, change, target, text):
         ({"unsound_us": NOW - 700_000}, "Arming denied: Resolve system health failures first"),
         ({"upright_us": NOW - 4000}, "Arming denied: vehicle is tipped over"),
         ({"position_us": LONG_AGO}, "Arming denied: no position estimate"),
-        ({"battery_warning": 3}, "Arming denied: low battery"),
+        ({"battery_arms": False}, "Arming denied: low battery"),
         ({"choices": CHOICES[1]}, "Arming denied: no connection to the ground station"),
         ({"intended": FlightMode.LAND}, "Arming denied: not in this mode"),
         (

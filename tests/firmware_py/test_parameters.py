@@ -157,16 +157,6 @@ def test_each_declaration_reads_well(declared):
 
 ROOT = Path(__file__).parents[2]
 NOT_USED_YET = {
-    "BAT1_R_INTERNAL",
-    "BAT1_SOURCE",
-    "CBRK_FLIGHTTERM",
-    "CBRK_SUPPLY_CHK",
-    "COM_ARM_BAT_MIN",
-    "COM_ARM_WO_GPS",
-    "COM_DLL_EXCEPT",
-    "COM_LKDOWN_TKO",
-    "COM_TAKEOFF_ACT",
-    "FD_FAIL_R_TTRI",
     "FLW_TGT_ALT_M",
     "FLW_TGT_MAX_VEL",
     "FLW_TGT_RS",
@@ -174,7 +164,6 @@ NOT_USED_YET = {
     "LNDMC_XY_VEL_MAX",
     "LNDMC_Z_VEL_MAX",
     "MAN_DEADZONE",
-    "MC_ORBIT_RAD_MAX",
     "MC_ORBIT_YAW_MOD",
     "MC_PITCHRATE_MAX",
     "MC_ROLLRATE_MAX",
@@ -185,13 +174,9 @@ NOT_USED_YET = {
     "MPC_THR_HOVER",
     "MPC_THR_MAX",
     "MPC_THR_MIN",
-    "MPC_TILTMAX_AIR",
     "MPC_VEL_MAN_BACK",
     "MPC_VEL_MAN_SIDE",
     "SDLOG_MODE",
-    "SIM_BAT_DRAIN",
-    "SIM_BAT_MIN_PCT",
-    "SYS_FAILURE_EN",
 }
 
 

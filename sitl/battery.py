@@ -1,0 +1,73 @@
+"""The simulated battery: what the motors draw, and what is left.
+
+The current is the mechanical power of the rotors, torque times speed, over motor and propeller losses and the
+voltage, beside what the electronics need. The voltage at rest falls in a straight line with the charge, and
+sags with the current over the internal resistance.
+"""
+
+from __future__ import annotations
+
+from firmware_py.airframe import Airframe
+from firmware_py.parameters import Parameters
+from firmware_py.types import MotorSpeeds
+
+_A_S_PER_MAH = 3.6
+
+
+class Battery:
+    """One battery, full at first.
+
+    Args:
+        airframe: its battery and motors.
+        parameters: SIM_BAT_DRAIN and SIM_BAT_MIN_PCT; BAT1_V_CHARGED and BAT1_V_EMPTY.
+
+    Attributes:
+        voltage_v: at its terminals.
+        current_a: drawn now.
+        charge: share of the full charge, 0..1.
+    """
+
+    __slots__ = ("_airframe", "_parameters", "_values", "_version", "charge", "current_a", "voltage_v")
+
+    def __init__(self, airframe: Airframe, parameters: Parameters) -> None:
+        self._airframe = airframe
+        self._parameters = parameters
+        self._version = -1
+        self._values = (0.0, 0.0, 0.0, 0.0)
+        self.charge = 1.0
+        self.current_a = 0.0
+        self.voltage_v = 0.0
+        self.step(0.0, (), armed=False)
+
+    def step(self, period_s: float, motor_speeds_rad_s: MotorSpeeds, *, armed: bool) -> None:
+        """Discharge.
+
+        Args:
+            period_s: since the last call.
+            motor_speeds_rad_s: now.
+            armed: for SIM_BAT_DRAIN, which drains by time and while armed only.
+        """
+        if self._version != self._parameters.version:
+            self._configure()
+        drain_s, least, empty_v, charged_v = self._values
+        battery, motor = self._airframe.battery, self._airframe.motor
+        rest_v = battery.cells * (empty_v + self.charge * (charged_v - empty_v))
+        power_w = motor.torque_nm_s2 * sum([abs(speed) ** 3 for speed in motor_speeds_rad_s])
+        self.current_a = battery.electronics_a + power_w / (battery.efficiency * rest_v)
+        self.voltage_v = rest_v - battery.resistance_ohm * self.current_a
+        if drain_s > 0.0:
+            used = period_s / drain_s if armed else 0.0
+        else:
+            used = self.current_a * period_s / (battery.capacity_mah * _A_S_PER_MAH)
+        # Charge never comes back, so a floor that is raised later changes nothing.
+        self.charge = max(self.charge - used, min(least, self.charge))
+
+    def _configure(self) -> None:
+        value = self._parameters.value
+        self._version = self._parameters.version
+        self._values = (
+            value("SIM_BAT_DRAIN"),
+            value("SIM_BAT_MIN_PCT") / 100.0,
+            value("BAT1_V_EMPTY"),
+            value("BAT1_V_CHARGED"),
+        )
