@@ -42,6 +42,8 @@ def sys_status(autopilot: AutopilotPort, _time_us: int) -> Message:
     status, battery = autopilot.status, autopilot.battery
     missing = 0 if status.origin is not None else _POSITION
     present = _PRESENT & ~missing
+    if status.armed and autopilot.parameters.value("SDLOG_MODE") >= 0:
+        present |= mavlink.MAV_SYS_STATUS_LOGGING
     healthy = _HEALTHY & ~missing
     if battery.warning > mavlink.MAV_BATTERY_CHARGE_STATE_OK:
         healthy &= ~mavlink.MAV_SYS_STATUS_SENSOR_BATTERY

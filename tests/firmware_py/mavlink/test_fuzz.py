@@ -103,13 +103,15 @@ HANDLED = [
     mavlink.MAVLink_set_position_target_local_ned_message,
     mavlink.MAVLink_timesync_message,
     mavlink.MAVLink_ping_message,
+    mavlink.MAVLink_system_time_message,
+    mavlink.MAVLink_rc_channels_override_message,
     mavlink.MAVLink_heartbeat_message,
     mavlink.MAVLink_mission_request_list_message,
     mavlink.MAVLink_mission_count_message,
     mavlink.MAVLink_mission_clear_all_message,
     mavlink.MAVLink_file_transfer_protocol_message,
 ]
-COMMANDS = [20, 21, 22, 176, 262, 300, 400, 401, 410, 510, 511, 512, 519, 520, 31999]
+COMMANDS = [20, 21, 22, 176, 262, 300, 400, 401, 410, 420, 510, 511, 512, 519, 520, 2000, 31999]
 NAMES = [b"MIS_TAKEOFF_ALT", b"COM_OBL_RC_ACT", b"_HASH_CHECK", b"", b"\xff" * 16, b"A" * 16]
 
 

@@ -1,5 +1,5 @@
 from itertools import pairwise
-from math import nan, pi
+from math import cos, inf, nan, pi, sin
 
 import pytest
 
@@ -9,7 +9,14 @@ from firmware_py.mavlink.framing import PacketReader
 from firmware_py.mavlink.sensing import pressure_hpa, temperature_k, to_body
 from firmware_py.mavlink.streams import SOURCES
 from firmware_py.status import FlightMode, LandedState, VehicleStatus
-from firmware_py.types import GeodeticPoint, MotorOutput, Setpoint, VehicleState
+from firmware_py.types import (
+    BatteryState,
+    FlightRecord,
+    GeodeticPoint,
+    MotorOutput,
+    Setpoint,
+    VehicleState,
+)
 
 
 def latest(peer, name, link="onboard"):
@@ -72,6 +79,112 @@ def test_health_bits_that_mavsdk_waits_for(autopilot, peer):
     status = latest(peer, "SYS_STATUS")
     assert status.onboard_control_sensors_health & (0x20 | 0x10000000) == 0
     assert status.onboard_control_sensors_health & 0x7 == 0x7
+
+
+def test_sys_status_has_px4s_bits_on_the_ground_and_in_the_air(autopilot, peer):
+    """As a PX4 v1.17 simulation without a remote control was seen to say."""
+    status = latest(peer, "SYS_STATUS")
+    assert status.onboard_control_sensors_present == 0x0200402F
+    assert status.onboard_control_sensors_enabled == 0x0201402F
+    autopilot.status.armed = True
+    status = latest(peer, "SYS_STATUS")
+    assert status.onboard_control_sensors_present == 0x0300402F
+    assert status.onboard_control_sensors_enabled == 0x0301402F
+    assert status.onboard_control_sensors_health == 0x1320C83F
+
+
+def test_the_battery_is_told_in_full_and_in_short(autopilot, peer):
+    autopilot.battery.voltage_v, autopilot.battery.current_a = 15.25, 12.5
+    autopilot.battery.used_mah, autopilot.battery.remaining = 840.0, 0.554
+    short, full = latest(peer, "SYS_STATUS"), latest(peer, "BATTERY_STATUS")
+    assert (short.voltage_battery, short.current_battery, short.battery_remaining) == (15250, 1250, 56)
+    assert (full.voltages[0], full.voltages[1]) == (15250, 65535)
+    assert (full.current_battery, full.current_consumed, full.battery_remaining) == (1250, 840, 55)
+    assert (full.type, full.charge_state) == (1, 1)
+    autopilot.battery.warning = 3
+    short, full = latest(peer, "SYS_STATUS"), latest(peer, "BATTERY_STATUS")
+    assert full.charge_state == 3
+    assert not short.onboard_control_sensors_health & mavlink.MAV_SYS_STATUS_SENSOR_BATTERY
+
+
+@pytest.mark.parametrize("value", [nan, inf, -inf, 1e9])
+def test_a_battery_that_makes_no_sense_ends_nothing(autopilot, peer, value):
+    autopilot.battery = BatteryState(value, value, value, value)
+    assert latest(peer, "SYS_STATUS") is not None
+    assert latest(peer, "BATTERY_STATUS") is not None
+
+
+def test_a_flights_times_are_those_of_the_flight_under_way(autopilot, peer):
+    autopilot.flight = FlightRecord(armed_us=3_000_000, takeoff_us=5_000_000, number=2)
+    request = peer.long(512, mavlink.MAVLINK_MSG_ID_FLIGHT_INFORMATION)
+    told = peer.ask(request)[0]
+    assert (told.arming_time_utc, told.takeoff_time_utc, told.flight_uuid) == (0, 0, 2)
+    autopilot.status.armed = True
+    told = peer.ask(request)[0]
+    assert (told.arming_time_utc, told.takeoff_time_utc) == (3_000_000, 5_000_000)
+    autopilot.flight.landed_us = 9_000_000
+    told = peer.ask(request)[0]
+    assert (told.takeoff_time_utc, told.landing_time) == (0, 9000)
+
+
+def test_targets_on_earth_and_of_attitude(autopilot, peer):
+    status = autopilot.status
+    status.armed, status.setpoint = True, Setpoint(0, position_ned_m=(100.0, 0.0, -5.0), yaw_rad=0.5)
+    place = latest(peer, "POSITION_TARGET_GLOBAL_INT")
+    assert (place.coordinate_frame, place.type_mask, place.alt) == (5, 0x9F8, 494.0)
+    assert place.lat_int - 473977420 == pytest.approx(8983, abs=20)  # 100 m north
+    attitude = latest(peer, "ATTITUDE_TARGET")
+    assert attitude.type_mask == 128 | 7
+    status.setpoint = Setpoint(0, attitude=(1.0, 0.0, 0.0, 0.0), thrust=0.4)
+    attitude = latest(peer, "ATTITUDE_TARGET")
+    assert attitude.type_mask == 7
+    assert attitude.thrust == pytest.approx(0.4)
+    assert latest(peer, "POSITION_TARGET_GLOBAL_INT") is None
+
+
+def test_the_range_to_the_ground_is_along_the_body(autopilot, peer):
+    autopilot.state = VehicleState(position_ned_m=(0.0, 0.0, -10.0))
+    assert latest(peer, "DISTANCE_SENSOR").current_distance == 1000
+    autopilot.state.attitude = (cos(pi / 6), sin(pi / 6), 0.0, 0.0)  # 60 degrees of roll
+    assert latest(peer, "DISTANCE_SENSOR").current_distance == 2000
+    autopilot.state.attitude = (0.0, 1.0, 0.0, 0.0)  # on its back
+    assert latest(peer, "DISTANCE_SENSOR").current_distance == 0
+    autopilot.state = VehicleState(position_ned_m=(0.0, 0.0, -200.0))
+    assert latest(peer, "DISTANCE_SENSOR").current_distance == 0
+
+
+def test_the_way_home_takes_its_time(autopilot, peer):
+    parameters = autopilot.parameters
+    for name, value in (("RTL_RETURN_ALT", 30), ("RTL_DESCEND_ALT", 10), ("RTL_LAND_DELAY", 0)):
+        parameters.set(name, value)
+    autopilot.state = VehicleState(position_ned_m=(50.0, 0.0, -12.0))
+    seconds = 18 / 3.0 + 50 / parameters.value("MPC_XY_CRUISE") + 20 / 1.5 + 10 / 0.7
+    assert latest(peer, "TIME_ESTIMATE_TO_TARGET").safe_return == pytest.approx(seconds, abs=1)
+
+
+def test_remote_identification_tells_place_speed_and_emergency(autopilot, peer):
+    autopilot.state = VehicleState(velocity_ned_m_s=(0.0, 3.0, -1.0))
+    told = latest(peer, "OPEN_DRONE_ID_LOCATION")
+    assert (told.status, told.direction, told.speed_horizontal, told.speed_vertical) == (1, 9000, 300, 100)
+    assert (told.latitude, told.timestamp) == (473977420, 65535.0)
+    autopilot.status.landed_state = LandedState.IN_AIR
+    assert latest(peer, "OPEN_DRONE_ID_LOCATION").status == 2
+    autopilot.status.armed = autopilot.status.failsafe = True
+    assert latest(peer, "OPEN_DRONE_ID_LOCATION").status == 3
+    assert latest(peer, "OPEN_DRONE_ID_SYSTEM").operator_latitude == 473977420
+
+
+def test_motors_are_told_in_three_more_ways(autopilot, peer, airframe):
+    speed = airframe.motor.max_speed_rad_s / 2
+    autopilot.output, autopilot.status.armed = MotorOutput((speed,) * 4), True
+    autopilot.battery.current_a = 20.0
+    (outputs, _) = peer.ask(peer.long(512, mavlink.MAVLINK_MSG_ID_ACTUATOR_OUTPUT_STATUS))
+    assert (outputs.active, outputs.actuator[:5]) == (4, [1500.0] * 4 + [0.0])
+    (status, _) = peer.ask(peer.long(512, mavlink.MAVLINK_MSG_ID_ESC_STATUS))
+    assert list(status.rpm) == [round(speed * 30 / pi)] * 4
+    assert list(status.current) == [5.0] * 4
+    (info, _) = peer.ask(peer.long(512, mavlink.MAVLINK_MSG_ID_ESC_INFO))
+    assert (info.count, info.info) == (4, 15)
 
 
 def test_nothing_is_claimed_before_a_position_is_known(autopilot, peer):
