@@ -11,7 +11,6 @@ from __future__ import annotations
 
 from math import nan
 
-from firmware_py.mavlink import version
 from firmware_py.mavlink.calibration import calibrate
 from firmware_py.mavlink.command import Command, CommandHandler, from_int, from_long
 from firmware_py.mavlink.dialect import BROADCAST, Message, mavlink
@@ -91,7 +90,7 @@ COMMANDS: dict[int, CommandHandler] = {
     mavlink.MAV_CMD_GET_MESSAGE_INTERVAL: _get_interval,
     mavlink.MAV_CMD_SET_MESSAGE_INTERVAL: _set_interval,
     mavlink.MAV_CMD_REQUEST_MESSAGE: _request,
-    mavlink.MAV_CMD_REQUEST_PROTOCOL_VERSION: _requester(version.ProtocolVersionMessage.id),
+    mavlink.MAV_CMD_REQUEST_PROTOCOL_VERSION: _requester(mavlink.MAVLINK_MSG_ID_PROTOCOL_VERSION),
     mavlink.MAV_CMD_REQUEST_AUTOPILOT_CAPABILITIES: _requester(mavlink.MAVLINK_MSG_ID_AUTOPILOT_VERSION),
 }
 

@@ -87,6 +87,16 @@ _DEFINITIONS: dict[str, tuple[int, tuple[_Field, ...]]] = {
             _Field("float", "current", 4),
         ),
     ),
+    "PROTOCOL_VERSION": (
+        300,
+        (
+            _Field("uint16_t", "version"),
+            _Field("uint16_t", "min_version"),
+            _Field("uint16_t", "max_version"),
+            _Field("uint8_t", "spec_version_hash", 8),
+            _Field("uint8_t", "library_version_hash", 8),
+        ),
+    ),
     "TIME_ESTIMATE_TO_TARGET": (
         380,
         (

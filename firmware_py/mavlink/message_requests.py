@@ -56,7 +56,7 @@ def _message_id(number: float) -> int | None:
 def _requested(exchange: Exchange, link: Link, message_id: int, argument: float) -> list[Message]:
     if message_id == mavlink.MAVLINK_MSG_ID_AUTOPILOT_VERSION:
         return [version.autopilot_version(exchange.system_id)]
-    if message_id == version.ProtocolVersionMessage.id:
+    if message_id == mavlink.MAVLINK_MSG_ID_PROTOCOL_VERSION:
         return [version.protocol_version()]
     if message_id in component_information.MESSAGE_IDS:
         autopilot, time_us = exchange.autopilot, exchange.time_us

@@ -7,8 +7,6 @@ SET_POSITION_TARGET_GLOBAL_INT, which PX4 understands too without saying so.
 
 from __future__ import annotations
 
-from struct import Struct
-
 from firmware_py.mavlink.dialect import Message, mavlink
 
 FOLLOWED_PX4_VERSION = (1, 17, 0)
@@ -31,25 +29,6 @@ CAPABILITIES = (
     | mavlink.MAV_PROTOCOL_CAPABILITY_MISSION_FENCE
     | mavlink.MAV_PROTOCOL_CAPABILITY_MISSION_RALLY
 )
-
-
-class ProtocolVersionMessage(mavlink.MAVLink_message):  # type: ignore[misc]  # pymavlink has no types
-    """PROTOCOL_VERSION (300), which pymavlink's dialects have dropped and MAVLink's `common` has kept."""
-
-    id = 300
-    msgname = "PROTOCOL_VERSION"
-    crc_extra = 217
-    unpacker = Struct("<HHH8s8s")
-
-    def __init__(self, version: int, minimum: int, maximum: int) -> None:
-        """Versions times 100."""
-        mavlink.MAVLink_message.__init__(self, self.id, self.msgname)
-        self.version, self.minimum, self.maximum = version, minimum, maximum
-
-    def pack(self, mav: Message, force_mavlink1: bool = False) -> bytes:
-        """The packet."""
-        payload = self.unpacker.pack(self.version, self.minimum, self.maximum, bytes(8), bytes(8))
-        return bytes(self._pack(mav, self.crc_extra, payload, force_mavlink1=force_mavlink1))
 
 
 def packed_version(version: tuple[int, int, int]) -> int:
@@ -78,4 +57,5 @@ def autopilot_version(system_id: int) -> Message:
 
 def protocol_version() -> Message:
     """PROTOCOL_VERSION with PX4's figures."""
-    return ProtocolVersionMessage(200, 100, 203)
+    no_hash = [0] * 8
+    return mavlink.MAVLink_protocol_version_message(200, 100, 203, no_hash, no_hash)

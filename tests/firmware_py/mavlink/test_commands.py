@@ -120,7 +120,7 @@ def test_component_zero_means_us_too(autopilot, peer):
     assert acks(peer.ask(peer.long(ARM, 1, target=(1, 0)))) == [(ARM, ACCEPTED)]
 
 
-@pytest.mark.parametrize(("command", "name"), [(519, "UNKNOWN_300"), (520, "AUTOPILOT_VERSION")])
+@pytest.mark.parametrize(("command", "name"), [(519, "PROTOCOL_VERSION"), (520, "AUTOPILOT_VERSION")])
 def test_version_requests_may_be_for_everyone(peer, command, name):
     answers = peer.ask(peer.long(command, 1, target=(0, 0)))
     assert acks(answers) == [(command, ACCEPTED)]
