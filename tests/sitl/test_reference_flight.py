@@ -1,4 +1,4 @@
-"""The commands of a flight recorded from PX4 v1.17 (SIH), sent again to the x500: the same answers in the same order.
+"""The commands of a flight recorded from PX4 v1.17 (SIH), sent again to the x500: the same answers in turn.
 
 The tables hold what was measured there: seconds since switched on, the peer 245/191 on the onboard link.
 PX4 acknowledges DO_SET_MODE twice, here it is acknowledged once.
