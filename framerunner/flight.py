@@ -26,6 +26,7 @@ from framerunner.recorder import FlightRecorder, RecordingCamera, VideoFile
 from framerunner.result_text import result_lines
 from framerunner.run_folder import RunFolder
 from framerunner.sitl_process import SitlProcess
+from framerunner.virtual_camera.lift import lifted
 from offboard.app import Moment, Outcome, fly_mission
 from offboard.mavsdk_drone import MavsdkDrone
 from offboard.mission import Mission
@@ -131,7 +132,8 @@ async def fly_once(settings: FlightSettings) -> int:
             "started": started.isoformat(timespec="seconds"),
         }
         folder.write_result(result)
-        track_picture(settings.scenario, flown.track, JudgedOutcome.from_result(result), folder.track)
+        scenario = lifted(settings.scenario, result.get("lift_m", 0.0))
+        track_picture(scenario, flown.track, JudgedOutcome.from_result(result), folder.track)
     print(result_lines(result))
     print(f"left in {folder.path}/", file=sys.stdout, flush=True)
     if flown.outcome.interrupted:
@@ -177,6 +179,7 @@ async def _fly_in_real_time(settings: FlightSettings, records: _Records) -> Flow
         "ended": outcome.ended,
         "seconds_in_state": track.seconds_in_state(),
         "judged_by": judge.source,
+        **({"lift_m": judge.lift_m} if judge.lift_m else {}),
         "version": metadata.version("framerunner"),
     }
     return Flown(result, outcome, track)

@@ -45,6 +45,7 @@ class Judge(Protocol):
     """A referee, wherever it is."""
 
     source: str
+    lift_m: float
 
     def see(self, moment: Moment) -> None:
         """Take a tick of the flight."""
@@ -67,12 +68,19 @@ class TruthJudge:
         session: for asking.
         scenario: what is flown.
         source: what its referee sees by, as it says itself.
+        lift_m: how much higher its frames hang than the scenario says, for want of a base.
     """
 
     def __init__(
-        self, url: str, session: aiohttp.ClientSession, scenario: Scenario, source: str = "truth"
+        self,
+        url: str,
+        session: aiohttp.ClientSession,
+        scenario: Scenario,
+        source: str = "truth",
+        lift_m: float = 0.0,
     ) -> None:
         self.source = source
+        self.lift_m = lift_m
         self._url = url
         self._session = session
         self._substitute = TelemetryJudge(scenario)
@@ -116,6 +124,7 @@ class TelemetryJudge:
     """
 
     source = "telemetry"
+    lift_m = 0.0
 
     def __init__(self, scenario: Scenario) -> None:
         self._referee = Referee(scenario, load_airframe(scenario.airframe).envelope_m)
@@ -175,7 +184,9 @@ async def choose_judge(
         answer = await ask_referee(url, session)
         if answer is not None and answer.get("scenario") == scenario.name:
             # The virtual camera's referee lives on telemetry, and says so.
-            return TruthJudge(url, session, scenario, str(answer.get("source", "truth")))
+            lift_m = answer.get("lift_m", 0.0)
+            lift_m = lift_m if isinstance(lift_m, int | float) else 0.0
+            return TruthJudge(url, session, scenario, str(answer.get("source", "truth")), lift_m)
     return TelemetryJudge(scenario)
 
 

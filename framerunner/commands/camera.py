@@ -48,16 +48,14 @@ def camera(
         raise SettingError(f"--port {port}: must be from 1 to 65535")
 
     from framerunner.vehicle_link import VehicleLink
-    from framerunner.virtual_camera.painter import VirtualCamera, without_base
+    from framerunner.virtual_camera.painter import VirtualCamera
     from framerunner.virtual_camera.server import COMPONENT_ID, SYSTEM_ID, CameraServer
     from scenarios.loader import load_scenario
     from sitl.video import VideoServer
 
     loaded = load_scenario(scenario)
-    if no_base:
-        loaded = without_base(loaded)
     link = VehicleLink(drone, system_id=SYSTEM_ID, component_id=COMPONENT_ID)
-    painter = VirtualCamera(loaded, level=level)
+    painter = VirtualCamera(loaded, level=level, base=not no_base)
     asyncio.run(CameraServer(painter, link, VideoServer(bind, port), _say).run())
     return 0
 

@@ -17,6 +17,7 @@ from framerunner.virtual_camera.history import (
     PositionReport,
     quaternion_from_euler,
 )
+from framerunner.virtual_camera.lift import lifted
 from framerunner.virtual_camera.placement import Placement, yaw_of
 from offboard.link.alignment import Pose
 from scenarios.axes import Quaternion
@@ -45,18 +46,6 @@ def levelled(attitude_arena: Quaternion) -> Quaternion:
     return (cos(half), 0.0, 0.0, sin(half))
 
 
-def without_base(scenario: Scenario) -> Scenario:
-    """The same layout for a drone that starts from the floor, where the base would be.
-
-    Heights count from where the drone stands, which the app takes for the base's top: so what hangs above
-    the floor is raised by the height of the base that is not there.
-    """
-    lift_m = scenario.base.top_m
-    frames = tuple(frame.model_copy(update={"z_m": frame.z_m + lift_m}) for frame in scenario.frames)
-    arena = scenario.arena.model_copy(update={"height_m": scenario.arena.height_m + lift_m})
-    return scenario.model_copy(update={"frames": frames, "arena": arena})
-
-
 class VirtualCamera:
     """Paints what a camera on the vehicle would see of the arena, and referees by the same poses.
 
@@ -67,6 +56,7 @@ class VirtualCamera:
     Args:
         scenario: what is to be seen.
         level: whether the camera is held level, as by a gimbal, and turns with the heading only.
+        base: whether the drone starts from the scenario's base; else it starts from the floor.
 
     Attributes:
         scenario: what is to be seen.
@@ -78,8 +68,9 @@ class VirtualCamera:
         restarts: how often the vehicle began anew.
     """
 
-    def __init__(self, scenario: Scenario, *, level: bool = False) -> None:
-        self.scenario = scenario
+    def __init__(self, scenario: Scenario, *, level: bool = False, base: bool = True) -> None:
+        self._lift_m = 0.0 if base else scenario.base.top_m
+        self.scenario = scenario = lifted(scenario, self._lift_m)
         self._level = level
         self._camera = Camera(scenario)
         self._envelope_m = load_airframe(scenario.airframe).envelope_m
@@ -165,6 +156,7 @@ class VirtualCamera:
         return {
             "scenario": self.scenario.name,
             "source": "telemetry",
+            "lift_m": self._lift_m,
             "time_us": self.history.newest_us or 0,
             "snapshot": asdict(self._referee.snapshot()),
             "report": self._referee.report(state, ended).as_dict(),

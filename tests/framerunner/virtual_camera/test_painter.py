@@ -9,7 +9,8 @@ from pymavlink.dialects.v20 import common as mavlink
 
 from firmware_py.mavlink.links import GROUND
 from firmware_py.mavlink.node import MavlinkNode
-from framerunner.virtual_camera.painter import VirtualCamera, start_pose, without_base
+from framerunner.virtual_camera.lift import lifted
+from framerunner.virtual_camera.painter import VirtualCamera, start_pose
 from scenarios.loader import load_scenario
 from sitl.camera import Camera
 from sitl.camera_feed import CameraFeed
@@ -160,12 +161,15 @@ def test_the_referee_follows_a_flight_through_a_frame_and_back():
 
 
 def test_without_a_base_all_hangs_as_high_above_where_the_drone_stands_as_above_the_floor():
-    lifted = without_base(SCENARIO)
-    assert lifted.name == SCENARIO.name
-    for frame, raised in zip(SCENARIO.frames, lifted.frames, strict=True):
-        assert raised.z_m - lifted.base.top_m == pytest.approx(frame.z_m)
-    assert lifted.arena.height_m - lifted.base.top_m == pytest.approx(SCENARIO.arena.height_m)
-    assert start_pose(lifted) == START
+    camera = VirtualCamera(SCENARIO, base=False)
+    lift_m = camera.standing()["lift_m"]
+    assert lift_m == SCENARIO.base.top_m
+    assert camera.scenario == lifted(SCENARIO, lift_m)
+    assert camera.scenario.name == SCENARIO.name
+    for frame, raised in zip(SCENARIO.frames, camera.scenario.frames, strict=True):
+        assert raised.z_m - lift_m == pytest.approx(frame.z_m)
+    assert camera.scenario.arena.height_m - lift_m == pytest.approx(SCENARIO.arena.height_m)
+    assert start_pose(camera.scenario) == START
 
 
 def fly_simulation(scenario, seconds):
