@@ -11,7 +11,6 @@ from firmware_py.types import Sensors
 
 _GPS, _BATTERY, _MOTOR = 4, 100, 101  # FAILURE_UNIT
 _OK, _OFF, _STUCK = 0, 1, 2  # FAILURE_TYPE
-_NOWHERE = (nan, nan, nan)
 
 
 class Motors(Protocol):
@@ -67,9 +66,13 @@ class Failures:
         return True
 
     def _falsified(self, sensors: Sensors) -> Sensors:
-        """Without GPS there is no position; a battery that is gone has no voltage, as PX4 empties its own."""
+        """Without GPS there is no place, but the barometer's height; a battery that is gone has no voltage."""
         if _GPS in self._lost:
-            sensors = replace(sensors, position_ned_m=_NOWHERE, velocity_ned_m_s=_NOWHERE)
+            sensors = replace(
+                sensors,
+                position_ned_m=(nan, nan, sensors.position_ned_m[2]),
+                velocity_ned_m_s=(nan, nan, sensors.velocity_ned_m_s[2]),
+            )
         if _BATTERY in self._lost:
             sensors = replace(sensors, battery_voltage_v=0.0)
         return sensors
