@@ -1,0 +1,54 @@
+"""docs/px4-compatibility.md names all that is there."""
+
+import re
+from pathlib import Path
+
+import pytest
+
+from firmware_py.mavlink import GROUND, ONBOARD
+from firmware_py.mavlink.camera_model import CAMERA_COMPONENT_ID, CameraModel
+from firmware_py.mavlink.commands import COMMANDS
+from firmware_py.mavlink.dialect import mavlink
+from firmware_py.mavlink.node import MavlinkNode
+from firmware_py.mavlink.streams import DATED_SOURCES, SOURCES
+
+PAGE = (Path(__file__).parents[3] / "docs" / "px4-compatibility.md").read_text(encoding="utf-8")
+NAMED = set(re.findall(r"[A-Z][A-Z0-9_]{3,}", PAGE))
+COMMAND_NAMES = {
+    number: name.removeprefix("MAV_CMD_")
+    for name, number in vars(mavlink).items()
+    if name.startswith("MAV_CMD_") and not name.endswith("ENUM_END")
+}
+
+
+@pytest.fixture(scope="module")
+def node(airframe):
+    from tests.firmware_py.mavlink.conftest import FakeAutopilot
+
+    return MavlinkNode(FakeAutopilot(airframe), (ONBOARD, GROUND), camera=CameraModel(320, 240, 1.57, 10.0))
+
+
+def test_every_message_that_is_handled_or_sent_is_on_the_page(node):
+    ids = set(SOURCES) | set(DATED_SOURCES) | set(node._exchange.sources)
+    ids |= {message_id for table in node._handlers.values() for message_id in table}
+    ids |= set(ONBOARD.rates_hz) | set(GROUND.rates_hz)
+    names = {mavlink.mavlink_map[number].msgname for number in ids if number in mavlink.mavlink_map}
+    assert names - NAMED - {"COMMAND_LONG", "COMMAND_INT"} == set()
+
+
+def test_every_command_is_on_the_page(node):
+    camera = node._exchange.camera
+    requests = {name for name in COMMAND_NAMES.values() if name.startswith("REQUEST_")}
+    own = {COMMAND_NAMES[number] for number in COMMANDS}
+    cameras = {COMMAND_NAMES[number] for number in camera._commands} - requests
+    assert (own | cameras) - NAMED == set()
+    assert CAMERA_COMPONENT_ID == 100
+
+
+def test_every_row_says_what_it_is():
+    rows = [line for line in PAGE.splitlines() if line.startswith("| ") and not line.startswith("|---")]
+    kinds = [row.split("|")[2].strip() for row in rows]
+    assert set(kinds) == {"same", "different", "not there", ""}
+    assert kinds.count("") == sum(
+        row.split("|")[3].strip() == "" for row in rows if row.split("|")[2].strip() == ""
+    )
