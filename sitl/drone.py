@@ -121,9 +121,12 @@ class ServedDrone:
     def tick(self) -> None:
         """Advance by one control period: fly, speak, look."""
         simulation = self.simulation
+        sampled_us = (
+            simulation.time_us
+        )  # not the estimate's time: that stands still while sensors are unusable
         simulation.tick()
         self._recorder.update(simulation.autopilot)
-        self._hub.update(simulation.autopilot.state.time_us)
+        self._hub.update(sampled_us)
         if self._camera is None or self._video is None:
             return
         arrived = self._camera.step(simulation.truth)

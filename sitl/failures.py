@@ -66,7 +66,7 @@ class Failures:
         return True
 
     def _falsified(self, sensors: Sensors) -> Sensors:
-        """Without GPS there is no place, but the barometer's height; a battery that is gone has no voltage."""
+        """Without GPS there is no place but the barometer's height; a battery that is gone has no voltage."""
         if _GPS in self._lost:
             sensors = replace(
                 sensors,

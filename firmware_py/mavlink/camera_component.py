@@ -84,7 +84,8 @@ class CameraComponent:
         time_us = self._exchange.time_us
         if time_us >= self._heartbeat_due_us:
             self._heartbeat_due_us = time_us - time_us % _HEARTBEAT_US + _HEARTBEAT_US
-            self._exchange.broadcast(camera_messages.heartbeat(), CAMERA_COMPONENT_ID)
+            beat = camera_messages.heartbeat(self._exchange.autopilot.status.mode)
+            self._exchange.broadcast(beat, CAMERA_COMPONENT_ID)
         self._captures.update()
 
     def start_capture(self, interval_s: float, count: int) -> CommandResult:

@@ -10,6 +10,7 @@ from firmware_py.mavlink.exchange import Exchange
 from firmware_py.mavlink.scaling import boot_ms, degrees_e7, millimetres
 from firmware_py.mavlink.version import OWN_VERSION
 from firmware_py.mavlink.video_links import VideoEncoding, VideoStream
+from firmware_py.status import FlightMode
 
 _FLAGS = mavlink.CAMERA_CAP_FLAGS_CAPTURE_IMAGE
 _RUNNING = mavlink.VIDEO_STREAM_STATUS_FLAGS_RUNNING
@@ -22,10 +23,22 @@ _INTERVAL_SET = 2  # image_status of CAMERA_CAPTURE_STATUS
 _URI_BYTES, _NAME_BYTES, _LABEL_BYTES, _FILE_BYTES = 160, 32, 32, 205
 
 
-def heartbeat() -> Message:
-    """HEARTBEAT of a camera, which is no autopilot."""
+def heartbeat(mode: FlightMode) -> Message:
+    """HEARTBEAT of a camera, which is no autopilot.
+
+    It tells the vehicle's mode too: MAVSDK's follow-me takes any component's heartbeat for the vehicle's,
+    and would end following with each one that tells none.
+
+    Args:
+        mode: the vehicle's.
+    """
     return mavlink.MAVLink_heartbeat_message(
-        mavlink.MAV_TYPE_CAMERA, mavlink.MAV_AUTOPILOT_INVALID, 0, 0, mavlink.MAV_STATE_ACTIVE, 3
+        mavlink.MAV_TYPE_CAMERA,
+        mavlink.MAV_AUTOPILOT_INVALID,
+        mavlink.MAV_MODE_FLAG_CUSTOM_MODE_ENABLED,
+        mode.custom_mode,
+        mavlink.MAV_STATE_ACTIVE,
+        3,
     )
 
 

@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 from firmware_py.mavlink.camera_model import CameraModel, PictureSpace
 from firmware_py.mavlink.dialect import mavlink
 from firmware_py.mavlink.video_links import VideoEncoding, VideoStream
-from firmware_py.status import CommandResult
+from firmware_py.status import CommandResult, FlightMode
 from firmware_py.types import GeodeticPoint, VehicleState
 
 MODEL = CameraModel(320, 240, radians(90.0), 10.0)
@@ -64,6 +64,12 @@ def test_its_heartbeat_is_a_cameras_once_a_second_on_every_link(viewer):
     for link in ("onboard", "ground"):
         beats = [m for on, m in received if on == link and m.get_srcComponent() == 100]
         assert [(m.get_type(), m.type, m.autopilot) for m in beats] == [("HEARTBEAT", 30, 8)] * 3
+
+
+def test_its_heartbeat_tells_the_vehicles_mode_for_mavsdk_follows_no_target_else(viewer, autopilot):
+    autopilot.status.mode = FlightMode.FOLLOW
+    (_, beat), *_ = [came for came in viewer.advance(1.5) if came[1].get_srcComponent() == 100]
+    assert (beat.base_mode & 1, beat.custom_mode) == (1, FlightMode.FOLLOW.custom_mode)
 
 
 def test_without_a_camera_nobody_answers_there(peer):
@@ -256,18 +262,14 @@ def test_a_mission_reaches_the_camera(viewer, album):
     assert camera.run(400, (1.0,) * 7) is CommandResult.UNSUPPORTED
 
 
-AWKWARD = st.one_of(
-    st.sampled_from([0.0, 1.0, -1.0, nan, inf, -inf, 3e38, 259.0]), st.floats(width=32)
-)
+AWKWARD = st.one_of(st.sampled_from([0.0, 1.0, -1.0, nan, inf, -inf, 3e38, 259.0]), st.floats(width=32))
 
 
 @settings(max_examples=200, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(
     st.lists(
         st.tuples(
-            st.sampled_from(
-                [REQUEST, START, STOP, 203, 206, 214, 521, 525, 528, 530, 2002, 2504, 2505]
-            ),
+            st.sampled_from([REQUEST, START, STOP, 203, 206, 214, 521, 525, 528, 530, 2002, 2504, 2505]),
             st.lists(AWKWARD, min_size=7, max_size=7),
             st.sampled_from([CAMERA, ALL]),
         ),
