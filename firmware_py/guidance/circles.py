@@ -1,17 +1,18 @@
-"""Orbit around a point, and following a target that moves."""
+"""Orbit around a point."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 from enum import IntEnum
-from math import atan2, cos, hypot, isnan, nan, pi, radians, sin
+from math import atan2, hypot, nan, pi
 
-from firmware_py.parameters import Parameters
+from firmware_py.guidance.limits import clamp
+from firmware_py.guidance.reference import Pace
 from firmware_py.types import Vec3, VehicleState
 
-_PULL = 1.0  # 1/s, back onto the circle
-_SMALLEST_M = 0.1
+_SMALLEST_M = 0.5  # nearer to the centre than this, it says nothing about where to look
 _FASTEST_TURN_M_S2 = 2.0  # PX4 limits the centripetal acceleration of an orbit so
+_NEAR_M = 3.0  # nearer to the circle than this, it goes along it
 
 
 class OrbitYaw(IntEnum):
@@ -42,84 +43,40 @@ class Orbit:
     yaw: OrbitYaw = OrbitYaw.CENTRE
     initial_yaw_rad: float = 0.0
 
-    def step(self, state: VehicleState) -> tuple[float, float, float]:
-        """Velocity north and east (m/s) and yaw (rad)."""
-        north_m = state.position_ned_m[0] - self.centre_ned_m[0]
-        east_m = state.position_ned_m[1] - self.centre_ned_m[1]
-        distance_m = hypot(north_m, east_m)
-        angle_rad = atan2(east_m, north_m) if distance_m > _SMALLEST_M else state.yaw_rad + pi
-        most_m_s = (_FASTEST_TURN_M_S2 * self.radius_m) ** 0.5
-        speed_m_s = max(-most_m_s, min(self.speed_m_s, most_m_s))
+    def speed_within(self, most_m_s2: float) -> float:
+        """The speed along it that turns no harder than this, m/s."""
+        most_m_s = (min(most_m_s2, _FASTEST_TURN_M_S2) * self.radius_m) ** 0.5
+        return clamp(self.speed_m_s, -most_m_s, most_m_s)
+
+    def velocity(self, place_ned_m: Vec3, pace: Pace, cruise_m_s: float) -> tuple[float, float]:
+        """Velocity north and east (m/s) at a place: far from the circle towards it, near by along it."""
+        north_m, east_m, distance_m = self._from_centre(place_ned_m)
         outside_m = distance_m - self.radius_m
-        # Far from the circle it is flown to first; the nearer, the more along it.
-        inward_m_s = max(-abs(speed_m_s) - 1.0, min(_PULL * outside_m, abs(speed_m_s) + 1.0))
-        along_m_s = speed_m_s * max(0.0, 1.0 - abs(outside_m) / max(self.radius_m, 1.0))
-        north_m_s = -inward_m_s * cos(angle_rad) - along_m_s * sin(angle_rad)
-        east_m_s = -inward_m_s * sin(angle_rad) + along_m_s * cos(angle_rad)
-        return north_m_s, east_m_s, self._yaw(angle_rad, speed_m_s)
+        gap_m = abs(outside_m)
+        inward_m_s = min(cruise_m_s, pace.stopping_level(gap_m)) * (1.0 if outside_m > 0.0 else -1.0)
+        along_m_s = self.speed_within(pace.level_m_s2) * max(0.0, 1.0 - gap_m / min(self.radius_m, _NEAR_M))
+        if distance_m == 0.0:
+            return -inward_m_s, 0.0  # out of the centre by any way
+        north, east = north_m / distance_m, east_m / distance_m
+        return -inward_m_s * north - along_m_s * east, -inward_m_s * east + along_m_s * north
 
-    def _yaw(self, angle_rad: float, speed_m_s: float) -> float:
+    def look(self, state: VehicleState, stick_rad_s: float) -> tuple[float, float]:
+        """Yaw (rad; NaN: open) and beside it the yaw rate (rad/s) that the nose needs."""
+        if self.yaw is OrbitYaw.INITIAL:
+            return self.initial_yaw_rad, 0.0
+        if self.yaw in (OrbitYaw.UNCONTROLLED, OrbitYaw.STICKS):
+            return nan, stick_rad_s if self.yaw is OrbitYaw.STICKS else 0.0
+        north_m, east_m, distance_m = self._from_centre(state.position_ned_m)
+        if distance_m < _SMALLEST_M:
+            return nan, 0.0
+        north_m_s, east_m_s, _ = state.velocity_ned_m_s
+        rate_rad_s = (north_m * east_m_s - east_m * north_m_s) / (distance_m * distance_m)
+        outward_rad = atan2(east_m, north_m)
         if self.yaw is OrbitYaw.CENTRE:
-            return angle_rad + pi
-        if self.yaw is OrbitYaw.TANGENT:
-            return angle_rad + (pi / 2 if speed_m_s >= 0 else -pi / 2)
-        return self.initial_yaw_rad if self.yaw is OrbitYaw.INITIAL else nan
+            return outward_rad + pi, rate_rad_s
+        return outward_rad + (pi / 2 if self.speed_m_s >= 0 else -pi / 2), rate_rad_s
 
-
-@dataclass(frozen=True, slots=True)
-class FollowSettings:
-    """How a target is followed: metres, radians."""
-
-    distance_m: float
-    height_m: float
-    angle_rad: float
-
-
-def follow_settings(parameters: Parameters) -> FollowSettings:
-    """What the FLW_TGT_ parameters say."""
-    value = parameters.value
-    return FollowSettings(value("FLW_TGT_DST"), value("FLW_TGT_HT"), radians(value("FLW_TGT_FA")))
-
-
-class TargetFollower:
-    """Keeps a place relative to a target that reports itself.
-
-    Attributes:
-        seen_us: when the target last reported; far in the past before.
-    """
-
-    __slots__ = ("_course_rad", "_position_ned_m", "_velocity_ned_m_s", "seen_us")
-
-    def __init__(self) -> None:
-        self.seen_us = -(10**15)
-        self._position_ned_m: Vec3 = (0.0, 0.0, 0.0)
-        self._velocity_ned_m_s: Vec3 = (0.0, 0.0, 0.0)
-        self._course_rad = 0.0
-
-    def report(self, time_us: int, position_ned_m: Vec3, velocity_ned_m_s: Vec3) -> None:
-        """Take a report; a velocity with NaN in it counts as standing."""
-        self.seen_us = time_us
-        self._position_ned_m = position_ned_m
-        standing = any(isnan(component) for component in velocity_ned_m_s)
-        self._velocity_ned_m_s = (0.0, 0.0, 0.0) if standing else velocity_ned_m_s
-        north_m_s, east_m_s, _ = self._velocity_ned_m_s
-        if hypot(north_m_s, east_m_s) > 1.0:  # slower, its course is noise
-            self._course_rad = atan2(east_m_s, north_m_s)
-
-    def place(self, now_us: int, settings: FollowSettings, home_down_m: float) -> tuple[Vec3, float]:
-        """Where to be (NED, metres) and where to look (rad) now; the height counts from home."""
-        ahead_s = min(max(now_us - self.seen_us, 0) / 1e6, 1.0)
-        north_m = self._position_ned_m[0] + ahead_s * self._velocity_ned_m_s[0]
-        east_m = self._position_ned_m[1] + ahead_s * self._velocity_ned_m_s[1]
-        angle_rad = self._course_rad + settings.angle_rad
-        place = (
-            north_m + settings.distance_m * cos(angle_rad),
-            east_m + settings.distance_m * sin(angle_rad),
-            home_down_m - settings.height_m,
-        )
-        return place, angle_rad + pi
-
-    @property
-    def velocity_ned_m_s(self) -> Vec3:
-        """The target's own, shape (3,)."""
-        return self._velocity_ned_m_s
+    def _from_centre(self, place_ned_m: Vec3) -> Vec3:
+        """North and east from the centre, and the horizontal distance."""
+        north_m, east_m = place_ned_m[0] - self.centre_ned_m[0], place_ned_m[1] - self.centre_ned_m[1]
+        return north_m, east_m, hypot(north_m, east_m)

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from math import hypot, radians
 
 from firmware_py.airframe import Airframe
+from firmware_py.guidance.reference import Pace
 from firmware_py.parameters import Parameters
 from firmware_py.types import Vec3
 
@@ -24,9 +25,7 @@ class SpeedLimits:
         cruise_m_s: of a journey by itself.
         auto_up_m_s: climb of a journey.
         auto_down_m_s: descent of a journey, and of a landing high up.
-        acceleration_m_s2: horizontal, of a journey.
-        acceleration_up_m_s2: of a journey.
-        acceleration_down_m_s2: of a journey.
+        pace: accelerations and jerk of a journey.
         auto_yaw_rate_rad_s: turn of a journey.
         position_gain: horizontal velocity per distance, 1/s.
         height_gain: vertical velocity per height, 1/s.
@@ -44,9 +43,7 @@ class SpeedLimits:
     cruise_m_s: float = 5.0
     auto_up_m_s: float = 3.0
     auto_down_m_s: float = 1.5
-    acceleration_m_s2: float = 3.0
-    acceleration_up_m_s2: float = 4.0
-    acceleration_down_m_s2: float = 3.0
+    pace: Pace = field(default_factory=Pace)
     auto_yaw_rate_rad_s: float = 1.0
     position_gain: float = 1.0
     height_gain: float = 1.0
@@ -87,9 +84,12 @@ def speed_limits(airframe: Airframe, parameters: Parameters) -> SpeedLimits:
         cruise_m_s=min(horizontal_m_s, value("MPC_XY_CRUISE")),
         auto_up_m_s=min(up_m_s, value("MPC_Z_V_AUTO_UP")),
         auto_down_m_s=min(down_m_s, value("MPC_Z_V_AUTO_DN")),
-        acceleration_m_s2=value("MPC_ACC_HOR"),
-        acceleration_up_m_s2=value("MPC_ACC_UP_MAX"),
-        acceleration_down_m_s2=value("MPC_ACC_DOWN_MAX"),
+        pace=Pace(
+            min(value("MPC_ACC_HOR"), value("MPC_ACC_HOR_MAX")),
+            value("MPC_ACC_UP_MAX"),
+            value("MPC_ACC_DOWN_MAX"),
+            value("MPC_JERK_AUTO"),
+        ),
         auto_yaw_rate_rad_s=radians(value("MPC_YAWRAUTO_MAX")),
         position_gain=value("MPC_XY_P"),
         height_gain=value("MPC_Z_P"),

@@ -1,17 +1,121 @@
-"""Offboard setpoints: which are usable, and how they are made safe to follow."""
+"""Offboard setpoints: which are usable, how they are made safe to follow, and following them."""
 
 from __future__ import annotations
 
 from dataclasses import replace
-from math import isfinite, isnan, nan
+from math import hypot, isfinite, isnan, nan, sqrt
 
+from firmware_py.estimator import euler_angles
+from firmware_py.guidance.frames import level, rate_command, towards, yaw_rate
 from firmware_py.guidance.limits import SpeedLimits, clamp
-from firmware_py.types import NAN3, Quaternion, Setpoint, Vec3
+from firmware_py.types import (
+    NAN3,
+    AccelerationCommand,
+    ActuatorCommand,
+    BodyRateCommand,
+    Command,
+    Quaternion,
+    RateCommand,
+    Setpoint,
+    TiltCommand,
+    Vec3,
+    VehicleState,
+)
 
 _LARGEST = 1e6  # metres or m/s asked for are cut to this, which keeps all arithmetic finite
 _LARGEST_ACCELERATION_M_S2 = 50.0
 _LARGEST_RATE_RAD_S = 30.0
 _NORM_TOLERANCE = 0.1
+_BRAKING_SHARE = 0.6  # of the acceleration allowed, for slowing down before a place: the vehicle lags behind
+
+
+class OffboardFlight:
+    """Follows setpoints.
+
+    Attributes:
+        setpoint: the one followed, as `bounded` made it.
+    """
+
+    __slots__ = ("_turning", "setpoint")
+
+    def __init__(self) -> None:
+        self.setpoint = Setpoint(0)
+        self._turning: RateCommand | None = None  # the same for every tick of a setpoint
+
+    def accept(self, setpoint: Setpoint, limits: SpeedLimits) -> None:
+        """Take the next setpoint; see `usable` and `bounded`."""
+        self.setpoint = wanted = bounded(setpoint, limits)
+        self._turning = None
+        if is_acceleration_only(setpoint):
+            self.setpoint = Setpoint(
+                setpoint.time_us,
+                acceleration_ned_m_s2=acceleration_or_zero(wanted),
+                yaw_rad=wanted.yaw_rad,
+                yaw_rate_rad_s=wanted.yaw_rate_rad_s,
+            )
+        elif not isnan(wanted.velocity_level_m_s[0]) and isnan(wanted.yaw_rad):
+            turn_rad_s = yaw_rate(0.0, nan, wanted.yaw_rate_rad_s, limits)
+            self._turning = RateCommand(wanted.velocity_level_m_s, turn_rad_s)
+
+    def step(self, state: VehicleState, limits: SpeedLimits) -> Command:
+        """What the stabiliser has to follow in this tick."""
+        if self._turning is not None:
+            return self._turning
+        wanted = self.setpoint
+        if not isnan(wanted.velocity_level_m_s[0]):
+            turn_rad_s = yaw_rate(state.yaw_rad, wanted.yaw_rad, wanted.yaw_rate_rad_s, limits)
+            return RateCommand(wanted.velocity_level_m_s, turn_rad_s)
+        if not isnan(wanted.thrust) or wanted.outputs:
+            return _thrusting(state, wanted, limits)
+        if isnan(wanted.velocity_ned_m_s[0]):
+            return AccelerationCommand(
+                level(state, acceleration_or_zero(wanted)),
+                yaw_rate(state.yaw_rad, wanted.yaw_rad, wanted.yaw_rate_rad_s, limits),
+            )
+        if isnan(wanted.position_ned_m[0]) or isnan(wanted.position_ned_m[1]):
+            velocity_ned_m_s = towards(
+                wanted.position_ned_m, state.position_ned_m, wanted.velocity_ned_m_s, limits
+            )
+        else:
+            velocity_ned_m_s = _approach(state, wanted, limits)
+        return rate_command(state, velocity_ned_m_s, wanted.yaw_rad, limits, wanted.yaw_rate_rad_s)
+
+
+def _approach(state: VehicleState, wanted: Setpoint, limits: SpeedLimits) -> Vec3:
+    """Velocity NED to a place: proportional near by, and never faster than it can brake."""
+    north_m, east_m, down_m = wanted.position_ned_m
+    distance_m = hypot(north_m - state.position_ned_m[0], east_m - state.position_ned_m[1])
+    north_m_s, east_m_s, down_m_s = towards(
+        (nan, nan, down_m), state.position_ned_m, wanted.velocity_ned_m_s, limits
+    )
+    if distance_m > 0.0:
+        share = braking_speed(distance_m, limits) / distance_m
+        north_m_s += share * (north_m - state.position_ned_m[0])
+        east_m_s += share * (east_m - state.position_ned_m[1])
+    return (north_m_s, east_m_s, down_m_s)
+
+
+def braking_speed(distance_m: float, limits: SpeedLimits) -> float:
+    """The speed from which one can stop in a distance.
+
+    Near the target it is proportional, farther away it follows v^2 = 2 a s; where the slopes meet it changes
+    over, so that the deceleration never exceeds a.
+    """
+    gain, most_m_s2 = limits.position_gain, _BRAKING_SHARE * limits.pace.level_m_s2
+    if distance_m * gain * gain <= most_m_s2:
+        return gain * distance_m
+    return sqrt(2.0 * most_m_s2 * distance_m - (most_m_s2 / gain) ** 2)
+
+
+def _thrusting(state: VehicleState, wanted: Setpoint, limits: SpeedLimits) -> Command:
+    """Setpoints below the velocity: attitude, rates, motors."""
+    if wanted.outputs:
+        return ActuatorCommand(wanted.outputs)
+    if wanted.rate_frd_rad_s is not None and wanted.attitude is None:
+        return BodyRateCommand(wanted.rate_frd_rad_s, wanted.thrust)
+    roll_rad, pitch_rad, yaw_rad = euler_angles(wanted.attitude or state.attitude)
+    turn_rad_s = yaw_rate(state.yaw_rad, yaw_rad, wanted.yaw_rate_rad_s, limits)
+    return TiltCommand(roll_rad, pitch_rad, turn_rad_s, wanted.thrust)
 
 
 def usable(setpoint: Setpoint) -> bool:

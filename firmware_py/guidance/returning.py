@@ -4,8 +4,9 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from enum import Enum
-from math import hypot, radians, tan
+from math import hypot, nan, radians, tan
 
+from firmware_py.guidance.limits import SpeedLimits
 from firmware_py.guidance.travel import Traveller
 from firmware_py.parameters import Parameters
 from firmware_py.types import Vec3, VehicleState
@@ -91,18 +92,17 @@ class ReturnHome:
         self._settings: ReturnSettings | None = None
         self._wait_since_us = 0
 
-    def start(self, state: VehicleState, home_ned_m: Vec3, settings: ReturnSettings) -> None:
+    def start(
+        self, state: VehicleState, home_ned_m: Vec3, settings: ReturnSettings, limits: SpeedLimits
+    ) -> None:
         """Begin here; home is in the local frame, shape (3,)."""
         self._home_ned_m, self._settings = home_ned_m, settings
         self.phase = Phase.CLIMB
         north_m, east_m, down_m = state.position_ned_m
         distance_m = hypot(home_ned_m[0] - north_m, home_ned_m[1] - east_m)
         height_m = return_height_m(settings, distance_m, home_ned_m[2] - down_m)
-        traveller = self.traveller
-        traveller.start(state)
-        traveller.speed_m_s = float("nan")
-        traveller.yaw_rad = float("nan")
-        traveller.target_ned_m = (north_m, east_m, home_ned_m[2] - height_m)
+        self.traveller.start(state, limits)
+        self.traveller.go((nan, nan, home_ned_m[2] - height_m), self.traveller.yaw_rad)
 
     def advance(self, state: VehicleState) -> Phase:
         """Go on to the next phase when this one is done, and say which it is."""
@@ -111,12 +111,11 @@ class ReturnHome:
             return self.phase
         if self.phase is Phase.CLIMB and traveller.climb_m(state) < settings.height_acceptance_m:
             self.phase = Phase.TRAVEL
-            traveller.target_ned_m = (home[0], home[1], traveller.target_ned_m[2])
+            traveller.go((home[0], home[1], traveller.target_ned_m[2]))
         if self.phase is Phase.TRAVEL and traveller.distance_m(state) < _AT_HOME_M:
             self.phase = Phase.DESCEND
             lowest_m = min(settings.descend_altitude_m, home[2] - state.position_ned_m[2])
-            traveller.yaw_rad = state.yaw_rad
-            traveller.target_ned_m = (home[0], home[1], home[2] - lowest_m)
+            traveller.go((home[0], home[1], home[2] - lowest_m), state.yaw_rad)
         if self.phase is Phase.DESCEND and abs(traveller.climb_m(state)) < settings.height_acceptance_m:
             self.phase = Phase.WAIT
             self._wait_since_us = state.time_us

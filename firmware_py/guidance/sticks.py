@@ -2,78 +2,146 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from math import cos, nan, radians, sin
+from dataclasses import dataclass, replace
+from math import cos, hypot, nan, radians, sin
 
 from firmware_py.airframe import Airframe
+from firmware_py.guidance.frames import level
 from firmware_py.guidance.limits import SpeedLimits
-from firmware_py.guidance.station import StationKeeper
+from firmware_py.guidance.reference import Pace, Reference
 from firmware_py.parameters import Parameters
-from firmware_py.types import BodyRateCommand, ManualInput, RateCommand, TiltCommand, Vec3, VehicleState
+from firmware_py.types import (
+    BodyRateCommand,
+    ManualInput,
+    RateCommand,
+    Setpoint,
+    TiltCommand,
+    VehicleState,
+)
 
-_DEAD = 0.1  # nearer to the centre than this, a stick is let go
 _FULL_THRUST = 1.0
 
 
 @dataclass(frozen=True, slots=True)
 class StickSettings:
-    """What full sticks mean: m/s, rad, rad/s; thrusts as shares of the most there is."""
+    """What full sticks mean: m/s, rad, rad/s; thrusts as shares of the most there is.
 
-    velocity_m_s: float
+    Attributes:
+        forward_m_s: horizontal speed in position mode.
+        back_m_s: the same backwards.
+        side_m_s: the same sideways.
+        tilt_rad: in modes that control the tilt.
+        yaw_rate_rad_s: acro mode apart.
+        acro_rate_frd_rad_s: body rates in acro mode, shape (3,).
+        least_thrust: throttle down, where height is not controlled.
+        hover_thrust: throttle in the middle.
+        dead: nearer to its middle than this, a stick is let go.
+        hold_level_m_s: let go, it keeps its place from below this horizontal speed; 0: at once.
+        hold_vertical_m_s: the same for its height.
+        moving: how hard it speeds up.
+        braking: how hard it stops.
+    """
+
+    forward_m_s: float
+    back_m_s: float
+    side_m_s: float
     tilt_rad: float
     yaw_rate_rad_s: float
-    acro_rate_frd_rad_s: Vec3
+    acro_rate_frd_rad_s: tuple[float, float, float]
     least_thrust: float
     hover_thrust: float
+    dead: float
+    hold_level_m_s: float
+    hold_vertical_m_s: float
+    moving: Pace
+    braking: Pace
 
 
 def stick_settings(airframe: Airframe, parameters: Parameters) -> StickSettings:
     """What airframe and parameters say."""
-    value = parameters.value
+    value, can = parameters.value, airframe.limits
+    forward_m_s = min(can.speed_horizontal_m_s, value("MPC_VEL_MANUAL"))
+    back_m_s, side_m_s = value("MPC_VEL_MAN_BACK"), value("MPC_VEL_MAN_SIDE")
+    most_m_s2 = value("MPC_ACC_HOR_MAX")
+    moving = Pace(
+        min(value("MPC_ACC_HOR"), most_m_s2),
+        value("MPC_ACC_UP_MAX"),
+        value("MPC_ACC_DOWN_MAX"),
+        value("MPC_JERK_MAX"),
+    )
     return StickSettings(
-        min(airframe.limits.speed_horizontal_m_s, value("MPC_VEL_MANUAL")),
-        min(airframe.limits.tilt_rad, radians(value("MPC_MAN_TILT_MAX"))),
-        min(airframe.limits.yaw_rate_rad_s, radians(value("MPC_MAN_Y_MAX"))),
+        forward_m_s,
+        forward_m_s if back_m_s < 0.0 else min(forward_m_s, back_m_s),
+        forward_m_s if side_m_s < 0.0 else min(forward_m_s, side_m_s),
+        min(can.tilt_rad, radians(value("MPC_MAN_TILT_MAX"))),
+        min(can.yaw_rate_rad_s, radians(value("MPC_MAN_Y_MAX"))),
         (radians(value("MC_ACRO_R_MAX")), radians(value("MC_ACRO_P_MAX")), radians(value("MC_ACRO_Y_MAX"))),
         value("MPC_MANTHR_MIN"),
         (airframe.hover_speed_rad_s / airframe.motor.max_speed_rad_s) ** 2,
+        value("MAN_DEADZONE"),
+        value("MPC_HOLD_MAX_XY"),
+        value("MPC_HOLD_MAX_Z"),
+        moving,
+        replace(moving, level_m_s2=most_m_s2),
     )
 
 
 class StickFlight:
     """Turns sticks into commands.
 
-    Attributes:
+    Args:
         settings: what full sticks mean.
-        keeper: holds what is let go.
+        period_s: of control.
+
+    Attributes:
+        settings: see above.
+        reference: the point that the sticks lead.
     """
 
-    __slots__ = ("keeper", "settings")
+    __slots__ = ("_level_held", "_period_s", "reference", "settings")
 
-    def __init__(self, keeper: StationKeeper, settings: StickSettings) -> None:
-        self.keeper = keeper
+    def __init__(self, settings: StickSettings, period_s: float) -> None:
         self.settings = settings
+        self.reference = Reference()
+        self._period_s = period_s
+        self._level_held = False
+
+    def start(self, state: VehicleState) -> None:
+        """Begin as it moves now."""
+        self.reference.start(state, self.settings.moving)
+        self._level_held = False
 
     def position(self, state: VehicleState, sticks: ManualInput, limits: SpeedLimits) -> RateCommand:
         """Velocities in level axes; let go, it brakes and stays."""
-        forward, right = released(sticks.forward), released(sticks.right)
-        moving = forward != 0.0 or right != 0.0
-        down_m_s, held_m_s = self._vertical(state, sticks, limits, moving=moving)
-        yaw_rate_rad_s = released(sticks.yaw) * self.settings.yaw_rate_rad_s
-        if moving:
-            speed_m_s = self.settings.velocity_m_s
-            forward_m_s, right_m_s, down_m_s = limits.clip(forward * speed_m_s, right * speed_m_s, down_m_s)
-            return RateCommand((forward_m_s, right_m_s, down_m_s), yaw_rate_rad_s)
-        north_m_s, east_m_s, down_m_s = limits.clip(held_m_s[0], held_m_s[1], down_m_s)
+        settings, reference = self.settings, self.reference
+        forward, right = self.released(sticks.forward), self.released(sticks.right)
+        size = hypot(forward, right)
+        if size > 1.0:
+            forward, right = forward / size, right / size
+        forward_m_s = forward * (settings.forward_m_s if forward >= 0.0 else settings.back_m_s)
+        right_m_s = right * settings.side_m_s
         cos_yaw, sin_yaw = cos(state.yaw_rad), sin(state.yaw_rad)
+        north_m_s, east_m_s, _ = limits.clip(
+            cos_yaw * forward_m_s - sin_yaw * right_m_s, sin_yaw * forward_m_s + cos_yaw * right_m_s, 0.0
+        )
+        moves = size > 0.0
+        speed_m_s = hypot(state.velocity_ned_m_s[0], state.velocity_ned_m_s[1])
+        if moves:
+            self._level_held = False
+        elif not self._level_held:
+            self._level_held = settings.hold_level_m_s <= 0.0 or speed_m_s < settings.hold_level_m_s
+        self._lead(state, sticks, limits, (north_m_s, east_m_s), level_bound=self._level_held)
+        velocity_ned_m_s = reference.chase(state, limits.position_gain, limits.height_gain)
         return RateCommand(
-            (cos_yaw * north_m_s + sin_yaw * east_m_s, cos_yaw * east_m_s - sin_yaw * north_m_s, down_m_s),
-            yaw_rate_rad_s,
+            level(state, limits.clip(*velocity_ned_m_s)),
+            self.released(sticks.yaw) * settings.yaw_rate_rad_s,
+            level(state, reference.acceleration_ned_m_s2),
         )
 
     def altitude(self, state: VehicleState, sticks: ManualInput, limits: SpeedLimits) -> TiltCommand:
         """Tilt by hand, height held."""
-        down_m_s, _ = self._vertical(state, sticks, limits, moving=True)
+        self._lead(state, sticks, limits, (0.0, 0.0), level_bound=False)
+        down_m_s = limits.clip(*self.reference.chase(state, limits.position_gain, limits.height_gain))[2]
         roll_rad, pitch_rad, yaw_rate_rad_s = self._tilt(sticks)
         return TiltCommand(roll_rad, pitch_rad, yaw_rate_rad_s, nan, down_m_s)
 
@@ -88,12 +156,44 @@ class StickFlight:
         rates = (sticks.right * roll_rad_s, -sticks.forward * pitch_rad_s, sticks.yaw * yaw_rad_s)
         return BodyRateCommand(rates, self._thrust(sticks))
 
-    def _tilt(self, sticks: ManualInput) -> Vec3:
+    def released(self, stick: float) -> float:
+        """A stick's value with the dead zone around its centre taken out, -1..1."""
+        dead = self.settings.dead
+        if -dead <= stick <= dead:
+            return 0.0
+        return (stick - dead) / (1.0 - dead) if stick > 0.0 else (stick + dead) / (1.0 - dead)
+
+    def _lead(
+        self,
+        state: VehicleState,
+        sticks: ManualInput,
+        limits: SpeedLimits,
+        level_ned_m_s: tuple[float, float],
+        *,
+        level_bound: bool,
+    ) -> None:
+        """Move the point by the throttle and a horizontal velocity."""
+        settings, reference = self.settings, self.reference
+        up = self.released(sticks.up)
+        wanted_down_m_s = -up * (limits.up_m_s if up > 0.0 else limits.down_m_s)
+        bound = settings.hold_vertical_m_s
+        height_bound = up == 0.0 and (bound <= 0.0 or abs(state.velocity_ned_m_s[2]) < bound)
+        pace = settings.braking if level_ned_m_s == (0.0, 0.0) else settings.moving
+        reference.move(
+            state,
+            (*level_ned_m_s, wanted_down_m_s),
+            pace,
+            self._period_s,
+            level_bound=level_bound,
+            height_bound=height_bound,
+        )
+
+    def _tilt(self, sticks: ManualInput) -> tuple[float, float, float]:
         settings = self.settings
         return (
             sticks.right * settings.tilt_rad,
             -sticks.forward * settings.tilt_rad,
-            released(sticks.yaw) * settings.yaw_rate_rad_s,
+            self.released(sticks.yaw) * settings.yaw_rate_rad_s,
         )
 
     def _thrust(self, sticks: ManualInput) -> float:
@@ -102,27 +202,7 @@ class StickFlight:
             return middle + sticks.up * (middle - low)
         return middle + sticks.up * (_FULL_THRUST - middle)
 
-    def _vertical(
-        self, state: VehicleState, sticks: ManualInput, limits: SpeedLimits, *, moving: bool
-    ) -> tuple[float, Vec3]:
-        """Vertical velocity, and the velocity NED that holds what is let go."""
-        keeper = self.keeper
-        up = released(sticks.up)
-        north_m, east_m, down_m = keeper.target_ned_m
-        if moving:
-            north_m = east_m = nan
-        if up != 0.0:
-            down_m = nan
-        keeper.target_ned_m = (north_m, east_m, down_m)
-        keeper.latch(state)
-        held_m_s = keeper.velocity(state, limits)
-        if up == 0.0:
-            return held_m_s[2], held_m_s
-        return (-up * limits.up_m_s if up > 0.0 else -up * limits.down_m_s), held_m_s
-
-
-def released(stick: float) -> float:
-    """A stick's value with the dead zone around its centre taken out, -1..1."""
-    if -_DEAD < stick < _DEAD:
-        return 0.0
-    return (stick - _DEAD) / (1.0 - _DEAD) if stick > 0.0 else (stick + _DEAD) / (1.0 - _DEAD)
+    def shown(self, time_us: int) -> Setpoint:
+        """What is followed, for telemetry."""
+        reference = self.reference
+        return Setpoint(time_us, reference.position_ned_m, reference.velocity_ned_m_s)

@@ -1,39 +1,100 @@
-"""Flying to a place by itself: fast on the way, in time slow before it, never jerking the velocity."""
+"""Flying to a place by itself, or stopping and staying: smooth all the way."""
 
 from __future__ import annotations
 
-from math import atan2, hypot, isnan, nan, sqrt
+from dataclasses import dataclass
+from enum import IntEnum
+from math import atan2, hypot, isnan, nan, pi, remainder, tau
 
 from firmware_py.guidance.limits import SpeedLimits, clamp
-from firmware_py.types import Vec3, VehicleState
+from firmware_py.guidance.reference import Reference
+from firmware_py.types import NAN3, Vec3, VehicleState
 
-_FACING_M = 1.0  # nearer than this, the way to the target says nothing about where to look
+_FACING_M = 1.0  # nearer than this, the way to a place says nothing about where to look
+_FACING_M_S = 0.5  # slower than this, the way it moves says nothing either
+_STOPPED_M_S = 0.05
+_ALIGNED_RAD = 0.2
+_LEAST_GAIN = 0.5
+_REST: Vec3 = (0.0, 0.0, 0.0)
+
+
+class YawMode(IntEnum):
+    """MPC_YAW_MODE."""
+
+    TO_PLACE = 0
+    TO_HOME = 1
+    FROM_HOME = 2
+    ALONG = 3
+    TURN_FIRST = 4
+    FIXED = 5
+
+
+@dataclass(slots=True)
+class Heading:
+    """Where to look on a journey that does not say it.
+
+    Attributes:
+        mode: MPC_YAW_MODE.
+        home_ned_m: shape (3,).
+    """
+
+    mode: YawMode = YawMode.TO_PLACE
+    home_ned_m: Vec3 = (0.0, 0.0, 0.0)
 
 
 class Traveller:
-    """A journey to one target.
+    """A journey to one target, or a halt.
 
     Attributes:
-        target_ned_m: where to, shape (3,).
+        target_ned_m: where to, shape (3,); a component that is NaN is braked and then stays as it is.
         speed_m_s: horizontal speed on the way; NaN: the cruising speed.
-        yaw_rad: where to look; NaN: along the way.
+        yaw_rad: where to look; NaN: as `heading` says.
         pass_m_s: speed with which the target may be passed; 0: stop there.
+        drift_ned_m_s: velocity of the target itself, shape (3,).
+        heading: where to look when `yaw_rad` is open.
+        reference: the point that is followed.
     """
 
-    __slots__ = ("_velocity_ned_m_s", "_yaw_rad", "pass_m_s", "speed_m_s", "target_ned_m", "yaw_rad")
+    __slots__ = (
+        "_fresh",
+        "_turning",
+        "_yaw_rad",
+        "drift_ned_m_s",
+        "heading",
+        "pass_m_s",
+        "reference",
+        "speed_m_s",
+        "target_ned_m",
+        "yaw_rad",
+    )
 
     def __init__(self) -> None:
-        self.target_ned_m: Vec3 = (0.0, 0.0, 0.0)
+        self.target_ned_m: Vec3 = NAN3
         self.speed_m_s = nan
         self.yaw_rad = nan
         self.pass_m_s = 0.0
-        self._velocity_ned_m_s: Vec3 = (0.0, 0.0, 0.0)
+        self.drift_ned_m_s = _REST
+        self.heading = Heading()
+        self.reference = Reference()
         self._yaw_rad = 0.0
+        self._turning = False
+        self._fresh = True  # the point has not been put where the vehicle is
 
-    def start(self, state: VehicleState) -> None:
-        """Begin with the velocity and yaw there are."""
-        self._velocity_ned_m_s = state.velocity_ned_m_s
+    def start(self, state: VehicleState, limits: SpeedLimits) -> None:
+        """Begin, with the next step, as it moves then: brake and stay, until told where to."""
+        self._fresh = True
+        turn_rad_s = state.angular_rate_frd_rad_s[2]
         self._yaw_rad = state.yaw_rad
+        if abs(turn_rad_s) > limits.auto_yaw_rate_rad_s:  # it would swing back
+            self._yaw_rad += turn_rad_s / max(limits.yaw_gain, _LEAST_GAIN)
+        self.go(NAN3, self._yaw_rad)
+
+    def go(self, target_ned_m: Vec3, yaw_rad: float = nan, speed_m_s: float = nan) -> None:
+        """Change where it goes; the velocity goes on smoothly."""
+        self.target_ned_m, self.yaw_rad, self.speed_m_s = target_ned_m, yaw_rad, speed_m_s
+        self.pass_m_s = 0.0
+        self.drift_ned_m_s = _REST
+        self._turning = self.heading.mode is YawMode.TURN_FIRST and isnan(yaw_rad)
 
     def distance_m(self, state: VehicleState) -> float:
         """Horizontal distance to the target."""
@@ -45,33 +106,87 @@ class Traveller:
         """How far the target is above."""
         return state.position_ned_m[2] - self.target_ned_m[2]
 
-    def step(self, state: VehicleState, limits: SpeedLimits, period_s: float) -> tuple[Vec3, float]:
-        """Velocity NED (m/s) and yaw (rad) for one control period."""
-        north_m = self.target_ned_m[0] - state.position_ned_m[0]
-        east_m = self.target_ned_m[1] - state.position_ned_m[1]
-        distance_m = hypot(north_m, east_m)
-        cruise_m_s = (
-            limits.cruise_m_s if isnan(self.speed_m_s) else min(self.speed_m_s, limits.horizontal_m_s)
+    @property
+    def is_at_rest(self) -> bool:
+        """Whether the point stands."""
+        return not self._fresh and hypot(*self.reference.velocity_ned_m_s) < _STOPPED_M_S
+
+    def led(self, state: VehicleState, limits: SpeedLimits) -> Reference:
+        """The point to lead; at the first call since `start` it is where the vehicle is."""
+        if self._fresh:
+            self._fresh = False
+            self.reference.start(state, limits.pace)
+        return self.reference
+
+    def step(
+        self, state: VehicleState, limits: SpeedLimits, period_s: float, *, height_bound: bool = True
+    ) -> tuple[Vec3, float]:
+        """Velocity NED (m/s) and yaw (rad) for one control period; the rest is in `reference`.
+
+        Without `height_bound` the height is left to the vertical `drift_ned_m_s`.
+        """
+        reference, pace = self.led(state, limits), limits.pace
+        place = reference.position_ned_m
+        north_m, east_m, down_m = (
+            self.target_ned_m[0] - place[0],
+            self.target_ned_m[1] - place[1],
+            self.target_ned_m[2] - place[2],
         )
-        stopping_m_s = braking_speed(distance_m, limits.position_gain, limits.acceleration_m_s2)
-        speed_m_s = min(cruise_m_s, hypot(stopping_m_s, self.pass_m_s))
-        share = speed_m_s / distance_m if distance_m > 0.0 else 0.0
-        climb_m = self.climb_m(state)
-        if climb_m > 0.0:
-            acceleration_m_s2 = limits.acceleration_down_m_s2  # what brakes a climb
-            down_m_s = -min(limits.auto_up_m_s, braking_speed(climb_m, limits.height_gain, acceleration_m_s2))
-        else:
-            acceleration_m_s2 = limits.acceleration_up_m_s2
-            down_m_s = min(
-                limits.auto_down_m_s, braking_speed(-climb_m, limits.height_gain, acceleration_m_s2)
-            )
-        wanted = (share * north_m, share * east_m, down_m_s)
-        self._velocity_ned_m_s = velocity = slewed(self._velocity_ned_m_s, wanted, limits, period_s)
+        wanted_north, wanted_east, wanted_down = self.drift_ned_m_s
+        cruise_m_s = limits.cruise_m_s
+        if not isnan(self.speed_m_s):
+            cruise_m_s = min(self.speed_m_s, limits.horizontal_m_s)
+        if not isnan(north_m):
+            distance_m = hypot(north_m, east_m)
+            speed_m_s = min(cruise_m_s, pace.stopping_level(distance_m, self.pass_m_s))
+            if self._turning and self._turns(state, north_m, east_m, distance_m):
+                speed_m_s = 0.0
+            share = speed_m_s / distance_m if distance_m > 0.0 else 0.0
+            wanted_north, wanted_east = wanted_north + share * north_m, wanted_east + share * east_m
+        if not isnan(down_m):
+            wanted_down += clamp(pace.stopping_down(down_m), -limits.auto_up_m_s, limits.auto_down_m_s)
+        wanted_ned_m_s = (wanted_north, wanted_east, wanted_down)
+        reference.move(state, wanted_ned_m_s, pace, period_s, height_bound=height_bound)
+        self._settle(height_bound=height_bound)
         if not isnan(self.yaw_rad):
             self._yaw_rad = self.yaw_rad
-        elif distance_m > _FACING_M:
-            self._yaw_rad = atan2(east_m, north_m)
+        else:
+            self._look(state, north_m, east_m)
+        velocity = reference.chase(state, limits.position_gain, limits.height_gain, cruise_m_s)
         return velocity, self._yaw_rad
+
+    def _settle(self, *, height_bound: bool) -> None:
+        """What was open has a place once it stands."""
+        north_m, east_m, down_m = self.target_ned_m
+        if not isnan(north_m) and not (isnan(down_m) and height_bound):
+            return
+        reference = self.reference
+        north_m_s, east_m_s, down_m_s = reference.velocity_ned_m_s
+        if isnan(north_m) and hypot(north_m_s, east_m_s) < _STOPPED_M_S:
+            north_m, east_m = reference.position_ned_m[0], reference.position_ned_m[1]
+        if isnan(down_m) and height_bound and abs(down_m_s) < _STOPPED_M_S:
+            down_m = reference.position_ned_m[2]
+        if (isnan(north_m), isnan(down_m)) != (isnan(self.target_ned_m[0]), isnan(self.target_ned_m[2])):
+            self.target_ned_m = (north_m, east_m, down_m)
+
+    def _turns(self, state: VehicleState, north_m: float, east_m: float, distance_m: float) -> bool:
+        """Whether it still turns towards the place before it flies there."""
+        error_rad = remainder(atan2(east_m, north_m) - state.yaw_rad, tau)
+        self._turning = distance_m > _FACING_M and abs(error_rad) > _ALIGNED_RAD
+        return self._turning
+
+    def _look(self, state: VehicleState, north_m: float, east_m: float) -> None:
+        mode, home = self.heading.mode, self.heading.home_ned_m
+        nearest = _FACING_M
+        if mode is YawMode.FIXED:
+            return
+        if mode in (YawMode.TO_HOME, YawMode.FROM_HOME):
+            north_m, east_m = home[0] - state.position_ned_m[0], home[1] - state.position_ned_m[1]
+        elif mode is YawMode.ALONG:
+            north_m, east_m, _ = self.reference.velocity_ned_m_s
+            nearest = _FACING_M_S
+        if hypot(north_m, east_m) > nearest:  # false for NaN too
+            self._yaw_rad = atan2(east_m, north_m) + (pi if mode is YawMode.FROM_HOME else 0.0)
 
 
 def passing_speed(here: Vec3, target: Vec3, onward: Vec3, cruise_m_s: float) -> float:
@@ -82,31 +197,3 @@ def passing_speed(here: Vec3, target: Vec3, onward: Vec3, cruise_m_s: float) -> 
     if length_m == 0.0:
         return 0.0
     return cruise_m_s * max(0.0, (north_m * next_north_m + east_m * next_east_m) / length_m)
-
-
-def braking_speed(distance_m: float, gain: float, acceleration_m_s2: float) -> float:
-    """The speed from which one can stop in a distance.
-
-    Near the target it is proportional (`gain`), farther away it follows v^2 = 2 a s; where the slopes meet it
-    changes over, so that the deceleration never exceeds `acceleration_m_s2`.
-    """
-    near_m = acceleration_m_s2 / (gain * gain)
-    if distance_m <= near_m:
-        return gain * distance_m
-    return sqrt(2.0 * acceleration_m_s2 * (distance_m - 0.5 * near_m))
-
-
-def slewed(before: Vec3, wanted: Vec3, limits: SpeedLimits, period_s: float) -> Vec3:
-    """A velocity that leaves the last one no faster than the accelerations allow."""
-    north_m_s, east_m_s = wanted[0] - before[0], wanted[1] - before[1]
-    change_m_s = hypot(north_m_s, east_m_s)
-    most_m_s = limits.acceleration_m_s2 * period_s
-    if change_m_s > most_m_s:
-        share = most_m_s / change_m_s
-        north_m_s, east_m_s = share * north_m_s, share * east_m_s
-    down_m_s = clamp(
-        wanted[2] - before[2],
-        -limits.acceleration_up_m_s2 * period_s,
-        limits.acceleration_down_m_s2 * period_s,
-    )
-    return (before[0] + north_m_s, before[1] + east_m_s, before[2] + down_m_s)

@@ -1,3 +1,4 @@
+from itertools import pairwise
 from math import cos, hypot, inf, isfinite, nan, pi, sin
 
 import pytest
@@ -5,11 +6,12 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from firmware_py.airframe import load_airframe
-from firmware_py.guidance.modes import Guidance, SpeedLimits, bounded, speed_limits, usable
+from firmware_py.guidance.modes import Guidance, SpeedLimits, bounded, manners, speed_limits, usable
 from firmware_py.parameters import Parameters
 from firmware_py.types import Setpoint, VehicleState
 
 LIMITS = SpeedLimits(2.0, 1.5, 1.0, 2.0, 1.2, 0.7)
+MANNERS = manners(load_airframe("abejorro"), Parameters())
 
 any_float = st.floats(allow_nan=True, allow_infinity=True)
 any_vec3 = st.tuples(any_float, any_float, any_float)
@@ -20,7 +22,7 @@ def at(north=0.0, east=0.0, down=0.0, yaw=0.0, velocity=(0.0, 0.0, 0.0)):
 
 
 def offboard(**setpoint):
-    guidance = Guidance(LIMITS)
+    guidance = Guidance(LIMITS, MANNERS)
     guidance.enter_offboard()
     guidance.accept(Setpoint(0, **setpoint))
     return guidance
@@ -106,19 +108,33 @@ def test_infinity_is_not_controlled_and_so_brakes():
     assert safe.velocity_ned_m_s == (0.0, 1.0, 0.0)
 
 
-def test_hold_brakes_first_and_then_keeps_the_place():
-    guidance = Guidance(LIMITS)
-    guidance.enter_hold(at(velocity=(1.0, 0.0, 0.0), yaw=0.3))
-    assert guidance.step(at(0.5, velocity=(1.0, 0.0, 0.0), yaw=0.3)).velocity_level_m_s[:2] == (0.0, 0.0)
-    guidance.step(at(1.0, velocity=(0.1, 0.0, 0.0), yaw=0.3))
-    assert guidance.setpoint.position_ned_m == (1.0, 0.0, 0.0)
-    command = guidance.step(at(1.5, 0.0, 0.2, yaw=0.0))
-    assert command.velocity_level_m_s == pytest.approx((-0.5, 0.0, -0.2))
+def test_hold_brakes_gently_and_then_keeps_the_place():
+    guidance = Guidance(LIMITS, MANNERS)
+    state = at(velocity=(1.0, 0.0, 0.0), yaw=0.3)
+    guidance.enter_hold(state)
+    speeds = []
+    for _ in range(500):
+        speeds.append(guidance.step(state).velocity_level_m_s[0])
+        state.position_ned_m = guidance.traveller.reference.position_ned_m
+    assert all(after < before + 1e-3 for before, after in pairwise(speeds))
+    assert speeds[0] == pytest.approx(cos(0.3), rel=0.01)
+    north_m, east_m, _ = guidance.setpoint.position_ned_m
+    assert 0.3 < north_m < 0.8
+    command = guidance.step(at(north_m - 0.2, east_m, 0.1, yaw=0.0))
+    assert command.velocity_level_m_s == pytest.approx((0.2, 0.0, -0.1), abs=0.01)
     assert command.yaw_rate_rad_s > 0
 
 
+def test_hold_of_what_stands_keeps_that_very_place():
+    guidance = Guidance(LIMITS, MANNERS)
+    guidance.enter_hold(at(1.0, 2.0, -3.0))
+    guidance.step(at(1.0, 2.0, -3.0))
+    assert guidance.setpoint.position_ned_m == (1.0, 2.0, -3.0)
+    assert guidance.step(at(0.5, 2.0, -3.1)).velocity_level_m_s == pytest.approx((0.5, 0.0, 0.1))
+
+
 def test_takeoff_climbs_straight_up_says_when_it_is_there_and_hold_keeps_its_height():
-    guidance = Guidance(LIMITS)
+    guidance = Guidance(LIMITS, MANNERS)
     guidance.enter_takeoff(at(1.0, 2.0, 0.0), -2.5)
     command = guidance.step(at(1.1, 2.0, 0.0))
     assert command.velocity_level_m_s == pytest.approx((-0.1, 0.0, -1.2))
@@ -126,27 +142,29 @@ def test_takeoff_climbs_straight_up_says_when_it_is_there_and_hold_keeps_its_hei
     guidance.step(at(1.0, 2.0, -2.4))
     assert guidance.target_reached
     guidance.enter_hold(at(1.0, 2.0, -2.4), keep_target=True)
-    assert guidance.step(at(1.0, 2.0, -2.4)).velocity_level_m_s[2] == pytest.approx(-0.1)
+    guidance.step(at(1.0, 2.0, -2.4))
+    assert guidance.setpoint.position_ned_m == (1.0, 2.0, -2.5)
 
 
 def test_takeoff_to_below_stays():
-    guidance = Guidance(LIMITS)
+    guidance = Guidance(LIMITS, MANNERS)
     guidance.enter_takeoff(at(down=-5.0), -2.5)
     assert guidance.step(at(down=-5.0)).velocity_level_m_s == (0.0, 0.0, 0.0)
     assert guidance.target_reached
 
 
-def test_land_descends_and_keeps_its_place():
-    guidance = Guidance(LIMITS)
+def test_land_descends_ever_faster_to_its_speed_and_keeps_its_place():
+    guidance = Guidance(LIMITS, MANNERS)
     guidance.enter_land(at(1.0, 1.0, -3.0))
-    guidance.step(at(1.0, 1.0, -3.0))
+    sinks = [guidance.step(at(1.0, 1.0, -3.0)).velocity_level_m_s[2] for _ in range(500)]
+    assert all(after > before - 1e-3 for before, after in pairwise(sinks))
     command = guidance.step(at(0.8, 1.0, -2.0))
-    assert command.velocity_level_m_s == pytest.approx((0.2, 0.0, 0.7))
-    assert guidance.command_down_m_s == 0.7
+    assert command.velocity_level_m_s == pytest.approx((0.2, 0.0, 0.7), abs=0.001)
+    assert guidance.command_down_m_s == pytest.approx(0.7, abs=0.001)
 
 
 def test_setpoints_are_shown_only_while_followed():
-    guidance = Guidance(LIMITS)
+    guidance = Guidance(LIMITS, MANNERS)
     guidance.enter_hold(at())
     guidance.accept(Setpoint(7, velocity_ned_m_s=(9.0, 0.0, 0.0)))
     assert guidance.setpoint.time_us == 0
