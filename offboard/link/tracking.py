@@ -18,8 +18,10 @@ LAG_S = 0.3  # of a vehicle that needs no help
 MEMORY_S = 0.5  # a lag is made up for about so long after the command has changed
 DEAD_BAND_M = 0.04
 DEAD_BAND_RAD = 0.05
+FORGET_S = 1.0  # what is off beside the way is given up so quickly: the mission sees it, and steers anew
 LEASH_M = 0.5  # how far the place may be from the vehicle
 LEASH_RAD = 0.5
+STAND_M_S = 0.05  # a slower command is a stand, which has no sides
 PULL_PER_S = 1.2
 TURN_PER_S = 1.5
 MOST_M_S = 0.5
@@ -90,10 +92,32 @@ def _advance(reference: _Reference, flown: VelocityCommand, state: DroneState, s
     z = off_z + at_z - state.z + up * step_s
     distance_m = hypot(x, y, z)
     scale = LEASH_M / distance_m if distance_m > LEASH_M else 1.0
-    reference.off_m, reference.at_m = (scale * x, scale * y, scale * z), (state.x, state.y, state.z)
+    x, y = _forget_beside((scale * x, scale * y), (forward, left), state.yaw, exp(-step_s / FORGET_S))
+    reference.off_m, reference.at_m = (x, y, scale * z), (state.x, state.y, state.z)
     off_rad = remainder(reference.yaw_rad + flown.yaw_rate_rad_s * step_s - state.yaw, 2 * pi)
     reference.yaw_rad = state.yaw + max(-LEASH_RAD, min(LEASH_RAD, off_rad))
     reference.time_us = state.time_us
+
+
+def _forget_beside(
+    off_m: tuple[float, float], flown_m_s: tuple[float, float], yaw_rad: float, kept: float
+) -> tuple[float, float]:
+    """Keep all of what is off along the command and a share of what is off beside it; all in a stand.
+
+    A mission that steers by sight has seen where it is and aims from there. A vehicle pushed back to the
+    old way meanwhile would come past its aim on the other side.
+    """
+    speed_m_s = hypot(*flown_m_s)
+    if speed_m_s < STAND_M_S:
+        return off_m
+    c, s = cos(yaw_rad), sin(yaw_rad)
+    forward, left = flown_m_s[0] / speed_m_s, flown_m_s[1] / speed_m_s
+    along_x, along_y = c * forward - s * left, s * forward + c * left
+    along_m = off_m[0] * along_x + off_m[1] * along_y
+    return (
+        along_m * along_x + kept * (off_m[0] - along_m * along_x),
+        along_m * along_y + kept * (off_m[1] - along_m * along_y),
+    )
 
 
 def _pulled(command: VelocityCommand, reference: _Reference, state: DroneState) -> VelocityCommand:

@@ -138,3 +138,19 @@ def test_without_time_nothing_moves():
     tracker, vehicle = CommandTracker(), Vehicle()
     for _ in range(5):
         assert tracker.correct(AHEAD, vehicle.state) == AHEAD
+
+
+def test_what_is_off_beside_the_way_is_forgotten_and_along_it_is_not():
+    """The mission steers by sight: pushed back to the old way, the vehicle would come past its aim."""
+    tracker, vehicle = CommandTracker(), Vehicle(yaw=0.0)
+    fly(vehicle, [(STAND, 1.0)], tracker)
+    vehicle.place[0] -= 0.3
+    vehicle.place[1] += 0.3
+    sent = [tracker.correct(AHEAD, vehicle.state)]
+    for _ in range(80):
+        vehicle.time_us += 50_000
+        vehicle.place[0] += AHEAD.forward_m_s * STEP_S  # goes on, parallel to the way
+        sent.append(tracker.correct(AHEAD, vehicle.state))
+    assert sent[0].left_m_s < -0.1
+    assert sent[-1].left_m_s == pytest.approx(0.0, abs=0.02)
+    assert sent[-1].forward_m_s > AHEAD.forward_m_s + 0.1
