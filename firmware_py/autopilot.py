@@ -134,6 +134,7 @@ class Autopilot:
         self._stopped = MotorOutput((0.0,) * len(airframe.rotors))
         self.output = self._stopped
         self._state_entered = State.DISARMED
+        self._motors_stand = True
         self._shown_state: State | None = None
         self._airborne = LandedState.IN_AIR
         self._texts: deque[StatusText] = deque(maxlen=_TEXTS_KEPT)
@@ -195,7 +196,7 @@ class Autopilot:
         if commander.state is State.MISSION:
             self._fly_mission()
         self._refresh_status()
-        if commander.state in _STOPPED_STATES:
+        if self._motors_stand:
             self.output = self._stopped
         elif sound:
             self.output = self._fly(guidance.step(state))
@@ -259,7 +260,7 @@ class Autopilot:
         """Fly to a place and hold there.
 
         Args:
-            target_ned_m: in the local frame, shape (3,); NaN components: where it is now.
+            target_ned_m: in the local frame, shape (3,); NaN components: where it holds, or has braked.
             yaw_rad: where to look; NaN: along the way.
             speed_m_s: horizontal; NaN: MPC_XY_CRUISE.
 
@@ -272,15 +273,7 @@ class Autopilot:
             return CommandResult.DENIED
         result = self._command(Event.SET_HOLD)
         if result is CommandResult.ACCEPTED and self.status.armed and not self._land_detector.landed:
-            if all(map(isnan, target_ned_m)):
-                self._guidance.enter_hold(self.state)
-            else:
-                here = self.state.position_ned_m
-                north, east, down = (
-                    place if isnan(wanted) else wanted
-                    for wanted, place in zip(target_ned_m, here, strict=True)
-                )
-                self._guidance.enter_journey(self.state, (north, east, down), yaw_rad, speed_m_s)
+            self._guidance.enter_journey(self.state, target_ned_m, yaw_rad, speed_m_s)
         return result
 
     def orbit(self, orbit: Orbit) -> CommandResult:
@@ -337,7 +330,7 @@ class Autopilot:
         self._guidance.sticks = sticks
         self._commander.sticks_came()
         state = self._commander.state
-        if state in _BY_HAND or state in _STOPPED_STATES or self._land_detector.landed:
+        if self._motors_stand or state in _BY_HAND or self._land_detector.landed:
             return
         threshold = self.parameters.value("COM_RC_STICK_OV") / 100.0
         bit = _OFFBOARD_BIT if state is State.OFFBOARD else _AUTO_BIT
@@ -396,7 +389,8 @@ class Autopilot:
         before, self._state_entered = self._state_entered, row.target
         if before is State.DISARMED:
             self._leave_disarmed()
-        if row.target in _STOPPED_STATES:
+        self._motors_stand = row.target in _STOPPED_STATES
+        if self._motors_stand:
             self.output = self._stopped
             self._lift_off.rest()
         self._update_view()
@@ -427,7 +421,7 @@ class Autopilot:
     def _detect_land(self) -> None:
         detector = self._land_detector
         before = detector.landed
-        armed = self._commander.state not in _STOPPED_STATES
+        armed = not self._motors_stand
         landed = detector.update(
             self.state,
             armed=armed,

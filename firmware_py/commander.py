@@ -149,14 +149,24 @@ class Commander:
             now.flown = self.state is not State.DISARMED
         now.target_reached = target_reached
         row = first_match(self._tick_rows, now)
-        if row is None and self.state is not State.DISARMED:
-            cause = self._trouble()
-            if cause is not None:
-                now.handled.add(cause)
-                row = first_match(RULES[self.state, CAUSE_EVENT[cause]], now)
+        if row is None:
+            if self.state is State.OFFBOARD and setpoint_lost(now):
+                row = self._react(Cause.SETPOINTS)
+            elif now_us >= self._watch_us:
+                row = self._watch(now_us)
         if row is not None:
             self._follow(row)
         return row
+
+    def _watch(self, now_us: int) -> Row | None:
+        """Look for what is not urgent."""
+        self._watch_us = now_us + _WATCH_PERIOD_US
+        cause = None if self.state is State.DISARMED else trouble(self.situation)
+        return None if cause is None else self._react(cause)
+
+    def _react(self, cause: Cause) -> Row | None:
+        self.situation.handled.add(cause)
+        return first_match(RULES[self.state, CAUSE_EVENT[cause]], self.situation)
 
     def handle(self, event: Event) -> Row:
         """Take a command, between ticks; the rule that fired holds the answer."""
@@ -203,15 +213,6 @@ class Commander:
             manual_disabled=whole("COM_RC_IN_MODE") == _MANUAL_DISABLED,
             without_sticks=_WITHOUT_STICKS.get(whole("NAV_RCL_ACT"), Reaction.HOLD),
         )
-
-    def _trouble(self) -> Cause | None:
-        now = self.situation
-        if self.state is State.OFFBOARD and setpoint_lost(now):
-            return Cause.SETPOINTS
-        if now.now_us < self._watch_us:
-            return None
-        self._watch_us = now.now_us + _WATCH_PERIOD_US
-        return trouble(now)
 
     def _follow(self, row: Row) -> None:
         now = self.situation

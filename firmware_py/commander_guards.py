@@ -362,10 +362,11 @@ def trouble(now: Situation) -> Cause | None:
     """The first cause, severe ones first, that holds and was not reacted to yet; forgets what is over."""
     handled = now.handled
     for cause, holds in _TROUBLES:
-        if not holds(now):
+        if holds(now):
+            if cause not in handled:
+                return cause
+        elif handled:
             handled.discard(cause)
-        elif cause not in handled:
-            return cause
     return None
 
 
