@@ -33,6 +33,25 @@ class FlightMode(Enum):
         return int(main) << 16 | int(sub) << 24
 
 
+NAVIGATION_STATES: dict[FlightMode, int] = {
+    FlightMode.MANUAL: 0,
+    FlightMode.ALTITUDE: 1,
+    FlightMode.POSITION: 2,
+    FlightMode.MISSION: 3,
+    FlightMode.HOLD: 4,
+    FlightMode.RETURN: 5,
+    FlightMode.ACRO: 10,
+    FlightMode.TERMINATION: 13,
+    FlightMode.OFFBOARD: 14,
+    FlightMode.STABILIZED: 15,
+    FlightMode.TAKEOFF: 17,
+    FlightMode.LAND: 18,
+    FlightMode.FOLLOW: 19,
+    FlightMode.ORBIT: 21,
+}
+"""PX4's number of each mode inside (its navigation state), as logs and events have it."""
+
+
 class LandedState(IntEnum):
     """MAV_LANDED_STATE."""
 

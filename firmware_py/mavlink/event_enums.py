@@ -7,25 +7,10 @@ from __future__ import annotations
 
 from enum import IntFlag
 
-from firmware_py.status import FlightMode
+from firmware_py.status import NAVIGATION_STATES, FlightMode
 
-MODE_GROUPS: dict[FlightMode, int] = {
-    FlightMode.MANUAL: 0,
-    FlightMode.ALTITUDE: 1,
-    FlightMode.POSITION: 2,
-    FlightMode.MISSION: 3,
-    FlightMode.HOLD: 4,
-    FlightMode.RETURN: 5,
-    FlightMode.ACRO: 10,
-    FlightMode.TERMINATION: 13,
-    FlightMode.OFFBOARD: 14,
-    FlightMode.STABILIZED: 15,
-    FlightMode.TAKEOFF: 17,
-    FlightMode.LAND: 18,
-    FlightMode.FOLLOW: 19,
-    FlightMode.ORBIT: 21,
-}
-"""PX4's number of each mode (its navigation state); each is a group of its own, as in PX4."""
+MODE_GROUPS = NAVIGATION_STATES
+"""Each mode is a group of its own, as in PX4."""
 
 ALL_MODES = sum(1 << group for group in MODE_GROUPS.values())
 

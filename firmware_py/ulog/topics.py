@@ -12,7 +12,7 @@ from math import atan2, hypot, nan
 
 from firmware_py.mavlink.port import AutopilotPort
 from firmware_py.mavlink.sensing import EARTH_FIELD_NED_GAUSS, pressure_hpa, temperature_k, to_body
-from firmware_py.status import FlightMode, LandedState
+from firmware_py.status import NAVIGATION_STATES, LandedState
 from firmware_py.types import GeodeticPoint
 from firmware_py.ulog.messages import Topic
 
@@ -26,23 +26,6 @@ _USUAL_US = 100_000
 _SLOW_US = 500_000
 _ARMED, _DISARMED = 2, 1  # vehicle_status.arming_state
 _ROTARY_WING = 1
-# vehicle_status.nav_state
-_NAV_STATES = {
-    FlightMode.MANUAL: 0,
-    FlightMode.ALTITUDE: 1,
-    FlightMode.POSITION: 2,
-    FlightMode.MISSION: 3,
-    FlightMode.HOLD: 4,
-    FlightMode.RETURN: 5,
-    FlightMode.ACRO: 10,
-    FlightMode.TERMINATION: 13,
-    FlightMode.OFFBOARD: 14,
-    FlightMode.STABILIZED: 15,
-    FlightMode.TAKEOFF: 17,
-    FlightMode.LAND: 18,
-    FlightMode.FOLLOW: 19,
-    FlightMode.ORBIT: 21,
-}
 # estimator_status.control_mode_flags: tilt and yaw aligned, GNSS position, magnetic heading, barometer
 # height, GNSS velocity; the bit in between says that it flies.
 _ESTIMATOR_MODE = 1 << 0 | 1 << 1 | 1 << 2 | 1 << 4 | 1 << 9 | 1 << 44
@@ -267,8 +250,8 @@ def _vehicle_status(sample: Sample) -> Values:
         flight.armed_us if status.armed else 0,
         flight.takeoff_us,
         _ARMED if status.armed else _DISARMED,
-        _NAV_STATES[status.intended_mode],
-        _NAV_STATES[status.mode],
+        NAVIGATION_STATES[status.intended_mode],
+        NAVIGATION_STATES[status.mode],
         0,
         _ROTARY_WING,
         status.failsafe,
