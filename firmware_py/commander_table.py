@@ -185,7 +185,7 @@ _HARD_FAILURES = (
     _stop(_ARMED, when.landed_after_flight, "Disarmed by landing"),
     _stop(_LANDING, when.landing_done, "Disarmed by landing"),
     _stop(_FLYING, when.never_flown, "Disarmed by auto preflight disarming"),
-    _tick(_ARMED, when.offboard_back, State.OFFBOARD, "Offboard setpoints are back: offboard resumed"),
+    _tick(_FLYING, when.offboard_back, State.OFFBOARD, "Offboard setpoints are back: offboard resumed"),
     _stop(_at(State.FAILSAFE_HOLD), when.hold_over_on_ground, "Disarmed by failsafe", severity=CRITICAL),
 )
 

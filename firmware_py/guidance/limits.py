@@ -59,13 +59,15 @@ class SpeedLimits:
             north_m_s, east_m_s = north_m_s * scale, east_m_s * scale
         return (north_m_s, east_m_s, clamp(down_m_s, -self.up_m_s, self.down_m_s))
 
-    def landing_m_s(self, height_m: float) -> float:
-        """Descent of a landing at a height above home: fast high up, slow near the ground, as PX4's."""
-        if height_m <= self.land_slow_below_m or self.auto_down_m_s <= self.land_m_s:
+    def landing_m_s(self, height_m: float, high_up_m_s: float) -> float:
+        """Descent at a height above home: slow near the ground, and as told high up, as PX4's."""
+        if high_up_m_s <= self.land_m_s:
+            return high_up_m_s
+        if height_m <= self.land_slow_below_m:
             return self.land_m_s
         span_m = max(self.land_fast_above_m - self.land_slow_below_m, 0.1)
         share = min((height_m - self.land_slow_below_m) / span_m, 1.0)
-        return self.land_m_s + share * (self.auto_down_m_s - self.land_m_s)
+        return self.land_m_s + share * (high_up_m_s - self.land_m_s)
 
 
 def speed_limits(airframe: Airframe, parameters: Parameters) -> SpeedLimits:

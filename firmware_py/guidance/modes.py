@@ -40,6 +40,7 @@ __all__ = ["Guidance", "SpeedLimits", "bounded", "speed_limits", "usable"]
 _REACHED_M = 0.15
 _FACING_M = 0.5  # nearer than this, a region of interest says nothing about where to look
 _LITTLE = 0.7  # less than this share of the thrust that carries the weight means to go down
+_COUNTED_ON_US = 5_000_000  # so long a velocity made of accelerations is good enough to brake by
 _CENTRED = ManualInput(0)
 
 
@@ -91,6 +92,7 @@ class Guidance:
     """
 
     __slots__ = (
+        "_blind_us",
         "_manners",
         "_offboard",
         "_orbit",
@@ -128,6 +130,7 @@ class Guidance:
         self._shown_ned_m = NAN3  # the target that `setpoint` tells
         self._takeoff_ned_m = NAN3
         self._yaw_rad = 0.0
+        self._blind_us = 0
         self._step: Callable[[VehicleState], Command] = self._travel
         self.configure(limits, manners)
 
@@ -138,7 +141,7 @@ class Guidance:
 
     @home_ned_m.setter
     def home_ned_m(self, home_ned_m: Vec3) -> None:
-        self.traveller.heading.home_ned_m = home_ned_m
+        self.traveller.heading.home_ned_m = self._stick_flight.home_ned_m = home_ned_m
 
     def configure(self, limits: SpeedLimits, manners: Manners) -> None:
         """Take over changed parameters."""
@@ -172,9 +175,9 @@ class Guidance:
         self._show_journey(state)
 
     def enter_descend(self, state: VehicleState) -> None:
-        """Descend level, without a position to hold."""
-        self._step = self._descend
-        self._yaw_rad = state.yaw_rad
+        """Brake as long as the velocity can be counted on, then descend level: the position is lost."""
+        self._begin(state, self._descend)
+        self._blind_us = state.time_us + _COUNTED_ON_US
 
     def enter_offboard(self) -> None:
         """Follow the setpoints of `accept`."""
@@ -204,13 +207,13 @@ class Guidance:
             speed_m_s: horizontal; NaN: cruising speed.
         """
         traveller = self.traveller
-        held = traveller.target_ned_m if self._step == self._travel else NAN3
         if self._step != self._travel:
             self._begin(state, self._travel)
+        held = traveller.target_ned_m if traveller.is_at_rest else NAN3
         north_m, east_m, down_m = target_ned_m
-        if isnan(north_m) and isnan(east_m) and traveller.is_at_rest:
+        if isnan(north_m) or isnan(east_m):
             north_m, east_m = held[0], held[1]
-        if isnan(down_m) and traveller.is_at_rest:
+        if isnan(down_m):
             down_m = held[2]
         traveller.go((north_m, east_m, down_m), yaw_rad, speed_m_s)
         self._show_journey(state)
@@ -297,13 +300,17 @@ class Guidance:
     def _land(self, state: VehicleState) -> Command:
         traveller = self.traveller
         height_m = self.home_ned_m[2] - state.position_ned_m[2]
-        traveller.drift_ned_m_s = (0.0, 0.0, self.limits.landing_m_s(height_m))
+        traveller.drift_ned_m_s = (0.0, 0.0, self.limits.landing_m_s(height_m, self.limits.auto_down_m_s))
         velocity_ned_m_s, yaw_rad = traveller.step(state, self.limits, self._period_s, height_bound=False)
         return self._chase(state, velocity_ned_m_s, yaw_rad)
 
     def _descend(self, state: VehicleState) -> Command:
-        turn_rad_s = yaw_rate(state.yaw_rad, self._yaw_rad, nan, self.limits)
-        return TiltCommand(0.0, 0.0, turn_rad_s, nan, self.limits.land_m_s)
+        if state.time_us < self._blind_us:
+            return self._land(state)
+        limits = self.limits
+        turn_rad_s = yaw_rate(state.yaw_rad, self.traveller.yaw_rad, nan, limits)
+        down_m_s = limits.landing_m_s(self.home_ned_m[2] - state.position_ned_m[2], limits.auto_down_m_s)
+        return TiltCommand(0.0, 0.0, turn_rad_s, nan, down_m_s)
 
     def _return(self, state: VehicleState) -> Command:
         before = self.returning.phase

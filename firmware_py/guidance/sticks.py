@@ -16,6 +16,7 @@ from firmware_py.types import (
     RateCommand,
     Setpoint,
     TiltCommand,
+    Vec3,
     VehicleState,
 )
 
@@ -95,13 +96,15 @@ class StickFlight:
 
     Attributes:
         settings: see above.
+        home_ned_m: near its height a descent is slow, shape (3,).
         reference: the point that the sticks lead.
     """
 
-    __slots__ = ("_level_held", "_period_s", "reference", "settings")
+    __slots__ = ("_level_held", "_period_s", "home_ned_m", "reference", "settings")
 
     def __init__(self, settings: StickSettings, period_s: float) -> None:
         self.settings = settings
+        self.home_ned_m: Vec3 = (0.0, 0.0, 0.0)
         self.reference = Reference()
         self._period_s = period_s
         self._level_held = False
@@ -175,7 +178,11 @@ class StickFlight:
         """Move the point by the throttle and a horizontal velocity."""
         settings, reference = self.settings, self.reference
         up = self.released(sticks.up)
-        wanted_down_m_s = -up * (limits.up_m_s if up > 0.0 else limits.down_m_s)
+        if up > 0.0:
+            wanted_down_m_s = -up * limits.up_m_s
+        else:  # slower near the ground, as a landing
+            height_m = self.home_ned_m[2] - state.position_ned_m[2]
+            wanted_down_m_s = -up * limits.landing_m_s(height_m, limits.down_m_s)
         bound = settings.hold_vertical_m_s
         height_bound = up == 0.0 and (bound <= 0.0 or abs(state.velocity_ned_m_s[2]) < bound)
         pace = settings.braking if level_ned_m_s == (0.0, 0.0) else settings.moving

@@ -121,7 +121,8 @@ def _orbit(exchange: Exchange, command: Command) -> CommandResult:
     speed_m_s = speed_m_s if isfinite(speed_m_s) else 1.0
     most_m_s = autopilot.parameters.value("MPC_XY_CRUISE")
     speed_m_s = min(max(speed_m_s, -most_m_s), most_m_s)
-    behaviour = OrbitYaw(int(yaw)) if yaw in tuple(OrbitYaw) else OrbitYaw.CENTRE
+    known = yaw in tuple(OrbitYaw)
+    behaviour = OrbitYaw(int(yaw) if known else autopilot.parameters.integer("MC_ORBIT_YAW_MOD"))
     here = autopilot.state.position_ned_m
     north_m, east_m, down_m = (
         place if isnan(wanted) else wanted for wanted, place in zip(centre, here, strict=True)
