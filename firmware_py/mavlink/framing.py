@@ -102,11 +102,12 @@ class Packet:
     """A message packed once, to be sent on several links with their own sequence numbers and signatures.
 
     Attributes:
+        component_id: of its sender; each counts its own packets.
         length: bytes without a signature.
         is_heartbeat: the one message that a slow link never leaves out.
     """
 
-    __slots__ = ("_crc_extra", "_template", "is_heartbeat", "length")
+    __slots__ = ("_crc_extra", "_template", "component_id", "is_heartbeat", "length")
 
     def __init__(self, message: Message, system_id: int, component_id: int) -> None:
         # pymavlink's own way makes two objects and two checksums more, of which none would be used.
@@ -121,6 +122,7 @@ class Packet:
         )
         self._template += payload + b"\0\0"
         self._crc_extra = bytes((message.crc_extra,))
+        self.component_id = component_id
         self.length = len(self._template)
         self.is_heartbeat = message.get_msgId() == mavlink.MAVLINK_MSG_ID_HEARTBEAT
 

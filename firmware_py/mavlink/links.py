@@ -214,7 +214,6 @@ class Link:
         budget: of a slow link.
         traffic: what it has carried.
         gcs_heard: a ground station's heartbeat came in here, so people read its texts.
-        sequence: of the next packet.
         open: False once it is gone; what is sent then is lost without a word.
     """
 
@@ -226,8 +225,8 @@ class Link:
     budget: Budget | None = field(init=False)
     traffic: Traffic = field(default_factory=Traffic)
     gcs_heard: bool = False
-    sequence: int = 0
     open: bool = True
+    _sequences: dict[int, int] = field(default_factory=dict)  # of each component's next packet
     _datagrams: list[bytearray] = field(default_factory=list)
 
     def __post_init__(self) -> None:
@@ -242,13 +241,14 @@ class Link:
 
     def send(self, packet: Packet) -> None:
         """Queue a packet."""
-        signing = self.signing
+        signing, component_id = self.signing, packet.component_id
+        sequence = self._sequences.get(component_id, 0)
         if signing is None or not signing.active:
-            data = packet.numbered(self.sequence)
+            data = packet.numbered(sequence)
         else:
-            data = packet.numbered(self.sequence, signed=True)
+            data = packet.numbered(sequence, signed=True)
             data += signing.block(data, self.number)
-        self.sequence = (self.sequence + 1) % 256
+        self._sequences[component_id] = (sequence + 1) % 256
         self.forward(data)
 
     def send_stream(self, packet: Packet) -> None:

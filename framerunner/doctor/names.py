@@ -68,6 +68,7 @@ _PX4_MODES = {
     10: "terminated",
 }
 _PX4_AUTO = {2: "take-off", 3: "hold", 4: "mission", 5: "return", 6: "land", 8: "follow"}
+_PX4_SUB = {(3, 1): "orbit", (3, 2): "slow position"}
 OFFBOARD_MODE = 6 << 16
 
 
@@ -76,7 +77,7 @@ def mode_name(custom_mode: int, listed: dict[int, str]) -> str:
     if listed.get(custom_mode):
         return listed[custom_mode]
     main, sub = custom_mode >> 16 & 0xFF, custom_mode >> 24 & 0xFF
-    name = _PX4_AUTO.get(sub) if main == 4 else _PX4_MODES.get(main)
+    name = _PX4_SUB.get((main, sub)) or (_PX4_AUTO.get(sub) if main == 4 else _PX4_MODES.get(main))
     return name or f"mode {main}/{sub}"
 
 

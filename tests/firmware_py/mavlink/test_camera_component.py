@@ -1,3 +1,4 @@
+from itertools import pairwise
 from math import inf, nan, radians
 
 import pytest
@@ -284,3 +285,12 @@ def test_awkward_parameters_break_nothing(autopilot, make_peer, sent):
         peer.advance(0.02)
     assert peer.node.failed_messages == 0
     assert autopilot.calls == []
+
+
+def test_each_component_counts_its_own_packets(make_peer, autopilot):
+    peer = make_peer(autopilot, node_options={"camera": MODEL})
+    sent = [message for link, message in peer.advance(3.0) if link == "ground"]
+    for component in (1, 100):
+        numbers = [m.get_seq() for m in sent if m.get_srcComponent() == component]
+        assert len(numbers) >= 3
+        assert all((after - before) % 256 == 1 for before, after in pairwise(numbers))
