@@ -1,4 +1,4 @@
-"""The real MAVProxy on the ground link: finds the drone, reads its parameters, arms, takes off, lands."""
+"""The real MAVProxy on the ground link: parameters, plans, modes and a flight, typed at its console."""
 
 import os
 import re
@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from tests.processes import ROOT, wait_until
+from tests.processes import ROOT, simulator, wait_until
 
 pytestmark = pytest.mark.realtime
 
@@ -32,7 +32,7 @@ class MavProxy:
                     mavproxy_path(),
                     f"--master=udpin:127.0.0.1:{port}",
                     f"--state-basedir={folder}",
-                    "--default-modules=cmdlong,param,mode,arm,misc",
+                    "--default-modules=cmdlong,param,ftp,mode,arm,misc,wp,fence,rally",
                 ],
                 cwd=folder,
                 env={**os.environ, "HOME": str(folder), "PYTHONUNBUFFERED": "1"},
@@ -82,31 +82,95 @@ class MavProxy:
 
 
 @pytest.fixture
+def sim(tmp_path, instance):
+    """MAVProxy does not mind when time runs faster."""
+    with simulator(tmp_path, instance, "--speed", "3") as running:
+        yield running
+        assert running.process.poll() is None
+        assert "Traceback" not in running.err
+
+
+@pytest.fixture
 def mavproxy(tmp_path, sim, instance):
     console = MavProxy(tmp_path, 14550 + instance)
+    console.expect(rf"Detected vehicle {instance + 1}:1", 20.0)
+    console.expect(r"Mode LOITER")
     yield console
     console.close()
 
 
-def test_mavproxy_connects_reads_arms_takes_off_and_lands(mavproxy, instance):
-    mavproxy.expect(rf"Detected vehicle {instance + 1}:1", 20.0)
-    mavproxy.expect(r"Mode LOITER")
-    received = mavproxy.expect(r"Received (\d+) parameters", 30.0)
-    assert int(received[1]) > 10
+def plan_file(path, *items):
+    """A file of items (command, frame, params 1 to 4, latitude, longitude, altitude); its name."""
+    lines = ["QGC WPL 110"]
+    for number, (command, frame, params, *place) in enumerate(items):
+        fields = (number, int(number == 0), frame, command, *params, *place, 1)
+        lines.append("\t".join(str(field) for field in fields))
+    path.write_text("\n".join([*lines, ""]), encoding="utf-8")
+    return path.name
+
+
+def test_parameters_are_received_shown_and_set(mavproxy):
+    received = mavproxy.expect(r"Received (\d+) parameters", 15.0)  # there is no file of them: it falls back
+    assert int(received[1]) > 100
     mavproxy.type("param show MIS_TAKEOFF_ALT")
-    assert float(mavproxy.expect(r"MIS_TAKEOFF_ALT +([0-9.]+)")[1]) == pytest.approx(2.5)
+    assert float(mavproxy.expect(r"MIS_TAKEOFF_ALT +([0-9.]+)")[1]) == 2.5
+    mavproxy.type("param set MIS_TAKEOFF_ALT 4.5")
+    mavproxy.type("param set COM_OBL_RC_ACT 5")  # a whole number, which PX4 sends bytewise
+    mavproxy.ask("param fetch MIS_TAKEOFF_ALT", r"MIS_TAKEOFF_ALT = 4\.5")
+    mavproxy.ask("param fetch COM_OBL_RC_ACT", r"COM_OBL_RC_ACT = 5\b")
+
+
+def test_mission_fence_and_rally_points_are_loaded_and_listed(mavproxy, tmp_path):
+    places = [
+        (47.3977 + north / 1e4, 8.5455 + east / 1e4) for north, east in ((4, -4), (4, 4), (-4, 4), (-4, -4))
+    ]
+    mission = [(16, 3, (0, 0, 0, 0), *place, 20.0) for place in places]
+    fence = [(5001, 3, (4, 0, 0, 0), *place, 0.0) for place in places]
+    rally = [(5100, 3, (0, 0, 0, 0), *place, 20.0) for place in places[:2]]
+    for module, items in (("wp", mission), ("fence", fence), ("rally", rally)):
+        name = plan_file(tmp_path / f"{module}.txt", *items)
+        mavproxy.type(f"{module} load {name}")
+        mavproxy.expect(rf"Loaded {len(items)} .+ in [0-9.]+s")  # the vehicle has said that it has them all
+        mavproxy.type(f"{module} list")
+        mavproxy.expect(rf"Requesting {len(items)} ")
+        mavproxy.expect(rf"Saved {len(items)} ")
+        mavproxy.type(f"{module} clear")
+        mavproxy.ask(f"{module} list", r"Requesting 0 ")
+
+
+def test_a_flight_with_modes_take_off_a_place_to_go_to_and_return(mavproxy, tmp_path):
+    for mode, main, sub in (("POSCTL", 3, 0), ("MISSION", 4, 4), ("LOITER", 4, 3)):
+        mavproxy.type(f"long DO_SET_MODE 1 {main} {sub}")
+        mavproxy.expect(r"DO_SET_MODE: ACCEPTED")
+        mavproxy.expect(rf"Mode {mode}")
     mavproxy.ask("status GLOBAL_POSITION_INT", r"lat : 473977\d{3}, lon : 85455\d{3}")
+    mavproxy.type("long DO_SET_MODE 1 99")
+    mavproxy.expect(r"DO_SET_MODE: TEMPORARILY_REJECTED")
 
     mavproxy.type("arm throttle")
     mavproxy.expect(r"COMPONENT_ARM_DISARM: ACCEPTED")
     mavproxy.expect(r"ARMED")
-    mavproxy.type("long NAV_TAKEOFF 0 0 0 nan nan nan 491.5")  # PX4 counts from the sea, not from home
+    mavproxy.type("takeoff 494")  # PX4 counts from the sea, not from home
     mavproxy.expect(r"NAV_TAKEOFF: ACCEPTED")
     mavproxy.expect(r"Mode TAKEOFF")
-    mavproxy.ask("status EXTENDED_SYS_STATE", r"landed_state : 2", 10.0)  # in the air
-    mavproxy.ask("status GLOBAL_POSITION_INT", r"relative_alt : (1[5-9]\d\d|2\d\d\d)", 20.0)
+    mavproxy.expect(r"Mode LOITER", 20.0)
+    mavproxy.ask("status GLOBAL_POSITION_INT", r"relative_alt : (4[5-9]|5[0-5])\d\d\b")
+    mavproxy.type("disarm")
+    mavproxy.expect(r"COMPONENT_ARM_DISARM: TEMPORARILY_REJECTED")
 
-    mavproxy.type("long NAV_LAND")
-    mavproxy.expect(r"NAV_LAND: ACCEPTED")
-    mavproxy.expect(r"Mode LAND")
+    mavproxy.type("guided 47.3978 8.5456 8")
+    mavproxy.expect(r"DO_REPOSITION: ACCEPTED")
+    there = r"lat : 47397(79[5-9]|80[0-5])\d, lon : 8545(59[5-9]|60[0-5])\d"
+    arrived = there + r", alt : \d+, relative_alt : (7[5-9]|8[0-4])\d\d\b"
+    mavproxy.ask("status GLOBAL_POSITION_INT", arrived, 20.0)
+
+    mavproxy.type("param set RTL_RETURN_ALT 8")
+    mavproxy.type("long NAV_RETURN_TO_LAUNCH")
+    mavproxy.expect(r"NAV_RETURN_TO_LAUNCH: ACCEPTED")
+    mavproxy.expect(r"Mode RTL")
     mavproxy.expect(r"DISARMED", 30.0)
+
+    mavproxy.type("arm throttle")
+    mavproxy.expect(r"COMPONENT_ARM_DISARM: ACCEPTED")
+    mavproxy.type("disarm")
+    mavproxy.expect(r"COMPONENT_ARM_DISARM: ACCEPTED")
