@@ -96,7 +96,9 @@ def check_health(record: Record) -> Iterator[Finding]:
     ready = status.onboard_control_sensors_health & mavlink.MAV_SYS_STATUS_PREARM_CHECK
     if not ready and not record.armed:
         reasons = f": {sick_names}" if sick_names else ""
-        yield Finding(Level.MISSING, "pre-arm checks", f"not passed{reasons}", "see what it says below")
+        mend = "see what it says below; without a global position hold never passes, then fly tries offboard"
+        mode = names.mode_name(record.latest["HEARTBEAT"].custom_mode, record.modes).lower()
+        yield Finding(Level.MISSING, "pre-arm checks", f"not passed in {mode}{reasons}", mend)
     elif sick_names:
         yield Finding(Level.NOTE, "health", f"not well: {sick_names}", "mend it before flying")
     else:
