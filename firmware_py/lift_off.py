@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+from math import isnan
 from typing import Protocol
 
 from firmware_py.control.limits import TiltLimit
@@ -16,7 +18,9 @@ from firmware_py.types import (
     VehicleState,
 )
 
+_LEAST_SHARE = 0.02  # of the climb wanted, whatever the ramp says, once it works to leave the ground
 _LIFT_M_S = 0.04  # asked to climb faster than this, it leaves the ground
+_RAMP_FROM_M_S = 2.45  # PX4's ramp begins so far below zero: without thrust, g over its velocity gain
 _LIFT_HELD_TICKS = 125  # half a second: integrals rest while the contact still carries the weight
 
 
@@ -47,21 +51,23 @@ class LiftOff:
     Attributes:
         ticks: for how many ticks the motors have been working to leave the ground; 0: they idle.
         spool_up_us: motors idle this long after arming (COM_SPOOLUP_TIME).
-        ramp_us: the climb asked for grows this long after lift-off (MPC_TKO_RAMP_T).
+        ramp_us: the climb asked for grows this long from when it is wanted (MPC_TKO_RAMP_T).
     """
 
-    __slots__ = ("_armed_us", "_lifted_us", "ramp_us", "spool_up_us", "ticks")
+    __slots__ = ("_armed_us", "_ramp_start_us", "_wanted", "ramp_us", "spool_up_us", "ticks")
 
     def __init__(self) -> None:
         self.ticks = 0
         self.spool_up_us = 0
         self.ramp_us = 0
         self._armed_us = 0
-        self._lifted_us = -(10**15)
+        self._wanted = False  # to lift
+        self._ramp_start_us = -(10**15)
 
     def arm(self, time_us: int) -> None:
         """The motors may turn from now on."""
         self.ticks = 0
+        self._wanted = False
         self._armed_us = time_us
 
     def rest(self) -> None:
@@ -71,7 +77,8 @@ class LiftOff:
     def fly(self, stabiliser: RateStabiliser, state: VehicleState, command: Command) -> MotorOutput:
         """Motors for a command in the air."""
         self.ticks = 0
-        if state.time_us - self._lifted_us < self.ramp_us:
+        self._wanted = False
+        if state.time_us - self._ramp_start_us < self.ramp_us:
             command = self._ramped(command, state.time_us)
         return stabiliser.step(state, command)
 
@@ -93,27 +100,43 @@ class LiftOff:
             down_m_s: what it means vertically; below zero: up.
             may_lift: the mode flown is one that takes off.
         """
-        waits = state.time_us - self._armed_us < self.spool_up_us
-        if waits or not may_lift or down_m_s > -_LIFT_M_S:
+        climbs = isinstance(command, RateCommand) or (
+            isinstance(command, TiltCommand) and isnan(command.thrust)
+        )
+        if not self._lifts(state.time_us, down_m_s, may_lift=may_lift, ramped=climbs and self.ramp_us > 0):
             self.ticks = 0
             stabiliser.reset()
             return stabiliser.idle()
-        if self.ticks == 0:
-            self._lifted_us = state.time_us
         self.ticks += 1
         if self.ramp_us > 0:
             command = self._ramped(command, state.time_us)
         return stabiliser.step(state, _straight_up(command), grounded=self.ticks <= _LIFT_HELD_TICKS)
 
+    def _lifts(self, time_us: int, down_m_s: float, *, may_lift: bool, ramped: bool) -> bool:
+        """Whether the motors work to leave the ground: it is wanted, and the ramp allows a climb."""
+        if time_us - self._armed_us < self.spool_up_us or not may_lift or down_m_s > -_LIFT_M_S:
+            self._wanted = False
+            return False
+        if not self._wanted:
+            self._wanted = True
+            self._ramp_start_us = time_us
+        return self.ticks > 0 or not ramped or self._ramp(down_m_s, time_us) < 0.0
+
+    def _ramp(self, down_m_s: float, time_us: int) -> float:
+        """The vertical velocity allowed on the way to one wanted, below zero: up."""
+        share = min((time_us - self._ramp_start_us) / self.ramp_us, 1.0)
+        return _RAMP_FROM_M_S - share * (_RAMP_FROM_M_S - down_m_s)
+
     def _ramped(self, command: Command, time_us: int) -> Command:
         """Less climb in the first moments."""
-        if not isinstance(command, RateCommand):
-            return command
-        share = min(max((time_us - self._lifted_us) / self.ramp_us, 0.02), 1.0)
-        forward_m_s, right_m_s, down_m_s = command.velocity_level_m_s
-        if down_m_s >= 0.0:
-            return command
-        return RateCommand((forward_m_s, right_m_s, share * down_m_s), command.yaw_rate_rad_s)
+        if isinstance(command, RateCommand) and command.velocity_level_m_s[2] < 0.0:
+            forward_m_s, right_m_s, down_m_s = command.velocity_level_m_s
+            down_m_s = min(self._ramp(down_m_s, time_us), _LEAST_SHARE * down_m_s)
+            return RateCommand((forward_m_s, right_m_s, down_m_s), command.yaw_rate_rad_s)
+        if isinstance(command, TiltCommand) and isnan(command.thrust) and command.down_m_s < 0.0:
+            down_m_s = min(self._ramp(command.down_m_s, time_us), _LEAST_SHARE * command.down_m_s)
+            return replace(command, down_m_s=down_m_s)
+        return command
 
 
 def _straight_up(command: Command) -> Command:

@@ -17,7 +17,7 @@ from sitl.world import World
 ORIGIN = GeodeticPoint(47.397742, 8.545594, 489.0)
 TICKS_PER_S = 250
 _STREAM_TICKS = 12  # setpoints and sticks come at 20 Hz
-GROUND_TRUTH = 5  # every so many ticks a sample is kept
+_SAMPLE_TICKS = 5
 
 
 @dataclass(frozen=True, slots=True)
@@ -51,6 +51,7 @@ class Flight:
     Attributes:
         setpoint: what an offboard controller sends; None: nothing.
         sticks: what a pilot sends; None: nothing.
+        ground_station: whether one is heard.
         sensed: makes what the autopilot senses of what is true.
         track: what was flown, oldest first.
         texts: what the autopilot told.
@@ -62,6 +63,7 @@ class Flight:
         self.autopilot = Autopilot(body, ORIGIN, Parameters(parameters, defaults=body.parameters))
         self.setpoint: Setpoint | None = None
         self.sticks: ManualInput | None = None
+        self.ground_station = False
         self.sensed: Callable[[Sensors], Sensors] = lambda sensors: sensors
         self.track: list[Sample] = []
         self.texts: list[str] = []
@@ -148,6 +150,8 @@ class Flight:
         time_us = self.world.time_us
         if self.setpoint is not None:
             self.autopilot.accept_setpoint(replace(self.setpoint, time_us=time_us))
+        if self.ground_station:
+            self.autopilot.ground_station_heard()
         if self.sticks is not None:
             self.autopilot.manual_input(replace(self.sticks, time_us=time_us))
 
@@ -155,7 +159,7 @@ class Flight:
         if self._ticks % _STREAM_TICKS == 0:
             self._stream()
         sensors = self.world.sensors()
-        if self._ticks % GROUND_TRUTH == 0:
+        if self._ticks % _SAMPLE_TICKS == 0:
             self.track.append(self._sample(sensors))
         self.world.step(self.autopilot.step(self.sensed(sensors)))
         self._ticks += 1

@@ -243,11 +243,15 @@ def test_nothing_happens_by_itself_when_all_is_well(state):
     assert first_match(RULES[state, Event.TICK], replace(FLYING)) is None
 
 
-@pytest.mark.parametrize("state", sorted(ARMED, key=lambda state: state.value))
+@pytest.mark.parametrize("state", sorted(ARMED - {State.TERMINATED}, key=lambda state: state.value))
 def test_offboard_resumes_from_wherever_its_loss_led(state):
     row = first_match(RULES[state, Event.TICK], replace(FLYING, cause=Cause.SETPOINTS))
     assert row is not None
     assert row.target is State.OFFBOARD
+
+
+def test_nothing_resumes_once_the_flight_is_terminated():
+    assert first_match(RULES[State.TERMINATED, Event.TICK], replace(FLYING, cause=Cause.SETPOINTS)) is None
 
 
 SEVERITY = [State.FAILSAFE_HOLD, State.FAILSAFE_RETURN, State.FAILSAFE_LAND, State.TERMINATED]
