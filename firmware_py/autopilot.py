@@ -463,12 +463,18 @@ class Autopilot:
             speed_limits(self.airframe, parameters), manners(self.airframe, self.parameters)
         )
         self._watch.configure(parameters)
-        self._stabiliser.limits.tilt_rad = radians(parameters.value("MPC_TILTMAX_AIR"))
+        self._limit_stabiliser()
         self._lift_off.spool_up_us = round(parameters.value("COM_SPOOLUP_TIME") * 1e6)
         self._lift_off.ramp_us = round(parameters.value("MPC_TKO_RAMP_T") * 1e6)
-        self._land_detector.trigger_us = round(parameters.value("LNDMC_TRIG_TIME") * 1e6)
+        self._land_detector.configure(parameters)
         tilt_deg = min(parameters.value("FD_FAIL_P"), parameters.value("FD_FAIL_R")) or 180.0  # 0: never
         self._upright_cosine = cos(radians(tilt_deg))
+
+    def _limit_stabiliser(self) -> None:
+        value, limits = self.parameters.value, self._stabiliser.limits
+        limits.tilt_rad = radians(value("MPC_TILTMAX_AIR"))
+        limits.rate_rad_s = radians(min(value("MC_ROLLRATE_MAX"), value("MC_PITCHRATE_MAX")))
+        limits.least_thrust, limits.most_thrust = value("MPC_THR_MIN"), value("MPC_THR_MAX")
 
     def _refresh_status(self) -> None:
         status, commander = self.status, self._commander

@@ -7,10 +7,13 @@ times because the vehicle is light and its state clean.
 
 from __future__ import annotations
 
+from math import hypot, inf, radians
+
+from firmware_py.parameters import Parameters
 from firmware_py.types import VehicleState
 
 _FALL_US = 100_000  # unasked motion longer than this is not standing
-_MOVING_M_S = 0.3
+_MOVING_M_S = 0.3  # while it stands
 _DESCENT_COMMAND_M_S = 0.05
 _DESCENT_SHARE = 0.3  # less than this share of the commanded descent is "not descending"
 _LOW_THRUST_SHARE = 0.9  # of hover; slow descent in the air needs nearly all of it
@@ -24,6 +27,9 @@ class LandDetector:
     Attributes:
         landed: whether it stands on something.
         trigger_us: the signs of ground must hold this long (LNDMC_TRIG_TIME).
+        vertical_m_s: standing means less (LNDMC_Z_VEL_MAX).
+        level_m_s: standing means less (LNDMC_XY_VEL_MAX).
+        turning_rad_s: of roll and pitch; standing means less (LNDMC_ROT_MAX).
     """
 
     __slots__ = (
@@ -32,7 +38,10 @@ class LandDetector:
         "_last_unlike_us",
         "_stand_down_m",
         "landed",
+        "level_m_s",
         "trigger_us",
+        "turning_rad_s",
+        "vertical_m_s",
     )
 
     def __init__(self, hover_throttle: float) -> None:
@@ -43,10 +52,20 @@ class LandDetector:
         """
         self.landed = True
         self.trigger_us = 300_000
+        self.vertical_m_s = self.level_m_s = _MOVING_M_S
+        self.turning_rad_s = inf
         self._hover_throttle = hover_throttle
         self._stand_down_m = 0.0
         self._last_still_us = 0
         self._last_unlike_us = 0
+
+    def configure(self, parameters: Parameters) -> None:
+        """Take over changed parameters."""
+        value = parameters.value
+        self.trigger_us = round(value("LNDMC_TRIG_TIME") * 1e6)
+        self.vertical_m_s = value("LNDMC_Z_VEL_MAX")
+        self.level_m_s = value("LNDMC_XY_VEL_MAX")
+        self.turning_rad_s = radians(value("LNDMC_ROT_MAX"))
 
     def update(
         self, state: VehicleState, *, armed: bool, lifting: bool, command_down_m_s: float, throttle: float
@@ -91,10 +110,11 @@ class LandDetector:
             self._last_unlike_us = state.time_us
             return
         north_m_s, east_m_s, down_m_s = state.velocity_ned_m_s
+        roll_rad_s, pitch_rad_s, _ = state.angular_rate_frd_rad_s
         like_ground = (
-            abs(down_m_s) < _MOVING_M_S
-            and abs(north_m_s) < _MOVING_M_S
-            and abs(east_m_s) < _MOVING_M_S
+            abs(down_m_s) < self.vertical_m_s
+            and hypot(north_m_s, east_m_s) < self.level_m_s
+            and hypot(roll_rad_s, pitch_rad_s) < self.turning_rad_s
             and (
                 not armed
                 or (

@@ -6,7 +6,7 @@ from dataclasses import replace
 from math import isnan
 from typing import Protocol
 
-from firmware_py.control.limits import TiltLimit
+from firmware_py.control.limits import FlightLimits
 from firmware_py.types import (
     AccelerationCommand,
     ActuatorCommand,
@@ -31,7 +31,7 @@ class RateStabiliser(Protocol):
         limits: of the tilt; may be set in flight.
     """
 
-    limits: TiltLimit
+    limits: FlightLimits
 
     def reset(self) -> None:
         """Forget all integrals."""
@@ -161,7 +161,7 @@ class Undesigned:
     """Stands in until the stabiliser is designed; never flown."""
 
     def __init__(self) -> None:
-        self.limits = TiltLimit(1.0)
+        self.limits = FlightLimits(1.0)
 
     def reset(self) -> None:
         """Nothing to forget."""

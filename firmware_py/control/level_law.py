@@ -17,7 +17,7 @@ from math import cos, sin, sqrt
 
 from firmware_py.airframe import GRAVITY_M_S2, Airframe
 from firmware_py.control.design import design
-from firmware_py.control.limits import TiltLimit
+from firmware_py.control.limits import FlightLimits
 from firmware_py.control.mixer import Mixer
 from firmware_py.control.weights import Weights
 from firmware_py.types import MotorOutput, RateCommand, Vec3, VehicleState
@@ -45,7 +45,7 @@ class LevelLaw:
         airframe: Airframe,
         period_s: float,
         weights: Weights | None,
-        limits: TiltLimit,
+        limits: FlightLimits,
         mixer: Mixer,
         *,
         horizontal_reference_weight: float = 0.5,

@@ -2,25 +2,39 @@
 
 from __future__ import annotations
 
-from math import tan
+from math import inf, tan
 
 
-class TiltLimit:
-    """The greatest tilt that following a velocity or an acceleration may ask for.
+class FlightLimits:
+    """The greatest tilt that following a velocity or an acceleration may ask for, and other bounds.
 
     Args:
         airframe_tilt_rad: what the airframe can do; nobody can ask for more.
 
     Attributes:
+        rate_rad_s: of roll and pitch together, where an attitude is turned to by the vector law.
+        least_thrust: where the height is controlled, as a share of full thrust.
+        most_thrust: the same.
         tilt_squared: square of the limit, for small angles.
         tilt_tangent: its tangent, horizontal thrust per vertical thrust.
     """
 
-    __slots__ = ("_airframe_tilt_rad", "_tilt_rad", "tilt_squared", "tilt_tangent")
+    __slots__ = (
+        "_airframe_tilt_rad",
+        "_tilt_rad",
+        "least_thrust",
+        "most_thrust",
+        "rate_rad_s",
+        "tilt_squared",
+        "tilt_tangent",
+    )
 
     def __init__(self, airframe_tilt_rad: float) -> None:
         self._airframe_tilt_rad = airframe_tilt_rad
         self.tilt_rad = airframe_tilt_rad
+        self.rate_rad_s = inf
+        self.least_thrust = 0.0
+        self.most_thrust = 1.0
 
     @property
     def tilt_rad(self) -> float:

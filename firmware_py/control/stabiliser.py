@@ -10,7 +10,7 @@ from math import radians
 
 from firmware_py.airframe import Airframe
 from firmware_py.control.level_law import LevelLaw
-from firmware_py.control.limits import TiltLimit
+from firmware_py.control.limits import FlightLimits
 from firmware_py.control.mixer import Mixer
 from firmware_py.control.vector_law import VectorLaw
 from firmware_py.control.weights import Weights
@@ -34,7 +34,7 @@ class Stabiliser:
 
     def __init__(self, airframe: Airframe, period_s: float, weights: Weights | None = None) -> None:
         mixer = Mixer(airframe)
-        self.limits = TiltLimit(airframe.limits.tilt_rad)
+        self.limits = FlightLimits(airframe.limits.tilt_rad)
         self._idle = MotorOutput(mixer.mix(0.0, 0.0, 0.0, 0.0).speeds_rad_s)
         self._vector = VectorLaw(airframe, period_s, weights, self.limits, mixer)
         self._rate_law: LevelLaw | VectorLaw = self._vector

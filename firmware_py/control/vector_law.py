@@ -13,7 +13,7 @@ from math import cos, isnan, sin, sqrt
 from firmware_py.airframe import GRAVITY_M_S2, Airframe
 from firmware_py.control.design import design_bandwidths
 from firmware_py.control.geometry import Rotation, rotation, tilt_error, to_body, to_world
-from firmware_py.control.limits import TiltLimit
+from firmware_py.control.limits import FlightLimits
 from firmware_py.control.mixer import Mixer
 from firmware_py.control.observer import DisturbanceObserver
 from firmware_py.control.weights import Weights
@@ -30,7 +30,7 @@ from firmware_py.types import (
 )
 
 _LEAST_COSINE = 0.5  # thrust is raised for tilt up to 60 degrees, and fades from there to none on its side
-_LEAST_LIFT = 0.2  # of the weight, so that falling leaves a thrust to steer with; PX4's MPC_THR_MIN
+_LEAST_LIFT = 0.2  # of the weight at most is kept for falling (MPC_THR_MIN), a thrust to steer with
 _MOST_THRUST = 0.92  # of full thrust for following a velocity; the rest steers
 _MOST_FORCE_M_S2 = GRAVITY_M_S2  # unknown acceleration ever learnt: the ground's push at landing
 _MOST_MOMENT_RAD_S2 = 20.0
@@ -53,7 +53,7 @@ class VectorLaw:
     """
 
     def __init__(
-        self, airframe: Airframe, period_s: float, weights: Weights | None, limits: TiltLimit, mixer: Mixer
+        self, airframe: Airframe, period_s: float, weights: Weights | None, limits: FlightLimits, mixer: Mixer
     ) -> None:
         weights = weights or airframe.stabiliser
         loops = design_bandwidths(airframe, period_s, weights)
@@ -66,7 +66,7 @@ class VectorLaw:
         self._drag = (forward / mass, right / mass, down / mass)
         self._drag_moment = airframe.drag.moment_nm_s2
         self._full_n = airframe.full_thrust_n
-        self._most_lift = _MOST_THRUST * self._full_n / mass
+        self._full_lift = self._full_n / mass
         self._rate_limit_rad_s = airframe.limits.roll_pitch_rate_rad_s
         self._max_speed_rad_s = airframe.motor.max_speed_rad_s
         self._rotors = len(airframe.rotors)
@@ -219,7 +219,7 @@ class VectorLaw:
         """Turn to a thrust per mass given as forward, right and up in level axes, m/s^2; up has priority."""
         ahead, aside, up = specific
         up = self._lift(up)
-        room = min(up * self._limits.tilt_tangent, sqrt(self._most_lift**2 - up * up))
+        room = min(up * self._limits.tilt_tangent, sqrt(max(self._most_lift() ** 2 - up * up, 0.0)))
         level = sqrt(ahead * ahead + aside * aside)
         if level > room:
             ahead, aside, level = ahead * room / level, aside * room / level, room
@@ -228,8 +228,12 @@ class VectorLaw:
         return (self._thrust(up, m), *self._turn_to(state, down_level, m, yaw_rate_rad_s))
 
     def _lift(self, up: float) -> float:
-        """Vertical thrust per mass within what there is."""
-        return max(_LEAST_LIFT * GRAVITY_M_S2, min(up, self._most_lift))
+        """Vertical thrust per mass within what there is and may be used."""
+        least = min(_LEAST_LIFT * GRAVITY_M_S2, self._limits.least_thrust * self._full_lift)
+        return max(least, min(up, self._most_lift()))
+
+    def _most_lift(self) -> float:
+        return min(_MOST_THRUST, self._limits.most_thrust) * self._full_lift
 
     def _thrust(self, up: float, m: Rotation) -> float:
         """Thrust along the body's axis as it stands that lifts so much, N."""
@@ -245,8 +249,9 @@ class VectorLaw:
         roll, pitch = tilt_error(m, (cos_yaw * x - sin_yaw * y, sin_yaw * x + cos_yaw * y, z))
         p, q = self._k_attitude[0] * roll, self._k_attitude[1] * pitch
         rate = sqrt(p * p + q * q)
-        if rate > self._rate_limit_rad_s:
-            p, q = p * self._rate_limit_rad_s / rate, q * self._rate_limit_rad_s / rate
+        most_rad_s = min(self._rate_limit_rad_s, self._limits.rate_rad_s)
+        if rate > most_rad_s:
+            p, q = p * most_rad_s / rate, q * most_rad_s / rate
         # With the right side down a pitch rate also turns the heading, by its share of world down; yaw makes
         # up for it. Else a velocity kept in axes of the heading would feed back into the pitch it asks for.
         r = -q * m[7] / max(m[8], _LEAST_COSINE)

@@ -78,7 +78,7 @@ def stick_settings(airframe: Airframe, parameters: Parameters) -> StickSettings:
         min(can.yaw_rate_rad_s, radians(value("MPC_MAN_Y_MAX"))),
         (radians(value("MC_ACRO_R_MAX")), radians(value("MC_ACRO_P_MAX")), radians(value("MC_ACRO_Y_MAX"))),
         value("MPC_MANTHR_MIN"),
-        (airframe.hover_speed_rad_s / airframe.motor.max_speed_rad_s) ** 2,
+        value("MPC_THR_HOVER"),
         value("MAN_DEADZONE"),
         value("MPC_HOLD_MAX_XY"),
         value("MPC_HOLD_MAX_Z"),

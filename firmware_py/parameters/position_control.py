@@ -94,7 +94,7 @@ POSITION.real(
 POSITION.real(
     "MPC_THR_HOVER",
     0.5,
-    (0.1, 0.8),
+    (0.01, 0.8),
     "norm",
     "Thrust that hovers, as a share of full thrust",
     details="The middle of the throttle stick means this in modes without height control.",
@@ -107,6 +107,7 @@ POSITION.real(
     (0.0, 0.5),
     "norm",
     "Least thrust where height is controlled",
+    details="A fifth of the weight is enough in any case.",
     decimals=2,
     increment=0.01,
 )
@@ -116,6 +117,7 @@ POSITION.real(
     (0.1, 1.0),
     "norm",
     "Most thrust where height is controlled",
+    details="Eight hundredths of full thrust are always kept for steering.",
     decimals=2,
     increment=0.05,
 )

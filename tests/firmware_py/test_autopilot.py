@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 from firmware_py.airframe import load_airframe
 from firmware_py.autopilot import Autopilot
-from firmware_py.control.limits import TiltLimit
+from firmware_py.control.limits import FlightLimits
 from firmware_py.parameters import Parameters
 from firmware_py.status import CommandResult, FlightMode, LandedState
 from firmware_py.types import GeodeticPoint, MotorOutput, RateCommand, Sensors, Setpoint
@@ -29,7 +29,7 @@ class Obedient:
     def __init__(self):
         self.command = None
         self.grounded = False
-        self.limits = TiltLimit(1.0)
+        self.limits = FlightLimits(1.0)
 
     def reset(self):
         pass

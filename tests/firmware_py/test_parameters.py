@@ -156,28 +156,7 @@ def test_each_declaration_reads_well(declared):
 
 
 ROOT = Path(__file__).parents[2]
-NOT_USED_YET = {
-    "FLW_TGT_ALT_M",
-    "FLW_TGT_MAX_VEL",
-    "FLW_TGT_RS",
-    "LNDMC_ROT_MAX",
-    "LNDMC_XY_VEL_MAX",
-    "LNDMC_Z_VEL_MAX",
-    "MAN_DEADZONE",
-    "MC_ORBIT_YAW_MOD",
-    "MC_PITCHRATE_MAX",
-    "MC_ROLLRATE_MAX",
-    "MPC_ACC_HOR_MAX",
-    "MPC_HOLD_MAX_XY",
-    "MPC_HOLD_MAX_Z",
-    "MPC_JERK_MAX",
-    "MPC_THR_HOVER",
-    "MPC_THR_MAX",
-    "MPC_THR_MIN",
-    "MPC_VEL_MAN_BACK",
-    "MPC_VEL_MAN_SIDE",
-    "SDLOG_MODE",
-}
+NOT_USED_YET = {"SDLOG_MODE"}
 
 
 def test_what_can_be_changed_is_used_somewhere():

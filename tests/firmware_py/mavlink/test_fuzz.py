@@ -9,7 +9,7 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from firmware_py.autopilot import Autopilot
-from firmware_py.control.limits import TiltLimit
+from firmware_py.control.limits import FlightLimits
 from firmware_py.mavlink.dialect import mavlink
 from firmware_py.status import FlightMode
 from firmware_py.types import GeodeticPoint, MotorOutput, Sensors
@@ -181,7 +181,7 @@ class Calm:
     """A stabiliser that does nothing, quickly built."""
 
     def __init__(self):
-        self.limits = TiltLimit(1.0)
+        self.limits = FlightLimits(1.0)
 
     def reset(self):
         pass
