@@ -96,7 +96,7 @@ def _reposition(exchange: Exchange, command: Command) -> CommandResult:
     speed_m_s, flags, _, yaw_rad = command.params
     if flags != 1.0:
         return CommandResult.UNSUPPORTED
-    target = _place(exchange, command)
+    target = _place(exchange, command, command.altitude_amsl_m(exchange.autopilot.status.home))
     if target is None:
         return CommandResult.DENIED
     return exchange.autopilot.reposition(
@@ -110,7 +110,7 @@ def _orbit(exchange: Exchange, command: Command) -> CommandResult:
     """DO_ORBIT: a negative radius turns counter-clockwise; what is left open is as PX4 has it."""
     autopilot = exchange.autopilot
     radius_m, speed_m_s, yaw, _ = command.params
-    centre = _place(exchange, command)
+    centre = _place(exchange, command, command.altitude_m)
     if centre is None:
         return CommandResult.DENIED
     radius_m = radius_m if isfinite(radius_m) and radius_m != 0.0 else _SMALLEST_ORBIT_M
@@ -140,10 +140,11 @@ def _change_speed(exchange: Exchange, command: Command) -> CommandResult:
 def _set_home(exchange: Exchange, command: Command) -> CommandResult:
     if command.params[0] > 0.5:
         return exchange.autopilot.set_home(None)
-    altitude_m = command.altitude_amsl_m(exchange.autopilot.status.home)
-    if not command.has_place or not isfinite(altitude_m):
+    if not command.has_place or not isfinite(command.altitude_m):
         return CommandResult.DENIED
-    return exchange.autopilot.set_home(GeodeticPoint(command.latitude_deg, command.longitude_deg, altitude_m))
+    return exchange.autopilot.set_home(
+        GeodeticPoint(command.latitude_deg, command.longitude_deg, command.altitude_m)
+    )
 
 
 def _set_origin(exchange: Exchange, command: Command) -> CommandResult:
@@ -153,7 +154,7 @@ def _set_origin(exchange: Exchange, command: Command) -> CommandResult:
 
 
 def _look_at(exchange: Exchange, command: Command) -> CommandResult:
-    place = _place(exchange, command)
+    place = _place(exchange, command, command.altitude_m)
     if place is None or any(map(isnan, place)):
         return CommandResult.DENIED
     return exchange.autopilot.look_at(place)
@@ -186,10 +187,17 @@ def _set_mission_item(exchange: Exchange, command: Command) -> CommandResult:
     return mission_commands.set_current(exchange, command.params[0])
 
 
-def _place(exchange: Exchange, command: Command) -> Vec3 | None:
-    """A command's place, NED metres with NaN for what is not given; None if it is no place on Earth."""
+def _place(exchange: Exchange, command: Command, altitude_m: float) -> Vec3 | None:
+    """A command's place, NED metres with NaN for what is not given; None if it is no place on Earth.
+
+    Args:
+        exchange: of the vehicle.
+        command: with latitude and longitude.
+        altitude_m: above mean sea level. PX4 takes all commands so, whatever the frame. MAVSDK relies on it
+            for circles and home: it names a relative frame and means an absolute altitude. Where no peer does
+            so, take-off and places to fly to, the frame counts.
+    """
     autopilot = exchange.autopilot
-    altitude_m = command.altitude_amsl_m(autopilot.status.home)
     here = autopilot.global_position()
     if here is None:
         return None

@@ -313,6 +313,16 @@ def test_a_region_of_interest_and_home_are_places(autopilot, peer):
     assert homed[1].latitude_deg == pytest.approx(PLACE.latitude_deg, abs=1e-7)
 
 
+def test_altitudes_of_circles_and_home_count_from_the_sea_whatever_the_frame(autopilot, peer):
+    """MAVSDK names a relative frame for both and means it so; PX4 looks at no frame."""
+    place = (round(PLACE.latitude_deg * 1e7), round(PLACE.longitude_deg * 1e7), PLACE.altitude_m)
+    peer.ask(peer.int(34, 20.0, 3.0, 0, nan, *place, frame=mavlink.MAV_FRAME_GLOBAL_RELATIVE_ALT))
+    peer.ask(peer.int(179, 0, 0, 0, 0, *place, frame=mavlink.MAV_FRAME_GLOBAL_RELATIVE_ALT))
+    (circled, homed) = autopilot.calls
+    assert circled[1].centre_ned_m == PLACE_NED_M
+    assert homed[1].altitude_m == PLACE.altitude_m
+
+
 def test_termination_needs_an_armed_vehicle(autopilot, peer):
     autopilot.status.armed = True
     assert acks(peer.ask(peer.long(185, 1))) == [(185, ACCEPTED)]
