@@ -367,7 +367,7 @@ class Guidance:
         return self._stick_flight.acro(self.sticks)
 
     def _follow_setpoint(self, state: VehicleState) -> Command:
-        return self._offboard.step(state, self.limits)
+        return self._offboard.turning or self._offboard.step(state, self.limits)
 
     def _chase(
         self, state: VehicleState, velocity_ned_m_s: Vec3, yaw_rad: float, turn_rad_s: float = 0.0

@@ -34,18 +34,19 @@ class OffboardFlight:
 
     Attributes:
         setpoint: the one followed, as `bounded` made it.
+        turning: the command of a setpoint that is the same in every tick; None: `step` says it.
     """
 
-    __slots__ = ("_turning", "setpoint")
+    __slots__ = ("setpoint", "turning")
 
     def __init__(self) -> None:
         self.setpoint = Setpoint(0)
-        self._turning: RateCommand | None = None  # the same for every tick of a setpoint
+        self.turning: RateCommand | None = None
 
     def accept(self, setpoint: Setpoint, limits: SpeedLimits) -> None:
         """Take the next setpoint; see `usable` and `bounded`."""
         self.setpoint = wanted = bounded(setpoint, limits)
-        self._turning = None
+        self.turning = None
         if is_acceleration_only(setpoint):
             self.setpoint = Setpoint(
                 setpoint.time_us,
@@ -55,12 +56,10 @@ class OffboardFlight:
             )
         elif not isnan(wanted.velocity_level_m_s[0]) and isnan(wanted.yaw_rad):
             turn_rad_s = yaw_rate(0.0, nan, wanted.yaw_rate_rad_s, limits)
-            self._turning = RateCommand(wanted.velocity_level_m_s, turn_rad_s)
+            self.turning = RateCommand(wanted.velocity_level_m_s, turn_rad_s)
 
     def step(self, state: VehicleState, limits: SpeedLimits) -> Command:
         """What the stabiliser has to follow in this tick."""
-        if self._turning is not None:
-            return self._turning
         wanted = self.setpoint
         if not isnan(wanted.velocity_level_m_s[0]):
             turn_rad_s = yaw_rate(state.yaw_rad, wanted.yaw_rad, wanted.yaw_rate_rad_s, limits)

@@ -14,6 +14,7 @@ from firmware_py.types import Vec3, VehicleState
 _EAGERNESS = 5.0  # 1/s, acceleration per difference of velocity when that is small
 _STANDING_M_S = 0.02  # slower than this, the vehicle stands
 _REST: Vec3 = (0.0, 0.0, 0.0)
+_ARRIVED_M = 1e-3  # and as many metres a second
 _LEASH_M = 1.0  # farther ahead of the vehicle than this, the point begins to wait
 
 
@@ -111,6 +112,16 @@ class Reference:
             east_m + east_m_s * walk_s if level_bound else here[1],
             down_m + down_m_s * walk_s if height_bound else here[2],
         )
+
+    def arrive(self, place_ned_m: Vec3) -> bool:
+        """Stand at a place from which nothing is left to go; False if there is."""
+        north_m, east_m, down_m = self.position_ned_m
+        left_m = hypot(place_ned_m[0] - north_m, place_ned_m[1] - east_m, place_ned_m[2] - down_m)
+        if not left_m < _ARRIVED_M or hypot(*self.velocity_ned_m_s) > _ARRIVED_M:  # NaN: has not
+            return False
+        self.position_ned_m = place_ned_m
+        self.velocity_ned_m_s = self.acceleration_ned_m_s2 = _REST
+        return True
 
     def chase(self, state: VehicleState, gain: float, height_gain: float, most_m_s: float = inf) -> Vec3:
         """The velocity NED that follows the point, shape (3,), m/s.

@@ -56,6 +56,7 @@ class Traveller:
     """
 
     __slots__ = (
+        "_arrived_ned_m",
         "_fresh",
         "_turning",
         "_yaw_rad",
@@ -69,7 +70,7 @@ class Traveller:
     )
 
     def __init__(self) -> None:
-        self.target_ned_m: Vec3 = NAN3
+        self.target_ned_m: Vec3 = (nan, nan, nan)
         self.speed_m_s = nan
         self.yaw_rad = nan
         self.pass_m_s = 0.0
@@ -78,6 +79,7 @@ class Traveller:
         self.reference = Reference()
         self._yaw_rad = 0.0
         self._turning = False
+        self._arrived_ned_m = NAN3  # the target at which the point stands
         self._fresh = True  # the point has not been put where the vehicle is
 
     def start(self, state: VehicleState, limits: SpeedLimits) -> None:
@@ -87,13 +89,14 @@ class Traveller:
         self._yaw_rad = state.yaw_rad
         if abs(turn_rad_s) > limits.auto_yaw_rate_rad_s:  # it would swing back
             self._yaw_rad += turn_rad_s / max(limits.yaw_gain, _LEAST_GAIN)
-        self.go(NAN3, self._yaw_rad)
+        self.go((nan, nan, nan), self._yaw_rad)
 
     def go(self, target_ned_m: Vec3, yaw_rad: float = nan, speed_m_s: float = nan) -> None:
         """Change where it goes; the velocity goes on smoothly."""
         self.target_ned_m, self.yaw_rad, self.speed_m_s = target_ned_m, yaw_rad, speed_m_s
         self.pass_m_s = 0.0
         self.drift_ned_m_s = _REST
+        self._arrived_ned_m = NAN3
         self._turning = self.heading.mode is YawMode.TURN_FIRST and isnan(yaw_rad)
 
     def distance_m(self, state: VehicleState) -> float:
@@ -125,6 +128,8 @@ class Traveller:
 
         Without `height_bound` the height is left to the vertical `drift_ned_m_s`.
         """
+        if self.target_ned_m is self._arrived_ned_m and self.drift_ned_m_s is _REST and not self._fresh:
+            return self._stay(state, limits)
         reference, pace = self.led(state, limits), limits.pace
         place = reference.position_ned_m
         north_m, east_m, down_m = (
@@ -148,12 +153,22 @@ class Traveller:
         wanted_ned_m_s = (wanted_north, wanted_east, wanted_down)
         reference.move(state, wanted_ned_m_s, pace, period_s, height_bound=height_bound)
         self._settle(height_bound=height_bound)
+        if reference.arrive(self.target_ned_m):
+            self._arrived_ned_m = self.target_ned_m
         if not isnan(self.yaw_rad):
             self._yaw_rad = self.yaw_rad
         else:
             self._look(state, north_m, east_m)
         velocity = reference.chase(state, limits.position_gain, limits.height_gain, cruise_m_s)
         return velocity, self._yaw_rad
+
+    def _stay(self, state: VehicleState, limits: SpeedLimits) -> tuple[Vec3, float]:
+        """The same where nothing moves."""
+        if isnan(self.yaw_rad):
+            self._look(state, 0.0, 0.0)
+        else:
+            self._yaw_rad = self.yaw_rad
+        return self.reference.chase(state, limits.position_gain, limits.height_gain), self._yaw_rad
 
     def _settle(self, *, height_bound: bool) -> None:
         """What was open has a place once it stands."""
