@@ -3,8 +3,9 @@
 A mission flies by velocities: 0.3 m/s for four seconds are 1.2 m through a frame, and none are a stand. The
 simulated drone of this project does just that. An ordinary one lags by a second, stays behind against drag,
 and drifts in height while it is told to stand, as PX4 does under velocity setpoints. So here the commands
-are summed up to the place where they lead, and what the vehicle is off it is added to them, once it is off
-by more than a lag of a quarter of a second explains: a vehicle that obeys well gets its commands unchanged.
+are summed up to the place where they lead, and what the vehicle is off it, by more than a short lag explains,
+is added to them. That begins once the vehicle has been off by so much that it cannot be one that obeys: until
+then, and for one that obeys for ever, commands are sent to the last bit as the mission wants them.
 """
 
 from __future__ import annotations
@@ -19,6 +20,11 @@ MEMORY_S = 0.5  # a lag is made up for about so long after the command has chang
 DEAD_BAND_M = 0.04
 DEAD_BAND_RAD = 0.05
 FORGET_S = 1.0  # what is off beside the way is given up so quickly: the mission sees it, and steers anew
+HELP_FROM_M = (
+    0.14  # off by more in a stand, it needs help for the rest of the flight; the simulated one: 0.04
+)
+HELP_FROM_S = 0.11  # so much more for each metre a second of late; the simulated one: 0.15 m off at 1 m/s
+HELP_FROM_RAD = 0.2  # likewise for its heading; the simulated one: 0.1
 LEASH_M = 0.5  # how far the place may be from the vehicle
 LEASH_RAD = 0.5
 STAND_M_S = 0.05  # a slower command is a stand, which has no sides
@@ -51,15 +57,21 @@ class _Reference:
 
 
 class CommandTracker:
-    """Adds to velocity commands what brings the vehicle to where they lead."""
+    """Adds to velocity commands what brings the vehicle to where they lead.
+
+    Attributes:
+        helps: the vehicle has shown that it needs it.
+    """
 
     def __init__(self) -> None:
+        self.helps = False
         self._reference: _Reference | None = None
         self._flown = VelocityCommand()
 
     def reset(self) -> None:
-        """Begin anew at the next state."""
+        """Begin anew at the next state, with a vehicle that obeys."""
         self._reference = None
+        self.helps = False
 
     def correct(self, command: VelocityCommand, state: DroneState) -> VelocityCommand:
         """The command to send.
@@ -76,7 +88,10 @@ class CommandTracker:
             self._reference = _Reference(state.time_us, (0.0, 0.0, 0.0), here, state.yaw)
             return command
         _advance(reference, flown, state, step_s)
-        return _pulled(command, reference, state)
+        off_m, off_rad = _unexplained(reference, state)
+        if off_m > HELP_FROM_M + HELP_FROM_S * reference.speed_m_s or off_rad > HELP_FROM_RAD:
+            self.helps = True
+        return _pulled(command, reference, state) if self.helps else command
 
 
 def _advance(reference: _Reference, flown: VelocityCommand, state: DroneState, step_s: float) -> None:
@@ -120,13 +135,19 @@ def _forget_beside(
     )
 
 
+def _unexplained(reference: _Reference, state: DroneState) -> tuple[float, float]:
+    """How far it is off, metres and radians, by more than a lag of LAG_S."""
+    off_rad = abs(reference.yaw_rad - state.yaw)
+    return hypot(*reference.off_m) - LAG_S * reference.speed_m_s, off_rad - LAG_S * reference.turn_rad_s
+
+
 def _pulled(command: VelocityCommand, reference: _Reference, state: DroneState) -> VelocityCommand:
     x, y, z = reference.off_m
     distance_m = hypot(x, y, z)
-    beyond_m = distance_m - DEAD_BAND_M - LAG_S * reference.speed_m_s
+    off_m, turned_rad = _unexplained(reference, state)
+    beyond_m, beyond_rad = off_m - DEAD_BAND_M, turned_rad - DEAD_BAND_RAD
     pull = min(PULL_PER_S * beyond_m, MOST_M_S) / distance_m if beyond_m > 0.0 else 0.0
     off_rad = reference.yaw_rad - state.yaw
-    beyond_rad = abs(off_rad) - DEAD_BAND_RAD - LAG_S * reference.turn_rad_s
     turn = min(TURN_PER_S * beyond_rad, MOST_RAD_S) if beyond_rad > 0.0 else 0.0
     c, s = cos(state.yaw), sin(state.yaw)
     return VelocityCommand(

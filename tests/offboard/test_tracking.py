@@ -7,7 +7,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from offboard.drone import DroneState, VelocityCommand
-from offboard.link.tracking import LEASH_M, MOST_M_S, MOST_RAD_S, CommandTracker
+from offboard.link.tracking import HELP_FROM_M, LEASH_M, MOST_M_S, MOST_RAD_S, CommandTracker
 
 STEP_S = 0.05
 
@@ -65,16 +65,7 @@ def test_a_vehicle_that_obeys_gets_its_commands_unchanged(lag_s):
         (STAND, 2.0),
     ]
     sent = fly(Vehicle(lag_s=lag_s), commands)
-    changes = [
-        hypot(
-            got.forward_m_s - wanted.forward_m_s,
-            got.left_m_s - wanted.left_m_s,
-            got.up_m_s - wanted.up_m_s,
-            got.yaw_rate_rad_s - wanted.yaw_rate_rad_s,
-        )
-        for wanted, got in sent
-    ]
-    assert max(changes) < 0.05
+    assert all(got is wanted for wanted, got in sent)
 
 
 def test_a_vehicle_that_stays_behind_still_goes_the_whole_way():
@@ -85,6 +76,7 @@ def test_a_vehicle_that_stays_behind_still_goes_the_whole_way():
         alone.fly(AHEAD)
     tracker = CommandTracker()
     fly(helped, [(AHEAD, 4.0)], tracker)
+    assert tracker.helps
     assert alone.place[0] < 0.65
     assert helped.place[0] > 0.85
     fly(helped, [(STAND, 4.0)], tracker)
@@ -97,8 +89,9 @@ def test_a_drifting_vehicle_is_held(drift):
     vehicle = Vehicle(lag_s=0.8, drift=drift)
     fly(vehicle, [(STAND, 20.0)])
     off_m = hypot(vehicle.place[0], vehicle.place[1], vehicle.place[2] - 1.0)
-    assert off_m < 0.05 + hypot(*drift)
-    assert hypot(*(v + d for v, d in zip(vehicle.velocity, drift, strict=True))) < 0.02
+    assert off_m < HELP_FROM_M + 0.02 + hypot(*drift)
+    if hypot(*drift) > 0.05:
+        assert hypot(*(v + d for v, d in zip(vehicle.velocity, drift, strict=True))) < 0.02
 
 
 @given(st.floats(-pi, pi), st.lists(st.tuples(*[st.floats(-1, 1)] * 4), min_size=1, max_size=8))
