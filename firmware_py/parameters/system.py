@@ -41,8 +41,6 @@ LOGGING.choice(
     {
         -1: "Never",
         0: "From arming until disarming",
-        1: "From boot until disarming",
-        2: "From boot until shutdown",
     },
     "When a flight is logged",
 )

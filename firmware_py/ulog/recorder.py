@@ -72,7 +72,7 @@ class UlogRecorder:
             if not status.armed:
                 self._paused = False
                 return
-            if self._paused:
+            if self._paused or autopilot.parameters.integer("SDLOG_MODE") < 0:
                 return
             self._begin(autopilot)
         time_us = autopilot.state.time_us

@@ -251,6 +251,13 @@ def test_the_oldest_log_makes_room_and_a_full_storage_ends_logging_with_a_word()
     assert storage.entry(PATH).size <= 60_000
 
 
+def test_nothing_is_written_when_nothing_is_to_be_logged():
+    flight = Flight()
+    flight.autopilot.parameters.set("SDLOG_MODE", -1)
+    flight.take_off(1.0).run(2.0)
+    assert flight.recorder.path is None
+
+
 def test_nothing_is_written_on_the_ground():
     flight = Flight().run(1.0)
     assert flight.storage.entries(()) == []
