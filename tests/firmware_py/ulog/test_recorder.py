@@ -38,7 +38,8 @@ class Flight:
     def __init__(self, storage=None):
         airframe = load_airframe("abejorro")
         self.world = World(Scenario(name="field"), airframe)
-        self.autopilot = Autopilot(airframe, ORIGIN, Parameters({"MPC_LAND_SPEED": 0.5}))
+        parameters = Parameters({"MPC_LAND_SPEED": 0.5}, defaults=airframe.parameters)
+        self.autopilot = Autopilot(airframe, ORIGIN, parameters)
         self.storage = storage or MemoryStorage(now=lambda: 0)
         self.recorder = UlogRecorder(self.storage, lambda time_us: PATH, boot_unix_us=BOOT_US)
         self.truth = []
