@@ -272,8 +272,9 @@ class Autopilot:
             self.say(WARNING, f"Reposition denied: {breach.text}")
             return CommandResult.DENIED
         result = self._command(Event.SET_HOLD)
-        if result is CommandResult.ACCEPTED and self.status.armed and not self._land_detector.landed:
-            self._guidance.enter_journey(self.state, target_ned_m, yaw_rad, speed_m_s)
+        nowhere = self._land_detector.landed and all(map(isnan, target_ned_m))
+        if result is CommandResult.ACCEPTED and self.status.armed and not nowhere:
+            self._guidance.enter_journey(self.state, target_ned_m, yaw_rad, speed_m_s)  # also from the ground
         return result
 
     def orbit(self, orbit: Orbit) -> CommandResult:
@@ -415,7 +416,7 @@ class Autopilot:
             self.state,
             command,
             self._guidance.command_down_m_s,
-            may_lift=self._commander.state not in _GROUND_STATES,
+            may_lift=self._commander.state not in _GROUND_STATES or self._guidance.departs(self.state),
         )
 
     def _detect_land(self) -> None:

@@ -14,6 +14,7 @@ _COURSE_M_S = 1.0  # slower than this, the target's course is noise
 _SLOWEST_S = 5.0  # how long FLW_TGT_RS = 1 takes to believe a change of velocity
 _LONGEST_AHEAD_S = 1.0  # a target that is silent for longer is thought to stand from then on
 _LOST_US = 3_000_000
+_LEAST_HEIGHT_M = 1.0  # over home; PX4 climbs again when it is lower over the ground
 _NEVER_US = -(10**15)
 
 
@@ -129,7 +130,7 @@ class TargetFollower:
         place = (
             north_m + settings.distance_m * cos(angle_rad),
             east_m + settings.distance_m * sin(angle_rad),
-            floor_m - settings.height_m,
+            min(floor_m - settings.height_m, home_down_m - _LEAST_HEIGHT_M),
         )
         return place, atan2(east_m - state.position_ned_m[1], north_m - state.position_ned_m[0])
 

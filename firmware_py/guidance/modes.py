@@ -40,6 +40,7 @@ __all__ = ["Guidance", "SpeedLimits", "bounded", "speed_limits", "usable"]
 _REACHED_M = 0.15
 _FACING_M = 0.5  # nearer than this, a region of interest says nothing about where to look
 _LITTLE = 0.7  # less than this share of the thrust that carries the weight means to go down
+_ABOVE_M = 0.5  # a place so much higher is flown to from the ground
 _COUNTED_ON_US = 5_000_000  # so long a velocity made of accelerations is good enough to brake by
 _CENTRED = ManualInput(0)
 
@@ -217,6 +218,12 @@ class Guidance:
             down_m = held[2]
         traveller.go((north_m, east_m, down_m), yaw_rad, speed_m_s)
         self._show_journey(state)
+
+    def departs(self, state: VehicleState) -> bool:
+        """Whether it is on the way to a place well above it: then it leaves the ground even from hold."""
+        return (
+            self._step == self._travel and self.traveller.target_ned_m[2] < state.position_ned_m[2] - _ABOVE_M
+        )
 
     def follow_leg(self, state: VehicleState, leg: Leg) -> None:
         """Fly a leg of a mission."""

@@ -1,0 +1,45 @@
+"""Flights as the programs of peers ask for them, where PX4 does something that one would not expect."""
+
+import pytest
+
+from firmware_py.status import CommandResult, FlightMode
+from firmware_py.types import GeodeticPoint
+from tests.firmware_py.flying import ORIGIN, Flight
+
+
+@pytest.fixture
+def flight():
+    return Flight()
+
+
+def test_a_place_to_go_to_just_after_take_off_was_asked_for_is_reached_from_the_ground(flight):
+    flight.autopilot.arm()
+    flight.autopilot.takeoff()
+    flight.run(1.0)
+    assert flight.landed  # its motors have just come up
+    above = flight.autopilot.local_position(
+        GeodeticPoint(ORIGIN.latitude_deg, ORIGIN.longitude_deg, ORIGIN.altitude_m + 8.0)
+    )
+    flight.autopilot.reposition(above, 0.0)
+    flight.run(12.0)
+    assert flight.now.position_ned_m[2] == pytest.approx(above[2], abs=0.5)
+
+
+def test_a_pause_on_the_ground_leaves_it_there(flight):
+    flight.autopilot.arm()
+    flight.autopilot.reposition((float("nan"),) * 3)
+    flight.run(3.0)
+    assert flight.landed
+
+
+def test_a_target_below_the_ground_is_followed_a_metre_above_it(flight):
+    """MAVSDK's example reports one that is nine metres deeper than home."""
+    flight.autopilot.parameters.set("FLW_TGT_ALT_M", 2)
+    flight.climb_to(3.0)
+    assert flight.autopilot.set_mode(FlightMode.FOLLOW) is CommandResult.ACCEPTED
+    for _ in range(12):
+        flight.autopilot.follow_target((20.0, 0.0, 12.0), (0.0, 0.0, 0.0))
+        flight.run(1.0)
+    assert flight.mode is FlightMode.FOLLOW
+    assert flight.now.distance_m() > 5.0
+    assert min(sample.height_m for sample in flight.track[-100:]) == pytest.approx(1.0, abs=0.3)
