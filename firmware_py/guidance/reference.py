@@ -103,10 +103,16 @@ class Reference:
             height_bound: the same for the height.
         """
         (north_m, east_m, down_m), here = self.position_ned_m, state.position_ned_m
-        ahead_m = hypot(north_m - here[0], east_m - here[1], down_m - here[2])
-        walk_s = period_s if ahead_m < _LEASH_M else period_s * max(0.0, 2.0 - ahead_m / _LEASH_M)
+        ahead_north_m, ahead_east_m, ahead_down_m = north_m - here[0], east_m - here[1], down_m - here[2]
+        ahead_m = hypot(ahead_north_m, ahead_east_m, ahead_down_m)
         self._speed_up(wanted_ned_m_s, pace, period_s)
         north_m_s, east_m_s, down_m_s = self.velocity_ned_m_s
+        walk_s = period_s
+        # Only a point that leads waits: one that has been overtaken would wait for ever.
+        if ahead_m > _LEASH_M and (
+            ahead_north_m * north_m_s + ahead_east_m * east_m_s + ahead_down_m * down_m_s > 0.0
+        ):
+            walk_s *= max(0.0, 2.0 - ahead_m / _LEASH_M)
         self.position_ned_m = (
             north_m + north_m_s * walk_s if level_bound else here[0],
             east_m + east_m_s * walk_s if level_bound else here[1],
@@ -191,8 +197,9 @@ def stopping_speed(
     """The speed from which another (by default: none) can be reached within a distance.
 
     Braking with a takes v^2 / 2a, and building the braking up takes a time t more, in which it goes on: the
-    distance is d = (v^2 - w^2) / 2a + (v - w) t, solved for v. t is a / j and what the eagerness adds.
+    distance is d = (v^2 - w^2) / 2a + (v - w) t, solved for v. t is a / j and what the eagerness adds; half as
+    much again, because a short journey still speeds up when it should begin to brake.
     """
-    delay_s = acceleration_m_s2 / jerk_m_s3 + 1.0 / _EAGERNESS
+    delay_s = acceleration_m_s2 / jerk_m_s3 + 1.5 / _EAGERNESS
     root_s = passing_m_s / acceleration_m_s2 + delay_s
     return acceleration_m_s2 * (sqrt(root_s * root_s + 2.0 * distance_m / acceleration_m_s2) - delay_s)

@@ -55,6 +55,19 @@ def test_a_journey_ends_at_its_target_and_passes_it_by_no_more_than_a_decimetre(
     assert farthest_m < length_m + 0.1
 
 
+@pytest.mark.parametrize("length_m", [0.5, 1.0, 2.0, 3.0, 4.0, 5.0, 7.0, 10.0, 13.0, 20.0, 40.0])
+def test_no_length_of_journey_is_passed(length_m):
+    traveller, state = Traveller(), VehicleState()
+    traveller.start(state, LIMITS)
+    traveller.go((0.0, length_m, 0.0))
+    farthest_m = 0.0
+    for _ in range(round(20.0 / PERIOD_S)):
+        traveller.step(state, LIMITS, PERIOD_S)
+        state.position_ned_m = traveller.reference.position_ned_m
+        farthest_m = max(farthest_m, state.position_ned_m[1])
+    assert farthest_m < length_m + 0.02
+
+
 def test_the_point_waits_for_a_vehicle_that_cannot_follow():
     traveller, state = Traveller(), VehicleState()
     traveller.start(state, LIMITS)
