@@ -436,6 +436,7 @@ class Autopilot:
             self.flight.landed_us = self._now_us
         else:
             self.flight.takeoff_us = self._now_us
+            self._guidance.traveller.resume()  # what led it off the ground has run ahead
         if armed:
             self.say(INFO, "Landing detected" if landed else "Takeoff detected")
 

@@ -197,8 +197,8 @@ def stopping_speed(
     """The speed from which another (by default: none) can be reached within a distance.
 
     Braking with a takes v^2 / 2a, and building the braking up takes a time t more, in which it goes on: the
-    distance is d = (v^2 - w^2) / 2a + (v - w) t, solved for v. t is a / j and what the eagerness adds; half as
-    much again, because a short journey still speeds up when it should begin to brake.
+    distance is d = (v^2 - w^2) / 2a + (v - w) t, solved for v. t is a / j and what the eagerness adds; half
+    as much again, because a short journey still speeds up when it should begin to brake.
     """
     delay_s = acceleration_m_s2 / jerk_m_s3 + 1.5 / _EAGERNESS
     root_s = passing_m_s / acceleration_m_s2 + delay_s

@@ -99,6 +99,10 @@ class Traveller:
         self._arrived_ned_m = NAN3
         self._turning = self.heading.mode is YawMode.TURN_FIRST and isnan(yaw_rad)
 
+    def resume(self) -> None:
+        """Go on to the same target from where the vehicle is then."""
+        self._fresh = True
+
     def distance_m(self, state: VehicleState) -> float:
         """Horizontal distance to the target."""
         return hypot(

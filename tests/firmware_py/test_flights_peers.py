@@ -3,8 +3,7 @@
 import pytest
 
 from firmware_py.status import CommandResult, FlightMode
-from firmware_py.types import GeodeticPoint
-from tests.firmware_py.flying import ORIGIN, Flight
+from tests.firmware_py.flying import Flight
 
 
 @pytest.fixture
@@ -17,12 +16,9 @@ def test_a_place_to_go_to_just_after_take_off_was_asked_for_is_reached_from_the_
     flight.autopilot.takeoff()
     flight.run(1.0)
     assert flight.landed  # its motors have just come up
-    above = flight.autopilot.local_position(
-        GeodeticPoint(ORIGIN.latitude_deg, ORIGIN.longitude_deg, ORIGIN.altitude_m + 8.0)
-    )
-    flight.autopilot.reposition(above, 0.0)
-    flight.run(12.0)
-    assert flight.now.position_ned_m[2] == pytest.approx(above[2], abs=0.5)
+    flight.autopilot.reposition((2.0, -60.0, -8.0), 0.0)
+    flight.run(25.0)
+    assert flight.now.position_ned_m == pytest.approx((2.0, -60.0, -8.0), abs=0.5)
 
 
 def test_a_pause_on_the_ground_leaves_it_there(flight):

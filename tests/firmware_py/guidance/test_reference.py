@@ -95,3 +95,17 @@ def test_it_may_be_faster_where_it_passes():
     assert (
         stopping_speed(10.0, 3.0, 4.0) < stopping_speed(10.0, 3.0, 4.0, 2.0) < stopping_speed(20.0, 3.0, 4.0)
     )
+
+
+def test_a_point_that_was_overtaken_does_not_wait_for_ever():
+    traveller, state = Traveller(), VehicleState()
+    traveller.start(state, LIMITS)
+    traveller.go((0.0, 40.0, 0.0))
+    for _ in range(round(3.0 / PERIOD_S)):  # it stands still, as on the ground: the point waits ahead of it
+        traveller.step(state, LIMITS, PERIOD_S)
+    waiting_m = traveller.reference.position_ned_m[1]
+    assert 0.5 < waiting_m < 3.0
+    state.position_ned_m = (0.0, waiting_m + 5.0, 0.0)  # a gust has carried it past
+    for _ in range(round(5.0 / PERIOD_S)):
+        traveller.step(state, LIMITS, PERIOD_S)
+    assert traveller.reference.position_ned_m[1] > waiting_m + 5.0
