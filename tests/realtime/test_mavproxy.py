@@ -84,7 +84,7 @@ class MavProxy:
 @pytest.fixture
 def sim(tmp_path, instance):
     """MAVProxy does not mind when time runs faster."""
-    with simulator(tmp_path, instance, "--speed", "3") as running:
+    with simulator(tmp_path, instance, "--speed", "4") as running:
         yield running
         assert running.process.poll() is None
         assert "Traceback" not in running.err

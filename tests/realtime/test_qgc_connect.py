@@ -13,6 +13,7 @@ import pytest
 from pymavlink import mavutil
 
 from firmware_py.mavlink import extra_messages
+from tests.processes import simulator
 
 mavlink = mavutil.mavlink
 pytestmark = pytest.mark.realtime
@@ -173,6 +174,15 @@ class Station:
 
 
 @pytest.fixture
+def sim(request, tmp_path, instance):
+    """A simulator in real time, or as much faster as a test wants."""
+    with simulator(tmp_path, instance, "--speed", getattr(request, "param", "1")) as running:
+        yield running
+        assert running.process.poll() is None
+        assert "Traceback" not in running.err
+
+
+@pytest.fixture
 def station(sim, instance):
     station = Station(14550 + instance, instance + 1)
     station.wait("HEARTBEAT", 20.0)
@@ -215,6 +225,7 @@ def test_everything_asked_at_connect_is_answered_at_once(station):
     )
 
 
+@pytest.mark.parametrize("sim", ["3"], indirect=True)
 def test_its_buttons_and_virtual_joystick_fly(station):
     station.next(
         20.0, lambda m: m.get_type() == "SYS_STATUS" and m.onboard_control_sensors_health & 0x10000000
