@@ -64,6 +64,15 @@ class MavProxy:
         self._read += found.end()
         return found
 
+    def expect_all(self, *patterns, limit_s=15.0):
+        """Wait until it has said some things, in any order, after what was expected before."""
+        begin, end = self._read, self._read
+        for pattern in patterns:
+            self._read = begin
+            self.expect(pattern, limit_s)
+            end = max(end, self._read)
+        self._read = end
+
     def ask(self, line, pattern, limit_s=15.0):
         """Type a line again and again until the answer is as wanted; the match."""
         for _ in range(int(limit_s / 0.5)):
@@ -141,19 +150,16 @@ def test_mission_fence_and_rally_points_are_loaded_and_listed(mavproxy, tmp_path
 def test_a_flight_with_modes_take_off_a_place_to_go_to_and_return(mavproxy, tmp_path):
     for mode, main, sub in (("POSCTL", 3, 0), ("MISSION", 4, 4), ("LOITER", 4, 3)):
         mavproxy.type(f"long DO_SET_MODE 1 {main} {sub}")
-        mavproxy.expect(r"DO_SET_MODE: ACCEPTED")
-        mavproxy.expect(rf"Mode {mode}")
+        mavproxy.expect_all(r"DO_SET_MODE: ACCEPTED", rf"{mode}> |Mode {mode}")
     mavproxy.ask("status GLOBAL_POSITION_INT", r"lat : 473977\d{3}, lon : 85455\d{3}")
     mavproxy.type("long DO_SET_MODE 1 99")
     mavproxy.expect(r"DO_SET_MODE: TEMPORARILY_REJECTED")
 
     mavproxy.type("arm throttle")
-    mavproxy.expect(r"COMPONENT_ARM_DISARM: ACCEPTED")
-    mavproxy.expect(r"ARMED")
+    mavproxy.expect_all(r"COMPONENT_ARM_DISARM: ACCEPTED", r"\bARMED")
     mavproxy.type("takeoff 494")  # PX4 counts from the sea, not from home
-    mavproxy.expect(r"NAV_TAKEOFF: ACCEPTED")
-    mavproxy.expect(r"Mode TAKEOFF")
-    mavproxy.expect(r"Mode LOITER", 20.0)
+    mavproxy.expect_all(r"NAV_TAKEOFF: ACCEPTED", r"TAKEOFF> |Mode TAKEOFF")
+    mavproxy.expect(r"LOITER> |Mode LOITER", 20.0)
     mavproxy.ask("status GLOBAL_POSITION_INT", r"relative_alt : (4[5-9]|5[0-5])\d\d\b")
     mavproxy.type("disarm")
     mavproxy.expect(r"COMPONENT_ARM_DISARM: TEMPORARILY_REJECTED")
@@ -166,8 +172,7 @@ def test_a_flight_with_modes_take_off_a_place_to_go_to_and_return(mavproxy, tmp_
 
     mavproxy.type("param set RTL_RETURN_ALT 8")
     mavproxy.type("long NAV_RETURN_TO_LAUNCH")
-    mavproxy.expect(r"NAV_RETURN_TO_LAUNCH: ACCEPTED")
-    mavproxy.expect(r"Mode RTL")
+    mavproxy.expect_all(r"NAV_RETURN_TO_LAUNCH: ACCEPTED", r"RTL> |Mode RTL")
     mavproxy.expect(r"DISARMED", 30.0)
 
     mavproxy.type("arm throttle")

@@ -201,7 +201,7 @@ async def test_offboard_by_position_velocity_and_acceleration(drone):
     assert refused.value.result == OffboardResult.NO_SETPOINT_SET
     home = await drone.seen("home", lambda _: True)
     ground = (await drone.place()).position
-    north_m, east_m, down_m = ground.north_m, ground.east_m, ground.down_m - 4.0
+    north_m, east_m, down_m = home.local_north_m, home.local_east_m, ground.down_m - 4.0
     await drone.take_off(4.0)
 
     await offboard.set_position_ned(PositionNedYaw(north_m + 3.0, east_m, down_m, 0.0))
@@ -296,7 +296,6 @@ async def test_it_follows(drone):
             await asyncio.sleep(0.1)
 
     home = await drone.seen("home", lambda _: True)
-    ground = (await drone.place()).position
     await follow_me.set_config(Config(8.0, 5.0, 0.1, Config.FollowAltitudeMode.CONSTANT, 8.0, 180.0))
     assert (await follow_me.get_config()).follow_distance_m == pytest.approx(5.0)
     await drone.take_off(5.0)
@@ -307,8 +306,8 @@ async def test_it_follows(drone):
         reporting = asyncio.create_task(keep_telling(target))
         await drone.seen(
             "position_velocity_ned",
-            lambda now, m=ground.north_m + away_m: (
-                3.0 < hypot(now.position.north_m - m, now.position.east_m - ground.east_m) < 7.0
+            lambda now, m=home.local_north_m + away_m: (
+                3.0 < hypot(now.position.north_m - m, now.position.east_m - home.local_east_m) < 7.0
             ),
         )
         reporting.cancel()
