@@ -10,6 +10,15 @@ from firmware_py.missions.flight import IssuedCommand
 from firmware_py.status import CommandResult
 from firmware_py.types import GeodeticPoint
 
+_TO_NOBODY = frozenset(  # every mission of MAVSDK has them, and there is no gimbal
+    {
+        mavlink.MAV_CMD_DO_MOUNT_CONFIGURE,
+        mavlink.MAV_CMD_DO_MOUNT_CONTROL,
+        mavlink.MAV_CMD_DO_GIMBAL_MANAGER_PITCHYAW,
+        mavlink.MAV_CMD_DO_GIMBAL_MANAGER_CONFIGURE,
+    }
+)
+
 
 class MissionOrders:
     """Passes on what the mission has commanded, and says what could not be done."""
@@ -30,6 +39,8 @@ class MissionOrders:
 
     def _pass_on(self, order: IssuedCommand) -> CommandResult:
         autopilot, camera = self._exchange.autopilot, self._exchange.camera
+        if order.command in _TO_NOBODY:
+            return CommandResult.ACCEPTED
         first, x, y, z = order.params[0], *order.params[4:]
         match order.command:
             case mavlink.MAV_CMD_COMPONENT_ARM_DISARM:
