@@ -73,7 +73,9 @@ async def test_a_camera_is_listed_described_and_takes_pictures_that_can_be_fetch
     await camera.start_photo_interval(CAMERA, 0.2)
     await asyncio.sleep(1.0)
     await camera.stop_photo_interval(CAMERA)
-    await first(camera.subscribe_storage(), lambda update: update.storage.storage_id)  # now the status is known
+    await first(
+        camera.subscribe_storage(), lambda update: update.storage.storage_id
+    )  # now the status is known
     assert len(await camera.list_photos(CAMERA, PhotosRange.ALL)) >= 4
 
     path = taken.file_url.removeprefix("mftp://[;comp=1]")
