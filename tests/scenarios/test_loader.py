@@ -223,7 +223,10 @@ def test_wrong_values_in_known_fields_give_one_line_or_load(fields):
 @pytest.mark.parametrize(
     ("name", "message"),
     [
-        ("testcase1", 'unknown scenario "testcase1"; did you mean test-case-1? Known: empty, open-field, round-1,'),
+        (
+            "testcase1",
+            'unknown scenario "testcase1"; did you mean test-case-1? Known: empty, open-field, round-1,',
+        ),
         ("zzz", 'unknown scenario "zzz"; Known: empty, open-field, round-1,'),
         ("", 'unknown scenario ""; Known:'),
         ("a\nb", 'unknown scenario "a\\nb"; Known:'),
