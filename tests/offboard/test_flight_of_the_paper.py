@@ -40,6 +40,17 @@ async def test_soft_landing_lets_the_vehicle_land():
     assert drone.calls == ["connect", "ready", "motors_on", "land", "close"]
 
 
+@pytest.mark.parametrize("lag_s", [0.2, 0.7, 0.9])
+async def test_careful_crossing_takes_late_vehicles_through_the_middle(lag_s):
+    drone = KinematicDrone(*START_1, lag_s=lag_s)
+    eyes = GeometricEyes(drone, TEST_CASE_1)
+    outcome = await fly_mission(drone, None, load_mission("careful_crossing"), eyes=eyes)
+    assert (outcome.ended, outcome.mission_state) == ("finished", "landing.touch_down")
+    for target in TEST_CASE_1.values():
+        assert min(crossings(drone.path, target)) < 0.05
+    assert drone.calls[-2:] == ["land", "close"]
+
+
 async def test_turns_for_ever_at_the_centre_when_a_frame_is_never_seen():
     far = {**TEST_CASE_1, "red": Target(0, 300, 1, 0)}
     drone, moments, outcome = await fly(load_mission("frame_challenge"), far, limit_s=60.0)

@@ -45,7 +45,7 @@ def problems(tmp_path: Path, text: str) -> str:
 
 
 def test_the_package_has_its_missions():
-    assert {"frame_challenge", "soft_landing"} <= set(list_missions())
+    assert {"careful_crossing", "frame_challenge", "soft_landing"} <= set(list_missions())
     for name in list_missions():
         assert load_mission(name).description
 

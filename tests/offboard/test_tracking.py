@@ -83,6 +83,24 @@ def test_a_vehicle_that_stays_behind_still_goes_the_whole_way():
     assert helped.place[0] == pytest.approx(1.2, abs=0.1)
 
 
+@pytest.mark.parametrize("lag_s", [0.6, 0.7])
+def test_a_late_vehicle_answers_quickly_once_it_is_known(lag_s):
+    """Its lag is learned from its own answers, and sent ahead of."""
+    alone, helped, tracker = Vehicle(lag_s=lag_s, yaw=0.0), Vehicle(lag_s=lag_s, yaw=0.0), CommandTracker()
+    turn = VelocityCommand(yaw_rate_rad_s=0.5)
+    fly(helped, [(VelocityCommand(forward_m_s=1.0), 2.0), (STAND, 2.0), (turn, 2.0), (STAND, 2.0)], tracker)
+    assert tracker.helps
+    alone.yaw = helped.yaw
+    wanted = VelocityCommand(forward_m_s=0.3, yaw_rate_rad_s=0.3)
+    fly(helped, [(wanted, 0.4)], tracker)
+    for _ in range(8):
+        alone.fly(wanted)
+    assert hypot(*alone.velocity) < 0.18
+    assert hypot(*helped.velocity) == pytest.approx(0.3, abs=0.07)
+    assert alone.rate < 0.18
+    assert helped.rate == pytest.approx(0.3, abs=0.07)
+
+
 @given(st.tuples(*[st.floats(-0.15, 0.15)] * 3))
 @settings(max_examples=30)
 def test_a_drifting_vehicle_is_held(drift):
