@@ -2,12 +2,36 @@
 
 from __future__ import annotations
 
+import asyncio
+import signal
 import time
+from contextlib import asynccontextmanager
 
 import pytest
+from mavsdk.asyncio import ComponentType, Configuration, Mavsdk
 from pymavlink import mavutil
 
 from tests.processes import free_instance, simulator
+
+
+@asynccontextmanager
+async def mavsdk_system(process, instance):
+    """The system that MAVSDK finds on a simulator's onboard port.
+
+    The simulator is halted while the client is destroyed: MAVSDK 4.1's library may end the whole program when
+    telemetry comes in at that moment.
+    """
+    configuration = Configuration.create_with_component_type(ComponentType.GROUND_STATION)
+    try:
+        async with Mavsdk(configuration) as mavsdk:
+            await mavsdk.add_any_connection(f"udpin://127.0.0.1:{14540 + instance}")
+            try:
+                yield await mavsdk.first_autopilot(10.0)
+            finally:
+                process.send_signal(signal.SIGSTOP)
+                await asyncio.sleep(0.3)  # what was on its way is over
+    finally:
+        process.send_signal(signal.SIGCONT)
 
 
 class Peer:

@@ -7,11 +7,12 @@ from types import SimpleNamespace
 import cv2
 import numpy as np
 import pytest
-from mavsdk.asyncio import ComponentType, Configuration, Mavsdk
 from mavsdk.asyncio.plugins.camera import CameraAsync, CameraError, Mode, PhotosRange
 from mavsdk.asyncio.plugins.ftp import FtpAsync
 from mavsdk.asyncio.plugins.info import InfoAsync
 from mavsdk.asyncio.plugins.telemetry import TelemetryAsync
+
+from tests.realtime.conftest import mavsdk_system
 
 pytestmark = pytest.mark.realtime
 
@@ -42,10 +43,7 @@ async def first(updates, wanted=lambda update: True, limit_s=15.0):
 
 @pytest.fixture
 async def drone(sim, instance):
-    configuration = Configuration.create_with_component_type(ComponentType.GROUND_STATION)
-    async with Mavsdk(configuration) as mavsdk:
-        await mavsdk.add_any_connection(f"udpin://127.0.0.1:{14540 + instance}")
-        system = await mavsdk.first_autopilot(10.0)
+    async with mavsdk_system(sim.process, instance) as system:
         yield SimpleNamespace(
             camera=CameraAsync(system),
             ftp=FtpAsync(system),

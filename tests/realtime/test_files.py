@@ -5,13 +5,14 @@ import random
 from types import SimpleNamespace
 
 import pytest
-from mavsdk.asyncio import ComponentType, Configuration, Mavsdk
 from mavsdk.asyncio.plugins.action import ActionAsync
 from mavsdk.asyncio.plugins.ftp import FtpAsync, FtpError, FtpResult
 from mavsdk.asyncio.plugins.log_files import LogFilesAsync, LogFilesError, LogFilesResult
 from mavsdk.asyncio.plugins.telemetry import TelemetryAsync
 from pymavlink.mavftp import MAVFTP, MAVFTPSettings
 from pyulog import ULog
+
+from tests.realtime.conftest import mavsdk_system
 
 pytestmark = pytest.mark.realtime
 
@@ -46,10 +47,7 @@ async def names(ftp, folder):
 
 @pytest.fixture
 async def drone(sim, instance):
-    configuration = Configuration.create_with_component_type(ComponentType.GROUND_STATION)
-    async with Mavsdk(configuration) as mavsdk:
-        await mavsdk.add_any_connection(f"udpin://127.0.0.1:{14540 + instance}")
-        system = await mavsdk.first_autopilot(10.0)
+    async with mavsdk_system(sim.process, instance) as system:
         yield SimpleNamespace(
             ftp=FtpAsync(system),
             logs=LogFilesAsync(system),

@@ -8,7 +8,6 @@ import asyncio
 from math import cos, hypot, radians, sin
 
 import pytest
-from mavsdk.asyncio import ComponentType, Configuration, Mavsdk
 from mavsdk.asyncio.plugins.action import ActionAsync, ActionError, OrbitYawBehavior
 from mavsdk.asyncio.plugins.calibration import CalibrationAsync, CalibrationResult
 from mavsdk.asyncio.plugins.component_metadata import ComponentMetadataAsync, MetadataType
@@ -35,6 +34,7 @@ from mavsdk.asyncio.plugins.shell import ShellAsync
 from mavsdk.asyncio.plugins.telemetry import FlightMode, TelemetryAsync
 
 from tests.processes import free_instance, simulator
+from tests.realtime.conftest import mavsdk_system
 
 pytestmark = pytest.mark.realtime
 
@@ -58,11 +58,15 @@ PLUGINS = {
 
 
 @pytest.fixture(scope="module")
-def instance(tmp_path_factory):
+def instance():
+    return free_instance()
+
+
+@pytest.fixture(scope="module")
+def running(tmp_path_factory, instance):
     """One simulator for all tests; each leaves the drone on the ground, disarmed."""
-    number = free_instance()
-    with simulator(tmp_path_factory.mktemp("sim"), number, "--speed", str(SPEED), "--shell") as running:
-        yield number
+    with simulator(tmp_path_factory.mktemp("sim"), instance, "--speed", str(SPEED), "--shell") as running:
+        yield running
         assert running.process.poll() is None
         assert "Traceback" not in running.err
 
@@ -130,11 +134,9 @@ class Drone:
 
 
 @pytest.fixture
-async def drone(instance):
-    configuration = Configuration.create_with_component_type(ComponentType.GROUND_STATION)
-    async with Mavsdk(configuration) as mavsdk:
-        await mavsdk.add_any_connection(f"udpin://127.0.0.1:{14540 + instance}")
-        drone = Drone(await mavsdk.first_autopilot(10.0))
+async def drone(running, instance):
+    async with mavsdk_system(running.process, instance) as system:
+        drone = Drone(system)
         if await drone.seen("armed", lambda _: True):  # the test before has failed
             await drone.come_down()
         await drone.seen("health", lambda health: health.is_armable and health.is_home_position_ok)

@@ -4,13 +4,14 @@ import asyncio
 from math import cos, nan, radians
 
 import pytest
-from mavsdk.asyncio import ComponentType, Configuration, Mavsdk
 from mavsdk.asyncio.plugins.action import ActionAsync
 from mavsdk.asyncio.plugins.geofence import Circle, FenceType, GeofenceAsync, GeofenceData, Point
 from mavsdk.asyncio.plugins.mission import MissionAsync, MissionItem, MissionPlan
 from mavsdk.asyncio.plugins.mission_raw import MissionItem as RawItem
 from mavsdk.asyncio.plugins.mission_raw import MissionRawAsync
 from mavsdk.asyncio.plugins.telemetry import TelemetryAsync
+
+from tests.realtime.conftest import mavsdk_system
 
 pytestmark = pytest.mark.realtime
 
@@ -19,10 +20,8 @@ METRES_PER_DEGREE = 111_194.93
 
 @pytest.fixture
 async def system(sim, instance):
-    configuration = Configuration.create_with_component_type(ComponentType.GROUND_STATION)
-    async with Mavsdk(configuration) as mavsdk:
-        await mavsdk.add_any_connection(f"udpin://127.0.0.1:{14540 + instance}")
-        yield await mavsdk.first_autopilot(10.0)
+    async with mavsdk_system(sim.process, instance) as found:
+        yield found
 
 
 @pytest.fixture
