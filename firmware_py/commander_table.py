@@ -14,6 +14,7 @@ from firmware_py.commander_guards import MANUAL_MODES, Cause, Guard, Reaction, S
 from firmware_py.status import CommandResult, FlightMode
 
 CRITICAL, WARNING, INFO = 2, 4, 6  # MAV_SEVERITY
+_MANY = 8  # states of a row that the diagram draws as one
 
 
 class State(Enum):
@@ -452,6 +453,3 @@ def mermaid() -> str:
         sources = ["armed"] if many else sorted(state.value for state in row.states)
         lines += [f"    {source} --> {row.target.value}: {f'{name} {guard}'.strip()}" for source in sources]
     return "\n".join(lines) + "\n"
-
-
-_MANY = 8

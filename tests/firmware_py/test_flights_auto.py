@@ -200,8 +200,8 @@ def test_follow_keeps_behind_a_target_that_moves_turns_and_stops():
     flight.autopilot.set_mode(FlightMode.FOLLOW)
     assert flight.run(2.0)[-1].distance_m() < 0.02  # nobody there yet
     place = [30.0, 0.0]
-    follow(flight, 8, place, (0.0, 0.0))
-    assert dist(flight.now.position_ned_m, (22.0, 0.0, -8.0)) < 0.3
+    follow(flight, 10, place, (0.0, 0.0))
+    assert dist(flight.now.position_ned_m, (22.0, 0.0, -8.0)) < 0.2
     follow(flight, 10, place, (3.0, 0.0))
     steady = follow(flight, 8, place, (3.0, 0.0))
     assert dist(flight.now.position_ned_m, (place[0] - 8.0, 0.0, -8.0)) < 0.3
