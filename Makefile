@@ -6,7 +6,7 @@ VENV := .venv
 MAVPROXY_VENV := .venv-mavproxy
 BENCH_VENV := .venv-bench
 BIN := $(VENV)/bin
-ROOMS := scenarios firmware_py sitl vision offboard framerunner
+ROOMS := scenarios firmware_py sitl vision mission_link offboard monitor framerunner
 LOCK := uv pip compile --universal --python-version 3.11 --quiet --custom-compile-command 'make lock'
 
 .DEFAULT_GOAL := help

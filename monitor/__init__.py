@@ -1,0 +1,1 @@
+"""The Game Monitor: drones, missions, tries and replays in a browser."""

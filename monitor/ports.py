@@ -1,0 +1,110 @@
+"""What the monitor is given by whoever starts it; it opens no link and knows no referee of its own."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any, Protocol
+
+from scenarios.models import Scenario
+from scenarios.report import RefereeReport, RefereeSnapshot
+from scenarios.truth import TrueState
+
+Message = Any  # pymavlink's classes are made by a generator and carry no types
+
+
+class LinkFailed(Exception):  # noqa: N818 - it is what happened, and is mended by opening the link again
+    """The link is gone or cannot be opened; the message is one line for people."""
+
+
+class Link(Protocol):
+    """A MAVLink link, read and written from one thread."""
+
+    url: str
+
+    def receive(self, timeout_s: float) -> list[Message]:
+        """Wait for messages of any system; empty if none came in time. Raises `LinkFailed`."""
+        ...
+
+    def send(self, message: Message) -> None:
+        """Send to the message's `target_system` or, if it has none or 0, to everybody heard so far."""
+
+    def close(self) -> None:
+        """Let go."""
+
+
+class Referee(Protocol):
+    """Judges a flight by the states it is shown (`scenarios.referee.Referee` is one)."""
+
+    def update(self, state: TrueState) -> None:
+        """Look at the next state."""
+
+    def snapshot(self) -> RefereeSnapshot:
+        """How the try stands now."""
+        ...
+
+    def report(self, mission_state: str = "", ended: str | None = None) -> RefereeReport:
+        """Judge what was seen so far."""
+        ...
+
+
+@dataclass(frozen=True, slots=True)
+class RunInfo:
+    """A run folder, for a list.
+
+    Attributes:
+        name: of the folder; names the run everywhere.
+        scenario: its name.
+        mission: its name; "" if unknown.
+        verdict: of the referee; "" if the flight was not judged.
+        total_time_s: with penalties; None if not judged.
+        started: ISO 8601; "" if unknown.
+    """
+
+    name: str
+    scenario: str
+    mission: str
+    verdict: str
+    total_time_s: float | None
+    started: str
+
+
+class RunLibrary(Protocol):
+    """The flights that can be shown again. Reading one may take seconds: call it in a thread."""
+
+    def runs(self) -> Sequence[RunInfo]:
+        """All runs, newest first."""
+        ...
+
+    def recording(self, name: str) -> Mapping[str, Any]:
+        """A run as `docs/monitor-channels.md` says. Raises `RunError` with one line."""
+        ...
+
+    def image(self, name: str, index: int) -> bytes:
+        """A JPEG of its camera. Raises `RunError`."""
+        ...
+
+
+class RunError(Exception):
+    """A run that cannot be shown; the message is one line for people."""
+
+
+@dataclass(frozen=True, slots=True)
+class Equipment:
+    """All that the monitor is given.
+
+    Attributes:
+        open_link: opens the link to the drones; called again when it failed. Raises `LinkFailed`.
+        make_referee: for a drone that brings none, following its telemetry.
+        scenario: what is flown, if the one who starts the monitor said so.
+        list_scenarios: names that can be drawn.
+        load_scenario: one of them; raises `ScenarioError`.
+        runs: flights to show again; None if there is no such folder.
+    """
+
+    open_link: Callable[[], Link]
+    make_referee: Callable[[Scenario], Referee]
+    scenario: Scenario | None
+    list_scenarios: Callable[[], Sequence[str]]
+    load_scenario: Callable[[str], Scenario]
+    runs: RunLibrary | None
