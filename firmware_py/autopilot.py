@@ -78,6 +78,7 @@ class Autopilot:
     Attributes:
         airframe: what it flies.
         parameters: what a ground station may change; changes act at the next tick.
+        estimator: knows the local frame's origin.
         state: the estimate of the vehicle, updated in place.
         status: arming, mode, home and so on, updated in place.
         output: what the last step sent to the motors.
@@ -101,8 +102,8 @@ class Autopilot:
         self.status = VehicleStatus()
         self.flight = FlightRecord()
         self.missions = MissionStore()
-        self._estimator = Estimator()
-        self.state = self._estimator.state
+        self.estimator = Estimator()
+        self.state = self.estimator.state
         self._places = Places(self.status, origin)
         self._period_us = round(control_period_s * 1e6)
         self._now_us = 0
@@ -169,7 +170,7 @@ class Autopilot:
         if self.parameters.version != self._parameters_version:
             self._configure()
         state, commander, guidance = self.state, self._commander, self._guidance
-        sound = self._estimator.update(sensors)
+        sound = self.estimator.update(sensors)
         if sound:
             self._now_us = max(self._now_us, state.time_us)
             if self._places.projection is None:
@@ -186,7 +187,7 @@ class Autopilot:
         row = commander.tick(
             self._now_us,
             sound=sound,
-            placed=self._estimator.placed,
+            placed=self.estimator.placed,
             upright=1.0 - 2.0 * (x * x + y * y) > self._upright_cosine,
             landed=self._land_detector.landed,
             target_reached=guidance.target_reached,
@@ -441,8 +442,7 @@ class Autopilot:
             self.say(INFO, "Landing detected" if landed else "Takeoff detected")
 
     def _fix_origin(self) -> None:
-        origin_ned_m = self._estimator.origin_ned_m
-        if origin_ned_m is not None:
+        if (origin_ned_m := self.estimator.origin_ned_m) is not None:
             self._places.fix_origin(origin_ned_m, self.state)
             self._guidance.home_ned_m = self.status.home_ned_m
 

@@ -9,6 +9,7 @@ from asyncio.subprocess import PIPE, Process
 from typing import TypeVar
 
 from framerunner.errors import SettingError
+from sitl.server_settings import VIDEO_PORT
 
 T = TypeVar("T")
 
@@ -37,8 +38,9 @@ class SitlProcess:
         self._said: list[str] = []
         self._reader: asyncio.Task[None] | None = None
         self.drone_url = f"udpin://127.0.0.1:{14540 + instance}"
-        self.video_url = f"http://127.0.0.1:{8080 + instance}/video"
-        self.referee_url = f"http://127.0.0.1:{8080 + instance}/referee.json"
+        port = VIDEO_PORT + instance
+        self.video_url = f"http://127.0.0.1:{port}/video"
+        self.referee_url = f"http://127.0.0.1:{port}/referee.json"
 
     async def __aenter__(self) -> SitlProcess:
         """Start it."""

@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING
 from firmware_py.mavlink.camera_model import CameraModel
 from firmware_py.mavlink.node import MavlinkNode
 from firmware_py.mavlink.video_links import VideoEncoding, VideoStream
+from scenarios.axes import flip_vector
 from sitl.drone_files import flight_recorder, open_storage
 from sitl.link_hub import LinkHub
 from sitl.link_urls import is_loopback
@@ -109,6 +110,7 @@ class ServedDrone:
         scenario = self.simulation.scenario
         video = VideoServer(self._settings.bind, self._settings.http_port)
         video.add_json("/referee.json", self._referee_answer)
+        video.add_json("/scenario.json", lambda _query: scenario.model_dump(mode="json"))
         if self._settings.video_rtp is not None:
             from sitl.rtp import RtpSender
 
@@ -174,7 +176,13 @@ class ServedDrone:
         referee = simulation.referee
         return {
             "scenario": simulation.scenario.name,
+            "source": "truth",
+            "lift_m": 0.0,
             "time_us": simulation.time_us,
+            "local_frame": {
+                "origin_arena_m": flip_vector(simulation.autopilot.estimator.origin_ned_m or (0.0, 0.0, 0.0)),
+                "yaw_rad": 0.0,
+            },
             "snapshot": asdict(referee.snapshot()),
             "report": referee.report(query.get("state", ""), query.get("ended")).as_dict(),
         }

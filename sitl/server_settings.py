@@ -12,7 +12,7 @@ from sitl.links import Address, UdpAddresses
 
 _LAST_ONBOARD_PORT = 14549  # PX4 sends all instances beyond the tenth there
 _GROUND_PORT = 14550  # of every instance, so that one ground station sees them all
-_VIDEO_PORT = 8080
+VIDEO_PORT = 8100  # 8080 is the monitor's
 _RTP_PORT = 5600  # where QGroundControl listens; the one after it is for RTCP
 _LAST_PORT = 65535
 _PORT_SCHEMES = ("udpin", "tcpin")
@@ -36,7 +36,7 @@ class ServerSettings:
         bind: address of all sockets.
         onboard_remote: host, or host:port, to which the onboard link (14540) speaks unasked.
         ground_remote: host, or host:port, to which the ground link (14550) speaks unasked.
-        video_port: TCP port of the video; None for port 8080 plus instance.
+        video_port: TCP port of the video; None for port 8100 plus instance.
         video_rtp: to which H.264 in RTP goes; None: nowhere.
         speed: simulated seconds a second.
         links: more links.
@@ -84,7 +84,7 @@ class ServerSettings:
     @property
     def http_port(self) -> int:
         """TCP port of the video."""
-        return _VIDEO_PORT + self.instance if self.video_port is None else self.video_port
+        return VIDEO_PORT + self.instance if self.video_port is None else self.video_port
 
     @property
     def is_open(self) -> bool:

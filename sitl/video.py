@@ -80,7 +80,7 @@ def encode_jpeg(image: Image) -> bytes:
 class VideoServer:
     """Serves the images published to it, and JSON documents beside them."""
 
-    def __init__(self, host: str = "127.0.0.1", port: int = 8080) -> None:
+    def __init__(self, host: str = "127.0.0.1", port: int = 8100) -> None:
         """Prepare; nothing is opened yet.
 
         Args:

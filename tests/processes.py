@@ -14,7 +14,7 @@ from pathlib import Path
 
 ROOT = Path(__file__).parents[1]
 UDP_PORTS = (14540, 14550, 14580, 18570)
-HTTP_PORT = 8080
+HTTP_PORT = 8100
 
 
 def bound(port: int, kind: socket.SocketKind = socket.SOCK_DGRAM) -> socket.socket:

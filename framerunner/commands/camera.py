@@ -27,7 +27,7 @@ def camera(
         bool, Parameter(negative=(), help="held level, as by a gimbal, however the drone leans")
     ] = False,
     bind: Annotated[str, Parameter(help="address to serve the video on")] = "127.0.0.1",
-    port: Annotated[WholeNumber, Parameter(help="TCP port of the video")] = 8080,
+    port: Annotated[WholeNumber, Parameter(help="TCP port of the video")] = 8100,
 ) -> int:
     """Paint what a camera on a drone would see of the arena, from the pose that the drone reports.
 

@@ -55,7 +55,7 @@ def fly(
 
         framerunner fly test-case-1 --lockstep --record
 
-        framerunner fly test-case-1 --drone udpin://0.0.0.0:14540 --camera http://127.0.0.1:8080/video
+        framerunner fly test-case-1 --drone udpin://0.0.0.0:14540 --camera http://127.0.0.1:8100/video
 
         framerunner fly test-case-1 --drone serial:///dev/ttyUSB0:57600 --camera rtsp://192.168.1.10/live
     """

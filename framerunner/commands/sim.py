@@ -68,7 +68,7 @@ class Connections:
         Path | None,
         Parameter(help="file with 64 hexadecimal digits or a passphrase: sign MAVLink 2 with it"),
     ] = None
-    video_port: Annotated[WholeNumber | None, Parameter(help="TCP port of the video; 8080 + instance")] = None
+    video_port: Annotated[WholeNumber | None, Parameter(help="TCP port of the video; 8100 + instance")] = None
     video_rtp: Annotated[
         str, Parameter(help="host or host:port that gets the video as H.264 in RTP, UDP 5600, or off")
     ] = "127.0.0.1"
@@ -88,7 +88,7 @@ def sim(
     onboard: Onboard | None = None,
     lifeline: Annotated[bool, Parameter(show=False, help="stop when standard input ends")] = False,
 ) -> int:
-    """Start the simulated drone: MAVLink on UDP 14540 and 14550, video on http://127.0.0.1:8080/.
+    """Start the simulated drone: MAVLink on UDP 14540 and 14550, video on http://127.0.0.1:8100/.
 
     Stop it with Ctrl-C.
 

@@ -59,7 +59,8 @@ class VirtualCamera:
         base: whether the drone starts from the scenario's base; else it starts from the floor.
 
     Attributes:
-        scenario: what is to be seen.
+        plan: the scenario as given.
+        scenario: what is to be seen; its frames may hang higher than in the plan.
         placement: of the arena at the vehicle.
         history: of the vehicle's reports.
         attitudes: reports of attitude so far.
@@ -70,6 +71,7 @@ class VirtualCamera:
 
     def __init__(self, scenario: Scenario, *, level: bool = False, base: bool = True) -> None:
         self._lift_m = 0.0 if base else scenario.base.top_m
+        self.plan = scenario
         self.scenario = scenario = lifted(scenario, self._lift_m)
         self._level = level
         self._camera = Camera(scenario)
@@ -158,9 +160,18 @@ class VirtualCamera:
             "source": "telemetry",
             "lift_m": self._lift_m,
             "time_us": self.history.newest_us or 0,
+            "local_frame": self._local_frame(),
             "snapshot": asdict(self._referee.snapshot()),
             "report": self._referee.report(state, ended).as_dict(),
         }
+
+    def _local_frame(self) -> dict[str, object] | None:
+        """Where in the arena the vehicle's local frame is; None as long as the arena has no place."""
+        alignment = self.placement.alignment
+        if alignment is None:
+            return None
+        origin = alignment.pose(Pose((0.0, 0.0, 0.0), 0.0))
+        return {"origin_arena_m": origin.position_m, "yaw_rad": origin.yaw_rad}
 
     def _take_angles(self, message: Message) -> None:
         angles = (message.roll, message.pitch, message.yaw)

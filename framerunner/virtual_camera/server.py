@@ -59,6 +59,8 @@ class CameraServer:
         loop = asyncio.get_running_loop()
         self._failed = loop.create_future()
         self._video.add_json("/referee.json", self._referee_answer)
+        plan = self._camera.plan
+        self._video.add_json("/scenario.json", lambda _query: plan.model_dump(mode="json"))
         reader = threading.Thread(target=self._read, args=(loop,), name="telemetry", daemon=True)
         keeper: asyncio.Task[None] | None = None
         try:

@@ -166,8 +166,8 @@ def test_a_busy_udp_port_is_refused_before_anything_is_said(refused, base):
 
 def test_a_busy_video_port_is_refused_before_anything_is_said(refused):
     instance = free_instance()
-    with bound(8080 + instance, socket.SOCK_STREAM):
-        assert str(8080 + instance) in refused("sim", "--instance", instance)
+    with bound(8100 + instance, socket.SOCK_STREAM):
+        assert str(8100 + instance) in refused("sim", "--instance", instance)
 
 
 def test_a_remote_host_without_address_is_refused(refused):

@@ -49,7 +49,7 @@ async def drone(sim, instance):
             ftp=FtpAsync(system),
             info=InfoAsync(system),
             telemetry=TelemetryAsync(system),
-            http_port=8080 + instance,
+            http_port=8100 + instance,
         )
 
 

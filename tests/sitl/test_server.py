@@ -10,6 +10,7 @@ import pytest
 
 from firmware_py.mavlink.signing import SigningKey
 from scenarios.loader import load_scenario
+from scenarios.models import Scenario
 from sitl.fleet import side_by_side
 from sitl.link_urls import LinkError, parse_link
 from sitl.server import SimulatorServer, _Notices
@@ -59,7 +60,11 @@ async def serving(simulation, *, count=1, **options):
 
 
 async def referee(settings, query=""):
-    url = f"http://127.0.0.1:{settings.http_port}/referee.json{query}"
+    return await document(settings, f"referee.json{query}")
+
+
+async def document(settings, path):
+    url = f"http://127.0.0.1:{settings.http_port}/{path}"
     async with aiohttp.ClientSession() as session, session.get(url) as response:
         assert response.status == 200
         return await response.json()
@@ -79,6 +84,20 @@ async def test_the_referee_tells_how_the_try_stands():
         assert answer["report"]["verdict"] == "aborted"
         assert "pulled out" in answer["report"]["reason"]
         assert "red.turning" in answer["report"]["reason"]
+
+
+async def test_who_looks_on_learns_the_scenario_and_where_the_local_frame_is():
+    scenario = load_scenario("test-case-1")
+    simulation = Simulation(scenario)
+    async with serving(simulation) as (_, settings):
+        assert Scenario.model_validate(await document(settings, "scenario.json")) == scenario
+        answer = await referee(settings)
+    north_m, east_m, down_m = simulation.autopilot.state.position_ned_m
+    x_m, y_m, z_m = answer["local_frame"]["origin_arena_m"]
+    assert (answer["source"], answer["lift_m"], answer["local_frame"]["yaw_rad"]) == ("truth", 0.0, 0.0)
+    assert (x_m + north_m, y_m - east_m, z_m - down_m) == pytest.approx(
+        simulation.truth.position_arena_m, abs=1e-6
+    )
 
 
 async def test_telemetry_goes_out_on_both_links_before_anybody_spoke():
@@ -144,7 +163,7 @@ async def test_a_busy_udp_port_is_said_and_nothing_stays_open(base):
 async def test_a_busy_video_port_ends_it_and_frees_the_links():
     instance = free_instance()
     server = SimulatorServer(Simulation(load_scenario("empty")), ServerSettings(instance=instance))
-    with bound(8080 + instance, socket.SOCK_STREAM), pytest.raises(VideoError, match=str(8080 + instance)):
+    with bound(8100 + instance, socket.SOCK_STREAM), pytest.raises(VideoError, match=str(8100 + instance)):
         await asyncio.wait_for(server.run(), 20.0)
     await asyncio.sleep(0.05)
     with bound(14580 + instance), bound(18570 + instance):
@@ -206,7 +225,7 @@ def test_instances_shift_every_port():
     settings = ServerSettings(instance=3)
     assert (settings.onboard.bind[1], settings.onboard.remote[1]) == (14583, 14543)
     assert (settings.ground.bind[1], settings.ground.remote[1]) == (18573, 14550)  # the same for all
-    assert settings.http_port == 8083
+    assert settings.http_port == 8103
     assert ServerSettings(instance=3, video_port=9000).http_port == 9000
 
 

@@ -344,7 +344,7 @@ async def test_opencv_reads_a_stream_and_notices_its_end() -> None:
 
 
 def test_open_source_chooses(tmp_path: Path, clip: Path) -> None:
-    assert isinstance(open_source("http://127.0.0.1:8080/video"), HttpSource)
+    assert isinstance(open_source("http://127.0.0.1:8100/video"), HttpSource)
     assert isinstance(open_source("http://127.0.0.1/film.mp4"), CaptureSource)
     assert isinstance(open_source("rtsp://127.0.0.1/live"), CaptureSource)
     assert isinstance(open_source("udp://127.0.0.1:5600"), CaptureSource)

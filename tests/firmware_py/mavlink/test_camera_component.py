@@ -14,7 +14,7 @@ from firmware_py.types import GeodeticPoint, VehicleState
 MODEL = CameraModel(320, 240, radians(90.0), 10.0)
 STREAMS = (
     VideoStream("5600", VideoEncoding.H264_RTP, 320, 240, 10.0, 90.0),
-    VideoStream("http://127.0.0.1:8080/video", VideoEncoding.MJPEG_HTTP, 320, 240, 10.0, 90.0),
+    VideoStream("http://127.0.0.1:8100/video", VideoEncoding.MJPEG_HTTP, 320, 240, 10.0, 90.0),
 )
 CAMERA, ALL, AUTOPILOT = (1, 100), (1, 0), (1, 1)
 ACCEPTED, DENIED, UNSUPPORTED, FAILED = 0, 2, 3, 4
@@ -113,7 +113,7 @@ def test_streams_tell_where_they_are(viewer):
     answers = named(viewer.ask(viewer.long(REQUEST, 269, 0, target=CAMERA)), "VIDEO_STREAM_INFORMATION")
     assert [(m.stream_id, m.count, m.uri, m.type, m.encoding) for m in answers] == [
         (1, 2, "5600", mavlink.VIDEO_STREAM_TYPE_RTPUDP, mavlink.VIDEO_STREAM_ENCODING_H264),
-        (2, 2, "http://127.0.0.1:8080/video", mavlink.VIDEO_STREAM_TYPE_TCP_MPEG, 0),
+        (2, 2, "http://127.0.0.1:8100/video", mavlink.VIDEO_STREAM_TYPE_TCP_MPEG, 0),
     ]
     one = named(viewer.ask(viewer.long(REQUEST, 269, 2, target=CAMERA)), "VIDEO_STREAM_INFORMATION")
     assert [m.stream_id for m in one] == [2]

@@ -90,6 +90,9 @@ async def test_serves_images_and_the_referee_until_telemetry_stays_away_and_agai
         async with session.get(f"{video.url}referee.json") as response:
             answer = await response.json()
         assert (answer["scenario"], answer["source"], answer["lift_m"]) == ("test-case-1", "telemetry", 0.0)
+        assert len(answer["local_frame"]["origin_arena_m"]) == 3
+        async with session.get(f"{video.url}scenario.json") as response:
+            assert (await response.json())["name"] == answer["scenario"]
         link.mute = True
         await until(lambda: any("no new images" in line for line in said))
         link.mute = False
