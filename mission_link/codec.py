@@ -239,7 +239,7 @@ def _unpack(packed: bytes, what: str) -> dict[str, Any]:
         raise PayloadError(f"{what}: cannot be decompressed")
     try:
         content = json.loads(plain.decode("utf-8"))
-        # What JSON or UTF-8 do not have (1e999, NaN, half a surrogate pair) must not reach whoever writes it on.
+        # What JSON or UTF-8 do not have (1e999, half a surrogate pair) must not reach whoever writes it on.
         json.dumps(content, ensure_ascii=False, allow_nan=False).encode("utf-8")
     except (ValueError, RecursionError):
         raise PayloadError(f"{what}: is no JSON") from None
