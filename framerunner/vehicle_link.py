@@ -33,15 +33,18 @@ class _Line(Protocol):
         """Wait for bytes; empty if none came in time. Raises `OSError` when the line is gone."""
         ...
 
-    def write(self, data: bytes) -> None:
-        """Send; drops the bytes if nobody can get them."""
+    def write(self, data: bytes, system_id: int) -> None:
+        """Send to a system or, with 0, to all; drops the bytes if nobody can get them."""
+
+    def heard(self, system_id: int) -> None:
+        """What was read last came from this system."""
 
     def close(self) -> None:
         """Let go."""
 
 
 class VehicleLink:
-    """One link, read and written by whoever opened it, from one thread.
+    """One link, read and written by whoever opened it. Several vehicles may speak on it.
 
     Args:
         url: as `fly --drone` takes it.
@@ -77,13 +80,17 @@ class VehicleLink:
             data = self._line.read(timeout_s)
         except OSError as error:
             raise DroneError(f"{self.url} failed: {error.strerror or error}") from None
-        messages = self._codec.parse_buffer(data) if data else None
-        return [message for message in messages or () if message.get_type() != "BAD_DATA"]
+        parsed = (self._codec.parse_buffer(data) if data else None) or ()
+        messages = [message for message in parsed if message.get_type() != "BAD_DATA"]
+        for message in messages:
+            self._line.heard(message.get_srcSystem())
+        return messages
 
     def send(self, message: Message) -> None:
-        """Send a message; lost without a word if nobody is there yet."""
+        """Send a message to the system it is for, or to all; lost without a word if nobody is there yet."""
+        system_id = getattr(message, "target_system", getattr(message, "target", 0))
         try:
-            self._line.write(message.pack(self._codec))
+            self._line.write(message.pack(self._codec), system_id)
         except OSError:
             return  # a vehicle that is gone shows in what is received
         self._codec.seq = (self._codec.seq + 1) % 256
@@ -94,30 +101,43 @@ class VehicleLink:
 
 
 class _UdpIn:
-    """Listens; answers go to whoever spoke last."""
+    """Listens; answers go to where a system spoke from last."""
 
     def __init__(self, url: VehicleUrl) -> None:
         self._socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
         self._socket.bind((url.address, url.number))
-        self._peer: tuple[str, int] | None = None
+        self._speaker: tuple[str, int] | None = None
+        self._peers: dict[int, tuple[str, int]] = {}
 
     def read(self, timeout_s: float) -> bytes:
         self._socket.settimeout(timeout_s)
         try:
-            data, self._peer = self._socket.recvfrom(_DATAGRAM_BYTES)
+            data, self._speaker = self._socket.recvfrom(_DATAGRAM_BYTES)
         except TimeoutError:
             return b""
         return data
 
-    def write(self, data: bytes) -> None:
-        if self._peer is not None:
-            self._socket.sendto(data, self._peer)
+    def heard(self, system_id: int) -> None:
+        if self._speaker is not None:
+            self._peers[system_id] = self._speaker
+
+    def write(self, data: bytes, system_id: int) -> None:
+        peer = self._peers.get(system_id)
+        for address in set(self._peers.values()) if peer is None else (peer,):
+            self._socket.sendto(data, address)
 
     def close(self) -> None:
         self._socket.close()
 
 
-class _UdpOut:
+class _OnePeer:
+    """A line on which all systems are behind the same other end."""
+
+    def heard(self, system_id: int) -> None:
+        """It makes no difference here."""
+
+
+class _UdpOut(_OnePeer):
     """Speaks to one address and listens to it."""
 
     def __init__(self, url: VehicleUrl) -> None:
@@ -131,14 +151,14 @@ class _UdpOut:
         except (TimeoutError, ConnectionRefusedError):  # refused: nobody listens there yet
             return b""
 
-    def write(self, data: bytes) -> None:
+    def write(self, data: bytes, system_id: int) -> None:
         self._socket.send(data)
 
     def close(self) -> None:
         self._socket.close()
 
 
-class _Stream:
+class _Stream(_OnePeer):
     """A TCP connection."""
 
     def __init__(self, connection: socket.socket) -> None:
@@ -155,7 +175,7 @@ class _Stream:
             raise ConnectionResetError(0, "the other side closed the connection")
         return data
 
-    def write(self, data: bytes) -> None:
+    def write(self, data: bytes, system_id: int) -> None:
         self._socket.settimeout(_CONNECT_S)
         self._socket.sendall(data)
 
@@ -167,7 +187,7 @@ def _tcp_out(url: VehicleUrl) -> _Stream:
     return _Stream(socket.create_connection((url.address, url.number), _CONNECT_S))
 
 
-class _TcpIn:
+class _TcpIn(_OnePeer):
     """Waits for a vehicle that calls, one after the other."""
 
     def __init__(self, url: VehicleUrl) -> None:
@@ -188,9 +208,9 @@ class _TcpIn:
             self._stream = None
             return b""
 
-    def write(self, data: bytes) -> None:
+    def write(self, data: bytes, system_id: int) -> None:
         if self._stream is not None:
-            self._stream.write(data)
+            self._stream.write(data, system_id)
 
     def close(self) -> None:
         if self._stream is not None:
@@ -198,7 +218,7 @@ class _TcpIn:
         self._listener.close()
 
 
-class _Serial:
+class _Serial(_OnePeer):
     """A serial device, eight bits, no parity, no flow control."""
 
     def __init__(self, url: VehicleUrl) -> None:
@@ -226,7 +246,7 @@ class _Serial:
             raise ConnectionResetError(0, "the serial line has gone")
         return data
 
-    def write(self, data: bytes) -> None:
+    def write(self, data: bytes, system_id: int) -> None:
         os.write(self._device, data)
 
     def close(self) -> None:

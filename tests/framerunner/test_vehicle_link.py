@@ -22,8 +22,8 @@ def open_link(url):
     return VehicleLink(url, system_id=246, component_id=191)
 
 
-def packet(sequence=0, kind=2, component=1):
-    codec = mavlink.MAVLink(None, srcSystem=3, srcComponent=component)
+def packet(sequence=0, kind=2, component=1, system=3):
+    codec = mavlink.MAVLink(None, srcSystem=system, srcComponent=component)
     codec.seq = sequence
     return mavlink.MAVLink_heartbeat_message(kind, 12, 0, 0, 3, 3).pack(codec)
 
@@ -38,6 +38,30 @@ def next_message(link):
 
 def parsed(data):
     return mavlink.MAVLink(None).parse_buffer(data)[0]
+
+
+def test_of_several_vehicles_on_one_port_each_gets_what_is_for_it():
+    port = free_port()
+    link = open_link(f"udpin://127.0.0.1:{port}")
+    vehicles = {system: socket.socket(socket.AF_INET, socket.SOCK_DGRAM) for system in (3, 4)}
+    try:
+        for system, vehicle in vehicles.items():
+            vehicle.settimeout(5)
+            vehicle.sendto(packet(system=system), ("127.0.0.1", port))
+            assert next_message(link).get_srcSystem() == system
+        for system, vehicle in vehicles.items():
+            link.send(command(system, mavlink.MAV_CMD_REQUEST_MESSAGE, 148))
+            link.send(mavlink.MAVLink_manual_control_message(system, 0, 0, 500, 0, 0))
+            assert [parsed(vehicle.recv(300)).get_type() for _ in range(2)] == [
+                "COMMAND_LONG",
+                "MANUAL_CONTROL",
+            ]
+        link.send(companion_heartbeat())
+        assert {parsed(vehicle.recv(300)).get_type() for vehicle in vehicles.values()} == {"HEARTBEAT"}
+    finally:
+        for vehicle in vehicles.values():
+            vehicle.close()
+        link.close()
 
 
 def test_listening_on_udp_hears_and_answers_the_last_speaker():
