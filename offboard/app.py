@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from typing import Literal
 
 from offboard.drone import Drone, DroneError, DroneState, VelocityCommand
-from offboard.engine import MissionEngine, MissionRunError
+from offboard.engine import MissionEngine, MissionRunError, TransitionTaken
 from offboard.eyes import Camera, CameraEyes, CameraLostError, ClosedEyes, Eyes
 from offboard.mission import Mission
 from offboard.pilot import Imu
@@ -29,6 +29,8 @@ class Moment:
         detections: of the latest image.
         mission_state: such as "red.turning".
         flight_time_s: vehicle time since motors on; 0 before.
+        transition: the one taken in this tick, if any.
+        paused: a pilot has the sticks; the mission waits.
     """
 
     state: DroneState
@@ -36,6 +38,8 @@ class Moment:
     detections: Detections
     mission_state: str
     flight_time_s: float
+    transition: TransitionTaken | None = None
+    paused: bool = False
 
 
 Observer = Callable[[Moment], None]
@@ -176,7 +180,8 @@ class _Flight:
         self._ticks += 1
         if self._observer is not None:
             flight_time_s = self._flight_time_s()
-            self._observer(Moment(state, command, detections, self._engine.state, flight_time_s))
+            engine = self._engine
+            self._observer(Moment(state, command, detections, engine.state, flight_time_s, engine.transition))
 
     def _time_is_up(self, time_us: int) -> bool:
         """Whether the limit is over; it counts from motors on, and before that from the first tick."""

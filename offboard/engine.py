@@ -10,13 +10,14 @@ through the chart; a test shows that both fly alike.
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import dataclass
 from math import isfinite
 
 from statemachine import StateChart
 
-from offboard.chart.expressions import Evaluate, compile_value
+from offboard.chart.expressions import Evaluate, compile_value, names_in
 from offboard.chart.native import TICK
-from offboard.chart.spec import Action, Leaf
+from offboard.chart.spec import Action, Leaf, Transition
 from offboard.drone import VelocityCommand
 from offboard.mission import Mission
 from offboard.pilot import Imu, Pilot, PilotError, velocity_command
@@ -25,17 +26,43 @@ from vision.types import Detections
 
 Act = Callable[[Pilot], None]
 
+DONE = "done"
+
 
 class MissionRunError(Exception):
     """The mission cannot go on; the message is one line with the state and the reason."""
 
 
+@dataclass(frozen=True, slots=True)
+class TransitionTaken:
+    """A change of state, and why.
+
+    Attributes:
+        source: full id of the state (a leaf) that was left.
+        target: full id of the one that is present now. If a superstate was finished on the way, this is
+            where the mission went on.
+        when: the guard that held; "" for a transition without one, "done" if a superstate was finished.
+        values: each name of the guard that held with its value then, such as ("frame.d", 0.44), in the order
+            of the guard; a name that could not be read is left out.
+        time_us: vehicle time, microseconds.
+        seconds_in_source: how long it was in `source`, vehicle time without pauses.
+    """
+
+    source: str
+    target: str
+    when: str
+    values: tuple[tuple[str, object], ...]
+    time_us: int
+    seconds_in_source: float
+
+
 class _FastState:
     """A leaf of the chart with its guards and its `during` compiled."""
 
-    __slots__ = ("during", "finish", "guards")
+    __slots__ = ("during", "finish", "guards", "leaf")
 
     def __init__(self, leaf: Leaf, finish: bool) -> None:
+        self.leaf = leaf
         self.guards = tuple(_guard(transition.when) for transition in leaf.transitions)
         self.during = tuple(_act(action) for action in leaf.during)
         self.finish = finish
@@ -64,6 +91,12 @@ class MissionEngine:
         self._started_us = 0
         self._entered_us = 0
         self._last_us = 0
+        self._taken: TransitionTaken | None = None
+
+    @property
+    def transition(self) -> TransitionTaken | None:
+        """The transition taken in the last tick; None if none was."""
+        return self._taken
 
     @property
     def state(self) -> str:
@@ -97,6 +130,7 @@ class MissionEngine:
         pilot = self.pilot
         pilot.imu = imu
         pilot.cam = cam
+        self._taken = None
         try:
             if self._present is None:
                 self._start(time_us)
@@ -122,15 +156,25 @@ class MissionEngine:
         pilot = self.pilot
         pilot.seconds_in_state = (time_us - self._entered_us) / 1e6
         pilot.seconds_in_mission = (time_us - self._started_us) / 1e6
-        leaves = any(guard(pilot) for guard in present.guards)
-        if leaves:
-            self._send_tick()
-            self._settle(time_us)
-        elif self._quiet_ticks:
+        for number, guard in enumerate(present.guards):
+            if guard(pilot):
+                self._take(present.leaf.transitions[number], time_us)
+                return
+        if self._quiet_ticks:
             for act in present.during:
                 act(pilot)
         elif present.during:
             self._send_tick()
+
+    def _take(self, transition: Transition, time_us: int) -> None:
+        """Have the chart take a transition whose guard holds, and note why it did."""
+        source, seconds = self._id, self.pilot.seconds_in_state
+        values = _values(transition.when, self.pilot)  # now: what is done on leaving may change them
+        self._send_tick()
+        self._settle(time_us)
+        arrived = self._id == transition.to or self._id.startswith(f"{transition.to}.")
+        when = transition.when if arrived else DONE
+        self._taken = TransitionTaken(source, self._id, when, values, time_us, seconds)
 
     def _send_tick(self) -> None:
         assert self._chart is not None
@@ -153,6 +197,20 @@ class MissionEngine:
         return MissionRunError(
             f"mission '{self.mission.name}', state '{self._id or 'not started'}': {reason}"
         )
+
+
+def _values(when: str, pilot: Pilot) -> tuple[tuple[str, object], ...]:
+    """What the names of a guard stand for now."""
+    found = []
+    for name in names_in(when):
+        value: object = pilot
+        try:
+            for part in name.split("."):
+                value = getattr(value, part)
+        except (Exception, SystemExit):  # a value which the guard did not get to read; nothing hangs on it
+            continue
+        found.append((name, value))
+    return tuple(found)
 
 
 def _guard(when: str) -> Evaluate:
