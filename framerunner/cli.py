@@ -9,7 +9,7 @@ from importlib import metadata
 
 from cyclopts import App, CycloptsError
 
-from framerunner.commands import camera, doctor, evaluate, fly, mission, replay, scenario, sim
+from framerunner.commands import camera, doctor, evaluate, fly, mission, monitor, replay, scenario, sim
 
 EXIT_BAD_INPUT = 2
 EXIT_INTERRUPTED = 130
@@ -30,6 +30,7 @@ def build_app() -> App:
     app.command(camera.camera)
     app.command(doctor.doctor)
     app.command(evaluate.evaluate)
+    app.command(monitor.monitor)
     app.command(replay.replay)
     app.command(mission.app)
     app.command(scenario.app)
@@ -92,6 +93,7 @@ def _is_foreseen(error: Exception) -> bool:
         "DynamicsError",
         "LinkError",
         "MissionError",
+        "MonitorError",
         "ParameterFileError",
         "PictureError",
         "ScenarioError",

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import asyncio
 import sys
-from dataclasses import dataclass
+from contextlib import AsyncExitStack
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -15,6 +16,7 @@ from framerunner.errors import SettingError
 
 if TYPE_CHECKING:
     from firmware_py.mavlink.signing import SigningKey
+    from framerunner.monitor_process import MonitorProcess
     from scenarios.models import Scenario
     from sitl.server import SimulatorServer
     from sitl.server_settings import ServerSettings
@@ -86,6 +88,9 @@ def sim(
     ] = 1,
     connections: Connections | None = None,
     onboard: Onboard | None = None,
+    monitor: Annotated[
+        bool, Parameter(negative=(), help="open the Game Monitor as well, on http://127.0.0.1:8080/")
+    ] = False,
     lifeline: Annotated[bool, Parameter(show=False, help="stop when standard input ends")] = False,
 ) -> int:
     """Start the simulated drone: MAVLink on UDP 14540 and 14550, video on http://127.0.0.1:8100/.
@@ -97,6 +102,8 @@ def sim(
         framerunner sim
 
         framerunner sim --scenario test-case-1 --speed 2
+
+        framerunner sim --scenario test-case-1 --monitor
 
         framerunner sim --ground-remote 192.168.1.20
 
@@ -112,14 +119,24 @@ def sim(
         raise SettingError(f"--instance {instance}: must be from 0 to 9")
     if not 1 <= count <= _MAX_COUNT:
         raise SettingError(f"--count {count}: must be from 1 to {_MAX_COUNT}")
-    settings = _settings(connections or Connections(), onboard or Onboard(), speed, instance, count)
+    chosen = connections or Connections()
+    watcher = _monitor() if monitor else None
+    if watcher is not None:
+        chosen = replace(chosen, link=(*chosen.link, watcher.link))
+    settings = _settings(chosen, onboard or Onboard(), speed, instance, count)
 
     from scenarios.loader import load_scenario
     from sitl.server import SimulatorServer
 
     server = SimulatorServer(_simulations(load_scenario(scenario), count), settings, notice=_say)
-    asyncio.run(_run(server, lifeline=lifeline))
+    asyncio.run(_run(server, monitor=watcher, lifeline=lifeline))
     return 0
+
+
+def _monitor() -> MonitorProcess:
+    from framerunner.monitor_process import MonitorProcess
+
+    return MonitorProcess()
 
 
 def _settings(
@@ -190,27 +207,14 @@ def _read_key(path: Path | None) -> SigningKey | None:
         raise SettingError(f"--signing-key {path}: {error}") from None
 
 
-async def _run(server: SimulatorServer, *, lifeline: bool) -> None:
-    if not lifeline:
-        await server.run()
-        return
-    running = asyncio.create_task(server.run())
-    watching = asyncio.create_task(_standard_input_ends())
-    done, _ = await asyncio.wait({running, watching}, return_when=asyncio.FIRST_COMPLETED)
-    for task in (running, watching):
-        task.cancel()
-    await asyncio.gather(running, watching, return_exceptions=True)
-    if running in done:
-        running.result()
+async def _run(server: SimulatorServer, *, monitor: MonitorProcess | None, lifeline: bool) -> None:
+    from framerunner.lifeline import until_standard_input_ends
 
-
-async def _standard_input_ends() -> None:
-    """Return when whoever started this process is gone, however it went."""
-    loop = asyncio.get_running_loop()
-    reader = asyncio.StreamReader()
-    await loop.connect_read_pipe(lambda: asyncio.StreamReaderProtocol(reader), sys.stdin)
-    while await reader.read(1024):
-        pass
+    async with AsyncExitStack() as stack:
+        if monitor is not None:
+            await stack.enter_async_context(monitor)
+            await monitor.opened()
+        await (until_standard_input_ends(server.run()) if lifeline else server.run())
 
 
 def _say(line: str) -> None:

@@ -1,0 +1,31 @@
+"""A program that ends with whoever started it."""
+
+from __future__ import annotations
+
+import asyncio
+import sys
+from collections.abc import Coroutine
+
+
+async def until_standard_input_ends(work: Coroutine[object, object, None]) -> None:
+    """Do some work until it is done or standard input ends: whoever started this is gone then.
+
+    Args:
+        work: is cancelled in the second case.
+    """
+    running = asyncio.create_task(work)
+    watching = asyncio.create_task(_standard_input_ends())
+    done, _ = await asyncio.wait({running, watching}, return_when=asyncio.FIRST_COMPLETED)
+    for task in (running, watching):
+        task.cancel()
+    await asyncio.gather(running, watching, return_exceptions=True)
+    if running in done:
+        running.result()
+
+
+async def _standard_input_ends() -> None:
+    loop = asyncio.get_running_loop()
+    reader = asyncio.StreamReader()
+    await loop.connect_read_pipe(lambda: asyncio.StreamReaderProtocol(reader), sys.stdin)
+    while await reader.read(1024):
+        pass

@@ -1,0 +1,72 @@
+"""The Game Monitor as a child process, with a link of its own to the drones."""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+import socket
+import sys
+
+from framerunner.child_process import ChildProcess
+
+_START_S = 20.0
+
+
+class MonitorProcess(ChildProcess):
+    """`framerunner monitor` as a child process; what it says is said here.
+
+    Args:
+        scenario: name or file, for a drone that brings no referee; None if it does.
+        runs: folder of flights to show again.
+
+    Attributes:
+        link: where it listens; whoever speaks for the drones sends there, as `--link` takes it.
+    """
+
+    def __init__(self, scenario: str | None = None, runs: str | None = None) -> None:
+        port = _free_port()
+        self.link = f"udpout://127.0.0.1:{port}"
+        arguments = ["monitor", "--lifeline", "--drone", f"udpin://127.0.0.1:{port}"]
+        if scenario is not None:
+            arguments += ["--scenario", scenario]
+        if runs is not None:
+            arguments += ["--runs", runs]
+        self._open = asyncio.Event()
+        self._watching: asyncio.Task[None] | None = None
+        super().__init__("the monitor", arguments, self._relay)
+
+    async def opened(self) -> None:
+        """Wait until its page can be opened.
+
+        Raises:
+            SettingError: it could not start; its own words are the reason.
+        """
+        await self.guard(asyncio.create_task(self._until_open()))
+        self._watching = asyncio.create_task(self._tell_of_its_end())
+
+    async def __aexit__(self, *problem: object) -> None:
+        """Stop it."""
+        if self._watching is not None:
+            self._watching.cancel()
+            await asyncio.gather(self._watching, return_exceptions=True)
+        await super().__aexit__(*problem)
+
+    async def _tell_of_its_end(self) -> None:
+        """An onlooker's end must not end a flight."""
+        print(f"warning: {await self.failed()}", file=sys.stderr, flush=True)
+
+    async def _until_open(self) -> None:
+        with contextlib.suppress(TimeoutError):  # a slow machine may go on without
+            await asyncio.wait_for(self._open.wait(), _START_S)
+
+    def _relay(self, line: str) -> None:
+        if not line.startswith("error: "):  # the reason of its end is told by whoever waits for it
+            print(line, file=sys.stderr, flush=True)
+        if "http://" in line:
+            self._open.set()
+
+
+def _free_port() -> int:
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
+        probe.bind(("127.0.0.1", 0))
+        return int(probe.getsockname()[1])

@@ -1,0 +1,1 @@
+"""What the monitor is given: links, referees, scenarios and recorded flights."""
