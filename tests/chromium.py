@@ -7,6 +7,7 @@ import shutil
 from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager
 
+import pytest
 from playwright.async_api import Browser, Page, async_playwright
 
 NAMES = ("chromium", "chromium-browser", "google-chrome")
@@ -19,10 +20,12 @@ FLAGS = (
 
 
 def find_chromium() -> str:
-    """The browser's path: $FRAMERUNNER_CHROMIUM or what is installed."""
+    """The browser's path: $FRAMERUNNER_CHROMIUM or what is installed; without one the test is skipped."""
     named = os.environ.get("FRAMERUNNER_CHROMIUM")
     found = named or next(filter(None, map(shutil.which, NAMES)), None)
-    assert found, "no Chromium: install Debian's package chromium, or name it in FRAMERUNNER_CHROMIUM"
+    if not found and not os.environ.get("CI"):
+        pytest.skip("no Chromium: install Debian's package chromium, or name it in FRAMERUNNER_CHROMIUM")
+    assert found, "no Chromium was installed"
     return found
 
 
