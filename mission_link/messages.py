@@ -12,6 +12,7 @@ COMPONENT_ID = 191  # MAV_COMP_ID_ONBOARD_COMPUTER, within the vehicle's system
 STATE_TYPE = 0x8F10  # payload types of MAVLink's TUNNEL; those from 0x8000 are nobody's
 DETECTIONS_TYPE = 0x8F11
 DOCUMENT_TYPE = 0x8F12
+TEXT_PREFIX = "mission: "  # of the app's STATUSTEXTs
 
 Box = tuple[float, float, float, float, float, float]  # n, s, e, w (pixels from the centre), d (m), a (deg)
 UNSEEN: Box = (-inf, inf, -inf, inf, inf, inf)

@@ -20,6 +20,7 @@ from mavsdk.plugins.offboard import VelocityBodyYawspeed
 
 from offboard.drone import DroneError, DroneState, VelocityCommand
 from offboard.link.alignment import Alignment, Pose
+from offboard.link.companion import Companion
 from offboard.link.telemetry import TelemetryFeed
 from offboard.link.tlog import TlogRecorder
 from offboard.link.tracking import CommandTracker
@@ -93,11 +94,16 @@ class MavsdkDrone:
         self._commanding = False
         self._tlog_path: Path | None = None
         self._recorder: TlogRecorder | None = None
+        self._companion: Companion | None = None
         self._watchdog = Watchdog(self._stop_from_watchdog, hang_report)
 
     def record_to(self, path: Path) -> None:
         """Record all MAVLink traffic as a tlog from `connect` to `close`."""
         self._tlog_path = path
+
+    def tell_through(self, companion: Companion) -> None:
+        """Let a companion speak over this link from `connect` to `close`; it is its owner's to close."""
+        self._companion = companion
 
     async def connect(self) -> None:
         """Find the vehicle and listen to it.
@@ -111,6 +117,7 @@ class MavsdkDrone:
         configuration = Configuration.create_with_component_type(ComponentType.GROUND_STATION)
         self._mavsdk = Mavsdk(configuration)
         await self._start_recorder()
+        await self._let_companion_in()
         try:
             await self._mavsdk.add_any_connection(self._url.text, ForwardingOption.ON)
         except MavsdkError as error:
@@ -123,6 +130,8 @@ class MavsdkDrone:
             )
         if self._recorder is not None:
             self._recorder.announce(await self._system.get_system_id())
+        if self._companion is not None:
+            self._companion.announce(await self._system.get_system_id())
         self._action = ActionAsync(self._system)
         self._offboard = OffboardAsync(self._system)
         self._telemetry = TelemetryAsync(self._system)
@@ -378,6 +387,14 @@ class MavsdkDrone:
             await self._mavsdk.add_any_connection(url, ForwardingOption.ON)
         except (OSError, MavsdkError) as error:
             raise DroneError(f"cannot record to {self._tlog_path}: {error}") from None
+
+    async def _let_companion_in(self) -> None:
+        if self._companion is None or self._mavsdk is None:
+            return
+        try:
+            await self._mavsdk.add_any_connection(self._companion.listen(), ForwardingOption.ON)
+        except (OSError, MavsdkError) as error:  # the mission can be flown all the same
+            logger.warning("the mission cannot be told of: %s", error)
 
     def _stop_from_watchdog(self) -> None:
         """On the watchdog's thread: end the native stream, ask for hold; if hold fails, silence is enough."""

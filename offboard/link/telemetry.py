@@ -14,6 +14,7 @@ from dataclasses import dataclass
 from math import radians
 from typing import Any
 
+from mission_link.messages import TEXT_PREFIX
 from scenarios.axes import Vec3
 
 TICK_US = 50_000
@@ -145,7 +146,9 @@ class TelemetryFeed:
         self.health = health
 
     def _on_text(self, text: Any, _user: object) -> None:  # noqa: ANN401
-        self._texts.append((time.monotonic(), text.text.strip()))
+        words = text.text.strip()
+        if not words.startswith(TEXT_PREFIX):  # MAVSDK hands over what this app's own companion says, too
+            self._texts.append((time.monotonic(), words))
 
     def _wake(self) -> None:
         loop = self._loop
