@@ -1,0 +1,145 @@
+"""Puts the web application together: guard, files, the modules' own routes, and NiceGUI behind them."""
+
+from __future__ import annotations
+
+import contextlib
+import logging
+import re
+import socket
+from collections.abc import Callable, Iterator
+from importlib import import_module
+from ipaddress import ip_address
+from pathlib import Path
+
+import nicegui
+import uvicorn
+from fastapi import FastAPI
+from nicegui import core, ui
+from starlette.responses import Response
+from starlette.staticfiles import StaticFiles
+from starlette.types import Scope
+
+from monitor.access import Access
+from monitor.fleet import Fleet
+from monitor.ports import Equipment
+from monitor.security import Guard
+from monitor.server import MODULES, Monitor
+from monitor.settings import MonitorSettings
+
+_STATIC = Path(__file__).parent / "static"
+_ELEMENTS = Path(nicegui.__file__).parent / "elements"
+_LIBRARIES = {"three": "scene", "echart": "echart", "mermaid": "mermaid"}
+_HASHED = re.compile(r"-[\w-]{8}\.js$")  # the bundler names a file by its content
+_RECONNECT_S = 10.0
+_END_S = 1
+_KEEP_ALIVE_S = 30
+_MAX_MESSAGE_BYTES = 1 << 20  # of a WebSocket; NiceGUI's own limit
+
+
+class _Files(StaticFiles):
+    """Files that a browser asks after each time, and gets again only if they changed."""
+
+    async def get_response(self, path: str, scope: Scope) -> Response:
+        response = await super().get_response(path, scope)
+        response.headers["Cache-Control"] = "no-cache"
+        return response
+
+
+class _Library(StaticFiles):
+    """A bundle of NiceGUI's: parts named by their content are kept for good."""
+
+    async def get_response(self, path: str, scope: Scope) -> Response:
+        response = await super().get_response(path, scope)
+        forever = _HASHED.search(path) is not None
+        response.headers["Cache-Control"] = "public, max-age=31536000, immutable" if forever else "no-cache"
+        return response
+
+
+class _Server(uvicorn.Server):
+    """Leaves signals to the command line, and tells when it listens."""
+
+    def __init__(self, config: uvicorn.Config, started: Callable[[], None]) -> None:
+        super().__init__(config)
+        self._tell_started = started
+
+    @contextlib.contextmanager
+    def capture_signals(self) -> Iterator[None]:
+        yield
+
+    async def startup(self, sockets: list[socket.socket] | None = None) -> None:
+        await super().startup(sockets)
+        self._tell_started()
+
+
+def assemble(
+    equipment: Equipment, settings: MonitorSettings, place: tuple[str, int], invite: Callable[[str], None]
+) -> Monitor:
+    """Make the monitor; nothing runs yet.
+
+    Args:
+        equipment: the link to the drones and what else the monitor needs.
+        settings: as started.
+        place: address and port it listens on.
+        invite: told the secret of each one-time link for judges.
+    """
+    local_only = ip_address(place[0]).is_loopback
+    access = Access(
+        settings.password,
+        all_may_fly=local_only,
+        cookie=f"framerunner-judge-{place[1]}",  # browsers keep one jar for all ports
+        hear_invitation=invite,
+    )
+    web = FastAPI(title="framerunner", docs_url=None, redoc_url=None, openapi_url=None)
+    web.add_middleware(Guard, local_only=local_only)
+    monitor = Monitor(settings, equipment, Fleet(equipment), access, web)
+    _add_static_files(web)
+    for name in MODULES:
+        import_module(name).register(monitor)
+    _add_nicegui(web)
+    return monitor
+
+
+def make_server(web: FastAPI, started: Callable[[], None]) -> uvicorn.Server:
+    """Return the server of a web application.
+
+    Args:
+        web: the application.
+        started: called once it listens.
+    """
+    config = uvicorn.Config(
+        web,
+        log_config=None,
+        log_level="critical",
+        access_log=False,
+        server_header=False,
+        proxy_headers=False,
+        timeout_keep_alive=_KEEP_ALIVE_S,
+        timeout_graceful_shutdown=_END_S,
+        ws_max_size=_MAX_MESSAGE_BYTES,
+        ws_per_message_deflate=False,  # would compress the same pose once for each viewer
+    )
+    return _Server(config, started)
+
+
+def _add_static_files(web: FastAPI) -> None:
+    """Serve the monitor's own files and the libraries that come with NiceGUI."""
+    web.mount("/static", _Files(directory=_STATIC))
+    for name, element in _LIBRARIES.items():
+        web.mount(f"/lib/{name}", _Library(directory=_ELEMENTS / element / "dist"))
+
+
+def _add_nicegui(web: FastAPI) -> None:
+    """Mount NiceGUI's pages behind everything else. Its application is global: begin it afresh."""
+    core.app.middleware_stack = None
+    core.app.user_middleware.clear()
+    core.app._shutdown_handlers.clear()
+    logging.getLogger("nicegui").setLevel(logging.ERROR)  # it warns of every address that is not there
+    ui.run_with(
+        web,
+        title="framerunner",
+        dark=None,
+        language="en-US",
+        reconnect_timeout=_RECONNECT_S,
+        gzip_middleware_factory=None,  # costs more time than it saves in the networks this is made for
+        show_welcome_message=False,
+    )

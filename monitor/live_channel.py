@@ -1,0 +1,188 @@
+"""`/ws/live`: what the drones do, written once and sent to all who watch; nobody gets a backlog."""
+
+from __future__ import annotations
+
+import asyncio
+import json
+import logging
+from collections import deque
+from collections.abc import Iterable, Mapping
+from math import isfinite
+from typing import TYPE_CHECKING, Any
+
+from starlette.websockets import WebSocket, WebSocketDisconnect
+
+if TYPE_CHECKING:
+    from monitor.fleet import Fleet
+    from monitor.server import Monitor
+
+POSE_HZ = 20
+STATUS_EVERY = 4  # poses
+MOST_VIEWERS = 200
+MOST_PENDING = 200
+TOO_SLOW_CODE = 1013  # "try again later"
+# Of these only the newest counts: one that was not sent yet is replaced.
+_REPLACED = ("pose", "status", "detections")
+_POSE_DECIMALS = 4  # a tenth of a millimetre; in a quaternion 0.2 mrad
+_log = logging.getLogger(__name__)
+
+
+class Viewer:
+    """What one browser is still to be sent.
+
+    Args:
+        kinds: of messages it wants; empty: all.
+    """
+
+    def __init__(self, kinds: Iterable[str] = ()) -> None:
+        self._kinds = frozenset(kinds)
+        self._events: deque[str] = deque()
+        self._newest: dict[tuple[str, object], str] = {}
+        self._arrived = asyncio.Event()
+        self.too_slow = False
+
+    def wants(self, kind: str) -> bool:
+        """Whether it asked for messages of a kind."""
+        return not self._kinds or kind in self._kinds
+
+    def put(self, kind: str, drone_id: object, text: str) -> None:
+        """Queue a message; never waits."""
+        if not self.wants(kind):
+            return
+        if kind in _REPLACED:
+            self._newest[kind, drone_id] = text
+        elif len(self._events) < MOST_PENDING:
+            self._events.append(text)
+        else:
+            self.too_slow = True
+        self._arrived.set()
+
+    async def next(self) -> str | None:
+        """Wait for the next message, events first; None when it is too slow to go on."""
+        while not (self._events or self._newest or self.too_slow):
+            self._arrived.clear()
+            await self._arrived.wait()
+        if self.too_slow:
+            return None
+        if self._events:
+            return self._events.popleft()
+        return self._newest.pop(next(iter(self._newest)))
+
+
+class LiveChannel:
+    """All viewers, and the task that keeps them up to date.
+
+    Args:
+        fleet: what is shown.
+    """
+
+    def __init__(self, fleet: Fleet) -> None:
+        self._fleet = fleet
+        self._viewers: set[Viewer] = set()
+        self._somebody = asyncio.Event()
+        self._last_status = ""
+
+    def enter(self, viewer: Viewer) -> bool:
+        """Let a viewer watch, beginning with the welcome; False if there are too many."""
+        if len(self._viewers) >= MOST_VIEWERS:
+            return False
+        for message in self._fleet.welcome():
+            viewer.put(message["kind"], message.get("id"), encode(message))
+        self._viewers.add(viewer)
+        self._somebody.set()
+        return True
+
+    def leave(self, viewer: Viewer) -> None:
+        """Forget a viewer."""
+        self._viewers.discard(viewer)
+        if not self._viewers:
+            self._somebody.clear()
+
+    def tell(self, message: Mapping[str, Any]) -> None:
+        """Send a message to all who want its kind."""
+        kind = message["kind"]
+        if any(viewer.wants(kind) for viewer in self._viewers):
+            text = encode(message)
+            for viewer in self._viewers:
+                viewer.put(kind, message.get("id"), text)
+
+    async def run(self) -> None:
+        """Send poses and status while somebody watches, until cancelled."""
+        unsubscribe = self._fleet.subscribe(self.tell)
+        try:
+            loop = asyncio.get_running_loop()
+            due_s, count = loop.time(), 0
+            while True:
+                await self._somebody.wait()
+                try:
+                    self._update(count)
+                except Exception:  # a fault in one message must not end the others
+                    _log.exception("the live channel skips an update")
+                count += 1
+                # Skips what it cannot keep up with instead of hurrying after it.
+                due_s = max(due_s + 1 / POSE_HZ, loop.time())
+                await asyncio.sleep(due_s - loop.time())
+        finally:
+            unsubscribe()
+
+    def _update(self, count: int) -> None:
+        self.tell(self._fleet.pose_message())
+        if count % STATUS_EVERY == 0:
+            message = self._fleet.status_message()
+            text = encode(message)
+            if text != self._last_status:
+                self._last_status = text
+                for viewer in self._viewers:
+                    viewer.put("status", None, text)
+
+
+def register(monitor: Monitor) -> None:
+    """Add `/ws/live`. A page that does not want everything says so: `/ws/live?kinds=status,notice`."""
+    channel = LiveChannel(monitor.fleet)
+    monitor.jobs.append(channel.run)
+
+    @monitor.web.websocket("/ws/live")
+    async def live(websocket: WebSocket, kinds: str = "") -> None:
+        await websocket.accept()
+        viewer = Viewer(kind for kind in kinds.split(",") if kind)
+        if not channel.enter(viewer):
+            await websocket.close(TOO_SLOW_CODE, "too many are watching")
+            return
+        sending = asyncio.create_task(_send(websocket, viewer))
+        try:
+            while True:  # ends when the browser goes; what it sends is ignored
+                await websocket.receive()
+                if websocket.client_state.name == "DISCONNECTED":
+                    break
+        except (WebSocketDisconnect, RuntimeError):
+            pass
+        finally:
+            channel.leave(viewer)
+            sending.cancel()
+
+
+async def _send(websocket: WebSocket, viewer: Viewer) -> None:
+    try:
+        while (text := await viewer.next()) is not None:
+            await websocket.send_text(text)
+        await websocket.close(TOO_SLOW_CODE, "too slow")
+    except (WebSocketDisconnect, RuntimeError, OSError):
+        pass  # it has gone
+
+
+def encode(message: Mapping[str, Any]) -> str:
+    """Write a message as JSON; numbers that are not finite become null, poses lose needless digits."""
+    decimals = _POSE_DECIMALS if message["kind"] == "pose" else None
+    return json.dumps(_tidy(message, decimals), separators=(",", ":"), allow_nan=False)
+
+
+def _tidy(value: Any, decimals: int | None) -> Any:  # noqa: ANN401 - whatever JSON can hold
+    if isinstance(value, float):
+        if not isfinite(value):
+            return None
+        return value if decimals is None else round(value, decimals)
+    if isinstance(value, Mapping):
+        return {key: _tidy(item, decimals) for key, item in value.items()}
+    if isinstance(value, list | tuple):
+        return [_tidy(item, decimals) for item in value]
+    return value

@@ -1,0 +1,103 @@
+"""The monitor as a web server: drones, pages and the live channel, served until cancelled."""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import Callable, Coroutine
+from dataclasses import dataclass, field
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
+
+from monitor.listening import listen, url_of
+from monitor.settings import MonitorSettings
+
+if TYPE_CHECKING:
+    import socket
+
+    import uvicorn
+    from fastapi import FastAPI
+
+    from monitor.access import Access
+    from monitor.fleet import Fleet
+    from monitor.ports import Equipment
+
+Job = Callable[[], Coroutine[Any, Any, None]]
+# Each has `register(monitor)`. One line a module.
+MODULES = (
+    "monitor.live_channel",
+    "monitor.video_proxy",
+    "monitor.pages.login",
+)
+
+
+@dataclass
+class Monitor:
+    """What every page is handed.
+
+    Attributes:
+        settings: as started.
+        equipment: what the monitor was given.
+        fleet: the drones.
+        access: who may do what.
+        web: where HTTP routes and WebSockets are added.
+        jobs: run from start to end of the monitor; a `register` appends to them.
+    """
+
+    settings: MonitorSettings
+    equipment: Equipment
+    fleet: Fleet
+    access: Access
+    web: FastAPI
+    jobs: list[Job] = field(default_factory=list)
+
+
+async def serve(equipment: Equipment, settings: MonitorSettings, say: Callable[[str], None]) -> None:
+    """Serve the monitor until cancelled.
+
+    Args:
+        equipment: the link to the drones and what else the monitor needs.
+        settings: where it listens and stores.
+        say: takes lines for people: the address, and judges' links.
+
+    Raises:
+        MonitorError: a setting cannot be used, or the port is taken.
+    """
+    settings.check()
+    with listen(settings.bind, settings.port) as listener:
+        # Reading the libraries takes more than a second; whoever else lives on this loop goes on meanwhile.
+        await asyncio.to_thread(_import_all)
+        from monitor.assembly import assemble, make_server  # noqa: PLC0415 - see above
+
+        host, port = listener.getsockname()[:2]
+        url = url_of(host, port)
+
+        def invite(secret: str) -> None:
+            say(f"judges log in at {url}login?token={secret}")
+
+        def started() -> None:
+            say(f"monitor: {url}")
+            monitor.access.invite()
+
+        monitor = assemble(equipment, settings, (host, port), invite)
+        server = make_server(monitor.web, started)
+        await _run(server, listener, [monitor.fleet.run, *monitor.jobs])
+
+
+def _import_all() -> None:
+    for name in ("monitor.assembly", *MODULES):
+        import_module(name)
+
+
+async def _run(server: uvicorn.Server, listener: socket.socket, jobs: list[Job]) -> None:
+    """Run the server and what belongs to it until cancelled or one of them fails."""
+    serving = asyncio.create_task(server.serve([listener]))
+    running = [asyncio.create_task(job()) for job in jobs]
+    try:
+        done, _ = await asyncio.wait([serving, *running], return_when=asyncio.FIRST_COMPLETED)
+        for task in done:
+            task.result()
+    finally:
+        server.should_exit = True
+        for task in running:
+            task.cancel()
+        await asyncio.gather(serving, *running, return_exceptions=True)

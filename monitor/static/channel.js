@@ -1,0 +1,78 @@
+/**
+ * The live channel: one WebSocket that comes back by itself.
+ *
+ *     const channel = new LiveChannel();
+ *     channel.on("pose", (message) => …);
+ *     channel.onState((state) => …);   // "open" or "away"
+ */
+
+const FIRST_WAIT_MS = 500;
+const LONGEST_WAIT_MS = 4000;
+
+export class LiveChannel {
+  /** @param {string[]} kinds of messages that are wanted; none: all */
+  constructor(kinds = []) {
+    this.listeners = new Map();
+    this.stateListeners = [];
+    this.wait = FIRST_WAIT_MS;
+    this.url = new URL("/ws/live", location.href);
+    this.url.protocol = location.protocol === "https:" ? "wss:" : "ws:";
+    if (kinds.length) this.url.searchParams.set("kinds", kinds.join(","));
+    addEventListener("pagehide", () => this.pause());
+    addEventListener("pageshow", () => this.open());
+    addEventListener("online", () => this.open());
+    this.open();
+  }
+
+  /**
+   * Hear messages of a kind.
+   * @param {string} kind as in docs/monitor-channels.md
+   * @param {(message: object) => void} hear
+   */
+  on(kind, hear) {
+    if (!this.listeners.has(kind)) this.listeners.set(kind, []);
+    this.listeners.get(kind).push(hear);
+  }
+
+  /** Hear whether the monitor is reached. @param {(state: "open"|"away") => void} hear */
+  onState(hear) {
+    this.stateListeners.push(hear);
+  }
+
+  /** Connect, unless it is. */
+  open() {
+    clearTimeout(this.timer);
+    if (this.socket) return;
+    const socket = new WebSocket(this.url);
+    this.socket = socket;
+    socket.onopen = () => {
+      this.wait = FIRST_WAIT_MS;
+      this.tell("open");
+    };
+    socket.onmessage = (event) => this.take(event.data);
+    socket.onclose = () => {
+      if (this.socket !== socket) return;
+      this.socket = null;
+      this.tell("away");
+      this.timer = setTimeout(() => this.open(), this.wait);
+      this.wait = Math.min(2 * this.wait, LONGEST_WAIT_MS);
+    };
+  }
+
+  /** Let go, for a page that is left or put aside. */
+  pause() {
+    clearTimeout(this.timer);
+    const socket = this.socket;
+    this.socket = null;
+    socket?.close();
+  }
+
+  take(text) {
+    const message = JSON.parse(text);
+    for (const hear of this.listeners.get(message.kind) ?? []) hear(message);
+  }
+
+  tell(state) {
+    for (const hear of this.stateListeners) hear(state);
+  }
+}
