@@ -16,7 +16,7 @@ from math import isfinite
 from statemachine import StateChart
 
 from offboard.chart.expressions import Evaluate, compile_value, names_in
-from offboard.chart.native import TICK
+from offboard.chart.native import RESUME, TICK
 from offboard.chart.spec import Action, Leaf, Transition
 from offboard.drone import VelocityCommand
 from offboard.mission import Mission
@@ -41,7 +41,8 @@ class TransitionTaken:
         source: full id of the state (a leaf) that was left.
         target: full id of the one that is present now. If a superstate was finished on the way, this is
             where the mission went on.
-        when: the guard that held; "" for a transition without one, "done" if a superstate was finished.
+        when: the guard that held; "" for a transition without one, "done" if a superstate was finished,
+            "resume" if the mission goes on here after a pause.
         values: each name of the guard that held with its value then, such as ("frame.d", 0.44), in the order
             of the guard; a name that could not be read is left out.
         time_us: vehicle time, microseconds.
@@ -91,6 +92,7 @@ class MissionEngine:
         self._started_us = 0
         self._entered_us = 0
         self._last_us = 0
+        self._paused_us: int | None = None
         self._taken: TransitionTaken | None = None
 
     @property
@@ -109,7 +111,7 @@ class MissionEngine:
         return self._present is not None and self._present.finish
 
     def tick(self, imu: Imu, cam: Detections, time_us: int) -> VelocityCommand:
-        """Run one step of the chart.
+        """Run one step of the chart. After a pause this goes on with the mission.
 
         Args:
             imu: where the drone is.
@@ -134,7 +136,9 @@ class MissionEngine:
         try:
             if self._present is None:
                 self._start(time_us)
-            elif not self._present.finish:
+            elif not self._present.finish and not (
+                self._paused_us is not None and self._resume(self._present, self._paused_us, time_us)
+            ):
                 self._step(self._present, time_us)
             return velocity_command(pilot.cmd)
         except PilotError as error:
@@ -146,6 +150,16 @@ class MissionEngine:
             SystemExit,
         ) as error:  # whatever an expression or a contestant's primitive may raise
             raise self._error(self._place(error) + in_words(error)) from error
+
+    def pause(self, time_us: int) -> None:
+        """Let the mission and its clocks stand still from this tick on, until the next call of `tick`.
+
+        Args:
+            time_us: vehicle time of the first tick that is left out, microseconds.
+        """
+        self._taken = None
+        if self._paused_us is None and self._present is not None:
+            self._paused_us = time_us
 
     def _start(self, time_us: int) -> None:
         self._started_us = time_us
@@ -165,6 +179,23 @@ class MissionEngine:
                 act(pilot)
         elif present.during:
             self._send_tick()
+
+    def _resume(self, present: _FastState, paused_us: int, time_us: int) -> bool:
+        """End a pause; True if the chart was sent elsewhere, so that this tick is done."""
+        self._paused_us = None
+        self._started_us += time_us - paused_us
+        self._entered_us += time_us - paused_us
+        if present.leaf.resume is None:
+            return False
+        assert self._chart is not None
+        source, seconds = self._id, (time_us - self._entered_us) / 1e6
+        self.pilot.seconds_in_mission = (time_us - self._started_us) / 1e6
+        cmd = self.pilot.cmd
+        cmd.vel_x = cmd.vel_y = cmd.vel_z = cmd.rot_z = 0.0  # those of the state that is left
+        self._chart.send(RESUME)
+        self._settle(time_us)
+        self._taken = TransitionTaken(source, self._id, RESUME, (), time_us, seconds)
+        return True
 
     def _take(self, transition: Transition, time_us: int) -> None:
         """Have the chart take a transition whose guard holds, and note why it did."""

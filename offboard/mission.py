@@ -155,7 +155,11 @@ def mermaid(mission: Mission, active: str | None = None) -> str:
 def _draw(state: State, indent: str, lines: list[str]) -> None:
     if state.states:
         lines.append(f'{indent}state "{state.name}" as {state.id} {{')
-        lines.append(f"{indent}    [*] --> {state.id}.{state.initial}")
+        initial = f"{state.id}.{state.initial}"
+        again = state.resume is not None and state.resume.to == initial
+        lines.append(f"{indent}    [*] --> {initial}{' : also after a pause' if again else ''}")
+        if state.resume and not again and state.resume.to.startswith(f"{state.id}."):
+            lines.append(f"{indent}    [*] --> {state.resume.to} : after a pause")
         for child in state.states:
             _draw(child, indent + "    ", lines)
         lines.append(f"{indent}}}")
@@ -174,6 +178,8 @@ def _draw(state: State, indent: str, lines: list[str]) -> None:
         lines.append(f"{indent}{state.id} --> {transition.to}{label}")
     if state.then:
         lines.append(f"{indent}{state.id} --> {state.then}")
+    if state.resume and not state.resume.to.startswith(f"{state.id}."):
+        lines.append(f"{indent}{state.id} --> {state.resume.to} : after a pause")
 
 
 def _label(actions: tuple[Action, ...]) -> str:

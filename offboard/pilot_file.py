@@ -20,10 +20,14 @@ from offboard.chart.problems import MissionError, Place, Problem
 from offboard.pilot import Pilot
 
 MAX_FILE_BYTES = 1_000_000
-_ON_ITS_INSTANCES = "final_states history_values initial_state model prepare_event state state_field tick"
+_ON_ITS_INSTANCES = (
+    "final_states history_values initial_state model prepare_event resume state state_field tick"
+)
 _THE_CHART_S_OWN = frozenset([*dir(StateChart), *_ON_ITS_INSTANCES.split()])
 """Names that python-statemachine takes for its own before it asks the pilot, or writes to."""
-_CALLED_BY_THE_CHART = re.compile(r"(before|on|after)_(transition|tick|done_.*)|on_(enter|exit|invoke)_.*")
+_CALLED_BY_THE_CHART = re.compile(
+    r"(before|on|after)_(transition|tick|resume|done_.*)|on_(enter|exit|invoke)_.*"
+)
 """Names that python-statemachine would call of itself whenever a state changes."""
 
 

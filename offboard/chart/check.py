@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from offboard.chart.expressions import ExpressionError, check_assignment, check_expression
 from offboard.chart.problems import Place, ProblemList
-from offboard.chart.spec import Action, MissionFile, State, all_states, leaves
+from offboard.chart.spec import Action, Leaf, MissionFile, State, all_states, leaves
 from offboard.chart.vocabulary import UnknownNameError, Vocabulary
 from offboard.pilot import Pilot
 
@@ -51,6 +51,9 @@ def _check_shape(state: State, problems: ProblemList) -> None:
         return
     if state.then or state.initial:
         problems.add(place, f"state '{state.id}' has 'then' or 'initial' but no states of its own")
+    if state.final and state.resume:
+        text = f"state '{state.id}' is final; nothing is left to go on with, take 'resume' away"
+        problems.add(state.resume.place, text)
     if state.final and (state.transitions or state.during):
         problems.add(place, f"state '{state.id}' is final; nothing happens after its 'enter'")
     always = [index for index, transition in enumerate(state.transitions) if not transition.when]
@@ -81,27 +84,36 @@ def _check_action(action: Action, vocabulary: Vocabulary, problems: ProblemList)
 
 
 def _check_reachable(mission: MissionFile, problems: ProblemList) -> None:
-    """Every leaf can be entered, and from the start a finish can be reached by some way."""
+    """Every leaf can be entered, and from the start a finish can be reached by some way, without a pause."""
     states = {state.id: state for state in all_states(mission.states)}
     by_leaf = {leaf.state.id: leaf for leaf in leaves(mission.states)}
+    entered = _reached(mission.initial, states, by_leaf, pauses=True)
+    for leaf_id, leaf in by_leaf.items():
+        if leaf_id not in entered:
+            problems.add(leaf.state.place, f"state '{leaf_id}' is never reached; lead a transition to it")
+    unpaused = _reached(mission.initial, states, by_leaf, pauses=False)
+    if not any(is_finish(states, leaf_id) for leaf_id in unpaused):
+        problems.add(mission.place, "never finishes: no final state ends it; mark one with 'final: true'")
+
+
+def _reached(initial: str, states: dict[str, State], by_leaf: dict[str, Leaf], *, pauses: bool) -> set[str]:
+    """The leaves that can be entered from the start, by transitions and, if wanted, after pauses."""
     seen: set[str] = set()
-    pending = [_entry(states, mission.initial)]
+    pending = [_entry(states, initial)]
     while pending:
         current = pending.pop()
         if current in seen:
             continue
         seen.add(current)
-        targets = [transition.to for transition in by_leaf[current].transitions]
+        leaf = by_leaf[current]
+        targets = [transition.to for transition in leaf.transitions]
+        if pauses and leaf.resume:
+            targets.append(leaf.resume.to)
         outer = states.get(current.rpartition(".")[0])
         if states[current].final and outer is not None and outer.then:
             targets.append(outer.then)
         pending += [_entry(states, target) for target in targets]
-    for leaf_id, leaf in by_leaf.items():
-        if leaf_id not in seen:
-            problems.add(leaf.state.place, f"state '{leaf_id}' is never reached; lead a transition to it")
-    finishes = (leaf_id for leaf_id in seen if is_finish(states, leaf_id))
-    if next(finishes, None) is None:
-        problems.add(mission.place, "never finishes: no final state ends it; mark one with 'final: true'")
+    return seen
 
 
 def is_finish(states: dict[str, State], leaf_id: str) -> bool:

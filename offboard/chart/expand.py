@@ -98,6 +98,7 @@ def _instance(state: State, templates: dict[str, State], used: set[str], problem
         state,
         use="",
         initial=template.initial,
+        resume=state.resume or template.resume,
         states=template.states,
         enter=state.enter + template.enter,
         during=state.during + template.during,
@@ -122,8 +123,12 @@ def _resolved(state: State, ids: set[str], problems: ProblemList) -> State:
         return name
 
     transitions = tuple(replace(t, to=target(t.to, t.place, "target")) for t in state.transitions)
+    resume = state.resume and replace(
+        state.resume, to=target(state.resume.to, state.resume.place, "'resume'")
+    )
     return replace(
         state,
+        resume=resume,
         then=target(state.then, state.place, "'then'") if state.then else "",
         transitions=transitions,
         states=tuple(_resolved(child, ids, problems) for child in state.states),

@@ -88,7 +88,7 @@ def compile_value(text: str) -> Evaluate:
 
 def names_in(text: str) -> tuple[str, ...]:
     """The dotted names of a checked expression, each once, in the order in which they stand there."""
-    return tuple(dict.fromkeys(".".join(path) for path in _paths(_parsed(text)))) if text else ()
+    return tuple(dict.fromkeys(".".join(path) for path in reversed(_paths(_parsed(text))))) if text else ()
 
 
 def _name_of_pilot(name: str) -> Evaluate:
@@ -113,7 +113,7 @@ def _parsed(text: str) -> ast.Expression:
 
 
 def _paths(tree: ast.AST) -> list[tuple[str, ...]]:
-    """Every dotted name of an expression, whole, in the order of the text."""
+    """Every dotted name of an expression, whole, the last one first."""
     found: list[tuple[str, ...]] = []
     pending = [tree]
     while pending:
@@ -128,5 +128,5 @@ def _paths(tree: ast.AST) -> list[tuple[str, ...]]:
         elif parts:
             raise ExpressionError(f"'.{parts[-1]}' must follow a name")
         else:
-            pending.extend(reversed(list(ast.iter_child_nodes(node))))
+            pending.extend(ast.iter_child_nodes(node))
     return found

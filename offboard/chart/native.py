@@ -23,6 +23,7 @@ from offboard.chart.problems import MissionError, Problem
 from offboard.chart.spec import Action, Leaf, MissionFile, State, leaves
 
 TICK = "tick"
+RESUME = "resume"
 
 
 def native_yaml(mission: MissionFile) -> str:
@@ -78,6 +79,8 @@ def _transitions(leaf: Leaf) -> list[dict[str, Any]]:
     if leaf.during:
         during = _actions(leaf.during)
         found.append({"event": TICK, "on": during})  # without a target nothing is left or entered
+    if leaf.resume:
+        found.append({"event": RESUME, "target": leaf.resume.to})
     return found
 
 

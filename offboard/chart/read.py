@@ -12,8 +12,11 @@ from offboard.chart.source import ListNode, MapNode, Node, Scalar, parse
 from offboard.chart.spec import Action, MissionFile, State, Transition
 
 _MISSION_KEYS = ("name", "description", "extends", "initial", "variables", "templates", "states")
-_STATE_KEYS = ("initial", "final", "then", "use", "enter", "during", "exit", "transitions", "states")
-_TEMPLATE_KEYS = ("initial", "states", "transitions", "enter", "during", "exit")
+_STATE_KEYS = (
+    *("initial", "final", "then", "use", "resume"),
+    *("enter", "during", "exit", "transitions", "states"),
+)
+_TEMPLATE_KEYS = ("initial", "states", "resume", "transitions", "enter", "during", "exit")
 _TRANSITION_KEYS = ("when", "to")
 _NAME = re.compile(r"[a-z][a-z0-9_]*\Z")
 _ASSIGNMENT = re.compile(r"\s*([A-Za-z_][\w.]*)\s*=(?!=)\s*(.*)\Z", re.DOTALL)
@@ -76,12 +79,21 @@ class _Reader:
             final=self._flag(node, "final"),
             then=self._text(node, "then"),
             use=self._text(node, "use"),
+            resume=self._resume(node),
             enter=self._actions(node, "enter"),
             during=self._actions(node, "during"),
             exit=self._actions(node, "exit"),
             transitions=self._transitions(node),
             states=self._states(node),
         )
+
+    def _resume(self, state: MapNode) -> Transition | None:
+        if "resume" not in state.items:
+            return None
+        place, to = state.keys["resume"], self._text(state, "resume")
+        if not to and isinstance(state.items["resume"], Scalar):
+            self._problems.add(place, "'resume' is empty; name the state to go on in after a pause")
+        return Transition(place, to)
 
     def _transitions(self, state: MapNode) -> tuple[Transition, ...]:
         found = []

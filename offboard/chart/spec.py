@@ -50,6 +50,7 @@ class State:
         initial: the state a superstate starts in.
         then: where a superstate goes on when one of its final states is reached.
         use: the template whose states it takes; empty after expansion.
+        resume: where the mission goes on after a pause within this state; None: where it was.
     """
 
     place: Place
@@ -58,6 +59,7 @@ class State:
     final: bool = False
     then: str = ""
     use: str = ""
+    resume: Transition | None = None
     enter: tuple[Action, ...] = ()
     during: tuple[Action, ...] = ()
     exit: tuple[Action, ...] = ()
@@ -92,11 +94,13 @@ class Leaf:
     Attributes:
         transitions: its own first, then those of the superstates around it, in order of priority.
         during: its own first, then those of the superstates around it.
+        resume: its own or, without one, that of the nearest superstate that has one.
     """
 
     state: State
     transitions: tuple[Transition, ...]
     during: tuple[Action, ...]
+    resume: Transition | None
 
 
 def leaves(states: tuple[State, ...], outer: tuple[State, ...] = ()) -> list[Leaf]:
@@ -114,7 +118,8 @@ def leaves(states: tuple[State, ...], outer: tuple[State, ...] = ()) -> list[Lea
         around = (state, *outer)
         transitions = () if state.final else tuple(t for s in around for t in s.transitions)
         during = () if state.final else tuple(a for s in around for a in s.during)
-        found.append(Leaf(state, transitions, during))
+        resume = None if state.final else next((s.resume for s in around if s.resume), None)
+        found.append(Leaf(state, transitions, during, resume))
     return found
 
 
