@@ -186,6 +186,10 @@ class LockstepDrone:
             self._ask("hold", self._autopilot.set_mode(FlightMode.HOLD))
             self._confirm("hold", lambda: self._mode is FlightMode.HOLD)
 
+    async def refuse(self) -> None:
+        """No pilot takes this drone, so none gives it back: as `hold`."""
+        await self.hold()
+
     def command(self, command: VelocityCommand) -> None:
         """Set the velocity to fly from now on. Without motors on it is passed over."""
         if self._commanding:

@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import asyncio
+import logging
 from collections.abc import AsyncIterator, Callable
 from dataclasses import dataclass
+from math import isfinite
 from typing import Literal
 
 from offboard.drone import Drone, DroneError, DroneState, VelocityCommand
@@ -16,6 +18,7 @@ from vision.types import Detections
 
 INTERRUPTED = "interrupted"
 MICROSECONDS = 1_000_000
+STILL = VelocityCommand()
 REST_US = 3 * MICROSECONDS  # time to fall onto the base, and to be seen at rest there
 
 
@@ -31,6 +34,7 @@ class Moment:
         flight_time_s: vehicle time since motors on; 0 before.
         transition: the one taken in this tick, if any.
         paused: a pilot has the sticks; the mission waits.
+        remark: why the mission did not go on when the pilot last gave the drone back; empty if it did.
     """
 
     state: DroneState
@@ -40,9 +44,11 @@ class Moment:
     flight_time_s: float
     transition: TransitionTaken | None = None
     paused: bool = False
+    remark: str = ""
 
 
 Observer = Callable[[Moment], None]
+logger = logging.getLogger(__name__)
 
 
 @dataclass(frozen=True, slots=True)
@@ -55,6 +61,7 @@ class Outcome:
         mission_state: the state it was in.
         flight_time_s: vehicle time from motors on to its end.
         ticks: how many were flown.
+        pauses: how often a pilot took the drone.
     """
 
     ended: Literal["finished", "timed out", "aborted"]
@@ -62,6 +69,7 @@ class Outcome:
     mission_state: str
     flight_time_s: float
     ticks: int
+    pauses: int = 0
 
     @property
     def interrupted(self) -> bool:
@@ -81,7 +89,8 @@ async def fly_mission(
     """Connect, fly the mission, let go.
 
     If anything goes wrong after the start (drone, camera, mission, time limit, Ctrl-C), commanding stops,
-    hold is asked for, and the outcome says why.
+    hold is asked for, and the outcome says why. A pilot who takes the drone pauses the mission; it goes on
+    when he gives the drone back where that is safe.
 
     Args:
         drone: not yet connected; closed at the end.
@@ -128,6 +137,9 @@ class _Flight:
         self._started_us: int | None = None
         self._now_us = 0
         self._ticks = 0
+        self._paused = False
+        self._pauses = 0
+        self._remark = ""
 
     async def run(self) -> Outcome:
         """Fly to the end, whichever it is."""
@@ -164,6 +176,8 @@ class _Flight:
         raise DroneError("the drone's ticks ended")
 
     async def _tick(self, state: DroneState) -> None:
+        if self._flying and (self._paused or not state.offboard) and await self._stay_paused(state):
+            return
         detections = self._eyes.latest(state.time_us)
         imu = Imu(state.x, state.y, state.z, state.yaw)
         command = self._engine.tick(imu, detections, state.time_us)
@@ -182,6 +196,35 @@ class _Flight:
             flight_time_s = self._flight_time_s()
             engine = self._engine
             self._observer(Moment(state, command, detections, engine.state, flight_time_s, engine.transition))
+
+    async def _stay_paused(self, state: DroneState) -> bool:
+        """Begin, go on with or end a pause; True if the mission waits in this tick."""
+        if not self._paused:
+            self._paused = True
+            self._pauses += 1
+            self._remark = ""
+            logger.info("paused: the pilot has the sticks (%s)", state.mode)
+        self._engine.pause(state.time_us)
+        if not state.armed:
+            by_whom = "the pilot landed and stopped" if state.landed else "others stopped in the air"
+            raise DroneError(f"{by_whom} the motors")
+        try:
+            detections, blind = self._eyes.latest(state.time_us), ""
+        except CameraLostError as error:  # no harm to a pilot, and it may come back
+            detections, blind = Detections(), str(error)
+        if state.offboard:
+            self._remark = _hindrance(state) or blind
+            if not self._remark:
+                self._paused = False
+                logger.info("the pilot gave the drone back: the mission goes on")
+                return False
+            logger.warning("the mission does not go on: %s", self._remark)
+            await self._drone.refuse()
+        self._ticks += 1
+        if self._observer is not None:
+            place, flight_time_s = self._engine.state, self._flight_time_s()
+            self._observer(Moment(state, STILL, detections, place, flight_time_s, None, True, self._remark))
+        return True
 
     def _time_is_up(self, time_us: int) -> bool:
         """Whether the limit is over; it counts from motors on, and before that from the first tick."""
@@ -213,8 +256,8 @@ class _Flight:
                 if self._observer is not None:
                     since_us = state.time_us if self._started_us is None else self._started_us
                     flight_time_s = (state.time_us - since_us) / MICROSECONDS
-                    still, blind = VelocityCommand(), Detections()
-                    self._observer(Moment(state, still, blind, self._engine.state, flight_time_s))
+                    blind = Detections()
+                    self._observer(Moment(state, STILL, blind, self._engine.state, flight_time_s))
                 if state.time_us >= end_us:
                     break
         except DroneError:
@@ -233,10 +276,20 @@ class _Flight:
         return self._outcome(ended, reason)
 
     def _outcome(self, ended: Literal["finished", "timed out", "aborted"], reason: str) -> Outcome:
-        return Outcome(ended, reason, self._engine.state, self._flight_time_s(), self._ticks)
+        place, flight_time_s = self._engine.state, self._flight_time_s()
+        return Outcome(ended, reason, place, flight_time_s, self._ticks, self._pauses)
 
     def _flight_time_s(self) -> float:
         return 0.0 if self._started_us is None else (self._now_us - self._started_us) / MICROSECONDS
+
+
+def _hindrance(state: DroneState) -> str:
+    """Why the drone's state forbids to fly on after a pause; empty if it does not."""
+    if state.landed:
+        return "the drone stands on the ground"
+    if not all(map(isfinite, (state.x, state.y, state.z, state.yaw))):
+        return "its position is not finite"
+    return ""
 
 
 async def _close(ticks: AsyncIterator[DroneState]) -> None:

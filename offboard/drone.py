@@ -23,7 +23,8 @@ class DroneState:
         yaw: heading, radians, -pi..pi.
         velocity_arena_m_s: shape (3,).
         armed: motors are on.
-        offboard: the drone follows this app's setpoints.
+        offboard: the drone follows this app's setpoints. If it does not between `motors_on` and the end of
+            commanding, a pilot has taken it.
         mode: flight mode in words, for people.
         landed: it stands on something.
     """
@@ -54,8 +55,15 @@ class Drone(Protocol):
     """A vehicle. All coroutines raise `DroneError` with a reason when the vehicle does not comply.
 
     After `connect` and `ready`, iterate over `ticks()`; it gives the state at 20 Hz of *vehicle* time and
-    raises `DroneError` when commanding must stop: link lost, state stale or not finite, the pilot took over
-    (left offboard by other hands), disarmed by others.
+    raises `DroneError` when commanding must stop: link lost, state stale or not finite, a mode that nobody
+    here asked for and that is no pilot's (a failsafe, most likely), disarmed by others.
+
+    A pilot may take the vehicle, by choosing one of his modes, and give it back, by choosing offboard. In
+    between the ticks go on, with `offboard` false, whatever the mode and whether armed or not: the vehicle is
+    in other hands, and what to make of it is up to whoever flies the mission. The adapter keeps offboard
+    possible for as long as the ticks are iterated, by setpoints that stand still, and flies no command. Once
+    a tick shows `offboard` again, the vehicle stands still until either `command` takes it back or `refuse`
+    lets it hold. An adapter whose vehicle no pilot can take never shows this.
     """
 
     async def connect(self) -> None:
@@ -78,7 +86,10 @@ class Drone(Protocol):
         """Let the vehicle land by itself and wait until it stands disarmed."""
 
     async def hold(self) -> None:
-        """Stop commanding and ask the vehicle to hold where it is."""
+        """Stop commanding for good and ask the vehicle to hold where it is, unless other hands have it."""
+
+    async def refuse(self) -> None:
+        """Do not take back the vehicle that a pilot gave: let it hold, and wait for another time."""
 
     def command(self, command: VelocityCommand) -> None:
         """Set the velocity to fly from now on. Never blocks."""

@@ -6,7 +6,7 @@ import asyncio
 import contextlib
 import logging
 from collections.abc import AsyncIterator, Awaitable, Callable
-from math import degrees, isfinite
+from math import isfinite
 from pathlib import Path
 from typing import Any, TextIO
 
@@ -16,11 +16,11 @@ from mavsdk.asyncio.plugins.action import ActionAsync
 from mavsdk.asyncio.plugins.offboard import OffboardAsync
 from mavsdk.asyncio.plugins.telemetry import TelemetryAsync
 from mavsdk.logging import log_subscribe
-from mavsdk.plugins.offboard import VelocityBodyYawspeed
 
 from offboard.drone import DroneError, DroneState, VelocityCommand
 from offboard.link.alignment import Alignment, Pose
 from offboard.link.companion import Companion
+from offboard.link.setpoints import SetpointStream
 from offboard.link.telemetry import TelemetryFeed
 from offboard.link.tlog import TlogRecorder
 from offboard.link.tracking import CommandTracker
@@ -52,8 +52,10 @@ class MavsdkDrone:
     wall's. Wall time is used only where the question is whether link and app are alive.
 
     Safety: setpoints are sent by MAVSDK's own thread at 20 Hz, so a watchdog guards the app (see
-    `Watchdog`). Whoever takes the vehicle out of offboard keeps it: this class then falls silent and does
-    not ask for hold, lest it take the sticks from a pilot.
+    `Watchdog`). Whoever takes the vehicle out of offboard keeps it: this class never asks for a mode then,
+    lest it take the sticks from a pilot. While a pilot has it, setpoints that stand still go on, one with
+    each tick, because PX4 lets nobody choose offboard without; they end when the app hangs, and with the
+    link or the flight.
     """
 
     def __init__(
@@ -86,12 +88,12 @@ class MavsdkDrone:
         self._mavsdk: Mavsdk | None = None
         self._system: Any = None
         self._action: Any = None
-        self._offboard: Any = None
+        self._setpoints: SetpointStream | None = None
         self._telemetry: Any = None
-        self._setpoint = VelocityBodyYawspeed(0.0, 0.0, 0.0, 0.0)
         self._tracker = CommandTracker()
         self._latest: DroneState | None = None
         self._commanding = False
+        self._pilot_has_it = False
         self._tlog_path: Path | None = None
         self._recorder: TlogRecorder | None = None
         self._companion: Companion | None = None
@@ -102,7 +104,7 @@ class MavsdkDrone:
         self._tlog_path = path
 
     def tell_through(self, companion: Companion) -> None:
-        """Let a companion speak over this link from `connect` to `close`; it is its owner's to close."""
+        """Let a companion speak over this link. As it may have more to say, only `let_go` closes it then."""
         self._companion = companion
 
     async def connect(self) -> None:
@@ -133,7 +135,7 @@ class MavsdkDrone:
         if self._companion is not None:
             self._companion.announce(await self._system.get_system_id())
         self._action = ActionAsync(self._system)
-        self._offboard = OffboardAsync(self._system)
+        self._setpoints = SetpointStream(OffboardAsync(self._system))
         self._telemetry = TelemetryAsync(self._system)
         self._feed.subscribe(_synchronous(self._telemetry))
 
@@ -167,14 +169,15 @@ class MavsdkDrone:
             await self._until(lambda: not self._missing(), min(PRESENT_MODE_S, self._ready_limit_s / 2))
         if self._missing() == [_CHECKS] and not self._feed.armed:
             await self._stream_before_offboard()
-            await self._ask("offboard mode", self._offboard.start())
+            await self._ask("offboard mode", self._stream.ask_for_offboard())
         await self._until(lambda: not self._missing(), self._ready_limit_s)
 
     async def ticks(self) -> AsyncIterator[DroneState]:
         """States at 20 Hz of vehicle time; ticks that were not waited for are passed over.
 
         Raises:
-            DroneError: link lost, values not finite, another hand took over, disarmed by others, app hung.
+            DroneError: link lost, values not finite, app hung; and, while no pilot has it: another mode,
+                disarmed by others.
         """
         while True:
             came = await self._feed.next_tick(LINK_LOST_S)
@@ -182,6 +185,8 @@ class MavsdkDrone:
             state = self._state()
             self._check_state(state)
             self._latest = state
+            if self._pilot_has_it:
+                self._send(VelocityCommand())
             yield state
 
     async def motors_on(self) -> None:
@@ -193,7 +198,7 @@ class MavsdkDrone:
         await self._stream_before_offboard()
         self._watchdog.start()
         try:
-            await self._ask("offboard mode", self._offboard.start())
+            await self._ask("offboard mode", self._stream.ask_for_offboard())
             await self._confirm("offboard mode", lambda: feed.mode == "OFFBOARD")
             await self._ask("arming", self._action.arm())
             await self._confirm("arming", lambda: bool(feed.armed))
@@ -202,6 +207,7 @@ class MavsdkDrone:
             await self._leave_offboard()
             raise
         self._tracker.reset()
+        self._pilot_has_it = False
         self._commanding = True
 
     async def _stream_before_offboard(self) -> None:
@@ -213,7 +219,7 @@ class MavsdkDrone:
     async def _leave_offboard(self) -> None:
         """On the ground, when there will be no flight."""
         with contextlib.suppress(MavsdkError, asyncio.CancelledError):
-            await self._offboard.stop()
+            await self._stream.ask_for_hold()
 
     async def motors_off(self) -> None:
         """Stop the motors at once (forced disarm), in the air too."""
@@ -222,7 +228,7 @@ class MavsdkDrone:
         await self._confirm("stopping the motors", lambda: self._feed.armed is False)
         self._watchdog.stop()
         with contextlib.suppress(MavsdkError):
-            await self._offboard.stop()
+            await self._stream.ask_for_hold()
 
     async def land(self) -> None:
         """Let the vehicle land and wait until it has disarmed itself."""
@@ -247,26 +253,51 @@ class MavsdkDrone:
         return not self._feed.armed
 
     async def hold(self) -> None:
-        """Stop commanding and ask for hold, unless another hand has the vehicle already."""
-        self._commanding = False
+        """Stop commanding for good and ask for hold, unless another hand has the vehicle already."""
+        self._commanding = self._pilot_has_it = False
         self._watchdog.stop()
-        if self._offboard is None:
+        if self._setpoints is None:
             return
         if self._feed.mode == "OFFBOARD":
-            await self._ask("hold", self._offboard.stop())
+            await self._ask_for_hold()
             await self._confirm("hold", lambda: self._feed.mode == "HOLD")
         else:
-            await asyncio.to_thread(_synchronous(self._offboard).destroy)  # ends the stream, asks for nothing
+            await asyncio.to_thread(self._stream.end)
+
+    async def refuse(self) -> None:
+        """Let the vehicle that was given back hold; go on waiting."""
+        if self._feed.mode == "OFFBOARD":
+            await self._ask_for_hold()
+            await self._confirm("hold", lambda: self._feed.mode != "OFFBOARD")
+
+    async def _ask_for_hold(self) -> None:
+        """By other means where the watchdog has ended the stream for good."""
+        stream = self._stream
+        await self._ask("hold", stream.ask_for_hold() if stream.can_ask else self._action.hold())
 
     def command(self, command: VelocityCommand) -> None:
-        """Set the velocity to fly from now on. Without motors on it is passed over."""
-        if self._commanding and not self._watchdog.tripped_after_s:
-            self._send(command if self._latest is None else self._tracker.correct(command, self._latest))
+        """Set the velocity to fly from now on. Without motors on, or with a pilot, it is passed over."""
+        latest = self._latest
+        if not self._commanding:
+            return
+        if self._pilot_has_it:
+            if latest is None or not latest.offboard:
+                return
+            self._pilot_has_it = False
+            self._tracker.reset()  # the vehicle was moved by others
+        self._send(command if latest is None else self._tracker.correct(command, latest))
 
     async def close(self) -> None:
-        """Let go of the vehicle and finish the recording."""
+        """Let go of the vehicle and finish the recording; with a companion only end all commanding."""
         self._commanding = False
         self._watchdog.stop()
+        if self._companion is None:
+            await self.let_go()
+        elif self._setpoints is not None:
+            await asyncio.to_thread(self._setpoints.end)  # whatever became of hold
+
+    async def let_go(self) -> None:
+        """Close the link and the recording; may be called again."""
         if self._mavsdk is not None:
             await asyncio.to_thread(self._mavsdk.destroy)
             self._mavsdk = None
@@ -274,14 +305,14 @@ class MavsdkDrone:
             self._recorder.close()
             self._recorder = None
 
+    @property
+    def _stream(self) -> SetpointStream:
+        assert self._setpoints is not None, "connect() comes first"
+        return self._setpoints
+
     def _send(self, command: VelocityCommand) -> None:
-        # The synchronous call stores four numbers (5 us); the asyncio one takes an executor job (190 us).
-        setpoint = self._setpoint
-        setpoint.forward_m_s = command.forward_m_s
-        setpoint.right_m_s = -command.left_m_s
-        setpoint.down_m_s = -command.up_m_s
-        setpoint.yawspeed_deg_s = -degrees(command.yaw_rate_rad_s)
-        _synchronous(self._offboard).set_velocity_body(setpoint)
+        if not self._watchdog.tripped_after_s:
+            self._stream.send(command)
 
     def _state(self) -> DroneState:
         assert self._alignment is not None, "ready() comes first"
@@ -316,14 +347,16 @@ class MavsdkDrone:
         values = (state.x, state.y, state.z, state.yaw, *state.velocity_arena_m_s)
         if not all(isfinite(value) for value in values):
             raise DroneError("the vehicle's position, velocity or heading is not finite")
-        if not self._commanding:
+        if not self._commanding or self._pilot_has_it:
             return
-        texts = self._feed.recent_texts()
         if not state.armed:
-            raise DroneError(f"the vehicle was disarmed by others{texts}")
-        if not state.offboard:
-            who = "the pilot" if state.mode in PILOT_MODES else "the pilot or a failsafe"
-            raise DroneError(f"{who} took over: mode {state.mode}{texts}")
+            raise DroneError(f"the vehicle was disarmed by others{self._feed.recent_texts()}")
+        if state.offboard:
+            return
+        if state.mode not in PILOT_MODES:
+            texts = self._feed.recent_texts()
+            raise DroneError(f"the pilot or a failsafe took over: mode {state.mode}{texts}")
+        self._pilot_has_it = True
 
     def _missing(self) -> list[str]:
         feed, health = self._feed, self._feed.health
@@ -397,9 +430,16 @@ class MavsdkDrone:
             logger.warning("the mission cannot be told of: %s", error)
 
     def _stop_from_watchdog(self) -> None:
-        """On the watchdog's thread: end the native stream, ask for hold; if hold fails, silence is enough."""
+        """On the watchdog's thread: end the native stream, ask for hold; if hold fails, silence is enough.
+
+        Not for hold if others have the vehicle, but the stream ends for good: nobody shall give the vehicle
+        back to an app that hangs.
+        """
         with contextlib.suppress(Exception):
-            _synchronous(self._offboard).stop()
+            if self._feed.mode == "OFFBOARD":
+                self._stream.ask_for_hold_now()
+            else:
+                self._stream.end()
 
 
 def _synchronous(wrapper: Any) -> Any:  # noqa: ANN401 - MAVSDK is untyped

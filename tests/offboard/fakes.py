@@ -33,7 +33,10 @@ START_1 = (-3.0, -3.0, 1.0)
 
 @dataclass
 class KinematicDrone:
-    """Follows velocity commands with a first-order lag; can be told to fail at a tick."""
+    """Follows velocity commands with a first-order lag; can be told to fail at a tick.
+
+    A pilot has it while `pilot_mode` says so: then it goes by `pilot_m_s`, not by commands.
+    """
 
     x: float = 0.0
     y: float = 0.0
@@ -54,6 +57,9 @@ class KinematicDrone:
         self.time_us = 1_000_000
         self.path: list[tuple[float, float, float]] = []
         self.hold_error: DroneError | None = None
+        self.pilot_mode = ""
+        self.pilot_m_s = (0.0, 0.0, 0.0)
+        self.landed = False
 
     async def connect(self) -> None:
         self.calls.append("connect")
@@ -79,6 +85,11 @@ class KinematicDrone:
         if self.hold_error:
             raise self.hold_error
 
+    async def refuse(self) -> None:
+        self.calls.append("refuse")
+        self.pilot_mode = "HOLD"
+        self.pilot_m_s = (0.0, 0.0, 0.0)
+
     async def close(self) -> None:
         self.calls.append("close")
 
@@ -95,10 +106,22 @@ class KinematicDrone:
             if tick in self.faults:
                 raise self.faults[tick]
             self.path.append((self.x, self.y, self.z))
-            yield DroneState(self.time_us, self.x, self.y, self.z, self.yaw, armed=self.armed)
+            yield DroneState(
+                *(self.time_us, self.x, self.y, self.z, self.yaw),
+                armed=self.armed,
+                offboard=self.armed and not self.pilot_mode,
+                mode=self.pilot_mode or "OFFBOARD",
+                landed=self.landed,
+            )
 
     def _move(self, dt_s: float) -> None:
         if not self.armed:
+            return
+        if self.pilot_mode:
+            self.rates = [0.0, 0.0, 0.0, 0.0]
+            self.x, self.y, self.z = (
+                at + speed * dt_s for at, speed in zip((self.x, self.y, self.z), self.pilot_m_s, strict=True)
+            )
             return
         c = self.command_now
         wanted = (c.forward_m_s, c.left_m_s, c.up_m_s, c.yaw_rate_rad_s)
