@@ -9,7 +9,7 @@ from importlib import metadata
 
 from cyclopts import App, CycloptsError
 
-from framerunner.commands import camera, doctor, evaluate, fly, mission, monitor, replay, scenario, sim
+from framerunner.commands import camera, doctor, evaluate, film, fly, mission, monitor, replay, scenario, sim
 
 EXIT_BAD_INPUT = 2
 EXIT_INTERRUPTED = 130
@@ -32,6 +32,7 @@ def build_app() -> App:
     app.command(evaluate.evaluate)
     app.command(monitor.monitor)
     app.command(replay.replay)
+    app.command(film.film)
     app.command(mission.app)
     app.command(scenario.app)
     return app

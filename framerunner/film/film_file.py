@@ -1,0 +1,221 @@
+"""Films as files: MP4 that phones and browsers play, or GIF."""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
+from fractions import Fraction
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, cast
+
+import av
+import numpy as np
+import numpy.typing as npt
+from av.codec import Codec
+from av.filter import Graph
+
+from framerunner.pictures import PictureError
+
+if TYPE_CHECKING:
+    from av.video.stream import VideoStream
+
+Image = npt.NDArray[np.uint8]
+
+SUFFIXES = (".mp4", ".gif")
+_X264 = {"crf": "21", "preset": "medium", "tune": "animation"}
+_PALETTE_COLOURS = 160  # fewer make smaller files; flat shades need no more
+
+
+class FilmFile(ABC):
+    """A film that is being written.
+
+    Args:
+        path: the file.
+        kind: container, as FFmpeg calls it.
+        size_px: width and height of all its pictures; both even.
+        fps: pictures a second.
+    """
+
+    def __init__(self, path: Path, kind: str, size_px: tuple[int, int], fps: float) -> None:
+        options = {"movflags": "+faststart"} if kind == "mp4" else {}
+        self._container = av.open(str(path), "w", format=kind, options=options)
+        self._rate = Fraction(fps).limit_denominator(1000)
+        self._size_px = size_px
+        self._count = 0
+        self._stream: VideoStream
+
+    @abstractmethod
+    def add(self, image: Image) -> None:
+        """Add a picture, BGR, shape (height, width, 3)."""
+
+    @abstractmethod
+    def finish(self) -> None:
+        """Write what is still to be written."""
+
+    def close(self) -> None:
+        """Let go of the file."""
+        self._container.close()
+
+    def _open_stream(self, codec: str, pixels: str, options: dict[str, str]) -> None:
+        stream = cast("VideoStream", self._container.add_stream(codec, rate=self._rate, options=options))
+        stream.width, stream.height = self._size_px
+        stream.pix_fmt = pixels
+        stream.time_base = 1 / self._rate
+        self._stream = stream
+
+    def _encode(self, frame: Any) -> None:  # noqa: ANN401 - PyAV's frame, or None at the end
+        for packet in self._stream.encode(frame):
+            self._container.mux(packet)
+
+    def _frame(self, image: Image) -> av.VideoFrame:
+        frame = av.VideoFrame.from_ndarray(np.ascontiguousarray(image), format="bgr24")
+        frame.pts, frame.time_base = self._count, 1 / self._rate
+        self._count += 1
+        return frame
+
+
+class Mp4File(FilmFile):
+    """H.264 in the form that every player has; MPEG-4 where FFmpeg was built without an encoder for that.
+
+    Args:
+        path: see `FilmFile`.
+        size_px: see `FilmFile`.
+        fps: see `FilmFile`.
+        codec: what to encode with; see `mp4_codec`.
+    """
+
+    def __init__(self, path: Path, size_px: tuple[int, int], fps: float, codec: str) -> None:
+        super().__init__(path, "mp4", size_px, fps)
+        self._open_stream(codec, "yuv420p", _X264 if codec == "libx264" else {"qscale": "3"})
+        if codec != "libx264":
+            self._stream.bit_rate = 4_000_000
+
+    def add(self, image: Image) -> None:
+        """Add a picture."""
+        self._encode(self._frame(image).reformat(format="yuv420p"))
+
+    def finish(self) -> None:
+        """Write the last pictures."""
+        self._encode(None)
+
+
+class GifFile(FilmFile):
+    """An animated GIF that begins again at its end.
+
+    Args:
+        path: see `FilmFile`.
+        size_px: see `FilmFile`.
+        fps: see `FilmFile`.
+        samples: some pictures of the film, from which its colours are chosen.
+    """
+
+    def __init__(self, path: Path, size_px: tuple[int, int], fps: float, samples: Sequence[Image]) -> None:
+        super().__init__(path, "gif", size_px, fps)
+        self._open_stream("gif", "pal8", {})
+        self._graph, self._source = self._palette_graph(self._palette(samples))
+
+    def add(self, image: Image) -> None:
+        """Add a picture."""
+        self._source.push(self._frame(image))
+        self._take()
+
+    def finish(self) -> None:
+        """Write the last pictures."""
+        self._source.push(None)
+        self._take()
+        self._encode(None)
+
+    def _take(self) -> None:
+        """Encode what the palette's filter has ready."""
+        for frame in _pulled(self._graph):
+            self._encode(frame)
+
+    def _palette(self, samples: Sequence[Image]) -> av.VideoFrame:
+        graph = Graph()
+        source = self._buffer(graph, self._size_px)
+        chosen = graph.add("palettegen", f"max_colors={_PALETTE_COLOURS}:stats_mode=full")
+        sink = graph.add("buffersink")
+        source.link_to(chosen)
+        chosen.link_to(sink)
+        graph.configure()
+        for number, image in enumerate(samples):
+            frame = av.VideoFrame.from_ndarray(np.ascontiguousarray(image), format="bgr24").reformat(
+                format="rgb32"
+            )
+            frame.pts, frame.time_base = number, 1 / self._rate
+            source.push(frame)
+        source.push(None)
+        return next(_pulled(graph))
+
+    def _palette_graph(self, palette: av.VideoFrame) -> tuple[Graph, Any]:
+        graph = Graph()
+        source = self._buffer(graph, self._size_px)
+        colours = self._buffer(graph, (palette.width, palette.height))
+        # Without dithering flat shades stay flat, and files small.
+        use = graph.add("paletteuse", "dither=none:diff_mode=rectangle")
+        sink = graph.add("buffersink")
+        source.link_to(use, 0, 0)
+        colours.link_to(use, 0, 1)
+        use.link_to(sink)
+        graph.configure()
+        palette.pts, palette.time_base = 0, 1 / self._rate
+        colours.push(palette)
+        colours.push(None)
+        return graph, source
+
+    def _buffer(self, graph: Graph, size_px: tuple[int, int]) -> Any:  # noqa: ANN401 - PyAV's filter context
+        width, height = size_px
+        pixels = av.VideoFormat("rgb32", width, height)
+        return graph.add_buffer(width=width, height=height, format=pixels, time_base=1 / self._rate)
+
+    def _frame(self, image: Image) -> av.VideoFrame:
+        frame = super()._frame(image)
+        pts, time_base = frame.pts, frame.time_base
+        converted = frame.reformat(format="rgb32")
+        converted.pts, converted.time_base = pts, time_base
+        return converted
+
+
+def _pulled(graph: Graph) -> Iterator[av.VideoFrame]:
+    """Frames that have come through a graph."""
+    while True:
+        try:
+            yield cast("av.VideoFrame", graph.pull())
+        except (av.error.BlockingIOError, av.error.EOFError):
+            return
+
+
+def mp4_codec() -> str:
+    """The best encoder for MP4 that FFmpeg was built with."""
+    try:
+        Codec("libx264", "w")
+    except (av.codec.codec.UnknownCodecError, ValueError):
+        return "mpeg4"
+    return "libx264"
+
+
+@contextmanager
+def film_file(path: Path, open_film: Callable[[Path], FilmFile]) -> Iterator[FilmFile]:
+    """A film that is there whole after the block, or not at all.
+
+    Args:
+        path: where it is to be in the end; what is there is replaced.
+        open_film: opens it at another place in the same folder.
+
+    Raises:
+        PictureError: it cannot be written.
+    """
+    part = path.with_name(f".{path.name}.part")
+    try:
+        film = open_film(part)
+        try:
+            yield film
+            film.finish()
+        finally:
+            film.close()
+        part.replace(path)
+    except (OSError, av.error.FFmpegError) as error:
+        raise PictureError(f"film: cannot write '{path}': {error.strerror or error}") from None
+    finally:
+        part.unlink(missing_ok=True)
