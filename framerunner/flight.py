@@ -5,12 +5,12 @@ from __future__ import annotations
 import asyncio
 import sys
 from collections.abc import Iterator
-from contextlib import AsyncExitStack, ExitStack, closing, contextmanager
+from contextlib import AsyncExitStack, closing, contextmanager
 from dataclasses import dataclass
 from datetime import UTC, datetime
 from importlib import metadata
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import aiohttp
 
@@ -20,6 +20,7 @@ from framerunner.errors import SettingError
 from framerunner.judges import Judge, ask_referee, choose_judge
 from framerunner.lockstep import Flown, lockstep_flight
 from framerunner.lockstep_progress import LockstepProgress
+from framerunner.mission_teller import MissionTeller
 from framerunner.pictures import Outcome as JudgedOutcome
 from framerunner.pictures import track_picture
 from framerunner.recorder import FlightRecorder, RecordingCamera, VideoFile
@@ -28,6 +29,7 @@ from framerunner.run_folder import RunFolder
 from framerunner.sitl_process import SitlProcess
 from framerunner.virtual_camera.lift import lifted
 from offboard.app import Moment, Outcome, fly_mission
+from offboard.link.companion import Companion
 from offboard.mavsdk_drone import MavsdkDrone
 from offboard.mission import Mission
 from scenarios.ground import start_position
@@ -81,6 +83,7 @@ class _Records:
     """
 
     def __init__(self, folder: RunFolder, recording: FlightRecording | None) -> None:
+        self._started = datetime.now(UTC)
         self.folder = folder
         self.recorder = FlightRecorder()
         self.recording = recording
@@ -101,6 +104,15 @@ class _Records:
         if self.recording is not None:
             self.recording.see_frame(frame)
 
+    def complete(self, result: dict[str, Any]) -> dict[str, Any]:
+        """What stands in `result.json`: a result with what tells of wall time."""
+        return {
+            **result,
+            "wall_time_s": self.recorder.wall_time_s,
+            "real_time_factor": self.recorder.real_time_factor,
+            "started": self._started.isoformat(timespec="seconds"),
+        }
+
     def finish(self, flown: Flown) -> None:
         """Add what is known only after the flight."""
         if self.recording is not None:
@@ -118,19 +130,13 @@ async def fly_once(settings: FlightSettings) -> int:
         CameraError: the camera gives no image.
         SettingError: the simulator cannot be started.
     """
-    started = datetime.now(UTC)
     fly = _fly_in_lockstep if settings.lockstep else _fly_in_real_time
     with _run_folder(settings) as folder:
         with _recording(settings, folder) as recording:
             records = _Records(folder, recording)
             flown = await fly(settings, records)
             records.finish(flown)
-        result = {
-            **flown.result,
-            "wall_time_s": records.recorder.wall_time_s,
-            "real_time_factor": records.recorder.real_time_factor,
-            "started": started.isoformat(timespec="seconds"),
-        }
+        result = records.complete(flown.result)
         folder.write_result(result)
         scenario = lifted(settings.scenario, result.get("lift_m", 0.0))
         track_picture(scenario, flown.track, JudgedOutcome.from_result(result), folder.track)
@@ -160,29 +166,50 @@ async def _fly_in_lockstep(settings: FlightSettings, records: _Records) -> Flown
 
 
 async def _fly_in_real_time(settings: FlightSettings, records: _Records) -> Flown:
+    scenario, folder = settings.scenario, records.folder
     async with AsyncExitStack() as stack:
         session = await stack.enter_async_context(aiohttp.ClientSession())
-        drone_url, camera_url, sitl = await _vehicle(settings, records.folder, session, stack)
-        judge = await choose_judge(settings.scenario, camera_url, session)
-        flight = asyncio.create_task(_fly(settings, records, judge, (drone_url, camera_url)))
+        drone_url, camera_url, sitl = await _vehicle(settings, folder, session, stack)
+        judge = await choose_judge(scenario, camera_url, session)
+        companion = Companion()
+        stack.push_async_callback(companion.close)
+        start_arena = _start(scenario)
+        source = folder.mission.read_text(encoding="utf-8")
+        teller = MissionTeller(companion, settings.mission, source, scenario.name, start_arena)
+        hang_report = stack.enter_context(folder.hang_report.open("w", encoding="utf-8"))
+        drone = MavsdkDrone(drone_url, start_arena=start_arena, hang_report=hang_report)
+        drone.record_to(folder.tlog)
+        drone.tell_through(companion)
+        stack.push_async_callback(drone.let_go)  # not before the result has been told, over its link
+        flight = asyncio.create_task(
+            _fly(settings, records, judge, teller, drone=drone, camera_url=camera_url)
+        )
         outcome = await (flight if sitl is None else sitl.guard(flight))
         ended = None if outcome.ended == "finished" else outcome.reason
         report = await judge.report(outcome.mission_state, ended)
         standing = await judge.standing()
-    track = records.recorder.track(standing.began_us if standing else None)
-    result = {
-        "scenario": settings.scenario.name,
-        "mission": settings.mission.name,
-        "seed": None,  # real time has no lockstep's repeatability
-        **report,
-        "mission_state": outcome.mission_state,
-        "ended": outcome.ended,
-        "seconds_in_state": track.seconds_in_state(),
-        "judged_by": judge.source,
-        **({"lift_m": judge.lift_m} if judge.lift_m else {}),
-        "version": metadata.version("framerunner"),
-    }
+        track = records.recorder.track(standing.began_us if standing else None)
+        result = {
+            "scenario": scenario.name,
+            "mission": settings.mission.name,
+            "seed": None,  # real time has no lockstep's repeatability
+            **report,
+            "mission_state": outcome.mission_state,
+            "ended": outcome.ended,
+            "seconds_in_state": track.seconds_in_state(),
+            "judged_by": judge.source,
+            **({"lift_m": judge.lift_m} if judge.lift_m else {}),
+            "version": metadata.version("framerunner"),
+        }
+        await teller.tell_result(records.complete(result))
     return Flown(result, outcome, track)
+
+
+def _start(scenario: Scenario) -> tuple[float, float, float, float]:
+    """Where the drone's centre stands at first: x, y, z (metres) and yaw (radians), arena axes."""
+    x_m, y_m, z_m = start_position(scenario)
+    height_m = load_airframe(scenario.airframe).envelope_m[2]
+    return (x_m, y_m, z_m + height_m / 2, scenario.start.yaw_rad)
 
 
 @contextmanager
@@ -234,30 +261,36 @@ async def _wait_for_sitl(url: str, session: aiohttp.ClientSession) -> None:
         await asyncio.sleep(0.05)
 
 
-async def _fly(settings: FlightSettings, records: _Records, judge: Judge, urls: tuple[str, str]) -> Outcome:
-    scenario, folder = settings.scenario, records.folder
-    x_m, y_m, z_m = start_position(scenario)
-    with ExitStack() as files:
-        hang_report = files.enter_context(folder.hang_report.open("w", encoding="utf-8"))
-        height_m = load_airframe(scenario.airframe).envelope_m[2]
-        start_arena = (x_m, y_m, z_m + height_m / 2, scenario.start.yaw_rad)
-        drone = MavsdkDrone(urls[0], start_arena=start_arena, hang_report=hang_report)
-        drone.record_to(folder.tlog)
+async def _fly(
+    settings: FlightSettings,
+    records: _Records,
+    judge: Judge,
+    teller: MissionTeller,
+    *,
+    drone: MavsdkDrone,
+    camera_url: str,
+) -> Outcome:
+    scenario = settings.scenario
 
-        def observe(moment: Moment) -> None:
-            records.see(moment)
-            judge.see(moment)
+    def observe(moment: Moment) -> None:
+        records.see(moment)
+        judge.see(moment)
+        teller.see(moment)
 
-        title = f"{scenario.name}: {settings.mission.name}"
-        display = FlightDisplay(title, scenario.try_limit_s, records.recorder, judge)
-        showing = asyncio.create_task(display.run())
-        try:
-            async with open_source(urls[1]) as source:
-                camera = RecordingCamera(source, folder.video, scenario.camera.rate_hz, records.see_frame)
-                files.callback(camera.close)
+    def keep(frame: CameraFrame) -> None:
+        records.see_frame(frame)
+        teller.see_frame(frame)
+
+    title = f"{scenario.name}: {settings.mission.name}"
+    display = FlightDisplay(title, scenario.try_limit_s, records.recorder, judge)
+    showing = asyncio.create_task(display.run())
+    try:
+        async with open_source(camera_url) as source:
+            camera = RecordingCamera(source, records.folder.video, scenario.camera.rate_hz, keep)
+            with closing(camera):
                 return await fly_mission(
                     drone, camera, settings.mission, limit_s=scenario.try_limit_s, observer=observe
                 )
-        finally:
-            showing.cancel()
-            await asyncio.gather(showing, return_exceptions=True)
+    finally:
+        showing.cancel()
+        await asyncio.gather(showing, return_exceptions=True)
