@@ -22,7 +22,7 @@ from vision.types import Detections
 
 TICK_US = 50_000
 _ARMED = 128  # MAV_MODE_FLAG_SAFETY_ARMED
-_GROUND_STATION = 6  # MAV_TYPE_GCS
+_NO_AUTOPILOT = 8  # MAV_AUTOPILOT_INVALID: a ground station, a camera, this app's own companion
 
 
 class TlogRecording:
@@ -122,7 +122,7 @@ class _Vehicle:
         """Take a message; a position after a yaw makes a moment, if one is due."""
         kind = message.get_type()
         if kind == "HEARTBEAT":
-            if message.type != _GROUND_STATION:
+            if message.autopilot != _NO_AUTOPILOT:
                 armed = bool(message.base_mode & _ARMED)
                 if armed and not self._armed:
                     self._armed_us = self._next_us
