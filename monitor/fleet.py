@@ -87,3 +87,17 @@ class Fleet:
             sticks: where they are; None lets go.
         """
         raise NotImplementedError
+
+    def set_pilot(self, drone_id: int, name: str) -> None:
+        """Say in the status who has a drone's sticks in a browser; "" is nobody."""
+        raise NotImplementedError
+
+    def notice(self, drone_id: int | None, level: str, text: str) -> None:
+        """Tell all watchers something, as a message of kind "notice".
+
+        Args:
+            drone_id: of which drone; None: of none.
+            level: info, warning or error.
+            text: one line.
+        """
+        raise NotImplementedError

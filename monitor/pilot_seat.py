@@ -18,7 +18,7 @@ STREAM_FIRST_S = 0.4  # sticks come for so long before position mode is asked fo
 ASK_AGAIN_S = 1.0
 NEUTRAL = Sticks(0.0, 0.0, 0.0, 0.0)
 
-BY_HAND = frozenset({"MANUAL", "STABILIZED", "ACRO", "ALTITUDE", "POSITION"})
+BY_HAND = frozenset({"MANUAL", "STABILIZED", "ACRO", "RATTITUDE", "ALTITUDE", "POSITION", "POSITION SLOW"})
 _OVERTAKING = frozenset({"hold", "land"})  # they wait for no other order's answer
 _ENDING = _OVERTAKING | {"give"}  # after these the drone flies by itself
 _BRAKING = _ENDING | {"take"}  # while these are under way, sticks are neutral

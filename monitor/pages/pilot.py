@@ -1,0 +1,25 @@
+"""The page of the manual pilot, at `/pilot`."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from nicegui import ui
+from starlette.requests import Request
+
+from monitor.pages.shell import shell, use_module
+
+if TYPE_CHECKING:
+    from monitor.server import Monitor
+
+
+def register(monitor: Monitor) -> None:
+    """Add the page."""
+
+    @ui.page("/pilot")
+    def pilot(request: Request) -> None:
+        ui.add_head_html('<link rel="stylesheet" href="/static/pilot.css">')
+        with shell(monitor, request, "Pilot", "/pilot") as visitor:
+            root = ui.element("div").classes("pilot")
+            root.props["id"] = "pilot"
+        use_module("pilot.js", mayFly=visitor.may_fly)
