@@ -3,8 +3,8 @@
     python -m benchmarks.monitor_updates
 
 Each way has a server in a process of its own and ten viewers that read what comes, 20 poses a second. With
-`ui.scene`, each viewer's drone (one group, its rotors standing still) is moved and turned from Python; with the
-WebSocket, one JSON text with everything of the message "pose" is written once and sent to all. Printed are
+`ui.scene`, each viewer's drone (one group, its rotors standing still) is moved and turned from Python; by
+WebSocket one JSON text with everything of the message "pose" is written once and sent to all. Printed are
 the processor time of the server as a share of one core, and the messages a viewer gets.
 """
 

@@ -18,6 +18,7 @@ if TYPE_CHECKING:
 
 POSE_HZ = 20
 STATUS_EVERY = 4  # poses
+STATUS_AT_LEAST_EVERY = 40  # poses; so a browser knows that the link is not dead
 MOST_VIEWERS = 200
 MOST_PENDING = 200
 TOO_SLOW_CODE = 1013  # "try again later"
@@ -130,7 +131,7 @@ class LiveChannel:
         if count % STATUS_EVERY == 0:
             message = self._fleet.status_message()
             text = encode(message)
-            if text != self._last_status:
+            if text != self._last_status or count % STATUS_AT_LEAST_EVERY == 0:
                 self._last_status = text
                 for viewer in self._viewers:
                     viewer.put("status", None, text)

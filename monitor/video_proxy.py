@@ -1,12 +1,188 @@
-"""`/video/ID`: a drone's MJPEG passed on, over one connection to the drone however many watch."""
+"""`/video/ID`: a drone's MJPEG passed on, over one connection to the drone however many watch.
+
+Images are not compressed again; whoever is slow misses some. The drone is asked while somebody watches.
+"""
 
 from __future__ import annotations
 
+import asyncio
+import logging
+from collections.abc import AsyncGenerator, Callable
 from typing import TYPE_CHECKING
+from urllib.parse import urlsplit
+
+import aiohttp
+from fastapi.responses import PlainTextResponse, Response, StreamingResponse
+
+from monitor.video_stream import Shot, ShotCutter, StreamBrokenError
 
 if TYPE_CHECKING:
     from monitor.server import Monitor
 
+MOST_WATCHERS = 100  # of one drone
+FIRST_IMAGE_S = 5.0
+_RETRY_S = 1.0
+_SILENCE_S = 5.0  # then the connection is made again
+_CHUNK_BYTES = 1 << 16
+_BOUNDARY = "frame"
+_log = logging.getLogger(__name__)
+
+
+class DroneVideo:
+    """The newest image of one drone, kept new while somebody watches.
+
+    Args:
+        find_url: tells where the video is now; None if nowhere.
+    """
+
+    def __init__(self, find_url: Callable[[], str | None]) -> None:
+        self._find_url = find_url
+        self._latest: Shot | None = None
+        self._arrived = asyncio.Event()
+        self._watchers = 0
+        self._fetching: asyncio.Task[None] | None = None
+
+    @property
+    def is_full(self) -> bool:
+        """Whether nobody else may watch."""
+        return self._watchers >= MOST_WATCHERS
+
+    async def shots(self) -> AsyncGenerator[Shot, None]:
+        """Give images as they come, the newest each time; ends never, so close it."""
+        self._watchers += 1
+        if self._fetching is None:
+            self._latest = None  # from before; nobody knows how old it is
+            self._fetching = asyncio.create_task(self._fetch())
+        last: Shot | None = None
+        try:
+            while True:
+                while self._latest is None or self._latest is last:
+                    await self._arrived.wait()
+                last = self._latest
+                yield last
+        finally:
+            self._watchers -= 1
+            if self._watchers == 0:
+                self.stop()
+
+    def stop(self) -> None:
+        """Let go of the drone."""
+        if self._fetching is not None:
+            self._fetching.cancel()
+            self._fetching = None
+
+    async def _fetch(self) -> None:
+        """Read the drone's video, again and again, until cancelled."""
+        timeout = aiohttp.ClientTimeout(total=None, sock_connect=_SILENCE_S, sock_read=_SILENCE_S)
+        async with aiohttp.ClientSession(timeout=timeout) as session:
+            while True:
+                url = self._find_url()
+                if url is not None:
+                    try:
+                        await self._read(session, url)
+                    except (aiohttp.ClientError, StreamBrokenError, OSError, ValueError) as error:
+                        _log.info("video %s: %s", url, error)
+                await asyncio.sleep(_RETRY_S)
+
+    async def _read(self, session: aiohttp.ClientSession, url: str) -> None:
+        # A redirection could lead anywhere: it is not followed.
+        async with session.get(url, allow_redirects=False) as response:
+            if response.status != 200:
+                raise StreamBrokenError(f"status {response.status}")
+            cutter = ShotCutter(response.headers.get("Content-Type", ""))
+            async for chunk in response.content.iter_chunked(_CHUNK_BYTES):
+                shots = cutter.feed(chunk)
+                if shots:
+                    self._latest = shots[-1]
+                    self._arrived.set()  # wakes all that wait now
+                    self._arrived.clear()
+
+
+def can_be_passed_on(url: str | None) -> bool:
+    """Whether a video's URL is one that this module reads."""
+    try:
+        return url is not None and urlsplit(url).scheme in ("http", "https") and bool(urlsplit(url).hostname)
+    except ValueError:
+        return False
+
 
 def register(monitor: Monitor) -> None:
     """Add `/video/ID` and `/video/ID/image.jpg`."""
+    videos: dict[int, DroneVideo] = {}
+
+    def open_video(drone_id: int) -> DroneVideo | Response:
+        problem = _problem(monitor, drone_id)
+        if problem is not None:
+            return PlainTextResponse(f"{problem}\n", 404)
+        if drone_id not in videos:
+            videos[drone_id] = DroneVideo(lambda: _readable(monitor.fleet.video_url(drone_id)))
+        if videos[drone_id].is_full:
+            return PlainTextResponse(f"{MOST_WATCHERS} are watching; no more can\n", 503)
+        return videos[drone_id]
+
+    @monitor.web.get("/video/{drone_id}")
+    async def stream(drone_id: int) -> Response:
+        video = open_video(drone_id)
+        if isinstance(video, Response):
+            return video
+        return StreamingResponse(
+            _parts(video),
+            media_type=f"multipart/x-mixed-replace; boundary={_BOUNDARY}",
+            headers={"Cache-Control": "no-store", "Connection": "close"},
+        )
+
+    @monitor.web.get("/video/{drone_id}/image.jpg")
+    async def image(drone_id: int) -> Response:
+        video = open_video(drone_id)
+        if isinstance(video, Response):
+            return video
+        shots = video.shots()
+        try:
+            shot = await asyncio.wait_for(anext(shots), FIRST_IMAGE_S)
+        except TimeoutError:
+            return PlainTextResponse("no image came\n", 503, {"Retry-After": "1"})
+        finally:
+            await shots.aclose()
+        headers = {"Cache-Control": "no-store"}
+        if shot.time_us is not None:
+            headers["X-Time-Us"] = str(shot.time_us)
+        return Response(shot.jpeg, media_type="image/jpeg", headers=headers)
+
+    async def end() -> None:
+        try:
+            await asyncio.Event().wait()
+        finally:
+            for video in videos.values():
+                video.stop()
+
+    monitor.jobs.append(end)
+
+
+def _problem(monitor: Monitor, drone_id: int) -> str | None:
+    """Say why a drone's video cannot be had; None if it can."""
+    if drone_id not in monitor.fleet.drone_ids():
+        return f"no drone {drone_id} was heard"
+    url = monitor.fleet.video_url(drone_id)
+    if url is None:
+        return f"drone {drone_id} tells of no video"
+    if not can_be_passed_on(url):
+        kind = url.partition("://")[0] if "://" in url else "another kind"
+        return f"the video of drone {drone_id} is {kind[:20]}; only MJPEG over http can be shown"
+    return None
+
+
+def _readable(url: str | None) -> str | None:
+    return url if can_be_passed_on(url) else None
+
+
+async def _parts(video: DroneVideo) -> AsyncGenerator[bytes, None]:
+    """Write images as parts of a stream, the boundary behind each: so a browser shows it at once."""
+    shots = video.shots()
+    try:
+        yield f"--{_BOUNDARY}\r\n".encode()
+        async for shot in shots:
+            stamp = "" if shot.time_us is None else f"X-Time-Us: {shot.time_us}\r\n"
+            head = f"Content-Type: image/jpeg\r\nContent-Length: {len(shot.jpeg)}\r\n{stamp}\r\n"
+            yield b"".join((head.encode(), shot.jpeg, f"\r\n--{_BOUNDARY}\r\n".encode()))
+    finally:
+        await shots.aclose()

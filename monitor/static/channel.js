@@ -8,6 +8,7 @@
 
 const FIRST_WAIT_MS = 500;
 const LONGEST_WAIT_MS = 4000;
+const SILENCE_MS = 7000; // a status comes every two seconds; a link that fell silent is gone even if nobody closed it
 
 export class LiveChannel {
   /** @param {string[]} kinds of messages that are wanted; none: all */
@@ -17,6 +18,7 @@ export class LiveChannel {
     this.wait = FIRST_WAIT_MS;
     this.url = new URL("/ws/live", location.href);
     this.url.protocol = location.protocol === "https:" ? "wss:" : "ws:";
+    this.isWatched = !kinds.length || kinds.includes("status");
     if (kinds.length) this.url.searchParams.set("kinds", kinds.join(","));
     addEventListener("pagehide", () => this.pause());
     addEventListener("pageshow", () => this.open());
@@ -49,19 +51,34 @@ export class LiveChannel {
       this.wait = FIRST_WAIT_MS;
       this.tell("open");
     };
-    socket.onmessage = (event) => this.take(event.data);
-    socket.onclose = () => {
+    socket.onmessage = (event) => {
       if (this.socket !== socket) return;
-      this.socket = null;
-      this.tell("away");
-      this.timer = setTimeout(() => this.open(), this.wait);
-      this.wait = Math.min(2 * this.wait, LONGEST_WAIT_MS);
+      this.listen(socket);
+      this.take(event.data);
     };
+    socket.onclose = () => this.lose(socket);
+    this.listen(socket);
+  }
+
+  /** Count a silence from now on as a loss. @param {WebSocket} socket */
+  listen(socket) {
+    clearTimeout(this.silence);
+    if (this.isWatched) this.silence = setTimeout(() => this.lose(socket), SILENCE_MS);
+  }
+
+  /** Go on after a loss: wait a little, then connect again. @param {WebSocket} socket the one lost */
+  lose(socket) {
+    if (this.socket !== socket) return;
+    this.pause();
+    this.tell("away");
+    this.timer = setTimeout(() => this.open(), this.wait);
+    this.wait = Math.min(2 * this.wait, LONGEST_WAIT_MS);
   }
 
   /** Let go, for a page that is left or put aside. */
   pause() {
     clearTimeout(this.timer);
+    clearTimeout(this.silence);
     const socket = this.socket;
     this.socket = null;
     socket?.close();
