@@ -27,6 +27,8 @@ MODULES = (
     "monitor.live_channel",
     "monitor.video_proxy",
     "monitor.pages.login",
+    "monitor.pilot",
+    "monitor.pages.pilot",
 )
 
 
