@@ -64,6 +64,7 @@ class Companion:
         self._documents: dict[DocumentKind, list[bytes]] = {}
         self._fresh: dict[DocumentKind, deque[bytes]] = {}
         self._turn = 0
+        self._beats = 0
         self._state = b""
         self._state_s = -inf
         self._text_id = 0
@@ -136,24 +137,8 @@ class Companion:
                 mavlink.MAVLink_statustext_message(mavlink.MAV_SEVERITY_INFO, chunk, self._text_id, number)
             )
 
-    async def farewell(self, kind: DocumentKind) -> None:
-        """Send all of a document twice and let it arrive: the link is about to be closed. Takes 0.3 s."""
-        for _ in range(2):
-            for piece in self._documents.get(kind, ()):
-                self._send_tunnel(DOCUMENT_TYPE, piece)
-            await asyncio.sleep(FAREWELL_GAP_S)
-
-    async def _beat_on(self) -> None:
-        number = 0
-        while True:
-            try:
-                self._beat(number)
-            except Exception:  # the flight goes on whatever happens here
-                logger.exception("telling of the mission failed")
-            number += 1
-            await asyncio.sleep(BEAT_S)
-
-    def _beat(self, number: int) -> None:
+    def beat(self) -> None:
+        """Send what is due besides the ticks: heartbeat, pieces of documents, a state that has grown old."""
         if self._hear_autopilot():
             self._send(
                 mavlink.MAVLink_heartbeat_message(
@@ -171,8 +156,25 @@ class Companion:
             if piece is None:
                 break
             self._send_tunnel(DOCUMENT_TYPE, piece)
-        if number % REPEAT_BEATS == 0:
+        if self._beats % REPEAT_BEATS == 0:
             self._repeat_piece()
+        self._beats += 1
+
+    async def farewell(self, kind: DocumentKind) -> None:
+        """Send all of a document twice and let it arrive: the link is about to be closed. Takes 0.3 s."""
+        for _ in range(2):
+            for piece in self._documents.get(kind, ()):
+                self._send_tunnel(DOCUMENT_TYPE, piece)
+            await asyncio.sleep(FAREWELL_GAP_S)
+
+    async def _beat_on(self) -> None:
+        while True:
+            try:
+                self.beat()
+            except Exception as error:  # the flight goes on whatever happens here
+                logger.warning("nothing is told of the mission any more: %r", error)
+                return
+            await asyncio.sleep(BEAT_S)
 
     def _hear_autopilot(self) -> bool:
         """Take all that MAVSDK forwarded; whether a heartbeat of the vehicle's autopilot was among it."""
