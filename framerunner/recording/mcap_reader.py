@@ -22,6 +22,7 @@ from framerunner.recording.mcap_writer import METADATA
 from framerunner.recording.schemas import CROSSING, DETECTIONS, IMAGE, MISSION, SETPOINT, TELEMETRY
 from offboard.app import Moment
 from offboard.drone import DroneState, VelocityCommand
+from offboard.engine import TransitionTaken
 from vision.types import Detection, Detections
 
 RECORD_LIMIT_BYTES = 1 << 28
@@ -128,13 +129,15 @@ class _Moments:
         self._state = ""
         self._command = VelocityCommand()
         self._detections = Detections()
+        self._transition: TransitionTaken | None = None
 
     def take(self, topic: str, time_us: int, message: Json) -> Event | None:
         """Take a message; telemetry is the last of a tick."""
         if topic == TELEMETRY:
             flight_time_s = float(message["flight_time_s"])
             state = _drone_state(time_us, message)
-            return Moment(state, self._command, self._detections, self._state, flight_time_s)
+            taken, self._transition = self._transition, None
+            return Moment(state, self._command, self._detections, self._state, flight_time_s, taken)
         if topic == IMAGE:
             return _picture(time_us, message)
         if topic == CROSSING:
@@ -146,6 +149,7 @@ class _Moments:
             self._detections = _detections(message)
         elif topic == MISSION:
             self._state = str(message["state"])
+            self._transition = _transition(time_us, message)
         return None
 
 
@@ -162,6 +166,21 @@ def _drone_state(time_us: int, message: Json) -> DroneState:
         bool(message["offboard"]),
         str(message["mode"]),
         bool(message["landed"]),
+    )
+
+
+def _transition(time_us: int, message: Json) -> TransitionTaken | None:
+    """Why the mission went on; None at its start, and in recordings of before this was kept."""
+    if "when" not in message:
+        return None
+    values = tuple((str(each["name"]), each.get("number", each.get("text"))) for each in message["values"])
+    return TransitionTaken(
+        str(message["previous"]),
+        str(message["state"]),
+        str(message["when"]),
+        values,
+        time_us,
+        float(message["previous_s"]),
     )
 
 

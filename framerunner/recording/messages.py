@@ -8,6 +8,7 @@ from typing import Any
 
 from offboard.app import Moment
 from offboard.drone import DroneState
+from offboard.engine import TransitionTaken
 from scenarios.axes import Vec3
 from scenarios.models import COLOURS
 from vision.types import Detection, Detections
@@ -25,6 +26,7 @@ RGBA: dict[str, Message] = {
 _CLEAR = {"r": 0.0, "g": 0.0, "b": 0.0, "a": 0.0}
 _LABEL = {"r": 1.0, "g": 1.0, "b": 1.0, "a": 1.0}
 INFO = 2
+_TEXT_CHARACTERS = 80  # of a guard's value that is no number
 
 
 def time_of(time_us: int) -> Message:
@@ -191,7 +193,26 @@ def mission_state(moment: Moment, previous: str, previous_s: float) -> Message:
         "state": moment.mission_state,
         "previous": previous,
         "previous_s": previous_s,
+        **_guard(moment.transition),
     }
+
+
+def _guard(taken: TransitionTaken | None) -> Message:
+    """Why the mission went on; nothing where that is not known."""
+    if taken is None:
+        return {}
+    return {"when": taken.when, "values": [_value(name, value) for name, value in taken.values]}
+
+
+def _value(name: str, value: object) -> Message:
+    """A value of a guard; a contestant's pilot may hold anything."""
+    try:
+        if isinstance(value, bool | str) or not hasattr(value, "__float__"):
+            return {"name": name, "text": str(value)[:_TEXT_CHARACTERS]}
+        number = float(value)
+    except Exception:  # whatever a contestant's conversion raises
+        return {"name": name, "text": type(value).__name__}
+    return {"name": name, "number": number} if isfinite(number) else {"name": name}
 
 
 def crossing(time_us: int, colour: str, time_s: float, offset_m: float, side: str) -> Message:

@@ -38,6 +38,16 @@ _DETECTION = schema_of(
     optional=tuple(_BOX),
 )
 
+_VALUE = schema_of(
+    "framerunner.GuardValue",
+    {
+        "name": _said("string", "as the guard has it, such as frame.d"),
+        "number": _said("number", "its value then; missing if it was infinite or none"),
+        "text": _said("string", "its value then, if it was no number"),
+    },
+    optional=("number", "text"),
+)
+
 _OWN = (
     schema_of(
         "framerunner.Telemetry",
@@ -82,7 +92,10 @@ _OWN = (
             "state": _said("string", "entered, such as red.turning"),
             "previous": _said("string", "left; empty at the start"),
             "previous_s": _said("number", "time spent in it, seconds"),
+            "when": _said("string", "the guard that held"),
+            "values": {"type": "array", "items": _VALUE},
         },
+        optional=("when", "values"),
     ),
     schema_of(
         "framerunner.Crossing",

@@ -1,0 +1,281 @@
+"""The runs of a folder, for the monitor's replay."""
+
+from __future__ import annotations
+
+import json
+import re
+import subprocess
+import sys
+import threading
+from collections import OrderedDict
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from datetime import UTC, datetime
+from math import isfinite
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import Any
+
+from framerunner.monitoring.read_run import IMAGES, RECORDING, SPANS
+from monitor.ports import RunError, RunInfo
+
+KEPT_RUNS = 6
+"""As many are kept unpacked, in a folder that vanishes with the program."""
+UNREADABLE = "unreadable"
+_LONGEST_READ_S = 300.0
+_MOST_RESULT_BYTES = 1_000_000
+_MOST_NAME = 80
+_SIGNS = ("result.json", "flight.mcap", "flight.tlog")
+_FILES = (*_SIGNS, "scenario.yaml", "mission.yaml", "video.avi")
+_STAMP = re.compile(r"\d{8}-\d{6}")
+
+
+@dataclass(frozen=True, slots=True)
+class _Seen:
+    """A folder as it was when it was last looked at."""
+
+    mark: tuple[int, ...]
+    info: RunInfo
+    order: float
+
+
+@dataclass(frozen=True)
+class _Unpacked:
+    """A run that was read."""
+
+    mark: tuple[int, ...]
+    folder: TemporaryDirectory[str]
+    recording: Mapping[str, Any]
+    spans: Sequence[tuple[int, int]]
+
+
+@dataclass
+class RunFolders:
+    """The run folders in a folder, as `monitor.ports.RunLibrary`; may be used from several threads.
+
+    Args:
+        path: the folder; it may come to be later.
+    """
+
+    path: Path
+    _seen: dict[str, _Seen] = field(default_factory=dict, init=False, repr=False)
+    _unpacked: OrderedDict[str, _Unpacked] = field(default_factory=OrderedDict, init=False, repr=False)
+    _looking: threading.Lock = field(default_factory=threading.Lock, init=False, repr=False)
+    _reading: threading.Lock = field(default_factory=threading.Lock, init=False, repr=False)
+
+    def runs(self) -> Sequence[RunInfo]:
+        """All runs, newest first; one that is damaged has the verdict "unreadable"."""
+        with self._looking:
+            seen = {folder.name: self._look(folder) for folder in self._folders()}
+            self._seen = {name: each for name, each in seen.items() if each is not None}
+            return [each.info for each in sorted(self._seen.values(), key=lambda one: -one.order)]
+
+    def recording(self, name: str) -> Mapping[str, Any]:
+        """A run as `docs/monitor-channels.md` says; reads it first, which may take seconds.
+
+        Raises:
+            RunError: there is no such run, or it cannot be shown.
+        """
+        return self._read(name, fresh=True).recording
+
+    def image(self, name: str, index: int) -> bytes:
+        """A JPEG of its camera.
+
+        Raises:
+            RunError: there is no such run or image.
+        """
+        run = self._read(name, fresh=False)
+        if not 0 <= index < len(run.spans):
+            raise RunError(f"run '{name:.{_MOST_NAME}}': has no image {index}; it has {len(run.spans)}")
+        start, length = run.spans[index]
+        try:
+            with (Path(run.folder.name) / IMAGES).open("rb") as file:
+                file.seek(start)
+                return file.read(length)
+        except OSError as error:
+            raise RunError(f"run '{name}': its images are gone: {error.strerror}") from None
+
+    def _folders(self) -> list[Path]:
+        """Folders that may be runs; no links, which could lead anywhere."""
+        try:
+            entries = list(self.path.iterdir())
+        except OSError:
+            return []
+        return [each for each in entries if _is_text(each.name) and not each.is_symlink() and each.is_dir()]
+
+    def _look(self, folder: Path) -> _Seen | None:
+        """What a folder is; None if it is no run."""
+        mark = _mark(folder)
+        if not any(mark):
+            return None
+        known = self._seen.get(folder.name)
+        if known is not None and known.mark == mark:
+            return known
+        info = _info(folder)
+        return _Seen(mark, info, _order(info, max(mark)))
+
+    def _read(self, name: str, *, fresh: bool) -> _Unpacked:
+        """A run, read if it was not.
+
+        Args:
+            name: of the run.
+            fresh: read it again if its files have changed since.
+        """
+        folder = self._folder(name)
+        known = self._kept(name)
+        if known is not None and (known.mark == _mark(folder) or not fresh):
+            return known
+        with self._reading:  # one after another: each keeps a processor busy
+            mark = _mark(folder)
+            known = self._kept(name)
+            if known is None or known.mark != mark:
+                known = _unpack(folder, mark)
+                self._keep(name, known)
+            return known
+
+    def _kept(self, name: str) -> _Unpacked | None:
+        with self._looking:
+            known = self._unpacked.get(name)
+            if known is not None:
+                self._unpacked.move_to_end(name)
+            return known
+
+    def _keep(self, name: str, run: _Unpacked) -> None:
+        with self._looking:
+            self._unpacked[name] = run
+            while len(self._unpacked) > KEPT_RUNS:
+                self._unpacked.popitem(last=False)
+
+    def _folder(self, name: str) -> Path:
+        """The folder of a run; the name must be one that stands in the listing, so it leads nowhere else."""
+        for folder in self._folders():
+            if folder.name == name and any(_mark(folder)):
+                return folder
+        raise RunError(f"run '{name[:_MOST_NAME]!s}': there is no such run in {self.path}/")
+
+
+def _is_text(name: str) -> bool:
+    """Whether a file's name is text at all; Linux takes any bytes."""
+    try:
+        name.encode()
+    except UnicodeEncodeError:
+        return False
+    return True
+
+
+def _mark(folder: Path) -> tuple[int, ...]:
+    """When each of the files that make a run was written, nanoseconds; 0 where there is none."""
+    times: list[int] = []
+    for sign in _SIGNS:
+        try:
+            status = (folder / sign).lstat()
+        except OSError:
+            times.append(0)
+        else:
+            times.append(status.st_mtime_ns)
+    return tuple(times)
+
+
+def _info(folder: Path) -> RunInfo:
+    try:
+        result = _result(folder / "result.json")
+    except (OSError, ValueError, RecursionError):
+        return RunInfo(folder.name, "", "", UNREADABLE, None, _started("", folder.name))
+    total_s = result.get("total_time_s")
+    judged = isinstance(total_s, int | float) and not isinstance(total_s, bool) and isfinite(total_s)
+    return RunInfo(
+        folder.name,
+        _text(result, "scenario") or _scenario_of(folder.name),
+        _text(result, "mission"),
+        _text(result, "verdict"),
+        float(total_s) if judged and total_s is not None else None,
+        _started(_text(result, "started"), folder.name),
+    )
+
+
+def _result(path: Path) -> dict[str, Any]:
+    """What stands in a result; empty if there is none.
+
+    Raises:
+        ValueError: it is damaged.
+        OSError: it cannot be read.
+    """
+    if not path.exists():
+        return {}
+    if path.is_symlink() or not path.is_file() or path.stat().st_size > _MOST_RESULT_BYTES:
+        raise ValueError("no result of ours")
+    result = json.loads(path.read_text(encoding="utf-8"))
+    if not isinstance(result, dict):
+        raise ValueError("no object")
+    return result
+
+
+def _text(result: Mapping[str, Any], name: str) -> str:
+    value = result.get(name)
+    return value[:_MOST_NAME] if isinstance(value, str) else ""
+
+
+def _scenario_of(name: str) -> str:
+    """The scenario as the folder's name tells it."""
+    stamp = _STAMP.match(name)
+    return name[stamp.end() + 1 :][:_MOST_NAME] if stamp else ""
+
+
+def _started(text: str, name: str) -> str:
+    """When a flight began, ISO 8601; from the folder's name, in local time, if the result does not tell."""
+    if _instant(text) is not None:
+        return text
+    stamp = _STAMP.match(name)
+    if stamp is None:
+        return ""
+    try:
+        return datetime.strptime(stamp[0], "%Y%m%d-%H%M%S").astimezone().isoformat()
+    except (ValueError, OverflowError, OSError):
+        return ""
+
+
+def _instant(text: str) -> float | None:
+    try:
+        moment = datetime.fromisoformat(text)
+        return (moment if moment.tzinfo else moment.replace(tzinfo=UTC)).timestamp()
+    except (ValueError, OverflowError, OSError):
+        return None
+
+
+def _order(info: RunInfo, written_ns: int) -> float:
+    instant = _instant(info.started)
+    return written_ns / 1e9 if instant is None else instant
+
+
+def _unpack(folder: Path, mark: tuple[int, ...]) -> _Unpacked:
+    """Read a run in a process of its own.
+
+    Raises:
+        RunError: it cannot be shown.
+    """
+    linked = [name for name in _FILES if (folder / name).is_symlink()]
+    if linked:
+        raise RunError(f"run '{folder.name}': its {linked[0]} is a link; only files of its own are shown")
+    target = TemporaryDirectory(prefix="framerunner-run-", ignore_cleanup_errors=True)
+    command = [sys.executable, "-m", "framerunner.monitoring.read_run", str(folder.absolute()), target.name]
+    try:
+        done = subprocess.run(
+            command,
+            stdin=subprocess.DEVNULL,
+            stdout=subprocess.DEVNULL,
+            stderr=subprocess.PIPE,
+            timeout=_LONGEST_READ_S,
+            check=False,
+        )
+    except (subprocess.TimeoutExpired, OSError):
+        raise RunError(f"run '{folder.name}': reading it takes too long") from None
+    if done.returncode != 0:
+        lines = done.stderr.decode(errors="replace").strip().splitlines()
+        reason = lines[-1][:300] if lines and done.returncode == 2 else "it is damaged"
+        raise RunError(f"run '{folder.name}': cannot be shown: {reason}")
+    try:
+        recording = json.loads((Path(target.name) / RECORDING).read_text(encoding="utf-8"))
+        spans = json.loads((Path(target.name) / SPANS).read_text(encoding="utf-8"))
+    except (OSError, ValueError):
+        raise RunError(f"run '{folder.name}': no room to unpack it") from None
+    return _Unpacked(mark, target, recording, [(int(start), int(length)) for start, length in spans])
