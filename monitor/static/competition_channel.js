@@ -1,0 +1,106 @@
+/** How the contest's pages speak with the monitor: they ask, judges send, and a WebSocket says when to ask anew. */
+
+const LONGEST_PAUSE_MS = 2000;
+
+/**
+ * Ask for something.
+ * @param {string} path below /api/competition/
+ * @returns {Promise<object>} throws an Error with one line for people
+ */
+export async function ask(path) {
+  return answer(await reach(fetch(`/api/competition/${path}`, { cache: "no-store" })));
+}
+
+/**
+ * Have something done; only judges may.
+ * @param {string} path below /api/competition/
+ * @param {object} form
+ * @returns {Promise<object>} throws an Error with one line for people; its `status` is that of HTTP
+ */
+export async function send(path, form) {
+  return answer(await reach(fetch(`/api/competition/${path}`, {
+    method: "POST",
+    headers: { "Content-Type": "application/json" },
+    body: JSON.stringify(form),
+  })));
+}
+
+async function reach(fetching) {
+  try {
+    return await fetching;
+  } catch {
+    throw new Error("the monitor does not answer");
+  }
+}
+
+async function answer(response) {
+  if (response.ok) return response.json();
+  const text = await response.text();
+  const error = new Error(detailOf(text) ?? `the monitor answers ${response.status}`);
+  error.status = response.status;
+  throw error;
+}
+
+function detailOf(text) {
+  try {
+    const detail = JSON.parse(text).detail;
+    return typeof detail === "string" ? detail : null;
+  } catch {
+    return text.length < 200 ? text.trim() || null : null;
+  }
+}
+
+/**
+ * Hear of changes, for as long as the page lives; a lost connection is opened again.
+ * @param {{changed: function(object): void, running: function(object[]): void, link: function(boolean): void}} hear
+ *   changed: something is other than before, also after each new connection; link: whether there is a connection
+ */
+export function watch(hear) {
+  let pause_ms = 250;
+  const open = () => {
+    const scheme = location.protocol === "https:" ? "wss:" : "ws:";
+    const socket = new WebSocket(`${scheme}//${location.host}/ws/competition`);
+    socket.onopen = () => {
+      pause_ms = 250;
+      hear.link(true);
+    };
+    socket.onmessage = (event) => {
+      const message = JSON.parse(event.data);
+      if (message.kind === "changed") hear.changed(message);
+      else if (message.kind === "running") hear.running(message.tries);
+    };
+    socket.onclose = () => {
+      hear.link(false);
+      setTimeout(open, pause_ms);
+      pause_ms = Math.min(LONGEST_PAUSE_MS, pause_ms * 1.6);
+    };
+  };
+  open();
+}
+
+/**
+ * Makes one call at a time of a function that asks, and one more if it was wanted meanwhile.
+ * @param {function(): Promise<void>} work
+ * @param {function(Error): void} fail
+ * @returns {function(): void}
+ */
+export function oneAtATime(work, fail) {
+  let busy = false;
+  let again = false;
+  return async function run() {
+    if (busy) {
+      again = true;
+      return;
+    }
+    busy = true;
+    do {
+      again = false;
+      try {
+        await work();
+      } catch (error) {
+        fail(error);
+      }
+    } while (again);
+    busy = false;
+  };
+}

@@ -1,0 +1,197 @@
+/** The ranking, for a projector: follows the contest by itself. */
+
+import { ask, oneAtATime, watch } from "./competition_channel.js";
+import { frameMarks, nameOf, orDash, seconds, worth } from "./competition_words.js";
+import { make, setText, wantsStillness, whenThere } from "./dom.js";
+
+const MOVE_MS = 700;
+const LONGEST_GUESS_S = 1.5; // how long a clock goes on without news
+
+class Ranking {
+  #element;
+  #title = make("h1", {}, "Ranking");
+  #rounds = make("select", { "aria-label": "Round" });
+  #line = make("p", { class: "line", role: "status", hidden: true });
+  #now = make("div", { class: "now", "aria-live": "off" });
+  #table = make("table", { class: "ranking", role: "table" });
+  #head = make("tr", { role: "row" });
+  #body = make("tbody", { role: "rowgroup" });
+  #rule = make("p", { class: "hint" });
+  #rows = new Map();
+  #wanted = "";
+  #linked = true;
+  #problem = "";
+  #running = [];
+  #heard_ms = 0;
+  #clocks = [];
+
+  /** @param {HTMLElement} element */
+  constructor(element) {
+    this.#element = element;
+    this.#rounds.addEventListener("change", () => {
+      this.#wanted = this.#rounds.value;
+      refresh();
+    });
+    const wide = make("button", { type: "button" }, "Full screen");
+    wide.addEventListener("click", () => this.#fill());
+    document.addEventListener("fullscreenchange", () => {
+      document.body.classList.toggle("projector", document.fullscreenElement !== null);
+    });
+    this.#table.append(make("thead", { role: "rowgroup" }, this.#head), this.#body);
+    element.append(
+      make("div", { class: "bar" }, this.#title, this.#rounds, wide), this.#line, this.#now, this.#table, this.#rule,
+    );
+    const refresh = oneAtATime(() => this.#load(), (error) => this.#say(error.message));
+    watch({
+      changed: refresh,
+      running: (tries) => this.#run(tries),
+      link: (up) => {
+        this.#linked = up;
+        this.#say();
+      },
+    });
+    requestAnimationFrame(() => this.#tick());
+  }
+
+  #fill() {
+    if (document.fullscreenElement !== null) document.exitFullscreen();
+    else document.documentElement.requestFullscreen?.().catch(() => {});
+  }
+
+  async #load() {
+    const state = await ask(`ranking${this.#wanted === "" ? "" : `?round=${this.#wanted}`}`);
+    this.#problem = state.problem;
+    this.#say();
+    this.#showRounds(state);
+    this.#showHead(state.ranking.scenarios);
+    this.#showRows(state.ranking.rows);
+    this.#showRule(state.rule);
+    this.next = state.next;
+    this.#run(state.running);
+  }
+
+  #say(trouble = "") {
+    const words = trouble || (this.#linked ? this.#problem : "connection to the monitor lost, trying again");
+    setText(this.#line, words);
+    this.#line.hidden = words === "";
+  }
+
+  #showRounds(state) {
+    const round = state.ranking.round;
+    setText(this.#title, round === 0 ? "Ranking: before the draw" : `Ranking: round ${round}`);
+    const known = [...this.#rounds.options].map((option) => Number(option.value));
+    if (known.join() !== state.rounds.join()) {
+      this.#rounds.replaceChildren(...state.rounds.map((number) =>
+        make("option", { value: String(number) }, number === 0 ? "Before the draw" : `Round ${number}`)));
+      this.#wanted = "";
+    }
+    this.#rounds.value = String(round);
+    if (round === state.rounds[0]) this.#wanted = "";
+    this.#rounds.hidden = state.rounds.length < 2;
+  }
+
+  #showHead(scenarios) {
+    const titles = ["Rank", "Team", ...scenarios.map((name, index) => name || `Scenario ${index + 1}`), "Total"];
+    const kinds = ["rank", "team", ...scenarios.map(() => "cell"), "total"];
+    this.#element.style.setProperty("--scenarios", String(scenarios.length));
+    this.#head.replaceChildren(...titles.map((title, index) =>
+      make("th", { scope: "col", role: "columnheader", class: kinds[index] }, title)));
+    this.titles = titles;
+  }
+
+  /** Put the rows in order; those that were there move from where they were. */
+  #showRows(rows) {
+    const before = new Map([...this.#rows].map(([team, row]) => [team, row.getBoundingClientRect().top]));
+    const present = new Set(rows.map((row) => row.team));
+    for (const [team, row] of this.#rows) {
+      if (present.has(team)) continue;
+      row.remove();
+      this.#rows.delete(team);
+    }
+    rows.forEach((row, index) => {
+      let element = this.#rows.get(row.team);
+      if (element === undefined) {
+        element = make("tr", { role: "row", "data-team": String(row.team) });
+        this.#rows.set(row.team, element);
+      }
+      this.#fillRow(element, row);
+      if (this.#body.children[index] !== element) this.#body.insertBefore(element, this.#body.children[index] ?? null);
+    });
+    if (rows.length === 0) this.#table.dataset.empty = "true";
+    else delete this.#table.dataset.empty;
+    if (!wantsStillness()) this.#move(before);
+  }
+
+  #move(before) {
+    for (const [team, row] of this.#rows) {
+      const way = (before.get(team) ?? row.getBoundingClientRect().top) - row.getBoundingClientRect().top;
+      if (way === 0) continue;
+      row.animate(
+        [{ transform: `translateY(${way}px)` }, { transform: "none" }],
+        { duration: MOVE_MS, easing: "ease-in-out" },
+      );
+    }
+  }
+
+  #fillRow(element, row) {
+    const text = JSON.stringify([row, this.titles]);
+    if (element.dataset.shown === text) return;
+    element.dataset.shown = text;
+    element.replaceChildren(
+      make("td", { class: "rank", role: "cell" }, String(row.rank)),
+      make("th", { class: "team", role: "rowheader", scope: "row" }, nameOf(row.name, { class: "name" })),
+      ...row.cells.map((cell, index) => this.#cell(cell, this.titles[index + 2])),
+      make("td", { class: "total", role: "cell" }, seconds(row.total_s)),
+    );
+  }
+
+  #cell(cell, title) {
+    const flown = cell.state !== "not flown";
+    const note = flown && cell.state !== "completed" ? worth({ completed: false, missing: Array(cell.missing).fill("") }) : "";
+    return make("td", { class: "cell", role: "cell", "data-state": cell.state, "data-title": title },
+      make("span", { class: "time" }, flown ? seconds(cell.counted_s) : "–"),
+      make("span", { class: "note" }, flown ? note : `counts ${seconds(cell.counted_s)}`));
+  }
+
+  #showRule(rule) {
+    setText(this.#rule, "Total: the sum over "
+      + `${rule.scenarios} ${rule.scenarios === 1 ? "scenario" : "scenarios"} of try time and penalty, in seconds. `
+      + `A try that is not completed counts ${rule.limit_s} s and ${rule.missing_frame_s} s for each frame missing; `
+      + `a scenario not flown counts as if all were. Of several tries the ${rule.counting} counts.`);
+  }
+
+  #run(tries) {
+    this.#running = tries;
+    this.#heard_ms = performance.now();
+    this.#clocks = [];
+    const lines = tries.map((each) => {
+      const clock = make("span", { class: "clock" }, each.try_time_s.toFixed(1));
+      this.#clocks.push([clock, each.try_time_s]);
+      return make("div", { class: "flight", "data-try": String(each.id) },
+        make("span", { class: "label" }, "Flying now"),
+        nameOf(each.team_name || `drone ${each.drone_id}`, { class: "name" }),
+        make("span", { class: "where" }, each.scenario),
+        frameMarks(each.frames, each.crossed),
+        make("span", {}, clock, " s"));
+    });
+    if (lines.length === 0 && this.next) {
+      lines.push(make("div", { class: "flight next" },
+        make("span", { class: "label" }, "Next"), nameOf(this.next.team_name, { class: "name" }),
+        make("span", { class: "where" }, orDash(this.next.scenario))));
+    }
+    this.#now.replaceChildren(...lines);
+    this.#now.hidden = lines.length === 0;
+    const flying = new Set(tries.map((each) => each.team_name));
+    for (const row of this.#rows.values()) {
+      row.toggleAttribute("data-flying", flying.has(row.querySelector(".name").textContent));
+    }
+  }
+
+  #tick() {
+    const guess_s = Math.min(LONGEST_GUESS_S, (performance.now() - this.#heard_ms) / 1000);
+    for (const [clock, from_s] of this.#clocks) setText(clock, (from_s + guess_s).toFixed(1));
+    setTimeout(() => requestAnimationFrame(() => this.#tick()), 100);
+  }
+}
+
+new Ranking(await whenThere("#ranking"));
