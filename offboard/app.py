@@ -206,8 +206,11 @@ class _Flight:
             logger.info("paused: the pilot has the sticks (%s)", state.mode)
         self._engine.pause(state.time_us)
         if not state.armed:
-            by_whom = "the pilot landed and stopped" if state.landed else "others stopped in the air"
-            raise DroneError(f"{by_whom} the motors")
+            raise DroneError(
+                "the pilot landed and stopped the motors"
+                if state.landed
+                else "the motors were stopped in the air while the pilot had the sticks"
+            )
         try:
             detections, blind = self._eyes.latest(state.time_us), ""
         except CameraLostError as error:  # no harm to a pilot, and it may come back

@@ -6,6 +6,7 @@ import asyncio
 import math
 import socket
 import struct
+import time
 from contextlib import asynccontextmanager
 from itertools import pairwise
 
@@ -100,21 +101,133 @@ async def until_error(ticks):
     raise AssertionError("the ticks ended without a reason")
 
 
-async def test_a_pilot_who_takes_over_keeps_the_vehicle(vehicle):
+async def until(ticks, condition, limit_s=8.0):
+    """The first state for which a condition holds."""
+    async with asyncio.timeout(limit_s):
+        async for state in ticks:
+            if condition(state):
+                return state
+    raise AssertionError("the ticks ended")
+
+
+@asynccontextmanager
+async def taken_by_a_pilot(vehicle):
+    """A drone and its ticks, and how many commands the vehicle had had when a pilot took it."""
     async with connected(vehicle) as drone:
         ticks = drone.ticks()
         await drone.motors_on()
+        drone.command(VelocityCommand(up_m_s=0.5))
         await take(ticks, 5)
-        vehicle.mode = (POSCTL, 0)
-        assert (await until_error(ticks)).startswith("the pilot took over: mode POSCTL")
         before = len(vehicle.commands)
+        vehicle.mode = (POSCTL, 0)
+        state = await until(ticks, lambda state: not state.offboard)
+        assert state.mode == "POSCTL"
+        yield drone, ticks, before
+
+
+def modes_asked_for(vehicle, before):
+    return [command for command in vehicle.commands[before:] if command[0] == 176]
+
+
+def fresh_setpoints(vehicle, seconds):
+    return [setpoint[1:] for setpoint in vehicle.setpoints if setpoint[0] > time.monotonic() - seconds]
+
+
+async def test_a_pilot_who_takes_over_keeps_the_vehicle_and_can_give_it_back(vehicle):
+    async with taken_by_a_pilot(vehicle) as (drone, ticks, before):
+        for _ in range(100):  # five seconds: MAVSDK has ended its own stream meanwhile
+            drone.command(VelocityCommand(forward_m_s=0.9))
+            assert not (await anext(ticks)).offboard
+        fresh = fresh_setpoints(vehicle, 1.0)
+        assert len(fresh) >= 15
+        assert set(fresh) == {(0.0, 0.0, 0.0, 0.0)}  # nothing of the mission
+        assert not modes_asked_for(vehicle, before)
+        assert vehicle.mode == (POSCTL, 0)
+        vehicle.mode = (6, 0)
+        await until(ticks, lambda state: state.offboard)
+        await take(ticks, 5)
+        assert set(fresh_setpoints(vehicle, 0.2)) == {(0.0, 0.0, 0.0, 0.0)}  # it stands until taken back
+        for _ in range(10):
+            drone.command(VelocityCommand(forward_m_s=0.4))
+            await anext(ticks)
+        assert vehicle.setpoints[-1][1] == pytest.approx(0.4)
+        vehicle.mode = (POSCTL, 0)  # and again
+        await until(ticks, lambda state: not state.offboard)
+
+
+async def test_after_a_pilot_the_vehicle_is_followed_from_where_he_left_it(vehicle):
+    async with taken_by_a_pilot(vehicle) as (drone, ticks, _):
+        vehicle.position[0] += 3.0  # off any model of what was commanded
+        vehicle.mode = (6, 0)
+        await until(ticks, lambda state: state.offboard)
+        for _ in range(10):
+            drone.command(VelocityCommand())
+            await anext(ticks)
+        assert set(fresh_setpoints(vehicle, 0.3)) == {(0.0, 0.0, 0.0, 0.0)}  # no way back is flown
+
+
+async def test_no_mode_is_asked_of_a_vehicle_that_a_pilot_has(vehicle):
+    async with taken_by_a_pilot(vehicle) as (drone, _, before):
         await drone.hold()
         await asyncio.sleep(0.3)
         count = len(vehicle.setpoints)
         await asyncio.sleep(0.5)
         assert len(vehicle.setpoints) == count  # silent
-        assert 176 not in [command[0] for command in vehicle.commands[before:]]  # no mode was asked for
+        assert not modes_asked_for(vehicle, before)
         assert vehicle.mode == (POSCTL, 0)
+
+
+async def test_a_vehicle_not_taken_back_holds_and_can_be_given_another_time(vehicle):
+    async with taken_by_a_pilot(vehicle) as (drone, ticks, before):
+        vehicle.mode = (6, 0)
+        await until(ticks, lambda state: state.offboard)
+        await drone.refuse()
+        assert vehicle.mode == (4, 3)
+        assert len(modes_asked_for(vehicle, before)) == 1
+        state = await anext(ticks)
+        assert (state.mode, state.offboard) == ("HOLD", False)
+        await take(ticks, 20)
+        assert set(fresh_setpoints(vehicle, 0.5)) == {(0.0, 0.0, 0.0, 0.0)}
+        vehicle.mode = (6, 0)
+        await until(ticks, lambda state: state.offboard)
+
+
+async def test_while_a_pilot_has_it_modes_and_arming_are_his(vehicle):
+    async with taken_by_a_pilot(vehicle) as (_, ticks, _):
+        vehicle.mode = (4, 3)
+        await until(ticks, lambda state: state.mode == "HOLD")
+        vehicle.armed = False
+        await until(ticks, lambda state: not state.armed)
+
+
+async def test_a_link_lost_while_a_pilot_has_it_is_noticed(vehicle):
+    async with taken_by_a_pilot(vehicle) as (_, ticks, _):
+        vehicle.mute = True
+        assert (await until_error(ticks)).startswith("link lost: no telemetry for 1.")
+
+
+async def test_an_app_that_hangs_while_a_pilot_has_it_leaves_no_stream_and_asks_for_nothing(vehicle):
+    async with taken_by_a_pilot(vehicle) as (drone, ticks, before):
+        await take(ticks, 5)
+        time.sleep(1.0)  # noqa: ASYNC251 - this is what hanging is
+        assert not fresh_setpoints(vehicle, 0.2)
+        assert "this app hung" in await until_error(ticks)
+        vehicle.mode = (6, 0)  # somebody gives it back to an app that has given up
+        await drone._until(lambda: drone._feed.mode == "OFFBOARD", 3.0)
+        await drone.hold()
+        assert vehicle.mode == (4, 3)
+        assert not fresh_setpoints(vehicle, 0.2)
+        assert len(modes_asked_for(vehicle, before)) == 1
+
+
+async def test_a_mode_that_is_no_pilot_s_ends_commanding(vehicle):
+    async with connected(vehicle) as drone:
+        ticks = drone.ticks()
+        await drone.motors_on()
+        await take(ticks, 5)
+        vehicle.mode = (4, 5)
+        expected = "the pilot or a failsafe took over: mode RETURN_TO_LAUNCH"
+        assert (await until_error(ticks)).startswith(expected)
 
 
 async def test_a_lost_link_is_noticed_within_a_second_or_so(vehicle):

@@ -7,7 +7,7 @@ from math import inf
 import pytest
 
 from offboard.drone import VelocityCommand
-from offboard.engine import MissionEngine, MissionRunError
+from offboard.engine import MissionEngine, MissionRunError, TransitionTaken
 from offboard.mission import load_mission
 from offboard.pilot import Imu
 from vision.types import Detection, Detections
@@ -141,6 +141,30 @@ def test_only_the_wanted_colour_counts(colour):
     others = {c: FAR for c in ("red", "green", "blue") if c != colour}
     driver = Driver().to(f"{colour}.turning")
     assert driver.tick(at(0, 0, 2), Detections(**others)) == f"{colour}.turning"
+
+
+def test_a_transition_tells_its_guard_and_what_its_names_were():
+    driver = Driver().to("red.frame_visible")
+    assert driver.engine.transition.when == "frame_seen"
+    driver.tick(cam=see("red", FAR))
+    assert driver.engine.transition is None
+    driver.tick(cam=see("red", NEAR))
+    assert driver.engine.transition == TransitionTaken(
+        "red.frame_visible", "red.frame_close", "frame.d < 0.45", (("frame.d", 0.44),), driver.time_us, 0.1
+    )
+    driver.tick(cam=see("red", NEAR))
+    taken = driver.engine.transition
+    assert (taken.target, taken.when, taken.values) == ("red.shift_left", "", ())
+    driver.tick(cam=see("red", angle(31.0)))
+    assert driver.engine.transition.values == (("frame.a", 31.0), ("memory.alpha0", 30.0))
+
+
+def test_a_superstate_that_is_done_is_told_with_the_leaves_on_both_sides():
+    driver = Driver().to("red.going_up")
+    driver.tick(after_s=2.0)
+    assert driver.engine.transition == TransitionTaken(
+        "red.going_up", "green.go_to_center", "done", (("seconds_in_state", 2.0),), driver.time_us, 2.0
+    )
 
 
 def test_nothing_happens_after_the_end():

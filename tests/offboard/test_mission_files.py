@@ -10,6 +10,7 @@ import pytest
 from offboard.engine import MissionEngine, MissionRunError
 from offboard.mission import MissionError, list_missions, load_mission, mermaid
 from offboard.pilot import Imu, Pilot
+from offboard.pilot_file import read_pilot
 from vision.types import Detections
 
 MINIMAL = dedent("""\
@@ -121,6 +122,22 @@ BAD_CHARTS = [
     ("  done:", "  Done:", "'Done' is not a name"),
     ("    during:", "    use: circle\n    during:", "unknown template 'circle'"),
     ("    during:", "    then: done\n    during:", "has 'then' or 'initial' but no states of its own"),
+    (
+        "    during:",
+        "    resume: upp\n    during:",
+        "m.yaml:8: 'resume' 'upp' of state 'up' is not a state; did you mean 'up'?",
+    ),
+    ("    during:", "    resume:\n    during:", "m.yaml:8: 'resume' is empty; name the state to go on in"),
+    ("    during:", "    resume: [up]\n    during:", "m.yaml:8: 'resume' must be one line of text"),
+    (
+        "    final: true",
+        "    final: true\n    resume: up",
+        "m.yaml:17: state 'done' is final; nothing is left to go on with, take 'resume' away",
+    ),
+    ("        to: done", "        to: done\n        resume: up", "a transition has no 'resume'"),
+    ("name: little", "resume: up", "a mission has no 'resume'"),
+    ("  done:", "  alone: {resume: alone}\n  done:", "state 'alone' is never reached"),
+    ("        to: done", "        to: up\n    resume: done", "never finishes"),
     ("  done:", "  alone:\n    transitions:\n      - to: done\n  done:", "state 'alone' is never reached"),
     (
         "      - when: seconds_in_state > 1\n        to: done",
@@ -271,6 +288,115 @@ def test_an_error_while_flying_is_raised_with_the_state(tmp_path, old, new, mess
 
     with pytest.raises(MissionRunError, match=message):
         fly()
+
+
+RESUMING = dedent("""\
+    initial: out
+    templates:
+      leg:
+        initial: a
+        resume: b
+        states:
+          a:
+            transitions:
+              - when: seconds_in_state > 1
+                to: c
+              - when: imu.x > 5
+                to: b
+          b:
+            enter:
+              - cmd.vel_y = 0.25
+            transitions:
+              - when: seconds_in_state > 1
+                to: c
+          c:
+            resume: home
+            transitions:
+              - when: seconds_in_state > 1
+                to: end
+          end:
+            final: true
+    states:
+      out:
+        use: leg
+        then: back
+        enter:
+          - cmd.vel_x = 0.5
+      back:
+        use: leg
+        resume: a
+        enter:
+          - cmd.vel_x = cmd.vel_x + 0.125
+        then: home
+      home:
+        final: true
+    """)
+
+
+@pytest.mark.parametrize("quiet", [True, False])
+@pytest.mark.parametrize(
+    ("state", "expected", "command"),
+    [
+        ("out.a", "out.b", (0.0, 0.25)),  # the template's, and `out` is not entered again
+        ("out.c", "home", (0.0, 0.0)),  # its own goes before, and may lead outside
+        ("back.a", "back.a", (0.0, 0.0)),  # who uses a template may choose otherwise
+    ],
+)
+def test_after_a_pause_a_mission_goes_on_where_it_says(tmp_path, state, expected, command, quiet):
+    engine = MissionEngine(load(tmp_path, RESUMING), quiet_ticks=quiet)
+    time_us = 0
+    while engine.state != state:
+        engine.tick(Imu(), Detections(), time_us)
+        time_us += 1_100_000
+    engine.pause(time_us)
+    engine.pause(time_us + 1_000_000)
+    assert engine.state == state
+    flown = engine.tick(Imu(), Detections(), time_us + 5_000_000)
+    assert engine.state == expected
+    assert (flown.forward_m_s, flown.left_m_s) == command
+    taken = engine.transition
+    assert (taken.source, taken.target, taken.when, taken.values) == (state, expected, "resume", ())
+    assert taken.seconds_in_source == pytest.approx(1.1)
+    engine.tick(Imu(), Detections(), time_us + 5_050_000)
+    assert engine.transition is None
+    assert engine.pilot.seconds_in_state == pytest.approx(0.0 if expected == "home" else 0.05)
+
+
+def test_a_superstate_may_be_begun_anew_after_a_pause(tmp_path):
+    engine = MissionEngine(load(tmp_path, RESUMING.replace("resume: a", "resume: back")))
+    time_us = 0
+    while engine.state != "back.a":
+        forward_m_s = engine.tick(Imu(), Detections(), time_us).forward_m_s
+        time_us += 1_100_000
+    assert forward_m_s == 0.625
+    engine.pause(time_us)
+    assert engine.tick(Imu(), Detections(), time_us).forward_m_s == 0.125  # from a stand, entered again
+    assert engine.state == "back.a"
+
+
+def test_a_pause_before_the_first_tick_is_none(tmp_path):
+    engine = MissionEngine(load(tmp_path, RESUMING))
+    engine.pause(1_000_000)
+    engine.tick(Imu(), Detections(), 2_000_000)
+    assert (engine.state, engine.transition) == ("out.a", None)
+
+
+def test_a_name_that_only_a_pause_would_take_is_refused(tmp_path):
+    path = tmp_path / "mine.py"
+    path.write_text("from offboard.pilot import Pilot\nclass Mine(Pilot):\n    def on_resume(self): pass\n")
+    with pytest.raises(MissionError, match="on_resume"):
+        read_pilot(path)
+
+
+def test_the_diagram_tells_where_a_mission_goes_on_after_a_pause(tmp_path):
+    drawn = mermaid(load(tmp_path, RESUMING))
+    assert "        [*] --> out.a\n        [*] --> out.b : after a pause\n" in drawn
+    assert "        out.c --> home : after a pause\n" in drawn
+    assert "        [*] --> back.a : also after a pause\n" in drawn
+    assert drawn.count("after a pause") == 4
+    assert "    back --> back : after a pause\n" in mermaid(
+        load(tmp_path, RESUMING.replace("resume: a", "resume: back"))
+    )
 
 
 def test_the_diagram_shows_every_state_and_transition_with_priority():
