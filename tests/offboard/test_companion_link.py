@@ -1,0 +1,90 @@
+"""The companion on the link of the flying MAVSDK, to a vehicle on a real UDP socket."""
+
+from __future__ import annotations
+
+import asyncio
+
+import pytest
+
+from mission_link.messages import MissionState
+from offboard.drone import DroneError
+from offboard.link.companion import Companion
+from offboard.mavsdk_drone import MavsdkDrone
+from tests.offboard.conftest import free_port
+from tests.offboard.udp_vehicle import UdpVehicle
+from tests.processes import wait_until
+
+pytestmark = pytest.mark.realtime
+
+
+class Vehicle(UdpVehicle):
+    """Keeps what a companion says; its heartbeats may end while its telemetry goes on."""
+
+    def __init__(self):
+        super().__init__(free_port())
+        self.heartless = False
+        self.heard = []
+
+    def _tell(self, step):
+        super()._tell(step + 1 if self.heartless and step % 50 == 1 else step)
+
+    def _handle(self, message):
+        if message.get_srcComponent() == 191:
+            self.heard.append(message)
+        super()._handle(message)
+
+    def count(self, kind):
+        return sum(message.get_type() == kind for message in list(self.heard))
+
+
+@pytest.fixture
+async def flying():
+    """A vehicle, a drone that has connected to it, and the companion on its link."""
+    vehicle, companion = Vehicle(), Companion()
+    vehicle.start()
+    drone = MavsdkDrone(f"udpin://127.0.0.1:{vehicle.port}")
+    drone.tell_through(companion)
+    try:
+        await drone.connect()
+        yield vehicle, drone, companion
+    finally:
+        await drone.let_go()
+        await companion.close()
+        vehicle.stop()
+
+
+async def until(condition):
+    """Wait for a condition, which must come."""
+    assert await asyncio.to_thread(wait_until, condition, 5.0)
+
+
+async def test_the_vehicle_hears_the_companion_until_it_is_let_go(flying):
+    vehicle, drone, companion = flying
+    await drone.ready()
+    await until(lambda: vehicle.count("HEARTBEAT") >= 2)
+    still = (0.0, 0.0, 0.0, 0.0)
+    companion.tell_state(MissionState(1, 0, 0, 1, 1, False, False, False, still, still))
+    await until(lambda: vehicle.count("TUNNEL") > 0)
+    await drone.close()
+    companion.say("mission: a last word")
+    await until(lambda: vehicle.count("STATUSTEXT") == 1)
+    assert {message.get_srcSystem() for message in vehicle.heard} == {1}
+    await drone.let_go()
+    await drone.let_go()
+
+
+async def test_the_companion_does_not_hide_that_the_vehicle_s_heartbeats_have_ended(flying):
+    vehicle, drone, companion = flying
+    await drone.ready()
+    await until(lambda: vehicle.count("HEARTBEAT") >= 1)
+    still = (0.0, 0.0, 0.0, 0.0)
+    vehicle.heartless = True
+
+    async def fly():
+        async for state in drone.ticks():
+            companion.tell_state(MissionState(1, 0, 0, state.time_us, 0, True, False, False, still, still))
+            companion.say("mission: still here")
+
+    with pytest.raises(DroneError, match="link lost: no heartbeat for 3 s"):
+        await asyncio.wait_for(fly(), 6.0)
+    assert vehicle.count("STATUSTEXT") > 20
