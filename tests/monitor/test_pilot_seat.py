@@ -9,9 +9,9 @@ from monitor.pilot_desk import Browser, PilotDesk
 from monitor.pilot_messages import Order
 from monitor.pilot_seat import NEUTRAL, Clock, Hands, Person
 from monitor.sticks import Sticks
+from tests.monitor.pilot_fakes import MISSION, FakeFleet
 
 FORWARD = Sticks(0.5, 0.0, 0.0, 0.0)
-MISSION = {"name": "frame_challenge", "alive": True, "paused": True}
 
 
 class FakeTime:
@@ -28,58 +28,6 @@ class FakeTime:
         woken = asyncio.Event()
         self.sleepers.append((self.now_s + seconds, woken))
         await woken.wait()
-
-
-class FakeFleet:
-    """Two drones that do at once what they are told, unless the test says otherwise."""
-
-    def __init__(self):
-        self.status = {number: self.drone(number) for number in (1, 2)}
-        self.orders = []
-        self.sent = []
-        self.notices = []
-        self.pilots = {}
-        self.refuse = {}
-        self.gates = {}
-        self.held = asyncio.Event()
-
-    @staticmethod
-    def drone(number):
-        return {
-            "id": number,
-            "mode": "OFFBOARD",
-            "armed": True,
-            "link": {"state": "live"},
-            "mission": None,
-        }
-
-    def drone_ids(self):
-        return list(self.status)
-
-    def status_message(self):
-        return {"kind": "status", "drones": list(self.status.values())}
-
-    async def do(self, drone_id, what):
-        self.orders.append(what)
-        if what == "hold":
-            self.held.set()
-        if what in self.gates:
-            await self.gates[what].wait()
-        if what in self.refuse:
-            return False, self.refuse[what]
-        modes = {"position": "POSITION", "offboard": "OFFBOARD", "hold": "HOLD", "land": "LAND"}
-        modes["take_off"] = "TAKEOFF"
-        self.status[drone_id]["mode"] = modes.get(what, self.status[drone_id]["mode"])
-        return True, f"{what} done"
-
-    def sticks(self, drone_id, sticks):
-        self.sent.append((drone_id, sticks))
-
-    def set_pilot(self, drone_id, name):
-        self.pilots[drone_id] = name
-
-    def notice(self, drone_id, level, text):
-        self.notices.append((drone_id, level, text))
 
 
 class Game:
@@ -239,7 +187,7 @@ async def test_hold_is_asked_for_until_the_drone_obeys(game):
 async def test_a_failsafe_that_flies_the_drone_is_not_disturbed_by_silence(game):
     ana = game.browser("Ana")
     await game.take(ana)
-    game.fleet.status[1]["mode"] = "RETURN"
+    game.fleet.status[1]["mode"] = "Return"
     await game.pass_time(1.0)
     assert "hold" not in game.fleet.orders and game.last_sticks() == NEUTRAL
     assert game.fleet.notices == [(1, "warning", "the pilot's page fell silent; drone 1 goes on by itself")]
@@ -397,7 +345,7 @@ async def test_after_a_take_off_by_button_the_pilot_flies_on(game):
     assert (await game.order(ana, "take_off")).ok
     await game.pass_time(2.0, ana, FORWARD)
     assert game.last_sticks() == NEUTRAL and game.fleet.orders == ["position", "take_off"]
-    game.fleet.status[1]["mode"] = "HOLD"
+    game.fleet.status[1]["mode"] = "Hold"
     await game.pass_time(0.6, ana, NEUTRAL)
     assert game.fleet.orders == ["position", "take_off", "position"]
     game.desk.sticks(ana, FORWARD)
@@ -409,7 +357,7 @@ async def test_a_pilot_who_falls_silent_during_take_off_leaves_it_to_end_by_itse
     await game.take(ana)
     assert (await game.order(ana, "take_off")).ok
     await game.pass_time(1.0)
-    game.fleet.status[1]["mode"] = "HOLD"
+    game.fleet.status[1]["mode"] = "Hold"
     await game.pass_time(1.0)
     assert game.fleet.orders == ["position", "take_off"]
 
