@@ -36,7 +36,7 @@ class FlightDisplay:
         self._recorder = recorder
         self._judge = judge
         self._console = Console(file=sys.stderr)
-        self._line_state = ""
+        self._line_state = ""  # what the last line said
         self._line_s = -_LINE_S
 
     async def run(self) -> None:
@@ -55,13 +55,15 @@ class FlightDisplay:
         if moment is None:
             return
         time_s = moment.flight_time_s
-        if moment.mission_state == self._line_state and time_s - self._line_s < _LINE_S:
+        paused = pause_in_words(moment)
+        if moment.mission_state + paused == self._line_state and time_s - self._line_s < _LINE_S:
             return
-        self._line_state, self._line_s = moment.mission_state, time_s
+        self._line_state, self._line_s = moment.mission_state + paused, time_s
         crossed = ", ".join(standing.crossed) if standing else ""
         place = place_in_words(moment)
         print(
-            f"{time_s:6.1f} s  {moment.mission_state:22s} {place}  crossed: {crossed or 'none'}",
+            f"{time_s:6.1f} s  {moment.mission_state:22s} {place}  crossed: {crossed or 'none'}"
+            f"{'  ' if paused else ''}{paused}",
             file=sys.stderr,
             flush=True,
         )
@@ -89,6 +91,8 @@ def moment_table(title: str, moment: Moment, time: str) -> Table:
     """
     table = _empty_table(title)
     table.add_row("state", escape(moment.mission_state))
+    if moment.paused:
+        table.add_row("[yellow]paused[/]", escape(pause_in_words(moment).removeprefix("paused: ")))
     table.add_row("time", time)
     table.add_row("drone", f"{place_in_words(moment)}  {escape(moment.state.mode)}")
     for colour in ("red", "green", "blue"):
@@ -108,6 +112,16 @@ def place_in_words(moment: Moment) -> str:
     """Where the drone is."""
     state = moment.state
     return f"x {state.x:5.2f}  y {state.y:5.2f}  z {state.z:4.2f} m  yaw {state.yaw:5.2f} rad"
+
+
+def pause_in_words(moment: Moment) -> str:
+    """Who has the drone while the mission waits, and why it went on waiting; empty when it does not wait."""
+    if not moment.paused:
+        return ""
+    mode = moment.state.mode
+    if moment.remark:
+        return f"paused: given back ({mode}), but {moment.remark}"
+    return f"paused: the pilot has the sticks ({mode})"
 
 
 def _seen(detection: Detection) -> str:

@@ -32,17 +32,17 @@ def flight():
     return recorder, FlightDisplay("a place: a mission", 180.0, recorder, Judge())
 
 
-def see(recorder, time_s, state):
-    drone = DroneState(round(time_s * 1e6), 1.25, -2.5, 0.75, 0.5, armed=True, mode="OFFBOARD")
+def see(recorder, time_s, state, mode="OFFBOARD", **fields):
+    drone = DroneState(round(time_s * 1e6), 1.25, -2.5, 0.75, 0.5, armed=True, mode=mode)
     detections = Detections(red=SEEN, green=IN_PART)
-    recorder.see(Moment(drone, VelocityCommand(), detections, state, time_s))
+    recorder.see(Moment(drone, VelocityCommand(), detections, state, time_s, **fields))
 
 
 async def shown(display, recorder, moments):
     """Run the display while moments come."""
     running = asyncio.create_task(display.run())
-    for time_s, state in moments:
-        see(recorder, time_s, state)
+    for time_s, state, *how in moments:
+        see(recorder, time_s, state, **(how[0] if how else {}))
         await asyncio.sleep(0.25)
     running.cancel()
     with suppress(asyncio.CancelledError):
@@ -61,6 +61,28 @@ async def test_without_a_terminal_a_line_comes_with_each_state_and_each_ten_seco
     ]
     assert all("crossed: red" in line for line in lines)
     assert "x  1.25" in lines[0] and "y -2.50" in lines[0] and "z 0.75" in lines[0]
+
+
+async def test_a_pause_is_a_line_and_its_end_another(flight, capsys):
+    recorder, display = flight
+    taken = {"mode": "POSCTL", "paused": True}
+    refused = {"mode": "HOLD", "paused": True, "remark": "the drone stands on the ground"}
+    moments = [(1.0, "red.turning"), (1.2, "red.turning", taken), (1.4, "red.turning", taken)]
+    await shown(display, recorder, [*moments, (1.6, "red.turning", refused), (1.8, "red.turning")])
+    ends = [line.partition("crossed: red")[2].strip() for line in capsys.readouterr().err.splitlines()]
+    assert ends == [
+        "",
+        "paused: the pilot has the sticks (POSCTL)",
+        "paused: given back (HOLD), but the drone stands on the ground",
+        "",
+    ]
+
+
+def test_the_table_tells_of_a_pause(flight):
+    recorder, display = flight
+    see(recorder, 12.3, "red.turning", "POSCTL", paused=True)
+    text = rendered(display._table(None))
+    assert "paused" in text and "the pilot has the sticks (POSCTL)" in text
 
 
 async def test_before_the_first_tick_nothing_is_said(flight, capsys):
