@@ -21,6 +21,7 @@ from framerunner.judges import Judge, ask_referee, choose_judge
 from framerunner.lockstep import Flown, lockstep_flight
 from framerunner.lockstep_progress import LockstepProgress
 from framerunner.mission_teller import MissionTeller
+from framerunner.monitor_process import MonitorProcess
 from framerunner.pictures import Outcome as JudgedOutcome
 from framerunner.pictures import track_picture
 from framerunner.recorder import FlightRecorder, RecordingCamera, VideoFile
@@ -41,6 +42,7 @@ if TYPE_CHECKING:
     from framerunner.recording.mcap_writer import FlightRecording
 
 _SITL_START_S = 20.0
+_INTERRUPTED_CODE = 130
 COMPLETED = ("clean", "completed")
 
 
@@ -59,6 +61,7 @@ class FlightSettings:
         lockstep: simulated in this process, in its own time, instead of in real time.
         seed: of everything random in a lockstep flight.
         record: write everything to an MCAP file, too.
+        monitor: open the Game Monitor for it.
     """
 
     scenario: Scenario
@@ -71,6 +74,7 @@ class FlightSettings:
     lockstep: bool = False
     seed: int = 0
     record: bool = False
+    monitor: bool = False
 
 
 class _Records:
@@ -128,13 +132,28 @@ async def fly_once(settings: FlightSettings) -> int:
     Raises:
         DroneError: the drone cannot be reached or made ready.
         CameraError: the camera gives no image.
-        SettingError: the simulator cannot be started.
+        SettingError: the simulator or the monitor cannot be started.
     """
-    fly = _fly_in_lockstep if settings.lockstep else _fly_in_real_time
+    if not settings.monitor:
+        return await _fly_and_judge(settings, None)
+    # A drone of one's own brings no referee; the simulator does.
+    scenario = None if settings.drone_url is None else settings.scenario
+    async with MonitorProcess(scenario, settings.out) as monitor:
+        await monitor.opened()
+        code = await _fly_and_judge(settings, monitor.link)
+        if code != _INTERRUPTED_CODE:
+            await monitor.stay()
+    return code
+
+
+async def _fly_and_judge(settings: FlightSettings, guest_url: str | None) -> int:
     with _run_folder(settings) as folder:
         with _recording(settings, folder) as recording:
             records = _Records(folder, recording)
-            flown = await fly(settings, records)
+            if settings.lockstep:
+                flown = await _fly_in_lockstep(settings, records)
+            else:
+                flown = await _fly_in_real_time(settings, records, guest_url)
             records.finish(flown)
         result = records.complete(flown.result)
         folder.write_result(result)
@@ -143,7 +162,7 @@ async def fly_once(settings: FlightSettings) -> int:
     print(result_lines(result))
     print(f"left in {folder.path}/", file=sys.stdout, flush=True)
     if flown.outcome.interrupted:
-        return 130
+        return _INTERRUPTED_CODE
     return 0 if result["verdict"] in COMPLETED else 1
 
 
@@ -165,11 +184,11 @@ async def _fly_in_lockstep(settings: FlightSettings, records: _Records) -> Flown
         )
 
 
-async def _fly_in_real_time(settings: FlightSettings, records: _Records) -> Flown:
+async def _fly_in_real_time(settings: FlightSettings, records: _Records, guest_url: str | None) -> Flown:
     scenario, folder = settings.scenario, records.folder
     async with AsyncExitStack() as stack:
         session = await stack.enter_async_context(aiohttp.ClientSession())
-        drone_url, camera_url, sitl = await _vehicle(settings, folder, session, stack)
+        drone_url, camera_url, sitl = await _vehicle(settings, folder, session, stack, guest_url)
         judge = await choose_judge(scenario, camera_url, session)
         companion = Companion()
         stack.push_async_callback(companion.close)
@@ -180,6 +199,8 @@ async def _fly_in_real_time(settings: FlightSettings, records: _Records) -> Flow
         drone = MavsdkDrone(drone_url, start_arena=start_arena, hang_report=hang_report)
         drone.record_to(folder.tlog)
         drone.tell_through(companion)
+        if guest_url is not None and sitl is None:
+            drone.share_with(guest_url)
         stack.push_async_callback(drone.let_go)  # not before the result has been told, over its link
         flight = asyncio.create_task(
             _fly(settings, records, judge, teller, drone=drone, camera_url=camera_url)
@@ -239,14 +260,20 @@ def _recording(settings: FlightSettings, folder: RunFolder) -> Iterator[FlightRe
 
 
 async def _vehicle(
-    settings: FlightSettings, folder: RunFolder, session: aiohttp.ClientSession, stack: AsyncExitStack
+    settings: FlightSettings,
+    folder: RunFolder,
+    session: aiohttp.ClientSession,
+    stack: AsyncExitStack,
+    guest_url: str | None,
 ) -> tuple[str, str, SitlProcess | None]:
     """Return the drone's and the camera's URL, and the simulator if one was started."""
     if settings.drone_url is not None and settings.camera_url is not None:
         return settings.drone_url, settings.camera_url, None
     # The simulator reads the very scenario that was checked here, whatever becomes of its file.
     sitl = await stack.enter_async_context(
-        SitlProcess(str(folder.scenario), settings.speed, settings.instance)
+        SitlProcess(
+            str(folder.scenario), settings.speed, settings.instance, () if guest_url is None else (guest_url,)
+        )
     )
     await sitl.guard(asyncio.create_task(_wait_for_sitl(sitl.referee_url, session)))
     return sitl.drone_url, sitl.video_url, sitl

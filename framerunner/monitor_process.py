@@ -6,8 +6,12 @@ import asyncio
 import contextlib
 import socket
 import sys
+from pathlib import Path
+from tempfile import TemporaryDirectory
 
 from framerunner.child_process import ChildProcess
+from scenarios.loader import dump_yaml
+from scenarios.models import Scenario
 
 _START_S = 20.0
 
@@ -16,21 +20,25 @@ class MonitorProcess(ChildProcess):
     """`framerunner monitor` as a child process; what it says is said here.
 
     Args:
-        scenario: name or file, for a drone that brings no referee; None if it does.
-        runs: folder of flights to show again.
+        scenario: for a drone that brings no referee; None if it does.
+        runs: folder of flights to show again; None for the monitor's own choice.
 
     Attributes:
         link: where it listens; whoever speaks for the drones sends there, as `--link` takes it.
     """
 
-    def __init__(self, scenario: str | None = None, runs: str | None = None) -> None:
+    def __init__(self, scenario: Scenario | None = None, runs: Path | None = None) -> None:
         port = _free_port()
         self.link = f"udpout://127.0.0.1:{port}"
         arguments = ["monitor", "--lifeline", "--drone", f"udpin://127.0.0.1:{port}"]
+        self._folder = TemporaryDirectory(prefix="framerunner-monitor-")
         if scenario is not None:
-            arguments += ["--scenario", scenario]
+            # It reads the very scenario that was checked, whatever becomes of its file.
+            path = Path(self._folder.name) / "scenario.yaml"
+            path.write_text(dump_yaml(scenario), encoding="utf-8")
+            arguments += ["--scenario", str(path)]
         if runs is not None:
-            arguments += ["--runs", runs]
+            arguments += ["--runs", str(runs)]
         self._open = asyncio.Event()
         self._watching: asyncio.Task[None] | None = None
         super().__init__("the monitor", arguments, self._relay)
@@ -50,6 +58,19 @@ class MonitorProcess(ChildProcess):
             self._watching.cancel()
             await asyncio.gather(self._watching, return_exceptions=True)
         await super().__aexit__(*problem)
+        self._folder.cleanup()
+
+    async def stay(self) -> None:
+        """When a person is there, let them look on until they press Ctrl-C; that ends nothing but this."""
+        if not sys.stdin.isatty():
+            return
+        print("the monitor stays open (Ctrl-C ends it)", file=sys.stderr, flush=True)
+        try:
+            await self.failed()
+        except asyncio.CancelledError:
+            task = asyncio.current_task()
+            if task is not None:
+                task.uncancel()
 
     async def _tell_of_its_end(self) -> None:
         """An onlooker's end must not end a flight."""

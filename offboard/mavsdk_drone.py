@@ -98,6 +98,7 @@ class MavsdkDrone:
         self._recorder: TlogRecorder | None = None
         self._companion: Companion | None = None
         self._watchdog = Watchdog(self._stop_from_watchdog, hang_report)
+        self._guests: list[str] = []
 
     def record_to(self, path: Path) -> None:
         """Record all MAVLink traffic as a tlog from `connect` to `close`."""
@@ -106,6 +107,10 @@ class MavsdkDrone:
     def tell_through(self, companion: Companion) -> None:
         """Let a companion speak over this link. As it may have more to say, only `let_go` closes it then."""
         self._companion = companion
+
+    def share_with(self, url: str) -> None:
+        """Let a ground station at this address in on the link: it hears the vehicle and can speak to it."""
+        self._guests.append(url)
 
     async def connect(self) -> None:
         """Find the vehicle and listen to it.
@@ -121,7 +126,8 @@ class MavsdkDrone:
         await self._start_recorder()
         await self._let_companion_in()
         try:
-            await self._mavsdk.add_any_connection(self._url.text, ForwardingOption.ON)
+            for url in (*self._guests, self._url.text):
+                await self._mavsdk.add_any_connection(url, ForwardingOption.ON)
         except MavsdkError as error:
             raise DroneError(f"cannot open {self._url.text}: {error}") from None
         self._system = await self._mavsdk.first_autopilot(self._connect_limit_s)

@@ -26,6 +26,9 @@ _Seed = Annotated[
 _Record = Annotated[
     bool, Parameter(negative=(), help="write flight.mcap as well, for `framerunner replay` and Foxglove")
 ]
+_Monitor = Annotated[
+    bool, Parameter(negative=(), help="open the Game Monitor as well, on http://127.0.0.1:8080/")
+]
 _Pilot = Annotated[Path | None, Parameter(help="Python file with primitives of your own; it is executed")]
 
 
@@ -40,6 +43,7 @@ def fly(
     lockstep: _Lockstep = False,
     seed: _Seed = None,
     record: _Record = False,
+    monitor: _Monitor = False,
     pilot: _Pilot = None,
     out: Annotated[Path, Parameter(help="folder in which this flight's folder is made")] = Path("runs"),
 ) -> int:
@@ -51,6 +55,8 @@ def fly(
 
         framerunner fly test-case-1
 
+        framerunner fly test-case-1 --monitor
+
         framerunner fly my_scenario.yaml --mission soft_landing --speed 2
 
         framerunner fly test-case-1 --lockstep --record
@@ -61,6 +67,8 @@ def fly(
     """
     _check(drone, camera, speed, instance, lockstep)
     _check_seed(seed, lockstep)
+    if monitor and lockstep:
+        raise SettingError("--monitor: looks on in real time; leave it out with --lockstep")
 
     from framerunner.flight import FlightSettings, fly_once
     from offboard.mission import load_mission
@@ -78,6 +86,7 @@ def fly(
         lockstep=lockstep,
         seed=seed or 0,
         record=record,
+        monitor=monitor,
     )
     return asyncio.run(fly_once(settings))
 
