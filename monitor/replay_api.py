@@ -53,7 +53,7 @@ class _Answers:
 
     def __init__(self, library: RunLibrary | None) -> None:
         self._library = library
-        self._packed: OrderedDict[str, tuple[int, bytes, str]] = OrderedDict()
+        self._packed: OrderedDict[str, tuple[object, bytes, str]] = OrderedDict()
 
     async def listing(self, request: Request) -> Response:
         """All runs, newest first; none if there is no library."""
@@ -73,9 +73,9 @@ class _Answers:
             return _sorry(str(error))
         # The library gives the same object for the same run until that changes.
         known = self._packed.get(name)
-        if known is None or known[0] != id(recording):
+        if known is None or known[0] is not recording:
             body, tag = await asyncio.to_thread(_pack, recording)
-            known = (id(recording), body, tag)
+            known = (recording, body, tag)
             self._packed[name] = known
         self._packed.move_to_end(name)
         while len(self._packed) > _KEPT_ANSWERS:

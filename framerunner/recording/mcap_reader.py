@@ -173,7 +173,7 @@ def _transition(time_us: int, message: Json) -> TransitionTaken | None:
     """Why the mission went on; None at its start, and in recordings of before this was kept."""
     if "when" not in message:
         return None
-    values = tuple((str(each["name"]), each.get("number", each.get("text"))) for each in message["values"])
+    values = tuple((str(each["name"]), _value(each)) for each in message["values"])
     return TransitionTaken(
         str(message["previous"]),
         str(message["state"]),
@@ -182,6 +182,11 @@ def _transition(time_us: int, message: Json) -> TransitionTaken | None:
         time_us,
         float(message["previous_s"]),
     )
+
+
+def _value(message: Json) -> object:
+    """A guard's value; None for a number that was not finite."""
+    return next((message[kind] for kind in ("number", "flag", "text") if kind in message), None)
 
 
 def _detections(message: Json) -> Detections:

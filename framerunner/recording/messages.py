@@ -207,7 +207,9 @@ def _guard(taken: TransitionTaken | None) -> Message:
 def _value(name: str, value: object) -> Message:
     """A value of a guard; a contestant's pilot may hold anything."""
     try:
-        if isinstance(value, bool | str) or not hasattr(value, "__float__"):
+        if isinstance(value, bool):
+            return {"name": name, "flag": value}
+        if isinstance(value, str) or not hasattr(value, "__float__"):
             return {"name": name, "text": str(value)[:_TEXT_CHARACTERS]}
         number = float(value)
     except Exception:  # whatever a contestant's conversion raises

@@ -43,9 +43,10 @@ _VALUE = schema_of(
     {
         "name": _said("string", "as the guard has it, such as frame.d"),
         "number": _said("number", "its value then; missing if it was infinite or none"),
-        "text": _said("string", "its value then, if it was no number"),
+        "flag": _said("boolean", "its value then, if it was true or false"),
+        "text": _said("string", "its value then, if it was neither"),
     },
-    optional=("number", "text"),
+    optional=("number", "flag", "text"),
 )
 
 _OWN = (
