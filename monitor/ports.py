@@ -100,6 +100,8 @@ class Equipment:
         list_scenarios: names that can be drawn.
         load_scenario: one of them; raises `ScenarioError`.
         runs: flights to show again; None if there is no such folder.
+        start_pose: where a scenario's drone stands at first: its centre (m) and yaw (rad), arena axes; None:
+            a drone that brings no referee cannot be judged.
     """
 
     open_link: Callable[[], Link]
@@ -108,3 +110,4 @@ class Equipment:
     list_scenarios: Callable[[], Sequence[str]]
     load_scenario: Callable[[str], Scenario]
     runs: RunLibrary | None
+    start_pose: Callable[[Scenario], tuple[float, float, float, float]] | None = None

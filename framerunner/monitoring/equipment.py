@@ -9,6 +9,7 @@ from framerunner.monitoring.run_library import RunFolders
 from framerunner.vehicle_link import VehicleLink
 from monitor.ports import Equipment, Link, LinkFailed, Message
 from offboard.drone import DroneError
+from scenarios.ground import start_position
 from scenarios.loader import list_scenarios, load_scenario
 from scenarios.models import Scenario
 from scenarios.referee import Referee
@@ -32,11 +33,18 @@ def equipment(drone_url: str, scenario: Scenario | None, runs: Path) -> Equipmen
         list_scenarios=list_scenarios,
         load_scenario=load_scenario,
         runs=RunFolders(runs),
+        start_pose=_start_pose,
     )
 
 
 def _referee(scenario: Scenario) -> Referee:
     return Referee(scenario, load_airframe(scenario.airframe).envelope_m)
+
+
+def _start_pose(scenario: Scenario) -> tuple[float, float, float, float]:
+    x_m, y_m, ground_m = start_position(scenario)
+    height_m = load_airframe(scenario.airframe).envelope_m[2]
+    return (x_m, y_m, ground_m + height_m / 2, scenario.start.yaw_rad)
 
 
 class _MonitorLink(Link):

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from ipaddress import ip_address
+from ipaddress import IPv4Address, IPv6Address, ip_address
 from urllib.parse import urlsplit
 
 from pymavlink.dialects.v20 import common as mavlink
@@ -81,22 +81,25 @@ def refusal(url: str, link_host: str = "") -> str:
         host, port = parts.hostname or "", parts.port
     except ValueError:
         return "it is no address"
-    if parts.scheme not in ("http", "https"):
-        return "only http and https are spoken"
-    if parts.username is not None or parts.password is not None:
-        return "it holds a user name"
-    if port == 0:
-        return "port 0 is none"
-    if link_host and host == link_host.lower():
-        return ""
+    problems = {
+        "only http and https are spoken": parts.scheme not in ("http", "https"),
+        "it holds a user name": "@" in parts.netloc,
+        "port 0 is none": port == 0,
+    }
+    problem = next((text for text, there in problems.items() if there), "")
+    if problem or (link_host and host == link_host.lower()):
+        return problem
     try:
-        address = ip_address(host)
+        return (
+            "" if _is_near(ip_address(host)) else "its host is neither this machine nor in a private network"
+        )
     except ValueError:
         return "its host must be given in numbers"
+
+
+def _is_near(address: IPv4Address | IPv6Address) -> bool:
     odd = address.is_link_local or address.is_multicast or address.is_unspecified or address.is_reserved
-    if address.is_loopback or (address.is_private and not odd):
-        return ""
-    return "its host is neither this machine nor in a private network"
+    return address.is_loopback or (address.is_private and not odd)
 
 
 def host_of(link_url: str) -> str:

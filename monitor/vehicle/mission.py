@@ -67,6 +67,7 @@ class MissionView:
         document: of the mission flown; None before.
         result: the RESULT document and its CRC; None before.
         problem: the last payload that made no sense, for a notice; "" if none.
+        problem_told: the notice was given.
     """
 
     def __init__(self, drone_id: int) -> None:
@@ -79,6 +80,7 @@ class MissionView:
         self.document: MissionDocument | None = None
         self.result: tuple[int, dict[str, Any]] | None = None
         self.problem = ""
+        self.problem_told = False
 
     def take(self, message: Message, now_s: float) -> list[JsonMessage]:
         """Take a TUNNEL message.

@@ -11,6 +11,7 @@ from scenarios.axes import Quaternion, Vec3, flip_quaternion, flip_vector, flip_
 ArenaPose = tuple[float, float, float, float]  # x, y, z (m) and yaw (rad), arena axes
 
 _STILL_M_S = 0.05
+_CARRIED_M_S = 0.3
 
 
 class Source(IntEnum):
@@ -41,9 +42,11 @@ class Placement:
             self._lay(yaw_rad, origin_arena_m)
 
     def lay_by_start(self, start_arena: ArenaPose, motion: Motion) -> None:
-        """It stands on its start: there is where it says to be now."""
+        """It stands on its start: there is where it says to be now. One that moves is being carried."""
         position = motion.position
-        if self.source <= Source.START and position is not None and motion.attitude_ned is not None:
+        if self.source > Source.START or position is None or motion.attitude_ned is None:
+            return
+        if hypot(*position.velocity_ned_m_s) < _CARRIED_M_S:
             self.source = Source.START
             self._lay_by_pair(start_arena, position)
 

@@ -26,6 +26,7 @@ from firmware_py.mavlink.video_links import VideoEncoding, VideoStream
 from mission_link.messages import COMPONENT_ID
 from monitor.ports import Equipment, LinkFailed, Message
 from scenarios.axes import flip_vector
+from scenarios.ground import start_position
 from scenarios.loader import list_scenarios, load_scenario
 from scenarios.models import Scenario
 from scenarios.referee import Referee
@@ -275,6 +276,12 @@ def make_referee(scenario: Scenario) -> Referee:
     return Referee(scenario, load_airframe(scenario.airframe).envelope_m)
 
 
+def start_pose(scenario: Scenario) -> tuple[float, float, float, float]:
+    """Where the drone's centre is at first, and where it looks."""
+    x_m, y_m, ground_m = start_position(scenario)
+    return (x_m, y_m, ground_m + load_airframe(scenario.airframe).envelope_m[2] / 2, scenario.start.yaw_rad)
+
+
 def equipment(link: SimulatedLink, scenario: Scenario | None = None) -> Equipment:
     """What a monitor is given to watch these drones."""
     return Equipment(
@@ -284,6 +291,7 @@ def equipment(link: SimulatedLink, scenario: Scenario | None = None) -> Equipmen
         list_scenarios=list_scenarios,
         load_scenario=load_scenario,
         runs=None,
+        start_pose=start_pose,
     )
 
 

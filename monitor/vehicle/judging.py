@@ -1,0 +1,135 @@
+"""Who judges a vehicle's tries: its own referee over HTTP, or the monitor's, which follows telemetry."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+from monitor.own_referee import OwnReferee
+from monitor.ports import Equipment
+from monitor.referee_channel import RefereeAnswer, RefereeChannel
+from monitor.standing import Standing, figures
+from monitor.tries import TryEvent, TryWatch
+from monitor.vehicle.condition import Condition
+from monitor.vehicle.motion import Motion
+from monitor.vehicle.placement import Placement, Source
+from scenarios.models import Scenario
+
+_PATIENCE_S = 5.0  # so long a drone has to show its own referee
+_FRESH_S = 1.0
+_NAMED_S = 3.0  # so long the drone has to say when it was switched on
+
+
+class Judging:
+    """Follows the tries of one boot of a vehicle.
+
+    Args:
+        drone_id: system id.
+        equipment: with the scenario, if there is one, and a referee for it.
+        tell: called with each event of a try.
+        now_s: loop time.
+
+    Attributes:
+        standing: how the try stands; None: nobody says.
+    """
+
+    def __init__(
+        self, drone_id: int, equipment: Equipment, tell: Callable[[TryEvent], None], now_s: float
+    ) -> None:
+        self._id = drone_id
+        self._equipment = equipment
+        self._tell = tell
+        self._began_s = now_s
+        self._own: OwnReferee | None = None
+        self._tries: TryWatch | None = None
+        self._answered_s = -1e9
+        self._result: tuple[int, dict[str, Any]] | None = None
+        self.standing: Standing | None = None
+
+    @property
+    def has_own(self) -> bool:
+        """Whether the monitor's own referee judges."""
+        return self._own is not None
+
+    def hear(self, answer: RefereeAnswer, now_s: float) -> None:
+        """Take what the vehicle's referee says; from now on it alone counts."""
+        self._own = None
+        self._answered_s = now_s
+        self.standing = answer.standing()
+        if self._tries is not None:
+            self._tries.see(self.standing, now_s)
+
+    def follow(self, motion: Motion, condition: Condition, placement: Placement) -> None:
+        """Show the monitor's own referee the latest telemetry, if it is the one who judges."""
+        position, attitude_ned = motion.position, motion.attitude_ned
+        if (
+            self._answered_s > 0
+            or placement.source < Source.START
+            or position is None
+            or attitude_ned is None
+        ):
+            return
+        if self._own is None:
+            scenario = self._equipment.scenario
+            if scenario is None:
+                return
+            self._own = OwnReferee(scenario, self._equipment.make_referee)
+        self._own.follow(
+            position.time_us,
+            placement.position(position.position_ned_m),
+            placement.vector(position.velocity_ned_m_s),
+            placement.attitude(attitude_ned),
+            armed=condition.armed,
+        )
+
+    def tick(self, boot_unix_us: int | None, now_s: float, wall_boot_us: int) -> None:
+        """Look at the clock, some times a second.
+
+        Args:
+            boot_unix_us: when the vehicle was switched on; None: it has not said so.
+            now_s: loop time.
+            wall_boot_us: the same by this machine's clock, in case it never does.
+        """
+        if self._tries is None:
+            late = now_s - self._began_s > _NAMED_S
+            if boot_unix_us is None and not late:
+                return
+            boot_us = wall_boot_us if boot_unix_us is None else boot_unix_us
+            # Clocks that are set by satellites differ a little each time they are asked.
+            self._tries = TryWatch(self._id, f"{boot_us // 10_000_000}", self._tell, now_s)
+            if self._result is not None:
+                self._tries.take_result(*self._result, now_s)
+        if self._own is not None:
+            self.standing = self._own.standing()
+            if self.standing is not None and now_s - self._began_s > _PATIENCE_S:
+                self._tries.see(self.standing, now_s)
+        self._tries.tick(now_s)
+
+    def take_result(self, crc: int, content: dict[str, Any], now_s: float) -> None:
+        """Take the app's RESULT document."""
+        self._result = (crc, content)
+        if self._tries is not None:
+            self._tries.take_result(crc, content, now_s)
+
+    def close(self) -> None:
+        """The vehicle begins anew."""
+        if self._tries is not None:
+            self._tries.close()
+
+    def motors_on(self, condition: Condition, now_s: float) -> bool:
+        """Whether the motors run: a referee knows it sooner than a heartbeat tells."""
+        if self.standing is not None and now_s - self._answered_s < _FRESH_S:
+            return self.standing.snapshot.motors_on
+        return condition.armed
+
+    def figures(self, channel: RefereeChannel | None) -> dict[str, Any] | None:
+        """The Game Monitor's figures; None if nothing is known."""
+        scenario = self.scenario(channel)
+        limit_s = scenario.try_limit_s if scenario is not None else None
+        result = self._tries.result if self._tries is not None else None
+        return figures(self.standing, result, limit_s)
+
+    def scenario(self, channel: RefereeChannel | None) -> Scenario | None:
+        """What is flown: as the vehicle's referee says, else as the monitor was told."""
+        told = channel.scenario if channel is not None else None
+        return told if told is not None else self._equipment.scenario

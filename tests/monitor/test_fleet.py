@@ -1,0 +1,202 @@
+"""What the fleet shows of real simulations behind a link without sockets."""
+
+import asyncio
+import json
+from math import hypot
+
+import pytest
+
+from monitor.sticks import Sticks
+from scenarios.loader import load_scenario
+from tests.monitor.simulated_link import SimulatedLink, all_finite, equipment, served_link
+from tests.monitor.watching import watching
+
+SCENARIO = load_scenario("test-case-1")
+
+
+@pytest.fixture
+def link():
+    return SimulatedLink(SCENARIO)
+
+
+def nearest(drone, pose):
+    return drone.truths[round(pose["t"] * 1000)]
+
+
+def error_m(drone, pose):
+    truth = nearest(drone, pose)
+    return hypot(*(told - true for told, true in zip(pose["p"], truth.position_arena_m, strict=True)))
+
+
+def turn_rad(drone, pose):
+    """Angle between the attitude told and the true one."""
+    truth = nearest(drone, pose).attitude_arena
+    dot = abs(sum(told * true for told, true in zip(pose["q"], truth, strict=True)))
+    return 2 * (1 - min(1.0, dot)) ** 0.5 * 2**0.5
+
+
+async def fly_a_little(watched, link, seconds=8.0):
+    """Take off, turn and move; poses on the way."""
+    await watched.until_ready(link)
+    with link.lock:
+        autopilot = link.drones[0].simulation.autopilot
+        autopilot.takeoff()
+        autopilot.arm()
+        end_us = link.drones[0].simulation.time_us + seconds * 1e6
+    poses = []
+    while link.drones[0].simulation.time_us < end_us:
+        await asyncio.sleep(0.005)
+        with link.lock:
+            pose = watched.pose()
+            if not poses or poses[-1][0]["t"] != pose["t"]:
+                poses.append((pose, error_m(link.drones[0], pose), turn_rad(link.drones[0], pose)))
+    return poses
+
+
+async def test_poses_are_the_truth_where_a_scenario_was_given(link):
+    async with watching(equipment(link, SCENARIO)) as watched:
+        await watched.until(lambda: watched.pose() and watched.pose()["p"][2] > 0.5)  # its place is known
+        poses = await fly_a_little(watched, link)
+    assert poses[-1][0]["p"][2] > SCENARIO.base.top_m + 0.5
+    assert max(error for _, error, _ in poses) < 0.01
+    assert max(turn for _, _, turn in poses) < 0.01
+    assert all(all_finite(pose) for pose, _, _ in poses)
+
+
+async def test_poses_are_the_truth_where_the_drone_brings_its_referee():
+    async with served_link(SCENARIO) as link, watching(equipment(link)) as watched:
+        await watched.until(lambda: watched.status() and watched.status()["figures"])
+        poses = await fly_a_little(watched, link)
+        assert watched.fleet.welcome()[0]["scenario"]["name"] == SCENARIO.name
+        assert watched.fleet.video_url(1) == f"{link.drones[0]._video.url}video"
+    assert max(error for _, error, _ in poses) < 0.01
+
+
+async def test_without_any_word_of_the_arena_north_is_x(link):
+    async with watching(equipment(link)) as watched:
+        await watched.until_ready(link)
+        with link.lock:
+            pose, truth = watched.pose(), link.drones[0].simulation.truth
+            origin_ned_m = link.drones[0].simulation.autopilot.estimator.origin_ned_m
+        x, y, z = truth.position_arena_m
+        assert pose["p"] == pytest.approx(
+            [x - origin_ned_m[0], y + origin_ned_m[1], z + origin_ned_m[2]], abs=0.01
+        )
+        assert watched.fleet.welcome()[0] == {
+            "kind": "world",
+            "scenario": None,
+            "lift_m": 0.0,
+            "source": "telemetry",
+        }
+
+
+async def test_the_status_tells_all_that_the_page_shows(link):
+    async with watching(equipment(link, SCENARIO)) as watched:
+        await watched.until_ready(link)
+        await asyncio.to_thread(link.advance, 2.0)
+        status = watched.status()
+        assert json.loads(json.dumps(status)) == status
+        assert {**status, "link": None, "figures": None} == {
+            "id": 1,
+            "name": "drone 1",
+            "mode": "Hold",
+            "armed": False,
+            "landed": True,
+            "battery_percent": 100,
+            "voltage_v": pytest.approx(12.6, abs=5.0),
+            "link": None,
+            "mission": None,
+            "pilot": "",
+            "figures": None,
+            "video": False,
+        }
+        assert status["link"]["state"] == "live"
+        assert status["link"]["loss_percent"] == 0.0
+        assert status["link"]["rate_hz"] > 300
+        watched.fleet.set_pilot(1, "Ada")
+        assert watched.status()["pilot"] == "Ada"
+
+
+async def test_two_drones_are_told_apart():
+    scenarios = (SCENARIO, load_scenario("test-case-2"))
+    link = SimulatedLink(*scenarios)
+    async with watching(equipment(link)) as watched:
+        await watched.until_ready(link, 1)
+        await watched.until_ready(link, 2)
+        assert watched.fleet.drone_ids() == [1, 2]
+        assert [drone["id"] for drone in watched.fleet.pose_message()["drones"]] == [1, 2]
+        ok, text = await watched.fleet.do(2, "arm")
+        assert ok, text
+        assert (watched.status(1)["armed"], watched.status(2)["armed"]) == (False, True)
+    assert watched.notices()[:2] == ["drone 1 is heard", "drone 2 is heard"]
+
+
+async def test_a_restart_is_noticed_and_all_begins_anew(link):
+    async with watching(equipment(link, SCENARIO)) as watched:
+        await fly_a_little(watched, link)
+        link.restart()
+        await watched.until(lambda: "drone 1 has started anew" in watched.notices())
+        await watched.until_ready(link)
+        with link.lock:
+            assert error_m(link.drones[0], watched.pose()) < 0.01
+        assert not watched.status()["armed"]
+    assert watched.notices().count("drone 1 has started anew") == 1
+
+
+async def test_a_silent_drone_is_stale_then_lost_then_back():
+    link = SimulatedLink(SCENARIO, speed=1.0)
+    async with watching(equipment(link)) as watched:
+        await watched.until(watched.pose)
+        assert watched.pose()["fresh"]
+        link.muted = True
+        await watched.until(lambda: watched.status()["link"]["state"] == "stale", 3.0)
+        assert not watched.pose()["fresh"]
+        await watched.until(lambda: "drone 1: link lost" in watched.notices(), 5.0)
+        assert watched.status()["link"]["state"] == "lost"
+        link.muted = False
+        await watched.until(lambda: watched.status()["link"]["state"] == "live", 3.0)
+        await watched.until(lambda: "drone 1: link is back after 3 s" in watched.notices(), 3.0)
+
+
+async def test_a_link_that_fails_is_opened_again(link):
+    async with watching(equipment(link)) as watched:
+        await watched.until(watched.pose)
+        link.fail("the cable was pulled")
+        await watched.until(lambda: "the cable was pulled; trying again" in watched.notices())
+        assert "the cable was pulled; trying again" in [
+            message.get("text") for message in watched.fleet.welcome()
+        ]
+        await watched.until(lambda: link.opened >= 2)
+        link.fail(None)
+        await watched.until(lambda: any("is back after" in text for text in watched.notices()))
+        assert watched.notices().count("the cable was pulled; trying again") == 1
+        before = watched.pose()["t"]
+        await watched.until(lambda: watched.pose()["t"] > before)
+
+
+async def test_sticks_are_streamed_until_let_go(link):
+    async with watching(equipment(link)) as watched:
+        await watched.until(watched.pose)
+        sent = lambda: [each for each in link.sent if each.get_type() == "MANUAL_CONTROL"]  # noqa: E731
+        watched.fleet.sticks(1, Sticks(0.5, -0.25, 0.1, 1.0))
+        await watched.until(lambda: len(sent()) >= 3)
+        assert [(m.target, m.x, m.y, m.z, m.r) for m in sent()[:1]] == [(1, 500, -250, 550, 1000)]
+        watched.fleet.sticks(1, Sticks(float("nan"), 9.0, -9.0, float("inf")))
+        await watched.until(lambda: sent()[-1].x == 0)
+        last = sent()[-1]
+        assert (last.y, last.z, last.r) == (1000, 0, 0)
+        watched.fleet.sticks(1, None)
+        await asyncio.sleep(0.1)
+        count = len(sent())
+        await asyncio.sleep(0.15)
+        assert len(sent()) == count
+
+
+async def test_the_monitor_says_who_it_is_once_a_second_and_asks_little(link):
+    async with watching(equipment(link)) as watched:
+        await watched.until(watched.pose)
+        await asyncio.sleep(2.5)
+        kinds = [message.get_type() for message in link.sent]
+    assert 2 <= kinds.count("HEARTBEAT") <= 4
+    commands = [message for message in link.sent if message.get_type() == "COMMAND_LONG"]
+    assert [(each.command, each.param1) for each in commands] == [(512, 2)]  # SYSTEM_TIME, once
