@@ -340,7 +340,8 @@ class MavsdkDrone:
     def _check_alive(self, tick_came: bool) -> None:
         hung_s = self._watchdog.tripped_after_s
         if hung_s:
-            raise DroneError(f"this app hung for more than {hung_s:.1f} s; its watchdog asked for hold")
+            did = "asked for hold" if self._stream.can_ask else "fell silent"
+            raise DroneError(f"this app hung for more than {hung_s:.1f} s; its watchdog {did}")
         age_s = self._feed.age_s()
         if age_s > LINK_LOST_S:
             raise DroneError(f"link lost: no telemetry for {age_s:.1f} s")

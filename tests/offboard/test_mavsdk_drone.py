@@ -211,7 +211,8 @@ async def test_an_app_that_hangs_while_a_pilot_has_it_leaves_no_stream_and_asks_
         await take(ticks, 5)
         time.sleep(1.0)  # noqa: ASYNC251 - this is what hanging is
         assert not fresh_setpoints(vehicle, 0.2)
-        assert "this app hung" in await until_error(ticks)
+        error = await until_error(ticks)
+        assert error.startswith("this app hung") and error.endswith("its watchdog fell silent")
         vehicle.mode = (6, 0)  # somebody gives it back to an app that has given up
         await drone._until(lambda: drone._feed.mode == "OFFBOARD", 3.0)
         await drone.hold()
