@@ -39,6 +39,10 @@ def register(monitor: Monitor) -> None:
     async def run(request: Request, name: str) -> Response:
         return await answers.run(request, name)
 
+    @monitor.web.get("/api/runs/{name}/result.json")
+    async def result(request: Request, name: str) -> Response:
+        return await answers.result(request, name)
+
     @monitor.web.get("/api/runs/{name}/image/{number}.jpg")
     async def image(name: str, number: str) -> Response:
         return await answers.image(name, number)
@@ -81,6 +85,19 @@ class _Answers:
         while len(self._packed) > _KEPT_ANSWERS:
             self._packed.popitem(last=False)
         return _answer(request, known[1], known[2])
+
+    async def result(self, request: Request, name: str) -> Response:
+        """What stands in a run's `result.json`."""
+        library = self._library
+        if library is None:
+            return _sorry(_NO_RUNS)
+        try:
+            recording = await _in_thread(lambda: library.recording(name))
+        except RunError as error:
+            return _sorry(str(error))
+        if recording["result"] is None:
+            return _sorry(f"run '{name}': was not judged, so it has no result")
+        return _answer(request, *_pack(recording["result"]))
 
     async def image(self, name: str, number: str) -> Response:
         """An image of a run's camera."""

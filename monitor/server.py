@@ -29,6 +29,8 @@ MODULES = (
     "monitor.pages.login",
     "monitor.pilot",
     "monitor.pages.pilot",
+    "monitor.replay_api",
+    "monitor.pages.replay",
 )
 
 

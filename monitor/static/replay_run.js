@@ -1,0 +1,186 @@
+/** A recorded flight: fetched whole, asked for any of its times. Nothing here touches the page. */
+
+const OLD_IMAGE_S = 1; // boxes of an image older than this are not drawn
+const TRANSITIONS = 10;
+
+/**
+ * Fetch JSON.
+ * @param {string} address
+ * @throws {Error} with one line for people
+ */
+export async function fetchJson(address) {
+  let answer;
+  try {
+    answer = await fetch(address);
+  } catch {
+    throw new Error("the monitor does not answer");
+  }
+  if (!answer.ok) throw new Error((await answer.text()).trim().slice(0, 400) || `the monitor answered ${answer.status}`);
+  return answer.json();
+}
+
+/** The address of a run. @param {string} name */
+export function addressOf(name) {
+  return `/api/runs/${encodeURIComponent(name)}`;
+}
+
+/** How many of a sorted list's times are not after t. */
+function countUntil(times, t) {
+  let [low, high] = [0, times.length];
+  while (low < high) {
+    const middle = (low + high) >> 1;
+    if (times[middle] <= t) low = middle + 1;
+    else high = middle;
+  }
+  return low;
+}
+
+/** The shortest way from one angle to another, as a share of it. */
+function turned(from, to, share) {
+  const way = Math.atan2(Math.sin(to - from), Math.cos(to - from));
+  return from + share * way;
+}
+
+function yawOf([w, x, y, z]) {
+  return Math.atan2(2 * (w * z + x * y), 1 - 2 * (y * y + z * z));
+}
+
+export class Run {
+  /** @param {object} recording as in docs/monitor-channels.md, section 5 */
+  constructor(recording) {
+    this.name = recording.name;
+    this.world = recording.world;
+    this.chart = recording.chart;
+    this.states = recording.states ?? recording.chart?.states ?? [];
+    this.poses = recording.poses;
+    this.images = recording.images;
+    this.crossings = recording.crossings;
+    this.transitions = recording.transitions;
+    this.detections = recording.detections;
+    this.result = recording.result;
+    this.begin = this.poses[0]?.t ?? 0;
+    this.end = this.poses.at(-1)?.t ?? 0;
+    this.poseTimes = this.poses.map((pose) => pose.t);
+    this.detectionTimes = this.detections.map((each) => each.t);
+    this.transitionTimes = this.transitions.map((each) => each.time_s);
+    this.outside = this.#outsideSeconds();
+  }
+
+  /** Fetch a run. @param {string} name */
+  static async fetch(name) {
+    return new Run(await fetchJson(addressOf(name)));
+  }
+
+  /** How many poses there are up to a time. */
+  posesUntil(t) {
+    return countUntil(this.poseTimes, t);
+  }
+
+  /** Where the drone is at a time, between the poses around it; null if nothing is known. */
+  poseAt(t) {
+    const count = this.posesUntil(t);
+    const before = this.poses[Math.max(0, count - 1)];
+    const after = this.poses[count];
+    if (!before) return null;
+    if (!after || count === 0) return { ...before, t };
+    const share = (t - before.t) / Math.max(1e-6, after.t - before.t);
+    const p = before.p.map((value, axis) => value + share * (after.p[axis] - value));
+    const yaw = turned(yawOf(before.q), yawOf(after.q), share);
+    // Level flights have only a yaw; others keep the attitude of the last pose, 50 ms old at most.
+    const isLevel = before.q[1] === 0 && before.q[2] === 0;
+    const q = isLevel ? [Math.cos(yaw / 2), 0, 0, Math.sin(yaw / 2)] : before.q;
+    return { ...before, t, p, q };
+  }
+
+  /** The id of the mission's state at a time, and since when: [id or null, seconds in it]. */
+  stateAt(t) {
+    const pose = this.poses[Math.max(0, this.posesUntil(t) - 1)];
+    const id = this.states[pose?.s] ?? null;
+    const count = countUntil(this.transitionTimes, t);
+    const since = count > 0 ? this.transitionTimes[count - 1] : this.begin;
+    return [id, Math.max(0, t - since)];
+  }
+
+  /** The last transitions at a time, newest first, and how many there were: [list, count]. */
+  transitionsAt(t) {
+    const count = countUntil(this.transitionTimes, t);
+    return [this.transitions.slice(Math.max(0, count - TRANSITIONS), count).reverse(), count];
+  }
+
+  /** The number of the image at a time; null before the first. */
+  imageAt(t) {
+    const count = countUntil(this.images, t);
+    return count > 0 ? count - 1 : null;
+  }
+
+  /** What was detected last at a time; null if that is too old. */
+  detectionsAt(t) {
+    const count = countUntil(this.detectionTimes, t);
+    const last = this.detections[count - 1];
+    if (!last) return null;
+    // An image without a change of what is seen has no entry of its own: it is the images that grow old.
+    const image = this.imageAt(t);
+    const seen = image === null ? last.t : Math.max(last.t, this.images[image]);
+    return t - seen <= OLD_IMAGE_S ? last : null;
+  }
+
+  /** The Game Monitor's figures at a time, as the live channel has them; null if nobody judged. */
+  figuresAt(t) {
+    const { result } = this;
+    if (!result) return null;
+    const end = result.try_time_s ?? this.end;
+    const isOver = t >= end;
+    const crossed = this.crossings.filter((each) => each.t <= t);
+    const order = ["red", "green", "blue"].filter((colour) => this.#hasFrame(colour));
+    const limit = this.world.scenario?.try_limit_s ?? null;
+    const time = Math.min(Math.max(0, t), end);
+    const pose = this.poses[Math.max(0, this.posesUntil(t) - 1)];
+    const outside = Math.min(this.outside[Math.max(0, this.posesUntil(t) - 1)] ?? 0, result.penalty_s ?? 0);
+    const penalty = isOver ? result.penalty_s ?? null : outside;
+    return {
+      try_time_s: time,
+      penalty_s: penalty,
+      total_time_s: isOver ? result.total_time_s ?? null : time + outside,
+      limit_s: limit,
+      time_over: limit !== null && time > limit,
+      crossed: crossed.map((each) => each.colour),
+      crossing_times_s: crossed.map((each) => this.#timeOf(each)),
+      next_colour: order.find((colour) => !crossed.some((each) => each.colour === colour)) ?? null,
+      contacts: isOver ? result.contacts ?? null : null,
+      inside: pose ? this.#isInside(pose) : true,
+      motors_on: Boolean(pose?.on) && !isOver,
+      over: isOver,
+      verdict: isOver ? result.verdict ?? "" : "",
+      reason: isOver ? result.reason ?? "" : "",
+      source: this.world.source,
+      final: isOver,
+    };
+  }
+
+  /** The exact time of a crossing, as the result has it. */
+  #timeOf(crossing) {
+    const index = this.result?.frames_crossed?.indexOf(crossing.colour) ?? -1;
+    return this.result?.crossing_times_s?.[index] ?? crossing.t;
+  }
+
+  #hasFrame(colour) {
+    return (this.world.scenario?.frames ?? []).some((frame) => frame.colour === colour);
+  }
+
+  #isInside({ p: [x, y, z] }) {
+    const arena = this.world.scenario?.arena;
+    if (!arena) return true;
+    const top = arena.height_m + (this.world.lift_m ?? 0);
+    return Math.abs(x) <= arena.length_x_m / 2 && Math.abs(y) <= arena.width_y_m / 2 && z <= top;
+  }
+
+  /** Seconds outside the arena with motors on, up to each pose. */
+  #outsideSeconds() {
+    let sum = 0;
+    return this.poses.map((pose, index) => {
+      const before = this.poses[index - 1];
+      if (before && before.on && !this.#isInside(before)) sum += pose.t - before.t;
+      return sum;
+    });
+  }
+}
