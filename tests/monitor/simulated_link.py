@@ -65,6 +65,7 @@ class SimulatedDrone:
     def restart(self) -> None:
         """Switch it off and on: it stands on its start, and its clock begins at 0."""
         self.simulation = Simulation(self.scenario)
+        self.simulation.autopilot.prepare()
         self.truths.clear()
         streams = ()
         if self._video is not None:

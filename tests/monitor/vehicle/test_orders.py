@@ -1,0 +1,144 @@
+"""Orders: carried out by a real autopilot, and refusals told with its own reason."""
+
+import asyncio
+
+import pytest
+
+from firmware_py.mavlink.dialect import mavlink
+from firmware_py.status import FlightMode
+from monitor.sticks import Sticks
+from monitor.vehicle.commands import CommandDesk
+from scenarios.loader import load_scenario
+from tests.monitor.simulated_link import SimulatedLink, equipment
+from tests.monitor.watching import watching
+
+SPEED = 4.0  # heartbeats come four times a second of the clock that orders count by
+
+
+@pytest.fixture
+async def flown():
+    """A fleet and a link on which one drone is ready."""
+    link = SimulatedLink(load_scenario("empty"), speed=SPEED)
+    async with watching(equipment(link)) as watched:
+        await watched.until_ready(link)
+        yield watched, link
+
+
+async def in_the_air(watched):
+    assert await watched.fleet.do(1, "take_off") == (True, "it takes off")
+    await watched.until(lambda: watched.status()["landed"] is False)
+
+
+async def test_arm_and_disarm_are_shown_by_telemetry(flown):
+    watched, link = flown
+    assert await watched.fleet.do(1, "arm") == (True, "the motors are on")
+    assert link.drones[0].simulation.autopilot.status.armed
+    assert watched.status()["armed"]
+    assert await watched.fleet.do(1, "disarm") == (True, "the motors are off")
+    assert not watched.status()["armed"]
+
+
+async def test_a_flight_by_orders(flown):
+    watched, _link = flown
+    await in_the_air(watched)
+    ok, text = await watched.fleet.do(1, "disarm")
+    assert not ok
+    assert text == "disarm: refused for now: Disarming denied: not landed"
+    assert await watched.fleet.do(1, "take_off") == (False, "it is in the air already")
+    assert await watched.fleet.do(1, "hold") == (True, "it holds")
+    assert watched.status()["mode"] == "Hold"
+    assert await watched.fleet.do(1, "land") == (True, "it lands")
+    assert watched.status()["mode"] == "Land"
+    await watched.until(lambda: not watched.status()["armed"])
+    assert watched.status()["landed"]
+
+
+async def test_the_sticks_lead_in_position_mode(flown):
+    watched, _link = flown
+    await in_the_air(watched)
+    watched.fleet.sticks(1, Sticks(0.0, 0.0, 0.0, 0.0))
+    await asyncio.sleep(0.1)
+    assert await watched.fleet.do(1, "position") == (True, "it follows the sticks")
+    watched.fleet.sticks(1, Sticks(0.5, 0.0, 0.0, 0.0))
+    await watched.until(lambda: watched.pose()["v"][0] > 0.3)
+    assert abs(watched.pose()["v"][1]) < 0.1
+    watched.fleet.sticks(1, Sticks(0.0, 0.0, 0.0, 0.5))  # to the right is clockwise, so not to the left
+    await watched.until(lambda: watched.pose()["r"] < -0.2)
+
+
+async def test_offboard_without_an_app_is_refused_with_the_reason(flown):
+    watched, _link = flown
+    await in_the_air(watched)
+    ok, text = await watched.fleet.do(1, "offboard")
+    assert not ok
+    problem, _, reason = text.removeprefix("offboard: ").partition(": ")
+    assert problem == "refused for now"
+    assert reason in [message["text"] for message in watched.of_kind("text")]
+
+
+async def test_stopping_the_motors_in_the_air_is_asked_with_force(flown):
+    watched, link = flown
+    await in_the_air(watched)
+    await watched.fleet.do(1, "stop_motors")  # whether it may is the vehicle's choice
+    sent = [m for m in link.sent if m.get_type() == "COMMAND_LONG" and m.command == 400]
+    assert (sent[-1].param1, sent[-1].param2) == (0.0, 21196.0)
+
+
+async def test_two_at_once_get_each_their_own_answer(flown):
+    watched, link = flown
+    await in_the_air(watched)
+    answers = await asyncio.gather(
+        watched.fleet.do(1, "hold"), watched.fleet.do(1, "offboard"), watched.fleet.do(1, "disarm")
+    )
+    assert [ok for ok, _ in answers] == [True, False, False]
+    assert answers[1][1].startswith("offboard: ") and answers[2][1].startswith("disarm: ")
+    assert link.drones[0].simulation.autopilot.status.mode is FlightMode.HOLD
+
+
+async def test_a_drone_that_does_not_answer_is_asked_three_times():
+    link = SimulatedLink(load_scenario("empty"))
+    async with watching(equipment(link)) as watched:
+        await watched.until_ready(link)
+        link.muted = True
+        assert await watched.fleet.do(1, "arm") == (False, "arm: the drone does not answer")
+    sent = [m.confirmation for m in link.sent if m.get_type() == "COMMAND_LONG" and m.command == 400]
+    assert sent == [0, 1, 2]
+
+
+async def test_what_is_no_order_is_told(flown):
+    watched, _link = flown
+    assert await watched.fleet.do(7, "arm") == (False, "no drone 7 is heard")
+    ok, text = await watched.fleet.do(1, "dance")
+    assert not ok and "'dance' is no order" in text
+
+
+def ack(number, result, target=250):
+    return mavlink.MAVLink_command_ack_message(number, result, 0, 0, target, 190)
+
+
+async def test_in_progress_waits_longer_and_others_answers_are_not_ours():
+    sent = []
+    desk = CommandDesk(1, sent.append)
+    asked = asyncio.create_task(desk.ask(22))
+    await asyncio.sleep(0)
+    desk.take(ack(22, 0, target=255))  # of another ground station
+    desk.take(ack(400, 0))
+    desk.take(ack(22, 5))  # in progress
+    await asyncio.sleep(0.8)
+    assert not asked.done()
+    assert len(sent) == 1
+    desk.take(ack(22, 2))
+    assert await asked == 2
+
+
+async def test_stopping_does_not_wait_for_its_turn():
+    sent = []
+    desk = CommandDesk(1, sent.append)
+    arming = asyncio.create_task(desk.ask(400, 1.0))
+    await asyncio.sleep(0)
+    stopping = asyncio.create_task(desk.ask(400, 0.0, 21196.0, urgent=True))
+    await asyncio.sleep(0)
+    assert [(m.param1, m.param2) for m in sent] == [(1.0, 0.0), (0.0, 21196.0)]
+    desk.take(ack(400, 0))
+    assert await stopping == 0
+    assert await arming is None
