@@ -12,14 +12,16 @@ from monitor.pages.shell import shell, use_module
 if TYPE_CHECKING:
     from monitor.server import Monitor
 
+_STYLE = "".join(f'<link rel="stylesheet" href="/static/{name}.css">' for name in ("monitor", "pilot"))
+
 
 def register(monitor: Monitor) -> None:
     """Add the page."""
 
     @ui.page("/pilot")
     def pilot(request: Request) -> None:
-        ui.add_head_html('<link rel="stylesheet" href="/static/pilot.css">')
         with shell(monitor, request, "Pilot", "/pilot") as visitor:
+            ui.add_head_html(_STYLE)
             root = ui.element("div").classes("pilot")
             root.props["id"] = "pilot"
         use_module("pilot.js", mayFly=visitor.may_fly)

@@ -71,11 +71,7 @@ class PilotPage {
 
   #connect() {
     this.#socket = new PilotSocket({
-      seat: (seat) => {
-        this.#seats.set(seat.id, seat);
-        if (!this.#seat.yours) this.#letGo();
-        this.#show();
-      },
+      seat: (seat) => this.#takeSeat(seat),
       reply: (reply) => this.#say(`${reply.what.replace("_", " ")}: ${reply.text}`, reply.ok ? "good" : "bad"),
       state: (state, reason) => {
         if (state === this.#connection) return;
@@ -92,6 +88,15 @@ class PilotPage {
         this.#show();
       },
     });
+  }
+
+  #takeSeat(seat) {
+    const before = this.#seat.yours;
+    this.#seats.set(seat.id, seat);
+    const now = this.#seat.yours;
+    if (!now) this.#letGo();
+    if (now && !before) this.root.scrollIntoView({ block: "start" }); // brings the sticks under the thumbs
+    this.#show();
   }
 
   #refused() {
@@ -261,7 +266,7 @@ class PilotPage {
     setText(this.#parts.words, words);
     const steering = seat.yours && seat.flying;
     setText(this.#parts.give, seat.yours ? "Give back" : "Automatic");
-    setText(this.#parts.take, steering ? "Manual" : "Take the sticks");
+    setText(this.#parts.take, steering ? "Manual" : "Take sticks");
     setAttribute(this.#parts.take, "aria-pressed", String(steering));
     setAttribute(this.#parts.give, "aria-pressed", String(look === "auto"));
     this.#parts.give.disabled = !seat.yours;

@@ -53,6 +53,7 @@ export function layOut(root) {
         button("take", "Manual"),
       ),
     ),
+    keep("log", make("ol", { class: "p-log", role: "log", "aria-label": "Messages" })),
     make(
       "div",
       { class: "p-views" },
@@ -63,7 +64,6 @@ export function layOut(root) {
     keep("right", make("div", { class: "p-right" })),
     make("section", { class: "p-middle", "aria-label": "Drone" }, figures(keep), orders(button), keep("stop", make("div"))),
     make("section", { class: "p-sent", "aria-label": "What is sent" }, sent(keep), speed(keep)),
-    keep("log", make("ol", { class: "p-log", role: "log", "aria-label": "Messages" })),
     help(),
   );
   return parts;
