@@ -27,6 +27,8 @@ MODULES = (
     "monitor.live_channel",
     "monitor.video_proxy",
     "monitor.pages.login",
+    "monitor.pages.live",
+    "monitor.pages.chart",
     "monitor.pilot",
     "monitor.pages.pilot",
     "monitor.replay_api",

@@ -1,7 +1,7 @@
-import { buildCone, buildWorld, discard, SKY } from "./arena_world.js";
+import { buildCone, buildWorld, discard, GROUND, SKY } from "./arena_world.js";
 import { DroneModel, SIZE_M } from "./arena_drone.js";
 import { ArenaEye } from "./arena_eye.js";
-import { stateColour } from "./colours.js";
+import { channels, kindOf, stateColour } from "./colours.js";
 import { isDark, isTyping, make, onTheme, setAttribute, setText, wantsStillness } from "./dom.js";
 import { TopView } from "./topview.js";
 
@@ -20,12 +20,16 @@ const FRAME_MS = 1000 / 30;
 const SLOW_FRAME_MS = 1000 / 12; // where the processor has to draw, it has other things to do too
 const SPAN_MS = 60; // from one pose to the next, a little more than they are apart
 const VIEWS = { orbit: "Orbit", follow: "Follow", onboard: "Onboard" };
-const DARK_SKY = "#141a22";
+// Sky and ground as they suit the page; the onboard view has the camera's.
+const LIGHT = { sky: "#eef1f5", ground: "#b4b7b9" };
+const DARK = { sky: "#161b22", ground: "#383c40" };
 
 /** The arena in three dimensions, or from above where a browser cannot draw those. */
 export class Arena {
   #box;
   #labels;
+  #legend;
+  #kinds = new Set();
   #buttons = {};
   #sizeButton;
   #flat = null;
@@ -44,13 +48,15 @@ export class Arena {
   #drawn = 0;
   #frame_ms = FRAME_MS;
   #waiting = [];
+  #paint = LIGHT;
 
   /** @param {HTMLElement} element an empty box with a size; its size is followed */
   constructor(element) {
     this.#box = make("div", { class: "m-arena", tabindex: "0", role: "group", "aria-label": "the arena" });
     this.#labels = make("div", { class: "m-arena-labels", "aria-hidden": "true" });
     const bar = this.#makeBar();
-    this.#box.append(this.#labels, bar);
+    this.#legend = make("ul", { class: "m-arena-legend", "aria-label": "colours of the trail" });
+    this.#box.append(this.#labels, bar, this.#legend);
     element.append(this.#box);
     this.ready = this.#open();
   }
@@ -112,6 +118,7 @@ export class Arena {
   /** Forget the trails. @param {number} [id] only this drone's */
   clearTrail(id) {
     this.#do(() => {
+      this.#forgetKinds();
       if (this.#flat) return this.#flat.clearTrail(id);
       for (const [each, drone] of this.#drones) if (id === undefined || id === each) drone.trail.clear();
       this.#ask();
@@ -129,6 +136,7 @@ export class Arena {
       if (this.#flat) return this.#flat.setTrail(poses, (pose) => this.#colour({ ...pose, id }, states), id);
       const drone = this.#drone(id);
       drone.trail.clear();
+      this.#forgetKinds();
       for (const pose of poses) if (pose.on) drone.trail.add(pose.p, rgbOf(this.#colour({ ...pose, id }, states)));
       if (poses.length > 0) drone.pose = poses.at(-1);
       this.#ask();
@@ -193,7 +201,7 @@ export class Arena {
 
   #paintSky() {
     const dark = isDark(this.#box);
-    this.skies = { orbit: dark ? DARK_SKY : "#e8ecf1", follow: dark ? DARK_SKY : "#e8ecf1", onboard: SKY };
+    this.#paint = dark ? DARK : LIGHT;
     this.#ask();
   }
 
@@ -261,10 +269,28 @@ export class Arena {
     const drone = this.#drone(pose.id ?? 1);
     const before = drone.pose;
     const isBack = before !== null && pose.t < before.t - 0.5;
-    if (isBack || (before && pose.on && !before.on)) drone.trail.clear();
+    if (isBack || (before && pose.on && !before.on)) {
+      drone.trail.clear();
+      this.#forgetKinds();
+    }
     drone.aim(pose, now, isBack);
     drone.setFresh(pose.fresh !== false);
     if (pose.on) drone.trail.add(pose.p, rgbOf(this.#colour(pose, states)));
+  }
+
+  #forgetKinds() {
+    this.#kinds.clear();
+    this.#legend.replaceChildren();
+  }
+
+  /** Say in the legend which kind of state a colour is, once it is on a trail. */
+  #explain(state, colour) {
+    const kind = kindOf(state);
+    if (this.#kinds.has(kind)) return;
+    this.#kinds.add(kind);
+    const swatch = make("span", { class: "m-swatch" });
+    swatch.style.background = colour;
+    this.#legend.append(make("li", {}, swatch, kind));
   }
 
   #colour(pose, states) {
@@ -278,7 +304,9 @@ export class Arena {
       list.forEach((each) => stateColour(each, order));
       this.#orders.set(id, { list, order });
     }
-    return stateColour(state, this.#orders.get(id).order);
+    const colour = stateColour(state, this.#orders.get(id).order);
+    if (pose.on) this.#explain(state, colour);
+    return colour;
   }
 
   #ask() {
@@ -301,11 +329,11 @@ export class Arena {
     const chosen = this.#drones.get(this.#selected) ?? null;
     moves = this.#eye.look(chosen?.group ?? null, passed_s, still) || moves;
     const { camera, rectangle } = this.#eye;
-    const sky = new this.#THREE.Color(this.skies[this.#eye.view]);
+    const sky = new this.#THREE.Color(this.#eye.view === "onboard" ? SKY : this.#paint.sky);
     this.#scene.background = sky;
-    this.#scene.fog = this.#eye.view === "onboard" ? null : new this.#THREE.Fog(sky, 18, 60);
+    this.#scene.fog = this.#eye.view === "onboard" ? null : new this.#THREE.Fog(sky, 1.5 * this.#eye.overview_m, 5 * this.#eye.overview_m);
     for (const [id, drone] of this.#drones) this.#dress(id, drone, chosen, camera);
-    this.#world?.traverse((part) => { if (part.userData.isHelp) part.visible = this.#eye.view !== "onboard"; });
+    this.#dressWorld();
     const renderer = this.#renderer;
     renderer.setViewport(...rectangle);
     renderer.setScissor(...rectangle);
@@ -318,6 +346,17 @@ export class Arena {
     return [...this.#drones.values()].some((drone) => now - drone.began < SPAN_MS);
   }
 
+  #dressWorld() {
+    if (!this.#world) return;
+    const isOnboard = this.#eye.view === "onboard";
+    this.#world.userData.ground.set(isOnboard ? GROUND : this.#paint.ground);
+    const [, , wide, high] = this.#eye.rectangle;
+    this.#world.traverse((part) => {
+      if (part.userData.isHelp) part.visible = !isOnboard;
+      part.userData.ribbon?.fit(3, [wide, high]);
+    });
+  }
+
   /** Size, label and parts of a drone as this view wants them. */
   #dress(id, drone, chosen, camera) {
     const isOwn = drone === chosen && this.#eye.view === "onboard";
@@ -328,10 +367,9 @@ export class Arena {
     const metre_px = high / (2 * away_m * Math.tan((camera.fov * Math.PI) / 360));
     const wanted = this.#eye.view === "orbit" && !this.#isTrueSize ? Math.min(5, Math.max(1, 40 / (SIZE_M * metre_px))) : 1;
     drone.setScale(wanted);
-    drone.trail.mesh.material.uniforms.size.value.set(wide, high);
-    drone.trail.mesh.material.uniforms.width.value = high > 600 ? 5 : 4;
+    drone.trail.fit(high > 600 ? 5 : 4, [wide, high]);
     drone.thread.visible = drone.thread.visible && this.#eye.view !== "onboard";
-    drone.trail.mesh.visible = drone.trail.geometry.instanceCount > 0 && this.#eye.view !== "onboard";
+    drone.trail.mesh.visible = drone.trail.isDrawn && this.#eye.view !== "onboard";
     const shown = this.#drones.size > 1 && drone.began >= 0 && !isOwn;
     const place = shown ? this.#eye.toScreen(drone.group.position) : null;
     drone.label.hidden = place === null;
@@ -346,7 +384,7 @@ const rgbs = new Map();
 function rgbOf(colour) {
   let rgb = rgbs.get(colour);
   if (!rgb) {
-    rgb = [1, 3, 5].map((at) => parseInt(colour.slice(at, at + 2), 16) / 255);
+    rgb = channels(colour).map((channel) => channel / 255);
     rgbs.set(colour, rgb);
   }
   return rgb;

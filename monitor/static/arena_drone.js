@@ -1,8 +1,8 @@
 /** A quadrotor with its shadow, the thread to the floor, and its trail. */
+import { Ribbon } from "./ribbon.js";
 
-const SIZE_M = 0.25; // over all, as the challenge's drone; its model is made for this
-const POINTS = 6000; // of a trail; when it is full every second one goes
-const STEP_M = 0.02; // no nearer together than this
+export const SIZE_M = 0.25; // over all, as the challenge's drone; its model is made for this
+const TRAIL_POINTS = 6000; // four minutes at full speed; after that it gets coarser
 const ROTOR_RAD_S = 26; // far slower than true, so that the eye sees it turn
 
 /** A drone as it is drawn. */
@@ -19,7 +19,7 @@ export class DroneModel {
     this.shadow = new THREE.Mesh(new THREE.CircleGeometry(SIZE_M / 2, 24), new THREE.MeshBasicMaterial(dark));
     const thread = new THREE.BufferGeometry().setFromPoints([new THREE.Vector3(), new THREE.Vector3(0, 0, 1)]);
     this.thread = new THREE.Line(thread, new THREE.LineBasicMaterial({ color: "#1c2733", transparent: true, opacity: 0.7 }));
-    this.trail = new Trail(THREE);
+    this.trail = new Ribbon(THREE, TRAIL_POINTS);
     scene.add(this.group, this.shadow, this.thread, this.trail.mesh);
     this.from = { p: new THREE.Vector3(), q: new THREE.Quaternion() };
     this.to = { p: new THREE.Vector3(), q: new THREE.Quaternion() };
@@ -118,105 +118,3 @@ export class DroneModel {
     }
   }
 }
-
-export { SIZE_M };
-
-/** A line of any width through places, each stretch in a colour of its own; its memory is set aside once. */
-export class Trail {
-  #array = new Float32Array(6 * POINTS);
-  #buffer;
-  #count = 0;
-  #step_m = STEP_M;
-
-  constructor(THREE) {
-    this.#buffer = new THREE.InstancedInterleavedBuffer(this.#array, 6).setUsage(THREE.DynamicDrawUsage);
-    this.geometry = new THREE.InstancedBufferGeometry();
-    const corners = [0, -1, 0, 1, -1, 0, 1, 1, 0, 0, 1, 0]; // share of the way, side
-    this.geometry.setAttribute("position", new THREE.Float32BufferAttribute(corners, 3));
-    this.geometry.setIndex([0, 1, 2, 0, 2, 3]);
-    const part = (size, offset) => new THREE.InterleavedBufferAttribute(this.#buffer, size, offset);
-    this.geometry.setAttribute("start", part(3, 0)); // a stretch reads its end from the next point
-    this.geometry.setAttribute("finish", part(3, 6));
-    this.geometry.setAttribute("tint", part(3, 9));
-    this.geometry.instanceCount = 0;
-    this.material = new THREE.ShaderMaterial({
-      uniforms: { size: { value: new THREE.Vector2(1, 1) }, width: { value: 4 } },
-      vertexShader: VERTEX, fragmentShader: FRAGMENT, side: THREE.DoubleSide,
-    });
-    this.mesh = new THREE.Mesh(this.geometry, this.material);
-    this.mesh.frustumCulled = false;
-    this.mesh.visible = false;
-  }
-
-  /**
-   * Go on to a place.
-   * @param {number[]} p metres
-   * @param {number[]} rgb 0..1
-   */
-  add(p, rgb) {
-    const array = this.#array;
-    const at = 6 * this.#count;
-    const isNear = this.#count > 0
-      && Math.hypot(p[0] - array[at - 6], p[1] - array[at - 5], p[2] - array[at - 4]) < this.#step_m;
-    if (isNear) return false;
-    if (this.#count === POINTS) {
-      this.#thin();
-      return this.add(p, rgb);
-    }
-    array.set([...p, ...rgb], at);
-    this.#count += 1;
-    this.#buffer.addUpdateRange(at, 6);
-    this.#publish();
-    return true;
-  }
-
-  clear() {
-    this.#count = 0;
-    this.#step_m = STEP_M;
-    this.#publish();
-  }
-
-  /** Keep every second point, and from now on lay them twice as far apart. */
-  #thin() {
-    const array = this.#array;
-    const kept = POINTS / 2;
-    for (let index = 0; index < kept; index += 1) array.copyWithin(6 * index, 12 * index, 12 * index + 6);
-    this.#count = kept;
-    this.#step_m *= 2;
-    this.#buffer.clearUpdateRanges();
-    this.#buffer.addUpdateRange(0, array.length);
-  }
-
-  #publish() {
-    this.#buffer.needsUpdate = true;
-    this.geometry.instanceCount = Math.max(0, this.#count - 1);
-    this.mesh.visible = this.#count > 1;
-  }
-}
-
-const VERTEX = `
-attribute vec3 start; attribute vec3 finish; attribute vec3 tint;
-uniform vec2 size; uniform float width;
-varying vec3 vTint; varying float vSide;
-void main() {
-  vec4 a = projectionMatrix * modelViewMatrix * vec4(start, 1.0);
-  vec4 b = projectionMatrix * modelViewMatrix * vec4(finish, 1.0);
-  float near = 0.02; // a stretch that begins behind the eye is cut there
-  if (a.w < near && b.w > near) a = mix(a, b, (near - a.w) / (b.w - a.w));
-  else if (b.w < near && a.w > near) b = mix(b, a, (near - b.w) / (a.w - b.w));
-  vec2 way = (b.xy / b.w - a.xy / a.w) * size;
-  way = length(way) > 1e-4 ? normalize(way) : vec2(1.0, 0.0);
-  vec4 place = position.x < 0.5 ? a : b;
-  vec2 shift = vec2(-way.y, way.x) * position.y * width * 0.5 + way * (position.x - 0.5) * width * 0.5;
-  place.xy += shift / size * 2.0 * place.w;
-  vTint = tint;
-  vSide = position.y;
-  gl_Position = place;
-}`;
-
-const FRAGMENT = `
-varying vec3 vTint; varying float vSide;
-void main() {
-  float rim = smoothstep(0.55, 0.85, abs(vSide)); // a pale rim keeps dark colours apart from a dark ground
-  gl_FragColor = vec4(mix(vTint, vec3(1.0), rim * 0.55), 1.0);
-}`;

@@ -34,8 +34,9 @@ export class ArenaEye {
     this.#ask = ask;
     this.view = "orbit";
     this.rectangle = [0, 0, 1, 1];
-    this.#orbitCamera = new THREE.PerspectiveCamera(ORBIT_FOV_DEG, 1, 0.05, 150);
-    this.#otherCamera = new THREE.PerspectiveCamera(FOLLOW_FOV_DEG, 1, 0.01, 150);
+    this.overview_m = 14; // how far away all of the arena is seen
+    this.#orbitCamera = new THREE.PerspectiveCamera(ORBIT_FOV_DEG, 1, 0.1, 300);
+    this.#otherCamera = new THREE.PerspectiveCamera(FOLLOW_FOV_DEG, 1, 0.01, 300);
     for (const camera of [this.#orbitCamera, this.#otherCamera]) camera.up.set(0, 0, 1);
     const controls = new OrbitControls(this.#orbitCamera, box);
     Object.assign(controls, { maxPolarAngle: 1.53, minDistance: 0.6, maxDistance: 45, enableZoom: false });
@@ -131,7 +132,10 @@ export class ArenaEye {
     const corners = [-0.5, 0.5].flatMap((x) => [-0.5, 0.5].flatMap((y) => [0, 1].map(
       (z) => new Vector3(x * length_x_m, y * width_y_m, z * Math.min(height_m, 3)))));
     this.#controls.target.copy(target);
-    let [near, far] = [1, 400];
+    const widest = Math.hypot(length_x_m, width_y_m, height_m);
+    let [near, far] = [0.5 * widest, 6 * widest];
+    camera.far = 10 * widest + 150;
+    camera.updateProjectionMatrix();
     for (let step = 0; step < 24; step += 1) {
       const away = (near + far) / 2;
       camera.position.copy(target).addScaledVector(way, away);
@@ -144,7 +148,8 @@ export class ArenaEye {
       if (fits) far = away;
       else near = away;
     }
-    this.#controls.maxDistance = Math.max(45, 3 * far);
+    this.overview_m = far;
+    this.#controls.maxDistance = 3 * far;
     this.#controls.update();
   }
 

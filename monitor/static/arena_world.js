@@ -1,16 +1,18 @@
 /** What stands still in the arena, made once for each scenario: floor, base, frames, their shadows, the outline. */
-import { FRAME_COLOURS } from "./colours.js";
+import { channels, FRAME_COLOURS } from "./colours.js";
+import { Ribbon } from "./ribbon.js";
 
 // Colours as the simulated camera paints them, so that the onboard view looks like its image.
 export const SKY = "#d0dae4";
-const GROUND = [134, 134, 132];
+export const GROUND = "#868684";
 const TATAMI = [226, 176, 56];
 const MAT = [213, 164, 48];
 const BASE = [172, 170, 168];
 const BASE_MARK = [238, 238, 238];
 const MAT_M = 2;
 const DARKEST = 0.3; // no face is painted darker than this share of its colour
-const SHADOW = 0.6;
+const PURE_SHADE = 0.35; // a frame keeps its colour, with just enough shade to have edges
+const SHADOW = 0.4; // how much of the light is missing there
 const GROUND_M = 120;
 
 /**
@@ -23,8 +25,7 @@ const GROUND_M = 120;
 export function buildWorld(THREE, scenario, lift_m) {
   const group = new THREE.Group();
   const { arena, base, light } = scenario;
-  const floor = new Painter(THREE, light);
-  floor.rectangle(-GROUND_M, GROUND_M, -GROUND_M, GROUND_M, GROUND);
+  const [floor, shadows] = [new Painter(THREE, light), new Painter(THREE, light)];
   const [half_x, half_y] = [arena.length_x_m / 2, arena.width_y_m / 2];
   floor.rectangle(-half_x, half_x, -half_y, half_y, TATAMI);
   paintMats(floor, arena);
@@ -32,14 +33,19 @@ export function buildWorld(THREE, scenario, lift_m) {
   const boxes = [baseBox(base), ...scenario.frames.flatMap((frame) => frameBars(frame, lift_m))];
   for (const box of boxes) {
     solids.box(box);
-    floor.shadow(box, arena);
+    shadows.shadow(box);
   }
   const mark = 0.35 * base.edge_m;
   solids.rectangle(base.x_m - mark, base.x_m + mark, base.y_m - mark, base.y_m + mark, BASE_MARK, base.top_m + 0.002);
   // The floor is painted first and in order, without depth: nothing lies below it, so nothing can flicker on it.
-  const ground = floor.mesh({ depthTest: false, depthWrite: false, fog: true });
-  ground.renderOrder = -2;
-  group.add(ground, solids.mesh({ side: THREE.DoubleSide }));
+  const flat = { depthTest: false, depthWrite: false };
+  const ground = new THREE.Mesh(new THREE.PlaneGeometry(2 * GROUND_M, 2 * GROUND_M), new THREE.MeshBasicMaterial({ color: GROUND, ...flat }));
+  ground.renderOrder = -3;
+  group.userData.ground = ground.material.color;
+  const tatami = floor.mesh(flat);
+  tatami.renderOrder = -2;
+  const shade = shadows.mesh({ transparent: true, opacity: SHADOW, depthWrite: false });
+  group.add(ground, tatami, shade, solids.mesh({ side: THREE.DoubleSide }));
   group.add(outline(THREE, half_x, half_y, arena.height_m + lift_m));
   for (const frame of scenario.frames) group.add(frameLines(THREE, frame, lift_m));
   return group;
@@ -91,7 +97,7 @@ function baseBox({ x_m, y_m, edge_m, top_m }) {
 function frameBars(frame, lift_m) {
   const bar = frame.bar_m / 2;
   const [wide, high] = [frame.outer_width_m / 2, frame.outer_height_m / 2];
-  const colour = [1, 3, 5].map((at) => parseInt(FRAME_COLOURS[frame.colour].slice(at, at + 2), 16));
+  const colour = channels(FRAME_COLOURS[frame.colour]);
   const [c, s] = [Math.cos(frame.yaw_rad), Math.sin(frame.yaw_rad)];
   const parts = [
     [0, high - bar, wide, bar], [0, bar - high, wide, bar],
@@ -99,25 +105,28 @@ function frameBars(frame, lift_m) {
   ];
   return parts.map(([y, z, half_y, half_z]) => ({
     centre: [frame.x_m - s * y, frame.y_m + c * y, frame.z_m + lift_m + z],
-    half: [bar, half_y, half_z], yaw: frame.yaw_rad, colour,
+    half: [bar, half_y, half_z], yaw: frame.yaw_rad, colour, isPure: true,
   }));
 }
 
-/** A frame's outline, which stays a pixel wide from far away, and a thread to the floor that shows where it hangs. */
+/** A frame's outline, which stays wide enough to be seen from far away, and a thread to the floor below it. */
 function frameLines(THREE, frame, lift_m) {
   const [c, s] = [Math.cos(frame.yaw_rad), Math.sin(frame.yaw_rad)];
   const z = frame.z_m + lift_m;
-  const at = (y, up) => new THREE.Vector3(frame.x_m - s * y, frame.y_m + c * y, z + up);
+  const at = (y, up) => [frame.x_m - s * y, frame.y_m + c * y, z + up];
   const [wide, high] = [(frame.outer_width_m - frame.bar_m) / 2, (frame.outer_height_m - frame.bar_m) / 2];
-  const ring = [at(-wide, -high), at(wide, -high), at(wide, high), at(-wide, high)];
-  const group = new THREE.Group();
-  const edge = new THREE.LineBasicMaterial({ color: FRAME_COLOURS[frame.colour], fog: false });
-  group.add(new THREE.LineLoop(new THREE.BufferGeometry().setFromPoints(ring), edge));
-  const thread = [new THREE.Vector3(frame.x_m, frame.y_m, 0.01), at(0, -high)];
+  const ring = new Ribbon(THREE, 5, { rim: 0 });
+  const rgb = channels(FRAME_COLOURS[frame.colour]).map((channel) => channel / 255);
+  for (const [y, up] of [[-wide, -high], [wide, -high], [wide, high], [-wide, high], [-wide, -high]]) ring.add(at(y, up), rgb);
+  ring.mesh.userData.ribbon = ring;
+  const thread = [new THREE.Vector3(frame.x_m, frame.y_m, 0.01), new THREE.Vector3(...at(0, -high))];
   const faint = new THREE.LineBasicMaterial({ color: "#4a4a46", transparent: true, opacity: 0.55 });
   const line = new THREE.Line(new THREE.BufferGeometry().setFromPoints(thread), faint);
-  line.userData.isHelp = true;
-  group.add(line);
+  const group = new THREE.Group();
+  for (const part of [ring.mesh, line]) {
+    part.userData.isHelp = true;
+    group.add(part);
+  }
   return group;
 }
 
@@ -150,10 +159,11 @@ class Painter {
     this.#ambient = light.ambient;
   }
 
-  /** A convex polygon, its corners in order; dim: share of its brightness that is left. */
-  polygon(corners, normal, rgb, dim = 1) {
+  /** A convex polygon, its corners in order; a pure colour is hardly shaded. */
+  polygon(corners, normal, rgb, isPure = false) {
     const facing = -(normal[0] * this.#sun[0] + normal[1] * this.#sun[1] + normal[2] * this.#sun[2]);
-    const share = dim * Math.max(DARKEST, this.#ambient + (1 - this.#ambient) * Math.max(0, facing));
+    const lit = Math.max(DARKEST, this.#ambient + (1 - this.#ambient) * Math.max(0, facing));
+    const share = isPure ? 1 - PURE_SHADE * (1 - lit) : lit;
     const [r, g, b] = rgb.map((channel) => (channel * share) / 255);
     const colour = new this.#THREE.Color().setRGB(r, g, b, this.#THREE.SRGBColorSpace);
     for (let index = 1; index + 1 < corners.length; index += 1) {
@@ -180,23 +190,21 @@ class Painter {
         const normal = [0, 0, 0];
         normal[axis] = sign;
         const [c, s] = [Math.cos(box.yaw), Math.sin(box.yaw)];
-        this.polygon(corners, [c * normal[0] - s * normal[1], s * normal[0] + c * normal[1], normal[2]], box.colour);
+        this.polygon(corners, [c * normal[0] - s * normal[1], s * normal[0] + c * normal[1], normal[2]], box.colour, box.isPure);
       }
     }
   }
 
   /** What a box keeps from the sun, on the floor. */
-  shadow(box, arena) {
+  shadow(box) {
     const sun = this.#sun;
     if (sun[2] >= -1e-3) return;
     const cast = [];
     for (const a of [-1, 1]) for (const b of [-1, 1]) for (const c of [-1, 1]) {
       const [x, y, z] = placed(box, [a, b, c]);
-      cast.push([x - (z / sun[2]) * sun[0], y - (z / sun[2]) * sun[1], 0]);
+      cast.push([x - (z / sun[2]) * sun[0], y - (z / sun[2]) * sun[1], 0.003]);
     }
-    const [x, y] = [0, 1].map((axis) => cast.reduce((sum, point) => sum + point[axis], 0) / cast.length);
-    const onTatami = Math.abs(x) <= arena.length_x_m / 2 && Math.abs(y) <= arena.width_y_m / 2;
-    this.polygon(hull(cast), [0, 0, 1], onTatami ? TATAMI : GROUND, SHADOW);
+    this.polygon(hull(cast), [0, 0, 1], [0, 0, 0]);
   }
 
   mesh(settings) {

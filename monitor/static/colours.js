@@ -29,3 +29,8 @@ export function stateColour(stateId, order) {
   if (number < 0) number = order.push(kind) - 1;
   return STATE_COLOURS[number % STATE_COLOURS.length];
 }
+
+/** Red, green and blue of "#rrggbb", 0..255. */
+export function channels(colour) {
+  return [1, 3, 5].map((at) => parseInt(colour.slice(at, at + 2), 16));
+}

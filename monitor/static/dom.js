@@ -32,7 +32,9 @@ export function setAttribute(element, name, value) {
 
 /** A number for people; a dash if there is none. */
 export function number(value, decimals = 1) {
-  return typeof value === "number" && Number.isFinite(value) ? value.toFixed(decimals) : "–";
+  if (typeof value !== "number" || !Number.isFinite(value)) return "–";
+  const text = value.toFixed(decimals);
+  return Number(text) === 0 ? text.replace("-", "") : text.replace("-", "−");
 }
 
 /** Wait until there is an element: the framework makes the page after this script was loaded. */

@@ -32,9 +32,10 @@ export class Figures {
       this.#number("try_time_s", "try time", "s", "m-first"),
       make("div", { class: "m-bar", "aria-hidden": "true" }, this.#bar),
       this.#limit,
-      this.#number("penalty_s", "penalty", "s"),
-      this.#number("total_time_s", "total", "s"),
-      this.#number("contacts", "contacts", ""),
+      make(
+        "div", { class: "m-three" },
+        this.#number("penalty_s", "penalty", "s"), this.#number("total_time_s", "total", "s"), this.#number("contacts", "contacts", ""),
+      ),
       this.#crossings(),
       this.#next,
       outcome,

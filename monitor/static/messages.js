@@ -40,7 +40,7 @@ export class Messages {
 
   #add(look, severity, text, time_s, who) {
     this.#list.querySelector(".m-none")?.remove();
-    const time = make("span", { class: "m-when" }, typeof time_s === "number" ? `${number(time_s)} s` : "");
+    const time = typeof time_s === "number" ? make("span", { class: "m-when" }, `${number(time_s)} s`) : null;
     const kind = make("span", { class: "m-severity", "data-look": look }, severity);
     const by = who ? make("span", { class: "m-who" }, who) : null;
     this.#list.prepend(make("li", { "data-look": look }, time, kind, by, make("span", { class: "m-text" }, String(text))));

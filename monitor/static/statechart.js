@@ -23,7 +23,7 @@ export class Statechart {
   #chart = null;
   #active = null;
   #entered = 0;
-  #follows;
+  #mode;
   #shown = null;
 
   /**
@@ -32,7 +32,7 @@ export class Statechart {
    *   from the start; live: seconds count on between two calls (default)
    */
   constructor(element, { small = false, live = true } = {}) {
-    this.#follows = small || innerWidth < 700;
+    this.#mode = small || innerWidth < 700 ? "follow" : "whole";
     this.#title = make("span", { class: "m-mission" });
     this.#state = make("output", { class: "m-state", "aria-live": "off" });
     this.#seconds = make("span", { class: "m-state-seconds" });
@@ -65,7 +65,8 @@ export class Statechart {
     if (!chart) return this.#say("no mission is heard of");
     this.#say("drawing the diagram");
     try {
-      const svg = await draw(chart.mermaid);
+      const { clientWidth: wide, clientHeight: high } = this.#picture;
+      const svg = await draw(chart.mermaid, wide > 1.2 * high ? "LR" : "TB");
       if (this.#chart !== chart) return; // another came meanwhile
       this.#take(svg);
     } catch (error) {
@@ -109,9 +110,9 @@ export class Statechart {
       const id = isSuper ? node.dataset.id : node.id.replace(head, "").replace(/-\d+$/, "");
       if (id) this.#nodes.set(id, node);
     }
-    this.#pan = new PanZoom(this.#picture, svg, () => this.#setFollow(false));
+    this.#pan = new PanZoom(this.#picture, svg, () => this.#setMode("free"));
     this.#light();
-    if (!this.#follows) this.#pan.whole();
+    if (this.#mode === "whole") this.#pan.whole();
   }
 
   /** Light the active state and all that it lies in. */
@@ -131,7 +132,7 @@ export class Statechart {
 
   /** Show the superstate that the active state lies in; in a narrow box, the state itself and its neighbours. */
   #follow() {
-    if (!this.#follows || !this.#pan || this.#lit.length === 0) return;
+    if (this.#mode !== "follow" || !this.#pan || this.#lit.length === 0) return;
     const [leaf, around] = [this.#lit[0], this.#lit[1] ?? this.#lit[0]];
     const wide = this.#picture.clientWidth;
     const part = boxOf(around);
@@ -143,10 +144,12 @@ export class Statechart {
     this.#pan.show(target);
   }
 
-  #setFollow(follows) {
-    this.#follows = follows;
+  /** @param {"follow"|"whole"|"free"} mode free: as somebody moved it */
+  #setMode(mode) {
+    this.#mode = mode;
     this.#shown = null;
-    setAttribute(this.#buttons.follow, "aria-pressed", String(follows));
+    for (const name of ["follow", "whole"]) setAttribute(this.#buttons[name], "aria-pressed", String(mode === name));
+    if (mode === "whole") this.#pan?.whole();
     this.#follow();
   }
 
@@ -158,14 +161,14 @@ export class Statechart {
       bar.append(button);
       return button;
     };
-    const zoom = (factor) => { this.#setFollow(false); this.#pan?.zoom(factor); };
+    const zoom = (factor) => { this.#setMode("free"); this.#pan?.zoom(factor); };
     this.#buttons = {
-      follow: add("follow", "Follow", "follow the active state", () => this.#setFollow(!this.#follows)),
-      whole: add("whole", "Whole", "show the whole diagram", () => { this.#setFollow(false); this.#pan?.whole(); }),
+      follow: add("follow", "Follow", "follow the active state", () => this.#setMode(this.#mode === "follow" ? "free" : "follow")),
+      whole: add("whole", "Whole", "show the whole diagram", () => this.#setMode("whole")),
       out: add("out", "−", "go away", () => zoom(1 / 1.35)),
       nearer: add("nearer", "+", "come nearer", () => zoom(1.35)),
     };
-    setAttribute(this.#buttons.follow, "aria-pressed", String(this.#follows));
+    for (const name of ["follow", "whole"]) setAttribute(this.#buttons[name], "aria-pressed", String(this.#mode === name));
     return bar;
   }
 
@@ -192,16 +195,18 @@ export class Statechart {
 
   #key(event) {
     if (event.ctrlKey || event.metaKey || event.altKey || !this.#pan) return;
-    if (event.key === "0") {
-      this.#setFollow(false);
-      this.#pan.whole();
-    } else if (!this.#pan.key(event.key)) return;
+    if (event.key === "0") this.#setMode("whole");
+    else if (!this.#pan.key(event.key)) return;
     event.preventDefault();
   }
 }
 
-/** Let Mermaid draw a diagram. The text comes from a drone: no settings of its own, no links, no markup. */
-async function draw(text) {
+/**
+ * Let Mermaid draw a diagram. The text comes from a drone: no settings of its own, no links, no markup.
+ * @param {string} text
+ * @param {"LR"|"TB"} direction in which superstates follow each other; within them it goes down
+ */
+async function draw(text, direction) {
   if (text.length > LONGEST_TEXT) throw new Error("it is too long");
   const { mermaid } = await import("/lib/mermaid/index.js");
   mermaid.initialize({
@@ -211,8 +216,10 @@ async function draw(text) {
   const plain = text
     .replace(/%%\{[\s\S]*?\}%%/g, "")
     .split("\n")
-    .filter((line) => !/^\s*(click\s|---|%%)/.test(line))
-    .join("\n");
+    .filter((line) => !/^\s*(click\s|---|%%|direction\s)/.test(line))
+    .join("\n")
+    .replace(/^(\s*stateDiagram(-v2)?)[^\n]*/, `$1\n    direction ${direction}`)
+    .replace(/^(\s*state .*\{)\s*$/gm, "$1\n    direction TB");
   if (!/^\s*stateDiagram/.test(plain)) throw new Error("it is no state diagram");
   count += 1;
   const { svg } = await mermaid.render(`m-chart-${count}`, plain);
