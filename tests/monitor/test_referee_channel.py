@@ -1,0 +1,158 @@
+"""The referee over HTTP: what it says is checked, and its absence costs little."""
+
+import asyncio
+from contextlib import asynccontextmanager
+from dataclasses import asdict
+
+import pytest
+from aiohttp import web
+
+from monitor.referee_channel import RefereeChannel
+from scenarios.loader import load_scenario
+from scenarios.report import RefereeSnapshot
+from tests.monitor.simulated_link import make_referee
+
+SCENARIO = load_scenario("test-case-1")
+SNAPSHOT = RefereeSnapshot(5, 1.0, 0.0, ("red",), "green", 0, True, True, False, False)
+
+
+def good_answer():
+    return {
+        "scenario": SCENARIO.name,
+        "source": "truth",
+        "lift_m": 0.25,
+        "time_us": 7,
+        "local_frame": {"origin_arena_m": [1.0, 2.0, 3.0], "yaw_rad": 0.5},
+        "snapshot": asdict(SNAPSHOT),
+        "report": make_referee(SCENARIO).report().as_dict(),
+    }
+
+
+class Site:
+    """A drone's web server; `answers` by path are JSON, bytes or a response's maker."""
+
+    def __init__(self):
+        self.answers = {"/referee.json": good_answer(), "/scenario.json": SCENARIO.model_dump(mode="json")}
+        self.asked = []
+        self.heard, self.said = [], []
+        self.channel = None
+
+    async def serve(self, request):
+        self.asked.append(request.path)
+        answer = self.answers.get(request.path)
+        if answer is None:
+            raise web.HTTPNotFound
+        if callable(answer):
+            return answer()
+        return web.Response(body=answer) if isinstance(answer, bytes) else web.json_response(answer)
+
+    async def until(self, condition):
+        for _ in range(800):
+            if condition():
+                return
+            await asyncio.sleep(0.01)
+        raise AssertionError(f"did not come: {self.asked} {self.said}")
+
+
+@asynccontextmanager
+async def asked(site):
+    app = web.Application()
+    app.router.add_get("/{path:.*}", site.serve)
+    runner = web.AppRunner(app, access_log=None, shutdown_timeout=0.1)
+    await runner.setup()
+    await web.TCPSite(runner, "127.0.0.1", 0).start()
+    url = f"http://127.0.0.1:{runner.addresses[0][1]}/video"
+    site.channel = RefereeChannel(url, site.heard.append, lambda level, text: site.said.append(text))
+    task = asyncio.create_task(site.channel.run())
+    try:
+        yield
+        assert not task.done(), task.exception()
+    finally:
+        task.cancel()
+        await asyncio.gather(task, return_exceptions=True)
+        await runner.cleanup()
+
+
+@pytest.fixture
+def site():
+    return Site()
+
+
+async def test_it_asks_five_times_a_second_and_for_the_scenario_once(site):
+    async with asked(site):
+        await site.until(lambda: len(site.heard) >= 4)
+        assert site.channel.scenario == SCENARIO
+    assert site.asked.count("/scenario.json") == 1
+    told = site.heard[0]
+    assert told.standing().snapshot == SNAPSHOT
+    assert told.local_frame.origin_arena_m == (1.0, 2.0, 3.0)
+    assert (site.channel.lift_m, site.channel.source, site.said) == (0.25, "truth", [])
+
+
+async def test_another_scenario_is_asked_for_when_its_name_changes(site):
+    other = load_scenario("test-case-2")
+    async with asked(site):
+        await site.until(lambda: site.channel.scenario)
+        site.answers = {
+            "/referee.json": {**good_answer(), "scenario": other.name},
+            "/scenario.json": other.model_dump(mode="json"),
+        }
+        await site.until(lambda: site.channel.scenario == other)
+    assert site.asked.count("/scenario.json") == 2
+
+
+async def test_where_there_is_none_it_asks_ever_more_seldom(site):
+    site.answers = {}
+    async with asked(site):
+        await asyncio.sleep(2.0)
+    assert 2 <= len(site.asked) <= 4
+    assert (site.heard, site.said) == ([], [])
+
+
+def big():
+    return b'{"a": "' + b"x" * 1_100_000 + b'"}'
+
+
+def elsewhere():
+    raise web.HTTPFound("/elsewhere.json")
+
+
+@pytest.mark.parametrize(
+    "answer",
+    [
+        b"\xff\xfe",
+        b"[" * 100_000,
+        b"7",
+        big(),
+        elsewhere,
+        {},
+        {**good_answer(), "snapshot": {}},
+        {**good_answer(), "lift_m": 1e300},
+        {**good_answer(), "scenario": "x" * 1000},
+        {**good_answer(), "snapshot": {**asdict(SNAPSHOT), "crossed": ["red"] * 1000}},
+        b'{"scenario": "s", "lift_m": NaN}',
+    ],
+    ids=range(11),
+)
+async def test_what_makes_no_sense_is_not_believed(site, answer):
+    site.answers["/referee.json"] = answer
+    site.answers["/elsewhere.json"] = good_answer()
+    async with asked(site):
+        await site.until(lambda: site.asked.count("/referee.json") >= 2)
+    assert site.heard == []
+    assert "/elsewhere.json" not in site.asked
+    assert len(site.said) <= 1
+
+
+@pytest.mark.parametrize(
+    "answer", [None, {"name": "UPPER"}, b"no", {**SCENARIO.model_dump(mode="json"), "x": 1}]
+)
+async def test_a_bad_scenario_is_told_once_and_the_referee_still_heard(site, answer):
+    site.answers["/scenario.json"] = answer
+    async with asked(site):
+        await site.until(lambda: len(site.heard) >= 3)
+        assert site.channel.scenario is None
+    assert len(site.said) == 1
+    assert "/scenario.json: " in site.said[0]
+    assert "\n" not in site.said[0]
+    assert site.asked.count("/scenario.json") == 1

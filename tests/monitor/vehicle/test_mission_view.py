@@ -1,0 +1,181 @@
+"""What an app tells, made into messages for the pages."""
+
+from math import inf, nan
+
+import pytest
+from pymavlink.dialects.v20 import common as mavlink
+
+from mission_link.codec import encode_detections, encode_state, split_document
+from mission_link.messages import (
+    DETECTIONS_TYPE,
+    DOCUMENT_TYPE,
+    STATE_TYPE,
+    DocumentKind,
+    MissionDetections,
+    MissionState,
+)
+from monitor.vehicle.mission import MissionView
+from tests.monitor.simulated_link import all_finite
+
+CHART = {
+    "name": "race <b>",
+    "description": "",
+    "scenario": "s",
+    "states": ["red.seek", "red.cross"],
+    "mermaid": "stateDiagram-v2",
+    "source": "states: {}",
+}
+COMMAND = (0.5, 0.0, -0.25, 0.125)
+
+
+def tunnel(kind, payload):
+    padded = list(payload) + [0] * (128 - len(payload))
+    return mavlink.MAVLink_tunnel_message(0, 0, kind, len(payload), padded)
+
+
+def state(crc=0, index=1, *, flying=True, paused=False, command=COMMAND, time_us=9_000_000):
+    told = MissionState(
+        crc, index, 3, time_us, 7_500_000, flying, paused, False, command, (1.0, 2.0, 3.0, 0.5)
+    )
+    return tunnel(STATE_TYPE, encode_state(told))
+
+
+def documents(kind, content):
+    crc, pieces = split_document(kind, content)
+    return crc, [tunnel(DOCUMENT_TYPE, piece) for piece in pieces]
+
+
+@pytest.fixture
+def view():
+    view = MissionView(1)
+    crc, pieces = documents(DocumentKind.MISSION, CHART)
+    (chart,) = [told for piece in pieces for told in view.take(piece, 10.0)]
+    assert chart == {
+        "kind": "chart",
+        "id": 1,
+        **{key: CHART[key] for key in ("name", "mermaid", "states", "source")},
+    }
+    view.take(state(crc), 10.0)
+    return view
+
+
+def test_the_status_names_the_state_and_counts_its_seconds(view):
+    assert view.as_dict(9_500_000, 10.1) == {
+        "name": "race <b>",
+        "state": "red.cross",
+        "seconds": 2.0,
+        "transitions": 3,
+        "paused": False,
+        "flying": True,
+        "finished": False,
+        "alive": True,
+    }
+    assert view.state_index(10.1) == 1
+    assert view.command(10.1) == [0.5, 0.0, -0.25, 0.125]
+
+
+def test_after_two_seconds_of_silence_the_app_is_not_alive(view):
+    assert view.as_dict(20_000_000, 12.1)["alive"] is False
+    assert view.as_dict(20_000_000, 12.1)["seconds"] == 1.5
+    assert (view.command(12.1), view.state_index(12.1)) == (None, -1)
+
+
+@pytest.mark.parametrize(
+    "told",
+    [state(paused=True), state(flying=False), state(command=(nan, 0, 0, 0)), state(command=(inf,) * 4)],
+)
+def test_there_is_no_command_while_the_app_does_not_lead(view, told):
+    view.take(told, 10.0)
+    assert view.command(10.1) is None
+
+
+def test_a_state_of_another_mission_has_no_name(view):
+    view.take(state(crc=1), 10.0)
+    assert view.as_dict(0, 10.0)["state"] == ""
+    view.take(state(view._document_crc, index=99), 10.0)
+    assert view.as_dict(0, 10.0)["state"] == ""
+
+
+def test_transitions_are_told_newest_first(view):
+    taken = [
+        {
+            "from": f"s{number}",
+            "to": f"s{number + 1}",
+            "time_us": number * 1_000_000,
+            "when": "frame.d < 1",
+            "values": [["frame.d", 0.44], ["frame.seen", True], ["frame.a", None]],
+            "seconds": 1.5,
+        }
+        for number in range(3)
+    ]
+    _, pieces = documents(DocumentKind.HISTORY, {"transitions": taken})
+    (told,) = [message for piece in pieces for message in view.take(piece, 10.0)]
+    assert [each["time_s"] for each in told["list"]] == [2.0, 1.0, 0.0]
+    assert told["list"][0] == {
+        "time_s": 2.0,
+        "from": "s2",
+        "to": "s3",
+        "when": "frame.d < 1",
+        "values": [["frame.d", 0.44], ["frame.seen", True], ["frame.a", None]],
+        "seconds": 1.5,
+    }
+    assert told["list"][0]["values"][1][1] is True
+    assert [message["kind"] for message in view.standing()] == ["chart", "transitions"]
+
+
+def test_detections_say_what_is_not_seen_and_what_is_not_known(view):
+    seen = MissionDetections(1_500_000, 320, 240, red=(10.0, -10.0, 20.0, -20.0, 1.25, inf))
+    (told,) = view.take(tunnel(DETECTIONS_TYPE, encode_detections(seen)), 10.0)
+    assert told == {
+        "kind": "detections",
+        "id": 1,
+        "t": 1.5,
+        "width": 320,
+        "height": 240,
+        "boxes": {"red": [10.0, -10.0, 20.0, -20.0, 1.25, None], "green": None, "blue": None},
+    }
+
+
+def test_a_result_is_kept_with_its_crc(view):
+    crc, pieces = documents(DocumentKind.RESULT, {"verdict": "clean", "try_time_s": 40.5})
+    for piece in pieces:
+        assert view.take(piece, 10.0) == []
+    assert view.result == (crc, {"verdict": "clean", "try_time_s": 40.5})
+
+
+@pytest.mark.parametrize(
+    ("kind", "payload"),
+    [
+        (STATE_TYPE, b""),
+        (STATE_TYPE, b"\x02" * 58),
+        (DETECTIONS_TYPE, b"\x01"),
+        (DOCUMENT_TYPE, b"\xff" * 128),
+        (0x8F13, b"\x01\x02"),
+    ],
+)
+def test_nonsense_is_passed_over(view, kind, payload):
+    assert view.take(tunnel(kind, payload), 10.0) == []
+    assert view.as_dict(9_500_000, 10.1)["state"] == "red.cross"
+
+
+@pytest.mark.parametrize(
+    "content",
+    [
+        {"transitions": 5},
+        {"transitions": [{"from": ["x"]}]},
+        {"transitions": [{"time_us": -1}]},
+        {"transitions": [{"values": [["a", {"b": 1}]]}]},
+    ],
+)
+def test_a_history_of_another_form_is_told_once(view, content):
+    _, pieces = documents(DocumentKind.HISTORY, content)
+    assert [message for piece in pieces for message in view.take(piece, 10.0)] == []
+    assert view.problem.startswith("history document: transitions")
+
+
+def test_numbers_are_finite_whatever_the_app_says(view):
+    _, pieces = documents(DocumentKind.RESULT, {"a": [{"b": inf}], "c": nan})
+    for piece in pieces:
+        view.take(piece, 10.0)
+    assert view.result is not None
+    assert all_finite(view.result[1])
