@@ -1,7 +1,5 @@
 """Tries of real flights, judged by the drone's referee, by the monitor's own, and by the app."""
 
-import asyncio
-
 import pytest
 
 from firmware_py.mavlink.dialect import mavlink
@@ -145,9 +143,8 @@ async def test_the_apps_own_pose_lays_the_arena_where_nothing_else_does():
         await watched.until(lambda: watched.pose()["p"][:2] == pytest.approx(start, abs=0.01))
         assert watched.pose()["c"] == [0.0] * 4
         assert watched.pose()["s"] == 0
-        await asyncio.sleep(2.2)
+        await watched.until(lambda: watched.status()["mission"]["alive"] is False)
         assert (watched.pose()["c"], watched.pose()["s"]) == (None, -1)
-        assert watched.status()["mission"]["alive"] is False
 
 
 async def test_texts_of_drone_and_mission_are_text():

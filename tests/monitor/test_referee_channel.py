@@ -103,9 +103,12 @@ async def test_another_scenario_is_asked_for_when_its_name_changes(site):
 
 async def test_where_there_is_none_it_asks_ever_more_seldom(site):
     site.answers = {}
+    loop, times_s = asyncio.get_running_loop(), []
     async with asked(site):
-        await asyncio.sleep(2.0)
-    assert 2 <= len(site.asked) <= 4
+        for count in (1, 2, 3):
+            await site.until(lambda count=count: len(site.asked) >= count)
+            times_s.append(loop.time())
+    assert times_s[2] - times_s[0] > 1.1  # 0.4 s, then 0.8 s
     assert (site.heard, site.said) == ([], [])
 
 

@@ -1,9 +1,9 @@
 """What a vehicle is asked for: little, and never for less than it sends."""
 
 import pytest
+from pymavlink.dialects.v20 import common as mavlink
 
 from monitor.vehicle.asking import BootTime, RateWatch
-from pymavlink.dialects.v20 import common as mavlink
 
 
 def wanted(messages):
