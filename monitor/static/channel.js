@@ -7,7 +7,7 @@
  */
 
 const FIRST_WAIT_MS = 500;
-const LONGEST_WAIT_MS = 4000;
+const LONGEST_WAIT_MS = 2000;
 const SILENCE_MS = 7000; // a status comes every two seconds; a link that fell silent is gone even if nobody closed it
 
 export class LiveChannel {

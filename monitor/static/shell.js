@@ -24,6 +24,10 @@ function show([state, words]) {
   if (element.textContent !== words) element.textContent = words;
 }
 
+// On a phone the navigation is a row that is moved sideways: begin where we are.
+const here = document.querySelector(".top nav [aria-current]");
+if (here) here.closest("nav").scrollLeft = here.offsetLeft - 40;
+
 if (place) {
   const channel = new LiveChannel(["status"]);
   channel.on("status", (message) => show(linkWords(message.drones)));

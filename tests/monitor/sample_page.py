@@ -1,0 +1,29 @@
+"""A page as the monitor's own are: within the frame, with a module and data that try to break out."""
+
+from fastapi import Request
+from nicegui import ui
+
+from monitor.pages.shell import shell, use_module
+
+EVIL = "</script><script>window.broken = true</script>"
+
+
+def register(monitor):
+    @ui.page("/")
+    def home(request: Request):
+        with shell(monitor, request, "Sample", "/") as visitor:
+            ui.label(f"may judge: {visitor.may_judge}")
+            ui.label(EVIL)
+        use_module("camera.js", text=EVIL)
+
+    @monitor.web.post("/judges-only")
+    async def judges_only(request: Request):
+        return {"who": monitor.access.require_judge(request).name}
+
+    @monitor.web.post("/pilots-only")
+    async def pilots_only(request: Request):
+        return {"who": monitor.access.require_pilot(request).name}
+
+    @monitor.web.post("/size")
+    async def size(request: Request):
+        return len(await request.body())

@@ -1,0 +1,119 @@
+"""The real web server on a free port of this process, before a fleet that only says what a test wants."""
+
+import asyncio
+import contextlib
+from dataclasses import dataclass, field
+
+import aiohttp
+
+from monitor.ports import Equipment
+from monitor.server import serve
+from monitor.settings import MonitorSettings
+
+
+class StubFleet:
+    """Drone 1 goes on by a tick with each pose."""
+
+    def __init__(self, equipment=None):
+        self.ticks = 0
+        self.hearers = []
+        self.video = None
+        self.status = {
+            "kind": "status",
+            "drones": [{"id": 1, "link": {"state": "live", "age_s": float("inf")}}],
+        }
+
+    async def run(self):
+        await asyncio.Event().wait()
+
+    def welcome(self):
+        return [{"kind": "world", "scenario": None, "lift_m": 0.0, "source": ""}, self.status]
+
+    def pose_message(self):
+        self.ticks += 1
+        place = [0.123456789, float("nan"), float("inf")]
+        return {"kind": "pose", "drones": [{"id": 1, "t": float(self.ticks), "p": place}]}
+
+    def status_message(self):
+        return self.status
+
+    def subscribe(self, hear):
+        self.hearers.append(hear)
+        return lambda: self.hearers.remove(hear)
+
+    def drone_ids(self):
+        return [1]
+
+    def video_url(self, drone_id):
+        return self.video
+
+
+@dataclass
+class Served:
+    """A monitor that runs."""
+
+    url: str
+    lines: list[str]
+    fleet: StubFleet
+    task: asyncio.Task = field(repr=False)
+
+    @property
+    def port(self):
+        return int(self.url.rstrip("/").rpartition(":")[2])
+
+    @property
+    def invitation(self):
+        """Secret of the newest one-time link."""
+        return next(line for line in reversed(self.lines) if "token=" in line).partition("token=")[2]
+
+
+@contextlib.asynccontextmanager
+async def serving(monkeypatch, *modules, bind="127.0.0.1", port=0, password=None):
+    """Serve with the given modules beside the server's own; yields a `Served`."""
+    fleets = []
+
+    def make_fleet(equipment):
+        fleets.append(StubFleet(equipment))
+        return fleets[-1]
+
+    own = ("monitor.live_channel", "monitor.video_proxy", "monitor.pages.login")
+    monkeypatch.setattr("monitor.server.MODULES", (*own, *modules))
+    monkeypatch.setattr("monitor.assembly.MODULES", (*own, *modules))
+    monkeypatch.setattr("monitor.assembly.Fleet", make_fleet)
+    lines: list[str] = []
+    up = asyncio.Event()
+
+    def say(line):
+        lines.append(line)
+        up.set()
+
+    settings = MonitorSettings(bind, port, "sqlite://", password)
+    task = asyncio.create_task(serve(equipment(), settings, say))
+    waiting = asyncio.create_task(up.wait())
+    try:
+        await asyncio.wait({task, waiting}, timeout=60, return_when=asyncio.FIRST_COMPLETED)
+        if task.done():
+            task.result()
+        assert up.is_set(), "the monitor does not start"
+        yield Served(lines[0].partition(" ")[2], lines, fleets[0], task)
+    finally:
+        waiting.cancel()
+        task.cancel()
+        with contextlib.suppress(asyncio.CancelledError):
+            await task
+
+
+def equipment():
+    """Nothing that a test of the server uses."""
+
+    def nothing(*_):
+        raise AssertionError("not used here")
+
+    return Equipment(nothing, nothing, None, list, nothing, None)
+
+
+@contextlib.asynccontextmanager
+async def browser():
+    """A client with a jar for cookies, also for addresses that are numbers."""
+    async with aiohttp.ClientSession(cookie_jar=aiohttp.CookieJar(unsafe=True)) as session:
+        yield session

@@ -1,0 +1,154 @@
+import asyncio
+import json
+import math
+
+import pytest
+
+from monitor.live_channel import MOST_PENDING, LiveChannel, Viewer, encode
+from tests.monitor.serving import StubFleet, browser, serving
+
+
+def kinds(viewer):
+    async def take():
+        return [json.loads(await viewer.next())["kind"] for _ in range(pending(viewer))]
+
+    return take()
+
+
+def pending(viewer):
+    return len(viewer._events) + len(viewer._newest)
+
+
+def test_numbers_are_short_and_finite():
+    text = encode({"kind": "pose", "drones": [{"p": [0.123456789, math.nan, -math.inf], "s": 3}]})
+    assert json.loads(text) == {"kind": "pose", "drones": [{"p": [0.1235, None, None], "s": 3}]}
+    figures = {"kind": "status", "total_time_s": 43.123456789, "limit": math.inf}
+    assert json.loads(encode(figures)) == {"kind": "status", "total_time_s": 43.123456789, "limit": None}
+
+
+async def test_the_welcome_comes_first_and_events_before_poses():
+    fleet = StubFleet()
+    channel, viewer = LiveChannel(fleet), Viewer()
+    channel.enter(viewer)
+    channel.tell(fleet.pose_message())
+    channel.tell({"kind": "text", "id": 1, "text": "hello"})
+    assert await kinds(viewer) == ["world", "text", "status", "pose"]
+
+
+async def test_only_the_newest_pose_waits_and_each_drone_has_its_own_detections():
+    fleet = StubFleet()
+    channel, viewer = LiveChannel(fleet), Viewer(["pose", "detections"])
+    channel.enter(viewer)
+    for _ in range(100):
+        channel.tell(fleet.pose_message())
+        for drone_id in (1, 2):
+            channel.tell({"kind": "detections", "id": drone_id})
+    assert pending(viewer) == 3
+    assert json.loads(await viewer.next())["drones"][0]["t"] == 100.0
+
+
+async def test_who_lets_events_pile_up_is_dropped():
+    channel, slow, other = LiveChannel(StubFleet()), Viewer(["text"]), Viewer(["text"])
+    channel.enter(slow)
+    channel.enter(other)
+    for number in range(MOST_PENDING + 1):
+        channel.tell({"kind": "text", "id": 1, "text": str(number)})
+        assert json.loads(await other.next())["text"] == str(number)
+    assert await slow.next() is None
+
+
+async def test_nothing_is_made_while_nobody_watches(monkeypatch):
+    async with serving(monkeypatch) as served, browser() as client:
+        assert served.fleet.ticks == 0
+        async with client.ws_connect(served.url + "ws/live") as live:
+            while (await live.receive_json())["kind"] != "pose":
+                pass
+        async with asyncio.timeout(10):
+            seen = -1
+            while seen != served.fleet.ticks:  # the server has noticed that the viewer went
+                seen = served.fleet.ticks
+                await asyncio.sleep(0.2)
+
+
+async def watch(client, url, seconds):
+    """Return when each pose came and what it was."""
+    loop = asyncio.get_running_loop()
+    poses = []
+    async with client.ws_connect(url) as live:
+        assert (await live.receive_json())["kind"] == "world"
+        end_s = loop.time() + seconds
+        while loop.time() < end_s:
+            message = await live.receive_json()
+            if message["kind"] == "pose":
+                poses.append((loop.time(), message["drones"][0]["t"]))
+    return poses
+
+
+async def test_ten_viewers_get_every_pose_at_once(monkeypatch):
+    async with (
+        serving(monkeypatch) as served,
+        browser() as client,
+        client.ws_connect(served.url + "ws/live"),
+    ):  # reads nothing and holds up nobody
+        watching = [watch(client, served.url + "ws/live", 1.5) for _ in range(10)]
+        seen = await asyncio.gather(*watching)
+    for poses in seen:
+        numbers = [number for _, number in poses]
+        # None is left out, so whatever the machine's load they came as fast as they were made.
+        assert numbers == list(range(int(numbers[0]), int(numbers[0]) + len(numbers)))
+    for same in {number for _, number in seen[0]} & {number for _, number in seen[-1]}:
+        times = [{n: t for t, n in poses}[same] for poses in (seen[0], seen[-1])]
+        assert abs(times[0] - times[1]) < 0.5
+
+
+async def test_a_page_may_ask_for_some_kinds_only(monkeypatch):
+    async with serving(monkeypatch) as served, browser() as client:
+        async with client.ws_connect(served.url + "ws/live?kinds=status,text") as live:
+            assert (await live.receive_json())["kind"] == "status"
+            served.fleet.hearers[0]({"kind": "text", "id": 1, "text": "hello"})
+            async with asyncio.timeout(10):
+                while (message := await live.receive_json())["kind"] != "text":
+                    assert message["kind"] == "status"
+        assert message["text"] == "hello"
+
+
+async def test_too_many_viewers_are_turned_away(monkeypatch):
+    monkeypatch.setattr("monitor.live_channel.MOST_VIEWERS", 1)
+    async with (
+        serving(monkeypatch) as served,
+        browser() as client,
+        client.ws_connect(served.url + "ws/live") as first,
+    ):
+        await first.receive_json()
+        async with client.ws_connect(served.url + "ws/live") as second:
+            await second.receive()
+            assert second.close_code == 1013
+
+
+async def test_a_fault_in_one_message_does_not_end_the_others(monkeypatch):
+    async with serving(monkeypatch) as served, browser() as client:
+        make = served.fleet.pose_message
+
+        def sometimes():
+            message = make()
+            if served.fleet.ticks == 2:
+                raise ValueError("a fault")
+            return message
+
+        served.fleet.pose_message = sometimes
+        async with asyncio.timeout(20):
+            poses = await watch(client, served.url + "ws/live", 0.5)
+            assert [number for _, number in poses[:2]] in ([1.0, 3.0], [3.0, 4.0])
+
+
+@pytest.mark.parametrize("text", ["hello", "x" * 100_000])
+async def test_what_a_browser_says_is_ignored(monkeypatch, text):
+    async with (
+        serving(monkeypatch) as served,
+        browser() as client,
+        client.ws_connect(served.url + "ws/live") as live,
+    ):
+        await live.send_str(text)
+        async with asyncio.timeout(10):
+            while (await live.receive_json())["kind"] != "pose":
+                pass

@@ -1,0 +1,202 @@
+import asyncio
+import json
+import re
+import socket
+import time
+
+import aiohttp
+import pytest
+
+from monitor.listening import url_of
+from monitor.security import MAX_BODY_BYTES
+from monitor.settings import MonitorError, MonitorSettings
+from tests.monitor.sample_page import EVIL
+from tests.monitor.serving import browser, serving
+
+SAMPLE = "tests.monitor.sample_page"
+
+
+async def test_a_page_has_frame_data_and_headers(monkeypatch):
+    async with serving(monkeypatch, SAMPLE) as served, browser() as client, client.get(served.url) as answer:
+        text = await answer.text()
+        assert answer.status == 200
+        assert "default-src 'self'" in answer.headers["Content-Security-Policy"]
+        assert answer.headers["X-Content-Type-Options"] == "nosniff"
+        assert answer.headers["X-Frame-Options"] == "DENY"
+        assert "Server" not in answer.headers
+    assert '<a href="/" aria-current=page>Live</a>' in text
+    assert EVIL not in text  # neither as data nor as a label
+    data = re.search(r'<script type="application/json" id="data-camera"[^>]*>(.*?)</script>', text)[1]
+    assert json.loads(data) == {"text": EVIL}
+
+
+async def test_all_that_a_page_names_is_here(monkeypatch):
+    """The page works offline: every address in it is one of ours and is answered."""
+    async with serving(monkeypatch, SAMPLE) as served, browser() as client:
+        text = await (await client.get(served.url)).text()
+        addresses = re.findall(r'(?:src|href)="([^"#]+)"|url\("([^"]+)"\)', text)
+        own = {first or second for first, second in addresses} - {
+            "/chart",
+            "/pilot",
+            "/competition",
+            "/ranking",
+            "/replay",
+        }
+        assert len(own) > 10
+        assert all(address.startswith("/") and not address.startswith("//") for address in own)
+        for address in sorted(own):
+            async with client.get(served.url.rstrip("/") + address) as answer:
+                assert answer.status == 200, address
+
+
+async def test_files_are_asked_after_and_libraries_are_served(monkeypatch):
+    async with serving(monkeypatch) as served, browser() as client:
+        async with client.get(served.url + "static/shell.css") as answer:
+            assert answer.headers["Cache-Control"] == "no-cache"
+            tag = answer.headers["ETag"]
+        async with client.get(served.url + "static/shell.css", headers={"If-None-Match": tag}) as answer:
+            assert answer.status == 304
+        for name in ("three", "echart", "mermaid"):
+            async with client.get(served.url + f"lib/{name}/index.js") as answer:
+                assert answer.status == 200
+                assert "javascript" in answer.headers["Content-Type"]
+                part = re.search(rb'"\./([\w.-]+-[\w-]{8}\.js)"', await answer.read())
+            if part:
+                async with client.get(served.url + f"lib/{name}/{part[1].decode()}") as answer:
+                    assert "immutable" in answer.headers["Cache-Control"]
+        async with client.get(served.url + "static/..%2f..%2fpyproject.toml") as answer:
+            assert answer.status == 404
+
+
+FOREIGN = (
+    {"Host": "evil.example"},
+    {"Host": "127.0.0.1.evil.example:80"},
+    {"Origin": "http://evil.example"},
+    {"Origin": "null"},
+    {"Origin": "http://127.0.0.1:1"},
+)
+
+
+async def test_foreign_names_and_pages_are_refused(monkeypatch):
+    async with serving(monkeypatch, SAMPLE) as served, browser() as client:
+        for path in ("", "ws/live", "_nicegui_ws/socket.io/?EIO=4&transport=polling"):
+            for headers in FOREIGN:
+                async with client.get(served.url + path, headers=headers) as answer:
+                    assert answer.status == 403, (path, headers)
+                    assert (await answer.text()).count("\n") == 1
+                with pytest.raises(aiohttp.WSServerHandshakeError) as refused:
+                    await client.ws_connect(served.url + path, headers=headers)
+                assert refused.value.status == 403, (path, headers)
+
+
+async def test_our_own_names_are_taken(monkeypatch):
+    async with serving(monkeypatch, SAMPLE) as served, browser() as client:
+        for host in (f"localhost:{served.port}", "[::1]:8080", "127.0.0.1"):
+            headers = {"Host": host, "Origin": f"http://{host}"}
+            async with client.get(served.url, headers=headers) as answer:
+                assert answer.status == 200
+            async with client.ws_connect(served.url + "ws/live", headers=headers) as live:
+                assert (await live.receive_json())["kind"] == "world"
+
+
+async def test_another_machine_may_call_us_any_name(monkeypatch):
+    async with serving(monkeypatch, SAMPLE, bind="0.0.0.0") as served, browser() as client:
+        url = f"http://127.0.0.1:{served.port}/"
+        async with client.get(url, headers={"Host": "laptop.local:8080"}) as answer:
+            assert answer.status == 200
+        async with client.get(url, headers={"Host": "a.example", "Origin": "http://b.example"}) as answer:
+            assert answer.status == 403
+
+
+async def test_a_form_of_another_site_is_refused_even_without_origin(monkeypatch):
+    async with serving(monkeypatch, SAMPLE) as served, browser() as client:
+        async with client.post(served.url + "size", headers={"Sec-Fetch-Site": "cross-site"}) as answer:
+            assert answer.status == 403
+        async with client.get(served.url, headers={"Sec-Fetch-Site": "cross-site"}) as answer:
+            assert answer.status == 200  # somebody followed a link
+
+
+async def pieces(count):
+    for _ in range(count):
+        yield b"x" * (MAX_BODY_BYTES // 4)
+
+
+async def test_bodies_are_limited_whether_announced_or_not(monkeypatch):
+    async with serving(monkeypatch, SAMPLE) as served, browser() as client:
+        async with client.post(served.url + "size", data=b"x" * MAX_BODY_BYTES) as answer:
+            assert await answer.json() == MAX_BODY_BYTES
+        async with client.post(served.url + "size", data=pieces(4)) as answer:
+            assert await answer.json() == MAX_BODY_BYTES
+        async with client.post(served.url + "size", data=pieces(5)) as answer:
+            assert answer.status == 413
+        head = f"POST /size HTTP/1.1\r\nHost: 127.0.0.1\r\nContent-Length: {MAX_BODY_BYTES + 1}\r\n\r\n"
+        reader, writer = await asyncio.open_connection("127.0.0.1", served.port)
+        writer.write(head.encode())
+        assert b" 413 " in await asyncio.wait_for(reader.readline(), 10)
+        writer.close()
+
+
+async def test_a_taken_port_is_told_in_one_line(monkeypatch):
+    with socket.create_server(("127.0.0.1", 0)) as taken:
+        port = taken.getsockname()[1]
+        with pytest.raises(MonitorError) as refused:
+            async with serving(monkeypatch, port=port):
+                pass
+    assert str(refused.value) == (
+        f"monitor: cannot listen on 127.0.0.1 port {port}: address already in use; choose another with --port"
+    )
+
+
+@pytest.mark.parametrize(
+    ("settings", "words"),
+    [
+        (MonitorSettings(password="short"), "FRAMERUNNER_JUDGE_PASSWORD has 5 characters"),
+        (MonitorSettings(port=70000), "--port 70000: must be from 0 to 65535"),
+        (MonitorSettings(bind=" "), "--bind is empty"),
+    ],
+)
+def test_settings_that_cannot_be_are_refused(settings, words):
+    with pytest.raises(MonitorError, match=words):
+        settings.check()
+    assert "short" not in repr(settings)
+
+
+async def test_an_address_that_is_not_ours_is_told_in_one_line(monkeypatch):
+    with pytest.raises(MonitorError, match=r"--bind no\.such\.host\.invalid: .*give an address"):
+        async with serving(monkeypatch, bind="no.such.host.invalid"):
+            pass
+
+
+def test_the_address_told_can_be_opened():
+    assert url_of("127.0.0.1", 8080) == "http://127.0.0.1:8080/"
+    assert url_of("::1", 80) == "http://[::1]:80/"
+    assert url_of("0.0.0.0", 80) == f"http://{socket.gethostname()}:80/"
+
+
+async def test_it_ends_soon_though_somebody_watches_and_its_port_is_free_again(monkeypatch):
+    async with serving(monkeypatch, SAMPLE) as served, browser() as client:
+        port = served.port
+        live = await client.ws_connect(served.url + "ws/live")
+        await live.receive_json()
+        begin_s = time.monotonic()
+        served.task.cancel()
+        with pytest.raises(asyncio.CancelledError):
+            await served.task
+        assert time.monotonic() - begin_s < 5  # 0.3 s on a quiet machine
+        assert served.fleet.hearers == []
+    async with (
+        serving(monkeypatch, SAMPLE, port=port) as again,
+        browser() as client,
+        client.get(again.url) as answer,
+    ):
+        assert answer.status == 200
+
+
+async def test_a_job_that_fails_ends_the_monitor_with_its_error(monkeypatch):
+    async def fail(_):
+        raise MonitorError("monitor: the database cannot be opened")
+
+    monkeypatch.setattr("monitor.live_channel.LiveChannel.run", fail)
+    with pytest.raises(MonitorError, match="the database cannot be opened"):
+        async with serving(monkeypatch) as served:
+            await served.task

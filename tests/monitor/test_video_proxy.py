@@ -1,0 +1,201 @@
+import asyncio
+import contextlib
+
+import pytest
+from aiohttp import web
+
+from monitor.video_proxy import can_be_passed_on
+from monitor.video_stream import MAX_IMAGE_BYTES, Shot, ShotCutter, StreamBrokenError
+from tests.monitor.serving import browser, serving
+
+JPEG = b"\xff\xd8\xff\xe0 an image \xff\xd9"
+
+
+def part(number, body=JPEG, head=""):
+    text = f"--x\r\nContent-Type: image/jpeg\r\nX-Time-Us: {number}\r\n{head}\r\n"
+    return text.encode() + body + b"\r\n"
+
+
+@pytest.mark.parametrize("size", [1, 7, 1000])
+@pytest.mark.parametrize("head", ["", f"Content-Length: {len(JPEG)}\r\n"])
+def test_images_are_cut_whatever_the_pieces(size, head):
+    cutter = ShotCutter("multipart/x-mixed-replace; boundary=--x")
+    stream = b"noise" + part(1, head=head) + part(2, head=head) + b"--x"
+    shots = []
+    for at in range(0, len(stream), size):
+        shots += cutter.feed(stream[at : at + size])
+    assert [shot.time_us for shot in shots] == [1, 2]
+    assert all(shot.jpeg.rstrip(b"\r\n") == JPEG for shot in shots)
+
+
+def test_what_is_no_jpeg_is_dropped():
+    cutter = ShotCutter('multipart/x-mixed-replace; boundary="x"')
+    evil = b"<script>alert(1)</script>"
+    length = f"Content-Length: {len(evil)}\r\n"
+    sound = f"Content-Length: {len(JPEG)}\r\n"
+    assert cutter.feed(part(1, evil, length) + part(2, head=sound)) == [Shot(JPEG, 2)]
+
+
+@pytest.mark.parametrize(
+    "data",
+    [
+        part(1, head=f"Content-Length: {MAX_IMAGE_BYTES + 1}\r\n"),
+        part(1, b"\xff\xd8\xff" + bytes(MAX_IMAGE_BYTES)),
+        b"--x\r\n" + b"a: b\r\n" * 10_000,
+    ],
+)
+def test_what_is_too_large_is_refused(data):
+    with pytest.raises(StreamBrokenError, match=r"exceed|refused"):
+        ShotCutter("multipart/x-mixed-replace; boundary=x").feed(data)
+
+
+@pytest.mark.parametrize("kind", ["text/html", "image/jpeg", "multipart/mixed", ""])
+def test_another_kind_of_stream_is_refused(kind):
+    with pytest.raises(StreamBrokenError):
+        ShotCutter(kind)
+
+
+def test_only_http_is_passed_on():
+    assert can_be_passed_on("http://127.0.0.1:8100/video")
+    for url in (
+        None,
+        "",
+        "rtsp://a/b",
+        "5600",
+        "udp://0.0.0.0:5600",
+        "file:///etc/passwd",
+        "http://[",
+        "http://",
+    ):
+        assert not can_be_passed_on(url)
+
+
+class Camera:
+    """A drone's video: numbered images, one for each `show`."""
+
+    def __init__(self):
+        self.connections = 0
+        self.now = 0
+        self.number = 0
+        self.is_broken = False
+        self.changed = asyncio.Event()
+
+    def show(self):
+        self.number += 1
+        self.changed.set()
+        self.changed.clear()
+
+    async def video(self, request):
+        response = web.StreamResponse(headers={"Content-Type": "multipart/x-mixed-replace; boundary=x"})
+        await response.prepare(request)
+        self.connections += 1
+        self.now += 1
+        try:
+            while True:
+                await response.write(part(self.number, head=f"Content-Length: {len(JPEG)}\r\n"))
+                await self.changed.wait()
+                if self.is_broken:
+                    self.is_broken = False
+                    return response
+        finally:
+            self.now -= 1
+
+    async def elsewhere(self, request):
+        raise web.HTTPFound("/video")
+
+
+@contextlib.asynccontextmanager
+async def camera():
+    source = Camera()
+    app = web.Application()
+    app.router.add_get("/video", source.video)
+    app.router.add_get("/moved", source.elsewhere)
+    runner = web.AppRunner(app, shutdown_timeout=0.1)
+    await runner.setup()
+    site = web.TCPSite(runner, "127.0.0.1", 0)
+    await site.start()
+    source.url = f"http://127.0.0.1:{runner.addresses[0][1]}/video"
+    try:
+        yield source
+    finally:
+        await runner.cleanup()
+
+
+async def reached(condition):
+    async with asyncio.timeout(15):
+        while not condition():  # noqa: ASYNC110 - it is another program's doing
+            await asyncio.sleep(0.02)
+
+
+async def next_number(answer):
+    async with asyncio.timeout(15):
+        while not (line := await answer.content.readline()).startswith(b"X-Time-Us:"):
+            assert line, "the stream ended"
+    return int(line.partition(b":")[2])
+
+
+async def test_many_watch_over_one_connection_which_ends_with_them(monkeypatch):
+    async with camera() as source, serving(monkeypatch) as served, browser() as client:
+        served.fleet.video = source.url
+        answers = [await client.get(served.url + "video/1") for _ in range(3)]
+        assert answers[0].headers["Content-Type"].startswith("multipart/x-mixed-replace")
+        for answer in answers:
+            assert await next_number(answer) == 0
+        source.show()
+        for answer in answers:
+            assert await next_number(answer) == 1
+        assert source.connections == 1
+        for answer in answers:
+            answer.close()
+        await reached(lambda: source.now == 0 or source.show())
+
+
+async def test_one_image_is_had_alone(monkeypatch):
+    async with camera() as source, serving(monkeypatch) as served, browser() as client:
+        served.fleet.video = source.url
+        source.number = 7
+        async with client.get(served.url + "video/1/image.jpg") as answer:
+            assert await answer.read() == JPEG
+            assert answer.headers["Content-Type"] == "image/jpeg"
+            assert answer.headers["X-Time-Us"] == "7"
+            assert answer.headers["X-Content-Type-Options"] == "nosniff"
+
+
+async def test_a_drone_that_was_away_is_seen_again(monkeypatch):
+    monkeypatch.setattr("monitor.video_proxy._RETRY_S", 0.05)
+    async with camera() as source, serving(monkeypatch) as served, browser() as client:
+        served.fleet.video = source.url
+        answer = await client.get(served.url + "video/1")
+        assert await next_number(answer) == 0
+        source.is_broken = True
+        source.number = 40
+        source.show()  # as the last one of this connection
+        await reached(lambda: source.connections == 2)
+        assert await next_number(answer) == 41
+        answer.close()
+
+
+@pytest.mark.parametrize(
+    ("path", "video", "status", "words"),
+    [
+        ("2", None, 404, "no drone 2"),
+        ("1", None, 404, "tells of no video"),
+        ("1", "rtsp://10.0.0.1/live", 404, "is rtsp; only MJPEG over http"),
+        ("1", "5600", 404, "only MJPEG over http"),
+    ],
+)
+async def test_video_that_cannot_be_had_is_told_in_words(monkeypatch, path, video, status, words):
+    async with serving(monkeypatch) as served, browser() as client:
+        served.fleet.video = video
+        async with client.get(served.url + f"video/{path}") as answer:
+            assert answer.status == status
+            assert words in await answer.text()
+
+
+async def test_a_redirection_is_not_followed(monkeypatch):
+    monkeypatch.setattr("monitor.video_proxy.FIRST_IMAGE_S", 0.5)
+    async with camera() as source, serving(monkeypatch) as served, browser() as client:
+        served.fleet.video = source.url.replace("/video", "/moved")
+        async with client.get(served.url + "video/1/image.jpg") as answer:
+            assert answer.status == 503
+        assert source.connections == 0
