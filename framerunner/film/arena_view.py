@@ -61,7 +61,8 @@ class ArenaView:
         self._tops_m = np.array([face.corners_arena_m[:, 2].max() for face in faces])
         self._drone = DroneShape(load_airframe(scenario.airframe), DRONE_SCALE)
         self._slab = _slab(scene.tatami.corners_arena_m)
-        self._canvas = np.empty((FINE * size_px[1], FINE * size_px[0], 3), np.uint8)
+        self._paper = np.full((FINE * size_px[1], FINE * size_px[0], 3), PAPER, np.uint8)
+        self._canvas = self._paper.copy()
         self._pen = max(1.0, FINE * size_px[1] / 430)  # a line's width where the picture has its usual size
 
     def paint(self, instant: Instant, viewpoint: Viewpoint, film_s: float) -> Image:
@@ -76,7 +77,7 @@ class ArenaView:
             A new image, BGR, shape (height, width, 3).
         """
         view = viewpoint.scaled(FINE)
-        self._canvas[:] = PAPER
+        np.copyto(self._canvas, self._paper)
         for corners, colour in self._slab:
             self._fill(view, corners, colour)
         for face in self._floor:
@@ -197,7 +198,9 @@ class ArenaView:
 def _fixed(pixels: Floats) -> npt.NDArray[np.int32]:
     """Pixels as OpenCV's drawing takes them, in sixteenths; what is far beside the picture is kept finite."""
     far = 20_000.0
-    return np.rint(np.clip(np.nan_to_num(pixels, nan=-far), -far, far) * (1 << _SHIFT)).astype(np.int32)
+    kept = np.clip(pixels, -far, far)
+    kept[np.isnan(kept)] = -far
+    return np.rint(kept * (1 << _SHIFT)).astype(np.int32)
 
 
 def _runs(slots: npt.NDArray[np.int64], kinds: npt.NDArray[np.int32]) -> list[tuple[int, int, int, int]]:

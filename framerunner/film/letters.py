@@ -25,10 +25,11 @@ class Letters:
     def __init__(self) -> None:
         self._font = lru_cache(32)(_font)
         self._mask = lru_cache(_REMEMBERED)(self._draw)
+        self._measured = lru_cache(_REMEMBERED)(self._measure)
 
     def width(self, text: str, size_px: float, bold: bool = False) -> int:
         """How wide a text will be, pixels."""
-        return round(self._font(round(size_px), bold).getlength(_printable(text)))
+        return self._measured(text, round(size_px), bold)
 
     def write(
         self,
@@ -72,6 +73,9 @@ class Letters:
         while text and self.width(text + "…", size_px, bold) > width_px:
             text = text[:-1]
         return text + "…"
+
+    def _measure(self, text: str, size_px: int, bold: bool) -> int:
+        return round(self._font(size_px, bold).getlength(_printable(text)))
 
     def _draw(self, text: str, size_px: int, bold: bool) -> tuple[Mask, int, int]:
         font = self._font(size_px, bold)

@@ -108,11 +108,11 @@ def _film(story: Story, settings: FilmSettings) -> Made:
         raise RecordingError(
             f"film: would take {flown_s / speed:.0f} s, at most {LONGEST_S:g} s are made; raise --speed"
         )
-    moving = max(2, round(flown_s / speed * settings.fps))
+    held = round(HOLD_S * settings.fps)
+    moving = max(2, round((flown_s / speed + HOLD_S) * settings.fps) - held)
     times_s = np.linspace(story.begin_s, story.end_s, moving)
     sheet = Sheet(story, settings.size_px, speed)
     codec = "gif" if settings.out.suffix.lower() == ".gif" else mp4_codec()
-    held = round(HOLD_S * settings.fps)
 
     def open_film(path: Path) -> FilmFile:
         if codec == "gif":
