@@ -182,8 +182,11 @@ class _Flight:
         imu = Imu(state.x, state.y, state.z, state.yaw)
         command = self._engine.tick(imu, detections, state.time_us)
         wanted = self._engine.pilot.cmd.on
+        switches = wanted != self._flying
+        self._motors_asked = self._motors_asked or wanted
+        if switches:  # this takes seconds; those who watch shall know at once why
+            self._observe(state, command, detections)
         if wanted and not self._flying:
-            self._motors_asked = True
             await self._drone.motors_on()
             self._flying = True
             self._started_us = None  # counts from the next tick, the first with motors on
@@ -192,6 +195,10 @@ class _Flight:
         if self._flying:
             self._drone.command(command)
         self._ticks += 1
+        if not switches:
+            self._observe(state, command, detections)
+
+    def _observe(self, state: DroneState, command: VelocityCommand, detections: Detections) -> None:
         if self._observer is not None:
             flight_time_s = self._flight_time_s()
             engine = self._engine
