@@ -14,7 +14,7 @@ from pathlib import Path
 import nicegui
 import uvicorn
 from fastapi import FastAPI
-from nicegui import core, ui
+from nicegui import Client, core, ui
 from starlette.responses import Response
 from starlette.staticfiles import StaticFiles
 from starlette.types import Scope
@@ -133,6 +133,7 @@ def _add_nicegui(web: FastAPI) -> None:
     core.app.middleware_stack = None
     core.app.user_middleware.clear()
     core.app._shutdown_handlers.clear()
+    Client.instances.clear()  # pages of before load again
     logging.getLogger("nicegui").setLevel(logging.ERROR)  # it warns of every address that is not there
     ui.run_with(
         web,
