@@ -96,9 +96,6 @@ async def test_ten_viewers_get_every_pose_at_once(monkeypatch):
         numbers = [number for _, number in poses]
         # None is left out, so whatever the machine's load they came as fast as they were made.
         assert numbers == list(range(int(numbers[0]), int(numbers[0]) + len(numbers)))
-    for same in {number for _, number in seen[0]} & {number for _, number in seen[-1]}:
-        times = [{n: t for t, n in poses}[same] for poses in (seen[0], seen[-1])]
-        assert abs(times[0] - times[1]) < 0.5
 
 
 async def test_a_page_may_ask_for_some_kinds_only(monkeypatch):

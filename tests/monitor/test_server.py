@@ -2,7 +2,6 @@ import asyncio
 import json
 import re
 import socket
-import time
 
 import aiohttp
 import pytest
@@ -178,11 +177,10 @@ async def test_it_ends_soon_though_somebody_watches_and_its_port_is_free_again(m
         port = served.port
         live = await client.ws_connect(served.url + "ws/live")
         await live.receive_json()
-        begin_s = time.monotonic()
         served.task.cancel()
-        with pytest.raises(asyncio.CancelledError):
-            await served.task
-        assert time.monotonic() - begin_s < 5  # 0.3 s on a quiet machine
+        done, _ = await asyncio.wait({served.task}, timeout=20)  # 0.3 s on a quiet machine
+        assert done == {served.task}
+        assert served.task.cancelled()
         assert served.fleet.hearers == []
     async with (
         serving(monkeypatch, SAMPLE, port=port) as again,
