@@ -208,9 +208,7 @@ class PilotSeat:
         if what == "take" and forsaken:
             return ""
         if what == "take":
-            return (
-                f"{holder.name} has the sticks; they are free when {holder.name} gives them back or is gone"
-            )
+            return f"{holder.name} has the sticks; ask for them to be given back"
         return f"{holder.name} has the sticks of {self._name}"
 
     def _must_wait(self, person: Person, what: str) -> bool:
