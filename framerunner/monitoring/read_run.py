@@ -75,8 +75,10 @@ def main() -> int:
     """Read the run that the command line names; what goes wrong is the last line on standard error."""
     with contextlib.suppress(OSError):
         os.nice(_NICENESS)
+    folder, target = Path(sys.argv[1]), Path(sys.argv[2])
     try:
-        read_run(Path(sys.argv[1]), Path(sys.argv[2]))
+        os.chdir(folder.parent)  # so that no message tells strangers where the runs lie
+        read_run(Path(folder.name), target)
     except (RecordingError, ScenarioError, OSError) as error:
         print(" ".join(str(error).split()), file=sys.stderr)
         return 2
