@@ -33,6 +33,10 @@ MODULES = (
     "monitor.pages.pilot",
     "monitor.replay_api",
     "monitor.pages.replay",
+    "monitor.competition.api",
+    "monitor.pages.competition",
+    "monitor.pages.judge",
+    "monitor.pages.ranking",
 )
 
 

@@ -146,19 +146,16 @@ def writing_routes(service: CompetitionService, access: Access) -> APIRouter:
         crossed = None if form.crossed is None else tuple(form.crossed)
         said = Correction(crossed, form.contacts, form.penalty_s, form.try_time_s, form.completed)
         await _words(
-            service.change(
-                lambda store: store.correct(_ident("try", try_id), form.seen, said, form.remarks, entry)
-            )
+            service.change(lambda store: store.correct(number, form.seen, said, form.remarks, entry))
         )
-        return _json({"try": int(try_id)})
+        return _json({"try": number})
 
     @routes.post("/tries/{try_id}/team")
     async def assign(request: Request, try_id: str) -> Response:
         form, entry = await asked(request, TeamOfTryForm)
-        await _words(
-            service.change(lambda store: store.assign(_ident("try", try_id), form.seen, form.team, entry))
-        )
-        return _json({"try": int(try_id)})
+        number = await _words(_ident("try", try_id))
+        await _words(service.change(lambda store: store.assign(number, form.seen, form.team, entry)))
+        return _json({"try": number})
 
     return routes
 

@@ -38,6 +38,7 @@ from monitor.competition.views import (
     TryDetail,
     TryView,
 )
+from monitor.competition.words import from_wire
 
 MOST_TRIES_SHOWN = 500
 
@@ -262,8 +263,8 @@ def _try_view(judged: _Judged, names: Mapping[int, str], attempts: Mapping[int, 
         frames=tuple(row.frames.split()),
         state=row.state,
         judged=judged.counts,
-        verdict=str(judged.report.get("verdict", "")),
-        reason=str(judged.report.get("reason", "")),
+        verdict=from_wire(judged.report.get("verdict"), 40),
+        reason=from_wire(judged.report.get("reason"), 500),
         source=row.source,
         final=row.final,
         referee=_result_view(judged.referee, rule),

@@ -136,7 +136,7 @@ class Desk {
       make("td", {}, `${each.id}`, make("span", { class: "when" }, moment(each.started))),
       make("td", { class: "team" }, team),
       make("td", {}, orDash(each.scenario), make("span", { class: "when" }, each.round === 0 ? "before the draw" : `round ${each.round}`)),
-      make("td", {}, standing(each), " ", frameMarks(each.frames, each.result.crossed),
+      make("td", {}, standing(each), " ", running ? null : frameMarks(each.frames, each.result.crossed),
         each.corrected_by === "" ? null : make("span", { class: "when" }, "corrected by ", nameOf(each.corrected_by))),
       counts,
       make("td", {}, make("a", {

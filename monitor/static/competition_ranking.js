@@ -1,7 +1,7 @@
 /** The ranking, for a projector: follows the contest by itself. */
 
 import { ask, oneAtATime, watch } from "./competition_channel.js";
-import { frameMarks, nameOf, orDash, seconds, worth } from "./competition_words.js";
+import { frameMarks, nameOf, orDash, seconds } from "./competition_words.js";
 import { make, setText, wantsStillness, whenThere } from "./dom.js";
 
 const MOVE_MS = 700;
@@ -93,7 +93,7 @@ class Ranking {
   #showHead(scenarios) {
     const titles = ["Rank", "Team", ...scenarios.map((name, index) => name || `Scenario ${index + 1}`), "Total"];
     const kinds = ["rank", "team", ...scenarios.map(() => "cell"), "total"];
-    this.#element.style.setProperty("--scenarios", String(scenarios.length));
+    this.#element.style.setProperty("--columns", String(Math.max(2, scenarios.length)));
     this.#head.replaceChildren(...titles.map((title, index) =>
       make("th", { scope: "col", role: "columnheader", class: kinds[index] }, title)));
     this.titles = titles;
@@ -147,7 +147,8 @@ class Ranking {
 
   #cell(cell, title) {
     const flown = cell.state !== "not flown";
-    const note = flown && cell.state !== "completed" ? worth({ completed: false, missing: Array(cell.missing).fill("") }) : "";
+    const lacks = cell.missing === 0 ? "not completed" : `${cell.missing} missing`;
+    const note = flown && cell.state !== "completed" ? lacks : "";
     return make("td", { class: "cell", role: "cell", "data-state": cell.state, "data-title": title },
       make("span", { class: "time" }, flown ? seconds(cell.counted_s) : "–"),
       make("span", { class: "note" }, flown ? note : `counts ${seconds(cell.counted_s)}`));

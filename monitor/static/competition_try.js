@@ -11,7 +11,7 @@ const { judge, attempt } = pageData(import.meta.url);
 class TryPage {
   #line = make("p", { class: "line", role: "status", hidden: true });
   #head = make("div", { class: "panel head" });
-  #form = make("form", { class: "panel fields judge", novalidate: true });
+  #form = make("form", { class: "panel fields judge", novalidate: true, hidden: true }); // until it is filled in
   #fields = new Fields(() => this.#preview());
   #team = make("select", { id: "try-team" });
   #counts = make("p", { class: "counts", "aria-live": "polite" });
@@ -41,7 +41,7 @@ class TryPage {
   }
 
   #teamForm() {
-    const form = make("form", { class: "panel fields" }, make("label", { for: "try-team" }, "Whose try it is"),
+    const form = make("form", { class: "panel fields", hidden: true }, make("label", { for: "try-team" }, "Whose try it is"),
       make("div", { class: "buttons" }, this.#team, make("button", { type: "submit" }, "Set")));
     form.addEventListener("submit", (event) => {
       event.preventDefault();
@@ -125,6 +125,7 @@ class TryPage {
     if (!judge) return;
     this.#showTeams(teams, detail.try.team, before?.try.team);
     if (!filled || force) this.#fields.show(detail);
+    for (const form of [this.#form, this.#team.form]) form.hidden = false;
     this.#preview();
   }
 
@@ -136,10 +137,7 @@ class TryPage {
       ...row("Team", each.team === null ? make("span", { class: "tag warn" }, "no team") : nameOf(each.team_name)),
       ...row("Scenario", orDash(each.scenario), each.round === 0 ? ", before the draw" : `, round ${each.round}`),
       ...row("State", each.state === "running" ? "running" : standing(each)),
-      ...row("Frames", frameMarks(each.frames, result.crossed), ` ${result.crossed.join(", ") || "none"}`),
-      ...row("Contacts", String(result.contacts)),
-      ...row("Try time", `${seconds(result.try_time_s)} s`),
-      ...row("Penalty", `${seconds(result.penalty_s)} s`),
+      ...(judge ? [] : values(each, result, row)),
       ...row("Counts", make("strong", {}, each.judged ? `${seconds(result.counted_s)} s` : "not yet judged")),
       ...row("Referee", each.reason || "–", each.source === "" ? "" : ` (by ${each.source}${each.final ? ", final" : ""})`),
     ];
@@ -175,6 +173,17 @@ class TryPage {
       make("div", {}, ...describe(entry)),
       entry.remarks === "" ? null : make("p", { class: "remarks", dir: "auto" }, entry.remarks))));
   }
+}
+
+/** What the form shows to judges, for those who only look. */
+function values(each, result, row) {
+  return [
+    ...row("Frames", frameMarks(each.frames, result.crossed), ` ${result.crossed.join(", ") || "none"}`),
+    ...row("Completed", result.completed ? "yes" : "no"),
+    ...row("Contacts", String(result.contacts)),
+    ...row("Try time", `${seconds(result.try_time_s)} s`),
+    ...row("Penalty", `${seconds(result.penalty_s)} s`),
+  ];
 }
 
 /** What an entry of the history says. */

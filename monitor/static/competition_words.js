@@ -11,7 +11,7 @@ export function seconds(value) {
 export function moment(iso) {
   const date = new Date(iso);
   const sameDay = date.toDateString() === new Date().toDateString();
-  const time = date.toLocaleTimeString([], { hour: "2-digit", minute: "2-digit", second: "2-digit" });
+  const time = date.toLocaleTimeString([], { hour: "2-digit", minute: "2-digit", second: "2-digit", hour12: false });
   return sameDay ? time : `${date.toLocaleDateString()} ${time}`;
 }
 

@@ -1,0 +1,57 @@
+import csv
+import io
+from datetime import UTC, datetime
+
+import pytest
+
+from monitor.competition.database import Database
+from monitor.competition.export import _safe, ranking_csv, tries_csv
+from monitor.competition.store import Entry, Store
+from tests.monitor.competition.harness import COLOURS, event
+
+NOW = datetime(2030, 5, 17, 12, 0, tzinfo=UTC)
+ADA = Entry("=Ada", NOW)
+
+
+@pytest.fixture
+def board():
+    store = Store(Database("sqlite://"))
+    for key, name in (("1", '=HYPERLINK("http://x")'), ("2", 'Comma, "quoted"'), ("3", "الصقور")):
+        store.call(store.add_team(name, "", ADA), "", ADA)
+        told = event("ended", key, time_s=30.0 + int(key), contacts=int(key))
+        told.report["reason"] = "-1+1\nsecond line"
+        store.take(told, COLOURS, NOW)
+    yield store.board()
+    store.close()
+
+
+def read(text):
+    return list(csv.DictReader(io.StringIO(text)))
+
+
+def test_the_ranking_has_a_header_and_names_that_are_no_formulas(board):
+    rows = read(ranking_csv(board.rankings[0]))
+    assert [row["team"] for row in rows] == ['\'=HYPERLINK("http://x")', 'Comma, "quoted"', "الصقور"]
+    assert rows[0]["rank"] == "1" and rows[0]["total_s"] == "751.00"
+    assert rows[0]["case-1 counted_s"] == "31.00" and rows[0]["case-1 try"] == "1"
+    assert rows[0]["scenario 2 state"] == "not flown" and rows[0]["scenario 2 try"] == ""
+
+
+def test_the_tries_have_all_that_is_known(board):
+    rows = read(tries_csv(board))
+    assert [row["try"] for row in rows] == ["1", "2", "3"]
+    assert rows[2]["team"] == "الصقور" and rows[2]["contacts"] == "3" and rows[2]["try_time_s"] == "33.0"
+    assert rows[0]["crossed"] == "red green blue" and rows[0]["judged"] == "true"
+    assert rows[0]["started"] == NOW.isoformat() and rows[0]["reason"] == "'-1+1second line"
+
+
+@pytest.mark.parametrize("value", ["=1", "+1", "-1", "@x", "\t=1", " =1", "\r=1"])
+def test_what_a_spreadsheet_takes_for_a_formula_is_marked(value):
+    assert _safe(value) == f"'{value}"
+
+
+@pytest.mark.parametrize(
+    ("value", "text"), [("a=1", "a=1"), (-1.5, "-1.5"), (None, ""), (True, "true"), (3, "3")]
+)
+def test_what_is_none_is_left_alone(value, text):
+    assert _safe(value) == text

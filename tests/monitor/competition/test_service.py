@@ -1,0 +1,189 @@
+"""The service on an event loop, with its database behind a thread."""
+
+import asyncio
+import threading
+from contextlib import asynccontextmanager
+from random import Random
+
+import pytest
+
+from monitor.competition.database import DatabaseError
+from monitor.competition.service import CompetitionService
+from monitor.competition.store import Store
+from monitor.competition.words import Refused
+from tests.monitor.competition.harness import COLOURS, EQUIPMENT, event
+
+
+async def until(holds, seconds=10.0):
+    async with asyncio.timeout(seconds):
+        while not holds():  # noqa: ASYNC110 - what it waits for has no event of its own
+            await asyncio.sleep(0.005)
+
+
+@asynccontextmanager
+async def serving(url, **options):
+    service = CompetitionService(url, EQUIPMENT, **options)
+    task = asyncio.create_task(service.run())
+    try:
+        await until(lambda: service._board is not None or task.done())
+        if task.done():
+            task.result()
+        yield service
+    finally:
+        task.cancel()
+        await asyncio.gather(task, return_exceptions=True)
+
+
+@pytest.fixture
+def url(tmp_path):
+    return f"sqlite:///{tmp_path}/contest.db"
+
+
+async def test_a_bad_database_ends_the_service_in_words():
+    with pytest.raises(DatabaseError, match="not the URL of a database"):
+        async with serving("rubbish"):
+            pass
+
+
+async def test_before_the_database_is_open_everything_says_so():
+    service = CompetitionService("sqlite://", EQUIPMENT)
+    with pytest.raises(DatabaseError, match="being opened"):
+        _ = service.board
+    with pytest.raises(DatabaseError, match="being opened"):
+        await service.change(lambda store: store.rule())
+    assert service.running == () and service.news()[0]["version"] == 0
+
+
+async def test_listeners_hear_only_what_is_committed(url):
+    async with serving(url) as service:
+        seen = []
+
+        def hear(message):
+            if message["kind"] == "changed":
+                other = Store(service._store._database)  # what another reader of the file finds now
+                seen.append((message["version"], [each.state for each in other.board().tries]))
+
+        service.subscribe(hear)
+        service.hear(event("began", "k", time_s=0.0))
+        await until(lambda: seen)
+        service.hear(event("ended", "k"))
+        await until(lambda: len(seen) >= 2)
+        assert [states for _, states in seen] == [["running"], ["ended"]]
+        assert seen[0][0] < seen[1][0]
+
+
+async def test_a_running_try_is_told_every_time_without_reading_everything(url):
+    async with serving(url) as service:
+        heard = []
+        service.subscribe(heard.append)
+        service.hear(event("began", "k", time_s=0.0))
+        await until(lambda: service.running)
+        version = service.board.version
+        for time_s in (1.0, 2.0, 3.0):
+            service.hear(event("running", "k", time_s=time_s, crossed=("red",)))
+            await until(lambda now=time_s: service.running[0].try_time_s == now)
+        assert service.board.version == version
+        assert [m["tries"][0]["try_time_s"] for m in heard if m["kind"] == "running"][-3:] == [1.0, 2.0, 3.0]
+        assert service.running[0].crossed == ("red",)
+        service.hear(event("ended", "k"))
+        await until(lambda: not service.running)
+
+
+async def test_a_listener_that_left_hears_nothing(url):
+    async with serving(url) as service:
+        heard = []
+        service.subscribe(heard.append)()
+        assert service.listeners == 0
+        service.hear(event("ended", "k"))
+        await until(lambda: service.board.tries)
+        assert heard == []
+
+
+async def test_a_slow_database_stalls_nobody_else(url):
+    async with serving(url) as service:
+        free = threading.Event()
+        blocked = asyncio.create_task(service.read(lambda _: free.wait(20)))
+        await asyncio.sleep(0)
+        started = asyncio.get_running_loop().time()
+        for _ in range(100):
+            assert service.board.tries == ()  # pages are answered from what was read before
+            await asyncio.sleep(0)
+        assert asyncio.get_running_loop().time() - started < 5.0 and not blocked.done()
+        service.hear(event("ended", "k"))
+        free.set()
+        await blocked
+        await until(lambda: service.board.tries)
+
+
+async def test_results_wait_for_a_database_that_is_away(url, monkeypatch):
+    monkeypatch.setattr("monitor.competition.service._AGAIN_S", 0.01)
+    away = True
+    take = Store.take
+
+    def fail(self, *arguments):
+        if away:
+            raise DatabaseError("database x: connection refused")
+        return take(self, *arguments)
+
+    monkeypatch.setattr(Store, "take", fail)
+    async with serving(url) as service:
+        problems = []
+        service.subscribe(lambda message: problems.append(message.get("problem")))
+        service.hear(event("began", "k", time_s=0.0))
+        service.hear(event("running", "k", time_s=1.0))
+        service.hear(event("ended", "k"))
+        await until(lambda: problems)
+        assert "connection refused; 2 changes of tries wait" in service.problem
+        away = False
+        await until(lambda: service.board.tries and service.board.tries[0].judged)
+        assert service.problem == ""
+
+
+async def test_one_bad_try_does_not_end_the_contest(url, monkeypatch):
+    take = Store.take
+    monkeypatch.setattr(
+        Store, "take", lambda self, told, *rest: 1 / 0 if told.key == "bad" else take(self, told, *rest)
+    )
+    async with serving(url) as service:
+        service.hear(event("ended", "bad"))
+        service.hear(event("ended", "good"))
+        await until(lambda: service.board.tries)
+        assert service.board.tries[0].judged
+
+
+async def test_a_draw_takes_from_the_pool_and_every_one_can_come_first(url):
+    async with serving(url, random=Random(1)) as service:
+        pool = ["case-1", "case-2", "case-3", "calm-17"]
+        first = set()
+        for _ in range(40):
+            await service.draw([*pool, "case-1"], 3, "Ada")
+            draw = service.board.draws[0]
+            assert len(set(draw.scenarios)) == 3 and set(draw.scenarios) <= set(pool)
+            assert draw.pool == tuple(pool) and draw.who == "Ada"
+            first.add(draw.scenarios[0])
+        assert first == set(pool)
+        assert service.board.round == 1
+
+
+@pytest.mark.parametrize(
+    ("pool", "count", "words"),
+    [
+        (["case-1"], 2, "count 2 is more than the 1"),
+        (["../secrets"], 1, "is no name"),
+        (["nowhere"], 1, "unknown"),
+    ],
+)
+async def test_a_bad_draw_is_refused(url, pool, count, words):
+    async with serving(url) as service:
+        with pytest.raises(Refused, match=words):
+            await service.draw(pool, count, "Ada")
+        assert service.board.draws == ()
+
+
+async def test_frames_are_those_of_the_scenario_or_all(url):
+    async with serving(url) as service:
+        for key, name in (("a", "two-1"), ("b", "somebody-elses"), ("c", "../x"), ("d", "")):
+            service.hear(event("ended", key, name))
+        await until(lambda: len(service.board.tries) == 4)
+        frames = {each.scenario: each.frames for each in service.board.tries}
+        assert frames == {"two-1": COLOURS[:2], "somebody-elses": COLOURS, "../x": COLOURS, "": COLOURS}
