@@ -55,9 +55,10 @@ export class Side {
     for (const pose of run.poses) this.#plots.add(pose.t, pose);
   }
 
-  /** Show a time. @param {number} t seconds since motors on */
-  show(t) {
+  /** Show a time; a flight that is over stands still. @param {number} now seconds since motors on */
+  show(now) {
     const run = this.#run;
+    const t = Math.min(now, run.end);
     this.#moveTo(t);
     this.#images.want(run.imageAt(t));
     this.#camera.setDetections(run.detectionsAt(t));
@@ -69,7 +70,7 @@ export class Side {
     this.#told = told;
     this.#plots.showUntil(t);
     setAttribute(this.root, "data-state", state ?? "");
-    setAttribute(this.root, "data-ended", t > run.end);
+    setAttribute(this.root, "data-ended", now > run.end);
   }
 
   #moveTo(t) {

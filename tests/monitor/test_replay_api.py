@@ -1,0 +1,112 @@
+"""Recorded flights over HTTP: whole, packed, asked for once; 404 with one line for the rest."""
+
+import gzip
+
+import pytest
+
+from tests.monitor.replay_runs import MARKUP, Library, a_run, serving_runs
+from tests.monitor.serving import browser
+
+
+async def test_the_list_and_a_run_are_json(monkeypatch):
+    library = Library(a_run(), a_run(MARKUP))
+    async with serving_runs(monkeypatch, library) as served, browser() as client:
+        async with client.get(f"{served.url}api/runs") as answer:
+            assert answer.status == 200
+            listed = await answer.json()
+        assert [each["name"] for each in listed] == ["first", MARKUP]
+        assert listed[0] == {
+            "name": "first",
+            "scenario": "test-case-1",
+            "mission": "frame_challenge",
+            "verdict": "clean",
+            "total_time_s": 39.0,
+            "started": "2026-01-02T03:04:05+00:00",
+        }
+        async with client.get(f"{served.url}api/runs/first") as answer:
+            assert answer.headers["Content-Type"] == "application/json"
+            assert await answer.json() == a_run()
+        async with client.get(f"{served.url}api/runs/first/result.json") as answer:
+            assert await answer.json() == a_run()["result"]
+
+
+async def test_it_is_packed_for_those_who_can_unpack_it(monkeypatch):
+    async with serving_runs(monkeypatch, Library(a_run())) as served, browser() as client:
+        sizes = {}
+        for coding in ("gzip", "identity"):
+            headers = {"Accept-Encoding": coding}
+            async with client.get(f"{served.url}api/runs/first", headers=headers) as answer:
+                sizes[coding] = int(answer.headers["Content-Length"])
+                assert answer.headers.get("Content-Encoding", "identity") == coding
+                assert (await answer.json())["name"] == "first"
+        assert sizes["gzip"] < sizes["identity"] / 3
+
+
+async def test_what_a_browser_has_already_is_not_sent_again(monkeypatch):
+    library = Library(a_run())
+    packed = []
+    compress = gzip.compress
+    monkeypatch.setattr(gzip, "compress", lambda *a, **more: packed.append(a) or compress(*a, **more))
+    async with serving_runs(monkeypatch, library) as served, browser() as client:
+        url = f"{served.url}api/runs/first"
+        async with client.get(url) as answer:
+            tag = answer.headers["ETag"]
+        async with client.get(url, headers={"If-None-Match": tag}) as answer:
+            assert answer.status == 304
+            assert await answer.read() == b""
+        assert len(packed) == 1
+        library._runs["first"] = a_run(end_s=20.0)  # flown on meanwhile
+        async with client.get(url, headers={"If-None-Match": tag}) as answer:
+            assert answer.status == 200
+            assert answer.headers["ETag"] != tag
+
+
+async def test_images_are_jpegs(monkeypatch):
+    async with serving_runs(monkeypatch, Library(a_run())) as served, browser() as client:
+        answer = await client.get(f"{served.url}api/runs/first/image/7.jpg")
+        assert answer.headers["Content-Type"] == "image/jpeg"
+        assert (await answer.read())[:2] == b"\xff\xd8"
+
+
+@pytest.mark.parametrize(
+    ("path", "words"),
+    [
+        ("missing", "run 'missing': there is no such run"),
+        ("first/image/60.jpg", "run 'first': has no image 60"),
+        ("first/image/-1.jpg", "image '-1': must be a whole number"),
+        ("first/image/%D9%A3.jpg", "must be a whole number"),
+        ("first/image/1e400.jpg", "must be a whole number"),
+        ("first/image/" + "9" * 5000 + ".jpg", "must be a whole number"),
+        ("missing/image/0.jpg", "run 'missing': there is no such run"),
+        ("missing/result.json", "run 'missing': there is no such run"),
+        ("unjudged/result.json", "run 'unjudged': was not judged"),
+    ],
+)
+async def test_what_is_not_there_is_told_in_one_line(monkeypatch, path, words):
+    library = Library(a_run(), a_run("unjudged", result=None))
+    async with serving_runs(monkeypatch, library) as served, browser() as client:
+        answer = await client.get(f"{served.url}api/runs/{path}")
+        assert answer.status == 404
+        text = await answer.text()
+        assert words in text
+        assert text.count("\n") == 1
+        assert answer.headers["Content-Type"].startswith("text/plain")
+
+
+async def test_a_name_cannot_climb_out_of_its_place(monkeypatch):
+    library = Library(a_run())
+    async with serving_runs(monkeypatch, library) as served, browser() as client:
+        for path in ("..%2f..%2fetc", "%2e%2e", "first%00", "%2fetc%2fpasswd"):
+            async with client.get(f"{served.url}api/runs/{path}") as answer:
+                assert answer.status == 404
+        assert all("first" not in name or "\0" in name for name in library.read)
+
+
+async def test_without_a_library_there_is_an_empty_list_and_a_hint(monkeypatch):
+    async with serving_runs(monkeypatch, None) as served, browser() as client:
+        async with client.get(f"{served.url}api/runs") as answer:
+            assert await answer.json() == []
+        for path in ("a", "a/image/0.jpg", "a/result.json"):
+            async with client.get(f"{served.url}api/runs/{path}") as answer:
+                assert answer.status == 404
+                assert "--runs" in await answer.text()
