@@ -1,8 +1,5 @@
-import { buildCone, buildWorld, discard, GROUND, SKY } from "./arena_world.js";
-import { DroneModel, SIZE_M } from "./arena_drone.js";
-import { ArenaEye } from "./arena_eye.js";
-import { channels, kindOf, stateColour } from "./colours.js";
-import { isDark, isTyping, make, onTheme, setAttribute, setText, wantsStillness } from "./dom.js";
+import { kindOf, stateColour } from "./colours.js";
+import { isTyping, make, setAttribute } from "./dom.js";
 import { TopView } from "./topview.js";
 
 /**
@@ -16,13 +13,9 @@ import { TopView } from "./topview.js";
  * @property {boolean} [fresh] true if there is none
  */
 
-const FRAME_MS = 1000 / 30;
-const SLOW_FRAME_MS = 1000 / 12; // where the processor has to draw, it has other things to do too
-const SPAN_MS = 60; // from one pose to the next, a little more than they are apart
 const VIEWS = { orbit: "Orbit", follow: "Follow", onboard: "Onboard" };
-// Sky and ground as they suit the page; the onboard view has the camera's.
-const LIGHT = { sky: "#eef1f5", ground: "#b4b7b9" };
-const DARK = { sky: "#161b22", ground: "#383c40" };
+const NO_STATE = "#5c6773";
+const BACK_S = 0.5; // a vehicle's time that goes back by more has begun anew
 
 /** The arena in three dimensions, or from above where a browser cannot draw those. */
 export class Arena {
@@ -32,50 +25,25 @@ export class Arena {
   #kinds = new Set();
   #buttons = {};
   #sizeButton;
-  #flat = null;
-  #THREE = null;
-  #renderer = null;
-  #scene;
-  #eye;
-  #world = null;
-  #worldMessage = null;
-  #drones = new Map();
-  #orders = new Map();
-  #view = "orbit";
-  #selected = null;
-  #isTrueSize = false;
-  #asked = false;
-  #drawn = 0;
-  #frame_ms = FRAME_MS;
+  #painter = null; // a Stage or a TopView, once it is there
   #waiting = [];
-  #paint = LIGHT;
+  #last = new Map(); // newest pose by drone
+  #orders = new Map();
 
   /** @param {HTMLElement} element an empty box with a size; its size is followed */
   constructor(element) {
-    this.#box = make("div", { class: "m-arena", tabindex: "0", role: "group", "aria-label": "the arena" });
+    this.#box = make("div", { class: "m-arena", tabindex: "0", role: "group", "data-view": "orbit", "aria-label": "the arena" });
     this.#labels = make("div", { class: "m-arena-labels", "aria-hidden": "true" });
-    const bar = this.#makeBar();
     this.#legend = make("ul", { class: "m-arena-legend", "aria-label": "colours of the trail" });
-    this.#box.append(this.#labels, bar, this.#legend);
+    this.#box.append(this.#labels, this.#makeBar(), this.#legend);
     element.append(this.#box);
+    /** Resolves once it can draw. */
     this.ready = this.#open();
   }
 
   /** @param {{scenario: object|null, lift_m: number, source: string}} world as in the message "world" */
   setWorld(world) {
-    this.#worldMessage = world;
-    this.#do(() => {
-      if (this.#flat) return this.#flat.setWorld(world);
-      if (this.#world) discard(this.#world);
-      this.#world = null;
-      for (const drone of this.#drones.values()) this.#setCone(drone);
-      if (world?.scenario) {
-        this.#world = buildWorld(this.#THREE, world.scenario, world.lift_m ?? 0);
-        this.#scene.add(this.#world);
-        this.#eye.setArena(world.scenario.arena, world.scenario.camera);
-      }
-      this.#ask();
-    });
+    this.#do((painter) => painter.setWorld(world));
   }
 
   /**
@@ -85,43 +53,34 @@ export class Arena {
    * @param {string[]|Object<number, string[]>} states ids of the mission's states, the same for all or by drone
    */
   setPoses(poses, states) {
-    this.#do(() => {
-      if (this.#flat) return this.#flat.setPoses(poses, (pose) => this.#colour(pose, states));
-      const now = performance.now();
-      const there = new Set(poses.map((pose) => pose.id ?? 1));
-      for (const id of this.#drones.keys()) if (!there.has(id)) this.#remove(id);
-      for (const pose of poses) this.#place(pose, now, states);
-      this.#ask();
+    this.#do((painter) => {
+      for (const pose of poses) {
+        const before = this.#last.get(pose.id ?? 1);
+        if (before && (pose.t < before.t - BACK_S || (pose.on && !before.on))) this.clearTrail(pose.id ?? 1);
+      }
+      this.#last = new Map(poses.map((pose) => [pose.id ?? 1, pose]));
+      painter.setPoses(poses, (pose) => this.#colour(pose, states));
     });
   }
 
   /** @param {"orbit"|"follow"|"onboard"} view */
   setView(view) {
-    this.#view = view;
     setAttribute(this.#box, "data-view", view);
-    for (const [name, button] of Object.entries(this.#buttons)) setAttribute(button, "aria-pressed", name === view ? "true" : "false");
-    this.#do(() => {
-      this.#eye?.setView(view);
-      this.#ask();
-    });
+    for (const [name, button] of Object.entries(this.#buttons)) setAttribute(button, "aria-pressed", String(name === view));
+    this.#do((painter) => painter.setView(view));
   }
 
   /** Whom "follow" and "onboard" follow. @param {number} id */
   select(id) {
-    this.#selected = id;
-    this.#do(() => {
-      this.#flat?.select(id);
-      this.#ask();
-    });
+    this.#do((painter) => painter.select(id));
   }
 
   /** Forget the trails. @param {number} [id] only this drone's */
   clearTrail(id) {
-    this.#do(() => {
-      this.#forgetKinds();
-      if (this.#flat) return this.#flat.clearTrail(id);
-      for (const [each, drone] of this.#drones) if (id === undefined || id === each) drone.trail.clear();
-      this.#ask();
+    this.#do((painter) => {
+      this.#kinds.clear();
+      this.#legend.replaceChildren();
+      painter.clearTrail(id);
     });
   }
 
@@ -132,105 +91,59 @@ export class Arena {
    * @param {number} [id]
    */
   setTrail(poses, states, id = 1) {
-    this.#do(() => {
-      if (this.#flat) return this.#flat.setTrail(poses, (pose) => this.#colour({ ...pose, id }, states), id);
-      const drone = this.#drone(id);
-      drone.trail.clear();
-      this.#forgetKinds();
-      for (const pose of poses) if (pose.on) drone.trail.add(pose.p, rgbOf(this.#colour({ ...pose, id }, states)));
-      if (poses.length > 0) drone.pose = poses.at(-1);
-      this.#ask();
+    this.clearTrail(id);
+    this.#do((painter) => {
+      painter.addTrail(id, poses, (pose) => this.#colour({ ...pose, id }, states));
+      if (poses.length > 0) this.#last.set(id, poses.at(-1));
     });
   }
 
   /** Let go of the graphics card. */
   dispose() {
-    this.#renderer?.dispose();
+    this.#painter?.dispose();
+    this.#painter = null;
+    this.#waiting = [];
     this.#box.remove();
-    this.#renderer = null;
   }
 
   /** Done at once, or when the graphics are there. */
   #do(what) {
-    if (this.#renderer || this.#flat) what();
+    if (this.#painter) what(this.#painter);
     else this.#waiting.push(what);
   }
 
   async #open() {
     try {
-      const { THREE, OrbitControls } = await import("/lib/three/index.js");
-      this.#start(THREE, OrbitControls);
+      // The library is large; the rest of the page does not wait for it.
+      const [{ THREE, OrbitControls }, { Stage }] = await Promise.all([import("/lib/three/index.js"), import("./arena_stage.js")]);
+      this.#painter = new Stage(THREE, OrbitControls, this.#box, this.#labels);
     } catch (error) {
       console.info(`no 3-D here (${error.message}); the arena is drawn from above`);
-      const words = "This browser draws no 3-D here, so the arena is shown from above.";
-      this.#flat = new TopView(this.#box, words);
-      for (const button of [...Object.values(this.#buttons), this.#sizeButton]) button.hidden = true;
+      this.#painter = new TopView(this.#box, "This browser draws no 3-D here, so the arena is shown from above.");
+      this.#box.querySelector(".m-views").hidden = true;
     }
-    for (const what of this.#waiting.splice(0)) what();
-  }
-
-  #start(THREE, OrbitControls) {
-    const canvas = make("canvas", { "aria-hidden": "true" });
-    const context = canvas.getContext("webgl2", { antialias: true, powerPreference: "low-power" });
-    if (!context) throw new Error("WebGL is missing");
-    const told = context.getExtension("WEBGL_debug_renderer_info");
-    const name = told ? String(context.getParameter(told.UNMASKED_RENDERER_WEBGL)) : "";
-    const isSlow = /swiftshader|llvmpipe|software/i.test(name);
-    this.#frame_ms = isSlow ? SLOW_FRAME_MS : FRAME_MS;
-    this.#box.dataset.renderer = isSlow ? "software" : "hardware";
-    const renderer = new THREE.WebGLRenderer({ canvas, context, antialias: true });
-    renderer.setPixelRatio(isSlow ? 1 : Math.min(1.5, devicePixelRatio || 1));
-    renderer.setScissorTest(true);
-    this.#THREE = THREE;
-    this.#scene = new THREE.Scene();
-    this.#scene.add(new THREE.HemisphereLight("#ffffff", "#8a8578", 2.2));
-    const sun = new THREE.DirectionalLight("#ffffff", 1.6);
-    sun.position.set(5, -1, 9);
-    this.#scene.add(sun);
-    this.#eye = new ArenaEye(THREE, OrbitControls, this.#box, () => this.#ask());
-    this.#box.prepend(canvas);
-    this.#renderer = renderer;
-    canvas.addEventListener("webglcontextlost", (event) => event.preventDefault());
-    canvas.addEventListener("webglcontextrestored", () => this.#ask());
-    document.addEventListener("visibilitychange", () => this.#ask());
-    onTheme(() => this.#paintSky());
-    this.#paintSky();
-    new ResizeObserver(() => this.#resize()).observe(this.#box);
-    this.#resize();
-  }
-
-  #paintSky() {
-    const dark = isDark(this.#box);
-    this.#paint = dark ? DARK : LIGHT;
-    this.#ask();
-  }
-
-  #resize() {
-    const { clientWidth: width, clientHeight: height } = this.#box;
-    if (width === 0 || height === 0) return;
-    this.#renderer.setSize(width, height, false);
-    this.#eye.setSize(width, height);
-    this.#ask();
+    for (const what of this.#waiting.splice(0)) what(this.#painter);
   }
 
   #makeBar() {
     const bar = make("div", { class: "m-views", role: "toolbar", "aria-label": "views" });
     Object.entries(VIEWS).forEach(([view, words], index) => {
-      const key = make("kbd", { "aria-hidden": "true" }, String(index + 1));
-      const pressed = view === "orbit" ? "true" : "false";
-      const button = make("button", { type: "button", "aria-pressed": pressed, "data-view": view, "aria-keyshortcuts": String(index + 1) }, key, words);
+      const key = String(index + 1);
+      const pressed = String(view === "orbit");
+      const attributes = { type: "button", "aria-pressed": pressed, "data-view": view, "aria-keyshortcuts": key };
+      const button = make("button", attributes, make("kbd", { "aria-hidden": "true" }, key), words);
       button.addEventListener("click", () => this.setView(view));
       this.#buttons[view] = button;
       bar.append(button);
     });
-    this.#sizeButton = make("button", { type: "button", "aria-pressed": "false", title: "show the drone no larger than it is" }, "True size");
+    const title = "show the drone no larger than it is";
+    this.#sizeButton = make("button", { type: "button", "aria-pressed": "false", title }, "True size");
     this.#sizeButton.addEventListener("click", () => {
-      this.#isTrueSize = !this.#isTrueSize;
-      setAttribute(this.#sizeButton, "aria-pressed", String(this.#isTrueSize));
-      this.#ask();
+      const isTrue = this.#sizeButton.getAttribute("aria-pressed") !== "true";
+      setAttribute(this.#sizeButton, "aria-pressed", String(isTrue));
+      this.#do((painter) => painter.setTrueSize(isTrue));
     });
     bar.append(this.#sizeButton);
-    this.#box.dataset.view = "orbit";
     document.addEventListener("keydown", (event) => {
       const view = Object.keys(VIEWS)[Number(event.key) - 1];
       if (view && !event.ctrlKey && !event.metaKey && !event.altKey && !isTyping(event)) this.setView(view);
@@ -238,154 +151,26 @@ export class Arena {
     return bar;
   }
 
-  #drone(id) {
-    let drone = this.#drones.get(id);
-    if (!drone) {
-      drone = new DroneModel(this.#THREE, this.#scene);
-      drone.label = make("span", {}, String(id));
-      this.#labels.append(drone.label);
-      this.#drones.set(id, drone);
-      this.#setCone(drone);
-      this.#selected ??= id;
-    }
-    return drone;
-  }
-
-  #remove(id) {
-    const drone = this.#drones.get(id);
-    drone.label.remove();
-    drone.discard();
-    this.#drones.delete(id);
-  }
-
-  #setCone(drone) {
-    if (drone.cone) discard(drone.cone);
-    const camera = this.#worldMessage?.scenario?.camera;
-    drone.cone = camera ? buildCone(this.#THREE, camera) : null;
-    if (drone.cone) drone.group.add(drone.cone);
-  }
-
-  #place(pose, now, states) {
-    const drone = this.#drone(pose.id ?? 1);
-    const before = drone.pose;
-    const isBack = before !== null && pose.t < before.t - 0.5;
-    if (isBack || (before && pose.on && !before.on)) {
-      drone.trail.clear();
-      this.#forgetKinds();
-    }
-    drone.aim(pose, now, isBack);
-    drone.setFresh(pose.fresh !== false);
-    if (pose.on) drone.trail.add(pose.p, rgbOf(this.#colour(pose, states)));
-  }
-
-  #forgetKinds() {
-    this.#kinds.clear();
-    this.#legend.replaceChildren();
-  }
-
-  /** Say in the legend which kind of state a colour is, once it is on a trail. */
-  #explain(state, colour) {
-    const kind = kindOf(state);
-    if (this.#kinds.has(kind)) return;
-    this.#kinds.add(kind);
-    const swatch = make("span", { class: "m-swatch" });
-    swatch.style.background = colour;
-    this.#legend.append(make("li", {}, swatch, kind));
-  }
-
+  /** The colour of a drone's state; with motors on it goes to the trail, so the legend says what it means. */
   #colour(pose, states) {
     const id = pose.id ?? 1;
     const list = Array.isArray(states) ? states : states?.[id];
     const state = list?.[pose.s];
-    if (state === undefined) return "#5c6773";
+    if (state === undefined) return NO_STATE;
     // Kinds are numbered as they first stand in the mission, so that all who watch see the same colours.
     if (this.#orders.get(id)?.list !== list) {
       const order = [];
-      list.forEach((each) => stateColour(each, order));
+      for (const each of list) stateColour(each, order);
       this.#orders.set(id, { list, order });
     }
     const colour = stateColour(state, this.#orders.get(id).order);
-    if (pose.on) this.#explain(state, colour);
+    const kind = kindOf(state);
+    if (pose.on && !this.#kinds.has(kind)) {
+      this.#kinds.add(kind);
+      const swatch = make("span", { class: "m-swatch" });
+      swatch.style.background = colour;
+      this.#legend.append(make("li", {}, swatch, kind));
+    }
     return colour;
   }
-
-  #ask() {
-    if (this.#asked || !this.#renderer || document.hidden) return;
-    this.#asked = true;
-    const wait_ms = this.#frame_ms - (performance.now() - this.#drawn);
-    const draw = () => requestAnimationFrame((now) => this.#draw(now));
-    if (wait_ms > 18) setTimeout(draw, wait_ms - 16);
-    else draw();
-  }
-
-  #draw(now) {
-    this.#asked = false;
-    if (!this.#renderer) return;
-    const passed_s = Math.min(0.2, (now - this.#drawn) / 1000);
-    this.#drawn = now;
-    const still = wantsStillness();
-    let moves = false;
-    for (const drone of this.#drones.values()) moves = drone.advance(now, still ? 1 : SPAN_MS, still ? 0 : passed_s) && !(still && !drone.pose) || moves;
-    const chosen = this.#drones.get(this.#selected) ?? null;
-    moves = this.#eye.look(chosen?.group ?? null, passed_s, still) || moves;
-    const { camera, rectangle } = this.#eye;
-    const sky = new this.#THREE.Color(this.#eye.view === "onboard" ? SKY : this.#paint.sky);
-    this.#scene.background = sky;
-    this.#scene.fog = this.#eye.view === "onboard" ? null : new this.#THREE.Fog(sky, 1.5 * this.#eye.overview_m, 5 * this.#eye.overview_m);
-    for (const [id, drone] of this.#drones) this.#dress(id, drone, chosen, camera);
-    this.#dressWorld();
-    const renderer = this.#renderer;
-    renderer.setViewport(...rectangle);
-    renderer.setScissor(...rectangle);
-    renderer.render(this.#scene, camera);
-    this.#box.dataset.frames = String(Number(this.#box.dataset.frames ?? 0) + 1);
-    if (moves && !(still && !this.#isMoving(now))) this.#ask();
-  }
-
-  #isMoving(now) {
-    return [...this.#drones.values()].some((drone) => now - drone.began < SPAN_MS);
-  }
-
-  #dressWorld() {
-    if (!this.#world) return;
-    const isOnboard = this.#eye.view === "onboard";
-    this.#world.userData.ground.set(isOnboard ? GROUND : this.#paint.ground);
-    const [, , wide, high] = this.#eye.rectangle;
-    this.#world.traverse((part) => {
-      if (part.userData.isHelp) part.visible = !isOnboard;
-      part.userData.ribbon?.fit(3, [wide, high]);
-    });
-  }
-
-  /** Size, label and parts of a drone as this view wants them. */
-  #dress(id, drone, chosen, camera) {
-    const isOwn = drone === chosen && this.#eye.view === "onboard";
-    drone.setVisible(drone.began >= 0 && !isOwn);
-    if (drone.cone) drone.cone.visible = drone === chosen && this.#eye.view === "orbit" && drone.began >= 0;
-    const [, , wide, high] = this.#eye.rectangle;
-    const away_m = camera.position.distanceTo(drone.group.position);
-    const metre_px = high / (2 * away_m * Math.tan((camera.fov * Math.PI) / 360));
-    const wanted = this.#eye.view === "orbit" && !this.#isTrueSize ? Math.min(5, Math.max(1, 40 / (SIZE_M * metre_px))) : 1;
-    drone.setScale(wanted);
-    drone.trail.fit(high > 600 ? 5 : 4, [wide, high]);
-    drone.thread.visible = drone.thread.visible && this.#eye.view !== "onboard";
-    drone.trail.mesh.visible = drone.trail.isDrawn && this.#eye.view !== "onboard";
-    const shown = this.#drones.size > 1 && drone.began >= 0 && !isOwn;
-    const place = shown ? this.#eye.toScreen(drone.group.position) : null;
-    drone.label.hidden = place === null;
-    setAttribute(drone.label, "data-selected", drone === chosen);
-    if (place) drone.label.style.transform = `translate(${place[0] + 12}px, ${place[1] - 26}px)`;
-    setText(drone.label, String(id));
-  }
-}
-
-const rgbs = new Map();
-
-function rgbOf(colour) {
-  let rgb = rgbs.get(colour);
-  if (!rgb) {
-    rgb = channels(colour).map((channel) => channel / 255);
-    rgbs.set(colour, rgb);
-  }
-  return rgb;
 }

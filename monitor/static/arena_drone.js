@@ -3,6 +3,7 @@ import { Ribbon } from "./ribbon.js";
 
 export const SIZE_M = 0.25; // over all, as the challenge's drone; its model is made for this
 const TRAIL_POINTS = 6000; // four minutes at full speed; after that it gets coarser
+const LATEST_MS = 600; // rotors stand still when no more poses come
 const ROTOR_RAD_S = 26; // far slower than true, so that the eye sees it turn
 
 /** A drone as it is drawn. */
@@ -29,29 +30,29 @@ export class DroneModel {
   }
 
   /** Set where it is to be soon, from where it is drawn now. */
-  aim(pose, now, jump) {
+  aim(pose, now) {
     this.pose = pose;
     const [w, x, y, z] = pose.q;
     this.to.p.set(...pose.p);
     this.to.q.set(x, y, z, w).normalize();
     const isFar = this.began < 0 || this.group.position.distanceTo(this.to.p) > 1.5;
-    this.from.p.copy(jump || isFar ? this.to.p : this.group.position);
-    this.from.q.copy(jump || isFar ? this.to.q : this.group.quaternion);
+    this.from.p.copy(isFar ? this.to.p : this.group.position);
+    this.from.q.copy(isFar ? this.to.q : this.group.quaternion);
     this.began = now;
   }
 
   /** Draw it where it is at a time; returns whether it moves on by itself. */
   advance(now, span_ms, turn) {
-    const share = Math.min(1, (now - this.began) / span_ms);
+    const share = Math.min(1, Math.max(0, now - this.began) / span_ms);
     this.group.position.lerpVectors(this.from.p, this.to.p, share);
     this.group.quaternion.slerpQuaternions(this.from.q, this.to.q, share);
     const { x, y, z } = this.group.position;
     this.shadow.position.set(x, y, 0.004);
     this.thread.position.set(x, y, 0);
     this.thread.scale.z = Math.max(0.001, z);
-    const turns = this.pose?.on && this.pose.fresh !== false;
+    const turns = this.pose?.on && this.pose.fresh !== false && now - this.began < LATEST_MS;
     if (turns && turn > 0) for (const rotor of this.rotors) rotor.rotation.z += rotor.userData.sense * ROTOR_RAD_S * turn;
-    return share < 1 || turns;
+    return share < 1 || (turns && turn > 0);
   }
 
   /** Its size on the screen: true, or as large as it takes to be seen. */

@@ -1,3 +1,4 @@
+import { onBeat } from "./beat.js";
 import { make, number, setText } from "./dom.js";
 
 // Bright edges with dark ones beside them, so that they are seen on any image. The colour's name stands there too.
@@ -58,7 +59,7 @@ export class CameraView {
     if (message?.width > 0 && message?.height > 0) {
       this.#box.style.aspectRatio = `${message.width} / ${message.height}`;
     }
-    this.#draw();
+    onBeat(this, () => this.#draw());
   }
 
   #showImage(shown) {
@@ -83,7 +84,7 @@ export class CameraView {
     const ratio = Math.min(2, devicePixelRatio || 1);
     const [wide, high] = [Math.round(width * ratio), Math.round(height * ratio)];
     if (canvas.width !== wide || canvas.height !== high) [canvas.width, canvas.height] = [wide, high];
-    const pen = canvas.getContext("2d");
+    const pen = canvas.getContext("2d", { willReadFrequently: true });
     pen.setTransform(ratio, 0, 0, ratio, 0, 0);
     pen.clearRect(0, 0, width, height);
     const message = this.#message;

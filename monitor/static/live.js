@@ -1,5 +1,6 @@
 /** The live page: joins the live channel with what is seen. */
 import { Arena } from "./arena.js";
+import { onBeat } from "./beat.js";
 import { CameraView } from "./camera.js";
 import { stateColour } from "./colours.js";
 import { make, whenThere } from "./dom.js";
@@ -52,12 +53,15 @@ function orderOf(states) {
   return orders.get(states);
 }
 
+/** The state at once, numbers with the next beat. */
 function showStatus(drone) {
   const { status } = drone;
-  strip.set(status, drone.chart ? orderOf(drone.chart.states) : []);
-  figures.set(status?.figures ?? null, status ?? undefined);
-  camera.setImage(status?.video ? `/video/${drone.id}` : null);
   statechart.setState(status?.mission?.state || null, status?.mission?.seconds ?? 0);
+  camera.setImage(status?.video ? `/video/${drone.id}` : null);
+  onBeat(strip, () => {
+    strip.set(status, drone.chart ? orderOf(drone.chart.states) : []);
+    figures.set(status?.figures ?? null, status ?? undefined);
+  });
 }
 
 function choose(drone) {
@@ -97,12 +101,7 @@ watchLive({
     fleet.setStatus(drones);
     messages.setSeveral(fleet.several);
     if (fleet.chosen) showStatus(fleet.chosen);
-    else {
-      strip.set(null);
-      figures.set(null);
-      camera.setImage(null);
-      statechart.setState(null);
-    }
+    else showStatus({ id: 0, status: null, chart: null });
   },
   detections(message) {
     const drone = fleet.of(message.id);

@@ -2,6 +2,7 @@ import { wantsStillness } from "./dom.js";
 
 const LARGEST = 6; // pixels on the page for one of the drawing
 const GLIDE_MS = 350;
+const SLOW_MS = 70; // between two steps of a glide: a machine that is so slow is spared the rest of it
 const STEP = 1.35;
 
 /** Moves about in an SVG by its view box: drag, pinch, wheel, keys. */
@@ -97,8 +98,11 @@ export class PanZoom {
     if (wantsStillness() || document.hidden || this.#svg.clientWidth === 0) return this.#set({ ...aim });
     const from = { ...this.#view };
     const began = performance.now();
+    let last = began;
     const step = (now) => {
-      const share = Math.min(1, Math.max(0, (now - began) / GLIDE_MS));
+      const isSlow = performance.now() - last > SLOW_MS;
+      last = performance.now();
+      const share = isSlow ? 1 : Math.min(1, Math.max(0, (now - began) / GLIDE_MS));
       const eased = share * share * (3 - 2 * share);
       const view = {};
       for (const name of ["x", "y", "width", "height"]) view[name] = from[name] + (aim[name] - from[name]) * eased;

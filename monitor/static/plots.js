@@ -1,3 +1,4 @@
+import { onBeat } from "./beat.js";
 import { make, number, onTheme, setText, themeColour } from "./dom.js";
 
 const WINDOW_S = 60;
@@ -38,7 +39,7 @@ export class Plots {
     const redraw = () => { this.#dirty = true; this.#colours = null; };
     new ResizeObserver(redraw).observe(grid);
     onTheme(redraw);
-    setInterval(() => this.#tick(), REDRAW_MS);
+    setInterval(() => onBeat(this, () => this.#tick()), REDRAW_MS);
   }
 
   /**
@@ -114,7 +115,7 @@ export class Plots {
     const ratio = Math.min(2, devicePixelRatio || 1);
     const [wide, high] = [Math.round(width * ratio), Math.round(height * ratio)];
     if (canvas.width !== wide || canvas.height !== high) [canvas.width, canvas.height] = [wide, high];
-    const pen = canvas.getContext("2d");
+    const pen = canvas.getContext("2d", { willReadFrequently: true });
     pen.setTransform(ratio, 0, 0, ratio, 0, 0);
     pen.clearRect(0, 0, width, height);
     const [low, top] = plot.range ?? rangeOf(shown, plot);

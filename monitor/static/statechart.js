@@ -1,3 +1,4 @@
+import { onBeat } from "./beat.js";
 import { make, number, setAttribute, setText } from "./dom.js";
 import { PanZoom } from "./panzoom.js";
 
@@ -48,7 +49,7 @@ export class Statechart {
     const past = make("div", { class: "m-transitions" }, this.#table);
     this.#root = make("div", { class: small ? "m-chart m-small" : "m-chart", "data-state": "" }, head, this.#picture, past, written);
     element.append(this.#root);
-    if (live) setInterval(() => this.#count(), 100);
+    if (live) setInterval(() => onBeat(this.#seconds, () => this.#count()), 200);
   }
 
   /** @param {{name: string, mermaid: string, states: string[], source: string}|null} chart */
@@ -83,8 +84,8 @@ export class Statechart {
     const isNew = id !== this.#active;
     this.#active = id;
     this.#entered = performance.now() - 1000 * (seconds ?? 0);
+    if (!isNew) return onBeat(this.#seconds, () => this.#count(seconds));
     this.#count(seconds);
-    if (!isNew) return;
     setAttribute(this.#root, "data-state", id ?? "");
     setText(this.#state, id ?? "");
     this.#light();

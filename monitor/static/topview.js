@@ -2,7 +2,7 @@
 import { FRAME_COLOURS } from "./colours.js";
 import { make } from "./dom.js";
 
-/** See `Arena`, which hands its calls on to this one. */
+/** Does what `Stage` does, as far as a plain canvas can. */
 export class TopView {
   #box;
   #canvas;
@@ -26,18 +26,12 @@ export class TopView {
   }
 
   setPoses(poses, colourOf) {
-    for (const pose of poses) {
-      const id = pose.id ?? 1;
-      const before = this.#poses.find((each) => (each.id ?? 1) === id);
-      if (before && (pose.t < before.t - 0.5 || (pose.on && !before.on))) this.#trails.delete(id);
-      if (pose.on) this.#extend(id, pose, colourOf(pose));
-    }
     this.#poses = poses;
+    for (const pose of poses) this.addTrail(pose.id ?? 1, [pose], colourOf);
     this.#ask();
   }
 
-  setTrail(poses, colourOf, id) {
-    this.#trails.delete(id);
+  addTrail(id, poses, colourOf) {
     for (const pose of poses) if (pose.on) this.#extend(id, pose, colourOf(pose));
     this.#ask();
   }
@@ -52,6 +46,13 @@ export class TopView {
     this.#selected = id;
     this.#ask();
   }
+
+  /** There is one view only, and everything is as large as it has to be. */
+  setView() {}
+
+  setTrueSize() {}
+
+  dispose() {}
 
   #extend(id, { p }, colour) {
     if (!this.#trails.has(id)) this.#trails.set(id, []);

@@ -1,0 +1,119 @@
+"""A monitor's pages without a monitor: files, the frame of a page, and a live channel that says what a test says."""
+
+from __future__ import annotations
+
+import asyncio
+import json
+from contextlib import asynccontextmanager
+from pathlib import Path
+
+import cv2
+import nicegui
+import numpy as np
+from aiohttp import WSMsgType, web
+
+import monitor
+from monitor.access import Visitor
+from monitor.pages.live import STYLE
+from monitor.pages.shell import HEAD, header_html
+
+STATIC = Path(monitor.__file__).parent / "static"
+ELEMENTS = Path(nicegui.__file__).parent / "elements"
+JPEG = cv2.imencode(".jpg", np.full((240, 320, 3), (56, 176, 226), np.uint8))[1].tobytes()
+PAGES = {"/": ("live", "live.js"), "/chart": ("chart", "chart.js")}
+
+
+class FakeMonitor:
+    """Serves pages; says to all who watch what it is told to say.
+
+    Attributes:
+        welcome: messages each new watcher gets first.
+        url: where the pages are.
+    """
+
+    def __init__(self) -> None:
+        self.welcome: list[dict] = []
+        self.url = ""
+        self._watchers: set[web.WebSocketResponse] = set()
+        self._port = 0
+        self._runner: web.AppRunner | None = None
+
+    async def start(self):
+        """Listen; a second time at the same place as before."""
+        app = web.Application()
+        for path in PAGES:
+            app.router.add_get(path, self._page)
+        app.router.add_get("/ws/live", self._watch)
+        app.router.add_get("/video/{id}", self._video)
+        app.router.add_static("/static", STATIC)
+        for name, element in (("three", "scene"), ("mermaid", "mermaid")):
+            app.router.add_static(f"/lib/{name}", ELEMENTS / element / "dist")
+        self._runner = web.AppRunner(app, shutdown_timeout=0.1)
+        await self._runner.setup()
+        site = web.TCPSite(self._runner, "127.0.0.1", self._port, reuse_address=True)
+        await site.start()
+        self._port = site._server.sockets[0].getsockname()[1]
+        self.url = f"http://127.0.0.1:{self._port}"
+
+    async def stop(self):
+        """Stop as a killed monitor does: all connections end."""
+        for watcher in list(self._watchers):
+            await watcher.close()
+        await self._runner.cleanup()
+
+    async def say(self, kind, **fields):
+        """Tell all who watch."""
+        text = json.dumps({"kind": kind, **fields})
+        for watcher in list(self._watchers):
+            await watcher.send_str(text)
+
+    async def until_watched(self):
+        """Wait for a page."""
+        async with asyncio.timeout(30):
+            while not self._watchers:
+                await asyncio.sleep(0.01)
+
+    async def _page(self, request):
+        name, module = PAGES[request.path]
+        header = header_html(Visitor("", may_judge=False, may_fly=False), request.path)
+        return web.Response(
+            content_type="text/html",
+            text=f'<!doctype html><html lang="en"><head><meta name="viewport" content="width=device-width">'
+            f'<link rel="icon" href="data:,">{HEAD}{STYLE}</head><body>{header}'
+            f'<script type="application/json" data-module="/static/{module}">{{}}</script>'
+            f'<main class="page" id="main"><div id="{name}"></div></main></body></html>',
+        )
+
+    async def _watch(self, request):
+        watcher = web.WebSocketResponse()
+        await watcher.prepare(request)
+        if "kinds" in request.query:  # the header's own; it has a test of its own
+            await watcher.receive()
+            return watcher
+        for message in self.welcome:
+            await watcher.send_str(json.dumps(message))
+        self._watchers.add(watcher)
+        try:
+            while (await watcher.receive()).type not in {
+                WSMsgType.CLOSE,
+                WSMsgType.CLOSING,
+                WSMsgType.CLOSED,
+            }:
+                pass
+        finally:
+            self._watchers.discard(watcher)
+        return watcher
+
+    async def _video(self, request):
+        return web.Response(body=JPEG, content_type="image/jpeg")
+
+
+@asynccontextmanager
+async def fake_monitor():
+    """A monitor that listens."""
+    fake = FakeMonitor()
+    await fake.start()
+    try:
+        yield fake
+    finally:
+        await fake.stop()

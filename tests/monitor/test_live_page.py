@@ -1,0 +1,279 @@
+"""The live page and the statechart's, in a real browser, told by a test what flies."""
+
+import pytest
+from playwright.async_api import expect
+
+from offboard.mission import load_mission, mermaid
+from scenarios.loader import load_scenario
+from tests.chromium import Complaints
+from tests.monitor.page_server import fake_monitor
+
+MISSION = load_mission("frame_challenge")
+STATES = list(MISSION.leaves)
+MARKUP = "<img src=x onerror=alert(1)><b>bold</b>"
+PATIENCE_MS = 20_000  # a browser that draws without a graphics card, on a machine that has other things to do
+expect.set_options(timeout=PATIENCE_MS)
+LAPTOP, PHONE = {"width": 1366, "height": 768}, {"width": 390, "height": 844}
+LIVE_LINK = {"state": "live", "age_s": 0.04, "loss_percent": 0.0, "rate_hz": 210.0}
+FIGURES = {
+    "try_time_s": 87.4321,
+    "penalty_s": 2.25,
+    "total_time_s": 89.6821,
+    "limit_s": 180.0,
+    "time_over": False,
+    "crossed": ["red", "green"],
+    "crossing_times_s": [32.4567, 56.9],
+    "next_colour": "blue",
+    "contacts": 1,
+    "inside": True,
+    "motors_on": True,
+    "over": False,
+    "verdict": "aborted",
+    "reason": "aborted after 87.4 s (the motors were still on); crossed: red, green",
+    "source": "truth",
+    "final": False,
+}
+
+
+def world(**more):
+    scenario = load_scenario("test-case-1").model_dump(mode="json")
+    return {"kind": "world", "scenario": scenario, "lift_m": 0.0, "source": "truth", **more}
+
+
+def chart(drone_id=1, name=MISSION.name, source="name: frame_challenge"):
+    return {
+        "kind": "chart",
+        "id": drone_id,
+        "name": name,
+        "mermaid": mermaid(MISSION),
+        "states": STATES,
+        "source": source,
+    }
+
+
+def pose(drone_id=1, t=10.0, state="red.turning", **more):
+    still = {
+        "p": [1.0, 2.0, 1.5],
+        "q": [1.0, 0.0, 0.0, 0.0],
+        "v": [0.1, 0.0, 0.0],
+        "r": 0.0,
+        "c": [0.2, 0, 0, 0],
+    }
+    return {"id": drone_id, "t": t, **still, "on": True, "s": STATES.index(state), "fresh": True, **more}
+
+
+def status(drone_id=1, state="red.turning", figures=FIGURES, **more):
+    mission = {"name": MISSION.name, "state": state, "seconds": 1.5, "transitions": 4}
+    mission |= {"paused": False, "flying": True, "finished": False, "alive": True}
+    vehicle = {"name": f"drone {drone_id}", "mode": "OFFBOARD", "armed": True, "landed": False}
+    vehicle |= {"battery_percent": 87.0, "voltage_v": 11.84, "link": LIVE_LINK, "pilot": "", "video": False}
+    return {"id": drone_id, **vehicle, "mission": mission, "figures": figures, **more}
+
+
+@pytest.fixture
+async def fake():
+    async with fake_monitor() as monitor:
+        monitor.welcome = [world(), chart(), {"kind": "status", "drones": [status()]}]
+        yield monitor
+
+
+async def visit(browser, fake, path="/", viewport=LAPTOP, **more):
+    context = await browser.new_context(viewport=viewport, **more)
+    page = await context.new_page()
+    page.set_default_timeout(PATIENCE_MS)
+    complaints = Complaints(page)
+    await page.goto(fake.url + path)
+    await fake.until_watched()
+    return page, complaints
+
+
+def figure(page, name):
+    return page.locator(f'[data-figure="{name}"]')
+
+
+async def width_of(page):
+    return await page.evaluate("document.documentElement.scrollWidth")
+
+
+async def frames_drawn(page):
+    return int(await page.locator(".m-arena").get_attribute("data-frames") or 0)
+
+
+async def test_figures_are_those_that_were_sent(chromium, fake):
+    page, complaints = await visit(chromium, fake)
+    for name, shown in (
+        ("try_time_s", "87.4"),
+        ("penalty_s", "2.3"),
+        ("total_time_s", "89.7"),
+        ("contacts", "1"),
+    ):
+        await expect(figure(page, name)).to_have_text(shown)
+        assert float(await figure(page, name).get_attribute("data-value")) == FIGURES[name]
+    await expect(figure(page, "crossed")).to_have_attribute("data-value", "red,green")
+    await expect(page.locator('[data-colour="red"]')).to_have_attribute("data-value", "32.4567")
+    await expect(page.locator('[data-colour="blue"]')).to_contain_text("next")
+    await expect(figure(page, "verdict")).to_have_text("under way")
+    await expect(page.locator(".m-warning")).to_be_hidden()
+    await expect(page.locator(".m-strip")).to_contain_text("87 %, 11.8 V")
+
+    outside = FIGURES | {"inside": False, "time_over": True, "try_time_s": 181.0}
+    await fake.say("status", drones=[status(figures=outside)])
+    await expect(page.get_by_role("alert")).to_contain_text("outside the arena")
+    await expect(page.get_by_role("alert")).to_contain_text("time over")
+
+    clean = FIGURES | {"verdict": "clean", "reason": "clean after 102.3 s", "over": True, "final": True}
+    await fake.say("status", drones=[status(figures=clean)])
+    await expect(figure(page, "verdict")).to_have_text("clean")
+    await expect(figure(page, "verdict")).to_have_attribute("data-value", "clean")
+    await expect(page.locator(".m-source")).to_have_text("judged by the simulator's truth, final")
+
+    await fake.say("status", drones=[status(figures=None)])
+    await expect(figure(page, "try_time_s")).to_have_text("–")
+    await expect(figure(page, "verdict")).to_have_text("nobody judges")
+    assert complaints == []
+
+
+async def test_texts_with_markup_are_shown_as_text(chromium, fake):
+    fake.welcome[1] = chart(name=MARKUP, source=f"name: {MARKUP}")
+    page, complaints = await visit(chromium, fake)
+    await fake.say("text", id=1, time_s=3.0, severity=4, text=MARKUP, **{"from": "drone"})
+    await fake.say("notice", id=None, level="warning", text=MARKUP)
+    values = [["frame.d", 0.4412345], [MARKUP, None]]
+    taken = {"time_s": 4.0, "from": MARKUP, "to": MARKUP, "when": MARKUP, "values": values, "seconds": 1.0}
+    await fake.say("transitions", id=1, list=[taken])
+    await fake.say("status", drones=[status(state=MARKUP, mode=MARKUP, name=MARKUP, pilot=MARKUP)])
+    messages = page.locator(".m-messages li")
+    await expect(messages).to_have_count(2)
+    for index in (0, 1):
+        await expect(messages.nth(index)).to_contain_text(f"warning{'monitor' if index == 0 else ''}{MARKUP}")
+    await expect(page.locator('[data-item="mode"]')).to_have_text(MARKUP)
+    await expect(page.locator('[data-name="because"]')).to_have_text(MARKUP)
+    await expect(page.locator('[data-name="values"]')).to_have_text(f"frame.d = 0.4412, {MARKUP} = ∞")
+    await expect(page.locator(".m-mission")).to_have_text(MARKUP)
+    await page.locator("summary").click()
+    await expect(page.locator(".m-written pre")).to_have_text(f"name: {MARKUP}")
+    assert await page.locator("#live img[src=x], #live b:text('bold')").count() == 0
+    assert complaints == []
+
+
+async def test_the_lit_state_follows_the_mission(chromium, fake):
+    page, complaints = await visit(chromium, fake, "/chart")
+    lit, around = page.locator("svg .m-active"), page.locator("svg .m-around")
+    panel = page.locator(".m-chart")
+    await expect(lit).to_contain_text("turning")
+    await expect(around).to_contain_text("red")
+    await fake.say("pose", drones=[pose()])
+    drawing = await page.evaluate("document.querySelector('.m-chart-picture svg').id")
+    await fake.say("pose", drones=[pose(t=10.05, state="blue.crossing")])
+    await expect(panel).to_have_attribute("data-state", "blue.crossing")
+    await expect(lit).to_have_count(1)
+    await expect(lit).to_contain_text("crossing")
+    await expect(around).to_contain_text("blue")
+    await fake.say("status", drones=[status(state="landing.stop")])
+    await expect(lit).to_contain_text("stop")
+    assert await page.evaluate("document.querySelector('.m-chart-picture svg').id") == drawing
+    await page.get_by_role("button", name="Follow").click()
+    await expect(page.get_by_role("button", name="Whole")).to_have_attribute("aria-pressed", "false")
+    assert complaints == []
+
+
+async def test_a_bad_diagram_is_told_and_the_state_is_still_shown(chromium, fake):
+    fake.welcome[1] = chart() | {"mermaid": "stateDiagram-v2\n    state {{ --> }\n"}
+    page, _ = await visit(chromium, fake, "/chart")
+    await expect(page.locator(".m-chart-words")).to_contain_text("cannot be drawn")
+    await expect(page.locator(".m-chart")).to_have_attribute("data-state", "red.turning")
+
+
+async def test_a_lost_monitor_is_told_and_found_again(chromium, fake):
+    page, _ = await visit(chromium, fake)
+    await expect(figure(page, "try_time_s")).to_have_text("87.4")
+    await fake.stop()
+    line = page.locator(".m-line")
+    await expect(line).to_have_text("connection to the monitor lost, trying again")
+    await expect(page.locator("#live")).to_have_class("m-live m-stale")
+    fake.welcome[2] = {"kind": "status", "drones": [status(figures=FIGURES | {"try_time_s": 12.0})]}
+    await fake.start()
+    await expect(line).to_contain_text("back after")
+    await expect(figure(page, "try_time_s")).to_have_text("12.0")
+    await expect(page.locator("#live")).not_to_have_class("m-live m-stale")
+
+
+async def test_keys_change_the_view_and_the_drone_is_drawn(chromium, fake):
+    page, complaints = await visit(chromium, fake)
+    arena = page.locator(".m-arena")
+    await expect(arena).to_have_attribute("data-view", "orbit")
+    for key, name in (("2", "follow"), ("3", "onboard"), ("1", "orbit")):
+        await page.keyboard.press(key)
+        await expect(arena).to_have_attribute("data-view", name)
+        button = page.locator(f'.m-views [data-view="{name}"]')
+        await expect(button).to_have_attribute("aria-pressed", "true")
+    await page.wait_for_function("document.querySelector('.m-arena').dataset.frames > 0")
+    before = await frames_drawn(page)
+    await fake.say("pose", drones=[pose(), pose(2, p=[0.0, 0.0, 1.0])])
+    await page.wait_for_function(f"document.querySelector('.m-arena').dataset.frames > {before}")
+    await expect(page.locator(".m-arena-legend")).to_have_text("turning")
+    await expect(page.locator(".m-arena-labels span")).to_have_text(["1", "2"])
+    # Motors that come on again begin a new try, and its trail has colours of its own.
+    await fake.say("pose", drones=[pose(t=20.0, on=False), pose(2)])
+    await fake.say("pose", drones=[pose(t=20.1, state="take_off.start"), pose(2, on=False)])
+    await expect(page.locator(".m-arena-legend")).to_have_text("start")
+    assert complaints == []
+
+
+async def test_one_of_several_drones_is_chosen(chromium, fake):
+    page, complaints = await visit(chromium, fake)
+    second = status(2, state="landing.stop", figures=FIGURES | {"try_time_s": 55.5})
+    await fake.say("status", drones=[status(), second])
+    await page.get_by_role("button", name="drone 2").click()
+    await expect(figure(page, "try_time_s")).to_have_text("55.5")
+    await expect(page.locator(".m-chart")).to_have_attribute("data-state", "landing.stop")
+    await fake.say("status", drones=[status()])
+    await expect(figure(page, "try_time_s")).to_have_text("87.4")
+    await expect(page.locator(".m-tabs")).to_be_hidden()
+    assert complaints == []
+
+
+async def test_a_phone_shows_everything_without_scrolling_sideways(chromium, fake):
+    fake.welcome[2] = {"kind": "status", "drones": [status(video=True)]}
+    page, complaints = await visit(chromium, fake, viewport=PHONE, has_touch=True, is_mobile=True)
+    await fake.say("pose", drones=[pose()])
+    box = [-10.0, -30.0, 40.0, 10.0, 1.234, 12.4]
+    boxes = {"red": box, "green": None, "blue": [120.0, 100.0, 160.0, 150.0, None, None]}
+    await fake.say("detections", id=1, t=10.0, width=320, height=240, boxes=boxes)
+    await expect(page.locator(".m-camera img")).to_be_visible()
+    await expect(page.locator("svg .m-active")).to_have_count(1)
+    assert await width_of(page) == PHONE["width"]
+    names = ("figures", "arena", "camera", "plots", "chart")
+    tops = [(await page.locator(f".m-{name}-panel").bounding_box())["y"] for name in names]
+    assert tops == sorted(tops)
+    await fake.say("status", drones=[status()])
+    await expect(page.locator(".m-camera")).to_have_text("no video")
+    assert complaints == []
+
+
+async def test_without_webgl_the_arena_is_shown_from_above(chromium, fake):
+    context = await chromium.new_context(viewport=LAPTOP)
+    page = await context.new_page()
+    await page.add_init_script(
+        """const context = HTMLCanvasElement.prototype.getContext;
+        HTMLCanvasElement.prototype.getContext = function (kind, ...more) {
+          return kind.startsWith("webgl") ? null : context.call(this, kind, ...more);
+        };"""
+    )
+    complaints = Complaints(page)
+    await page.goto(fake.url)
+    await fake.until_watched()
+    await expect(page.locator(".m-arena-words")).to_contain_text("from above")
+    await fake.say("pose", drones=[pose(p=[4.0, 4.0, 1.0])])
+    # The drone's dark arrow comes to stand on the floor's gold.
+    await page.wait_for_function(
+        """() => {
+          const canvas = document.querySelector(".m-topview");
+          const {width, height} = canvas;
+          const pixels = canvas.getContext("2d").getImageData(width / 2, 0, width / 2, height / 2).data;
+          for (let index = 0; index < pixels.length; index += 4)
+            if (pixels[index + 3] === 255 && pixels[index] === 28 && pixels[index + 1] === 39) return true;
+          return false;
+        }"""
+    )
+    assert complaints == []
