@@ -10,6 +10,7 @@ from framerunner.cli import run
 from framerunner.film import film_file as film_file_module
 from framerunner.film.film_file import Mp4File, film_file
 from framerunner.pictures import PictureError
+from tests.framerunner.recording.logs import write_log
 
 
 def frames_of(path):
@@ -93,6 +94,15 @@ def test_a_flight_that_is_flown_again_is_filmed_to_its_verdict(short_folder, tmp
     right = frames[-1][130:170, 200:]
     assert (right.astype(int) @ [2, -1, -1] > 150).sum() > 300  # a verdict that is not a good one is red
     assert (frames[2][130:170, 250:].astype(int) @ [2, -1, -1] > 150).sum() == 0
+
+
+def test_a_killed_real_time_flight_is_filmed_from_its_log(short_folder, tmp_path):
+    shutil.copy(short_folder / "scenario.yaml", tmp_path)
+    (tmp_path / "flight.mcap").write_bytes(b"cut short")
+    write_log(tmp_path / "flight.tlog")
+    assert make(tmp_path, "--size", "320x180", "--fps", "4", "--seconds", "4") == 0
+    first, *_, last = frames_of(tmp_path / "film.mp4")[1]
+    assert np.abs(first.astype(int) - last).mean() > 0.5
 
 
 @pytest.mark.parametrize(

@@ -13,8 +13,10 @@ import pytest
 from framerunner.cli import run
 from framerunner.monitoring import run_library
 from framerunner.monitoring.run_library import RunFolders
+from framerunner.recorder import VideoFile
 from monitor.ports import RunError
 from scenarios.loader import load_scenario
+from tests.framerunner.recording.logs import write_log
 
 SHORT = """name: short
 frames: [{colour: red, x_m: 2.0, y_m: 0.0, z_m: 1.0}]
@@ -173,6 +175,27 @@ def test_detections_and_images_have_their_times(recording, library, flown):
     n, s, e, w, _, _ = seen["boxes"]["red"]
     box = image[round(120 - n) : round(120 - s), round(160 + w) : round(160 + e)].astype(int)
     assert (box @ [-1, -1, 2] > 200).any()
+
+
+def test_a_real_time_flight_is_told_from_its_log_and_video(tmp_path):
+    folder = tmp_path / "run"
+    folder.mkdir()
+    (folder / "scenario.yaml").write_text(SHORT, encoding="utf-8")
+    write_log(folder / "flight.tlog")
+    video = VideoFile(folder / "video.avi", 10.0)
+    for level in range(50):
+        video.write(np.full((48, 64, 3), 5 * level, np.uint8))
+    video.close()
+    recording = RunFolders(tmp_path).recording("run")
+    poses = recording["poses"]
+    assert (recording["chart"], recording["result"], recording["detections"][0]["width"]) == (None, None, 64)
+    assert all(pose["c"] is None for pose in poses)
+    assert poses[0]["t"] == pytest.approx(-2.0, abs=0.1)  # motors on come after two of ten seconds
+    assert poses[-1]["t"] == pytest.approx(8.0, abs=0.1)
+    assert poses[-1]["p"][2] - poses[0]["p"][2] == pytest.approx(0.8, abs=0.02)
+    assert recording["states"][poses[-1]["s"]] == "offboard"
+    assert len(recording["images"]) == 50
+    assert recording["images"][-1] == poses[-1]["t"]
 
 
 def test_it_is_json_without_nan(recording):

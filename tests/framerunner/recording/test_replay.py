@@ -9,7 +9,6 @@ import aiohttp
 import numpy as np
 import pytest
 from mcap.writer import Writer
-from pymavlink.dialects.v20 import common as mavlink
 
 from framerunner.cli import run
 from framerunner.recorder import VideoFile
@@ -21,6 +20,7 @@ from offboard.app import Moment
 from offboard.drone import DroneState, VelocityCommand
 from sitl.video import VideoServer
 from tests.framerunner.recording.conftest import SEED
+from tests.framerunner.recording.logs import write_log
 from tests.processes import program
 from vision.types import Detections
 
@@ -57,8 +57,9 @@ class Flight:
 
 
 def states_in(text):
-    """Second column of the lines that begin with a time."""
-    return [line.split()[2] for line in text.splitlines() if line.split()[1:2] == ["s"]]
+    """Second column of the lines that begin with a time; not those of a flight that is flown again ("s of")."""
+    lines = [line.split() for line in text.splitlines()]
+    return [words[2] for words in lines if words[1:2] == ["s"] and words[2] != "of"]
 
 
 def test_a_recording_is_shown_state_by_state_and_ends_with_its_result(recorded, capsys):
@@ -112,28 +113,6 @@ def test_the_recording_of_the_command_holds_the_flight_of_the_result(lockstep_fo
     with recorded_flight(folder) as flight:
         assert flight.result["state_sha256"] == plain["state_sha256"]
         assert "wall_time_s" not in flight.result
-
-
-def write_log(path):
-    """Ten seconds of telemetry; the vehicle's axes are turned and shifted against the arena's."""
-    link = mavlink.MAVLink(None, srcSystem=1, srcComponent=1)
-    with path.open("wb") as file:
-
-        def add(message, time_ms):
-            file.write((1_700_000_000_000_000 + time_ms * 1000).to_bytes(8, "big") + message.pack(link))
-
-        for time_ms in range(5000, 15_000, 20):
-            if time_ms % 1000 == 0:
-                armed = time_ms >= 7000
-                flags = 1 | (mavlink.MAV_MODE_FLAG_SAFETY_ARMED if armed else 0)
-                heartbeat = mavlink.MAVLink_heartbeat_message(2, 12, flags, 6 << 16, 4, 3)
-                add(heartbeat, time_ms)
-            add(mavlink.MAVLink_attitude_message(time_ms, 0.0, 0.0, 0.3, 0.0, 0.0, 0.0), time_ms)
-            climb_m = max(0, time_ms - 7000) / 10_000
-            position = mavlink.MAVLink_local_position_ned_message(
-                time_ms, 5.0, 6.0, -7.0 - climb_m, 0.0, 0.0, -0.1
-            )
-            add(position, time_ms)
 
 
 def test_a_real_time_flight_is_shown_from_its_log_and_video(tmp_path, capsys):
