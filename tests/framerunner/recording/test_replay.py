@@ -57,7 +57,7 @@ class Flight:
 
 
 def states_in(text):
-    """Second column of the lines that begin with a time; not those of a flight that is flown again ("s of")."""
+    """Second column of the lines that begin with a time; not those of a flight being flown ("s of")."""
     lines = [line.split() for line in text.splitlines()]
     return [words[2] for words in lines if words[1:2] == ["s"] and words[2] != "of"]
 
