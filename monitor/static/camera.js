@@ -13,6 +13,7 @@ export class CameraView {
   #address = null;
   #owned = null;
   #message = null;
+  #drawn = "";
   #again = 0;
 
   /** @param {HTMLElement} element an empty box; the view takes its width */
@@ -59,6 +60,9 @@ export class CameraView {
     if (message?.width > 0 && message?.height > 0) {
       this.#box.style.aspectRatio = `${message.width} / ${message.height}`;
     }
+    const told = JSON.stringify([message?.width, message?.height, message?.boxes]);
+    if (told === this.#drawn) return;
+    this.#drawn = told;
     onBeat(this, () => this.#draw());
   }
 

@@ -1,4 +1,4 @@
-"""A monitor's pages without a monitor: files, the frame of a page, and a live channel that says what a test says."""
+"""A monitor's pages without a monitor: files, a page's frame, and a live channel that a test speaks on."""
 
 from __future__ import annotations
 
@@ -34,6 +34,7 @@ class FakeMonitor:
     def __init__(self) -> None:
         self.welcome: list[dict] = []
         self.url = ""
+        self._somebody = asyncio.Event()
         self._watchers: set[web.WebSocketResponse] = set()
         self._port = 0
         self._runner: web.AppRunner | None = None
@@ -70,8 +71,7 @@ class FakeMonitor:
     async def until_watched(self):
         """Wait for a page."""
         async with asyncio.timeout(30):
-            while not self._watchers:
-                await asyncio.sleep(0.01)
+            await self._somebody.wait()
 
     async def _page(self, request):
         name, module = PAGES[request.path]
@@ -93,6 +93,7 @@ class FakeMonitor:
         for message in self.welcome:
             await watcher.send_str(json.dumps(message))
         self._watchers.add(watcher)
+        self._somebody.set()
         try:
             while (await watcher.receive()).type not in {
                 WSMsgType.CLOSE,
