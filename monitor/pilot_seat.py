@@ -327,8 +327,10 @@ class PilotSeat:
 
     async def _take_after_climb(self, person: Person) -> Answer:
         answer = await self._take(person)
-        level = "info" if answer.ok else "warning"
-        self._drone.notice(level, f"after its take-off, {person.name}: {answer.text}")
+        if answer.ok:
+            self._drone.notice("info", f"{self._name} is up; it follows the sticks")
+        else:
+            self._drone.notice("warning", f"{self._name} is up, but follows no sticks: {answer.text}")
         return answer
 
     def _fall_silent(self, how: str) -> None:

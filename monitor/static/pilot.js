@@ -33,7 +33,6 @@ class PilotPage {
   #id = null;
   #pose = null;
   #connection = "away";
-  #sent = neutral();
   #shownAt = 0;
 
   /** @param {HTMLElement} root @param {boolean} mayFly */
@@ -121,10 +120,9 @@ class PilotPage {
     live.on("notice", (message) => {
       if (message.id === null || message.id === this.#id) this.#say(message.text, message.level === "info" ? "" : "bad");
     });
-    let welcomed = false;
-    setTimeout(() => { welcomed = true; }, 1000);
+    const openedAt = performance.now();
     live.on("text", (message) => { // what was said before this page was opened is no news
-      if (welcomed && message.id === this.#id && message.severity <= 4) this.#say(`drone: ${message.text}`, "bad");
+      if (performance.now() - openedAt > 1000 && message.id === this.#id && message.severity <= 4) this.#say(`drone: ${message.text}`, "bad");
     });
   }
 
@@ -240,7 +238,6 @@ class PilotPage {
   }
 
   #showSent(sticks, name) {
-    this.#sent = sticks;
     for (const axis of AXES) {
       setText(this.#parts[`value-${axis}`], sticks[axis].toFixed(2));
       this.#parts[`bar-${axis}`].style.setProperty("--value", sticks[axis]);
