@@ -47,7 +47,9 @@ def register(monitor: Monitor) -> None:
     monitor.web.state.competition = service
     add_channel(monitor.web, service)
     monitor.web.include_router(reading_routes(service))
-    monitor.web.include_router(writing_routes(service, monitor.access))
+    judges = _Judges(service, monitor.access)
+    monitor.web.include_router(organising_routes(service, judges))
+    monitor.web.include_router(judging_routes(service, judges))
 
 
 def reading_routes(service: CompetitionService) -> APIRouter:
@@ -69,7 +71,7 @@ def reading_routes(service: CompetitionService) -> APIRouter:
 
     @routes.get("/tries.csv")
     async def tries_as_csv() -> Response:
-        return _csv("tries.csv", tries_csv((await _words(_state(service))).board))
+        return _csv("tries.csv", tries_csv(await _words(service.read(lambda store: store.everything()))))
 
     @routes.get("/tries/{try_id}")
     async def one_try(try_id: str) -> Response:
@@ -87,31 +89,40 @@ def reading_routes(service: CompetitionService) -> APIRouter:
     return routes
 
 
-def writing_routes(service: CompetitionService, access: Access) -> APIRouter:
-    """What judges may ask for. Everybody else's request is refused before its body is looked at."""
-    routes = APIRouter(prefix="/api/competition")
+class _Judges:
+    """Reads what judges send. Everybody else's request is refused before its body is looked at."""
 
-    async def asked(request: Request, model: type[Form]) -> tuple[Form, Entry]:
-        judge = access.require_judge(request)
+    def __init__(self, service: CompetitionService, access: Access) -> None:
+        self._service = service
+        self._access = access
+
+    async def asked(self, request: Request, model: type[Form]) -> tuple[Form, Entry]:
+        """What a judge asks for, and who it is, now."""
+        judge = self._access.require_judge(request)
         if request.headers.get("content-type", "").partition(";")[0].strip().lower() != "application/json":
             raise HTTPException(415, "the body must be JSON; send Content-Type: application/json")
         body = await request.body()
         if len(body) > MOST_BODY_BYTES:
             raise HTTPException(413, f"the body has {len(body)} bytes; send at most {MOST_BODY_BYTES}")
         try:
-            return read_form(model, body), service.entry(judge.name)
+            return read_form(model, body), self._service.entry(judge.name)
         except Refused as error:
             raise HTTPException(error.status, str(error)) from error
 
+
+def organising_routes(service: CompetitionService, judges: _Judges) -> APIRouter:
+    """Teams, who flies next, the draw, the rule."""
+    routes = APIRouter(prefix="/api/competition")
+
     @routes.post("/teams")
     async def add_team(request: Request) -> Response:
-        form, entry = await asked(request, TeamForm)
+        form, entry = await judges.asked(request, TeamForm)
         team = await _words(service.change(lambda store: store.add_team(form.name, form.members, entry)))
         return _json({"team": team})
 
     @routes.post("/teams/{team_id}")
     async def change_team(request: Request, team_id: str) -> Response:
-        form, entry = await asked(request, TeamChangeForm)
+        form, entry = await judges.asked(request, TeamChangeForm)
         number = await _words(_ident("team", team_id))
         values = (form.name, form.members, form.withdrawn)
         await _words(service.change(lambda store: store.change_team(number, *values, entry)))
@@ -119,7 +130,7 @@ def writing_routes(service: CompetitionService, access: Access) -> APIRouter:
 
     @routes.post("/next")
     async def call(request: Request) -> Response:
-        form, entry = await asked(request, NextForm)
+        form, entry = await judges.asked(request, NextForm)
         if form.scenario:
             await _words(service.frames(form.scenario))
         await _words(service.change(lambda store: store.call(form.team, form.scenario, entry)))
@@ -127,21 +138,28 @@ def writing_routes(service: CompetitionService, access: Access) -> APIRouter:
 
     @routes.post("/draw")
     async def draw(request: Request) -> Response:
-        form, entry = await asked(request, DrawForm)
+        form, entry = await judges.asked(request, DrawForm)
         count = form.count or (await _words(_state(service))).board.rule.scenarios
         number = await _words(service.draw(form.pool, count, entry.who))
         return _json({"round": number})
 
     @routes.post("/settings")
     async def set_rule(request: Request) -> Response:
-        form, entry = await asked(request, SettingsForm)
+        form, entry = await judges.asked(request, SettingsForm)
         rule = Rule(form.limit_s, form.missing_frame_s, form.scenarios, form.counting)
         await _words(service.change(lambda store: store.set_rule(rule, entry)))
         return _json(form)
 
+    return routes
+
+
+def judging_routes(service: CompetitionService, judges: _Judges) -> APIRouter:
+    """What judges say of a try."""
+    routes = APIRouter(prefix="/api/competition")
+
     @routes.post("/tries/{try_id}/judgement")
     async def judge(request: Request, try_id: str) -> Response:
-        form, entry = await asked(request, JudgementForm)
+        form, entry = await judges.asked(request, JudgementForm)
         number = await _words(_ident("try", try_id))
         crossed = None if form.crossed is None else tuple(form.crossed)
         said = Correction(crossed, form.contacts, form.penalty_s, form.try_time_s, form.completed)
@@ -152,7 +170,7 @@ def writing_routes(service: CompetitionService, access: Access) -> APIRouter:
 
     @routes.post("/tries/{try_id}/team")
     async def assign(request: Request, try_id: str) -> Response:
-        form, entry = await asked(request, TeamOfTryForm)
+        form, entry = await judges.asked(request, TeamOfTryForm)
         number = await _words(_ident("try", try_id))
         await _words(service.change(lambda store: store.assign(number, form.seen, form.team, entry)))
         return _json({"try": number})
@@ -173,13 +191,14 @@ async def _words(work: Awaitable[Answer]) -> Answer:
 
 
 async def _state(service: CompetitionService) -> StateView:
+    board = await service.board()
     return StateView(
-        board=service.board, running=service.running, problem=service.problem, scenarios=service.scenarios
+        board=board, running=service.running, problem=service.problem, scenarios=service.scenarios
     )
 
 
 async def _ranking(service: CompetitionService, number: str) -> RankingStateView:
-    board = service.board
+    board = await service.board()
     return RankingStateView(
         version=board.version,
         ranking=_of_round(board.rankings, number),

@@ -60,8 +60,8 @@ class _Judged:
         return self.row.state == "ended" or (self.row.state == "interrupted" and self.correction is not None)
 
 
-def read_board(session: Session, version: int) -> Board:
-    """Read everything."""
+def read_board(session: Session, version: int, most_tries: int = MOST_TRIES_SHOWN) -> Board:
+    """Read everything, and of the tries the newest to show."""
     rule_row = last_settings(session)
     rule = rule_of(rule_row)
     teams = list(session.scalars(select(tables.Team).order_by(tables.Team.id)))
@@ -81,9 +81,7 @@ def read_board(session: Session, version: int) -> Board:
         ),
         called=_next_view(session, names),
         draws=tuple(draw_view(draw) for draw in reversed(draws)),
-        tries=tuple(
-            _try_view(judged, names, attempts, rule) for judged in reversed(tries[-MOST_TRIES_SHOWN:])
-        ),
+        tries=tuple(_try_view(judged, names, attempts, rule) for judged in reversed(tries[-most_tries:])),
         rankings=tuple(_ranking(number, teams, draws, tries, rule) for number in reversed(rounds)),
     )
 

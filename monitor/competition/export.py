@@ -32,7 +32,7 @@ def ranking_csv(ranking: RankingView) -> str:
 
 
 def tries_csv(board: Board) -> str:
-    """All tries of the board, oldest first, after correction."""
+    """The tries of a board, oldest first, after correction."""
     rows: list[list[object]] = []
     for each in reversed(board.tries):
         result = each.result

@@ -8,6 +8,7 @@ import re
 from collections import deque
 from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
+from contextlib import suppress
 from datetime import UTC, datetime
 from random import Random, SystemRandom
 from typing import TYPE_CHECKING, Any, TypeVar
@@ -64,15 +65,18 @@ class CompetitionService:
         self._events: deque[tuple[TryEvent, datetime]] = deque()
         self._latest: dict[str, tuple[TryEvent, datetime]] = {}
         self._arrived = asyncio.Event()
+        self._opened = asyncio.Event()
         self._flying: dict[int, Result] = {}
         self._frames: dict[str, tuple[str, ...]] = {}
         self._listeners: set[Callable[[Message], None]] = set()
         self.problem = ""
         self.scenarios: tuple[str, ...] = ()
 
-    @property
-    def board(self) -> Board:
-        """The contest as last read. Raises `DatabaseError` before the database is open."""
+    async def board(self) -> Board:
+        """The contest as last read; waits for the database to be opened. Raises `DatabaseError`."""
+        if self._board is None:
+            with suppress(TimeoutError):
+                await asyncio.wait_for(self._opened.wait(), _ANSWER_S)
         if self._board is None:
             raise DatabaseError("the contest's database is still being opened; try again in a moment")
         return self._board
@@ -152,6 +156,7 @@ class CompetitionService:
                 _log.warning("tries that ran when the monitor was stopped: %d", interrupted)
             self.scenarios = tuple(await asyncio.to_thread(self._equipment.list_scenarios))
             await self._refresh()
+            self._opened.set()
             while True:
                 await self._arrived.wait()
                 await self._write_next()
@@ -178,7 +183,8 @@ class CompetitionService:
         """Have the store do something that changes nothing. Raises as `change` does."""
         store = self._store
         if store is None:
-            raise DatabaseError("the contest's database is still being opened; try again in a moment")
+            await self.board()
+            return await self.read(work)
         doing = asyncio.get_running_loop().run_in_executor(self._worker, work, store)
         try:
             return await asyncio.wait_for(asyncio.shield(doing), _ANSWER_S)

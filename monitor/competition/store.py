@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import sys
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass
 from datetime import datetime
@@ -69,6 +70,11 @@ class Store:
         self._version += 1
         with self._database.transaction() as session:
             return read_board(session, self._version)
+
+    def everything(self) -> Board:
+        """The whole contest with all tries, however many."""
+        with self._database.transaction() as session:
+            return read_board(session, self._version, sys.maxsize)
 
     def detail(self, try_id: int) -> TryDetail:
         """A try with its history. Raises `Refused` if there is no such."""
