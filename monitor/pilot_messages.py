@@ -11,6 +11,7 @@ from monitor.sticks import Sticks
 
 LONGEST_MESSAGE = 1000  # bytes; one holds some 80
 MESSAGES_PER_SECOND = 60.0  # a page sends 25 and a word now and then
+BURST = 240.0  # what a page sends in 10 s and a network or this machine may hold back
 
 WORDS = ("take", "give", "arm", "disarm", "take_off", "land", "hold", "stop_motors")
 _AXES = ("forward", "right", "up", "yaw")
@@ -86,24 +87,21 @@ def _short(value: object) -> str:
 
 
 class Allowance:
-    """How many messages may come: so many a second, and a second's worth at once.
+    """How many messages may come: so many a second in the long run, and some at once after a pause.
 
     Args:
         clock: seconds that only grow.
-        per_second: how many.
     """
 
-    def __init__(self, clock: Callable[[], float], per_second: float = MESSAGES_PER_SECOND) -> None:
+    def __init__(self, clock: Callable[[], float]) -> None:
         self._clock = clock
-        self._per_second = per_second
-        self._left = per_second
+        self._left = BURST
         self._counted_s = clock()
 
     def spend(self) -> bool:
         """Count one message; False if it is one too many."""
         now_s = self._clock()
-        earned = (now_s - self._counted_s) * self._per_second
-        self._left = min(self._per_second, self._left + earned)
+        self._left = min(BURST, self._left + (now_s - self._counted_s) * MESSAGES_PER_SECOND)
         self._counted_s = now_s
         if self._left < 1.0:
             return False

@@ -134,7 +134,7 @@ def test_a_long_reason_is_cut_to_what_a_websocket_allows():
 
 def test_a_flood_closes_the_websocket():
     with connected() as (socket, _fleet):
-        for _ in range(100):
+        for _ in range(500):
             socket.send_json(CENTRED)
         closed = closing_of(socket)
     assert closed.code == 4429 and closed.reason == "too many messages a second"
