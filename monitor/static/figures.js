@@ -109,7 +109,7 @@ export class Figures {
     }
     const next = figures?.next_colour ?? null;
     setAttribute(this.#next, "data-value", next);
-    setText(this.#next, !figures ? "" : next ? `next frame: ${next}` : "all frames crossed, back to the base");
+    setText(this.#next, !figures ? "" : next ? `next frame: ${next}` : `all frames crossed${figures.over ? "" : ", back to the base"}`);
   }
 
   #setOutcome(figures, status) {
