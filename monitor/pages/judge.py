@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 def register(monitor: Monitor) -> None:
     """Add the page."""
 
-    @ui.page("/competition/try/{try_id}")
+    @ui.page("/competition/try/{try_id:int}")
     def judge(request: Request, try_id: int) -> None:
         ui.add_head_html(STYLE)
         with shell(monitor, request, f"Try {try_id}", "/competition") as visitor:

@@ -201,6 +201,14 @@ async def test_another_judge_was_quicker(running, chromium):
     assert [entry["who"] for entry in kept["history"]] == ["Ada", "Grace"]
 
 
+async def test_a_try_that_does_not_exist_is_said(running, chromium):
+    page = await open_page(chromium, running, "competition/try/99", judge="Ada")
+    await page.wait_for_selector(".line:has-text('try 99 does not exist')")
+    assert await page.locator("#main form:visible").count() == 0
+    async with running.http.get("/competition/try/abc") as answer:
+        assert answer.status == 404
+
+
 async def test_crossings_and_completion_by_hand(running, chromium):
     team = (await running.post("teams", {"name": "Falken"}))[1]["team"]
     await running.fly("k", verdict="aborted", crossed=("red", "green"), time_s=50.0)
