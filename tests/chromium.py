@@ -6,10 +6,12 @@ import os
 import shutil
 from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager
+from pathlib import Path
 
 import pytest
 from playwright.async_api import Browser, Page, async_playwright
 
+POLITE = Path(__file__).with_name("polite_browser.sh")
 NAMES = ("chromium", "chromium-browser", "google-chrome")
 # The first line for containers and machines without a graphics card; the others keep it from calling home.
 FLAGS = (
@@ -33,7 +35,9 @@ def find_chromium() -> str:
 async def chromium() -> AsyncIterator[Browser]:
     """A browser of its own."""
     async with async_playwright() as playwright:
-        browser = await playwright.chromium.launch(executable_path=find_chromium(), args=list(FLAGS))
+        browser = await playwright.chromium.launch(
+            executable_path=POLITE, args=list(FLAGS), env={**os.environ, "POLITE_BROWSER": find_chromium()}
+        )
         try:
             yield browser
         finally:

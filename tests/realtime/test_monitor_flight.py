@@ -82,7 +82,7 @@ LEAVES = ["up", "through", "over", "home.back", "home.down", "home.stop"]
 NOTE_STATES = """() => {
     window.lit = [];
     const note = () => {
-        const id = document.querySelector("[data-state].s-chart, .m-chart [data-state]")?.dataset.state;
+        const id = document.querySelector(".m-chart")?.dataset.state;
         if (id && id !== window.lit.at(-1)?.id) window.lit.push({ id, unix_s: Date.now() / 1000 });
     };
     new MutationObserver(note).observe(document.body, { subtree: true, attributes: true, childList: true });
@@ -181,11 +181,13 @@ async def test_a_flight_is_seen_from_take_off_to_its_verdict_by_ten_viewers(plan
     told = told_states(run)
     late_s = {state: lit[state] - told[state] for state in LEAVES}
     assert max(late_s.values()) < LATE_S, late_s
+    print(f"poses a second: {min(rates_hz):.1f} to {max(rates_hz):.1f}; lit after {late_s}")
     assert complaints == []
 
     async with aiohttp.ClientSession() as session, session.get(f"{monitor}api/competition/tries") as response:
         (judged,) = await response.json()
-    assert judged["report"]["total_time_s"] == result["total_time_s"]
+    assert (judged["verdict"], judged["final"]) == (result["verdict"], True)
+    assert judged["result"]["total_s"] == pytest.approx(result["total_time_s"], abs=0.005)
 
 
 async def test_a_pilot_takes_the_sticks_from_a_mission_and_gives_them_back(plan, monitor):
@@ -195,12 +197,12 @@ async def test_a_pilot_takes_the_sticks_from_a_mission_and_gives_them_back(plan,
         await page.goto(f"{monitor}pilot")
         async with flying(plan) as flight:
             await asyncio.to_thread(flight.wait_for, "home.back", 90.0)
-            await page.get_by_role("button", name="Take the sticks").click()
+            await page.get_by_role("button", name="Manual").click()
             await page.get_by_text("paused").first.wait_for(timeout=10_000)
             await page.keyboard.down("ArrowLeft")
             await asyncio.sleep(1.0)
             await page.keyboard.up("ArrowLeft")
-            await page.get_by_role("button", name="Give back").click()
+            await page.get_by_role("button", name="Automatic").click()
     (run,) = (plan / "runs").iterdir()
     result = json.loads((run / "result.json").read_text())
     assert result["verdict"] == "clean"
