@@ -15,6 +15,7 @@ from framerunner.errors import SettingError
 
 PASSWORD_VARIABLE = "FRAMERUNNER_JUDGE_PASSWORD"
 DATABASE = "sqlite:///framerunner.db"
+_NICENESS = 5  # beside a flight: who looks on must not slow it
 
 
 def monitor(
@@ -58,6 +59,8 @@ def monitor(
     parse_url(drone)
     given = equipment(drone, None if scenario is None else load_scenario(scenario), runs)
     settings = MonitorSettings(bind, port, database, os.environ.get(PASSWORD_VARIABLE) or None)
+    if lifeline:
+        os.nice(_NICENESS)
     work = serve(given, settings, _say)
     asyncio.run(until_standard_input_ends(work) if lifeline else work)
     return 0
