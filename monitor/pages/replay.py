@@ -12,9 +12,7 @@ from monitor.pages.shell import shell, use_module
 if TYPE_CHECKING:
     from monitor.server import Monitor
 
-_STYLE = (
-    '<link rel="stylesheet" href="/static/monitor.css"><link rel="stylesheet" href="/static/replay.css">'
-)
+_STYLE = '<link rel="stylesheet" href="/static/monitor.css"><link rel="stylesheet" href="/static/replay.css">'
 
 
 def register(monitor: Monitor) -> None:
