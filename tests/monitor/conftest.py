@@ -10,3 +10,10 @@ async def chromium():
     """A headless Chromium of its own, a playwright `Browser`."""
     async with open_chromium() as browser:
         yield browser
+
+
+@pytest.fixture
+async def solid_chromium():
+    """The same with WebGL."""
+    async with open_chromium(solid=True) as browser:
+        yield browser

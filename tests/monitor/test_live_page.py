@@ -200,8 +200,8 @@ async def test_a_lost_monitor_is_told_and_found_again(chromium, fake):
     await expect(page.locator("#live")).not_to_have_class(re.compile(r"\bm-stale\b"))
 
 
-async def test_keys_change_the_view_and_the_drone_is_drawn(chromium, fake):
-    page, complaints = await visit(chromium, fake)
+async def test_keys_change_the_view_and_the_drone_is_drawn(solid_chromium, fake):
+    page, complaints = await visit(solid_chromium, fake)
     arena = page.locator(".m-arena")
     await expect(arena).to_have_attribute("data-view", "orbit")
     for key, name in (("2", "follow"), ("3", "onboard"), ("1", "orbit")):

@@ -151,7 +151,7 @@ def told_states(folder):
 async def test_a_flight_is_seen_from_take_off_to_its_verdict_by_ten_viewers(plan, monitor):
     viewers = [Viewer(monitor) for _ in range(VIEWERS)]
     looking = [asyncio.create_task(viewer.look()) for viewer in viewers]
-    async with chromium() as browser:
+    async with chromium(solid=True) as browser:
         page = await browser.new_page(viewport={"width": 1366, "height": 768})
         complaints = Complaints(page)
         await page.goto(monitor)
