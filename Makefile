@@ -44,7 +44,11 @@ lint-rooms: $(VENV)/installed-dev
 
 .PHONY: test-fast
 test-fast: $(VENV)/installed-dev ## the tests that need no real time, in parallel
-	$(BIN)/pytest -n 2 -m "not realtime"
+	$(BIN)/pytest -n 2 -m "not realtime and not pages"
+
+.PHONY: test-pages
+test-pages: $(VENV)/installed-dev ## the monitor's single pages in a browser, at length; not part of `make test`
+	$(BIN)/pytest -n 2 -m pages
 
 .PHONY: test-realtime
 test-realtime: setup ## the tests that fly in real time, one after another

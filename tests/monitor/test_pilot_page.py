@@ -14,6 +14,7 @@ from tests.chromium import Complaints
 from tests.monitor.pilot_fakes import MISSION, FakeFleet
 from tests.monitor.pilot_server import served
 
+pytestmark = pytest.mark.pages
 PHONE = {"width": 390, "height": 844}
 FAKE_GAMEPAD = """
 window.pad = {

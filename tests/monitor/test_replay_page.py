@@ -4,12 +4,14 @@ import contextlib
 import re
 from urllib.parse import urlencode
 
+import pytest
 from playwright.async_api import expect
 
 from monitor.ports import RunInfo
 from tests.chromium import Complaints
 from tests.monitor.replay_runs import END_S, MARKUP, Library, a_run, info_of, serving_runs
 
+pytestmark = pytest.mark.pages
 PATIENCE_MS = 30_000
 expect.set_options(timeout=PATIENCE_MS)
 LAPTOP, PHONE = {"width": 1366, "height": 768}, {"width": 390, "height": 844}
