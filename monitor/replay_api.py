@@ -7,9 +7,9 @@ import gzip
 import hashlib
 import json
 from collections import OrderedDict
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import asdict
-from typing import TYPE_CHECKING, TypeVar
+from typing import TYPE_CHECKING, Any, TypeVar
 
 from starlette.requests import Request
 from starlette.responses import PlainTextResponse, Response
@@ -68,11 +68,8 @@ class _Answers:
 
     async def run(self, request: Request, name: str) -> Response:
         """One run, whole."""
-        library = self._library
-        if library is None:
-            return _sorry(_NO_RUNS)
         try:
-            recording = await _in_thread(lambda: library.recording(name))
+            recording = await self._recording(name)
         except RunError as error:
             return _sorry(str(error))
         # The library gives the same object for the same run until that changes.
@@ -86,13 +83,17 @@ class _Answers:
             self._packed.popitem(last=False)
         return _answer(request, known[1], known[2])
 
-    async def result(self, request: Request, name: str) -> Response:
-        """What stands in a run's `result.json`."""
+    async def _recording(self, name: str) -> Mapping[str, Any]:
+        """One run from the library. Raises `RunError`."""
         library = self._library
         if library is None:
-            return _sorry(_NO_RUNS)
+            raise RunError(_NO_RUNS)
+        return await _in_thread(lambda: library.recording(name))
+
+    async def result(self, request: Request, name: str) -> Response:
+        """What stands in a run's `result.json`."""
         try:
-            recording = await _in_thread(lambda: library.recording(name))
+            recording = await self._recording(name)
         except RunError as error:
             return _sorry(str(error))
         if recording["result"] is None:
