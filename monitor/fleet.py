@@ -139,7 +139,8 @@ class Fleet:
         """
         if sticks is not None:
             self._sticks[drone_id] = sticks
-            if drone_id not in self._streams:
+            stream = self._streams.get(drone_id)
+            if stream is None or stream.done():  # one that failed is begun anew
                 self._streams[drone_id] = asyncio.create_task(self._stream_sticks(drone_id))
             return
         self._sticks.pop(drone_id, None)
