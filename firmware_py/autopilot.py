@@ -139,7 +139,7 @@ class Autopilot:
         self._shown_state: State | None = None
         self._airborne = LandedState.IN_AIR
         self._texts: deque[StatusText] = deque(maxlen=_TEXTS_KEPT)
-        self._intake = OffboardIntake(self._guidance, self.say)
+        self.intake = OffboardIntake(self._guidance, self.say)
         self._ready_due_us = 0
         self._parameters_version = -1
         self._upright_cosine = 0.0
@@ -181,8 +181,8 @@ class Autopilot:
         if self._now_us >= self._watch.due_us:
             self._update_view()
             self._watch.look(self._now_us, sensors, armed=self.status.armed)
-        if self._intake.waiting is not None:
-            self._intake.pass_on(self._now_us)
+        if self.intake.waiting is not None:
+            self.intake.pass_on(self._now_us)
         _, x, y, _ = state.attitude
         row = commander.tick(
             self._now_us,
@@ -324,7 +324,7 @@ class Autopilot:
         One that says nothing that can be flown counts as none received; a status text says so, once until a
         usable one comes.
         """
-        if self._intake.offer(setpoint, self._now_us):
+        if self.intake.offer(setpoint, self._now_us):
             self._commander.setpoint_came(setpoint.time_us)
 
     def manual_input(self, sticks: ManualInput) -> None:
@@ -397,7 +397,7 @@ class Autopilot:
             self._lift_off.rest()
         self._update_view()
         if row.target is State.OFFBOARD:
-            self._intake.pass_on_now()
+            self.intake.pass_on_now()
         self._entry.enter(row.target, before, row.event)
 
     def _leave_disarmed(self) -> None:
@@ -418,6 +418,7 @@ class Autopilot:
             command,
             self._guidance.command_down_m_s,
             may_lift=self._commander.state not in _GROUND_STATES or self._guidance.departs(self.state),
+            climb_ramp=self._guidance.climb_ramp,
         )
 
     def _detect_land(self) -> None:
@@ -466,8 +467,7 @@ class Autopilot:
         )
         self._watch.configure(parameters)
         self._limit_stabiliser()
-        self._lift_off.spool_up_us = round(parameters.value("COM_SPOOLUP_TIME") * 1e6)
-        self._lift_off.ramp_us = round(parameters.value("MPC_TKO_RAMP_T") * 1e6)
+        self._lift_off.configure(parameters)
         self._land_detector.configure(parameters)
         tilt_deg = min(parameters.value("FD_FAIL_P"), parameters.value("FD_FAIL_R")) or 180.0  # 0: never
         self._upright_cosine = cos(radians(tilt_deg))

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from math import isnan
 from typing import Protocol
 
 from firmware_py.control.limits import FlightLimits
+from firmware_py.parameters import Parameters
 from firmware_py.types import (
     AccelerationCommand,
     ActuatorCommand,
@@ -20,8 +21,20 @@ from firmware_py.types import (
 
 _LEAST_SHARE = 0.02  # of the climb wanted, whatever the ramp says, once it works to leave the ground
 _LIFT_M_S = 0.04  # asked to climb faster than this, it leaves the ground
-_RAMP_FROM_M_S = 2.45  # PX4's ramp begins so far below zero: without thrust, g over its velocity gain
 _LIFT_HELD_TICKS = 125  # half a second: integrals rest while the contact still carries the weight
+
+
+@dataclass(frozen=True, slots=True)
+class ClimbRamp:
+    """What climb is allowed while taking off, m/s; as PX4's, it leads to a limit and not to the climb wanted.
+
+    Attributes:
+        from_m_s: at its beginning; below zero.
+        to_m_s: at its end, after MPC_TKO_RAMP_T.
+    """
+
+    from_m_s: float
+    to_m_s: float
 
 
 class RateStabiliser(Protocol):
@@ -51,18 +64,24 @@ class LiftOff:
     Attributes:
         ticks: for how many ticks the motors have been working to leave the ground; 0: they idle.
         spool_up_us: motors idle this long after arming (COM_SPOOLUP_TIME).
-        ramp_us: the climb asked for grows this long from when it is wanted (MPC_TKO_RAMP_T).
+        ramp_us: the climb allowed grows this long from when it is wanted (MPC_TKO_RAMP_T).
     """
 
-    __slots__ = ("_armed_us", "_ramp_start_us", "_wanted", "ramp_us", "spool_up_us", "ticks")
+    __slots__ = ("_armed_us", "_climb_ramp", "_ramp_start_us", "_wanted", "ramp_us", "spool_up_us", "ticks")
 
     def __init__(self) -> None:
         self.ticks = 0
         self.spool_up_us = 0
         self.ramp_us = 0
+        self._climb_ramp = ClimbRamp(0.0, 0.0)
         self._armed_us = 0
         self._wanted = False  # to lift
         self._ramp_start_us = -(10**15)
+
+    def configure(self, parameters: Parameters) -> None:
+        """Take over changed parameters."""
+        self.spool_up_us = round(parameters.value("COM_SPOOLUP_TIME") * 1e6)
+        self.ramp_us = round(parameters.value("MPC_TKO_RAMP_T") * 1e6)
 
     def arm(self, time_us: int) -> None:
         """The motors may turn from now on."""
@@ -90,6 +109,7 @@ class LiftOff:
         down_m_s: float,
         *,
         may_lift: bool,
+        climb_ramp: ClimbRamp,
     ) -> MotorOutput:
         """Motors for a command on the ground.
 
@@ -99,7 +119,9 @@ class LiftOff:
             command: of guidance.
             down_m_s: what it means vertically; below zero: up.
             may_lift: the mode flown is one that takes off.
+            climb_ramp: of the mode flown.
         """
+        self._climb_ramp = climb_ramp
         climbs = isinstance(command, RateCommand) or (
             isinstance(command, TiltCommand) and isnan(command.thrust)
         )
@@ -124,8 +146,9 @@ class LiftOff:
 
     def _ramp(self, down_m_s: float, time_us: int) -> float:
         """The vertical velocity allowed on the way to one wanted, below zero: up."""
+        ramp = self._climb_ramp
         share = min((time_us - self._ramp_start_us) / self.ramp_us, 1.0)
-        return _RAMP_FROM_M_S - share * (_RAMP_FROM_M_S - down_m_s)
+        return max(down_m_s, -ramp.from_m_s - share * (ramp.to_m_s - ramp.from_m_s))
 
     def _ramped(self, command: Command, time_us: int) -> Command:
         """Less climb in the first moments."""

@@ -11,7 +11,7 @@ from firmware_py.guidance.modes import Guidance
 from firmware_py.navigator import Navigator
 from firmware_py.parameters import Parameters
 from firmware_py.places import Places
-from firmware_py.status import VehicleStatus
+from firmware_py.status import LandedState, VehicleStatus
 from firmware_py.types import VehicleState
 
 
@@ -80,6 +80,8 @@ class ModeEntry:
         match target:
             case State.DISARMED | State.TERMINATED:
                 self._navigator.disarmed()
+            case State.FAILSAFE_HOLD if before is State.TAKEOFF and self._on_ground:
+                pass  # as PX4: a take-off that has begun goes on to its height and holds there
             case State.HOLD | State.FAILSAFE_HOLD:
                 reached = before is State.TAKEOFF and event is Event.TICK
                 guidance.enter_hold(state, keep_target=reached or event is Event.MISSION_DONE)
@@ -94,6 +96,10 @@ class ModeEntry:
                 self._navigator.enter_mission()
             case _:
                 self._enter_other(target)
+
+    @property
+    def _on_ground(self) -> bool:
+        return self._status.landed_state is LandedState.ON_GROUND
 
     def _enter_other(self, target: State) -> None:
         guidance, state = self._guidance, self._state

@@ -25,12 +25,14 @@ class OffboardIntake:
 
     Attributes:
         waiting: the newest setpoint that is not flown yet.
+        newest: the newest setpoint, flown or not.
     """
 
-    __slots__ = ("_guidance", "_refusal_said", "_say", "_slot", "waiting")
+    __slots__ = ("_guidance", "_refusal_said", "_say", "_slot", "newest", "waiting")
 
     def __init__(self, guidance: Guidance, say: Callable[[int, str], None]) -> None:
         self.waiting: Setpoint | None = None
+        self.newest: Setpoint | None = None
         self._guidance = guidance
         self._say = say
         self._slot = 0
@@ -44,9 +46,17 @@ class OffboardIntake:
                 self._say(_WARNING, "Offboard setpoint ignored: nothing in it can be flown")
             return False
         self._refusal_said = False
-        self.waiting = setpoint
+        self.waiting = self.newest = setpoint
         self._slot = now_us // _GRID_US
         return True
+
+    def newest_velocity(self) -> tuple[float, float, float, float] | None:
+        """The newest setpoint as forward, right, down (m/s) and yaw rate (rad/s, clockwise).
+
+        NaN where it does not control one; None before the first.
+        """
+        newest = self.newest
+        return None if newest is None else (*newest.velocity_level_m_s, newest.yaw_rate_rad_s)
 
     def pass_on(self, now_us: int) -> None:
         """Fly what waits, if its time has come."""

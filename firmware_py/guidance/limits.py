@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from math import hypot, radians
+from math import hypot, inf, radians
 
 from firmware_py.airframe import Airframe
 from firmware_py.guidance.reference import Pace
@@ -21,6 +21,7 @@ class SpeedLimits:
         down_m_s: any descent.
         yaw_rate_rad_s: any turn.
         takeoff_m_s: climb of a take-off.
+        takeoff_m_s2: how fast that climb is built up; infinite: at once.
         land_m_s: descent near the ground.
         cruise_m_s: of a journey by itself.
         auto_up_m_s: climb of a journey.
@@ -40,6 +41,7 @@ class SpeedLimits:
     yaw_rate_rad_s: float
     takeoff_m_s: float
     land_m_s: float
+    takeoff_m_s2: float = inf
     cruise_m_s: float = 5.0
     auto_up_m_s: float = 3.0
     auto_down_m_s: float = 1.5
@@ -76,12 +78,15 @@ def speed_limits(airframe: Airframe, parameters: Parameters) -> SpeedLimits:
     up_m_s = min(can.speed_up_m_s, value("MPC_Z_VEL_MAX_UP"))
     down_m_s = min(can.speed_down_m_s, value("MPC_Z_VEL_MAX_DN"))
     horizontal_m_s = min(can.speed_horizontal_m_s, value("MPC_XY_VEL_MAX"))
+    takeoff_m_s = min(up_m_s, value("MPC_TKO_SPEED"))
+    ramp_s = value("MPC_TKO_RAMP_T")
     return SpeedLimits(
         horizontal_m_s=horizontal_m_s,
         up_m_s=up_m_s,
         down_m_s=down_m_s,
         yaw_rate_rad_s=min(can.yaw_rate_rad_s, radians(value("MC_YAWRATE_MAX"))),
-        takeoff_m_s=min(up_m_s, value("MPC_TKO_SPEED")),
+        takeoff_m_s=takeoff_m_s,
+        takeoff_m_s2=takeoff_m_s / ramp_s if ramp_s > 0.0 else inf,
         land_m_s=min(down_m_s, value("MPC_LAND_SPEED")),
         cruise_m_s=min(horizontal_m_s, value("MPC_XY_CRUISE")),
         auto_up_m_s=min(up_m_s, value("MPC_Z_V_AUTO_UP")),

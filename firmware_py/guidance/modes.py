@@ -19,6 +19,7 @@ from firmware_py.guidance.offboard import OffboardFlight, bounded, usable
 from firmware_py.guidance.returning import Phase, ReturnHome, ReturnSettings, return_settings
 from firmware_py.guidance.sticks import StickFlight, StickSettings, stick_settings
 from firmware_py.guidance.travel import Traveller, YawMode, passing_speed
+from firmware_py.lift_off import ClimbRamp
 from firmware_py.missions.flight import Leg, LegKind
 from firmware_py.parameters import Parameters
 from firmware_py.status import FlightMode
@@ -41,6 +42,9 @@ _REACHED_M = 0.15
 _FACING_M = 0.5  # nearer than this, a region of interest says nothing about where to look
 _LITTLE = 0.7  # less than this share of the thrust that carries the weight means to go down
 _ABOVE_M = 0.5  # a place so much higher is flown to from the ground
+_RAMP_FROM_M_S = -2.45  # PX4's: without thrust, g over its velocity gain
+_WOUND_UP_M_S = 0.95  # fitted to heights of x500 flights: PX4's velocity loop winds up during the ramp
+_CATCHING_UP = 1.2  # of MPC_Z_V_AUTO_UP: what PX4 leaves modes that fly by themselves
 _COUNTED_ON_US = 5_000_000  # so long a velocity made of accelerations is good enough to brake by
 _CENTRED = ManualInput(0)
 
@@ -94,6 +98,7 @@ class Guidance:
 
     __slots__ = (
         "_blind_us",
+        "_climb_m_s",
         "_manners",
         "_offboard",
         "_orbit",
@@ -132,6 +137,7 @@ class Guidance:
         self._takeoff_ned_m = NAN3
         self._yaw_rad = 0.0
         self._blind_us = 0
+        self._climb_m_s = 0.0  # of a take-off
         self._step: Callable[[VehicleState], Command] = self._travel
         self.configure(limits, manners)
 
@@ -166,6 +172,7 @@ class Guidance:
         north_m, east_m, down_m = state.position_ned_m
         self._takeoff_ned_m = (north_m, east_m, min(down_m, target_down_m))
         self._yaw_rad = state.yaw_rad
+        self._climb_m_s = max(0.0, -state.velocity_ned_m_s[2])
         self.target_reached = False
         self.setpoint = Setpoint(state.time_us, self._takeoff_ned_m, yaw_rad=self._yaw_rad)
 
@@ -221,9 +228,18 @@ class Guidance:
 
     def departs(self, state: VehicleState) -> bool:
         """Whether it is on the way to a place well above it: then it leaves the ground even from hold."""
+        if self._step == self._takeoff:
+            return self._takeoff_ned_m[2] < state.position_ned_m[2] - _ABOVE_M
         return (
             self._step == self._travel and self.traveller.target_ned_m[2] < state.position_ned_m[2] - _ABOVE_M
         )
+
+    @property
+    def climb_ramp(self) -> ClimbRamp:
+        """How the climb of a take-off grows in this mode."""
+        if self._step in (self._takeoff, self._travel):
+            return ClimbRamp(_RAMP_FROM_M_S, _CATCHING_UP * self.limits.auto_up_m_s)
+        return ClimbRamp(_RAMP_FROM_M_S - _WOUND_UP_M_S, self.limits.up_m_s)
 
     def follow_leg(self, state: VehicleState, leg: Leg) -> None:
         """Fly a leg of a mission."""
@@ -301,7 +317,9 @@ class Guidance:
             target_ned_m, state.position_ned_m, (0.0, 0.0, 0.0), self.limits
         )
         self.target_reached = abs(target_ned_m[2] - state.position_ned_m[2]) < _REACHED_M
-        down_m_s = max(down_m_s, -self.limits.takeoff_m_s)
+        limits = self.limits
+        self._climb_m_s = min(limits.takeoff_m_s, self._climb_m_s + limits.takeoff_m_s2 * self._period_s)
+        down_m_s = max(down_m_s, -self._climb_m_s)
         return rate_command(state, (north_m_s, east_m_s, down_m_s), self._yaw_rad, self.limits)
 
     def _land(self, state: VehicleState) -> Command:

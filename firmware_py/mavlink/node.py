@@ -145,6 +145,34 @@ class MavlinkNode:
         for message in source.reader.feed(data):
             self._take(source, message)
 
+    def add_input(self, link: str, data: bytes) -> int:
+        """Keep bytes that came in for `process_input`; how many found no room and are lost.
+
+        Args:
+            link: name of the link's profile.
+            data: any piece of the stream.
+        """
+        source = self._links.get(link)
+        if source is None:
+            return 0
+        dropped_bytes = source.reader.dropped_bytes
+        source.reader.add(data)
+        return source.reader.dropped_bytes - dropped_bytes
+
+    def process_input(self, link: str, most_steps: int) -> bool:
+        """Read some of what `add_input` kept and act on it; whether some is left that can be read now.
+
+        Args:
+            link: name of the link's profile.
+            most_steps: bounds the work: a step is one message or some noise, see `PacketReader`.
+        """
+        source = self._links.get(link)
+        if source is None:
+            return False
+        for message in source.reader.read(most_steps):
+            self._take(source, message)
+        return source.reader.behind
+
     def _take(self, link: Link, message: Message) -> None:
         exchange = self._exchange
         packet = message.get_msgbuf()

@@ -142,5 +142,7 @@ def stream_message(exchange: Exchange, message_id: int, link: Link | None = None
     if of_service is not None:
         return of_service()
     if message_id == _LINK_NODE_STATUS and link is not None:
-        return link_node_status(link.traffic, link.reader.skipped_bytes, exchange.time_us)
+        return link_node_status(
+            link.traffic, link.reader.skipped_bytes, link.reader.overflows, exchange.time_us
+        )
     return None

@@ -75,12 +75,13 @@ class Traffic:
         return self._rates_bytes_s
 
 
-def link_node_status(traffic: Traffic, noise_bytes: int, time_us: int) -> Message:
+def link_node_status(traffic: Traffic, noise_bytes: int, overflows: int, time_us: int) -> Message:
     """LINK_NODE_STATUS.
 
     Args:
         traffic: of the link.
         noise_bytes: that came in and were no part of a packet; told as parse errors.
+        overflows: how often bytes that came in were dropped because too many waited.
         time_us: vehicle time.
     """
     sent_bytes_s, heard_bytes_s = traffic.rates_bytes_s(time_us)
@@ -92,7 +93,7 @@ def link_node_status(traffic: Traffic, noise_bytes: int, time_us: int) -> Messag
         min(heard_bytes_s, 0xFFFFFFFF),
         min(noise_bytes, 0xFFFF),
         0,
-        0,
+        min(overflows, 0xFFFF),
         traffic.messages_sent & 0xFFFFFFFF,
         traffic.messages_heard & 0xFFFFFFFF,
         traffic.messages_lost & 0xFFFFFFFF,

@@ -127,6 +127,19 @@ def test_offboard_takes_off_with_spool_up_and_ramp():
     assert 0.8 < flight.now.height_m < 1.6  # PX4: 1.3 m
 
 
+def test_offboard_climbs_from_the_ground_at_once_when_the_motors_turn():
+    flight = Flight()
+    flight.send(velocity_ned_m_s=(0.0, 0.0, 0.0))
+    flight.run(0.1)
+    flight.arm(FlightMode.OFFBOARD)
+    assert max(sample.height_m for sample in flight.run(2.0)) < 0.01
+    flight.fly(1.0, velocity_ned_m_s=(0.0, 0.0, -1.0))
+    assert flight.now.height_m < 0.01
+    flight.run(4.0)
+    assert 2.5 < flight.now.height_m < 3.2
+    assert max(-sample.velocity_ned_m_s[2] for sample in flight.track) < 1.1
+
+
 def test_offboard_position_is_reached_fast_and_not_passed():
     flight = offboard()
     start = flight.now

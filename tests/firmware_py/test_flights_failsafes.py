@@ -5,7 +5,8 @@ from math import hypot
 
 import pytest
 
-from firmware_py.status import FlightMode
+from firmware_py.status import CommandResult, FlightMode
+from firmware_py.types import ManualInput
 from tests.firmware_py.flying import Flight, without_gps
 
 
@@ -58,6 +59,46 @@ def test_a_lost_ground_station_holds_and_then_acts(action, mode):
     assert noticed_s == pytest.approx(12.28, abs=0.1)
     assert flight.mode is FlightMode.HOLD
     assert flight.take(6.0, lambda: flight.mode is mode) == pytest.approx(5.0, abs=0.05)
+
+
+def takeoff_after_one_stick_message(quiet_s=0.05):
+    """Sticks are sent once, then it is armed and told to take off."""
+    flight = Flight()
+    flight.autopilot.manual_input(ManualInput(flight.world.time_us))
+    flight.run(quiet_s)
+    flight.arm()
+    assert flight.autopilot.takeoff() is CommandResult.ACCEPTED
+    return flight
+
+
+def test_sticks_sent_once_before_arming_let_it_take_off():
+    flight = takeoff_after_one_stick_message()
+    assert flight.take(1.0, lambda: flight.mode is FlightMode.HOLD) == pytest.approx(0.45, abs=0.1)
+    flight.take(4.0, lambda: flight.now.height_m > 0.5)  # PX4: 5 s after the command
+    flight.take(4.0, lambda: flight.mode is FlightMode.RETURN)
+    assert flight.now.height_m < 2.55
+    flight.take(20.0, lambda: not flight.armed)
+    assert abs(flight.now.height_m) < 0.01
+
+
+def test_sticks_that_come_back_after_such_a_takeoff_fly_it():
+    flight = takeoff_after_one_stick_message()
+    flight.run(5.0)
+    flight.steer(0.1)
+    assert flight.autopilot.set_mode(FlightMode.POSITION) is CommandResult.ACCEPTED
+    flight.steer(3.0, forward=0.5)
+    assert flight.mode is FlightMode.POSITION
+    assert flight.now.height_m > 1.0
+    assert flight.now.speed_m_s > 1.0
+
+
+def test_hold_commanded_on_the_ground_takes_a_takeoff_back():
+    flight = Flight()
+    flight.arm()
+    flight.autopilot.takeoff()
+    flight.run(0.5)
+    assert flight.autopilot.set_mode(FlightMode.HOLD) is CommandResult.ACCEPTED
+    assert max(sample.height_m for sample in flight.run(6.0)) < 0.01
 
 
 def test_lost_sticks_hold_and_then_return():

@@ -40,7 +40,7 @@ def test_noise_before_a_packet_costs_only_itself(noise):
 
 def test_a_packet_shut_in_by_a_false_start_comes_out_with_the_next():
     reader = PacketReader()
-    assert reader.feed(b"\xfd\xff" + packed()) == []  # the false header announces 279 bytes
+    assert reader.feed(b"\xfd\xff\x00" + packed()) == []  # the false header announces 267 bytes
     assert len(reader.feed(packed())) == 2
 
 
@@ -55,6 +55,13 @@ def test_a_message_of_unknown_id_is_passed_over_whole():
     unknown[7:10] = b"\x11\x22\x33"
     messages = PacketReader().feed(bytes(unknown) + packed())
     assert [message.get_type() for message in messages] == [f"UNKNOWN_{0x332211}", "PING"]
+
+
+def test_a_message_of_unknown_id_is_not_believed_amid_noise():
+    unknown = bytearray(packed())
+    unknown[7:10] = b"\x11\x22\x33"
+    messages = PacketReader().feed(b"noise" + bytes(unknown) + packed())
+    assert [message.get_type() for message in messages] == ["PING"]
 
 
 def test_an_unknown_flag_drops_the_packet():
@@ -81,6 +88,74 @@ def test_random_splits_lose_nothing():
         count += len(reader.feed(stream[:cut]))
         stream = stream[cut:]
     assert count == 50
+
+
+FALSE_HEADERS = b"\xfd\xff\x00\x00\x00\x01\x01\x54\x00\x00"  # each within the payload of those before it
+
+
+@pytest.mark.parametrize(
+    ("noise", "most"),
+    [
+        (b"\xfe" * 65536, 0),
+        (b"\xfd" * 65536, 0),
+        (bytes(65536), 0),
+        (random.Random(2).randbytes(65536), 40),
+        (packed()[:-1] * 2700, 2700),
+    ],
+)
+def test_noise_costs_few_checksums(noise, most):
+    reader = PacketReader()
+    assert reader.feed(noise) == []
+    assert reader.checksums <= most
+    assert reader.skipped_bytes > 65000
+
+
+@pytest.mark.parametrize("noise", [FALSE_HEADERS, b"\xfe\xfe\x6e", packed()[:-1], packed()])
+def test_what_one_step_may_cost_is_bounded(noise):
+    reader = PacketReader()
+    reader.add(noise * (65536 // len(noise)))
+    steps = 0
+    while True:
+        before = reader.checksums, reader.skipped_bytes
+        messages = reader.read(1)
+        assert len(messages) <= 1
+        assert reader.checksums - before[0] <= 1 + 64 + 64
+        assert reader.skipped_bytes - before[1] <= 2048
+        if not reader.behind:
+            break
+        steps += 1
+    assert reader.skipped_bytes > 60000 or steps > 2000
+
+
+@pytest.mark.parametrize("noise", [b"\xfe", b"\xfd", b"\xfd\xff\x00", FALSE_HEADERS, b"\x00", None])
+def test_sound_packets_amid_noise_are_all_heard(noise):
+    rng = random.Random(3)
+    stream = b""
+    for count in range(200):
+        length = rng.randint(0, 5000 if count % 20 == 0 else 40)
+        stream += rng.randbytes(length) if noise is None else noise * (length // len(noise))
+        stream += packed(version_1=count % 2 == 1)
+    stream += bytes(600)  # whatever a false header announces is there
+    whole, stepwise = PacketReader(), PacketReader()
+    assert sum(message.get_type() == "PING" for message in whole.feed(stream)) == 200
+    heard = []
+    for first in range(0, len(stream), 1000):
+        stepwise.add(stream[first : first + 1000])
+        heard += stepwise.read(1)
+    while stepwise.behind:
+        heard += stepwise.read(1)
+    assert sum(message.get_type() == "PING" for message in heard) == 200
+
+
+def test_what_finds_no_room_is_dropped_and_counted():
+    reader = PacketReader()
+    reader.add(packed() * 100)
+    reader.add(bytes(100_000))
+    reader.add(bytes(10))
+    assert reader.dropped_bytes == 100 * len(packed()) + 100_000 + 10 - 65536
+    assert reader.overflows == 2
+    assert len(reader.read()) == 100
+    assert len(reader.feed(packed())) == 1
 
 
 def test_a_numbered_packet_is_what_pymavlink_would_pack():
