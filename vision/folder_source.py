@@ -9,13 +9,13 @@ from collections.abc import AsyncIterator
 from pathlib import Path
 from typing import Self
 
-import cv2
-import numpy as np
-
+from vision.decoder import ImageDecoder
+from vision.jpeg import JPEG_START, ImageError
 from vision.latest import CameraError, shown
-from vision.types import CameraFrame, Image
+from vision.types import CameraFrame
 
 SUFFIXES = (".png", ".jpg", ".jpeg", ".bmp")
+MAX_FILE_BYTES = 64 * 1024 * 1024
 _TIME = re.compile(r"(\d{1,18})us$")
 
 
@@ -36,6 +36,7 @@ class FolderSource:
         self._name = f"camera {shown(str(folder))}"
         self._period_s = 1.0 / rate_hz if rate_hz else 0.0
         self._paths: list[Path] = []
+        self._decoder = ImageDecoder()
         self._bad_frames = 0
 
     @property
@@ -59,25 +60,31 @@ class FolderSource:
         return self
 
     async def __aexit__(self, *exc_info: object) -> None:
-        """Nothing to close."""
+        """End what decodes."""
+        self._decoder.close()
 
     async def frames(self) -> AsyncIterator[CameraFrame]:
         """Every image once; what cannot be decoded is skipped and counted."""
         for path in self._paths:
-            data, image = _read(path)
-            if image is None:
+            data = _read(path)
+            is_jpeg = data.startswith(JPEG_START)
+            decode = self._decoder.decode_jpeg if is_jpeg else self._decoder.decode_file
+            try:
+                image = await decode(data)
+            except ImageError:
                 self._bad_frames += 1
                 continue
             found = _TIME.search(path.stem)
             time_us = int(found.group(1)) if found else None
-            jpeg = data if path.suffix.lower() in (".jpg", ".jpeg") else None
-            yield CameraFrame(image, time_us, time.monotonic(), jpeg)
+            yield CameraFrame(image, time_us, time.monotonic(), data if is_jpeg else None)
             await asyncio.sleep(self._period_s)
 
 
-def _read(path: Path) -> tuple[bytes, Image | None]:
+def _read(path: Path) -> bytes:
+    """The content of a file; nothing if it cannot be read or is too large."""
     try:
-        data = path.read_bytes()
-        return data, cv2.imdecode(np.frombuffer(data, np.uint8), cv2.IMREAD_COLOR)
-    except (OSError, cv2.error):
-        return b"", None
+        if not path.is_file() or path.stat().st_size > MAX_FILE_BYTES:
+            return b""
+        return path.read_bytes()
+    except OSError:
+        return b""

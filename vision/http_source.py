@@ -10,26 +10,27 @@ from contextlib import suppress
 from typing import Self
 
 import aiohttp
-import cv2
-import numpy as np
 
+from vision.decoder import ImageDecoder
+from vision.jpeg import ImageError
 from vision.latest import CameraError, Latest, first_line, shown
-from vision.mjpeg import MjpegParser, Part, StreamError, boundary_of, jpeg_size
-from vision.types import CameraFrame, Image
+from vision.mjpeg import MjpegParser, Part, StreamError, boundary_of
+from vision.types import CameraFrame
 
-MAX_PIXELS = 4096 * 4096
-_JPEG_END = b"\xff\xd9"
+_FEED_BYTES = 16 * 1024  # of the stream, between which others run
+_MAX_PARTS_PER_S = 1000
 
 
 class HttpSource:
     """Reads the stream in a task of its own and decodes only what the consumer asks for."""
 
-    def __init__(self, url: str, timeout_s: float = 5.0) -> None:
+    def __init__(self, url: str, timeout_s: float = 5.0, size_px: tuple[int, int] | None = None) -> None:
         """Prepare; nothing is opened yet.
 
         Args:
             url: http:// or https://
             timeout_s: how long to wait for the connection, and for each image.
+            size_px: width and height of its images, others are skipped; None for any.
         """
         self._url = url
         self._name = f"camera {shown(url)}"
@@ -37,11 +38,13 @@ class HttpSource:
         self._latest: Latest[tuple[Part, float]] = Latest()
         self._session: aiohttp.ClientSession | None = None
         self._task: asyncio.Task[None] | None = None
+        self._decoder = ImageDecoder(size_px)
         self._bad_frames = 0
+        self._last_refused = ""
 
     @property
     def bad_frames(self) -> int:
-        """Images skipped so far because they could not be decoded."""
+        """Images skipped so far because they are damaged or not of this camera."""
         return self._bad_frames
 
     async def __aenter__(self) -> Self:
@@ -63,6 +66,7 @@ class HttpSource:
 
     async def __aexit__(self, *exc_info: object) -> None:
         """Disconnect."""
+        self._decoder.close()
         if self._task is not None:
             self._task.cancel()
             with suppress(asyncio.CancelledError):
@@ -89,9 +93,11 @@ class HttpSource:
             if taken is None:
                 return
             part, received_s = taken
-            image = decode_jpeg(part.data)
-            if image is None:
+            try:
+                image = await self._decoder.decode_jpeg(part.data)
+            except ImageError as error:
                 self._bad_frames += 1
+                self._last_refused = str(error)
                 await asyncio.sleep(0)  # a flood of garbage must not keep others from running
                 continue
             yield CameraFrame(image, part.time_us, received_s, part.data)
@@ -113,7 +119,9 @@ class HttpSource:
             raise CameraError(f"{self._name}: {first_line(error)}") from error
 
     def _skipped(self) -> str:
-        return f" ({self._bad_frames} could not be decoded)" if self._bad_frames else ""
+        if not self._bad_frames:
+            return ""
+        return f" ({self._bad_frames} images were skipped; the last one is {self._last_refused})"
 
     def _boundary(self, response: aiohttp.ClientResponse) -> str:
         if response.status != 200:
@@ -128,23 +136,20 @@ class HttpSource:
         return boundary
 
     async def _read(self, response: aiohttp.ClientResponse, parser: MjpegParser) -> None:
+        parts, since_s = 0, time.monotonic()
         try:
             async for chunk in response.content.iter_any():
-                parts = parser.feed(chunk)
-                if parts:
-                    self._latest.put((parts[-1], time.monotonic()))
+                for at in range(0, len(chunk), _FEED_BYTES):
+                    found = parser.feed(chunk[at : at + _FEED_BYTES])
+                    now_s = time.monotonic()
+                    if found:
+                        self._latest.put((found[-1], now_s))
+                    if now_s - since_s > 1.0:
+                        parts, since_s = 0, now_s
+                    parts += len(found)
+                    if parts > _MAX_PARTS_PER_S:
+                        raise StreamError(f"more than {_MAX_PARTS_PER_S} images a second")
+                    await asyncio.sleep(0)
             self._latest.end(CameraError(f"{self._name}: the stream ended"))
         except (StreamError, aiohttp.ClientError, OSError) as error:
             self._latest.end(CameraError(f"{self._name}: the stream broke: {first_line(error)}"))
-
-
-def decode_jpeg(data: bytes) -> Image | None:
-    """Decode a JPEG of reasonable size to BGR; None if it is not one."""
-    size = jpeg_size(data)
-    if size is None or size[0] * size[1] > MAX_PIXELS or _JPEG_END not in data:
-        return None  # a cut-off JPEG would decode to half an image
-    try:
-        image: Image | None = cv2.imdecode(np.frombuffer(data, np.uint8), cv2.IMREAD_COLOR)
-    except cv2.error:
-        return None
-    return image

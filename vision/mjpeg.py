@@ -12,10 +12,6 @@ from dataclasses import dataclass
 MAX_PART_BYTES = 8 * 1024 * 1024
 _MAX_HEAD_BYTES = 16 * 1024
 _END_OF_HEAD = re.compile(rb"\r?\n\r?\n")
-_MAX_MARKERS = 1000
-_JPEG_START = b"\xff\xd8"
-# Markers that hold the size of the image: all start-of-frame markers (C4, C8 and CC are something else).
-_SIZE_MARKERS = frozenset(range(0xC0, 0xD0)) - {0xC4, 0xC8, 0xCC}
 
 
 class StreamError(ValueError):
@@ -115,30 +111,6 @@ def boundary_of(content_type: str) -> str | None:
         return None
     found = re.search(r"""boundary\s*=\s*(?:"([^"]{1,200})"|([^\s;"]{1,200}))""", content_type, re.IGNORECASE)
     return (found.group(1) or found.group(2)) if found else None
-
-
-def jpeg_size(data: bytes) -> tuple[int, int] | None:
-    """Return width and height a JPEG claims, from its headers alone; None if it is not a JPEG.
-
-    A few bytes can claim an image of gigabytes; ask before decoding.
-    """
-    if not data.startswith(_JPEG_START):
-        return None
-    at = 2
-    for _ in range(_MAX_MARKERS):
-        if at + 9 > len(data) or data[at] != 0xFF:
-            return None
-        marker = data[at + 1]
-        if marker == 0xFF:  # padding
-            at += 1
-        elif marker in _SIZE_MARKERS:
-            height, width = int.from_bytes(data[at + 5 : at + 7]), int.from_bytes(data[at + 7 : at + 9])
-            return (width, height) if width and height else None
-        elif marker == 0x01 or 0xD0 <= marker <= 0xD8:  # these have no content
-            at += 2
-        else:
-            at += 2 + max(2, int.from_bytes(data[at + 2 : at + 4]))
-    return None
 
 
 def _number(head: bytes, name: bytes) -> int | None:

@@ -15,13 +15,16 @@ __all__ = ["CameraError", "CameraSource", "open_source"]
 _VIDEO_FILE = re.compile(r"\.(mp4|mkv|avi|mov|webm|ts|m3u8|mpd|sdp)$", re.IGNORECASE)
 
 
-def open_source(url_or_path: str | int | Path, *, timeout_s: float = 5.0) -> CameraSource:
+def open_source(
+    url_or_path: str | int | Path, *, timeout_s: float = 5.0, size_px: tuple[int, int] | None = None
+) -> CameraSource:
     """Choose the source for a camera; it is opened by `async with`.
 
     Args:
         url_or_path: http(s):// is MJPEG over HTTP, unless it ends like a video file; a folder is its
             images; a number is a video device; anything else is left to OpenCV (rtsp://, udp://, files).
         timeout_s: how long to wait for the camera, and for each of its images.
+        size_px: width and height of an MJPEG camera's images, others are skipped; None for any.
 
     Raises:
         CameraError: it is none of these.
@@ -37,7 +40,7 @@ def open_source(url_or_path: str | int | Path, *, timeout_s: float = 5.0) -> Cam
         if parts.scheme.lower() in ("http", "https") and not _VIDEO_FILE.search(parts.path):
             from vision.http_source import HttpSource  # noqa: PLC0415 - its library is slow to import
 
-            return HttpSource(text, timeout_s)
+            return HttpSource(text, timeout_s, size_px)
         return CaptureSource(text, timeout_s)
     path = Path(text)
     try:

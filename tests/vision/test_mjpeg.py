@@ -1,12 +1,10 @@
 """The MJPEG parser: what cameras send, and what they should not."""
 
-import cv2
-import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from vision.mjpeg import MjpegParser, Part, StreamError, boundary_of, jpeg_size
+from vision.mjpeg import MjpegParser, Part, StreamError, boundary_of
 
 
 def part(data: bytes, head: str = "", *, length: bool = True) -> bytes:
@@ -96,19 +94,3 @@ def test_any_bytes_do_no_harm(chunks: list[bytes]) -> None:
 )
 def test_boundary_of_a_content_type(content_type: str, boundary: str | None) -> None:
     assert boundary_of(content_type) == boundary
-
-
-@pytest.mark.parametrize("progressive", [0, 1])
-def test_size_of_a_jpeg(progressive: int) -> None:
-    settings = [cv2.IMWRITE_JPEG_PROGRESSIVE, progressive]
-    data = bytes(cv2.imencode(".jpg", np.zeros((30, 50, 3), np.uint8), settings)[1])
-    assert jpeg_size(data) == (50, 30)
-    for end in range(len(data)):
-        assert jpeg_size(data[:end]) in (None, (50, 30))
-
-
-@pytest.mark.parametrize(
-    "data", [b"", b"GIF89a", b"\xff\xd8", b"\xff\xd8" + b"\xff" * 100_000, b"\xff\xd8\xff\x01" * 9]
-)
-def test_no_size_where_there_is_none(data: bytes) -> None:
-    assert jpeg_size(data) is None

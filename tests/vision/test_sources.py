@@ -1,6 +1,9 @@
 """Camera sources against real servers, honest and hostile, folders and files."""
 
 import asyncio
+import os
+import struct
+import zlib
 from collections.abc import AsyncIterator, Awaitable, Callable
 from contextlib import asynccontextmanager, suppress
 from pathlib import Path
@@ -12,7 +15,7 @@ from aiohttp import web
 
 from vision.capture_source import CaptureSource
 from vision.folder_source import FolderSource
-from vision.http_source import HttpSource, decode_jpeg
+from vision.http_source import HttpSource
 from vision.latest import Latest, shown
 from vision.sources import CameraError, open_source
 from vision.types import CameraFrame, Image
@@ -127,7 +130,6 @@ async def test_garbage_is_skipped_and_counted() -> None:
         bomb,
         b"\x89PNG\r\n\x1a\n",
     ]
-    assert [decode_jpeg(data) for data in bad] == [None] * len(bad)
     taken = asyncio.Event()
 
     async def send(write: Write) -> None:
@@ -153,8 +155,46 @@ async def test_only_garbage_is_no_image() -> None:
     async with streaming(send) as url:
         message = await failure(HttpSource(url, timeout_s=0.3))
     assert "no image for 0.3 s" in message
-    assert "could not be decoded" in message
+    assert "images were skipped; the last one is not a JPEG" in message
     assert url in message
+
+
+async def test_images_of_another_size_than_the_camera_has_are_skipped() -> None:
+    async def send(write: Write) -> None:
+        while True:
+            await write(part(bytes(cv2.imencode(".jpg", np.zeros((48, 80, 3), np.uint8))[1])))
+            await asyncio.sleep(0.01)
+
+    async with streaming(send) as url:
+        message = await failure(open_source(url, timeout_s=0.3, size_px=(64, 48)))
+    assert "the last one is of 80 x 48 pixels; the camera has 64 x 48" in message
+
+
+async def test_a_progressive_jpeg_is_decoded_in_another_process_and_kept_as_it_came() -> None:
+    data = bytes(cv2.imencode(".jpg", picture(7), [cv2.IMWRITE_JPEG_PROGRESSIVE, 1])[1])
+
+    async def send(write: Write) -> None:
+        for i in range(1000):
+            await write(part(data, f"X-Time-Us: {i}\r\n"))
+            await asyncio.sleep(0.01)
+
+    async with streaming(send) as url:
+        frames = await take(HttpSource(url), 3)
+    assert all(
+        np.array_equal(frame.image, cv2.imdecode(np.frombuffer(data, np.uint8), 1)) for frame in frames
+    )
+    assert all(frame.jpeg == data for frame in frames)
+    assert len({frame.time_us for frame in frames}) == 3
+
+
+async def test_a_flood_of_parts_breaks_the_stream() -> None:
+    async def send(write: Write) -> None:
+        while True:
+            await write(b"--cut\r\n\r\nx" * 1000)
+            await asyncio.sleep(0)
+
+    async with streaming(send) as url:
+        assert "more than 1000 images a second" in await failure(HttpSource(url))
 
 
 async def test_silence_is_no_image() -> None:
@@ -295,13 +335,21 @@ async def test_folder_in_order_with_times_and_bad_files(tmp_path: Path) -> None:
     for name, value in (("b_0000002000us", 2), ("a_0000001000us", 1), ("c", 3)):
         cv2.imwrite(str(tmp_path / f"{name}.png"), picture(value))
     (tmp_path / "bad.png").write_bytes(b"not an image")
+    (tmp_path / "huge.png").write_bytes(png_of(60_000, 60_000))
+    os.mkfifo(tmp_path / "pipe.png")
     (tmp_path / "notes.txt").write_text("not an image either")
     source = open_source(tmp_path)
     async with source:
         frames = [frame async for frame in source.frames()]
     assert [int(frame.image[0, 0, 0]) for frame in frames] == [1, 2, 3]
     assert [frame.time_us for frame in frames] == [1000, 2000, None]
-    assert source.bad_frames == 1
+    assert source.bad_frames == 3
+
+
+def png_of(width: int, height: int) -> bytes:
+    """The head of a PNG that claims a size."""
+    head = b"IHDR" + struct.pack(">IIBBBBB", width, height, 8, 2, 0, 0, 0)
+    return b"\x89PNG\r\n\x1a\n" + struct.pack(">I", 13) + head + struct.pack(">I", zlib.crc32(head))
 
 
 async def test_folder_without_images(tmp_path: Path) -> None:
@@ -331,6 +379,17 @@ async def test_file_that_is_no_video(tmp_path: Path) -> None:
     path = tmp_path / "text.mp4"
     path.write_text("hello")
     assert "cannot be opened" in await failure(CaptureSource(str(path)))
+
+
+async def test_a_camera_that_says_nothing_is_not_waited_for() -> None:
+    async def talk(reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
+        await reader.read()
+
+    server = await asyncio.start_server(talk, "127.0.0.1", 0)
+    port = server.sockets[0].getsockname()[1]
+    source = CaptureSource(f"http://127.0.0.1:{port}/live.mp4", 1.0)
+    async with server:
+        assert await failure(source) == f"camera http://127.0.0.1:{port}/live.mp4: did not open within 1 s"
 
 
 async def test_opencv_reads_a_stream_and_notices_its_end() -> None:
