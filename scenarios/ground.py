@@ -12,9 +12,9 @@ def is_over_base(base: Base, x_m: float, y_m: float) -> bool:
     return abs(x_m - base.x_m) <= half_m and abs(y_m - base.y_m) <= half_m
 
 
-def ground_height(scenario: Scenario, x_m: float, y_m: float) -> float:
-    """Height above the floor of what is under a point in plan, metres."""
-    return scenario.base.top_m if is_over_base(scenario.base, x_m, y_m) else 0.0
+def ground_height(scenario: Scenario, x_m: float, y_m: float, floor_m: float = 0.0) -> float:
+    """Height of what is under a point in plan, metres; the floor is at `floor_m`."""
+    return scenario.base.top_m if is_over_base(scenario.base, x_m, y_m) else floor_m
 
 
 def start_position(scenario: Scenario) -> Vec3:

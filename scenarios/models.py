@@ -46,6 +46,7 @@ class Arena(Part):
     length_x_m: float = Field(10.0, gt=0, le=1000, description="extent along x")
     width_y_m: float = Field(10.0, gt=0, le=1000, description="extent along y")
     height_m: float = Field(4.0, gt=0, le=1000, description="ceiling above the floor")
+    margin_m: float = Field(1.0, ge=0, le=100, description="how far outside the app lets the drone fly")
 
 
 class Base(Part):

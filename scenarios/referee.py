@@ -56,11 +56,13 @@ class Referee:
     Args:
         scenario: what is flown.
         envelope_m: length, width and height of the drone.
+        floor_m: height of the floor, arena axes; without a base it is where the base's top would be.
     """
 
-    def __init__(self, scenario: Scenario, envelope_m: Vec3) -> None:
+    def __init__(self, scenario: Scenario, envelope_m: Vec3, floor_m: float = 0.0) -> None:
         self._scenario = scenario
         self._envelope_m = envelope_m
+        self._floor_m = floor_m
         self._limit_us = round(scenario.try_limit_s * 1e6)
         self._boundary = Boundary(scenario.arena)
         frames = {frame.colour: frame for frame in scenario.frames}
@@ -75,7 +77,7 @@ class Referee:
 
     def _reset(self) -> None:
         """Forget the try, if there was one."""
-        self._crash_watch = CrashWatch(self._scenario, self._envelope_m)
+        self._crash_watch = CrashWatch(self._scenario, self._envelope_m, self._floor_m)
         self._start_us = 0
         self._start_height_m = 0.0
         self._stop_us: int | None = None
@@ -119,7 +121,7 @@ class Referee:
         x_m, y_m, z_m = state.position_arena_m
         self._start_height_m = z_m
         underside_m = z_m - self._envelope_m[2] / 2
-        self._taken_off = underside_m - ground_height(self._scenario, x_m, y_m) > IN_AIR_M
+        self._taken_off = underside_m - ground_height(self._scenario, x_m, y_m, self._floor_m) > IN_AIR_M
         self._restart_path(state)
         self._watch(state)
 
@@ -236,7 +238,9 @@ class Referee:
         elif -state.velocity_arena_m_s[2] > HARD_HIT_M_S:
             self._crash = "fell with its motors off"
         else:
-            self._landing = find_landing(self._scenario, self._envelope_m, state.position_arena_m)
+            self._landing = find_landing(
+                self._scenario, self._envelope_m, state.position_arena_m, self._floor_m
+            )
 
     @property
     def settled(self) -> bool:

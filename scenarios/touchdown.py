@@ -47,12 +47,21 @@ def is_resting(velocity_m_s: Vec3) -> bool:
     return vx * vx + vy * vy + vz * vz < RESTING_M_S * RESTING_M_S
 
 
-def find_landing(scenario: Scenario, envelope_m: Vec3, position_m: Vec3) -> Landing | None:
+def find_landing(
+    scenario: Scenario, envelope_m: Vec3, position_m: Vec3, floor_m: float = 0.0
+) -> Landing | None:
     """Say what a drone at rest stands on, by its position alone, so that it serves a real drone as well.
 
-    It stands on the base when its centre is over the base's square and its underside nearer to the top than
-    to the floor. The error is measured from the base's centre, since the base is what has to be met; in all
-    challenge scenarios that is the start as well.
+    It stands on the base when its centre is over the base's square and not high above its top. How low it
+    seems to be does not matter: the base is solid, so a lower height is an error of the estimate, or the
+    floor that stands in for a base is soft. The error is measured from the base's centre, since the base is
+    what has to be met; in all challenge scenarios that is the start as well.
+
+    Args:
+        scenario: what is flown.
+        envelope_m: length, width and height of the drone.
+        position_m: of its centre, arena axes, shape (3,).
+        floor_m: height of the floor, arena axes; without a base it is where the base's top would be.
 
     Returns:
         The landing, or None when there is nothing under it to stand on.
@@ -61,9 +70,9 @@ def find_landing(scenario: Scenario, envelope_m: Vec3, position_m: Vec3) -> Land
     base = scenario.base
     underside_m = z_m - envelope_m[2] / 2
     error_m = hypot(x_m - base.x_m, y_m - base.y_m)
-    if is_over_base(base, x_m, y_m) and base.top_m / 2 < underside_m < base.top_m + STANDING_TOLERANCE_M:
+    if is_over_base(base, x_m, y_m) and underside_m < base.top_m + STANDING_TOLERANCE_M:
         return Landing("base", error_m)
-    if underside_m < STANDING_TOLERANCE_M:
+    if underside_m < floor_m + STANDING_TOLERANCE_M:
         return Landing("floor", error_m)
     return None
 
@@ -82,6 +91,7 @@ class CrashWatch:
 
     __slots__ = (
         "_envelope_m",
+        "_floor_m",
         "_inverted_since_us",
         "_lying_since_us",
         "_near_m",
@@ -90,9 +100,10 @@ class CrashWatch:
         "_touched",
     )
 
-    def __init__(self, scenario: Scenario, envelope_m: Vec3) -> None:
+    def __init__(self, scenario: Scenario, envelope_m: Vec3, floor_m: float = 0.0) -> None:
         self._scenario = scenario
         self._envelope_m = envelope_m
+        self._floor_m = floor_m
         self._near_m = scenario.base.top_m + envelope_m[2] / 2 + TOUCHING_M
         self._touched = True  # a try begins on the ground: that is no impact
         self._sinking_m_s = 0.0
@@ -143,7 +154,6 @@ class CrashWatch:
             return "floor"
         x_m, y_m, z_m = state.position_arena_m
         underside_m = z_m - self._envelope_m[2] / 2
-        ground_m = ground_height(self._scenario, x_m, y_m)
-        if underside_m > ground_m + TOUCHING_M:
+        if underside_m > ground_height(self._scenario, x_m, y_m, self._floor_m) + TOUCHING_M:
             return None
-        return "base" if ground_m > 0.0 else "floor"
+        return "base" if is_over_base(self._scenario.base, x_m, y_m) else "floor"

@@ -28,6 +28,7 @@ _SCALARS = (  # tag, what it looks like, its first characters; the first match c
     ("tag:yaml.org,2002:float", rf"{_NUMBER}|[-+]?\.(?:inf|Inf|INF)|\.(?:nan|NaN|NAN)", "-+.0123456789"),
     ("tag:yaml.org,2002:null", r"~|null|Null|NULL|", ("~", "n", "N", "")),
 )
+_UNUSUAL_BREAK = re.compile(r"[\x85\u2028\u2029]")
 _PATTERNS = tuple((tag, re.compile(rf"(?:{shape})\Z"), tuple(first)) for tag, shape, first in _SCALARS)
 
 
@@ -99,6 +100,16 @@ class _Dumper(yaml.SafeDumper):
         return True
 
 
+def _represent_text(dumper: _Dumper, text: str) -> yaml.ScalarNode:
+    r"""Double-quote a text with unusual line breaks: there they are escaped, elsewhere readers change them.
+
+    U+0085, U+2028 and U+2029 are line breaks of YAML 1.1; a reader gives "\\n" for the first.
+    """
+    style = '"' if _UNUSUAL_BREAK.search(text) else None
+    return dumper.represent_scalar("tag:yaml.org,2002:str", text, style)
+
+
+_Dumper.add_representer(str, _represent_text)
 for _tag, _pattern, _first in _PATTERNS:
     _Dumper.add_implicit_resolver(_tag, _pattern, list(_first))
 

@@ -1,4 +1,5 @@
 import os
+import unicodedata
 
 import pytest
 from hypothesis import given
@@ -93,6 +94,20 @@ def scenarios(draw):
 def test_dump_and_parse_round_trip(scenario):
     assert parse_scenario(dump_yaml(scenario)) == scenario
     assert parse_scenario(dump_yaml(scenario).encode()) == scenario
+
+
+UNUSUAL = [
+    chr(code)
+    for code in (*range(0x10000), 0x1F600, 0x1FFFF, 0x10FFFF)
+    if unicodedata.category(chr(code)) in ("Cc", "Cf", "Zl", "Zp", "Zs") or code % 0x10000 >= 0xFFFE
+]
+
+
+@pytest.mark.parametrize("around", ["{}", "a{}b", "a {} b", "a\n{}b", "- {}: #", 60 * "a " + "{} b"])
+def test_characters_that_yaml_folds_or_refuses_survive_a_round_trip(around):
+    for character in [*UNUSUAL, *"-?:,[]{}#&*!|>'\"%@`"]:
+        scenario = Scenario(name="a", description=around.replace("{}", character))
+        assert parse_scenario(dump_yaml(scenario).encode()) == scenario, f"U+{ord(character):04X}"
 
 
 def test_a_file_loads_by_path(tmp_path):

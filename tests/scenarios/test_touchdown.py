@@ -34,7 +34,7 @@ def test_up_component_is_the_cosine_of_the_tilt():
         ((1.0, 0.0, 0.75), "base", 0.0),  # a real drone's height is not exact
         ((1.25, 0.0, 0.53), "base", 0.25),
         ((1.26, 0.0, 0.02), "floor", 0.26),
-        ((1.0, 0.0, 0.2), "floor", 0.0),
+        ((1.07, 0.0, 0.2), "base", 0.07),  # nor is a real floor hard
         ((4.0, 4.0, 0.02), "floor", 5.0),
         ((1.3, 0.0, 0.53), None, None),
         ((1.0, 0.0, 1.0), None, None),
@@ -48,6 +48,22 @@ def test_where_it_stands(position, surface, error_m):
         assert landing is not None
         assert landing.surface == surface
         assert landing.error_m == pytest.approx(error_m)
+
+
+@pytest.mark.parametrize(
+    ("x_m", "height_m", "surface"),
+    [(1.07, 0.53, "base"), (1.07, 0.2, "base"), (1.4, 0.53, "floor"), (1.4, 0.2, "floor"), (1.4, 0.9, None)],
+)
+def test_where_it_stands_on_a_floor_without_a_base(x_m, height_m, surface):
+    landing = find_landing(SCENARIO, ENVELOPE, (x_m, 0.0, height_m), SCENARIO.base.top_m)
+    assert (landing.surface if landing else None) == surface
+
+
+def test_a_floor_without_a_base_is_hit_at_its_own_height():
+    fall = state(0, (3, 0, 0.9), (0, 0, -2.5))
+    hit = state(0.03, (3, 0, 0.54), (0, 0, 0.4))
+    watch = CrashWatch(SCENARIO, ENVELOPE, SCENARIO.base.top_m)
+    assert (watch.follow(fall, True), watch.follow(hit, True)) == (None, "hit the floor at 2.5 m/s")
 
 
 @pytest.mark.parametrize(("contacts", "height_m"), [(("floor",), 0.05), ((), 0.03)])
