@@ -11,6 +11,7 @@ from math import degrees
 from typing import TYPE_CHECKING
 
 from firmware_py.mavlink.camera_model import CameraModel
+from firmware_py.mavlink.dialect import mavlink
 from firmware_py.mavlink.node import MavlinkNode
 from firmware_py.mavlink.video_links import VideoEncoding, VideoStream
 from scenarios.axes import flip_vector
@@ -22,6 +23,8 @@ from sitl.picture_album import PictureAlbum
 from sitl.server_settings import ServerSettings
 from sitl.simulation import Simulation
 from sitl.solids import Solid
+from sitl.time_grants import TimeGrants, Velocity
+from sitl.world import CONTROL_PERIOD_US
 
 if TYPE_CHECKING:
     from sitl.camera_feed import CameraFeed
@@ -76,10 +79,12 @@ class ServedDrone:
             captures=self._album,
             failures=simulation.failures,
         )
-        self._hub = LinkHub(self.node)
+        self._notice = notice
+        self._hub = LinkHub(self.node, self._warn)
         self._camera: CameraFeed | None = None
         self._video: VideoServer | None = None
         self._rtp: RtpSender | None = None
+        self._image_us = -1
 
     async def open_links(self) -> None:
         """Open the links and speak at once.
@@ -108,7 +113,9 @@ class ServedDrone:
         from sitl.video import VideoServer
 
         scenario = self.simulation.scenario
-        video = VideoServer(self._settings.bind, self._settings.http_port)
+        video = VideoServer(
+            self._settings.bind, self._settings.http_port, options="--instance (sim also: --video-port)"
+        )
         video.add_json("/referee.json", self._referee_answer)
         video.add_json("/scenario.json", lambda _query: scenario.model_dump(mode="json"))
         if self._settings.video_rtp is not None:
@@ -119,6 +126,11 @@ class ServedDrone:
         self._video = video
         await video.start()
         self._camera = CameraFeed(scenario, others)
+
+    def _warn(self, line: str) -> None:
+        """Tell people at the terminal and at ground stations."""
+        self._notice(line)
+        self.simulation.autopilot.say(mavlink.MAV_SEVERITY_WARNING, line)
 
     def tick(self) -> None:
         """Advance by one control period: fly, speak, look."""
@@ -134,10 +146,20 @@ class ServedDrone:
         arrived = self._camera.step(simulation.truth)
         if arrived is not None:
             time_us, image = arrived
+            self._image_us = time_us
             self._video.publish(image, time_us)
             self._album.show(image)
             if self._rtp is not None:
                 self._rtp.send(image, time_us)
+
+    async def hold(self, grants: TimeGrants) -> None:
+        """Wait until simulated time may go on."""
+
+        def received() -> Velocity | None:
+            self._hub.read()  # a flooded link may have left a setpoint waiting
+            return self.simulation.autopilot.intake.newest_velocity()
+
+        await grants.hold(self.simulation.time_us - CONTROL_PERIOD_US, self._image_us, received)
 
     async def close(self) -> None:
         """Finish the log, save the parameters, stop the video and close the links."""

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 
 from firmware_py.mavlink.links import LinkProfile
 from firmware_py.mavlink.node import MavlinkNode
+from sitl.link_input import LinkInput
 from sitl.link_urls import LinkUrl, is_loopback
 from sitl.links import Carrier, Receive, UdpAddresses, open_udp
 from sitl.stream_links import Closable, Joined, SerialLine, TcpClient, TcpServer
@@ -17,10 +18,12 @@ class LinkHub:
 
     Args:
         node: whose bytes they carry; it begins without links.
+        notice: called with lines for people.
     """
 
-    def __init__(self, node: MavlinkNode) -> None:
+    def __init__(self, node: MavlinkNode, notice: Callable[[str], None] = lambda line: None) -> None:
         self._node = node
+        self._input = LinkInput(node, notice)
         self._carriers: dict[str, Carrier] = {}
         self._opened: list[Closable] = []
         self._joined = 0
@@ -68,8 +71,14 @@ class LinkHub:
         for url in urls:
             await self.open(url)
 
+    def read(self) -> None:
+        """Read input that waits, as far as there is time, and send the answers."""
+        self._input.work()
+        self.flush()
+
     def update(self, time_us: int) -> None:
-        """Send what is due at a vehicle time."""
+        """Read input that waits, then send what is due at a vehicle time."""
+        self._input.work()
         self._node.update(time_us)
         self.flush()
 
@@ -85,7 +94,7 @@ class LinkHub:
 
     def _receiver(self, name: str) -> Receive:
         def receive(data: bytes) -> None:
-            self._node.receive(name, data)
+            self._input.take(name, data)
             self.flush()  # answers do not wait for the next tick
 
         return receive

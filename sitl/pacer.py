@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-_FORGIVEN_S = 0.1  # shorter delays are caught up; longer ones become slower simulated time
+_FORGIVEN_S = 0.05  # shorter delays are caught up; longer ones become slower simulated time
 
 
 class Pacer:

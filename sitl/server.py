@@ -12,9 +12,10 @@ from sitl.fleet import Fleet
 from sitl.pacer import Pacer
 from sitl.server_settings import ServerSettings
 from sitl.simulation import Simulation
+from sitl.time_grants import FREE_US, TimeGrants
 from sitl.world import CONTROL_PERIOD_US
 
-_BURST_TICKS = 25  # at most 0.1 s of simulated time before links and video get their turn
+_BURST_TICKS = 5  # at most 0.02 s of simulated time before links and video get their turn
 _NOTICE_PERIOD_S = 5.0
 
 
@@ -25,6 +26,7 @@ class SimulatorServer:
         simulation: what runs; of several, drone n has the ports and the system id of instance + n.
         settings: ports and speed.
         notice: called with lines for people: where it speaks once all is open, when it cannot keep up.
+        grants: how far the time of a single simulation may go; None: it is free.
     """
 
     def __init__(
@@ -32,10 +34,12 @@ class SimulatorServer:
         simulation: Simulation | Sequence[Simulation],
         settings: ServerSettings,
         notice: Callable[[str], None] = lambda line: None,
+        grants: TimeGrants | None = None,
     ) -> None:
         simulations = [simulation] if isinstance(simulation, Simulation) else list(simulation)
         self._settings = settings
         self._notice = notice
+        self._grants = grants
         boot_unix_us = int(time.time() * 1e6)
         self._drones = [
             ServedDrone(flown, settings.shifted(number), boot_unix_us, notice)
@@ -62,6 +66,8 @@ class SimulatorServer:
             if video_task is not None:
                 video_task.cancel()
                 await asyncio.gather(video_task, return_exceptions=True)
+            if self._grants is not None:
+                await self._grants.close()
             for drone in self._drones:
                 await drone.close()
 
@@ -72,6 +78,8 @@ class SimulatorServer:
             self._notice("other machines can command the drone: MAVLink is unsigned; see --signing-key")
         for drone in self._drones:
             self._notice(f"{drone.greeting()} (Ctrl-C stops)")
+        if self._grants is not None:
+            await self._grants.open()
 
     async def _run_paced(self, video_task: asyncio.Task[None]) -> None:
         drones, fleet = self._drones, self._fleet
@@ -83,7 +91,7 @@ class SimulatorServer:
                 video_task.result()  # a busy port ends the simulator
             target_us = pacer.target_us(time.monotonic())
             for _ in range(_BURST_TICKS):
-                if simulation.time_us + CONTROL_PERIOD_US > target_us:
+                if simulation.time_us + CONTROL_PERIOD_US > target_us or simulation.time_us > self._until_us:
                     break
                 for drone in drones:
                     drone.tick()
@@ -92,7 +100,14 @@ class SimulatorServer:
             lost_s = pacer.give_up_lag(now_s, simulation.time_us)
             if video_task.done():  # until then much is loaded
                 notices.lag(lost_s, now_s)
+            if self._grants is not None and simulation.time_us > self._until_us:
+                await drones[0].hold(self._grants)
+                continue
             await asyncio.sleep(pacer.wait_s(now_s, simulation.time_us + CONTROL_PERIOD_US))
+
+    @property
+    def _until_us(self) -> int:
+        return FREE_US if self._grants is None else self._grants.until_us
 
 
 class _Notices:

@@ -85,8 +85,10 @@ class FolderStorage:
             before = os.fstat(file).st_size
             after = max(before, offset + len(data)) if data else before
             self._usage.resize(path, before, after)
-            self._usage.bytes += after - before
-            os.pwrite(file, data, offset)
+            with self._counted(file):
+                written = 0
+                while written < len(data):  # a full disk takes a part; the next try says why
+                    written += os.pwrite(file, data[written:], offset + written)
 
     def create(self, path: Path) -> None:
         """Make an empty file, or empty the one that is there."""
@@ -102,8 +104,8 @@ class FolderStorage:
         with self._file(path, os.O_WRONLY) as file:
             before = os.fstat(file).st_size
             self._usage.resize(path, before, size)
-            self._usage.bytes += size - before
-            os.ftruncate(file, size)
+            with self._counted(file):
+                os.ftruncate(file, size)
 
     def remove(self, path: Path) -> None:
         """Remove a file."""
@@ -145,6 +147,15 @@ class FolderStorage:
             if there is not None and old != new:
                 self._usage.files -= 1
                 self._usage.bytes -= replaced
+
+    @contextmanager
+    def _counted(self, file: int) -> Iterator[None]:
+        """Count by how much a file has really grown, also when the disk refused."""
+        before = os.fstat(file).st_size
+        try:
+            yield
+        finally:
+            self._usage.bytes += os.fstat(file).st_size - before
 
     @contextmanager
     def _folder(self, path: Path) -> Iterator[int]:

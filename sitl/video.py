@@ -80,13 +80,15 @@ def encode_jpeg(image: Image) -> bytes:
 class VideoServer:
     """Serves the images published to it, and JSON documents beside them."""
 
-    def __init__(self, host: str = "127.0.0.1", port: int = 8100) -> None:
+    def __init__(self, host: str = "127.0.0.1", port: int = 8100, *, options: str = "--port") -> None:
         """Prepare; nothing is opened yet.
 
         Args:
             host: address to listen on.
             port: TCP port; 0 lets the system choose one.
+            options: of the command, that choose another port; for the message when this one is in use.
         """
+        self._options = options
         self._host = host
         self._port = port
         self._shot: _Shot | None = None
@@ -147,8 +149,10 @@ class VideoServer:
         except (OSError, OverflowError) as error:
             await runner.cleanup()
             reason = (getattr(error, "strerror", None) or str(error)).split("\n", maxsplit=1)[0]
-            where = f"{self._host} port {self._port}"
-            raise VideoError(f"video: cannot listen on {where}: {reason.lower()}; choose another") from error
+            raise VideoError(
+                f"video: cannot listen on {self._host} port {self._port}: "
+                f"{reason.rpartition(': ')[2].lower()}; choose another with {self._options}"
+            ) from error
         self._port = runner.addresses[0][1]
         self._loop, self._runner = asyncio.get_running_loop(), runner
 

@@ -190,6 +190,19 @@ async def test_udp_out_speaks_first():
     raise AssertionError("nothing came")
 
 
+async def test_a_tcp_client_is_heard_after_a_megabyte_of_noise():
+    port = free_port()
+    async with drone_with(f"tcpin://127.0.0.1:{port}") as drone:
+        peer = await tcp_peer(port)
+        for _ in range(20):
+            peer.writer.write(b"\xfe" * 50_000)
+            drone.pass_time()
+            await asyncio.sleep(0.005)
+        peer.say(ASK)
+        assert (await heard(drone, peer.read, "PARAM_VALUE")).param_id == "MAV_SYS_ID"
+        peer.leave()
+
+
 async def test_a_serial_line_carries_both_ways():
     ours, theirs = pty.openpty()
     os.set_blocking(ours, False)

@@ -2,7 +2,7 @@
 
 import errno
 import os
-from contextlib import suppress
+from contextlib import closing, suppress
 from datetime import UTC, datetime
 
 import pytest
@@ -13,6 +13,7 @@ from firmware_py.storage import Entry, parse_path
 from sitl.drone_files import flight_recorder, open_storage
 from sitl.storage import MemoryStorage, StorageLimits
 from sitl.storage_folder import FolderStorage, StorageFolderError
+from tests.disk import disk_that_takes
 
 LIMITS = StorageLimits(files=6, file_bytes=1000, total_bytes=1500)
 
@@ -98,6 +99,20 @@ def test_errors_have_numbers(storage):
     assert number(storage.rename, ("folder",), ("folder", "inside")) == errno.EINVAL
     assert number(storage.rename, ("no",), ("new",)) == errno.ENOENT
     assert number(storage.rename, ("folder",), ("a",)) == errno.EEXIST
+
+
+def test_what_the_disk_refused_is_an_error_and_does_not_count(tmp_path):
+    with closing(FolderStorage(tmp_path, LIMITS)) as storage:
+        storage.create(("a",))
+        with disk_that_takes(100):
+            for _ in range(3):
+                assert number(storage.write, ("a",), 0, bytes(700)) == errno.EFBIG
+                assert storage.space()[0] == storage.entry(("a",)).size == 100
+            for _ in range(3):
+                assert number(storage.truncate, ("a",), 900) == errno.EFBIG
+        assert storage.space()[0] == 100
+        storage.write(("a",), 0, bytes(1000))
+        assert storage.space()[0] == 1000
 
 
 def test_limits_of_size_sum_and_count(storage):
