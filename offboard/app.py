@@ -12,6 +12,7 @@ from typing import Literal
 from offboard.drone import Drone, DroneError, DroneState, VelocityCommand
 from offboard.engine import MissionEngine, MissionRunError, TransitionTaken
 from offboard.eyes import Camera, CameraEyes, CameraLostError, ClosedEyes, Eyes
+from offboard.keep_in_box import Box, KeepInBox, OutsideBoxError
 from offboard.mission import Mission
 from offboard.pilot import Imu
 from vision.types import Detections
@@ -34,7 +35,8 @@ class Moment:
         flight_time_s: vehicle time since motors on; 0 before.
         transition: the one taken in this tick, if any.
         paused: a pilot has the sticks; the mission waits.
-        remark: why the mission did not go on when the pilot last gave the drone back; empty if it did.
+        remark: in a pause, why the mission did not go on when the pilot last gave the drone back; otherwise
+            what keeping the drone in its box made of the mission's command. Empty if nothing.
     """
 
     state: DroneState
@@ -62,6 +64,7 @@ class Outcome:
         flight_time_s: vehicle time from motors on to its end.
         ticks: how many were flown.
         pauses: how often a pilot took the drone.
+        kept_in_box_s: vehicle time for which the command was changed to keep the drone in its box.
     """
 
     ended: Literal["finished", "timed out", "aborted"]
@@ -70,6 +73,7 @@ class Outcome:
     flight_time_s: float
     ticks: int
     pauses: int = 0
+    kept_in_box_s: float = 0.0
 
     @property
     def interrupted(self) -> bool:
@@ -85,6 +89,7 @@ async def fly_mission(
     limit_s: float = 180.0,
     observer: Observer | None = None,
     eyes: Eyes | None = None,
+    box: Box | None = None,
 ) -> Outcome:
     """Connect, fly the mission, let go.
 
@@ -99,6 +104,7 @@ async def fly_mission(
         limit_s: vehicle time from motors on, seconds.
         observer: called at every tick; must be quick.
         eyes: instead of `camera`: other means to see, such as those of a lockstep simulation.
+        box: in which the drone is kept, whatever the mission says; None: it is not.
 
     Returns:
         How it ended.
@@ -109,7 +115,8 @@ async def fly_mission(
     """
     if eyes is None:
         eyes = ClosedEyes() if camera is None else CameraEyes(camera)
-    flight = _Flight(drone, eyes, MissionEngine(mission), limit_s, observer)
+    keeper = None if box is None else KeepInBox(box)
+    flight = _Flight(drone, eyes, MissionEngine(mission), limit_s, observer, keeper=keeper)
     try:
         await drone.connect()
         await eyes.open()
@@ -124,15 +131,24 @@ class _Flight:
     """One flight under way."""
 
     def __init__(
-        self, drone: Drone, eyes: Eyes, engine: MissionEngine, limit_s: float, observer: Observer | None
+        self,
+        drone: Drone,
+        eyes: Eyes,
+        engine: MissionEngine,
+        limit_s: float,
+        observer: Observer | None,
+        *,
+        keeper: KeepInBox | None,
     ) -> None:
         self._drone = drone
         self._eyes = eyes
         self._engine = engine
         self._limit_us = round(limit_s * MICROSECONDS)
         self._observer = observer
+        self._keeper = keeper
         self._flying = False
         self._motors_asked = False
+        self._landed = False
         self._first_us: int | None = None
         self._started_us: int | None = None
         self._now_us = 0
@@ -145,7 +161,7 @@ class _Flight:
         """Fly to the end, whichever it is."""
         try:
             timed_out = await self._fly()
-        except (DroneError, CameraLostError, MissionRunError) as error:
+        except (DroneError, CameraLostError, MissionRunError, OutsideBoxError) as error:
             return await self._stop("aborted", str(error))
         except asyncio.CancelledError:
             task = asyncio.current_task()
@@ -180,7 +196,7 @@ class _Flight:
             return
         detections = self._eyes.latest(state.time_us)
         imu = Imu(state.x, state.y, state.z, state.yaw)
-        command = self._engine.tick(imu, detections, state.time_us)
+        command = self._kept_in(self._engine.tick(imu, detections, state.time_us), state)
         wanted = self._engine.pilot.cmd.on
         switches = wanted != self._flying
         self._motors_asked = self._motors_asked or wanted
@@ -201,8 +217,22 @@ class _Flight:
     def _observe(self, state: DroneState, command: VelocityCommand, detections: Detections) -> None:
         if self._observer is not None:
             flight_time_s = self._flight_time_s()
-            engine = self._engine
-            self._observer(Moment(state, command, detections, engine.state, flight_time_s, engine.transition))
+            place, transition = self._engine.state, self._engine.transition
+            remark = "" if self._keeper is None else self._keeper.remark
+            self._observer(
+                Moment(state, command, detections, place, flight_time_s, transition, remark=remark)
+            )
+
+    def _kept_in(self, command: VelocityCommand, state: DroneState) -> VelocityCommand:
+        """What of a command may be flown; the first change in a flight is logged."""
+        keeper = self._keeper
+        if keeper is None or not self._flying:
+            return command
+        first = not keeper.limited_us
+        kept = keeper.limit(command, state)
+        if first and keeper.remark:
+            logger.warning("%s (x %.1f, y %.1f, z %.1f m)", keeper.remark, state.x, state.y, state.z)
+        return kept
 
     async def _stay_paused(self, state: DroneState) -> bool:
         """Begin, go on with or end a pause; True if the mission waits in this tick."""
@@ -254,15 +284,21 @@ class _Flight:
         self._flying = False
         if cmd.land or cmd.on:
             await self._drone.land()
+            self._landed = True
         else:
             await self._drone.motors_off()
 
     async def _watch_come_to_rest(self) -> None:
-        """Go on observing after motors off, for the records and for a referee who lives on telemetry."""
+        """Go on observing after motors off, for the records and for a referee who lives on telemetry.
+
+        A landing takes many seconds, in which no tick is observed; the time counts from its end.
+        """
         ticks = self._drone.ticks()
-        end_us = self._now_us + REST_US
+        end_us = None if self._landed else self._now_us + REST_US
         try:
             async for state in ticks:
+                if end_us is None:
+                    end_us = state.time_us + REST_US
                 if self._observer is not None:
                     since_us = state.time_us if self._started_us is None else self._started_us
                     flight_time_s = (state.time_us - since_us) / MICROSECONDS
@@ -287,7 +323,8 @@ class _Flight:
 
     def _outcome(self, ended: Literal["finished", "timed out", "aborted"], reason: str) -> Outcome:
         place, flight_time_s = self._engine.state, self._flight_time_s()
-        return Outcome(ended, reason, place, flight_time_s, self._ticks, self._pauses)
+        kept_s = 0.0 if self._keeper is None else self._keeper.limited_us / MICROSECONDS
+        return Outcome(ended, reason, place, flight_time_s, self._ticks, self._pauses, kept_s)
 
     def _flight_time_s(self) -> float:
         return 0.0 if self._started_us is None else (self._now_us - self._started_us) / MICROSECONDS

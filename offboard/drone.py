@@ -27,6 +27,7 @@ class DroneState:
             commanding, a pilot has taken it.
         mode: flight mode in words, for people.
         landed: it stands on something.
+        position_age_s: how much older the position is than `time_us`, seconds.
     """
 
     time_us: int
@@ -39,6 +40,7 @@ class DroneState:
     offboard: bool = False
     mode: str = ""
     landed: bool = True
+    position_age_s: float = 0.0
 
 
 @dataclass(frozen=True, slots=True)

@@ -22,6 +22,7 @@ from offboard.drone import VelocityCommand
 from offboard.mission import Mission
 from offboard.pilot import Imu, Pilot, PilotError, velocity_command
 from offboard.pilot_file import PilotFile, in_words, place_in
+from scenarios.models import COLOURS
 from vision.types import Detections
 
 Act = Callable[[Pilot], None]
@@ -92,6 +93,7 @@ class MissionEngine:
         self._started_us = 0
         self._entered_us = 0
         self._last_us = 0
+        self._seen_us: dict[str, int] = {}
         self._paused_us: int | None = None
         self._taken: TransitionTaken | None = None
 
@@ -134,6 +136,7 @@ class MissionEngine:
         pilot.cam = cam
         self._taken = None
         try:
+            self._count_unseen(time_us)
             if self._present is None:
                 self._start(time_us)
             elif not self._present.finish and not (
@@ -160,6 +163,16 @@ class MissionEngine:
         self._taken = None
         if self._paused_us is None and self._present is not None:
             self._paused_us = time_us
+
+    def _count_unseen(self, time_us: int) -> None:
+        """Note which frames are wholly in view."""
+        pilot, seen_us = self.pilot, self._seen_us
+        if self._present is None or self._paused_us is not None:
+            seen_us.update(dict.fromkeys(COLOURS, time_us))
+        for colour in COLOURS:
+            if isfinite(getattr(pilot.cam, colour).d):
+                seen_us[colour] = time_us
+        pilot.seconds_unseen = (time_us - seen_us[pilot.colour]) / 1e6
 
     def _start(self, time_us: int) -> None:
         self._started_us = time_us

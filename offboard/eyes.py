@@ -7,6 +7,7 @@ import contextlib
 from collections.abc import AsyncIterator, Callable
 from typing import Protocol
 
+from offboard.link.message_order import MessageOrder
 from vision.detector import detect
 from vision.types import CameraFrame, Detections, Image
 
@@ -61,6 +62,9 @@ class CameraEyes:
 
     The age of an image counts vehicle time: from its own time stamp where the source gives one (a picture
     that waited in a buffer is old, too), else from the tick after its arrival.
+
+    Attributes:
+        oldest_s: age of the oldest image that was used, seconds.
     """
 
     def __init__(self, camera: Camera, detector: Detector = detect) -> None:
@@ -74,9 +78,12 @@ class CameraEyes:
         self._detector = detector
         self._detections = Detections()
         self._image_us: int | None = None
+        self._order = MessageOrder()
         self._images = 0
         self._images_known = 0
         self._first = asyncio.Event()
+        self._arrived = asyncio.Event()
+        self.oldest_s = 0.0
         self._seen_us = 0
         self._ended = ""
         self._task: asyncio.Task[None] | None = None
@@ -108,9 +115,23 @@ class CameraEyes:
         if self._ended:
             raise CameraLostError(self._ended)
         age_s = (time_us - self._seen_us) / 1e6
+        self.oldest_s = max(self.oldest_s, age_s)
         if age_s > CAMERA_DEAD_S:
             raise CameraLostError(f"the camera is dead: no image for {age_s:.1f} s")
         return self._detections
+
+    async def seen(self, image_us: int, limit_s: float) -> bool:
+        """Wait until an image exposed at a vehicle time, or a later one, has been looked at.
+
+        Returns:
+            False if it was not within `limit_s` of wall time, or the camera has failed.
+        """
+        with contextlib.suppress(TimeoutError):
+            async with asyncio.timeout(limit_s):
+                while not self._ended and (self._image_us is None or self._image_us < image_us):
+                    self._arrived.clear()
+                    await self._arrived.wait()
+        return self._image_us is not None and self._image_us >= image_us
 
     async def close(self) -> None:
         """Stop watching."""
@@ -123,11 +144,15 @@ class CameraEyes:
     async def _watch(self) -> None:
         try:
             async for frame in self._camera.frames():
+                if frame.time_us is not None and not self._order.is_next(frame.time_us):
+                    continue  # a link may swap images, too
                 self._detections = self._detector(frame.image, frame.time_us)
                 self._image_us = frame.time_us
                 self._images += 1
                 self._first.set()
+                self._arrived.set()
             self._ended = "the camera's stream ended"
         except Exception as error:  # whatever a source raises, the flight must hear of it
             self._ended = f"the camera failed: {error or type(error).__name__}"
         self._first.set()
+        self._arrived.set()

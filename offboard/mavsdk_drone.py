@@ -13,31 +13,33 @@ from typing import Any, TextIO
 from mavsdk.asyncio import Configuration, ForwardingOption, Mavsdk, MavsdkError
 from mavsdk.asyncio.component_type import ComponentType
 from mavsdk.asyncio.plugins.action import ActionAsync
+from mavsdk.asyncio.plugins.mavlink_direct import MavlinkDirectAsync
 from mavsdk.asyncio.plugins.offboard import OffboardAsync
 from mavsdk.asyncio.plugins.telemetry import TelemetryAsync
 from mavsdk.logging import log_subscribe
 
 from offboard.drone import DroneError, DroneState, VelocityCommand
+from offboard.keep_in_box import Box, confine
 from offboard.link.alignment import Alignment, Pose
 from offboard.link.companion import Companion
+from offboard.link.hold import leave_offboard
+from offboard.link.requests import Requests
 from offboard.link.setpoints import SetpointStream
-from offboard.link.telemetry import TelemetryFeed
+from offboard.link.telemetry import CHECKS, TelemetryFeed, ask_for_rates
+from offboard.link.ticks import TickSource, VehicleClock
 from offboard.link.tlog import TlogRecorder
 from offboard.link.tracking import CommandTracker
 from offboard.link.url import check_free, parse_url
-from offboard.link.watchdog import Watchdog
+from offboard.link.watchdog import PATIENT, Watchdog
 
+STAND_STILL_S = 0.5  # wall time without a tick after which the last velocity is not flown any longer
 LINK_LOST_S = 1.0  # wall time without telemetry
-CONFIRM_S = (
-    6.0  # until a heartbeat (one a second) shows what was asked for; simulations may run at half speed
-)
+HEARTBEAT_LOST_S = 6.0  # wall time; there is one a second, and of a lossy link three in a row get lost
+CONFIRM_S = 6.0  # until one of the heartbeats, one a second, shows what was asked for
 LAND_LIMIT_S = 120.0  # vehicle time
 STREAM_BEFORE_OFFBOARD_S = 0.3  # PX4 enters offboard only with fresh setpoints
 PRESENT_MODE_S = 8.0
-WANTED_RATE_HZ = 50.0
 PILOT_MODES = ("MANUAL", "ALTCTL", "POSCTL", "ACRO", "STABILIZED", "RATTITUDE")
-
-_CHECKS = "pre-arm checks not passed"
 
 logger = logging.getLogger(__name__)
 
@@ -66,6 +68,7 @@ class MavsdkDrone:
         connect_limit_s: float = 10.0,
         ready_limit_s: float = 30.0,
         hang_report: TextIO | None = None,
+        box: Box | None = None,
     ) -> None:
         """Check the address; nothing is opened yet.
 
@@ -75,6 +78,7 @@ class MavsdkDrone:
             connect_limit_s: wall time to find the vehicle.
             ready_limit_s: wall time until it can be armed.
             hang_report: a real file for the stack of a hung app; by default standard error.
+            box: out of which nothing leads that is added to commands here; None: there is none.
 
         Raises:
             DroneError: bad address.
@@ -84,21 +88,28 @@ class MavsdkDrone:
         self._connect_limit_s = connect_limit_s
         self._ready_limit_s = ready_limit_s
         self._feed = TelemetryFeed()
+        self._ticks = TickSource(self._feed)
+        self._sent = VelocityCommand()
+        self._system_id: int | None = None
         self._alignment: Alignment | None = None
         self._mavsdk: Mavsdk | None = None
         self._system: Any = None
         self._action: Any = None
         self._setpoints: SetpointStream | None = None
         self._telemetry: Any = None
+        self._requests = Requests()
+        self._direct: Any = None
         self._tracker = CommandTracker()
         self._latest: DroneState | None = None
         self._commanding = False
         self._pilot_has_it = False
         self._tlog_path: Path | None = None
         self._recorder: TlogRecorder | None = None
+        self.recording_problem = ""  # why recording ended before the flight; known after `let_go`
         self._companion: Companion | None = None
-        self._watchdog = Watchdog(self._stop_from_watchdog, hang_report)
+        self._watchdog = Watchdog(self._stand_still, self._stop_from_watchdog, hang_report)
         self._guests: list[str] = []
+        self._box = box
 
     def record_to(self, path: Path) -> None:
         """Record all MAVLink traffic as a tlog from `connect` to `close`."""
@@ -112,13 +123,31 @@ class MavsdkDrone:
         """Let a ground station at this address in on the link: it hears the vehicle and can speak to it."""
         self._guests.append(url)
 
+    def wait_with(self, clock: VehicleClock, system_id: int) -> None:
+        """Let the vehicle's time wait for this app from `ready` on.
+
+        Args:
+            clock: of the vehicle.
+            system_id: MAVLink id of the vehicle whose clock it is; no other one is flown.
+        """
+        self._ticks.grant(clock)
+        self._system_id = system_id
+        self._watchdog.limits = PATIENT
+
+    @property
+    def late_ticks(self) -> int:
+        """Ticks of the flight that this app was not given in time."""
+        return self._ticks.late
+
     async def connect(self) -> None:
         """Find the vehicle and listen to it.
 
         Raises:
             DroneError: port taken, device missing, no vehicle within the limit.
         """
-        check_free(self._url)
+        check_free(
+            self._url, "give another address" if self._system_id is None else "choose another --instance"
+        )
         log_subscribe(_log)
         # As a ground station: PX4 sends the reasons of its refusals (STATUSTEXT) to no one else.
         configuration = Configuration.create_with_component_type(ComponentType.GROUND_STATION)
@@ -136,14 +165,20 @@ class MavsdkDrone:
                 f"no vehicle was heard on {self._url.text} within {self._connect_limit_s:g} s; "
                 "is it running and sending to this address?"
             )
-        if self._recorder is not None:
-            self._recorder.announce(await self._system.get_system_id())
-        if self._companion is not None:
-            self._companion.announce(await self._system.get_system_id())
+        system_id = await self._system.get_system_id()
+        if self._system_id not in (None, system_id):
+            raise DroneError(
+                f"another vehicle (system {system_id}) sends to {self._url.text}; stop it, or choose another "
+                "--instance"
+            )
+        for listener in (self._recorder, self._companion):
+            if listener is not None:
+                listener.announce(system_id)
         self._action = ActionAsync(self._system)
         self._setpoints = SetpointStream(OffboardAsync(self._system))
         self._telemetry = TelemetryAsync(self._system)
-        self._feed.subscribe(_synchronous(self._telemetry))
+        self._direct = MavlinkDirectAsync(self._system)
+        self._feed.subscribe(_synchronous(self._telemetry), _synchronous(self._direct))
 
     async def ready(self) -> None:
         """Wait until the vehicle can be armed; then fix the axes.
@@ -154,16 +189,18 @@ class MavsdkDrone:
         try:
             await self._wait_for_checks()
         except TimeoutError:
-            missing = ", ".join(self._missing())
+            missing = ", ".join(self._feed.missing())
             await self._leave_offboard()
             raise DroneError(
-                f"not ready within {self._ready_limit_s:g} s: {missing}{self._feed.recent_texts()}"
+                f"not ready within {self._ready_limit_s:g} s: {missing}{self._feed.recent_texts()}; "
+                f"framerunner doctor --drone {self._url.text} says what is missing"
             ) from None
         if self._feed.armed:
             raise DroneError("the vehicle is armed already; land and disarm it, then put it on its start")
-        await self._ask_for_rates()
+        await ask_for_rates(self._feed, self._telemetry)
         feed = self._feed
         self._alignment = Alignment(self._start_arena, Pose(feed.position_ned_m, feed.yaw_ned_rad))
+        await self._ticks.begin()
 
     async def _wait_for_checks(self) -> None:
         """Wait until nothing is missing.
@@ -172,11 +209,11 @@ class MavsdkDrone:
         in a hall, without GPS, it never passes, while offboard does. So that is tried when all else is there.
         """
         with contextlib.suppress(TimeoutError):
-            await self._until(lambda: not self._missing(), min(PRESENT_MODE_S, self._ready_limit_s / 2))
-        if self._missing() == [_CHECKS] and not self._feed.armed:
+            await self._until(lambda: not self._feed.missing(), min(PRESENT_MODE_S, self._ready_limit_s / 2))
+        if self._feed.missing() == [CHECKS] and not self._feed.armed:
             await self._stream_before_offboard()
             await self._ask("offboard mode", self._stream.ask_for_offboard())
-        await self._until(lambda: not self._missing(), self._ready_limit_s)
+        await self._until(lambda: not self._feed.missing(), self._ready_limit_s)
 
     async def ticks(self) -> AsyncIterator[DroneState]:
         """States at 20 Hz of vehicle time; ticks that were not waited for are passed over.
@@ -186,7 +223,12 @@ class MavsdkDrone:
                 disarmed by others.
         """
         while True:
-            came = await self._feed.next_tick(LINK_LOST_S)
+            follows = self._commanding and not self._pilot_has_it
+            command = self._sent if follows else None
+            came = await self._ticks.next(STAND_STILL_S, command)
+            if not came and not self._ticks.waits:
+                self._stand_still()
+                came = await self._ticks.next(LINK_LOST_S - STAND_STILL_S, command)
             self._check_alive(came)
             state = self._state()
             self._check_state(state)
@@ -218,14 +260,14 @@ class MavsdkDrone:
 
     async def _stream_before_offboard(self) -> None:
         self._send(VelocityCommand())
-        for _ in range(int(STREAM_BEFORE_OFFBOARD_S / 0.05)):
-            await asyncio.sleep(0.05)
+        for _ in range(round(STREAM_BEFORE_OFFBOARD_S / 0.05)):
+            await self._ticks.next(0.05)
             self._send(VelocityCommand())
 
     async def _leave_offboard(self) -> None:
         """On the ground, when there will be no flight."""
         with contextlib.suppress(MavsdkError, asyncio.CancelledError):
-            await self._stream.ask_for_hold()
+            await self._requests.wait(self._stream.ask_for_hold())
 
     async def motors_off(self) -> None:
         """Stop the motors at once (forced disarm), in the air too."""
@@ -234,7 +276,7 @@ class MavsdkDrone:
         await self._confirm("stopping the motors", lambda: self._feed.armed is False)
         self._watchdog.stop()
         with contextlib.suppress(MavsdkError):
-            await self._stream.ask_for_hold()
+            await self._requests.wait(self._stream.ask_for_hold())
 
     async def land(self) -> None:
         """Let the vehicle land and wait until it has disarmed itself."""
@@ -245,18 +287,13 @@ class MavsdkDrone:
         self._watchdog.stop()
         limit_us = feed.time_us + int(LAND_LIMIT_S * 1e6)
         while feed.armed:
-            came = await feed.next_tick(LINK_LOST_S)
+            came = await self._ticks.next(LINK_LOST_S)
             self._check_alive(came)
-            if feed.mode != "LAND" and not await self._soon_disarmed():
+            # One heartbeat tells of mode and arming, but MAVSDK passes them on one after the other.
+            if feed.mode != "LAND" and not await self._shows(lambda: not feed.armed, 0.5):
                 raise DroneError(f"landing was broken off: mode {feed.mode}{feed.recent_texts()}")
             if feed.time_us > limit_us:
                 raise DroneError(f"still not landed after {LAND_LIMIT_S:g} s{feed.recent_texts()}")
-
-    async def _soon_disarmed(self) -> bool:
-        """One heartbeat tells of mode and arming, but MAVSDK passes them on one after the other."""
-        with contextlib.suppress(TimeoutError):
-            await self._until(lambda: not self._feed.armed, 0.5)
-        return not self._feed.armed
 
     async def hold(self) -> None:
         """Stop commanding for good and ask for hold, unless another hand has the vehicle already."""
@@ -265,16 +302,20 @@ class MavsdkDrone:
         if self._setpoints is None:
             return
         if self._feed.mode == "OFFBOARD":
-            await self._ask_for_hold()
-            await self._confirm("hold", lambda: self._feed.mode == "HOLD")
+            await leave_offboard(self._ask_for_hold, self._left_offboard)
+            mode = self._feed.mode
+            if mode != "HOLD" and mode not in PILOT_MODES:
+                raise DroneError(f"the vehicle is in {mode} instead{self._feed.recent_texts()}")
         else:
             await asyncio.to_thread(self._stream.end)
 
     async def refuse(self) -> None:
         """Let the vehicle that was given back hold; go on waiting."""
         if self._feed.mode == "OFFBOARD":
-            await self._ask_for_hold()
-            await self._confirm("hold", lambda: self._feed.mode != "OFFBOARD")
+            await leave_offboard(self._ask_for_hold, self._left_offboard)
+
+    async def _left_offboard(self, limit_s: float) -> bool:
+        return await self._shows(lambda: self._feed.mode != "OFFBOARD", limit_s)
 
     async def _ask_for_hold(self) -> None:
         """By other means where the watchdog has ended the stream for good."""
@@ -291,12 +332,18 @@ class MavsdkDrone:
                 return
             self._pilot_has_it = False
             self._tracker.reset()  # the vehicle was moved by others
-        self._send(command if latest is None else self._tracker.correct(command, latest))
+        if latest is not None:
+            command = self._tracker.correct(command, latest)
+            if self._box is not None:
+                command, _ = confine(command, latest, self._box)
+        self._send(command)
 
     async def close(self) -> None:
         """Let go of the vehicle and finish the recording; with a companion only end all commanding."""
         self._commanding = False
         self._watchdog.stop()
+        self._ticks.release()
+        await self._requests.settled()
         if self._companion is None:
             await self.let_go()
         elif self._setpoints is not None:
@@ -304,12 +351,19 @@ class MavsdkDrone:
 
     async def let_go(self) -> None:
         """Close the link and the recording; may be called again."""
+        await self._requests.settled()
         if self._mavsdk is not None:
             await asyncio.to_thread(self._mavsdk.destroy)
             self._mavsdk = None
         if self._recorder is not None:
+            self.recording_problem = self._recorder.problem
             self._recorder.close()
             self._recorder = None
+
+    def _stand_still(self) -> None:
+        """Send a velocity of zero, as MAVSDK's thread would send the last one on; from any thread."""
+        if self._commanding and not self._pilot_has_it:
+            self._send(VelocityCommand())
 
     @property
     def _stream(self) -> SetpointStream:
@@ -318,6 +372,7 @@ class MavsdkDrone:
 
     def _send(self, command: VelocityCommand) -> None:
         if not self._watchdog.tripped_after_s:
+            self._sent = command
             self._stream.send(command)
 
     def _state(self) -> DroneState:
@@ -335,6 +390,7 @@ class MavsdkDrone:
             offboard=feed.mode == "OFFBOARD",
             mode=feed.mode,
             landed=feed.landed,
+            position_age_s=max(0.0, (sample.time_us - sample.position_us) * 1e-6),
         )
 
     def _check_alive(self, tick_came: bool) -> None:
@@ -342,13 +398,17 @@ class MavsdkDrone:
         if hung_s:
             did = "asked for hold" if self._stream.can_ask else "fell silent"
             raise DroneError(f"this app hung for more than {hung_s:.1f} s; its watchdog {did}")
-        age_s = self._feed.age_s()
-        if age_s > LINK_LOST_S:
+        if self._ticks.waits:
+            if not tick_came:
+                raise DroneError("link lost: the simulator runs, but its telemetry does not arrive")
+            return
+        feed = self._feed
+        if (age_s := feed.age_s()) > LINK_LOST_S:
             raise DroneError(f"link lost: no telemetry for {age_s:.1f} s")
         if not tick_came:
             raise DroneError("link lost: the vehicle's clock stands still")
-        if not _synchronous(self._system).is_connected():
-            raise DroneError("link lost: no heartbeat for 3 s")
+        if (heartbeat_age_s := feed.heartbeat_age_s()) > HEARTBEAT_LOST_S:
+            raise DroneError(f"link lost: no heartbeat for {heartbeat_age_s:.1f} s")
 
     def _check_state(self, state: DroneState) -> None:
         values = (state.x, state.y, state.z, state.yaw, *state.velocity_arena_m_s)
@@ -365,38 +425,9 @@ class MavsdkDrone:
             raise DroneError(f"the pilot or a failsafe took over: mode {state.mode}{texts}")
         self._pilot_has_it = True
 
-    def _missing(self) -> list[str]:
-        feed, health = self._feed, self._feed.health
-        missing = []
-        if not feed.attitudes:
-            missing.append("no attitude (ATTITUDE)")
-        if not feed.positions:
-            missing.append("no local position (LOCAL_POSITION_NED)")
-        if feed.armed is None or not feed.mode:
-            missing.append("no heartbeat")
-        if health is None:
-            missing.append("no health (SYS_STATUS)")
-            return missing
-        if not health.is_armable:
-            missing.append(_CHECKS)
-        return missing
-
-    async def _ask_for_rates(self) -> None:
-        """Ask for 50 Hz of attitude and position where the vehicle sends less; a refusal is no error."""
-        feed = self._feed
-        start_us, attitudes, positions = feed.time_us, feed.attitudes, feed.positions
-        await asyncio.sleep(0.5)
-        span_s = max((feed.time_us - start_us) / 1e6, 1e-3)
-        wanted = WANTED_RATE_HZ
-        with contextlib.suppress(MavsdkError):
-            if (feed.attitudes - attitudes) / span_s < 0.9 * wanted:
-                await self._telemetry.set_rate_attitude_euler(wanted)
-            if (feed.positions - positions) / span_s < 0.9 * wanted:
-                await self._telemetry.set_rate_position_velocity_ned(wanted)
-
     async def _ask(self, what: str, request: Awaitable[object]) -> None:
         try:
-            await request
+            await self._requests.wait(request)
         except MavsdkError as error:
             result = getattr(getattr(error, "result", None), "name", str(error))
             raise DroneError(f"{what} was refused: {result}{self._feed.recent_texts()}") from None
@@ -413,10 +444,19 @@ class MavsdkDrone:
                 f"after {CONFIRM_S:g} s{feed.recent_texts()}"
             ) from None
 
+    async def _shows(self, condition: Callable[[], bool], limit_s: float) -> bool:
+        with contextlib.suppress(TimeoutError):
+            await self._until(condition, limit_s)
+        return condition()
+
     async def _until(self, condition: Callable[[], bool], limit_s: float) -> None:
-        async with asyncio.timeout(limit_s):
+        """Wait for a condition; the limit is vehicle time where that waits for the app, else wall time."""
+        waits, limit_us = self._ticks.waits, self._feed.time_us + round(limit_s * 1e6)
+        async with asyncio.timeout(None if waits else limit_s):
             while not condition():
-                await self._feed.next_tick(0.05)
+                if waits and self._feed.time_us > limit_us:
+                    raise TimeoutError
+                await self._ticks.next(0.05)
 
     async def _start_recorder(self) -> None:
         if self._tlog_path is None or self._mavsdk is None:

@@ -96,7 +96,6 @@ def load_mission(name_or_path: str | Path, pilot: PilotFile | type[Pilot] | None
     written = read_mission_file(_read_text(path), path)
     problems = ProblemList()
     spec = expand(merge_extended(written, _open_base), problems)
-    problems.raise_if_any()
     check(spec, pilot.pilot_class() if isinstance(pilot, PilotFile) else pilot, problems)
     problems.raise_if_any()
     mission = Mission(spec.name, spec.description, path, spec, pilot, native_yaml(spec))

@@ -81,6 +81,8 @@ class Pilot:
         memory: the mission's own variables.
         seconds_in_state: vehicle time since the present state was entered.
         seconds_in_mission: vehicle time since the mission started.
+        seconds_unseen: vehicle time since `frame` was last wholly in view, or since the mission started or
+            went on after a pause.
     """
 
     imu: Imu
@@ -91,6 +93,7 @@ class Pilot:
     memory: Memory
     seconds_in_state: float
     seconds_in_mission: float
+    seconds_unseen: float
 
     def __init__(self, variables: dict[str, object] | None = None) -> None:
         """Start with motors off.
@@ -106,6 +109,7 @@ class Pilot:
         self.memory = Memory(**(variables or {}))
         self.seconds_in_state = 0.0
         self.seconds_in_mission = 0.0
+        self.seconds_unseen = 0.0
 
     @property
     def frame(self) -> Detection:

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
-from offboard.chart.expressions import ExpressionError, check_assignment, check_expression
-from offboard.chart.problems import Place, ProblemList
-from offboard.chart.spec import Action, Leaf, MissionFile, State, all_states, leaves
+from difflib import get_close_matches
+
+from offboard.chart.expressions import IN_LOCATION, ExpressionError, check_assignment, check_guard
+from offboard.chart.problems import Place, ProblemList, cut
+from offboard.chart.spec import Action, Leaf, MissionFile, State, Transition, all_states, leaves
 from offboard.chart.vocabulary import UnknownNameError, Vocabulary
 from offboard.pilot import Pilot
 
@@ -19,35 +21,40 @@ def check(mission: MissionFile, pilot_class: type[Pilot], problems: ProblemList)
     """
     vocabulary = Vocabulary(pilot_class, mission.variables)
     if not mission.states:
-        problems.add(mission.place, "has no 'states'")
+        problems.add(mission.place, "has no 'states'; write 'states:' and below it the states, indented")
         return
-    _check_initial(mission.place, "the mission", mission.initial, mission.states, problems)
+    is_whole = not problems.found
+    for state in all_states(mission.states):
+        _check_words(state, vocabulary, problems)
+    if not is_whole:
+        return  # what follows would tell of the same fault again
+    _check_initial(mission.place, "the mission", mission, problems)
     for state in all_states(mission.states):
         _check_shape(state, problems)
-        _check_words(state, vocabulary, problems)
     if not problems.found:
-        _check_reachable(mission, problems)
+        _check_ways(mission, problems)
 
 
-def _check_initial(
-    place: Place, what: str, initial: str, states: tuple[State, ...], problems: ProblemList
-) -> None:
-    names = [state.name for state in states]
+def _check_initial(place: Place, what: str, around: MissionFile | State, problems: ProblemList) -> None:
+    names, initial = [state.name for state in around.states], around.initial
     if not initial:
         problems.add(place, f"{what} has no 'initial'; name the state it starts in, such as '{names[0]}'")
     elif initial not in names:
-        problems.add(place, f"'initial' of {what} is '{initial}'; it has the states {', '.join(names)}")
+        near = get_close_matches(initial, names, 1)
+        mend = f"did you mean '{near[0]}'?" if near else f"it has the states {cut(', '.join(names), 100)}"
+        problems.add(around.initial_place, f"'initial' of {what} is '{cut(initial, 40)}'; {mend}")
 
 
 def _check_shape(state: State, problems: ProblemList) -> None:
     place = state.place
     if state.states:
-        _check_initial(place, f"state '{state.id}'", state.initial, state.states, problems)
+        _check_initial(place, f"state '{state.id}'", state, problems)
         if state.final:
             problems.add(place, f"state '{state.id}' is final and has states; only one of both is possible")
         ends = any(child.final for child in state.states)
         if state.then and not ends:
-            problems.add(place, f"state '{state.id}' has 'then' but no final state that leads there")
+            text = f"none of the states of '{state.id}' has 'final: true', so its 'then' is never reached"
+            problems.add(state.states[-1].place, text)
         return
     if state.then or state.initial:
         problems.add(place, f"state '{state.id}' has 'then' or 'initial' but no states of its own")
@@ -56,19 +63,33 @@ def _check_shape(state: State, problems: ProblemList) -> None:
         problems.add(state.resume.place, text)
     if state.final and (state.transitions or state.during):
         problems.add(place, f"state '{state.id}' is final; nothing happens after its 'enter'")
-    always = [index for index, transition in enumerate(state.transitions) if not transition.when]
-    if always and always[0] < len(state.transitions) - 1:
-        late = state.transitions[always[0] + 1].place
-        problems.add(late, f"this transition of '{state.id}' is never reached: the one above always holds")
+    _check_transitions(state, problems)
+
+
+def _check_transitions(state: State, problems: ProblemList) -> None:
+    """None that can never be taken, for one above it always goes first."""
+    seen: dict[str, Transition] = {}
+    for transition in state.transitions:
+        if "" in seen:
+            text = f"this transition of '{state.id}' is never reached: the one above always holds"
+            problems.add(transition.when_place, text)
+            return
+        guard = " ".join(transition.when.split())
+        if guard in seen:
+            line = seen[guard].when_place.line
+            text = f"this transition of '{state.id}' is never reached: line {line} has the same 'when'"
+            problems.add(transition.when_place, text)
+        seen.setdefault(guard, transition)
 
 
 def _check_words(state: State, vocabulary: Vocabulary, problems: ProblemList) -> None:
     for transition in state.transitions:
         if transition.when:
             try:
-                check_expression(transition.when, vocabulary)
+                check_guard(transition.when, vocabulary)
             except ExpressionError as error:
-                problems.add(transition.place, f"guard '{transition.when}': {error}")
+                place = transition.when_place.moved(error.offset)
+                problems.add(place, f"when '{cut(transition.when)}': {error}")
     for action in (*state.enter, *state.during, *state.exit):
         _check_action(action, vocabulary, problems)
 
@@ -79,40 +100,82 @@ def _check_action(action: Action, vocabulary: Vocabulary, problems: ProblemList)
             vocabulary.check_primitive(action.name)
         else:
             check_assignment(action.location, action.expression, vocabulary)
-    except (UnknownNameError, ExpressionError) as error:
-        problems.add(action.place, str(error) if action.name else f"'{action}': {error}")
+    except UnknownNameError as error:
+        problems.add(action.place, str(error))
+    except ExpressionError as error:
+        in_location = error.offset == IN_LOCATION
+        place = action.place if in_location else action.expression_place.moved(error.offset)
+        problems.add(place, f"'{cut(str(action))}': {error}")
 
 
-def _check_reachable(mission: MissionFile, problems: ProblemList) -> None:
-    """Every leaf can be entered, and from the start a finish can be reached by some way, without a pause."""
+def _check_ways(mission: MissionFile, problems: ProblemList) -> None:
+    """Every state can be entered and has a way out; from each a final one can be reached without a pause."""
     states = {state.id: state for state in all_states(mission.states)}
     by_leaf = {leaf.state.id: leaf for leaf in leaves(mission.states)}
-    entered = _reached(mission.initial, states, by_leaf, pauses=True)
+    start = [_entry(states, mission.initial)]
+    ways = _ways(states, by_leaf, pauses=False)
+    unpaused = _reached(start, ways)
+    back: dict[str, list[str]] = {}
+    for leaf_id, targets in ways.items():
+        for target in targets:
+            back.setdefault(target, []).append(leaf_id)
+    ending = _reached([leaf_id for leaf_id in by_leaf if is_finish(states, leaf_id)], back)
+    stuck = [leaf_id for leaf_id in by_leaf if leaf_id in unpaused and leaf_id not in ending]
+    ends = [leaf_id for leaf_id in stuck if not set(ways[leaf_id]) - {leaf_id}]
+    for leaf_id in ends:
+        text = f"state '{leaf_id}' has no way out; add 'transitions:', or 'final: true' if it is the end"
+        problems.add(states[leaf_id].place, text)
+    if ends:
+        return  # that a state is not reached or the end is not may follow from it
+    if stuck:
+        text = f"never finishes: no way from state '{stuck[0]}' to a final state"
+        mend = "lead a transition there, or mark one with 'final: true'"
+        problems.add(states[stuck[0]].place, f"{text}; {mend}")
+        return
+    entered = _reached(start, _ways(states, by_leaf, pauses=True))
+    for state_id in _never_entered(mission.states, entered):
+        if _entry(states, state_id) in entered:
+            continue  # it follows one that was told of
+        entered |= _reached([_entry(states, state_id)], ways)
+        place = states[state_id].place
+        problems.add(place, f"state '{state_id}' is never reached; lead a transition to it or take it away")
+
+
+def _never_entered(around: tuple[State, ...], entered: set[str]) -> list[str]:
+    """States of which nothing is entered; of those within each other the outermost."""
+    found = []
+    for state in around:
+        own = [leaf.state.id for leaf in leaves((state,))]
+        if not entered.intersection(own):
+            found.append(state.id)
+        else:
+            found += _never_entered(state.states, entered)
+    return found
+
+
+def _ways(states: dict[str, State], by_leaf: dict[str, Leaf], *, pauses: bool) -> dict[str, list[str]]:
+    """Of each leaf those that can follow it, by transitions and, if wanted, after pauses."""
+    found = {}
     for leaf_id, leaf in by_leaf.items():
-        if leaf_id not in entered:
-            problems.add(leaf.state.place, f"state '{leaf_id}' is never reached; lead a transition to it")
-    unpaused = _reached(mission.initial, states, by_leaf, pauses=False)
-    if not any(is_finish(states, leaf_id) for leaf_id in unpaused):
-        problems.add(mission.place, "never finishes: no final state ends it; mark one with 'final: true'")
-
-
-def _reached(initial: str, states: dict[str, State], by_leaf: dict[str, Leaf], *, pauses: bool) -> set[str]:
-    """The leaves that can be entered from the start, by transitions and, if wanted, after pauses."""
-    seen: set[str] = set()
-    pending = [_entry(states, initial)]
-    while pending:
-        current = pending.pop()
-        if current in seen:
-            continue
-        seen.add(current)
-        leaf = by_leaf[current]
         targets = [transition.to for transition in leaf.transitions]
         if pauses and leaf.resume:
             targets.append(leaf.resume.to)
-        outer = states.get(current.rpartition(".")[0])
-        if states[current].final and outer is not None and outer.then:
+        outer = states.get(leaf_id.rpartition(".")[0])
+        if states[leaf_id].final and outer is not None and outer.then:
             targets.append(outer.then)
-        pending += [_entry(states, target) for target in targets]
+        found[leaf_id] = [_entry(states, target) for target in targets]
+    return found
+
+
+def _reached(start: list[str], ways: dict[str, list[str]]) -> set[str]:
+    """What can be reached from some leaves, they included."""
+    seen: set[str] = set()
+    pending = list(start)
+    while pending:
+        current = pending.pop()
+        if current not in seen:
+            seen.add(current)
+            pending += ways.get(current, [])
     return seen
 
 

@@ -13,7 +13,7 @@ from collections.abc import Callable
 from dataclasses import replace
 from difflib import get_close_matches
 
-from offboard.chart.problems import MissionError, Place, Problem, ProblemList
+from offboard.chart.problems import MissionError, Place, Problem, ProblemList, cut
 from offboard.chart.spec import MissionFile, State, all_states
 
 MAX_EXTENDS = 5
@@ -51,6 +51,7 @@ def _merge(base: MissionFile, top: MissionFile) -> MissionFile:
         top,
         extends="",
         initial=top.initial or base.initial,
+        initial_place=top.initial_place if top.initial else base.initial_place,
         description=top.description or base.description,
         variables={**base.variables, **top.variables},
         templates={**base.templates, **top.templates},
@@ -98,6 +99,7 @@ def _instance(state: State, templates: dict[str, State], used: set[str], problem
         state,
         use="",
         initial=template.initial,
+        initial_place=template.initial_place,
         resume=state.resume or template.resume,
         states=template.states,
         enter=state.enter + template.enter,
@@ -117,9 +119,10 @@ def _resolved(state: State, ids: set[str], problems: ProblemList) -> State:
         found = _look_up(name, state.id, ids)
         if found:
             return found
-        near = get_close_matches(name, {known.rpartition(".")[2] for known in ids} | ids, 1)
-        mend = f"; did you mean '{near[0]}'?" if near else ""
-        problems.add(place, f"{what} '{name}' of state '{state.id}' is not a state{mend}")
+        near = get_close_matches(name.lower(), sorted({known.rpartition(".")[2] for known in ids} | ids), 1)
+        beside = [known for known in sorted(ids) if known.rpartition(".")[0] == state.id.rpartition(".")[0]]
+        mend = f"did you mean '{near[0]}'?" if near else f"there are {cut(', '.join(beside), 100)}"
+        problems.add(place, f"{what} '{cut(name, 40)}' of state '{state.id}' is not a state; {mend}")
         return name
 
     transitions = tuple(replace(t, to=target(t.to, t.place, "target")) for t in state.transitions)
@@ -129,7 +132,7 @@ def _resolved(state: State, ids: set[str], problems: ProblemList) -> State:
     return replace(
         state,
         resume=resume,
-        then=target(state.then, state.place, "'then'") if state.then else "",
+        then=target(state.then, state.then_place, "'then'") if state.then else "",
         transitions=transitions,
         states=tuple(_resolved(child, ids, problems) for child in state.states),
     )

@@ -2,18 +2,34 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 
 @dataclass(frozen=True, slots=True)
 class Place:
-    """A line of a mission file; line 0 stands for the whole file."""
+    """A place in a mission file.
+
+    Attributes:
+        file: its name.
+        line: counted from 1; 0 stands for the whole file.
+        column: counted from 1; 0 stands for the whole line.
+    """
 
     file: str
     line: int = 0
+    column: int = 0
 
     def __str__(self) -> str:
-        return f"{self.file}:{self.line}" if self.line else self.file
+        numbers = (number for number in (self.line, self.column) if number)
+        return ":".join((self.file, *map(str, numbers)))
+
+    def moved(self, characters: int) -> Place:
+        """The place some characters further on in the line; the same if the column is not known."""
+        return replace(self, column=self.column + characters) if self.column else self
+
+
+NOWHERE = Place("")
+MAX_TOLD = 50
 
 
 @dataclass(frozen=True, slots=True)
@@ -24,7 +40,9 @@ class Problem:
     text: str
 
     def __str__(self) -> str:
-        return f"{self.place}: {self.text}"
+        line = f"{self.place}: {self.text}"
+        # A file may hold anything; what it makes us print must not move the terminal's cursor.
+        return "".join(c if c.isprintable() else c.encode("unicode_escape").decode() for c in line)
 
 
 class MissionError(Exception):
@@ -37,19 +55,42 @@ class MissionError(Exception):
 
 @dataclass(slots=True)
 class ProblemList:
-    """Collects problems, so that a pupil sees all of them at once."""
+    """Collects problems, so that a pupil sees all of them at once.
 
-    found: list[Problem] = field(default_factory=list)
+    Of one place only the first is told: what stands in a template is looked at once for each of its uses, and
+    a second fault of the same word mostly follows from the first.
+    """
+
+    _by_place: dict[Place, Problem] = field(default_factory=dict)
+
+    @property
+    def found(self) -> bool:
+        """Whether there is any."""
+        return bool(self._by_place)
 
     def add(self, place: Place, text: str) -> None:
         """Note a problem."""
-        self.found.append(Problem(place, text))
+        self._by_place.setdefault(place, Problem(place, text))
+
+    def take_back(self, place: Place) -> None:
+        """Forget what was said of a place; a better word for it has been found."""
+        self._by_place.pop(place, None)
 
     def raise_if_any(self) -> None:
-        """Stop if anything was found, in order of file and line.
+        """Stop if anything was found, in order of file, line and column.
 
         Raises:
             MissionError: with all problems.
         """
         if self.found:
-            raise MissionError(sorted(set(self.found), key=lambda p: (p.place.file, p.place.line, p.text)))
+            order = sorted(self._by_place, key=lambda place: (place.file, place.line, place.column))
+            problems = [self._by_place[place] for place in order]
+            if len(problems) > MAX_TOLD:
+                rest = Problem(Place(order[0].file), f"and {len(problems) - MAX_TOLD} more mistakes")
+                problems = [*problems[:MAX_TOLD], rest]
+            raise MissionError(problems)
+
+
+def cut(text: str, longest: int = 60) -> str:
+    """A text of a file as it is quoted in a problem: not too long."""
+    return text if len(text) <= longest else f"{text[: longest - 3]}..."

@@ -7,7 +7,7 @@ import re
 from difflib import get_close_matches
 from pathlib import Path
 
-from offboard.chart.problems import Place, ProblemList
+from offboard.chart.problems import Place, ProblemList, cut
 from offboard.chart.source import ListNode, MapNode, Node, Scalar, parse
 from offboard.chart.spec import Action, MissionFile, State, Transition
 
@@ -18,7 +18,19 @@ _STATE_KEYS = (
 )
 _TEMPLATE_KEYS = ("initial", "states", "resume", "transitions", "enter", "during", "exit")
 _TRANSITION_KEYS = ("when", "to")
+_SYNONYMS = {
+    **dict.fromkeys(("while", "loop", "do", "tick", "always"), "during"),
+    **dict.fromkeys(("on_enter", "entry", "begin", "on_start"), "enter"),
+    **dict.fromkeys(("on_exit", "leave", "on_leave"), "exit"),
+    **dict.fromkeys(("if", "condition", "guard", "cond"), "when"),
+    **dict.fromkeys(("target", "next", "state"), "to"),
+    **dict.fromkeys(("end", "stop", "finish", "last"), "final"),
+    **dict.fromkeys(("template", "extends"), "use"),
+    **dict.fromkeys(("first", "start"), "initial"),
+}
 _NAME = re.compile(r"[a-z][a-z0-9_]*\Z")
+_MISSION_NAME = re.compile(r"[a-z0-9][a-z0-9_-]{0,79}\Z")  # as a scenario's: folders are named by it
+_SETTING = re.compile(r"[a-z][\w.]*\Z")
 _ASSIGNMENT = re.compile(r"\s*([A-Za-z_][\w.]*)\s*=(?!=)\s*(.*)\Z", re.DOTALL)
 
 
@@ -32,7 +44,7 @@ def read_mission_file(text: str, path: Path) -> MissionFile:
     Raises:
         MissionError: with every problem of its structure.
     """
-    root = parse(text, path.name)
+    root = parse(text, path.name, _MISSION_KEYS)
     problems = ProblemList()
     mission = _Reader(problems).mission(root, path)
     problems.raise_if_any()
@@ -47,37 +59,47 @@ class _Reader:
 
     def mission(self, root: MapNode, path: Path) -> MissionFile:
         self._check_keys(root, _MISSION_KEYS, "a mission")
-        variables = self._children(root, "variables")
-        templates = self._children(root, "templates")
+        variables = self._variables(root)
+        templates = self._named(root, "templates")
         return MissionFile(
-            place=root.place,
+            place=Place(root.place.file, root.place.line),
             path=path,
-            name=self._text(root, "name") or path.stem,
+            name=self._mission_name(root, path),
             description=self._text(root, "description"),
             extends=self._text(root, "extends"),
             initial=self._text(root, "initial"),
+            initial_place=_value_place(root, "initial"),
             variables={key: self._constant(key, node) for key, node in variables.items()},
-            templates={key: self._state(key, node, _TEMPLATE_KEYS) for key, node in templates.items()},
+            templates={
+                key: self._state(key, node, _TEMPLATE_KEYS, root.items["templates"])
+                for key, node in templates.items()
+            },
             states=self._states(root),
         )
 
     def _states(self, parent: MapNode) -> tuple[State, ...]:
-        children = self._children(parent, "states")
-        return tuple(self._state(key, node, _STATE_KEYS) for key, node in children.items())
+        children = self._named(parent, "states")
+        return tuple(
+            self._state(key, node, _STATE_KEYS, parent.items["states"]) for key, node in children.items()
+        )
 
-    def _state(self, name: str, node: Node, keys: tuple[str, ...]) -> State:
+    def _state(self, name: str, node: Node, keys: tuple[str, ...], around: Node) -> State:
+        place = self._key_place(around, name)
         if isinstance(node, Scalar) and not node.text:  # "end:" with nothing below
             node = MapNode(node.place, {}, {})
         if not isinstance(node, MapNode):
-            self._problems.add(node.place, f"state '{name}' must be a mapping of {_listing(keys)}")
-            return State(node.place, name)
+            text = f"state '{name}' needs lines below it, such as 'enter:' and 'transitions:'"
+            self._problems.add(node.place, text)
+            return State(place, name)
         self._check_keys(node, keys, f"state '{name}'")
         return State(
-            place=node.place,
+            place=place,
             id=name,
             initial=self._text(node, "initial"),
+            initial_place=_value_place(node, "initial"),
             final=self._flag(node, "final"),
             then=self._text(node, "then"),
+            then_place=_value_place(node, "then"),
             use=self._text(node, "use"),
             resume=self._resume(node),
             enter=self._actions(node, "enter"),
@@ -90,61 +112,129 @@ class _Reader:
     def _resume(self, state: MapNode) -> Transition | None:
         if "resume" not in state.items:
             return None
-        place, to = state.keys["resume"], self._text(state, "resume")
+        place, to = _value_place(state, "resume"), self._text(state, "resume")
         if not to and isinstance(state.items["resume"], Scalar):
-            self._problems.add(place, "'resume' is empty; name the state to go on in after a pause")
+            self._problems.add(
+                state.keys["resume"], "'resume' is empty; name the state to go on in after a pause"
+            )
         return Transition(place, to)
 
     def _transitions(self, state: MapNode) -> tuple[Transition, ...]:
-        found = []
+        found: list[Transition] = []
+        incomplete: Place | None = None  # where the one before begins, if it has no target
         for node in self._list(state, "transitions"):
             if not isinstance(node, MapNode):
-                self._problems.add(node.place, "a transition is a mapping with 'to' and, mostly, 'when'")
+                self._problems.add(node.place, "a transition has 'when: ...' and, under it, 'to: ...'")
                 continue
-            self._check_keys(node, _TRANSITION_KEYS, "a transition")
-            to, when = self._text(node, "to"), self._text(node, "when")
-            if not to:
-                self._problems.add(node.place, "transition without 'to'; name the state it leads to")
-            if "when" in node.items and not when:
-                self._problems.add(
-                    node.place, "'when' is empty; leave it out for a transition at the next tick"
-                )
-            place = node.keys.get("when", node.place)
-            found.append(Transition(place, to, when))
+            if incomplete is not None and set(node.keys) == {"to"}:
+                text = "take the '-' before 'to' away, and put 'to' under the 'when' above it"
+                self._problems.take_back(incomplete)
+                self._problems.add(node.place, text)
+                incomplete = None
+                continue
+            transition = self._transition(node)
+            incomplete = node.place if not transition.to and set(node.keys) == {"when"} else None
+            found.append(transition)
         return tuple(found)
+
+    def _transition(self, node: MapNode) -> Transition:
+        known = self._check_keys(node, _TRANSITION_KEYS, "a transition")
+        to, when = self._text(node, "to"), self._text(node, "when")
+        if not to and known:
+            self._problems.add(node.place, "transition without 'to'; name the state it leads to")
+        if "when" in node.items and not when:
+            text = "'when' is empty; leave it out for a transition at the next tick"
+            self._problems.add(node.keys["when"], text)
+        when_place = _value_place(node, "when") if "when" in node.items else node.place
+        return Transition(_value_place(node, "to"), to, when, when_place)
 
     def _actions(self, state: MapNode, key: str) -> tuple[Action, ...]:
-        found = []
-        for node in self._list(state, key):
-            if not isinstance(node, Scalar) or not node.text.strip():
-                self._problems.add(node.place, f"'{key}' lists primitives and assignments, one a line")
-                continue
-            assignment = _ASSIGNMENT.match(node.text)
-            if assignment:
-                location, expression = assignment.groups()
-                found.append(Action(node.place, location=location, expression=expression.strip()))
-            else:
-                found.append(Action(node.place, name=node.text.strip()))
-        return tuple(found)
+        return tuple(
+            action for node in self._list(state, key) if (action := self._action(key, node)) is not None
+        )
+
+    def _action(self, key: str, node: Node) -> Action | None:
+        if isinstance(node, MapNode) and len(node.items) == 1:
+            (name, value), place = next(iter(node.items.items())), next(iter(node.keys.values()))
+            if name in _TRANSITION_KEYS:
+                self._problems.add(place, f"'{name}' does not belong here; it stands under 'transitions:'")
+                return None
+            if isinstance(value, Scalar) and _SETTING.match(name):
+                self._problems.add(place, f"to set a value write '=': {name} = {cut(value.text, 30)}")
+                return None
+        if not isinstance(node, Scalar) or not node.text.strip():
+            text = f"'{key}' lists primitives and assignments, such as '- hover' and '- cmd.vel_x = 0.3'"
+            self._problems.add(node.place, text)
+            return None
+        assignment = _ASSIGNMENT.match(node.text)
+        if not assignment:
+            return Action(node.place, name=node.text.strip())
+        location, expression = assignment.groups()
+        return Action(
+            node.place,
+            location=location,
+            expression=expression.strip(),
+            expression_place=node.place.moved(assignment.start(2)),
+        )
+
+    def _variables(self, root: MapNode) -> dict[str, Node]:
+        variables = self._children(root, "variables")
+        for name, node in variables.items():
+            if isinstance(node, MapNode):
+                text = f"'{name}' looks like a state, but stands under 'variables:'; put 'states:' above it"
+                self._problems.add(self._key_place(root.items["variables"], name), text)
+                return {}
+        return variables
 
     def _constant(self, name: str, node: Node) -> object:
-        text = node.text if isinstance(node, Scalar) else ""
+        text = node.text.strip() if isinstance(node, Scalar) else ""
         try:
             value: object = ast.literal_eval(text)
-        except (ValueError, SyntaxError):
-            value = None
-        if not isinstance(value, (bool, int, float, str, tuple)):
-            self._problems.add(
-                node.place, f"variable '{name}' needs a number, a (x, y, z), True, False or 'text'"
-            )
+        except (ValueError, SyntaxError, MemoryError, RecursionError):
+            value = text if isinstance(node, Scalar) and node.quoted else None
+        is_place = isinstance(value, tuple) and len(value) == 3 and all(map(_is_number, value))
+        if not is_place and not isinstance(value, (bool, int, float, str)):
+            what = f"variable '{name}' needs a number, a (x, y, z), True, False or 'text'"
+            if re.fullmatch(r"[+-]?\d+,\d+", text):
+                what = f"{text} is two numbers; write it with a point: {text.replace(',', '.')}"
+            elif re.fullmatch(r"[A-Za-z_]\w*", text):
+                word = text.capitalize()
+                what = f"write {word}" if word in ("True", "False") else f"texts stand in quotes: '{text}'"
+            self._problems.add(node.place, what)
         return value
+
+    def _mission_name(self, root: MapNode, path: Path) -> str:
+        """What the file says, or the file's own name written as a mission's."""
+        name = self._text(root, "name")
+        if not name:
+            words = re.sub(r"[^a-z0-9_-]+", "-", path.stem.lower()).strip("-_")
+            return words[:80] or "mission"
+        if not _MISSION_NAME.match(name):
+            text = f"name '{cut(name, 40)}': use small letters, digits, - and _, a letter or digit first"
+            limit = "; at most 80" if len(name) > 80 else ""
+            self._problems.add(_value_place(root, "name"), text + limit)
+        return name
+
+    def _named(self, parent: MapNode, key: str) -> dict[str, Node]:
+        """States or templates by name; none if what belongs into one of them stands beside them."""
+        children = self._children(parent, key)
+        names = list(children)
+        for number, (name, node) in enumerate(children.items()):
+            if name in _STATE_KEYS and (name == "states" or not isinstance(node, MapNode)):
+                under = f", under '{names[number - 1]}:'" if number else ""
+                place = self._key_place(parent.items[key], name)
+                self._problems.add(place, f"'{name}' stands beside the {key}; indent it more{under}")
+                return {}
+        return children
 
     def _children(self, node: MapNode, key: str) -> dict[str, Node]:
         child = node.items.get(key)
         if child is None:
             return {}
         if not isinstance(child, MapNode):
-            self._problems.add(node.keys[key], f"'{key}' must be a mapping of names")
+            if not (isinstance(child, Scalar) and not child.text):
+                example = "such as '  start_x: 0'" if key == "variables" else f"such as '  {key[:-1]}_1:'"
+                self._problems.add(node.keys[key], f"'{key}' needs names below it, {example}")
             return {}
         for name, place in child.keys.items():
             if not _NAME.match(name):
@@ -158,8 +248,16 @@ class _Reader:
             return ()
         if isinstance(child, ListNode):
             return child.items
-        self._problems.add(node.keys[key], f"'{key}' must be a list; start its lines with '- '")
+        if isinstance(child, Scalar) and not child.text:
+            return ()
+        example = "- when: ..." if key == "transitions" else "- hover"
+        text = f"'{key}' must be a list; start its lines with '- ', such as '{example}'"
+        self._problems.add(child.place, text)
         return ()
+
+    @staticmethod
+    def _key_place(node: Node, key: str) -> Place:
+        return node.keys[key] if isinstance(node, MapNode) and key in node.keys else node.place
 
     def _text(self, node: MapNode, key: str) -> str:
         child = node.items.get(key)
@@ -173,19 +271,42 @@ class _Reader:
     def _flag(self, node: MapNode, key: str) -> bool:
         text = self._text(node, key).lower()
         if text not in ("", "true", "false"):
-            self._problems.add(node.keys[key], f"'{key}' is true or false, not '{text}'")
+            self._problems.add(node.items[key].place, f"'{key}' is true or false, not '{cut(text, 30)}'")
         return text == "true"
 
-    def _check_keys(self, node: MapNode, allowed: tuple[str, ...], what: str) -> None:
-        for key, place in node.keys.items():
-            if key not in allowed:
-                self._unknown_key(place, key, allowed, what)
+    def _check_keys(self, node: MapNode, allowed: tuple[str, ...], what: str) -> bool:
+        """Whether all keys are known."""
+        unknown = [key for key in node.keys if key not in allowed]
+        if "when" in unknown and "to" in unknown:
+            unknown.remove("to")  # it belongs to the same transition
+        if len(unknown) > 2:
+            del unknown[1:]  # they all stand in the wrong place, for one reason
+        for key in unknown:
+            self._unknown_key(node, key, allowed, what)
+        return not unknown
 
-    def _unknown_key(self, place: Place, key: str, allowed: tuple[str, ...], what: str) -> None:
-        near = get_close_matches(key, allowed, 1)
-        mend = f"did you mean '{near[0]}'?" if near else f"it has {_listing(allowed)}"
-        self._problems.add(place, f"{what} has no '{key}'; {mend}")
+    def _unknown_key(self, node: MapNode, key: str, allowed: tuple[str, ...], what: str) -> None:
+        near = get_close_matches(key.lower(), allowed, 1)
+        near = near or [word for word in (_SYNONYMS.get(key.lower(), ""),) if word in allowed]
+        mend = f"did you mean '{near[0]}'?" if near else f"it has {', '.join(allowed)}"
+        if not near and allowed == _MISSION_KEYS and isinstance(node.items[key], MapNode):
+            mend = "if it is a state, indent it to stand under 'states:'"
+        elif key in _TRANSITION_KEYS:
+            mend = f"write it into a list under 'transitions:', such as '- {key}: ...'"
+        elif key in _only_of_missions(allowed):
+            mend = "it belongs to the mission; write it at the beginning of a line"
+        self._problems.add(node.keys[key], f"{what} has no '{cut(key, 30)}'; {mend}")
 
 
-def _listing(words: tuple[str, ...]) -> str:
-    return ", ".join(words)
+def _only_of_missions(allowed: tuple[str, ...]) -> tuple[str, ...]:
+    """Keys that only the mission itself has."""
+    return tuple(key for key in _MISSION_KEYS if key not in allowed and key not in _STATE_KEYS)
+
+
+def _value_place(node: MapNode, key: str) -> Place:
+    """Where the value of a key stands; without it, where the mapping begins."""
+    return node.items[key].place if key in node.items else node.place
+
+
+def _is_number(value: object) -> bool:
+    return isinstance(value, (int, float)) and not isinstance(value, bool)

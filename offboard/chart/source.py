@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import yaml
 
 from offboard.chart.problems import MissionError, Place, Problem, ProblemList
+from offboard.chart.yaml_faults import explain
 
 MAX_FILE_BYTES = 1_000_000
 MAX_DEPTH = 40
@@ -14,10 +15,16 @@ MAX_DEPTH = 40
 
 @dataclass(frozen=True, slots=True)
 class Scalar:
-    """A text as written, without YAML's guess at its type (so that `on` stays `on`)."""
+    """A text as written, without YAML's guess at its type (so that `on` stays `on`).
+
+    Attributes:
+        place: of its first character.
+        quoted: it stands in quotation marks, which are not part of the text.
+    """
 
     place: Place
     text: str
+    quoted: bool = False
 
 
 @dataclass(frozen=True, slots=True)
@@ -30,7 +37,7 @@ class ListNode:
 
 @dataclass(frozen=True, slots=True)
 class MapNode:
-    """A YAML mapping; `keys` has the line of each key."""
+    """A YAML mapping; `keys` has the place of each key."""
 
     place: Place
     items: dict[str, Node]
@@ -40,12 +47,13 @@ class MapNode:
 Node = Scalar | ListNode | MapNode
 
 
-def parse(text: str, file: str) -> MapNode:
+def parse(text: str, file: str, keys: tuple[str, ...]) -> MapNode:
     """Read YAML text whose outermost node is a mapping.
 
     Args:
         text: the document.
         file: the name to report problems with.
+        keys: that the outermost mapping may have.
 
     Raises:
         MissionError: bad syntax, an alias, a key written twice, too deep, too large, not a mapping.
@@ -54,13 +62,16 @@ def parse(text: str, file: str) -> MapNode:
         raise _error(
             Place(file), f"is larger than {MAX_FILE_BYTES // 1_000_000} MB; a mission is a page or two"
         )
-    _refuse_aliases_and_depth(text, file)
     try:
+        _refuse_aliases_and_depth(text, file)
         root = yaml.compose(text, Loader=yaml.SafeLoader)
     except yaml.YAMLError as error:
-        raise _syntax_error(error, file) from None
+        line, column, what = explain(text, error, keys)
+        raise _error(Place(file, line, column), what) from None
+    if root is None:
+        raise _error(Place(file, 1), "is empty; `framerunner mission new NAME` writes one to begin with")
     if not isinstance(root, yaml.MappingNode):
-        raise _error(Place(file, 1), "a mission is a mapping: name, initial, states, ...")
+        raise _error(Place(file, 1), "a mission begins with 'name: ...', then 'initial: ...' and 'states:'")
     problems = ProblemList()
     tree = _convert(root, file, problems)
     problems.raise_if_any()
@@ -70,31 +81,33 @@ def parse(text: str, file: str) -> MapNode:
 
 def _refuse_aliases_and_depth(text: str, file: str) -> None:
     depth = 0
-    try:
-        for event in yaml.parse(text, Loader=yaml.SafeLoader):
-            place = Place(file, event.start_mark.line + 1 if event.start_mark else 0)
-            if isinstance(event, yaml.AliasEvent):
-                raise _error(place, f"alias '*{event.anchor}' is not allowed; use a template instead")
-            if isinstance(event, yaml.CollectionStartEvent):
-                depth += 1
-                if depth > MAX_DEPTH:
-                    raise _error(place, f"nested deeper than {MAX_DEPTH} levels")
-            elif isinstance(event, yaml.CollectionEndEvent):
-                depth -= 1
-    except yaml.YAMLError as error:
-        raise _syntax_error(error, file) from None
+    for event in yaml.parse(text, Loader=yaml.SafeLoader):
+        place = _place(event, file)
+        if isinstance(event, yaml.AliasEvent):
+            raise _error(place, f"alias '*{event.anchor}' is not allowed; use a template instead")
+        if isinstance(event, yaml.CollectionStartEvent):
+            depth += 1
+            if depth > MAX_DEPTH:
+                raise _error(place, f"nested deeper than {MAX_DEPTH} levels")
+        elif isinstance(event, yaml.CollectionEndEvent):
+            depth -= 1
 
 
 def _convert(node: yaml.Node, file: str, problems: ProblemList) -> Node:
-    place = Place(file, node.start_mark.line + 1)
+    place = _place(node, file)
     if isinstance(node, yaml.ScalarNode):
-        return Scalar(place, node.value)
+        if node.tag.startswith("!"):  # YAML takes the word after a '!' for a type; it is meant as written
+            return Scalar(place, f"{node.tag} {node.value}".strip())
+        quoted = node.style in ("'", '"')
+        if node.start_mark.line != node.end_mark.line:
+            place = replace(place, column=0)  # characters cannot be counted over several lines
+        return Scalar(place.moved(quoted), node.value, quoted)
     if isinstance(node, yaml.SequenceNode):
         return ListNode(place, tuple(_convert(item, file, problems) for item in node.value))
     items: dict[str, Node] = {}
     keys: dict[str, Place] = {}
     for key_node, value_node in node.value:
-        key_place = Place(file, key_node.start_mark.line + 1)
+        key_place = _place(key_node, file)
         if not isinstance(key_node, yaml.ScalarNode):
             problems.add(key_place, "a key must be a plain word")
             continue
@@ -106,11 +119,9 @@ def _convert(node: yaml.Node, file: str, problems: ProblemList) -> Node:
     return MapNode(place, items, keys)
 
 
-def _syntax_error(error: yaml.YAMLError, file: str) -> MissionError:
-    mark = getattr(error, "problem_mark", None)
-    line = mark.line + 1 if mark else 0
-    what = getattr(error, "problem", None) or getattr(error, "reason", None) or "cannot be read"
-    return _error(Place(file, line), f"YAML syntax: {what}")
+def _place(part: yaml.Node | yaml.Event, file: str) -> Place:
+    mark = part.start_mark
+    return Place(file, mark.line + 1, mark.column + 1) if mark else Place(file)
 
 
 def _error(place: Place, text: str) -> MissionError:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from offboard.chart.problems import Place
+from offboard.chart.problems import NOWHERE, Place
 
 
 @dataclass(frozen=True, slots=True)
@@ -13,15 +13,18 @@ class Action:
     """One line of `enter`, `exit` or `during`: a primitive by name, or `location = expression`.
 
     Attributes:
+        place: where it begins.
         name: the primitive; empty for an assignment.
         location: what is assigned to, dotted; empty for a primitive.
         expression: its new value.
+        expression_place: where that begins.
     """
 
     place: Place
     name: str = ""
     location: str = ""
     expression: str = ""
+    expression_place: Place = NOWHERE
 
     def __str__(self) -> str:
         return self.name or f"{self.location} = {self.expression}"
@@ -32,13 +35,16 @@ class Transition:
     """One way out of a state.
 
     Attributes:
+        place: of its target.
         to: the target as written; after expansion, a full state id.
         when: the guard; empty for "always".
+        when_place: where the guard begins; without one, where the transition begins.
     """
 
     place: Place
     to: str
     when: str = ""
+    when_place: Place = NOWHERE
 
 
 @dataclass(frozen=True, slots=True)
@@ -46,8 +52,10 @@ class State:
     """A state or, if it has states of its own, a superstate.
 
     Attributes:
+        place: of its name.
         id: name as written; after expansion the full id ("red.turning").
         initial: the state a superstate starts in.
+        initial_place, then_place: of what they name.
         then: where a superstate goes on when one of its final states is reached.
         use: the template whose states it takes; empty after expansion.
         resume: where the mission goes on after a pause within this state; None: where it was.
@@ -56,8 +64,10 @@ class State:
     place: Place
     id: str
     initial: str = ""
+    initial_place: Place = NOWHERE
     final: bool = False
     then: str = ""
+    then_place: Place = NOWHERE
     use: str = ""
     resume: Transition | None = None
     enter: tuple[Action, ...] = ()
@@ -82,6 +92,7 @@ class MissionFile:
     description: str = ""
     extends: str = ""
     initial: str = ""
+    initial_place: Place = NOWHERE
     variables: dict[str, object] = field(default_factory=dict)
     templates: dict[str, State] = field(default_factory=dict)
     states: tuple[State, ...] = ()

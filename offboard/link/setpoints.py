@@ -32,17 +32,17 @@ class SetpointStream:
         # asyncio one takes an executor job (190 us).
         self._direct: Any = plugin._plugin
         self._setpoint = VelocityBodyYawspeed(0.0, 0.0, 0.0, 0.0)
-        self._lock = threading.Lock()  # a watchdog's thread may end what the loop's thread is using
+        self._lock = threading.Lock()  # a watchdog's thread may use what the loop's thread uses
         self._ended = False
 
     def send(self, command: VelocityCommand) -> None:
         """Send a velocity from now on; passed over when the stream was ended for good."""
         setpoint = self._setpoint
-        setpoint.forward_m_s = command.forward_m_s
-        setpoint.right_m_s = -command.left_m_s
-        setpoint.down_m_s = -command.up_m_s
-        setpoint.yawspeed_deg_s = -degrees(command.yaw_rate_rad_s)
         with self._lock:
+            setpoint.forward_m_s = command.forward_m_s
+            setpoint.right_m_s = -command.left_m_s
+            setpoint.down_m_s = -command.up_m_s
+            setpoint.yawspeed_deg_s = -degrees(command.yaw_rate_rad_s)
             if not self._ended:
                 self._direct.set_velocity_body(setpoint)
 

@@ -10,6 +10,8 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
+import errno
+import os
 import socket
 import struct
 import time
@@ -23,14 +25,23 @@ RECEIVE_BUFFER_BYTES = 4 << 20
 
 
 class TlogRecorder(asyncio.DatagramProtocol):
-    """A local UDP port whose packets are written to a file, unbuffered: what was received is kept."""
+    """A local UDP port whose packets are written to a file, unbuffered: what was received is kept.
+
+    A disk that is full ends the recording, after the last packet that fits.
+
+    Args:
+        path: the file.
+
+    Attributes:
+        packets: how many were written.
+        problem: why recording ended before the flight did; empty if it did not.
+
+    Raises:
+        OSError: the file cannot be made.
+    """
 
     def __init__(self, path: Path) -> None:
-        """Open the file.
-
-        Raises:
-            OSError: it cannot be written.
-        """
+        self.problem = ""
         self._file: BinaryIO = path.open("wb", buffering=0)
         self._transport: asyncio.DatagramTransport | None = None
         self._peer: tuple[str, int] | None = None
@@ -73,10 +84,21 @@ class TlogRecorder(asyncio.DatagramProtocol):
             self._peer = addr
             if self._system_id:
                 self._send_announcement()
-        stamp = struct.pack(">Q", time.time_ns() // 1000)
-        with contextlib.suppress(OSError, ValueError):  # a full disk must not end a flight
-            self._file.write(stamp + data)
+        if not self.problem and not self._file.closed:
+            self._write(struct.pack(">Q", time.time_ns() // 1000) + data)
+
+    def _write(self, record: bytes) -> None:
+        """Write a packet whole or not at all: what follows half a packet could not be read."""
+        whole = self._file.tell()
+        try:
+            written = self._file.write(record)
+            if written < len(record):
+                raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
             self.packets += 1
+        except OSError as error:
+            self.problem = f"recording of '{self._file.name}' stopped: {error.strerror or error}"
+            with contextlib.suppress(OSError):
+                self._file.truncate(whole)
 
     def _send_announcement(self) -> None:
         sender = mavlink.MAVLink(None, srcSystem=self._system_id, srcComponent=LOGGER_COMPONENT)

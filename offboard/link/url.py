@@ -56,11 +56,15 @@ def parse_url(text: str) -> VehicleUrl:
     return url
 
 
-def check_free(url: VehicleUrl) -> None:
+def check_free(url: VehicleUrl, advice: str = "give another address") -> None:
     """See that the port or device can be had.
 
     MAVSDK binds a UDP port that another program holds without complaint, and the last binder gets all
     packets; so the port is bound here first, exclusively, and let go.
+
+    Args:
+        url: where to listen.
+        advice: for people, if the port is taken.
 
     Raises:
         DroneError: port taken, device missing.
@@ -72,7 +76,7 @@ def check_free(url: VehicleUrl) -> None:
             except OSError as error:
                 raise DroneError(
                     f"cannot listen on {url.text}: {error.strerror}; is another flight or ground station on "
-                    f"UDP port {url.number}? Close it or give another address"
+                    f"UDP port {url.number}? Close it or {advice}"
                 ) from None
     elif url.scheme == "serial" and url.address.startswith("/") and not Path(url.address).exists():
         raise DroneError(f"serial device {url.address} does not exist; is it plugged in?")

@@ -1,6 +1,7 @@
 """Two guards against a hung app, whose native MAVLink thread would go on sending the last setpoint.
 
-1. A thread: if the event loop has not turned for half a second, it stops the setpoints and asks for hold.
+1. A thread: if the event loop has not turned for half a second, it sends a velocity of zero, and the flight
+   goes on when the loop turns again; after a second it stops the setpoints and asks for hold.
 2. A timer that needs no interpreter (`faulthandler`): a hang that holds the GIL stops that thread, too; then
    the process is ended, and with the setpoints gone the vehicle's own offboard-loss failsafe acts.
 
@@ -16,24 +17,53 @@ import sys
 import threading
 import time
 from collections.abc import Callable
+from dataclasses import dataclass
 from typing import TextIO
 
-HANG_S = 0.5
-GIL_HANG_S = 2.0
 BEAT_S = 0.1
+
+
+@dataclass(frozen=True, slots=True)
+class HangLimits:
+    """Wall seconds for which the event loop may stand still.
+
+    Attributes:
+        stand_s: then the vehicle stands until the loop turns again.
+        hang_s: then commanding ends.
+        locked_s: then, with the interpreter's lock held, the process ends.
+    """
+
+    stand_s: float = 0.5
+    hang_s: float = 1.0
+    locked_s: float = 2.0
+
+
+LIMITS = HangLimits()
+PATIENT = HangLimits(10.0, 20.0, 60.0)
+"""For a vehicle whose time waits for the app: it flies nothing meanwhile."""
 
 
 class Watchdog:
     """Watches the event loop it is started on."""
 
-    def __init__(self, stop_commanding: Callable[[], None], report: TextIO | None = None) -> None:
+    def __init__(
+        self,
+        stand_still: Callable[[], None],
+        stop_commanding: Callable[[], None],
+        report: TextIO | None = None,
+        limits: HangLimits = LIMITS,
+    ) -> None:
         """Prepare.
 
         Args:
-            stop_commanding: called once, on the watchdog's thread, when the loop hangs.
+            stand_still: called on the watchdog's thread, once a hang, when the loop hangs.
+            stop_commanding: called once, on the watchdog's thread, when the loop goes on hanging.
             report: where the second guard writes where the app hung; by default standard error. It needs a
                 real file.
+            limits: of a hang.
         """
+        self.limits = limits
+        self._stand_still = stand_still
         self._stop_commanding = stop_commanding
         self._report = report
         self._beat_s = 0.0
@@ -76,12 +106,16 @@ class Watchdog:
         self._beat_s = time.monotonic()
         with contextlib.suppress(OSError, ValueError, RuntimeError):  # no real standard error: guard 1 only
             file = sys.stderr if self._report is None else self._report
-            faulthandler.dump_traceback_later(GIL_HANG_S, exit=True, file=file)
+            faulthandler.dump_traceback_later(self.limits.locked_s, exit=True, file=file)
 
     def _watch(self) -> None:
+        stood_since_s = 0.0
         while not self._stop.wait(BEAT_S):
             hung_s = time.monotonic() - self._beat_s
-            if hung_s > HANG_S:
+            if hung_s > self.limits.stand_s and stood_since_s != self._beat_s:
+                stood_since_s = self._beat_s
+                self._stand_still()
+            if hung_s > self.limits.hang_s:
                 self._tripped_after_s = hung_s
                 faulthandler.cancel_dump_traceback_later()  # this thread runs, so the GIL is free
                 self._stop_commanding()

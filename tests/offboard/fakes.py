@@ -60,6 +60,7 @@ class KinematicDrone:
         self.pilot_mode = ""
         self.pilot_m_s = (0.0, 0.0, 0.0)
         self.landed = False
+        self.landing_us = 0
 
     async def connect(self) -> None:
         self.calls.append("connect")
@@ -79,6 +80,7 @@ class KinematicDrone:
         self.calls.append("land")
         self.armed = False
         self.z = self.base_m
+        self.time_us += self.landing_us
 
     async def hold(self) -> None:
         self.calls.append("hold")
@@ -108,11 +110,19 @@ class KinematicDrone:
             self.path.append((self.x, self.y, self.z))
             yield DroneState(
                 *(self.time_us, self.x, self.y, self.z, self.yaw),
+                velocity_arena_m_s=self._velocity(),
                 armed=self.armed,
                 offboard=self.armed and not self.pilot_mode,
                 mode=self.pilot_mode or "OFFBOARD",
                 landed=self.landed,
             )
+
+    def _velocity(self) -> tuple[float, float, float]:
+        if self.pilot_mode:
+            return self.pilot_m_s
+        forward, left, up, _ = self.rates
+        c, s = cos(self.yaw), sin(self.yaw)
+        return (c * forward - s * left, s * forward + c * left, up)
 
     def _move(self, dt_s: float) -> None:
         if not self.armed:

@@ -159,9 +159,15 @@ async def test_a_mission_that_ends_in_the_air_lands(tmp_path):
             """)
     )
     drone, eyes = starting()
-    outcome = await fly_mission(drone, None, load_mission(str(path)), eyes=eyes)
+    moments = []
+    drone.landing_us = 12_000_000
+    outcome = await fly_mission(drone, None, load_mission(str(path)), eyes=eyes, observer=moments.append)
     assert outcome.ended == "finished"
     assert drone.calls == ["connect", "ready", "motors_on", "land", "close"]
+    landed_us = [
+        moment.state.time_us for moment in moments if not moment.state.armed and moment.flight_time_s
+    ]
+    assert landed_us[-1] - landed_us[0] >= 3_000_000  # seen at rest by a referee who lives on telemetry
 
 
 class Film:

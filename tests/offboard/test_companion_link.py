@@ -85,6 +85,6 @@ async def test_the_companion_does_not_hide_that_the_vehicle_s_heartbeats_have_en
             companion.tell_state(MissionState(1, 0, 0, state.time_us, 0, True, False, False, still, still))
             companion.say("mission: still here")
 
-    with pytest.raises(DroneError, match="link lost: no heartbeat for 3 s"):
-        await asyncio.wait_for(fly(), 6.0)
+    with pytest.raises(DroneError, match=r"link lost: no heartbeat for 6\.\d s"):
+        await asyncio.wait_for(fly(), 12.0)
     assert vehicle.count("STATUSTEXT") > 20

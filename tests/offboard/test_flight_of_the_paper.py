@@ -11,6 +11,7 @@ from offboard.engine import MissionEngine
 from offboard.mission import load_mission
 from offboard.pilot import Imu
 from tests.offboard.fakes import START_1, TEST_CASE_1, GeometricEyes, KinematicDrone, Target, crossings
+from vision.types import Detections
 
 
 async def fly(mission, targets=TEST_CASE_1, limit_s=180.0):
@@ -49,6 +50,34 @@ async def test_careful_crossing_takes_late_vehicles_through_the_middle(lag_s):
     for target in TEST_CASE_1.values():
         assert min(crossings(drone.path, target)) < 0.05
     assert drone.calls[-2:] == ["land", "close"]
+
+
+class GoingBlind(GeometricEyes):
+    """Sees nothing any more from some tick on."""
+
+    blind = False
+
+    def latest(self, time_us):
+        return Detections() if self.blind else super().latest(time_us)
+
+
+@pytest.mark.parametrize("mission", ["frame_challenge", "careful_crossing"])
+@pytest.mark.parametrize("state", ["red.frame_visible", "red.shift_left", "red.shift_right"])
+async def test_a_frame_lost_from_view_is_not_climbed_after(mission, state):
+    drone = KinematicDrone(*START_1)
+    eyes, moments = GoingBlind(drone, TEST_CASE_1), []
+
+    def observe(moment):
+        if moment.mission_state == state and not eyes.blind:
+            eyes.blind, drone.rates[2] = True, 0.3
+        if eyes.blind:
+            moments.append(moment)
+
+    await fly_mission(drone, None, load_mission(mission), limit_s=60.0, observer=observe, eyes=eyes)
+    after = [each for each in moments if each.flight_time_s - moments[0].flight_time_s > 2.0]
+    assert {each.mission_state for each in after} <= {"red.lost", "red.go_to_center", "red.turning"}
+    search_m = 2.0
+    assert max(each.state.z for each in moments) < max(moments[0].state.z, search_m) + 0.6
 
 
 async def test_turns_for_ever_at_the_centre_when_a_frame_is_never_seen():

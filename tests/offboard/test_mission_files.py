@@ -16,7 +16,7 @@ from vision.types import Detections
 MINIMAL = dedent("""\
     name: little
     initial: up
-    variables: {count: 0}
+    variables: {count: 0, word: 'x'}
     states:
       up:
         enter:
@@ -57,22 +57,22 @@ def test_the_minimal_mission_is_fine(tmp_path):
 
 GUARD = "seconds_in_state > 1"
 BAD_GUARDS = [
-    ("cam.red.q < 1", "m.yaml:11: guard 'cam.red.q < 1': 'Detection' has no 'q'; it has n s e w d a seen"),
-    ("cam.rde.d < 1", "'Detections' has no 'rde'"),
+    ("cam.red.q < 1", "m.yaml:11:15: when 'cam.red.q < 1': 'cam.red' has no 'q'; it has n s e w d a seen"),
+    ("cam.rde.d < 1", "'cam' has no 'rde'; did you mean 'cam.red'?"),
     ("secondsinstate > 4", "unknown name 'secondsinstate'; did you mean 'seconds_in_state'?"),
     ("hover", "'hover' is an action, not a value"),
-    ("memory.speed > 1", "no variable 'speed'; declared under 'variables': count"),
+    ("memory.speed > 1", "no variable 'speed'; declared under 'variables': count word"),
     ("fly2(0, 0, 2) < 0.2", "calls are not possible"),
-    ("imu.x.real > 1", "'float' has no 'real'"),
-    ("cam.red.__class__ == 1", "'Detection' has no '__class__'"),
+    ("imu.x.real > 1", "'imu.x' has no 'real'; it is a plain value"),
+    ("cam.red.__class__ == 1", "'cam.red' has no '__class__'"),
     ("__import__('os')", "calls are not possible"),
     ("(lambda:1)", "Lambda is not possible"),
     ("goal_m[0] > 1", "[...] is not possible"),
     ("9 ** 9 ** 9 > 1", "** is not possible"),
     ("1 + 'a'.upper == 1", "must follow a name"),
-    ("frame_seen and", "cannot be understood"),
-    ("frame_seen = True", "cannot be understood"),
-    ("true", "unknown name 'true'"),
+    ("frame_seen and", "something must follow 'and'"),
+    ("frame_seen = True", "'=' sets a value; to compare write '=='"),
+    ("true", "unknown name 'true'; write True"),
 ]
 
 
@@ -80,16 +80,17 @@ BAD_GUARDS = [
 def test_a_bad_guard_is_refused_at_its_line(tmp_path, guard, message):
     said = problems(tmp_path, MINIMAL.replace(GUARD, guard))
     assert message in said
-    assert said.startswith(f"m.yaml:11: guard '{guard}'")
+    assert said.startswith("m.yaml:11:")
+    assert f": when '{guard}': " in said
     assert said.count("\n") == 0
 
 
 BAD_ACTIONS = [
-    ("hoover", "m.yaml:7: unknown action 'hoover'; did you mean 'hover'?"),
+    ("hoover", "m.yaml:7:9: unknown action 'hoover'; did you mean 'hover'?"),
     ("imu", "'imu' is a value, not an action"),
-    ("cmd.velX = 1", "'Command' has no 'velX'; it has on vel_x vel_y vel_z rot_z land"),
-    ("imu.x = 1", "'imu.x' cannot be set"),
-    ("cmd = 1", "'cmd' cannot be set"),
+    ("cmd.velX = 1", "'cmd' has no 'velX'; did you mean 'cmd.vel_x'?"),
+    ("imu.x = 1", "'imu.x' can only be read"),
+    ("cmd = 1", "'cmd' cannot be set as a whole; set cmd.on cmd.vel_x"),
     ("hover = 1", "'hover' is an action"),
     ("colour = 'purple'", "colour cannot be 'purple'; it is one of 'red', 'green', 'blue'"),
     ("memory.total = 1", "no variable 'total'"),
@@ -103,46 +104,58 @@ BAD_ACTIONS = [
 def test_a_bad_action_is_refused_at_its_line(tmp_path, action, message):
     said = problems(tmp_path, MINIMAL.replace("- hover", f"- {action}"))
     assert message in said
-    assert said.startswith("m.yaml:7: ")
+    assert said.startswith("m.yaml:7:")
 
 
 BAD_CHARTS = [
-    ("to: done", "to: dune", "m.yaml:11: target 'dune' of state 'up' is not a state; did you mean 'done'?"),
+    (
+        "to: done",
+        "to: dune",
+        "m.yaml:12:13: target 'dune' of state 'up' is not a state; did you mean 'done'?",
+    ),
     ("initial: up\n", "", "has no 'initial'; name the state it starts in, such as 'up'"),
-    ("initial: up", "initial: down", "it has the states up, done"),
-    ("  done:\n", "  up:\n", "m.yaml:13: 'up' stands twice (first in line 5); rename one"),
+    (
+        "initial: up",
+        "initial: landing",
+        "m.yaml:2:10: 'initial' of the mission is 'landing'; it has the states up, done",
+    ),
+    ("  done:\n", "  up:\n", "m.yaml:13:3: 'up' stands twice (first in line 5); rename one"),
     ("transitions:", "transition:", "state 'up' has no 'transition'; did you mean 'transitions'?"),
     ("name: little", "nam: little", "a mission has no 'nam'; did you mean 'name'?"),
     ("final: true", "final: maybe", "'final' is true or false, not 'maybe'"),
-    ("        to: done", "        too: done", "transition without 'to'"),
-    ("    final: true", "    # end", "never finishes"),
+    ("        to: done", "        too: done", "m.yaml:12:9: a transition has no 'too'; did you mean 'to'?"),
+    (
+        "    final: true",
+        "    # end",
+        "m.yaml:13:3: state 'done' has no way out; add 'transitions:', or 'final: true'",
+    ),
     ("  - hover", "  hover", "m.yaml"),
     ("states:", "states: {a: &x 1, b: *x}\nrest:", "alias '*x' is not allowed"),
-    ("variables: {count: 0}", "variables: {count: open()}", "variable 'count' needs a number"),
+    ("{count: 0,", "{count: open(),", "variable 'count' needs a number"),
     ("  done:", "  Done:", "'Done' is not a name"),
     ("    during:", "    use: circle\n    during:", "unknown template 'circle'"),
     ("    during:", "    then: done\n    during:", "has 'then' or 'initial' but no states of its own"),
     (
         "    during:",
         "    resume: upp\n    during:",
-        "m.yaml:8: 'resume' 'upp' of state 'up' is not a state; did you mean 'up'?",
+        "m.yaml:8:13: 'resume' 'upp' of state 'up' is not a state; did you mean 'up'?",
     ),
-    ("    during:", "    resume:\n    during:", "m.yaml:8: 'resume' is empty; name the state to go on in"),
-    ("    during:", "    resume: [up]\n    during:", "m.yaml:8: 'resume' must be one line of text"),
+    ("    during:", "    resume:\n    during:", "m.yaml:8:5: 'resume' is empty; name the state to go on in"),
+    ("    during:", "    resume: [up]\n    during:", "m.yaml:8:5: 'resume' must be one line of text"),
     (
         "    final: true",
         "    final: true\n    resume: up",
-        "m.yaml:17: state 'done' is final; nothing is left to go on with, take 'resume' away",
+        "m.yaml:17:13: state 'done' is final; nothing is left to go on with, take 'resume' away",
     ),
     ("        to: done", "        to: done\n        resume: up", "a transition has no 'resume'"),
     ("name: little", "resume: up", "a mission has no 'resume'"),
     ("  done:", "  alone: {resume: alone}\n  done:", "state 'alone' is never reached"),
-    ("        to: done", "        to: up\n    resume: done", "never finishes"),
+    ("        to: done", "        to: up\n    resume: done", "m.yaml:5:3: state 'up' has no way out"),
     ("  done:", "  alone:\n    transitions:\n      - to: done\n  done:", "state 'alone' is never reached"),
     (
         "      - when: seconds_in_state > 1\n        to: done",
         "      - to: done\n      - when: frame_seen\n        to: done",
-        "m.yaml:12: this transition of 'up' is never reached: the one above always holds",
+        "m.yaml:12:15: this transition of 'up' is never reached: the one above always holds",
     ),
     ("name: little", "name: [little", "YAML syntax"),
     (
@@ -274,7 +287,7 @@ def test_a_subclass_adds_primitives(tmp_path):
         ("- fly_to_goal", "- fail", "state 'up': ZeroDivisionError: no spin"),
         ("- fly_to_goal", "- cmd.vel_x = 1 / memory.count", "ZeroDivisionError"),
         (GUARD, "1 / memory.count > 1", "state 'up': ZeroDivisionError"),
-        (GUARD, "frame < 1", "state 'up': TypeError"),
+        (GUARD, "memory.word < 1", "state 'up': TypeError"),
         ("- fly_to_goal", "- cmd.vel_x = frame.d - frame.d", "cmd.vel_x is not a number"),
     ],
 )

@@ -28,10 +28,14 @@ class UdpVehicle(threading.Thread):
         self.mode = (AUTO, LOITER)
         self.armable = True
         self.armable_modes: set[int] = set()  # main modes; empty: any
+        self.setpoint_loss_s = 1.0
         self.drift_m_s = 0.0  # downwards, in offboard
         self.refuse_arming = ""
         self.ignore_modes = False
         self.mute = False
+        self.heartbeats = True
+        self.deaf_s = 0.0  # vehicle time until which commands are lost
+        self.swap = False  # ten times a second an attitude comes after the next one
         self.setpoints: list[tuple[float, float, float, float, float]] = []  # wall time, vx, vy, vz, yaw rate
         self.commands: list[tuple[int, float, float]] = []
         self.time_s = 100.0
@@ -78,7 +82,7 @@ class UdpVehicle(threading.Thread):
             down += self.drift_m_s
             velocity = [cos_yaw * forward - sin_yaw * right, sin_yaw * forward + cos_yaw * right, down]
             self.yaw = math.remainder(self.yaw + self._yaw_rate * STEP_S, 2 * math.pi)
-            if self.time_s - self._last_setpoint_s > 1.0:
+            if self.time_s - self._last_setpoint_s > self.setpoint_loss_s:
                 self.mode = (AUTO, LOITER)
         elif self.armed and self.mode == (AUTO, LAND):
             velocity = [0.0, 0.0, 1.0]
@@ -90,11 +94,12 @@ class UdpVehicle(threading.Thread):
 
     def _tell(self, step: int) -> None:
         now_ms = round(self.time_s * 1000)
-        if step % 50 == 1:
+        if step % 50 == 1 and self.heartbeats:
             base = (128 if self.armed else 0) | (1 if self.mode[0] == OFFBOARD else 29)
             custom = self.mode[0] << 16 | self.mode[1] << 24
             self._mav.heartbeat_send(2, 12, base, custom, 4 if self.armed else 3)
-        self._mav.attitude_send(now_ms, 0, 0, self.yaw, 0, 0, 0)
+        for stamp_ms in self._stamps(step, now_ms):
+            self._mav.attitude_send(stamp_ms, 0, 0, self.yaw, 0, 0, 0)
         if step % 2 == 0:
             self._mav.local_position_ned_send(now_ms, *self.position, *self._moving)
         if step % 20 == 0:
@@ -102,6 +107,11 @@ class UdpVehicle(threading.Thread):
             sensors = 0x2F | (0x10000000 if armable else 0)
             self._mav.sys_status_send(sensors, sensors, sensors, 0, 12000, -1, -1, 0, 0, 0, 0, 0, 0)
             self._mav.extended_sys_state_send(0, 1 if self.position[2] > -0.02 else 2)
+
+    def _stamps(self, step: int, now_ms: int) -> tuple[int, ...]:
+        if not self.swap or step % 10 not in (0, 9):
+            return (now_ms,)
+        return () if step % 10 == 9 else (now_ms, now_ms - 10)
 
     def _read(self) -> None:
         while True:
@@ -120,7 +130,7 @@ class UdpVehicle(threading.Thread):
             self.setpoints.append((time.monotonic(), *setpoint))
             self._velocity, self._yaw_rate = list(setpoint[:3]), setpoint[3]
             self._last_setpoint_s = self.time_s
-        elif kind == "COMMAND_LONG":
+        elif kind == "COMMAND_LONG" and self.time_s >= self.deaf_s:
             self.commands.append((message.command, message.param1, message.param2))
             result = self._obey(message)
             source = (message.get_srcSystem(), message.get_srcComponent())

@@ -1,0 +1,273 @@
+"""What an expression gives: a condition, a number, a text or a place, and what does not go together."""
+
+from __future__ import annotations
+
+import ast
+from collections.abc import Mapping
+from dataclasses import is_dataclass
+from enum import Enum
+from typing import get_args, get_origin
+
+from offboard.chart.hints import decimal_comma
+from offboard.chart.problems import cut
+from offboard.chart.vocabulary import Vocabulary, choices_of, path_of
+from offboard.pilot import MAX_VELOCITY_M_S, MAX_YAW_RATE_RAD_S
+from scenarios.axes import Vec3
+
+LIMITS: Mapping[tuple[str, ...], tuple[float, str]] = {
+    ("cmd", "vel_x"): (MAX_VELOCITY_M_S, "m/s"),
+    ("cmd", "vel_y"): (MAX_VELOCITY_M_S, "m/s"),
+    ("cmd", "vel_z"): (MAX_VELOCITY_M_S, "m/s"),
+    ("cmd", "rot_z"): (MAX_YAW_RATE_RAD_S, "rad/s"),
+}
+_ORDER = (ast.Lt, ast.LtE, ast.Gt, ast.GtE)
+
+
+class Kind(Enum):
+    """What a value is, in words."""
+
+    CONDITION = "true or false"
+    NUMBER = "a number"
+    TEXT = "a text"
+    PLACE = "a place (x, y, z)"
+    PARTS = "several values"
+    ANY = "anything"
+
+
+class KindError(Exception):
+    """Values that do not go together, in one line.
+
+    Attributes:
+        node: the part of the expression that is meant.
+    """
+
+    def __init__(self, node: ast.AST, text: str) -> None:
+        super().__init__(text)
+        self.node = node
+
+
+class Kinds:
+    """Finds kinds in one expression."""
+
+    def __init__(self, text: str, vocabulary: Vocabulary) -> None:
+        """Prepare.
+
+        Args:
+            text: the expression as written.
+            vocabulary: its names, all known.
+        """
+        self._text = text
+        self._vocabulary = vocabulary
+
+    def of(self, node: ast.expr) -> Kind:
+        """What a part of the expression gives.
+
+        Raises:
+            KindError: it can give nothing sensible.
+        """
+        kind = Kind.ANY
+        match node:
+            case ast.Constant(value=value):
+                kind = _kind_of_type(type(value))
+            case ast.Name() | ast.Attribute():
+                kind = self._of_name(node)
+            case ast.Tuple():
+                kind = self._of_tuple(node)
+            case ast.BoolOp():
+                for part in node.values:
+                    self.want_condition(part)
+                kind = Kind.CONDITION
+            case ast.UnaryOp(op=ast.Not()):
+                self.want_condition(node.operand)
+                kind = Kind.CONDITION
+            case ast.UnaryOp():
+                kind = self._want_number(node.operand)
+            case ast.BinOp():
+                self._want_number(node.left)
+                kind = self._want_number(node.right)
+            case ast.Compare():
+                for left, operator, right in zip(
+                    [node.left, *node.comparators], node.ops, node.comparators, strict=False
+                ):
+                    self._compare(left, operator, right)
+                kind = Kind.CONDITION
+        return kind
+
+    def want_condition(self, node: ast.expr) -> None:
+        """Refuse what is not true or false.
+
+        Raises:
+            KindError: with what to write.
+        """
+        kind = self.of(node)
+        if kind in (Kind.CONDITION, Kind.ANY):
+            return
+        shown = self._shown(node)
+        if kind is Kind.PLACE and isinstance(node, ast.Tuple):
+            raise self._comma(node)
+        if kind is Kind.TEXT and isinstance(node, ast.Constant):
+            raise KindError(
+                node, f"{shown} alone is no condition; write the whole comparison: colour == {shown}"
+            )
+        example = "imu.z > 1" if isinstance(node, ast.Constant) else f"{shown} > 1"
+        mend = {
+            Kind.NUMBER: f"compare it, such as {example}",
+            Kind.TEXT: f"compare it, such as {shown} == 'red'",
+            Kind.PLACE: "compare a number, such as distance_to_goal_m < 0.2",
+            Kind.PARTS: f"name one of its parts, such as {self._parts(node)}",
+        }[kind]
+        raise KindError(node, f"{shown} is {kind.value}, no condition; {mend}")
+
+    def want_for(self, path: tuple[str, ...], node: ast.expr) -> None:
+        """Refuse a value that cannot be assigned to a name.
+
+        Args:
+            path: the name, in parts.
+            node: the value.
+
+        Raises:
+            KindError: with what to write.
+        """
+        target = self._vocabulary.type_of(path)
+        name, wanted = ".".join(path), _kind_of_type(target)
+        if isinstance(node, ast.Tuple) and wanted is Kind.PLACE and len(node.elts) != 3:
+            raise self._not_three(node, name)
+        if path[0] == "memory":
+            wanted = Kind.ANY  # a variable may change its kind
+        given = self.of(node)
+        if given is Kind.PARTS:
+            raise KindError(
+                node, f"{self._shown(node)} is several values; name one, such as {self._parts(node)}"
+            )
+        if wanted is not Kind.ANY and given not in (wanted, Kind.ANY):
+            raise self._not_assignable(name, wanted, given, node)
+        choices = choices_of(target)
+        if choices and isinstance(node, ast.Constant) and node.value not in choices:
+            listed = ", ".join(map(repr, choices))
+            raise KindError(node, f"{name} cannot be {node.value!r}; it is one of {listed}")
+        limit, value = LIMITS.get(path), _number(node)
+        if limit is not None and value is not None and abs(value) > limit[0]:
+            text = f"{name} = {value:g} is too fast; at most {limit[0]:g} {limit[1]} is flown"
+            raise KindError(node, f"{text}: write a number from -{limit[0]:g} to {limit[0]:g}")
+
+    def _not_assignable(self, name: str, wanted: Kind, given: Kind, node: ast.expr) -> KindError:
+        if isinstance(node, ast.Tuple) and decimal_comma(self._text):
+            return self._comma(node)
+        example = {
+            Kind.PLACE: f"{name} = (0, 0, 2)",
+            Kind.NUMBER: f"{name} = 0.5",
+            Kind.CONDITION: f"{name} = True",
+            Kind.TEXT: f"{name} = 'red'",
+        }.get(wanted, name)
+        return KindError(
+            node, f"{name} is {wanted.value}, {self._shown(node)} is {given.value}; write {example}"
+        )
+
+    def _of_name(self, node: ast.expr) -> Kind:
+        path = path_of(node)
+        return Kind.ANY if path[0] == "memory" else _kind_of_type(self._vocabulary.type_of(path))
+
+    def _of_tuple(self, node: ast.Tuple) -> Kind:
+        for part in node.elts:
+            if self.of(part) not in (Kind.NUMBER, Kind.ANY):
+                if decimal_comma(self._text):
+                    raise self._comma(node)
+                raise KindError(part, f"{self._shown(part)} is no number; a place is three numbers (x, y, z)")
+        if len(node.elts) != 3:
+            raise self._comma(node)
+        return Kind.PLACE
+
+    def _want_number(self, node: ast.expr) -> Kind:
+        kind = self.of(node)
+        if kind in (Kind.NUMBER, Kind.ANY):
+            return Kind.NUMBER
+        if isinstance(node, ast.Tuple):
+            raise self._comma(node)
+        shown = self._shown(node)
+        mend = {
+            Kind.PARTS: f"name one of its parts, such as {self._parts(node)}",
+            Kind.PLACE: "read distance_to_goal_m, or imu.x",
+            Kind.TEXT: "a number stands without quotes"
+            if isinstance(node, ast.Constant)
+            else "take a number",
+        }.get(kind, "take a number")
+        raise KindError(node, f"{shown} is {kind.value}, not a number; {mend}")
+
+    def _compare(self, left: ast.expr, operator: ast.cmpop, right: ast.expr) -> None:
+        if isinstance(operator, _ORDER):
+            self._want_number(left)
+            self._want_number(right)
+            return
+        kinds = self.of(left), self.of(right)
+        for node, kind in zip((left, right), kinds, strict=True):
+            if kind is Kind.PARTS:
+                mend = f"name one of its parts, such as {self._parts(node)}"
+                raise KindError(node, f"{self._shown(node)} is several values; {mend}")
+        for name, constant in ((left, right), (right, left)):
+            choices = () if not isinstance(name, (ast.Name, ast.Attribute)) else self._choices(name)
+            if choices and isinstance(constant, ast.Constant) and constant.value not in choices:
+                listed = ", ".join(map(repr, choices))
+                text = f"{self._shown(name)} is never {self._shown(constant)}; it is one of {listed}"
+                raise KindError(constant, text)
+        alike = {Kind.CONDITION: Kind.NUMBER}  # True is 1
+        first, second = (alike.get(kind, kind) for kind in kinds)
+        if Kind.ANY not in kinds and first is not second:
+            one, other = self._shown(left), self._shown(right)
+            text = f"{one} is {kinds[0].value}, {other} is {kinds[1].value}; they are never equal"
+            raise KindError(left, text)
+
+    def _choices(self, node: ast.expr) -> tuple[object, ...]:
+        path = path_of(node)
+        return () if path[0] == "memory" else choices_of(self._vocabulary.type_of(path))
+
+    def _comma(self, node: ast.Tuple) -> KindError:
+        """A comma where a number is wanted."""
+        hint = decimal_comma(self._text)
+        if hint is not None:
+            return KindError(node, hint[1])
+        return KindError(node, f"{self._shown(node)} is {len(node.elts)} values; take the comma away")
+
+    def _not_three(self, node: ast.Tuple, name: str) -> KindError:
+        count = len(node.elts)
+        text = f"{name} needs three numbers (x, y, z), here are {count}"
+        hint = decimal_comma(self._text) if count > 3 else None
+        if hint is not None:
+            return KindError(node, f"{text}; {hint[1]}")
+        return KindError(node, f"{text}; the third is the height" if count == 2 else text)
+
+    def _shown(self, node: ast.expr) -> str:
+        return cut(ast.get_source_segment(self._text, node) or "this", 40)
+
+    def _parts(self, node: ast.expr) -> str:
+        parts = (
+            self._vocabulary.parts_of(path_of(node)) if isinstance(node, (ast.Name, ast.Attribute)) else []
+        )
+        return f"{self._shown(node)}.{'d' if 'd' in parts else parts[0]}" if parts else "imu.x"
+
+
+def _kind_of_type(kind: object) -> Kind:
+    """What values of a declared type are; anything, if that is not certain."""
+    if kind is bool:
+        return Kind.CONDITION
+    if kind in (int, float):
+        return Kind.NUMBER
+    if kind is str or (choices_of(kind) and all(isinstance(one, str) for one in choices_of(kind))):
+        return Kind.TEXT
+    if kind == Vec3 or (get_origin(kind) is tuple and get_args(kind) == (float, float, float)):
+        return Kind.PLACE
+    return Kind.PARTS if isinstance(kind, type) and is_dataclass(kind) else Kind.ANY
+
+
+def _number(node: ast.expr) -> float | None:
+    """The value of an expression of numbers alone; None if it is not one."""
+    match node:
+        case ast.Constant(value=bool()):
+            return None
+        case ast.Constant(value=int() | float() as value):
+            return float(value)
+        case ast.UnaryOp(op=ast.USub()):
+            inner = _number(node.operand)
+            return None if inner is None else -inner
+        case ast.UnaryOp(op=ast.UAdd()):
+            return _number(node.operand)
+    return None

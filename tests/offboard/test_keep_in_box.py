@@ -1,0 +1,189 @@
+"""The box that no mission leads the drone out of."""
+
+from __future__ import annotations
+
+from math import cos, pi, sin
+from textwrap import dedent
+from types import SimpleNamespace
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from offboard.app import fly_mission
+from offboard.drone import DroneState, VelocityCommand
+from offboard.keep_in_box import Box, KeepInBox, OutsideBoxError, confine, flight_box, outside
+from offboard.mavsdk_drone import MavsdkDrone
+from offboard.mission import load_mission
+from scenarios.loader import load_scenario
+from tests.offboard.fakes import KinematicDrone
+
+BOX = flight_box(load_scenario("test-case-1"))
+START = (-3.0, -3.0)
+
+
+def state(x=0.0, y=0.0, z=2.0, yaw=0.0, velocity=(0.0, 0.0, 0.0), time_us=0, age_s=0.0):
+    return DroneState(time_us, x, y, z, yaw, velocity, armed=True, offboard=True, position_age_s=age_s)
+
+
+def in_arena(command, yaw):
+    c, s = cos(yaw), sin(yaw)
+    forward, left = command.forward_m_s, command.left_m_s
+    return (c * forward - s * left, s * forward + c * left, command.up_m_s)
+
+
+def test_the_box_is_the_arena_and_its_margin_with_the_floor_where_it_is():
+    assert Box((-6.0, -6.0, 0.15), (6.0, 6.0, 5.0), START) == BOX
+    assert flight_box(load_scenario("test-case-1"), 0.51).low_m[2] == pytest.approx(0.66)
+    scenario = load_scenario("test-case-1")
+    arena = scenario.arena.model_copy(update={"margin_m": 0.0})
+    assert flight_box(scenario.model_copy(update={"arena": arena})).high_m == (5.0, 5.0, 4.0)
+
+
+speed = st.floats(-1.0, 1.0)
+
+
+@given(
+    st.tuples(st.floats(-4.7, 4.7), st.floats(-4.7, 4.7), st.floats(1.1, 4.0), st.floats(-pi, pi)),
+    st.builds(VelocityCommand, speed, speed, speed, speed),
+)
+def test_inside_the_arena_a_command_is_the_very_same(place, command):
+    kept, sides = confine(command, state(*place), BOX)
+    assert kept is command
+    assert not sides
+
+
+@given(
+    st.tuples(st.floats(-9, 9), st.floats(-9, 9), st.floats(-1, 9), st.floats(-pi, pi)),
+    st.tuples(speed, speed, speed),
+    st.builds(VelocityCommand, speed, speed, speed, speed),
+)
+def test_nothing_leads_out_and_turning_is_free(place, velocity, command):
+    at = state(*place, velocity)
+    kept, _ = confine(command, at, BOX)
+    assert kept.yaw_rate_rad_s == command.yaw_rate_rad_s
+    flown = in_arena(kept, at.yaw)
+    near_start = (at.x + 3.0) ** 2 + (at.y + 3.0) ** 2 < 1.0
+    for axis, (low, high) in enumerate(zip(BOX.low_m, BOX.high_m, strict=True)):
+        p, v = place[axis], flown[axis]
+        assert v <= max(high - p, 0.0) / 0.5 + 1e-9
+        if axis < 2 or not near_start:
+            assert v >= -max(p - low, 0.0) / 0.5 - 1e-9
+        if p > high + 0.5:
+            assert v == pytest.approx(-0.5) or v < -0.5  # comes back
+    assert all(abs(v) <= 1.5 for v in flown)
+
+
+def test_near_the_start_it_may_land_and_elsewhere_not_sink_to_the_floor():
+    down = VelocityCommand(up_m_s=-0.3)
+    assert confine(down, state(-3.2, -2.8, 0.1), BOX)[0] is down
+    assert confine(down, state(1.0, 1.0, 0.1), BOX)[0].up_m_s > 0.0
+
+
+class Lagging:
+    """A vehicle that follows late: first order, and every state and command delayed."""
+
+    def __init__(self, lag_s, delay_ticks):
+        self.place, self.velocity = [0.0, 0.0, 2.0], [0.0, 0.0, 0.0]
+        self.lag_s = lag_s
+        self.waiting = [(0.0, 0.0, 0.0)] * delay_ticks
+
+    def step(self, wanted, dt_s=0.05):
+        self.waiting.append(wanted)
+        wanted = self.waiting.pop(0)
+        for axis in range(3):
+            self.velocity[axis] += dt_s / self.lag_s * (wanted[axis] - self.velocity[axis])
+            self.place[axis] += dt_s * self.velocity[axis]
+
+
+@pytest.mark.parametrize(("lag_s", "delay_ticks"), [(0.3, 1), (0.3, 8), (0.6, 4), (0.6, 8)])
+@pytest.mark.parametrize("way", [(1, 0, 0), (0, -1, 0), (0.7, 0.7, 0), (0, 0, 1), (0, 0, -1)])
+def test_a_vehicle_told_to_fly_on_for_ever_stays_inside(lag_s, delay_ticks, way):
+    vehicle, keeper = Lagging(lag_s, delay_ticks), KeepInBox(BOX)
+    for tick in range(600):
+        at = state(*vehicle.place, 0.0, tuple(vehicle.velocity), 50_000 * tick)
+        vehicle.step(in_arena(keeper.limit(VelocityCommand(*map(float, way)), at), 0.0))
+        assert outside(BOX, state(*vehicle.place)) < 0.005, vehicle.place
+    assert keeper.remark.startswith("kept in the box: ")
+    assert keeper.limited_us > 5_000_000
+
+
+def test_a_position_that_is_old_is_no_place_to_fly_by():
+    keeper = KeepInBox(BOX)
+    assert keeper.limit(VelocityCommand(0.5), state(age_s=0.6)) == VelocityCommand()
+    assert keeper.remark == "stopped: the position is 0.6 s old"
+    assert keeper.limit(VelocityCommand(0.5), state(age_s=0.1)) == VelocityCommand(0.5)
+    assert not keeper.remark
+
+
+def test_a_drone_that_does_not_come_back_is_given_up_and_one_that_does_is_not():
+    keeper = KeepInBox(BOX)
+    for tick in range(100):
+        keeper.limit(VelocityCommand(), state(x=9.0 - 0.02 * tick, time_us=50_000 * tick))
+    keeper.limit(VelocityCommand(), state(x=7.0, time_us=5_000_000))
+    keeper.limit(VelocityCommand(), state(x=9.0, time_us=7_900_000))
+    with pytest.raises(OutsideBoxError, match=r"3\.0 m outside its box and does not come back: x 9\.0"):
+        keeper.limit(VelocityCommand(), state(x=9.0, time_us=8_050_000))
+
+
+RUNAWAY = """
+    name: runaway
+    description: Flies on for ever
+    initial: rise
+    states:
+      rise:
+        enter:
+          - hover
+          - cmd.vel_z = 0.5
+        transitions:
+          - when: seconds_in_state > 3
+            to: run
+      run:
+        enter:
+          - cmd.vel_z = 0
+          - {}
+        transitions:
+          - when: seconds_in_state > 1000
+            to: end
+      end:
+        final: true
+"""
+
+
+@pytest.mark.parametrize("order", ["cmd.vel_x = 1", "cmd.vel_y = -1", "cmd.vel_z = 1", "cmd.vel_z = -1"])
+async def test_a_mission_that_runs_away_is_kept_in_and_told_of(tmp_path, order):
+    path = tmp_path / "runaway.yaml"
+    path.write_text(dedent(RUNAWAY).format(order), encoding="utf-8")
+    drone, moments = KinematicDrone(0.0, 0.0, 0.5), []
+    box = Box(BOX.low_m, BOX.high_m, (-4.0, -4.0))
+    outcome = await fly_mission(
+        drone, None, load_mission(str(path)), limit_s=30.0, observer=moments.append, box=box
+    )
+    assert (outcome.ended, drone.calls[-2:]) == ("timed out", ["hold", "close"])
+    assert outcome.kept_in_box_s > 5.0
+    assert moments[-1].remark.startswith("kept in the box: ")
+    flown = [moment.state for moment in moments if moment.flight_time_s > 3.0]
+    assert max(outside(box, each) for each in flown) < 0.005
+
+
+async def test_a_drone_carried_off_ends_in_hold(tmp_path):
+    path = tmp_path / "runaway.yaml"
+    path.write_text(dedent(RUNAWAY).format("hover"), encoding="utf-8")
+    drone = KinematicDrone(0.0, 0.0, 0.5)
+    drone.x = 8.0  # and does not fly back, however it is told to
+    drone.command = drone.commands.append
+    outcome = await fly_mission(drone, None, load_mission(str(path)), limit_s=30.0, box=BOX)
+    assert outcome.ended == "aborted"
+    assert "2.0 m outside its box and does not come back" in outcome.reason
+    assert drone.calls[-2:] == ["hold", "close"]
+    assert drone.commands[-1].forward_m_s < 0.0
+
+
+def test_what_the_adapter_adds_to_a_command_does_not_lead_out_either():
+    drone, sent = MavsdkDrone("udpin://127.0.0.1:14540", box=BOX), []
+    drone._commanding, drone._setpoints = True, SimpleNamespace(send=sent.append)
+    drone._tracker = SimpleNamespace(correct=lambda command, state: VelocityCommand(up_m_s=0.7))
+    for z in (3.0, 4.9, 5.5):
+        drone._latest = state(z=z)
+        drone.command(VelocityCommand())
+    assert [command.up_m_s for command in sent] == pytest.approx([0.7, 0.2, -0.5])

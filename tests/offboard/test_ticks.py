@@ -1,0 +1,103 @@
+"""Ticks of a vehicle whose time waits for the app, and of one whose time does not."""
+
+import asyncio
+from types import SimpleNamespace
+
+import pytest
+
+from offboard.drone import VelocityCommand
+from offboard.link import ticks
+from offboard.link.telemetry import TelemetryFeed
+from offboard.link.ticks import TickSource
+
+COMMAND = VelocityCommand(forward_m_s=0.5)
+
+
+class Clock:
+    """A vehicle whose telemetry arrives at once, but for some ticks.
+
+    Args:
+        feed: is told of each tick.
+        lost: numbers of ticks whose telemetry is lost.
+    """
+
+    def __init__(self, feed, lost=()):
+        self.feed = feed
+        self.lost = lost
+        self.granted = []
+        self.released = False
+
+    async def stop(self):
+        return 1_020_000
+
+    async def advance(self, tick_us, command):
+        self.granted.append((tick_us, command))
+        if tick_us // 50_000 not in self.lost:
+            attitude(self.feed, tick_us)
+
+    def release(self):
+        self.released = True
+
+
+def attitude(feed, time_us):
+    feed._on_attitude(SimpleNamespace(yaw_deg=0.0, timestamp_us=time_us), None)
+
+
+@pytest.fixture
+async def feed():
+    feed = TelemetryFeed()
+    feed._loop = asyncio.get_running_loop()
+    return feed
+
+
+async def test_time_that_waits_gives_every_tick_however_late_it_is_asked_for(feed):
+    clock, source = Clock(feed), TickSource(feed)
+    source.grant(clock)
+    await source.begin()
+    for number in (21, 22, 23):
+        await asyncio.sleep(0.06)
+        assert await source.next(1.0, COMMAND)
+        assert feed.sample.time_us == number * 50_000
+    assert clock.granted == [(1_050_000, COMMAND), (1_100_000, COMMAND), (1_150_000, COMMAND)]
+    assert source.late == 0
+    source.release()
+    assert clock.released
+
+
+async def test_a_tick_lost_on_the_link_is_counted_and_the_next_one_is_given(feed, monkeypatch):
+    monkeypatch.setattr(ticks, "LOST_S", 0.02)
+    source = TickSource(feed)
+    source.grant(Clock(feed, lost=(22, 23)))
+    await source.begin()
+    assert await source.next(1.0) and await source.next(1.0)
+    assert feed.sample.time_us == 24 * 50_000
+    assert source.late == 2
+
+
+async def test_telemetry_that_never_comes_ends_the_waiting(feed, monkeypatch):
+    monkeypatch.setattr(ticks, "LOST_S", 0.001)
+    source = TickSource(feed)
+    source.grant(Clock(feed, lost=range(100)))
+    await source.begin()
+    assert not await source.next(1.0)
+
+
+async def test_time_that_does_not_wait_passes_ticks_over_and_counts_them_in_flight(feed):
+    source = TickSource(feed)
+    await source.begin()
+    assert not source.waits
+    late = []
+    for times_us, command in (
+        ((1_050_000,), None),
+        ((1_100_000, 1_150_000), None),
+        ((1_200_000, 1_250_000), COMMAND),
+        ((1_300_000,), COMMAND),
+        ((1_350_000, 1_400_000, 1_450_000), COMMAND),
+    ):
+        for time_us in times_us:
+            attitude(feed, time_us)
+        assert await source.next(1.0, command)
+        assert feed.sample.time_us == times_us[-1]
+        late.append(source.late)
+    assert late == [0, 0, 0, 0, 2]
+    assert not await source.next(0.01, COMMAND)
