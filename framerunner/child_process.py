@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
+import socket
 import sys
 from asyncio.subprocess import PIPE, Process
 from collections.abc import Callable, Sequence
@@ -27,27 +28,39 @@ class ChildProcess:
         name: for people: "the simulator".
         arguments: of the command, `--lifeline` among them.
         hear: called with each line that it says on standard error.
+        handed: a socket that it inherits, with its number; closed here once it has started.
     """
 
     def __init__(
-        self, name: str, arguments: Sequence[str], hear: Callable[[str], None] = lambda line: None
+        self,
+        name: str,
+        arguments: Sequence[str],
+        hear: Callable[[str], None] = lambda line: None,
+        handed: socket.socket | None = None,
     ) -> None:
         self._name = name
         self._arguments = [sys.executable, "-m", "framerunner", *arguments]
         self._hear = hear
+        self._handed = handed
         self._process: Process | None = None
         self._said: list[str] = []
         self._reader: asyncio.Task[None] | None = None
 
     async def __aenter__(self) -> Self:
         """Start it."""
-        self._process = await asyncio.create_subprocess_exec(
-            *self._arguments,
-            stdin=PIPE,
-            stdout=asyncio.subprocess.DEVNULL,
-            stderr=PIPE,
-            start_new_session=True,
-        )
+        handed = self._handed
+        try:
+            self._process = await asyncio.create_subprocess_exec(
+                *self._arguments,
+                stdin=PIPE,
+                stdout=asyncio.subprocess.DEVNULL,
+                stderr=PIPE,
+                start_new_session=True,
+                pass_fds=() if handed is None else (handed.fileno(),),
+            )
+        finally:
+            if handed is not None:
+                handed.close()
         self._reader = asyncio.create_task(self._read())
         return self
 

@@ -2,21 +2,42 @@
 
 from __future__ import annotations
 
+import errno
 import os
 import signal
 import sys
-from importlib import metadata
+from typing import TYPE_CHECKING
 
-from cyclopts import App, CycloptsError
+if TYPE_CHECKING:
+    from types import FrameType
 
-from framerunner.commands import camera, doctor, evaluate, film, fly, mission, monitor, replay, scenario, sim
+    from cyclopts import App
 
 EXIT_BAD_INPUT = 2
 EXIT_INTERRUPTED = 130
+_INTERRUPT_AGAIN_S = 0.02
+_DISK_REFUSES = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EROFS, errno.EIO)
 
 
 def build_app() -> App:
     """Return the command with all its parts."""
+    from importlib import metadata
+
+    from cyclopts import App
+
+    from framerunner.commands import (
+        camera,
+        doctor,
+        evaluate,
+        film,
+        fly,
+        mission,
+        monitor,
+        replay,
+        scenario,
+        sim,
+    )
+
     app = App(
         name="framerunner",
         help="A simulated drone that speaks MAVLink, and an app that flies the frame challenge with it.",
@@ -40,13 +61,16 @@ def build_app() -> App:
 
 def main() -> None:
     """Run the command line and exit."""
-    signal.signal(signal.SIGTERM, _terminate)
+    _handle_signals()
     # Read by libraries when they are first imported: matrices here are too small to share among threads,
     # and a dead camera URL is reported by us, in one line.
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     os.environ.setdefault("OPENCV_LOG_LEVEL", "ERROR")
     os.environ.setdefault("OPENCV_FFMPEG_LOGLEVEL", "-8")
-    sys.exit(run(sys.argv[1:]))
+    code = run(sys.argv[1:])
+    for number in (signal.SIGALRM, signal.SIGINT, signal.SIGTERM):
+        signal.signal(number, signal.SIG_DFL)  # an exception at shutdown would be a traceback
+    sys.exit(code)
 
 
 def run(arguments: list[str]) -> int:
@@ -60,25 +84,47 @@ def run(arguments: list[str]) -> int:
     """
     try:
         code = build_app()(arguments or ["--help"], print_error=False, exit_on_error=False)
-    except CycloptsError as error:
-        return _refuse(" ".join(str(error).split()) + " Try --help.")
     except KeyboardInterrupt:
         print("interrupted", file=sys.stderr)
         return EXIT_INTERRUPTED
     except BrokenPipeError:
-        # Whoever read our output has gone; Python must not complain about that again at exit.
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        _forget_output()  # whoever read it has gone
         return 0
     except Exception as error:
-        if not _is_foreseen(error):
+        reason = _reason(error)
+        if reason is None:
             raise
-        return _refuse(str(error))
+        return _refuse(reason)
     return code if isinstance(code, int) else 0
+
+
+def _reason(error: Exception) -> str | None:
+    """What to tell people of a failure; None for a fault of this program."""
+    from cyclopts import CycloptsError
+
+    from framerunner.extras import advice
+
+    if isinstance(error, CycloptsError):
+        return " ".join(str(error).split()) + " Try --help."
+    if _is_foreseen(error):
+        return str(error)
+    if isinstance(error, ModuleNotFoundError):
+        return advice(error.name or "")
+    if isinstance(error, OSError) and error.errno in _DISK_REFUSES:
+        _forget_output()
+        what = error.filename or "standard output or a file"
+        return f"{what}: cannot be written to ({error.strerror}); free some space"
+    return None
 
 
 def _refuse(reason: str) -> int:
     print(f"error: {reason}", file=sys.stderr)
     return EXIT_BAD_INPUT
+
+
+def _forget_output() -> None:
+    """Throw away what could not be written; Python must not complain about it again at exit."""
+    os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
 
 
 def _is_foreseen(error: Exception) -> bool:
@@ -105,8 +151,30 @@ def _is_foreseen(error: Exception) -> bool:
     return any(kind.__name__ in foreseen for kind in type(error).__mro__)
 
 
-def _terminate(_signal: int, _frame: object) -> None:
+def _handle_signals() -> None:
+    """Let SIGTERM do what Ctrl-C does, also where Ctrl-C is ignored."""
+    if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
+        # Started in the background by a script. Ctrl-C stays without effect, but asyncio ends its tasks in
+        # order only where SIGINT has Python's own handler, which `_terminate` calls.
+        signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+        signal.signal(signal.SIGINT, signal.default_int_handler)
+    signal.signal(signal.SIGTERM, _terminate)
+    signal.signal(signal.SIGALRM, _terminate)
+    report = sys.unraisablehook
+
+    def interrupt_again(unraisable: sys.UnraisableHookArgs) -> None:
+        """Repeat an interrupt that came where Python drops exceptions, as in a destructor."""
+        if issubclass(unraisable.exc_type, KeyboardInterrupt):
+            signal.setitimer(signal.ITIMER_REAL, _INTERRUPT_AGAIN_S)  # not within this function
+        else:
+            report(unraisable)
+
+    sys.unraisablehook = interrupt_again
+
+
+def _terminate(number: int, frame: FrameType | None) -> None:
     """Leave by the same way as Ctrl-C: what was recorded is kept and nothing is left running."""
-    if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:  # started in the background by a script
+    interrupt = signal.getsignal(signal.SIGINT)
+    if not callable(interrupt):
         raise KeyboardInterrupt
-    signal.raise_signal(signal.SIGINT)
+    interrupt(number, frame)

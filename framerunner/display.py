@@ -60,10 +60,10 @@ class FlightDisplay:
             return
         self._line_state, self._line_s = moment.mission_state + paused, time_s
         crossed = ", ".join(standing.crossed) if standing else ""
-        place = place_in_words(moment)
+        place, told = place_in_words(moment), paused or moment.remark
         print(
             f"{time_s:6.1f} s  {moment.mission_state:22s} {place}  crossed: {crossed or 'none'}"
-            f"{'  ' if paused else ''}{paused}",
+            f"{'  ' if told else ''}{told}",
             file=sys.stderr,
             flush=True,
         )
@@ -93,6 +93,8 @@ def moment_table(title: str, moment: Moment, time: str) -> Table:
     table.add_row("state", escape(moment.mission_state))
     if moment.paused:
         table.add_row("[yellow]paused[/]", escape(pause_in_words(moment).removeprefix("paused: ")))
+    elif moment.remark:
+        table.add_row("[yellow]limited[/]", escape(moment.remark))
     table.add_row("time", time)
     table.add_row("drone", f"{place_in_words(moment)}  {escape(moment.state.mode)}")
     for colour in ("red", "green", "blue"):

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import asyncio
-import sys
 from collections.abc import Iterator
 from contextlib import AsyncExitStack, closing, contextmanager
 from dataclasses import dataclass
@@ -11,37 +10,31 @@ from datetime import UTC, datetime
 from importlib import metadata
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
-
-import aiohttp
+from urllib.parse import urlsplit
 
 from firmware_py.airframe import load_airframe
-from framerunner.display import FlightDisplay
-from framerunner.errors import SettingError
-from framerunner.judges import Judge, ask_referee, choose_judge
+from framerunner.flight_files import left_lines, warn, write_outcome
+from framerunner.flight_timing import FlightTiming, timing_line
 from framerunner.lockstep import Flown, lockstep_flight
 from framerunner.lockstep_progress import LockstepProgress
-from framerunner.mission_teller import MissionTeller
-from framerunner.monitor_process import MonitorProcess
-from framerunner.pictures import Outcome as JudgedOutcome
-from framerunner.pictures import track_picture
 from framerunner.recorder import FlightRecorder, RecordingCamera, VideoFile
 from framerunner.result_text import result_lines
 from framerunner.run_folder import RunFolder
-from framerunner.sitl_process import SitlProcess
 from framerunner.virtual_camera.lift import lifted
 from offboard.app import Moment, Outcome, fly_mission
-from offboard.link.companion import Companion
-from offboard.mavsdk_drone import MavsdkDrone
+from offboard.keep_in_box import Box, flight_box
 from offboard.mission import Mission
 from scenarios.ground import start_position
 from scenarios.models import Scenario
-from vision.sources import open_source
 from vision.types import CameraFrame, Image
 
-if TYPE_CHECKING:
+if TYPE_CHECKING:  # what only flights in real time need is imported when one is flown
+    from framerunner.judges import Judge
+    from framerunner.mission_teller import MissionTeller
     from framerunner.recording.mcap_writer import FlightRecording
+    from framerunner.sitl_process import SitlProcess
+    from offboard.mavsdk_drone import MavsdkDrone
 
-_SITL_START_S = 20.0
 _INTERRUPTED_CODE = 130
 COMPLETED = ("clean", "completed")
 
@@ -61,6 +54,7 @@ class FlightSettings:
         lockstep: simulated in this process, in its own time, instead of in real time.
         seed: of everything random in a lockstep flight.
         record: write everything to an MCAP file, too.
+        video: write what the camera saw in lockstep, too.
         monitor: open the Game Monitor for it.
     """
 
@@ -74,6 +68,7 @@ class FlightSettings:
     lockstep: bool = False
     seed: int = 0
     record: bool = False
+    video: bool = False
     monitor: bool = False
 
 
@@ -136,9 +131,11 @@ async def fly_once(settings: FlightSettings) -> int:
     """
     if not settings.monitor:
         return await _fly_and_judge(settings, None)
+    from framerunner.monitor_process import MonitorProcess
+
     # A drone of one's own brings no referee; the simulator does.
     scenario = None if settings.drone_url is None else settings.scenario
-    async with MonitorProcess(scenario, settings.out) as monitor:
+    async with MonitorProcess(scenario, settings.out, _camera_hosts(settings.camera_url)) as monitor:
         await monitor.opened()
         code = await _fly_and_judge(settings, monitor.link)
         if code != _INTERRUPTED_CODE:
@@ -146,21 +143,35 @@ async def fly_once(settings: FlightSettings) -> int:
     return code
 
 
+def _camera_hosts(camera_url: str | None) -> tuple[str, ...]:
+    """The host that the user named as the camera's: the monitor, too, may ask there."""
+    try:
+        parts = urlsplit(camera_url or "")
+        host = parts.hostname
+    except ValueError:
+        return ()
+    return (host,) if host and parts.scheme in ("http", "https") else ()
+
+
 async def _fly_and_judge(settings: FlightSettings, guest_url: str | None) -> int:
     with _run_folder(settings) as folder:
         with _recording(settings, folder) as recording:
             records = _Records(folder, recording)
-            if settings.lockstep:
-                flown = await _fly_in_lockstep(settings, records)
-            else:
-                flown = await _fly_in_real_time(settings, records, guest_url)
+            try:
+                if settings.lockstep:
+                    flown = await _fly_in_lockstep(settings, records)
+                else:
+                    flown = await _fly_in_real_time(settings, records, guest_url)
+            except (asyncio.CancelledError, KeyboardInterrupt):
+                folder.stopped_before_start = records.recorder.latest is None
+                raise
             records.finish(flown)
         result = records.complete(flown.result)
-        folder.write_result(result)
         scenario = lifted(settings.scenario, result.get("lift_m", 0.0))
-        track_picture(scenario, flown.track, JudgedOutcome.from_result(result), folder.track)
-    print(result_lines(result))
-    print(f"left in {folder.path}/", file=sys.stdout, flush=True)
+        write_outcome(folder, scenario, flown.track, result)
+    late = timing_line(result)
+    lines = [result_lines(result), *([late] if late else []), *left_lines(folder, result)]
+    print("\n".join(lines), flush=True)
     if flown.outcome.interrupted:
         return _INTERRUPTED_CODE
     return 0 if result["verdict"] in COMPLETED else 1
@@ -168,7 +179,7 @@ async def _fly_and_judge(settings: FlightSettings, guest_url: str | None) -> int
 
 async def _fly_in_lockstep(settings: FlightSettings, records: _Records) -> Flown:
     scenario = settings.scenario
-    video = VideoFile(records.folder.video, scenario.camera.rate_hz)
+    video = VideoFile(records.folder.video, scenario.camera.rate_hz)  # made with its first image
     with closing(video), LockstepProgress(scenario.try_limit_s) as progress:
 
         def observe(moment: Moment) -> None:
@@ -176,19 +187,29 @@ async def _fly_in_lockstep(settings: FlightSettings, records: _Records) -> Flown
             progress.see(moment)
 
         def keep(time_us: int, image: Image) -> None:
-            video.write(image)
+            if settings.video:
+                video.write(image)
             records.see_image(time_us, image)
 
-        return await lockstep_flight(
+        flown = await lockstep_flight(
             scenario, settings.mission, seed=settings.seed, observer=observe, on_image=keep
         )
+    warn(video.problem)
+    return flown
 
 
 async def _fly_in_real_time(settings: FlightSettings, records: _Records, guest_url: str | None) -> Flown:
+    import aiohttp
+
+    from framerunner.judges import choose_judge
+    from framerunner.mission_teller import MissionTeller
+    from offboard.link.companion import Companion
+    from offboard.mavsdk_drone import MavsdkDrone
+
     scenario, folder = settings.scenario, records.folder
     async with AsyncExitStack() as stack:
         session = await stack.enter_async_context(aiohttp.ClientSession())
-        drone_url, camera_url, sitl = await _vehicle(settings, folder, session, stack, guest_url)
+        drone_url, camera_url, sitl = await _vehicle(settings, folder, stack, guest_url)
         judge = await choose_judge(scenario, camera_url, session)
         companion = Companion()
         stack.push_async_callback(companion.close)
@@ -196,14 +217,19 @@ async def _fly_in_real_time(settings: FlightSettings, records: _Records, guest_u
         source = folder.mission.read_text(encoding="utf-8")
         teller = MissionTeller(companion, settings.mission, source, scenario.name, start_arena)
         hang_report = stack.enter_context(folder.hang_report.open("w", encoding="utf-8"))
-        drone = MavsdkDrone(drone_url, start_arena=start_arena, hang_report=hang_report)
+        box = flight_box(scenario, judge.lift_m)
+        drone = MavsdkDrone(drone_url, start_arena=start_arena, hang_report=hang_report, box=box)
         drone.record_to(folder.tlog)
+        stack.callback(lambda: warn(drone.recording_problem))
         drone.tell_through(companion)
+        if sitl is not None:
+            drone.wait_with(sitl.clock, sitl.system_id)
         if guest_url is not None and sitl is None:
             drone.share_with(guest_url)
         stack.push_async_callback(drone.let_go)  # not before the result has been told, over its link
+        timing = FlightTiming(drone, None if sitl is None else sitl.clock)
         flight = asyncio.create_task(
-            _fly(settings, records, judge, teller, drone=drone, camera_url=camera_url)
+            _fly(settings, records, judge, teller, timing, drone=drone, camera_url=camera_url, box=box)
         )
         outcome = await (flight if sitl is None else sitl.guard(flight))
         ended = None if outcome.ended == "finished" else outcome.reason
@@ -218,12 +244,22 @@ async def _fly_in_real_time(settings: FlightSettings, records: _Records, guest_u
             "mission_state": outcome.mission_state,
             "ended": outcome.ended,
             "seconds_in_state": track.seconds_in_state(),
+            "kept_in_box_s": outcome.kept_in_box_s,
             "judged_by": judge.source,
             **({"lift_m": judge.lift_m} if judge.lift_m else {}),
+            "timing": timing.report(records.recorder.real_time_factor, settings.speed),
             "version": metadata.version("framerunner"),
         }
         await teller.tell_result(records.complete(result))
     return Flown(result, outcome, track)
+
+
+def _camera_size(settings: FlightSettings) -> tuple[int, int] | None:
+    """Width and height of the camera's images, pixels; None for a camera of one's own."""
+    if settings.drone_url is not None and settings.camera_url is not None:
+        return None
+    camera = settings.scenario.camera
+    return camera.width_px, camera.height_px
 
 
 def _start(scenario: Scenario) -> tuple[float, float, float, float]:
@@ -255,37 +291,27 @@ def _recording(settings: FlightSettings, folder: RunFolder) -> Iterator[FlightRe
     seed = settings.seed if settings.lockstep else None
     with FlightRecording(folder.recording, settings.scenario, settings.mission, seed) as recording:
         yield recording
-    if recording.problem:
-        print(f"warning: {recording.problem}", file=sys.stderr)
+    warn(recording.problem)
 
 
 async def _vehicle(
     settings: FlightSettings,
     folder: RunFolder,
-    session: aiohttp.ClientSession,
     stack: AsyncExitStack,
     guest_url: str | None,
 ) -> tuple[str, str, SitlProcess | None]:
     """Return the drone's and the camera's URL, and the simulator if one was started."""
     if settings.drone_url is not None and settings.camera_url is not None:
         return settings.drone_url, settings.camera_url, None
+    from framerunner.sitl_process import SitlProcess
+
     # The simulator reads the very scenario that was checked here, whatever becomes of its file.
     sitl = await stack.enter_async_context(
         SitlProcess(
             str(folder.scenario), settings.speed, settings.instance, () if guest_url is None else (guest_url,)
         )
     )
-    await sitl.guard(asyncio.create_task(_wait_for_sitl(sitl.referee_url, session)))
     return sitl.drone_url, sitl.video_url, sitl
-
-
-async def _wait_for_sitl(url: str, session: aiohttp.ClientSession) -> None:
-    loop = asyncio.get_running_loop()
-    limit_s = loop.time() + _SITL_START_S
-    while await ask_referee(url, session) is None:
-        if loop.time() > limit_s:
-            raise SettingError(f"the simulator did not start within {_SITL_START_S:g} s")
-        await asyncio.sleep(0.05)
 
 
 async def _fly(
@@ -293,10 +319,16 @@ async def _fly(
     records: _Records,
     judge: Judge,
     teller: MissionTeller,
+    timing: FlightTiming,
     *,
     drone: MavsdkDrone,
     camera_url: str,
+    box: Box,
 ) -> Outcome:
+    from framerunner.display import FlightDisplay
+    from offboard.eyes import CameraEyes
+    from vision.sources import open_source
+
     scenario = settings.scenario
 
     def observe(moment: Moment) -> None:
@@ -312,12 +344,22 @@ async def _fly(
     display = FlightDisplay(title, scenario.try_limit_s, records.recorder, judge)
     showing = asyncio.create_task(display.run())
     try:
-        async with open_source(camera_url) as source:
+        async with open_source(camera_url, size_px=_camera_size(settings)) as source:
             camera = RecordingCamera(source, records.folder.video, scenario.camera.rate_hz, keep)
+            eyes = CameraEyes(camera)
+            timing.look_through(eyes)
             with closing(camera):
-                return await fly_mission(
-                    drone, camera, settings.mission, limit_s=scenario.try_limit_s, observer=observe
+                outcome = await fly_mission(
+                    drone,
+                    None,
+                    settings.mission,
+                    limit_s=scenario.try_limit_s,
+                    observer=observe,
+                    eyes=eyes,
+                    box=box,
                 )
+            warn(camera.problem)
+            return outcome
     finally:
         showing.cancel()
         await asyncio.gather(showing, return_exceptions=True)

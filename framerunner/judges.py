@@ -11,13 +11,17 @@ from urllib.parse import urlsplit, urlunsplit
 import aiohttp
 
 from firmware_py.airframe import load_airframe
+from framerunner.virtual_camera.lift import lifted
 from offboard.app import Moment
 from scenarios.models import Scenario
 from scenarios.referee import Referee
 from scenarios.truth import TrueState
 
 _ANSWER_S = 2.0
-_SETTLING_S = 10.0  # wall time; the referee itself needs at most 2 s of vehicle time
+_POLL_S = 0.1
+# Vehicle time. A heartbeat a second tells each link of the disarming; then the referee needs at most 2 s.
+_SETTLE_LIMIT_US = 5_000_000
+_CLOCK_STOPPED_S = 3.0  # wall time without progress of vehicle time
 
 
 @dataclass(frozen=True, slots=True)
@@ -83,7 +87,7 @@ class TruthJudge:
         self.lift_m = lift_m
         self._url = url
         self._session = session
-        self._substitute = TelemetryJudge(scenario)
+        self._substitute = TelemetryJudge(scenario, lift_m)
 
     def see(self, moment: Moment) -> None:
         """The referee sees for itself; the substitute follows."""
@@ -105,8 +109,12 @@ class TruthJudge:
         )
 
     async def report(self, mission_state: str, ended: str | None) -> dict[str, Any]:
-        """Ask for the report once the drone is at rest (or goes on flying, in hold)."""
-        await _settle(self)
+        """Ask for the report once the drone is at rest.
+
+        A mission that finished has seen the motors stop; the referee's own link may tell it later. A flight
+        that was broken off may go on, in hold, with the motors on: that is not waited for.
+        """
+        await self._settle(motors_stopped=ended is None)
         parameters = {"state": mission_state, **({"ended": ended} if ended else {})}
         answer = await ask_referee(self._url, self._session, parameters)
         if answer is None:
@@ -115,19 +123,43 @@ class TruthJudge:
         report: dict[str, Any] = answer["report"]
         return report
 
+    async def _settle(self, *, motors_stopped: bool) -> None:
+        """Wait until the referee sees the drone at rest, for 5 s of vehicle time at most.
+
+        Args:
+            motors_stopped: the motors are known to be off, whatever the referee has heard yet.
+        """
+        loop = asyncio.get_running_loop()
+        began_us = newest_us = -1
+        newest_s = loop.time()
+        while (answer := await ask_referee(self._url, self._session)) is not None:
+            now, time_us = answer["snapshot"], answer.get("time_us")
+            time_us = time_us if isinstance(time_us, int) else 0
+            if now["settled"] or now.get("over") or (now["motors_on"] and not motors_stopped):
+                return
+            if began_us < 0:
+                began_us = time_us
+            if time_us > newest_us:
+                newest_us, newest_s = time_us, loop.time()
+            if time_us - began_us > _SETTLE_LIMIT_US or loop.time() - newest_s > _CLOCK_STOPPED_S:
+                return
+            await asyncio.sleep(_POLL_S)
+
 
 class TelemetryJudge:
     """Judges by what the drone says of itself; contacts with frames remain unseen.
 
     Args:
         scenario: what is flown.
+        lift_m: how much higher its frames hang than the scenario says, for want of a base.
     """
 
     source = "telemetry"
-    lift_m = 0.0
 
-    def __init__(self, scenario: Scenario) -> None:
-        self._referee = Referee(scenario, load_airframe(scenario.airframe).envelope_m)
+    def __init__(self, scenario: Scenario, lift_m: float = 0.0) -> None:
+        self.lift_m = lift_m
+        envelope_m = load_airframe(scenario.airframe).envelope_m
+        self._referee = Referee(lifted(scenario, lift_m), envelope_m, lift_m)
 
     def see(self, moment: Moment) -> None:
         """Follow the drone's state."""
@@ -188,12 +220,3 @@ async def choose_judge(
             lift_m = lift_m if isinstance(lift_m, int | float) else 0.0
             return TruthJudge(url, session, scenario, str(answer.get("source", "truth")), lift_m)
     return TelemetryJudge(scenario)
-
-
-async def _settle(judge: TruthJudge) -> None:
-    """Wait until the drone is at rest, if its motors are off."""
-    for _ in range(int(_SETTLING_S / 0.1)):
-        standing = await judge.standing()
-        if standing is None or standing.settled or standing.motors_on:
-            return
-        await asyncio.sleep(0.1)

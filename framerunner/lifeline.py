@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import asyncio
+import os
 import sys
-from collections.abc import Coroutine
+import threading
+from collections.abc import Callable, Coroutine
 
 
 async def until_standard_input_ends(work: Coroutine[object, object, None]) -> None:
@@ -29,3 +31,19 @@ async def _standard_input_ends() -> None:
     await loop.connect_read_pipe(lambda: asyncio.StreamReaderProtocol(reader), sys.stdin)
     while await reader.read(1024):
         pass
+
+
+def end_with_standard_input(tidy: Callable[[], None]) -> None:
+    """Have this process end at once when standard input ends, whatever it is doing; for one without a loop.
+
+    Args:
+        tidy: is called before.
+    """
+
+    def watch() -> None:
+        while os.read(0, 1024):
+            pass
+        tidy()
+        os._exit(1)
+
+    threading.Thread(target=watch, name="lifeline", daemon=True).start()

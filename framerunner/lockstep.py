@@ -17,6 +17,7 @@ from framerunner.pictures import Track
 from framerunner.recorder import TrackRecorder
 from framerunner.state_hash import StateHash
 from offboard.app import Moment, Observer, Outcome, fly_mission
+from offboard.keep_in_box import flight_box
 from offboard.mission import Mission
 from scenarios.ground import start_position
 from scenarios.models import Scenario
@@ -87,9 +88,8 @@ async def lockstep_flight(
         if observer is not None:
             observer(moment)
 
-    outcome = await fly_mission(
-        drone, None, mission, limit_s=scenario.try_limit_s, observer=observe, eyes=eyes
-    )
+    limit_s, box = scenario.try_limit_s, flight_box(scenario)
+    outcome = await fly_mission(drone, None, mission, limit_s=limit_s, observer=observe, eyes=eyes, box=box)
     drone.settle()
     track = recorder.track(simulation.referee.snapshot().began_us)
     result = {
@@ -100,6 +100,7 @@ async def lockstep_flight(
         "mission_state": outcome.mission_state,
         "ended": outcome.ended,
         "seconds_in_state": track.seconds_in_state(),
+        "kept_in_box_s": outcome.kept_in_box_s,
         "judged_by": "truth",
         "state_sha256": states.hexdigest(),
         "version": metadata.version("framerunner"),

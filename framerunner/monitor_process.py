@@ -6,6 +6,7 @@ import asyncio
 import contextlib
 import socket
 import sys
+from collections.abc import Sequence
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
@@ -22,12 +23,18 @@ class MonitorProcess(ChildProcess):
     Args:
         scenario: for a drone that brings no referee; None if it does.
         runs: folder of flights to show again; None for the monitor's own choice.
+        camera_hosts: HOST or HOST:PORT of cameras whose drones' packets come through this process.
 
     Attributes:
         link: where it listens; whoever speaks for the drones sends there, as `--link` takes it.
     """
 
-    def __init__(self, scenario: Scenario | None = None, runs: Path | None = None) -> None:
+    def __init__(
+        self,
+        scenario: Scenario | None = None,
+        runs: Path | None = None,
+        camera_hosts: Sequence[str] = (),
+    ) -> None:
         port = _free_port()
         self.link = f"udpout://127.0.0.1:{port}"
         arguments = ["monitor", "--lifeline", "--drone", f"udpin://127.0.0.1:{port}"]
@@ -39,6 +46,8 @@ class MonitorProcess(ChildProcess):
             arguments += ["--scenario", str(path)]
         if runs is not None:
             arguments += ["--runs", str(runs)]
+        for host in camera_hosts:
+            arguments += ["--camera-host", host]
         self._open = asyncio.Event()
         self._watching: asyncio.Task[None] | None = None
         super().__init__("the monitor", arguments, self._relay)
@@ -59,6 +68,14 @@ class MonitorProcess(ChildProcess):
             await asyncio.gather(self._watching, return_exceptions=True)
         await super().__aexit__(*problem)
         self._folder.cleanup()
+
+    async def failed(self) -> str:
+        """Return, when the monitor ends by itself, why; its options are not those of the command here."""
+        said = await super().failed()
+        return said.replace(
+            "choose another with --port",
+            "stop what listens there, or leave out --monitor and start framerunner monitor --port 8081",
+        )
 
     async def stay(self) -> None:
         """When a person is there, let them look on until they press Ctrl-C; that ends nothing but this."""

@@ -15,7 +15,7 @@ from framerunner.pictures import Track
 from offboard.app import Moment
 from vision.types import CameraFrame, Image
 
-_MOST_UNDER_WAY = 50  # images that wait to be compressed: 12 MB
+_MAX_WAITING_BYTES = 12 << 20  # of images that wait to be compressed: 50 of 320 x 240 pixels
 
 
 class FrameSource(Protocol):
@@ -92,18 +92,35 @@ class VideoFile:
     Args:
         path: the video; made with the first image.
         rate_hz: images a second, for players.
+
+    Attributes:
+        problem: why the file is not whole, known when it is closed; empty if it is.
     """
 
     def __init__(self, path: Path, rate_hz: float) -> None:
+        self.problem = ""
         self._path = path
         self._rate_hz = rate_hz
         self._writer: cv2.VideoWriter | None = None
         self._worker = ThreadPoolExecutor(1, "video")
+        self._size: tuple[int, ...] = ()
         self._under_way: deque[Future[None]] = deque()
 
-    def write(self, image: Image) -> None:
-        """Add an image, BGR, of the first one's size; it must not be changed afterwards."""
-        if len(self._under_way) >= _MOST_UNDER_WAY:
+    def write(self, image: Image, *, wait: bool = True) -> None:
+        """Add an image; one of another size than the first is left out.
+
+        Args:
+            image: BGR; it must not be changed afterwards.
+            wait: for room, if many images wait to be compressed; if not, the image is left out then.
+        """
+        self._size = self._size or image.shape
+        if image.shape != self._size:
+            return
+        while self._under_way and self._under_way[0].done():
+            self._under_way.popleft().result()
+        if len(self._under_way) * image.nbytes > _MAX_WAITING_BYTES:
+            if not wait:
+                return
             self._under_way.popleft().result()
         self._under_way.append(self._worker.submit(self._compress, image))
 
@@ -113,6 +130,8 @@ class VideoFile:
         if self._writer is not None:
             self._writer.release()
             self._writer = None
+            if not _is_whole_avi(self._path):
+                self.problem = f"'{self._path}' is not whole: the disk did not take it"
 
     def _compress(self, image: Image) -> None:
         if self._writer is None:
@@ -120,6 +139,20 @@ class VideoFile:
             codec = cv2.VideoWriter.fourcc(*"MJPG")
             self._writer = cv2.VideoWriter(str(self._path), codec, self._rate_hz, (width, height))
         self._writer.write(image)
+
+
+def _is_whole_avi(path: Path) -> bool:
+    """Whether the length that stands in the file's head was written, and that much is there.
+
+    OpenCV does not tell of failed writes; the length is written last, after the index.
+    """
+    try:
+        with path.open("rb") as file:
+            head = file.read(12)
+        written = int.from_bytes(head[4:8], "little") + 8
+        return head[:4] == b"RIFF" and written <= path.stat().st_size
+    except OSError:
+        return False
 
 
 class RecordingCamera:
@@ -146,7 +179,7 @@ class RecordingCamera:
     async def frames(self) -> AsyncIterator[CameraFrame]:
         """Images as they come, each written before it is handed on."""
         async for frame in self._source.frames():
-            self._video.write(frame.image)
+            self._video.write(frame.image, wait=False)
             if self._on_frame is not None:
                 self._on_frame(frame)
             yield frame
@@ -154,3 +187,8 @@ class RecordingCamera:
     def close(self) -> None:
         """Finish the file."""
         self._video.close()
+
+    @property
+    def problem(self) -> str:
+        """Why the video is not whole, known when it is closed; empty if it is."""
+        return self._video.problem

@@ -17,8 +17,12 @@ def result_lines(result: Mapping[str, Any]) -> str:
     """
     error_m = result["landing_error_m"]
     landing = "did not land" if error_m is None else f"landed {100 * error_m:.1f} cm from the base's centre"
+    verdict, reason = str(result["verdict"]), str(result["reason"])
+    said = reason if reason.startswith(verdict) else f"{verdict}: {reason}"
+    kept_s = result.get("kept_in_box_s", 0.0)
+    kept = f", kept in its box for {kept_s:.1f} s" if kept_s else ""
     return (
-        f"{result['verdict']}: {result['reason']}\n"
+        f"{said}\n"
         f"try {result['try_time_s']:.1f} s, penalty {result['penalty_s']:.1f} s, "
-        f"path {result['path_length_m']:.1f} m, {landing}, judged by {result['judged_by']}"
+        f"path {result['path_length_m']:.1f} m, {landing}, judged by {result['judged_by']}{kept}"
     )

@@ -22,6 +22,9 @@ class RunFolder:
         out: folder of all runs; made if it is not there.
         scenario: name for people.
 
+    Attributes:
+        stopped_before_start: somebody stopped the flight before its first tick; set by whoever flies.
+
     Raises:
         SettingError: the folder cannot be made.
     """
@@ -29,6 +32,8 @@ class RunFolder:
     def __init__(self, out: Path, scenario: str) -> None:
         stamp = datetime.now().astimezone().strftime("%Y%m%d-%H%M%S")
         path = out / f"{stamp}-{scenario}"
+        self.stopped_before_start = False
+        self._made_out = not out.exists()
         try:
             out.mkdir(parents=True, exist_ok=True)
             number = 1
@@ -55,25 +60,49 @@ class RunFolder:
         self.recording = path / "flight.mcap"
 
     def write_plan(self, scenario: Scenario, mission: Mission) -> None:
-        """Write what is to be flown, so that the flight can be judged, replayed and flown again."""
-        self.scenario.write_text(dump_yaml(scenario), encoding="utf-8")
-        self.mission.write_bytes(mission.path.read_bytes())
-        if isinstance(mission.pilot, PilotFile):
-            self.pilot.write_text(mission.pilot.text, encoding="utf-8")
+        """Write what is to be flown, so that the flight can be judged, replayed and flown again.
+
+        Raises:
+            SettingError: the disk does not take it; nothing of it stays.
+        """
+        source = mission.path.read_bytes()
+        try:
+            self.scenario.write_text(dump_yaml(scenario), encoding="utf-8")
+            self.mission.write_bytes(source)
+            if isinstance(mission.pilot, PilotFile):
+                self.pilot.write_text(mission.pilot.text, encoding="utf-8")
+        except OSError as error:
+            raise SettingError(
+                f"--out {self.path.parent}: cannot be written to ({error.strerror}); free some space "
+                "or choose another"
+            ) from None
 
     def write_result(self, result: dict[str, Any]) -> None:
-        """Write `result.json` whole or not at all."""
+        """Write `result.json` whole or not at all.
+
+        Raises:
+            OSError: the disk does not take it.
+        """
         part = self.result.with_suffix(".part")
-        part.write_text(json.dumps(result, indent=2, allow_nan=False) + "\n", encoding="utf-8")
-        os.replace(part, self.result)
+        try:
+            part.write_text(json.dumps(result, indent=2, allow_nan=False) + "\n", encoding="utf-8")
+            os.replace(part, self.result)
+        except OSError:
+            part.unlink(missing_ok=True)
+            raise
 
     def remove_if_empty(self) -> None:
-        """Take away empty files, and the folder if no result, log or recording remains."""
+        """Take away empty files, and the folder if no result, log or recording remains.
+
+        All goes if the flight was stopped before it began; `out` too, if it was made for this flight.
+        """
         for path in self.path.iterdir():
-            if path.stat().st_size == 0:
+            if path.stat().st_size == 0 or self.stopped_before_start:
                 path.unlink()
         if not any(path.exists() for path in (self.result, self.tlog, self.recording)):
             for path in (self.scenario, self.mission, self.pilot):
                 path.unlink(missing_ok=True)
             if not any(self.path.iterdir()):
                 self.path.rmdir()
+                if self._made_out and not any(self.path.parent.iterdir()):
+                    self.path.parent.rmdir()

@@ -15,6 +15,7 @@ from collections.abc import Callable
 from typing import Any, Protocol
 
 from firmware_py.mavlink.dialect import mavlink
+from firmware_py.mavlink.framing import PacketReader
 from offboard.drone import DroneError
 from offboard.link.url import VehicleUrl, check_free, parse_url
 
@@ -38,6 +39,11 @@ class _Line(Protocol):
 
     def heard(self, system_id: int) -> None:
         """What was read last came from this system."""
+
+    @property
+    def host(self) -> str:
+        """In numbers, from which came what was read last; "" over a wire."""
+        ...
 
     def close(self) -> None:
         """Let go."""
@@ -65,7 +71,7 @@ class VehicleLink:
             raise DroneError(f"cannot open {parsed.text}: {reason}") from None
         self.url = parsed.text
         self._codec = mavlink.MAVLink(None, srcSystem=system_id, srcComponent=component_id)
-        self._codec.robust_parsing = True
+        self._reader = PacketReader()
 
     def receive(self, timeout_s: float) -> list[Message]:
         """Wait for messages; what cannot be understood is passed over.
@@ -80,8 +86,7 @@ class VehicleLink:
             data = self._line.read(timeout_s)
         except OSError as error:
             raise DroneError(f"{self.url} failed: {error.strerror or error}") from None
-        parsed = (self._codec.parse_buffer(data) if data else None) or ()
-        messages = [message for message in parsed if message.get_type() != "BAD_DATA"]
+        messages = self._reader.feed(data)
         for message in messages:
             self._line.heard(message.get_srcSystem())
         return messages
@@ -94,6 +99,11 @@ class VehicleLink:
         except OSError:
             return  # a vehicle that is gone shows in what is received
         self._codec.seq = (self._codec.seq + 1) % 256
+
+    @property
+    def host(self) -> str:
+        """The host in numbers from which came what was received last; "" over a wire."""
+        return self._line.host
 
     def close(self) -> None:
         """Let go of the port or device."""
@@ -117,6 +127,10 @@ class _UdpIn:
             return b""
         return data
 
+    @property
+    def host(self) -> str:
+        return self._speaker[0] if self._speaker is not None else ""
+
     def heard(self, system_id: int) -> None:
         if self._speaker is not None:
             self._peers[system_id] = self._speaker
@@ -133,6 +147,8 @@ class _UdpIn:
 class _OnePeer:
     """A line on which all systems are behind the same other end."""
 
+    host = ""
+
     def heard(self, system_id: int) -> None:
         """It makes no difference here."""
 
@@ -143,6 +159,7 @@ class _UdpOut(_OnePeer):
     def __init__(self, url: VehicleUrl) -> None:
         self._socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
         self._socket.connect((url.address, url.number))
+        self.host = str(self._socket.getpeername()[0])
 
     def read(self, timeout_s: float) -> bytes:
         self._socket.settimeout(timeout_s)
@@ -163,6 +180,7 @@ class _Stream(_OnePeer):
 
     def __init__(self, connection: socket.socket) -> None:
         self._socket = connection
+        self.host = str(connection.getpeername()[0])
         connection.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
 
     def read(self, timeout_s: float) -> bytes:
@@ -199,6 +217,7 @@ class _TcpIn(_OnePeer):
             self._listener.settimeout(timeout_s)
             try:
                 self._stream = _Stream(self._listener.accept()[0])
+                self.host = self._stream.host
             except TimeoutError:
                 return b""
         try:

@@ -40,9 +40,9 @@ def camera(
 
         framerunner camera --scenario test-case-1
 
-        framerunner camera --scenario test-case-1 --no-base --drone udpin://127.0.0.1:14550 --port 8081
+        framerunner camera --scenario test-case-1 --no-base --port 8081
 
-        framerunner camera --drone serial:///dev/ttyUSB1:921600 --scenario my_hall.yaml --bind 0.0.0.0
+        framerunner camera --drone serial:///dev/ttyUSB1:921600 --bind 0.0.0.0
     """
     if not 1 <= port <= 65535:
         raise SettingError(f"--port {port}: must be from 1 to 65535")

@@ -57,7 +57,7 @@ def evaluate(
 
         framerunner evaluate --level calm --count 200 --seed 1
 
-        framerunner evaluate --level calm --count 200 --mission my_mission.yaml --compare runs/before
+        framerunner evaluate --level calm --mission mine.yaml --compare runs/before
 
         framerunner evaluate my_scenarios/ --out runs/mine
 

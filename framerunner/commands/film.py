@@ -44,9 +44,9 @@ def film(
 
         framerunner film runs/20260101-120000-test-case-1
 
-        framerunner film runs/20260101-120000-test-case-1 --out flight.gif --seconds 12
+        framerunner film runs/20260101-120000-test-case-1 --out short.gif --seconds 9
 
-        framerunner film runs/20260101-120000-test-case-1 --out tall.mp4 --size 720x1280 --speed 4
+        framerunner film runs/20260101-120000-test-case-1 --speed 4 --size 720x1280
     """
     target = flight / "film.mp4" if out is None else out
     suffix = target.suffix.lower()

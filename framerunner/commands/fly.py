@@ -26,6 +26,9 @@ _Seed = Annotated[
 _Record = Annotated[
     bool, Parameter(negative=(), help="write flight.mcap as well, for `framerunner replay` and Foxglove")
 ]
+_Video = Annotated[
+    bool, Parameter(negative=(), help="write video.avi in lockstep, too; in real time it is always written")
+]
 _Monitor = Annotated[
     bool, Parameter(negative=(), help="open the Game Monitor as well, on http://127.0.0.1:8080/")
 ]
@@ -43,11 +46,14 @@ def fly(
     lockstep: _Lockstep = False,
     seed: _Seed = None,
     record: _Record = False,
+    video: _Video = False,
     monitor: _Monitor = False,
     pilot: _Pilot = None,
     out: Annotated[Path, Parameter(help="folder in which this flight's folder is made")] = Path("runs"),
 ) -> int:
     """Fly a mission, show it live, and leave result, track, log and video in `runs/<time>-<scenario>/`.
+
+    In lockstep there is no log, and a video only with --video.
 
     Exit code 0: completed, 1: flown but not completed, 2: bad input.
 
@@ -61,14 +67,12 @@ def fly(
 
         framerunner fly test-case-1 --lockstep --record
 
-        framerunner fly test-case-1 --drone udpin://0.0.0.0:14540 --camera http://127.0.0.1:8100/video
+        framerunner fly --drone udpin://0.0.0.0:14540 --camera 0
 
-        framerunner fly test-case-1 --drone serial:///dev/ttyUSB0:57600 --camera rtsp://192.168.1.10/live
+        framerunner fly --drone serial:///dev/ttyUSB0:57600 --camera rtsp://10.0.0.2/1
     """
     _check(drone, camera, speed, instance, lockstep)
-    _check_seed(seed, lockstep)
-    if monitor and lockstep:
-        raise SettingError("--monitor: looks on in real time; leave it out with --lockstep")
+    _check_lockstep(seed, monitor, lockstep)
 
     from framerunner.flight import FlightSettings, fly_once
     from offboard.mission import load_mission
@@ -86,6 +90,7 @@ def fly(
         lockstep=lockstep,
         seed=seed or 0,
         record=record,
+        video=video,
         monitor=monitor,
     )
     return asyncio.run(fly_once(settings))
@@ -99,16 +104,22 @@ def _check(drone: str | None, camera: str | None, speed: float, instance: int, l
         raise SettingError("--drone: a camera given by --camera needs the URL of its drone too")
     if drone is not None and (speed != 1.0 or instance != 0):
         raise SettingError("--speed and --instance are for the simulated drone; leave them out with --drone")
-    if lockstep and (drone is not None or speed != 1.0 or instance != 0):
-        raise SettingError("--lockstep: flies a simulated drone in this process; leave out the others")
+    unused = [("--drone", drone is not None), ("--speed", speed != 1.0), ("--instance", instance != 0)]
+    given = [option for option, is_given in unused if is_given]
+    if lockstep and given:
+        raise SettingError(
+            f"--lockstep: flies a simulated drone in this process; leave out {' and '.join(given)}"
+        )
     if not 0.01 <= speed <= 100:
         raise SettingError(f"--speed {speed:g}: must be from 0.01 to 100")
     if not 0 <= instance <= 9:
         raise SettingError(f"--instance {instance}: must be from 0 to 9")
 
 
-def _check_seed(seed: int | None, lockstep: bool) -> None:
-    """Refuse a seed that is none, or that has no use."""
+def _check_lockstep(seed: int | None, monitor: bool, lockstep: bool) -> None:
+    """Refuse a seed that is none or has no use, and a monitor of what takes no real time."""
+    if monitor and lockstep:
+        raise SettingError("--monitor: looks on in real time; leave it out with --lockstep")
     if seed is None:
         return
     if not lockstep:

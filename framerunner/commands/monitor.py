@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import os
+import resource
 import sys
 from pathlib import Path
 from typing import Annotated
@@ -15,6 +16,7 @@ from framerunner.errors import SettingError
 
 PASSWORD_VARIABLE = "FRAMERUNNER_JUDGE_PASSWORD"
 DATABASE = "sqlite:///framerunner.db"
+_OPEN_FILES = 4096
 _NICENESS = 5  # beside a flight: who looks on must not slow it
 
 
@@ -30,6 +32,17 @@ def monitor(
     port: Annotated[WholeNumber, Parameter(help="TCP port of the pages; 0 lets the system choose")] = 8080,
     database: Annotated[str, Parameter(help="of teams and tries; SQLAlchemy URL")] = DATABASE,
     runs: Annotated[Path, Parameter(help="folder of flights to show again")] = Path("runs"),
+    camera_host: Annotated[
+        tuple[str, ...],
+        Parameter(
+            negative=(),
+            help="HOST or HOST:PORT of a camera, if a drone names one that its packets do not come from",
+        ),
+    ] = (),
+    trusted_proxy: Annotated[
+        tuple[str, ...],
+        Parameter(negative=(), help="address or network of a proxy whose X-Forwarded-For is believed"),
+    ] = (),
     lifeline: Annotated[bool, Parameter(show=False, help="stop when standard input ends")] = False,
 ) -> int:
     """Open the Game Monitor on http://127.0.0.1:8080/: see drones, fly them, judge tries, show flights again.
@@ -57,13 +70,28 @@ def monitor(
     from scenarios.loader import load_scenario
 
     parse_url(drone)
-    given = equipment(drone, None if scenario is None else load_scenario(scenario), runs)
-    settings = MonitorSettings(bind, port, database, os.environ.get(PASSWORD_VARIABLE) or None)
+    given = equipment(drone, None if scenario is None else load_scenario(scenario), runs, camera_host)
+    password, qr_codes = os.environ.get(PASSWORD_VARIABLE) or None, _shows_qr_codes()
+    settings = MonitorSettings(bind, port, database, password, trusted_proxy, qr_codes=qr_codes)
+    _allow_many_files()
     if lifeline:
         os.nice(_NICENESS)
     work = serve(given, settings, _say)
     asyncio.run(until_standard_input_ends(work) if lifeline else work)
     return 0
+
+
+def _allow_many_files() -> None:
+    """Raise this process's limit of open files, each connection being one, as far as it may."""
+    soft, hard = resource.getrlimit(resource.RLIMIT_NOFILE)
+    wanted = _OPEN_FILES if hard == resource.RLIM_INFINITY else min(_OPEN_FILES, hard)
+    if soft != resource.RLIM_INFINITY and soft < wanted:
+        resource.setrlimit(resource.RLIMIT_NOFILE, (wanted, hard))
+
+
+def _shows_qr_codes() -> bool:
+    """Whether somebody sits at a terminal that can show them."""
+    return sys.stderr.isatty() and "utf" in (sys.stderr.encoding or "").lower()
 
 
 def _say(line: str) -> None:

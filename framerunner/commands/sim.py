@@ -13,6 +13,7 @@ from cyclopts import Parameter
 
 from framerunner.commands.options import WholeNumber
 from framerunner.errors import SettingError
+from framerunner.extras import advice, is_installed
 
 if TYPE_CHECKING:
     from firmware_py.mavlink.signing import SigningKey
@@ -21,6 +22,7 @@ if TYPE_CHECKING:
     from sitl.server import SimulatorServer
     from sitl.server_settings import ServerSettings
     from sitl.simulation import Simulation
+    from sitl.time_grants import TimeGrants
 
 _MAX_COUNT = 20
 
@@ -92,6 +94,9 @@ def sim(
         bool, Parameter(negative=(), help="open the Game Monitor as well, on http://127.0.0.1:8080/")
     ] = False,
     lifeline: Annotated[bool, Parameter(show=False, help="stop when standard input ends")] = False,
+    time_grants: Annotated[
+        int | None, Parameter(show=False, help="descriptor of a socket by which the caller grants time")
+    ] = None,
 ) -> int:
     """Start the simulated drone: MAVLink on UDP 14540 and 14550, video on http://127.0.0.1:8100/.
 
@@ -111,16 +116,13 @@ def sim(
 
         framerunner sim --storage drone-files --parameters drone.params
 
-        framerunner sim --link tcpin://127.0.0.1:5760 --link serial:///dev/ttyUSB0:57600
+        framerunner sim --link tcpin://127.0.0.1:5760
+
+        framerunner sim --link serial:///dev/ttyUSB0:57600
     """
-    if not 0.01 <= speed <= 1000:
-        raise SettingError(f"--speed {speed:g}: must be from 0.01 to 1000")
-    if not 0 <= instance <= 9:
-        raise SettingError(f"--instance {instance}: must be from 0 to 9")
-    if not 1 <= count <= _MAX_COUNT:
-        raise SettingError(f"--count {count}: must be from 1 to {_MAX_COUNT}")
+    _check(speed, instance, count)
     chosen = connections or Connections()
-    watcher = _monitor() if monitor else None
+    watcher = _monitor(chosen.video_port, count) if monitor else None
     if watcher is not None:
         chosen = replace(chosen, link=(*chosen.link, watcher.link))
     settings = _settings(chosen, onboard or Onboard(), speed, instance, count)
@@ -128,15 +130,37 @@ def sim(
     from scenarios.loader import load_scenario
     from sitl.server import SimulatorServer
 
-    server = SimulatorServer(_simulations(load_scenario(scenario), count), settings, notice=_say)
+    simulations = _simulations(load_scenario(scenario), count)
+    server = SimulatorServer(simulations, settings, notice=_say, grants=_grants(time_grants))
     asyncio.run(_run(server, monitor=watcher, lifeline=lifeline))
     return 0
 
 
-def _monitor() -> MonitorProcess:
+def _check(speed: float, instance: int, count: int) -> None:
+    """Refuse numbers that are out of range."""
+    if not 0.01 <= speed <= 1000:
+        raise SettingError(f"--speed {speed:g}: must be from 0.01 to 1000")
+    if not 0 <= instance <= 9:
+        raise SettingError(f"--instance {instance}: must be from 0 to 9")
+    if not 1 <= count <= _MAX_COUNT:
+        raise SettingError(f"--count {count}: must be from 1 to {_MAX_COUNT}")
+
+
+def _grants(descriptor: int | None) -> TimeGrants | None:
+    if descriptor is None:
+        return None
+    import socket
+
+    from sitl.time_grants import TimeGrants
+
+    return TimeGrants(socket.socket(fileno=descriptor))
+
+
+def _monitor(video_port: int | None, count: int) -> MonitorProcess:
     from framerunner.monitor_process import MonitorProcess
 
-    return MonitorProcess()
+    ports = () if video_port is None else range(video_port, video_port + count)
+    return MonitorProcess(camera_hosts=[f"127.0.0.1:{port}" for port in ports])
 
 
 def _settings(
@@ -161,7 +185,7 @@ def _settings(
         onboard_remote=chosen.onboard_remote,
         ground_remote=chosen.ground_remote,
         video_port=port,
-        video_rtp=None if chosen.video_rtp == "off" else rtp_address(chosen.video_rtp, instance),
+        video_rtp=rtp_address(chosen.video_rtp, instance) if _sends_rtp(chosen.video_rtp) else None,
         speed=speed,
         links=links,
         signing_key=_read_key(chosen.signing_key),
@@ -172,6 +196,14 @@ def _settings(
     )
     settings.check(count)
     return settings
+
+
+def _sends_rtp(video_rtp: str) -> bool:
+    """Whether H.264 video is wanted and can be made; a small installation flies without."""
+    missing = None if video_rtp == "off" or is_installed("av") else advice("av")
+    if missing is not None:
+        _say(f"warning: no video in RTP: {missing}")
+    return video_rtp != "off" and missing is None
 
 
 def _simulations(scenario: Scenario, count: int) -> list[Simulation]:

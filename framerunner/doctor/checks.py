@@ -3,55 +3,24 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
-from enum import Enum
 
 from firmware_py.mavlink.dialect import mavlink
 from framerunner.doctor import names
+from framerunner.doctor.findings import Finding, Level
+from framerunner.doctor.position import check_height, check_position, check_still, check_vision_settings
 from framerunner.doctor.record import Record
 
 WANTED_HZ = 50.0  # what `fly` and `camera` ask for
 LOW_HZ = 20.0  # the mission's own rate
 LOST_SHARE = 0.05
-WANDER_M = 0.1
 BATTERY_PERCENT = 40
 CHALLENGE_HEIGHT_M = 3.0  # frames hang up to 2 m, the mission flies up from them
 CHALLENGE_REACH_M = 8.0
 
 
-class Level(Enum):
-    """How much a finding matters."""
-
-    GOOD = "good"
-    NOTE = "note"
-    MISSING = "missing"
-
-
-@dataclass(frozen=True, slots=True)
-class Finding:
-    """One thing about the drone.
-
-    Attributes:
-        level: whether the challenge can be flown with it.
-        subject: a word or two.
-        text: what is the case.
-        mend: what to do; empty if nothing.
-    """
-
-    level: Level
-    subject: str
-    text: str
-    mend: str = ""
-
-
 def examine(record: Record) -> list[Finding]:
     """Everything there is to say, in the order of a flight's needs."""
     return [finding for check in CHECKS for finding in check(record)]
-
-
-def can_fly(findings: list[Finding]) -> bool:
-    """Whether nothing is missing."""
-    return all(finding.level is not Level.MISSING for finding in findings)
 
 
 def check_autopilot(record: Record) -> Iterator[Finding]:
@@ -85,7 +54,11 @@ def check_armed(record: Record) -> Iterator[Finding]:
 
 
 def check_health(record: Record) -> Iterator[Finding]:
-    """Pre-arm checks, and which sensors are not well."""
+    """Pre-arm checks, and which sensors are not well.
+
+    PX4's checks are those of its present mode. Hold wants a global position; offboard, to which `fly` goes,
+    does not.
+    """
     status = record.latest.get("SYS_STATUS")
     if status is None:
         yield Finding(Level.MISSING, "health", "no SYS_STATUS", "let the link carry it; see MAV_x_MODE")
@@ -94,11 +67,17 @@ def check_health(record: Record) -> Iterator[Finding]:
     sick &= ~status.onboard_control_sensors_health
     sick_names = ", ".join(name for bit, name in names.SENSORS.items() if sick & bit)
     ready = status.onboard_control_sensors_health & mavlink.MAV_SYS_STATUS_PREARM_CHECK
-    if not ready and not record.armed:
-        reasons = f": {sick_names}" if sick_names else ""
-        mend = "see what it says below; without a global position hold never passes, then fly tries offboard"
-        mode = names.mode_name(record.latest["HEARTBEAT"].custom_mode, record.modes).lower()
-        yield Finding(Level.MISSING, "pre-arm checks", f"not passed in {mode}{reasons}", mend)
+    mode = names.mode_name(record.latest["HEARTBEAT"].custom_mode, record.modes).lower()
+    if not ready and not record.armed and record.arming.ready_for_offboard:
+        text = f"passed for offboard, where fly arms it; not in {mode}"
+        yield Finding(Level.GOOD, "pre-arm checks", text)
+    elif not ready and not record.armed:
+        reasons = "; ".join((*record.arming.failures, *((sick_names,) if sick_names else ())))
+        words = f"not passed in {mode}" + (f": {reasons}" if reasons else "")
+        mend = "mend what is named, here and below"
+        if record.arming.armable_modes is None:
+            mend = "it does not tell why; fly may pass in offboard, which needs no global position"
+        yield Finding(Level.MISSING, "pre-arm checks", words, mend)
     elif sick_names:
         yield Finding(Level.NOTE, "health", f"not well: {sick_names}", "mend it before flying")
     else:
@@ -142,20 +121,6 @@ def check_link(record: Record) -> Iterator[Finding]:
         yield Finding(Level.GOOD, "link", words)
 
 
-def check_estimate(record: Record) -> Iterator[Finding]:
-    """The position stays where the drone stands."""
-    if not record.places or record.armed:
-        return
-    wander_m, source = record.wander_m, record.parameters.get("EKF2_HGT_REF")
-    by = f" (height by {names.HEIGHT_SOURCE.get(int(source), 'unknown means')})" if source is not None else ""
-    if wander_m > WANDER_M:
-        mend = "indoors take height from a range finder or from vision: EKF2_HGT_REF, see docs/real-drone.md"
-        text = f"wanders {wander_m:.2f} m while it stands{by}; a frame's opening is 0.18 m high"
-        yield Finding(Level.NOTE, "estimate", text, mend)
-    else:
-        yield Finding(Level.GOOD, "estimate", f"still within {wander_m:.2f} m{by}")
-
-
 def check_battery(record: Record) -> Iterator[Finding]:
     """Enough for a try."""
     status = record.latest.get("SYS_STATUS")
@@ -188,17 +153,24 @@ def check_limits(record: Record) -> Iterator[Finding]:
         value = parameters.get(name)
         if value is not None and value < least:
             yield Finding(Level.MISSING, name, f"{value:g} {unit}", f"set it to {least:g} or more")
-    yield from _fence(parameters)
+    yield from _fence(record)
     preflight_s = parameters.get("COM_DISARM_PRFLT", 0.0)
     if 0.0 < preflight_s < 5.0:
         mend = "set it to 10: take-off begins by a slow ramp"
         yield Finding(Level.MISSING, "COM_DISARM_PRFLT", f"{preflight_s:g} s", mend)
 
 
-def _fence(parameters: dict[str, float]) -> Iterator[Finding]:
-    if not parameters.get("GF_ACTION"):
+def _fence(record: Record) -> Iterator[Finding]:
+    parameters = record.parameters
+    limits = (("GF_MAX_VER_DIST", CHALLENGE_HEIGHT_M), ("GF_MAX_HOR_DIST", CHALLENGE_REACH_M))
+    if not parameters.get("GF_ACTION") or not any(parameters.get(name, 0.0) > 0.0 for name, _ in limits):
         return
-    for name, least_m in (("GF_MAX_VER_DIST", CHALLENGE_HEIGHT_M), ("GF_MAX_HOR_DIST", CHALLENGE_REACH_M)):
+    status = record.latest.get("ESTIMATOR_STATUS")
+    if status is not None and not status.flags & mavlink.ESTIMATOR_POS_HORIZ_ABS:
+        text = "PX4's fence does nothing without a global position"
+        yield Finding(Level.NOTE, "fence", text, "put a net around the flying space")
+        return
+    for name, least_m in limits:
         value = parameters.get(name, 0.0)
         if 0.0 < value < least_m:
             mend = f"the challenge needs {least_m:g} m; set more, or 0"
@@ -227,7 +199,8 @@ def check_failsafes(record: Record) -> Iterator[Finding]:
     station = parameters.get("NAV_DLL_ACT")
     if station is not None:
         words = names.LINK_LOSS.get(int(station), f"action {station:g}")
-        yield Finding(Level.GOOD, "ground station lost", words + (climbs if station == 2 else ""))
+        needed = "; it arms only while it hears one, as fly is" if station else ""
+        yield Finding(Level.GOOD, "ground station lost", words + (climbs if station == 2 else "") + needed)
     low = parameters.get("COM_LOW_BAT_ACT")
     if low is not None:
         yield Finding(Level.GOOD, "battery low", names.LOW_BATTERY.get(int(low), f"action {low:g}"))
@@ -248,7 +221,10 @@ CHECKS: tuple[Callable[[Record], Iterator[Finding]], ...] = (
     check_offboard,
     check_streams,
     check_link,
-    check_estimate,
+    check_position,
+    check_height,
+    check_vision_settings,
+    check_still,
     check_battery,
     check_limits,
     check_failsafes,

@@ -8,6 +8,7 @@ from dataclasses import dataclass, field
 from math import dist, isfinite
 
 from firmware_py.mavlink.dialect import mavlink
+from framerunner.doctor.arming import ArmingReport
 from framerunner.vehicle_link import AUTOPILOT_COMPONENT, Message, is_vehicle
 
 TEXTS_KEPT = 12
@@ -68,6 +69,7 @@ class Record:
         texts: (severity, text), the latest last.
         clock_ms: vehicle's time stamps of attitude, first and latest; with wall time, seconds.
         places: local positions heard, NED metres.
+        arming: what it says of its arming checks.
     """
 
     system_id: int | None = None
@@ -83,6 +85,7 @@ class Record:
     texts: deque[tuple[int, str]] = field(default_factory=lambda: deque(maxlen=TEXTS_KEPT))
     clock_ms: list[tuple[int, float]] = field(default_factory=list)
     places: list[tuple[float, float, float]] = field(default_factory=list)
+    arming: ArmingReport = field(default_factory=ArmingReport)
     _pieces: dict[int, str] = field(default_factory=dict)
 
     def take(self, message: Message, now_s: float) -> None:
@@ -165,6 +168,9 @@ class Record:
     def _take_parameter(self, message: Message, _now_s: float) -> None:
         self.parameters[message.param_id] = parameter_value(message)
 
+    def _take_event(self, message: Message, _now_s: float) -> None:
+        self.arming.take(message)
+
     def _take_mode(self, message: Message, _now_s: float) -> None:
         if not message.mode_name.startswith("("):  # PX4 lists empty places for modes of others
             self.modes[message.custom_mode] = message.mode_name
@@ -174,6 +180,7 @@ _TAKERS = {
     "ATTITUDE": Record._take_clock,
     "LOCAL_POSITION_NED": Record._take_place,
     "STATUSTEXT": Record._take_text,
+    "EVENT": Record._take_event,
     "PARAM_VALUE": Record._take_parameter,
     "AVAILABLE_MODES": Record._take_mode,
 }

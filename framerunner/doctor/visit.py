@@ -15,6 +15,7 @@ FIND_S = 10.0
 _ASK_AGAIN_S = 1.0
 _QUESTION_GAP_S = 0.02  # a serial line should not choke on questions
 _PREARM_S = 0.5
+_PREARM_AGAIN_S = 2.0  # while no report of its arming checks has come
 
 Progress = Callable[[str, float], None]
 
@@ -57,7 +58,7 @@ def listen(link: VehicleLink, record: Record, seconds: float, progress: Progress
     """
     began_s = time.monotonic()
     beat_s = asked_s = -10.0
-    prearm_asked = False
+    prearm_s = began_s + _PREARM_S
     questions = open_questions(record)
     question_s = began_s
     while (now_s := time.monotonic()) - began_s < seconds:
@@ -65,8 +66,8 @@ def listen(link: VehicleLink, record: Record, seconds: float, progress: Progress
         if now_s - beat_s >= 1.0:
             beat_s = now_s
             link.send(companion_heartbeat() if record.armed else station_heartbeat())
-        if not prearm_asked and not record.armed and now_s - began_s > _PREARM_S:
-            prearm_asked = True
+        if now_s > prearm_s and not record.armed and record.arming.armable_modes is None:
+            prearm_s = now_s + _PREARM_AGAIN_S
             link.send(prearm_question(record))
         if now_s - question_s >= _QUESTION_GAP_S:
             question_s = now_s

@@ -20,6 +20,7 @@ from framerunner.evaluation.statistics import summarise
 from framerunner.evaluation.store import EvaluationFolder, open_folder, read_folder
 from framerunner.evaluation.table_file import csv_text
 from framerunner.evaluation.tables import print_comparison, print_summary
+from framerunner.extras import advice, is_installed
 
 EXIT_INTERRUPTED = 130
 
@@ -110,7 +111,12 @@ def _report(settings: EvaluationSettings, folder: EvaluationFolder, before: Eval
     if comparison is not None:
         print_comparison(comparison)
     sys.stdout.flush()
+    code = 1 if ERROR in summary.verdicts else 0
 
+    if not is_installed("matplotlib"):
+        _note(f"warning: report.html was not made: {advice('matplotlib')}")
+        print(f"left in {folder.path}/: results.csv", flush=True)
+        return code
     console = Console(stderr=True)
     with console.status("drawing the report") as status:
         from framerunner.evaluation.report import Page, write_report
@@ -124,7 +130,7 @@ def _report(settings: EvaluationSettings, folder: EvaluationFolder, before: Eval
             lambda done, total: status.update(f"drawing the report, picture {done + 1} of {total}"),
         )
     print(f"left in {folder.path}/: report.html, results.csv", flush=True)
-    return 1 if ERROR in summary.verdicts else 0
+    return code
 
 
 def _say_interrupted(settings: EvaluationSettings, folder: EvaluationFolder) -> None:

@@ -17,6 +17,7 @@ LANDED = (Verdict.CLEAN.value, Verdict.COMPLETED.value)
 VERDICTS = (*(verdict.value for verdict in Verdict), ERROR)
 """All that stands in the column `verdict`, best first."""
 _NOT_COLUMNS = ("track", "traceback")
+_ADDED_LATER = ("kept_in_box_s",)  # columns that older evaluations do not have
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -51,6 +52,7 @@ class Row:
     mission_state: str = ""
     ended: str = ERROR
     seconds_in_state: Mapping[str, float] = field(default_factory=dict)
+    kept_in_box_s: float = 0.0
     judged_by: str = ""
     state_sha256: str = ""
     version: str = ""
@@ -78,7 +80,7 @@ class Row:
         Raises:
             KeyError: a column is missing.
         """
-        values = {name: result[name] for name in COLUMNS}
+        values = {name: result[name] for name in COLUMNS if name in result or name not in _ADDED_LATER}
         plain: dict[str, Any] = {
             name: tuple(value) if isinstance(value, list) else value for name, value in values.items()
         }

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import fcntl
 import json
 import os
@@ -73,7 +74,9 @@ class EvaluationFolder:
             if row.traceback:
                 self.error_file(row.scenario).write_text(row.traceback, encoding="utf-8")
             with (self.path / FLIGHTS).open("ab", buffering=0) as file:
-                file.write(row.to_json().encode() + b"\n")
+                line = row.to_json().encode() + b"\n"
+                if file.write(line) < len(line):  # a full disk takes a part; the next start takes that away
+                    raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
                 os.fsync(file.fileno())
         self.done.add(row.scenario)
 

@@ -7,6 +7,7 @@ from collections.abc import Iterable, Mapping
 from io import StringIO
 
 from framerunner.evaluation.rows import COLUMNS, ERROR, Row
+from scenarios.spreadsheet import cell
 
 _OF_ERRORS = ("scenario", "mission", "seed", "verdict", "reason", "version")
 
@@ -32,9 +33,11 @@ def _cell(row: Row, name: str) -> str:
         return ""  # it was not flown to its end: its numbers would be no results
     value = getattr(row, name)
     if isinstance(value, Mapping):
-        return ";".join(f"{key}={number}" for key, number in value.items())
+        return ";".join(f"{cell(key)}={number}" for key, number in value.items())
     if isinstance(value, tuple):
-        return ";".join(str(part) for part in value)
+        return ";".join(cell(part) if isinstance(part, str) else str(part) for part in value)
+    if isinstance(value, str):
+        return cell(value)
     if isinstance(value, bool):
         return "true" if value else "false"
     return "" if value is None else str(value)

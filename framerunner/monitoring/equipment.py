@@ -18,13 +18,16 @@ SYSTEM_ID = 250  # the doctor has 247, the virtual camera 246, MAVSDK 245, other
 COMPONENT_ID = 190  # MAV_COMP_ID_MISSIONPLANNER, which is what ground stations use
 
 
-def equipment(drone_url: str, scenario: Scenario | None, runs: Path) -> Equipment:
+def equipment(
+    drone_url: str, scenario: Scenario | None, runs: Path, camera_hosts: tuple[str, ...] = ()
+) -> Equipment:
     """What the monitor is given.
 
     Args:
         drone_url: of the link to the drones.
         scenario: what is flown, for a drone that brings no referee.
         runs: folder of flights to show again; it may come to be later.
+        camera_hosts: see `Equipment`.
     """
     return Equipment(
         open_link=lambda: _MonitorLink(drone_url),
@@ -34,6 +37,7 @@ def equipment(drone_url: str, scenario: Scenario | None, runs: Path) -> Equipmen
         load_scenario=load_scenario,
         runs=RunFolders(runs),
         start_pose=_start_pose,
+        camera_hosts=camera_hosts,
     )
 
 
@@ -62,6 +66,10 @@ class _MonitorLink(Link):
             return self._link.receive(timeout_s)
         except DroneError as error:
             raise LinkFailed(str(error)) from None
+
+    @property
+    def host(self) -> str:
+        return self._link.host
 
     def send(self, message: Message) -> None:
         self._link.send(message)

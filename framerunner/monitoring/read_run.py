@@ -9,9 +9,14 @@ from __future__ import annotations
 import contextlib
 import json
 import os
+import resource
+import shutil
 import sys
 from pathlib import Path
 
+import cv2
+
+from framerunner.lifeline import end_with_standard_input
 from framerunner.monitoring.run_json import FlownMission, flight_json
 from framerunner.recording.collected import CollectedFlight, ImageFile, collect
 from framerunner.recording.errors import RecordingError
@@ -23,6 +28,10 @@ from scenarios.models import Scenario
 RECORDING = "recording.json"
 IMAGES = "images"
 SPANS = "spans.json"
+LONGEST_READ_S = 180
+"""Of processor time; a flight of three minutes is flown again in some seconds."""
+MEMORY_BYTES = 1 << 30
+"""Beyond the libraries'. A recording of an hour takes less than a third of it."""
 _NICENESS = 10
 _MEGABYTE = 1_000_000
 
@@ -73,16 +82,41 @@ def _image_size(flight: CollectedFlight, scenario: Scenario | None) -> tuple[int
 
 def main() -> int:
     """Read the run that the command line names; what goes wrong is the last line on standard error."""
+    folder, target = Path(sys.argv[1]), Path(sys.argv[2])
+    end_with_standard_input(lambda: shutil.rmtree(target, ignore_errors=True))
     with contextlib.suppress(OSError):
         os.nice(_NICENESS)
-    folder, target = Path(sys.argv[1]), Path(sys.argv[2])
+    cv2.setNumThreads(1)  # each has a stack, and the flight that is watched wants the processors
+    limit_resources(MEMORY_BYTES, LONGEST_READ_S)
     try:
         os.chdir(folder.parent)  # so that no message tells strangers where the runs lie
         read_run(Path(folder.name), target)
+    except MemoryError:
+        print(f"it needs more than {MEMORY_BYTES >> 20} MB of memory; it must be damaged", file=sys.stderr)
+        return 2
     except (RecordingError, ScenarioError, OSError) as error:
         print(" ".join(str(error).split()), file=sys.stderr)
         return 2
     return 0
+
+
+def limit_resources(memory_bytes: int, processor_s: int) -> None:
+    """Have this process fail with MemoryError, or be killed, when it takes more than this.
+
+    Args:
+        memory_bytes: that it may take from now on.
+        processor_s: of processor time in all.
+    """
+    with open("/proc/self/statm", encoding="ascii") as file:
+        held_bytes = int(file.read().split()[5]) * resource.getpagesize()  # data and stacks
+    for what, limit in (
+        (resource.RLIMIT_DATA, held_bytes + memory_bytes),
+        (resource.RLIMIT_CPU, processor_s),
+        (resource.RLIMIT_CORE, 0),
+    ):
+        hard = resource.getrlimit(what)[1]
+        wanted = limit if hard == resource.RLIM_INFINITY else min(limit, hard)
+        resource.setrlimit(what, (wanted, wanted))
 
 
 if __name__ == "__main__":

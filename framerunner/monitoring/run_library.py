@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import json
 import re
-import subprocess
+import signal
 import sys
 import threading
+import time
 from collections import OrderedDict
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
@@ -17,12 +18,14 @@ from tempfile import TemporaryDirectory
 from typing import Any
 
 from framerunner.monitoring.read_run import IMAGES, RECORDING, SPANS
-from monitor.ports import RunError, RunInfo
+from framerunner.monitoring.readers import Readers
+from monitor.ports import RunError, RunInfo, RunNotReadError
 
 KEPT_RUNS = 6
 """As many are kept unpacked, in a folder that vanishes with the program."""
 UNREADABLE = "unreadable"
-_LONGEST_READ_S = 300.0
+_FAILURE_KEPT_S = 60.0  # so long a run that could not be read is not tried again, unless it changes
+_MOST_FAILURES = 100
 _MOST_RESULT_BYTES = 1_000_000
 _MOST_NAME = 80
 _SIGNS = ("result.json", "flight.mcap", "flight.tlog")
@@ -49,6 +52,15 @@ class _Unpacked:
     spans: Sequence[tuple[int, int]]
 
 
+@dataclass(frozen=True, slots=True)
+class _Failed:
+    """A run that could not be read, and when."""
+
+    mark: tuple[int, ...]
+    at_s: float
+    words: str
+
+
 @dataclass
 class RunFolders:
     """The run folders in a folder, as `monitor.ports.RunLibrary`; may be used from several threads.
@@ -61,7 +73,8 @@ class RunFolders:
     _seen: dict[str, _Seen] = field(default_factory=dict, init=False, repr=False)
     _unpacked: OrderedDict[str, _Unpacked] = field(default_factory=OrderedDict, init=False, repr=False)
     _looking: threading.Lock = field(default_factory=threading.Lock, init=False, repr=False)
-    _reading: threading.Lock = field(default_factory=threading.Lock, init=False, repr=False)
+    _failed: OrderedDict[str, _Failed] = field(default_factory=OrderedDict, init=False, repr=False)
+    _readers: Readers = field(default_factory=Readers, init=False, repr=False)
 
     def runs(self) -> Sequence[RunInfo]:
         """All runs, newest first; one that is damaged has the verdict "unreadable"."""
@@ -76,15 +89,34 @@ class RunFolders:
         Raises:
             RunError: there is no such run, or it cannot be shown.
         """
-        return self._read(name, fresh=True).recording
+        known = self.kept(name)
+        return self._read(name).recording if known is None else known
+
+    def kept(self, name: str) -> Mapping[str, Any] | None:
+        """A run that was read and has not changed since, at once; None: it has to be read.
+
+        Raises:
+            RunError: there is no such run.
+        """
+        folder = self._folder(name)
+        known = self._kept(name)
+        return known.recording if known is not None and known.mark == _mark(folder) else None
+
+    def close(self) -> None:
+        """Let go: what is being read is broken off, and nothing more is read."""
+        self._readers.close()
 
     def image(self, name: str, index: int) -> bytes:
         """A JPEG of its camera.
 
         Raises:
+            RunNotReadError: the run is to be read first; `recording` does so.
             RunError: there is no such run or image.
         """
-        run = self._read(name, fresh=False)
+        self._folder(name)
+        run = self._kept(name)
+        if run is None:
+            raise RunNotReadError(f"run '{name:.{_MOST_NAME}}': is not read yet")
         if not 0 <= index < len(run.spans):
             raise RunError(f"run '{name:.{_MOST_NAME}}': has no image {index}; it has {len(run.spans)}")
         start, length = run.spans[index]
@@ -114,24 +146,24 @@ class RunFolders:
         info = _info(folder)
         return _Seen(mark, info, _order(info, max(mark)))
 
-    def _read(self, name: str, *, fresh: bool) -> _Unpacked:
-        """A run, read if it was not.
-
-        Args:
-            name: of the run.
-            fresh: read it again if its files have changed since.
-        """
+    def _read(self, name: str) -> _Unpacked:
+        """Read a run, unless that failed a moment ago."""
         folder = self._folder(name)
-        known = self._kept(name)
-        if known is not None and (known.mark == _mark(folder) or not fresh):
-            return known
-        with self._reading:  # one after another: each keeps a processor busy
-            mark = _mark(folder)
-            known = self._kept(name)
-            if known is None or known.mark != mark:
-                known = _unpack(folder, mark)
-                self._keep(name, known)
-            return known
+        mark = _mark(folder)
+        with self._looking:
+            failed = self._failed.get(name)
+        if failed and failed.mark == mark and time.monotonic() - failed.at_s < _FAILURE_KEPT_S:
+            raise RunError(failed.words)
+        try:
+            run = _unpack(folder, mark, self._readers)
+        except RunError as error:
+            with self._looking:
+                self._failed[name] = _Failed(mark, time.monotonic(), str(error))
+                while len(self._failed) > _MOST_FAILURES:
+                    self._failed.popitem(last=False)
+            raise
+        self._keep(name, run)
+        return run
 
     def _kept(self, name: str) -> _Unpacked | None:
         with self._looking:
@@ -247,7 +279,7 @@ def _order(info: RunInfo, written_ns: int) -> float:
     return written_ns / 1e9 if instant is None else instant
 
 
-def _unpack(folder: Path, mark: tuple[int, ...]) -> _Unpacked:
+def _unpack(folder: Path, mark: tuple[int, ...], readers: Readers) -> _Unpacked:
     """Read a run in a process of its own.
 
     Raises:
@@ -259,19 +291,14 @@ def _unpack(folder: Path, mark: tuple[int, ...]) -> _Unpacked:
     target = TemporaryDirectory(prefix="framerunner-run-", ignore_cleanup_errors=True)
     command = [sys.executable, "-m", "framerunner.monitoring.read_run", str(folder.absolute()), target.name]
     try:
-        done = subprocess.run(
-            command,
-            stdin=subprocess.DEVNULL,
-            stdout=subprocess.DEVNULL,
-            stderr=subprocess.PIPE,
-            timeout=_LONGEST_READ_S,
-            check=False,
-        )
-    except (subprocess.TimeoutExpired, OSError):
-        raise RunError(f"run '{folder.name}': reading it takes too long") from None
-    if done.returncode != 0:
-        lines = done.stderr.decode(errors="replace").strip().splitlines()
-        reason = lines[-1][:300] if lines and done.returncode == 2 else "it is damaged"
+        code, said = readers.run(command)
+    except OSError:
+        raise RunError(f"run '{folder.name}': it cannot be read now") from None
+    if code in (-signal.SIGKILL, -signal.SIGXCPU):
+        raise RunError(f"run '{folder.name}': reading it takes too long")
+    if code != 0:
+        lines = said.strip().splitlines()
+        reason = lines[-1][:300] if lines and code == 2 else "it is damaged"
         raise RunError(f"run '{folder.name}': cannot be shown: {reason}")
     try:
         recording = json.loads((Path(target.name) / RECORDING).read_text(encoding="utf-8"))

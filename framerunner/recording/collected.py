@@ -20,7 +20,8 @@ from offboard.app import Moment
 from vision.types import Image
 
 JPEG_QUALITY = 90
-_TICKS_AT_MOST = 2_000_000  # 28 hours: a file that claims more is damaged
+_TICKS_AT_MOST = 576_000  # eight hours: a file that claims more is damaged
+_MAX_IMAGES_BYTES = 2_000_000_000
 
 
 class ImageFile:
@@ -52,6 +53,8 @@ class ImageFile:
         Raises:
             RecordingError: it cannot be written.
         """
+        if self._end > _MAX_IMAGES_BYTES:
+            raise RecordingError(f"recording: more than {_MAX_IMAGES_BYTES // 1_000_000_000} GB of images")
         done, data = cv2.imencode(".jpg", picture.image, (cv2.IMWRITE_JPEG_QUALITY, JPEG_QUALITY))
         if not done:
             raise RecordingError("recording: an image cannot be compressed")
@@ -136,7 +139,9 @@ def collect(recorded: Recorded, images: ImageFile | None = None) -> CollectedFli
         if isinstance(event, Moment):
             moments.append(event)
             if len(moments) > _TICKS_AT_MOST:
-                raise RecordingError(f"recording '{recorded.title}': longer than a day; it must be damaged")
+                raise RecordingError(
+                    f"recording '{recorded.title}': longer than eight hours; it must be damaged"
+                )
         elif isinstance(event, Picture):
             images.add(event)
         else:

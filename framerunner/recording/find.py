@@ -16,6 +16,8 @@ from framerunner.recording.errors import RecordingError
 from framerunner.recording.events import Recorded
 from offboard.pilot_file import PilotFile
 
+_MAX_RESULT_BYTES = 1_000_000
+
 
 @contextmanager
 def recorded_flight(path: Path, pilot: PilotFile | None = None) -> Iterator[Recorded]:
@@ -111,8 +113,10 @@ def read_result(folder: Path) -> dict[str, Any] | None:
     if not path.is_file():
         return None
     try:
+        if path.stat().st_size > _MAX_RESULT_BYTES:
+            raise ValueError(f"larger than {_MAX_RESULT_BYTES} bytes")
         result = json.loads(path.read_text(encoding="utf-8"))
-    except (OSError, ValueError) as error:
+    except (OSError, ValueError, RecursionError) as error:
         reason = " ".join(str(error).split())
         raise RecordingError(f"replay '{path}': damaged: {reason:.120}") from None
     if not isinstance(result, dict):

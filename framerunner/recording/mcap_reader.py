@@ -8,16 +8,18 @@ from base64 import b64decode
 from collections.abc import Iterator
 from os import SEEK_END
 from pathlib import Path
-from typing import Any, BinaryIO
+from typing import Any, BinaryIO, cast
 
 import cv2
 import numpy as np
 from mcap.exceptions import McapError
-from mcap.reader import McapReader, SeekingReader
+from mcap.reader import SeekingReader
 from mcap.writer import MCAP0_MAGIC
 
 from framerunner.recording.errors import RecordingError
 from framerunner.recording.events import Crossed, Event, Picture
+from framerunner.recording.image_limits import check_image
+from framerunner.recording.mcap_file import MAX_CHUNK_BYTES, BoundedFile, messages, summary_of
 from framerunner.recording.mcap_writer import METADATA
 from framerunner.recording.schemas import CROSSING, DETECTIONS, IMAGE, MISSION, SETPOINT, TELEMETRY
 from offboard.app import Moment
@@ -25,7 +27,7 @@ from offboard.drone import DroneState, VelocityCommand
 from offboard.engine import TransitionTaken
 from vision.types import Detection, Detections
 
-RECORD_LIMIT_BYTES = 1 << 28
+_MAX_TEXT_BYTES = 1_000_000  # of a message or attachment that is no image
 Json = dict[str, Any]
 
 
@@ -50,14 +52,14 @@ class McapRecording:
         except OSError as error:
             raise RecordingError(f"recording '{path}': cannot be read: {error.strerror}") from None
         try:
-            self._reader: McapReader = SeekingReader(
-                self._file, validate_crcs=True, record_size_limit=RECORD_LIMIT_BYTES
+            self._bounded = BoundedFile(self._file)
+            self._reader = SeekingReader(
+                cast(BinaryIO, self._bounded), validate_crcs=True, record_size_limit=MAX_CHUNK_BYTES
             )
+            self._summary = summary_of(self._reader)
             about = self._about()
-            attached = {each.name: each.data for each in self._reader.iter_attachments()}
-            result = attached.get("result.json")
             self.title = f"{about['scenario']}: {about['mission']}"
-            self.result: Json | None = None if result is None else json.loads(result)
+            self.result: Json | None = self._attached_result()
         except Exception as error:
             self._file.close()
             raise self._damaged(error) from None
@@ -75,12 +77,22 @@ class McapRecording:
         topics = (TELEMETRY, SETPOINT, DETECTIONS, MISSION, IMAGE, CROSSING)
         moments = _Moments()
         try:
-            for _, channel, message in self._reader.iter_messages(topics):
+            for channel, message in messages(self._bounded, self._summary, topics):
+                if channel.topic != IMAGE and len(message.data) > _MAX_TEXT_BYTES:
+                    raise RecordingError(f"a message of {channel.topic} has {len(message.data)} bytes")
                 event = moments.take(channel.topic, message.log_time // 1000, json.loads(message.data))
                 if event is not None:
                     yield event
         except Exception as error:
             raise self._damaged(error) from None
+
+    def _attached_result(self) -> Json | None:
+        for each in self._reader.iter_attachments():
+            if each.name == "result.json":
+                if len(each.data) > _MAX_TEXT_BYTES:
+                    raise RecordingError(f"its result has {len(each.data)} bytes")
+                return cast(Json, json.loads(each.data))
+        return None
 
     def _about(self) -> dict[str, str]:
         with warnings.catch_warnings():
@@ -94,7 +106,7 @@ class McapRecording:
 
     def _damaged(self, error: Exception) -> RecordingError:
         """In one line, whatever a damaged file makes the libraries raise."""
-        if isinstance(error, RecordingError):
+        if isinstance(error, RecordingError) and str(error).startswith("recording '"):
             return error
         first, last = self._ends()
         if first != MCAP0_MAGIC:
@@ -104,7 +116,8 @@ class McapRecording:
         if last != MCAP0_MAGIC:
             what = "cut short, as if its program had been killed"
         else:
-            text = " ".join(str(error).split()) if isinstance(error, McapError) else ""
+            told = isinstance(error, McapError | RecordingError)
+            text = " ".join(str(error).split()) if told else ""
             what = f"damaged ({text or type(error).__name__:.120})"
         return RecordingError(
             f"recording '{self._path}': {what}; `mcap recover` of the MCAP tools may save a part of it"
@@ -202,8 +215,9 @@ def _detection(message: Json) -> Detection:
 
 
 def _picture(time_us: int, message: Json) -> Picture:
-    data = np.frombuffer(b64decode(message["data"]), np.uint8)
-    image = cv2.imdecode(data, cv2.IMREAD_COLOR)
+    data = b64decode(message["data"])
+    check_image(data)
+    image = cv2.imdecode(np.frombuffer(data, np.uint8), cv2.IMREAD_COLOR)
     if image is None:
         raise ValueError("an image cannot be decoded")
     return Picture(time_us, image)

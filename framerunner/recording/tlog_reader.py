@@ -18,9 +18,11 @@ from offboard.drone import DroneState, VelocityCommand
 from offboard.link.alignment import Alignment, Pose
 from scenarios.ground import start_position
 from scenarios.models import Scenario
+from vision.jpeg import MAX_PIXELS
 from vision.types import Detections
 
 TICK_US = 50_000
+_TICKS_AT_MOST = 576_000  # eight hours: a log that holds more is damaged
 _ARMED = 128  # MAV_MODE_FLAG_SAFETY_ARMED
 _NO_AUTOPILOT = 8  # MAV_AUTOPILOT_INVALID: a ground station, a camera, this app's own companion
 
@@ -58,6 +60,11 @@ class TlogRecording:
             return
         video = cv2.VideoCapture(str(self._video))
         try:
+            pixels = video.get(cv2.CAP_PROP_FRAME_WIDTH) * video.get(cv2.CAP_PROP_FRAME_HEIGHT)
+            if pixels > MAX_PIXELS:
+                raise RecordingError(
+                    f"replay: '{self._video}' has images of {pixels:.0f} pixels; it is damaged"
+                )
             count = int(video.get(cv2.CAP_PROP_FRAME_COUNT))
             last_us = self._moments[-1].state.time_us
             for number in range(count):
@@ -101,6 +108,8 @@ def _read_moments(path: Path, start: Pose) -> list[Moment]:
             moment = vehicle.take(message)
             if moment is not None:
                 moments.append(moment)
+                if len(moments) > _TICKS_AT_MOST:
+                    raise RecordingError(f"replay: '{path}' is longer than eight hours; it must be damaged")
     finally:
         log.close()
 

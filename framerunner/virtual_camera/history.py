@@ -13,7 +13,7 @@ from scenarios.axes import Quaternion, Vec3
 SPAN_US = 1_500_000  # kept
 AHEAD_US = 60_000  # as far as a pose is carried on beyond the last report
 GAP_US = 300_000  # between two reports farther apart nothing is made up
-RESTART_US = 1_000_000  # a clock that goes back farther has started again
+RESTART_US = 3_000_000  # a clock that goes back farther has started again; less far back is a late report
 
 
 @dataclass(frozen=True, slots=True)

@@ -85,7 +85,7 @@ class VirtualCamera:
         """Know nothing of the vehicle."""
         self.history = PoseHistory()
         self.placement = Placement(start_pose(self.scenario))
-        self._referee = Referee(self.scenario, self._envelope_m)
+        self._referee = Referee(self.scenario, self._envelope_m, self._lift_m)
         self._judged_us = 0
         self._next = 0
         self._motors_on = False
@@ -204,7 +204,7 @@ class VirtualCamera:
             return
         armed = bool(self.placement.armed)
         if armed and not self._motors_on and self._referee.over:
-            self._referee = Referee(self.scenario, self._envelope_m)  # a new try
+            self._referee = Referee(self.scenario, self._envelope_m, self._lift_m)  # a new try
         self._motors_on = armed
         self._referee.update(
             TrueState(

@@ -6,6 +6,7 @@ import signal
 import socket
 import subprocess
 import sys
+import time
 from pathlib import Path
 
 import cv2
@@ -22,6 +23,10 @@ COMMANDS = [
     "fly",
     "replay",
     "evaluate",
+    "camera",
+    "doctor",
+    "film",
+    "monitor",
     *(f"mission {name}" for name in ("list", "show", "check", "new")),
     *(f"scenario {name}" for name in ("list", "show", "check", "schema", "random")),
 ]
@@ -135,12 +140,12 @@ def test_a_bad_drone_address_is_refused_and_leaves_no_folder(refused, url):
     line = refused("fly", "--drone", url, "--camera", ".")
     assert url in line
     assert "udpin://0.0.0.0:14540" in line
-    assert list(Path("runs").iterdir()) == []
+    assert not Path("runs").exists()
 
 
 def test_a_camera_that_is_not_there_is_refused_and_leaves_no_folder(refused):
     assert "nowhere.avi" in refused("fly", "--drone", "udpin://127.0.0.1:25099", "--camera", "nowhere.avi")
-    assert list(Path("runs").iterdir()) == []
+    assert not Path("runs").exists()
 
 
 def test_an_out_folder_that_cannot_be_made_is_refused(refused):
@@ -170,6 +175,17 @@ def test_a_busy_video_port_is_refused_before_anything_is_said(refused):
         assert str(8100 + instance) in refused("sim", "--instance", instance)
 
 
+@pytest.mark.parametrize(
+    ("given", "named"),
+    [
+        (["--speed", "2", "--instance", "3"], "leave out --speed and --instance"),
+        (["--drone", "udpin://127.0.0.1:14540", "--camera", "0"], "leave out --drone"),
+    ],
+)
+def test_options_without_a_use_in_lockstep_are_named(refused, given, named):
+    assert named in refused("fly", "--lockstep", *given)
+
+
 def test_a_remote_host_without_address_is_refused(refused):
     line = refused("sim", "--instance", free_instance(), "--ground-remote", "two..dots")
     assert "two..dots" in line
@@ -184,7 +200,7 @@ def test_a_busy_port_of_the_simulator_is_what_fly_says(refused):
     with bound(14580 + instance):
         line = refused("fly", "--instance", instance)
     assert str(14580 + instance) in line
-    assert list(Path("runs").iterdir()) == []
+    assert not Path("runs").exists()
 
 
 @pytest.mark.parametrize(
@@ -202,11 +218,15 @@ def test_a_picture_that_cannot_be_written_is_refused(capsys):
 
 
 @pytest.mark.parametrize("command", COMMANDS)
-def test_help_shows_examples(capsys, command):
+def test_help_shows_examples_that_fit_80_columns(capsys, monkeypatch, command):
+    monkeypatch.setenv("COLUMNS", "80")
     assert run([*command.split(), "--help"]) == 0
     help_text = capsys.readouterr().out
     assert "Example" in help_text
-    assert f"framerunner {command}" in help_text.partition("Example")[2]
+    section = help_text.partition("Example")[2].partition("╭")[0]
+    examples = [line.strip() for line in section.splitlines()[1:] if line.strip()]
+    assert examples[0].startswith(f"framerunner {command}")
+    assert all(line.startswith("framerunner ") for line in examples), "an example is wrapped"
 
 
 def test_without_arguments_help_is_shown(capsys):
@@ -271,6 +291,67 @@ def test_as_a_program_a_fault_is_one_line_and_exit_code_2():
     assert done.stdout == ""
     assert done.stderr.startswith("error: ")
     assert done.stderr.count("\n") == 1
+
+
+INTERRUPTED_IN_DESTRUCTOR = """
+import os, signal, time
+from framerunner import cli
+
+class Closing:
+    def __del__(self):
+        os.kill(os.getpid(), signal.SIGTERM)
+        time.sleep(0.01)
+
+cli._handle_signals()
+try:
+    Closing()
+    time.sleep(10.0)
+except KeyboardInterrupt:
+    print("stopped")
+"""
+
+
+def test_sigterm_is_not_lost_where_python_drops_exceptions():
+    program = [sys.executable, "-c", INTERRUPTED_IN_DESTRUCTOR]
+    done = subprocess.run(program, cwd=ROOT, capture_output=True, text=True, timeout=20, check=False)
+    assert (done.stdout, done.stderr, done.returncode) == ("stopped\n", "", 0)
+
+
+@pytest.mark.realtime
+@pytest.mark.parametrize("seconds", [0.1, 0.4, 0.8, 1.6])
+def test_sigterm_while_a_flight_starts_ends_it_without_a_traceback(tmp_path, seconds):
+    program = [sys.executable, "-m", "framerunner", "fly", "round-1", "--lockstep"]
+    environment = {**os.environ, "PYTHONPATH": str(ROOT)}
+    with subprocess.Popen(
+        program, cwd=tmp_path, env=environment, stderr=subprocess.PIPE, text=True
+    ) as running:
+        time.sleep(seconds)  # whatever it does by then
+        running.send_signal(signal.SIGTERM)
+        said = running.communicate(timeout=20)[1]
+    assert "Traceback" not in said
+    assert "ignored" not in said
+    assert running.returncode in (130, -signal.SIGTERM, -signal.SIGINT), said
+    assert all(any(folder.iterdir()) for folder in (tmp_path / "runs").glob("*"))
+
+
+def test_sigterm_ends_a_flight_in_order_where_ctrl_c_is_ignored(tmp_path):
+    """As in the background of a script."""
+    script = f'trap "" INT; exec "{sys.executable}" -m framerunner fly round-1 --lockstep'
+    environment = {**os.environ, "PYTHONPATH": str(ROOT)}
+    with subprocess.Popen(
+        ["sh", "-c", script], cwd=tmp_path, env=environment, stderr=subprocess.PIPE
+    ) as running:
+        for line in running.stderr:
+            if b"times real time" in line:  # it flies
+                break
+        running.send_signal(signal.SIGINT)
+        running.send_signal(signal.SIGTERM)
+        running.communicate(timeout=20)
+    assert running.returncode == 130
+    (folder,) = (tmp_path / "runs").iterdir()
+    result = json.loads((folder / "result.json").read_text(encoding="utf-8"))
+    assert result["verdict"] == "aborted"
+    assert "interrupted" in result["reason"]
 
 
 def test_a_reader_that_goes_away_is_no_fault():

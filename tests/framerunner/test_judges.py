@@ -47,8 +47,13 @@ async def referee(*answers):
         await runner.cleanup()
 
 
-def answer(scenario=SCENARIO.name, **snapshot):
-    return {"scenario": scenario, "snapshot": {**SNAPSHOT, **snapshot}, "report": {"verdict": "clean"}}
+def answer(scenario=SCENARIO.name, time_us=0, **snapshot):
+    return {
+        "scenario": scenario,
+        "time_us": time_us,
+        "snapshot": {**SNAPSHOT, **snapshot},
+        "report": {"verdict": "clean"},
+    }
 
 
 async def test_the_simulator_of_the_camera_is_the_judge():
@@ -91,6 +96,30 @@ async def test_a_drone_that_flies_on_is_not_waited_for():
     assert queries == [{}, {"state": "red.turning", "ended": "link lost & gone"}]
 
 
+async def test_the_disarming_may_reach_the_referee_later_than_the_app():
+    """Heartbeats come once a second, on each link at another moment; then the referee looks for rest."""
+    late = [answer(time_us=250_000 * step, motors_on=True) for step in range(8)]
+    async with referee(*late, answer(time_us=2_100_000, settled=True)) as (root, session, queries):
+        judge = TruthJudge(f"{root}/referee.json", session, SCENARIO)
+        assert await judge.report("landing.touch_down", None) == {"verdict": "clean"}
+    assert queries == [{}] * 9 + [{"state": "landing.touch_down"}]
+
+
+async def test_a_disarming_that_never_comes_is_waited_for_in_vehicle_time(monkeypatch):
+    monkeypatch.setattr("framerunner.judges._POLL_S", 0.0)
+    never = [answer(time_us=500_000 * step, motors_on=True) for step in range(20)]
+    async with referee(*never) as (root, session, queries):
+        await TruthJudge(f"{root}/referee.json", session, SCENARIO).report("landing.touch_down", None)
+    assert len(queries) == 12 + 1  # 0 to 5.5 s, then the report
+
+
+async def test_a_referee_whose_clock_stands_still_is_not_waited_for(monkeypatch):
+    monkeypatch.setattr("framerunner.judges._CLOCK_STOPPED_S", 0.2)
+    async with referee(answer(time_us=7, motors_on=True)) as (root, session, queries):
+        await TruthJudge(f"{root}/referee.json", session, SCENARIO).report("landing.touch_down", None)
+    assert 2 <= len(queries) <= 5
+
+
 async def test_a_referee_that_is_gone_has_no_standing():
     async with aiohttp.ClientSession() as session:
         assert await ask_referee("http://127.0.0.1:9/referee.json", session) is None
@@ -114,6 +143,19 @@ async def test_telemetry_is_judged_as_it_comes():
     assert report["verdict"] == "aborted"
     assert "pilot took over" in report["reason"]
     assert report["path_length_m"] == pytest.approx(1.45, abs=0.1)
+
+
+@pytest.mark.parametrize(("x_m", "z_m"), [(-2.93, 0.3), (-2.93, 0.55), (-2.6, 0.55)])
+async def test_without_a_base_it_lands_where_the_base_would_be_or_beside_it(x_m, z_m):
+    """A floor may be soft, or the estimate low: what counts is the place in plan."""
+    judge = TelemetryJudge(SCENARIO, SCENARIO.base.top_m)
+    for tick in range(20):
+        judge.see(moment(10.0 + 0.05 * tick, -3.0, 0.55 + 0.05 * tick))
+    for tick in range(40):
+        judge.see(moment(20.0 + 0.05 * tick, x_m, z_m, armed=False))
+    report = await judge.report("landing.touch_down", None)
+    assert report["landed_on_base"] == (x_m == -2.93)
+    assert report["landing_error_m"] == pytest.approx(x_m + 3.0)
 
 
 async def test_telemetry_judges_when_the_simulator_has_died():

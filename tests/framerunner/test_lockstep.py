@@ -3,13 +3,16 @@
 import json
 import subprocess
 import sys
+from dataclasses import replace
 
+import cv2
 import pytest
 
 from framerunner.cli import run
 from framerunner.lockstep import fly_lockstep
 from offboard.mission import load_mission
 from scenarios.loader import load_scenario
+from tests.framerunner import reference_flights
 
 HASH = """
 from framerunner.lockstep import fly_lockstep
@@ -31,7 +34,7 @@ def fly(scenario, **options):
 
 @pytest.mark.parametrize("name", ["test-case-1", "test-case-2", "test-case-3"])
 def test_the_test_cases_are_completed(name):
-    flown = fly(load_scenario(name))
+    flown, _ = reference_flights.fly(name)
     result = flown.result
     assert result["verdict"] in ("clean", "completed"), result["reason"]
     assert result["frames_crossed"] == ("red", "green", "blue")
@@ -42,14 +45,44 @@ def test_the_test_cases_are_completed(name):
 
 def test_test_case_1_takes_about_as_long_as_the_paper_s_own_stabiliser():
     """92 s in a faithful reproduction; the mission's own gains set the pace, not the stabiliser."""
-    assert fly(load_scenario("test-case-1")).result["try_time_s"] == pytest.approx(92.0, rel=0.15)
+    flown, _ = reference_flights.fly("test-case-1")
+    assert flown.result["try_time_s"] == pytest.approx(92.0, rel=0.15)
 
 
 def test_round_1_turns_for_green_until_time_is_up():
-    result = fly(load_scenario("round-1")).result
+    result = reference_flights.fly("round-1")[0].result
     assert (result["verdict"], result["mission_state"]) == ("timed out", "green.turning")
     assert result["frames_crossed"] == ("red",)
     assert "not finished within" in result["reason"] or result["try_time_s"] == 180.0
+
+
+@pytest.mark.parametrize("name", reference_flights.SCENARIOS)
+def test_a_flight_is_the_stored_one(name):
+    """`make reference-flights` stores them again after a change that is meant to change flights."""
+    _, ticks = reference_flights.fly(name)
+    difference = reference_flights.first_difference(reference_flights.load(name), ticks)
+    if difference:
+        pytest.fail(difference, pytrace=False)
+
+
+def test_a_difference_from_a_stored_flight_is_located():
+    stored = reference_flights.load("test-case-1")
+    number = next(i for i, tick in enumerate(stored) if tick.mission_state == "green.frame_visible") + 10
+    tick = stored[number]
+
+    def difference(**changes):
+        changed = [*stored[:number], replace(tick, **changes), *stored[number + 1 :]]
+        return reference_flights.first_difference(stored, changed)
+
+    where = f"tick {number}, vehicle time {tick.time_us / 1e6:.2f} s, green.frame_visible: "
+    assert difference(x_mm=tick.x_mm + 19, yaw_mrad=tick.yaw_mrad + 19) is None
+    assert difference(y_mm=tick.y_mm - 21).startswith(f"{where}0.021 m apart")
+    assert difference(yaw_mrad=tick.yaw_mrad + 21).startswith(f"{where}yaw is ")
+    assert difference(mission_state="green.turning") == f"{where}state is green.turning"
+    assert difference(time_us=tick.time_us + 1).startswith(f"{where}time is ")
+    assert reference_flights.first_difference(stored, stored[:-2]) is None
+    shorter = reference_flights.first_difference(stored, stored[:-3])
+    assert shorter == f"{len(stored) - 3} ticks, stored {len(stored)}"
 
 
 def test_a_flight_repeats_to_the_last_bit_here_and_elsewhere():
@@ -82,13 +115,25 @@ def test_looking_on_changes_nothing():
     assert {moment.state.time_us % 50_000 for moment in flown} == {0, 2_000}
 
 
+def test_a_video_is_written_if_asked_for(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "short.yaml").write_text("name: short\ntry_limit_s: 2\n", encoding="utf-8")
+    run(["fly", "short.yaml", "--lockstep", "--video"])
+    (path,) = tmp_path.glob("runs/*/video.avi")
+    video = cv2.VideoCapture(str(path))
+    count = 0
+    while video.read()[0]:
+        count += 1
+    assert 20 <= count <= 80  # 10 a second, from before take-off
+
+
 def test_the_command_leaves_what_a_flight_in_real_time_leaves(tmp_path, capsys, monkeypatch):
     monkeypatch.chdir(tmp_path)
     (tmp_path / "short.yaml").write_text(
         "name: short\nbase: {x_m: 0, y_m: 0}\nstart: {x_m: 0, y_m: 0}\nframes: []\ntry_limit_s: 2\n",
         encoding="utf-8",
     )
-    code = run(["fly", "short.yaml", "--lockstep"])
+    code = run(["fly", "short.yaml", "--lockstep"])  # a video and a recording only if asked for
     said = capsys.readouterr()
     assert code == 1, said.err
     (folder,) = (tmp_path / "runs").iterdir()
@@ -97,10 +142,10 @@ def test_the_command_leaves_what_a_flight_in_real_time_leaves(tmp_path, capsys, 
         "result.json",
         "scenario.yaml",
         "track.png",
-        "video.avi",
     }
     result = json.loads((folder / "result.json").read_text(encoding="utf-8"))
-    assert said.out.startswith(f"{result['verdict']}: ")
+    assert said.out.startswith("timed out after 2.0 s")
+    assert said.out.splitlines()[-1] == f"see it again: framerunner replay runs/{folder.name}"
     assert (result["verdict"], result["seed"], result["judged_by"]) == ("timed out", 0, "truth")
     assert len(result["state_sha256"]) == 64
     assert result["wall_time_s"] > 0.0

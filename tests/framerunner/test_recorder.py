@@ -1,12 +1,15 @@
 """What a flight shows of itself is kept."""
 
+from threading import Event
+
 import cv2
 import numpy as np
 import pytest
 
-from framerunner.recorder import FlightRecorder, RecordingCamera
+from framerunner.recorder import FlightRecorder, RecordingCamera, VideoFile
 from offboard.app import Moment
 from offboard.drone import DroneState, VelocityCommand
+from tests.disk import disk_that_takes
 from vision.types import CameraFrame, Detections
 
 
@@ -64,11 +67,20 @@ async def test_images_are_handed_on_and_filmed(tmp_path):
     assert handed == [100_000 * number for number in range(8)]
     video = cv2.VideoCapture(str(tmp_path / "video.avi"))
     assert video.get(cv2.CAP_PROP_FPS) == pytest.approx(10.0)
+    assert camera.problem == ""
     levels = []
     while (image := video.read()[1]) is not None:
         assert image.shape == (48, 64, 3)
         levels.append(float(image.mean()))
     assert levels == pytest.approx([20.0 * number for number in range(8)], abs=4.0)
+
+
+async def test_a_video_that_the_disk_did_not_take_says_so(tmp_path):
+    camera = RecordingCamera(Source(8), tmp_path / "video.avi", 10.0)
+    with disk_that_takes(6000):
+        assert len([frame async for frame in camera.frames()]) == 8
+        camera.close()
+    assert camera.problem == f"'{tmp_path}/video.avi' is not whole: the disk did not take it"
 
 
 async def test_without_images_there_is_no_video(tmp_path):
@@ -77,3 +89,18 @@ async def test_without_images_there_is_no_video(tmp_path):
     camera.close()
     camera.close()
     assert not (tmp_path / "video.avi").exists()
+
+
+def test_a_film_that_falls_behind_leaves_images_out_instead_of_keeping_them(tmp_path, monkeypatch):
+    free = Event()
+    compress = VideoFile._compress
+    monkeypatch.setattr(VideoFile, "_compress", lambda self, image: (free.wait(10), compress(self, image)))
+    film = VideoFile(tmp_path / "video.avi", 10.0)
+    for _ in range(10):
+        film.write(np.zeros((1080, 1920, 3), np.uint8), wait=False)
+        film.write(np.zeros((48, 64, 3), np.uint8), wait=False)  # a camera that changes its mind
+    free.set()
+    film.close()
+    video = cv2.VideoCapture(str(tmp_path / "video.avi"))
+    assert video.get(cv2.CAP_PROP_FRAME_COUNT) == 3  # of 6 MB each, and 12 MB may wait
+    assert video.read()[1].shape == (1080, 1920, 3)

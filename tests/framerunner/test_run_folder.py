@@ -45,6 +45,15 @@ def test_a_flight_that_did_not_begin_leaves_nothing(tmp_path):
     assert not folder.path.exists()
 
 
+def test_a_flight_that_was_stopped_before_it_began_leaves_nothing(tmp_path):
+    folder = RunFolder(tmp_path / "runs", "empty")
+    folder.tlog.write_bytes(b"while it was connecting")
+    folder.video.write_bytes(b"from the ground")
+    folder.stopped_before_start = True
+    folder.remove_if_empty()
+    assert list(tmp_path.iterdir()) == []
+
+
 def test_what_was_recorded_stays(tmp_path):
     folder = RunFolder(tmp_path, "empty")
     folder.scenario.write_text("name: empty\n", encoding="utf-8")

@@ -156,6 +156,17 @@ def test_noise_between_packets_is_passed_over():
     link.close()
 
 
+@pytest.mark.parametrize("noise", [b"\xfd\xff\x00", b"\xfe\x09"])
+def test_a_false_header_costs_no_packet_that_follows(noise):
+    port = free_port()
+    link = open_link(f"udpin://127.0.0.1:{port}")
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as vehicle:
+        vehicle.sendto(noise + b"".join(packet(count) for count in range(20)), ("127.0.0.1", port))
+        heard = [message for message in link.receive(1.0) if message.get_type() == "HEARTBEAT"]
+        assert [message.get_seq() for message in heard] == list(range(20))
+    link.close()
+
+
 @pytest.mark.parametrize(
     ("url", "words"),
     [

@@ -1,9 +1,13 @@
 """What a drone lacks, and what is said of it."""
 
+import struct
+
 import pytest
 
 from firmware_py.mavlink.dialect import mavlink
-from framerunner.doctor.checks import Level, can_fly, examine
+from framerunner.doctor.arming import SUMMARY, event_id
+from framerunner.doctor.checks import examine
+from framerunner.doctor.findings import Level, can_fly
 from framerunner.doctor.record import Record
 
 GOOD_PARAMETERS = {
@@ -12,7 +16,10 @@ GOOD_PARAMETERS = {
     "COM_LOW_BAT_ACT": 2.0,
     "COM_OBL_RC_ACT": 4.0,
     "COM_OF_LOSS_T": 1.0,
-    "EKF2_HGT_REF": 2.0,
+    "EKF2_DELAY_MAX": 20.0,
+    "EKF2_EVP_NOISE": 0.01,
+    "EKF2_EV_CTRL": 15.0,
+    "EKF2_HGT_REF": 3.0,
     "GF_ACTION": 2.0,
     "GF_MAX_VER_DIST": 0.0,
     "MC_YAWRATE_MAX": 200.0,
@@ -38,12 +45,26 @@ def version(capabilities=0xE8FF):
     )
 
 
+def estimator_status(flags=431, horizontal_m=0.0028, vertical_m=0.002):
+    return mavlink.MAVLink_estimator_status_message(0, flags, 0, 0, 0, 0, 0, 0, horizontal_m, vertical_m)
+
+
+def event(name, layout, *arguments, level=3):
+    packed = struct.pack(layout, *arguments).ljust(40, b"\0")
+    return mavlink.MAVLink_event_message(0, 0, event_id(name), 0, 0, level << 4 | level, list(packed))
+
+
+def summary(armable_modes):
+    return event("commander_arming_check_summary", "<BIIII", 0, 0x1100000, 0x80, armable_modes, armable_modes)
+
+
 def healthy(**parameters):
     record = Record(system_id=1)
     for message in (
         heartbeat(),
         sys_status(),
         version(),
+        estimator_status(),
         mavlink.MAVLink_extended_sys_state_message(0, mavlink.MAV_LANDED_STATE_ON_GROUND),
     ):
         record.latest[message.get_type()] = message
@@ -102,7 +123,9 @@ def test_what_a_message_shows_to_be_missing(message, subject):
     ],
 )
 def test_parameters_that_would_end_the_flight(name, value):
-    assert missing(healthy(**{name: value})) == {name}
+    record = healthy(**{name: value})
+    record.latest["ESTIMATOR_STATUS"] = estimator_status(*VISION_AND_GPS[0])
+    assert missing(record) == {name}
 
 
 def test_a_fence_that_does_nothing_is_no_fence():
@@ -137,6 +160,94 @@ def test_an_estimate_that_wanders_is_noted():
     record = healthy()
     record.places.append((0.0, 0.0, 0.4))
     assert notes(record) == {"estimate"}
+
+
+# What PX4 v1.17.0 sent (SIH quadrotor): ESTIMATOR_STATUS, whether hold's checks passed, their summary.
+GPS = (1023, 0.2928, 0.0716), True, 0x807F3AB0
+GPS_AND_RANGE_FINDER = (959, 0.2917, 0.0646), True, 0x807F3AB0
+VISION = (431, 0.0028, 0.0020), False, 0x807F3A80
+VISION_WANTED = (165, 0.0127, 0.3256), False, 0x80013A80  # nobody sends it, or with estimator type MOCAP
+VISION_AND_GPS = (959, 0.0183, 0.0170), True, 0x807F3AB0
+
+
+@pytest.mark.parametrize(
+    ("told", "parameters", "lacks"),
+    [
+        (GPS, {"EKF2_EV_CTRL": 0.0, "EKF2_HGT_REF": 1.0}, {"position", "height"}),
+        (GPS, {"EKF2_EV_CTRL": 15.0, "EKF2_HGT_REF": 3.0}, {"position", "height"}),
+        (GPS_AND_RANGE_FINDER, {"EKF2_EV_CTRL": 0.0, "EKF2_HGT_REF": 2.0}, {"position"}),
+        (VISION, {}, set()),
+        (VISION, {"EKF2_HGT_REF": 0.0}, {"height"}),
+        (VISION, {"EKF2_EV_CTRL": 13.0}, {"height"}),
+        (VISION, {"EKF2_HGT_REF": 2.0, "EKF2_RNG_CTRL": 0.0}, {"height"}),
+        (VISION, {"EKF2_DELAY_MAX": 110.0}, {"estimator"}),
+        (VISION_WANTED, {}, {"pre-arm checks", "position", "height"}),
+        (VISION_AND_GPS, {}, set()),
+    ],
+)
+def test_the_verdict_on_what_px4_says_of_its_estimate(told, parameters, lacks):
+    estimate, passed, armable_modes = told
+    record = healthy(**parameters)
+    record.counts["DISTANCE_SENSOR"] = 60
+    record.latest["ESTIMATOR_STATUS"] = estimator_status(*estimate)
+    record.latest["SYS_STATUS"] = sys_status(health=ALL if passed else ALL & ~0x10000000)
+    record.arming.take(summary(armable_modes))
+    assert missing(record) == lacks
+
+
+def finding_of(record, subject):
+    (finding,) = (finding for finding in examine(record) if finding.subject == subject)
+    return finding
+
+
+def test_the_height_is_said_to_come_from_what_is_used_not_from_what_is_wished():
+    record = healthy()
+    assert finding_of(record, "height").text == "by vision, estimated accuracy 0.00 m"
+    record.latest["ESTIMATOR_STATUS"] = estimator_status(*VISION_WANTED[0])
+    height = finding_of(record, "height")
+    assert height.text.startswith(
+        "by barometer, though EKF2_HGT_REF asks for vision, estimated accuracy 0.33 m"
+    )
+    assert "not MOCAP" in finding_of(record, "position").mend
+    assert height.mend == "as for the position"
+    record.latest["ESTIMATOR_STATUS"] = estimator_status(*GPS[0])
+    assert "the drone will stray" in finding_of(record, "position").text
+
+
+def test_an_ideal_drone_with_a_position_from_gps_can_fly():
+    record = healthy()
+    del record.parameters["EKF2_HGT_REF"], record.parameters["EKF2_EV_CTRL"]
+    record.latest["ESTIMATOR_STATUS"] = estimator_status(959, 0.0, 0.0)
+    assert missing(record) == set()
+
+
+def test_what_keeps_it_from_arming_in_offboard_is_named():
+    record = healthy()
+    record.latest["SYS_STATUS"] = sys_status(health=0x2F)
+    assert "it does not tell why" in finding_of(record, "pre-arm checks").mend
+    for message in (
+        summary(0),
+        event("check_modes_global_pos", "<IB", 0x38, 24),
+        event("check_modes_offboard_signal", "<IB", 0x4000, 20),
+        event("check_modes_manual_control", "<IB", 0xFFFFFFFF, 7, level=4),  # a warning
+        event("check_rc_dl_no_dllink", "<IB", 0xFFFFFFFF, 12),
+    ):
+        record.arming.take(message)
+    checks = finding_of(record, "pre-arm checks")
+    assert (checks.level, checks.text) == (Level.MISSING, "not passed in hold: no ground station is heard")
+    record.arming.take(summary(VISION[2]))
+    assert finding_of(record, "pre-arm checks").text == "passed for offboard, where fly arms it; not in hold"
+
+
+def test_the_summary_is_known_by_its_number():
+    assert SUMMARY == 0x01A893E0  # as PX4 sends it
+
+
+def test_a_fence_of_px4_without_a_global_position_is_noted():
+    record = healthy(GF_MAX_VER_DIST=3.5)
+    assert notes(record) == {"fence"}
+    record.latest["ESTIMATOR_STATUS"] = estimator_status(*VISION_AND_GPS[0])
+    assert notes(record) == set()
 
 
 @pytest.mark.parametrize("action", [0.0, 3.0])

@@ -1,12 +1,14 @@
 """A visit to a vehicle on a wire that needs no time: what is asked, and that nothing is changed."""
 
 import itertools
+import struct
 
 import pytest
 
 from firmware_py.mavlink.dialect import mavlink
 from framerunner.cli import run
 from framerunner.doctor import visit
+from framerunner.doctor.arming import SUMMARY
 from framerunner.doctor.questions import PARAMETERS
 from framerunner.doctor.record import Record
 
@@ -20,6 +22,7 @@ class StillVehicle:
         self.url = "a wire"
         self.clock, self.armed, self.mute = clock, armed, mute
         self.sent = []
+        self.reports = False
         self._codec = mavlink.MAVLink(None, srcSystem=1, srcComponent=1)
         self._reader = mavlink.MAVLink(None)
         self._asker = mavlink.MAVLink(None, srcSystem=visit.SYSTEM_ID, srcComponent=visit.COMPONENT_ID)
@@ -33,6 +36,10 @@ class StillVehicle:
             self._answers.append(
                 mavlink.MAVLink_param_value_message(message.param_id.encode(), 2.5, 9, 100, 0)
             )
+        if message.get_type() == "COMMAND_LONG" and message.command == mavlink.MAV_CMD_RUN_PREARM_CHECKS:
+            arguments = list(struct.pack("<BIIII", 0, 0, 0, 0x807F3A80, 0).ljust(40, b"\0"))
+            report = mavlink.MAVLink_event_message(0, 0, SUMMARY, 0, 0, 0x88, arguments)
+            self._answers += [report] if self.reports else []
         if message.get_type() == "COMMAND_LONG" and message.param1 == 242:
             self._answers.append(
                 mavlink.MAVLink_home_position_message(1, 2, 3, 0, 0, 0, [1, 0, 0, 0], 0, 0, 0)
@@ -95,6 +102,15 @@ def test_what_is_not_answered_is_asked_again_and_what_is_answered_is_not(clock):
     assert asked.count("MPC_THR_HOVER") > 3
     assert asked.count("RTL_RETURN_ALT") == 1
     assert "MPC_THR_HOVER" not in record.parameters
+
+
+@pytest.mark.parametrize(("reports", "asked"), [(True, 1), (False, 3)])
+def test_the_arming_report_is_asked_for_until_it_comes(clock, reports, asked):
+    vehicle = StillVehicle(clock)
+    vehicle.reports = reports
+    assert visited(vehicle).arming.ready_for_offboard is reports
+    checks = [message for message in vehicle.sent if message.get_type() == "COMMAND_LONG"]
+    assert [check.command for check in checks].count(mavlink.MAV_CMD_RUN_PREARM_CHECKS) == asked
 
 
 def test_to_an_armed_vehicle_it_is_no_ground_station_and_asks_for_no_checks(clock):

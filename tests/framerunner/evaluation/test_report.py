@@ -126,7 +126,7 @@ def test_the_table_has_a_row_a_flight_and_gives_the_numbers_back():
     rows = [
         made_row("a", seconds_in_state={"turning": 3.1999999999999997, "crossing": 4.0}),
         made_row("b", "timed out", reason='he said "no", twice'),
-        made_row("c", "error", reason="ValueError: no"),
+        made_row("c", "error", reason="＝cmd|' /C calc'!A0"),
     ]
     text = csv_text(rows)
     assert text == csv_text(rows)
@@ -141,7 +141,7 @@ def test_the_table_has_a_row_a_flight_and_gives_the_numbers_back():
         "",
     )
     assert read[1]["reason"] == 'he said "no", twice'
-    assert read[2]["verdict"] == "error"
+    assert (read[2]["verdict"], read[2]["reason"]) == ("error", "'＝cmd|' /C calc'!A0")
     assert {read[2][name] for name in ("try_time_s", "contacts", "landed_on_base", "ended")} == {""}
     assert "wall_time_s" not in read[0]
 

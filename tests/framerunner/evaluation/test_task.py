@@ -1,5 +1,6 @@
 """One flight of an evaluation: its row, and that nothing that goes wrong in it comes out of it."""
 
+import json
 from dataclasses import replace
 
 import pytest
@@ -37,6 +38,12 @@ def test_a_row_has_the_result_s_fields_and_order():
     assert row.as_dict() == result
     assert (row.verdict, row.landed, row.cause) == ("timed out", False, "take_off.set_base")
     assert row.traceback == ""
+
+
+def test_a_row_of_before_the_box_can_be_read():
+    told = json.loads(made_row("calm-1").to_json())
+    del told["kept_in_box_s"]
+    assert Row.from_json(json.dumps(told)) == made_row("calm-1")
 
 
 def test_a_failed_flight_brings_its_track_thinned_out():

@@ -1,0 +1,124 @@
+"""Reads an MCAP file chunk by chunk within bounds: what it claims of its sizes is checked, not believed.
+
+MCAP's own reader unpacks a chunk to whatever it holds; some kilobytes can hold gigabytes.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Iterator
+from dataclasses import replace
+from heapq import heapify, heappop, heappush
+from typing import BinaryIO
+
+import zstandard
+from mcap.data_stream import ReadDataStream
+from mcap.reader import SeekingReader
+from mcap.records import Channel, Chunk, ChunkIndex, Message
+from mcap.stream_reader import breakup_chunk
+from mcap.summary import Summary
+
+from framerunner.recording.errors import RecordingError
+
+MAX_CHUNK_BYTES = 24 << 20
+"""Of a chunk, packed or not; the writer ends one at a megabyte and the message that exceeds it."""
+_MAX_WAITING_BYTES = 256 << 20  # of messages in memory, each with what Python adds
+_MESSAGE_OVERHEAD_BYTES = 400
+_RECORD_HEAD_BYTES = 9
+
+_Waiting = tuple[int, int, int, ChunkIndex | Message]
+
+
+class BoundedFile:
+    """A file of which nobody reads more than a chunk at once, whatever length stands in it.
+
+    Args:
+        file: to read from.
+    """
+
+    def __init__(self, file: BinaryIO) -> None:
+        self._file = file
+
+    def read(self, size: int = -1) -> bytes:
+        """Read some bytes; raises `RecordingError` if more are asked for than any record may have."""
+        if not 0 <= size <= MAX_CHUNK_BYTES:
+            raise RecordingError(f"a part of it is said to have {size} bytes; {MAX_CHUNK_BYTES} are the most")
+        return self._file.read(size)
+
+    def seek(self, offset: int, whence: int = 0) -> int:
+        """As a file's."""
+        return self._file.seek(offset, whence)
+
+    def tell(self) -> int:
+        """As a file's."""
+        return self._file.tell()
+
+
+def summary_of(reader: SeekingReader) -> Summary:
+    """Return a file's index.
+
+    Raises:
+        RecordingError: it has none, or it names a part twice.
+    """
+    summary = reader.get_summary()
+    if summary is None or not summary.chunk_indexes:
+        raise RecordingError("it has no index")
+    places = {index.chunk_start_offset for index in summary.chunk_indexes}
+    if len(places) != len(summary.chunk_indexes):
+        raise RecordingError("its index names a chunk twice")
+    return summary
+
+
+def messages(
+    file: BoundedFile, summary: Summary, topics: Collection[str]
+) -> Iterator[tuple[Channel, Message]]:
+    """Give the messages of some topics in order of their time.
+
+    Args:
+        file: of which the summary is.
+        summary: its index.
+        topics: which are wanted.
+
+    Raises:
+        RecordingError: a chunk is larger than a recording's can be.
+    """
+    wanted = {number: each for number, each in summary.channels.items() if each.topic in topics}
+    waiting: list[_Waiting] = [
+        (index.message_start_time, index.chunk_start_offset, -1, index)
+        for index in summary.chunk_indexes
+        if not index.message_index_offsets or wanted.keys() & index.message_index_offsets.keys()
+    ]
+    heapify(waiting)
+    waiting_bytes = 0
+    while waiting:
+        _, place, _, item = heappop(waiting)
+        if isinstance(item, Message):
+            waiting_bytes -= len(item.data) + _MESSAGE_OVERHEAD_BYTES
+            yield wanted[item.channel_id], item
+            continue
+        file.seek(place + _RECORD_HEAD_BYTES)
+        chunk = Chunk.read(ReadDataStream(file))  # type: ignore[arg-type]
+        for number, record in enumerate(breakup_chunk(_unpacked(chunk), validate_crc=True)):
+            if isinstance(record, Message) and record.channel_id in wanted:
+                heappush(waiting, (record.log_time, place, number, record))
+                waiting_bytes += len(record.data) + _MESSAGE_OVERHEAD_BYTES
+        if waiting_bytes > _MAX_WAITING_BYTES:
+            raise RecordingError("too much of it is of the same time")
+
+
+def _unpacked(chunk: Chunk) -> Chunk:
+    size = chunk.uncompressed_size
+    if size > MAX_CHUNK_BYTES:
+        raise RecordingError(f"a chunk is said to hold {size} bytes; {MAX_CHUNK_BYTES} are the most")
+    if chunk.compression not in ("", "zstd"):
+        raise RecordingError(f"compressed by '{chunk.compression:.20}'; recordings use zstd")
+    data = chunk.data
+    if chunk.compression == "zstd" and size:
+        told = zstandard.get_frame_parameters(data).content_size
+        if told not in (size, zstandard.CONTENTSIZE_UNKNOWN):
+            raise RecordingError("a chunk holds another number of bytes than it says")
+        data = zstandard.ZstdDecompressor(max_window_size=MAX_CHUNK_BYTES).decompress(
+            data, max_output_size=size
+        )
+    if len(data) != size:
+        raise RecordingError("a chunk holds another number of bytes than it says")
+    return replace(chunk, compression="", data=data)

@@ -1,0 +1,130 @@
+"""The process that reads a run: bounded in memory and time, and never without its parent."""
+
+import subprocess
+import sys
+import threading
+import time
+from pathlib import Path
+
+import pytest
+
+from framerunner.monitoring import run_library
+from framerunner.monitoring.run_library import RunFolders
+from monitor.ports import RunError
+
+GREEDY = """
+from framerunner.monitoring.read_run import limit_resources
+limit_resources({memory}, 100)
+try:
+    held = bytearray(200_000_000)
+except MemoryError:
+    print("refused")
+"""
+PARENT = """
+import sys
+from pathlib import Path
+from framerunner.monitoring import run_library
+run_library.sys = type("S", (), {{"executable": {script!r}}})
+run_library._unpack(Path({folder!r}), (), run_library.Readers())
+"""
+
+
+def is_alive(pid):
+    """Whether a process is there and does something."""
+    try:
+        return Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()[0] != "Z"
+    except OSError:
+        return False
+
+
+def until(condition, limit_s=30.0):
+    end_s = time.monotonic() + limit_s
+    while not (found := condition()):
+        assert time.monotonic() < end_s, "did not come"
+        time.sleep(0.02)
+    return found
+
+
+def slow_reader(tmp_path):
+    """A program that does what the reader does before it reads, says its process id, and then never ends."""
+    said = tmp_path / "pid"
+    code = (
+        "import os, time\n"
+        "from framerunner.lifeline import end_with_standard_input\n"
+        "end_with_standard_input(lambda: None)\n"
+        f"open({str(said)!r}, 'w').write(str(os.getpid()) + '\\n')\n"
+        "while True: sum(range(10**6))\n"
+    )
+    script = tmp_path / "python"
+    script.write_text(f"#!{sys.executable}\n{code}", encoding="utf-8")
+    script.chmod(0o755)
+    return script, said
+
+
+def pid_in(said):
+    text = said.read_text() if said.exists() else ""
+    return int(text) if text.endswith("\n") else None
+
+
+def test_memory_is_limited():
+    for memory, words in ((100_000_000, "refused\n"), (1_000_000_000, "")):
+        done = subprocess.run(
+            [sys.executable, "-c", GREEDY.format(memory=memory)], capture_output=True, text=True, check=True
+        )
+        assert done.stdout == words
+
+
+def test_the_reader_ends_when_its_parent_is_killed(tmp_path):
+    script, said = slow_reader(tmp_path)
+    code = PARENT.format(script=str(script), folder=str(tmp_path / "run"))
+    parent = subprocess.Popen([sys.executable, "-c", code])
+    try:
+        pid = until(lambda: pid_in(said))
+        assert is_alive(pid)
+    finally:
+        parent.kill()
+        parent.wait()
+    until(lambda: not is_alive(pid))
+
+
+def test_closing_the_library_breaks_off_what_is_read(tmp_path, monkeypatch):
+    script, said = slow_reader(tmp_path)
+    monkeypatch.setattr(run_library.sys, "executable", str(script))
+    folder = tmp_path / "runs" / "slow"
+    folder.mkdir(parents=True)
+    (folder / "flight.tlog").write_bytes(b"\0")
+    library = RunFolders(tmp_path / "runs")
+    told = []
+
+    def read():
+        with pytest.raises(RunError) as refused:
+            library.recording("slow")
+        told.append(str(refused.value))
+
+    reading = threading.Thread(target=read)
+    reading.start()
+    pid = until(lambda: pid_in(said))
+    library.close()
+    reading.join(20)
+    assert told == ["run 'slow': reading it takes too long"]
+    assert not is_alive(pid)
+    with pytest.raises(RunError, match="takes too long"):
+        library.recording("slow")  # not tried again at once
+
+
+def test_what_could_not_be_read_is_not_read_again_until_it_changes(tmp_path, monkeypatch):
+    folder = tmp_path / "bad"
+    folder.mkdir()
+    (folder / "flight.mcap").write_bytes(b"no recording")
+    library = RunFolders(tmp_path)
+    with pytest.raises(RunError, match="not an MCAP file"):
+        library.recording("bad")
+    started = []
+    monkeypatch.setattr(library._readers, "run", lambda command: started.append(command) or (1, ""))
+    with pytest.raises(RunError, match="not an MCAP file"):
+        library.recording("bad")
+    assert started == []
+    (folder / "flight.mcap").write_bytes(b"another")
+    with pytest.raises(RunError, match="it is damaged"):
+        library.recording("bad")
+    assert len(started) == 1

@@ -1,0 +1,399 @@
+"""The real app and its MAVSDK adapter over a bad link, in simulated time.
+
+All of the app runs: mission, box, `MavsdkDrone`, its telemetry feed, `CameraEyes` and the detector. In place
+of MAVSDK and UDP there is a link whose two ways lose, swap, double, delay and fall silent, by a seed; at its
+other end are the simulation's autopilot and camera. The event loop's clock is the simulation's: where it
+would wait, the simulation moves on. So a flight needs no real time and repeats exactly.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import heapq
+import json
+import selectors
+from dataclasses import dataclass, field
+from math import degrees, radians
+from random import Random
+from types import SimpleNamespace
+
+from mavsdk.exceptions import MavsdkError
+
+from firmware_py.setpoints import setpoint_from_body_velocity
+from firmware_py.status import CommandResult, FlightMode, LandedState
+from framerunner.flight import _start
+from offboard.app import Moment, Outcome, fly_mission
+from offboard.keep_in_box import Box, flight_box
+from offboard.link.setpoints import SetpointStream
+from offboard.link.telemetry import TelemetryFeed
+from offboard.link.ticks import TickSource
+from offboard.mavsdk_drone import MavsdkDrone
+from offboard.mission import Mission
+from scenarios.models import Scenario
+from scenarios.truth import TrueState
+from sitl.camera_feed import CameraFeed
+from sitl.simulation import Simulation
+from vision.types import CameraFrame
+
+TELEMETRY_US = 20_000
+HEARTBEAT_US = 1_000_000
+SETPOINT_US = 50_000
+LATENCY_US = 2_000
+OVERTAKEN_BY_US = 8_000
+AFTER_US = 2_500_000
+
+
+@dataclass(frozen=True)
+class Impairment:
+    """What a link does to datagrams, both ways and images alike.
+
+    Attributes:
+        loss: share that is lost.
+        swap_every_s: so often, one datagram is overtaken by the next one.
+        doubled: share that comes twice.
+        delay_s: of each.
+        jitter_s: at most so much is added, uniformly.
+        silent_s: begin and end of a time in which all is lost, vehicle time.
+    """
+
+    loss: float = 0.0
+    swap_every_s: float = 0.0
+    doubled: float = 0.0
+    delay_s: float = 0.0
+    jitter_s: float = 0.0
+    silent_s: tuple[float, float] = (0.0, 0.0)
+
+
+class Way:
+    """One way of a link. A datagram is what is to be done when it arrives."""
+
+    def __init__(self, impairment: Impairment, random: Random):
+        self._is, self._random = impairment, random
+        self._under_way = []
+        self._overtaken = None
+        self._swap_us = impairment.swap_every_s * 1e6
+        self._number = 0
+
+    def send(self, now_us, arrive):
+        how, draw = self._is, self._random.random
+        if how.silent_s[0] <= now_us / 1e6 < how.silent_s[1] or draw() < how.loss:
+            return
+        if how.swap_every_s and now_us >= self._swap_us and self._overtaken is None:
+            self._swap_us = now_us + how.swap_every_s * 1e6
+            self._overtaken = arrive
+            return
+        self._put(now_us, arrive)
+        if self._overtaken is not None:
+            self._put(now_us + OVERTAKEN_BY_US, self._overtaken)
+            self._overtaken = None
+        if draw() < how.doubled:
+            self._put(now_us, arrive)
+
+    def deliver(self, now_us):
+        while self._under_way and self._under_way[0][0] <= now_us:
+            heapq.heappop(self._under_way)[2]()
+
+    def _put(self, now_us, arrive):
+        how = self._is
+        delay_us = LATENCY_US + 1e6 * (how.delay_s + how.jitter_s * self._random.random())
+        self._number += 1
+        heapq.heappush(self._under_way, (now_us + delay_us, self._number, arrive))
+
+
+class LinkedVehicle:
+    """A simulation and the link to it."""
+
+    def __init__(self, scenario: Scenario, impairment: Impairment, seed: int):
+        self.simulation = Simulation(scenario)
+        self.autopilot = self.simulation.autopilot
+        self.truths: list[TrueState] = []
+        self.down = Way(impairment, Random(f"down {seed}"))
+        self.up = Way(impairment, Random(f"up {seed}"))
+        self.video = Way(impairment, Random(f"video {seed}"))
+        self.telemetry, self.direct = Callbacks(), Callbacks()
+        self.offboard = Offboard(self)
+        self.images: asyncio.Queue[CameraFrame] = asyncio.Queue()
+        self._camera = CameraFeed(scenario)
+        self._telemetry_us = self._heartbeat_us = 0
+
+    @property
+    def time_us(self):
+        return self.simulation.time_us
+
+    def time_s(self):
+        return self.simulation.time_us / 1e6
+
+    def tick(self):
+        self.simulation.tick()
+        truth, now_us = self.simulation.truth, self.time_us
+        self.truths.append(truth)
+        if truth.time_us >= self._camera.next_us and (arrived := self._camera.step(truth)) is not None:
+            frame = CameraFrame(image=arrived[1], time_us=arrived[0], received_s=now_us / 1e6)
+            self.video.send(now_us, lambda: self.images.put_nowait(frame))
+        if now_us >= self._telemetry_us:
+            self._telemetry_us += TELEMETRY_US
+            self._tell_motion(now_us)
+        if now_us >= self._heartbeat_us:
+            self._heartbeat_us += HEARTBEAT_US
+            self._tell_condition(now_us)
+        self.offboard.update(now_us)
+        for way in (self.up, self.down, self.video):
+            way.deliver(now_us)
+
+    def _tell_motion(self, now_us):
+        state = self.autopilot.state
+        euler = SimpleNamespace(yaw_deg=degrees(state.yaw_rad), timestamp_us=state.time_us)
+        told = {"time_boot_ms": state.time_us // 1000}
+        told |= zip("xyz", state.position_ned_m, strict=True)
+        told |= zip(("vx", "vy", "vz"), state.velocity_ned_m_s, strict=True)
+        position = SimpleNamespace(fields_json=json.dumps(told))
+
+        def arrive():
+            self.direct.call("LOCAL_POSITION_NED", position)
+            self.telemetry.call("attitude_euler", euler)
+
+        self.down.send(now_us, arrive)
+
+    def _tell_condition(self, now_us):
+        status = self.autopilot.status
+        armed, mode, ready = status.armed, status.mode, status.ready
+        landed = status.landed_state is LandedState.ON_GROUND
+
+        def arrive():
+            self.offboard.hear_mode(mode)
+            call = self.telemetry.call
+            call("armed", armed)
+            call("flight_mode", SimpleNamespace(name=mode.name))
+            call("landed_state", SimpleNamespace(name="ON_GROUND" if landed else "IN_AIR"))
+            call("health", SimpleNamespace(is_armable=ready))
+
+        self.down.send(now_us, arrive)
+
+    async def command(self, act):
+        """As MAVSDK: asked four times, half a second apart, until an acknowledgement comes."""
+        answered = asyncio.get_running_loop().create_future()
+
+        def at_vehicle():
+            result = act()
+            self.down.send(self.time_us, lambda: answered.done() or answered.set_result(result))
+
+        for _ in range(4):
+            self.up.send(self.time_us, at_vehicle)
+            try:
+                result = await asyncio.wait_for(asyncio.shield(answered), 0.5)
+            except TimeoutError:
+                continue
+            if result is not CommandResult.ACCEPTED:
+                raise MavsdkError(result.name)
+            return
+        raise MavsdkError("TIMEOUT")
+
+
+class Callbacks:
+    """What is subscribed to."""
+
+    def __init__(self):
+        self._called = {}
+
+    def __getattr__(self, name):
+        return lambda callback: self._called.__setitem__(name.removeprefix("subscribe_"), callback)
+
+    def subscribe_message(self, name, callback):
+        self._called[name] = callback
+
+    def call(self, name, value):
+        if name in self._called:
+            self._called[name](value, None)
+
+
+class Offboard:
+    """As MAVSDK's plugin: a setpoint goes out at once and on at 20 Hz, until another mode is heard."""
+
+    def __init__(self, vehicle):
+        self._vehicle = vehicle
+        self._plugin = self
+        self._velocity = None
+        self._due_us = self._asked_us = 0
+
+    def set_velocity_body(self, told):
+        self._velocity = ((told.forward_m_s, told.right_m_s, told.down_m_s), radians(told.yawspeed_deg_s))
+        self._due_us = 0
+        self.update(self._vehicle.time_us)
+
+    def update(self, now_us):
+        if self._velocity is None or now_us < self._due_us:
+            return
+        self._due_us = now_us + SETPOINT_US
+        (velocity, yaw_rate), autopilot = self._velocity, self._vehicle.autopilot
+
+        def arrive():
+            state = autopilot.state
+            autopilot.accept_setpoint(
+                setpoint_from_body_velocity(velocity, yaw_rate, state.yaw_rad, state.time_us)
+            )
+
+        self._vehicle.up.send(now_us, arrive)
+
+    def hear_mode(self, mode):
+        if mode is not FlightMode.OFFBOARD and self._vehicle.time_us > self._asked_us + 3_000_000:
+            self._velocity = None
+
+    def destroy(self):
+        self._velocity = None
+
+    async def start(self):
+        self._asked_us = self._vehicle.time_us
+        await self._vehicle.command(lambda: self._vehicle.autopilot.set_mode(FlightMode.OFFBOARD))
+
+    async def stop(self):
+        self._velocity = None
+        await self._vehicle.command(lambda: self._vehicle.autopilot.set_mode(FlightMode.HOLD))
+
+
+class LinkedDrone(MavsdkDrone):
+    """The adapter with the simulated link in place of MAVSDK's."""
+
+    def __init__(self, vehicle: LinkedVehicle, scenario: Scenario, box: Box | None):
+        super().__init__("udpin://127.0.0.1:14540", start_arena=_start(scenario), box=box)
+        self._vehicle = vehicle
+        self._feed = TelemetryFeed(vehicle.time_s)
+        self._ticks = TickSource(self._feed)
+        self._watchdog = SimpleNamespace(start=lambda: None, stop=lambda: None, tripped_after_s=0.0)
+
+    async def connect(self):
+        vehicle, autopilot = self._vehicle, self._vehicle.autopilot
+        self._action = SimpleNamespace(
+            arm=lambda: vehicle.command(autopilot.arm),
+            kill=lambda: vehicle.command(lambda: autopilot.disarm(force=True)),
+            land=lambda: vehicle.command(autopilot.land),
+            hold=vehicle.offboard.stop,
+        )
+        self._setpoints = SetpointStream(vehicle.offboard)
+        self._telemetry = SimpleNamespace(
+            set_rate_attitude_euler=_refuse, set_rate_position_velocity_ned=_refuse
+        )
+        self._feed.subscribe(vehicle.telemetry, vehicle.direct)
+
+
+async def _refuse(_rate_hz):
+    raise MavsdkError("UNSUPPORTED")
+
+
+class _Selector(selectors.DefaultSelector):
+    """Waits by letting the simulation move on until something happens in the loop."""
+
+    vehicle: LinkedVehicle
+    loop: SimulatedTimeLoop
+
+    def select(self, timeout=None):
+        ready = super().select(0)
+        end_s = float("inf") if timeout is None else self.vehicle.time_s() + timeout
+        while not ready and not self.loop._ready and self.vehicle.time_s() < end_s:
+            self.vehicle.tick()
+        return ready
+
+
+class SimulatedTimeLoop(asyncio.SelectorEventLoop):
+    """An event loop whose clock is a simulation's."""
+
+    def __init__(self, vehicle: LinkedVehicle):
+        self._vehicle = vehicle
+        selector = _Selector()
+        selector.vehicle, selector.loop = vehicle, self
+        super().__init__(selector)
+
+    def time(self):
+        return self._vehicle.time_s()
+
+    def run_in_executor(self, executor, func, *args):
+        future = self.create_future()
+        future.set_result(func(*args))
+        return future
+
+
+@dataclass
+class LinkedFlight:
+    """What came of a flight.
+
+    Attributes:
+        outcome: as the app tells it.
+        flown: how many of the truths there were when the app ended.
+        box: in which it was to stay.
+        truths: of every control tick, to some seconds after its end.
+        mode: of the vehicle at the end.
+        armed: likewise.
+        moments: every tick of the mission.
+    """
+
+    outcome: Outcome
+    flown: int
+    box: Box
+    truths: list[TrueState]
+    mode: FlightMode
+    armed: bool
+    frames: tuple[str, ...]
+    moments: list[Moment] = field(default_factory=list)
+
+    @property
+    def ended_safely(self) -> bool:
+        """Completed and disarmed, or in hold or landing (or landed)."""
+        if self.outcome.ended == "finished":
+            return not self.armed
+        return not self.armed or self.mode in (FlightMode.HOLD, FlightMode.LAND)
+
+    @property
+    def farthest_outside_m(self) -> float:
+        """How far outside the box it ever was, sideways and upwards; below 0 inside."""
+        low, high = self.box.low_m, self.box.high_m
+        return max(
+            max(low[0] - x, x - high[0], low[1] - y, y - high[1], z - high[2])
+            for x, y, z in (truth.position_arena_m for truth in self.truths)
+        )
+
+    def lowest_m(self, start_radius_m: float = 1.2) -> float:
+        """The least height away from the start while the app flew."""
+        start_x, start_y = self.box.start_m
+        return min(
+            (
+                z
+                for x, y, z in (truth.position_arena_m for truth in self.truths[: self.flown])
+                if (x - start_x) ** 2 + (y - start_y) ** 2 > start_radius_m**2
+            ),
+            default=9.0,
+        )
+
+
+def fly_over(
+    impairment: Impairment, scenario: Scenario, mission: Mission, *, seed: int = 0, boxed: bool = True
+) -> LinkedFlight:
+    """Fly a mission over a bad link."""
+    vehicle = LinkedVehicle(scenario, impairment, seed)
+    box = flight_box(scenario)
+    moments: list[Moment] = []
+
+    async def fly() -> Outcome:
+        kept_in = box if boxed else None
+        drone = LinkedDrone(vehicle, scenario, kept_in)
+        camera = _Camera(vehicle)
+        return await fly_mission(
+            drone, camera, mission, limit_s=scenario.try_limit_s, observer=moments.append, box=kept_in
+        )
+
+    with asyncio.Runner(loop_factory=lambda: SimulatedTimeLoop(vehicle)) as runner:
+        outcome = runner.run(fly())
+    flown = len(vehicle.truths)
+    end_us = vehicle.time_us + AFTER_US
+    while vehicle.time_us < end_us:
+        vehicle.tick()
+    status = vehicle.autopilot.status
+    frames = vehicle.simulation.referee.snapshot().crossed
+    return LinkedFlight(outcome, flown, box, vehicle.truths, status.mode, status.armed, frames, moments)
+
+
+class _Camera:
+    def __init__(self, vehicle):
+        self._vehicle = vehicle
+
+    async def frames(self):
+        while True:
+            yield await self._vehicle.images.get()

@@ -1,0 +1,114 @@
+"""Flights over links that lose, swap, double, delay and fall silent: all end well, inside the box."""
+
+from textwrap import dedent
+
+import pytest
+
+from offboard.mission import load_mission
+from scenarios.loader import load_scenario
+from tests.framerunner.simulated_link import Impairment, fly_over
+
+SEEDS = range(20)
+IMPAIRMENTS = {
+    "5 % lost": Impairment(loss=0.05),
+    "20 % lost": Impairment(loss=0.2),
+    "5 % lost, 100 ± 100 ms": Impairment(loss=0.05, jitter_s=0.2),
+    "swapped once a second": Impairment(swap_every_s=1.03),
+    "doubled": Impairment(doubled=0.3),
+    "200 ms jitter": Impairment(jitter_s=0.2),
+    "3 s of silence": Impairment(silent_s=(6.0, 9.0)),
+}
+TRY_LIMIT_S = 11.0
+SLOW_AND_LOSSY = IMPAIRMENTS["5 % lost, 100 ± 100 ms"]
+
+
+def before_a_low_frame():
+    """Test case 1, but the drone starts before red, which hangs low: after seconds it shifts before it."""
+    scenario = load_scenario("test-case-1")
+    base = scenario.base.model_copy(update={"x_m": 1.5, "y_m": 2.0})
+    start = scenario.start.model_copy(update={"x_m": 1.5, "y_m": 2.0, "yaw_rad": 0.0})
+    red = scenario.frames[0].model_copy(update={"z_m": 0.3})
+    frames = (red, *scenario.frames[1:])
+    update = {"base": base, "start": start, "frames": frames, "try_limit_s": TRY_LIMIT_S}
+    return scenario.model_copy(update=update)
+
+
+def silence_later(impairment, seed):
+    """The same silence at another time of the flight."""
+    begin_s, end_s = impairment.silent_s
+    if end_s == 0.0:
+        return impairment
+    late_s = 0.3 * seed
+    return Impairment(silent_s=(begin_s + late_s, end_s + late_s))
+
+
+@pytest.mark.parametrize("name", IMPAIRMENTS)
+def test_every_flight_ends_well_inside_its_box(name):
+    scenario, mission = before_a_low_frame(), load_mission("frame_challenge")
+    for seed in SEEDS:
+        flight = fly_over(silence_later(IMPAIRMENTS[name], seed), scenario, mission, seed=seed)
+        told = f"{name}, seed {seed}: {flight.outcome}, {flight.mode.name}"
+        assert flight.ended_safely, told
+        assert flight.farthest_outside_m < 0.0, told
+        assert flight.lowest_m() > 0.1, told
+        assert "ran back" not in flight.outcome.reason, told
+
+
+@pytest.mark.parametrize("mission", ["frame_challenge", "careful_crossing"])
+def test_a_flight_with_swapped_datagrams_is_completed(mission):
+    scenario = load_scenario("test-case-3")
+    flight = fly_over(Impairment(swap_every_s=1.03, doubled=0.1), scenario, load_mission(mission))
+    assert flight.outcome.ended == "finished", flight.outcome
+    assert flight.frames == ("red", "green", "blue")
+    assert not flight.outcome.kept_in_box_s
+
+
+RUNAWAY = """
+    name: runaway
+    description: Flies on for ever
+    initial: rise
+    states:
+      rise:
+        enter:
+          - hover
+          - cmd.vel_z = 0.5
+        transitions:
+          - when: imu.z > 1.2
+            to: run
+      run:
+        enter:
+          - cmd.vel_z = 0
+        during:
+          - cmd.vel_x = {}
+          - cmd.vel_y = {}
+          - cmd.vel_z = {}
+        transitions:
+          - when: seconds_in_state > 4
+            to: run_on
+      run_on:
+        during:
+          - cmd.vel_x = {}
+          - cmd.vel_y = {}
+          - cmd.vel_z = {}
+        transitions:
+          - when: seconds_in_state > 1000
+            to: end
+      end:
+        final: true
+"""
+
+
+@pytest.mark.parametrize(
+    ("first", "then"),
+    [((1, 0, 0), (1, 0, 0)), ((0, 1, 0), (0, 1, 0)), ((0, 0, 1), (0, 0, 1)), ((0.5, 0, 0), (0, 0, -1))],
+)
+def test_no_mission_leads_out_over_a_slow_and_lossy_link(tmp_path, first, then):
+    path = tmp_path / "runaway.yaml"
+    path.write_text(dedent(RUNAWAY).format(*first, *then), encoding="utf-8")
+    scenario = before_a_low_frame().model_copy(update={"frames": (), "try_limit_s": 14.0})
+    for seed in range(3):
+        flight = fly_over(SLOW_AND_LOSSY, scenario, load_mission(str(path)), seed=seed)
+        assert flight.outcome.kept_in_box_s > 1.0
+        assert flight.ended_safely
+        assert flight.farthest_outside_m < 0.01
+        assert flight.lowest_m() > 0.1

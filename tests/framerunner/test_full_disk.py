@@ -1,0 +1,76 @@
+"""A disk that fills up during a flight: each file that does not fit is one line, the verdict stays."""
+
+import subprocess
+import sys
+
+import pytest
+
+from tests.processes import ROOT
+
+SHORT = "name: short\nbase: {x_m: 0, y_m: 0}\nstart: {x_m: 0, y_m: 0}\nframes: []\ntry_limit_s: 3\n"
+ON_SMALL_DISK = 'mount -t tmpfs -o size="$0" small disk && exec "$@"'
+
+
+def can_mount(folder):
+    (folder / "disk").mkdir()
+    trial = ["unshare", "--mount", "--map-root-user", "sh", "-c", ON_SMALL_DISK, "16k", "true"]
+    try:
+        return subprocess.run(trial, cwd=folder, capture_output=True, check=False).returncode == 0
+    except FileNotFoundError:
+        return False
+
+
+def run(folder, size, *arguments):
+    """Run a command whose folder `disk` holds only so much."""
+    if not can_mount(folder):
+        pytest.skip("this system lets nobody mount a small disk")
+    program = [sys.executable, "-m", "framerunner", *arguments]
+    command = ["unshare", "--mount", "--map-root-user", "sh", "-c", ON_SMALL_DISK, size, *program]
+    environment = {"PYTHONPATH": str(ROOT), "OPENBLAS_NUM_THREADS": "1"}
+    return subprocess.run(command, cwd=folder, env=environment, capture_output=True, text=True, check=False)
+
+
+def test_a_flight_on_a_full_disk_keeps_its_verdict_and_says_what_it_does_not_leave(tmp_path):
+    (tmp_path / "short.yaml").write_text(SHORT, encoding="utf-8")
+    done = run(tmp_path, "16k", "fly", "short.yaml", "--lockstep", "--record", "--video", "--out", "disk")
+    assert done.returncode == 1, done.stderr
+    assert done.stdout.startswith("timed out after 3.0 s")
+    assert "see it again" not in done.stdout
+    lines = [line for line in done.stderr.splitlines() if "times real time" not in line]
+    for name in ("video.avi", "recording", "result.json", "track.png"):
+        assert sum(line.startswith("warning: ") and name in line for line in lines) == 1, lines
+    assert len(lines) == 4, lines
+    assert "Traceback" not in done.stderr
+
+
+def test_a_flight_does_not_begin_where_not_even_its_plan_fits(tmp_path):
+    done = run(tmp_path, "4k", "fly", "--lockstep", "--out", "disk")
+    assert done.returncode == 2
+    assert done.stderr == (
+        "error: --out disk: cannot be written to (No space left on device); free some space "
+        "or choose another\n"
+    )
+
+
+def test_an_evaluation_on_a_full_disk_keeps_what_it_flew_and_ends_in_one_line(tmp_path):
+    for number in range(4):
+        text = SHORT.replace("short", f"short-{number}")
+        (tmp_path / f"short-{number}.yaml").write_text(text, encoding="utf-8")
+    names = [f"short-{number}.yaml" for number in range(4)]
+    done = run(tmp_path, "16k", "evaluate", *names, "--jobs", "1", "--out", "disk/evaluation")
+    assert done.returncode == 2
+    assert done.stderr.splitlines()[-1] == (
+        "error: --out disk/evaluation: cannot be written to (No space left on device); "
+        "mend it or choose another; what was kept stays"
+    )
+    assert "Traceback" not in done.stderr
+
+
+def test_output_that_cannot_be_written_is_one_line():
+    with open("/dev/full", "w", encoding="utf-8") as full:
+        program = [sys.executable, "-m", "framerunner", "scenario", "list"]
+        done = subprocess.run(program, cwd=ROOT, stdout=full, stderr=subprocess.PIPE, text=True, check=False)
+    assert done.returncode == 2
+    assert done.stderr == (
+        "error: standard output or a file: cannot be written to (No space left on device); free some space\n"
+    )
