@@ -1,4 +1,4 @@
-"""Who is at a browser: anybody, or a judge who logged in; sessions live in memory only."""
+"""Who is at a browser: anybody, or a judge who logged in."""
 
 from __future__ import annotations
 
@@ -10,11 +10,13 @@ import unicodedata
 from collections import deque
 from collections.abc import Callable
 from dataclasses import dataclass
-from ipaddress import ip_address, ip_network
 
 from starlette.exceptions import HTTPException
 from starlette.requests import HTTPConnection
 from starlette.websockets import WebSocket
+
+from monitor.addresses import visitor_key
+from monitor.sessions import SessionFile, StoredSession
 
 REFUSED_CODE = 4403  # closes a WebSocket, as 403 ends a request
 SESSION_S = 12 * 3600.0
@@ -69,6 +71,7 @@ class Access:
         cookie: name of the session's cookie.
         hear_invitation: told the secret of the next one-time link, now and whenever one was used.
         clock: seconds that never go back.
+        kept: where sessions are kept over a restart; None: nowhere.
     """
 
     def __init__(
@@ -79,13 +82,15 @@ class Access:
         cookie: str = "framerunner-judge",
         hear_invitation: Callable[[str], None] = lambda _: None,
         clock: Callable[[], float] = time.monotonic,
+        kept: SessionFile | None = None,
     ) -> None:
         self.cookie = cookie
         self._password = password
         self._all_may_fly = all_may_fly
         self._hear_invitation = hear_invitation
         self._clock = clock
-        self._sessions: dict[str, _Session] = {}
+        self._kept = kept
+        self._sessions = self._load()
         self._tries: dict[str, deque[float]] = {}
         self._invitation = ""
 
@@ -152,25 +157,55 @@ class Access:
             raise LoginRefusedError(
                 "This link was used before or never valid; the newest one is on the console."
             )
-        self._tries.pop(_neighbourhood(address), None)
+        self._tries.pop(visitor_key(address), None)
         self._forget_old()
         session_id = secrets.token_urlsafe(32)
-        self._sessions[session_id] = _Session(name, self._clock() + SESSION_S)
+        self._sessions[self._digest(session_id)] = _Session(name, self._clock() + SESSION_S)
+        self._save()
         self.invite()
         return session_id
 
     def log_out(self, connection: HTTPConnection) -> None:
         """End the visitor's session, if there is one."""
-        self._sessions.pop(connection.cookies.get(self.cookie, ""), None)
+        if self._sessions.pop(self._digest(connection.cookies.get(self.cookie, "")), None) is not None:
+            self._save()
+
+    def _digest(self, session_id: str) -> str:
+        """What a session is known by here: useless to whoever reads it, void with another password."""
+        key = (self._password or "").encode()
+        return hmac.new(key, session_id.encode("utf-8", "replace"), "sha256").hexdigest()
+
+    def _load(self) -> dict[str, _Session]:
+        if self._kept is None:
+            return {}
+        offset_s = self._clock() - self._kept.now_s()
+        stored = self._kept.load().items()
+        return {
+            digest: _Session(each.name, min(each.ends_unix_s + offset_s, self._clock() + SESSION_S))
+            for digest, each in stored
+        }
+
+    def _save(self) -> None:
+        if self._kept is None:
+            return
+        offset_s = self._kept.now_s() - self._clock()
+        items = self._sessions.items()
+        self._kept.save(
+            {
+                digest: StoredSession(name=each.name, ends_unix_s=each.ends_s + offset_s)
+                for digest, each in items
+            }
+        )
 
     def _is_right(self, secret: str) -> bool:
         expected = self._invitation if self._password is None else self._password
         return bool(expected) and hmac.compare_digest(secret.encode(), expected.encode())
 
     def _session(self, session_id: str) -> _Session | None:
-        session = self._sessions.get(session_id)
+        digest = self._digest(session_id)
+        session = self._sessions.get(digest)
         if session is not None and session.ends_s <= self._clock():
-            del self._sessions[session_id]
+            del self._sessions[digest]
             return None
         return session
 
@@ -184,7 +219,7 @@ class Access:
     def _count_try(self, address: str) -> None:
         """Count a try before it is looked at, so that many at once are no way around."""
         now_s = self._clock()
-        tries = self._tries.setdefault(_neighbourhood(address), deque())
+        tries = self._tries.setdefault(visitor_key(address), deque())
         while tries and tries[0] <= now_s - _MINUTE_S:
             tries.popleft()
         if len(tries) >= TRIES_A_MINUTE:
@@ -214,12 +249,3 @@ def _clean_name(name: str) -> str:
     if any(unicodedata.category(letter).startswith(_INVISIBLE) for letter in name):
         raise LoginRefusedError("The name has characters that cannot be seen; leave them out.", 400)
     return name
-
-
-def _neighbourhood(address: str) -> str:
-    """Return what stands for an address: an IPv6 one is one of 2**64 of its owner."""
-    try:
-        parsed = ip_address(address)
-    except ValueError:
-        return address
-    return address if parsed.version == 4 else str(ip_network(f"{parsed}/64", strict=False))

@@ -7,9 +7,11 @@ import logging
 import re
 import socket
 from collections.abc import Callable, Iterator
+from functools import partial
 from importlib import import_module
-from ipaddress import ip_address
+from ipaddress import ip_address, ip_network
 from pathlib import Path
+from typing import Any, cast
 
 import nicegui
 import uvicorn
@@ -17,13 +19,18 @@ from fastapi import FastAPI
 from nicegui import Client, core, ui
 from starlette.responses import Response
 from starlette.staticfiles import StaticFiles
-from starlette.types import Scope
+from starlette.types import ASGIApp, Scope
+from uvicorn.middleware.proxy_headers import ProxyHeadersMiddleware
 
+from monitor import server
 from monitor.access import Access
+from monitor.connections import Connections, Gate
 from monitor.fleet import Fleet
+from monitor.listening import BACKLOG
 from monitor.ports import Equipment
 from monitor.security import Guard
-from monitor.server import MODULES, Monitor
+from monitor.server import Monitor
+from monitor.sessions import SessionFile, session_path
 from monitor.settings import MonitorSettings
 
 _STATIC = Path(__file__).parent / "static"
@@ -32,8 +39,7 @@ _LIBRARIES = {"three": "scene", "echart": "echart", "mermaid": "mermaid"}
 _HASHED = re.compile(r"-[\w-]{8}\.js$")  # the bundler names a file by its content
 _RECONNECT_S = 10.0
 _END_S = 1
-_KEEP_ALIVE_S = 30
-_MAX_MESSAGE_BYTES = 1 << 20  # of a WebSocket; NiceGUI's own limit
+_MAX_MESSAGE_BYTES = 1 << 17  # of a WebSocket; pages send some hundred bytes
 
 
 class _Files(StaticFiles):
@@ -82,38 +88,53 @@ def assemble(
         place: address and port it listens on.
         invite: told the secret of each one-time link for judges.
     """
-    local_only = ip_address(place[0]).is_loopback
+    local_only = ip_address(place[0]).is_loopback and not settings.trusted_proxies
+    cookie = f"framerunner-judge-{place[1]}"  # browsers keep one jar for all ports
+    # Nobody comes back to a port that the system chose.
+    path = session_path(settings.database) if settings.port != 0 else None
     access = Access(
         settings.password,
         all_may_fly=local_only,
-        cookie=f"framerunner-judge-{place[1]}",  # browsers keep one jar for all ports
+        cookie=cookie,
         hear_invitation=invite,
+        kept=SessionFile(path, cookie) if path is not None else None,
     )
     web = FastAPI(title="framerunner", docs_url=None, redoc_url=None, openapi_url=None)
-    web.add_middleware(Guard, local_only=local_only)
-    monitor = Monitor(settings, equipment, Fleet(equipment), access, web)
+    web.add_middleware(Guard, local_only=local_only, limits=settings.limits)
+    monitor = Monitor(settings, equipment, Fleet(equipment), access, place, web)
     _add_static_files(web)
-    for name in MODULES:
+    for name in server.MODULES:
         import_module(name).register(monitor)
     _add_nicegui(web)
     return monitor
 
 
-def make_server(web: FastAPI, started: Callable[[], None]) -> uvicorn.Server:
+def make_server(web: ASGIApp, settings: MonitorSettings, started: Callable[[], None]) -> uvicorn.Server:
     """Return the server of a web application.
 
     Args:
         web: the application.
+        settings: as started.
         started: called once it listens.
     """
+    proxies = [ip_network(each) for each in settings.trusted_proxies]
+
+    def is_proxy(address: str) -> bool:
+        return any(ip_address(address) in each for each in proxies)
+
+    connections = Connections(settings.limits, is_proxy)
+    if proxies:
+        web = cast(ASGIApp, ProxyHeadersMiddleware(cast(Any, web), [str(each) for each in proxies]))
     config = uvicorn.Config(
-        web,
+        cast(Any, connections.watch(web)),
+        http=cast(Any, partial(Gate, connections)),
         log_config=None,
         log_level="critical",
         access_log=False,
         server_header=False,
         proxy_headers=False,
-        timeout_keep_alive=_KEEP_ALIVE_S,
+        backlog=BACKLOG,  # asyncio accepts so many before any of them can be refused
+        timeout_keep_alive=settings.limits.keep_alive_s,
         timeout_graceful_shutdown=_END_S,
         ws_max_size=_MAX_MESSAGE_BYTES,
         ws_per_message_deflate=False,  # would compress the same pose once for each viewer

@@ -164,8 +164,8 @@ class Fleet:
         """
         self._tell(_notice(drone_id, level, text))
 
-    def _take(self, messages: Sequence[Message]) -> None:
-        """Take what came over the link; never raises, whatever it is."""
+    def _take(self, messages: Sequence[Message], host: str = "") -> None:
+        """Take what came over the link from a host; never raises, whatever it is."""
         now_s = asyncio.get_running_loop().time()
         for message in messages:
             try:
@@ -175,7 +175,7 @@ class Fleet:
                     if not _is_vehicle(message) or not self._has_room(now_s):
                         continue
                     vehicle = self._meet(system, now_s)
-                vehicle.take(message, now_s)
+                vehicle.take(message, now_s, host)
             except Exception:  # the last boundary: no message may end the watching
                 self._note_fault(f"{message.get_type()} could not be taken")
 

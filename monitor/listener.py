@@ -7,6 +7,8 @@ import threading
 import time
 from collections import deque
 from collections.abc import Callable, Sequence
+from itertools import groupby
+from operator import itemgetter
 
 from monitor.ports import Link, LinkFailed, Message
 
@@ -26,7 +28,7 @@ class Listener:
 
     Args:
         open_link: opens it; raises `LinkFailed`.
-        take: called on the loop with what came.
+        take: called on the loop with what came, and the host it came from; "" over a wire.
         say: called on the loop with level and one line for people.
 
     Attributes:
@@ -35,12 +37,12 @@ class Listener:
     """
 
     def __init__(
-        self, open_link: Callable[[], Link], take: Callable[[Sequence[Message]], None], say: Say
+        self, open_link: Callable[[], Link], take: Callable[[Sequence[Message], str], None], say: Say
     ) -> None:
         self._open_link = open_link
         self._take = take
         self._say = say
-        self._heard: deque[Message] = deque(maxlen=_MOST_HEARD)
+        self._heard: deque[tuple[str, Message]] = deque(maxlen=_MOST_HEARD)
         self._to_send: deque[Message] = deque(maxlen=_MOST_TO_SEND)
         self._is_called = False
         self._halt = threading.Event()
@@ -97,7 +99,8 @@ class Listener:
                     link.send(self._to_send.popleft())
                 messages = link.receive(_WAIT_S)
                 if messages:
-                    self._heard.extend(messages)
+                    host = link.host
+                    self._heard.extend((host, message) for message in messages)
                     if not self._is_called:
                         self._is_called = True
                         loop.call_soon_threadsafe(self._hand_over)
@@ -107,7 +110,8 @@ class Listener:
     def _hand_over(self) -> None:
         self._is_called = False
         batch = [self._heard.popleft() for _ in range(len(self._heard))]
-        self._take(batch)
+        for host, pairs in groupby(batch, key=itemgetter(0)):
+            self._take([message for _, message in pairs], host)
 
     def _opened(self, url: str) -> None:
         self.url = url

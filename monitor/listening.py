@@ -1,13 +1,12 @@
-"""The socket the monitor listens on, and how people are told where."""
+"""The socket the monitor listens on."""
 
 from __future__ import annotations
 
 import socket
-from ipaddress import ip_address
 
 from monitor.settings import MonitorError
 
-_BACKLOG = 128
+BACKLOG = 100  # connections accepted at once; must leave room below the limit of open files
 _MOST_UNSENT_BYTES = 1 << 16  # that the kernel takes for a slow viewer, beyond what is on its way
 
 
@@ -38,7 +37,7 @@ def listen(bind: str, port: int) -> socket.socket:
         if hasattr(socket, "TCP_NOTSENT_LOWAT"):
             listener.setsockopt(socket.IPPROTO_TCP, socket.TCP_NOTSENT_LOWAT, _MOST_UNSENT_BYTES)
         listener.bind(address)
-        listener.listen(_BACKLOG)
+        listener.listen(BACKLOG)
         listener.setblocking(False)
     except OSError as error:
         listener.close()
@@ -47,10 +46,3 @@ def listen(bind: str, port: int) -> socket.socket:
             f"monitor: cannot listen on {bind} port {port}: {reason}; choose another with --port"
         ) from error
     return listener
-
-
-def url_of(host: str, port: int) -> str:
-    """Return the address for people; who listens everywhere is found under this machine's name."""
-    if ip_address(host).is_unspecified:
-        host = socket.gethostname()
-    return f"http://[{host}]:{port}/" if ":" in host else f"http://{host}:{port}/"

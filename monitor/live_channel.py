@@ -12,6 +12,8 @@ from typing import TYPE_CHECKING, Any
 
 from starlette.websockets import WebSocket, WebSocketDisconnect
 
+from monitor.addresses import Places, client_address
+
 if TYPE_CHECKING:
     from monitor.fleet import Fleet
     from monitor.server import Monitor
@@ -20,6 +22,7 @@ POSE_HZ = 20
 STATUS_EVERY = 4  # poses
 STATUS_AT_LEAST_EVERY = 40  # poses; so a browser knows that the link is not dead
 MOST_VIEWERS = 200
+MOST_VIEWERS_PER_ADDRESS = 60  # a page has two; a class may share one address
 MOST_PENDING = 200
 TOO_SLOW_CODE = 1013  # "try again later"
 # Of these only the newest counts: one that was not sent yet is replaced.
@@ -33,9 +36,11 @@ class Viewer:
 
     Args:
         kinds: of messages it wants; empty: all.
+        address: where it is.
     """
 
-    def __init__(self, kinds: Iterable[str] = ()) -> None:
+    def __init__(self, kinds: Iterable[str] = (), address: str = "") -> None:
+        self.address = address
         self._kinds = frozenset(kinds)
         self._events: deque[str] = deque()
         self._newest: dict[tuple[str, object], str] = {}
@@ -80,22 +85,38 @@ class LiveChannel:
     def __init__(self, fleet: Fleet) -> None:
         self._fleet = fleet
         self._viewers: set[Viewer] = set()
+        self._places = Places(MOST_VIEWERS, MOST_VIEWERS_PER_ADDRESS)
         self._somebody = asyncio.Event()
         self._last_status = ""
+        self._histories: dict[int, tuple[tuple[int, float | None], str]] = {}
 
     def enter(self, viewer: Viewer) -> bool:
-        """Let a viewer watch, beginning with the welcome; False if there are too many."""
-        if len(self._viewers) >= MOST_VIEWERS:
+        """Let a viewer watch, beginning with the welcome; False if there is no place for it."""
+        if self._places.take(viewer.address):
             return False
         for message in self._fleet.welcome():
-            viewer.put(message["kind"], message.get("id"), encode(message))
+            if viewer.wants(message["kind"]):
+                viewer.put(message["kind"], message.get("id"), self._encode_welcome(message))
         self._viewers.add(viewer)
         self._somebody.set()
         return True
 
+    def _encode_welcome(self, message: Mapping[str, Any]) -> str:
+        """Write a message; a history is long, so those who come within a tenth of a second share it."""
+        if message["kind"] != "history":
+            return encode(message)
+        rows = message["poses"]
+        key = (len(rows), rows[-1][0] if rows else None)
+        known = self._histories.get(message["id"])
+        if known is None or known[0] != key:
+            known = (key, json.dumps(message, separators=(",", ":"), allow_nan=False))
+            self._histories[message["id"]] = known
+        return known[1]
+
     def leave(self, viewer: Viewer) -> None:
-        """Forget a viewer."""
-        self._viewers.discard(viewer)
+        """Forget a viewer that entered."""
+        self._viewers.remove(viewer)
+        self._places.give_back(viewer.address)
         if not self._viewers:
             self._somebody.clear()
 
@@ -145,7 +166,7 @@ def register(monitor: Monitor) -> None:
     @monitor.web.websocket("/ws/live")
     async def live(websocket: WebSocket, kinds: str = "") -> None:
         await websocket.accept()
-        viewer = Viewer(kind for kind in kinds.split(",") if kind)
+        viewer = Viewer((kind for kind in kinds.split(",") if kind), client_address(websocket.scope))
         if not channel.enter(viewer):
             await websocket.close(TOO_SLOW_CODE, "too many are watching")
             return

@@ -18,9 +18,19 @@ class LinkFailed(Exception):  # noqa: N818 - it is what happened, and is mended 
 
 
 class Link(Protocol):
-    """A MAVLink link, read and written from one thread."""
+    """A MAVLink link, read and written from one thread.
+
+    Attributes:
+        url: as given.
+        host: in numbers, from which came what was received last; "" over a wire.
+    """
 
     url: str
+
+    @property
+    def host(self) -> str:
+        """See above."""
+        ...
 
     def receive(self, timeout_s: float) -> list[Message]:
         """Wait for messages of any system; empty if none came in time. Raises `LinkFailed`."""
@@ -70,23 +80,34 @@ class RunInfo:
 
 
 class RunLibrary(Protocol):
-    """The flights that can be shown again. Reading one may take seconds: call it in a thread."""
+    """The flights that can be shown again. Call it in a thread; reading a run may take seconds."""
 
     def runs(self) -> Sequence[RunInfo]:
         """All runs, newest first."""
         ...
 
     def recording(self, name: str) -> Mapping[str, Any]:
-        """A run as `docs/monitor-channels.md` says. Raises `RunError` with one line."""
+        """A run as `docs/monitor-channels.md` says, read if it was not. Raises `RunError` with one line."""
+        ...
+
+    def kept(self, name: str) -> Mapping[str, Any] | None:
+        """A run that needs no reading; None if it does. Raises `RunError` if there is no such run."""
         ...
 
     def image(self, name: str, index: int) -> bytes:
-        """A JPEG of its camera. Raises `RunError`."""
+        """A JPEG of its camera. Raises `RunNotReadError` if the run is to be read first, else `RunError`."""
         ...
+
+    def close(self) -> None:
+        """Break off what is being read, and read nothing more."""
 
 
 class RunError(Exception):
     """A run that cannot be shown; the message is one line for people."""
+
+
+class RunNotReadError(RunError):
+    """A run of which nothing can be had before it has been read."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -102,6 +123,8 @@ class Equipment:
         runs: flights to show again; None if there is no such folder.
         start_pose: where a scenario's drone stands at first: its centre (m) and yaw (rad), arena axes; None:
             a drone that brings no referee cannot be judged.
+        camera_hosts: HOST or HOST:PORT from which video and referee may be fetched although a drone's packets
+            come from elsewhere.
     """
 
     open_link: Callable[[], Link]
@@ -111,3 +134,4 @@ class Equipment:
     load_scenario: Callable[[str], Scenario]
     runs: RunLibrary | None
     start_pose: Callable[[Scenario], tuple[float, float, float, float]] | None = None
+    camera_hosts: tuple[str, ...] = ()

@@ -7,19 +7,18 @@ import gzip
 import hashlib
 import json
 from collections import OrderedDict
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import asdict
-from typing import TYPE_CHECKING, Any, TypeVar
+from typing import TYPE_CHECKING, Any
 
 from starlette.requests import Request
 from starlette.responses import PlainTextResponse, Response
 
-from monitor.ports import RunError, RunLibrary
+from monitor.ports import RunError, RunLibrary, RunNotReadError
+from monitor.reading_queue import BusyError, ReadingQueue
 
 if TYPE_CHECKING:
     from monitor.server import Monitor
-
-T = TypeVar("T")
 
 _KEPT_ANSWERS = 4
 _QUICK = 5  # of gzip: the best costs ten times as long for a tenth less
@@ -30,6 +29,7 @@ _NO_RUNS = "there is no folder of runs; start the monitor with --runs FOLDER"
 def register(monitor: Monitor) -> None:
     """Add the addresses of recorded flights."""
     answers = _Answers(monitor.equipment.runs)
+    monitor.jobs.append(answers.close_at_end)
 
     @monitor.web.get("/api/runs")
     async def runs(request: Request) -> Response:
@@ -57,7 +57,16 @@ class _Answers:
 
     def __init__(self, library: RunLibrary | None) -> None:
         self._library = library
+        self._queue = None if library is None else ReadingQueue(library)
         self._packed: OrderedDict[str, tuple[object, bytes, str]] = OrderedDict()
+
+    async def close_at_end(self) -> None:
+        """Wait until cancelled, then have the library break off what it reads."""
+        try:
+            await asyncio.Event().wait()
+        finally:
+            if self._library is not None:
+                self._library.close()
 
     async def listing(self, request: Request) -> Response:
         """All runs, newest first; none if there is no library."""
@@ -71,7 +80,7 @@ class _Answers:
         try:
             recording = await self._recording(name)
         except RunError as error:
-            return _sorry(str(error))
+            return _sorry(error)
         # The library gives the same object for the same run until that changes.
         known = self._packed.get(name)
         if known is None or known[0] is not recording:
@@ -85,38 +94,39 @@ class _Answers:
 
     async def _recording(self, name: str) -> Mapping[str, Any]:
         """One run from the library. Raises `RunError`."""
-        library = self._library
-        if library is None:
+        if self._queue is None:
             raise RunError(_NO_RUNS)
-        return await _in_thread(lambda: library.recording(name))
+        return await self._queue.recording(name)
 
     async def result(self, request: Request, name: str) -> Response:
         """What stands in a run's `result.json`."""
         try:
             recording = await self._recording(name)
         except RunError as error:
-            return _sorry(str(error))
+            return _sorry(error)
         if recording["result"] is None:
-            return _sorry(f"run '{name}': was not judged, so it has no result")
+            return _sorry(RunError(f"run '{name}': was not judged, so it has no result"))
         return _answer(request, *_pack(recording["result"]))
 
     async def image(self, name: str, number: str) -> Response:
         """An image of a run's camera."""
-        library = self._library
-        if library is None:
-            return _sorry(_NO_RUNS)
         if not (number.isascii() and number.isdigit() and len(number) <= _LONGEST_INDEX):
-            return _sorry(f"image '{number[:40]}': must be a whole number")
+            return _sorry(RunError(f"image '{number[:40]}': must be a whole number"))
         try:
-            data = await _in_thread(lambda: library.image(name, int(number)))
+            data = await self._image(name, int(number))
         except RunError as error:
-            return _sorry(str(error))
+            return _sorry(error)
         # A run that is still being flown may get other images under the same numbers.
         return Response(data, media_type="image/jpeg", headers={"Cache-Control": "private, max-age=60"})
 
-
-async def _in_thread(work: Callable[[], T]) -> T:
-    return await asyncio.to_thread(work)
+    async def _image(self, name: str, index: int) -> bytes:
+        if self._library is None:
+            raise RunError(_NO_RUNS)
+        try:
+            return await asyncio.to_thread(self._library.image, name, index)
+        except RunNotReadError:
+            await self._recording(name)
+        return await asyncio.to_thread(self._library.image, name, index)
 
 
 def _pack(content: object) -> tuple[bytes, str]:
@@ -135,5 +145,7 @@ def _answer(request: Request, body: bytes, tag: str) -> Response:
     return Response(gzip.decompress(body), media_type="application/json", headers=headers)
 
 
-def _sorry(words: str) -> Response:
-    return PlainTextResponse(f"{words}\n", 404)
+def _sorry(error: RunError) -> Response:
+    if isinstance(error, BusyError):
+        return PlainTextResponse(f"{error}\n", 503, {"Retry-After": "60"})
+    return PlainTextResponse(f"{error}\n", 404)

@@ -2,14 +2,19 @@
 
 from __future__ import annotations
 
+import asyncio
 from ipaddress import ip_address
 from urllib.parse import urlsplit
 
 from starlette.datastructures import Headers, MutableHeaders
+from starlette.exceptions import HTTPException
 from starlette.responses import PlainTextResponse
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
-MAX_BODY_BYTES = 1 << 20
+from monitor.addresses import Places, client_address
+from monitor.settings import ConnectionLimits
+
+_FORWARDED = ("x-forwarded-for", "x-real-ip", "forwarded")
 _MERELY_READING = ("GET", "HEAD", "OPTIONS")
 # NiceGUI compiles templates in the browser and begins its pages by inline scripts.
 CONTENT_POLICY = "; ".join(
@@ -42,13 +47,16 @@ class Guard:
 
     Args:
         app: what is guarded.
-        local_only: the server listens on this machine's own address only; then other names in the Host
-            header are a foreign page's trick (DNS rebinding).
+        local_only: only programs of this machine reach the server, and no proxy passes on requests of others;
+            then other names in the Host header are a foreign page's trick (DNS rebinding).
+        limits: of bodies, and of requests under way from one address.
     """
 
-    def __init__(self, app: ASGIApp, *, local_only: bool) -> None:
+    def __init__(self, app: ASGIApp, *, local_only: bool, limits: ConnectionLimits) -> None:
         self._app = app
         self._local_only = local_only
+        self._limits = limits
+        self._places = Places(limits.total, limits.per_address)
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
         """Let a request or WebSocket pass, or refuse it."""
@@ -60,15 +68,36 @@ class Guard:
         if problem is not None:
             await _refuse(scope, receive, send, 403, problem)
             return
+        address = client_address(scope)
+        problem = self._places.take(address)
+        if problem:
+            await _refuse(scope, receive, send, 429, problem)
+            return
+        try:
+            await self._pass(scope, headers, receive, send)
+        finally:
+            self._places.give_back(address)
+
+    async def _pass(self, scope: Scope, headers: Headers, receive: Receive, send: Send) -> None:
         if scope["type"] == "websocket":
             await self._app(scope, receive, send)
             return
-        body = await _read_body(headers, receive)
-        if body is None:
-            words = f"too large; at most {MAX_BODY_BYTES} bytes are taken"
-            await _refuse(scope, receive, send, 413, words)
+        problem = self._body_problem(scope, headers)
+        if problem:
+            await _refuse(scope, receive, send, 413, problem)
             return
-        await self._app(scope, _replay(body, receive), _with_headers(send))
+        await self._app(scope, _Body(receive, self._limits), _with_headers(send))
+
+    def _body_problem(self, scope: Scope, headers: Headers) -> str:
+        """Say from the head alone why a body is not taken; "" if it may come."""
+        announced = headers.get("content-length", "0")
+        if announced == "0" and "transfer-encoding" not in headers:
+            return ""
+        if scope["method"] in _MERELY_READING:
+            return f"{scope['method']} takes no body"
+        if not announced.isdecimal() or len(announced) > 18 or int(announced) > self._limits.body_bytes:
+            return _too_large(self._limits)
+        return ""
 
     def _problem(self, scope: Scope, headers: Headers) -> str | None:
         """Say why a request is not for us; None if it is."""
@@ -77,6 +106,8 @@ class Guard:
             return "the Host header names no host"
         if self._local_only and not _is_local(host):
             return "the monitor listens on this machine only: open it as http://127.0.0.1 or http://localhost"
+        if self._local_only and any(name in headers for name in _FORWARDED):
+            return "a proxy passed this on: start the monitor with --trusted-proxy and the proxy's address"
         origin = headers.get("origin")
         if origin is not None and not _same_place(origin, host):
             return "pages of other sites may not use the monitor"
@@ -110,37 +141,41 @@ def _same_place(origin: str, host: str) -> bool:
     return bool(separator) and scheme in ("http", "https") and place.lower() == host.lower()
 
 
-async def _read_body(headers: Headers, receive: Receive) -> list[Message] | None:
-    """Read a request's whole body, however it comes; None if it is too large."""
-    announced = headers.get("content-length", "0")
-    if announced == "0" and "transfer-encoding" not in headers:
-        return []
-    if announced.isdecimal() and int(announced) > MAX_BODY_BYTES:
-        return None
-    messages: list[Message] = []
-    size = 0
-    while True:
-        message = await receive()
-        messages.append(message)
-        if message["type"] != "http.request":
-            return messages  # gone
-        size += len(message.get("body", b""))
-        if size > MAX_BODY_BYTES:
-            return None
-        if not message.get("more_body", False):
-            return messages
+class _Body:
+    """A request's `receive` that takes a body of a certain length, within a certain time.
+
+    Raises:
+        HTTPException: 413 or 408; the application that asked for the body answers with it.
+    """
+
+    def __init__(self, receive: Receive, limits: ConnectionLimits) -> None:
+        self._receive = receive
+        self._limits = limits
+        self._size = 0
+        self._due_s: float | None = None
+        self._complete = False
+
+    async def __call__(self) -> Message:
+        if self._complete:
+            return await self._receive()  # waits for the client to go
+        loop = asyncio.get_running_loop()
+        if self._due_s is None:
+            self._due_s = loop.time() + self._limits.body_s
+        try:
+            async with asyncio.timeout_at(self._due_s):
+                message = await self._receive()
+        except TimeoutError:
+            text = f"no whole body within {self._limits.body_s:g} s"
+            raise HTTPException(408, text, {"Connection": "close"}) from None
+        self._size += len(message.get("body", b""))
+        if self._size > self._limits.body_bytes:
+            raise HTTPException(413, _too_large(self._limits), {"Connection": "close"})
+        self._complete = not message.get("more_body", False)
+        return message
 
 
-def _replay(messages: list[Message], receive: Receive) -> Receive:
-    """Return a `receive` that gives what was read before what is still to come."""
-    pending = iter(messages)
-
-    async def again() -> Message:
-        for message in pending:
-            return message
-        return await receive()
-
-    return again
+def _too_large(limits: ConnectionLimits) -> str:
+    return f"the body is too large; at most {limits.body_bytes} bytes are taken"
 
 
 def _with_headers(send: Send) -> Send:
@@ -160,5 +195,6 @@ async def _refuse(scope: Scope, receive: Receive, send: Send, status: int, words
         await receive()
         await send({"type": "websocket.close", "code": 4403, "reason": words})
         return
-    headers = {**_HEADERS, "Connection": "close"} if status == 413 else _HEADERS
+    # The body, if there is one, is not read; so nothing more can be read from this connection.
+    headers = {**_HEADERS, "Connection": "close"}
     await PlainTextResponse(f"{words}\n", status, headers)(scope, receive, send)

@@ -8,8 +8,10 @@ from dataclasses import dataclass, field
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
-from monitor.listening import listen, url_of
+from monitor.listening import listen
+from monitor.qr_code import terminal_code
 from monitor.settings import MonitorSettings
+from monitor.urls import is_for_others, url_of, urls_for_people
 
 if TYPE_CHECKING:
     import socket
@@ -34,9 +36,12 @@ MODULES = (
     "monitor.replay_api",
     "monitor.pages.replay",
     "monitor.competition.api",
+    "monitor.competition.stage",
     "monitor.pages.competition",
     "monitor.pages.judge",
     "monitor.pages.ranking",
+    "monitor.pages.stage",
+    "monitor.pages.join",
 )
 
 
@@ -49,6 +54,7 @@ class Monitor:
         equipment: what the monitor was given.
         fleet: the drones.
         access: who may do what.
+        place: IP address and TCP port that it listens on.
         web: where HTTP routes and WebSockets are added.
         jobs: run from start to end of the monitor; a `register` appends to them.
     """
@@ -57,6 +63,7 @@ class Monitor:
     equipment: Equipment
     fleet: Fleet
     access: Access
+    place: tuple[str, int]
     web: FastAPI
     jobs: list[Job] = field(default_factory=list)
 
@@ -79,17 +86,27 @@ async def serve(equipment: Equipment, settings: MonitorSettings, say: Callable[[
         from monitor.assembly import assemble, make_server  # noqa: PLC0415 - see above
 
         host, port = listener.getsockname()[:2]
-        url = url_of(host, port)
+        reachable = urls_for_people(host, port)
+        urls = reachable or [url_of("127.0.0.1", port)]
+        qr_codes = settings.qr_codes and bool(reachable) and is_for_others(host)
 
         def invite(secret: str) -> None:
-            say(f"judges log in at {url}login?token={secret}")
+            link = f"{urls[0]}login?token={secret}"
+            say(f"judges log in at {link}")
+            if qr_codes:
+                say(f"one judge's phone reads it here; the next judge gets another\n{terminal_code(link)}")
 
         def started() -> None:
-            say(f"monitor: {url}")
+            for url in urls:
+                say(f"monitor: {url}")
+            if not reachable:
+                say("this machine is in no network: phones cannot open it yet")
+            if qr_codes:
+                say(f"phones that look on read it here, or at {urls[0]}join\n{terminal_code(urls[0])}")
             monitor.access.invite()
 
         monitor = assemble(equipment, settings, (host, port), invite)
-        server = make_server(monitor.web, started)
+        server = make_server(monitor.web, settings, started)
         await _run(server, listener, [monitor.fleet.run, *monitor.jobs])
 
 

@@ -4,11 +4,40 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 
+from monitor.addresses import is_address_or_network
+
 SHORTEST_PASSWORD = 8
 
 
 class MonitorError(Exception):
     """The monitor cannot be started; the message is one line for people."""
+
+
+@dataclass(frozen=True, slots=True)
+class ConnectionLimits:
+    """How much of the server its clients may have.
+
+    Attributes:
+        head_s: from the connection, or the first byte of its next request, to the end of the request's head.
+        keep_alive_s: from the end of a request to the end of the next one's head.
+        body_s: from the head to the end of the body.
+        stalled_s: how long a client may take nothing of what waits for it.
+        close_s: from closing a connection to its end.
+        head_bytes: length of a request's head.
+        body_bytes: length of a request's body.
+        total: connections.
+        per_address: connections from one address, and requests under way from one address behind a proxy.
+    """
+
+    head_s: float = 10.0
+    keep_alive_s: int = 30
+    body_s: float = 20.0
+    stalled_s: float = 30.0
+    close_s: float = 5.0
+    head_bytes: int = 65_536
+    body_bytes: int = 65_536
+    total: int = 1000
+    per_address: int = 250
 
 
 @dataclass(frozen=True, slots=True)
@@ -20,12 +49,18 @@ class MonitorSettings:
         port: TCP port; 0 lets the system choose one.
         database: SQLAlchemy URL of the competition's tables.
         password: with which judges log in; None: they are given one-time links.
+        trusted_proxies: addresses or networks whose X-Forwarded-For and X-Forwarded-Proto are believed.
+        limits: of connections.
+        qr_codes: say addresses as QR codes too; for a terminal that shows them.
     """
 
     bind: str = "127.0.0.1"
     port: int = 8080
     database: str = "sqlite:///framerunner.db"
     password: str | None = field(default=None, repr=False)
+    trusted_proxies: tuple[str, ...] = ()
+    limits: ConnectionLimits = ConnectionLimits()
+    qr_codes: bool = False
 
     def check(self) -> None:
         """See that it can be meant so.
@@ -42,3 +77,9 @@ class MonitorSettings:
                 f"monitor: FRAMERUNNER_JUDGE_PASSWORD has {len(self.password)} characters; "
                 f"use at least {SHORTEST_PASSWORD}, or unset it for one-time links"
             )
+        for proxy in self.trusted_proxies:
+            if not is_address_or_network(proxy):
+                raise MonitorError(
+                    f"monitor: --trusted-proxy '{proxy[:60]}': must be an address or a network in numbers, "
+                    "such as 127.0.0.1 or 10.0.0.0/24"
+                )

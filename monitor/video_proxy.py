@@ -7,24 +7,29 @@ from __future__ import annotations
 
 import asyncio
 import logging
+import struct
 from collections.abc import AsyncGenerator, Callable
 from typing import TYPE_CHECKING
 from urllib.parse import urlsplit
 
 import aiohttp
+from fastapi import Request
 from fastapi.responses import PlainTextResponse, Response, StreamingResponse
 
+from monitor.addresses import Places, client_address
 from monitor.video_stream import Shot, ShotCutter, StreamBrokenError
 
 if TYPE_CHECKING:
     from monitor.server import Monitor
 
 MOST_WATCHERS = 100  # of one drone
+MOST_WATCHERS_PER_ADDRESS = 30
 FIRST_IMAGE_S = 5.0
 _RETRY_S = 1.0
 _SILENCE_S = 5.0  # then the connection is made again
 _CHUNK_BYTES = 1 << 16
 _BOUNDARY = "frame"
+_FRAME_HEAD = struct.Struct("<qI")  # time of exposure in microseconds or -1, length of the JPEG
 _log = logging.getLogger(__name__)
 
 
@@ -38,31 +43,41 @@ class DroneVideo:
     def __init__(self, find_url: Callable[[], str | None]) -> None:
         self._find_url = find_url
         self._latest: Shot | None = None
+        self._before: Shot | None = None  # the last one when nobody watched any more
         self._arrived = asyncio.Event()
-        self._watchers = 0
+        self._places = Places(MOST_WATCHERS, MOST_WATCHERS_PER_ADDRESS)
         self._fetching: asyncio.Task[None] | None = None
 
-    @property
-    def is_full(self) -> bool:
-        """Whether nobody else may watch."""
-        return self._watchers >= MOST_WATCHERS
+    def problem(self, address: str) -> str:
+        """Say in one line why nobody else may watch from an address; "" if somebody may."""
+        return self._places.problem(address)
 
-    async def shots(self) -> AsyncGenerator[Shot, None]:
-        """Give images as they come, the newest each time; ends never, so close it."""
-        self._watchers += 1
+    async def shots(self, address: str, *, kept: bool = False) -> AsyncGenerator[Shot, None]:
+        """Give images as they come, the newest each time; without end, so close it.
+
+        None come if there is no place for another watcher from this address.
+
+        Args:
+            address: of the watcher.
+            kept: begin with the last one of before, if there is one, however old it is.
+        """
+        if self._places.take(address):
+            return
         if self._fetching is None:
-            self._latest = None  # from before; nobody knows how old it is
+            self._before, self._latest = self._latest or self._before, None
             self._fetching = asyncio.create_task(self._fetch())
         last: Shot | None = None
         try:
+            if kept and self._latest is None and self._before is not None:
+                yield self._before
             while True:
                 while self._latest is None or self._latest is last:
                     await self._arrived.wait()
                 last = self._latest
                 yield last
         finally:
-            self._watchers -= 1
-            if self._watchers == 0:
+            self._places.give_back(address)
+            if len(self._places) == 0:
                 self.stop()
 
     def stop(self) -> None:
@@ -74,7 +89,8 @@ class DroneVideo:
     async def _fetch(self) -> None:
         """Read the drone's video, again and again, until cancelled."""
         timeout = aiohttp.ClientTimeout(total=None, sock_connect=_SILENCE_S, sock_read=_SILENCE_S)
-        async with aiohttp.ClientSession(timeout=timeout) as session:
+        jar = aiohttp.DummyCookieJar()
+        async with aiohttp.ClientSession(timeout=timeout, cookie_jar=jar, auto_decompress=False) as session:
             while True:
                 url = self._find_url()
                 if url is not None:
@@ -107,39 +123,47 @@ def can_be_passed_on(url: str | None) -> bool:
 
 
 def register(monitor: Monitor) -> None:
-    """Add `/video/ID` and `/video/ID/image.jpg`."""
+    """Add `/video/ID`, `/video/ID/frames` and `/video/ID/image.jpg`."""
     videos: dict[int, DroneVideo] = {}
 
-    def open_video(drone_id: int) -> DroneVideo | Response:
+    def open_video(request: Request, drone_id: int) -> DroneVideo | Response:
         problem = _problem(monitor, drone_id)
         if problem is not None:
             return PlainTextResponse(f"{problem}\n", 404)
         if drone_id not in videos:
             videos[drone_id] = DroneVideo(lambda: _readable(monitor.fleet.video_url(drone_id)))
-        if videos[drone_id].is_full:
-            return PlainTextResponse(f"{MOST_WATCHERS} are watching; no more can\n", 503)
-        return videos[drone_id]
+        problem = videos[drone_id].problem(client_address(request.scope))
+        return PlainTextResponse(f"{problem}\n", 503) if problem else videos[drone_id]
 
     @monitor.web.get("/video/{drone_id}")
-    async def stream(drone_id: int) -> Response:
-        video = open_video(drone_id)
+    async def stream(request: Request, drone_id: int) -> Response:
+        video = open_video(request, drone_id)
         if isinstance(video, Response):
             return video
         return StreamingResponse(
-            _parts(video),
+            _parts(video.shots(client_address(request.scope))),
             media_type=f"multipart/x-mixed-replace; boundary={_BOUNDARY}",
             headers={"Cache-Control": "no-store", "Connection": "close"},
         )
 
-    @monitor.web.get("/video/{drone_id}/image.jpg")
-    async def image(drone_id: int) -> Response:
-        video = open_video(drone_id)
+    @monitor.web.get("/video/{drone_id}/frames")
+    async def frames(request: Request, drone_id: int) -> Response:
+        video = open_video(request, drone_id)
         if isinstance(video, Response):
             return video
-        shots = video.shots()
+        shots = video.shots(client_address(request.scope), kept=True)
+        headers = {"Cache-Control": "no-store", "Connection": "close"}
+        return StreamingResponse(_frames(shots), media_type="application/octet-stream", headers=headers)
+
+    @monitor.web.get("/video/{drone_id}/image.jpg")
+    async def image(request: Request, drone_id: int) -> Response:
+        video = open_video(request, drone_id)
+        if isinstance(video, Response):
+            return video
+        shots = video.shots(client_address(request.scope))
         try:
             shot = await asyncio.wait_for(anext(shots), FIRST_IMAGE_S)
-        except TimeoutError:
+        except (TimeoutError, StopAsyncIteration):
             return PlainTextResponse("no image came\n", 503, {"Retry-After": "1"})
         finally:
             await shots.aclose()
@@ -175,9 +199,18 @@ def _readable(url: str | None) -> str | None:
     return url if can_be_passed_on(url) else None
 
 
-async def _parts(video: DroneVideo) -> AsyncGenerator[bytes, None]:
+async def _frames(shots: AsyncGenerator[Shot, None]) -> AsyncGenerator[bytes, None]:
+    """Write images for a page that shows each with what belongs to its moment: head, then JPEG."""
+    try:
+        async for shot in shots:
+            time_us = -1 if shot.time_us is None else shot.time_us
+            yield _FRAME_HEAD.pack(time_us, len(shot.jpeg)) + shot.jpeg
+    finally:
+        await shots.aclose()
+
+
+async def _parts(shots: AsyncGenerator[Shot, None]) -> AsyncGenerator[bytes, None]:
     """Write images as parts of a stream, the boundary behind each: so a browser shows it at once."""
-    shots = video.shots()
     try:
         yield f"--{_BOUNDARY}\r\n".encode()
         async for shot in shots:

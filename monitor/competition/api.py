@@ -10,6 +10,7 @@ from fastapi import APIRouter, HTTPException, Request, Response
 from pydantic import BaseModel
 from sqlalchemy.exc import SQLAlchemyError
 
+from monitor.competition.calls import Entry
 from monitor.competition.channel import add_channel
 from monitor.competition.database import DatabaseError
 from monitor.competition.export import ranking_csv, tries_csv
@@ -19,15 +20,16 @@ from monitor.competition.forms import (
     Form,
     JudgementForm,
     NextForm,
+    QueueForm,
     SettingsForm,
     TeamChangeForm,
     TeamForm,
     TeamOfTryForm,
+    UndoForm,
     read_form,
 )
 from monitor.competition.rules import Correction, Rule
 from monitor.competition.service import CompetitionService
-from monitor.competition.store import Entry
 from monitor.competition.views import RankingStateView, RankingView, StateView
 from monitor.competition.words import Refused, shown
 
@@ -111,7 +113,7 @@ class _Judges:
 
 
 def organising_routes(service: CompetitionService, judges: _Judges) -> APIRouter:
-    """Teams, who flies next, the draw, the rule."""
+    """Teams, calls and the queue, the draw, the rule."""
     routes = APIRouter(prefix="/api/competition")
 
     @routes.post("/teams")
@@ -135,6 +137,19 @@ def organising_routes(service: CompetitionService, judges: _Judges) -> APIRouter
             await _words(service.frames(form.scenario))
         await _words(service.change(lambda store: store.call(form.team, form.scenario, entry)))
         return _json({"team": form.team, "scenario": form.scenario})
+
+    @routes.post("/next/undo")
+    async def take_back(request: Request) -> Response:
+        form, entry = await judges.asked(request, UndoForm)
+        await _words(service.change(lambda store: store.take_back(form.call, entry)))
+        return _json({"call": form.call})
+
+    @routes.post("/queue")
+    async def set_queue(request: Request) -> Response:
+        form, entry = await judges.asked(request, QueueForm)
+        teams = service.shuffled(form.teams) if form.shuffle else form.teams
+        await _words(service.change(lambda store: store.set_queue(form.seen, teams, entry)))
+        return _json({"teams": teams})
 
     @routes.post("/draw")
     async def draw(request: Request) -> Response:
@@ -205,6 +220,7 @@ async def _ranking(service: CompetitionService, number: str) -> RankingStateView
         rounds=tuple(ranking.round for ranking in board.rankings),
         rule=board.rule,
         called=board.called,
+        queue=board.queue,
         running=service.running,
         problem=service.problem,
     )

@@ -12,6 +12,14 @@ from sqlalchemy import select
 from sqlalchemy.orm import Session
 
 from monitor.competition import tables
+from monitor.competition.calls import (
+    current_call,
+    flying_on,
+    last_call,
+    queue_number,
+    read_queue,
+    tries_of,
+)
 from monitor.competition.rules import (
     Attempt,
     Correction,
@@ -19,6 +27,7 @@ from monitor.competition.rules import (
     Result,
     Rule,
     Standing,
+    choose,
     correct,
     counted_cs,
     rank,
@@ -26,12 +35,16 @@ from monitor.competition.rules import (
 )
 from monitor.competition.views import (
     Board,
+    CallView,
     CellView,
     DrawView,
     JudgementView,
-    NextView,
+    LastCallView,
+    QueuedView,
+    QueueView,
     RankingView,
     ResultView,
+    RivalView,
     RowView,
     RuleView,
     TeamView,
@@ -65,12 +78,14 @@ def read_board(session: Session, version: int, most_tries: int = MOST_TRIES_SHOW
     rule_row = last_settings(session)
     rule = rule_of(rule_row)
     teams = list(session.scalars(select(tables.Team).order_by(tables.Team.id)))
+    by_id = {team.id: team for team in teams}
     names = {team.id: team.name for team in teams}
     tries = _judged_tries(session)
     draws = list(session.scalars(select(tables.Draw).order_by(tables.Draw.id)))
     present = present_round(draws)
     rounds = sorted({present, *(draw.round for draw in draws), *(judged.row.round for judged in tries)})
     attempts = _attempt_numbers(tries)
+    countable = {number: _countable(number, draws, tries, rule) for number in rounds}
     return Board(
         version=version,
         round=present,
@@ -79,9 +94,14 @@ def read_board(session: Session, version: int, most_tries: int = MOST_TRIES_SHOW
             TeamView(id=team.id, name=team.name, members=team.members, withdrawn=team.withdrawn)
             for team in teams
         ),
-        called=_next_view(session, names),
+        called=_call_view(session, names),
+        last_call=_last_call_view(session, names),
+        queue=_queue_view(session, names),
         draws=tuple(draw_view(draw) for draw in reversed(draws)),
-        tries=tuple(_try_view(judged, names, attempts, rule) for judged in reversed(tries[-most_tries:])),
+        tries=tuple(
+            _try_view(judged, names, attempts, rule, _barrier(judged.row, by_id, countable[judged.row.round]))
+            for judged in reversed(tries[-most_tries:])
+        ),
         rankings=tuple(_ranking(number, teams, draws, tries, rule) for number in reversed(rounds)),
     )
 
@@ -91,11 +111,9 @@ def read_detail(session: Session, try_id: int) -> TryDetail | None:
     row = session.get(tables.Try, try_id)
     if row is None:
         return None
-    names = {team.id: team.name for team in session.scalars(select(tables.Team))}
-    same = select(tables.Try).where(
-        tables.Try.round == row.round, tables.Try.team_id == row.team_id, tables.Try.scenario == row.scenario
-    )
-    number = sum(1 for other in session.scalars(same) if other.id <= row.id) if row.team_id is not None else 0
+    teams = {team.id: team for team in session.scalars(select(tables.Team))}
+    names = {team.id: team.name for team in teams.values()}
+    same = [judged for judged in _tries_of_team(session, row) if judged.row.id != row.id]
     said = list(
         session.scalars(
             select(tables.Judgement)
@@ -104,15 +122,79 @@ def read_detail(session: Session, try_id: int) -> TryDetail | None:
         )
     )
     judged = _judge(row, said[::-1])
+    number = 1 + sum(1 for other in same if other.row.id < row.id) if row.team_id is not None else 0
     rule_row = last_settings(session)
     rule = rule_of(rule_row)
     views = tuple(_judgement_view(entry, names) for entry in said)
+    of_round = select(tables.Draw).where(tables.Draw.round == row.round).order_by(tables.Draw.id)
+    draws = list(session.scalars(of_round))
+    scenarios = _countable(row.round, draws, [] if draws else _judged_tries(session), rule)
     return TryDetail(
-        attempt=_try_view(judged, names, {row.id: number}, rule),
+        attempt=_try_view(judged, names, {row.id: number}, rule, _barrier(row, teams, scenarios)),
+        rival=_rival_view(same, rule),
         correction=next((view for view in views if view.kind == "correction"), None),
         rule=_rule_view(rule, rule_row),
         history=views,
     )
+
+
+def _tries_of_team(session: Session, row: tables.Try) -> list[_Judged]:
+    """All tries of a try's team at its scenario in its round, oldest first; none of a try without a team."""
+    if row.team_id is None:
+        return []
+    same = select(tables.Try).where(
+        tables.Try.round == row.round, tables.Try.team_id == row.team_id, tables.Try.scenario == row.scenario
+    )
+    rows = list(session.scalars(same.order_by(tables.Try.id)))
+    of_these = tables.Judgement.try_id.in_([each.id for each in rows])
+    said: dict[int, list[tables.Judgement]] = {}
+    for entry in session.scalars(select(tables.Judgement).where(of_these).order_by(tables.Judgement.number)):
+        said.setdefault(entry.try_id, []).append(entry)
+    return [_judge(each, said.get(each.id, [])) for each in rows]
+
+
+def _barrier(row: tables.Try, teams: Mapping[int, tables.Team], scenarios: frozenset[str] | None) -> str:
+    """Why no ranking has a try, as in `TryView`; "" if one has or may have it.
+
+    Args:
+        row: the try.
+        teams: by id.
+        scenarios: `_countable` of the try's round.
+    """
+    team = teams.get(row.team_id) if row.team_id is not None else None
+    if team is None:
+        return "no team"
+    if team.withdrawn:
+        return "withdrawn"
+    if not row.scenario:
+        return "no scenario"
+    return "" if scenarios is None or row.scenario in scenarios else "not drawn"
+
+
+def _countable(
+    number: int, draws: Sequence[tables.Draw], tries: Sequence[_Judged], rule: Rule
+) -> frozenset[str] | None:
+    """The scenarios of a round; None while any other that is flown would still become one of them."""
+    names = [name for name, _ in _scenarios(number, draws, _attempts(number, tries))][: rule.scenarios]
+    is_complete = len(names) == rule.scenarios or any(draw.round == number for draw in draws)
+    return frozenset(names) if is_complete else None
+
+
+def _rival_view(same: Sequence[_Judged], rule: Rule) -> RivalView | None:
+    rival = choose((_attempt(judged) for judged in same if judged.counts), rule)
+    if rival is None:
+        return None
+    return RivalView(
+        attempt=rival.order,
+        counted_s=counted_cs(rival.result, rule) / 100,
+        contacts=rival.result.contacts,
+    )
+
+
+def _attempt(judged: _Judged) -> Attempt:
+    """A try of a team, for the ranking."""
+    assert judged.row.team_id is not None
+    return Attempt(judged.row.team_id, judged.row.scenario, judged.row.id, judged.result)
 
 
 def last_settings(session: Session) -> tables.SettingsChange | None:
@@ -200,17 +282,8 @@ def _ranking(
     tries: Sequence[_Judged],
     rule: Rule,
 ) -> RankingView:
-    attempts = [
-        Attempt(judged.row.team_id, judged.row.scenario, judged.row.id, judged.result)
-        for judged in tries
-        if judged.row.round == number and judged.row.team_id is not None and judged.counts
-    ]
-    draw = next((draw for draw in reversed(draws) if draw.round == number), None)
-    if draw is not None:
-        scenarios = drawn_scenarios(draw)
-    else:  # nothing was drawn: what is flown makes the round
-        frames = {attempt.scenario: attempt.result.frames for attempt in reversed(attempts)}
-        scenarios = [(name, frames[name]) for name in dict.fromkeys(attempt.scenario for attempt in attempts)]
+    attempts = _attempts(number, tries)
+    scenarios = _scenarios(number, draws, attempts)
     flown = Counter((attempt.team, attempt.scenario) for attempt in attempts)
     names = {team.id: team.name for team in teams if not team.withdrawn}
     rows = rank(names, scenarios, attempts, rule)
@@ -220,6 +293,29 @@ def _ranking(
         scenarios=(*shown, *[""] * (rule.scenarios - len(shown))),
         rows=tuple(_row_view(row, flown) for row in rows),
     )
+
+
+def _attempts(number: int, tries: Sequence[_Judged]) -> list[Attempt]:
+    """The tries that can count in the ranking of a round."""
+    return [
+        _attempt(judged)
+        for judged in tries
+        if judged.row.round == number
+        and judged.row.team_id is not None
+        and judged.row.scenario
+        and judged.counts
+    ]
+
+
+def _scenarios(
+    number: int, draws: Sequence[tables.Draw], attempts: Sequence[Attempt]
+) -> list[tuple[str, tuple[str, ...]]]:
+    """Names and frames of a round's scenarios: those drawn, or, where nothing was drawn, those flown."""
+    draw = next((draw for draw in reversed(draws) if draw.round == number), None)
+    if draw is not None:
+        return drawn_scenarios(draw)
+    frames = {attempt.scenario: attempt.result.frames for attempt in reversed(attempts)}
+    return [(name, frames[name]) for name in dict.fromkeys(attempt.scenario for attempt in attempts)]
 
 
 def _row_view(row: Standing, flown: Mapping[tuple[int, str], int]) -> RowView:
@@ -248,7 +344,9 @@ def _row_view(row: Standing, flown: Mapping[tuple[int, str], int]) -> RowView:
     )
 
 
-def _try_view(judged: _Judged, names: Mapping[int, str], attempts: Mapping[int, int], rule: Rule) -> TryView:
+def _try_view(
+    judged: _Judged, names: Mapping[int, str], attempts: Mapping[int, int], rule: Rule, barrier: str
+) -> TryView:
     row = judged.row
     return TryView(
         id=row.id,
@@ -261,6 +359,7 @@ def _try_view(judged: _Judged, names: Mapping[int, str], attempts: Mapping[int, 
         frames=tuple(row.frames.split()),
         state=row.state,
         judged=judged.counts,
+        barrier=barrier,
         verdict=from_wire(judged.report.get("verdict"), 40),
         reason=from_wire(judged.report.get("reason"), 500),
         source=row.source,
@@ -303,18 +402,33 @@ def _judgement_view(entry: tables.Judgement, names: Mapping[int, str]) -> Judgem
     )
 
 
-def _next_view(session: Session, names: Mapping[int, str]) -> NextView | None:
-    row = last_call(session)
+def _call_view(session: Session, names: Mapping[int, str]) -> CallView | None:
+    row = current_call(session)
     if row is None or row.team_id is None:
         return None
-    return NextView(
-        team=row.team_id, team_name=names.get(row.team_id, ""), scenario=row.scenario, who=row.who, at=row.at
+    flying = flying_on(session, row)
+    return CallView(
+        id=row.id,
+        team=row.team_id,
+        team_name=names.get(row.team_id, ""),
+        scenario=row.scenario,
+        attempt=flying.id if flying is not None else None,
+        who=row.who,
+        at=row.at,
     )
 
 
-def last_call(session: Session) -> tables.Next | None:
-    """Who was called last."""
-    return session.scalars(select(tables.Next).order_by(tables.Next.id.desc()).limit(1)).first()
+def _last_call_view(session: Session, names: Mapping[int, str]) -> LastCallView | None:
+    row = last_call(session)
+    if row is None or row.team_id is None:
+        return None
+    tries = tuple(each.id for each in tries_of(session, row))
+    return LastCallView(id=row.id, team=row.team_id, team_name=names.get(row.team_id, ""), tries=tries)
+
+
+def _queue_view(session: Session, names: Mapping[int, str]) -> QueueView:
+    teams = tuple(QueuedView(team=team, team_name=names.get(team, "")) for team in read_queue(session))
+    return QueueView(number=queue_number(session), teams=teams)
 
 
 def _rule_view(rule: Rule, row: tables.SettingsChange | None) -> RuleView:

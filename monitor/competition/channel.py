@@ -9,19 +9,29 @@ from collections.abc import Awaitable, Callable
 from fastapi import FastAPI
 from starlette.websockets import WebSocket, WebSocketDisconnect
 
+from monitor.addresses import Places, client_address
 from monitor.competition.service import CompetitionService, Message
 
 MOST_WATCHERS = 300
+MOST_WATCHERS_PER_ADDRESS = 90
 _TOO_MANY = 1013  # "try again later"
 
 
 def add_channel(web: FastAPI, service: CompetitionService) -> None:
     """Add the WebSocket."""
+    places = Places(MOST_WATCHERS, MOST_WATCHERS_PER_ADDRESS)
 
     @web.websocket("/ws/competition")
     async def live(websocket: WebSocket) -> None:
         await websocket.accept()
-        await _serve_watcher(service, websocket)
+        address = client_address(websocket.scope)
+        if places.take(address):
+            await websocket.close(_TOO_MANY, "too many are watching")
+            return
+        try:
+            await _serve_watcher(service, websocket)
+        finally:
+            places.give_back(address)
 
 
 class _Watcher:
@@ -47,9 +57,6 @@ class _Watcher:
 
 async def _serve_watcher(service: CompetitionService, websocket: WebSocket) -> None:
     watcher = _Watcher()
-    if service.listeners >= MOST_WATCHERS:
-        await websocket.close(_TOO_MANY, "too many are watching")
-        return
     unsubscribe = service.subscribe(watcher.put)
     for message in service.news():
         watcher.put(message)

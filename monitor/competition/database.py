@@ -13,6 +13,7 @@ from sqlalchemy.exc import ArgumentError, IntegrityError, NoSuchModuleError, SQL
 from sqlalchemy.orm import Session, sessionmaker
 from sqlalchemy.pool import StaticPool
 
+from monitor.competition.migrations import migrate
 from monitor.competition.tables import PREFIX, SCHEMA_VERSION, Schema, Table
 from monitor.settings import MonitorError
 
@@ -69,7 +70,11 @@ class Database:
         self._engine.dispose()
 
     def _prepare(self) -> None:
+        """Make the tables, or bring older ones up to date: all of it or nothing."""
         with self._engine.begin() as connection:
+            if connection.dialect.name == "sqlite":
+                # Its driver begins no transaction before a change of tables.
+                connection.exec_driver_sql("BEGIN IMMEDIATE")
             present = {name for name in inspect(connection).get_table_names() if name.startswith(PREFIX)}
             if not present:
                 Table.metadata.create_all(connection)
@@ -80,6 +85,9 @@ class Database:
                 if Schema.__tablename__ in present
                 else []
             )
+            if len(versions) == 1 and 1 <= versions[0] < SCHEMA_VERSION:
+                migrate(connection, versions[0])
+                versions = [SCHEMA_VERSION]
         if versions != [SCHEMA_VERSION]:
             held = f"version {versions[0]}" if len(versions) == 1 else "no version that is known here"
             raise DatabaseError(
@@ -146,6 +154,8 @@ def _mend(error: SQLAlchemyError) -> str:
         ("unable to open database file", "does its folder exist, and may you write there?"),
         ("readonly", "it cannot be written; name another file or change its permissions"),
         ("not a database", "the file is something else; name another"),
+        ("disk is full", "free some space; it goes on by itself"),
+        ("disk i/o error", "is the disk full or gone? It goes on by itself"),
         ("database is locked", "another program is writing to it"),
         ("could not translate host", "is the host's name right?"),
         ("connection refused", "is the server running there?"),

@@ -7,8 +7,8 @@ import io
 from collections.abc import Iterable, Sequence
 
 from monitor.competition.views import Board, RankingView
+from scenarios.spreadsheet import cell
 
-_FORMULA = ("=", "+", "-", "@", "\t", "\r")
 _TRY_COLUMNS = (
     *("try", "round", "team", "scenario", "attempt", "drone", "state", "judged", "verdict"),
     *("crossed", "missing", "contacts", "penalty_s", "try_time_s", "total_s", "completed", "counted_s"),
@@ -25,8 +25,8 @@ def ranking_csv(ranking: RankingView) -> str:
     rows: list[list[object]] = []
     for row in ranking.rows:
         values: list[object] = [row.rank, row.name, f"{row.total_s:.2f}", row.contacts, row.flown]
-        for cell in row.cells:
-            values += [f"{cell.counted_s:.2f}", cell.state, cell.attempt]
+        for flown in row.cells:
+            values += [f"{flown.counted_s:.2f}", flown.state, flown.attempt]
         rows.append(values)
     return _csv(columns, rows)
 
@@ -64,4 +64,4 @@ def _safe(value: object) -> str:
         return "true" if value else "false"
     if not isinstance(value, str):
         return str(value)
-    return f"'{value}" if value.lstrip().startswith(_FORMULA) or value.startswith(_FORMULA) else value
+    return cell(value)

@@ -12,6 +12,7 @@ from monitor.competition.words import Refused, shown
 MOST_BODY_BYTES = 65_536
 MOST_SCENARIOS = 10  # of a round
 MOST_POOL = 200
+MOST_QUEUED = 500
 
 Id = Annotated[int, Field(ge=1, le=2**31 - 1)]
 Seconds = Annotated[float, Field(ge=0, le=LONGEST_S, allow_inf_nan=False)]
@@ -25,7 +26,10 @@ _MENDS = {
     "scenario": 'give the name of a scenario, or "" for whatever the drone flies',
     "pool": f"give a list of 1 to {MOST_POOL} names of scenarios",
     "count": f"give a whole number from 1 to {MOST_SCENARIOS}",
-    "seen": "give the try's `judgements` as you saw it",
+    "seen": "give the try's `judgements`, or the queue's `number`, as you saw it",
+    "call": "give the id of the last call",
+    "teams": f"give a list of at most {MOST_QUEUED} numbers of teams, the first flies first",
+    "shuffle": "give true or false",
     "crossed": "give a list of colours, or null for what the referee says",
     "contacts": f"give a whole number from 0 to {MOST_CONTACTS}, or null for what the referee says",
     "penalty_s": f"give seconds from 0 to {LONGEST_S:.0f}, or null for what the referee says",
@@ -61,10 +65,24 @@ class TeamChangeForm(FormModel):
 
 
 class NextForm(FormModel):
-    """Who flies next; null for nobody."""
+    """Whom to call to the start; null for nobody."""
 
     team: Id | None
     scenario: Name = Field("", description="empty for whatever the drone flies")
+
+
+class UndoForm(FormModel):
+    """A call to take back."""
+
+    call: Id
+
+
+class QueueForm(FormModel):
+    """The order in which teams are to fly."""
+
+    seen: int = Field(ge=0, description="the number of the queue when the judge looked at it")
+    teams: list[Id] = Field(max_length=MOST_QUEUED, description="the first flies first")
+    shuffle: bool = Field(False, description="put them in a random order")
 
 
 class DrawForm(FormModel):

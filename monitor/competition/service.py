@@ -15,9 +15,10 @@ from typing import TYPE_CHECKING, Any, TypeVar
 
 from sqlalchemy.exc import SQLAlchemyError
 
+from monitor.competition.calls import Entry
 from monitor.competition.database import Database, DatabaseError
 from monitor.competition.rules import Result, read_report
-from monitor.competition.store import Entry, Store
+from monitor.competition.store import Store
 from monitor.competition.views import Board, RunningView
 from monitor.competition.words import Refused, shown
 from monitor.tries import TryEvent
@@ -93,8 +94,10 @@ class CompetitionService:
                 views.append(
                     RunningView(
                         id=each.id,
+                        team=each.team,
                         team_name=each.team_name,
                         scenario=each.scenario,
+                        barrier=each.barrier,
                         drone_id=each.drone_id,
                         frames=each.frames,
                         crossed=now.crossed if now is not None else each.referee.crossed,
@@ -154,7 +157,7 @@ class CompetitionService:
             interrupted = await loop.run_in_executor(self._worker, self._store.interrupt)
             if interrupted:
                 _log.warning("tries that ran when the monitor was stopped: %d", interrupted)
-            self.scenarios = tuple(await asyncio.to_thread(self._equipment.list_scenarios))
+            self.scenarios = await self._scenarios_to_draw()
             await self._refresh()
             self._opened.set()
             while True:
@@ -205,12 +208,18 @@ class CompetitionService:
             The round.
 
         Raises:
-            Refused: a name is unknown, or the pool holds too few.
+            Refused: a name is unknown, its scenario lacks a frame, or the pool holds too few.
         """
         names = list(dict.fromkeys(pool))
         if count > len(names):
             raise Refused(f"count {count} is more than the {len(names)} scenarios of the pool; tick more")
         frames = {name: await self.frames(name) for name in names}
+        for name, colours in frames.items():
+            if colours != COLOURS:
+                raise Refused(
+                    f"scenario {shown(name)} cannot be drawn: it has {_listed(colours)}, a try needs a red, "
+                    "a green and a blue one; take it out of the pool"
+                )
         drawn = {name: frames[name] for name in self._random.sample(names, count)}
         entry = Entry(who, self._now())
         return await self.change(lambda store: store.draw(drawn, names, entry))
@@ -233,6 +242,19 @@ class CompetitionService:
         if len(self._frames) < _MOST_REMEMBERED:
             self._frames[scenario] = frames
         return frames
+
+    def shuffled(self, teams: Sequence[int]) -> list[int]:
+        """Teams in a random order."""
+        return self._random.sample(teams, len(teams))
+
+    async def _scenarios_to_draw(self) -> tuple[str, ...]:
+        """Names of the scenarios that have all frames of the challenge."""
+        names = []
+        for name in await asyncio.to_thread(self._equipment.list_scenarios):
+            with suppress(Refused):
+                if await self.frames(name) == COLOURS:
+                    names.append(name)
+        return tuple(names)
 
     def entry(self, who: str) -> Entry:
         """Somebody, now."""
@@ -303,3 +325,8 @@ class CompetitionService:
     def _tell(self, message: Message) -> None:
         for hear in tuple(self._listeners):
             hear(message)
+
+
+def _listed(colours: Sequence[str]) -> str:
+    """Frames of a scenario in words."""
+    return "no frames" if not colours else f"only the {' and the '.join(colours)} frame"

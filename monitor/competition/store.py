@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import json
 import sys
-from collections.abc import Mapping, Sequence
-from dataclasses import asdict, dataclass
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import asdict
 from datetime import datetime
 from math import isfinite
 from typing import Any
@@ -16,12 +16,23 @@ from sqlalchemy.orm import Session
 
 from monitor.competition import tables
 from monitor.competition.board import (
-    last_call,
     last_settings,
     present_round,
     read_board,
     read_detail,
+    read_json,
     rule_of,
+)
+from monitor.competition.calls import (
+    Entry,
+    call_team,
+    current_call,
+    flying_on,
+    leave,
+    queue_number,
+    take_back,
+    use_call,
+    write_queue,
 )
 from monitor.competition.database import Database
 from monitor.competition.rules import Correction, Rule, correct, read_report
@@ -34,20 +45,6 @@ MOST_JUDGEMENTS = 200  # of one try
 MOST_REMARKS = 1000  # characters
 MOST_MEMBERS = 300  # characters
 _LONGEST_REPORT = 100_000  # characters of JSON
-_MOVED_M = 0.3  # a try whose drone moved less used nobody's call
-
-
-@dataclass(frozen=True, slots=True)
-class Entry:
-    """Who does something, and when.
-
-    Attributes:
-        who: name, as the visitor gave it.
-        at: now, with its time zone.
-    """
-
-    who: str
-    at: datetime
 
 
 class Store:
@@ -84,6 +81,12 @@ class Store:
             raise _no_try(try_id)
         return detail
 
+    def reports(self, try_ids: Iterable[int]) -> dict[int, dict[str, Any]]:
+        """What the referee said of some tries, by their ids."""
+        wanted = select(tables.Try.id, tables.Try.report).where(tables.Try.id.in_(list(try_ids)))
+        with self._database.transaction() as session:
+            return {number: read_json(report) for number, report in session.execute(wanted)}
+
     def interrupt(self) -> int:
         """Say of tries that seem to run that the monitor was stopped meanwhile. Returns how many."""
         with self._database.transaction() as session:
@@ -114,22 +117,21 @@ class Store:
                 row.state = "running"
             elif row.state != "ended":
                 row.state, row.ended = "ended", at
-                self._use_call(session, row, event.report, at)
+                use_call(session, row, event.report, at)
             return row.id
 
     def _begin(self, session: Session, event: TryEvent, frames: Sequence[str], at: datetime) -> tables.Try:
         scenario = from_wire(event.scenario, 80)
-        call = last_call(session)
-        team = call.team_id if call is not None and call.scenario in {"", scenario} else None
-        flying = select(tables.Try.id).where(tables.Try.state == "running", tables.Try.team_id == team)
-        if team is not None and session.scalars(flying).first() is not None:
-            team = None  # the call is being flown already, by another drone
+        call = current_call(session)
+        if call is not None and (call.scenario not in {"", scenario} or flying_on(session, call) is not None):
+            call = None  # it is for another scenario, or another drone flies on it already
         draws = list(session.scalars(select(tables.Draw)))
         row = tables.Try(
             key=event.key,
             drone_id=event.drone_id,
             round=present_round(draws),
-            team_id=team,
+            team_id=call.team_id if call is not None else None,
+            call_id=call.id if call is not None else None,
             scenario=scenario,
             frames=" ".join(frames),
             state="running",
@@ -142,15 +144,6 @@ class Store:
         session.add(row)
         session.flush()
         return row
-
-    @staticmethod
-    def _use_call(session: Session, row: tables.Try, report: Mapping[str, Any], at: datetime) -> None:
-        """The call is used up by a try that was flown; who is next must be said anew."""
-        call = last_call(session)
-        path_m = report.get("path_length_m")
-        moved = not isinstance(path_m, int | float) or path_m >= _MOVED_M
-        if call is not None and call.team_id is not None and call.team_id == row.team_id and moved:
-            session.add(tables.Next(team_id=None, scenario="", who="", at=at))
 
     def add_team(self, name: str, members: str, entry: Entry) -> int:
         """Enter a team.
@@ -194,16 +187,47 @@ class Store:
                     team.members = free_text(members, "members", MOST_MEMBERS)
                 if withdrawn is not None:
                     team.withdrawn = withdrawn
+                    if withdrawn:
+                        leave(session, team, entry)
                 session.add(_team_change(team, entry))
         except IntegrityError as error:
             raise _name_taken(name or "") from error
 
     def call(self, team_id: int | None, scenario: str, entry: Entry) -> None:
-        """Say who flies next; None for nobody. `scenario` "" is whatever the drone flies."""
+        """Call a team to the start; None for nobody. `scenario` "" is whatever the drone flies.
+
+        Raises:
+            Refused: there is no such team, or it is withdrawn.
+        """
         with self._database.transaction() as session:
-            if team_id is not None and _team(session, team_id).withdrawn:
-                raise Refused(f"team {team_id} is withdrawn; take it back in first")
-            session.add(tables.Next(team_id=team_id, scenario=scenario, who=entry.who, at=entry.at))
+            if team_id is not None:
+                _active_team(session, team_id)
+            call_team(session, team_id, scenario, entry)
+
+    def take_back(self, call_id: int, entry: Entry) -> None:
+        """Take the last call back; its tries become nobody's. Raises `Refused` if it is another by now."""
+        with _Quicker(), self._database.transaction() as session:
+            take_back(session, call_id, entry)
+
+    def set_queue(self, seen: int, teams: Sequence[int], entry: Entry) -> None:
+        """Keep the order in which teams are to fly.
+
+        Args:
+            seen: number of the queue that the judge saw.
+            teams: ids, the first flies first.
+            entry: who and when.
+
+        Raises:
+            Refused: another judge was quicker, a team is named twice, not there or withdrawn.
+        """
+        with self._database.transaction() as session:
+            if queue_number(session) != seen:
+                raise Refused("the queue was changed meanwhile; look at it again", 409)
+            for team_id in teams:
+                _active_team(session, team_id)
+                if teams.count(team_id) > 1:
+                    raise Refused(f"team {team_id} stands in the queue twice; name each team once")
+            write_queue(session, teams, entry)
 
     def draw(self, scenarios: Mapping[str, Sequence[str]], pool: Sequence[str], entry: Entry) -> int:
         """Keep a draw. A round that nobody has flown in yet is drawn again, else the next one begins.
@@ -319,6 +343,13 @@ def _team(session: Session, team_id: int) -> tables.Team:
     team = session.get(tables.Team, team_id)
     if team is None:
         raise Refused(f"team {team_id} does not exist; choose one of the list", 404)
+    return team
+
+
+def _active_team(session: Session, team_id: int) -> tables.Team:
+    team = _team(session, team_id)
+    if team.withdrawn:
+        raise Refused(f"team {team_id} is withdrawn; take it back in first")
     return team
 
 

@@ -9,7 +9,7 @@ from sqlalchemy.orm import DeclarativeBase, Mapped, mapped_column
 from sqlalchemy.types import TypeDecorator
 
 PREFIX = "competition_"  # so that a database may hold other things too
-SCHEMA_VERSION = 1
+SCHEMA_VERSION = 2
 
 
 class UtcTime(TypeDecorator[datetime]):
@@ -89,12 +89,15 @@ class Draw(Table):
     at: Mapped[datetime]
 
 
-class Next(Table):
-    """Who was called to fly next; the last row is the one that holds.
+class Call(Table):
+    """A team called to the start, or the end of a call; the last row is the one that holds.
 
     Attributes:
-        team_id: None when nobody is called.
+        team_id: None when nobody is called any more.
         scenario: "" for whatever the drone flies.
+        kind: "call"; "used" when a try was flown on it; "taken back" by a judge.
+        queue_place: where in the queue the team stood when it was called, from 0; None if it stood in none.
+        who: "" where nobody did it: the call was used.
     """
 
     __tablename__ = PREFIX + "next"
@@ -102,6 +105,23 @@ class Next(Table):
     id: Mapped[int] = mapped_column(primary_key=True)
     team_id: Mapped[int | None] = mapped_column(ForeignKey(Team.id))
     scenario: Mapped[str] = mapped_column(String(80))
+    kind: Mapped[str] = mapped_column(String(20), server_default="call")
+    queue_place: Mapped[int | None]
+    who: Mapped[str] = mapped_column(String(100))
+    at: Mapped[datetime]
+
+
+class Queue(Table):
+    """The order in which teams are to fly, as somebody set it; the last row is the one that holds.
+
+    Attributes:
+        teams: ids, the first flies first, separated by spaces.
+    """
+
+    __tablename__ = PREFIX + "queues"
+
+    id: Mapped[int] = mapped_column(primary_key=True)
+    teams: Mapped[str] = mapped_column(Text)
     who: Mapped[str] = mapped_column(String(100))
     at: Mapped[datetime]
 
@@ -113,6 +133,7 @@ class Try(Table):
         key: the fleet's; names this try and no other.
         round: in which it was flown; 0 before the first draw.
         team_id: None until a judge says whose it was.
+        call_id: the call on which it began; None if nobody was called.
         frames: colours to cross, in order, separated by spaces.
         state: "running", "ended", or "interrupted" when the monitor was stopped meanwhile.
         report: JSON as the referee gave it.
@@ -129,6 +150,7 @@ class Try(Table):
     drone_id: Mapped[int]
     round: Mapped[int] = mapped_column(index=True)
     team_id: Mapped[int | None] = mapped_column(ForeignKey(Team.id), index=True)
+    call_id: Mapped[int | None] = mapped_column(ForeignKey(Call.id))
     scenario: Mapped[str] = mapped_column(String(80))
     frames: Mapped[str] = mapped_column(String(80))
     state: Mapped[str] = mapped_column(String(20), index=True)

@@ -50,6 +50,9 @@ class TryView(View):
     frames: tuple[str, ...] = Field(description="colours to cross, in order")
     state: str = Field(description='"running", "ended", or "interrupted": to be judged by hand')
     judged: bool = Field(description="it has a result: it ended, or a judge corrected it")
+    barrier: str = Field(
+        description='why no ranking has it: "no team", "withdrawn", "no scenario", "not drawn"; "" if one has'
+    )
     verdict: str = Field(description="the referee's word")
     reason: str = Field(description="the referee's sentence")
     source: str = Field(description='what the referee saw by: "truth" or "telemetry"')
@@ -89,14 +92,41 @@ class DrawView(View):
     at: datetime
 
 
-class NextView(View):
-    """Who is called to fly."""
+class CallView(View):
+    """The team that is called to the start; the next try that begins is its."""
 
+    id: int
     team: int
     team_name: str
     scenario: str = Field(description='"" for whatever the drone flies')
+    attempt: int | None = Field(
+        description="id of the try that the team flies on this call now", serialization_alias="try"
+    )
     who: str
     at: datetime
+
+
+class QueuedView(View):
+    """A team in the queue."""
+
+    team: int
+    team_name: str
+
+
+class QueueView(View):
+    """Who flies after the team that is called."""
+
+    number: int = Field(description="names this state of the queue; who sets another must carry it")
+    teams: tuple[QueuedView, ...] = Field(description="the first flies first")
+
+
+class LastCallView(View):
+    """The call that a judge can still take back."""
+
+    id: int
+    team: int
+    team_name: str
+    tries: tuple[int, ...] = Field(description="flown on it: they would become nobody's")
 
 
 class RuleView(View):
@@ -110,10 +140,19 @@ class RuleView(View):
     at: datetime | None
 
 
+class RivalView(View):
+    """Another try of the same team at the same scenario of the round."""
+
+    attempt: int = Field(serialization_alias="try")
+    counted_s: float
+    contacts: int
+
+
 class TryDetail(View):
     """A try with all that judges said of it."""
 
     attempt: TryView = Field(serialization_alias="try")
+    rival: RivalView | None = Field(description="of the other tries the one that would count; null for none")
     correction: JudgementView | None = Field(description="the one that holds")
     rule: RuleView
     history: tuple[JudgementView, ...] = Field(description="newest first")
@@ -154,8 +193,10 @@ class RunningView(View):
     """A try that is being flown; sent every second."""
 
     id: int
+    team: int | None = Field(description="id; null until a judge says whose it is")
     team_name: str
     scenario: str
+    barrier: str = Field(description="as of a try")
     drone_id: int
     frames: tuple[str, ...]
     crossed: tuple[str, ...]
@@ -171,7 +212,9 @@ class Board(View):
     round: int = Field(description="the present one; 0 before the first draw")
     rule: RuleView
     teams: tuple[TeamView, ...]
-    called: NextView | None = Field(serialization_alias="next")
+    called: CallView | None
+    last_call: LastCallView | None
+    queue: QueueView
     draws: tuple[DrawView, ...] = Field(description="newest first")
     tries: tuple[TryView, ...] = Field(description="newest first, at most 500")
     rankings: tuple[RankingView, ...] = Field(description="one for each round, the present one first")
@@ -183,7 +226,7 @@ class StateView(View):
     board: Board
     running: tuple[RunningView, ...]
     problem: str = Field(description='what the database says; "" while it works')
-    scenarios: tuple[str, ...] = Field(description="names that can be drawn")
+    scenarios: tuple[str, ...] = Field(description="names that can be drawn: those with all three frames")
 
 
 class RankingStateView(View):
@@ -193,6 +236,7 @@ class RankingStateView(View):
     ranking: RankingView
     rounds: tuple[int, ...] = Field(description="that there are, the present one first")
     rule: RuleView
-    called: NextView | None = Field(serialization_alias="next")
+    called: CallView | None
+    queue: QueueView
     running: tuple[RunningView, ...]
     problem: str

@@ -45,6 +45,7 @@ def register(monitor: Monitor) -> None:
             path="/",
             httponly=True,
             samesite="lax",
+            secure=_is_encrypted(request),
         )
         return response
 
@@ -52,8 +53,15 @@ def register(monitor: Monitor) -> None:
     async def log_out(request: Request) -> Response:
         monitor.access.log_out(request)
         response = RedirectResponse("/", status_code=303)
-        response.delete_cookie(monitor.access.cookie, path="/", httponly=True, samesite="lax")
+        response.delete_cookie(
+            monitor.access.cookie, path="/", httponly=True, samesite="lax", secure=_is_encrypted(request)
+        )
         return response
+
+
+def _is_encrypted(request: Request) -> bool:
+    """Whether the browser came by TLS, of which a trusted proxy tells."""
+    return request.url.scheme == "https"
 
 
 def _page(

@@ -9,6 +9,7 @@ from starlette.requests import Request
 
 from monitor.pages.competition import STYLE
 from monitor.pages.shell import shell, use_module
+from monitor.urls import is_for_others
 
 if TYPE_CHECKING:
     from monitor.server import Monitor
@@ -22,4 +23,4 @@ def register(monitor: Monitor) -> None:
         ui.add_head_html(STYLE)
         with shell(monitor, request, "Ranking", "/ranking"):
             ui.element("div").props("id=ranking")
-        use_module("competition_ranking.js")
+        use_module("competition_ranking.js", join=is_for_others(monitor.place[0]))

@@ -22,6 +22,7 @@ _PAGES = (
     ("Pilot", "/pilot"),
     ("Competition", "/competition"),
     ("Ranking", "/ranking"),
+    ("Stage", "/stage"),
     ("Replay", "/replay"),
 )
 HEAD = (
@@ -53,6 +54,21 @@ def shell(monitor: Monitor, request: Request, title: str, here: str) -> Iterator
     main.props["tabindex"] = "-1"  # the skip link moves the focus here
     with main:
         yield visitor
+
+
+@contextmanager
+def bare(title: str) -> Iterator[None]:
+    """Put a page without header and navigation around what is made inside the `with`, for a projector.
+
+    Args:
+        title: of the page, for the browser's tab.
+    """
+    ui.page_title(f"{title} – framerunner")
+    ui.add_head_html(HEAD)
+    main = ui.element("main").classes("page")
+    main.props["id"] = "main"
+    with main:
+        yield
 
 
 def use_module(path: str, **data: object) -> None:

@@ -54,12 +54,28 @@ export class Arena {
    */
   setPoses(poses, states) {
     this.#do((painter) => {
-      for (const pose of poses) {
-        const before = this.#last.get(pose.id ?? 1);
-        if (before && (pose.t < before.t - BACK_S || (pose.on && !before.on))) this.clearTrail(pose.id ?? 1);
-      }
+      for (const pose of poses) this.#watchForNew(pose);
       this.#last = new Map(poses.map((pose) => [pose.id ?? 1, pose]));
       painter.setPoses(poses, (pose) => this.#colour(pose, states));
+    });
+  }
+
+  /**
+   * Where the drones are at one moment: drawn exactly there, at once.
+   * @param {Pose[]} poses
+   * @param {Pose[]} passed through which they came since the last call; the trail goes through all of them
+   * @param {string[]|Object<number, string[]>} states as in `setPoses`
+   */
+  showMoment(poses, passed, states) {
+    this.#do((painter) => {
+      const colourOf = (pose) => this.#colour(pose, states);
+      for (const pose of passed) {
+        this.#watchForNew(pose);
+        this.#last.set(pose.id ?? 1, pose);
+        painter.addTrail(pose.id ?? 1, [pose], colourOf);
+      }
+      painter.setPoses(poses, colourOf, true);
+      setAttribute(this.#box, "data-time", poses[0]?.t ?? null);
     });
   }
 
@@ -104,6 +120,12 @@ export class Arena {
     this.#painter = null;
     this.#waiting = [];
     this.#box.remove();
+  }
+
+  /** A trail begins anew with a flight. */
+  #watchForNew(pose) {
+    const before = this.#last.get(pose.id ?? 1);
+    if (before && (pose.t < before.t - BACK_S || (pose.on && !before.on))) this.clearTrail(pose.id ?? 1);
   }
 
   /** Done at once, or when the graphics are there. */

@@ -29,13 +29,13 @@ export class DroneModel {
     this.cone = null;
   }
 
-  /** Set where it is to be soon, from where it is drawn now. */
-  aim(pose, now) {
+  /** Set where it is to be soon, from where it is drawn now; at once, if so exactly. */
+  aim(pose, now, isExact = false) {
     this.pose = pose;
     const [w, x, y, z] = pose.q;
     this.to.p.set(...pose.p);
     this.to.q.set(x, y, z, w).normalize();
-    const isFar = this.began < 0 || this.group.position.distanceTo(this.to.p) > 1.5;
+    const isFar = isExact || this.began < 0 || this.group.position.distanceTo(this.to.p) > 1.5;
     this.from.p.copy(isFar ? this.to.p : this.group.position);
     this.from.q.copy(isFar ? this.to.q : this.group.quaternion);
     this.began = now;

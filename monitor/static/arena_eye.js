@@ -143,7 +143,7 @@ export class ArenaEye {
       camera.updateMatrixWorld();
       const fits = corners.every((corner) => {
         const seen = corner.clone().project(camera);
-        return Math.abs(seen.x) < 0.98 && seen.y < 0.94 && seen.y > -0.86 && seen.z < 1; // below stands the legend
+        return Math.abs(seen.x) < 0.98 && seen.y < 0.94 && seen.y > -0.8 && seen.z < 1; // below stands the legend
       });
       if (fits) far = away;
       else near = away;

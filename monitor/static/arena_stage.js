@@ -78,19 +78,20 @@ export class Stage {
   /**
    * @param {import("./arena.js").Pose[]} poses
    * @param {function(object): string} colourOf a pose
+   * @param {boolean} [isExact] drawn there at once; else they move there smoothly
    */
-  setPoses(poses, colourOf) {
+  setPoses(poses, colourOf, isExact = false) {
     const now = performance.now();
     const there = new Set(poses.map((pose) => pose.id ?? 1));
     for (const [id, drone] of this.#drones) {
-      if (there.has(id)) continue;
+      if (there.has(id) || drone.began < 0) continue; // a trail may be known before the first pose
       drone.label.remove();
       drone.discard();
       this.#drones.delete(id);
     }
     for (const pose of poses) {
       const drone = this.#drone(pose.id ?? 1);
-      drone.aim(pose, now);
+      drone.aim(pose, now, isExact);
       drone.setFresh(pose.fresh !== false);
       this.addTrail(pose.id ?? 1, [pose], colourOf);
     }

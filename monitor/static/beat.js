@@ -12,15 +12,17 @@ let frame = 0;
 let early = 0;
 let timer = 0;
 let isAsked = false;
+let isRunning = false;
 
 /**
- * Do something with the next beat; asked again before that, only the newest is done.
+ * Do something with the next beat; asked again before that, only the newest is done. What is asked for during a beat is
+ * done in the same one, unless it was done in it already: so what belongs together is drawn in one picture.
  * @param {object} key whose it is
  * @param {function(number): void} act gets the time of the picture, as `performance.now()`
  */
 export function onBeat(key, act) {
   waiting.set(key, act);
-  if (!isAsked) ask();
+  if (!isAsked && !isRunning) ask();
 }
 
 /** How often there may be a new picture. @param {number} wanted_ms from one to the next */
@@ -45,13 +47,18 @@ function run() {
   cancelAnimationFrame(frame);
   isAsked = false;
   last = performance.now();
-  const now = [...waiting.values()];
-  waiting.clear();
-  for (const act of now) {
+  isRunning = true;
+  const done = new Set();
+  for (const [key, act] of waiting) { // a map goes on with what is added meanwhile
+    if (done.has(key)) continue;
+    done.add(key);
+    waiting.delete(key);
     try {
       act(last);
     } catch (error) {
       console.error(error); // a fault in one part must not stop the others
     }
   }
+  isRunning = false;
+  if (waiting.size > 0) ask();
 }

@@ -15,13 +15,17 @@ export class CameraView {
   #message = null;
   #drawn = "";
   #again = 0;
+  #note;
+  #bitmap = null;
+  #wanted = null;
 
   /** @param {HTMLElement} element an empty box; the view takes its width */
   constructor(element) {
     this.#image = make("img", { alt: "what the drone's camera sees", draggable: "false" });
     this.#canvas = make("canvas", { "aria-hidden": "true" });
     this.#words = make("p", { class: "m-camera-words" }, "no video");
-    this.#box = make("div", { class: "m-camera" }, this.#image, this.#canvas, this.#words);
+    this.#note = make("p", { class: "m-camera-note", hidden: true });
+    this.#box = make("div", { class: "m-camera" }, this.#image, this.#canvas, this.#words, this.#note);
     element.append(this.#box);
     this.#image.hidden = true;
     this.#image.addEventListener("load", () => this.#showImage(true));
@@ -54,11 +58,51 @@ export class CameraView {
     if (old) URL.revokeObjectURL(old);
   }
 
+  /**
+   * Show an image and what was detected in this very image, both at once.
+   * @param {{jpeg: Blob, t: number|null, detections: object|null}} frame
+   */
+  async showFrame(frame) {
+    this.#wanted = frame;
+    let bitmap;
+    try {
+      bitmap = await createImageBitmap(frame.jpeg);
+    } catch {
+      return; // it is no image; the one before stays
+    }
+    if (this.#wanted !== frame) return bitmap.close();
+    this.#bitmap?.close();
+    this.#bitmap = bitmap;
+    this.#message = frame.detections;
+    this.#box.style.setProperty("--shape", `${bitmap.width} / ${bitmap.height}`);
+    this.#box.dataset.time = frame.t ?? "";
+    this.#box.dataset.boxesTime = frame.detections?.t ?? "";
+    this.#words.hidden = true;
+    this.#draw();
+  }
+
+  /** Forget the image. @param {string} words what to say instead */
+  clearFrame(words) {
+    this.#wanted = null;
+    this.#bitmap?.close();
+    this.#bitmap = null;
+    this.#message = null;
+    this.#words.hidden = false;
+    setText(this.#words, words);
+    this.#draw();
+  }
+
+  /** Say something about the image, such as that it is the last one; "" takes it away. */
+  setNote(words) {
+    setText(this.#note, words);
+    this.#note.hidden = words === "";
+  }
+
   /** @param {{width: number, height: number, boxes: object}|null} message as "detections"; null: nothing known */
   setDetections(message) {
     this.#message = message;
     if (message?.width > 0 && message?.height > 0) {
-      this.#box.style.aspectRatio = `${message.width} / ${message.height}`;
+      this.#box.style.setProperty("--shape", `${message.width} / ${message.height}`);
     }
     const told = JSON.stringify([message?.width, message?.height, message?.boxes]);
     if (told === this.#drawn) return;
@@ -91,7 +135,10 @@ export class CameraView {
     const pen = canvas.getContext("2d", { willReadFrequently: true });
     pen.setTransform(ratio, 0, 0, ratio, 0, 0);
     pen.clearRect(0, 0, width, height);
-    const message = this.#message;
+    const [message, bitmap] = [this.#message, this.#bitmap];
+    if (bitmap) {
+      pen.drawImage(bitmap, 0, 0, width, height);
+    }
     if (!message || !(message.width > 0)) return;
     const scale = width / message.width;
     for (const colour of ["red", "green", "blue"]) {
@@ -125,17 +172,19 @@ export class CameraView {
 
   #label(pen, text, left, top, bottom, edge) {
     const { clientWidth: width, clientHeight: height } = this.#box;
-    pen.font = "600 12px system-ui, sans-serif";
-    const wide = pen.measureText(text).width + 12;
+    const size = Math.max(12, Math.min(26, width / 36)); // read from afar on a large picture
+    const high = 1.5 * size;
+    pen.font = `600 ${size}px system-ui, sans-serif`;
+    const wide = pen.measureText(text).width + size;
     const x = Math.max(0, Math.min(width - wide, left - 1));
-    let y = top - 21;
-    if (y < 0) y = bottom + 4 + 18 <= height ? bottom + 4 : 2;
+    let y = top - high - 3;
+    if (y < 0) y = bottom + 4 + high <= height ? bottom + 4 : 2;
     pen.fillStyle = "rgba(0, 0, 0, 0.75)";
-    pen.fillRect(x, y, wide, 18);
+    pen.fillRect(x, y, wide, high);
     pen.fillStyle = edge;
-    pen.fillRect(x, y, 3, 18);
+    pen.fillRect(x, y, 0.25 * size, high);
     pen.fillStyle = "#ffffff";
     pen.textBaseline = "middle";
-    pen.fillText(text, x + 8, y + 9.5);
+    pen.fillText(text, x + 0.6 * size, y + 0.53 * high);
   }
 }

@@ -82,25 +82,25 @@ export function watch(hear) {
  * Makes one call at a time of a function that asks, and one more if it was wanted meanwhile.
  * @param {function(): Promise<void>} work
  * @param {function(Error): void} fail
- * @returns {function(): void}
+ * @returns {function(): Promise<void>} done when what was wanted by then was asked for
  */
 export function oneAtATime(work, fail) {
-  let busy = false;
+  let going = null;
   let again = false;
-  return async function run() {
-    if (busy) {
-      again = true;
-      return;
-    }
-    busy = true;
-    do {
+  const run = async () => {
+    while (again) {
       again = false;
       try {
         await work();
       } catch (error) {
         fail(error);
       }
-    } while (again);
-    busy = false;
+    }
+    going = null;
+  };
+  return () => {
+    again = true;
+    going ??= run();
+    return going;
   };
 }

@@ -7,7 +7,7 @@ class NumberField {
   /**
    * @param {string} id
    * @param {string} label
-   * @param {{step: number, decimals: number, most: number, unit: string}} kind
+   * @param {{step: number, decimals: number, most: number, unit: string, note?: string}} kind
    * @param {function(): void} changed
    */
   constructor(id, label, kind, changed) {
@@ -39,7 +39,7 @@ class NumberField {
     this.initial = this.#text(now);
     this.corrected = corrected;
     this.input.value = this.initial;
-    setText(this.hint, `referee: ${this.referee} ${this.kind.unit}`.trim());
+    setText(this.hint, `referee: ${this.referee}${this.kind.unit}${this.kind.note ?? ""}`);
   }
 
   #text(value) {
@@ -114,9 +114,9 @@ export class Fields {
   constructor(changed) {
     this.crossed = new TickField("Frames crossed, in their turn", changed);
     this.completed = new TickField("Completed", changed);
-    this.contacts = new NumberField("contacts", "Contacts with frames", { step: 1, decimals: 0, most: 1000, unit: "" }, changed);
-    this.penalty = new NumberField("penalty", "Penalty, seconds", { step: 1, decimals: 2, most: 36000, unit: "s" }, changed);
-    this.time = new NumberField("time", "Try time, seconds", { step: 0.1, decimals: 2, most: 36000, unit: "s" }, changed);
+    this.contacts = new NumberField("contacts", "Contacts with frames", { step: 1, decimals: 0, most: 1000, unit: "", note: "; between equal totals fewer contacts win" }, changed);
+    this.penalty = new NumberField("penalty", "Penalty, seconds", { step: 1, decimals: 2, most: 36000, unit: " s" }, changed);
+    this.time = new NumberField("time", "Try time, seconds", { step: 0.1, decimals: 2, most: 36000, unit: " s" }, changed);
     this.remarks = make("textarea", { id: "remarks", maxlength: "1000", rows: "3", dir: "auto" });
     this.remarks.addEventListener("input", changed);
     this.remarksShown = "";
@@ -162,7 +162,7 @@ export class Fields {
     };
   }
 
-  /** What the try would count, by a rule. */
+  /** What the try would count, by a rule; as `effect` takes it. */
   counts(frames, rule) {
     const missing = frames.filter((colour) => !this.crossed.ticked.includes(colour));
     const completed = this.completed.ticked.length > 0;
@@ -170,6 +170,14 @@ export class Fields {
     const counted_s = completed && !contradiction
       ? this.time.value + this.penalty.value
       : rule.limit_s + missing.length * rule.missing_frame_s;
-    return { missing, completed: completed && !contradiction, contradiction, counted_s };
+    return {
+      missing,
+      completed: completed && !contradiction,
+      contradiction,
+      counted_s,
+      contacts: this.contacts.value,
+      penalty_s: this.penalty.value,
+      try_time_changed: this.time.changed,
+    };
   }
 }

@@ -1,8 +1,10 @@
 /** The ranking, for a projector: follows the contest by itself. */
 
 import { ask, oneAtATime, watch } from "./competition_channel.js";
-import { frameMarks, nameOf, orDash, seconds } from "./competition_words.js";
+import { nowLines } from "./competition_now.js";
+import { nameOf, seconds } from "./competition_words.js";
 import { make, setText, wantsStillness, whenThere } from "./dom.js";
+import { pageData } from "./start.js";
 
 const MOVE_MS = 700;
 const LONGEST_GUESS_S = 1.5; // how long a clock goes on without news
@@ -24,9 +26,11 @@ class Ranking {
   #running = [];
   #heard_ms = 0;
   #clocks = [];
+  called = null;
+  queue = { teams: [] };
 
-  /** @param {HTMLElement} element */
-  constructor(element) {
+  /** @param {HTMLElement} element @param {boolean} join whether phones can open the monitor */
+  constructor(element, join) {
     this.#element = element;
     this.#rounds.addEventListener("change", () => {
       this.#wanted = this.#rounds.value;
@@ -39,7 +43,8 @@ class Ranking {
     });
     this.#table.append(make("thead", { role: "rowgroup" }, this.#head), this.#body);
     element.append(
-      make("div", { class: "bar" }, this.#title, this.#rounds, wide), this.#line, this.#now, this.#table, this.#rule,
+      make("div", { class: "bar" }, this.#title, this.#rounds, wide), this.#line, this.#now, this.#table,
+      make("div", { class: "foot" }, this.#rule, join ? joinCode() : null),
     );
     const refresh = oneAtATime(() => this.#load(), (error) => this.#say(error.message));
     watch({
@@ -66,7 +71,8 @@ class Ranking {
     this.#showHead(state.ranking.scenarios);
     this.#showRows(state.ranking.rows);
     this.#showRule(state.rule);
-    this.next = state.next;
+    this.called = state.called;
+    this.queue = state.queue;
     this.#run(state.running);
   }
 
@@ -164,28 +170,12 @@ class Ranking {
   #run(tries) {
     this.#running = tries;
     this.#heard_ms = performance.now();
-    this.#clocks = [];
-    const lines = tries.map((each) => {
-      const clock = make("span", { class: "clock" }, each.try_time_s.toFixed(1));
-      this.#clocks.push([clock, each.try_time_s]);
-      return make("div", { class: "flight", "data-try": String(each.id) },
-        make("span", { class: "label" }, "Flying now"),
-        nameOf(each.team_name || `drone ${each.drone_id}`, { class: "name" }),
-        make("span", { class: "where" }, each.scenario),
-        frameMarks(each.frames, each.crossed),
-        make("span", {}, clock, " s"));
-    });
-    if (lines.length === 0 && this.next) {
-      lines.push(make("div", { class: "flight next" },
-        make("span", { class: "label" }, "Next"), nameOf(this.next.team_name, { class: "name" }),
-        make("span", { class: "where" }, orDash(this.next.scenario))));
-    }
+    const { lines, clocks } = nowLines({ running: tries, called: this.called, queue: this.queue });
+    this.#clocks = clocks;
     this.#now.replaceChildren(...lines);
     this.#now.hidden = lines.length === 0;
-    const flying = new Set(tries.map((each) => each.team_name));
-    for (const row of this.#rows.values()) {
-      row.toggleAttribute("data-flying", flying.has(row.querySelector(".name").textContent));
-    }
+    const flying = new Set(tries.map((each) => each.team));
+    for (const [team, row] of this.#rows) row.toggleAttribute("data-flying", flying.has(team));
   }
 
   #tick() {
@@ -195,4 +185,10 @@ class Ranking {
   }
 }
 
-new Ranking(await whenThere("#ranking"));
+/** The code that opens this monitor on a phone. */
+function joinCode() {
+  const image = make("img", { src: "/join.svg", alt: "QR code with the address of this monitor" });
+  return make("a", { class: "join-code", href: "/join" }, image, make("span", {}, "on your phone"));
+}
+
+new Ranking(await whenThere("#ranking"), pageData(import.meta.url).join === true);

@@ -1,6 +1,7 @@
 /** The teams: entering them, calling one to fly, taking one out. */
 
 import { send } from "./competition_channel.js";
+import { isWaiting } from "./competition_now.js";
 import { nameOf } from "./competition_words.js";
 import { make, setText } from "./dom.js";
 
@@ -17,7 +18,7 @@ export class Teams {
   #edited = null;
 
   /**
-   * @param {{judge: boolean, attempt: function(function(): Promise<void>): Promise<boolean>}} desk
+   * @param {{judge: boolean, queue: Queue, attempt: function(function(): Promise<void>): Promise<boolean>}} desk
    */
   constructor(desk) {
     this.#desk = desk;
@@ -52,23 +53,29 @@ export class Teams {
     this.#name.focus();
   }
 
-  /** @param {object} board */
-  show(board) {
+  /** @param {object} board @param {object[]} running tries */
+  show(board, running) {
     setText(this.#count, board.teams.length === 0 ? "" : String(board.teams.length));
-    const called = board.next?.team ?? null;
+    const flying = new Set(running.map((each) => each.team));
+    const waiting = isWaiting(board.called) ? board.called.team : null;
+    const state = (team) => {
+      const place = board.queue.teams.findIndex((each) => each.team === team.id) + 1;
+      const inQueue = place > 0 ? `in the queue: ${place}` : "";
+      return flying.has(team.id) ? "flying" : team.id === waiting ? "called" : inQueue;
+    };
     if (board.teams.length === 0) {
       this.#list.replaceChildren(make("li", { class: "hint" }, "No team has been entered yet."));
       return;
     }
-    this.#list.replaceChildren(...board.teams.map((team) => this.#row(team, team.id === called)));
+    this.#list.replaceChildren(...board.teams.map((team) => this.#row(team, state(team))));
   }
 
-  #row(team, isNext) {
+  #row(team, state) {
     const row = make("li", { "data-team": String(team.id), "data-withdrawn": String(team.withdrawn) },
       make("span", { class: "who-is" }, nameOf(team.name, { class: "name" }),
         team.members === "" ? null : nameOf(team.members, { class: "members" })),
       team.withdrawn ? make("span", { class: "tag" }, "withdrawn") : null,
-      isNext ? make("span", { class: "tag good" }, "next") : null);
+      state === "" ? null : make("span", { class: "tag good" }, state));
     if (!this.#desk.judge) return row;
     const button = (words, key, work) => {
       const element = make("button", { type: "button", "data-key": `${key}-${team.id}`, "aria-label": `${words}: ${team.name}` }, words);
@@ -77,6 +84,9 @@ export class Teams {
     };
     const withdraw = (withdrawn) => this.#desk.attempt(() => send(`teams/${team.id}`, { withdrawn }));
     row.append(make("span", { class: "buttons" },
+      team.withdrawn || state.startsWith("in the queue")
+        ? null
+        : button("Queue", "queue", () => this.#desk.queue.add(team.id)),
       button("Change", "change", () => this.#edit(team)),
       team.withdrawn
         ? button("Take back in", "withdraw", () => withdraw(false))

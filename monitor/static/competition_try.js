@@ -1,8 +1,9 @@
 /** One try: a judge's form on a phone, and the history of all that judges said. Viewers read it. */
 
 import { ask, oneAtATime, send, watch } from "./competition_channel.js";
+import { effect, penaltyNote } from "./competition_effect.js";
 import { Fields } from "./competition_form.js";
-import { frameMarks, moment, nameOf, orDash, seconds, standing, worth } from "./competition_words.js";
+import { frameMarks, moment, nameOf, notDrawn, orDash, seconds, standing } from "./competition_words.js";
 import { make, setText, whenThere } from "./dom.js";
 import { pageData } from "./start.js";
 
@@ -76,7 +77,7 @@ class TryPage {
     try {
       await work();
       await this.#load(!keep, keep);
-      this.#say("Saved.", "good");
+      this.#say(`Saved. ${this.#counts.textContent}`, "good");
     } catch (error) {
       this.#say(error.message);
       if (error.status === 409) this.#offerNew();
@@ -89,7 +90,7 @@ class TryPage {
     setText(this.#line, words);
     this.#line.dataset.look = look;
     this.#line.hidden = words === "";
-    if (look === "bad" && words !== "") this.#line.scrollIntoView({ block: "center" });
+    if (words !== "") this.#line.scrollIntoView({ block: "center" }); // the form is longer than a phone's screen
   }
 
   /** Somebody else changed the try: what is filled in stays until the judge wants the new state. */
@@ -135,7 +136,7 @@ class TryPage {
     const row = (term, ...values) => [make("dt", {}, term), make("dd", {}, ...values)];
     const rows = [
       ...row("Team", each.team === null ? make("span", { class: "tag warn" }, "no team") : nameOf(each.team_name)),
-      ...row("Scenario", orDash(each.scenario), each.round === 0 ? ", before the draw" : `, round ${each.round}`),
+      ...row("Scenario", orDash(each.scenario), each.round === 0 ? ", before the draw" : `, round ${each.round} `, notDrawn(each) ?? ""),
       ...row("State", each.state === "running" ? "running" : standing(each)),
       ...(judge ? [] : values(each, result, row)),
       ...row("Counts", make("strong", {}, each.judged ? `${seconds(result.counted_s)} s` : "not yet judged")),
@@ -155,11 +156,7 @@ class TryPage {
 
   #preview() {
     if (this.#detail === null) return;
-    const now = this.#fields.counts(this.#detail.try.frames, this.#detail.rule);
-    const words = now.contradiction
-      ? `Not completed while ${now.missing.join(", ")} ${now.missing.length === 1 ? "is" : "are"} missing: tick the frames or take “Completed” away.`
-      : `Counts ${seconds(now.counted_s)} s: ${worth(now)}.`;
-    setText(this.#counts, words);
+    setText(this.#counts, effect(this.#detail, this.#fields.counts(this.#detail.try.frames, this.#detail.rule)));
     this.#save.textContent = this.#fields.changed ? "Save" : "Confirm";
   }
 
@@ -182,7 +179,7 @@ function values(each, result, row) {
     ...row("Completed", result.completed ? "yes" : "no"),
     ...row("Contacts", String(result.contacts)),
     ...row("Try time", `${seconds(result.try_time_s)} s`),
-    ...row("Penalty", `${seconds(result.penalty_s)} s`),
+    ...row("Penalty", `${seconds(result.penalty_s)} s${penaltyNote(result)}`),
   ];
 }
 

@@ -49,6 +49,11 @@ export function frameMarks(frames, crossed) {
   return marks;
 }
 
+/** A mark on a try at a scenario that no ranking has; null for all others. @param {object} each a try, also a running one */
+export function notDrawn(each) {
+  return each.barrier === "not drawn" ? make("span", { class: "tag warn" }, "not drawn: does not count") : null;
+}
+
 /** Whether there is a team, scenario or none: a dash for none. */
 export function orDash(text) {
   return text === "" ? "–" : text;

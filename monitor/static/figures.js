@@ -86,11 +86,11 @@ export class Figures {
   }
 
   #setTime(figures) {
-    const share = figures ? Math.min(1, figures.try_time_s / figures.limit_s) : 0;
+    const share = figures?.limit_s ? Math.min(1, figures.try_time_s / figures.limit_s) : 0;
     this.#bar.style.transform = `scaleX(${Number.isFinite(share) ? share : 0})`;
     setAttribute(this.#bar, "data-over", Boolean(figures?.time_over));
     const left_s = figures ? figures.limit_s - figures.try_time_s : null;
-    const words = left_s === null ? "no referee" : `limit ${figures.limit_s} s${left_s >= 0 ? "" : ", time over"}`;
+    const words = left_s === null ? "no referee" : figures.limit_s === null ? "" : `limit ${figures.limit_s} s${left_s >= 0 ? "" : ", time over"}`;
     setText(this.#limit, words);
   }
 

@@ -7,8 +7,7 @@
  * @property {object|null} status
  * @property {object|null} chart
  * @property {object[]} transitions newest first
- * @property {object|null} detections
- * @property {number} detectedAt performance.now() of the last image
+ * @property {object[]} recent poses of the last minute
  */
 
 export class Fleet {
@@ -46,7 +45,7 @@ export class Fleet {
   of(id) {
     let drone = this.#drones.get(id);
     if (!drone) {
-      drone = { id, pose: null, status: null, chart: null, transitions: [], detections: null, detectedAt: 0 };
+      drone = { id, pose: null, status: null, chart: null, transitions: [], recent: [] };
       this.#drones.set(id, drone);
       this.#show();
       if (this.#chosen === null) this.choose(id);
@@ -95,7 +94,8 @@ export class Fleet {
       const id = Number(button.dataset.drone);
       const { status } = this.#drones.get(id);
       const link = status?.link?.state;
-      const words = `${status?.name || `drone ${id}`}${link && link !== "live" ? `, link ${link}` : ""}`;
+      const note = status?.over && link !== "live" ? ", flight over" : link && link !== "live" ? `, link ${link}` : "";
+      const words = `${status?.name || `drone ${id}`}${note}`;
       if (button.textContent !== words) button.textContent = words;
       const pressed = String(id === this.#chosen);
       if (button.getAttribute("aria-pressed") !== pressed) button.setAttribute("aria-pressed", pressed);

@@ -3,44 +3,53 @@ import { Arena } from "./arena.js";
 import { onBeat } from "./beat.js";
 import { CameraView } from "./camera.js";
 import { stateColour } from "./colours.js";
+import { nameOf, orDash } from "./competition_words.js";
+import { interruptedFigures, tryOf, watchContest } from "./contest.js";
 import { make, whenThere } from "./dom.js";
 import { Figures } from "./figures.js";
 import { Fleet } from "./fleet.js";
+import { Flight, isFlying } from "./flight.js";
 import { Messages } from "./messages.js";
 import { Plots } from "./plots.js";
 import { watchLive } from "./socket.js";
 import { Statechart } from "./statechart.js";
 import { DroneStrip } from "./strip.js";
 
-const OLD_IMAGE_MS = 1000; // boxes of an image older than this are not drawn any more
+const MOST_RECENT = 2000; // poses: more than the minute that is plotted
 
 const root = await whenThere("#live");
 root.classList.add("m-live");
 
 /** A part of the page with a heading. */
-function panel(name, title) {
+function panel(place, name, title) {
   const body = make("div", { class: "m-body" });
   const section = make("section", { class: `m-panel m-${name}-panel`, "aria-labelledby": `m-${name}` }, make("h2", { id: `m-${name}` }, title), body);
-  grid.append(section);
+  place.append(section);
   return body;
 }
 
 const line = make("p", { class: "m-line", role: "status", hidden: true });
 const tabs = make("div", { class: "m-tabs" });
 const top = make("div", { class: "m-top" });
+const side = make("div", { class: "m-side" });
 const grid = make("div", { class: "m-grid" });
 root.append(line, tabs, grid);
 grid.append(top);
 
+const team = make("p", { class: "m-team", hidden: true });
 const strip = new DroneStrip(top);
-const figures = new Figures(panel("figures", "The try"));
-const arena = new Arena(panel("arena", "Arena"));
-const camera = new CameraView(panel("camera", "Camera"));
-const plots = new Plots(panel("plots", "Place and speeds"));
-const statechart = new Statechart(panel("chart", "Statechart"), { small: true });
-const messages = new Messages(panel("messages", "Messages"));
+const figuresBody = panel(side, "figures", "The try");
+figuresBody.append(team);
+const figures = new Figures(figuresBody);
+const arena = new Arena(panel(grid, "arena", "Arena"));
+const camera = new CameraView(panel(grid, "camera", "Camera"));
+const plots = new Plots(panel(grid, "plots", "Place and speeds"));
+const statechart = new Statechart(panel(grid, "chart", "Statechart"), { small: true });
+grid.append(side);
+const messages = new Messages(panel(side, "messages", "Messages"));
 
 let isConnected = false;
+let contest = { running: [], stage: null };
 const orders = new Map();
 
 /** Kinds of a mission's states, in the order in which they stand in it. */
@@ -56,20 +65,53 @@ function orderOf(states) {
 /** The state at once, numbers with the next beat. */
 function showStatus(drone) {
   const { status } = drone;
-  statechart.setState(status?.mission?.state || null, status?.mission?.seconds ?? 0);
-  camera.setImage(status?.video ? `/video/${drone.id}` : null);
+  const state = status?.mission?.state || null;
+  // A new state comes with a pose; the status may be behind that.
+  const isAhead = drone.pose?.fresh && drone.chart?.states[drone.pose.s] && state !== statechart.active;
+  if (!isAhead) statechart.setState(state, status?.mission?.seconds ?? 0);
   onBeat(strip, () => {
     strip.set(status, drone.chart ? orderOf(drone.chart.states) : []);
-    figures.set(status?.figures ?? null, status ?? undefined);
+    figures.set(status?.figures ?? interruptedFigures(contest, drone.id), status ?? undefined);
+    showTeam(drone);
+    root.classList.toggle("m-flying", isFlying(status));
   });
+}
+
+/** Whose try it is, if the contest knows. */
+function showTeam(drone) {
+  const flown = tryOf(contest, drone.id);
+  team.hidden = !flown?.team_name;
+  const shown = `${flown?.id} ${flown?.team_name}`;
+  if (team.hidden || team.dataset.shown === shown) return;
+  team.dataset.shown = shown;
+  team.replaceChildren(nameOf(flown.team_name, { class: "m-team-name" }), make("span", { class: "m-team-where" }, orDash(flown.scenario)));
+}
+
+const flight = new Flight(arena, camera, {
+  states: () => fleet.states(),
+  passed(pose) {
+    const drone = fleet.of(pose.id);
+    const last = drone.recent.at(-1);
+    if (last && pose.t <= last.t && pose.t > last.t - 0.5) return; // the history had it
+    if (last && pose.t < last.t) drone.recent = [];
+    drone.recent.push(pose);
+    if (drone.recent.length > MOST_RECENT) drone.recent.splice(0, MOST_RECENT / 4);
+    if (isChosen(pose.id)) plots.add(pose.t, pose); // begins anew by itself when time goes back
+  },
+});
+
+function plot(drone) {
+  plots.clear();
+  for (const pose of drone.recent) plots.add(pose.t, pose);
 }
 
 function choose(drone) {
   arena.select(drone.id);
-  plots.clear();
+  plot(drone);
   statechart.setChart(drone.chart);
   statechart.setTransitions(drone.transitions);
-  camera.setDetections(drone.detections);
+  flight.choose(drone.id);
+  flight.setStatus(drone.status);
   showStatus(drone);
 }
 
@@ -83,31 +125,29 @@ watchLive({
     world = message;
     arena.setWorld(message);
   },
+  history(message) {
+    const drone = fleet.of(message.id);
+    drone.recent = flight.setHistory(message);
+    if (isChosen(message.id)) plot(drone);
+  },
   pose({ drones }) {
     for (const pose of drones) {
       const drone = fleet.of(pose.id);
-      // The state travels with the pose, so that a new one is lit at once and not with the next status.
-      const state = drone.chart?.states[pose.s];
-      if (isChosen(pose.id) && state && drone.pose && drone.pose.s !== pose.s) statechart.setState(state, 0);
-      const isRestarted = drone.pose !== null && pose.t < drone.pose.t - 0.5;
       drone.pose = pose;
-      if (!isChosen(pose.id)) continue;
-      if (isRestarted) plots.clear();
-      plots.add(pose.t, pose);
+      // The state travels with the pose, and is lit at once: it is news, and no part of the picture.
+      const state = drone.chart?.states[pose.s];
+      if (isChosen(pose.id) && state && state !== statechart.active) statechart.setState(state, 0);
     }
-    arena.setPoses(drones, fleet.states());
+    flight.addPoses(drones);
   },
   status({ drones }) {
     fleet.setStatus(drones);
     messages.setSeveral(fleet.several);
-    if (fleet.chosen) showStatus(fleet.chosen);
-    else showStatus({ id: 0, status: null, chart: null });
+    flight.setStatus(fleet.chosen?.status ?? null);
+    showStatus(fleet.chosen ?? { id: 0, status: null, chart: null });
   },
   detections(message) {
-    const drone = fleet.of(message.id);
-    drone.detections = message;
-    drone.detectedAt = performance.now();
-    if (isChosen(message.id)) camera.setDetections(message);
+    if (isChosen(message.id)) flight.addDetections(message);
   },
   chart(message) {
     const drone = fleet.of(message.id);
@@ -127,12 +167,16 @@ watchLive({
   if (connected) messages.clear(); // the last ones are sent again
 });
 
+watchContest((known) => {
+  contest = known;
+  if (fleet.chosen) showStatus(fleet.chosen);
+});
+
+// The height that is left below the frame of the page: on a large screen everything has its place in it.
+const frame = document.querySelector(".top") ?? root;
+new ResizeObserver(() => root.style.setProperty("--above", `${root.getBoundingClientRect().top + scrollY}px`)).observe(frame);
+
 setInterval(() => {
-  const drone = fleet.chosen;
-  if (!drone || document.hidden) return;
-  if (drone.detections && performance.now() - drone.detectedAt > OLD_IMAGE_MS) {
-    drone.detections = null;
-    camera.setDetections(null);
-  }
-  root.classList.toggle("m-old", !isConnected || drone.pose?.fresh === false);
+  const { pose, status } = fleet.chosen ?? {};
+  root.classList.toggle("m-old", !isConnected || (pose?.fresh === false && !status?.over));
 }, 500);

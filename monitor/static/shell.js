@@ -9,6 +9,7 @@ import { LiveChannel } from "./channel.js";
  */
 export function linkWords(drones) {
   if (!drones.length) return ["lost", "no drone"];
+  if (drones.every((drone) => drone.over && drone.link?.state !== "live")) return ["over", "flight over"];
   const live = drones.filter((drone) => drone.link?.state === "live").length;
   if (live === drones.length) return ["live", "live"];
   if (drones.length === 1) return ["lost", "link lost"];

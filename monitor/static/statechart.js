@@ -76,6 +76,11 @@ export class Statechart {
     }
   }
 
+  /** Id of the state that is lit; null if there is none. */
+  get active() {
+    return this.#active;
+  }
+
   /**
    * @param {string|null} id of the active state
    * @param {number} [seconds] in it so far; it counts on by itself

@@ -2,6 +2,7 @@ import { stateColour } from "./colours.js";
 import { make, number, setAttribute, setText } from "./dom.js";
 
 const LINKS = { live: "live", stale: "stale", lost: "lost" };
+const NO_NAME = "under way"; // the names of its states are still being received
 
 /** What a drone says of itself, in one line: mode, motors, battery, link, mission. */
 export class DroneStrip {
@@ -29,11 +30,12 @@ export class DroneStrip {
   set(status, order = []) {
     setAttribute(this.#root, "data-empty", status === null);
     this.#put("mode", status ? status.mode || "–" : "no drone is heard");
-    this.#put("motors", status ? (status.armed ? "armed" : "off") : null, status?.armed ? "on" : null);
-    this.#put("ground", status ? (status.landed ? "on the ground" : "in the air") : null);
+    const isKnown = status !== null && !(status.over && status.link?.state === "lost"); // else it is what was heard last
+    this.#put("motors", isKnown ? (status.armed ? "armed" : "off") : null, status?.armed ? "on" : null);
+    this.#put("ground", isKnown ? (status.landed ? "on the ground" : "in the air") : null);
     this.#putBattery(status);
-    this.#putLink(status?.link);
-    this.#putMission(status?.mission, order);
+    this.#putLink(status?.link, status?.over);
+    this.#putMission(status?.mission, order, status?.over);
     this.#put("pilot", status?.pilot ? `${status.pilot} has the sticks` : null, "warn");
   }
 
@@ -53,8 +55,9 @@ export class DroneStrip {
     this.#put("battery", text ? text + low : null, look);
   }
 
-  #putLink(link) {
+  #putLink(link, isOver) {
     if (!link) return this.#put("link", null);
+    if (isOver && link.state !== "live") return this.#put("link", "ended with the flight");
     const quality = link.state === "live"
       ? [link.loss_percent === null ? "" : `${number(link.loss_percent, 1)} % lost`, link.rate_hz === null ? "" : `${number(link.rate_hz, 0)}/s`]
       : [`last heard ${number(link.age_s)} s ago`];
@@ -62,15 +65,18 @@ export class DroneStrip {
     this.#put("link", [LINKS[link.state] ?? link.state, ...quality.filter(Boolean)].join(", "), look);
   }
 
-  #putMission(mission, order) {
+  #putMission(mission, order, isOver) {
     const { value } = this.#items.mission;
     if (!mission) {
       value.style.removeProperty("--swatch");
       return this.#put("mission", null);
     }
     const seconds = number(mission.seconds);
+    const isBegun = mission.transitions > 0 || mission.flying || mission.finished;
+    const state = mission.state || (isBegun ? NO_NAME : "waits to begin");
+    if (isOver && !mission.alive) return this.#put("mission", `${mission.name || "mission"}: ended${mission.state ? ` in ${mission.state}` : ""}`);
     const how = mission.alive === false ? "is not heard any more" : mission.finished ? "finished" : mission.paused ? "paused, a pilot has the sticks" : `for ${seconds} s`;
-    this.#put("mission", `${mission.name}: ${mission.state || "not begun"} ${how}`, mission.alive === false ? "bad" : mission.paused ? "warn" : "state");
+    this.#put("mission", `${mission.name || "mission"}: ${state} ${how}`, mission.alive === false ? "bad" : mission.paused ? "warn" : "state");
     if (mission.state) value.style.setProperty("--swatch", stateColour(mission.state, order));
   }
 }

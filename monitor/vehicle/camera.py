@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import re
+from collections.abc import Collection
 from ipaddress import IPv4Address, IPv6Address, ip_address
-from urllib.parse import urlsplit
+from urllib.parse import SplitResult, urlsplit
 
 from pymavlink.dialects.v20 import common as mavlink
 
@@ -13,6 +15,12 @@ from monitor.vehicle.texts import plain
 CAMERAS = range(mavlink.MAV_COMP_ID_CAMERA, mavlink.MAV_COMP_ID_CAMERA6 + 1)
 _ASK_EVERY_S = 2.0
 _ASKS = 8
+_PATH = re.compile(r"(?:/[\w-][\w.-]{0,60}){0,5}/?", re.ASCII)
+_WEB_PORTS = (80, 443)
+_FIRST_FREE_PORT = 1024  # those below belong to other services
+# What the simulator and the virtual camera serve on this machine: one port an instance.
+_OWN_PORTS = range(8100, 8110)
+_OWN_PATH = "/video"
 
 
 class CameraWatch:
@@ -21,15 +29,17 @@ class CameraWatch:
     Args:
         drone_id: the vehicle's system id.
         link_host: the host to which the link goes; "" if it only listens.
+        confirmed: HOST or HOST:PORT that the operator allows besides.
 
     Attributes:
         url: of the MJPEG video; None: none that may be asked for.
         problem: why an address was refused, for a notice; "" if none was.
     """
 
-    def __init__(self, drone_id: int, link_host: str = "") -> None:
+    def __init__(self, drone_id: int, link_host: str = "", confirmed: Collection[str] = ()) -> None:
         self._id = drone_id
         self._link_host = link_host
+        self._confirmed = confirmed
         self._component: int | None = None
         self._asked_s = -1e9
         self._asks = 0
@@ -53,53 +63,99 @@ class CameraWatch:
         wanted = mavlink.MAVLINK_MSG_ID_VIDEO_STREAM_INFORMATION
         return request(self._id, self._component, wanted)
 
-    def take(self, message: Message) -> None:
-        """Take VIDEO_STREAM_INFORMATION; the first stream that can be shown counts."""
+    def take(self, message: Message, host: str) -> None:
+        """Take VIDEO_STREAM_INFORMATION; the first stream that can be shown counts.
+
+        Args:
+            message: as parsed.
+            host: in numbers, from which it came; "" if over a wire.
+        """
         self._answered = True
         url = plain(bytes(message._uri_raw), 200)
         if self.url is not None or not url.startswith(("http:", "https:")):
             return
-        problem = refusal(url, self._link_host)
+        problem = refusal(url, host, self._link_host, self._confirmed)
         if problem:
-            self.problem = f"the video at {url} is not asked for: {problem}"
+            self.problem = (
+                f"the video at {url} is not asked for: {problem}; if it is right, start the monitor with "
+                "--camera-host HOST or HOST:PORT"
+            )
         else:
             self.url = url
 
 
-def refusal(url: str, link_host: str = "") -> str:
+def refusal(url: str, host: str, link_host: str = "", confirmed: Collection[str] = ()) -> str:
     """Why an address that a vehicle told must not be asked for; "" if it may.
 
-    A vehicle could name any address and have this machine ask there. So: HTTP, no user name, and a host that
-    is given in numbers and is this machine, in a private network, or the one that the link goes to.
+    A vehicle could name any address and have this machine ask there. So: HTTP, no user name, and what the
+    operator confirmed or else the host that said so, with nothing that a camera does not need. On this
+    machine, where packets of a distant vehicle may be passed on and other services trust who is local, only
+    the simulator's and virtual camera's own addresses.
 
     Args:
         url: as told.
-        link_host: the host to which the link goes; "" if it only listens.
+        host: in numbers, from which it was told; "" if over a wire.
+        link_host: the host to which the link goes, as the operator wrote it; "" if it only listens.
+        confirmed: HOST or HOST:PORT that the operator allows.
     """
     try:
         parts = urlsplit(url)
-        host, port = parts.hostname or "", parts.port
+        name, port = parts.hostname or "", parts.port
     except ValueError:
         return "it is no address"
     problems = {
         "only http and https are spoken": parts.scheme not in ("http", "https"),
         "it holds a user name": "@" in parts.netloc,
         "port 0 is none": port == 0,
+        "it names no host": not name,
     }
     problem = next((text for text, there in problems.items() if there), "")
-    if problem or (link_host and host == link_host.lower()):
+    if problem or {name, f"{name}:{port}"} & {each.lower() for each in confirmed}:
         return problem
+    return _unneeded(parts) or _other_host(name, host, link_host) or _trusting(parts)
+
+
+def _unneeded(parts: SplitResult) -> str:
+    """What an address holds that a camera does not need; "" if nothing."""
+    if parts.query or parts.fragment or not _PATH.fullmatch(parts.path):
+        return "it holds more than a plain path"
+    port = parts.port or _WEB_PORTS[0]
+    return "" if port in _WEB_PORTS or port >= _FIRST_FREE_PORT else f"port {port} is of another service"
+
+
+def _other_host(name: str, host: str, link_host: str) -> str:
+    if link_host and name == link_host.lower():
+        return ""
     try:
-        return (
-            "" if _is_near(ip_address(host)) else "its host is neither this machine nor in a private network"
-        )
+        address = _plain_address(name)
     except ValueError:
         return "its host must be given in numbers"
+    if host and address == _plain_address(host):
+        return ""
+    return (
+        f"the drone's packets come from {host}"
+        if host
+        else "nobody knows where the drone's packets come from"
+    )
 
 
-def _is_near(address: IPv4Address | IPv6Address) -> bool:
-    odd = address.is_link_local or address.is_multicast or address.is_unspecified or address.is_reserved
-    return address.is_loopback or (address.is_private and not odd)
+def _trusting(parts: SplitResult) -> str:
+    """Why an address of this very machine must not be asked for; "" if it may, or is not of this machine."""
+    try:
+        is_own = parts.hostname == "localhost" or _plain_address(parts.hostname or "").is_loopback
+    except ValueError:
+        is_own = False
+    if not is_own or (parts.port in _OWN_PORTS and parts.path == _OWN_PATH):
+        return ""
+    first, last = _OWN_PORTS[0], _OWN_PORTS[-1]
+    return f"on this machine only {_OWN_PATH} at ports {first} to {last} is asked for"
+
+
+def _plain_address(text: str) -> IPv4Address | IPv6Address:
+    """An address; an IPv4 one that is written as IPv6 is that IPv4 one. Raises `ValueError`."""
+    address = ip_address(text.partition("%")[0])
+    mapped = address.ipv4_mapped if isinstance(address, IPv6Address) else None
+    return address if mapped is None else mapped
 
 
 def host_of(link_url: str) -> str:

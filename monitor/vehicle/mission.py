@@ -76,6 +76,7 @@ class MissionView:
         self._document_crc = 0
         self._heard_s = -1e9
         self._history: JsonMessage | None = None
+        self._seen: JsonMessage | None = None
         self.state: MissionState | None = None
         self.document: MissionDocument | None = None
         self.result: tuple[int, dict[str, Any]] | None = None
@@ -94,7 +95,8 @@ class MissionView:
                 self.state = decode_state(payload)
                 self._heard_s = now_s
             elif message.payload_type == DETECTIONS_TYPE:
-                return [self._detections(payload)]
+                self._seen = self._detections(payload)
+                return [self._seen]
             elif message.payload_type == DOCUMENT_TYPE:
                 document = self._assembler.take(payload)
                 return [] if document is None else self._read(document)
@@ -142,8 +144,9 @@ class MissionView:
         }
 
     def standing(self) -> list[JsonMessage]:
-        """What a new watcher is told: the chart and the last transitions."""
-        return [message for message in (self._chart(), self._history) if message is not None]
+        """What a new watcher is told: the chart, the last transitions, and what the last image showed."""
+        told = (self._chart(), self._history, self._seen)
+        return [message for message in told if message is not None]
 
     def _state_name(self, state: MissionState) -> str:
         document = self.document

@@ -10,7 +10,8 @@ from monitor.ports import Message
 from scenarios.axes import Quaternion, Vec3
 
 _FAR = 1e6  # metres or metres a second beyond which it is no place and no speed
-_RESTART_MS = 1000  # a clock that goes back farther has begun anew
+_RESTART_MS = 3000  # a clock that goes back farther has begun anew; less far back is a late message
+_ATTITUDE, _POSITION = 0, 1
 _PAST_LENGTH = 128
 _NEAR_US = 100_000
 
@@ -56,6 +57,7 @@ class Motion:
         self.rates_frd_rad_s: Vec3 = (0.0, 0.0, 0.0)
         self.position: Position | None = None
         self.heard_s = [-1e9, -1e9]
+        self._newest_ms = [0, 0]  # of attitudes, of positions
         self._past: deque[Position] = deque(maxlen=_PAST_LENGTH)
         self._has_quaternion = False
 
@@ -71,15 +73,16 @@ class Motion:
             self._take_attitude(message, _from_angles(message.roll, message.pitch, message.yaw), now_s)
 
     def take_position(self, message: Message, now_s: float) -> bool:
-        """Take LOCAL_POSITION_NED; False for nonsense."""
+        """Take LOCAL_POSITION_NED; False for nonsense, and for one older than the last."""
         x, y, z, vx, vy, vz = message.x, message.y, message.z, message.vx, message.vy, message.vz
         if not abs(x) + abs(y) + abs(z) + abs(vx) + abs(vy) + abs(vz) < _FAR:  # nor is it with a NaN
             return False
-        self._watch_clock(message.time_boot_ms)
+        if not self._is_next(_POSITION, message.time_boot_ms):
+            return False
         self.position = Position(message.time_boot_ms * 1000, (x, y, z), (vx, vy, vz), self.yaw_ned_rad)
         self._past.append(self.position)
-        self.heard_s[1] = now_s
-        self.counts[1] += 1
+        self.heard_s[_POSITION] = now_s
+        self.counts[_POSITION] += 1
         return True
 
     @property
@@ -114,21 +117,24 @@ class Motion:
         norm = hypot(w, x, y, z)
         if not (0.5 < norm < 2.0 and abs(rates[0]) + abs(rates[1]) + abs(rates[2]) < _FAR):
             return False
-        self._watch_clock(message.time_boot_ms)
+        if not self._is_next(_ATTITUDE, message.time_boot_ms):
+            return False
         self.attitude_ned = (w / norm, x / norm, y / norm, z / norm)
         self.rates_frd_rad_s = rates
-        self.heard_s[0] = now_s
-        self.counts[0] += 1
+        self.heard_s[_ATTITUDE] = now_s
+        self.counts[_ATTITUDE] += 1
         return True
 
-    def _watch_clock(self, time_ms: int) -> None:
-        newest_ms = self.time_us // 1000
-        if time_ms >= newest_ms:
-            self.time_us = time_ms * 1000
-        elif time_ms < newest_ms - _RESTART_MS:
+    def _is_next(self, kind: int, time_ms: int) -> bool:
+        """Follow the vehicle's clock; whether a message is not older than the last one of its kind."""
+        if time_ms < self.time_us // 1000 - _RESTART_MS:
             self.restarts += 1
             self._begin()
-            self.time_us = time_ms * 1000
+        elif time_ms < self._newest_ms[kind]:
+            return False
+        self._newest_ms[kind] = time_ms
+        self.time_us = max(self.time_us, time_ms * 1000)
+        return True
 
 
 def _between(before: Position, after: Position | None, time_us: int) -> Position | None:

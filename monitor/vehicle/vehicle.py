@@ -20,6 +20,7 @@ from monitor.vehicle.asking import BootTime, RateWatch
 from monitor.vehicle.camera import CAMERAS, CameraWatch
 from monitor.vehicle.commands import CommandDesk
 from monitor.vehicle.condition import Condition
+from monitor.vehicle.history import History
 from monitor.vehicle.judging import Judging
 from monitor.vehicle.mission import MissionView
 from monitor.vehicle.motion import Motion
@@ -80,7 +81,7 @@ class Vehicle:
         self._traffic = Traffic(now_s)
         self._was_lost_s: float | None = None
         self._motion = Motion()
-        self._camera = CameraWatch(drone_id, link_host)
+        self._camera = CameraWatch(drone_id, link_host, equipment.camera_hosts)
         self._channel: RefereeChannel | None = None
         self._channel_task: asyncio.Task[None] | None = None
         self._speech = Speech(drone_id, ears.tell)
@@ -96,6 +97,8 @@ class Vehicle:
         """Forget what belongs to one boot."""
         self.condition = Condition()
         self._placement = Placement()
+        self._history = History()
+        self._history_source = self._placement.source
         self._mission = MissionView(self.id)
         self._judging = Judging(self.id, self._equipment, self._ears.tell_try, now_s)
         self._boot = BootTime(self.id)
@@ -119,8 +122,14 @@ class Vehicle:
             mavlink.MAVLINK_MSG_ID_STATUSTEXT: self._take_text,
         }
 
-    def take(self, message: Message, now_s: float) -> None:
-        """Take a message of this system, of whichever component."""
+    def take(self, message: Message, now_s: float, host: str = "") -> None:
+        """Take a message of this system, of whichever component.
+
+        Args:
+            message: as parsed.
+            now_s: loop time.
+            host: in numbers, from which it came; "" if over a wire.
+        """
         number, component = message.get_msgId(), message.get_srcComponent()
         if component == AUTOPILOT:
             self._traffic.hear(message.get_seq(), now_s)
@@ -137,7 +146,7 @@ class Vehicle:
             if number == mavlink.MAVLINK_MSG_ID_HEARTBEAT:
                 self._camera.see(component)
             elif number == mavlink.MAVLINK_MSG_ID_VIDEO_STREAM_INFORMATION:
-                self._camera.take(message)
+                self._camera.take(message, host)
 
     def tick(self, now_s: float) -> None:
         """Look at the clock, ten times a second."""
@@ -146,6 +155,7 @@ class Vehicle:
         wall_boot_us = int(time.time() * 1e6) - self._motion.time_us
         self._judging.tick(self._boot.unix_us, now_s, wall_boot_us)
         self._watch_problems()
+        self._keep_history(now_s)
         if self._traffic.state(now_s) == "live":
             self._ask(now_s)
         if self._camera.url is not None and self._channel_task is None:
@@ -205,6 +215,7 @@ class Vehicle:
         """Its part of the message "status"."""
         condition = self.condition
         voltage_v = condition.voltage_v
+        figures = self._judging.figures(self._channel)
         return {
             "id": self.id,
             "name": f"drone {self.id}",
@@ -216,8 +227,9 @@ class Vehicle:
             "link": self._traffic.as_dict(now_s),
             "mission": self._mission.as_dict(self._motion.time_us, now_s),
             "pilot": self.pilot,
-            "figures": self._judging.figures(self._channel),
+            "figures": figures,
             "video": self._camera.url is not None,
+            "over": self._is_over(figures),
         }
 
     def world(self) -> JsonMessage | None:
@@ -238,8 +250,8 @@ class Vehicle:
         }
 
     def standing_messages(self) -> list[JsonMessage]:
-        """What a new watcher is told of its mission."""
-        return self._mission.standing()
+        """What a new watcher is told of its mission and of the flight so far."""
+        return [*self._mission.standing(), self._history_message()]
 
     def _take_heartbeat(self, message: Message, _now_s: float) -> None:
         self.condition.take_heartbeat(message)
@@ -281,11 +293,33 @@ class Vehicle:
         state = self._traffic.state(now_s)
         if state == "lost" and self._was_lost_s is None:
             self._was_lost_s = self._traffic.heard_s
-            self._ears.notice("warning", f"drone {self.id}: link lost")
+            if self._is_over(self._judging.figures(self._channel)):
+                self._ears.notice("info", f"drone {self.id}: not heard any more; its flight was over")
+            else:
+                self._ears.notice("warning", f"drone {self.id}: link lost")
         elif state == "live" and self._was_lost_s is not None:
             away_s = self._traffic.heard_s - self._was_lost_s
             self._was_lost_s = None
             self._ears.notice("info", f"drone {self.id}: link is back after {away_s:.0f} s")
+
+    def _is_over(self, figures: JsonMessage | None) -> bool:
+        """Whether it has flown and its flight has ended: disarmed, or judged for good."""
+        judged = figures is not None and figures["final"]
+        return self._has_flown and (judged or not self.condition.armed)
+
+    def _keep_history(self, now_s: float) -> None:
+        """Note where it is. What was noted before the arena was laid under it would be in the wrong place."""
+        source = self._placement.source
+        if source != self._history_source:
+            self._history_source = source
+            self._history.clear()
+            self._ears.tell(self._history_message())
+        pose = self.pose(now_s)
+        if pose is not None:
+            self._history.add(pose)
+
+    def _history_message(self) -> JsonMessage:
+        return {"kind": "history", "id": self.id, "poses": self._history.rows()}
 
     def _watch_problems(self) -> None:
         """Say what was wrong with what it sent, each once."""

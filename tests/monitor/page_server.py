@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import json
+import struct
 from contextlib import asynccontextmanager
 from pathlib import Path
 
@@ -14,13 +15,19 @@ from aiohttp import WSMsgType, web
 
 import monitor
 from monitor.access import Visitor
-from monitor.pages.live import STYLE
+from monitor.pages import live, stage
 from monitor.pages.shell import HEAD, header_html
 
 STATIC = Path(monitor.__file__).parent / "static"
 ELEMENTS = Path(nicegui.__file__).parent / "elements"
 JPEG = cv2.imencode(".jpg", np.full((240, 320, 3), (56, 176, 226), np.uint8))[1].tobytes()
-PAGES = {"/": ("live", "live.js"), "/chart": ("chart", "chart.js")}
+PAGES = {"/": ("live", "live.js"), "/chart": ("chart", "chart.js"), "/stage": ("stage", "stage.js")}
+
+
+NO_CONTEST = {
+    **{"running": [], "last": None, "last_against": None, "interrupted": None},
+    **{"best": [], "called": None, "queue": {"number": 0, "teams": []}, "ranking": None, "complete": False},
+}
 
 
 class FakeMonitor:
@@ -28,13 +35,19 @@ class FakeMonitor:
 
     Attributes:
         welcome: messages each new watcher gets first.
+        stage: what the contest's page for the projector is told.
         url: where the pages are.
     """
 
     def __init__(self) -> None:
         self.welcome: list[dict] = []
         self.url = ""
+        self.stage = dict(NO_CONTEST)
         self._somebody = asyncio.Event()
+        self._filmed = asyncio.Event()
+        self._ended = asyncio.Event()
+        self._cameras: list[web.StreamResponse] = []
+        self._contest_watchers: set[web.WebSocketResponse] = set()
         self._watchers: set[web.WebSocketResponse] = set()
         self._port = 0
         self._runner: web.AppRunner | None = None
@@ -42,10 +55,13 @@ class FakeMonitor:
     async def start(self):
         """Listen; a second time at the same place as before."""
         app = web.Application()
+        self._ended.clear()
         for path in PAGES:
             app.router.add_get(path, self._page)
         app.router.add_get("/ws/live", self._watch)
-        app.router.add_get("/video/{id}", self._video)
+        app.router.add_get("/video/{id}/frames", self._frames)
+        app.router.add_get("/api/competition/stage", self._stage)
+        app.router.add_get("/ws/competition", self._contest)
         app.router.add_static("/static", STATIC)
         for name, element in (("three", "scene"), ("mermaid", "mermaid")):
             app.router.add_static(f"/lib/{name}", ELEMENTS / element / "dist")
@@ -58,8 +74,9 @@ class FakeMonitor:
 
     async def stop(self):
         """Stop as a killed monitor does: all connections end."""
-        for watcher in list(self._watchers):
+        for watcher in [*self._watchers, *self._contest_watchers]:
             await watcher.close()
+        self._ended.set()
         await self._runner.cleanup()
 
     async def say(self, kind, **fields):
@@ -75,11 +92,13 @@ class FakeMonitor:
 
     async def _page(self, request):
         name, module = PAGES[request.path]
-        header = header_html(Visitor("", may_judge=False, may_fly=False), request.path)
+        is_bare = name == "stage"
+        header = "" if is_bare else header_html(Visitor("", may_judge=False, may_fly=False), request.path)
+        style = stage.STYLE if is_bare else live.STYLE
         return web.Response(
             content_type="text/html",
             text=f'<!doctype html><html lang="en"><head><meta name="viewport" content="width=device-width">'
-            f'<link rel="icon" href="data:,">{HEAD}{STYLE}</head><body>{header}'
+            f'<link rel="icon" href="data:,">{HEAD}{style}</head><body>{header}'
             f'<script type="application/json" data-module="/static/{module}">{{}}</script>'
             f'<main class="page" id="main"><div id="{name}"></div></main></body></html>',
         )
@@ -105,8 +124,45 @@ class FakeMonitor:
             self._watchers.discard(watcher)
         return watcher
 
-    async def _video(self, request):
-        return web.Response(body=JPEG, content_type="image/jpeg")
+    async def show(self, jpeg, time_s):
+        """Send an image of the camera to all who watch it."""
+        time_us = -1 if time_s is None else round(time_s * 1e6)
+        for camera in self._cameras:
+            await camera.write(struct.pack("<qI", time_us, len(jpeg)) + jpeg)
+
+    async def until_filmed(self):
+        """Wait for a page that reads the camera."""
+        async with asyncio.timeout(30):
+            await self._filmed.wait()
+
+    async def change_contest(self, **stage):
+        """Have the contest be another."""
+        self.stage |= stage
+        for watcher in list(self._contest_watchers):
+            await watcher.send_str(json.dumps({"kind": "changed", "version": 1, "problem": ""}))
+
+    async def _frames(self, request):
+        camera = web.StreamResponse(headers={"Content-Type": "application/octet-stream"})
+        await camera.prepare(request)
+        self._cameras.append(camera)
+        self._filmed.set()
+        try:
+            await self._ended.wait()
+        finally:
+            self._cameras.remove(camera)
+        return camera
+
+    async def _stage(self, request):
+        return web.json_response(self.stage)
+
+    async def _contest(self, request):
+        watcher = web.WebSocketResponse()
+        await watcher.prepare(request)
+        self._contest_watchers.add(watcher)
+        await watcher.send_str(json.dumps({"kind": "changed", "version": 1, "problem": ""}))
+        await watcher.receive()
+        self._contest_watchers.discard(watcher)
+        return watcher
 
 
 @asynccontextmanager

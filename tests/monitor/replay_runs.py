@@ -94,6 +94,7 @@ class Library:
         self._runs = {run["name"]: run for run in runs}
         self.infos = infos or [info_of(run) for run in runs]
         self.read = []
+        self.closed = False
 
     def runs(self):
         return self.infos
@@ -103,6 +104,12 @@ class Library:
         if name not in self._runs:
             raise RunError(f"run '{name}': there is no such run")
         return self._runs[name]
+
+    def kept(self, name):
+        return None
+
+    def close(self):
+        self.closed = True
 
     def image(self, name, index):
         if index >= len(self.recording(name)["images"]):

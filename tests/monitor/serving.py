@@ -41,6 +41,9 @@ class StubFleet:
         self.hearers.append(hear)
         return lambda: self.hearers.remove(hear)
 
+    def on_try(self, hear):
+        pass
+
     def drone_ids(self):
         return [1]
 
@@ -68,8 +71,8 @@ class Served:
 
 
 @contextlib.asynccontextmanager
-async def serving(monkeypatch, *modules, bind="127.0.0.1", port=0, password=None):
-    """Serve with the given modules beside the server's own; yields a `Served`."""
+async def serving(monkeypatch, *modules, bind="127.0.0.1", port=0, password=None, **more):
+    """Serve with the given modules beside the server's own, and more settings; yields a `Served`."""
     fleets = []
 
     def make_fleet(equipment):
@@ -78,7 +81,6 @@ async def serving(monkeypatch, *modules, bind="127.0.0.1", port=0, password=None
 
     own = ("monitor.live_channel", "monitor.video_proxy", "monitor.pages.login")
     monkeypatch.setattr("monitor.server.MODULES", (*own, *modules))
-    monkeypatch.setattr("monitor.assembly.MODULES", (*own, *modules))
     monkeypatch.setattr("monitor.assembly.Fleet", make_fleet)
     lines: list[str] = []
     up = asyncio.Event()
@@ -87,7 +89,7 @@ async def serving(monkeypatch, *modules, bind="127.0.0.1", port=0, password=None
         lines.append(line)
         up.set()
 
-    settings = MonitorSettings(bind, port, "sqlite://", password)
+    settings = MonitorSettings(bind, port, "sqlite://", password, **more)
     task = asyncio.create_task(serve(equipment(), settings, say))
     waiting = asyncio.create_task(up.wait())
     try:

@@ -134,6 +134,7 @@ class SimulatedLink:
     """
 
     url = "simulated"
+    host = "127.0.0.1"
 
     def __init__(
         self,
@@ -151,6 +152,7 @@ class SimulatedLink:
         self.opened = 0
         self.sent: deque[Message] = deque(maxlen=1000)
         self.muted = False
+        self.camera_hosts = tuple(f"127.0.0.1:{server.port}" for server in video)
         self._speed = speed
         self._waiting: deque[bytes] = deque()
         self._granted_us = 0  # by `advance`, not gone by yet
@@ -293,6 +295,7 @@ def equipment(link: SimulatedLink, scenario: Scenario | None = None) -> Equipmen
         load_scenario=load_scenario,
         runs=None,
         start_pose=start_pose,
+        camera_hosts=link.camera_hosts,
     )
 
 

@@ -1,7 +1,10 @@
+from pathlib import Path
+
 import pytest
 from starlette.requests import HTTPConnection
 
 from monitor.access import LONGEST_NAME, SESSION_S, TRIES_A_MINUTE, Access, LoginRefusedError, Visitor
+from monitor.sessions import SessionFile, session_path
 from tests.monitor.serving import browser, serving
 
 SAMPLE = "tests.monitor.sample_page"
@@ -33,6 +36,66 @@ async def test_a_password_opens_a_session_that_ends():
     assert access.visitor(judge) == Visitor("Ada", may_judge=True, may_fly=True)
     clock.now_s = SESSION_S
     assert access.visitor(judge) == Visitor("", may_judge=False, may_fly=False)
+
+
+async def test_a_restart_keeps_judges_logged_in_until_their_session_ends(tmp_path):
+    wall, path = Clock(), tmp_path / "contest.db.sessions"
+    wall.now_s = 1e9
+
+    def start(password=PASSWORD, cookie="judge-8080"):
+        # The clock of each start begins anew, as a machine's does; Unix time goes on.
+        kept = SessionFile(path, cookie, wall)
+        return Access(password, all_may_fly=False, clock=Clock(), cookie=cookie, kept=kept)
+
+    before = start()
+    ada = await before.log_in("Ada", PASSWORD, "10.0.0.1")
+    bob = await before.log_in("Bob", PASSWORD, "10.0.0.1")
+    before.log_out(connection(before, bob))
+    assert ada not in path.read_text()
+    assert path.stat().st_mode & 0o077 == 0
+    after = start()
+    assert after.visitor(connection(after, ada)) == Visitor("Ada", may_judge=True, may_fly=True)
+    assert not after.visitor(connection(after, bob)).may_judge
+    other = start(cookie="judge-8081")
+    await other.log_in("Eve", PASSWORD, "10.0.0.1")
+    assert not other.visitor(connection(other, ada)).may_judge
+    assert start().visitor(connection(after, ada)).may_judge  # the other monitor left them alone
+    renamed = start(password="another password")
+    assert not renamed.visitor(connection(renamed, ada)).may_judge
+    wall.now_s += SESSION_S
+    late = start()
+    assert not late.visitor(connection(late, ada)).may_judge
+
+
+@pytest.mark.parametrize("content", ["", "[]", '{"cookies": {"judge": {"x": {"name": 1}}}}', "[" * 100_000])
+async def test_a_spoiled_file_of_sessions_is_passed_over_and_replaced(tmp_path, content):
+    path = tmp_path / "contest.db.sessions"
+    path.write_text(content)
+    access = Access(PASSWORD, all_may_fly=False, cookie="judge", kept=SessionFile(path, "judge"))
+    session_id = await access.log_in("Ada", PASSWORD, "10.0.0.1")
+    again = Access(PASSWORD, all_may_fly=False, cookie="judge", kept=SessionFile(path, "judge"))
+    assert again.visitor(connection(again, session_id)).may_judge
+
+
+async def test_without_a_folder_to_write_to_judges_still_log_in(tmp_path):
+    kept = SessionFile(tmp_path / "missing" / "contest.db.sessions", "judge")
+    access = Access(PASSWORD, all_may_fly=False, cookie="judge", kept=kept)
+    session_id = await access.log_in("Ada", PASSWORD, "10.0.0.1")
+    assert access.visitor(connection(access, session_id)).may_judge
+
+
+@pytest.mark.parametrize(
+    ("database", "path"),
+    [
+        ("sqlite:///framerunner.db", "framerunner.db.sessions"),
+        ("sqlite:////srv/our contest.db?timeout=5", "/srv/our contest.db.sessions"),
+        ("postgresql+psycopg://judge:secret@host/contest", "framerunner.db.sessions"),
+        ("sqlite://", None),
+        ("sqlite:///:memory:", None),
+    ],
+)
+def test_sessions_lie_beside_the_database(database, path):
+    assert session_path(database) == (None if path is None else Path(path))
 
 
 async def test_who_guesses_is_slowed_down_and_others_are_not():

@@ -110,6 +110,7 @@ async def test_the_status_tells_all_that_the_page_shows(link):
             "pilot": "",
             "figures": None,
             "video": False,
+            "over": False,
         }
         assert status["link"]["state"] == "live"
         assert status["link"]["loss_percent"] == 0.0
@@ -157,6 +158,33 @@ async def test_a_silent_drone_is_stale_then_lost_then_back():
         await watched.until(lambda: watched.status()["link"]["state"] == "live")
         await watched.until(lambda: re.fullmatch(r"drone 1: link is back after \d+ s", watched.notices()[-1]))
     assert watched.notices().count("drone 1: link lost") == 1
+
+
+async def test_a_drone_that_falls_silent_after_its_flight_is_no_lost_link():
+    link = SimulatedLink(SCENARIO)
+    async with watching(equipment(link)) as watched:
+        await watched.until_ready(link)
+        assert (await watched.fleet.do(1, "arm"))[0]
+        assert not watched.status()["over"]
+        assert (await watched.fleet.do(1, "disarm"))[0]
+        await watched.until(lambda: watched.status()["over"])
+        link.muted = True
+        ended = "drone 1: not heard any more; its flight was over"
+        await watched.until(lambda: ended in watched.notices())
+        assert watched.status()["over"]
+    assert "drone 1: link lost" not in watched.notices()
+
+
+async def test_who_comes_late_is_told_where_the_drone_has_been(link):
+    async with watching(equipment(link, SCENARIO)) as watched:
+        await fly_a_little(watched, link)
+        kinds = [message["kind"] for message in watched.fleet.welcome()]
+        history = next(message for message in watched.fleet.welcome() if message["kind"] == "history")
+        times = [row[0] for row in history["poses"]]
+        heights = [row[3] for row in history["poses"]]
+        assert times == sorted(set(times))
+        assert max(heights) - min(heights) > 0.3
+        assert kinds[-1] == "status"
 
 
 async def test_a_link_that_fails_is_opened_again(link):

@@ -149,3 +149,16 @@ async def test_what_a_browser_says_is_ignored(monkeypatch, text):
         async with asyncio.timeout(10):
             while (await live.receive_json())["kind"] != "pose":
                 pass
+
+
+async def test_who_comes_late_is_sent_the_flight_so_far_and_the_next_one_what_was_added():
+    fleet, welcome = StubFleet(), {"kind": "history", "id": 1, "poses": [[0.1, 1.0, None]]}
+    fleet.welcome = lambda: [welcome]
+    channel = LiveChannel(fleet)
+    for rows in ([[0.1, 1.0, None]], [[0.1, 1.0, None], [0.2, 2.0, None]], []):
+        welcome["poses"] = rows
+        viewer, other = Viewer(["history"]), Viewer(["pose"])
+        channel.enter(viewer)
+        channel.enter(other)
+        assert json.loads(await viewer.next())["poses"] == rows
+        assert pending(other) == 0

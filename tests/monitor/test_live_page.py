@@ -1,5 +1,6 @@
 """The live page and the statechart's, in a real browser, told by a test what flies."""
 
+import asyncio
 import re
 
 import pytest
@@ -8,7 +9,7 @@ from playwright.async_api import expect
 from offboard.mission import load_mission, mermaid
 from scenarios.loader import load_scenario
 from tests.chromium import Complaints
-from tests.monitor.page_server import fake_monitor
+from tests.monitor.page_server import JPEG, fake_monitor
 
 pytestmark = pytest.mark.pages
 MISSION = load_mission("frame_challenge")
@@ -17,6 +18,7 @@ MARKUP = "<img src=x onerror=alert(1)><b>bold</b>"
 PATIENCE_MS = 20_000  # a browser that draws without a graphics card, on a machine that has other things to do
 expect.set_options(timeout=PATIENCE_MS)
 LAPTOP, PHONE = {"width": 1366, "height": 768}, {"width": 390, "height": 844}
+SMALL, LARGE = {"width": 1024, "height": 768}, {"width": 1920, "height": 1080}
 LIVE_LINK = {"state": "live", "age_s": 0.04, "loss_percent": 0.0, "rate_hz": 210.0}
 FIGURES = {
     "try_time_s": 87.4321,
@@ -80,9 +82,17 @@ async def fake():
         yield monitor
 
 
-async def visit(browser, fake, path="/", viewport=LAPTOP, **more):
+async def visit(browser, fake, path="/", viewport=LAPTOP, *, three=None, **more):
+    """Open a page; `three` is an event that its library for 3-D waits for."""
     context = await browser.new_context(viewport=viewport, **more)
     page = await context.new_page()
+
+    async def load_three(route):
+        await three.wait()
+        await route.continue_()
+
+    if three is not None:
+        await page.route("**/lib/three/index.js", load_three)
     page.set_default_timeout(PATIENCE_MS)
     complaints = Complaints(page)
     await page.goto(fake.url + path)
@@ -138,7 +148,7 @@ async def test_figures_are_those_that_were_sent(chromium, fake):
 
 async def test_texts_with_markup_are_shown_as_text(chromium, fake):
     fake.welcome[1] = chart(name=MARKUP, source=f"name: {MARKUP}")
-    page, complaints = await visit(chromium, fake)
+    page, complaints = await visit(chromium, fake, viewport=SMALL)
     await fake.say("text", id=1, time_s=3.0, severity=4, text=MARKUP, **{"from": "drone"})
     await fake.say("notice", id=None, level="warning", text=MARKUP)
     values = [["frame.d", 0.4412345], [MARKUP, None]]
@@ -242,8 +252,10 @@ async def test_a_phone_shows_everything_without_scrolling_sideways(chromium, fak
     await fake.say("pose", drones=[pose()])
     box = [-10.0, -30.0, 40.0, 10.0, 1.234, 12.4]
     boxes = {"red": box, "green": None, "blue": [120.0, 100.0, 160.0, 150.0, None, None]}
+    await fake.until_filmed()
+    await fake.show(JPEG, 10.0)
     await fake.say("detections", id=1, t=10.0, width=320, height=240, boxes=boxes)
-    await expect(page.locator(".m-camera img")).to_be_visible()
+    await expect(page.locator(".m-camera")).to_have_attribute("data-boxes-time", "10")
     await expect(page.locator("svg .m-active")).to_have_count(1)
     assert await width_of(page) == PHONE["width"]
     names = ("figures", "arena", "camera", "plots", "chart")
@@ -279,4 +291,124 @@ async def test_without_webgl_the_arena_is_shown_from_above(chromium, fake):
           return false;
         }"""
     )
+    assert complaints == []
+
+
+BOX = [20.0, -20.0, 30.0, -30.0, 1.5, 5.0]
+WATCH_MOMENTS = """() => {
+  const camera = document.querySelector(".m-camera"), arena = document.querySelector(".m-arena");
+  window.moments = [];
+  new MutationObserver(() => {
+    const { time, boxesTime } = camera.dataset;
+    window.moments.push([Number(time), boxesTime, Number(arena.dataset.time)]);
+  }).observe(camera, { attributes: true, attributeFilter: ["data-boxes-time"] });
+}"""
+
+
+async def test_camera_boxes_and_arena_are_of_one_moment(chromium, fake):
+    """What the app finds in an image comes 0.2 s after the image, and the drone has moved on by then."""
+    fake.welcome[2] = {"kind": "status", "drones": [status(video=True)]}
+    page, complaints = await visit(chromium, fake)
+    await fake.until_filmed()
+    await page.evaluate(WATCH_MOMENTS)
+    for step in range(60):
+        t = 10 + step / 20
+        await fake.say("pose", drones=[pose(t=t, p=[t - 12, 0.0, 1.5])])
+        if step % 2 == 0:
+            await fake.show(JPEG, t)
+            seen = {"red": BOX, "green": None, "blue": None}
+            await fake.say("detections", id=1, t=round(t - 0.2, 3), width=320, height=240, boxes=seen)
+        await asyncio.sleep(0.05)
+    await page.wait_for_function("Number(document.querySelector('.m-camera').dataset.time) >= 12.69")
+    moments = [each for each in await page.evaluate("window.moments") if each[0] > 10.5]
+    assert len(moments) >= 4
+    assert {boxes for _, boxes, _ in moments} == {f"{image:.6g}" for image, _, _ in moments}
+    # An image stands until the next one's moment, 0.1 s later; a slow browser draws a few times a second.
+    assert all(-0.001 <= arena - image < 0.5 for image, _, arena in moments), moments
+    assert complaints == []
+
+
+async def test_who_comes_late_sees_the_flight_so_far_at_once(chromium, fake):
+    rows = [
+        [10 + 0.1 * step, 0.02 * step, 1.0, 1.5, 0.3, 0.2, 0.0, 0.0, 0.0, 0.2, 0.0, 0.0, 0.0, 1, state]
+        for step in range(300)
+        for state in [STATES.index("red.turning" if step < 150 else "red.crossing")]
+    ]
+    fake.welcome.insert(2, {"kind": "history", "id": 1, "poses": rows})
+    for step in range(40):  # these come while the page still loads what draws the arena, which is large
+        now = pose(t=40 + step / 20, state="red.crossing", p=[6.0 + step / 100, 1.0, 1.5])
+        fake.welcome.append({"kind": "pose", "drones": [now]})
+    three = asyncio.Event()
+    page, complaints = await visit(chromium, fake, three=three)
+    await expect(page.locator(".m-plots output").first).to_have_text("6.39")
+    three.set()
+    await expect(page.locator(".m-arena-legend")).to_have_text("turningcrossing")
+    assert complaints == []
+
+
+async def test_after_a_flight_its_result_and_last_image_stay(chromium, fake):
+    fake.welcome[2] = {"kind": "status", "drones": [status(video=True)]}
+    page, complaints = await visit(chromium, fake)
+    await fake.until_filmed()
+    await fake.say("pose", drones=[pose()])
+    await fake.show(JPEG, 10.0)
+    await expect(page.locator(".m-camera")).to_have_attribute("data-time", "10")
+    clean = FIGURES | {"verdict": "clean", "over": True, "final": True, "motors_on": False}
+    lost = LIVE_LINK | {"state": "lost", "age_s": 9.0}
+    over = status(video=True, figures=clean, armed=False, link=lost, over=True)
+    over["mission"] |= {"alive": False}
+    await fake.say("status", drones=[over])
+    await fake.say("pose", drones=[pose(fresh=False, on=False)])
+    await expect(page.locator(".m-camera-note")).to_have_text("last image of the flight")
+    await expect(figure(page, "verdict")).to_have_text("clean")
+    await expect(page.locator('[data-item="link"]')).to_have_text("ended with the flight")
+    await expect(page.locator('[data-item="mission"]')).to_contain_text("ended in red.turning")
+    await asyncio.sleep(0.6)
+    await expect(page.locator("#live")).not_to_have_class(re.compile(r"m-old|m-stale|m-flying"))
+    assert complaints == []
+
+
+async def test_a_restarted_monitor_does_not_say_that_a_flight_has_not_begun(chromium, fake):
+    """The names of a mission's states come some seconds after its state."""
+    unnamed = status(state="")
+    unnamed["mission"] |= {"name": ""}
+    fake.welcome = [world(), {"kind": "status", "drones": [unnamed]}]
+    page, _ = await visit(chromium, fake)
+    await expect(page.locator('[data-item="mission"]')).to_contain_text("mission: under way")
+
+
+@pytest.mark.parametrize("viewport", [{"width": 1440, "height": 900}, LARGE], ids=["1440x900", "1920x1080"])
+async def test_all_of_it_fits_a_large_screen_with_the_team(chromium, fake, viewport):
+    flown = {"id": 7, "drone_id": 1, "team_name": MARKUP, "scenario": "test-case-1"}
+    fake.stage["running"] = [flown]
+    fake.welcome[2] = {"kind": "status", "drones": [status(video=True, armed=False, figures=None)]}
+    page, complaints = await visit(chromium, fake, viewport=viewport)
+    await expect(page.locator(".m-team-name")).to_have_text(MARKUP)
+    page_size = "[document.documentElement.scrollWidth, document.documentElement.scrollHeight]"
+    wait = f"String({page_size}) === String([innerWidth, innerHeight])"
+    await page.wait_for_function(wait)
+    before = await page.locator(".m-camera").bounding_box()
+    await fake.say("status", drones=[status(video=True)])
+    await expect(page.locator("#live")).to_have_class(re.compile(r"\bm-flying\b"))
+    await page.wait_for_function(wait)
+    during = await page.locator(".m-camera").bounding_box()
+    assert during["width"] > 1.1 * before["width"]
+    assert during["width"] > 0.35 * viewport["width"]
+    for name in ("figures", "messages", "chart", "plots"):
+        box = await page.locator(f".m-{name}-panel").bounding_box()
+        assert box["y"] + box["height"] <= viewport["height"]
+    assert complaints == []
+
+
+async def test_a_try_that_was_interrupted_is_shown_as_the_store_has_it(chromium, fake):
+    """A real drone's referee is the monitor's own; after a restart it cannot know how the try began."""
+    flown = {"id": 7, "drone_id": 1, "team_name": "Adler", "scenario": "test-case-1", "penalty_s": 0.0}
+    flown |= {"crossed": ["red"], "splits": {"red": 31.2}, "try_time_s": 40.5, "total_s": 40.5}
+    fake.stage["interrupted"] = flown
+    fake.welcome[2] = {"kind": "status", "drones": [status(figures=None)]}
+    page, complaints = await visit(chromium, fake)
+    await expect(figure(page, "verdict")).to_have_text("interrupted")
+    await expect(figure(page, "try_time_s")).to_have_text("40.5")
+    await expect(page.locator('[data-colour="red"]')).to_have_attribute("data-value", "31.2")
+    await expect(page.locator(".m-team-name")).to_have_text("Adler")
     assert complaints == []

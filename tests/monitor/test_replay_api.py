@@ -1,6 +1,8 @@
 """Recorded flights over HTTP: whole, packed, asked for once; 404 with one line for the rest."""
 
+import asyncio
 import gzip
+import threading
 
 import pytest
 
@@ -110,3 +112,50 @@ async def test_without_a_library_there_is_an_empty_list_and_a_hint(monkeypatch):
             async with client.get(f"{served.url}api/runs/{path}") as answer:
                 assert answer.status == 404
                 assert "--runs" in await answer.text()
+
+
+class SlowLibrary(Library):
+    """Reads nothing before it is told to."""
+
+    def __init__(self, *runs):
+        super().__init__(*runs)
+        self.go = threading.Event()
+        self.at_once = 0
+        self.most_at_once = 0
+        self._lock = threading.Lock()
+
+    def recording(self, name):
+        with self._lock:
+            self.at_once += 1
+            self.most_at_once = max(self.most_at_once, self.at_once)
+        self.go.wait(20)
+        with self._lock:
+            self.at_once -= 1
+            return super().recording(name)
+
+
+async def test_two_are_read_at_once_two_wait_and_more_are_refused_in_words(monkeypatch):
+    names = [f"run-{number}" for number in range(5)]
+    library = SlowLibrary(*(a_run(name, end_s=2.0) for name in names))
+    async with serving_runs(monkeypatch, library) as served, browser() as client:
+
+        async def status(name):
+            async with client.get(f"{served.url}api/runs/{name}") as answer:
+                return answer.status, answer.headers.get("Retry-After"), await answer.text()
+
+        asked = [asyncio.create_task(status(name)) for name in names[:4] for _ in range(3)]
+        async with asyncio.timeout(20):
+            refused = (0, None, "")
+            while refused[0] != 503:
+                await asyncio.sleep(0.05)
+                if library.at_once == 2:
+                    refused = await asyncio.wait_for(status(names[4]), 5)
+            assert refused[1:] == ("60", "4 flights are being read; try again in a minute\n")
+            async with client.get(f"{served.url}api/runs") as answer:
+                assert answer.status == 200  # the list does not wait for them
+            library.go.set()
+            assert {each[0] for each in await asyncio.gather(*asked)} == {200}
+            assert (await status(names[4]))[0] == 200
+    assert library.most_at_once == 2
+    assert sorted(library.read) == names  # each once, though three asked for it
+    assert library.closed

@@ -6,13 +6,12 @@ import socket
 import aiohttp
 import pytest
 
-from monitor.listening import url_of
-from monitor.security import MAX_BODY_BYTES
-from monitor.settings import MonitorError, MonitorSettings
+from monitor.settings import ConnectionLimits, MonitorError, MonitorSettings
 from tests.monitor.sample_page import EVIL
 from tests.monitor.serving import browser, serving
 
 SAMPLE = "tests.monitor.sample_page"
+MAX_BODY_BYTES = ConnectionLimits().body_bytes
 
 
 async def test_a_page_has_frame_data_and_headers(monkeypatch):
@@ -39,6 +38,7 @@ async def test_all_that_a_page_names_is_here(monkeypatch):
             "/pilot",
             "/competition",
             "/ranking",
+            "/stage",
             "/replay",
         }
         assert len(own) > 10
@@ -152,6 +152,10 @@ async def test_a_taken_port_is_told_in_one_line(monkeypatch):
         (MonitorSettings(password="short"), "FRAMERUNNER_JUDGE_PASSWORD has 5 characters"),
         (MonitorSettings(port=70000), "--port 70000: must be from 0 to 65535"),
         (MonitorSettings(bind=" "), "--bind is empty"),
+        (
+            MonitorSettings(trusted_proxies=("proxy.local",)),
+            "--trusted-proxy 'proxy.local': must be",
+        ),
     ],
 )
 def test_settings_that_cannot_be_are_refused(settings, words):
@@ -164,12 +168,6 @@ async def test_an_address_that_is_not_ours_is_told_in_one_line(monkeypatch):
     with pytest.raises(MonitorError, match=r"--bind no\.such\.host\.invalid: .*give an address"):
         async with serving(monkeypatch, bind="no.such.host.invalid"):
             pass
-
-
-def test_the_address_told_can_be_opened():
-    assert url_of("127.0.0.1", 8080) == "http://127.0.0.1:8080/"
-    assert url_of("::1", 80) == "http://[::1]:80/"
-    assert url_of("0.0.0.0", 80) == f"http://{socket.gethostname()}:80/"
 
 
 async def test_it_ends_soon_though_somebody_watches_and_its_port_is_free_again(monkeypatch):

@@ -66,6 +66,9 @@ async def test_a_lost_drone_is_told_in_words(monkeypatch, chromium):
         await page.wait_for_function(LINK_IS, arg="live")
         served.fleet.status = {"kind": "status", "drones": [{"id": 1, "link": {"state": "lost"}}]}
         await page.wait_for_function(LINK_IS, arg="link lost")
+        over = {"id": 1, "over": True, "link": {"state": "lost"}}
+        served.fleet.status = {"kind": "status", "drones": [over]}
+        await page.wait_for_function(LINK_IS, arg="flight over")
         served.fleet.status = {"kind": "status", "drones": []}
         await page.wait_for_function(LINK_IS, arg="no drone")
 

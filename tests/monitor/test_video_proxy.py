@@ -1,5 +1,6 @@
 import asyncio
 import contextlib
+import struct
 
 import pytest
 from aiohttp import web
@@ -77,7 +78,7 @@ class Camera:
         self.connections = 0
         self.now = 0
         self.number = 0
-        self.is_broken = False
+        self.is_broken = self.hold = False
         self.changed = asyncio.Event()
 
     def show(self):
@@ -92,6 +93,8 @@ class Camera:
         self.now += 1
         try:
             while True:
+                if self.hold:
+                    await asyncio.Event().wait()
                 await response.write(part(self.number, head=f"Content-Length: {len(JPEG)}\r\n"))
                 await self.changed.wait()
                 if self.is_broken:
@@ -159,6 +162,29 @@ async def test_one_image_is_had_alone(monkeypatch):
             assert answer.headers["Content-Type"] == "image/jpeg"
             assert answer.headers["X-Time-Us"] == "7"
             assert answer.headers["X-Content-Type-Options"] == "nosniff"
+
+
+async def next_frame(answer):
+    async with asyncio.timeout(15):
+        time_us, length = struct.unpack("<qI", await answer.content.readexactly(12))
+        return time_us, await answer.content.readexactly(length)
+
+
+async def test_frames_carry_their_time_and_who_comes_late_gets_the_last_one_at_once(monkeypatch):
+    async with camera() as source, serving(monkeypatch) as served, browser() as client:
+        served.fleet.video = source.url
+        source.number = 7
+        async with client.get(served.url + "video/1/frames") as answer:
+            assert await next_frame(answer) == (7, JPEG)
+            source.show()
+            assert await next_frame(answer) == (8, JPEG)
+        await reached(lambda: source.now == 0 or source.show())
+        last = source.number
+        source.hold = True  # the flight is over: nothing new comes
+        async with client.get(served.url + "video/1/frames") as answer:
+            time_us, jpeg = await next_frame(answer)
+            assert 8 <= time_us <= last
+            assert jpeg == JPEG
 
 
 async def test_a_drone_that_was_away_is_seen_again(monkeypatch):

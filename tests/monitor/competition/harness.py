@@ -15,7 +15,7 @@ PASSWORD = "only for these tests"
 COLOURS = ("red", "green", "blue")
 MODULES = (
     "monitor.competition.api",
-    *(f"monitor.pages.{name}" for name in ("login", "competition", "judge", "ranking")),
+    *(f"monitor.pages.{name}" for name in ("login", "competition", "judge", "ranking", "join")),
 )
 
 
@@ -24,14 +24,20 @@ def scenario(name, colours=COLOURS):
     return Scenario(name=name, frames=frames)
 
 
+FRAMES = {"case": COLOURS, "calm": COLOURS, "two": COLOURS[:2], "no": ()}
+
+
 def load(name):
-    if not name.startswith(("case-", "calm-", "two-")):
+    kind = name.partition("-")[0]
+    if kind not in FRAMES:
         raise ValueError(f"scenario {name} is unknown")
-    return scenario(name, COLOURS[:2] if name.startswith("two-") else COLOURS)
+    return scenario(name, FRAMES[kind])
 
 
 EQUIPMENT = SimpleNamespace(
-    scenario=None, list_scenarios=lambda: ["case-1", "case-2", "case-3", "case-4"], load_scenario=load
+    scenario=None,
+    list_scenarios=lambda: ["broken", "case-1", "case-2", "case-3", "case-4", "no-frames", "two-1"],
+    load_scenario=load,
 )
 
 
@@ -127,7 +133,7 @@ class Contest:
 @asynccontextmanager
 async def contest(database, monkeypatch, port=0):
     """A monitor, its database open; port 0 is a free one."""
-    monkeypatch.setattr("monitor.fleet.Fleet", FakeFleet)
+    monkeypatch.setattr("monitor.assembly.Fleet", FakeFleet)
     monkeypatch.setattr(server, "MODULES", MODULES)
     said = []
     serving = asyncio.create_task(

@@ -14,6 +14,8 @@ POSTS = {
     "teams": {"name": "Falken"},
     "teams/1": {"members": "Ann"},
     "next": {"team": 1},
+    "next/undo": {"call": 1},
+    "queue": {"seen": 0, "teams": [1]},
     "draw": {"pool": ["case-1", "case-2", "case-3"]},
     "settings": {"limit_s": 180.0, "missing_frame_s": 60.0, "scenarios": 3, "counting": "best"},
     "tries/1/judgement": {"seen": 0, "contacts": 3},
@@ -46,7 +48,8 @@ async def test_a_judge_may_do_all_of_it(running):
     await running.log_in("Ada")
     await running.post("teams", {"name": "Falken"})
     await running.fly("k", 1)
-    forms = {**POSTS, "teams": {"name": "Adler"}, "tries/1/team": {"seen": 1, "team": 1}}
+    call = {"call": 3}  # after that of the try and its end
+    forms = {**POSTS, "teams": {"name": "Adler"}, "next/undo": call, "tries/1/team": {"seen": 1, "team": 1}}
     for path, form in forms.items():
         status, answer = await running.post(path, form)
         assert status == 200, (path, answer)
@@ -84,6 +87,11 @@ BAD = [
     ("next", {"team": True}, "team"),
     ("next", {"team": None, "scenario": "../../etc/passwd"}, "is no name"),
     ("next", {"team": None, "scenario": "nowhere"}, "unknown; choose one"),
+    ("next/undo", {}, "call is missing; give the id of the last call"),
+    ("queue", {"teams": []}, "seen is missing; .*queue's `number`"),
+    ("queue", {"seen": 0, "teams": ["x"]}, "teams .* numbers of teams"),
+    ("queue", {"seen": 0, "teams": [1] * 501}, "teams .* at most 500"),
+    ("queue", {"seen": 0, "teams": [], "shuffle": 1}, "shuffle"),
     ("draw", {"pool": []}, "pool .* give a list of 1 to 200"),
     ("draw", {"pool": ["case-1"] * 201}, "pool"),
     ("draw", {"pool": ["case-1"], "count": 0}, 'count "0" cannot be taken; give a whole number from 1 to 10'),
@@ -155,6 +163,29 @@ async def test_what_does_not_exist_is_404(running):
         ] == 404
     assert (await running.post("teams/99", {"members": ""}))[0] == 404
     assert (await running.post("next", {"team": 99}))[0] == 404
+
+
+async def test_everybody_sees_who_is_called_and_the_queue(running):
+    await running.log_in()
+    teams = [(await running.post("teams", {"name": name}))[1]["team"] for name in ("A", "B", "C")]
+    assert (await running.post("queue", {"seen": 0, "teams": teams, "shuffle": True}))[0] == 200
+    await running.http.post("/logout")
+    state, ranking = (await running.get("state"))[1], (await running.get("ranking"))[1]
+    queue = state["board"]["queue"]
+    assert sorted(each["team"] for each in queue["teams"]) == teams and ranking["queue"] == queue
+    await running.log_in()
+    assert (await running.post("queue", {"seen": 0, "teams": []}))[0] == 409
+    first = queue["teams"][0]["team"]
+    await running.post("next", {"team": first})
+    running.fleet.tell(event("began", "k", time_s=0.0))
+    ranking = await running.until("ranking", lambda state: state["running"])
+    assert ranking["called"]["team"] == ranking["running"][0]["team"] == first
+    assert ranking["called"]["try"] == 1 and len(ranking["queue"]["teams"]) == 2
+    call = (await running.get("state"))[1]["board"]["last_call"]
+    assert call["tries"] == [1]
+    assert (await running.post("next/undo", {"call": call["id"]}))[0] == 200
+    assert (await running.post("next/undo", {"call": call["id"]}))[0] == 409
+    assert (await running.get("tries/1"))[1]["try"]["team"] is None
 
 
 async def test_the_quicker_of_two_judges_wins(running):

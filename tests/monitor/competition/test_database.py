@@ -1,10 +1,14 @@
 import os
 import sqlite3
+from pathlib import Path
 
 import pytest
 from sqlalchemy import create_engine, text
 
+from monitor.competition import migrations
+from monitor.competition.calls import Entry
 from monitor.competition.database import Database, DatabaseError
+from monitor.competition.store import Store
 from monitor.competition.tables import SCHEMA_VERSION
 from monitor.settings import MonitorError
 
@@ -69,6 +73,63 @@ def test_a_newer_version_is_refused_in_words(database_url):
     assert "version 99" in words and f"version {SCHEMA_VERSION}" in words and "update framerunner" in words
 
 
+VERSION_1 = Path(__file__).with_name("version_1.sql")
+
+
+def version_1(file):
+    """A contest that an older framerunner wrote: one team flew, another is called."""
+    with sqlite3.connect(file) as connection:
+        connection.executescript(VERSION_1.read_text())
+    connection.close()
+
+
+def test_an_older_contest_goes_on(tmp_path):
+    file = tmp_path / "x.db"
+    version_1(file)
+    database = Database(f"sqlite:///{file}")
+    store = Store(database)
+    board = store.board()
+    assert [team.name for team in board.teams] == ["Falken", "Adler"]
+    assert (board.called.team_name, board.called.scenario, board.called.who) == ("Adler", "case-2", "Ada")
+    assert board.tries[0].result.counted_s == 70.0 and board.tries[0].team_name == "Falken"
+    assert board.queue.teams == ()
+    store.set_queue(0, [1, 2], Entry("Ada", board.called.at))
+    store.take_back(board.called.id, Entry("Ada", board.called.at))
+    assert store.board().called is None
+    with database.transaction() as session:
+        kinds = session.execute(text("select kind from competition_next order by id")).scalars().all()
+    assert kinds == ["call", "used", "call", "taken back", "call", "taken back"]
+    store.close()
+    assert columns(file) == columns_of_new(tmp_path)
+
+
+def columns(file):
+    """Name, type and whether it may be null, of every column of every table."""
+    with sqlite3.connect(file) as connection:
+        names = [row[0] for row in connection.execute("select name from sqlite_master where type = 'table'")]
+        return {
+            name: sorted(row[1:4] for row in connection.execute(f"pragma table_info({name})"))
+            for name in names
+        }
+
+
+def columns_of_new(folder):
+    Database(f"sqlite:///{folder}/new.db").close()
+    return columns(folder / "new.db")
+
+
+def test_an_older_contest_is_brought_up_to_date_as_a_whole_or_not_at_all(tmp_path, monkeypatch):
+    file = tmp_path / "x.db"
+    version_1(file)
+    before = columns(file)
+    monkeypatch.setitem(migrations._STATEMENTS, 1, (*migrations._STATEMENTS[1], "select * from nowhere"))
+    assert "nowhere" in refusal(f"sqlite:///{file}")
+    assert columns(file) == before
+    monkeypatch.undo()
+    Database(f"sqlite:///{file}").close()
+    assert columns(file) == columns_of_new(tmp_path)
+
+
 def test_tables_without_a_version_are_refused(tmp_path):
     file = tmp_path / "x.db"
     with sqlite3.connect(file) as connection:
@@ -111,6 +172,22 @@ def test_a_database_that_is_locked_is_told_in_words(tmp_path):
         session.execute(text("update competition_schema set version = 1"))
     other.rollback()
     other.close()
+    database.close()
+
+
+def test_a_full_disk_is_told_in_words_and_what_fits_again_is_written(tmp_path):
+    database = Database(f"sqlite:///{tmp_path}/x.db")
+    fill = text("create table filling as select zeroblob(100000) as bytes")
+    with database.transaction() as session:
+        session.execute(text("pragma max_page_count=1"))  # as large as it is, and no larger
+    with (
+        pytest.raises(DatabaseError, match="disk is full; free some space"),
+        database.transaction() as session,
+    ):
+        session.execute(fill)
+    with database.transaction() as session:
+        session.execute(text("pragma max_page_count=1000000"))
+        session.execute(fill)
     database.close()
 
 

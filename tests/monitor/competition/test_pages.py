@@ -6,7 +6,7 @@ from tests.chromium import Complaints
 from tests.monitor.competition.harness import PASSWORD, contest, event
 
 EVIL = ('<img src=x onerror="window.hurt=1">', "<script>window.hurt=1</script>", "{{7*7}}\u200f&amp;<b>")
-SIZES = ((390, 844), (1366, 768), (1920, 1080))
+SIZES = ((375, 812), (1366, 768), (1920, 1080))
 
 # Notes when something came to hold, by the page's own clock, and what was animated since.
 WATCH = """(holds) => {
@@ -164,11 +164,11 @@ async def test_a_whole_contest_by_hand(running, chromium):
 
     await page.select_option("#next-team", label="Falken")
     await page.select_option("#next-scenario", drawn[0])
-    await page.click("button:has-text('Call')")
-    await page.wait_for_selector(".flight.next")
+    await page.click("button:text-is('Call Falken')")
+    await page.wait_for_selector(".flight.called")
     running.fleet.tell(event("began", "k", drawn[0], time_s=0.0))
     running.fleet.tell(event("running", "k", drawn[0], time_s=12.0, crossed=("red",)))
-    await page.wait_for_function("document.querySelector('.flight .clock')?.textContent === '12.0 s'")
+    await page.wait_for_function("document.querySelector('.flight .clock')?.textContent === '12.0'")
     running.fleet.tell(event("ended", "k", drawn[0], time_s=44.44))
     await page.wait_for_function("document.querySelector('.tries .number')?.textContent === '44.44'")
     assert "Nobody is called" in await page.inner_text(".now")
@@ -217,7 +217,10 @@ async def test_crossings_and_completion_by_hand(running, chromium):
     await page.check("input[value='completed']")
     assert "blue is missing" in await text_of(page, ".counts")
     await page.check("input[value='blue']")
-    assert await text_of(page, ".counts") == "Counts 50.00 s: completed."
+    assert (
+        await text_of(page, ".counts")
+        == "Counts 50.00 s: completed. It counts for nobody until a team is set."
+    )
     await page.press("input[value='blue']", "Enter")
     await page.wait_for_selector(".line:has-text('Saved')")
     await page.select_option("#try-team", str(team))
@@ -235,7 +238,7 @@ async def test_the_clock_of_a_try_runs_until_its_result_stands_there(running, ch
     team = (await running.post("teams", {"name": "Falken"}))[1]["team"]
     await running.post("next", {"team": team})
     page = await open_page(chromium, running, "ranking")
-    await page.wait_for_selector(".flight.next:has-text('Falken')")
+    await page.wait_for_selector(".flight.called:has-text('Falken')")
     running.fleet.tell(event("began", "k", time_s=3.0))
     await page.wait_for_selector("[data-team][data-flying]")
     await page.wait_for_function("Number(document.querySelector('.clock').textContent) > 3.5")
@@ -268,7 +271,8 @@ async def test_pages_fit_every_window(running, chromium):
         await running.fly(str(number), team)
     worst = {"seen": 0, "remarks": "y" * 1000, "contacts": 1000, "penalty_s": 36000}
     assert (await running.post("tries/1/judgement", worst))[0] == 200
-    await running.post("next", {"team": 1})
+    await running.post("queue", {"seen": 0, "teams": [1, 2, 3]})
+    await running.post("next", {"team": 2})
     shown = {"competition": ".teams .name", "competition/try/1": ".history .by", "ranking": ".ranking .rank"}
     for path, selector in shown.items():
         page = await open_page(chromium, running, path, judge="Ada")

@@ -103,7 +103,6 @@ async def test_a_listener_that_left_hears_nothing(url):
     async with serving(url) as service:
         heard = []
         service.subscribe(heard.append)()
-        assert service.listeners == 0
         service.hear(event("ended", "k"))
         await until(lambda: service._board.tries)
         assert heard == []
@@ -181,6 +180,8 @@ async def test_a_draw_takes_from_the_pool_and_every_one_can_come_first(url):
         (["case-1"], 2, "count 2 is more than the 1"),
         (["../secrets"], 1, "is no name"),
         (["nowhere"], 1, "unknown"),
+        (["case-1", "no-frames"], 1, '"no-frames" cannot be drawn: it has no frames, .* take it out'),
+        (["two-1", "case-1"], 1, '"two-1" cannot be drawn: it has only the red and the green frame'),
     ],
 )
 async def test_a_bad_draw_is_refused(url, pool, count, words):
@@ -188,6 +189,17 @@ async def test_a_bad_draw_is_refused(url, pool, count, words):
         with pytest.raises(Refused, match=words):
             await service.draw(pool, count, "Ada")
         assert service._board.draws == ()
+
+
+async def test_the_pot_holds_what_has_all_frames(url):
+    async with serving(url) as service:
+        assert service.scenarios == ("case-1", "case-2", "case-3", "case-4")
+
+
+async def test_every_order_can_come_of_shuffling(url):
+    async with serving(url, random=Random(1)) as service:
+        orders = {tuple(service.shuffled([1, 2, 3])) for _ in range(100)}
+        assert len(orders) == 6 and all(sorted(order) == [1, 2, 3] for order in orders)
 
 
 async def test_frames_are_those_of_the_scenario_or_all(url):

@@ -6,9 +6,10 @@ from math import inf, nan
 import pytest
 
 from monitor.competition import tables
+from monitor.competition.calls import Entry
 from monitor.competition.database import Database
 from monitor.competition.rules import Correction, Rule
-from monitor.competition.store import MOST_JUDGEMENTS, MOST_TEAMS, Entry, Store
+from monitor.competition.store import MOST_JUDGEMENTS, MOST_TEAMS, Store
 from monitor.competition.words import Refused
 from tests.monitor.competition.harness import COLOURS, event
 

@@ -7,47 +7,73 @@ from monitor.vehicle.camera import CameraWatch, host_of, refusal
 
 
 @pytest.mark.parametrize(
-    "url",
+    ("url", "host"),
     [
-        "http://127.0.0.1:8100/video",
-        "http://192.168.1.7/video",
-        "https://10.0.0.3:8443/video",
-        "http://[fd00::1]:8100/video",
+        ("http://127.0.0.1:8100/video", "127.0.0.1"),
+        ("http://127.0.0.1:8109/video", "127.0.0.1"),
+        ("http://192.168.1.7/video", "192.168.1.7"),
+        ("http://192.168.1.7:81/stream", "192.168.1.7"),
+        ("https://10.0.0.3:8443/cam-1/video.mjpg", "::ffff:10.0.0.3"),
+        ("http://[fd00::1]:8100/video", "fd00::1"),
+        ("http://8.8.8.8/video", "8.8.8.8"),
     ],
 )
-def test_this_machine_and_private_networks_may_be_asked(url):
-    assert refusal(url) == ""
+def test_the_host_that_the_packets_come_from_may_be_asked_for_a_camera_s_address(url, host):
+    if ":81/" in url:
+        assert "port 81 is of another service" in refusal(url, host)
+        url = url.replace(":81/", ":8081/")
+    assert refusal(url, host) == ""
 
 
 @pytest.mark.parametrize(
-    "url",
+    ("url", "host", "words"),
     [
-        "http://8.8.8.8/video",
-        "http://example.com/video",
-        "http://localhost/video",
-        "http://169.254.169.254/latest/meta-data",
-        "http://0.0.0.0:8100/video",
-        "http://[::ffff:8.8.8.8]/video",
-        "http://user:secret@127.0.0.1/video",
-        "http://127.0.0.1:99999/video",
-        "http://127.0.0.1:0/video",
-        "file:///etc/passwd",
-        "ftp://127.0.0.1/video",
-        "http://[::1/video",
-        "http:///video",
-        "http://2130706433/video",
+        ("http://192.168.1.8/video", "192.168.1.7", "packets come from 192.168.1.7"),
+        ("http://127.0.0.1:8100/video", "192.168.1.7", "packets come from 192.168.1.7"),
+        ("http://192.168.1.7/video", "127.0.0.1", "packets come from 127.0.0.1"),
+        ("http://192.168.1.7/video", "", "nobody knows where"),
+        ("http://169.254.169.254/latest/meta-data", "10.0.0.1", "packets come from"),
+        ("http://0.0.0.0:8100/video", "127.0.0.1", "packets come from"),
+        ("http://127.0.0.1:7777/admin?delete=all", "127.0.0.1", "more than a plain path"),
+        ("http://127.0.0.1:7777/admin", "127.0.0.1", "on this machine only /video at ports 8100 to 8109"),
+        ("http://127.0.0.1:7777/video", "127.0.0.1", "on this machine only"),
+        ("http://127.0.0.1:8100/video/", "127.0.0.1", "on this machine only"),
+        ("http://[::ffff:127.0.0.1]:7777/video", "127.0.0.1", "on this machine only"),
+        ("http://127.0.0.2:7777/video", "127.0.0.2", "on this machine only"),
+        ("http://127.0.0.1/video", "127.0.0.1", "on this machine only"),
+        ("http://10.0.0.1/video?a=b", "10.0.0.1", "more than a plain path"),
+        ("http://10.0.0.1/../video", "10.0.0.1", "more than a plain path"),
+        ("http://10.0.0.1/a%0d%0ab", "10.0.0.1", "more than a plain path"),
+        ("http://10.0.0.1:22/video", "10.0.0.1", "port 22 is of another service"),
+        ("http://example.com/video", "10.0.0.1", "given in numbers"),
+        ("http://localhost:8100/video", "127.0.0.1", "given in numbers"),
+        ("http://2130706433:8100/video", "127.0.0.1", "given in numbers"),
+        ("http://user:secret@127.0.0.1:8100/video", "127.0.0.1", "user name"),
+        ("http://127.0.0.1:99999/video", "127.0.0.1", "no address"),
+        ("http://127.0.0.1:0/video", "127.0.0.1", "port 0"),
+        ("file:///etc/passwd", "127.0.0.1", "only http"),
+        ("http://[::1/video", "::1", "no address"),
+        ("http:///video", "127.0.0.1", "names no host"),
     ],
 )
-def test_all_else_is_refused_in_words(url):
-    assert refusal(url)
+def test_all_else_is_refused_in_words(url, host, words):
+    assert words in refusal(url, host)
 
 
 def test_the_host_that_the_link_goes_to_may_be_asked():
     assert host_of("tcpout://drone.example:5760") == "drone.example"
     assert host_of("udpin://0.0.0.0:14550") == ""
     assert host_of("serial:///dev/ttyUSB0:57600") == ""
-    assert refusal("http://drone.example:8100/video", "drone.example") == ""
-    assert refusal("ftp://drone.example/video", "drone.example")
+    assert refusal("http://drone.example:8100/video", "10.0.0.1", "drone.example") == ""
+    assert refusal("ftp://drone.example/video", "10.0.0.1", "drone.example")
+    assert refusal("http://localhost:7777/video", "127.0.0.1", "localhost")
+
+
+@pytest.mark.parametrize("confirmed", ["192.168.1.7", "192.168.1.7:81"])
+def test_what_the_operator_confirmed_may_be_asked(confirmed):
+    assert refusal("http://192.168.1.7:81/stream?size=1", "127.0.0.1", "", (confirmed,)) == ""
+    assert refusal("http://192.168.1.8:81/stream", "127.0.0.1", "", (confirmed,))
+    assert refusal("ftp://192.168.1.7:81/stream", "127.0.0.1", "", (confirmed,))
 
 
 def told(uri, number=1):
@@ -65,9 +91,9 @@ def test_a_camera_is_asked_until_it_answers_and_its_first_http_stream_counts():
     assert (asked.command, asked.param1) == (512, 269)
     assert watch.question(1.0) is None
     assert watch.question(2.5) is not None
-    watch.take(told(b"5600"))
-    watch.take(told(b"http://127.0.0.1:8100/video", 2))
-    watch.take(told(b"http://127.0.0.1:9/other", 3))
+    watch.take(told(b"5600"), "127.0.0.1")
+    watch.take(told(b"http://127.0.0.1:8100/video", 2), "127.0.0.1")
+    watch.take(told(b"http://127.0.0.1:8101/video", 3), "127.0.0.1")
     assert watch.url == "http://127.0.0.1:8100/video"
     assert watch.question(99.0) is None
 
@@ -80,6 +106,7 @@ def test_a_camera_that_never_answers_is_left_alone():
 
 def test_a_refused_address_is_told():
     watch = CameraWatch(1)
-    watch.take(told(b"http://8.8.8.8/video"))
+    watch.take(told(b"http://8.8.8.8/video"), "127.0.0.1")
     assert watch.url is None
     assert "http://8.8.8.8/video is not asked for" in watch.problem
+    assert "--camera-host" in watch.problem

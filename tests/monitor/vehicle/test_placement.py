@@ -74,3 +74,14 @@ def test_between_two_reports_it_goes_straight():
     assert motion.at(1_150_000).position_ned_m == pytest.approx((1.0, 0.0, 0.0))
     assert motion.at(1_300_000) is None
     assert motion.at(500_000) is None
+
+
+def test_late_and_doubled_reports_change_nothing():
+    motion = Motion()
+    for time_ms, x in ((1000, 0.0), (1100, 1.0), (1050, 0.5), (1100, 1.0), (1120, 1.2), (900, -1.0)):
+        motion.take_position(mavlink.MAVLink_local_position_ned_message(time_ms, x, 0, 0, 0, 0, 0), 0.0)
+        motion.take_angles(mavlink.MAVLink_attitude_message(time_ms, 0, 0, x / 10, 0, 0, 0), 0.0)
+    assert (motion.time_us, motion.restarts) == (1_120_000, 0)
+    assert motion.position.position_ned_m[0] == 1.2
+    assert motion.yaw_ned_rad == pytest.approx(0.12)
+    assert motion.at(1_025_000).position_ned_m == pytest.approx((0.25, 0.0, 0.0))
