@@ -6,6 +6,7 @@ import re
 import shlex
 import statistics
 import tomllib
+from collections import defaultdict
 from pathlib import Path
 
 import pytest
@@ -19,6 +20,8 @@ ROOMS = ("scenarios", "firmware_py", "sitl", "vision", "mission_link", "offboard
 MODULES = sorted(path for room in ROOMS for path in (ROOT / room).rglob("*.py"))
 DOCUMENTS = sorted([*ROOT.glob("*.md"), *(ROOT / "docs").rglob("*.md")])
 LOCKS = sorted((ROOT / "locks").glob("*.txt"))
+INSTALLED_LOCKS = [path for path in LOCKS if path.name != "mavproxy-without.txt"]
+HASHED = re.compile(r"\S+==[^\n]* \\\n( {4}--hash=sha256:[0-9a-f]{64}( \\)?\n)+( {4}#.*\n?)*\Z")
 
 
 def name_of(path):
@@ -142,20 +145,49 @@ def test_nothing_is_decided_by_the_name_of_a_scenario():
 def test_locked_versions_name_no_place_to_get_them_from(path):
     text = path.read_text(encoding="utf-8")
     assert "://" not in text
-    assert not re.search(r"^\s*--", text, re.MULTILINE)
+    assert not re.search(r"^\s*--(?!hash=)", text, re.MULTILINE)
 
 
-def test_everything_that_is_needed_is_locked():
-    text = (ROOT / "locks" / "framerunner.txt").read_text(encoding="utf-8")
-    locked = {
-        name.replace("_", "-").lower() for name in re.findall(r"^([A-Za-z0-9._-]+)==", text, re.MULTILINE)
-    }
+@pytest.mark.parametrize("path", INSTALLED_LOCKS, ids=name_of)
+def test_everything_that_is_locked_has_hashes(path):
+    entries = re.split(r"^(?=[A-Za-z0-9])", path.read_text(encoding="utf-8"), flags=re.MULTILINE)[1:]
+    assert entries
+    assert [entry.split()[0] for entry in entries if not HASHED.match(entry)] == []
+
+
+def locked(name):
+    """Versions by package; more than one where they depend on Python's version."""
+    text = (ROOT / "locks" / f"{name}.txt").read_text(encoding="utf-8")
+    found = defaultdict(set)
+    for package, version in re.findall(r"^([A-Za-z0-9._-]+)==(.*?) \\$", text, re.MULTILINE):
+        found[package].add(version)
+    return found
+
+
+def needed(*extras):
+    """What pyproject.toml asks for, as the files in locks/ name it."""
     project = PROJECT["project"]
-    needed = {
-        re.match(r"[A-Za-z0-9._-]+", line).group().replace("_", "-").lower()
-        for line in [*project["dependencies"], *project["optional-dependencies"]["dev"]]
-    }
-    assert needed <= locked
+    lines = [
+        *project["dependencies"],
+        *(each for e in extras for each in project["optional-dependencies"][e]),
+    ]
+    names = {re.match(r"[A-Za-z0-9._-]+", line).group().replace("_", "-").lower() for line in lines}
+    return names - {"framerunner"}
+
+
+@pytest.mark.parametrize(
+    ("name", "extras"),
+    [
+        ("small", []),
+        ("framerunner", ["monitor", "plots", "video"]),
+        ("extras", ["monitor", "plots", "video", "dask", "gym", "postgresql"]),
+        ("dev", ["monitor", "plots", "video", "dask", "gym", "dev"]),
+    ],
+)
+def test_everything_that_is_needed_is_locked_and_no_lock_contradicts_another(name, extras):
+    own, dev = locked(name), locked("dev")
+    assert needed(*extras) | {"setuptools"} <= set(own)
+    assert {package for package in own if package in dev and own[package] != dev[package]} == set()
 
 
 def test_nothing_is_left_half_done():

@@ -344,10 +344,14 @@ async def test_information_health_and_metadata(drone):
         report = await anext(drone.events.subscribe_health_and_arming_checks())
         assert report.current_mode_intention.can_arm_or_run
         await drone.component_metadata.request_autopilot_component()
-        async for update in drone.component_metadata.subscribe_metadata_available():
-            if update.type == MetadataType.PARAMETER:
-                assert "MPC_XY_VEL_MAX" in update.json_metadata
+        # To the end: MAVSDK 4.1 crashes when it is destroyed while it still has metadata to tell.
+        texts, updates = {}, drone.component_metadata.subscribe_metadata_available()
+        async for update in updates:
+            texts[update.type] = update.json_metadata
+            if update.type == MetadataType.ALL_COMPLETED:
                 break
+        await updates.aclose()
+        assert "MPC_XY_VEL_MAX" in texts[MetadataType.PARAMETER]
 
 
 async def test_calibration_failures_shell_and_messages_of_ones_own(drone):
