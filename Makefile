@@ -7,7 +7,11 @@ MAVPROXY_VENV := .venv-mavproxy
 BENCH_VENV := .venv-bench
 BIN := $(VENV)/bin
 ROOMS := scenarios firmware_py sitl vision mission_link offboard monitor framerunner
-LOCK := uv pip compile --universal --python-version 3.11 --quiet --custom-compile-command 'make lock'
+LOCK := uv pip compile --universal --python-version 3.11 --generate-hashes --quiet --custom-compile-command 'make lock'
+LOCK_PROJECT := $(LOCK) pyproject.toml locks/build.in
+# Everything but this project has a hash and is refused if it differs; the folder itself can have none.
+INSTALL_LOCKED := $(BIN)/pip install --require-hashes --requirement
+INSTALL_PROJECT := $(BIN)/pip install --no-deps --no-build-isolation --editable .
 
 .DEFAULT_GOAL := help
 .DELETE_ON_ERROR:
@@ -62,6 +66,10 @@ bench: $(VENV)/installed ## time our flight, alone and beside MuJoCo and PyFlyt;
 parameters: $(VENV)/installed-dev ## write docs/parameters.md anew from the declarations
 	$(BIN)/python -m firmware_py.parameters.reference > docs/parameters.md
 
+.PHONY: reference-flights
+reference-flights: $(VENV)/installed-dev ## store again the flights that tests compare with
+	$(BIN)/python -m tests.framerunner.reference_flights
+
 .PHONY: format
 format: $(VENV)/installed-dev ## write the code as the checks want it
 	$(BIN)/ruff format .
@@ -73,7 +81,10 @@ hooks: $(VENV)/installed-dev ## check every commit before it is made
 
 .PHONY: lock
 lock: ## choose newer versions of everything installed (needs uv)
-	$(LOCK) --upgrade pyproject.toml --extra dev -o locks/framerunner.txt
+	$(LOCK_PROJECT) --upgrade --extra dev -o locks/dev.txt
+	$(LOCK_PROJECT) --constraint locks/dev.txt -o locks/small.txt
+	$(LOCK_PROJECT) --constraint locks/dev.txt --extra all -o locks/framerunner.txt
+	$(LOCK_PROJECT) --constraint locks/dev.txt --extra all --extra dask --extra gym --extra postgresql -o locks/extras.txt
 	$(LOCK) --upgrade locks/mavproxy.in --override locks/mavproxy-without.txt -o locks/mavproxy.txt
 
 .PHONY: clean
@@ -93,14 +104,16 @@ $(BIN)/python:
 		exit 1; }
 
 $(VENV)/installed: $(BIN)/python pyproject.toml locks/framerunner.txt
-	$(BIN)/pip install --constraint locks/framerunner.txt --editable .
+	$(INSTALL_LOCKED) locks/framerunner.txt
+	$(INSTALL_PROJECT)
 	@touch $@
 
-$(VENV)/installed-dev: $(BIN)/python pyproject.toml locks/framerunner.txt
-	$(BIN)/pip install --constraint locks/framerunner.txt --editable '.[dev]'
+$(VENV)/installed-dev: $(BIN)/python pyproject.toml locks/dev.txt
+	$(INSTALL_LOCKED) locks/dev.txt
+	$(INSTALL_PROJECT)
 	@touch $@ $(VENV)/installed
 
 $(MAVPROXY_VENV)/installed: $(BIN)/python locks/mavproxy.txt
 	$(BIN)/python -m venv $(MAVPROXY_VENV)
-	$(MAVPROXY_VENV)/bin/pip install --no-deps --requirement locks/mavproxy.txt
+	$(MAVPROXY_VENV)/bin/pip install --no-deps --require-hashes --requirement locks/mavproxy.txt
 	@touch $@
