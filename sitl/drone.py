@@ -201,13 +201,17 @@ class ServedDrone:
             "source": "truth",
             "lift_m": 0.0,
             "time_us": simulation.time_us,
-            "local_frame": {
-                "origin_arena_m": flip_vector(simulation.autopilot.estimator.origin_ned_m or (0.0, 0.0, 0.0)),
-                "yaw_rad": 0.0,
-            },
+            "local_frame": self._local_frame(),
             "snapshot": asdict(referee.snapshot()),
             "report": referee.report(query.get("state", ""), query.get("ended")).as_dict(),
         }
+
+    def _local_frame(self) -> dict[str, object] | None:
+        """Where in the arena the vehicle's local frame is; None before the estimator has fixed its origin."""
+        origin_ned_m = self.simulation.autopilot.estimator.origin_ned_m
+        if origin_ned_m is None:
+            return None
+        return {"origin_arena_m": flip_vector(origin_ned_m), "yaw_rad": 0.0}
 
 
 def _camera_model(simulation: Simulation) -> CameraModel:

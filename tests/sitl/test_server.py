@@ -91,13 +91,23 @@ async def test_who_looks_on_learns_the_scenario_and_where_the_local_frame_is():
     simulation = Simulation(scenario)
     async with serving(simulation) as (_, settings):
         assert Scenario.model_validate(await document(settings, "scenario.json")) == scenario
-        answer = await referee(settings)
+        for _ in range(500):
+            if (answer := await referee(settings))["local_frame"] is not None:
+                break
+            await asyncio.sleep(0.01)
     north_m, east_m, down_m = simulation.autopilot.state.position_ned_m
     x_m, y_m, z_m = answer["local_frame"]["origin_arena_m"]
     assert (answer["source"], answer["lift_m"], answer["local_frame"]["yaw_rad"]) == ("truth", 0.0, 0.0)
     assert (x_m + north_m, y_m - east_m, z_m - down_m) == pytest.approx(
         simulation.truth.position_arena_m, abs=1e-6
     )
+
+
+async def test_before_its_origin_is_fixed_the_local_frame_is_nowhere():
+    simulation = Simulation(load_scenario("test-case-1"))
+    simulation.tick = lambda: None  # the estimator never takes a measurement
+    async with serving(simulation) as (_, settings):
+        assert (await referee(settings))["local_frame"] is None
 
 
 async def test_telemetry_goes_out_on_both_links_before_anybody_spoke():
