@@ -14,7 +14,7 @@ from framerunner.evaluation.backends import Pool, check_pool
 from framerunner.evaluation.compare import check_comparable, compare
 from framerunner.evaluation.plan import Plan
 from framerunner.evaluation.progress import EvaluationProgress
-from framerunner.evaluation.rows import ERROR
+from framerunner.evaluation.rows import ERROR, Row
 from framerunner.evaluation.runner import fly_all
 from framerunner.evaluation.statistics import summarise
 from framerunner.evaluation.store import EvaluationFolder, open_folder, read_folder
@@ -86,6 +86,7 @@ def _fly_missing(settings: EvaluationSettings, folder: EvaluationFolder) -> None
     if kept == len(plan):
         return
     scenarios = {scenario.name: scenario for scenario in plan.scenarios}
+    not_kept: tuple[Row, SettingError] | None = None
     with (
         EvaluationProgress(len(plan), list(folder.rows().values())) as progress,
         closing(fly_all(plan.tasks(frozenset(folder.done)), settings.pool)) as rows,
@@ -96,14 +97,20 @@ def _fly_missing(settings: EvaluationSettings, folder: EvaluationFolder) -> None
                     f"--address {settings.pool.address}: a worker has framerunner {row.version}, not "
                     f"{folder.identity.version}; install the same version there"
                 )
-            folder.keep(scenarios[row.scenario], row)
+            try:
+                folder.keep(scenarios[row.scenario], row)
+            except SettingError as why:
+                not_kept = row, why
+                break
             progress.add(row)
+    if not_kept is not None:
+        _print_flown(settings, folder, not_kept[0])
+        raise not_kept[1]
 
 
 def _report(settings: EvaluationSettings, folder: EvaluationFolder, before: EvaluationFolder | None) -> int:
     """Write and print everything; return the exit code."""
     rows = list(folder.rows().values())
-    folder.write(folder.results, csv_text(rows))
     summary = summarise(rows)
     comparison = None if before is None else compare(before, folder)
     title = f"{settings.plan.title}: {folder.identity.mission}"
@@ -111,6 +118,7 @@ def _report(settings: EvaluationSettings, folder: EvaluationFolder, before: Eval
     if comparison is not None:
         print_comparison(comparison)
     sys.stdout.flush()
+    folder.write(folder.results, csv_text(rows))
     code = 1 if ERROR in summary.verdicts else 0
 
     if not is_installed("matplotlib"):
@@ -131,6 +139,16 @@ def _report(settings: EvaluationSettings, folder: EvaluationFolder, before: Eval
         )
     print(f"left in {folder.path}/: report.html, results.csv", flush=True)
     return code
+
+
+def _print_flown(settings: EvaluationSettings, folder: EvaluationFolder, last: Row) -> None:
+    """Print what was flown until the folder took no more, with the flight that it did not take."""
+    rows = [row for row in folder.rows().values() if row.scenario != last.scenario]
+    flown = f"{len(rows) + 1} of {len(settings.plan)} flights"
+    print_summary(
+        summarise([*rows, last]), f"{settings.plan.title}: {folder.identity.mission}, the first {flown}"
+    )
+    sys.stdout.flush()
 
 
 def _say_interrupted(settings: EvaluationSettings, folder: EvaluationFolder) -> None:

@@ -1,5 +1,6 @@
 """A disk that fills up during a flight: each file that does not fit is one line, the verdict stays."""
 
+import re
 import subprocess
 import sys
 
@@ -52,13 +53,15 @@ def test_a_flight_does_not_begin_where_not_even_its_plan_fits(tmp_path):
     )
 
 
-def test_an_evaluation_on_a_full_disk_keeps_what_it_flew_and_ends_in_one_line(tmp_path):
+def test_an_evaluation_on_a_full_disk_counts_what_it_flew_and_ends_in_one_line(tmp_path):
     for number in range(4):
         text = SHORT.replace("short", f"short-{number}")
         (tmp_path / f"short-{number}.yaml").write_text(text, encoding="utf-8")
     names = [f"short-{number}.yaml" for number in range(4)]
     done = run(tmp_path, "16k", "evaluate", *names, "--jobs", "1", "--out", "disk/evaluation")
     assert done.returncode == 2
+    flown = int(re.search(r"the first (\d) of 4", done.stdout)[1])
+    assert re.search(rf"^timed out +{flown} ", done.stdout, re.MULTILINE), done.stdout
     assert done.stderr.splitlines()[-1] == (
         "error: --out disk/evaluation: cannot be written to (No space left on device); "
         "mend it or choose another; what was kept stays"
