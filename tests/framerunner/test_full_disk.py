@@ -61,7 +61,7 @@ def test_an_evaluation_on_a_full_disk_counts_what_it_flew_and_ends_in_one_line(t
     done = run(tmp_path, "16k", "evaluate", *names, "--jobs", "1", "--out", "disk/evaluation")
     assert done.returncode == 2
     flown = int(re.search(r"the first (\d) of 4", done.stdout)[1])
-    assert re.search(rf"^timed out +{flown} ", done.stdout, re.MULTILINE), done.stdout
+    assert re.search(rf"^ timed out +{flown} ", done.stdout, re.MULTILINE), done.stdout
     assert done.stderr.splitlines()[-1] == (
         "error: --out disk/evaluation: cannot be written to (No space left on device); "
         "mend it or choose another; what was kept stays"
