@@ -28,14 +28,14 @@ from typing import ClassVar
 from rich.console import Console
 from rich.table import Table
 
-from firmware_py.mavlink.dialect import mavlink
-from firmware_py.mavlink.traffic import Traffic
 from scenarios.loader import load_scenario
 from sitl import server
 from sitl.link_urls import parse_link
 from sitl.pacer import Pacer
 from sitl.server_settings import ServerSettings
 from sitl.simulation import Simulation
+from wire.dialect import mavlink
+from wire.traffic import Traffic
 
 LINKS = ("udp", "udp, 60 kB", "tcp", "serial")
 TCP_PORT = 5790

@@ -15,7 +15,7 @@ import yaml
 from pydantic import BaseModel, ConfigDict, Field, StringConstraints, ValidationError, model_validator
 
 from firmware_py.control.weights import Weights
-from firmware_py.types import Vec3
+from geometry.vectors import Vec3
 
 GRAVITY_M_S2 = 9.80665
 

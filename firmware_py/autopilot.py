@@ -36,9 +36,9 @@ from firmware_py.types import (
     Sensors,
     Setpoint,
     StatusText,
-    Vec3,
 )
 from firmware_py.watch import Watch
+from geometry.vectors import Vec3
 
 _TEXTS_KEPT = 100
 _READY_PERIOD_US = 100_000  # once armed, whether it could be armed again is of little interest

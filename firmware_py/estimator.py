@@ -5,7 +5,8 @@ from __future__ import annotations
 from dataclasses import replace
 from math import asin, atan2, copysign, isfinite, isnan, pi
 
-from firmware_py.types import Quaternion, Sensors, Vec3, VehicleState
+from firmware_py.types import Sensors, VehicleState
+from geometry.vectors import Quaternion, Vec3
 
 _LONGEST_S = 0.1  # between samples that can be counted on
 _NORM_TOLERANCE = 0.05  # of the attitude quaternion's squared length; more than rounding, so it is a fault

@@ -9,7 +9,8 @@ from __future__ import annotations
 
 from math import asin, atan2, cos, degrees, hypot, radians, remainder, sin
 
-from firmware_py.types import GeodeticPoint, Vec3
+from firmware_py.types import GeodeticPoint
+from geometry.vectors import Vec3
 
 EARTH_RADIUS_M = 6_371_000.0
 

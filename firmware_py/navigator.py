@@ -12,7 +12,8 @@ from firmware_py.missions.store import MissionStore
 from firmware_py.parameters import Parameters
 from firmware_py.places import Places
 from firmware_py.status import VehicleStatus
-from firmware_py.types import StatusText, Vec3, VehicleState
+from firmware_py.types import StatusText, VehicleState
+from geometry.vectors import Vec3
 
 _ISSUED_KEPT = 100
 _ENDS = {LegKind.RETURN: Event.MISSION_RETURNS, LegKind.DONE: Event.MISSION_DONE}

@@ -6,7 +6,8 @@ from math import isfinite
 
 from firmware_py.geodesy import LocalProjection
 from firmware_py.status import VehicleStatus
-from firmware_py.types import GeodeticPoint, Vec3, VehicleState
+from firmware_py.types import GeodeticPoint, VehicleState
+from geometry.vectors import Vec3
 
 _LATITUDE_DEG, _LONGITUDE_DEG, _ALTITUDE_M = 90.0, 180.0, 100_000.0
 

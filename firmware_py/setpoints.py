@@ -17,7 +17,8 @@ from enum import IntEnum, IntFlag
 from math import cos, isfinite, nan, sin
 
 from firmware_py.airframe import Airframe
-from firmware_py.types import NAN3, Quaternion, Setpoint, Vec3, VehicleState
+from firmware_py.types import Setpoint, VehicleState
+from geometry.vectors import NAN3, Quaternion, Vec3
 
 ZERO3: Vec3 = (0.0, 0.0, 0.0)
 _LOCAL = "SET_POSITION_TARGET_LOCAL_NED"

@@ -5,7 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from enum import Enum, IntEnum
 
-from firmware_py.types import GeodeticPoint, Setpoint, Vec3
+from firmware_py.types import GeodeticPoint, Setpoint
+from geometry.vectors import Vec3
 
 
 class FlightMode(Enum):

@@ -5,11 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 from math import nan
 
-Vec3 = tuple[float, float, float]
-Quaternion = tuple[float, float, float, float]
-MotorSpeeds = tuple[float, ...]
+from geometry.vectors import NAN3, Quaternion, Vec3
 
-NAN3: Vec3 = (nan, nan, nan)
+MotorSpeeds = tuple[float, ...]
 
 
 @dataclass(slots=True)

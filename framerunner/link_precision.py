@@ -9,7 +9,7 @@ from __future__ import annotations
 from math import degrees, pi, radians
 from struct import Struct
 
-from scenarios.axes import Vec3
+from geometry.vectors import Vec3
 
 _ONE = Struct("<f")
 _THREE = Struct("<3f")

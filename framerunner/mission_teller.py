@@ -7,19 +7,19 @@ from collections import deque
 from collections.abc import Mapping
 from typing import Any
 
-from mission_link.codec import PayloadError, split_document
-from mission_link.messages import (
+from offboard.app import Moment
+from offboard.engine import TransitionTaken
+from offboard.link.companion import Companion
+from offboard.mission import Mission, mermaid
+from vision.types import CameraFrame, Detection, Detections
+from wire.mission_codec import PayloadError, split_document
+from wire.mission_messages import (
     TEXT_PREFIX,
     Box,
     DocumentKind,
     MissionDetections,
     MissionState,
 )
-from offboard.app import Moment
-from offboard.engine import TransitionTaken
-from offboard.link.companion import Companion
-from offboard.mission import Mission, mermaid
-from vision.types import CameraFrame, Detection, Detections
 
 STATE_TICKS = 2  # 10 Hz of vehicle time
 HISTORY = 10

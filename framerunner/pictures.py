@@ -12,7 +12,7 @@ from math import isfinite
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from scenarios.axes import Vec3
+from geometry.vectors import Vec3
 from scenarios.models import Scenario
 
 if TYPE_CHECKING:

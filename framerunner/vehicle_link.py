@@ -14,10 +14,10 @@ import tty
 from collections.abc import Callable
 from typing import Any, Protocol
 
-from firmware_py.mavlink.dialect import mavlink
-from firmware_py.mavlink.framing import PacketReader
 from offboard.drone import DroneError
 from offboard.link.url import VehicleUrl, check_free, parse_url
+from wire.dialect import mavlink
+from wire.framing import PacketReader
 
 Message = Any  # pymavlink's classes are made by a generator and carry no types
 

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
+from geometry.vectors import Quaternion, Vec3
 from monitor.ports import Referee
 from monitor.standing import Standing
-from scenarios.axes import Quaternion, Vec3
 from scenarios.models import Scenario
 from scenarios.truth import TrueState
 

@@ -9,8 +9,8 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 from math import cos, hypot, sin
 
+from geometry.vectors import Vec3
 from offboard.drone import DroneState, VelocityCommand
-from scenarios.axes import Vec3
 from scenarios.models import Scenario
 
 FLOOR_M = 0.15

@@ -12,8 +12,8 @@ from dataclasses import dataclass
 from math import cos, isfinite, isnan, sin, sqrt
 from types import SimpleNamespace
 
+from geometry.vectors import Vec3
 from offboard.drone import VelocityCommand
-from scenarios.axes import Vec3
 from scenarios.models import COLOURS, Colour
 from vision.types import Detection, Detections
 

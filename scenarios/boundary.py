@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from scenarios.axes import Vec3
+from geometry.vectors import Vec3
 from scenarios.models import Arena
 
 

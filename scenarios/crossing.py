@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from math import cos, hypot, sin
 from typing import Literal
 
-from scenarios.axes import Vec3
+from geometry.vectors import Vec3
 from scenarios.models import Frame
 
 Side = Literal["front", "back"]

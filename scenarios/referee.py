@@ -5,7 +5,7 @@ from __future__ import annotations
 from enum import Enum
 from math import dist, isfinite
 
-from scenarios.axes import Vec3
+from geometry.vectors import Vec3
 from scenarios.boundary import Boundary
 from scenarios.crossing import Gate, Passage
 from scenarios.ground import ground_height

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from math import hypot
 from typing import Literal
 
-from scenarios.axes import Quaternion, Vec3
+from geometry.vectors import Quaternion, Vec3
 from scenarios.ground import ground_height, is_over_base
 from scenarios.models import Scenario
 from scenarios.truth import TrueState

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from scenarios.axes import Quaternion, Vec3
+from geometry.vectors import Quaternion, Vec3
 
 
 @dataclass(slots=True)

@@ -18,7 +18,7 @@ import cv2
 import numpy as np
 import numpy.typing as npt
 
-from scenarios.axes import Quaternion, Vec3
+from geometry.vectors import Quaternion, Vec3
 from scenarios.models import Scenario
 from sitl.camera_clip import clip_half_plane
 from sitl.camera_drones import DRONE_BGR, outlines

@@ -14,7 +14,7 @@ import cv2
 import numpy as np
 import numpy.typing as npt
 
-from scenarios.axes import Vec3
+from geometry.vectors import Vec3
 from sitl.camera_mesh import SUBPIXELS, Matrix, Pinhole
 from sitl.solids import Solid
 

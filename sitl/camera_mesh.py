@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from scenarios.axes import Vec3
+from geometry.vectors import Vec3
 from sitl.camera_clip import clip_near, clip_window
 from sitl.camera_scene import Bgr, Face
 

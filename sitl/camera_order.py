@@ -16,7 +16,7 @@ from math import cos, sin
 import numpy as np
 import numpy.typing as npt
 
-from scenarios.axes import Vec3
+from geometry.vectors import Vec3
 from sitl.camera_scene import Body, Face
 
 _FLAT_M = 1e-7  # corners nearer to a plane than this lie on it

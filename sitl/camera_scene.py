@@ -14,7 +14,7 @@ import cv2
 import numpy as np
 import numpy.typing as npt
 
-from scenarios.axes import Vec3
+from geometry.vectors import Vec3
 from scenarios.models import Arena, Base, Frame, Light, Scenario
 
 Bgr = tuple[int, int, int]

@@ -11,10 +11,9 @@ from math import degrees
 from typing import TYPE_CHECKING
 
 from firmware_py.mavlink.camera_model import CameraModel
-from firmware_py.mavlink.dialect import mavlink
 from firmware_py.mavlink.node import MavlinkNode
 from firmware_py.mavlink.video_links import VideoEncoding, VideoStream
-from scenarios.axes import flip_vector
+from geometry.axes import flip_vector
 from sitl.drone_files import flight_recorder, open_storage
 from sitl.link_hub import LinkHub
 from sitl.link_urls import is_loopback
@@ -25,6 +24,7 @@ from sitl.simulation import Simulation
 from sitl.solids import Solid
 from sitl.time_grants import TimeGrants, Velocity
 from sitl.world import CONTROL_PERIOD_US
+from wire.dialect import mavlink
 
 if TYPE_CHECKING:
     from sitl.camera_feed import CameraFeed

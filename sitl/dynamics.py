@@ -10,7 +10,7 @@ from pathlib import Path
 import jsbsim
 
 from firmware_py.airframe import Airframe
-from firmware_py.types import Quaternion, Vec3
+from geometry.vectors import Quaternion, Vec3
 from sitl.airframe_xml import (
     COMMAND_PROPERTY,
     SPEED_PROPERTY,

@@ -6,9 +6,9 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 from firmware_py.mavlink.links import GROUND, ONBOARD, LinkProfile
-from firmware_py.mavlink.signing import SigningKey
 from sitl.link_urls import LinkError, LinkUrl, host_and_port, is_loopback
 from sitl.links import Address, UdpAddresses
+from wire.signing import SigningKey
 
 _LAST_ONBOARD_PORT = 14549  # PX4 sends all instances beyond the tenth there
 _GROUND_PORT = 14550  # of every instance, so that one ground station sees them all

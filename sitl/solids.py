@@ -10,7 +10,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from math import cos, sin, sqrt
 
-from scenarios.axes import Vec3
+from geometry.vectors import Vec3
 from scenarios.models import Frame, Scenario
 
 Matrix = tuple[Vec3, Vec3, Vec3]

@@ -8,8 +8,9 @@ from __future__ import annotations
 from math import atan2, dist, hypot
 
 from firmware_py.airframe import Airframe
-from firmware_py.types import MotorSpeeds, Sensors, Vec3
-from scenarios.axes import Quaternion, flip_quaternion, flip_vector, flip_yaw
+from firmware_py.types import MotorSpeeds, Sensors
+from geometry.axes import flip_quaternion, flip_vector, flip_yaw
+from geometry.vectors import Quaternion, Vec3
 from scenarios.ground import is_over_base, start_position
 from scenarios.models import Scenario
 from scenarios.truth import TrueState

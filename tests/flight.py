@@ -8,7 +8,8 @@ from math import asin, atan2, cos, hypot, sin
 
 from firmware_py.airframe import Airframe, load_airframe
 from firmware_py.control.stabiliser import Stabiliser
-from firmware_py.types import Command, MotorOutput, Vec3, VehicleState
+from firmware_py.types import Command, MotorOutput, VehicleState
+from geometry.vectors import Vec3
 from sitl.dynamics import Dynamics
 
 PERIOD_S = 0.004

@@ -16,7 +16,17 @@ from scenarios.loader import list_scenarios
 
 ROOT = Path(__file__).parents[1]
 PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))
-ROOMS = ("scenarios", "firmware_py", "sitl", "vision", "mission_link", "offboard", "monitor", "framerunner")
+ROOMS = (
+    "wire",
+    "geometry",
+    "scenarios",
+    "firmware_py",
+    "sitl",
+    "vision",
+    "offboard",
+    "monitor",
+    "framerunner",
+)
 MODULES = sorted(path for room in ROOMS for path in (ROOT / room).rglob("*.py"))
 DOCUMENTS = sorted([*ROOT.glob("*.md"), *(ROOT / "docs").rglob("*.md")])
 LOCKS = sorted((ROOT / "locks").glob("*.txt"))

@@ -14,8 +14,8 @@ import aiohttp
 from vision.decoder import ImageDecoder
 from vision.jpeg import ImageError
 from vision.latest import CameraError, Latest, first_line, shown
-from vision.mjpeg import MjpegParser, Part, StreamError, boundary_of
 from vision.types import CameraFrame
+from wire.mjpeg import MjpegParser, Part, StreamError, boundary_of
 
 _FEED_BYTES = 16 * 1024  # of the stream, between which others run
 _MAX_PARTS_PER_S = 1000

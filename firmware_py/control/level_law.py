@@ -20,7 +20,8 @@ from firmware_py.control.design import design
 from firmware_py.control.limits import FlightLimits
 from firmware_py.control.mixer import Mixer
 from firmware_py.control.weights import Weights
-from firmware_py.types import MotorOutput, RateCommand, Vec3, VehicleState
+from firmware_py.types import MotorOutput, RateCommand, VehicleState
+from geometry.vectors import Vec3
 
 _NOTHING: Vec3 = (0.0, 0.0, 0.0)
 _LEAST_COSINE = 0.5  # thrust is raised for tilt up to 60 degrees

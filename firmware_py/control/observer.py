@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from firmware_py.types import Vec3
+from geometry.vectors import Vec3
 
 
 class DisturbanceObserver:

@@ -12,7 +12,6 @@ from math import cos, isnan, sin, sqrt
 
 from firmware_py.airframe import GRAVITY_M_S2, Airframe
 from firmware_py.control.design import design_bandwidths
-from firmware_py.control.geometry import Rotation, rotation, tilt_error, to_body, to_world
 from firmware_py.control.limits import FlightLimits
 from firmware_py.control.mixer import Mixer
 from firmware_py.control.observer import DisturbanceObserver
@@ -25,9 +24,10 @@ from firmware_py.types import (
     MotorOutput,
     RateCommand,
     TiltCommand,
-    Vec3,
     VehicleState,
 )
+from geometry.rotations import Rotation, rotation, tilt_error, to_body, to_world
+from geometry.vectors import Vec3
 
 _LEAST_COSINE = 0.5  # thrust is raised for tilt up to 60 degrees, and fades from there to none on its side
 _LEAST_LIFT = 0.2  # of the weight at most is kept for falling (MPC_THR_MIN), a thrust to steer with

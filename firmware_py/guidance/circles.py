@@ -8,7 +8,8 @@ from math import atan2, hypot, nan, pi
 
 from firmware_py.guidance.limits import clamp
 from firmware_py.guidance.reference import Pace
-from firmware_py.types import Vec3, VehicleState
+from firmware_py.types import VehicleState
+from geometry.vectors import Vec3
 
 _SMALLEST_M = 0.5  # nearer to the centre than this, it says nothing about where to look
 _FASTEST_TURN_M_S2 = 2.0  # PX4 limits the centripetal acceleration of an orbit so

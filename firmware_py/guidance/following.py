@@ -8,7 +8,8 @@ from math import atan2, cos, hypot, isnan, radians, remainder, sin, tau
 
 from firmware_py.guidance.limits import clamp
 from firmware_py.parameters import Parameters
-from firmware_py.types import Vec3, VehicleState
+from firmware_py.types import VehicleState
+from geometry.vectors import Vec3
 
 _COURSE_M_S = 1.0  # slower than this, the target's course is noise
 _SLOWEST_S = 5.0  # how long FLW_TGT_RS = 1 takes to believe a change of velocity

@@ -5,7 +5,8 @@ from __future__ import annotations
 from math import cos, isnan, nan, remainder, sin, tau
 
 from firmware_py.guidance.limits import SpeedLimits, clamp
-from firmware_py.types import RateCommand, Vec3, VehicleState
+from firmware_py.types import RateCommand, VehicleState
+from geometry.vectors import Vec3
 
 
 def level(state: VehicleState, vector_ned: Vec3) -> Vec3:

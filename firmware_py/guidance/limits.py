@@ -8,7 +8,7 @@ from math import hypot, inf, radians
 from firmware_py.airframe import Airframe
 from firmware_py.guidance.reference import Pace
 from firmware_py.parameters import Parameters
-from firmware_py.types import Vec3
+from geometry.vectors import Vec3
 
 
 @dataclass(slots=True)

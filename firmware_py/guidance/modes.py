@@ -24,7 +24,6 @@ from firmware_py.missions.flight import Leg, LegKind
 from firmware_py.parameters import Parameters
 from firmware_py.status import FlightMode
 from firmware_py.types import (
-    NAN3,
     AccelerationCommand,
     ActuatorCommand,
     Command,
@@ -32,9 +31,9 @@ from firmware_py.types import (
     RateCommand,
     Setpoint,
     TiltCommand,
-    Vec3,
     VehicleState,
 )
+from geometry.vectors import NAN3, Vec3
 
 __all__ = ["Guidance", "SpeedLimits", "bounded", "speed_limits", "usable"]
 

@@ -9,18 +9,16 @@ from firmware_py.estimator import euler_angles
 from firmware_py.guidance.frames import level, rate_command, towards, yaw_rate
 from firmware_py.guidance.limits import SpeedLimits, clamp
 from firmware_py.types import (
-    NAN3,
     AccelerationCommand,
     ActuatorCommand,
     BodyRateCommand,
     Command,
-    Quaternion,
     RateCommand,
     Setpoint,
     TiltCommand,
-    Vec3,
     VehicleState,
 )
+from geometry.vectors import NAN3, Quaternion, Vec3
 
 _LARGEST = 1e6  # metres or m/s asked for are cut to this, which keeps all arithmetic finite
 _LARGEST_ACCELERATION_M_S2 = 50.0

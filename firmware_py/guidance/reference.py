@@ -9,7 +9,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 from math import hypot, inf, sqrt
 
-from firmware_py.types import Vec3, VehicleState
+from firmware_py.types import VehicleState
+from geometry.vectors import Vec3
 
 _EAGERNESS = 5.0  # 1/s, acceleration per difference of velocity when that is small
 _STANDING_M_S = 0.02  # slower than this, the vehicle stands

@@ -9,7 +9,8 @@ from math import hypot, nan, radians, tan
 from firmware_py.guidance.limits import SpeedLimits
 from firmware_py.guidance.travel import Traveller
 from firmware_py.parameters import Parameters
-from firmware_py.types import Vec3, VehicleState
+from firmware_py.types import VehicleState
+from geometry.vectors import Vec3
 
 _STEEPEST_DEG = 89.0
 

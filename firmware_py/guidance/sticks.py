@@ -10,15 +10,8 @@ from firmware_py.guidance.frames import level
 from firmware_py.guidance.limits import SpeedLimits
 from firmware_py.guidance.reference import Pace, Reference
 from firmware_py.parameters import Parameters
-from firmware_py.types import (
-    BodyRateCommand,
-    ManualInput,
-    RateCommand,
-    Setpoint,
-    TiltCommand,
-    Vec3,
-    VehicleState,
-)
+from firmware_py.types import BodyRateCommand, ManualInput, RateCommand, Setpoint, TiltCommand, VehicleState
+from geometry.vectors import Vec3
 
 _FULL_THRUST = 1.0
 

@@ -8,7 +8,8 @@ from math import atan2, hypot, isnan, nan, pi, remainder, tau
 
 from firmware_py.guidance.limits import SpeedLimits, clamp
 from firmware_py.guidance.reference import Reference
-from firmware_py.types import NAN3, Vec3, VehicleState
+from firmware_py.types import VehicleState
+from geometry.vectors import NAN3, Vec3
 
 _FACING_M = 1.0  # nearer than this, the way to a place says nothing about where to look
 _FACING_M_S = 0.5  # slower than this, the way it moves says nothing either

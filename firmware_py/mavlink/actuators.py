@@ -5,10 +5,10 @@ The speeds are those that were asked for; nothing measures them.
 
 from __future__ import annotations
 
-from firmware_py.mavlink.dialect import Message, mavlink
 from firmware_py.mavlink.port import AutopilotPort
 from firmware_py.mavlink.scaling import whole
 from firmware_py.types import MotorSpeeds
+from wire.dialect import Message, mavlink
 
 _PWM_DISARMED_US, _PWM_LOW_US, _PWM_SPAN_US = 900, 1000, 1000
 _SERVOS = 16

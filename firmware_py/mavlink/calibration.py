@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from firmware_py.mavlink.command import Command
-from firmware_py.mavlink.dialect import mavlink
 from firmware_py.mavlink.exchange import Exchange
 from firmware_py.status import CommandResult
+from wire.dialect import mavlink
 
 _INFO = mavlink.MAV_SEVERITY_INFO
 _ACCELEROMETER, _LEVEL = 1.0, 2.0  # param 5

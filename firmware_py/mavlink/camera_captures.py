@@ -7,10 +7,10 @@ from math import dist, inf, isfinite
 
 from firmware_py.mavlink import camera_messages
 from firmware_py.mavlink.camera_model import CAMERA_COMPONENT_ID, CameraModel, CaptureSink
-from firmware_py.mavlink.dialect import Message
 from firmware_py.mavlink.exchange import Exchange
 from firmware_py.status import CommandResult
-from firmware_py.types import Vec3
+from geometry.vectors import Vec3
+from wire.dialect import Message
 
 _REMEMBERED = 1000  # pictures that can be told again
 _LONGEST_S = 86400.0

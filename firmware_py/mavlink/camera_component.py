@@ -18,10 +18,10 @@ from firmware_py.mavlink.camera_model import (
     CountingSink,
     SevenParams,
 )
-from firmware_py.mavlink.dialect import BROADCAST, Message, mavlink
 from firmware_py.mavlink.exchange import Exchange, Handler
 from firmware_py.mavlink.links import Link
 from firmware_py.status import CommandResult
+from wire.dialect import BROADCAST, Message, mavlink
 
 _HEARTBEAT_US = 1_000_000
 

@@ -5,12 +5,12 @@ from __future__ import annotations
 from math import nan
 
 from firmware_py.mavlink.camera_model import CameraModel, PictureSpace
-from firmware_py.mavlink.dialect import Message, mavlink
 from firmware_py.mavlink.exchange import Exchange
 from firmware_py.mavlink.scaling import boot_ms, degrees_e7, millimetres
 from firmware_py.mavlink.version import OWN_VERSION
 from firmware_py.mavlink.video_links import VideoEncoding, VideoStream
 from firmware_py.status import FlightMode
+from wire.dialect import Message, mavlink
 
 _FLAGS = mavlink.CAMERA_CAP_FLAGS_CAPTURE_IMAGE
 _RUNNING = mavlink.VIDEO_STREAM_STATUS_FLAGS_RUNNING

@@ -6,11 +6,11 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from math import isfinite, nan
 
-from firmware_py.mavlink.dialect import Message, mavlink
 from firmware_py.mavlink.exchange import Exchange
 from firmware_py.mavlink.links import Link
 from firmware_py.status import CommandResult
 from firmware_py.types import GeodeticPoint
+from wire.dialect import Message, mavlink
 
 _NOT_GIVEN = 0x7FFFFFFF  # of x and y in COMMAND_INT
 _RELATIVE_FRAMES = (mavlink.MAV_FRAME_GLOBAL_RELATIVE_ALT, mavlink.MAV_FRAME_GLOBAL_RELATIVE_ALT_INT)

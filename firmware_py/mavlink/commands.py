@@ -13,7 +13,6 @@ from math import nan
 
 from firmware_py.mavlink.calibration import calibrate
 from firmware_py.mavlink.command import Command, CommandHandler, from_int, from_long
-from firmware_py.mavlink.dialect import BROADCAST, Message, mavlink
 from firmware_py.mavlink.exchange import Exchange, Handler
 from firmware_py.mavlink.failure_injection import inject_failure
 from firmware_py.mavlink.flight_commands import FLIGHT_COMMANDS, set_mode
@@ -21,6 +20,7 @@ from firmware_py.mavlink.links import Link
 from firmware_py.mavlink.message_requests import request_message, set_interval
 from firmware_py.mavlink.parameter_storage import preflight_storage
 from firmware_py.status import CommandResult
+from wire.dialect import BROADCAST, Message, mavlink
 
 _TO_EVERYONE = (
     mavlink.MAV_CMD_REQUEST_PROTOCOL_VERSION,

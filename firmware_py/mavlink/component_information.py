@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from firmware_py.mavlink.component_metadata import GENERAL_FILE, extras, file_crc
-from firmware_py.mavlink.dialect import Message, mavlink
 from firmware_py.mavlink.port import AutopilotPort
 from firmware_py.mavlink.scaling import boot_ms
+from wire.dialect import Message, mavlink
 
 MESSAGE_IDS = (mavlink.MAVLINK_MSG_ID_COMPONENT_METADATA, mavlink.MAVLINK_MSG_ID_COMPONENT_INFORMATION)
 """What `component_message` can make."""

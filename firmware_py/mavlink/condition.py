@@ -8,11 +8,11 @@ from __future__ import annotations
 
 from math import ceil, isfinite
 
-from firmware_py.mavlink.dialect import Message, mavlink
 from firmware_py.mavlink.port import AutopilotPort
 from firmware_py.mavlink.scaling import boot_ms, degrees_e7, millimetres, whole
 from firmware_py.mavlink.standard_modes import standard_mode
 from firmware_py.status import LandedState
+from wire.dialect import Message, mavlink
 
 _POSITION = mavlink.MAV_SYS_STATUS_SENSOR_GPS | mavlink.MAV_SYS_STATUS_SENSOR_XY_POSITION_CONTROL
 _PRESENT = (

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from firmware_py.mavlink.dialect import mavlink
 from firmware_py.mavlink.event_catalogue import ARMING_SUMMARY, CHECKS, HEALTH_SUMMARY, OTHER_CHECK
 from firmware_py.mavlink.event_enums import ALL_MODES, MODE_GROUPS, Part
 from firmware_py.mavlink.event_model import PROTOCOL_LEVEL, EventKind, Occurrence
 from firmware_py.mavlink.port import AutopilotPort
 from firmware_py.status import FlightMode
+from wire.dialect import mavlink
 
 _UNARMABLE = sum(
     1 << MODE_GROUPS[mode]

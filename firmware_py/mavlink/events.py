@@ -9,7 +9,6 @@ from __future__ import annotations
 
 from collections import deque
 
-from firmware_py.mavlink.dialect import Message, mavlink
 from firmware_py.mavlink.event_catalogue import MODE_CHANGED, event_of
 from firmware_py.mavlink.event_enums import MODE_GROUPS
 from firmware_py.mavlink.event_health import HealthReport, assess
@@ -18,6 +17,7 @@ from firmware_py.mavlink.exchange import Exchange, Handler
 from firmware_py.mavlink.links import Link
 from firmware_py.mavlink.scaling import boot_ms
 from firmware_py.types import StatusText
+from wire.dialect import Message, mavlink
 
 _FIRST_SEQUENCE = 65525
 _KEPT = 20

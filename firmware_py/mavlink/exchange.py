@@ -5,13 +5,13 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 
 from firmware_py.mavlink.camera_model import CameraControl
-from firmware_py.mavlink.dialect import AUTOPILOT_COMPONENT_ID, BROADCAST, Message
 from firmware_py.mavlink.failure_sink import FailureSink
-from firmware_py.mavlink.framing import Packet
 from firmware_py.mavlink.links import Link
 from firmware_py.mavlink.port import AutopilotPort
-from firmware_py.mavlink.signing import Signing
 from firmware_py.mavlink.video_links import VideoStream
+from wire.dialect import AUTOPILOT_COMPONENT_ID, BROADCAST, Message
+from wire.framing import Packet
+from wire.signing import Signing
 
 
 class Exchange:

@@ -8,9 +8,9 @@ from __future__ import annotations
 
 from math import floor, isfinite
 
-from firmware_py.mavlink.dialect import mavlink
 from firmware_py.mavlink.exchange import Exchange
 from firmware_py.status import CommandResult
+from wire.dialect import mavlink
 
 _LARGEST = 0xFFFF
 

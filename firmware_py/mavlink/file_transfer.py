@@ -16,7 +16,6 @@ from dataclasses import dataclass
 from struct import pack
 from zlib import crc32
 
-from firmware_py.mavlink.dialect import Message, mavlink
 from firmware_py.mavlink.exchange import Exchange, Handler
 from firmware_py.mavlink.file_transfer_clients import Burst, Client, Clients, Session
 from firmware_py.mavlink.file_transfer_tree import FileTree
@@ -32,6 +31,7 @@ from firmware_py.mavlink.file_transfer_wire import (
 )
 from firmware_py.mavlink.links import Link
 from firmware_py.storage import Path, Storage, parse_path, refuse
+from wire.dialect import Message, mavlink
 
 _BURST_PACKETS = 8  # a link and update: some 480 kB/s at 250 updates a second
 _BURST_BYTES = 35_000  # PX4's figure

@@ -7,10 +7,11 @@ from math import copysign, floor, isfinite, isinf, isnan, nan
 from firmware_py.guidance.circles import Orbit, OrbitYaw
 from firmware_py.mavlink import mission_commands
 from firmware_py.mavlink.command import Command, CommandHandler
-from firmware_py.mavlink.dialect import mavlink
 from firmware_py.mavlink.exchange import Exchange
 from firmware_py.status import CommandResult, FlightMode
-from firmware_py.types import NAN3, GeodeticPoint, Vec3
+from firmware_py.types import GeodeticPoint
+from geometry.vectors import NAN3, Vec3
+from wire.dialect import mavlink
 
 FORCE_MAGIC = 21196.0  # param2 of COMPONENT_ARM_DISARM
 _STANDARD_MODES = {

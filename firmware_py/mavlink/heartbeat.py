@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from firmware_py.mavlink.dialect import Message, mavlink
 from firmware_py.mavlink.exchange import Exchange, Handler
 from firmware_py.mavlink.links import Link
 from firmware_py.mavlink.port import AutopilotPort
 from firmware_py.status import FlightMode, VehicleStatus
+from wire.dialect import Message, mavlink
 
 _CUSTOM = mavlink.MAV_MODE_FLAG_CUSTOM_MODE_ENABLED
 _ARMED = mavlink.MAV_MODE_FLAG_SAFETY_ARMED

@@ -11,11 +11,11 @@ from dataclasses import dataclass, field
 from math import inf, isfinite
 from types import MappingProxyType
 
-from firmware_py.mavlink.dialect import mavlink
-from firmware_py.mavlink.framing import Packet, PacketReader
-from firmware_py.mavlink.schedule import Schedule
-from firmware_py.mavlink.signing import Signing
-from firmware_py.mavlink.traffic import Traffic
+from wire.dialect import mavlink
+from wire.framing import Packet, PacketReader
+from wire.schedule import Schedule
+from wire.signing import Signing
+from wire.traffic import Traffic
 
 _ADAPT_US = 1_000_000
 _MAX_STRETCH = 20.0  # PX4 slows streams down to a twentieth at most

@@ -12,10 +12,10 @@ from collections import deque
 from contextlib import suppress
 from dataclasses import dataclass, field
 
-from firmware_py.mavlink.dialect import Message, mavlink
 from firmware_py.mavlink.exchange import Exchange, Handler
 from firmware_py.mavlink.links import Link
 from firmware_py.storage import Path, Storage
+from wire.dialect import Message, mavlink
 
 LOG_FOLDER: Path = ("log",)
 _CHUNK = 90

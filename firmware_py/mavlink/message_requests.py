@@ -8,12 +8,12 @@ from __future__ import annotations
 from math import isfinite
 
 from firmware_py.mavlink import component_information, version
-from firmware_py.mavlink.dialect import Message, mavlink
 from firmware_py.mavlink.exchange import Exchange
 from firmware_py.mavlink.links import Link
 from firmware_py.mavlink.standard_modes import available_modes
 from firmware_py.mavlink.streams import can_stream, stream_message
 from firmware_py.status import CommandResult
+from wire.dialect import Message, mavlink
 
 _LARGEST_ID = 0xFFFFFF
 _LONGEST_US = 0x7FFFFFFF

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from math import isfinite
 
-from firmware_py.mavlink.dialect import mavlink
 from firmware_py.mavlink.exchange import Exchange
 from firmware_py.status import CommandResult, FlightMode
+from wire.dialect import mavlink
 
 
 def start(exchange: Exchange, first: float) -> CommandResult:

@@ -6,7 +6,6 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from math import isfinite, isinf, isnan, nan
 
-from firmware_py.mavlink.dialect import Message, mavlink
 from firmware_py.mavlink.scaling import whole
 from firmware_py.missions.fence_shapes import FEWEST_VERTICES, vertex_count
 from firmware_py.missions.items import (
@@ -23,6 +22,7 @@ from firmware_py.missions.items import (
     MissionItem,
     PlanType,
 )
+from wire.dialect import Message, mavlink
 
 _NOT_GIVEN = 0x7FFF_FFFF  # x or y of MISSION_ITEM_INT
 _REGIONS = frozenset({Do.NAV_ROI, Do.SET_ROI})

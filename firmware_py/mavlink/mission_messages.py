@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from struct import Struct
 
-from firmware_py.mavlink.dialect import Message, mavlink
+from wire.dialect import Message, mavlink
 
 
 class MissionCount(mavlink.MAVLink_message):  # type: ignore[misc]  # pymavlink has no types

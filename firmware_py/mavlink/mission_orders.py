@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from math import isfinite
 
-from firmware_py.mavlink.dialect import mavlink
 from firmware_py.mavlink.exchange import Exchange
 from firmware_py.missions.flight import IssuedCommand
 from firmware_py.status import CommandResult
 from firmware_py.types import GeodeticPoint
+from wire.dialect import mavlink
 
 _TO_NOBODY = frozenset(  # every mission of MAVSDK has them, and there is no gimbal
     {

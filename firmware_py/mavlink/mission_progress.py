@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from firmware_py.geodesy import LocalProjection
-from firmware_py.mavlink.dialect import Message, mavlink
 from firmware_py.mavlink.exchange import Exchange
 from firmware_py.mavlink.mission_messages import MissionCurrent
 from firmware_py.mavlink.port import AutopilotPort
@@ -12,6 +11,7 @@ from firmware_py.missions.flight import View
 from firmware_py.missions.geofence import Geofence
 from firmware_py.status import FlightMode, LandedState
 from firmware_py.types import GeodeticPoint
+from wire.dialect import Message, mavlink
 
 _REPEATS, _REPEAT_US = 10, 1_000_000  # of MISSION_ITEM_REACHED, as PX4
 _NO_TOTAL = 0xFFFF

@@ -13,7 +13,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
-from firmware_py.mavlink.dialect import Message, mavlink
 from firmware_py.mavlink.exchange import Exchange, Handler
 from firmware_py.mavlink.links import Link
 from firmware_py.mavlink.mission_items import Refusal, item_message, read_item
@@ -23,6 +22,7 @@ from firmware_py.mavlink.mission_upload import GIVE_UP_US, RETRY_US, Outcome, Pa
 from firmware_py.missions.fence_shapes import fence_fault
 from firmware_py.missions.items import PlanType
 from firmware_py.missions.store import Plan
+from wire.dialect import Message, mavlink
 
 _MOST_ITEMS = {PlanType.MISSION: 10_000, PlanType.FENCE: 64, PlanType.RALLY: 32}  # PX4's SITL has the same
 _PLAN_TYPES = {int(plan_type): plan_type for plan_type in PlanType}

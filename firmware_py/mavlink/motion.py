@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from math import degrees, hypot, nan
 
-from firmware_py.mavlink.dialect import Message, mavlink
 from firmware_py.mavlink.port import AutopilotPort
 from firmware_py.mavlink.scaling import boot_ms, degrees_e7, millimetres, whole
+from wire.dialect import Message, mavlink
 
 _COVARIANCE_UNKNOWN = [nan] + [0.0] * 20
 _MILLI_G = 1000.0 / 9.80665  # of 1 m/s²

@@ -9,13 +9,10 @@ from firmware_py.mavlink import commands, heartbeat, places, signing_setup, stic
 from firmware_py.mavlink.camera_component import CameraComponent
 from firmware_py.mavlink.camera_model import CAMERA_COMPONENT_ID, CameraModel, CaptureSink
 from firmware_py.mavlink.component_metadata import ExtraFiles
-from firmware_py.mavlink.dialect import AUTOPILOT_COMPONENT_ID, BROADCAST, Message, mavlink
 from firmware_py.mavlink.events import EventService
 from firmware_py.mavlink.exchange import Exchange, Handler
 from firmware_py.mavlink.failure_sink import FailureSink
 from firmware_py.mavlink.file_transfer import FileTransferService
-from firmware_py.mavlink.forwarding import Router
-from firmware_py.mavlink.framing import Packet, source_of
 from firmware_py.mavlink.links import Link, LinkProfile
 from firmware_py.mavlink.log_transfer import LogTransferService
 from firmware_py.mavlink.mission_orders import MissionOrders
@@ -26,12 +23,15 @@ from firmware_py.mavlink.parameter_protocol import ParameterService
 from firmware_py.mavlink.port import AutopilotPort
 from firmware_py.mavlink.rc_channels import RcChannels
 from firmware_py.mavlink.shell import ShellService
-from firmware_py.mavlink.signing import Signing, SigningKey
 from firmware_py.mavlink.status_texts import StatusTextService
 from firmware_py.mavlink.streams import is_shared, stream_message
 from firmware_py.mavlink.video_links import VideoStream
 from firmware_py.storage import Storage
 from firmware_py.types import GeodeticPoint, StatusText
+from wire.dialect import AUTOPILOT_COMPONENT_ID, BROADCAST, Message, mavlink
+from wire.forwarding import Router
+from wire.framing import Packet, source_of
+from wire.signing import Signing, SigningKey
 
 HandlerTable = dict[int, tuple[Handler, ...]]  # by message id; one message may have several
 

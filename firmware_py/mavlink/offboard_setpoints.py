@@ -8,7 +8,6 @@ from __future__ import annotations
 
 from math import isfinite
 
-from firmware_py.mavlink.dialect import Message, mavlink
 from firmware_py.mavlink.exchange import Exchange, Handler
 from firmware_py.mavlink.links import Link
 from firmware_py.setpoints import (
@@ -19,7 +18,9 @@ from firmware_py.setpoints import (
     setpoint_from_controls,
     setpoint_from_target,
 )
-from firmware_py.types import NAN3, GeodeticPoint, Setpoint, Vec3
+from firmware_py.types import GeodeticPoint, Setpoint
+from geometry.vectors import NAN3, Vec3
+from wire.dialect import Message, mavlink
 
 _SAY_AGAIN_US = 1_000_000
 _ALTITUDES = {

@@ -6,12 +6,12 @@ is told on all links by the plain protocol.
 
 from __future__ import annotations
 
-from firmware_py.mavlink.dialect import Message, mavlink
 from firmware_py.mavlink.exchange import Exchange, Handler
 from firmware_py.mavlink.links import Link
 from firmware_py.mavlink.parameter_listing import Listings
 from firmware_py.mavlink.parameter_wire import TYPES, Refusals, from_bytes, to_bytes
 from firmware_py.parameters import ParameterError
+from wire.dialect import Message, mavlink
 
 _BY_NAME = -1
 

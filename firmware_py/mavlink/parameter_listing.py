@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-from firmware_py.mavlink.dialect import Message
 from firmware_py.mavlink.exchange import Exchange
 from firmware_py.mavlink.links import Link
+from wire.dialect import Message
 
 _PER_UPDATE = 4  # 1000 a second at 250 updates: PX4's pace, gentle to slow links
 

@@ -9,12 +9,12 @@ from __future__ import annotations
 
 from struct import pack, unpack
 
-from firmware_py.mavlink.dialect import Message, mavlink
 from firmware_py.mavlink.exchange import Exchange, Handler
 from firmware_py.mavlink.links import Link
 from firmware_py.mavlink.parameter_listing import Listings
 from firmware_py.mavlink.parameter_wire import TYPES, Refusals, from_float, to_float
 from firmware_py.parameters import ParameterError
+from wire.dialect import Message, mavlink
 
 HASH_NAME = "_HASH_CHECK"
 _HASH_PLACE = -1  # in a list

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from firmware_py.mavlink.dialect import mavlink
 from firmware_py.mavlink.exchange import Exchange
 from firmware_py.status import CommandResult
+from wire.dialect import mavlink
 
 _LOAD, _SAVE, _RESET, _RESET_SENSORS, _RESET_ALL = 0, 1, 2, 3, 4  # PREFLIGHT_STORAGE_PARAMETER_ACTION
 

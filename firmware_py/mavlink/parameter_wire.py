@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from struct import pack, unpack
 
-from firmware_py.mavlink.dialect import mavlink
 from firmware_py.mavlink.exchange import Exchange
 from firmware_py.parameters import Parameter, ParameterError
+from wire.dialect import mavlink
 
 TYPES = {"int32": mavlink.MAV_PARAM_TYPE_INT32, "float": mavlink.MAV_PARAM_TYPE_REAL32}
 """MAV_PARAM_TYPE; MAV_PARAM_EXT_TYPE has the same numbers."""

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from math import isfinite
 
-from firmware_py.mavlink.dialect import Message, mavlink
 from firmware_py.mavlink.exchange import Exchange, Handler
 from firmware_py.mavlink.links import Link
 from firmware_py.types import GeodeticPoint
+from wire.dialect import Message, mavlink
 
 _HAS_VELOCITY = 1 << 1  # est_capabilities of FOLLOW_TARGET
 

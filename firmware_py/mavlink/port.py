@@ -19,9 +19,9 @@ from firmware_py.types import (
     MotorOutput,
     Setpoint,
     StatusText,
-    Vec3,
     VehicleState,
 )
+from geometry.vectors import Vec3
 
 
 class AutopilotPort(Protocol):

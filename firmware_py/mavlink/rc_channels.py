@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from firmware_py.mavlink.dialect import BROADCAST, Message, mavlink
 from firmware_py.mavlink.exchange import Exchange, Handler
 from firmware_py.mavlink.links import Link
 from firmware_py.mavlink.scaling import boot_ms
+from wire.dialect import BROADCAST, Message, mavlink
 
 _CHANNELS = 18
 _NOT_GIVEN = (0, 0xFFFF)

@@ -8,10 +8,10 @@ from __future__ import annotations
 
 from math import atan2, degrees, hypot
 
-from firmware_py.mavlink.dialect import BROADCAST, Message, mavlink
 from firmware_py.mavlink.exchange import Exchange
 from firmware_py.mavlink.scaling import degrees_e7, whole
 from firmware_py.status import LandedState
+from wire.dialect import BROADCAST, Message, mavlink
 
 _NO_IDENTITY = [0] * 20
 _UNKNOWN_M = -1000.0

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from math import atan2, degrees, hypot
 
-from firmware_py.mavlink.dialect import Message, mavlink
 from firmware_py.mavlink.port import AutopilotPort
 from firmware_py.mavlink.scaling import boot_ms, degrees_e7, millimetres, whole
-from firmware_py.types import Quaternion, Vec3
+from geometry.vectors import Quaternion, Vec3
+from wire.dialect import Message, mavlink
 
 # North, east, down at PX4's simulated home (Zurich), gauss; World Magnetic Model 2025, two digits.
 EARTH_FIELD_NED_GAUSS: Vec3 = (0.22, 0.013, 0.43)

@@ -10,10 +10,10 @@ from __future__ import annotations
 from collections import deque
 from dataclasses import dataclass, field
 
-from firmware_py.mavlink.dialect import BROADCAST, Message, mavlink
 from firmware_py.mavlink.exchange import Exchange, Handler
 from firmware_py.mavlink.links import Link
 from firmware_py.mavlink.shell_commands import answer
+from wire.dialect import BROADCAST, Message, mavlink
 
 _PROMPT = b"nsh> "
 _PIECE = 70

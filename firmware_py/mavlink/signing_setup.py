@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from firmware_py.mavlink.dialect import Message, mavlink
 from firmware_py.mavlink.exchange import Exchange, Handler
 from firmware_py.mavlink.links import Link
+from wire.dialect import Message, mavlink
 
 
 def _set_up(exchange: Exchange, link: Link, message: Message) -> None:

@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Mapping
 from types import MappingProxyType
 
-from firmware_py.mavlink.dialect import Message, mavlink
 from firmware_py.status import FlightMode
+from wire.dialect import Message, mavlink
 
 _ADVANCED = mavlink.MAV_MODE_PROPERTY_ADVANCED
 _NOT_SELECTABLE = mavlink.MAV_MODE_PROPERTY_NOT_USER_SELECTABLE

@@ -9,9 +9,9 @@ from __future__ import annotations
 from collections import deque
 from collections.abc import Callable
 
-from firmware_py.mavlink.dialect import Message, mavlink
 from firmware_py.mavlink.exchange import Exchange
 from firmware_py.types import StatusText
+from wire.dialect import Message, mavlink
 
 _PIECE = 50
 _KEPT = 8

@@ -10,13 +10,13 @@ from collections.abc import Callable, Mapping
 from types import MappingProxyType
 
 from firmware_py.mavlink import actuators, condition, motion, remote_id, sensing, targets, time_sync
-from firmware_py.mavlink.dialect import Message, mavlink
 from firmware_py.mavlink.exchange import Exchange
 from firmware_py.mavlink.heartbeat import heartbeat
 from firmware_py.mavlink.links import Link
 from firmware_py.mavlink.mission_progress import mission_current
 from firmware_py.mavlink.port import AutopilotPort
-from firmware_py.mavlink.traffic import link_node_status
+from wire.dialect import Message, mavlink
+from wire.traffic import link_node_status
 
 Source = Callable[[AutopilotPort, int], "Message | None"]
 DatedSource = Callable[[Exchange], "Message | None"]

@@ -5,11 +5,12 @@ from __future__ import annotations
 from math import hypot, isfinite, isnan, nan
 
 from firmware_py.geodesy import LocalProjection
-from firmware_py.mavlink.dialect import Message, mavlink
 from firmware_py.mavlink.port import AutopilotPort
 from firmware_py.mavlink.scaling import boot_ms, degrees_e7, whole
 from firmware_py.status import FlightMode
-from firmware_py.types import Quaternion, Setpoint
+from firmware_py.types import Setpoint
+from geometry.vectors import Quaternion
+from wire.dialect import Message, mavlink
 
 _GLOBAL_MODES = frozenset(
     {

@@ -6,11 +6,11 @@ somebody tells it, at boot or by the same message.
 
 from __future__ import annotations
 
-from firmware_py.mavlink.dialect import BROADCAST, Message, mavlink
 from firmware_py.mavlink.exchange import Exchange, Handler
 from firmware_py.mavlink.links import Link
 from firmware_py.mavlink.port import AutopilotPort
 from firmware_py.mavlink.scaling import boot_ms
+from wire.dialect import BROADCAST, Message, mavlink
 
 _LEAST_UNIX_US = 1_234_567_890_000_000  # what is earlier is no date, in PX4's view
 _MOST_UNIX_US = 1 << 62

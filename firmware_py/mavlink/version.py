@@ -7,7 +7,7 @@ SET_POSITION_TARGET_GLOBAL_INT, which PX4 understands too without saying so.
 
 from __future__ import annotations
 
-from firmware_py.mavlink.dialect import Message, mavlink
+from wire.dialect import Message, mavlink
 
 FOLLOWED_PX4_VERSION = (1, 17, 0)
 OWN_VERSION = (0, 1, 0)

@@ -7,7 +7,7 @@ from math import hypot, isfinite, isnan, nan, radians, remainder, tau
 from firmware_py.missions.flight import Leg, View
 from firmware_py.missions.items import Do, MissionItem
 from firmware_py.parameters import Parameters
-from firmware_py.types import Vec3
+from geometry.vectors import Vec3
 
 _LONGEST_S = 1e9
 _HOLDING = frozenset({Do.WAYPOINT, Do.LOITER_TIME, Do.DELAY})

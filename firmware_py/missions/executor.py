@@ -14,7 +14,8 @@ from firmware_py.missions.pictures import Pictures
 from firmware_py.missions.regions import Gaze
 from firmware_py.missions.store import MissionStore
 from firmware_py.parameters import Parameters
-from firmware_py.types import StatusText, Vec3
+from firmware_py.types import StatusText
+from geometry.vectors import Vec3
 
 _CRITICAL, _WARNING, _INFO = 2, 4, 6  # MAV_SEVERITY
 _LEAST_CLIMB_M = 0.5  # a first place no higher than this is no take-off: it climbs to MIS_TAKEOFF_ALT

@@ -9,7 +9,7 @@ from math import isfinite
 
 from firmware_py.missions.flight import View
 from firmware_py.missions.items import CIRCLES, POLYGONS, Do, MissionItem
-from firmware_py.types import Vec3
+from geometry.vectors import Vec3
 
 FEWEST_VERTICES = 3
 _KEEP_IN = frozenset({Do.POLYGON_INCLUSION, Do.CIRCLE_INCLUSION})

@@ -8,7 +8,8 @@ from math import isfinite, nan
 
 from firmware_py.geodesy import LocalProjection
 from firmware_py.missions.items import MissionItem
-from firmware_py.types import GeodeticPoint, Vec3
+from firmware_py.types import GeodeticPoint
+from geometry.vectors import Vec3
 
 SevenParams = tuple[float, float, float, float, float, float, float]
 

@@ -11,7 +11,8 @@ from firmware_py.missions.fence_shapes import Shape, shapes_of
 from firmware_py.missions.flight import View
 from firmware_py.missions.store import MissionStore
 from firmware_py.parameters import Parameters
-from firmware_py.types import StatusText, Vec3
+from firmware_py.types import StatusText
+from geometry.vectors import Vec3
 
 _CRITICAL = 2  # MAV_SEVERITY
 

@@ -6,7 +6,7 @@ from math import dist, isfinite
 
 from firmware_py.missions.flight import IssuedCommand
 from firmware_py.missions.items import Do, MissionItem
-from firmware_py.types import Vec3
+from geometry.vectors import Vec3
 
 
 class Pictures:

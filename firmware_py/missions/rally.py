@@ -11,7 +11,7 @@ from firmware_py.missions.flight import View
 from firmware_py.missions.items import Do, MissionItem
 from firmware_py.missions.store import MissionStore
 from firmware_py.parameters import Parameters
-from firmware_py.types import Vec3
+from geometry.vectors import Vec3
 
 _NEARER_M = 2.0  # another place must be nearer than the best so far by this
 _OF_HOME_M = 10.0  # a rally point this near to home is home

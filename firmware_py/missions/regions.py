@@ -6,7 +6,7 @@ from math import atan2, hypot, isfinite, nan, radians, remainder, tau
 
 from firmware_py.missions.flight import View
 from firmware_py.missions.items import ROI_LOCATION, ROI_WPNEXT, Do, MissionItem
-from firmware_py.types import Vec3
+from geometry.vectors import Vec3
 
 
 class Gaze:

@@ -16,13 +16,13 @@ from framerunner.errors import SettingError
 from framerunner.extras import advice, is_installed
 
 if TYPE_CHECKING:
-    from firmware_py.mavlink.signing import SigningKey
     from framerunner.monitor_process import MonitorProcess
     from scenarios.models import Scenario
     from sitl.server import SimulatorServer
     from sitl.server_settings import ServerSettings
     from sitl.simulation import Simulation
     from sitl.time_grants import TimeGrants
+    from wire.signing import SigningKey
 
 _MAX_COUNT = 20
 
@@ -225,7 +225,7 @@ def _read_key(path: Path | None) -> SigningKey | None:
     """Read the key of a file; what is in it is never shown."""
     if path is None:
         return None
-    from firmware_py.mavlink.signing import SigningKey
+    from wire.signing import SigningKey
 
     try:
         return SigningKey.from_text(path.read_text(encoding="utf-8"))

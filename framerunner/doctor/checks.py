@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 
-from firmware_py.mavlink.dialect import mavlink
 from framerunner.doctor import names
 from framerunner.doctor.findings import Finding, Level
 from framerunner.doctor.position import check_height, check_position, check_still, check_vision_settings
 from framerunner.doctor.record import Record
+from wire.dialect import mavlink
 
 WANTED_HZ = 50.0  # what `fly` and `camera` ask for
 LOW_HZ = 20.0  # the mission's own rate

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from firmware_py.mavlink.dialect import mavlink
+from wire.dialect import mavlink
 
 AUTOPILOTS = {mavlink.MAV_AUTOPILOT_PX4: "PX4", mavlink.MAV_AUTOPILOT_ARDUPILOTMEGA: "ArduPilot"}
 STATES = (

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from firmware_py.mavlink.dialect import mavlink
 from framerunner.doctor.record import Record
 from framerunner.vehicle_link import AUTOPILOT_COMPONENT, Message, command
+from wire.dialect import mavlink
 
 PARAMETERS = (
     "BAT_CRIT_THR",

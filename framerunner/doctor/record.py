@@ -7,9 +7,9 @@ from collections import deque
 from dataclasses import dataclass, field
 from math import dist, isfinite
 
-from firmware_py.mavlink.dialect import mavlink
 from framerunner.doctor.arming import ArmingReport
 from framerunner.vehicle_link import AUTOPILOT_COMPONENT, Message, is_vehicle
+from wire.dialect import mavlink
 
 TEXTS_KEPT = 12
 _HALF_TURN = 128

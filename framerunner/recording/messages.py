@@ -6,10 +6,10 @@ from base64 import b64encode
 from math import cos, isfinite, sin
 from typing import Any
 
+from geometry.vectors import Vec3
 from offboard.app import Moment
 from offboard.drone import DroneState
 from offboard.engine import TransitionTaken
-from scenarios.axes import Vec3
 from scenarios.models import COLOURS
 from vision.types import Detection, Detections
 

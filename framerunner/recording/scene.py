@@ -9,7 +9,7 @@ from typing import Any
 
 from firmware_py.airframe import load_airframe
 from framerunner.recording.messages import ARENA, CAMERA, DRONE, RGBA, Message, time_of, turn_of, vector_of
-from scenarios.axes import Vec3
+from geometry.vectors import Vec3
 from scenarios.models import Arena, Scenario
 from sitl.solids import Solid, base_solid, frame_solids
 from vision.intrinsics import camera_matrix

@@ -8,7 +8,7 @@ from math import cos, hypot, isfinite, sin
 from operator import attrgetter
 from typing import Generic, Protocol, TypeVar
 
-from scenarios.axes import Quaternion, Vec3
+from geometry.vectors import Quaternion, Vec3
 
 SPAN_US = 1_500_000  # kept
 AHEAD_US = 60_000  # as far as a pose is carried on beyond the last report

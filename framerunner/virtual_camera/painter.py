@@ -19,8 +19,8 @@ from framerunner.virtual_camera.history import (
 )
 from framerunner.virtual_camera.lift import lifted
 from framerunner.virtual_camera.placement import Placement, yaw_of
+from geometry.vectors import Quaternion
 from offboard.link.alignment import Pose
-from scenarios.axes import Quaternion
 from scenarios.ground import start_position
 from scenarios.models import Scenario
 from scenarios.referee import Referee

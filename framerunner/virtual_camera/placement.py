@@ -7,8 +7,8 @@ from dataclasses import dataclass
 from math import atan2, cos, sin
 
 from framerunner.virtual_camera.history import VehiclePose
+from geometry.vectors import Quaternion, Vec3
 from offboard.link.alignment import Alignment, Pose
-from scenarios.axes import Quaternion, Vec3
 
 HELD_AFTER_FLIGHT_US = 10_000_000  # the verdict is made by then; later the vehicle is put back on its start
 _PENDING = 200  # poses between two heartbeats

@@ -7,11 +7,11 @@ import threading
 import time
 from collections.abc import Callable, Mapping
 
-from firmware_py.mavlink.dialect import mavlink
 from framerunner.vehicle_link import Message, VehicleLink, command, companion_heartbeat, is_vehicle
 from framerunner.virtual_camera.painter import VirtualCamera
 from offboard.drone import DroneError
 from sitl.video import VideoServer
+from wire.dialect import mavlink
 
 STALE_S = 0.5  # wall time without attitude or position, after which no image is served
 SYSTEM_ID = 246  # MAVSDK has 245, ground stations 255

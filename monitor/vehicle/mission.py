@@ -7,8 +7,10 @@ from typing import Annotated, Any
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
-from mission_link.codec import DocumentAssembler, PayloadError, decode_detections, decode_state
-from mission_link.messages import (
+from monitor.ports import Message
+from monitor.vehicle.texts import plain
+from wire.mission_codec import DocumentAssembler, PayloadError, decode_detections, decode_state
+from wire.mission_messages import (
     DETECTIONS_TYPE,
     DOCUMENT_TYPE,
     STATE_TYPE,
@@ -18,8 +20,6 @@ from mission_link.messages import (
     DocumentKind,
     MissionState,
 )
-from monitor.ports import Message
-from monitor.vehicle.texts import plain
 
 ALIVE_S = 2.0
 _TRANSITIONS = 10

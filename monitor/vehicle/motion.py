@@ -6,8 +6,8 @@ from collections import deque
 from dataclasses import dataclass
 from math import atan2, cos, hypot, isfinite, sin
 
+from geometry.vectors import Quaternion, Vec3
 from monitor.ports import Message
-from scenarios.axes import Quaternion, Vec3
 
 _FAR = 1e6  # metres or metres a second beyond which it is no place and no speed
 _RESTART_MS = 3000  # a clock that goes back farther has begun anew; less far back is a late message

@@ -5,8 +5,9 @@ from __future__ import annotations
 from enum import IntEnum
 from math import cos, hypot, isfinite, sin
 
+from geometry.axes import flip_quaternion, flip_vector, flip_yaw
+from geometry.vectors import Quaternion, Vec3
 from monitor.vehicle.motion import Motion, Position
-from scenarios.axes import Quaternion, Vec3, flip_quaternion, flip_vector, flip_yaw
 
 ArenaPose = tuple[float, float, float, float]  # x, y, z (m) and yaw (rad), arena axes
 

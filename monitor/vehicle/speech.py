@@ -8,10 +8,10 @@ from typing import Any
 
 from pymavlink.dialects.v20 import common as mavlink
 
-from mission_link.messages import COMPONENT_ID as APP
 from monitor.ports import Message
 from monitor.vehicle.orders import is_warning
 from monitor.vehicle.texts import Text, TextAssembler
+from wire.mission_messages import COMPONENT_ID as APP
 
 _KEPT = 16
 _MOST_A_SECOND = 20  # a drone that says more is shouting

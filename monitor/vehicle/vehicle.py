@@ -12,7 +12,6 @@ from typing import Any
 
 from pymavlink.dialects.v20 import common as mavlink
 
-from mission_link.messages import COMPONENT_ID as APP
 from monitor.ports import Equipment, Message
 from monitor.referee_channel import RefereeAnswer, RefereeChannel
 from monitor.tries import TryEvent
@@ -29,6 +28,7 @@ from monitor.vehicle.placement import Placement
 from monitor.vehicle.speech import Speech
 from monitor.vehicle.traffic import Traffic
 from scenarios.models import Scenario
+from wire.mission_messages import COMPONENT_ID as APP
 
 AUTOPILOT = mavlink.MAV_COMP_ID_AUTOPILOT1
 _FRESH_S = 1.0

@@ -8,11 +8,11 @@ from dataclasses import is_dataclass
 from enum import Enum
 from typing import get_args, get_origin
 
+from geometry.vectors import Vec3
 from offboard.chart.hints import decimal_comma
 from offboard.chart.problems import cut
 from offboard.chart.vocabulary import Vocabulary, choices_of, path_of
 from offboard.pilot import MAX_VELOCITY_M_S, MAX_YAW_RATE_RAD_S
-from scenarios.axes import Vec3
 
 LIMITS: Mapping[tuple[str, ...], tuple[float, str]] = {
     ("cmd", "vel_x"): (MAX_VELOCITY_M_S, "m/s"),

@@ -5,7 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 from math import cos, pi, remainder, sin
 
-from scenarios.axes import Quaternion, Vec3, flip_quaternion, flip_vector, flip_yaw
+from geometry.axes import flip_quaternion, flip_vector, flip_yaw
+from geometry.vectors import Quaternion, Vec3
 
 
 @dataclass(frozen=True, slots=True)

@@ -20,8 +20,8 @@ from typing import Any
 
 from pymavlink.dialects.v20 import common as mavlink
 
-from mission_link.codec import PayloadError, encode_detections, encode_state
-from mission_link.messages import (
+from wire.mission_codec import PayloadError, encode_detections, encode_state
+from wire.mission_messages import (
     COMPONENT_ID,
     DETECTIONS_TYPE,
     DOCUMENT_TYPE,

@@ -22,9 +22,9 @@ from typing import Any
 
 from mavsdk.asyncio import MavsdkError
 
-from mission_link.messages import TEXT_PREFIX
+from geometry.vectors import Vec3
 from offboard.link.message_order import MessageOrder
-from scenarios.axes import Vec3
+from wire.mission_messages import TEXT_PREFIX
 
 TICK_US = 50_000
 TEXTS_KEPT = 8

@@ -14,9 +14,9 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from math import cos, exp, hypot, pi, remainder, sin
 
+from geometry.vectors import Vec3
 from offboard.drone import DroneState, VelocityCommand
 from offboard.link.lag import LagEstimate
-from scenarios.axes import Vec3
 
 LAG_S = 0.15  # of the model, as of the simulated drone
 MEMORY_S = 0.5  # in telling whether a vehicle obeys, a command counts for so long after it has changed

@@ -10,7 +10,8 @@ from firmware_py.airframe import load_airframe
 from firmware_py.autopilot import Autopilot
 from firmware_py.parameters import Parameters
 from firmware_py.status import CommandResult, FlightMode, LandedState
-from firmware_py.types import GeodeticPoint, ManualInput, Sensors, Setpoint, Vec3
+from firmware_py.types import GeodeticPoint, ManualInput, Sensors, Setpoint
+from geometry.vectors import Vec3
 from scenarios.models import Scenario
 from sitl.world import World
 

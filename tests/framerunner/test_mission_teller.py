@@ -10,14 +10,14 @@ import numpy as np
 import pytest
 
 from framerunner.mission_teller import HISTORY, MissionTeller
-from mission_link.codec import DocumentAssembler
-from mission_link.messages import DocumentKind
 from offboard.app import Moment, fly_mission
 from offboard.drone import DroneState, VelocityCommand
 from offboard.engine import TransitionTaken
 from offboard.mission import load_mission, mermaid
 from tests.offboard.fakes import START_1, TEST_CASE_1, GeometricEyes, KinematicDrone
 from vision.types import CameraFrame, Detection, Detections
+from wire.mission_codec import DocumentAssembler
+from wire.mission_messages import DocumentKind
 
 MISSION = load_mission("frame_challenge")
 LEAVES = list(MISSION.leaves)

@@ -21,11 +21,9 @@ from math import inf, isfinite
 from firmware_py.airframe import load_airframe
 from firmware_py.mavlink import GROUND, ONBOARD, MavlinkNode
 from firmware_py.mavlink.camera_model import CameraModel
-from firmware_py.mavlink.dialect import mavlink
 from firmware_py.mavlink.video_links import VideoEncoding, VideoStream
-from mission_link.messages import COMPONENT_ID
+from geometry.axes import flip_vector
 from monitor.ports import Equipment, LinkFailed, Message
-from scenarios.axes import flip_vector
 from scenarios.ground import start_position
 from scenarios.loader import list_scenarios, load_scenario
 from scenarios.models import Scenario
@@ -35,6 +33,8 @@ from sitl.camera_feed import CameraFeed
 from sitl.simulation import Simulation
 from sitl.video import VideoServer
 from sitl.world import CONTROL_PERIOD_US
+from wire.dialect import mavlink
+from wire.mission_messages import COMPONENT_ID
 
 _BURST_TICKS = 5  # 20 ms of simulated time at once
 _TRUTHS = 5000  # 20 s

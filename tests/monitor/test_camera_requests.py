@@ -8,9 +8,9 @@ from pathlib import Path
 import pytest
 from aiohttp import web
 
-from firmware_py.mavlink.dialect import mavlink
 from framerunner.monitoring.equipment import equipment
 from tests.monitor.watching import watching
+from wire.dialect import mavlink
 
 
 @asynccontextmanager

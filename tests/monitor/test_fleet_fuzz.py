@@ -8,10 +8,10 @@ import struct
 import pytest
 from pymavlink.generator.mavcrc import x25crc
 
-from firmware_py.mavlink.dialect import mavlink
 from monitor.fleet import Fleet
 from scenarios.loader import load_scenario
 from tests.monitor.simulated_link import SimulatedLink, all_finite, equipment
+from wire.dialect import mavlink
 
 CLASSES = [mavlink.mavlink_map[number] for number in sorted(mavlink.mavlink_map)]
 USED = [

@@ -2,16 +2,16 @@
 
 import pytest
 
-from firmware_py.mavlink.dialect import mavlink
 from firmware_py.status import FlightMode
-from mission_link.codec import encode_state, split_document
-from mission_link.messages import DOCUMENT_TYPE, STATE_TYPE, DocumentKind, MissionState
 from monitor.vehicle.placement import Source
 from scenarios.loader import load_scenario
 from scenarios.truth import TrueState
 from tests.monitor.simulated_link import SimulatedLink, equipment, make_referee, served_link
 from tests.monitor.vehicle.test_mission_view import tunnel
 from tests.monitor.watching import watching
+from wire.dialect import mavlink
+from wire.mission_codec import encode_state, split_document
+from wire.mission_messages import DOCUMENT_TYPE, STATE_TYPE, DocumentKind, MissionState
 
 SCENARIO = load_scenario("test-case-1")
 

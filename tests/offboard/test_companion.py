@@ -8,11 +8,11 @@ import socket
 import pytest
 from pymavlink.dialects.v20 import common as mavlink
 
-from mission_link.codec import DocumentAssembler, decode_detections, decode_state, split_document
-from mission_link.messages import DocumentKind, MissionDetections, MissionState
 from offboard.link import companion as module
 from offboard.link.companion import Companion
 from offboard.link.telemetry import TelemetryFeed
+from wire.mission_codec import DocumentAssembler, decode_detections, decode_state, split_document
+from wire.mission_messages import DocumentKind, MissionDetections, MissionState
 
 SYSTEM = 3
 STATE = MissionState(

@@ -6,13 +6,13 @@ import asyncio
 
 import pytest
 
-from mission_link.messages import MissionState
 from offboard.drone import DroneError
 from offboard.link.companion import Companion
 from offboard.mavsdk_drone import MavsdkDrone
 from tests.offboard.conftest import free_port
 from tests.offboard.udp_vehicle import UdpVehicle
 from tests.processes import wait_until
+from wire.mission_messages import MissionState
 
 pytestmark = pytest.mark.realtime
 

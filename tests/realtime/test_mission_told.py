@@ -9,10 +9,10 @@ from dataclasses import dataclass
 import pytest
 from pymavlink import mavutil
 
-from mission_link.codec import DocumentAssembler, decode_detections, decode_state
-from mission_link.messages import DocumentKind
 from offboard.mission import load_mission, mermaid
 from tests.processes import bound, free_instance, program
+from wire.mission_codec import DocumentAssembler, decode_detections, decode_state
+from wire.mission_messages import DocumentKind
 
 mavlink = mavutil.mavlink
 pytestmark = pytest.mark.realtime

@@ -7,7 +7,7 @@ import numpy as np
 import numpy.typing as npt
 import pytest
 
-from scenarios.axes import Quaternion, Vec3
+from geometry.vectors import Quaternion, Vec3
 from scenarios.models import Arena, Base, Camera, Frame, Light, Scenario
 from sitl.camera import Camera as PaintedCamera
 from sitl.camera import Image

@@ -10,12 +10,12 @@ import pytest
 from firmware_py.airframe import load_airframe
 from firmware_py.autopilot import Autopilot
 from firmware_py.mavlink import MavlinkNode
-from firmware_py.mavlink.dialect import mavlink
-from firmware_py.mavlink.framing import PacketReader
 from firmware_py.types import GeodeticPoint
 from sitl.link_hub import LinkHub
 from sitl.link_urls import LinkError, parse_link
 from tests.processes import bound
+from wire.dialect import mavlink
+from wire.framing import PacketReader
 
 STATION = mavlink.MAVLink(None, 255, 190)
 BEAT = mavlink.MAVLink_heartbeat_message(mavlink.MAV_TYPE_GCS, 8, 0, 0, 4, 3)

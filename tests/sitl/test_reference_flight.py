@@ -9,10 +9,10 @@ from math import nan
 import pytest
 
 from firmware_py.mavlink import ONBOARD, MavlinkNode
-from firmware_py.mavlink.dialect import mavlink
-from firmware_py.mavlink.framing import PacketReader
 from scenarios.loader import load_scenario
 from sitl.simulation import Simulation
+from wire.dialect import mavlink
+from wire.framing import PacketReader
 
 COMMANDS = [  # time, command, params
     (8.04, 512, (148, 0, 0, 0, 0, 0, 0)),

@@ -8,7 +8,6 @@ from contextlib import asynccontextmanager, suppress
 import aiohttp
 import pytest
 
-from firmware_py.mavlink.signing import SigningKey
 from scenarios.loader import load_scenario
 from scenarios.models import Scenario
 from sitl.fleet import side_by_side
@@ -19,6 +18,7 @@ from sitl.simulation import Simulation
 from sitl.video import VideoError
 from sitl.world import CONTROL_PERIOD_US
 from tests.processes import bound, free_instance
+from wire.signing import SigningKey
 
 GREETING = "Ctrl-C stops"
 

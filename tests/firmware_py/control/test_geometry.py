@@ -7,7 +7,7 @@ import pytest
 from hypothesis import assume, given
 from hypothesis import strategies as st
 
-from firmware_py.control.geometry import rotation, tilt_error, to_body, to_world
+from geometry.rotations import rotation, tilt_error, to_body, to_world
 
 part = st.floats(-1.0, 1.0)
 

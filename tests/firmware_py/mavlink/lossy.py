@@ -2,7 +2,7 @@
 
 import random
 
-from firmware_py.mavlink.framing import PacketReader
+from wire.framing import PacketReader
 
 
 class LossyPipe:

@@ -6,10 +6,10 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from firmware_py.mavlink.camera_model import CameraModel, PictureSpace
-from firmware_py.mavlink.dialect import mavlink
 from firmware_py.mavlink.video_links import VideoEncoding, VideoStream
 from firmware_py.status import CommandResult, FlightMode
 from firmware_py.types import GeodeticPoint, VehicleState
+from wire.dialect import mavlink
 
 MODEL = CameraModel(320, 240, radians(90.0), 10.0)
 STREAMS = (

@@ -3,10 +3,10 @@ from math import inf, isnan, nan
 import pytest
 
 from firmware_py.guidance.circles import OrbitYaw
-from firmware_py.mavlink.dialect import mavlink
 from firmware_py.status import CommandResult, FlightMode, VehicleStatus
 from firmware_py.types import GeodeticPoint
 from tests.firmware_py.mavlink.conftest import HOME
+from wire.dialect import mavlink
 
 ACCEPTED, REJECTED, DENIED, UNSUPPORTED, FAILED = range(5)
 ARM, SET_MODE, TAKEOFF, LAND = 400, 176, 22, 21

@@ -8,9 +8,9 @@ import pytest
 from firmware_py.mavlink import GROUND, ONBOARD
 from firmware_py.mavlink.camera_model import CAMERA_COMPONENT_ID, CameraModel
 from firmware_py.mavlink.commands import COMMANDS
-from firmware_py.mavlink.dialect import mavlink
 from firmware_py.mavlink.node import MavlinkNode
 from firmware_py.mavlink.streams import DATED_SOURCES, SOURCES
+from wire.dialect import mavlink
 
 PAGE = (Path(__file__).parents[3] / "docs" / "px4-compatibility.md").read_text(encoding="utf-8")
 NAMED = set(re.findall(r"[A-Z][A-Z0-9_]{3,}", PAGE))

@@ -6,11 +6,11 @@ import pytest
 
 from firmware_py.mavlink import GROUND, ONBOARD, MavlinkNode
 from firmware_py.mavlink.component_metadata import EVENTS_FILE, extras
-from firmware_py.mavlink.dialect import mavlink
 from firmware_py.mavlink.event_catalogue import CHECKS, MODE_CHANGED, TEXTS, all_kinds, event_of
 from firmware_py.mavlink.event_model import EventKind
-from firmware_py.mavlink.framing import PacketReader
 from firmware_py.status import FlightMode
+from wire.dialect import mavlink
+from wire.framing import PacketReader
 
 INFO, PROTOCOL = 6, 8
 NUMBERED = ("EVENT", "CURRENT_EVENT_SEQUENCE")

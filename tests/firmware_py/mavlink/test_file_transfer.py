@@ -7,11 +7,11 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from firmware_py.mavlink.dialect import mavlink
 from sitl.storage import MemoryStorage, StorageLimits
 from tests.firmware_py.mavlink import ftp_client as ftp
 from tests.firmware_py.mavlink.ftp_client import FtpClient, RefusedError, Reply, request
 from tests.firmware_py.mavlink.lossy import LossyPeer
+from wire.dialect import mavlink
 
 FIRMWARE = {"etc/extras/general.json.xz": b"general", "etc/extras/parameters.json.xz": b"p" * 5000}
 PERFECT = {"loss": 0.0, "duplicate": 0.0, "reorder": 0.0}

@@ -10,9 +10,9 @@ from hypothesis import strategies as st
 
 from firmware_py.autopilot import Autopilot
 from firmware_py.control.limits import FlightLimits
-from firmware_py.mavlink.dialect import mavlink
 from firmware_py.status import FlightMode
 from firmware_py.types import GeodeticPoint, MotorOutput, Sensors
+from wire.dialect import mavlink
 
 LINKS = ("onboard", "ground")
 AWKWARD = [

@@ -5,11 +5,11 @@ from struct import unpack_from
 
 import pytest
 
-from firmware_py.mavlink.dialect import mavlink
 from firmware_py.mavlink.exchange import Exchange
 from firmware_py.mavlink.mission_commands import set_current, start
 from firmware_py.missions.items import PlanType
 from firmware_py.status import CommandResult, FlightMode
+from wire.dialect import mavlink
 
 MISSION, FENCE, RALLY = PlanType
 LATITUDE, LONGITUDE = 473977420, 85455940

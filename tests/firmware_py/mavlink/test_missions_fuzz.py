@@ -6,13 +6,13 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from firmware_py.geodesy import LocalProjection
-from firmware_py.mavlink.dialect import mavlink
 from firmware_py.missions.executor import MissionExecutor
 from firmware_py.missions.flight import View
 from firmware_py.missions.geofence import Geofence
 from firmware_py.missions.items import PlanType, opaque_id
 from firmware_py.missions.rally import destination
 from tests.firmware_py.mavlink.conftest import HOME, FakeAutopilot
+from wire.dialect import mavlink
 
 FLOATS = st.one_of(
     st.sampled_from([0.0, -0.0, 1.0, -1.0, 3.0, 5.0, 1e-40, 3e38, -3e38, float("nan"), float("inf")]),

@@ -2,8 +2,8 @@
 
 import pytest
 
-from firmware_py.mavlink.dialect import mavlink
 from firmware_py.missions.items import PlanType
+from wire.dialect import mavlink
 
 RETRY_S, RETRIES = 0.5, 5
 STEP_S = 0.02

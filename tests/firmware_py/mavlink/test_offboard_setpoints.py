@@ -2,9 +2,9 @@ from math import nan, pi
 
 import pytest
 
-from firmware_py.mavlink.dialect import mavlink
 from firmware_py.types import VehicleState
 from tests.firmware_py.mavlink.conftest import HOME
+from wire.dialect import mavlink
 
 VELOCITY_AND_YAW_RATE = 0x5C7
 

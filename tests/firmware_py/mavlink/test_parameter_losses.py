@@ -2,8 +2,8 @@
 
 import pytest
 
-from firmware_py.mavlink.dialect import mavlink
 from firmware_py.parameters import DECLARATIONS
+from wire.dialect import mavlink
 
 
 def heard(messages):

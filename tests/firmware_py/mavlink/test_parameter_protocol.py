@@ -3,8 +3,8 @@ from struct import pack, unpack
 
 import pytest
 
-from firmware_py.mavlink.dialect import mavlink
 from firmware_py.parameters import DECLARATIONS
+from wire.dialect import mavlink
 
 INT32, UINT32, REAL32 = 6, 5, 9
 TAKEOFF_ALTITUDE = b"MIS_TAKEOFF_ALT"

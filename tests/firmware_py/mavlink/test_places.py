@@ -2,8 +2,8 @@ from math import nan
 
 import pytest
 
-from firmware_py.mavlink.dialect import mavlink
 from tests.firmware_py.mavlink.conftest import HOME
+from wire.dialect import mavlink
 
 
 def target(lat=HOME.latitude_deg + 1e-4, vel=(1.0, 2.0, 0.0), capabilities=3):

@@ -4,9 +4,9 @@ from collections import Counter
 
 import pytest
 
-from firmware_py.mavlink.dialect import mavlink
 from firmware_py.mavlink.streams import can_stream
 from firmware_py.types import Setpoint
+from wire.dialect import mavlink
 
 SECONDS = 30.0
 

@@ -4,8 +4,8 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from firmware_py.mavlink.dialect import mavlink
 from firmware_py.mavlink.links import LinkProfile
+from wire.dialect import mavlink
 
 SHELL, REPLY, RESPOND = 10, 1, 2
 LINKS = (LinkProfile("onboard", {}),)

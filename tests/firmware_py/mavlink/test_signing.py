@@ -5,9 +5,9 @@ from hashlib import sha256
 
 import pytest
 
-from firmware_py.mavlink.dialect import mavlink
 from firmware_py.mavlink.links import GROUND, ONBOARD
-from firmware_py.mavlink.signing import Signing, SigningKey
+from wire.dialect import mavlink
+from wire.signing import Signing, SigningKey
 
 KEY = SigningKey.from_text("correct horse battery staple")
 OTHER_KEY = SigningKey(bytes(range(1, 33)))

@@ -1,6 +1,6 @@
 import pytest
 
-from firmware_py.mavlink.dialect import mavlink
+from wire.dialect import mavlink
 
 
 def joystick(x=0, y=0, z=500, r=0, target=1):

@@ -4,8 +4,6 @@ from math import cos, inf, nan, pi, sin
 import pytest
 
 from firmware_py.mavlink import GROUND, ONBOARD, MavlinkNode
-from firmware_py.mavlink.dialect import mavlink
-from firmware_py.mavlink.framing import PacketReader
 from firmware_py.mavlink.sensing import pressure_hpa, temperature_k, to_body
 from firmware_py.mavlink.streams import SOURCES
 from firmware_py.status import FlightMode, LandedState, VehicleStatus
@@ -17,6 +15,8 @@ from firmware_py.types import (
     Setpoint,
     VehicleState,
 )
+from wire.dialect import mavlink
+from wire.framing import PacketReader
 
 
 def latest(peer, name, link="onboard"):

@@ -4,11 +4,11 @@ import struct
 
 import pytest
 
-from firmware_py.mavlink.dialect import mavlink
 from framerunner.doctor.arming import SUMMARY, event_id
 from framerunner.doctor.checks import examine
 from framerunner.doctor.findings import Level, can_fly
 from framerunner.doctor.record import Record
+from wire.dialect import mavlink
 
 GOOD_PARAMETERS = {
     "BAT_CRIT_THR": 0.07,

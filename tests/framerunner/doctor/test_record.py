@@ -7,8 +7,8 @@ import pytest
 from hypothesis import example, given
 from hypothesis import strategies as st
 
-from firmware_py.mavlink.dialect import mavlink
 from framerunner.doctor.record import Record, StreamCounter, parameter_value
+from wire.dialect import mavlink
 
 
 class Wire:

@@ -5,12 +5,12 @@ import struct
 
 import pytest
 
-from firmware_py.mavlink.dialect import mavlink
 from framerunner.cli import run
 from framerunner.doctor import visit
 from framerunner.doctor.arming import SUMMARY
 from framerunner.doctor.questions import PARAMETERS
 from framerunner.doctor.record import Record
+from wire.dialect import mavlink
 
 HARMLESS = {"HEARTBEAT", "COMMAND_LONG", "PARAM_REQUEST_READ"}
 

@@ -8,12 +8,12 @@ from contextlib import asynccontextmanager, suppress
 import aiohttp
 import pytest
 
-from firmware_py.mavlink.dialect import mavlink
 from framerunner.virtual_camera.painter import VirtualCamera
 from framerunner.virtual_camera.server import CameraServer
 from offboard.drone import DroneError
 from scenarios.loader import load_scenario
 from sitl.video import VideoServer
+from wire.dialect import mavlink
 
 SCENARIO = load_scenario("test-case-1")
 

@@ -5,8 +5,10 @@ from math import inf, nan
 import pytest
 from pymavlink.dialects.v20 import common as mavlink
 
-from mission_link.codec import encode_detections, encode_state, split_document
-from mission_link.messages import (
+from monitor.vehicle.mission import MissionView
+from tests.monitor.simulated_link import all_finite
+from wire.mission_codec import encode_detections, encode_state, split_document
+from wire.mission_messages import (
     DETECTIONS_TYPE,
     DOCUMENT_TYPE,
     STATE_TYPE,
@@ -14,8 +16,6 @@ from mission_link.messages import (
     MissionDetections,
     MissionState,
 )
-from monitor.vehicle.mission import MissionView
-from tests.monitor.simulated_link import all_finite
 
 CHART = {
     "name": "race <b>",

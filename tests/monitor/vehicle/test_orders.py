@@ -4,13 +4,13 @@ import asyncio
 
 import pytest
 
-from firmware_py.mavlink.dialect import mavlink
 from firmware_py.status import FlightMode
 from monitor.sticks import Sticks
 from monitor.vehicle.commands import CommandDesk
 from scenarios.loader import load_scenario
 from tests.monitor.simulated_link import SimulatedLink, equipment
 from tests.monitor.watching import watching
+from wire.dialect import mavlink
 
 SPEED = 4.0  # heartbeats come four times a second of the clock that orders count by
 

@@ -9,7 +9,7 @@ from collections.abc import Mapping
 from math import isfinite
 from typing import Any
 
-from mission_link.messages import Box, Document, DocumentKind, MissionDetections, MissionState
+from wire.mission_messages import Box, Document, DocumentKind, MissionDetections, MissionState
 
 VERSION = 1
 PIECE_BYTES = 118  # of a document, in one payload of at most 128

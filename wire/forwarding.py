@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-from firmware_py.mavlink.dialect import BROADCAST, Message, mavlink
+from wire.dialect import BROADCAST, Message, mavlink
 
 _FORGOTTEN_US = 60_000_000
 _CAPACITY = 64  # components in all; beyond, the one not heard for longest is forgotten

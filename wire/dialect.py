@@ -11,7 +11,7 @@ from typing import Any
 
 from pymavlink.dialects.v20 import development as mavlink
 
-from firmware_py.mavlink import extra_messages
+from wire import extra_messages
 
 extra_messages.complete(mavlink)
 

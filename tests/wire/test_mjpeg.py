@@ -4,7 +4,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from vision.mjpeg import MjpegParser, Part, StreamError, boundary_of
+from wire.mjpeg import MjpegParser, Part, StreamError, boundary_of
 
 
 def part(data: bytes, head: str = "", *, length: bool = True) -> bytes:

@@ -1,6 +1,6 @@
 import pytest
 
-from firmware_py.mavlink.schedule import Schedule
+from wire.schedule import Schedule
 
 
 def counted(schedule, seconds, step_us=4000):

@@ -3,7 +3,7 @@ from math import cos, sin
 from hypothesis import given
 from hypothesis import strategies as st
 
-from scenarios.axes import flip_quaternion, flip_vector, flip_yaw
+from geometry.axes import flip_quaternion, flip_vector, flip_yaw
 
 number = st.floats(-100, 100)
 

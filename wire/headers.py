@@ -8,7 +8,7 @@ from __future__ import annotations
 import numpy as np
 import numpy.typing as npt
 
-from firmware_py.mavlink.dialect import mavlink
+from wire.dialect import mavlink
 
 MARKER_V1 = int(mavlink.PROTOCOL_MARKER_V1)
 MARKER_V2 = int(mavlink.PROTOCOL_MARKER_V2)

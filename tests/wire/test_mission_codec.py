@@ -10,7 +10,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from mission_link.codec import (
+from wire.mission_codec import (
     MAX_DOCUMENT_BYTES,
     MAX_PIECES,
     PIECE_BYTES,
@@ -22,7 +22,7 @@ from mission_link.codec import (
     encode_state,
     split_document,
 )
-from mission_link.messages import UNSEEN, DocumentKind, MissionDetections, MissionState
+from wire.mission_messages import UNSEEN, DocumentKind, MissionDetections, MissionState
 
 MISSION, HISTORY, RESULT = DocumentKind
 TUNNEL_BYTES = 128

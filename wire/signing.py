@@ -11,8 +11,8 @@ from __future__ import annotations
 
 from hashlib import sha256
 
-from firmware_py.mavlink.dialect import Message, mavlink
-from firmware_py.mavlink.framing import message_id_of, source_of
+from wire.dialect import Message, mavlink
+from wire.framing import message_id_of, source_of
 
 KEY_BYTES = 32
 _SIGNATURE_BYTES = 6

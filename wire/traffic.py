@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from firmware_py.mavlink.dialect import Message, mavlink
+from wire.dialect import Message, mavlink
 
 _WINDOW_US = 1_000_000
 _MOST_SENDERS = 64  # whose gaps are counted; a noisy network must not fill the memory

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from math import atan2, pi, sqrt
 
-from firmware_py.types import Quaternion, Vec3
+from geometry.vectors import Quaternion, Vec3
 
 Rotation = tuple[float, float, float, float, float, float, float, float, float]
 """Rows of the matrix from body FRD to world NED; its last row is world down seen in body axes."""

@@ -4,8 +4,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from firmware_py.mavlink.dialect import mavlink
-from firmware_py.mavlink.framing import Packet, PacketReader
+from wire.dialect import mavlink
+from wire.framing import Packet, PacketReader
 
 PING = mavlink.MAVLink_ping_message(123456, 7, 1, 1)
 

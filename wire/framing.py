@@ -5,8 +5,8 @@ from __future__ import annotations
 from struct import Struct
 from sys import maxsize
 
-from firmware_py.mavlink.dialect import Message, mavlink
-from firmware_py.mavlink.headers import (
+from wire.dialect import Message, mavlink
+from wire.headers import (
     CHECKSUM_BYTES,
     CRC_EXTRA,
     HEADER_BYTES_V1,

@@ -8,8 +8,7 @@ their own inverses.
 
 from __future__ import annotations
 
-Vec3 = tuple[float, float, float]
-Quaternion = tuple[float, float, float, float]
+from geometry.vectors import Quaternion, Vec3
 
 
 def flip_vector(vector: Vec3) -> Vec3:

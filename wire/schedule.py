@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
-from firmware_py.mavlink.dialect import mavlink
+from wire.dialect import mavlink
 
 _NEVER_US = 1 << 62
 _REQUESTED_PHASE_US = 16_000

@@ -2,9 +2,9 @@
 
 import pytest
 
-from firmware_py.mavlink.dialect import mavlink
-from firmware_py.mavlink.forwarding import _CAPACITY, Router
 from firmware_py.mavlink.links import GROUND, ONBOARD
+from wire.dialect import mavlink
+from wire.forwarding import _CAPACITY, Router
 
 OTHERS = (245, 191)
 STATION = (255, 190)

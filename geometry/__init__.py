@@ -1,0 +1,1 @@
+"""Vectors, rotations, and the axes that the rooms use."""

@@ -1,1 +1,0 @@
-"""What an app tells of its mission over MAVLink, as bytes and back; see `docs/monitor-channels.md`."""
