@@ -116,12 +116,17 @@ def _services(autopilot: AutopilotPort, exchange: Exchange, options: NodeOptions
         merged(service.sources for service in services),
         merged(service.replies for service in services),
     )
+    own = [service for service in (streams, *services) if service is not camera]
     commands = CommandService(
         exchange,
-        merged(service.commands for service in (streams, *services)),
-        reserved=frozenset() if camera is None else camera.reserved,
+        AUTOPILOT_COMPONENT_ID,
+        merged(service.commands for service in own),
+        lambda command: camera is None or not camera.takes_broadcast(command),
     )
-    return (streams, *services, commands)
+    if camera is None:
+        return (streams, *services, commands)
+    camera_commands = CommandService(exchange, CAMERA_COMPONENT_ID, camera.commands, camera.takes_broadcast)
+    return (streams, *services, commands, camera_commands)
 
 
 class MavlinkNode:

@@ -10,11 +10,12 @@ from typing import Any, TypeVar
 
 from firmware_py.status import CommandResult
 from firmware_py.types import GeodeticPoint
-from wire.dialect import AUTOPILOT_COMPONENT_ID, Message, mavlink
+from wire.dialect import AUTOPILOT_COMPONENT_ID, BROADCAST, Message, mavlink
 from wire.link import Link
 
 _NOT_GIVEN = 0x7FFFFFFF  # of x and y in COMMAND_INT
 _RELATIVE_FRAMES = (mavlink.MAV_FRAME_GLOBAL_RELATIVE_ALT, mavlink.MAV_FRAME_GLOBAL_RELATIVE_ALT_INT)
+SevenParams = tuple[float, float, float, float, float, float, float]
 _EMPTY: Mapping[int, Any] = MappingProxyType({})
 Entry = TypeVar("Entry")
 
@@ -31,6 +32,8 @@ class Command:
         altitude_m: param 7 or z; above mean sea level unless the frame says above home.
         frame: MAV_FRAME of COMMAND_INT.
         params_567: params 5 to 7 as they came, for commands in which they are no place.
+        sender: system and component id.
+        repeated: it says that it is sent again, for want of an acknowledgement.
     """
 
     link: Link
@@ -40,13 +43,17 @@ class Command:
     altitude_m: float = nan
     frame: int = mavlink.MAV_FRAME_GLOBAL
     params_567: tuple[float, float, float] = (nan, nan, nan)
+    sender: tuple[int, int] = (BROADCAST, BROADCAST)
+    repeated: bool = False
 
     @classmethod
     def from_long(cls, link: Link, message: Message) -> Command:
         """The command of a COMMAND_LONG."""
         p5, p6, p7 = message.param5, message.param6, message.param7
         params = (message.param1, message.param2, message.param3, message.param4)
-        return cls(link, params, p5, p6, p7, params_567=(p5, p6, p7))
+        sender = (message.get_srcSystem(), message.get_srcComponent())
+        repeated = message.confirmation > 0
+        return cls(link, params, p5, p6, p7, params_567=(p5, p6, p7), sender=sender, repeated=repeated)
 
     @classmethod
     def from_int(cls, link: Link, message: Message) -> Command:
@@ -59,7 +66,13 @@ class Command:
             message.z,
             message.frame,
             (float(message.x), float(message.y), message.z),
+            (message.get_srcSystem(), message.get_srcComponent()),
         )
+
+    @property
+    def all_params(self) -> SevenParams:
+        """Params 1 to 7 as they came."""
+        return (*self.params, *self.params_567)
 
     @property
     def has_place(self) -> bool:

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections import OrderedDict
 from collections.abc import Callable
+from functools import partial
 from math import dist, inf, isfinite, isnan
 
 from firmware_py.mavlink.camera import messages
@@ -16,16 +17,14 @@ from firmware_py.mavlink.camera.model import (
     CameraModel,
     CaptureSink,
     CountingSink,
-    SevenParams,
     VideoStream,
 )
 from firmware_py.mavlink.port import AutopilotPort
-from firmware_py.mavlink.service import Service
+from firmware_py.mavlink.service import Command, Service, SevenParams
 from firmware_py.status import CommandResult
 from geometry.vectors import Vec3
-from wire.dialect import BROADCAST, Message, mavlink
+from wire.dialect import Message, mavlink
 from wire.exchange import Exchange
-from wire.link import Link
 
 _REMEMBERED = 1000  # pictures that can be told again
 _MAX_INTERVAL_S = 86400.0
@@ -143,9 +142,6 @@ class CameraComponent(Service):
         camera: which.
         video: its streams, the one to be preferred first.
         sink: who takes and keeps pictures; by default they are only counted.
-
-    Attributes:
-        reserved: commands to all components that this one answers, and the autopilot does not.
     """
 
     component_id = CAMERA_COMPONENT_ID
@@ -166,11 +162,11 @@ class CameraComponent(Service):
         self._captures = Captures(autopilot, exchange, camera, self._sink)
         self._heartbeat_due_us = 0
         self._last_single: tuple[int, int, float] | None = None
-        self._commands: dict[int, Callable[[SevenParams], CommandResult]] = {
+        self._work: dict[int, Callable[[SevenParams], CommandResult]] = {
             mavlink.MAV_CMD_DO_DIGICAM_CONTROL: self._digicam,
             mavlink.MAV_CMD_DO_SET_CAM_TRIGG_DIST: self._trigger_distance,
             mavlink.MAV_CMD_DO_SET_CAM_TRIGG_INTERVAL: self._trigger_interval,
-            mavlink.MAV_CMD_RESET_CAMERA_SETTINGS: self._reset,
+            mavlink.MAV_CMD_RESET_CAMERA_SETTINGS: self._stop_images,
             mavlink.MAV_CMD_SET_CAMERA_MODE: self._set_mode,
             mavlink.MAV_CMD_IMAGE_START_CAPTURE: self._start_images,
             mavlink.MAV_CMD_IMAGE_STOP_CAPTURE: self._stop_images,
@@ -182,11 +178,12 @@ class CameraComponent(Service):
             mavlink.MAV_CMD_SET_CAMERA_ZOOM: _cannot,
             mavlink.MAV_CMD_SET_CAMERA_FOCUS: _cannot,
         }
-        self.handlers = {
-            mavlink.MAVLINK_MSG_ID_COMMAND_LONG: self._receive_long,
-            mavlink.MAVLINK_MSG_ID_COMMAND_INT: self._receive_int,
+        self.commands = {
+            **{number: partial(_run, work) for number, work in self._work.items()},
+            **{number: partial(self._answer, *asked) for number, asked in _REQUESTS.items()},
+            mavlink.MAV_CMD_IMAGE_START_CAPTURE: self._start_once,
+            mavlink.MAV_CMD_REQUEST_MESSAGE: self._request_message,
         }
-        self.reserved = frozenset({*self._commands, *_REQUESTS})
 
     def update(self) -> None:
         """Send the heartbeat and take pictures that are due."""
@@ -199,69 +196,37 @@ class CameraComponent(Service):
 
     def run(self, command: int, params: SevenParams) -> CommandResult:
         """Do what a MAV_CMD to the camera says, from a mission for one; UNSUPPORTED if it is none of ours."""
-        handler = self._commands.get(command)
-        return CommandResult.UNSUPPORTED if handler is None else handler(params)
+        work = self._work.get(command)
+        return CommandResult.UNSUPPORTED if work is None else work(params)
 
-    def _receive_long(self, link: Link, message: Message) -> None:
-        params = (
-            message.param1,
-            message.param2,
-            message.param3,
-            message.param4,
-            message.param5,
-            message.param6,
-            message.param7,
-        )
-        self._receive(link, message, params, repeated=message.confirmation > 0)
+    def takes_broadcast(self, command: int) -> bool:
+        """Whether a command to all components is the camera's, and not the autopilot's."""
+        return command in self.commands and command != mavlink.MAV_CMD_REQUEST_MESSAGE
 
-    def _receive_int(self, link: Link, message: Message) -> None:
-        params = (
-            message.param1,
-            message.param2,
-            message.param3,
-            message.param4,
-            float(message.x),
-            float(message.y),
-            message.z,
-        )
-        self._receive(link, message, params, repeated=False)
+    def _start_once(self, command: Command) -> CommandResult:
+        """IMAGE_START_CAPTURE; the same single picture, which its number tells, is not taken again."""
+        _, _, count, number = command.params
+        if command.repeated and count == 1.0 and self._last_single == (*command.sender, number):
+            return CommandResult.ACCEPTED
+        result = self._start_images(command.all_params)
+        if result is CommandResult.ACCEPTED:
+            self._last_single = (*command.sender, number)
+        return result
 
-    def _receive(self, link: Link, message: Message, params: SevenParams, *, repeated: bool) -> None:
-        """Run a command and acknowledge it; one to all components only if it is a camera's."""
-        exchange, command = self._exchange, message.command
-        if not exchange.is_for_us(message, component_id=CAMERA_COMPONENT_ID):
-            return
-        if message.target_component == BROADCAST and command not in self.reserved:
-            return
-        sender = (message.get_srcSystem(), message.get_srcComponent())
-        if command == mavlink.MAV_CMD_REQUEST_MESSAGE:
-            result = self._request(link, params[0], params[1])
-        elif command in _REQUESTS:
-            wanted, place = _REQUESTS[command]
-            result = self._request(link, float(wanted), params[place - 1] if place else 0.0)
-        elif repeated and self._is_same_picture(command, sender, params):
-            result = CommandResult.ACCEPTED
-        else:
-            result = self.run(command, params)
-            if command == mavlink.MAV_CMD_IMAGE_START_CAPTURE and result is CommandResult.ACCEPTED:
-                self._last_single = (*sender, params[3])
-        acknowledgement = mavlink.MAVLink_command_ack_message(command, int(result), 0, 0, *sender)
-        exchange.send(link, acknowledgement, CAMERA_COMPONENT_ID)
+    def _request_message(self, command: Command) -> CommandResult:
+        message_id = command.params[0]
+        return self._send(command, int(message_id) if isfinite(message_id) else -1, command.params[1])
 
-    def _is_same_picture(self, command: int, sender: tuple[int, int], params: SevenParams) -> bool:
-        """Whether a repeated command asks for the picture it has already got: its number tells."""
-        return bool(
-            command == mavlink.MAV_CMD_IMAGE_START_CAPTURE
-            and params[2] == 1.0
-            and self._last_single == (*sender, params[3])
-        )
+    def _answer(self, message_id: int, place: int, command: Command) -> CommandResult:
+        """A request that is older than REQUEST_MESSAGE."""
+        return self._send(command, message_id, command.all_params[place - 1] if place else 0.0)
 
-    def _request(self, link: Link, message_id: float, argument: float) -> CommandResult:
+    def _send(self, command: Command, message_id: int, argument: float) -> CommandResult:
         index = int(argument) if isfinite(argument) and 0 <= argument < 1 << 31 else 0
-        messages = self._requested(int(message_id) if isfinite(message_id) else -1, index)
-        for message in messages:
-            self._exchange.send(link, message, CAMERA_COMPONENT_ID)
-        return CommandResult.ACCEPTED if messages else CommandResult.DENIED
+        answers = self._requested(message_id, index)
+        for answer in answers:
+            self._exchange.send(command.link, answer, CAMERA_COMPONENT_ID)
+        return CommandResult.ACCEPTED if answers else CommandResult.DENIED
 
     def _requested(self, message_id: int, index: int) -> list[Message]:
         time_us, captures = self._exchange.time_us, self._captures
@@ -321,14 +286,14 @@ class CameraComponent(Service):
         image = params[1] == mavlink.CAMERA_MODE_IMAGE
         return CommandResult.ACCEPTED if image else CommandResult.DENIED
 
-    def _reset(self, _params: SevenParams) -> CommandResult:
-        self._captures.stop()
-        return CommandResult.ACCEPTED
-
     def _start_streaming(self, params: SevenParams) -> CommandResult:
         """It runs already, if it is there: stream 0 means all."""
         there = isnan(params[0]) or 0 <= params[0] <= len(self._video)
         return CommandResult.ACCEPTED if there and self._video else CommandResult.DENIED
+
+
+def _run(work: Callable[[SevenParams], CommandResult], command: Command) -> CommandResult:
+    return work(command.all_params)
 
 
 def _cannot(_params: SevenParams) -> CommandResult:

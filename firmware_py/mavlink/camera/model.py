@@ -7,12 +7,11 @@ from enum import Enum
 from math import tan
 from typing import Protocol
 
+from firmware_py.mavlink.service import SevenParams
 from firmware_py.status import CommandResult
 
 CAMERA_COMPONENT_ID = 100  # MAV_COMP_ID_CAMERA
 _SENSOR_WIDTH_MM = 6.17  # nominal, of a 1/2.3 inch sensor: a pinhole has an angle of view but no size
-
-SevenParams = tuple[float, float, float, float, float, float, float]
 
 
 @dataclass(frozen=True, slots=True)
@@ -97,11 +96,9 @@ class CaptureSink(Protocol):
             Where it can be fetched, a URL of at most 205 bytes; empty if it is not kept; None if none could
             be taken.
         """
-        ...
 
     def space(self) -> PictureSpace | None:
         """How much room there is; None if pictures are not kept."""
-        ...
 
 
 class CountingSink:
@@ -121,4 +118,3 @@ class CameraControl(Protocol):
 
     def run(self, command: int, params: SevenParams) -> CommandResult:
         """Do what a MAV_CMD to the camera says; UNSUPPORTED if it is not the camera's."""
-        ...

@@ -31,7 +31,6 @@ class FailureSink(Protocol):
         Returns:
             False if it cannot be done; nothing has changed then.
         """
-        ...
 
 
 class MaintenanceCommands(Service):

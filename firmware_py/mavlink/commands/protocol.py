@@ -9,10 +9,10 @@ Differences from PX4, on purpose:
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from math import nan
 
-from firmware_py.mavlink.service import Command, CommandHandler, Service
+from firmware_py.mavlink.service import Command, CommandHandler, Handler, Service
 from firmware_py.status import CommandResult
 from wire.dialect import BROADCAST, Message, mavlink
 from wire.exchange import Exchange
@@ -25,25 +25,33 @@ _TO_EVERYONE = (
 
 
 class CommandService(Service):
-    """Takes commands to their handlers and acknowledges them.
+    """Takes one component's commands to their handlers and acknowledges them.
 
     Args:
         exchange: of the vehicle.
-        table: of all the autopilot's services, by MAV_CMD.
-        reserved: commands that another component answers when they are sent to all components.
+        component_id: whose commands.
+        table: of all the component's services, by MAV_CMD.
+        takes_broadcast: whether a command to all components is this one's to answer.
     """
 
     def __init__(
-        self, exchange: Exchange, table: Mapping[int, CommandHandler], reserved: frozenset[int]
+        self,
+        exchange: Exchange,
+        component_id: int,
+        table: Mapping[int, CommandHandler],
+        takes_broadcast: Callable[[int], bool],
     ) -> None:
         self._exchange = exchange
+        self.component_id = component_id
         self._table = table
-        self._reserved = reserved
-        self.handlers = {
+        self._takes_broadcast = takes_broadcast
+        handlers: dict[int, Handler] = {
             mavlink.MAVLINK_MSG_ID_COMMAND_LONG: self._receive_long,
             mavlink.MAVLINK_MSG_ID_COMMAND_INT: self._receive_int,
-            mavlink.MAVLINK_MSG_ID_SET_MODE: self._receive_set_mode,
         }
+        if mavlink.MAV_CMD_DO_SET_MODE in table:
+            handlers[mavlink.MAVLINK_MSG_ID_SET_MODE] = self._receive_set_mode
+        self.handlers = handlers
 
     def _receive_long(self, link: Link, message: Message) -> None:
         self._receive(message, Command.from_long(link, message))
@@ -54,10 +62,11 @@ class CommandService(Service):
     def _receive(self, message: Message, command: Command) -> None:
         """Run a command; one with a wrong target is ignored."""
         number = message.command
-        if not self._exchange.is_for_us(message, or_everyone=number in _TO_EVERYONE):
+        or_everyone = number in _TO_EVERYONE and number in self._table
+        if not self._exchange.is_for_us(message, or_everyone=or_everyone, component_id=self.component_id):
             return
-        if message.target_component != BROADCAST or number not in self._reserved:
-            self._run(message, number, command)
+        if message.target_component != BROADCAST or self._takes_broadcast(number):
+            self._run(number, command)
 
     def _receive_set_mode(self, link: Link, message: Message) -> None:
         """The legacy SET_MODE, which QGroundControl uses; acknowledged as DO_SET_MODE, as PX4 does."""
@@ -66,15 +75,13 @@ class CommandService(Service):
         main, sub = message.custom_mode >> 16 & 0xFF, message.custom_mode >> 24 & 0xFF
         if message.custom_mode & 0xFFFF:
             main = 0  # reserved bits are set, so this is no custom mode of PX4's
-        command = Command(link, (float(message.base_mode), float(main), float(sub), nan))
-        self._run(message, mavlink.MAV_CMD_DO_SET_MODE, command)
+        params = (float(message.base_mode), float(main), float(sub), nan)
+        sender = (message.get_srcSystem(), message.get_srcComponent())
+        self._run(mavlink.MAV_CMD_DO_SET_MODE, Command(link, params, sender=sender))
 
-    def _run(self, message: Message, number: int, command: Command) -> None:
+    def _run(self, number: int, command: Command) -> None:
         handler = self._table.get(number)
         result = CommandResult.UNSUPPORTED if handler is None else handler(command)
-        if result is None:
-            return
-        acknowledgement = mavlink.MAVLink_command_ack_message(
-            number, int(result), 0, 0, message.get_srcSystem(), message.get_srcComponent()
-        )
-        self._exchange.send(command.link, acknowledgement)
+        if result is not None:
+            acknowledgement = mavlink.MAVLink_command_ack_message(number, int(result), 0, 0, *command.sender)
+            self._exchange.send(command.link, acknowledgement, self.component_id)

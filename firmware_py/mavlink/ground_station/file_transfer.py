@@ -166,6 +166,127 @@ class _Checksum:
     crc: int = 0xFFFFFFFF  # zlib's inverted zero: PX4's sum starts at 0 and is not inverted
 
 
+class FileOperations:
+    """Does what requests ask for at once. Its methods raise RefusalError and OSError, which become NAKs.
+
+    Args:
+        tree: of files.
+        exchange: of the vehicle.
+    """
+
+    def __init__(self, tree: FileTree, exchange: Exchange) -> None:
+        self._tree = tree
+        self._exchange = exchange
+        self.table: dict[int, Callable[[Client, Request], Answer]] = {
+            Opcode.NONE: self._nothing,
+            Opcode.TERMINATE_SESSION: self._terminate,
+            Opcode.RESET_SESSIONS: self._reset,
+            Opcode.LIST_DIRECTORY: self._list,
+            Opcode.OPEN_FILE_RO: self._open,
+            Opcode.READ_FILE: self._read,
+            Opcode.CREATE_FILE: self._open,
+            Opcode.WRITE_FILE: self._write,
+            Opcode.REMOVE_FILE: self._change,
+            Opcode.CREATE_DIRECTORY: self._change,
+            Opcode.REMOVE_DIRECTORY: self._change,
+            Opcode.OPEN_FILE_WO: self._open,
+            Opcode.TRUNCATE_FILE: self._change,
+            Opcode.RENAME: self._rename,
+        }
+
+    def reading(self, client: Client, request: Request) -> Session:
+        """The session that a request reads from."""
+        session = client.session(request.session, self._exchange.time_us)
+        if session.writable:
+            raise refuse(errno.EBADF, session.path)
+        return session
+
+    def _nothing(self, _client: Client, request: Request) -> Answer:
+        return Answer(request.data, session=request.session, offset=request.offset)
+
+    def _terminate(self, client: Client, request: Request) -> Answer:
+        client.session(request.session, self._exchange.time_us)
+        client.close([request.session], request.raw, self._exchange.time_us)
+        return Answer(session=request.session)
+
+    def _reset(self, client: Client, request: Request) -> Answer:
+        client.close(list(client.sessions), request.raw, self._exchange.time_us)
+        return Answer(session=request.session)
+
+    def _list(self, _client: Client, request: Request) -> Answer:
+        page = self._tree.listing(parse_path(request.path), request.offset)
+        if not page:
+            raise RefusalError(FtpError.EOF)
+        return Answer(page, session=request.session, offset=request.offset)
+
+    def _open(self, client: Client, request: Request) -> Answer:
+        number, time_us = request.session, self._exchange.time_us
+        twin = client.twin(number, request.raw, time_us)
+        if twin is not None:
+            return Answer(pack("<I", twin.size), session=number)
+        client.make_room(number, time_us)
+        path, writable = parse_path(request.path), request.opcode != Opcode.OPEN_FILE_RO
+        size = self._prepare(path, request.opcode)
+        client.sessions[number] = Session(path, size, writable, request.raw, time_us, time_us)
+        return Answer(pack("<I", size & 0xFFFFFFFF), session=number)
+
+    def _prepare(self, path: Path, opcode: int) -> int:
+        """Have a file as it is to be opened; its size before, as PX4 tells it."""
+        try:
+            entry = self._tree.entry(path)
+            if entry.is_folder:
+                raise refuse(errno.EISDIR, path)
+            size = entry.size
+        except FileNotFoundError:
+            if opcode == Opcode.OPEN_FILE_RO:
+                raise
+            self._tree.writable(path).create(path)
+            return 0
+        if opcode != Opcode.OPEN_FILE_RO:
+            storage = self._tree.writable(path)
+            if opcode == Opcode.CREATE_FILE:
+                storage.truncate(path, 0)
+        return size
+
+    def _read(self, client: Client, request: Request) -> Answer:
+        session = self.reading(client, request)
+        if request.offset >= session.size:
+            raise RefusalError(FtpError.EOF)
+        data = self._tree.read(session.path, request.offset, request.size)
+        return Answer(data, session=request.session, offset=request.offset)
+
+    def _write(self, client: Client, request: Request) -> Answer:
+        session = client.session(request.session, self._exchange.time_us)
+        if not session.writable:
+            raise refuse(errno.EBADF, session.path)
+        self._tree.writable(session.path).write(session.path, request.offset, request.data)
+        return Answer(pack("<I", len(request.data)), session=request.session, offset=request.offset)
+
+    def _change(self, _client: Client, request: Request) -> Answer:
+        path, offset = parse_path(request.path), 0
+        storage = self._tree.writable(path)
+        match request.opcode:
+            case Opcode.REMOVE_FILE:
+                storage.remove(path)
+            case Opcode.CREATE_DIRECTORY:
+                storage.make_folder(path)
+            case Opcode.REMOVE_DIRECTORY:
+                storage.remove_folder(path)
+            case Opcode.TRUNCATE_FILE:
+                offset = request.offset
+                storage.truncate(path, offset)
+        return Answer(session=request.session, offset=offset)
+
+    def _rename(self, _client: Client, request: Request) -> Answer:
+        names = request.strings
+        if len(names) < 2:
+            raise refuse(errno.EINVAL, ())
+        old, new = parse_path(names[0]), parse_path(names[1])
+        self._tree.writable(old)
+        self._tree.writable(new).rename(old, new)
+        return Answer(session=request.session)
+
+
 class FileTransferService(Service):
     """Serves files.
 
@@ -180,28 +301,16 @@ class FileTransferService(Service):
     ) -> None:
         self._exchange = exchange
         self._tree = FileTree(storage, firmware_files)
+        self._operations = FileOperations(self._tree, exchange)
+        self._work: dict[int, Callable[[Client, Request], Answer | None]] = {
+            **self._operations.table,
+            Opcode.CALC_FILE_CRC32: self._checksum,
+            Opcode.BURST_READ_FILE: self._burst,
+        }
         self._clients = Clients()
         self._checksums: list[_Checksum] = []
         self._idle_due_us = 0
         self.handlers = {mavlink.MAVLINK_MSG_ID_FILE_TRANSFER_PROTOCOL: self._hear}
-        self._work: dict[int, Callable[[Client, Request], Answer | None]] = {
-            Opcode.NONE: self._nothing,
-            Opcode.TERMINATE_SESSION: self._terminate,
-            Opcode.RESET_SESSIONS: self._reset,
-            Opcode.LIST_DIRECTORY: self._list,
-            Opcode.OPEN_FILE_RO: self._open,
-            Opcode.READ_FILE: self._read,
-            Opcode.CREATE_FILE: self._open,
-            Opcode.WRITE_FILE: self._write,
-            Opcode.REMOVE_FILE: self._remove,
-            Opcode.CREATE_DIRECTORY: self._make_folder,
-            Opcode.REMOVE_DIRECTORY: self._remove_folder,
-            Opcode.OPEN_FILE_WO: self._open,
-            Opcode.TRUNCATE_FILE: self._truncate,
-            Opcode.RENAME: self._rename,
-            Opcode.CALC_FILE_CRC32: self._checksum,
-            Opcode.BURST_READ_FILE: self._burst,
-        }
 
     def update(self) -> None:
         """Go on with bursts and checksums, and close what is unused."""
@@ -256,96 +365,6 @@ class FileTransferService(Service):
             message = mavlink.MAVLink_file_transfer_protocol_message(0, system, component, payload)
             self._exchange.send(link, message)
 
-    def _nothing(self, _client: Client, request: Request) -> Answer:
-        return Answer(request.data, session=request.session, offset=request.offset)
-
-    def _terminate(self, client: Client, request: Request) -> Answer:
-        client.session(request.session, self._exchange.time_us)
-        client.close([request.session], request.raw, self._exchange.time_us)
-        return Answer(session=request.session)
-
-    def _reset(self, client: Client, request: Request) -> Answer:
-        client.close(list(client.sessions), request.raw, self._exchange.time_us)
-        return Answer(session=request.session)
-
-    def _list(self, _client: Client, request: Request) -> Answer:
-        page = self._tree.listing(parse_path(request.path), request.offset)
-        if not page:
-            raise RefusalError(FtpError.EOF)
-        return Answer(page, session=request.session, offset=request.offset)
-
-    def _open(self, client: Client, request: Request) -> Answer:
-        number, time_us = request.session, self._exchange.time_us
-        twin = client.twin(number, request.raw, time_us)
-        if twin is not None:
-            return Answer(pack("<I", twin.size), session=number)
-        client.make_room(number, time_us)
-        path, writable = parse_path(request.path), request.opcode != Opcode.OPEN_FILE_RO
-        size = self._prepare(path, request.opcode)
-        client.sessions[number] = Session(path, size, writable, request.raw, time_us, time_us)
-        return Answer(pack("<I", size & 0xFFFFFFFF), session=number)
-
-    def _prepare(self, path: Path, opcode: int) -> int:
-        """Have a file as it is to be opened; its size before, as PX4 tells it."""
-        try:
-            entry = self._tree.entry(path)
-            if entry.is_folder:
-                raise refuse(errno.EISDIR, path)
-            size = entry.size
-        except FileNotFoundError:
-            if opcode == Opcode.OPEN_FILE_RO:
-                raise
-            self._tree.writable(path).create(path)
-            return 0
-        if opcode != Opcode.OPEN_FILE_RO:
-            storage = self._tree.writable(path)
-            if opcode == Opcode.CREATE_FILE:
-                storage.truncate(path, 0)
-        return size
-
-    def _read(self, client: Client, request: Request) -> Answer:
-        session = self._reading(client, request)
-        if request.offset >= session.size:
-            raise RefusalError(FtpError.EOF)
-        data = self._tree.read(session.path, request.offset, request.size)
-        return Answer(data, session=request.session, offset=request.offset)
-
-    def _write(self, client: Client, request: Request) -> Answer:
-        session = client.session(request.session, self._exchange.time_us)
-        if not session.writable:
-            raise refuse(errno.EBADF, session.path)
-        self._tree.writable(session.path).write(session.path, request.offset, request.data)
-        return Answer(pack("<I", len(request.data)), session=request.session, offset=request.offset)
-
-    def _remove(self, _client: Client, request: Request) -> Answer:
-        path = parse_path(request.path)
-        self._tree.writable(path).remove(path)
-        return Answer(session=request.session)
-
-    def _make_folder(self, _client: Client, request: Request) -> Answer:
-        path = parse_path(request.path)
-        self._tree.writable(path).make_folder(path)
-        return Answer(session=request.session)
-
-    def _remove_folder(self, _client: Client, request: Request) -> Answer:
-        path = parse_path(request.path)
-        self._tree.writable(path).remove_folder(path)
-        return Answer(session=request.session)
-
-    def _truncate(self, _client: Client, request: Request) -> Answer:
-        path = parse_path(request.path)
-        self._tree.writable(path).truncate(path, request.offset)
-        return Answer(session=request.session, offset=request.offset)
-
-    def _rename(self, _client: Client, request: Request) -> Answer:
-        names = request.strings
-        if len(names) < 2:
-            raise refuse(errno.EINVAL, ())
-        old, new = parse_path(names[0]), parse_path(names[1])
-        self._tree.writable(old)
-        self._tree.writable(new).rename(old, new)
-        return Answer(session=request.session)
-
     def _checksum(self, client: Client, request: Request) -> Answer | None:
         path = parse_path(request.path)
         entry = self._tree.entry(path)
@@ -376,15 +395,9 @@ class FileTransferService(Service):
         self._reply(checksum.client, checksum.request, answer)
 
     def _burst(self, client: Client, request: Request) -> None:
-        session = self._reading(client, request)
+        session = self._operations.reading(client, request)
         if session.burst is None or session.burst.request != request.raw:  # else it came twice
             session.burst = Burst(request.raw, request.sequence + 1, request.offset)
-
-    def _reading(self, client: Client, request: Request) -> Session:
-        session = client.session(request.session, self._exchange.time_us)
-        if session.writable:
-            raise refuse(errno.EBADF, session.path)
-        return session
 
     def _send_burst(self, client: Client, number: int, session: Session, room: dict[str, int]) -> None:
         """Send the next packets of a burst, as many as its link has room for."""

@@ -6,7 +6,7 @@ from math import isfinite
 
 from firmware_py.geodesy import LocalProjection
 from firmware_py.mavlink.camera.model import CameraControl
-from firmware_py.mavlink.missions.messages import MissionCurrent
+from firmware_py.mavlink.missions.messages import mission_current
 from firmware_py.mavlink.port import AutopilotPort
 from firmware_py.mavlink.service import Command, Service
 from firmware_py.missions.checks import mission_faults
@@ -115,7 +115,7 @@ class MissionExecution(Service):
     def _mission_current(self) -> Message:
         """MISSION_CURRENT, with the ids of all three plans."""
         store, mode = self._autopilot.missions, self._autopilot.status.mode
-        return MissionCurrent(
+        return mission_current(
             store.current,
             len(store.mission.items) or _NO_TOTAL,
             _mission_state(self._autopilot),

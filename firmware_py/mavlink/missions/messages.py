@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass
 from math import isfinite, isinf, isnan, nan
-from struct import Struct
+from struct import pack
 
 from firmware_py.mavlink.scaling import whole
 from firmware_py.missions.fence_shapes import FEWEST_VERTICES, vertex_count
@@ -143,58 +143,39 @@ def _as_int(value: float, scale: float) -> int:
     return _NOT_GIVEN if isnan(value) else whole(value * scale, 32)
 
 
-class MissionCount(mavlink.MAVLink_message):  # type: ignore[misc]  # pymavlink has no types
-    """MISSION_COUNT (44)."""
+class ExtendedMessage(mavlink.MAVLink_message):  # type: ignore[misc]  # pymavlink has no types
+    """A message with an extension field that the dialect does not know yet.
 
-    id = mavlink.MAVLINK_MSG_ID_MISSION_COUNT
-    msgname = "MISSION_COUNT"
-    crc_extra = mavlink.MAVLink_mission_count_message.crc_extra
-    unpacker = Struct("<HBBBI")
+    Args:
+        known: the dialect's message.
+        layout: of all fields, for `struct`.
+        fields: in the order of the wire.
+    """
 
-    def __init__(self, target: tuple[int, int], count: int, mission_type: int, opaque_id: int) -> None:
-        """Args: target system and component, number of items, MAV_MISSION_TYPE, id of the plan or 0."""
-        mavlink.MAVLink_message.__init__(self, self.id, self.msgname)
-        self.fields = (count, *target, mission_type, opaque_id)
-
-    def pack(self, mav: Message, force_mavlink1: bool = False) -> bytes:
-        """The packet."""
-        payload = self.unpacker.pack(*self.fields)
-        return bytes(self._pack(mav, self.crc_extra, payload, force_mavlink1=force_mavlink1))
-
-
-class MissionAck(mavlink.MAVLink_message):  # type: ignore[misc]  # pymavlink has no types
-    """MISSION_ACK (47)."""
-
-    id = mavlink.MAVLINK_MSG_ID_MISSION_ACK
-    msgname = "MISSION_ACK"
-    crc_extra = mavlink.MAVLink_mission_ack_message.crc_extra
-    unpacker = Struct("<BBBBI")
-
-    def __init__(self, target: tuple[int, int], result: int, mission_type: int, opaque_id: int = 0) -> None:
-        """Args: target system and component, MAV_MISSION_RESULT, MAV_MISSION_TYPE, id of the new plan."""
-        mavlink.MAVLink_message.__init__(self, self.id, self.msgname)
-        self.fields = (*target, result, mission_type, opaque_id)
+    def __init__(self, known: Message, layout: str, *fields: int) -> None:
+        mavlink.MAVLink_message.__init__(self, known.id, known.msgname)
+        self.crc_extra = known.crc_extra
+        self._payload = pack(layout, *fields)
 
     def pack(self, mav: Message, force_mavlink1: bool = False) -> bytes:
         """The packet."""
-        payload = self.unpacker.pack(*self.fields)
-        return bytes(self._pack(mav, self.crc_extra, payload, force_mavlink1=force_mavlink1))
+        return bytes(self._pack(mav, self.crc_extra, self._payload, force_mavlink1=force_mavlink1))
 
 
-class MissionCurrent(mavlink.MAVLink_message):  # type: ignore[misc]  # pymavlink has no types
-    """MISSION_CURRENT (42)."""
+def mission_count(target: tuple[int, int], count: int, mission_type: int, opaque_id: int) -> Message:
+    """MISSION_COUNT with the id of the plan, or 0."""
+    known = mavlink.MAVLink_mission_count_message
+    return ExtendedMessage(known, "<HBBBI", count, *target, mission_type, opaque_id)
 
-    id = mavlink.MAVLINK_MSG_ID_MISSION_CURRENT
-    msgname = "MISSION_CURRENT"
-    crc_extra = mavlink.MAVLink_mission_current_message.crc_extra
-    unpacker = Struct("<HHBBIII")
 
-    def __init__(self, seq: int, total: int, state: int, mode: int, opaque_ids: tuple[int, int, int]) -> None:
-        """Args: item, number of items, MISSION_STATE, 1 active or 2 not, ids of mission, fence and rally."""
-        mavlink.MAVLink_message.__init__(self, self.id, self.msgname)
-        self.fields = (seq, total, state, mode, *opaque_ids)
+def mission_ack(target: tuple[int, int], result: int, mission_type: int, opaque_id: int) -> Message:
+    """MISSION_ACK with the id of the new plan, or 0."""
+    return ExtendedMessage(
+        mavlink.MAVLink_mission_ack_message, "<BBBBI", *target, result, mission_type, opaque_id
+    )
 
-    def pack(self, mav: Message, force_mavlink1: bool = False) -> bytes:
-        """The packet."""
-        payload = self.unpacker.pack(*self.fields)
-        return bytes(self._pack(mav, self.crc_extra, payload, force_mavlink1=force_mavlink1))
+
+def mission_current(seq: int, total: int, state: int, mode: int, opaque_ids: tuple[int, int, int]) -> Message:
+    """MISSION_CURRENT: item, number of items, MISSION_STATE, 1 active or 2 not, ids of the three plans."""
+    known = mavlink.MAVLink_mission_current_message
+    return ExtendedMessage(known, "<HHBBIII", seq, total, state, mode, *opaque_ids)

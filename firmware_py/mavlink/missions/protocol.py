@@ -14,7 +14,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 
 from firmware_py.mavlink.missions.execution import MissionExecution
-from firmware_py.mavlink.missions.messages import MissionAck, MissionCount, Refusal, item_message, read_item
+from firmware_py.mavlink.missions.messages import Refusal, item_message, mission_ack, mission_count, read_item
 from firmware_py.mavlink.port import AutopilotPort
 from firmware_py.mavlink.service import Service
 from firmware_py.missions.fence_shapes import fence_fault
@@ -283,7 +283,7 @@ class MissionService(Service):
         self._downloads[_key(partner, plan_type)] = (plan, self._exchange.time_us)
         if len(self._downloads) > _MAX_DOWNLOADS:
             self._downloads.pop(next(iter(self._downloads)))
-        count = MissionCount(partner.address, len(plan.items), plan_type, plan.opaque_id)
+        count = mission_count(partner.address, len(plan.items), plan_type, plan.opaque_id)
         self._exchange.send(link, count)
 
     def _request(self, link: Link, message: Message) -> None:
@@ -365,7 +365,7 @@ class MissionService(Service):
         return Partner(link, message.get_srcSystem(), message.get_srcComponent()) if for_us else None
 
     def _answer(self, partner: Partner, result: int, mission_type: int, opaque_id: int = 0) -> None:
-        self._exchange.send(partner.link, MissionAck(partner.address, result, mission_type, opaque_id))
+        self._exchange.send(partner.link, mission_ack(partner.address, result, mission_type, opaque_id))
 
     def _say(self, text: str) -> None:
         self._autopilot.say(_CRITICAL, text)

@@ -19,44 +19,15 @@ from wire.link import Link
 _MAX_MESSAGE_ID = 0xFFFFFF
 _MAX_INTERVAL_US = 0x7FFFFFFF
 _LINK_NODE_STATUS = mavlink.MAVLINK_MSG_ID_LINK_NODE_STATUS  # the one message that differs from link to link
-_SILENT = frozenset(
-    int(getattr(mavlink, f"MAVLINK_MSG_ID_{name}"))
-    for name in (
-        "ADSB_VEHICLE",
-        "CAMERA_TRIGGER",
-        "COLLISION",
-        "DEBUG",
-        "DEBUG_FLOAT_ARRAY",
-        "DEBUG_VECT",
-        "EFI_STATUS",
-        "GIMBAL_DEVICE_ATTITUDE_STATUS",
-        "GIMBAL_DEVICE_INFORMATION",
-        "GIMBAL_DEVICE_SET_ATTITUDE",
-        "GIMBAL_MANAGER_INFORMATION",
-        "GIMBAL_MANAGER_STATUS",
-        "GPS2_RAW",
-        "GPS_STATUS",
-        "HYGROMETER_SENSOR",
-        "LANDING_TARGET",
-        "MAG_CAL_REPORT",
-        "MANUAL_CONTROL",
-        "MOUNT_ORIENTATION",
-        "NAMED_VALUE_FLOAT",
-        "NAV_CONTROLLER_OUTPUT",
-        "OBSTACLE_DISTANCE",
-        "OPEN_DRONE_ID_ARM_STATUS",
-        "OPEN_DRONE_ID_BASIC_ID",
-        "OPTICAL_FLOW_RAD",
-        "ORBIT_EXECUTION_STATUS",
-        "RAW_RPM",
-        "RC_CHANNELS",
-        "SCALED_IMU2",
-        "SCALED_IMU3",
-        "SCALED_PRESSURE2",
-        "SCALED_PRESSURE3",
-        "WIND_COV",
-    )
-)
+_SILENT = """
+    ADSB_VEHICLE CAMERA_TRIGGER COLLISION DEBUG DEBUG_FLOAT_ARRAY DEBUG_VECT EFI_STATUS
+    GIMBAL_DEVICE_ATTITUDE_STATUS GIMBAL_DEVICE_INFORMATION GIMBAL_DEVICE_SET_ATTITUDE
+    GIMBAL_MANAGER_INFORMATION GIMBAL_MANAGER_STATUS GPS2_RAW GPS_STATUS HYGROMETER_SENSOR
+    LANDING_TARGET MAG_CAL_REPORT MANUAL_CONTROL MOUNT_ORIENTATION NAMED_VALUE_FLOAT
+    NAV_CONTROLLER_OUTPUT OBSTACLE_DISTANCE OPEN_DRONE_ID_ARM_STATUS OPEN_DRONE_ID_BASIC_ID
+    OPTICAL_FLOW_RAD ORBIT_EXECUTION_STATUS RAW_RPM RC_CHANNELS SCALED_IMU2 SCALED_IMU3 SCALED_PRESSURE2
+    SCALED_PRESSURE3 WIND_COV
+"""
 
 
 class StreamService(Service):
@@ -74,7 +45,8 @@ class StreamService(Service):
         self._exchange = exchange
         self._sources = sources
         self._replies = replies
-        self._streamable = frozenset({*sources, _LINK_NODE_STATUS, *_SILENT})
+        silent = (getattr(mavlink, f"MAVLINK_MSG_ID_{name}") for name in _SILENT.split())
+        self._streamable = frozenset({*sources, _LINK_NODE_STATUS, *silent})
         self.commands = {
             mavlink.MAV_CMD_GET_HOME_POSITION: self._requester(mavlink.MAVLINK_MSG_ID_HOME_POSITION),
             mavlink.MAV_CMD_GET_MESSAGE_INTERVAL: self._get_interval,
