@@ -11,7 +11,9 @@ It answers as PX4 does. Differences, all for links that lose, double or swap pac
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, field
+from functools import partial
 
 from firmware_py.mavlink.missions.execution import MissionExecution
 from firmware_py.mavlink.missions.messages import Refusal, item_message, mission_ack, mission_count, read_item
@@ -125,17 +127,20 @@ class MissionService(Service):
         self._outcome: Outcome | None = None
         self._downloads: dict[_DownloadKey, tuple[Plan, int]] = {}  # what is read, and when it was last
         self.handlers = {
-            mavlink.MAVLINK_MSG_ID_MISSION_COUNT: self._count,
-            mavlink.MAVLINK_MSG_ID_MISSION_ITEM: self._item,
-            mavlink.MAVLINK_MSG_ID_MISSION_ITEM_INT: self._item,
-            mavlink.MAVLINK_MSG_ID_MISSION_ACK: self._ack,
-            mavlink.MAVLINK_MSG_ID_MISSION_REQUEST_LIST: self._request_list,
-            mavlink.MAVLINK_MSG_ID_MISSION_REQUEST: self._request,
-            mavlink.MAVLINK_MSG_ID_MISSION_REQUEST_INT: self._request,
-            mavlink.MAVLINK_MSG_ID_MISSION_REQUEST_PARTIAL_LIST: self._partial_list,
-            mavlink.MAVLINK_MSG_ID_MISSION_WRITE_PARTIAL_LIST: self._partial_list,
-            mavlink.MAVLINK_MSG_ID_MISSION_CLEAR_ALL: self._clear_all,
-            mavlink.MAVLINK_MSG_ID_MISSION_SET_CURRENT: self._set_current,
+            message_id: partial(self._receive, work)
+            for message_id, work in {
+                mavlink.MAVLINK_MSG_ID_MISSION_COUNT: self._count,
+                mavlink.MAVLINK_MSG_ID_MISSION_ITEM: self._item,
+                mavlink.MAVLINK_MSG_ID_MISSION_ITEM_INT: self._item,
+                mavlink.MAVLINK_MSG_ID_MISSION_ACK: self._ack,
+                mavlink.MAVLINK_MSG_ID_MISSION_REQUEST_LIST: self._request_list,
+                mavlink.MAVLINK_MSG_ID_MISSION_REQUEST: self._request,
+                mavlink.MAVLINK_MSG_ID_MISSION_REQUEST_INT: self._request,
+                mavlink.MAVLINK_MSG_ID_MISSION_REQUEST_PARTIAL_LIST: self._partial_list,
+                mavlink.MAVLINK_MSG_ID_MISSION_WRITE_PARTIAL_LIST: self._partial_list,
+                mavlink.MAVLINK_MSG_ID_MISSION_CLEAR_ALL: self._clear_all,
+                mavlink.MAVLINK_MSG_ID_MISSION_SET_CURRENT: self._set_current,
+            }.items()
         }
 
     def update(self) -> None:
@@ -150,12 +155,18 @@ class MissionService(Service):
         if self._downloads:
             self._forget_downloads(now_us)
 
+    def _receive(self, work: Callable[[Partner, Message], None], link: Link, message: Message) -> None:
+        """Act on a message that is for us."""
+        if message.target_component == _MISSION_PLANNER:
+            for_us = message.target_system == self._exchange.system_id
+        else:
+            for_us = self._exchange.is_for_us(message)
+        if for_us:
+            work(Partner(link, message.get_srcSystem(), message.get_srcComponent()), message)
+
     # Uploads
 
-    def _count(self, link: Link, message: Message) -> None:
-        partner = self._partner(link, message)
-        if partner is None:
-            return
+    def _count(self, partner: Partner, message: Message) -> None:
         plan_type = _PLAN_TYPES.get(message.mission_type)
         upload, now_us = self._upload, self._exchange.time_us
         if plan_type is None:
@@ -189,10 +200,7 @@ class MissionService(Service):
             upload.partner.link, build(*upload.partner.address, upload.wanted, int(upload.plan_type))
         )
 
-    def _item(self, link: Link, message: Message) -> None:
-        partner = self._partner(link, message)
-        if partner is None:
-            return
+    def _item(self, partner: Partner, message: Message) -> None:
         upload = self._upload
         if self._repeat_outcome(partner, message):
             return
@@ -253,11 +261,9 @@ class MissionService(Service):
         self._answer(partner, outcome.result, outcome.plan_type, outcome.opaque_id)
         return True
 
-    def _ack(self, link: Link, message: Message) -> None:
+    def _ack(self, partner: Partner, message: Message) -> None:
         """The other side cancels, or wants to be asked in the other form; or it has read all."""
-        partner, upload = self._partner(link, message), self._upload
-        if partner is None:
-            return
+        upload = self._upload
         plan_type = _PLAN_TYPES.get(message.mission_type)
         if plan_type is not None:
             self._downloads.pop(_key(partner, plan_type), None)
@@ -271,10 +277,7 @@ class MissionService(Service):
 
     # Downloads
 
-    def _request_list(self, link: Link, message: Message) -> None:
-        partner = self._partner(link, message)
-        if partner is None:
-            return
+    def _request_list(self, partner: Partner, message: Message) -> None:
         plan_type = _PLAN_TYPES.get(message.mission_type)
         if plan_type is None:
             self._answer(partner, mavlink.MAV_MISSION_UNSUPPORTED, message.mission_type)
@@ -284,12 +287,9 @@ class MissionService(Service):
         if len(self._downloads) > _MAX_DOWNLOADS:
             self._downloads.pop(next(iter(self._downloads)))
         count = mission_count(partner.address, len(plan.items), plan_type, plan.opaque_id)
-        self._exchange.send(link, count)
+        self._exchange.send(partner.link, count)
 
-    def _request(self, link: Link, message: Message) -> None:
-        partner = self._partner(link, message)
-        if partner is None:
-            return
+    def _request(self, partner: Partner, message: Message) -> None:
         plan_type = _PLAN_TYPES.get(message.mission_type)
         if plan_type is None:
             self._answer(partner, mavlink.MAV_MISSION_UNSUPPORTED, message.mission_type)
@@ -307,23 +307,19 @@ class MissionService(Service):
         answer = item_message(
             plan.items[message.seq], partner.address, plan_type, current=current, as_int=as_int
         )
-        self._exchange.send(link, answer)
+        self._exchange.send(partner.link, answer)
 
     def _forget_downloads(self, now_us: int) -> None:
         for key in [key for key, (_, used_us) in self._downloads.items() if now_us - used_us > _GIVE_UP_US]:
             del self._downloads[key]
 
-    def _partial_list(self, link: Link, message: Message) -> None:
-        partner = self._partner(link, message)
-        if partner is not None:
-            self._answer(partner, mavlink.MAV_MISSION_UNSUPPORTED, message.mission_type)
+    def _partial_list(self, partner: Partner, message: Message) -> None:
+        self._answer(partner, mavlink.MAV_MISSION_UNSUPPORTED, message.mission_type)
 
     # The rest
 
-    def _clear_all(self, link: Link, message: Message) -> None:
-        partner, upload = self._partner(link, message), self._upload
-        if partner is None:
-            return
+    def _clear_all(self, partner: Partner, message: Message) -> None:
+        upload = self._upload
         result = mavlink.MAV_MISSION_ACCEPTED
         if message.mission_type == mavlink.MAV_MISSION_TYPE_ALL:
             cleared = tuple(PlanType)
@@ -345,9 +341,7 @@ class MissionService(Service):
         self._store.clear(plan_type)
         self._execution.check()
 
-    def _set_current(self, link: Link, message: Message) -> None:
-        if self._partner(link, message) is None:
-            return
+    def _set_current(self, partner: Partner, message: Message) -> None:
         if self._upload is not None:
             self._say("WPM: IGN WP CURR CMD: Busy")
         elif self._store.select(message.seq):
@@ -355,14 +349,6 @@ class MissionService(Service):
         else:
             count = len(self._store.mission.items)
             self._say(f"WPM: WP CURR CMD: Not in list: {message.seq} of {count}")
-
-    def _partner(self, link: Link, message: Message) -> Partner | None:
-        """Who sent a message; None when it is not for us."""
-        if message.target_component == _MISSION_PLANNER:
-            for_us = message.target_system == self._exchange.system_id
-        else:
-            for_us = self._exchange.is_for_us(message)
-        return Partner(link, message.get_srcSystem(), message.get_srcComponent()) if for_us else None
 
     def _answer(self, partner: Partner, result: int, mission_type: int, opaque_id: int = 0) -> None:
         self._exchange.send(partner.link, mission_ack(partner.address, result, mission_type, opaque_id))
