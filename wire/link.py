@@ -38,6 +38,7 @@ class LinkProfile:
     trusted: bool = True
 
 
+@dataclass(slots=True)
 class Traffic:
     """Counts of one link, both ways.
 
@@ -49,35 +50,17 @@ class Traffic:
         messages_lost: gaps in the senders' sequence numbers.
     """
 
-    __slots__ = (
-        "_next",
-        "_rates_bytes_s",
-        "_window",
-        "bytes_heard",
-        "bytes_sent",
-        "messages_heard",
-        "messages_lost",
-        "messages_sent",
-    )
-
-    def __init__(self) -> None:
-        self.messages_sent = 0
-        self.bytes_sent = 0
-        self.messages_heard = 0
-        self.bytes_heard = 0
-        self.messages_lost = 0
-        self._next: dict[tuple[int, int], int] = {}
-        self._window = (0, 0, 0)  # time, bytes sent and heard where it began
-        self._rates_bytes_s = (0, 0)
+    messages_sent: int = 0
+    bytes_sent: int = 0
+    messages_heard: int = 0
+    bytes_heard: int = 0
+    messages_lost: int = 0
+    _next: dict[tuple[int, int], int] = field(default_factory=dict)  # sequence number by sender
+    _window: tuple[int, int, int] = (0, 0, 0)  # time, bytes sent and heard where it began
+    _rates_bytes_s: tuple[int, int] = (0, 0)
 
     def hear(self, sender: tuple[int, int], sequence: int, size: int) -> None:
-        """Count a sound packet.
-
-        Args:
-            sender: system and component id.
-            sequence: the packet's number, 0 to 255.
-            size: in bytes.
-        """
+        """Count a sound packet: its sender's system and component id, its number, its size in bytes."""
         self.messages_heard += 1
         self.bytes_heard += size
         expected = self._next.get(sender)

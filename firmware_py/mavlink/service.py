@@ -103,7 +103,8 @@ class Service:
     """One MAVLink service of one of the vehicle's components.
 
     A service sets the tables that it has in its constructor, and overrides `update` if it sends something
-    that nobody asked for. No two services of a component have an entry for the same id.
+    that nobody asked for. No two services of a component have an entry for the same id. Most are
+    given `autopilot`, for which they speak, and `exchange`, the vehicle's links and time.
 
     Attributes:
         component_id: whose service it is.

@@ -137,8 +137,6 @@ class CameraComponent(Service):
     """Answers for the camera, sends its heartbeat and takes its pictures.
 
     Args:
-        autopilot: of the vehicle it sits on.
-        exchange: of the vehicle.
         camera: which.
         video: its streams, the one to be preferred first.
         sink: who takes and keeps pictures; by default they are only counted.

@@ -112,14 +112,7 @@ def capture_status(interval_s: float, count: int, space: PictureSpace | None, ti
 
 
 def image_captured(autopilot: AutopilotPort, exchange: Exchange, index: int, url: str | None) -> Message:
-    """CAMERA_IMAGE_CAPTURED: a picture taken now, and where; the camera is fixed to the vehicle.
-
-    Args:
-        autopilot: that knows where the camera is.
-        exchange: of the vehicle.
-        index: of the picture.
-        url: where it can be fetched; None: it could not be taken.
-    """
+    """CAMERA_IMAGE_CAPTURED: a picture taken now, where, and its URL; None: it could not be taken."""
     place, home = autopilot.global_position(), autopilot.status.home
     altitude_m = place.altitude_m if place else 0.0
     return mavlink.MAVLink_camera_image_captured_message(

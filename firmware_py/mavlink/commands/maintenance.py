@@ -37,7 +37,6 @@ class MaintenanceCommands(Service):
     """Does them.
 
     Args:
-        autopilot: whom they concern.
         failures: breaks parts; None: nothing can be broken.
     """
 
@@ -74,7 +73,7 @@ class MaintenanceCommands(Service):
         numbers = [_whole(unit), _whole(kind), _whole(instance) if isfinite(instance) else 0]
         if min(numbers) < 0 or self._failures is None or not self._failures.inject(*numbers):
             return CommandResult.UNSUPPORTED
-        what = "mended" if numbers[1] == mavlink.FAILURE_TYPE_OK else f"failure {numbers[1]}"
+        what = "repaired" if numbers[1] == mavlink.FAILURE_TYPE_OK else f"failure {numbers[1]}"
         autopilot.say(mavlink.MAV_SEVERITY_WARNING, f"Injected: unit {numbers[0]}.{numbers[2]} {what}")
         return CommandResult.ACCEPTED
 

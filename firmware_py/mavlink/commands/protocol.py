@@ -28,7 +28,6 @@ class CommandService(Service):
     """Takes one component's commands to their handlers and acknowledges them.
 
     Args:
-        exchange: of the vehicle.
         component_id: whose commands.
         table: of all the component's services, by MAV_CMD.
         takes_broadcast: whether a command to all components is this one's to answer.

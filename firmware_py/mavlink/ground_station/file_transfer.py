@@ -171,7 +171,6 @@ class FileOperations:
 
     Args:
         tree: of files.
-        exchange: of the vehicle.
     """
 
     def __init__(self, tree: FileTree, exchange: Exchange) -> None:
@@ -291,7 +290,6 @@ class FileTransferService(Service):
     """Serves files.
 
     Args:
-        exchange: of the vehicle.
         storage: what clients may change; None: there are only the firmware's files.
         firmware_files: path to content, such as `etc/extras/parameters.json.xz`, for `mftp://` addresses.
     """

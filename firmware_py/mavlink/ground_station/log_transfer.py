@@ -57,7 +57,6 @@ class LogTransferService(Service):
     """Lists and sends the logs.
 
     Args:
-        exchange: of the vehicle.
         storage: where the logs are; None: there are none.
     """
 

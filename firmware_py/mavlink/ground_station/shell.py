@@ -45,7 +45,6 @@ class Console:
     """What the shell knows: words in, text out. Nothing here reaches further than the vehicle.
 
     Args:
-        autopilot: about which is asked.
         system_id: of the vehicle.
     """
 
@@ -163,12 +162,7 @@ class _Shell:
 
 
 class ShellService(Service):
-    """Answers what is typed.
-
-    Args:
-        autopilot: about which is asked.
-        exchange: of the vehicle.
-    """
+    """Answers what is typed."""
 
     def __init__(self, autopilot: AutopilotPort, exchange: Exchange) -> None:
         self._console = Console(autopilot, exchange.system_id)

@@ -35,8 +35,6 @@ class MissionExecution(Service):
     """Checks missions when they change, starts them, tells where they are and passes on their commands.
 
     Args:
-        autopilot: that flies the mission.
-        exchange: of the vehicle.
         camera: that the mission may command; None: there is none.
     """
 

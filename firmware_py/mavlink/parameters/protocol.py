@@ -42,12 +42,7 @@ def _from_float(declared: Parameter, value: float) -> float:
 
 
 class Refusals:
-    """Says why a value was refused; once, as clients repeat what is not taken up to six times.
-
-    Args:
-        autopilot: who says it.
-        exchange: of the vehicle.
-    """
+    """Says why a value was refused; once, as clients repeat what is not taken up to six times."""
 
     __slots__ = ("_autopilot", "_exchange", "_said", "_said_us")
 
@@ -70,7 +65,6 @@ class Listings:
     """The lists under way, one a link.
 
     Args:
-        exchange: of the vehicle.
         count: of parameters.
         message: makes the message of an index.
         first: index with which a list begins; -1 where something comes before the parameters.

@@ -24,8 +24,6 @@ class StatusTextService(Service):
     """Brings the autopilot's texts to people.
 
     Args:
-        autopilot: whose texts.
-        exchange: of the vehicle.
         announce: tells a text as an event, if there is one that says the same, and answers whether.
         log: called with vehicle time and each text, heard by anybody or not.
     """

@@ -34,7 +34,6 @@ class StreamService(Service):
     """Sends what is due on each link and what is asked for.
 
     Args:
-        exchange: of the vehicle.
         sources: of all services, by message id.
         replies: of all services, by message id.
     """
