@@ -11,9 +11,10 @@ from rich.live import Live
 from rich.markup import escape
 from rich.table import Table
 
-from framerunner.judges import Judge, Standing
+from framerunner.judges import Judge
 from framerunner.recorder import FlightRecorder
 from offboard.app import Moment
+from scenarios.result import RefereeSnapshot
 from vision.types import Detection
 
 _REFRESH_S = 0.2
@@ -50,7 +51,7 @@ class FlightDisplay:
                 live.update(self._table(await self._judge.standing()), refresh=True)
                 await asyncio.sleep(_REFRESH_S)
 
-    def _print_line(self, standing: Standing | None) -> None:
+    def _print_line(self, standing: RefereeSnapshot | None) -> None:
         moment = self._recorder.latest
         if moment is None:
             return
@@ -68,7 +69,7 @@ class FlightDisplay:
             flush=True,
         )
 
-    def _table(self, standing: Standing | None) -> Table:
+    def _table(self, standing: RefereeSnapshot | None) -> Table:
         moment = self._recorder.latest
         if moment is None:
             table = _empty_table(self._title)

@@ -7,25 +7,25 @@ from collections.abc import Iterator
 from contextlib import AsyncExitStack, closing, contextmanager
 from dataclasses import dataclass
 from datetime import UTC, datetime
-from importlib import metadata
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 from urllib.parse import urlsplit
 
 from firmware_py.airframe import load_airframe
 from framerunner.flight_files import left_lines, warn, write_outcome
-from framerunner.flight_timing import FlightTiming, timing_line
+from framerunner.flight_result import flight_result, result_lines, timing_line
+from framerunner.flight_timing import FlightTiming
 from framerunner.lockstep import Flown, lockstep_flight
 from framerunner.lockstep_progress import LockstepProgress
 from framerunner.recorder import FlightRecorder, RecordingCamera, VideoFile
-from framerunner.result_text import result_lines
 from framerunner.run_folder import RunFolder
 from framerunner.virtual_camera.lift import lifted
-from offboard.app import Moment, Outcome, fly_mission
+from offboard.app import MissionEnd, Moment, fly_mission
 from offboard.keep_in_box import Box, flight_box
 from offboard.mission import Mission
 from scenarios.ground import start_position
 from scenarios.models import Scenario
+from scenarios.result import FlightResult
 from vision.types import CameraFrame, Image
 
 if TYPE_CHECKING:  # what only flights in real time need is imported when one is flown
@@ -36,7 +36,6 @@ if TYPE_CHECKING:  # what only flights in real time need is imported when one is
     from offboard.mavsdk_drone import MavsdkDrone
 
 _INTERRUPTED_CODE = 130
-COMPLETED = ("clean", "completed")
 
 
 @dataclass(frozen=True, slots=True)
@@ -103,14 +102,14 @@ class _Records:
         if self.recording is not None:
             self.recording.see_frame(frame)
 
-    def complete(self, result: dict[str, Any]) -> dict[str, Any]:
+    def complete(self, result: FlightResult) -> FlightResult:
         """What stands in `result.json`: a result with what tells of wall time."""
-        return {
-            **result,
+        wall = {
             "wall_time_s": self.recorder.wall_time_s,
             "real_time_factor": self.recorder.real_time_factor,
             "started": self._started.isoformat(timespec="seconds"),
         }
+        return result.model_copy(update=wall)
 
     def finish(self, flown: Flown) -> None:
         """Add what is known only after the flight."""
@@ -167,14 +166,14 @@ async def _fly_and_judge(settings: FlightSettings, guest_url: str | None) -> int
                 raise
             records.finish(flown)
         result = records.complete(flown.result)
-        scenario = lifted(settings.scenario, result.get("lift_m", 0.0))
+        scenario = lifted(settings.scenario, result.lift_m)
         write_outcome(folder, scenario, flown.track, result)
-    late = timing_line(result)
+    late = timing_line(result.timing)
     lines = [result_lines(result), *([late] if late else []), *left_lines(folder, result)]
     print("\n".join(lines), flush=True)
     if flown.outcome.interrupted:
         return _INTERRUPTED_CODE
-    return 0 if result["verdict"] in COMPLETED else 1
+    return 0 if result.completed else 1
 
 
 async def _fly_in_lockstep(settings: FlightSettings, records: _Records) -> Flown:
@@ -236,20 +235,16 @@ async def _fly_in_real_time(settings: FlightSettings, records: _Records, guest_u
         report = await judge.report(outcome.mission_state, ended)
         standing = await judge.standing()
         track = records.recorder.track(standing.began_us if standing else None)
-        result = {
-            "scenario": scenario.name,
-            "mission": settings.mission.name,
-            "seed": None,  # real time has no lockstep's repeatability
-            **report,
-            "mission_state": outcome.mission_state,
-            "ended": outcome.ended,
-            "seconds_in_state": track.seconds_in_state(),
-            "kept_in_box_s": outcome.kept_in_box_s,
-            "judged_by": judge.source,
-            **({"lift_m": judge.lift_m} if judge.lift_m else {}),
-            "timing": timing.report(records.recorder.real_time_factor, settings.speed),
-            "version": metadata.version("framerunner"),
-        }
+        result = flight_result(
+            scenario,
+            settings.mission,
+            report,
+            outcome,
+            track,
+            judged_by=judge.source,
+            lift_m=judge.lift_m,
+            timing=timing.report(records.recorder.real_time_factor, settings.speed),
+        )
         await teller.tell_result(records.complete(result))
     return Flown(result, outcome, track)
 
@@ -324,7 +319,7 @@ async def _fly(
     drone: MavsdkDrone,
     camera_url: str,
     box: Box,
-) -> Outcome:
+) -> MissionEnd:
     from framerunner.display import FlightDisplay
     from offboard.eyes import CameraEyes
     from vision.sources import open_source

@@ -6,25 +6,25 @@ import shlex
 import sys
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any
 
 from framerunner.extras import advice
-from framerunner.pictures import Outcome, PictureError, Track, track_picture
+from framerunner.pictures import PictureError, Track, track_picture
 from framerunner.run_folder import RunFolder
 from scenarios.models import Scenario
+from scenarios.result import FlightResult
 
 
-def write_outcome(folder: RunFolder, scenario: Scenario, track: Track, result: dict[str, Any]) -> None:
+def write_outcome(folder: RunFolder, scenario: Scenario, track: Track, result: FlightResult) -> None:
     """Write `result.json` and `track.png`; say on standard error what could not be written.
 
     Args:
         folder: of the flight.
         scenario: what was flown, its frames where they were.
         track: where the drone was.
-        result: as in `result.json`.
+        result: of the flight.
     """
     _try(folder.result, lambda: folder.write_result(result))
-    _try(folder.track, lambda: track_picture(scenario, track, Outcome.from_result(result), folder.track))
+    _try(folder.track, lambda: track_picture(scenario, track, result, folder.track))
 
 
 def warn(problem: str) -> None:
@@ -33,16 +33,16 @@ def warn(problem: str) -> None:
         print(f"warning: {problem}", file=sys.stderr, flush=True)
 
 
-def left_lines(folder: RunFolder, result: dict[str, Any]) -> list[str]:
+def left_lines(folder: RunFolder, result: FlightResult) -> list[str]:
     """Say where a flight's files are, and how to see it again; nothing that is not there.
 
     Args:
         folder: of the flight; it may be gone.
-        result: as in `result.json`.
+        result: of the flight.
     """
     lines = [f"left in {folder.path}/"] if folder.path.is_dir() else []
     # A lockstep flight is flown again from its plan.
-    shown_from = (folder.recording, folder.tlog) if result["seed"] is None else (folder.result,)
+    shown_from = (folder.recording, folder.tlog) if result.seed is None else (folder.result,)
     if any(path.is_file() and path.stat().st_size for path in shown_from):
         command = shlex.join(["framerunner", "replay", str(folder.path)])
         lines.append(f"see it again: {command}")

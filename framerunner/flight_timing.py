@@ -1,9 +1,10 @@
-"""Whether the machine kept up with a flight, in `result.json` and in words."""
+"""Counts whether the machine kept up with a flight in real time."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
+
+from scenarios.result import Timing
 
 if TYPE_CHECKING:
     from framerunner.simulator_clock import SimulatorClock
@@ -32,8 +33,8 @@ class FlightTiming:
         if self._clock is not None:
             self._clock.look_through(eyes)
 
-    def report(self, real_time_factor: float | None, speed: float) -> dict[str, Any]:
-        """What stands in `result.json`.
+    def report(self, real_time_factor: float | None, speed: float) -> Timing:
+        """What the flight's result says of it.
 
         Args:
             real_time_factor: vehicle time a wall time; None before two ticks.
@@ -46,39 +47,10 @@ class FlightTiming:
             "late_setpoints": 0 if clock is None else clock.setpoints_missed,
         }
         slow = real_time_factor is not None and real_time_factor < SLOW_FACTOR * speed
-        return {
-            "kept_up": not slow and not any(late.values()),
-            "vehicle_time_waits": clock is not None,
-            "speed": speed if real_time_factor is None else real_time_factor / speed,
+        return Timing(
+            kept_up=not slow and not any(late.values()),
+            vehicle_time_waits=clock is not None,
+            speed=speed if real_time_factor is None else real_time_factor / speed,
             **late,
-            "oldest_image_s": 0.0 if self._eyes is None else self._eyes.oldest_s,
-        }
-
-
-def timing_line(result: Mapping[str, Any]) -> str:
-    """One line for people if the machine did not keep up; empty if it did, or nothing is known.
-
-    Args:
-        result: as in `result.json`.
-    """
-    timing = result.get("timing")
-    if timing is None or timing["kept_up"]:
-        return ""
-    late = ", ".join(
-        f"{timing[key]} {what}"
-        for key, what in (
-            ("late_ticks", "ticks"),
-            ("late_images", "images"),
-            ("late_setpoints", "setpoints"),
+            oldest_image_s=0.0 if self._eyes is None else self._eyes.oldest_s,
         )
-        if timing[key]
-    )
-    if late:
-        return (
-            f"the machine did not keep up: {late} came late (oldest image {timing['oldest_image_s']:.2f} s); "
-            "the flight may differ from one on a free machine"
-        )
-    return (
-        f"the machine did not keep up: vehicle time ran at {timing['speed']:.2f} of the wanted speed; "
-        "it waited for the app, so the flight is the same as on a free machine"
-    )

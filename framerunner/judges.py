@@ -3,18 +3,19 @@
 from __future__ import annotations
 
 import asyncio
-from dataclasses import dataclass
 from math import cos, sin
-from typing import Any, Protocol
+from typing import Protocol
 from urllib.parse import urlsplit, urlunsplit
 
 import aiohttp
+from pydantic import ValidationError
 
 from firmware_py.airframe import load_airframe
 from framerunner.virtual_camera.lift import lifted
 from offboard.app import Moment
 from scenarios.models import Scenario
 from scenarios.referee import Referee
+from scenarios.result import RefereeReport, RefereeSnapshot, Standing
 from scenarios.truth import TrueState
 
 _ANSWER_S = 2.0
@@ -22,27 +23,6 @@ _POLL_S = 0.1
 # Vehicle time. A heartbeat a second tells each link of the disarming; then the referee needs at most 2 s.
 _SETTLE_LIMIT_US = 5_000_000
 _CLOCK_STOPPED_S = 3.0  # wall time without progress of vehicle time
-
-
-@dataclass(frozen=True, slots=True)
-class Standing:
-    """How a try stands, for the display.
-
-    Attributes:
-        try_time_s: since motors on.
-        crossed: colours so far.
-        contacts: with frames, so far.
-        settled: motors off and at rest.
-        motors_on: whether the try is being flown.
-        began_us: vehicle time of motors on, microseconds; None before.
-    """
-
-    try_time_s: float
-    crossed: tuple[str, ...]
-    contacts: int
-    settled: bool
-    motors_on: bool
-    began_us: int | None
 
 
 class Judge(Protocol):
@@ -54,10 +34,10 @@ class Judge(Protocol):
     def see(self, moment: Moment) -> None:
         """Take a tick of the flight."""
 
-    async def standing(self) -> Standing | None:
+    async def standing(self) -> RefereeSnapshot | None:
         """How the try stands now; None if it cannot be had."""
 
-    async def report(self, mission_state: str, ended: str | None) -> dict[str, Any]:
+    async def report(self, mission_state: str, ended: str | None) -> RefereeReport:
         """The report, when the drone has come to rest."""
         ...
 
@@ -93,22 +73,12 @@ class TruthJudge:
         """The referee sees for itself; the substitute follows."""
         self._substitute.see(moment)
 
-    async def standing(self) -> Standing | None:
+    async def standing(self) -> RefereeSnapshot | None:
         """Ask for the snapshot."""
         answer = await ask_referee(self._url, self._session)
-        if answer is None:
-            return None
-        now = answer["snapshot"]
-        return Standing(
-            now["try_time_s"],
-            tuple(now["crossed"]),
-            now["contacts"],
-            now["settled"],
-            now["motors_on"],
-            now["began_us"],
-        )
+        return None if answer is None else answer.snapshot
 
-    async def report(self, mission_state: str, ended: str | None) -> dict[str, Any]:
+    async def report(self, mission_state: str, ended: str | None) -> RefereeReport:
         """Ask for the report once the drone is at rest.
 
         A mission that finished has seen the motors stop; the referee's own link may tell it later. A flight
@@ -120,8 +90,7 @@ class TruthJudge:
         if answer is None:
             self.source = self._substitute.source
             return await self._substitute.report(mission_state, ended)
-        report: dict[str, Any] = answer["report"]
-        return report
+        return answer.report
 
     async def _settle(self, *, motors_stopped: bool) -> None:
         """Wait until the referee sees the drone at rest, for 5 s of vehicle time at most.
@@ -133,9 +102,8 @@ class TruthJudge:
         began_us = newest_us = -1
         newest_s = loop.time()
         while (answer := await ask_referee(self._url, self._session)) is not None:
-            now, time_us = answer["snapshot"], answer.get("time_us")
-            time_us = time_us if isinstance(time_us, int) else 0
-            if now["settled"] or now.get("over") or (now["motors_on"] and not motors_stopped):
+            now, time_us = answer.snapshot, answer.time_us or 0
+            if now.settled or now.over or (now.motors_on and not motors_stopped):
                 return
             if began_us < 0:
                 began_us = time_us
@@ -175,29 +143,27 @@ class TelemetryJudge:
             )
         )
 
-    async def standing(self) -> Standing | None:
+    async def standing(self) -> RefereeSnapshot | None:
         """From the last tick."""
-        now = self._referee.snapshot()
-        return Standing(now.try_time_s, now.crossed, now.contacts, now.settled, now.motors_on, now.began_us)
+        return self._referee.snapshot()
 
-    async def report(self, mission_state: str, ended: str | None) -> dict[str, Any]:
+    async def report(self, mission_state: str, ended: str | None) -> RefereeReport:
         """Judge what was seen."""
-        return self._referee.report(mission_state, ended).as_dict()
+        return self._referee.report(mission_state, ended)
 
 
 async def ask_referee(
     url: str, session: aiohttp.ClientSession, parameters: dict[str, str] | None = None
-) -> dict[str, Any] | None:
+) -> Standing | None:
     """Get a simulator's `referee.json`; None if there is none."""
     timeout = aiohttp.ClientTimeout(total=_ANSWER_S)
     try:
         async with session.get(url, params=parameters, timeout=timeout) as response:
             if response.status != 200:
                 return None
-            answer = await response.json()
-    except (aiohttp.ClientError, TimeoutError, ValueError):
+            return Standing.model_validate_json(await response.read())
+    except (aiohttp.ClientError, TimeoutError, ValidationError):
         return None
-    return answer if isinstance(answer, dict) and "snapshot" in answer else None
 
 
 async def choose_judge(
@@ -214,9 +180,7 @@ async def choose_judge(
     if parts.scheme == "http":
         url = urlunsplit((parts.scheme, parts.netloc, "/referee.json", "", ""))
         answer = await ask_referee(url, session)
-        if answer is not None and answer.get("scenario") == scenario.name:
+        if answer is not None and answer.scenario == scenario.name:
             # The virtual camera's referee lives on telemetry, and says so.
-            lift_m = answer.get("lift_m", 0.0)
-            lift_m = lift_m if isinstance(lift_m, int | float) else 0.0
-            return TruthJudge(url, session, scenario, str(answer.get("source", "truth")), lift_m)
+            return TruthJudge(url, session, scenario, answer.source, answer.lift_m)
     return TelemetryJudge(scenario)

@@ -8,20 +8,19 @@ from __future__ import annotations
 
 import asyncio
 from dataclasses import dataclass
-from importlib import metadata
-from typing import Any
 
+from framerunner.flight_result import flight_result
 from framerunner.lockstep_drone import LockstepDrone
 from framerunner.lockstep_eyes import ImageObserver, LockstepEyes
 from framerunner.pictures import Track
 from framerunner.recorder import TrackRecorder
 from framerunner.state_hash import StateHash
-from offboard.app import Moment, Observer, Outcome, fly_mission
+from offboard.app import MissionEnd, Moment, Observer, fly_mission
 from offboard.keep_in_box import flight_box
 from offboard.mission import Mission
 from scenarios.ground import start_position
 from scenarios.models import Scenario
-from scenarios.referee import Referee
+from scenarios.result import FlightResult
 from sitl.simulation import Simulation
 
 
@@ -30,13 +29,13 @@ class Flown:
     """A flight that is over.
 
     Attributes:
-        result: what stands in `result.json`, but for what tells of wall time.
+        result: without wall times.
         outcome: how the mission ended.
         track: where the drone was, 20 times a second.
     """
 
-    result: dict[str, Any]
-    outcome: Outcome
+    result: FlightResult
+    outcome: MissionEnd
     track: Track
 
 
@@ -92,22 +91,16 @@ async def lockstep_flight(
     outcome = await fly_mission(drone, None, mission, limit_s=limit_s, observer=observe, eyes=eyes, box=box)
     drone.settle()
     track = recorder.track(simulation.referee.snapshot().began_us)
-    result = {
-        "scenario": scenario.name,
-        "mission": mission.name,
-        "seed": seed,
-        **_judged(simulation.referee, outcome),
-        "mission_state": outcome.mission_state,
-        "ended": outcome.ended,
-        "seconds_in_state": track.seconds_in_state(),
-        "kept_in_box_s": outcome.kept_in_box_s,
-        "judged_by": "truth",
-        "state_sha256": states.hexdigest(),
-        "version": metadata.version("framerunner"),
-    }
-    return Flown(result, outcome, track)
-
-
-def _judged(referee: Referee, outcome: Outcome) -> dict[str, Any]:
     ended = None if outcome.ended == "finished" else outcome.reason
-    return referee.report(outcome.mission_state, ended).as_dict()
+    report = simulation.referee.report(outcome.mission_state, ended)
+    result = flight_result(
+        scenario,
+        mission,
+        report,
+        outcome,
+        track,
+        judged_by="truth",
+        seed=seed,
+        state_sha256=states.hexdigest(),
+    )
+    return Flown(result, outcome, track)

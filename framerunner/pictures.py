@@ -5,15 +5,16 @@ Drawing itself is in `framerunner.drawing`, imported only when a picture is made
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from itertools import groupby
 from math import isfinite
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from geometry.vectors import Vec3
 from scenarios.models import Scenario
+from scenarios.result import FlightResult
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -97,37 +98,6 @@ class Track:
         return spent_s
 
 
-@dataclass(frozen=True, slots=True)
-class Outcome:
-    """What the referee said of a flight.
-
-    Attributes:
-        verdict: one word or two.
-        reason: one sentence; may be empty.
-        try_time_s: motors on to motors off.
-        penalty_s: for time outside the arena.
-        crossing_times_s: since motors on, by the frame's colour.
-    """
-
-    verdict: str
-    reason: str = ""
-    try_time_s: float = 0.0
-    penalty_s: float = 0.0
-    crossing_times_s: Mapping[str, float] | None = None
-
-    @classmethod
-    def from_result(cls, result: Mapping[str, Any]) -> Outcome:
-        """Read it from the content of `result.json`."""
-        times = zip(result["frames_crossed"], result["crossing_times_s"], strict=True)
-        return cls(
-            verdict=str(result["verdict"]),
-            reason=str(result["reason"]),
-            try_time_s=float(result["try_time_s"]),
-            penalty_s=float(result["penalty_s"]),
-            crossing_times_s={str(colour): float(time_s) for colour, time_s in times},
-        )
-
-
 def scenario_picture(scenario: Scenario, path: Path) -> None:
     """Draw a scenario from above and from the side: floor, base, start and frames with their heights.
 
@@ -144,13 +114,13 @@ def scenario_picture(scenario: Scenario, path: Path) -> None:
     _save(draw_scenario(scenario), path)
 
 
-def track_picture(scenario: Scenario, track: Track, outcome: Outcome | None, path: Path) -> None:
+def track_picture(scenario: Scenario, track: Track, result: FlightResult | None, path: Path) -> None:
     """Draw a flight from above and from the side, its path coloured by the mission's state.
 
     Args:
         scenario: what was flown.
         track: where the drone was; may be empty.
-        outcome: what the referee said; None if there was no referee.
+        result: None if nobody judged the flight.
         path: the file to write; its suffix, one of `SUFFIXES`, says the format.
 
     Raises:
@@ -159,7 +129,7 @@ def track_picture(scenario: Scenario, track: Track, outcome: Outcome | None, pat
     _check_suffix(path)
     from framerunner.drawing import draw_track
 
-    _save(draw_track(scenario, track, outcome), path)
+    _save(draw_track(scenario, track, result), path)
 
 
 def _check_suffix(path: Path) -> None:

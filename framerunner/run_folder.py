@@ -2,17 +2,16 @@
 
 from __future__ import annotations
 
-import json
 import os
 from datetime import datetime
 from pathlib import Path
-from typing import Any
 
 from framerunner.errors import SettingError
 from offboard.mission import Mission
 from offboard.pilot_file import PilotFile
 from scenarios.loader import dump_yaml
 from scenarios.models import Scenario
+from scenarios.result import FlightResult
 
 
 class RunFolder:
@@ -77,7 +76,7 @@ class RunFolder:
                 "or choose another"
             ) from None
 
-    def write_result(self, result: dict[str, Any]) -> None:
+    def write_result(self, result: FlightResult) -> None:
         """Write `result.json` whole or not at all.
 
         Raises:
@@ -85,7 +84,7 @@ class RunFolder:
         """
         part = self.result.with_suffix(".part")
         try:
-            part.write_text(json.dumps(result, indent=2, allow_nan=False) + "\n", encoding="utf-8")
+            part.write_text(result.text(), encoding="utf-8")
             os.replace(part, self.result)
         except OSError:
             part.unlink(missing_ok=True)

@@ -214,7 +214,7 @@ def _read_rows(file: Path, identity: Identity) -> tuple[dict[str, Row], bool]:
         with file.open("r", encoding="utf-8", errors="replace") as lines:
             for line in lines:
                 try:
-                    row = Row.from_json(line)
+                    row = Row.model_validate_json(line)
                 except ValueError:
                     is_whole = False
                     continue

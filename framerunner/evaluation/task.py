@@ -7,11 +7,12 @@ import traceback
 from dataclasses import dataclass
 from importlib import metadata
 
-from framerunner.evaluation.rows import ERROR, Row
+from framerunner.evaluation.rows import Row
 from framerunner.lockstep import fly_lockstep
 from framerunner.pictures import Track
 from offboard.mission import Mission
 from scenarios.models import Scenario
+from scenarios.verdict import Verdict
 
 TRACK_STEP_S = 0.2
 """Between two samples that are kept for a picture."""
@@ -51,13 +52,12 @@ def fly_task(task: FlightTask) -> Row:
             flown = fly_lockstep(task.scenario, task.mission, seed=task.seed)
         if flown.outcome.interrupted:
             raise KeyboardInterrupt
-        row = Row.from_result(flown.result)
-        row.to_json()  # what cannot be kept is found here, where it is the flight's fault
     except KeyboardInterrupt:
         raise
     except BaseException as error:  # a contestant's code may raise anything, SystemExit too
         return broken_off(task, error)
-    return row if row.landed else Row.from_result(flown.result, thinned(flown.track))
+    track = None if flown.result.completed else thinned(flown.track)
+    return Row(**dict(flown.result), track=track)
 
 
 def broken_off(task: FlightTask, error: BaseException) -> Row:
@@ -68,8 +68,9 @@ def broken_off(task: FlightTask, error: BaseException) -> Row:
         scenario=task.scenario.name,
         mission=task.mission.name,
         seed=task.seed,
-        verdict=ERROR,
+        verdict=Verdict.ERROR,
         reason=f"{kind}: {text}" if text else kind,
+        ended="error",
         version=metadata.version("framerunner"),
         traceback="".join(traceback.format_exception(error)),
     )

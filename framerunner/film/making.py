@@ -93,10 +93,8 @@ def _scenario(folder: Path) -> Scenario:
 
 def _hung(scenario: Scenario, flight: CollectedFlight) -> Scenario:
     """The scenario with its frames as high as they were hung for this drone."""
-    lift_m = (flight.result or {}).get("lift_m", 0.0)
-    if isinstance(lift_m, int | float) and abs(lift_m) < 10.0:
-        return lifted(scenario, float(lift_m))
-    return scenario
+    lift_m = 0.0 if flight.result is None else flight.result.lift_m
+    return lifted(scenario, lift_m) if abs(lift_m) < 10.0 else scenario
 
 
 def _film(story: Story, settings: FilmSettings) -> Made:

@@ -9,7 +9,7 @@ from offboard.drone import DroneError, DroneState, VelocityCommand
 from scenarios.ground import is_over_base, start_position
 from scenarios.models import COLOURS, Scenario
 from scenarios.referee import Referee
-from scenarios.report import RefereeReport
+from scenarios.result import RefereeReport
 from sitl.simulation import Simulation
 from vision.types import Detections, Image
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import heapq
 import os
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -18,6 +18,7 @@ from offboard.drone import DroneState, VelocityCommand
 from offboard.link.alignment import Alignment, Pose
 from scenarios.ground import start_position
 from scenarios.models import Scenario
+from scenarios.result import FlightResult
 from vision.jpeg import MAX_PIXELS
 from vision.types import Detections
 
@@ -42,7 +43,7 @@ class TlogRecording:
         RecordingError: the log holds no telemetry.
     """
 
-    def __init__(self, folder: Path, scenario: Scenario | None, result: Mapping[str, Any] | None) -> None:
+    def __init__(self, folder: Path, scenario: Scenario | None, result: FlightResult | None) -> None:
         self.title = folder.name
         self.result = result
         self._video = folder / "video.avi"

@@ -22,7 +22,7 @@ from mavsdk.exceptions import MavsdkError
 from firmware_py.setpoints import setpoint_from_body_velocity
 from firmware_py.status import CommandResult, FlightMode, LandedState
 from framerunner.flight import _start
-from offboard.app import Moment, Outcome, fly_mission
+from offboard.app import MissionEnd, Moment, fly_mission
 from offboard.keep_in_box import Box, flight_box
 from offboard.link.setpoints import SetpointStream
 from offboard.link.telemetry import TelemetryFeed
@@ -325,7 +325,7 @@ class LinkedFlight:
         moments: every tick of the mission.
     """
 
-    outcome: Outcome
+    outcome: MissionEnd
     flown: int
     box: Box
     truths: list[TrueState]
@@ -371,7 +371,7 @@ def fly_over(
     box = flight_box(scenario)
     moments: list[Moment] = []
 
-    async def fly() -> Outcome:
+    async def fly() -> MissionEnd:
         kept_in = box if boxed else None
         drone = LinkedDrone(vehicle, scenario, kept_in)
         camera = _Camera(vehicle)
