@@ -62,7 +62,7 @@ def replay(
 
 
 def _say_result(recorded: Recorded) -> None:
-    from framerunner.result_text import result_lines
+    from framerunner.runs.result_text import result_lines
 
     if recorded.result is None:
         print("no result: the flight was not judged")

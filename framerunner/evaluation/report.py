@@ -18,7 +18,7 @@ from framerunner.evaluation.rows import ERROR, Row
 from framerunner.evaluation.statistics import Spread, Summary
 from framerunner.evaluation.store import EvaluationFolder
 from framerunner.evaluation.tables import comparison_lines
-from framerunner.pictures import Outcome
+from framerunner.runs.pictures import Outcome
 from scenarios.loader import ScenarioError, load_scenario
 
 PICTURES_AT_MOST = 150
@@ -157,7 +157,7 @@ def _picture(folder: EvaluationFolder, row: Row) -> str | None:
     track = folder.track(row.scenario)
     if len(track) == 0:
         return None
-    from framerunner.drawing import draw_track
+    from framerunner.runs.drawing import draw_track
 
     try:
         scenario = load_scenario(folder.scenario_file(row.scenario))

@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field, fields
 from typing import Any, Self
 
-from framerunner.pictures import Track
+from framerunner.runs.pictures import Track
 from scenarios.verdict import Verdict
 
 ERROR = "error"

@@ -21,7 +21,7 @@ from mavsdk.exceptions import MavsdkError
 
 from firmware_py.setpoints import setpoint_from_body_velocity
 from firmware_py.status import CommandResult, FlightMode, LandedState
-from framerunner.flight import _start
+from framerunner.flying.run import _start
 from offboard.app import Moment, Outcome, fly_mission
 from offboard.keep_in_box import Box, flight_box
 from offboard.link.setpoints import SetpointStream

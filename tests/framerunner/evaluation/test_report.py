@@ -17,7 +17,7 @@ from framerunner.evaluation.rows import COLUMNS
 from framerunner.evaluation.statistics import summarise
 from framerunner.evaluation.store import open_folder
 from framerunner.evaluation.table_file import csv_text
-from framerunner.pictures import Track
+from framerunner.runs.pictures import Track
 from offboard.mission import load_mission
 from tests.framerunner.evaluation.flights import made_row
 

@@ -6,7 +6,7 @@ import cv2
 import numpy as np
 import pytest
 
-from framerunner.recorder import FlightRecorder, RecordingCamera, VideoFile
+from framerunner.runs.recorder import FlightRecorder, RecordingCamera, TrackRecorder, VideoFile
 from offboard.app import Moment
 from offboard.drone import DroneState, VelocityCommand
 from tests.disk import disk_that_takes
@@ -21,14 +21,14 @@ def moment(time_us, mission_state="red.turning", x=0.0):
 
 def test_an_empty_flight_has_an_empty_track():
     recorder = FlightRecorder()
-    assert len(recorder.track(None)) == 0
+    assert len(TrackRecorder().track(None)) == 0
     assert recorder.wall_time_s == 0.0
     assert recorder.real_time_factor is None
     assert recorder.latest is None
 
 
 def test_the_track_counts_from_motors_on():
-    recorder = FlightRecorder()
+    recorder = TrackRecorder()
     for tick, state in enumerate(("take_off.start", "red.turning", "red.crossing")):
         recorder.see(moment(5_000_000 + 50_000 * tick, state, x=float(tick)))
     track = recorder.track(5_050_000)
@@ -37,17 +37,17 @@ def test_the_track_counts_from_motors_on():
     assert set(track.y) == {2.0} and set(track.z) == {3.0}
     assert track.mission_state == ["take_off.start", "red.turning", "red.crossing"]
     assert recorder.track(None).time_s[0] == 0.0
-    assert recorder.latest.mission_state == "red.crossing"
 
 
 def test_the_real_time_factor_is_vehicle_time_by_wall_time(monkeypatch):
     wall_s = iter((10.0, 12.0, 14.0))
-    monkeypatch.setattr("framerunner.recorder.time.monotonic", lambda: next(wall_s))
+    monkeypatch.setattr("framerunner.runs.recorder.time.monotonic", lambda: next(wall_s))
     recorder = FlightRecorder()
     for time_us in (1_000_000, 7_000_000, 13_000_000):
         recorder.see(moment(time_us))
     assert recorder.wall_time_s == pytest.approx(4.0)
     assert recorder.real_time_factor == pytest.approx(3.0)
+    assert recorder.latest.state.time_us == 13_000_000
 
 
 class Source:

@@ -5,8 +5,8 @@ from math import inf, nan
 import pytest
 from matplotlib.colors import to_hex
 
-from framerunner.drawing import draw_scenario, draw_track
-from framerunner.pictures import Outcome, PictureError, Track, scenario_picture, track_picture
+from framerunner.runs.drawing import draw_scenario, draw_track
+from framerunner.runs.pictures import Outcome, PictureError, Track, scenario_picture, track_picture
 from scenarios.models import Arena, Base, Frame, Scenario, Start
 
 SCENARIO = Scenario(
@@ -121,7 +121,7 @@ def test_the_legend_has_the_states_in_order_of_appearance():
 def test_the_path_is_drawn_where_the_drone_was_in_both_views():
     track = Track([0.0, 1.0], [1.0, 2.0], [3.0, 4.0], [0.5, 1.5], ["a.fly", "a.fly"])
     figure = draw_track(SCENARIO, track, None)
-    from framerunner.drawing import STATE_COLOURS
+    from framerunner.runs.drawing import STATE_COLOURS
 
     for view, across, up in ((0, [1.0, 2.0], [3.0, 4.0]), (1, [1.0, 2.0], [0.5, 1.5])):
         line = coloured_line(figure, view, STATE_COLOURS[0])

@@ -4,24 +4,32 @@ from __future__ import annotations
 
 import asyncio
 import sys
+import time
 from math import isfinite
+from types import TracebackType
 
 from rich.console import Console
 from rich.live import Live
 from rich.markup import escape
+from rich.status import Status
 from rich.table import Table
 
-from framerunner.judges import Judge, Standing
-from framerunner.recorder import FlightRecorder
+from framerunner.flying.judges import Judge, Standing
+from framerunner.runs.recorder import FlightRecorder
 from offboard.app import Moment
 from vision.types import Detection
 
 _REFRESH_S = 0.2
 _LINE_S = 10.0
+_PROGRESS_QUIET_S = 1.0
+_PROGRESS_REFRESH_S = 0.25
+_PROGRESS_LINE_S = 2.0
 
 
 class FlightDisplay:
     """A live table in a terminal; elsewhere a line at every change of state and every ten seconds.
+
+    Shown while it is entered as a context.
 
     Args:
         title: scenario and mission.
@@ -38,9 +46,20 @@ class FlightDisplay:
         self._console = Console(file=sys.stderr)
         self._line_state = ""  # what the last line said
         self._line_s = -_LINE_S
+        self._showing: asyncio.Task[None] | None = None
 
-    async def run(self) -> None:
-        """Show until cancelled."""
+    async def __aenter__(self) -> FlightDisplay:
+        """Begin to show."""
+        self._showing = asyncio.create_task(self._show())
+        return self
+
+    async def __aexit__(self, *_: object) -> None:
+        """Take the table away."""
+        if self._showing is not None:
+            self._showing.cancel()
+            await asyncio.gather(self._showing, return_exceptions=True)
+
+    async def _show(self) -> None:
         if not self._console.is_terminal:
             while True:
                 self._print_line(await self._judge.standing())
@@ -132,3 +151,49 @@ def _seen(detection: Detection) -> str:
     if not isfinite(detection.d):
         return "seen in part"
     return f"{detection.d:.2f} m away, {detection.a:.0f} degrees aside"
+
+
+class LockstepProgress:
+    """A status line in a terminal, elsewhere a line every two seconds; nothing in the first second.
+
+    Args:
+        limit_s: of the try.
+    """
+
+    def __init__(self, limit_s: float) -> None:
+        self._limit_s = limit_s
+        self._console = Console(stderr=True)
+        self._status: Status | None = None
+        self._started_s = time.monotonic()
+        self._next_s = self._started_s + _PROGRESS_QUIET_S
+
+    def __enter__(self) -> LockstepProgress:
+        """Begin to count the first second."""
+        return self
+
+    def __exit__(
+        self, _kind: type[BaseException] | None, _error: BaseException | None, _trace: TracebackType | None
+    ) -> None:
+        """Take the status line away."""
+        if self._status is not None:
+            self._status.stop()
+
+    def see(self, moment: Moment) -> None:
+        """Take a tick of the flight."""
+        now_s = time.monotonic()
+        if now_s < self._next_s:
+            return
+        speed = moment.flight_time_s / (now_s - self._started_s)
+        text = (
+            f"{moment.flight_time_s:6.1f} s of {self._limit_s:g} s  {moment.mission_state:22s} "
+            f"{speed:.0f} times real time"
+        )
+        if not self._console.is_terminal:
+            self._next_s = now_s + _PROGRESS_LINE_S
+            self._console.print(text, markup=False, highlight=False)
+            return
+        self._next_s = now_s + _PROGRESS_REFRESH_S
+        if self._status is None:
+            self._status = self._console.status(text)
+            self._status.start()
+        self._status.update(text)

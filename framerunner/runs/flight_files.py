@@ -9,8 +9,8 @@ from pathlib import Path
 from typing import Any
 
 from framerunner.extras import advice
-from framerunner.pictures import Outcome, PictureError, Track, track_picture
-from framerunner.run_folder import RunFolder
+from framerunner.runs.pictures import Outcome, PictureError, Track, track_picture
+from framerunner.runs.run_folder import RunFolder
 from scenarios.models import Scenario
 
 

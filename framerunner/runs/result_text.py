@@ -26,3 +26,32 @@ def result_lines(result: Mapping[str, Any]) -> str:
         f"try {result['try_time_s']:.1f} s, penalty {result['penalty_s']:.1f} s, "
         f"path {result['path_length_m']:.1f} m, {landing}, judged by {result['judged_by']}{kept}"
     )
+
+
+def timing_line(result: Mapping[str, Any]) -> str:
+    """One line for people if the machine did not keep up; empty if it did, or nothing is known.
+
+    Args:
+        result: as in `result.json`.
+    """
+    timing = result.get("timing")
+    if timing is None or timing["kept_up"]:
+        return ""
+    late = ", ".join(
+        f"{timing[key]} {what}"
+        for key, what in (
+            ("late_ticks", "ticks"),
+            ("late_images", "images"),
+            ("late_setpoints", "setpoints"),
+        )
+        if timing[key]
+    )
+    if late:
+        return (
+            f"the machine did not keep up: {late} came late (oldest image {timing['oldest_image_s']:.2f} s); "
+            "the flight may differ from one on a free machine"
+        )
+    return (
+        f"the machine did not keep up: vehicle time ran at {timing['speed']:.2f} of the wanted speed; "
+        "it waited for the app, so the flight is the same as on a free machine"
+    )

@@ -1,6 +1,6 @@
 """Pictures for people: a scenario from above, and where a flight went.
 
-Drawing itself is in `framerunner.drawing`, imported only when a picture is made: matplotlib takes a second.
+Drawing itself is in `framerunner.runs.drawing`, imported only when a picture is made: matplotlib takes a second.
 """
 
 from __future__ import annotations
@@ -139,7 +139,7 @@ def scenario_picture(scenario: Scenario, path: Path) -> None:
         PictureError: the suffix is not known, or the file cannot be written.
     """
     _check_suffix(path)
-    from framerunner.drawing import draw_scenario
+    from framerunner.runs.drawing import draw_scenario
 
     _save(draw_scenario(scenario), path)
 
@@ -157,7 +157,7 @@ def track_picture(scenario: Scenario, track: Track, outcome: Outcome | None, pat
         PictureError: the suffix is not known, or the file cannot be written.
     """
     _check_suffix(path)
-    from framerunner.drawing import draw_track
+    from framerunner.runs.drawing import draw_track
 
     _save(draw_track(scenario, track, outcome), path)
 

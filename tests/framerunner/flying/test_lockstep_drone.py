@@ -7,8 +7,8 @@ from math import nan
 import pytest
 
 from firmware_py.status import CommandResult, FlightMode
-from framerunner.lockstep_drone import TICK_US, LockstepDrone
-from framerunner.lockstep_eyes import LockstepEyes
+from framerunner.flying.lockstep import LockstepEyes
+from framerunner.flying.lockstep_drone import TICK_US, LockstepDrone
 from offboard.drone import DroneError, VelocityCommand
 from offboard.eyes import CameraLostError
 from scenarios.loader import load_scenario

@@ -1,4 +1,4 @@
-"""The time of a simulator that this program has started: it waits for the app at each tick.
+"""The simulator as a child process, whose time waits for this program at each tick.
 
 See `sitl.time_grants`. What the app is given at a tick is then a function of vehicle time alone, as in
 lockstep: the image that was sent last, the telemetry of that tick; and the setpoint that answers it arrives
@@ -9,14 +9,17 @@ from __future__ import annotations
 
 import asyncio
 import socket
+from typing import Self
 
 from framerunner.errors import SettingError
-from framerunner.link_precision import sent_yaw_rate, single
-from framerunner.lockstep_drone import TELEMETRY_DELAY_US
+from framerunner.flying.child_process import ChildProcess
+from framerunner.flying.lockstep_drone import TELEMETRY_DELAY_US, sent_yaw_rate, single
 from offboard.drone import DroneError, VelocityCommand
 from offboard.eyes import CameraEyes
+from sitl.server_settings import VIDEO_PORT
 from sitl.time_grants import FREE_US, Grant, Held, Velocity
 from sitl.world import CONTROL_PERIOD_US
+from wire.simulator_api import SimulatorApi
 
 START_S = 20.0
 ANSWER_S = 20.0  # wall time in which a simulator runs 50 ms, on the busiest machine
@@ -24,6 +27,58 @@ _LAST_WORDS_S = 3.0
 IMAGE_S = 2.0  # wall time for an image to come and be looked at
 _ANSWER_US = CONTROL_PERIOD_US + TELEMETRY_DELAY_US - 1
 """From a multiple of 50 ms to the last control tick before the one that flies the answer."""
+
+
+class SitlProcess(ChildProcess):
+    """`framerunner sim` as a child process.
+
+    Args:
+        scenario: name or file.
+        speed: simulated seconds a second.
+        instance: shifts its ports.
+        links: more links, as `--link` takes them.
+
+    Attributes:
+        clock: its time, which waits for this program once asked to.
+        system_id: MAVLink id of its drone.
+        drone_url: where its MAVLink arrives.
+        api: where it serves video and referee.
+    """
+
+    def __init__(
+        self, scenario: str, speed: float = 1.0, instance: int = 0, links: tuple[str, ...] = ()
+    ) -> None:
+        here, there = socket.socketpair()
+        arguments = [
+            *("sim", "--lifeline", "--scenario", scenario),
+            *("--speed", f"{speed:g}", "--instance", str(instance), "--video-rtp", "off"),
+            *("--time-grants", str(there.fileno())),
+            *(word for link in links for word in ("--link", link)),
+        ]
+        super().__init__("the simulator", arguments, handed=there)
+        self.clock = SimulatorClock(here)
+        self.system_id = instance + 1
+        self.drone_url = f"udpin://127.0.0.1:{14540 + instance}"
+        self.api = SimulatorApi(f"http://127.0.0.1:{VIDEO_PORT + instance}")
+
+    async def __aenter__(self) -> Self:
+        """Start it, and wait until it says that all its ports are open.
+
+        Raises:
+            SettingError: it cannot start; its own words are the reason.
+        """
+        await super().__aenter__()
+        try:
+            await self.guard(asyncio.create_task(self.clock.up()))
+        except BaseException:
+            await self.__aexit__()
+            raise
+        return self
+
+    async def __aexit__(self, *_: object) -> None:
+        """Stop it."""
+        self.clock.close()
+        await super().__aexit__()
 
 
 class SimulatorClock:

@@ -1,4 +1,4 @@
-"""How pictures look. Importing this imports matplotlib; see `framerunner.pictures` for what to call.
+"""How pictures look. Importing this imports matplotlib; see `framerunner.runs.pictures` for what to call.
 
 Figures are made without pyplot, so there is no state shared between them and no display is needed.
 """
@@ -17,7 +17,7 @@ from matplotlib.patches import Polygon, Rectangle
 from matplotlib.patheffects import withStroke
 from matplotlib.ticker import MaxNLocator
 
-from framerunner.pictures import Outcome, Track
+from framerunner.runs.pictures import Outcome, Track
 from scenarios.ground import start_position
 from scenarios.models import Frame, Scenario
 

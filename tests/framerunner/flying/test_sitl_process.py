@@ -9,8 +9,8 @@ import aiohttp
 import pytest
 
 from framerunner.errors import SettingError
-from framerunner.judges import ask_referee
-from framerunner.sitl_process import SitlProcess
+from framerunner.flying.judges import ask_referee
+from framerunner.flying.simulator_process import SitlProcess
 from tests.processes import bound, free_instance, is_running, ports_are_free, program, simulator
 
 
@@ -57,7 +57,7 @@ def test_with_a_lifeline_it_ends_when_its_standard_input_ends(tmp_path):
 
 async def answering(sitl):
     async with aiohttp.ClientSession() as session:
-        return await ask_referee(sitl.referee_url, session)
+        return await ask_referee(sitl.api, session)
 
 
 async def test_a_child_simulator_answers_and_is_gone_afterwards():

@@ -10,7 +10,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
-from framerunner.child_process import ChildProcess
+from framerunner.flying.child_process import ChildProcess
 from scenarios.loader import dump_yaml
 from scenarios.models import Scenario
 

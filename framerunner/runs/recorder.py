@@ -4,16 +4,21 @@ from __future__ import annotations
 
 import time
 from collections import deque
-from collections.abc import AsyncIterator, Callable
+from collections.abc import AsyncIterator, Callable, Mapping
 from concurrent.futures import Future, ThreadPoolExecutor
+from datetime import UTC, datetime
 from pathlib import Path
-from typing import Protocol
+from typing import TYPE_CHECKING, Any, Protocol
 
 import cv2
 
-from framerunner.pictures import Track
+from framerunner.runs.pictures import Track
+from framerunner.runs.run_folder import RunFolder
 from offboard.app import Moment
 from vision.types import CameraFrame, Image
+
+if TYPE_CHECKING:
+    from framerunner.recording.mcap_writer import FlightRecording
 
 _MAX_WAITING_BYTES = 12 << 20  # of images that wait to be compressed: 50 of 320 x 240 pixels
 
@@ -57,18 +62,16 @@ class TrackRecorder:
         return Track(time_s, self._x, self._y, self._z, self._mission_state)
 
 
-class FlightRecorder(TrackRecorder):
-    """Remembers the track, the latest tick and how fast wall time went by."""
+class FlightRecorder:
+    """Remembers the latest tick of a flight and how fast wall time went by."""
 
     def __init__(self) -> None:
-        super().__init__()
         self._first: tuple[float, int] | None = None
         self._last: tuple[float, int] | None = None
         self.latest: Moment | None = None
 
     def see(self, moment: Moment) -> None:
         """Take a tick."""
-        super().see(moment)
         self._last = (time.monotonic(), moment.state.time_us)
         self._first = self._first or self._last
         self.latest = moment
@@ -192,3 +195,49 @@ class RecordingCamera:
     def problem(self) -> str:
         """Why the video is not whole, known when it is closed; empty if it is."""
         return self._video.problem
+
+
+class RunRecords:
+    """Everything that keeps what a flight shows of itself.
+
+    Attributes:
+        folder: where it is kept.
+        recorder: the latest tick and the pace.
+        recording: the MCAP file; None without `--record`.
+    """
+
+    def __init__(self, folder: RunFolder, recording: FlightRecording | None) -> None:
+        self._started = datetime.now(UTC)
+        self.folder = folder
+        self.recorder = FlightRecorder()
+        self.recording = recording
+
+    def see(self, moment: Moment) -> None:
+        """Take a tick."""
+        self.recorder.see(moment)
+        if self.recording is not None:
+            self.recording.see(moment)
+
+    def see_image(self, time_us: int, image: Image) -> None:
+        """Take a raw image, of the simulated camera."""
+        if self.recording is not None:
+            self.recording.see_image(time_us, image)
+
+    def see_frame(self, frame: CameraFrame) -> None:
+        """Take an image of a camera source."""
+        if self.recording is not None:
+            self.recording.see_frame(frame)
+
+    def complete(self, result: dict[str, Any]) -> dict[str, Any]:
+        """What stands in `result.json`: a result with what tells of wall time."""
+        return {
+            **result,
+            "wall_time_s": self.recorder.wall_time_s,
+            "real_time_factor": self.recorder.real_time_factor,
+            "started": self._started.isoformat(timespec="seconds"),
+        }
+
+    def finish(self, result: Mapping[str, Any], track: Track) -> None:
+        """Add what is known only after the flight."""
+        if self.recording is not None:
+            self.recording.finish(result, track.time_s)

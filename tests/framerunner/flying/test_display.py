@@ -1,15 +1,14 @@
 """What people see during a flight."""
 
 import asyncio
-from contextlib import suppress
 from io import StringIO
 
 import pytest
 from rich.console import Console
 
-from framerunner.display import FlightDisplay
-from framerunner.judges import Standing
-from framerunner.recorder import FlightRecorder
+from framerunner.flying.display import FlightDisplay
+from framerunner.flying.judges import Standing
+from framerunner.runs.recorder import FlightRecorder
 from offboard.app import Moment
 from offboard.drone import DroneState, VelocityCommand
 from vision.types import Detection, Detections
@@ -40,13 +39,10 @@ def see(recorder, time_s, state, mode="OFFBOARD", **fields):
 
 async def shown(display, recorder, moments):
     """Run the display while moments come."""
-    running = asyncio.create_task(display.run())
-    for time_s, state, *how in moments:
-        see(recorder, time_s, state, **(how[0] if how else {}))
-        await asyncio.sleep(0.25)
-    running.cancel()
-    with suppress(asyncio.CancelledError):
-        await running
+    async with display:
+        for time_s, state, *how in moments:
+            see(recorder, time_s, state, **(how[0] if how else {}))
+            await asyncio.sleep(0.25)
 
 
 async def test_without_a_terminal_a_line_comes_with_each_state_and_each_ten_seconds(flight, capsys):

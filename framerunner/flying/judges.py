@@ -5,17 +5,17 @@ from __future__ import annotations
 import asyncio
 from dataclasses import dataclass
 from math import cos, sin
-from typing import Any, Protocol
-from urllib.parse import urlsplit, urlunsplit
+from typing import TYPE_CHECKING, Any, Protocol
 
-import aiohttp
-
-from firmware_py.airframe import load_airframe
-from framerunner.virtual_camera.lift import lifted
+from framerunner.errors import SettingError
+from framerunner.flying.plan import FlightPlan
 from offboard.app import Moment
-from scenarios.models import Scenario
 from scenarios.referee import Referee
 from scenarios.truth import TrueState
+from wire.simulator_api import SimulatorApi
+
+if TYPE_CHECKING:  # a flight in lockstep asks nobody over HTTP
+    import aiohttp
 
 _ANSWER_S = 2.0
 _POLL_S = 0.1
@@ -46,10 +46,13 @@ class Standing:
 
 
 class Judge(Protocol):
-    """A referee, wherever it is."""
+    """A referee, wherever it is.
+
+    Attributes:
+        source: by what it judges: "truth" or "telemetry".
+    """
 
     source: str
-    lift_m: float
 
     def see(self, moment: Moment) -> None:
         """Take a tick of the flight."""
@@ -68,26 +71,19 @@ class TruthJudge:
     Should the simulator die, the verdict comes from the telemetry seen so far.
 
     Args:
-        url: of its `referee.json`.
+        api: of the simulator.
         session: for asking.
-        scenario: what is flown.
-        source: what its referee sees by, as it says itself.
-        lift_m: how much higher its frames hang than the scenario says, for want of a base.
+        plan: of the flight, for the substitute.
+        source: by what its referee judges, as it says itself.
     """
 
     def __init__(
-        self,
-        url: str,
-        session: aiohttp.ClientSession,
-        scenario: Scenario,
-        source: str = "truth",
-        lift_m: float = 0.0,
+        self, api: SimulatorApi, session: aiohttp.ClientSession, plan: FlightPlan, source: str = "truth"
     ) -> None:
         self.source = source
-        self.lift_m = lift_m
-        self._url = url
+        self._api = api
         self._session = session
-        self._substitute = TelemetryJudge(scenario, lift_m)
+        self._substitute = TelemetryJudge(plan.new_referee())
 
     def see(self, moment: Moment) -> None:
         """The referee sees for itself; the substitute follows."""
@@ -95,7 +91,7 @@ class TruthJudge:
 
     async def standing(self) -> Standing | None:
         """Ask for the snapshot."""
-        answer = await ask_referee(self._url, self._session)
+        answer = await ask_referee(self._api, self._session)
         if answer is None:
             return None
         now = answer["snapshot"]
@@ -116,7 +112,7 @@ class TruthJudge:
         """
         await self._settle(motors_stopped=ended is None)
         parameters = {"state": mission_state, **({"ended": ended} if ended else {})}
-        answer = await ask_referee(self._url, self._session, parameters)
+        answer = await ask_referee(self._api, self._session, parameters)
         if answer is None:
             self.source = self._substitute.source
             return await self._substitute.report(mission_state, ended)
@@ -132,7 +128,7 @@ class TruthJudge:
         loop = asyncio.get_running_loop()
         began_us = newest_us = -1
         newest_s = loop.time()
-        while (answer := await ask_referee(self._url, self._session)) is not None:
+        while (answer := await ask_referee(self._api, self._session)) is not None:
             now, time_us = answer["snapshot"], answer.get("time_us")
             time_us = time_us if isinstance(time_us, int) else 0
             if now["settled"] or now.get("over") or (now["motors_on"] and not motors_stopped):
@@ -150,16 +146,13 @@ class TelemetryJudge:
     """Judges by what the drone says of itself; contacts with frames remain unseen.
 
     Args:
-        scenario: what is flown.
-        lift_m: how much higher its frames hang than the scenario says, for want of a base.
+        referee: is shown what telemetry tells.
     """
 
     source = "telemetry"
 
-    def __init__(self, scenario: Scenario, lift_m: float = 0.0) -> None:
-        self.lift_m = lift_m
-        envelope_m = load_airframe(scenario.airframe).envelope_m
-        self._referee = Referee(lifted(scenario, lift_m), envelope_m, lift_m)
+    def __init__(self, referee: Referee) -> None:
+        self._referee = referee
 
     def see(self, moment: Moment) -> None:
         """Follow the drone's state."""
@@ -186,12 +179,14 @@ class TelemetryJudge:
 
 
 async def ask_referee(
-    url: str, session: aiohttp.ClientSession, parameters: dict[str, str] | None = None
+    api: SimulatorApi, session: aiohttp.ClientSession, parameters: dict[str, str] | None = None
 ) -> dict[str, Any] | None:
     """Get a simulator's `referee.json`; None if there is none."""
+    import aiohttp
+
     timeout = aiohttp.ClientTimeout(total=_ANSWER_S)
     try:
-        async with session.get(url, params=parameters, timeout=timeout) as response:
+        async with session.get(api.referee_url, params=parameters, timeout=timeout) as response:
             if response.status != 200:
                 return None
             answer = await response.json()
@@ -201,22 +196,36 @@ async def ask_referee(
 
 
 async def choose_judge(
-    scenario: Scenario, camera_url: str, session: aiohttp.ClientSession
-) -> TruthJudge | TelemetryJudge:
-    """Take the referee of the simulator that the camera belongs to, or judge by telemetry.
+    plan: FlightPlan, api: SimulatorApi | None, session: aiohttp.ClientSession, *, named: bool = False
+) -> tuple[Judge, FlightPlan]:
+    """Take the referee of the simulator that flies, or judge by telemetry.
 
     Args:
-        scenario: what is flown; a simulator with another one cannot judge it.
-        camera_url: whatever was given as the camera.
+        plan: of the flight; a simulator with another scenario cannot judge it.
+        api: where the simulator may be; None: the drone is none.
         session: for asking.
+        named: whether somebody said that a simulator is there; else it is not missed.
+
+    Returns:
+        The judge, and the plan with its frames as high as the simulator has them.
+
+    Raises:
+        SettingError: the simulator that was named does not judge this scenario.
     """
-    parts = urlsplit(camera_url)
-    if parts.scheme == "http":
-        url = urlunsplit((parts.scheme, parts.netloc, "/referee.json", "", ""))
-        answer = await ask_referee(url, session)
-        if answer is not None and answer.get("scenario") == scenario.name:
-            # The virtual camera's referee lives on telemetry, and says so.
-            lift_m = answer.get("lift_m", 0.0)
-            lift_m = lift_m if isinstance(lift_m, int | float) else 0.0
-            return TruthJudge(url, session, scenario, str(answer.get("source", "truth")), lift_m)
-    return TelemetryJudge(scenario)
+    answer = None if api is None else await ask_referee(api, session)
+    flown = None if answer is None else answer.get("scenario")
+    if api is not None and answer is not None and flown == plan.scenario.name:
+        # The virtual camera's referee lives on telemetry, and says so.
+        lift_m = answer.get("lift_m", 0.0)
+        plan = plan.lifted(lift_m if isinstance(lift_m, int | float) else 0.0)
+        return TruthJudge(api, session, plan, str(answer.get("source", "truth"))), plan
+    if api is not None and named:
+        raise SettingError(
+            f"--simulator {api.url}: "
+            + (
+                "nothing there answers as a simulator; check the address, or leave it out"
+                if answer is None
+                else f"flies the scenario {flown}; start it with --scenario {plan.scenario.name}"
+            )
+        )
+    return TelemetryJudge(plan.new_referee()), plan

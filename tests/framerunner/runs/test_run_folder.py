@@ -6,7 +6,7 @@ import re
 import pytest
 
 from framerunner.errors import SettingError
-from framerunner.run_folder import RunFolder
+from framerunner.runs.run_folder import RunFolder
 
 
 def test_its_name_says_when_and_what(tmp_path):

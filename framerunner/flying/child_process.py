@@ -1,13 +1,15 @@
-"""A command of this program as a process of its own, which never outlives whoever started it."""
+"""A command of this program as a child process, which never outlives whoever started it: both its ends."""
 
 from __future__ import annotations
 
 import asyncio
 import contextlib
+import os
 import socket
 import sys
+import threading
 from asyncio.subprocess import PIPE, Process
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Coroutine, Sequence
 from typing import Self, TypeVar
 
 from framerunner.errors import SettingError
@@ -136,3 +138,43 @@ async def _wait_or_cancel(work: asyncio.Task[T], watching: asyncio.Task[str]) ->
         task = asyncio.current_task()
         if task is not None:
             task.uncancel()  # the work's result tells of it
+
+
+async def until_standard_input_ends(work: Coroutine[object, object, None]) -> None:
+    """Do some work until it is done or standard input ends: whoever started this is gone then.
+
+    Args:
+        work: is cancelled in the second case.
+    """
+    running = asyncio.create_task(work)
+    watching = asyncio.create_task(_standard_input_ends())
+    done, _ = await asyncio.wait({running, watching}, return_when=asyncio.FIRST_COMPLETED)
+    for task in (running, watching):
+        task.cancel()
+    await asyncio.gather(running, watching, return_exceptions=True)
+    if running in done:
+        running.result()
+
+
+async def _standard_input_ends() -> None:
+    loop = asyncio.get_running_loop()
+    reader = asyncio.StreamReader()
+    await loop.connect_read_pipe(lambda: asyncio.StreamReaderProtocol(reader), sys.stdin)
+    while await reader.read(1024):
+        pass
+
+
+def end_with_standard_input(tidy: Callable[[], None]) -> None:
+    """Have this process end at once when standard input ends, whatever it is doing; for one without a loop.
+
+    Args:
+        tidy: is called before.
+    """
+
+    def watch() -> None:
+        while os.read(0, 1024):
+            pass
+        tidy()
+        os._exit(1)
+
+    threading.Thread(target=watch, name="lifeline", daemon=True).start()

@@ -4,8 +4,8 @@ import asyncio
 
 import pytest
 
-from framerunner.gym.run_through import run_through
-from framerunner.lockstep_drone import LockstepDrone
+from framerunner.flying.lockstep_drone import LockstepDrone
+from framerunner.gym.flight import run_through
 from offboard.drone import VelocityCommand
 from scenarios.loader import load_scenario
 from sitl.simulation import Simulation

@@ -3,18 +3,22 @@
 What a link does in time is kept, so that a mission flies as it does in real time: telemetry comes a little
 later than what it tells, mode and arming are learnt from heartbeats once a second, and motors are switched on
 in the same order. What is asked of the vehicle goes through the functions that packets go through.
+
+Numbers become what they are on a link: MAVLink carries single precision, MAVSDK goes through degrees. The
+paper's navigator decides by single pixels, so even a ten-millionth of a metre may turn a flight. With the
+link's rounding in it, a lockstep flight is the same as one over UDP until something else differs.
 """
 
 from __future__ import annotations
 
 import asyncio
 from collections.abc import AsyncIterator, Callable, Sequence
-from math import isfinite
+from math import degrees, isfinite, pi, radians
+from struct import Struct
 
 from firmware_py.commander_table import CRITICAL
 from firmware_py.setpoints import setpoint_from_body_velocity
 from firmware_py.status import CommandResult, FlightMode, LandedState
-from framerunner.link_precision import sent_yaw_rate, single, told_yaw
 from geometry.vectors import Vec3
 from offboard.drone import DroneError, DroneState, VelocityCommand
 from offboard.link.alignment import Alignment, Pose
@@ -39,6 +43,8 @@ LAND_LIMIT_US = 120_000_000
 SETTLE_LIMIT_US = 3_000_000
 _NEVER_US = 1 << 62
 _TEXTS_KEPT = 8
+_ONE = Struct("<f")
+_THREE = Struct("<3f")
 
 TruthObserver = Callable[[TrueState], None]
 
@@ -315,3 +321,32 @@ class LockstepDrone:
         """What the vehicle said since it was last asked, for the end of an error message."""
         texts = list(dict.fromkeys(text.text for text in self._autopilot.take_texts()))[-_TEXTS_KEPT:]
         return f"; the vehicle says: {' | '.join(texts)}" if texts else ""
+
+
+def single(vector: Vec3) -> Vec3:
+    """A vector, shape (3,), rounded to single precision."""
+    x, y, z = _THREE.unpack(_THREE.pack(*vector))
+    return (x, y, z)
+
+
+def told_yaw(yaw_rad: float) -> float:
+    """A yaw as ATTITUDE and then MAVSDK's degrees bring it, radians.
+
+    MAVSDK multiplies by 180/pi in single precision. A product of two singles is exact in double precision,
+    so rounding it once gives the same.
+    """
+    return radians(_rounded(_DEGREES * _rounded(yaw_rad)))
+
+
+def sent_yaw_rate(yaw_rate_rad_s: float) -> float:
+    """A yaw rate as it is on the wire after MAVSDK has turned it from degrees, rad/s."""
+    return _rounded(_RADIANS * _rounded(degrees(yaw_rate_rad_s)))
+
+
+def _rounded(value: float) -> float:
+    rounded: float = _ONE.unpack(_ONE.pack(value))[0]
+    return rounded
+
+
+_DEGREES = _rounded(180.0 / _rounded(pi))
+_RADIANS = _rounded(_rounded(pi) / 180.0)

@@ -9,7 +9,7 @@ from math import inf
 import numpy as np
 import pytest
 
-from framerunner.mission_teller import HISTORY, MissionTeller
+from framerunner.flying.mission_teller import HISTORY, MissionTeller
 from offboard.app import Moment, fly_mission
 from offboard.drone import DroneState, VelocityCommand
 from offboard.engine import TransitionTaken
