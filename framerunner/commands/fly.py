@@ -22,8 +22,8 @@ _Camera = Annotated[str | None, Parameter(help="URL, device or folder of its cam
 _Simulator = Annotated[
     str | None,
     Parameter(
-        help="with --drone, a simulator's URL, http://HOST:PORT: its referee judges, and its camera is used "
-        "if no --camera is given; by default what an http --camera belongs to, if that is a simulator"
+        help="with --drone: http://HOST:PORT of the simulator that flies it and judges; without it the referee "
+        "is looked for where an http camera is. Without --camera its camera is used"
     ),
 ]
 _Lockstep = Annotated[
@@ -84,7 +84,7 @@ def fly(
 
         framerunner fly --drone serial:///dev/ttyUSB0:57600 --camera rtsp://10.0.0.2/1
     """
-    api = _simulator(simulator, drone)
+    api = _simulator_api(simulator, drone)
     if api is not None and camera is None:
         camera = api.video_url
     _check(drone, camera, speed, instance, lockstep)
@@ -104,7 +104,7 @@ def fly(
     return asyncio.run(fly_once(FlightSettings(plan, real_time, out, record, video, monitor)))
 
 
-def _simulator(url: str | None, drone: str | None) -> SimulatorApi | None:
+def _simulator_api(url: str | None, drone: str | None) -> SimulatorApi | None:
     """The simulator that flies a drone which is there already."""
     if url is None:
         return None

@@ -17,6 +17,7 @@ from vision.types import CameraFrame
 from wire.simulator_api import SimulatorApi
 
 if TYPE_CHECKING:  # what is heavy is imported when a flight begins
+    from framerunner.flying.mission_teller import MissionTeller
     from framerunner.flying.simulator_process import SimulatorClock, SitlProcess
     from offboard.eyes import CameraEyes
     from offboard.link.companion import Companion
@@ -88,9 +89,7 @@ async def fly_in_real_time(
     from framerunner.flying.mission_teller import MissionTeller
     from offboard.eyes import CameraEyes
     from offboard.link.companion import Companion
-    from vision.sources import open_source
 
-    mission, folder = plan.chart, records.folder
     async with AsyncExitStack() as stack:
         session = await stack.enter_async_context(aiohttp.ClientSession())
         vehicle = await _vehicle(plan, settings, records, stack, monitor_url)
@@ -98,27 +97,16 @@ async def fly_in_real_time(
         judge, plan = await choose_judge(plan, vehicle.api, session, named=named)
         companion = Companion()
         stack.push_async_callback(companion.close)
-        source = folder.mission.read_text(encoding="utf-8")
-        teller = MissionTeller(companion, mission, source, plan.scenario.name, plan.start_pose)
+        source = records.folder.mission.read_text(encoding="utf-8")
+        teller = MissionTeller(companion, plan.chart, source, plan.scenario.name, plan.start_pose)
         drone = _drone(plan, vehicle, records, stack, companion)
-        timing = FlightTiming(drone, None if vehicle.sitl is None else vehicle.sitl.clock)
-        title = f"{plan.scenario.name}: {mission.name}"
+        camera = await _camera(plan, vehicle, records, stack, teller)
+        eyes = CameraEyes(camera)
+        timing = FlightTiming(drone, eyes, None if vehicle.sitl is None else vehicle.sitl.clock)
+        title = f"{plan.scenario.name}: {plan.chart.name}"
         display = FlightDisplay(title, plan.limit_s, records.recorder, judge)
 
-        def keep(frame: CameraFrame) -> None:
-            records.see_frame(frame)
-            teller.see_frame(frame)
-
-        images = await stack.enter_async_context(
-            open_source(vehicle.camera_url, size_px=vehicle.image_size_px)
-        )
-        camera = RecordingCamera(images, folder.video, plan.scenario.camera.rate_hz, keep)
-        stack.callback(camera.close)
-        eyes = CameraEyes(camera)
-        timing.look_through(eyes)
-
         async def run(flight: Coroutine[Any, Any, Outcome]) -> Outcome:
-            """While it is flown, the display is shown and the simulator is watched."""
             async with display:
                 task = asyncio.create_task(flight)
                 outcome = await (task if vehicle.sitl is None else vehicle.sitl.guard(task))
@@ -185,24 +173,41 @@ def _drone(
     return drone
 
 
+async def _camera(
+    plan: FlightPlan,
+    vehicle: _Vehicle,
+    records: RunRecords,
+    stack: AsyncExitStack,
+    teller: MissionTeller,
+) -> RecordingCamera:
+    """The camera, whose images are recorded; let go of when the stack is left."""
+    from vision.sources import open_source
+
+    def keep(frame: CameraFrame) -> None:
+        records.see_frame(frame)
+        teller.see_frame(frame)
+
+    source = await stack.enter_async_context(open_source(vehicle.camera_url, size_px=vehicle.image_size_px))
+    camera = RecordingCamera(source, records.folder.video, plan.scenario.camera.rate_hz, keep)
+    stack.callback(camera.close)
+    return camera
+
+
 class FlightTiming:
     """Counts what came late in a real-time flight: whether the machine kept up.
 
     Args:
         drone: what is flown.
+        eyes: through which it sees.
         clock: of a simulator whose time waits for this program; None: vehicle time does not wait.
     """
 
-    def __init__(self, drone: MavsdkDrone, clock: SimulatorClock | None) -> None:
+    def __init__(self, drone: MavsdkDrone, eyes: CameraEyes, clock: SimulatorClock | None) -> None:
         self._drone = drone
-        self._clock = clock
-        self._eyes: CameraEyes | None = None
-
-    def look_through(self, eyes: CameraEyes) -> None:
-        """Take the age of images from these."""
         self._eyes = eyes
-        if self._clock is not None:
-            self._clock.look_through(eyes)
+        self._clock = clock
+        if clock is not None:
+            clock.look_through(eyes)
 
     def report(self, real_time_factor: float | None, speed: float) -> dict[str, Any]:
         """What stands in `result.json`.
@@ -223,5 +228,5 @@ class FlightTiming:
             "vehicle_time_waits": clock is not None,
             "speed": speed if real_time_factor is None else real_time_factor / speed,
             **late,
-            "oldest_image_s": 0.0 if self._eyes is None else self._eyes.oldest_s,
+            "oldest_image_s": self._eyes.oldest_s,
         }
