@@ -22,8 +22,8 @@ _Camera = Annotated[str | None, Parameter(help="URL, device or folder of its cam
 _Simulator = Annotated[
     str | None,
     Parameter(
-        help="with --drone: http://HOST:PORT of the simulator that flies it and judges; without it the referee "
-        "is looked for where an http camera is. Without --camera its camera is used"
+        help="with --drone: http://HOST:PORT of the simulator that flies it: its referee judges, and without "
+        "--camera its camera is used. By default that of an http --camera, if there is one"
     ),
 ]
 _Lockstep = Annotated[

@@ -12,7 +12,7 @@ from scenarios.ground import start_position
 from scenarios.models import Scenario
 from scenarios.referee import Referee
 
-if TYPE_CHECKING:  # it brings the statechart library, which monitor and virtual camera do without
+if TYPE_CHECKING:  # it brings the statechart library, which the virtual camera does without
     from offboard.mission import Mission
 
 StartPose = tuple[float, float, float, float]
