@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import Any, Protocol
 
 from scenarios.models import Scenario
-from scenarios.report import RefereeReport, RefereeSnapshot
+from scenarios.result import RefereeReport, RefereeSnapshot
 from scenarios.truth import TrueState
 
 Message = Any  # pymavlink's classes are made by a generator and carry no types

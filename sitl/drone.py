@@ -5,7 +5,6 @@ from __future__ import annotations
 import asyncio
 import socket
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import asdict
 from importlib import import_module
 from math import degrees
 from typing import TYPE_CHECKING
@@ -14,6 +13,7 @@ from firmware_py.mavlink.camera_model import CameraModel
 from firmware_py.mavlink.node import MavlinkNode
 from firmware_py.mavlink.video_links import VideoEncoding, VideoStream
 from geometry.axes import flip_vector
+from scenarios.result import LocalFrame, Standing
 from sitl.drone_files import flight_recorder, open_storage
 from sitl.link_hub import LinkHub
 from sitl.link_urls import is_loopback
@@ -199,22 +199,22 @@ class ServedDrone:
         """What `/referee.json?state=…&ended=…` tells: how the try stands, and the report if it ended now."""
         simulation = self.simulation
         referee = simulation.referee
-        return {
-            "scenario": simulation.scenario.name,
-            "source": "truth",
-            "lift_m": 0.0,
-            "time_us": simulation.time_us,
-            "local_frame": self._local_frame(),
-            "snapshot": asdict(referee.snapshot()),
-            "report": referee.report(query.get("state", ""), query.get("ended")).as_dict(),
-        }
+        standing = Standing(
+            scenario=simulation.scenario.name,
+            source="truth",
+            time_us=simulation.time_us,
+            local_frame=self._local_frame(),
+            snapshot=referee.snapshot(),
+            report=referee.report(query.get("state", ""), query.get("ended")),
+        )
+        return standing.model_dump(mode="json")
 
-    def _local_frame(self) -> dict[str, object] | None:
+    def _local_frame(self) -> LocalFrame | None:
         """Where in the arena the vehicle's local frame is; None before the estimator has fixed its origin."""
         origin_ned_m = self.simulation.autopilot.estimator.origin_ned_m
         if origin_ned_m is None:
             return None
-        return {"origin_arena_m": flip_vector(origin_ned_m), "yaw_rad": 0.0}
+        return LocalFrame(origin_arena_m=flip_vector(origin_ned_m))
 
 
 def _camera_model(simulation: Simulation) -> CameraModel:

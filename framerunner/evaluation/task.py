@@ -6,10 +6,11 @@ import threading
 import traceback
 from importlib import metadata
 
-from framerunner.evaluation.rows import ERROR, Row
+from framerunner.evaluation.rows import Row
 from framerunner.flying.lockstep import fly_lockstep
 from framerunner.flying.plan import FlightPlan
-from framerunner.runs.pictures import Track
+from framerunner.runs.track import Track
+from scenarios.verdict import Verdict
 
 TRACK_STEP_S = 0.2
 """Between two samples that are kept for a picture."""
@@ -34,13 +35,12 @@ def fly_task(plan: FlightPlan) -> Row:
             flown = fly_lockstep(plan)
         if flown.outcome.interrupted:
             raise KeyboardInterrupt
-        row = Row.from_result(flown.result)
-        row.to_json()  # what cannot be kept is found here, where it is the flight's fault
     except KeyboardInterrupt:
         raise
     except BaseException as error:  # a contestant's code may raise anything, SystemExit too
         return broken_off(plan, error)
-    return row if row.landed else Row.from_result(flown.result, thinned(flown.track))
+    track = None if flown.result.completed else thinned(flown.track)
+    return Row(**dict(flown.result), track=track)
 
 
 def broken_off(plan: FlightPlan, error: BaseException) -> Row:
@@ -50,9 +50,10 @@ def broken_off(plan: FlightPlan, error: BaseException) -> Row:
     return Row(
         scenario=plan.scenario.name,
         mission="" if plan.mission is None else plan.mission.name,
-        seed=plan.seed or 0,
-        verdict=ERROR,
+        seed=plan.seed,
+        verdict=Verdict.ERROR,
         reason=f"{kind}: {text}" if text else kind,
+        ended="error",
         version=metadata.version("framerunner"),
         traceback="".join(traceback.format_exception(error)),
     )

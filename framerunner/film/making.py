@@ -93,10 +93,8 @@ def _scenario(folder: Path) -> Scenario:
 
 def _hung(scenario: Scenario, flight: CollectedFlight) -> Scenario:
     """The scenario with its frames as high as they were hung for this drone."""
-    lift_m = (flight.result or {}).get("lift_m", 0.0)
-    if isinstance(lift_m, int | float) and abs(lift_m) < 10.0:
-        return FlightPlan(scenario, lift_m=float(lift_m)).layout
-    return scenario
+    lift_m = 0.0 if flight.result is None else flight.result.lift_m
+    return FlightPlan(scenario, lift_m=lift_m).layout if abs(lift_m) < 10.0 else scenario
 
 
 def _film(story: Story, settings: FilmSettings) -> Made:

@@ -14,9 +14,10 @@ from rich.markup import escape
 from rich.status import Status
 from rich.table import Table
 
-from framerunner.flying.judges import Judge, Standing
+from framerunner.flying.judges import Judge
 from framerunner.runs.recorder import FlightRecorder
 from offboard.app import Moment
+from scenarios.result import RefereeSnapshot
 from vision.types import Detection
 
 _REFRESH_S = 0.2
@@ -69,7 +70,7 @@ class FlightDisplay:
                 live.update(self._table(await self._judge.standing()), refresh=True)
                 await asyncio.sleep(_REFRESH_S)
 
-    def _print_line(self, standing: Standing | None) -> None:
+    def _print_line(self, standing: RefereeSnapshot | None) -> None:
         moment = self._recorder.latest
         if moment is None:
             return
@@ -87,7 +88,7 @@ class FlightDisplay:
             flush=True,
         )
 
-    def _table(self, standing: Standing | None) -> Table:
+    def _table(self, standing: RefereeSnapshot | None) -> Table:
         moment = self._recorder.latest
         if moment is None:
             table = _empty_table(self._title)

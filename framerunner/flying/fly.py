@@ -8,18 +8,18 @@ from __future__ import annotations
 
 from collections.abc import Awaitable, Callable, Coroutine, Mapping, Sequence
 from dataclasses import dataclass
-from importlib import metadata
 from typing import Any
 
+from framerunner.flying.flight_result import flight_result
 from framerunner.flying.judges import Judge
 from framerunner.flying.plan import FlightPlan
-from framerunner.runs.pictures import Track
-from framerunner.runs.recorder import TrackRecorder
-from offboard.app import Moment, Observer, Outcome, fly_mission
+from framerunner.runs.track import Track, TrackRecorder
+from offboard.app import MissionEnd, Moment, Observer, fly_mission
 from offboard.drone import Drone
 from offboard.eyes import Eyes
+from scenarios.result import FlightResult
 
-Run = Callable[[Coroutine[Any, Any, Outcome]], Awaitable[Outcome]]
+Run = Callable[[Coroutine[Any, Any, MissionEnd]], Awaitable[MissionEnd]]
 
 
 @dataclass(frozen=True, slots=True)
@@ -27,13 +27,13 @@ class Flown:
     """A flight that is over.
 
     Attributes:
-        result: what stands in `result.json`, but for what tells of wall time.
+        result: without wall times.
         outcome: how the mission ended.
         track: where the drone was, 20 times a second.
     """
 
-    result: dict[str, Any]
-    outcome: Outcome
+    result: FlightResult
+    outcome: MissionEnd
     track: Track
 
 
@@ -56,7 +56,7 @@ async def fly(
         judge: is shown every tick, and asked at the end.
         observers: called at every tick, in this order; must be quick.
         run: awaits the flight itself, without the judgement; for what must be done around it.
-        measured: called at the end; what stands in the result besides.
+        measured: called at the end; more of the result, see `flight_result`.
 
     Raises:
         DroneError: the drone cannot be reached or made ready.
@@ -80,18 +80,5 @@ async def fly(
     )
     standing = await judge.standing()
     track = recorder.track(None if standing is None else standing.began_us)
-    result = {
-        "scenario": plan.scenario.name,
-        "mission": mission.name,
-        "seed": plan.seed,
-        **report,
-        "mission_state": outcome.mission_state,
-        "ended": outcome.ended,
-        "seconds_in_state": track.seconds_in_state(),
-        "kept_in_box_s": outcome.kept_in_box_s,
-        "judged_by": judge.source,
-        **({"lift_m": plan.lift_m} if plan.lift_m else {}),
-        **measured(),
-        "version": metadata.version("framerunner"),
-    }
+    result = flight_result(plan, report, outcome, track, judged_by=judge.source, **measured())
     return Flown(result, outcome, track)

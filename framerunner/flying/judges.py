@@ -3,14 +3,16 @@
 from __future__ import annotations
 
 import asyncio
-from dataclasses import dataclass
 from math import cos, sin
-from typing import TYPE_CHECKING, Any, Protocol
+from typing import TYPE_CHECKING, Protocol
+
+from pydantic import ValidationError
 
 from framerunner.errors import SettingError
 from framerunner.flying.plan import FlightPlan
 from offboard.app import Moment
 from scenarios.referee import Referee
+from scenarios.result import RefereeReport, RefereeSnapshot, Standing
 from scenarios.truth import TrueState
 from wire.simulator_api import SimulatorApi
 
@@ -22,27 +24,6 @@ _POLL_S = 0.1
 # Vehicle time. A heartbeat a second tells each link of the disarming; then the referee needs at most 2 s.
 _SETTLE_LIMIT_US = 5_000_000
 _CLOCK_STOPPED_S = 3.0  # wall time without progress of vehicle time
-
-
-@dataclass(frozen=True, slots=True)
-class Standing:
-    """How a try stands, for the display.
-
-    Attributes:
-        try_time_s: since motors on.
-        crossed: colours so far.
-        contacts: with frames, so far.
-        settled: motors off and at rest.
-        motors_on: whether the try is being flown.
-        began_us: vehicle time of motors on, microseconds; None before.
-    """
-
-    try_time_s: float
-    crossed: tuple[str, ...]
-    contacts: int
-    settled: bool
-    motors_on: bool
-    began_us: int | None
 
 
 class Judge(Protocol):
@@ -57,10 +38,10 @@ class Judge(Protocol):
     def see(self, moment: Moment) -> None:
         """Take a tick of the flight."""
 
-    async def standing(self) -> Standing | None:
+    async def standing(self) -> RefereeSnapshot | None:
         """How the try stands now; None if it cannot be had."""
 
-    async def report(self, mission_state: str, ended: str | None) -> dict[str, Any]:
+    async def report(self, mission_state: str, ended: str | None) -> RefereeReport:
         """The report, when the drone has come to rest."""
         ...
 
@@ -89,22 +70,12 @@ class TruthJudge:
         """The referee sees for itself; the substitute follows."""
         self._substitute.see(moment)
 
-    async def standing(self) -> Standing | None:
+    async def standing(self) -> RefereeSnapshot | None:
         """Ask for the snapshot."""
         answer = await ask_referee(self._api, self._session)
-        if answer is None:
-            return None
-        now = answer["snapshot"]
-        return Standing(
-            now["try_time_s"],
-            tuple(now["crossed"]),
-            now["contacts"],
-            now["settled"],
-            now["motors_on"],
-            now["began_us"],
-        )
+        return None if answer is None else answer.snapshot
 
-    async def report(self, mission_state: str, ended: str | None) -> dict[str, Any]:
+    async def report(self, mission_state: str, ended: str | None) -> RefereeReport:
         """Ask for the report once the drone is at rest.
 
         A mission that finished has seen the motors stop; the referee's own link may tell it later. A flight
@@ -116,8 +87,7 @@ class TruthJudge:
         if answer is None:
             self.source = self._substitute.source
             return await self._substitute.report(mission_state, ended)
-        report: dict[str, Any] = answer["report"]
-        return report
+        return answer.report
 
     async def _settle(self, *, motors_stopped: bool) -> None:
         """Wait until the referee sees the drone at rest, for 5 s of vehicle time at most.
@@ -129,9 +99,8 @@ class TruthJudge:
         began_us = newest_us = -1
         newest_s = loop.time()
         while (answer := await ask_referee(self._api, self._session)) is not None:
-            now, time_us = answer["snapshot"], answer.get("time_us")
-            time_us = time_us if isinstance(time_us, int) else 0
-            if now["settled"] or now.get("over") or (now["motors_on"] and not motors_stopped):
+            now, time_us = answer.snapshot, answer.time_us or 0
+            if now.settled or now.over or (now.motors_on and not motors_stopped):
                 return
             if began_us < 0:
                 began_us = time_us
@@ -168,19 +137,18 @@ class TelemetryJudge:
             )
         )
 
-    async def standing(self) -> Standing | None:
+    async def standing(self) -> RefereeSnapshot | None:
         """From the last tick."""
-        now = self._referee.snapshot()
-        return Standing(now.try_time_s, now.crossed, now.contacts, now.settled, now.motors_on, now.began_us)
+        return self._referee.snapshot()
 
-    async def report(self, mission_state: str, ended: str | None) -> dict[str, Any]:
+    async def report(self, mission_state: str, ended: str | None) -> RefereeReport:
         """Judge what was seen."""
-        return self._referee.report(mission_state, ended).as_dict()
+        return self._referee.report(mission_state, ended)
 
 
 async def ask_referee(
     api: SimulatorApi, session: aiohttp.ClientSession, parameters: dict[str, str] | None = None
-) -> dict[str, Any] | None:
+) -> Standing | None:
     """Get a simulator's `referee.json`; None if there is none."""
     import aiohttp
 
@@ -189,10 +157,9 @@ async def ask_referee(
         async with session.get(api.referee_url, params=parameters, timeout=timeout) as response:
             if response.status != 200:
                 return None
-            answer = await response.json()
-    except (aiohttp.ClientError, TimeoutError, ValueError):
+            return Standing.model_validate_json(await response.read())
+    except (aiohttp.ClientError, TimeoutError, ValidationError):
         return None
-    return answer if isinstance(answer, dict) and "snapshot" in answer else None
 
 
 async def choose_judge(
@@ -213,19 +180,16 @@ async def choose_judge(
         SettingError: the simulator that was named does not judge this scenario.
     """
     answer = None if api is None else await ask_referee(api, session)
-    flown = None if answer is None else answer.get("scenario")
-    if api is not None and answer is not None and flown == plan.scenario.name:
-        # The virtual camera's referee lives on telemetry, and says so.
-        lift_m = answer.get("lift_m", 0.0)
-        plan = plan.lifted(lift_m if isinstance(lift_m, int | float) else 0.0)
-        return TruthJudge(api, session, plan, str(answer.get("source", "truth"))), plan
+    if api is not None and answer is not None and answer.scenario == plan.scenario.name:
+        plan = plan.lifted(answer.lift_m)
+        return TruthJudge(api, session, plan, answer.source), plan  # a virtual camera's lives on telemetry
     if api is not None and named:
         raise SettingError(
             f"--simulator {api.url}: "
             + (
                 "nothing there answers as a simulator; check the address, or leave it out"
                 if answer is None
-                else f"flies the scenario {flown}; start it with --scenario {plan.scenario.name}"
+                else f"flies the scenario {answer.scenario}; start it with --scenario {plan.scenario.name}"
             )
         )
     return TelemetryJudge(plan.new_referee()), plan

@@ -10,15 +10,14 @@ import asyncio
 import hashlib
 from collections.abc import Callable, Sequence
 from struct import Struct
-from typing import Any
 
 from framerunner.flying.fly import Flown, fly
-from framerunner.flying.judges import Standing
 from framerunner.flying.lockstep_drone import LockstepDrone, TruthObserver
 from framerunner.flying.plan import FlightPlan
 from offboard.app import Moment, Observer
 from offboard.eyes import CAMERA_DEAD_S, CameraLostError
 from scenarios.models import Scenario
+from scenarios.result import RefereeReport, RefereeSnapshot
 from scenarios.truth import TrueState
 from sitl.camera_feed import CameraFeed
 from sitl.simulation import Simulation
@@ -101,15 +100,14 @@ class _SimulationJudge:
     def see(self, moment: Moment) -> None:
         """The referee sees for itself."""
 
-    async def standing(self) -> Standing:
+    async def standing(self) -> RefereeSnapshot:
         """How the try stands now."""
-        now = self._vehicle.simulation.referee.snapshot()
-        return Standing(now.try_time_s, now.crossed, now.contacts, now.settled, now.motors_on, now.began_us)
+        return self._vehicle.simulation.referee.snapshot()
 
-    async def report(self, mission_state: str, ended: str | None) -> dict[str, Any]:
+    async def report(self, mission_state: str, ended: str | None) -> RefereeReport:
         """The report, when the drone has come to rest."""
         self._vehicle.drone.settle()
-        return self._vehicle.simulation.referee.report(mission_state, ended).as_dict()
+        return self._vehicle.simulation.referee.report(mission_state, ended)
 
 
 class LockstepEyes:

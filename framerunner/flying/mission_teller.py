@@ -11,6 +11,7 @@ from offboard.app import Moment
 from offboard.engine import TransitionTaken
 from offboard.link.companion import Companion
 from offboard.mission import Mission, mermaid
+from scenarios.result import FlightResult
 from vision.types import CameraFrame, Detection, Detections
 from wire.mission_codec import PayloadError, split_document
 from wire.mission_messages import (
@@ -79,13 +80,9 @@ class MissionTeller:
             self._broken = True
             logger.warning("the mission is not told of any more: %r", error)
 
-    async def tell_result(self, result: Mapping[str, Any]) -> None:
-        """Tell how the flight was judged, at once and twice, and wait 0.3 s until that has gone out.
-
-        Args:
-            result: as it will stand in `result.json`.
-        """
-        if self._tell_document(DocumentKind.RESULT, result) is not None:
+    async def tell_result(self, result: FlightResult) -> None:
+        """Tell how the flight was judged, at once and twice, and wait 0.3 s until that has gone out."""
+        if self._tell_document(DocumentKind.RESULT, result.as_json()) is not None:
             await self._companion.farewell(DocumentKind.RESULT)
 
     def _see(self, moment: Moment) -> None:

@@ -10,9 +10,10 @@ from typing import TYPE_CHECKING, Any
 
 from framerunner.flying.fly import Flown, fly
 from framerunner.flying.plan import FlightPlan
-from framerunner.runs.flight_files import warn
 from framerunner.runs.recorder import RecordingCamera, RunRecords
-from offboard.app import Outcome
+from framerunner.runs.run_folder import warn
+from offboard.app import MissionEnd
+from scenarios.result import Timing
 from vision.types import CameraFrame
 from wire.simulator_api import SimulatorApi
 
@@ -106,7 +107,7 @@ async def fly_in_real_time(
         title = f"{plan.scenario.name}: {plan.chart.name}"
         display = FlightDisplay(title, plan.limit_s, records.recorder, judge)
 
-        async def run(flight: Coroutine[Any, Any, Outcome]) -> Outcome:
+        async def run(flight: Coroutine[Any, Any, MissionEnd]) -> MissionEnd:
             async with display:
                 task = asyncio.create_task(flight)
                 outcome = await (task if vehicle.sitl is None else vehicle.sitl.guard(task))
@@ -209,8 +210,8 @@ class FlightTiming:
         if clock is not None:
             clock.look_through(eyes)
 
-    def report(self, real_time_factor: float | None, speed: float) -> dict[str, Any]:
-        """What stands in `result.json`.
+    def report(self, real_time_factor: float | None, speed: float) -> Timing:
+        """What the flight's result says of it.
 
         Args:
             real_time_factor: vehicle time a wall time; None before two ticks.
@@ -223,10 +224,10 @@ class FlightTiming:
             "late_setpoints": 0 if clock is None else clock.setpoints_missed,
         }
         slow = real_time_factor is not None and real_time_factor < SLOW_FACTOR * speed
-        return {
-            "kept_up": not slow and not any(late.values()),
-            "vehicle_time_waits": clock is not None,
-            "speed": speed if real_time_factor is None else real_time_factor / speed,
+        return Timing(
+            kept_up=not slow and not any(late.values()),
+            vehicle_time_waits=clock is not None,
+            speed=speed if real_time_factor is None else real_time_factor / speed,
             **late,
-            "oldest_image_s": self._eyes.oldest_s,
-        }
+            oldest_image_s=self._eyes.oldest_s,
+        )

@@ -10,13 +10,12 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 from urllib.parse import urlsplit
 
+from framerunner.flying.flight_result import result_lines, timing_line
 from framerunner.flying.fly import Flown
 from framerunner.flying.plan import FlightPlan
 from framerunner.flying.real_time import RealTimeSettings, fly_in_real_time
-from framerunner.runs.flight_files import left_lines, warn, write_outcome
 from framerunner.runs.recorder import RunRecords, VideoFile
-from framerunner.runs.result_text import result_lines, timing_line
-from framerunner.runs.run_folder import RunFolder
+from framerunner.runs.run_folder import RunFolder, left_lines, warn, write_outcome
 from vision.types import Image
 from wire.simulator_api import SimulatorApi
 
@@ -24,7 +23,6 @@ if TYPE_CHECKING:
     from framerunner.recording.mcap_writer import FlightRecording
 
 _INTERRUPTED_CODE = 130
-COMPLETED = ("clean", "completed")
 
 
 @dataclass(frozen=True, slots=True)
@@ -94,14 +92,14 @@ async def _fly_and_judge(settings: FlightSettings, monitor_url: str | None) -> i
                 raise
             records.finish(flown.result, flown.track)
         result = records.complete(flown.result)
-        layout = settings.plan.lifted(result.get("lift_m", 0.0)).layout
+        layout = settings.plan.lifted(result.lift_m).layout
         write_outcome(folder, layout, flown.track, result)
-    late = timing_line(result)
+    late = timing_line(result.timing)
     lines = [result_lines(result), *([late] if late else []), *left_lines(folder, result)]
     print("\n".join(lines), flush=True)
     if flown.outcome.interrupted:
         return _INTERRUPTED_CODE
-    return 0 if result["verdict"] in COMPLETED else 1
+    return 0 if result.completed else 1
 
 
 async def _fly_in_lockstep(settings: FlightSettings, records: RunRecords) -> Flown:

@@ -120,7 +120,7 @@ class FrameChallengeEnv(gymnasium.Env[Observation, Action]):
             report = flight.report()
             timed_out = report.verdict is Verdict.TIMED_OUT
             reward += final_reward(report)
-            info["report"] = report.as_dict()
+            info["report"] = report.model_dump(mode="json")
         return self._observe(flight), reward, over and not timed_out, timed_out, info
 
     def render(self) -> Image | None:

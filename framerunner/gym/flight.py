@@ -10,7 +10,7 @@ from offboard.drone import DroneError, DroneState, VelocityCommand
 from scenarios.ground import is_over_base
 from scenarios.models import COLOURS
 from scenarios.referee import Referee
-from scenarios.report import RefereeReport
+from scenarios.result import RefereeReport
 from vision.types import Detections, Image
 
 TAKEN_OFF_M = 0.3

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import heapq
 import os
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -17,6 +17,7 @@ from offboard.app import Moment
 from offboard.drone import DroneState, VelocityCommand
 from offboard.link.alignment import Alignment, Pose
 from scenarios.models import Scenario
+from scenarios.result import FlightResult
 from vision.jpeg import MAX_PIXELS
 from vision.types import Detections
 
@@ -41,7 +42,7 @@ class TlogRecording:
         RecordingError: the log holds no telemetry.
     """
 
-    def __init__(self, folder: Path, scenario: Scenario | None, result: Mapping[str, Any] | None) -> None:
+    def __init__(self, folder: Path, scenario: Scenario | None, result: FlightResult | None) -> None:
         self.title = folder.name
         self.result = result
         self._video = folder / "video.avi"

@@ -17,9 +17,10 @@ from matplotlib.patches import Polygon, Rectangle
 from matplotlib.patheffects import withStroke
 from matplotlib.ticker import MaxNLocator
 
-from framerunner.runs.pictures import Outcome, Track
+from framerunner.runs.track import Track
 from scenarios.ground import start_position
 from scenarios.models import Frame, Scenario
+from scenarios.result import FlightResult
 
 _Dash = Literal["-"] | tuple[float, Sequence[float]]
 
@@ -80,10 +81,10 @@ def draw_scenario(scenario: Scenario) -> Figure:
     return figure
 
 
-def draw_track(scenario: Scenario, track: Track, outcome: Outcome | None) -> Figure:
+def draw_track(scenario: Scenario, track: Track, result: FlightResult | None) -> Figure:
     """Return a flight from above and from the side, with a legend of its states in order of appearance."""
     figure, top, side, words = _sheet()
-    times_s = (outcome.crossing_times_s if outcome else None) or {}
+    times_s = {} if result is None else result.times_s
     _draw_top(top, scenario, {frame.colour: _crossing_label(frame, times_s) for frame in scenario.frames})
     _draw_side(side, scenario)
     _draw_start(top, scenario)
@@ -94,7 +95,7 @@ def draw_track(scenario: Scenario, track: Track, outcome: Outcome | None) -> Fig
         _draw_marks(axes, view, track, times_s)
     _set_limits(top, side, scenario, track)
     _draw_legend(words, spent_s, styles)
-    _write(figure, *_headline(scenario, outcome))
+    _write(figure, *_headline(scenario, result))
     return figure
 
 
@@ -327,15 +328,15 @@ def _draw_legend(axes: Axes, spent_s: Mapping[str, float], styles: _Styles) -> N
         text.set_parse_math(False)
 
 
-def _headline(scenario: Scenario, outcome: Outcome | None) -> tuple[str, str]:
+def _headline(scenario: Scenario, result: FlightResult | None) -> tuple[str, str]:
     """Title and subtitle of a flight."""
-    if outcome is None:
+    if result is None:
         return scenario.name, ""
-    total_s = outcome.try_time_s + outcome.penalty_s
+    total_s = result.try_time_s + result.penalty_s
     times = f"{total_s:.1f} s"
-    if outcome.penalty_s > 0:
-        times += f" (try {outcome.try_time_s:.1f} s, penalty {outcome.penalty_s:.1f} s)"
-    return f"{scenario.name}: {outcome.verdict}, {times}", outcome.reason
+    if result.penalty_s > 0:
+        times += f" (try {result.try_time_s:.1f} s, penalty {result.penalty_s:.1f} s)"
+    return f"{scenario.name}: {result.verdict}, {times}", result.reason
 
 
 def _write(figure: Figure, title: str, subtitle: str) -> None:

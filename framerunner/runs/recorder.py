@@ -4,17 +4,18 @@ from __future__ import annotations
 
 import time
 from collections import deque
-from collections.abc import AsyncIterator, Callable, Mapping
+from collections.abc import AsyncIterator, Callable
 from concurrent.futures import Future, ThreadPoolExecutor
 from datetime import UTC, datetime
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Protocol
+from typing import TYPE_CHECKING, Protocol
 
 import cv2
 
-from framerunner.runs.pictures import Track
 from framerunner.runs.run_folder import RunFolder
+from framerunner.runs.track import Track
 from offboard.app import Moment
+from scenarios.result import FlightResult
 from vision.types import CameraFrame, Image
 
 if TYPE_CHECKING:
@@ -29,37 +30,6 @@ class FrameSource(Protocol):
     def frames(self) -> AsyncIterator[CameraFrame]:
         """Images as they come."""
         ...
-
-
-class TrackRecorder:
-    """Remembers where the drone was at every tick of a flight."""
-
-    def __init__(self) -> None:
-        self._time_us: list[int] = []
-        self._x: list[float] = []
-        self._y: list[float] = []
-        self._z: list[float] = []
-        self._mission_state: list[str] = []
-
-    def see(self, moment: Moment) -> None:
-        """Take a tick."""
-        state = moment.state
-        self._time_us.append(state.time_us)
-        self._x.append(state.x)
-        self._y.append(state.y)
-        self._z.append(state.z)
-        self._mission_state.append(moment.mission_state)
-
-    def track(self, began_us: int | None) -> Track:
-        """Return where the drone was.
-
-        Args:
-            began_us: vehicle time from which to count, microseconds; None for the first tick's.
-        """
-        if began_us is None:
-            began_us = self._time_us[0] if self._time_us else 0
-        time_s = [(time_us - began_us) / 1e6 for time_us in self._time_us]
-        return Track(time_s, self._x, self._y, self._z, self._mission_state)
 
 
 class FlightRecorder:
@@ -228,16 +198,16 @@ class RunRecords:
         if self.recording is not None:
             self.recording.see_frame(frame)
 
-    def complete(self, result: dict[str, Any]) -> dict[str, Any]:
+    def complete(self, result: FlightResult) -> FlightResult:
         """What stands in `result.json`: a result with what tells of wall time."""
-        return {
-            **result,
+        wall = {
             "wall_time_s": self.recorder.wall_time_s,
             "real_time_factor": self.recorder.real_time_factor,
             "started": self._started.isoformat(timespec="seconds"),
         }
+        return result.model_copy(update=wall)
 
-    def finish(self, result: Mapping[str, Any], track: Track) -> None:
+    def finish(self, result: FlightResult, track: Track) -> None:
         """Add what is known only after the flight."""
         if self.recording is not None:
             self.recording.finish(result, track.time_s)

@@ -1,18 +1,23 @@
-"""The folder that a flight leaves behind."""
+"""The folder that a flight leaves behind. A file that cannot be written costs one line, never the verdict."""
 
 from __future__ import annotations
 
-import json
 import os
+import shlex
+import sys
+from collections.abc import Callable
 from datetime import datetime
 from pathlib import Path
-from typing import Any
 
 from framerunner.errors import SettingError
+from framerunner.extras import advice
+from framerunner.runs.pictures import PictureError, track_picture
+from framerunner.runs.track import Track
 from offboard.mission import Mission
 from offboard.pilot_file import PilotFile
 from scenarios.loader import dump_yaml
 from scenarios.models import Scenario
+from scenarios.result import FlightResult
 
 
 class RunFolder:
@@ -77,7 +82,7 @@ class RunFolder:
                 "or choose another"
             ) from None
 
-    def write_result(self, result: dict[str, Any]) -> None:
+    def write_result(self, result: FlightResult) -> None:
         """Write `result.json` whole or not at all.
 
         Raises:
@@ -85,7 +90,7 @@ class RunFolder:
         """
         part = self.result.with_suffix(".part")
         try:
-            part.write_text(json.dumps(result, indent=2, allow_nan=False) + "\n", encoding="utf-8")
+            part.write_text(result.text(), encoding="utf-8")
             os.replace(part, self.result)
         except OSError:
             part.unlink(missing_ok=True)
@@ -106,3 +111,53 @@ class RunFolder:
                 self.path.rmdir()
                 if self._made_out and not any(self.path.parent.iterdir()):
                     self.path.parent.rmdir()
+
+
+def write_outcome(folder: RunFolder, scenario: Scenario, track: Track, result: FlightResult) -> None:
+    """Write `result.json` and `track.png`; say on standard error what could not be written.
+
+    Args:
+        folder: of the flight.
+        scenario: what was flown, its frames where they were.
+        track: where the drone was.
+        result: of the flight.
+    """
+    _try(folder.result, lambda: folder.write_result(result))
+    _try(folder.track, lambda: track_picture(scenario, track, result, folder.track))
+
+
+def warn(problem: str) -> None:
+    """Say in one line what a flight does not leave; nothing if there is no problem."""
+    if problem:
+        print(f"warning: {problem}", file=sys.stderr, flush=True)
+
+
+def left_lines(folder: RunFolder, result: FlightResult) -> list[str]:
+    """Say where a flight's files are, and how to see it again; nothing that is not there.
+
+    Args:
+        folder: of the flight; it may be gone.
+        result: of the flight.
+    """
+    lines = [f"left in {folder.path}/"] if folder.path.is_dir() else []
+    # A lockstep flight is flown again from its plan.
+    shown_from = (folder.recording, folder.tlog) if result.seed is None else (folder.result,)
+    if any(path.is_file() and path.stat().st_size for path in shown_from):
+        command = shlex.join(["framerunner", "replay", str(folder.path)])
+        lines.append(f"see it again: {command}")
+    return lines
+
+
+def _try(path: Path, write: Callable[[], None]) -> None:
+    try:
+        write()
+    except PictureError as error:
+        path.unlink(missing_ok=True)  # half a picture
+        warn(str(error))
+    except ModuleNotFoundError as error:
+        missing = advice(error.name or "")
+        if missing is None:
+            raise
+        warn(f"{path.name} was not drawn: {missing}")
+    except OSError as error:
+        warn(f"cannot write '{path}': {error.strerror or error}")

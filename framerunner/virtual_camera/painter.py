@@ -5,7 +5,6 @@ No clock and no socket: time is the vehicle's, messages come in, images come out
 
 from __future__ import annotations
 
-from dataclasses import asdict
 from math import cos, isfinite, sin
 
 from framerunner.flying.plan import FlightPlan
@@ -21,6 +20,7 @@ from framerunner.virtual_camera.placement import Placement, yaw_of
 from geometry.vectors import Quaternion
 from offboard.link.alignment import Pose
 from scenarios.models import Scenario
+from scenarios.result import LocalFrame, Standing
 from scenarios.truth import TrueState
 from sitl.camera import Camera, Image
 from sitl.camera_feed import FIRST_EXPOSURE_US
@@ -135,30 +135,30 @@ class VirtualCamera:
         attitude = levelled(where.attitude_arena) if self._level else where.attitude_arena
         return exposure_us, self._camera.render(where.position_arena_m, attitude)
 
-    def standing(self, state: str = "", ended: str | None = None) -> dict[str, object]:
-        """What `/referee.json` tells, in the simulator's form.
+    def standing(self, state: str = "", ended: str | None = None) -> Standing:
+        """How the try stands, for `/referee.json`.
 
         Args:
             state: the mission's, for the report.
             ended: why the flight was broken off, if it was.
         """
-        return {
-            "scenario": self.plan.scenario.name,
-            "source": "telemetry",
-            "lift_m": self.plan.lift_m,
-            "time_us": self.history.newest_us or 0,
-            "local_frame": self._local_frame(),
-            "snapshot": asdict(self._referee.snapshot()),
-            "report": self._referee.report(state, ended).as_dict(),
-        }
+        return Standing(
+            scenario=self.plan.scenario.name,
+            source="telemetry",
+            lift_m=self.plan.lift_m,
+            time_us=self.history.newest_us or 0,
+            local_frame=self._local_frame(),
+            snapshot=self._referee.snapshot(),
+            report=self._referee.report(state, ended),
+        )
 
-    def _local_frame(self) -> dict[str, object] | None:
+    def _local_frame(self) -> LocalFrame | None:
         """Where in the arena the vehicle's local frame is; None as long as the arena has no place."""
         alignment = self.placement.alignment
         if alignment is None:
             return None
         origin = alignment.pose(Pose((0.0, 0.0, 0.0), 0.0))
-        return {"origin_arena_m": origin.position_m, "yaw_rad": origin.yaw_rad}
+        return LocalFrame(origin_arena_m=origin.position_m, yaw_rad=origin.yaw_rad)
 
     def _take_angles(self, message: Message) -> None:
         angles = (message.roll, message.pitch, message.yaw)

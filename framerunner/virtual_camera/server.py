@@ -161,7 +161,7 @@ class CameraServer:
                 self._link.send(command(self._vehicle, *asking))
 
     def _referee_answer(self, query: Mapping[str, str]) -> object:
-        return self._camera.standing(query.get("state", ""), query.get("ended"))
+        return self._camera.standing(query.get("state", ""), query.get("ended")).model_dump(mode="json")
 
 
 class _Rates:

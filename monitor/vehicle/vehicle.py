@@ -13,7 +13,7 @@ from typing import Any
 from pymavlink.dialects.v20 import common as mavlink
 
 from monitor.ports import Equipment, Message
-from monitor.referee_channel import RefereeAnswer, RefereeChannel
+from monitor.referee_channel import RefereeChannel
 from monitor.tries import TryEvent
 from monitor.vehicle.asking import BootTime, RateWatch
 from monitor.vehicle.camera import CAMERAS, CameraWatch
@@ -28,6 +28,7 @@ from monitor.vehicle.placement import Placement
 from monitor.vehicle.speech import Speech
 from monitor.vehicle.traffic import Traffic
 from scenarios.models import Scenario
+from scenarios.result import Standing
 from wire.mission_messages import COMPONENT_ID as APP
 from wire.simulator_api import SimulatorApi
 
@@ -345,7 +346,7 @@ class Vehicle:
                 self._ears.send(question)
 
     def _open_channel(self, api: SimulatorApi) -> None:
-        def hear(answer: RefereeAnswer) -> None:
+        def hear(answer: Standing) -> None:
             ahead_us = (answer.time_us or 0) - self._motion.time_us
             if ahead_us >= _OTHER_BOOT_US:
                 return

@@ -128,7 +128,7 @@ def _store_all() -> None:
         changed = _changed(stored, ticks)
         store(name, ticks)
         states = sum(old.mission_state != new.mission_state for old, new in pairwise(ticks)) + 1
-        print(f"{name}: {flown.result['verdict']}, {len(ticks)} ticks, {states} states; {changed}")
+        print(f"{name}: {flown.result.verdict}, {len(ticks)} ticks, {states} states; {changed}")
 
 
 def _changed(stored: Sequence[Tick], ticks: Sequence[Tick]) -> str:

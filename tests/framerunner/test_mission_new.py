@@ -66,7 +66,7 @@ def test_its_first_exercise_flies_the_whole_challenge():
     new("mine")
     path = Path("mine.yaml")
     path.write_text(with_exercise_done(path.read_text(encoding="utf-8")), encoding="utf-8")
-    assert fly("test-case-1", "mine.yaml").result["verdict"] == "clean"
+    assert fly("test-case-1", "mine.yaml").result.verdict == "clean"
 
 
 @pytest.mark.parametrize("python", [[], ["--python"]], ids=["yaml", "python"])
@@ -160,7 +160,7 @@ def test_the_examples_of_the_documents_are_good(kind):
         assert {"creep", "far_away", "careful_m_s"} <= set(dir(read_pilot("mine.py").pilot_class()))
     else:
         Path("mine.yaml").write_text(example, encoding="utf-8")
-        assert fly("empty", "mine.yaml").result["ended"] == "finished"
+        assert fly("empty", "mine.yaml").result.ended == "finished"
 
 
 def test_its_templates_are_shipped():

@@ -116,7 +116,7 @@ class SimulatedDrone:
             "time_us": simulation.time_us,
             "local_frame": origin_ned_m and {"origin_arena_m": flip_vector(origin_ned_m), "yaw_rad": 0.0},
             "snapshot": asdict(referee.snapshot()),
-            "report": referee.report().as_dict(),
+            "report": referee.report().as_json(),
         }
 
 

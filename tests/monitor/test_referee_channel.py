@@ -10,7 +10,7 @@ from aiohttp import web
 from framerunner.flying.plan import FlightPlan
 from monitor.referee_channel import RefereeChannel
 from scenarios.loader import load_scenario
-from scenarios.report import RefereeSnapshot
+from scenarios.result import RefereeSnapshot
 from wire.simulator_api import SimulatorApi
 
 SCENARIO = load_scenario("test-case-1")
@@ -25,7 +25,7 @@ def good_answer():
         "time_us": 7,
         "local_frame": {"origin_arena_m": [1.0, 2.0, 3.0], "yaw_rad": 0.5},
         "snapshot": asdict(SNAPSHOT),
-        "report": FlightPlan(SCENARIO).new_referee().report().as_dict(),
+        "report": FlightPlan(SCENARIO).new_referee().report().as_json(),
     }
 
 
@@ -85,7 +85,7 @@ async def test_it_asks_five_times_a_second_and_for_the_scenario_once(site):
         assert site.channel.scenario == SCENARIO
     assert site.asked.count("/scenario.json") == 1
     told = site.heard[0]
-    assert told.standing().snapshot == SNAPSHOT
+    assert told.snapshot == SNAPSHOT
     assert told.local_frame.origin_arena_m == (1.0, 2.0, 3.0)
     assert (site.channel.lift_m, site.channel.source, site.said) == (0.25, "truth", [])
 

@@ -237,8 +237,8 @@ def test_an_error_in_flight_ends_it_in_hold(tmp_path, mission_file):
     mission = load_mission(mission_file, read_pilot(pilot_file(tmp_path, breaks)))
     flown = fly_lockstep(FlightPlan(load_scenario("empty"), mission))
     assert flown.outcome.ended == "aborted"
-    assert "my_pilot.py:24: ZeroDivisionError: " in flown.result["reason"]
-    assert flown.result["verdict"] == "aborted"
+    assert "my_pilot.py:24: ZeroDivisionError: " in flown.result.reason
+    assert flown.result.verdict == "aborted"
     assert flown.track.z[-1] > 0.5  # its motors were not stopped in the air
 
 
@@ -253,7 +253,7 @@ def test_a_mission_travels_and_flies_alike(tmp_path, mission_file):
     )
     assert len(sent) < 10_000
     assert here.outcome.ended == "finished"
-    assert flown.stdout.decode().split() == [here.result["state_sha256"], str(here.result["try_time_s"])]
+    assert flown.stdout.decode().split() == [here.result.state_sha256, str(here.result.try_time_s)]
     assert pickle.loads(sent) == mission
 
 

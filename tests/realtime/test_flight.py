@@ -145,9 +145,9 @@ def test_it_leaves_result_track_log_and_video(busy_flight, lockstep_flight):
     assert images(folder / "video.avi") > 8 * result["try_time_s"]
 
     assert (result["verdict"], result["try_time_s"], tuple(result["crossing_sides"])) == (
-        lockstep["verdict"],
-        pytest.approx(lockstep["try_time_s"], abs=0.01),
-        lockstep["crossing_sides"],
+        lockstep.verdict,
+        pytest.approx(lockstep.try_time_s, abs=0.01),
+        lockstep.crossing_sides,
     )
 
 

@@ -8,8 +8,8 @@ from framerunner.errors import SettingError
 from framerunner.evaluation import backends
 from framerunner.evaluation.backends import Pool, check_pool
 from framerunner.evaluation.plan import plan_files
+from framerunner.evaluation.rows import csv_text
 from framerunner.evaluation.runner import fly_all, fly_alone
-from framerunner.evaluation.table_file import csv_text
 from framerunner.flying.plan import FlightPlan
 from offboard.mission import load_mission
 from offboard.pilot_file import PilotFile

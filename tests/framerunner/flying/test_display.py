@@ -7,10 +7,10 @@ import pytest
 from rich.console import Console
 
 from framerunner.flying.display import FlightDisplay
-from framerunner.flying.judges import Standing
 from framerunner.runs.recorder import FlightRecorder
 from offboard.app import Moment
 from offboard.drone import DroneState, VelocityCommand
+from scenarios.result import RefereeSnapshot
 from vision.types import Detection, Detections
 
 SEEN = Detection(n=10, s=-10, e=20, w=-20, d=2.345, a=31.0)
@@ -19,7 +19,7 @@ IN_PART = Detection(n=120, s=-10, e=20, w=-20)
 
 class Judge:
     source = "test"
-    now = Standing(1.0, ("red",), 2, settled=False, motors_on=True, began_us=0)
+    now = RefereeSnapshot(0, 1.0, 0.0, ("red",), "green", 2, True, True, False, False)
 
     async def standing(self):
         return self.now

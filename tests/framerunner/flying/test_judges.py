@@ -12,6 +12,7 @@ from framerunner.flying.plan import FlightPlan
 from offboard.app import Moment
 from offboard.drone import DroneState, VelocityCommand
 from scenarios.loader import load_scenario
+from scenarios.result import RefereeReport
 from vision.types import Detections
 from wire.simulator_api import SimulatorApi
 
@@ -21,10 +22,14 @@ NOBODY = SimulatorApi("http://127.0.0.1:9")
 SNAPSHOT = {
     "began_us": 3,
     "try_time_s": 7.5,
+    "penalty_s": 0.0,
     "crossed": ["red"],
+    "next_colour": "green",
     "contacts": 1,
-    "settled": False,
+    "inside": True,
     "motors_on": False,
+    "settled": False,
+    "over": False,
 }
 
 
@@ -76,7 +81,9 @@ async def test_a_referee_that_lives_on_telemetry_is_not_taken_for_the_truth():
         assert judge.source == "telemetry"
 
 
-@pytest.mark.parametrize("body", [answer("another-place"), "not json", {"weather": "fine"}], ids=str)
+@pytest.mark.parametrize(
+    "body", [answer("another-place"), "not json", {"weather": "fine"}, answer(contacts="many")], ids=str
+)
 async def test_whoever_is_not_the_referee_of_this_scenario_does_not_judge(body):
     async with referee(body) as (root, session, _):
         judge, plan = await choose_judge(PLAN, SimulatorApi(root), session)
@@ -114,7 +121,7 @@ async def test_a_simulator_that_was_named_must_judge(body, words):
 async def test_the_report_is_asked_for_when_the_drone_is_at_rest():
     async with referee(answer(), answer(), answer(settled=True)) as (root, session, queries):
         judge = TruthJudge(SimulatorApi(root), session, PLAN)
-        assert await judge.report("landing.stop", None) == {"verdict": "clean"}
+        assert await judge.report("landing.stop", None) == RefereeReport(verdict="clean")
     assert queries == [{}, {}, {}, {"state": "landing.stop"}]
 
 
@@ -129,7 +136,7 @@ async def test_the_disarming_may_reach_the_referee_later_than_the_app():
     late = [answer(time_us=250_000 * step, motors_on=True) for step in range(8)]
     async with referee(*late, answer(time_us=2_100_000, settled=True)) as (root, session, queries):
         judge = TruthJudge(SimulatorApi(root), session, PLAN)
-        assert await judge.report("landing.touch_down", None) == {"verdict": "clean"}
+        assert await judge.report("landing.touch_down", None) == RefereeReport(verdict="clean")
     assert queries == [{}] * 9 + [{"state": "landing.touch_down"}]
 
 
@@ -168,9 +175,9 @@ async def test_telemetry_is_judged_as_it_comes():
     assert standing.try_time_s == pytest.approx(4.95, abs=0.06)
     assert standing.motors_on
     report = await judge.report("take_off.rise", "pilot took over")
-    assert report["verdict"] == "aborted"
-    assert "pilot took over" in report["reason"]
-    assert report["path_length_m"] == pytest.approx(1.45, abs=0.1)
+    assert report.verdict == "aborted"
+    assert "pilot took over" in report.reason
+    assert report.path_length_m == pytest.approx(1.45, abs=0.1)
 
 
 @pytest.mark.parametrize(("x_m", "z_m"), [(-2.93, 0.3), (-2.93, 0.55), (-2.6, 0.55)])
@@ -182,8 +189,8 @@ async def test_without_a_base_it_lands_where_the_base_would_be_or_beside_it(x_m,
     for tick in range(40):
         judge.see(moment(20.0 + 0.05 * tick, x_m, z_m, armed=False))
     report = await judge.report("landing.touch_down", None)
-    assert report["landed_on_base"] == (x_m == -2.93)
-    assert report["landing_error_m"] == pytest.approx(x_m + 3.0)
+    assert report.landed_on_base == (x_m == -2.93)
+    assert report.landing_error_m == pytest.approx(x_m + 3.0)
 
 
 async def test_telemetry_judges_when_the_simulator_has_died():
@@ -194,5 +201,5 @@ async def test_telemetry_judges_when_the_simulator_has_died():
             judge.see(moment(10.0 + 0.05 * tick, -3.0, 0.6 + 0.05 * tick, armed=tick > 0))
         report = await judge.report("red.turning", "link lost")
     assert judge.source == "telemetry"
-    assert report["verdict"] == "aborted"
-    assert "link lost" in report["reason"]
+    assert report.verdict == "aborted"
+    assert "link lost" in report.reason

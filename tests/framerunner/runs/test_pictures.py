@@ -6,8 +6,10 @@ import pytest
 from matplotlib.colors import to_hex
 
 from framerunner.runs.drawing import draw_scenario, draw_track
-from framerunner.runs.pictures import Outcome, PictureError, Track, scenario_picture, track_picture
+from framerunner.runs.pictures import PictureError, scenario_picture, track_picture
+from framerunner.runs.track import Track
 from scenarios.models import Arena, Base, Frame, Scenario, Start
+from scenarios.result import FlightResult
 
 SCENARIO = Scenario(
     name="two-frames",
@@ -25,7 +27,14 @@ TRACK = Track(
     z=[0.5, 1.0, 2.0, 2.0, 0.6],
     mission_state=["take_off.start", "red.turning", "red.crossing", "green.turning", "landing.stop"],
 )
-OUTCOME = Outcome("timed out", "in green.turning", 180.0, 2.5, {"red": 2.0})
+RESULT = FlightResult(
+    verdict="timed out",
+    reason="in green.turning",
+    try_time_s=180.0,
+    penalty_s=2.5,
+    frames_crossed=("red",),
+    crossing_times_s=(2.0,),
+)
 
 
 def texts(figure):
@@ -70,21 +79,6 @@ def test_a_place_bridges_samples_without_one():
     assert track.place_at(1.0) == pytest.approx((1.0, 0.0, 1.0))
 
 
-def test_an_outcome_is_read_from_a_result():
-    outcome = Outcome.from_result(
-        {
-            "verdict": "clean",
-            "reason": "all well",
-            "try_time_s": 90,
-            "penalty_s": 0,
-            "frames_crossed": ["red", "blue"],
-            "crossing_times_s": [30.5, 60.25],
-            "anything": "else",
-        }
-    )
-    assert outcome == Outcome("clean", "all well", 90.0, 0.0, {"red": 30.5, "blue": 60.25})
-
-
 def test_the_scenario_picture_names_frames_and_heights():
     figure = draw_scenario(SCENARIO)
     assert {"two-frames", "red, 2 m", "green, 0.5 m", "start"} <= set(texts(figure))
@@ -99,7 +93,7 @@ def test_frames_have_their_true_colours():
 
 
 def test_the_track_picture_tells_verdict_times_and_reason():
-    words = texts(draw_track(SCENARIO, TRACK, OUTCOME))
+    words = texts(draw_track(SCENARIO, TRACK, RESULT))
     assert "two-frames: timed out, 182.5 s (try 180.0 s, penalty 2.5 s)" in words
     assert "in green.turning" in words
     assert "red\n2.0 s" in words
@@ -107,7 +101,7 @@ def test_the_track_picture_tells_verdict_times_and_reason():
 
 
 def test_the_legend_has_the_states_in_order_of_appearance():
-    entries = legend_entries(draw_track(SCENARIO, TRACK, OUTCOME))
+    entries = legend_entries(draw_track(SCENARIO, TRACK, RESULT))
     assert entries == [
         "start  1.0 s",
         "turning  2.0 s",
@@ -130,7 +124,7 @@ def test_the_path_is_drawn_where_the_drone_was_in_both_views():
 
 
 def test_the_crossing_is_marked_where_the_drone_was_then():
-    figure = draw_track(SCENARIO, TRACK, OUTCOME)
+    figure = draw_track(SCENARIO, TRACK, RESULT)
     marks = [line for line in figure.axes[0].lines if line.get_markerfacecolor() == "white"]
     assert [(mark.get_xdata()[0], mark.get_ydata()[0]) for mark in marks] == [(3.0, 2.0)]
 
@@ -157,7 +151,7 @@ def test_forty_states_can_be_told_apart():
     ],
     ids=["empty", "one sample", "no place at all", "absurd numbers"],
 )
-@pytest.mark.parametrize("outcome", [None, OUTCOME])
+@pytest.mark.parametrize("outcome", [None, RESULT])
 @pytest.mark.filterwarnings("error")
 def test_odd_tracks_are_drawn_within_reach_of_the_arena(tmp_path, track, outcome):
     path = tmp_path / "track.png"

@@ -6,7 +6,8 @@ import cv2
 import numpy as np
 import pytest
 
-from framerunner.runs.recorder import FlightRecorder, RecordingCamera, TrackRecorder, VideoFile
+from framerunner.runs.recorder import FlightRecorder, RecordingCamera, VideoFile
+from framerunner.runs.track import TrackRecorder
 from offboard.app import Moment
 from offboard.drone import DroneState, VelocityCommand
 from tests.disk import disk_that_takes

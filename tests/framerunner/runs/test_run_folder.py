@@ -7,6 +7,7 @@ import pytest
 
 from framerunner.errors import SettingError
 from framerunner.runs.run_folder import RunFolder
+from scenarios.result import FlightResult
 
 
 def test_its_name_says_when_and_what(tmp_path):
@@ -29,10 +30,13 @@ def test_a_place_that_cannot_be_written_to_is_said(tmp_path):
 
 def test_a_result_is_written_whole_or_not_at_all(tmp_path):
     folder = RunFolder(tmp_path, "empty")
-    folder.write_result({"verdict": "clean", "seed": None})
-    assert json.loads(folder.result.read_text(encoding="utf-8")) == {"verdict": "clean", "seed": None}
+    result = FlightResult(verdict="clean", seed=None)
+    folder.write_result(result)
+    assert json.loads(folder.result.read_text(encoding="utf-8")) == {"seed": None, "verdict": "clean"}
     with pytest.raises(ValueError, match="JSON"):
-        folder.write_result({"verdict": float("nan")})  # no reader of JSON takes NaN
+        folder.write_result(
+            result.model_copy(update={"try_time_s": float("nan")})
+        )  # no reader of JSON takes NaN
     assert json.loads(folder.result.read_text(encoding="utf-8"))["verdict"] == "clean"
     assert [path.name for path in folder.path.iterdir()] == ["result.json"]
 

@@ -149,22 +149,22 @@ def test_the_referee_follows_a_flight_through_a_frame_and_back():
             c, s = cos(START.yaw_rad), sin(START.yaw_rad)
             north, left = c * (px - x) + s * (py - y), -s * (px - x) + c * (py - y)
             tell(camera, reports(time_us, north, -left, pz - z))
-    assert camera.standing()["snapshot"]["crossed"] == ("red",)
-    assert camera.standing()["snapshot"]["motors_on"]
+    assert camera.standing().snapshot.crossed == ("red",)
+    assert camera.standing().snapshot.motors_on
     for step in range(150):
         time_us += 20_000
         tell(camera, reports(time_us, armed=False if step % 50 == 0 else None))
     standing = camera.standing("landing.stop")
-    assert standing["scenario"] == "test-case-1" and standing["source"] == "telemetry"
-    assert standing["snapshot"]["settled"]
-    assert standing["report"]["landed_on_base"]
-    assert standing["report"]["landing_error_m"] == pytest.approx(0.0, abs=1e-3)
-    assert standing["report"]["frames_crossed"] == ("red",)
+    assert standing.scenario == "test-case-1" and standing.source == "telemetry"
+    assert standing.snapshot.settled
+    assert standing.report.landed_on_base
+    assert standing.report.landing_error_m == pytest.approx(0.0, abs=1e-3)
+    assert standing.report.frames_crossed == ("red",)
 
 
 def test_without_a_base_all_hangs_as_high_above_where_the_drone_stands_as_above_the_floor():
     camera = VirtualCamera(SCENARIO, base=False)
-    lift_m = camera.standing()["lift_m"]
+    lift_m = camera.standing().lift_m
     assert lift_m == SCENARIO.base.top_m
     layout = camera.plan.layout
     assert layout.name == SCENARIO.name
