@@ -6,13 +6,13 @@ import asyncio
 import json
 from collections.abc import Callable
 from typing import Any
-from urllib.parse import urlsplit, urlunsplit
 
 import aiohttp
 from pydantic import ValidationError
 
 from scenarios.models import Scenario
 from scenarios.result import Standing, first_error
+from wire.simulator_api import SimulatorApi
 
 _PERIOD_S = 0.2
 _LONGEST_PAUSE_S = 5.0
@@ -30,7 +30,7 @@ class RefereeChannel:
     """Asks one drone's referee, five times a second while it answers.
 
     Args:
-        video_url: of the drone's video; the referee is at the same host and port.
+        api: of the simulator or virtual camera whose video the drone tells of.
         hear: called with each answer.
         say: called with level and one line for people.
 
@@ -40,10 +40,8 @@ class RefereeChannel:
         source: what the referee sees by; "" before its first answer.
     """
 
-    def __init__(self, video_url: str, hear: Callable[[Standing], None], say: Say) -> None:
-        parts = urlsplit(video_url)
-        self._referee_url = urlunsplit((parts.scheme, parts.netloc, "/referee.json", "", ""))
-        self._scenario_url = urlunsplit((parts.scheme, parts.netloc, "/scenario.json", "", ""))
+    def __init__(self, api: SimulatorApi, hear: Callable[[Standing], None], say: Say) -> None:
+        self._api = api
         self._hear = hear
         self._say = say
         self._complaint = ""
@@ -66,11 +64,11 @@ class RefereeChannel:
                 await asyncio.sleep(pause_s)
 
     async def _ask(self, session: aiohttp.ClientSession) -> None:
-        content = await _fetch(session, self._referee_url)
+        content = await _fetch(session, self._api.referee_url)
         try:
             answer = Standing.model_validate(content)
         except ValidationError as error:
-            self._complain(f"{self._referee_url}: {first_error(error)}")
+            self._complain(f"{self._api.referee_url}: {first_error(error)}")
             raise _NotThereError from None
         self.lift_m, self.source = answer.lift_m, answer.source
         if answer.scenario != self._asked_for:
@@ -81,14 +79,14 @@ class RefereeChannel:
         """Get what is flown there, once for each name; a referee without it is still a referee."""
         self.scenario = None
         try:
-            content = await _fetch(session, self._scenario_url)
+            content = await _fetch(session, self._api.scenario_url)
             scenario = Scenario.model_validate(content)
         except _NotThereError as error:
-            self._complain(f"{self._scenario_url}: {error}; the arena cannot be drawn")
+            self._complain(f"{self._api.scenario_url}: {error}; the arena cannot be drawn")
             self._asked_for = name
             return
         except ValidationError as error:
-            self._complain(f"{self._scenario_url}: {first_error(error)}; the arena cannot be drawn")
+            self._complain(f"{self._api.scenario_url}: {first_error(error)}; the arena cannot be drawn")
             self._asked_for = name
             return
         if scenario.name == name:  # else it changed in between: ask again

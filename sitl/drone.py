@@ -24,6 +24,7 @@ from sitl.solids import Solid
 from sitl.time_grants import TimeGrants, Velocity
 from sitl.world import CONTROL_PERIOD_US
 from wire.dialect import mavlink
+from wire.simulator_api import REFEREE_PATH, SCENARIO_PATH, VIDEO_PATH
 
 if TYPE_CHECKING:
     from sitl.camera_feed import CameraFeed
@@ -116,8 +117,8 @@ class ServedDrone:
         video = VideoServer(
             self._settings.bind, self._settings.http_port, options="--instance (sim also: --video-port)"
         )
-        video.add_json("/referee.json", self._referee_answer)
-        video.add_json("/scenario.json", lambda _query: scenario.model_dump(mode="json"))
+        video.add_json(REFEREE_PATH, self._referee_answer)
+        video.add_json(SCENARIO_PATH, lambda _query: scenario.model_dump(mode="json"))
         if self._settings.video_rtp is not None:
             from sitl.rtp import RtpSender
 
@@ -187,7 +188,9 @@ class ServedDrone:
         settings, camera = self._settings, self.simulation.scenario.camera
         common = (camera.width_px, camera.height_px, camera.rate_hz, degrees(camera.horizontal_fov_rad))
         host = _seen_from_outside(settings)
-        page = VideoStream(f"http://{host}:{settings.http_port}/video", VideoEncoding.MJPEG_HTTP, *common)
+        page = VideoStream(
+            f"http://{host}:{settings.http_port}{VIDEO_PATH}", VideoEncoding.MJPEG_HTTP, *common
+        )
         if settings.video_rtp is None:
             return (page,)
         return (VideoStream(str(settings.video_rtp[1]), VideoEncoding.H264_RTP, *common), page)

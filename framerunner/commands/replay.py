@@ -62,7 +62,7 @@ def replay(
 
 
 def _say_result(recorded: Recorded) -> None:
-    from framerunner.flight_result import result_lines
+    from framerunner.flying.flight_result import result_lines
 
     if recorded.result is None:
         print("no result: the flight was not judged")

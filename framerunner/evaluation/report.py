@@ -159,7 +159,7 @@ def _picture(folder: EvaluationFolder, row: Row) -> str | None:
     track = folder.track(row.scenario)
     if len(track) == 0:
         return None
-    from framerunner.drawing import draw_track
+    from framerunner.runs.drawing import draw_track
 
     try:
         scenario = load_scenario(folder.scenario_file(row.scenario))

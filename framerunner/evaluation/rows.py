@@ -9,7 +9,7 @@ from io import StringIO
 
 from pydantic import Field
 
-from framerunner.pictures import Track
+from framerunner.runs.track import Track
 from scenarios.result import FlightResult
 from scenarios.spreadsheet import cell
 from scenarios.verdict import Verdict

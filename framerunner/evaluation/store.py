@@ -16,7 +16,7 @@ from typing import Any
 from framerunner.errors import SettingError
 from framerunner.evaluation.plan import Identity
 from framerunner.evaluation.rows import Row
-from framerunner.pictures import Track
+from framerunner.runs.track import Track
 from scenarios.loader import dump_yaml
 from scenarios.models import Scenario
 

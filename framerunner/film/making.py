@@ -13,10 +13,10 @@ from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, T
 from framerunner.film.film_file import FilmFile, GifFile, Mp4File, film_file, mp4_codec
 from framerunner.film.sheet import Sheet
 from framerunner.film.story import Story
+from framerunner.flying.plan import FlightPlan
 from framerunner.recording.collected import CollectedFlight, collect
 from framerunner.recording.errors import RecordingError
 from framerunner.recording.find import recorded_flight
-from framerunner.virtual_camera.lift import lifted
 from offboard.pilot_file import PilotFile
 from scenarios.loader import load_scenario
 from scenarios.models import Scenario
@@ -94,7 +94,7 @@ def _scenario(folder: Path) -> Scenario:
 def _hung(scenario: Scenario, flight: CollectedFlight) -> Scenario:
     """The scenario with its frames as high as they were hung for this drone."""
     lift_m = 0.0 if flight.result is None else flight.result.lift_m
-    return lifted(scenario, lift_m) if abs(lift_m) < 10.0 else scenario
+    return FlightPlan(scenario, lift_m=lift_m).layout if abs(lift_m) < 10.0 else scenario
 
 
 def _film(story: Story, settings: FilmSettings) -> Made:

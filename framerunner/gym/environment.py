@@ -13,6 +13,7 @@ from gymnasium import spaces
 from gymnasium.error import ResetNeeded
 
 from framerunner.errors import SettingError
+from framerunner.flying.plan import FlightPlan
 from framerunner.gym.flight import SteppedFlight
 from framerunner.gym.observation import LONGEST_TRY_S, Observation, observation_space, observe, rgb
 from framerunner.gym.reward import Scorer, final_reward
@@ -89,7 +90,7 @@ class FrameChallengeEnv(gymnasium.Env[Observation, Action]):
         """
         super().reset(seed=seed)
         self._flying = self._choose(options or {})
-        self._flight = SteppedFlight(self._flying)
+        self._flight = SteppedFlight(FlightPlan(self._flying))
         self._scorer = Scorer(self._flight.referee)
         return self._observe(self._flight), self._info(self._flight)
 

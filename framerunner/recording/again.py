@@ -4,11 +4,12 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from framerunner.lockstep import fly_lockstep
-from framerunner.lockstep_progress import LockstepProgress
+from framerunner.flying.display import LockstepProgress
+from framerunner.flying.lockstep import fly_lockstep
+from framerunner.flying.plan import FlightPlan
 from framerunner.recording.errors import RecordingError
 from framerunner.recording.mcap_writer import FlightRecording
-from offboard.app import INTERRUPTED, Moment
+from offboard.app import INTERRUPTED
 from offboard.mission import MissionError, load_mission
 from offboard.pilot_file import PilotFile
 from scenarios.loader import load_scenario
@@ -46,12 +47,9 @@ def fly_again(folder: Path, result: FlightResult, path: Path, pilot: PilotFile |
         raise RecordingError(f"replay '{folder}': result.json has no seed; fly it again with --record")
     with FlightRecording(path, scenario, mission, seed) as recording:
         with LockstepProgress(scenario.try_limit_s) as progress:
-
-            def observe(moment: Moment) -> None:
-                recording.see(moment)
-                progress.see(moment)
-
-            flown = fly_lockstep(scenario, mission, seed=seed, observer=observe, on_image=recording.see_image)
+            observers = (recording.see, progress.see)
+            plan = FlightPlan(scenario, mission, seed)
+            flown = fly_lockstep(plan, observers=observers, on_image=recording.see_image)
         if flown.outcome.interrupted:
             raise KeyboardInterrupt
         recording.finish(flown.result, flown.track.time_s)

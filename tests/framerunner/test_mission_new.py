@@ -9,7 +9,8 @@ from pathlib import Path
 import pytest
 
 from framerunner.cli import run
-from framerunner.lockstep import fly_lockstep
+from framerunner.flying.lockstep import fly_lockstep
+from framerunner.flying.plan import FlightPlan
 from offboard.chart.vocabulary import Vocabulary
 from offboard.mission import load_mission
 from offboard.pilot import Pilot
@@ -30,7 +31,8 @@ def new(*arguments):
 
 
 def fly(scenario, mission, pilot=None):
-    return fly_lockstep(load_scenario(scenario), load_mission(mission, pilot and read_pilot(pilot)))
+    loaded = load_mission(mission, pilot and read_pilot(pilot))
+    return fly_lockstep(FlightPlan(load_scenario(scenario), loaded))
 
 
 def with_exercise_done(text):

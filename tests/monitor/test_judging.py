@@ -3,10 +3,11 @@
 import pytest
 
 from firmware_py.status import FlightMode
+from framerunner.flying.plan import FlightPlan
 from monitor.vehicle.placement import Source
 from scenarios.loader import load_scenario
 from scenarios.truth import TrueState
-from tests.monitor.simulated_link import SimulatedLink, equipment, make_referee, served_link
+from tests.monitor.simulated_link import SimulatedLink, equipment, served_link
 from tests.monitor.vehicle.test_mission_view import tunnel
 from tests.monitor.watching import watching
 from wire.dialect import mavlink
@@ -79,7 +80,7 @@ async def result_follows(watched, link):
 async def test_the_monitors_own_referee_judges_as_one_that_is_fed_directly(monkeypatch):
     link = SimulatedLink(SCENARIO, speed=6.0)
     Hop(link.drones[0], air_s=8.0)
-    fed = make_referee(SCENARIO)
+    fed = FlightPlan(SCENARIO).new_referee()
     async with watching(equipment(link, SCENARIO)) as watched:
         vehicle = await watched.until(lambda: watched.fleet._vehicles.get(1))
         await watched.until(lambda: vehicle._placement.source is Source.START)

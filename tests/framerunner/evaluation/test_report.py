@@ -16,7 +16,7 @@ from framerunner.evaluation.report import Page, picked_for_pictures, replay_comm
 from framerunner.evaluation.rows import COLUMNS, csv_text
 from framerunner.evaluation.statistics import summarise
 from framerunner.evaluation.store import open_folder
-from framerunner.pictures import Track
+from framerunner.runs.track import Track
 from offboard.mission import load_mission
 from tests.framerunner.evaluation.flights import made_row
 

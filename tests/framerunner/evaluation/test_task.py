@@ -7,9 +7,10 @@ import pytest
 
 from framerunner.evaluation import task as task_module
 from framerunner.evaluation.rows import COLUMNS, Row
-from framerunner.evaluation.task import FlightTask, fly_task, thinned
-from framerunner.lockstep import fly_lockstep
-from framerunner.pictures import Track
+from framerunner.evaluation.task import fly_task, thinned
+from framerunner.flying.lockstep import fly_lockstep
+from framerunner.flying.plan import FlightPlan
+from framerunner.runs.track import Track
 from offboard.mission import load_mission
 from offboard.pilot_file import PilotFile
 from tests.framerunner.evaluation.flights import made_row, short_scenario
@@ -27,12 +28,12 @@ class MyPilot(Pilot):
 
 
 def task(seed=1, pilot=None):
-    return FlightTask(short_scenario(seed), load_mission("frame_challenge", pilot))
+    return FlightPlan(short_scenario(seed), load_mission("frame_challenge", pilot))
 
 
 def test_a_row_has_the_result_s_fields_and_order():
     flight = task()
-    result = fly_lockstep(flight.scenario, flight.mission).result
+    result = fly_lockstep(flight).result
     row = fly_task(flight)
     assert tuple(result.as_json()) == COLUMNS
     assert json.loads(row.to_json()) == result.as_json()
@@ -48,7 +49,7 @@ def test_a_row_of_before_the_box_can_be_read():
 
 def test_a_failed_flight_brings_its_track_thinned_out():
     flight = task()
-    whole = fly_lockstep(flight.scenario, flight.mission).track
+    whole = fly_lockstep(flight).track
     track = fly_task(flight).track
     assert len(track) < len(whole) / 2
     assert (track.time_s[0], track.time_s[-1]) == (round(whole.time_s[0], 3), round(whole.time_s[-1], 3))
@@ -87,7 +88,7 @@ def test_a_number_that_cannot_be_kept_is_the_flight_s_fault(monkeypatch):
 
 def test_ctrl_c_is_no_verdict(monkeypatch):
     flight = task()
-    flown = fly_lockstep(flight.scenario, flight.mission)
+    flown = fly_lockstep(flight)
     stopped = replace(flown, outcome=replace(flown.outcome, ended="aborted", reason="interrupted"))
     monkeypatch.setattr(task_module, "fly_lockstep", lambda *_args, **_options: stopped)
     with pytest.raises(KeyboardInterrupt):

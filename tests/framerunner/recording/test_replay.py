@@ -11,11 +11,11 @@ import pytest
 from mcap.writer import Writer
 
 from framerunner.cli import run
-from framerunner.recorder import VideoFile
 from framerunner.recording import replay as replay_module
 from framerunner.recording.events import Crossed, Picture
 from framerunner.recording.find import recorded_flight
 from framerunner.recording.replay import replay
+from framerunner.runs.recorder import VideoFile
 from offboard.app import Moment
 from offboard.drone import DroneState, VelocityCommand
 from sitl.video import VideoServer
