@@ -10,7 +10,8 @@ from collections.abc import Callable, Sequence
 from itertools import groupby
 from operator import itemgetter
 
-from monitor.ports import Link, LinkFailed, Message
+from monitor.ports import Link, Message
+from wire.transports.urls import LinkError
 
 _WAIT_S = 0.02  # what is to be sent waits so long at most when nothing comes in
 _FIRST_PAUSE_S, _LONGEST_PAUSE_S = 0.5, 5.0
@@ -27,7 +28,7 @@ class Listener:
     All but the thread itself belongs to the loop.
 
     Args:
-        open_link: opens it; raises `LinkFailed`.
+        open_link: opens it; raises `LinkError`.
         take: called on the loop with what came, and the host it came from; "" over a wire.
         say: called on the loop with level and one line for people.
 
@@ -81,7 +82,7 @@ class Listener:
                     loop.call_soon_threadsafe(self._opened, link.url)
                     pause_s = _FIRST_PAUSE_S
                     self._carry(loop, link)
-                except LinkFailed as error:
+                except LinkError as error:
                     self._to_send.clear()
                     loop.call_soon_threadsafe(self._fail, str(error), time.monotonic())
                     self._halt.wait(pause_s)

@@ -29,8 +29,9 @@ from offboard.link.telemetry import CHECKS, TelemetryFeed, ask_for_rates
 from offboard.link.ticks import TickSource, VehicleClock
 from offboard.link.tlog import TlogRecorder
 from offboard.link.tracking import CommandTracker
-from offboard.link.url import check_free, parse_url
 from offboard.link.watchdog import PATIENT, Watchdog
+from wire.transports.sockets import check_free
+from wire.transports.urls import LinkError, parse_url
 
 STAND_STILL_S = 0.5  # wall time without a tick after which the last velocity is not flown any longer
 LINK_LOST_S = 1.0  # wall time without telemetry
@@ -83,7 +84,10 @@ class MavsdkDrone:
         Raises:
             DroneError: bad address.
         """
-        self._url = parse_url(url)
+        try:
+            self._url = parse_url(url)
+        except LinkError as error:
+            raise DroneError(str(error)) from None
         self._start_arena = Pose(start_arena[:3], start_arena[3])
         self._connect_limit_s = connect_limit_s
         self._ready_limit_s = ready_limit_s
@@ -145,9 +149,11 @@ class MavsdkDrone:
         Raises:
             DroneError: port taken, device missing, no vehicle within the limit.
         """
-        check_free(
-            self._url, "give another address" if self._system_id is None else "choose another --instance"
-        )
+        advice = "give another address" if self._system_id is None else "choose another --instance"
+        try:
+            check_free(self._url, advice)
+        except LinkError as error:
+            raise DroneError(str(error)) from None
         log_subscribe(_log)
         # As a ground station: PX4 sends the reasons of its refusals (STATUSTEXT) to no one else.
         configuration = Configuration.create_with_component_type(ComponentType.GROUND_STATION)

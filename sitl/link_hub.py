@@ -8,9 +8,20 @@ from dataclasses import replace
 from firmware_py.mavlink.links import LinkProfile
 from firmware_py.mavlink.node import MavlinkNode
 from sitl.link_input import LinkInput
-from sitl.link_urls import LinkUrl, is_loopback
-from sitl.links import Carrier, Receive, UdpAddresses, open_udp
-from sitl.stream_links import Closable, Joined, SerialLine, TcpClient, TcpServer
+from sitl.links import (
+    Carrier,
+    Closable,
+    Joined,
+    LastingLink,
+    Receive,
+    TcpServer,
+    UdpAddresses,
+    connect_tcp,
+    open_udp,
+)
+from sitl.server_settings import WantedLink
+from wire.transports.sockets import Stream, open_serial
+from wire.transports.urls import is_loopback
 
 
 class LinkHub:
@@ -39,37 +50,39 @@ class LinkHub:
         self._node.add_link(profile)
         self._carriers[profile.name] = link
 
-    async def open(self, url: LinkUrl) -> None:
+    async def open(self, link: WantedLink) -> None:
         """Open a link that a person asked for.
 
         Raises:
             LinkError: it cannot be opened.
         """
-        there = (url.address, url.number)
+        url, profile = link.url, link.profile
+        place = (url.address, url.number)
         if url.scheme == "udpout":
             here = "127.0.0.1" if is_loopback(url.address) else "0.0.0.0"
-            await self.open_udp(url.profile, UdpAddresses((here, 0), there))
+            await self.open_udp(profile, UdpAddresses((here, 0), place))
         elif url.scheme == "udpin":
-            await self.open_udp(url.profile, UdpAddresses(there, None))
+            await self.open_udp(profile, UdpAddresses(place, None))
         elif url.scheme == "tcpin":
-            server = TcpServer(self._joiner(url.profile), self._leave)
-            self._opened.append(server)
-            await server.open(*there)
+            self._opened.append(TcpServer(place, self._joiner(profile), self._leave))
         elif url.scheme == "tcpout":
-            self._opened.append(TcpClient(*there, self._joiner(url.profile), self._leave))
+            self._opened.append(LastingLink(lambda: connect_tcp(place), self._joiner(profile), self._leave))
         else:
-            line = SerialLine()
-            self._opened.append(line)
-            await line.open(*there, self._joiner(url.profile), self._leave)
 
-    async def open_all(self, urls: Sequence[LinkUrl]) -> None:
+            async def open_again() -> Stream:
+                return open_serial(*place)
+
+            line = open_serial(*place)
+            self._opened.append(LastingLink(open_again, self._joiner(profile), self._leave, line))
+
+    async def open_all(self, links: Sequence[WantedLink]) -> None:
         """Open links that a person asked for.
 
         Raises:
             LinkError: one cannot be opened.
         """
-        for url in urls:
-            await self.open(url)
+        for link in links:
+            await self.open(link)
 
     def read(self) -> None:
         """Read input that waits, as far as there is time, and send the answers."""

@@ -46,7 +46,7 @@ class VideoError(Exception):
 
 
 @dataclass(slots=True)
-class _Image:
+class _VideoImage:
     """An image and, once somebody wanted it, the same as JPEG."""
 
     image: Image
@@ -92,7 +92,7 @@ class VideoServer:
         self._options = options
         self._host = host
         self._port = port
-        self._newest: _Image | None = None
+        self._newest: _VideoImage | None = None
         self._documents: dict[str, JsonProvider] = {}
         self._texts: dict[str, tuple[str, str]] = {}
         self._loop: asyncio.AbstractEventLoop | None = None
@@ -164,7 +164,7 @@ class VideoServer:
             image: BGR, shape (height, width, 3), uint8; must not be changed afterwards.
             time_us: vehicle time of its exposure, microseconds.
         """
-        self._newest = _Image(image, time_us)
+        self._newest = _VideoImage(image, time_us)
         if self._loop is not None and not self._closing:
             self._loop.call_soon_threadsafe(self._wake)
 
@@ -180,7 +180,7 @@ class VideoServer:
         self._arrived.set()
         self._arrived.clear()
 
-    async def _next(self, last: _Image | None) -> _Image | None:
+    async def _next(self, last: _VideoImage | None) -> _VideoImage | None:
         """Wait for another image than the last; None when the server closes."""
         while not self._closing:
             if self._newest is not None and self._newest is not last:

@@ -9,7 +9,6 @@ from dataclasses import asdict
 from math import cos, isfinite, sin
 
 from firmware_py.airframe import load_airframe
-from framerunner.vehicle_link import Message
 from framerunner.virtual_camera.history import (
     AHEAD_US,
     AttitudeReport,
@@ -27,6 +26,7 @@ from scenarios.referee import Referee
 from scenarios.truth import TrueState
 from sitl.camera import Camera, Image
 from sitl.camera_feed import FIRST_EXPOSURE_US
+from wire.dialect import Message
 
 REFEREE_STEP_US = 20_000
 REPORT_GAP_US = 20_000  # between two reports: the one that shows that a time is over comes so much later

@@ -7,11 +7,11 @@ import threading
 import time
 from collections.abc import Callable, Mapping
 
-from framerunner.vehicle_link import Message, VehicleLink, command, companion_heartbeat, is_vehicle
 from framerunner.virtual_camera.painter import VirtualCamera
-from offboard.drone import DroneError
 from sitl.video import VideoServer
-from wire.dialect import mavlink
+from wire.dialect import Message, mavlink
+from wire.transports.urls import LinkError
+from wire.transports.vehicle_link import VehicleLink, command, companion_heartbeat, is_vehicle
 
 STALE_S = 0.5  # wall time without attitude or position, after which no image is served
 SYSTEM_ID = 246  # MAVSDK has 245, ground stations 255
@@ -54,7 +54,7 @@ class CameraServer:
 
         Raises:
             VideoError: the TCP port is taken.
-            DroneError: the link failed.
+            LinkError: the link failed.
         """
         loop = asyncio.get_running_loop()
         self._failed = loop.create_future()
@@ -86,13 +86,13 @@ class CameraServer:
         while not self._halt.is_set():
             try:
                 messages = self._link.receive(_RECEIVE_S)
-            except DroneError as error:
+            except LinkError as error:
                 loop.call_soon_threadsafe(self._fail, error)
                 return
             if messages and not self._halt.is_set():
                 loop.call_soon_threadsafe(self._take, messages)
 
-    def _fail(self, error: DroneError) -> None:
+    def _fail(self, error: LinkError) -> None:
         if self._failed is not None and not self._failed.done():
             self._failed.set_exception(error)
 

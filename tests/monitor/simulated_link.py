@@ -23,7 +23,7 @@ from firmware_py.mavlink import GROUND, ONBOARD, MavlinkNode
 from firmware_py.mavlink.camera_model import CameraModel
 from firmware_py.mavlink.video_links import VideoEncoding, VideoStream
 from geometry.axes import flip_vector
-from monitor.ports import Equipment, LinkFailed, Message
+from monitor.ports import Equipment, Message
 from scenarios.ground import start_position
 from scenarios.loader import list_scenarios, load_scenario
 from scenarios.models import Scenario
@@ -35,6 +35,7 @@ from sitl.video import VideoServer
 from sitl.world import CONTROL_PERIOD_US
 from wire.dialect import mavlink
 from wire.mission_messages import COMPONENT_ID
+from wire.transports.urls import LinkError
 
 _BURST_TICKS = 5  # 20 ms of simulated time at once
 _TRUTHS = 5000  # 20 s
@@ -165,10 +166,10 @@ class SimulatedLink:
         self._parser.robust_parsing = True
 
     def open(self) -> SimulatedLink:
-        """What `Equipment.open_link` calls; raises `LinkFailed` while the link is broken."""
+        """What `Equipment.open_link` calls; raises `LinkError` while the link is broken."""
         self.opened += 1
         if self._problem is not None:
-            raise LinkFailed(self._problem)
+            raise LinkError(self._problem)
         return self
 
     def receive(self, timeout_s: float) -> list[Message]:
@@ -176,7 +177,7 @@ class SimulatedLink:
         messages: list[Message] = []
         with self._asked:
             if self._problem is not None:
-                raise LinkFailed(self._problem)
+                raise LinkError(self._problem)
             self._deliver(messages)
             for _ in range(self._due_ticks()):
                 for drone in self.drones:
