@@ -9,19 +9,20 @@ from firmware_py.mavlink.links import LinkProfile
 from firmware_py.mavlink.node import MavlinkNode
 from sitl.link_input import LinkInput
 from sitl.links import (
-    Carrier,
-    Closable,
     Joined,
     LastingLink,
     Receive,
+    StreamLink,
+    StreamLinks,
     TcpServer,
     UdpAddresses,
-    connect_tcp,
+    UdpLink,
+    connect_tcp_async,
     open_udp,
 )
 from sitl.server_settings import WantedLink
 from wire.transports.sockets import Stream, open_serial
-from wire.transports.urls import is_loopback
+from wire.transports.urls import LinkUrl, is_loopback
 
 
 class LinkHub:
@@ -35,8 +36,8 @@ class LinkHub:
     def __init__(self, node: MavlinkNode, notice: Callable[[str], None] = lambda line: None) -> None:
         self._node = node
         self._input = LinkInput(node, notice)
-        self._carriers: dict[str, Carrier] = {}
-        self._opened: list[Closable] = []
+        self._carriers: dict[str, UdpLink | StreamLink] = {}
+        self._opened: list[UdpLink | StreamLinks] = []
         self._joined = 0
 
     async def open_udp(self, profile: LinkProfile, addresses: UdpAddresses) -> None:
@@ -57,23 +58,13 @@ class LinkHub:
             LinkError: it cannot be opened.
         """
         url, profile = link.url, link.profile
-        place = (url.address, url.number)
         if url.scheme == "udpout":
             here = "127.0.0.1" if is_loopback(url.address) else "0.0.0.0"
-            await self.open_udp(profile, UdpAddresses((here, 0), place))
+            await self.open_udp(profile, UdpAddresses((here, 0), url.place))
         elif url.scheme == "udpin":
-            await self.open_udp(profile, UdpAddresses(place, None))
-        elif url.scheme == "tcpin":
-            self._opened.append(TcpServer(place, self._joiner(profile), self._leave))
-        elif url.scheme == "tcpout":
-            self._opened.append(LastingLink(lambda: connect_tcp(place), self._joiner(profile), self._leave))
+            await self.open_udp(profile, UdpAddresses(url.place, None))
         else:
-
-            async def open_again() -> Stream:
-                return open_serial(*place)
-
-            line = open_serial(*place)
-            self._opened.append(LastingLink(open_again, self._joiner(profile), self._leave, line))
+            self._opened.append(self._open_stream(url, self._joiner(profile)))
 
     async def open_all(self, links: Sequence[WantedLink]) -> None:
         """Open links that a person asked for.
@@ -105,6 +96,17 @@ class LinkHub:
         for opened in self._opened:
             opened.close()
 
+    def _open_stream(self, url: LinkUrl, joined: Joined) -> StreamLinks:
+        if url.scheme == "tcpin":
+            return TcpServer(url.place, joined, self._leave)
+        if url.scheme == "tcpout":
+            return LastingLink(lambda: connect_tcp_async(url.place), joined, self._leave)
+
+        async def open_again() -> Stream:
+            return open_serial(*url.place)
+
+        return LastingLink(open_again, joined, self._leave, open_serial(*url.place))
+
     def _receiver(self, name: str) -> Receive:
         def receive(data: bytes) -> None:
             self._input.take(name, data)
@@ -113,7 +115,7 @@ class LinkHub:
         return receive
 
     def _joiner(self, profile: LinkProfile) -> Joined:
-        def join(carrier: Carrier) -> Receive:
+        def join(carrier: StreamLink) -> Receive:
             self._joined += 1
             name = f"{profile.name}#{self._joined}"
             self._node.add_link(replace(profile, name=name))
@@ -122,7 +124,7 @@ class LinkHub:
 
         return join
 
-    def _leave(self, carrier: Carrier) -> None:
+    def _leave(self, carrier: StreamLink) -> None:
         for name, known in list(self._carriers.items()):
             if known is carrier:
                 self._node.remove_link(name)

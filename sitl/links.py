@@ -10,14 +10,13 @@ import socket
 import time
 from collections.abc import Awaitable, Callable
 from dataclasses import dataclass
-from typing import Protocol
 
 from wire.transports.sockets import (
     Address,
     Stream,
-    TcpListener,
     UdpSocket,
     bind_udp,
+    listen_tcp,
     resolved_ipv4,
 )
 from wire.transports.urls import LinkError
@@ -31,28 +30,8 @@ _MAX_CLIENTS = 16
 _MAVLINK_MARKERS = (0xFD, 0xFE)  # who sends something else is no peer
 
 
-class Carrier(Protocol):
-    """What brings bytes to somebody."""
-
-    def send(self, data: bytes) -> None:
-        """Send whole packets; lost if nobody is there or too much waits."""
-        ...
-
-    def close(self) -> None:
-        """Close it."""
-        ...
-
-
-class Closable(Protocol):
-    """What a hub closes at the end."""
-
-    def close(self) -> None:
-        """Close it and all connections it made."""
-        ...
-
-
-Joined = Callable[[Carrier], Receive]  # told of a new connection; gives who takes its bytes
-Left = Callable[[Carrier], None]
+Joined = Callable[["StreamLink"], Receive]  # told of a new connection; gives who takes its bytes
+Left = Callable[["StreamLink"], None]
 
 
 @dataclass(frozen=True, slots=True)
@@ -200,54 +179,70 @@ class StreamLink:
             self._loop.remove_writer(self._stream)
 
 
-class TcpServer:
-    """Takes TCP clients; each is a connection of its own.
+class StreamLinks:
+    """Links over streams, as they come and go; after a failure it is tried again, a second later.
+
+    Args:
+        joined: called with each that is open.
+        left: called with each that is over.
+    """
+
+    def __init__(self, joined: Joined, left: Left) -> None:
+        self._joined, self._left = joined, left
+        self._links: set[StreamLink] = set()
+        self._task = asyncio.create_task(self._run())
+
+    def close(self) -> None:
+        """Close all and open no more."""
+        self._task.cancel()
+        for link in list(self._links):
+            link.close()
+
+    async def _run(self) -> None:
+        while True:
+            try:
+                await self._serve_next()
+            except (LinkError, OSError):
+                await asyncio.sleep(RETRY_S)
+
+    async def _serve_next(self) -> None:
+        raise NotImplementedError
+
+    def _add(self, stream: Stream) -> StreamLink:
+        link = StreamLink(stream, self._joined, self._leave)
+        self._links.add(link)
+        return link
+
+    def _leave(self, link: StreamLink) -> None:
+        self._links.discard(link)
+        self._left(link)
+
+
+class TcpServer(StreamLinks):
+    """Takes TCP clients; each is a link of its own.
 
     Raises:
         LinkError: the port is taken or the address is not this machine's.
     """
 
     def __init__(self, place: Address, joined: Joined, left: Left) -> None:
-        self._listener = TcpListener(place)
-        self._joined, self._left = joined, left
-        self._loop = asyncio.get_running_loop()
-        self._links: set[Carrier] = set()
-        self._pause: asyncio.TimerHandle | None = None
-        self._listen()
+        self._listener = listen_tcp(place)
+        super().__init__(joined, left)
 
-    def close(self) -> None:
-        """Listen no more and send all clients away."""
-        self._loop.remove_reader(self._listener)
-        if self._pause is not None:
-            self._pause.cancel()
-        self._listener.close()
-        for link in list(self._links):
-            link.close()
+    async def _run(self) -> None:
+        with self._listener:
+            await super()._run()
 
-    def _listen(self) -> None:
-        self._loop.add_reader(self._listener, self._accept)
-
-    def _accept(self) -> None:
-        try:
-            stream = self._listener.accept()
-        except OSError:  # no more files can be opened
-            self._loop.remove_reader(self._listener)
-            self._pause = self._loop.call_later(RETRY_S, self._listen)
-            return
-        if stream is None:
-            return
-        if len(self._links) >= _MAX_CLIENTS:
+    async def _serve_next(self) -> None:
+        stream = Stream.of(*await asyncio.get_running_loop().sock_accept(self._listener))
+        if len(self._links) < _MAX_CLIENTS:
+            self._add(stream)
+        else:
             stream.close()
-            return
-        self._links.add(StreamLink(stream, self._joined, self._leave))
-
-    def _leave(self, link: Carrier) -> None:
-        self._links.discard(link)
-        self._left(link)
 
 
-class LastingLink:
-    """A TCP client or serial line that is opened again, a second after it was lost or could not be opened.
+class LastingLink(StreamLinks):
+    """A TCP connection or serial line that is opened again when it was lost.
 
     Args:
         open_stream: opens it; raises `LinkError` or `OSError`.
@@ -264,40 +259,25 @@ class LastingLink:
         opened: Stream | None = None,
     ) -> None:
         self._open_stream = open_stream
-        self._joined, self._left = joined, left
-        self._link = None if opened is None else StreamLink(opened, joined, left)
-        self._task = asyncio.create_task(self._run())
+        self._opened = opened
+        super().__init__(joined, left)
 
-    def close(self) -> None:
-        """Close it and try no more."""
-        self._task.cancel()
-        if self._link is not None:
-            self._link.close()
-
-    async def _run(self) -> None:
-        while True:
-            if self._link is not None:
-                await self._link.over.wait()
-                self._link = None
-                await asyncio.sleep(RETRY_S)
-            try:
-                self._link = StreamLink(await self._open_stream(), self._joined, self._left)
-            except (LinkError, OSError):
-                await asyncio.sleep(RETRY_S)
+    async def _serve_next(self) -> None:
+        stream, self._opened = self._opened or await self._open_stream(), None
+        await self._add(stream).over.wait()
+        await asyncio.sleep(RETRY_S)
 
 
-async def connect_tcp(place: Address) -> Stream:
+async def connect_tcp_async(place: Address) -> Stream:
     """Connect to a TCP server. Raises `OSError` if nobody answers."""
     loop = asyncio.get_running_loop()
     failure = OSError()
     for family, kind, protocol, _, address in await loop.getaddrinfo(*place, type=socket.SOCK_STREAM):
-        connection = socket.socket(family, kind, protocol)
-        try:
+        with socket.socket(family, kind, protocol) as connection:  # empty when `Stream.of` took it over
             connection.setblocking(False)
-            await loop.sock_connect(connection, address)
-            return Stream.of(connection)
-        except OSError as error:
-            failure = error
-        finally:
-            connection.close()  # what `Stream.of` took over stays open
+            try:
+                await loop.sock_connect(connection, address)
+                return Stream.of(connection, place)
+            except OSError as error:
+                failure = error
     raise failure

@@ -5,6 +5,7 @@ from __future__ import annotations
 import asyncio
 import threading
 import time
+from collections import deque
 from collections.abc import Callable, Mapping
 
 from framerunner.virtual_camera.painter import VirtualCamera
@@ -44,6 +45,7 @@ class CameraServer:
         self._say = say
         self._watch = _Watch(say, link.url)
         self._vehicle: int | None = None
+        self._to_send: deque[Message] = deque()  # by the thread that reads
         self._halt = threading.Event()
         self._failed: asyncio.Future[None] | None = None
         self._rates = _Rates()
@@ -82,9 +84,11 @@ class CameraServer:
             self._link.close()
 
     def _read(self, loop: asyncio.AbstractEventLoop) -> None:
-        """On a thread of its own: wait for packets, hand them to the loop."""
+        """On a thread of its own, which alone uses the link: send, wait for packets, hand them to the loop."""
         while not self._halt.is_set():
             try:
+                while self._to_send:
+                    self._link.send(self._to_send.popleft())
                 messages = self._link.receive(_RECEIVE_S)
             except LinkError as error:
                 loop.call_soon_threadsafe(self._fail, error)
@@ -123,13 +127,13 @@ class CameraServer:
     async def _keep_house(self) -> None:
         """Heartbeat once a second, rates, and the word when telemetry stays away."""
         beat_s = rates_s = time.monotonic()
-        self._link.send(companion_heartbeat())  # over udpout the vehicle does not know us before
+        self._to_send.append(companion_heartbeat())  # over udpout the vehicle does not know us before
         while True:
             await asyncio.sleep(_HOUSEKEEPING_S)
             now_s = time.monotonic()
             if now_s - beat_s >= 1.0:
                 beat_s = now_s
-                self._link.send(companion_heartbeat())
+                self._to_send.append(companion_heartbeat())
             self._watch.check(now_s)
             if self._vehicle is not None and now_s - rates_s >= _RATE_PERIOD_S:
                 self._ask_for_rates(now_s - rates_s)
@@ -157,7 +161,7 @@ class CameraServer:
         ):
             if rate_hz < ENOUGH_HZ:
                 asking = (mavlink.MAV_CMD_SET_MESSAGE_INTERVAL, number, 1e6 / WANTED_HZ)
-                self._link.send(command(self._vehicle, *asking))
+                self._to_send.append(command(self._vehicle, *asking))
 
     def _referee_answer(self, query: Mapping[str, str]) -> object:
         return self._camera.standing(query.get("state", ""), query.get("ended"))

@@ -1,16 +1,14 @@
 """URLs of links, and sockets that never block."""
 
-import errno
-import socket
-
 import pytest
 
 from wire.transports.sockets import (
     MAX_UNSENT_BYTES,
+    OneClient,
     Stream,
-    TcpListener,
     check_free,
     connect_tcp,
+    listen_tcp,
 )
 from wire.transports.urls import LinkError, LinkUrl, UrlRules, host_and_port, is_loopback, parse_url
 
@@ -80,15 +78,13 @@ def test_loopback(host, own):
 
 def test_a_missing_serial_device_is_told():
     with pytest.raises(LinkError, match=r"/dev/ttyNONE9 cannot be opened .*; is it plugged in"):
-        check_free(parse_url("serial:///dev/ttyNONE9:57600"))
+        check_free(parse_url("serial:///dev/ttyNONE9:57600"), "")
 
 
 def connected():
-    listener = TcpListener(("127.0.0.1", 0))
-    client = connect_tcp(listener._socket.getsockname())
-    server = listener.accept()
-    listener.close()
-    return client, server
+    with listen_tcp(("127.0.0.1", 0)) as listener:
+        client = connect_tcp(listener.getsockname())
+        return client, Stream.of(*listener.accept())
 
 
 def test_what_is_not_read_waits_up_to_a_limit_and_is_then_lost_whole():
@@ -112,14 +108,19 @@ def test_what_is_not_read_waits_up_to_a_limit_and_is_then_lost_whole():
     server.close()
 
 
-def test_a_listener_without_clients_gives_none(monkeypatch):
-    listener = TcpListener(("127.0.0.1", 0))
-    assert listener.accept() is None
-    with socket.create_connection(listener._socket.getsockname()):
-
-        def fail(*_):
-            raise OSError(errno.ENOTCONN, "it has gone")
-
-        monkeypatch.setattr(Stream, "of", fail)
-        assert listener.accept() is None
-    listener.close()
+def test_one_client_after_the_other():
+    server = OneClient(listen_tcp(("127.0.0.1", 0)))
+    place = server._listener.getsockname()
+    assert server.read() == b""
+    server.write(b"to nobody")
+    first, second = connect_tcp(place), connect_tcp(place)
+    assert server.read() == b""  # lets the first in
+    first.write(b"a")
+    second.write(b"b")
+    assert (server.read(), server.read()) == (b"a", b"")
+    server.write(b"c")
+    assert first.read() == b"c"
+    first.close()
+    assert (server.read(), server.read(), server.read()) == (b"", b"", b"b")
+    second.close()
+    server.close()

@@ -1,7 +1,9 @@
 """UDP, TCP and serial lines as transports of bytes that never block.
 
-A thread waits for them with `select.poll`, an asyncio loop with `add_reader`. What cannot be sent is lost in
-whole writes without an error, as on a radio; that the other end is gone shows in `read`.
+A thread waits for them with `select.poll`, an asyncio loop with `add_reader`; both by `fileno`, which may be
+another one after each `read`. `read` gives b"" when there is nothing now and raises `OSError` when the link
+has gone. What cannot be sent is lost in whole writes without an error, as on a radio. Functions that open
+something raise `LinkError`: one line with what cannot be opened, why, and what to do.
 """
 
 from __future__ import annotations
@@ -11,8 +13,8 @@ import os
 import socket
 import termios
 import tty
-from abc import ABC, abstractmethod
-from contextlib import suppress
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import cast
 
@@ -21,62 +23,28 @@ from wire.transports.urls import LinkError, LinkUrl
 Address = tuple[str, int]
 
 MAX_UNSENT_BYTES = 1 << 18  # of a stream; whoever reads slower loses packets
-CONNECT_S = 5.0
+_CONNECT_S = 5.0
 _READ_BYTES = 1 << 16
 
 
-class Transport(ABC):
-    """A link's bytes.
+class UdpSocket:
+    """A UDP socket, bound or connected.
 
     Attributes:
-        peer: IP address and port of whoever sent what was read last; None before, and on a serial line.
+        peer: who sent what was read last; None before.
     """
-
-    peer: Address | None = None
-
-    @abstractmethod
-    def fileno(self) -> int:
-        """The descriptor to wait for; after a `read` it may be another one."""
-
-    @abstractmethod
-    def read(self) -> bytes:
-        """The next bytes; b"" if there are none now. Raises `OSError` when the link is gone."""
-
-    @abstractmethod
-    def write(self, data: bytes, to: Address | None = None) -> None:
-        """Send whole packets.
-
-        Args:
-            data: the packets; they are lost if nobody can get them now.
-            to: whom, at a UDP socket that listens; all others have one peer.
-        """
-
-    @abstractmethod
-    def close(self) -> None:
-        """Let go of the port, connection or device."""
-
-    def has_unsent(self) -> bool:
-        """Whether bytes wait for `flush`."""
-        return False
-
-    @abstractmethod
-    def flush(self) -> None:
-        """Send what waits, as far as the other end takes it."""
-
-
-class UdpSocket(Transport):
-    """A UDP socket, bound or connected."""
 
     def __init__(self, opened: socket.socket) -> None:
         opened.setblocking(False)
         self._socket = opened
+        self.peer: Address | None = None
 
     def fileno(self) -> int:
-        """See `Transport`."""
+        """The descriptor to wait for."""
         return self._socket.fileno()
 
     def read(self) -> bytes:
-        """The next datagram; see `Transport`."""
+        """The next datagram."""
         try:
             data, self.peer = self._socket.recvfrom(_READ_BYTES)
         except (BlockingIOError, ConnectionRefusedError):  # refused: nobody listens there yet
@@ -84,27 +52,24 @@ class UdpSocket(Transport):
         return data
 
     def write(self, data: bytes, to: Address | None = None) -> None:
-        """Send a datagram; see `Transport`."""
+        """Send a datagram to the peer it is connected to, or to another."""
         with suppress(OSError):
             if to is None:
                 self._socket.send(data)
             else:
                 self._socket.sendto(data, to)
 
-    def flush(self) -> None:
-        """Nothing waits here."""
-
     def close(self) -> None:
-        """See `Transport`."""
+        """Let go of the port."""
         self._socket.close()
 
 
-class Stream(Transport):
+class Stream:
     """A TCP connection or a serial line.
 
     Args:
         descriptor: of the open connection or device; this object closes it.
-        peer: address of the other end.
+        peer: address of the other end; None on a serial line.
     """
 
     def __init__(self, descriptor: int, peer: Address | None = None) -> None:
@@ -114,215 +79,147 @@ class Stream(Transport):
         self._unsent = bytearray()
 
     @classmethod
-    def of(cls, connection: socket.socket) -> Stream:
+    def of(cls, connection: socket.socket, peer: Address) -> Stream:
         """Take over a TCP connection."""
         connection.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
-        peer = cast(Address, connection.getpeername()[:2])
         return cls(connection.detach(), peer)
 
-    def has_unsent(self) -> bool:
-        """See `Transport`."""
-        return bool(self._unsent)
-
     def fileno(self) -> int:
-        """See `Transport`."""
+        """The descriptor to wait for."""
         return self._descriptor
 
     def read(self) -> bytes:
-        """See `Transport`."""
+        """The next bytes; sends on what waits, too."""
+        if self._unsent:
+            self.flush()
         try:
             data = os.read(self._descriptor, _READ_BYTES)
         except BlockingIOError:
             return b""
         if not data:
-            who = "the serial line has gone" if self.peer is None else "the other side closed the connection"
-            raise ConnectionResetError(errno.ECONNRESET, who)
+            why = "the serial line has gone" if self.peer is None else "the other side closed the connection"
+            raise ConnectionResetError(errno.ECONNRESET, why)
         return data
 
-    def write(self, data: bytes, to: Address | None = None) -> None:
-        """See `Transport`."""
-        del to
+    def write(self, data: bytes) -> None:
+        """Send bytes, or keep them for `flush` while there is room for them."""
         if len(self._unsent) + len(data) <= MAX_UNSENT_BYTES:
             self._unsent += data
             self.flush()
 
+    def has_unsent(self) -> bool:
+        """Whether bytes wait until the other end takes more."""
+        return bool(self._unsent)
+
     def flush(self) -> None:
-        """See `Transport`."""
+        """Send what waits, as far as the other end takes it."""
         try:
             del self._unsent[: os.write(self._descriptor, self._unsent)]
         except BlockingIOError:
             return
         except OSError:
-            self._unsent.clear()
+            self._unsent.clear()  # that it is gone shows in `read`
 
     def close(self) -> None:
-        """See `Transport`."""
+        """Let go of the connection or device."""
         os.close(self._descriptor)
 
 
-class TcpListener:
-    """Takes TCP connections at a port."""
+class OneClient:
+    """A TCP server that takes one client after the other, and loses what is sent while there is none."""
 
-    def __init__(self, place: Address) -> None:
-        """Listen.
-
-        Raises:
-            LinkError: the port is taken, or the address is not this machine's.
-        """
-        try:
-            family, address = _resolved(place, socket.SOCK_STREAM)
-            self._socket = socket.create_server(address, family=family)
-        except (OSError, UnicodeError) as error:
-            raise LinkError(
-                f"TCP {_name(place)} cannot be listened on ({_reason(error)}); choose another port"
-            ) from None
-        self._socket.setblocking(False)
-
-    def fileno(self) -> int:
-        """The descriptor to wait for."""
-        return self._socket.fileno()
-
-    def accept(self) -> Stream | None:
-        """The next connection; None if there is none. Raises `OSError` if no more can be opened."""
-        try:
-            connection, _ = self._socket.accept()
-            return Stream.of(connection)
-        except (BlockingIOError, ConnectionError):
-            return None
-        except OSError as error:
-            if error.errno in (errno.ENOTCONN, errno.EINVAL):  # it has gone already
-                return None
-            raise
-
-    def close(self) -> None:
-        """Listen no more."""
-        self._socket.close()
-
-
-class _OneClient(Transport):
-    """A TCP server that takes one client after the other."""
-
-    def __init__(self, listener: TcpListener) -> None:
+    def __init__(self, listener: socket.socket) -> None:
         self._listener = listener
         self._client: Stream | None = None
+        self.peer: Address | None = None
 
     def fileno(self) -> int:
+        """The descriptor to wait for: of the client or, without one, for the next."""
         return (self._client or self._listener).fileno()
 
     def read(self) -> bytes:
+        """The client's next bytes; lets the next client in when that has gone."""
         try:
             if self._client is not None:
                 return self._client.read()
-            self._client = self._listener.accept()
-            self.peer = None if self._client is None else self._client.peer
+            self._client = Stream.of(*self._listener.accept())
+            self.peer = self._client.peer
+        except BlockingIOError:
+            pass
         except ConnectionError:
-            assert self._client is not None
-            self._client.close()
+            if self._client is not None:
+                self._client.close()
             self._client = None
         return b""
 
-    def write(self, data: bytes, to: Address | None = None) -> None:
+    def write(self, data: bytes) -> None:
+        """Send bytes to the client."""
         if self._client is not None:
-            self._client.write(data, to)
-
-    def has_unsent(self) -> bool:
-        return self._client is not None and self._client.has_unsent()
-
-    def flush(self) -> None:
-        if self._client is not None:
-            self._client.flush()
+            self._client.write(data)
 
     def close(self) -> None:
+        """Let go of client and port."""
         if self._client is not None:
             self._client.close()
         self._listener.close()
 
 
 def bind_udp(place: Address, advice: str) -> UdpSocket:
-    """A UDP socket that listens.
-
-    Args:
-        place: local address; port 0 lets the system choose one.
-        advice: what people can do when the port is taken.
-
-    Raises:
-        LinkError: it is taken, or the address is not this machine's.
-    """
-    try:
-        family, address = _resolved(place, socket.SOCK_DGRAM)
+    """A UDP socket that listens; `advice` says what people can do when the port is taken."""
+    with _explained(f"UDP {_name(place)} cannot be opened", advice):
+        family, address = _local(place, socket.SOCK_DGRAM)
         opened = socket.socket(family, socket.SOCK_DGRAM)
         try:
             opened.bind(address)
         except OSError:
             opened.close()
             raise
-    except (OSError, UnicodeError) as error:
-        raise LinkError(f"UDP {_name(place)} cannot be opened ({_reason(error)}); {advice}") from None
     return UdpSocket(opened)
 
 
 def connect_udp(place: Address) -> UdpSocket:
-    """A UDP socket that sends to one address and hears only what comes from there.
-
-    Raises:
-        LinkError: there is no such host, or no way to it.
-    """
+    """A UDP socket that sends to one address and hears only what comes from there."""
+    address = resolved_ipv4(place)
     opened = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
-    try:
-        opened.connect(resolved_ipv4(place))
-    except LinkError:
-        opened.close()
-        raise
-    except OSError as error:
-        opened.close()
-        raise _cannot_send(place, error) from None
+    with _explained(f"UDP {_name(place)} cannot be sent to", "check host and network"):
+        try:
+            opened.connect(address)
+        except OSError:
+            opened.close()
+            raise
     return UdpSocket(opened)
 
 
 def resolved_ipv4(place: Address, what: str = "UDP") -> Address:
-    """Look up where UDP goes, once: with a name, `sendto` would look it up, blocking, for every packet.
-
-    Args:
-        place: host and port.
-        what: is sent there, for the message.
-
-    Raises:
-        LinkError: no such host is known.
-    """
-    try:
+    """Look up where UDP goes, once: with a name, `sendto` would look it up, blocking, for every packet."""
+    with _explained(f"{what} {_name(place)} cannot be sent to", "give a host's name or an IPv4 address"):
         found = socket.getaddrinfo(*place, family=socket.AF_INET, type=socket.SOCK_DGRAM)
-    except (OSError, UnicodeError) as error:
-        raise _cannot_send(place, error, what) from None
     return cast(Address, found[0][4])
 
 
-def connect_tcp(place: Address) -> Stream:
-    """Connect to a TCP server, within five seconds.
+def listen_tcp(place: Address) -> socket.socket:
+    """A socket that takes TCP connections and does not block."""
+    with _explained(f"TCP {_name(place)} cannot be listened on", "choose another port"):
+        family, address = _local(place, socket.SOCK_STREAM)
+        listener = socket.create_server(address, family=family)
+    listener.setblocking(False)
+    return listener
 
-    Raises:
-        LinkError: nobody answers there.
-    """
-    try:
-        return Stream.of(socket.create_connection(place, CONNECT_S))
-    except (OSError, UnicodeError) as error:
-        raise LinkError(
-            f"TCP {_name(place)} cannot be connected to ({_reason(error)}); is the server running?"
-        ) from None
+
+def connect_tcp(place: Address) -> Stream:
+    """Connect to a TCP server; waits five seconds at most."""
+    with _explained(f"TCP {_name(place)} cannot be connected to", "is the server running?"):
+        connection = socket.create_connection(place, _CONNECT_S)
+        return Stream.of(connection, connection.getpeername())
 
 
 def open_serial(path: str, baud: int) -> Stream:
-    """A serial line: eight bits, no parity, no flow control.
-
-    Raises:
-        LinkError: there is no such device, it is no serial line, or the baud rate is unusual.
-    """
+    """A serial line: eight bits, no parity, no flow control."""
     speed = getattr(termios, f"B{baud}", None)
     if not speed:
         raise LinkError(f"serial {path}:{baud}: {baud} is not a usual baud rate, such as 57600 or 921600")
-    try:
+    with _explained(f"serial {path} cannot be opened", "is it plugged in, and may you use it?"):
         line = os.open(path, os.O_RDWR | os.O_NOCTTY | os.O_NONBLOCK)
-    except OSError as error:
-        raise _no_device(path, _reason(error)) from None
     try:
         tty.setraw(line, termios.TCSANOW)
         settings = termios.tcgetattr(line)
@@ -335,68 +232,52 @@ def open_serial(path: str, baud: int) -> Stream:
     return Stream(line)
 
 
-def check_free(url: LinkUrl, advice: str = "give another address") -> None:
+def open_drone(url: LinkUrl) -> UdpSocket | Stream | OneClient:
+    """Open the link on which a drone is, as a ground station does."""
+    if url.scheme == "udpin":
+        return bind_udp(url.place, _advice(url, "give another address"))
+    if url.scheme == "udpout":
+        return connect_udp(url.place)
+    if url.scheme == "tcpin":
+        return OneClient(listen_tcp(url.place))
+    if url.scheme == "tcpout":
+        return connect_tcp(url.place)
+    return open_serial(*url.place)
+
+
+def check_free(url: LinkUrl, advice: str) -> None:
     """See that a drone's port or device can be had before MAVSDK is told to open it.
 
     MAVSDK binds a UDP port that another program holds without complaint, and the last binder gets all
-    packets; so the port is bound here first, exclusively, and let go.
-
-    Args:
-        url: of the drone.
-        advice: what people can do if the port is taken.
-
-    Raises:
-        LinkError: port taken, device missing.
+    packets; so the port is bound here first, exclusively, and let go. `advice` is for a port that is taken.
     """
     if url.scheme == "udpin":
-        bind_udp((url.address, url.number), _close_or(advice, url.number)).close()
-    elif url.scheme == "serial" and url.address.startswith("/") and not Path(url.address).exists():
-        raise _no_device(url.address, os.strerror(errno.ENOENT))
+        bind_udp(url.place, _advice(url, advice)).close()
+    elif url.scheme == "serial" and url.address.startswith("/"):
+        with _explained(f"serial {url.address} cannot be opened", "is it plugged in?"):
+            Path(url.address).stat()
 
 
-def open_drone(url: LinkUrl) -> Transport:
-    """Open the link on which a drone is, as a ground station does.
-
-    Raises:
-        LinkError: port taken, nobody answers, no such host or device.
-    """
-    place = (url.address, url.number)
-    if url.scheme == "udpin":
-        return bind_udp(place, _close_or("give another address", url.number))
-    if url.scheme == "udpout":
-        return connect_udp(place)
-    if url.scheme == "tcpin":
-        return _OneClient(TcpListener(place))
-    if url.scheme == "tcpout":
-        return connect_tcp(place)
-    return open_serial(*place)
+def _advice(url: LinkUrl, otherwise: str) -> str:
+    return f"is another flight or ground station on UDP port {url.number}? Close it or {otherwise}"
 
 
-def _resolved(place: Address, kind: socket.SocketKind) -> tuple[socket.AddressFamily, Address]:
+def _local(place: Address, kind: socket.SocketKind) -> tuple[socket.AddressFamily, Address]:
     """Look a local address up, IPv4 first: a name may stand for both."""
     found = socket.getaddrinfo(*place, type=kind, flags=socket.AI_PASSIVE)
     family, _, _, _, address = min(found, key=lambda each: each[0] != socket.AF_INET)
     return family, cast(Address, address)
 
 
-def _cannot_send(place: Address, error: OSError | UnicodeError, what: str = "UDP") -> LinkError:
-    return LinkError(
-        f"{what} {_name(place)} cannot be sent to ({_reason(error)}); give a host's name or an IPv4 address"
-    )
-
-
-def _no_device(path: str, reason: str) -> LinkError:
-    return LinkError(f"serial {path} cannot be opened ({reason}); is it plugged in, and may you use it?")
-
-
-def _close_or(advice: str, port: int) -> str:
-    return f"is another flight or ground station on UDP port {port}? Close it or {advice}"
-
-
 def _name(place: Address) -> str:
     return f"{place[0]}:{place[1]}"
 
 
-def _reason(error: OSError | UnicodeError) -> str:
-    """Why, in few words."""
-    return (isinstance(error, OSError) and error.strerror) or str(error)
+@contextmanager
+def _explained(problem: str, advice: str) -> Iterator[None]:
+    """Make one line of a failure: what the problem is, why, and what to do."""
+    try:
+        yield
+    except (OSError, UnicodeError) as error:
+        reason = (isinstance(error, OSError) and error.strerror) or error
+        raise LinkError(f"{problem} ({reason}); {advice}") from None

@@ -70,6 +70,11 @@ class LinkUrl:
     number: int
     options: tuple[tuple[str, str], ...] = ()
 
+    @property
+    def place(self) -> tuple[str, int]:
+        """Address and number."""
+        return (self.address, self.number)
+
 
 def parse_url(text: str, rules: UrlRules = DRONE) -> LinkUrl:
     """Check a link's URL.

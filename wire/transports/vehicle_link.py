@@ -10,14 +10,14 @@ import select
 
 from wire.dialect import Message, mavlink
 from wire.framing import PacketReader
-from wire.transports.sockets import Address, open_drone
+from wire.transports.sockets import Address, UdpSocket, open_drone
 from wire.transports.urls import LinkError, parse_url
 
 AUTOPILOT_COMPONENT = mavlink.MAV_COMP_ID_AUTOPILOT1
 
 
 class VehicleLink:
-    """One link, used by one thread at a time. Several vehicles may be heard on it.
+    """One link, used by one thread. Several vehicles may be heard on it.
 
     Args:
         url: as `fly --drone` takes it.
@@ -34,7 +34,8 @@ class VehicleLink:
     def __init__(self, url: str, *, system_id: int, component_id: int) -> None:
         parsed = parse_url(url)
         self._transport = open_drone(parsed)
-        self._listens = parsed.scheme == "udpin"  # several vehicles may send to one port
+        # Several vehicles may send to a UDP port; elsewhere all are behind the same other end.
+        self._shared = self._transport if parsed.scheme == "udpin" else None
         self._peers: dict[int, Address] = {}  # by system id
         self.url = parsed.text
         self._codec = mavlink.MAVLink(None, srcSystem=system_id, srcComponent=component_id)
@@ -51,16 +52,14 @@ class VehicleLink:
         """
         transport = self._transport
         waiting = select.poll()
-        waiting.register(transport, select.POLLIN | (select.POLLOUT if transport.has_unsent() else 0))
-        if not waiting.poll(timeout_s * 1000):
-            return []
-        transport.flush()
+        waiting.register(transport, select.POLLIN)
+        waiting.poll(timeout_s * 1000)
         try:
             data = transport.read()
         except OSError as error:
             raise LinkError(f"{self.url} failed: {error.strerror or error}") from None
         messages = self._reader.feed(data)
-        if self._listens and transport.peer is not None:
+        if transport.peer is not None:
             for message in messages:
                 self._peers[message.get_srcSystem()] = transport.peer
         return messages
@@ -69,12 +68,12 @@ class VehicleLink:
         """Send a message to the system it is for, or to all; lost if nobody is there yet."""
         data = message.pack(self._codec)
         self._codec.seq = (self._codec.seq + 1) % 256
-        if not self._listens:
+        if not isinstance(self._shared, UdpSocket):
             self._transport.write(data)
             return
         peer = self._peers.get(getattr(message, "target_system", getattr(message, "target", 0)))
         for address in set(self._peers.values()) if peer is None else (peer,):
-            self._transport.write(data, address)
+            self._shared.write(data, address)
 
     @property
     def host(self) -> str:
