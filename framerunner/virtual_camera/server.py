@@ -84,7 +84,7 @@ class CameraServer:
             self._link.close()
 
     def _read(self, loop: asyncio.AbstractEventLoop) -> None:
-        """On a thread of its own, which alone uses the link: send, wait for packets, hand them to the loop."""
+        """On a thread that alone uses the link: send, wait for packets, hand them to the loop."""
         while not self._halt.is_set():
             try:
                 while self._to_send:
