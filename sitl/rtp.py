@@ -1,7 +1,7 @@
 """Video out as H.264 in RTP over UDP, as QGroundControl and GStreamer want it (PX4's Gazebo sends the same).
 
 Images are compressed in a thread of their own, the newest only: when the encoder is late, images are left
-out and the flight does not notice. Every second begins anew with a key frame that carries the stream's
+out and the flight does not notice. Every second begins with a key frame that carries the stream's
 headers, so whoever starts listening sees something within a second.
 """
 
