@@ -270,7 +270,7 @@ async def test_only_so_many_tcp_clients_are_let_in():
         ("serial:///dev/null:57600", "not a serial line"),
         ("serial:///dev/not-there:57600", "No such file"),
         ("serial:///dev/null:57601", "baud rate"),
-        ("tcpin://192.0.2.1:5760", "192.0.2.1:5760"),
+        ("tcpin://192.0.2.1:5760", "192.0.2.1:5760 cannot be listened on (Cannot assign requested address);"),
     ],
 )
 async def test_what_cannot_be_opened_is_said_in_one_line(url, said):

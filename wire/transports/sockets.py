@@ -279,5 +279,8 @@ def _explained(problem: str, advice: str) -> Iterator[None]:
     try:
         yield
     except (OSError, UnicodeError) as error:
-        reason = (isinstance(error, OSError) and error.strerror) or error
+        reason: object = error
+        if isinstance(error, OSError):  # some texts of Python's own repeat the address
+            number = error.errno or 0
+            reason = os.strerror(number) if number > 0 else error.strerror or error
         raise LinkError(f"{problem} ({reason}); {advice}") from None
