@@ -82,12 +82,9 @@ class MavsdkDrone:
             box: out of which nothing leads that is added to commands here; None: there is none.
 
         Raises:
-            DroneError: bad address.
+            LinkError: bad address.
         """
-        try:
-            self._url = parse_url(url)
-        except LinkError as error:
-            raise DroneError(str(error)) from None
+        self._url = parse_url(url)
         self._start_arena = Pose(start_arena[:3], start_arena[3])
         self._connect_limit_s = connect_limit_s
         self._ready_limit_s = ready_limit_s
@@ -204,8 +201,9 @@ class MavsdkDrone:
         if self._feed.armed:
             raise DroneError("the vehicle is armed already; land and disarm it, then put it on its start")
         await ask_for_rates(self._feed, self._telemetry)
-        feed = self._feed
-        self._alignment = Alignment(self._start_arena, Pose(feed.position_ned_m, feed.yaw_ned_rad))
+        self._alignment = Alignment(
+            self._start_arena, Pose(self._feed.position_ned_m, self._feed.yaw_ned_rad)
+        )
         await self._ticks.begin()
 
     async def _wait_for_checks(self) -> None:
@@ -229,8 +227,7 @@ class MavsdkDrone:
                 disarmed by others.
         """
         while True:
-            follows = self._commanding and not self._pilot_has_it
-            command = self._sent if follows else None
+            command = self._sent if self._commanding and not self._pilot_has_it else None
             came = await self._ticks.next(STAND_STILL_S, command)
             if not came and not self._ticks.waits:
                 self._stand_still()
