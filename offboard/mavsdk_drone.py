@@ -201,9 +201,8 @@ class MavsdkDrone:
         if self._feed.armed:
             raise DroneError("the vehicle is armed already; land and disarm it, then put it on its start")
         await ask_for_rates(self._feed, self._telemetry)
-        self._alignment = Alignment(
-            self._start_arena, Pose(self._feed.position_ned_m, self._feed.yaw_ned_rad)
-        )
+        feed = self._feed
+        self._alignment = Alignment(self._start_arena, Pose(feed.position_ned_m, feed.yaw_ned_rad))
         await self._ticks.begin()
 
     async def _wait_for_checks(self) -> None:
@@ -245,14 +244,13 @@ class MavsdkDrone:
 
         Offboard first, while disarmed: so the motors never run in another mode.
         """
-        feed = self._feed
         await self._stream_before_offboard()
         self._watchdog.start()
         try:
             await self._ask("offboard mode", self._stream.ask_for_offboard())
-            await self._confirm("offboard mode", lambda: feed.mode == "OFFBOARD")
+            await self._confirm("offboard mode", lambda: self._feed.mode == "OFFBOARD")
             await self._ask("arming", self._action.arm())
-            await self._confirm("arming", lambda: bool(feed.armed))
+            await self._confirm("arming", lambda: bool(self._feed.armed))
         except BaseException:
             self._watchdog.stop()
             await self._leave_offboard()
@@ -440,11 +438,10 @@ class MavsdkDrone:
         try:
             await self._until(shown, CONFIRM_S)
         except TimeoutError:
-            feed = self._feed
-            armed = "armed" if feed.armed else "disarmed"
+            armed = "armed" if self._feed.armed else "disarmed"
             raise DroneError(
-                f"{what} was acknowledged, but telemetry still shows mode {feed.mode}, {armed} "
-                f"after {CONFIRM_S:g} s{feed.recent_texts()}"
+                f"{what} was acknowledged, but telemetry still shows mode {self._feed.mode}, {armed} "
+                f"after {CONFIRM_S:g} s{self._feed.recent_texts()}"
             ) from None
 
     async def _shows(self, condition: Callable[[], bool], limit_s: float) -> bool:
