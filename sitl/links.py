@@ -8,9 +8,11 @@ from __future__ import annotations
 import asyncio
 import socket
 import time
+from abc import ABC, abstractmethod
 from collections.abc import Awaitable, Callable
 from dataclasses import dataclass
 
+from wire.headers import MARKERS
 from wire.transports.sockets import (
     Address,
     Stream,
@@ -27,8 +29,6 @@ SILENCE_S = 5.0  # after that, a peer who sent something unasked is forgotten
 MAX_PEERS = 8
 RETRY_S = 1.0  # before a lost connection or line is opened again
 _MAX_CLIENTS = 16
-_MAVLINK_MARKERS = (0xFD, 0xFE)  # who sends something else is no peer
-
 
 Joined = Callable[["StreamLink"], Receive]  # told of a new connection; gives who takes its bytes
 Left = Callable[["StreamLink"], None]
@@ -101,7 +101,7 @@ class UdpLink:
         peer = self._transport.peer
         if not data or peer is None:
             return
-        if peer != self._remote and data[0] in _MAVLINK_MARKERS:
+        if peer != self._remote and data[0] in MARKERS:  # who sends something else is no peer
             now_s = self._clock()
             self._forget_the_silent(now_s)
             if peer in self._heard_s or len(self._heard_s) < MAX_PEERS:
@@ -179,7 +179,7 @@ class StreamLink:
             self._loop.remove_writer(self._stream)
 
 
-class StreamLinks:
+class StreamLinks(ABC):
     """Links over streams, as they come and go; after a failure it is tried again, a second later.
 
     Args:
@@ -205,8 +205,8 @@ class StreamLinks:
             except (LinkError, OSError):
                 await asyncio.sleep(RETRY_S)
 
-    async def _serve_next(self) -> None:
-        raise NotImplementedError
+    @abstractmethod
+    async def _serve_next(self) -> None: ...
 
     def _add(self, stream: Stream) -> StreamLink:
         link = StreamLink(stream, self._joined, self._leave)

@@ -35,7 +35,7 @@ class VehicleLink:
         parsed = parse_url(url)
         self._transport = open_drone(parsed)
         # Several vehicles may send to a UDP port; elsewhere all are behind the same other end.
-        self._shared = self._transport if parsed.scheme == "udpin" else None
+        self._udp_port = self._transport if parsed.scheme == "udpin" else None
         self._peers: dict[int, Address] = {}  # by system id
         self.url = parsed.text
         self._codec = mavlink.MAVLink(None, srcSystem=system_id, srcComponent=component_id)
@@ -68,12 +68,12 @@ class VehicleLink:
         """Send a message to the system it is for, or to all; lost if nobody is there yet."""
         data = message.pack(self._codec)
         self._codec.seq = (self._codec.seq + 1) % 256
-        if not isinstance(self._shared, UdpSocket):
+        if not isinstance(self._udp_port, UdpSocket):
             self._transport.write(data)
             return
         peer = self._peers.get(getattr(message, "target_system", getattr(message, "target", 0)))
         for address in set(self._peers.values()) if peer is None else (peer,):
-            self._shared.write(data, address)
+            self._udp_port.write(data, address)
 
     @property
     def host(self) -> str:
