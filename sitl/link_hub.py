@@ -7,7 +7,6 @@ from collections import deque
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 
-from firmware_py.mavlink.links import LinkProfile
 from firmware_py.mavlink.node import MavlinkNode
 from sitl.links import (
     Joined,
@@ -22,6 +21,7 @@ from sitl.links import (
     open_udp,
 )
 from sitl.server_settings import WantedLink
+from wire.link import LinkProfile
 from wire.transports.sockets import Stream, open_serial
 from wire.transports.urls import LinkUrl, is_loopback
 

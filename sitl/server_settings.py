@@ -6,8 +6,9 @@ from dataclasses import dataclass, replace
 from math import inf
 from pathlib import Path
 
-from firmware_py.mavlink.links import GROUND, NORMAL, ONBOARD, LinkProfile
+from firmware_py.mavlink.rates import GROUND, NORMAL, ONBOARD
 from sitl.links import UdpAddresses
+from wire.link import LinkProfile
 from wire.signing import SigningKey
 from wire.transports.sockets import Address
 from wire.transports.urls import MAX_PORT, LinkError, LinkUrl, UrlRules, host_and_port, is_loopback, parse_url
