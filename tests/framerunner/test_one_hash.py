@@ -1,8 +1,7 @@
 """A hundred runs of one flight, half of them beside others in other processes: one hash."""
 
 from framerunner.evaluation.backends import Pool
-from framerunner.evaluation.runner import fly_all
-from framerunner.evaluation.task import fly_task
+from framerunner.evaluation.runner import fly_all, fly_task
 from framerunner.flying.plan import FlightPlan
 from offboard.mission import load_mission
 from scenarios.loader import load_scenario
