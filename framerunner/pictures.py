@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Any
 
 from geometry.vectors import Vec3
 from scenarios.models import Scenario
+from text.errors import UserError
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -21,7 +22,7 @@ if TYPE_CHECKING:
 SUFFIXES = (".png", ".svg", ".pdf")
 
 
-class PictureError(ValueError):
+class PictureError(UserError):
     """A picture that cannot be made; the message is one line for people."""
 
 

@@ -17,6 +17,7 @@ from starlette.websockets import WebSocket
 
 from monitor.addresses import visitor_key
 from monitor.sessions import SessionFile, StoredSession
+from text.errors import UserError
 
 REFUSED_CODE = 4403  # closes a WebSocket, as 403 ends a request
 SESSION_S = 12 * 3600.0
@@ -29,7 +30,7 @@ _MINUTE_S = 60.0
 _INVISIBLE = ("C", "Zl", "Zp")  # control and format characters, line ends
 
 
-class LoginRefusedError(Exception):
+class LoginRefusedError(UserError):
     """A log-in failed; the message is one line for people.
 
     Attributes:

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from monitor.sticks import Sticks
+from text.errors import UserError
 
 LONGEST_MESSAGE = 1000  # bytes; one holds some 80
 MESSAGES_PER_SECOND = 60.0  # a page sends 25 and a word now and then
@@ -18,7 +19,7 @@ _AXES = ("forward", "right", "up", "yaw")
 _LAST_SYSTEM = 255
 
 
-class PilotMessageError(ValueError):
+class PilotMessageError(UserError):
     """A message that no page of ours sends; its text is one line for people."""
 
 

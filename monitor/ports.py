@@ -9,11 +9,12 @@ from typing import Any, Protocol
 from scenarios.models import Scenario
 from scenarios.report import RefereeReport, RefereeSnapshot
 from scenarios.truth import TrueState
+from text.errors import UserError
 
 Message = Any  # pymavlink's classes are made by a generator and carry no types
 
 
-class LinkFailed(Exception):  # noqa: N818 - it is what happened, and is mended by opening the link again
+class LinkFailed(UserError):  # noqa: N818 - it is what happened, and is mended by opening the link again
     """The link is gone or cannot be opened; the message is one line for people."""
 
 
@@ -102,7 +103,7 @@ class RunLibrary(Protocol):
         """Break off what is being read, and read nothing more."""
 
 
-class RunError(Exception):
+class RunError(UserError):
     """A run that cannot be shown; the message is one line for people."""
 
 

@@ -5,11 +5,12 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 
 from monitor.addresses import is_address_or_network
+from text.errors import UserError
 
 SHORTEST_PASSWORD = 8
 
 
-class MonitorError(Exception):
+class MonitorError(UserError):
     """The monitor cannot be started; the message is one line for people."""
 
 

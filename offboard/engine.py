@@ -23,6 +23,7 @@ from offboard.mission import Mission
 from offboard.pilot import Imu, Pilot, PilotError, velocity_command
 from offboard.pilot_file import PilotFile, in_words, place_in
 from scenarios.models import COLOURS
+from text.errors import UserError
 from vision.types import Detections
 
 Act = Callable[[Pilot], None]
@@ -30,7 +31,7 @@ Act = Callable[[Pilot], None]
 DONE = "done"
 
 
-class MissionRunError(Exception):
+class MissionRunError(UserError):
     """The mission cannot go on; the message is one line with the state and the reason."""
 
 

@@ -12,6 +12,7 @@ from math import cos, hypot, sin
 from geometry.vectors import Vec3
 from offboard.drone import DroneState, VelocityCommand
 from scenarios.models import Scenario
+from text.errors import UserError
 
 FLOOR_M = 0.15
 """Least height of the drone's centre away from its start."""
@@ -37,7 +38,7 @@ MAX_STEP_US = 200_000  # between two ticks of one piece of flight
 STILL = VelocityCommand()
 
 
-class OutsideBoxError(Exception):
+class OutsideBoxError(UserError):
     """The drone is outside and does not come back; the message is one line for people."""
 
 

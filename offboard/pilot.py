@@ -15,6 +15,7 @@ from types import SimpleNamespace
 from geometry.vectors import Vec3
 from offboard.drone import VelocityCommand
 from scenarios.models import COLOURS, Colour
+from text.errors import UserError
 from vision.types import Detection, Detections
 
 MAX_VELOCITY_M_S = 1.0
@@ -23,7 +24,7 @@ LOOK_TURN_PX = 80.0  # pixels aside that make 1 rad/s: the paper's gains, for it
 LOOK_CLIMB_PX = 120.0  # pixels above that make 1 m/s
 
 
-class PilotError(Exception):
+class PilotError(UserError):
     """A mission computed something that must not be flown; the message is one line for people."""
 
 

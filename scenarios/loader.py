@@ -14,11 +14,12 @@ from scenarios.complaints import Fault, describe_faults, shorten, show
 from scenarios.models import Scenario
 from scenarios.yaml_file import FileKind, is_path, packaged
 from scenarios.yaml_tree import to_yaml
+from text.errors import UserError
 
 _SOME_SEED = re.compile(r"[0-9]{1,19}")
 
 
-class ScenarioError(ValueError):
+class ScenarioError(UserError):
     """A scenario that cannot be used; the message is one line for people."""
 
 

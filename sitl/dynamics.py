@@ -18,11 +18,12 @@ from sitl.airframe_xml import (
     TOUCH_MOMENTS,
     airframe_xml,
 )
+from text.errors import UserError
 
 METRES_PER_FOOT = 0.3048
 
 
-class DynamicsError(RuntimeError):
+class DynamicsError(UserError):
     """JSBSim refused the model; the message is one line for people."""
 
 

@@ -18,6 +18,7 @@ from math import inf
 from urllib.parse import parse_qsl
 
 from firmware_py.mavlink.links import GROUND, NORMAL, ONBOARD, LinkProfile
+from text.errors import UserError
 
 SCHEMES = ("udpout", "udpin", "tcpin", "tcpout", "serial")
 EXAMPLES = "udpout://192.168.1.20:14550, tcpin://127.0.0.1:5760, serial:///dev/ttyS1:57600?streams=onboard"
@@ -26,7 +27,7 @@ _PROFILES = {profile.name: profile for profile in (ONBOARD, GROUND, NORMAL)}
 _MIN_RATE, _MAX_RATE = 100, 10_000_000  # bytes a second
 
 
-class LinkError(OSError):
+class LinkError(UserError):
     """A link that cannot be opened; the message is one line for people."""
 
 

@@ -15,6 +15,7 @@ from struct import pack, unpack
 from tempfile import NamedTemporaryFile
 
 from firmware_py.parameters import Parameter, ParameterError, Parameters
+from text.errors import UserError
 
 SAVE_DELAY_S = 0.5
 """Changes that follow each other this closely are saved at once."""
@@ -24,7 +25,7 @@ _DECIDED_BY_INSTANCE = "MAV_SYS_ID"
 _NAMED_IN_NOTICE = 5
 
 
-class ParameterFileError(Exception):
+class ParameterFileError(UserError):
     """A file that cannot be read or written; the message is one line for people."""
 
 

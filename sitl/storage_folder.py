@@ -15,9 +15,10 @@ from pathlib import Path as DiskPath
 
 from firmware_py.storage import Entry, Path, refuse, sound_name
 from sitl.storage import StorageLimits, Usage
+from text.errors import UserError
 
 
-class StorageFolderError(OSError):
+class StorageFolderError(UserError):
     """A folder that cannot be used; the message is one line for people."""
 
 

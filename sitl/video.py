@@ -20,6 +20,8 @@ import cv2
 import numpy as np
 import numpy.typing as npt
 
+from text.errors import UserError
+
 if TYPE_CHECKING:
     from aiohttp import web
 
@@ -40,7 +42,7 @@ object-fit:contain;image-rendering:pixelated}</style>
 """
 
 
-class VideoError(Exception):
+class VideoError(UserError):
     """Video cannot be served; the message is one line for people."""
 
 

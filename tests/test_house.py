@@ -17,6 +17,7 @@ from scenarios.loader import list_scenarios
 ROOT = Path(__file__).parents[1]
 PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))
 ROOMS = (
+    "text",
     "wire",
     "geometry",
     "scenarios",

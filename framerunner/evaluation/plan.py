@@ -12,7 +12,7 @@ from importlib import metadata
 from pathlib import Path
 from typing import Any, Self
 
-from firmware_py.airframe import load_airframe
+from firmware_py.airframe import AirframeError, load_airframe
 from framerunner.errors import SettingError
 from framerunner.evaluation.task import FlightTask
 from offboard.mission import Mission
@@ -204,7 +204,7 @@ def _checked(scenarios: list[Scenario]) -> list[Scenario]:
             continue
         try:
             load_airframe(scenario.airframe)
-        except ValueError as error:
+        except AirframeError as error:
             raise ScenarioError(f"scenario {scenario.name}: {error}") from None
         known.add(scenario.airframe)
     return scenarios

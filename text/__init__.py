@@ -1,0 +1,1 @@
+"""What becomes text: errors for people, values for JSON."""
