@@ -6,7 +6,7 @@ VENV := .venv
 MAVPROXY_VENV := .venv-mavproxy
 BENCH_VENV := .venv-bench
 BIN := $(VENV)/bin
-ROOMS := text wire geometry scenarios firmware_py sitl vision offboard monitor framerunner
+ROOMS := errors wire geometry scenarios firmware_py sitl vision offboard monitor framerunner
 LOCK := uv pip compile --universal --python-version 3.11 --generate-hashes --quiet --custom-compile-command 'make lock'
 LOCK_PROJECT := $(LOCK) pyproject.toml locks/build.in
 # Everything but this project has a hash and is refused if it differs; the folder itself can have none.

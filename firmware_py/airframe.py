@@ -14,9 +14,9 @@ from typing import Annotated, Literal, Self
 import yaml
 from pydantic import BaseModel, ConfigDict, Field, StringConstraints, ValidationError, model_validator
 
+from errors import UserError
 from firmware_py.control.weights import Weights
 from geometry.vectors import Vec3
-from text.errors import UserError
 
 GRAVITY_M_S2 = 9.80665
 

@@ -102,8 +102,8 @@ def _reason(error: Exception) -> str | None:
     """What to tell people of a failure; None for a fault of this program."""
     from cyclopts import CycloptsError
 
+    from errors import UserError
     from framerunner.extras import advice
-    from text.errors import UserError
 
     if isinstance(error, CycloptsError):
         return " ".join(str(error).split()) + " Try --help."

@@ -1,6 +1,6 @@
 """Errors of the front door."""
 
-from text.errors import UserError
+from errors import UserError
 
 
 class SettingError(UserError):

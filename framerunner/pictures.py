@@ -12,9 +12,9 @@ from math import isfinite
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from errors import UserError
 from geometry.vectors import Vec3
 from scenarios.models import Scenario
-from text.errors import UserError
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

@@ -15,9 +15,9 @@ from starlette.exceptions import HTTPException
 from starlette.requests import HTTPConnection
 from starlette.websockets import WebSocket
 
+from errors import UserError
 from monitor.addresses import visitor_key
 from monitor.sessions import SessionFile, StoredSession
-from text.errors import UserError
 
 REFUSED_CODE = 4403  # closes a WebSocket, as 403 ends a request
 SESSION_S = 12 * 3600.0

@@ -7,8 +7,8 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Any
 
+from errors import UserError
 from monitor.sticks import Sticks
-from text.errors import UserError
 
 LONGEST_MESSAGE = 1000  # bytes; one holds some 80
 MESSAGES_PER_SECOND = 60.0  # a page sends 25 and a word now and then

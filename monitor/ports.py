@@ -6,10 +6,10 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, Protocol
 
+from errors import UserError
 from scenarios.models import Scenario
 from scenarios.report import RefereeReport, RefereeSnapshot
 from scenarios.truth import TrueState
-from text.errors import UserError
 
 Message = Any  # pymavlink's classes are made by a generator and carry no types
 

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 
+from errors import UserError
 from monitor.addresses import is_address_or_network
-from text.errors import UserError
 
 SHORTEST_PASSWORD = 8
 

@@ -6,7 +6,7 @@ from collections.abc import AsyncIterator
 from dataclasses import dataclass
 from typing import Protocol
 
-from text.errors import UserError
+from errors import UserError
 
 
 class DroneError(UserError):

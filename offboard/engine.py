@@ -15,6 +15,7 @@ from math import isfinite
 
 from statemachine import StateChart
 
+from errors import UserError
 from offboard.chart.expressions import Evaluate, compile_value, names_in
 from offboard.chart.native import RESUME, TICK
 from offboard.chart.spec import Action, Leaf, Transition
@@ -23,7 +24,6 @@ from offboard.mission import Mission
 from offboard.pilot import Imu, Pilot, PilotError, velocity_command
 from offboard.pilot_file import PilotFile, in_words, place_in
 from scenarios.models import COLOURS
-from text.errors import UserError
 from vision.types import Detections
 
 Act = Callable[[Pilot], None]

@@ -7,8 +7,8 @@ import contextlib
 from collections.abc import AsyncIterator, Callable
 from typing import Protocol
 
+from errors import UserError
 from offboard.link.message_order import MessageOrder
-from text.errors import UserError
 from vision.detector import detect
 from vision.types import CameraFrame, Detections, Image
 

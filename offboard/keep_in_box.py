@@ -9,10 +9,10 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 from math import cos, hypot, sin
 
+from errors import UserError
 from geometry.vectors import Vec3
 from offboard.drone import DroneState, VelocityCommand
 from scenarios.models import Scenario
-from text.errors import UserError
 
 FLOOR_M = 0.15
 """Least height of the drone's centre away from its start."""

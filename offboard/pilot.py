@@ -12,10 +12,10 @@ from dataclasses import dataclass
 from math import cos, isfinite, isnan, sin, sqrt
 from types import SimpleNamespace
 
+from errors import UserError
 from geometry.vectors import Vec3
 from offboard.drone import VelocityCommand
 from scenarios.models import COLOURS, Colour
-from text.errors import UserError
 from vision.types import Detection, Detections
 
 MAX_VELOCITY_M_S = 1.0

@@ -11,16 +11,12 @@ from typing import Any
 from pydantic import ValidationError
 
 from scenarios.complaints import Fault, describe_faults, shorten, show
-from scenarios.models import Scenario
+from scenarios.level import list_levels, load_level
+from scenarios.models import Scenario, ScenarioError
 from scenarios.yaml_file import FileKind, is_path, packaged
 from scenarios.yaml_tree import to_yaml
-from text.errors import UserError
 
 _SOME_SEED = re.compile(r"[0-9]{1,19}")
-
-
-class ScenarioError(UserError):
-    """A scenario that cannot be used; the message is one line for people."""
 
 
 _KIND = FileKind("scenario", ScenarioError)
@@ -81,8 +77,7 @@ def json_schema() -> dict[str, Any]:
 
 def _random(name: str, known: list[str]) -> Scenario:
     """The scenario that `random_scenario` gives this name."""
-    from scenarios.level import list_levels, load_level  # noqa: PLC0415 - they import this module
-    from scenarios.random_scenarios import random_scenario  # noqa: PLC0415 - and numpy
+    from scenarios.random_scenarios import random_scenario  # noqa: PLC0415 - it imports numpy
 
     level, _, seed = name.rpartition("-")
     levels = list_levels()

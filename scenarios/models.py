@@ -7,6 +7,7 @@ from typing import Annotated, Literal, Self
 from pydantic import BaseModel, ConfigDict, Field, model_validator
 from pydantic_core import PydanticCustomError
 
+from errors import UserError
 from geometry.vectors import Vec3
 
 Colour = Literal["red", "green", "blue"]
@@ -14,6 +15,10 @@ COLOURS: tuple[Colour, ...] = ("red", "green", "blue")
 
 Metres = Annotated[float, Field(ge=-1000, le=1000, allow_inf_nan=False)]
 Radians = Annotated[float, Field(ge=-6.3, le=6.3, allow_inf_nan=False)]
+
+
+class ScenarioError(UserError):
+    """A scenario that cannot be used; the message is one line for people."""
 
 
 def refusal(value: float | str, message: str, *at: str | int) -> PydanticCustomError:

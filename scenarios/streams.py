@@ -11,7 +11,7 @@ import hashlib
 
 from numpy.random import PCG64, Generator, SeedSequence
 
-from text.errors import UserError
+from errors import UserError
 
 MAX_SEED = 2**63 - 1  # fits the integers of every file format and database
 

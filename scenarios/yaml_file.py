@@ -7,9 +7,9 @@ from dataclasses import dataclass
 from importlib import resources
 from pathlib import Path
 
+from errors import UserError
 from scenarios.complaints import shorten, show
 from scenarios.yaml_tree import YamlError, YamlTree, parse_yaml
-from text.errors import UserError
 
 MAX_BYTES = 1_000_000
 SUFFIXES = (".yaml", ".yml")

@@ -9,6 +9,7 @@ from pathlib import Path
 
 import jsbsim
 
+from errors import UserError
 from firmware_py.airframe import Airframe
 from geometry.vectors import Quaternion, Vec3
 from sitl.airframe_xml import (
@@ -18,7 +19,6 @@ from sitl.airframe_xml import (
     TOUCH_MOMENTS,
     airframe_xml,
 )
-from text.errors import UserError
 
 METRES_PER_FOOT = 0.3048
 

@@ -14,8 +14,8 @@ from pathlib import Path
 from struct import pack, unpack
 from tempfile import NamedTemporaryFile
 
+from errors import UserError
 from firmware_py.parameters import Parameter, ParameterError, Parameters
-from text.errors import UserError
 
 SAVE_DELAY_S = 0.5
 """Changes that follow each other this closely are saved at once."""

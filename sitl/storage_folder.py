@@ -13,9 +13,9 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path as DiskPath
 
+from errors import UserError
 from firmware_py.storage import Entry, Path, refuse, sound_name
 from sitl.storage import StorageLimits, Usage
-from text.errors import UserError
 
 
 class StorageFolderError(UserError):

@@ -20,7 +20,7 @@ import cv2
 import numpy as np
 import numpy.typing as npt
 
-from text.errors import UserError
+from errors import UserError
 
 if TYPE_CHECKING:
     from aiohttp import web

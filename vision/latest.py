@@ -7,7 +7,7 @@ from collections.abc import AsyncIterator
 from typing import Generic, Protocol, Self, TypeVar
 from urllib.parse import urlsplit
 
-from text.errors import UserError
+from errors import UserError
 from vision.types import CameraFrame
 
 T = TypeVar("T")

@@ -8,7 +8,7 @@ from typing import Literal, Self
 
 from pydantic import BaseModel, ConfigDict, Field, model_validator
 
-from text.errors import UserError
+from errors import UserError
 
 ParameterKind = Literal["int32", "float"]
 

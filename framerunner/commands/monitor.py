@@ -64,7 +64,7 @@ def monitor(
 
     from framerunner.lifeline import until_standard_input_ends
     from framerunner.monitoring.equipment import equipment
-    from monitor.server import serve
+    from monitor.run import serve
     from monitor.settings import MonitorSettings
     from offboard.link.url import parse_url
     from scenarios.loader import load_scenario

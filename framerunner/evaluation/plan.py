@@ -18,8 +18,8 @@ from framerunner.evaluation.task import FlightTask
 from offboard.mission import Mission
 from offboard.pilot_file import PilotFile
 from scenarios.level import load_level
-from scenarios.loader import ScenarioError, load_scenario
-from scenarios.models import Scenario
+from scenarios.loader import load_scenario
+from scenarios.models import Scenario, ScenarioError
 from scenarios.random_scenarios import random_scenario
 from scenarios.yaml_file import SUFFIXES
 

@@ -19,7 +19,8 @@ from framerunner.evaluation.statistics import Spread, Summary
 from framerunner.evaluation.store import EvaluationFolder
 from framerunner.evaluation.tables import comparison_lines
 from framerunner.pictures import Outcome
-from scenarios.loader import ScenarioError, load_scenario
+from scenarios.loader import load_scenario
+from scenarios.models import ScenarioError
 
 PICTURES_AT_MOST = 150
 """More would make a page that phones cannot show; some 60 kB each."""

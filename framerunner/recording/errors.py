@@ -1,6 +1,6 @@
 """Errors of recordings."""
 
-from text.errors import UserError
+from errors import UserError
 
 
 class RecordingError(UserError):

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import unicodedata
 
-from text.errors import UserError
+from errors import UserError
 
 _CONTROL = frozenset({"Cc", "Cs", "Zl", "Zp"})
 _TURNING = frozenset("\u202a\u202b\u202c\u202d\u202e\u2066\u2067\u2068\u2069")  # turn the text around them

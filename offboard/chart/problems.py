@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
 
-from text.errors import UserError
+from errors import UserError
 
 
 @dataclass(frozen=True, slots=True)

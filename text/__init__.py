@@ -1,1 +1,0 @@
-"""What becomes text: errors for people, values for JSON."""
