@@ -26,11 +26,10 @@ from uvicorn.middleware.proxy_headers import ProxyHeadersMiddleware
 from monitor.access import Access
 from monitor.connections import Connections, Gate
 from monitor.fleet import Fleet
-from monitor.listening import BACKLOG
 from monitor.ports import Equipment
 from monitor.security import Guard
 from monitor.sessions import SessionFile, session_path
-from monitor.settings import MonitorSettings
+from monitor.settings import BACKLOG, MonitorSettings
 
 Job = Callable[[], Coroutine[Any, Any, None]]
 
@@ -106,7 +105,7 @@ class _Library(StaticFiles):
 
 
 class _Server(uvicorn.Server):
-    """Leaves signals to the command line, and tells when it listens."""
+    """Leaves signals to the command line, and reports when it listens."""
 
     def __init__(self, config: uvicorn.Config, started: Callable[[], None]) -> None:
         super().__init__(config)
@@ -200,11 +199,11 @@ def _add_static_files(web: FastAPI) -> None:
 
 
 def _add_nicegui(web: FastAPI) -> None:
-    """Mount NiceGUI's pages behind everything else. Its application is global: begin it afresh."""
+    """Mount NiceGUI's pages behind everything else. Its application is global: reset it."""
     core.app.middleware_stack = None
     core.app.user_middleware.clear()
     core.app._shutdown_handlers.clear()
-    Client.instances.clear()  # pages of before load again
+    Client.instances.clear()  # pages opened before reload
     logging.getLogger("nicegui").setLevel(logging.ERROR)  # it warns of every address that is not there
     ui.run_with(
         web,

@@ -8,6 +8,7 @@ from errors import UserError
 from monitor.addresses import is_address_or_network
 
 SHORTEST_PASSWORD = 8
+BACKLOG = 100  # connections accepted at once; must leave room below the limit of open files
 
 
 class MonitorError(UserError):

@@ -123,7 +123,7 @@ def parse_level(content: bytes | str, source: str = "level") -> Level:
         source: what to call it in messages, usually the file's path.
 
     Raises:
-        LevelError: it is not a valid level; the message names source, line, field, value and mend.
+        LevelError: it is not a valid level; the message names source, line, field, value and what to do.
     """
     tree = _KIND.parse(content, source)
     try:

@@ -1,4 +1,4 @@
-"""Scenarios by name or from files, with faults told by file, line and field."""
+"""Scenarios by name or from files, with faults reported by file, line and field."""
 
 from __future__ import annotations
 
@@ -55,7 +55,7 @@ def parse_scenario(content: bytes | str, source: str = "scenario") -> Scenario:
         source: what to call it in messages, usually the file's path.
 
     Raises:
-        ScenarioError: it is not a valid scenario; the message names source, line, field, value and mend.
+        ScenarioError: it is not a valid scenario; the message names line, field, value and what to do.
     """
     tree = _KIND.parse(content, source)
     try:

@@ -26,7 +26,7 @@ def refusal(value: float | str, message: str, *at: str | int) -> PydanticCustomE
 
     Args:
         value: the bad value, which may be a default.
-        message: what is wrong and how to mend it, one line that goes on from the value.
+        message: what is wrong and how to correct it, one line that goes on from the value.
         *at: keys and indices from the validated part to the value; the loader finds its line with them.
     """
     context = {"field": field_path(at), "value": value, "message": message, "at": at}

@@ -1,11 +1,11 @@
-"""What one link has carried, and how LINK_NODE_STATUS tells it."""
+"""What one link has carried, and how LINK_NODE_STATUS reports it."""
 
 from __future__ import annotations
 
 from wire.dialect import Message, mavlink
 
 _WINDOW_US = 1_000_000
-_MOST_SENDERS = 64  # whose gaps are counted; a noisy network must not fill the memory
+_MAX_SENDERS = 64  # whose gaps are counted; a noisy network must not fill the memory
 _LATE = 128  # a number that far ahead is an old packet that came late
 
 
@@ -53,7 +53,7 @@ class Traffic:
         self.bytes_heard += size
         expected = self._next.get(sender)
         if expected is None:
-            if len(self._next) >= _MOST_SENDERS:
+            if len(self._next) >= _MAX_SENDERS:
                 return
         else:
             gap = (sequence - expected) % 256
@@ -80,7 +80,7 @@ def link_node_status(traffic: Traffic, noise_bytes: int, overflows: int, time_us
 
     Args:
         traffic: of the link.
-        noise_bytes: that came in and were no part of a packet; told as parse errors.
+        noise_bytes: that came in and were no part of a packet; reported as parse errors.
         overflows: how often bytes that came in were dropped because too many waited.
         time_us: vehicle time.
     """
