@@ -82,7 +82,7 @@ class RefereeAnswer(_Told):
 
 
 class _NotThereError(Exception):
-    """Nothing usable was answered; the message says what, for people."""
+    """Nothing usable was answered; the message says what."""
 
 
 class RefereeChannel:

@@ -172,6 +172,18 @@ def test_no_modules_import_each_other_in_a_circle():
     assert circles == {}
 
 
+def test_errors_for_people_are_user_errors():
+    """The command line prints a UserError; any other error ends in a traceback."""
+    strays = [
+        f"{name_of(path)}:{node.lineno} {node.name}"
+        for path in MODULES
+        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8")))
+        if isinstance(node, ast.ClassDef) and "for people" in (ast.get_docstring(node) or "")
+        if {ast.unparse(base) for base in node.bases} & {"Exception", "OSError", "RuntimeError", "ValueError"}
+    ]
+    assert strays == []
+
+
 def test_no_room_has_two_classes_of_one_name():
     found = defaultdict(list)
     for path in MODULES:
