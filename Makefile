@@ -70,6 +70,10 @@ parameters: $(VENV)/installed-dev ## write docs/parameters.md anew from the decl
 messages: $(VENV)/installed-dev ## generate wire/extra_messages.py again from wire/extra_messages.xml
 	$(BIN)/python -m tests.wire.generate_messages
 
+.PHONY: result-schema
+result-schema: $(VENV)/installed-dev ## write docs/result.schema.json again from the type FlightResult
+	$(BIN)/python -m scenarios.result > docs/result.schema.json
+
 .PHONY: reference-flights
 reference-flights: $(VENV)/installed-dev ## store again the flights that tests compare with
 	$(BIN)/python -m tests.framerunner.reference_flights

@@ -1,4 +1,4 @@
-"""Video out: MJPEG over HTTP, for browsers, for `cv2.VideoCapture` and for the navigator.
+"""The simulator's HTTP API: video for browsers, `cv2.VideoCapture` and the navigator, and JSON documents.
 
 `/video` is a stream of JPEG images, each with the vehicle time of its exposure in the header `X-Time-Us`;
 `/image.jpg` is the latest one, `/` a page that shows the stream. An image is compressed when the first
@@ -21,6 +21,7 @@ import numpy as np
 import numpy.typing as npt
 
 from errors import UserError
+from wire.simulator_api import VIDEO_PATH
 
 if TYPE_CHECKING:
     from aiohttp import web
@@ -141,7 +142,7 @@ class VideoServer:
         web = await asyncio.to_thread(import_module, "aiohttp.web")
         app = web.Application()
         app.router.add_get("/", self._page)
-        app.router.add_get("/video", self._video, allow_head=False)
+        app.router.add_get(VIDEO_PATH, self._video, allow_head=False)
         app.router.add_get("/image.jpg", self._image)
         app.router.add_get("/{path:.+}", self._document)
         runner = web.AppRunner(app, access_log=None, shutdown_timeout=_CLOSE_S)
@@ -235,7 +236,7 @@ class VideoServer:
             return web.Response(text=text, content_type=content_type)
         provider = self._documents.get(request.path)
         if provider is None:
-            known = ", ".join(["/video", "/image.jpg", *self._texts, *self._documents])
+            known = ", ".join([VIDEO_PATH, "/image.jpg", *self._texts, *self._documents])
             return web.Response(status=404, text=f"not here; there are {known}\n")
         try:
             text = json.dumps(_finite(provider(request.query)), allow_nan=False)

@@ -62,7 +62,7 @@ def monitor(
     if not 0 <= port <= 65535:
         raise SettingError(f"--port {port}: must be from 0 to 65535")
 
-    from framerunner.lifeline import until_standard_input_ends
+    from framerunner.flying.child_process import until_standard_input_ends
     from framerunner.monitoring.equipment import equipment
     from monitor.run import serve
     from monitor.settings import MonitorSettings

@@ -16,7 +16,7 @@ from framerunner.errors import SettingError
 from framerunner.extras import advice, is_installed
 
 if TYPE_CHECKING:
-    from framerunner.monitor_process import MonitorProcess
+    from framerunner.monitoring.monitor_process import MonitorProcess
     from scenarios.models import Scenario
     from sitl.server import SimulatorServer
     from sitl.server_settings import ServerSettings
@@ -157,7 +157,7 @@ def _grants(descriptor: int | None) -> TimeGrants | None:
 
 
 def _monitor(video_port: int | None, count: int) -> MonitorProcess:
-    from framerunner.monitor_process import MonitorProcess
+    from framerunner.monitoring.monitor_process import MonitorProcess
 
     ports = () if video_port is None else range(video_port, video_port + count)
     return MonitorProcess(camera_hosts=[f"127.0.0.1:{port}" for port in ports])
@@ -240,7 +240,7 @@ def _read_key(path: Path | None) -> SigningKey | None:
 
 
 async def _run(server: SimulatorServer, *, monitor: MonitorProcess | None, lifeline: bool) -> None:
-    from framerunner.lifeline import until_standard_input_ends
+    from framerunner.flying.child_process import until_standard_input_ends
 
     async with AsyncExitStack() as stack:
         if monitor is not None:

@@ -4,15 +4,13 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from firmware_py.airframe import load_airframe
+from framerunner.flying.plan import FlightPlan
 from framerunner.monitoring.run_library import RunFolders
 from framerunner.vehicle_link import VehicleLink
 from monitor.ports import Equipment, Link, LinkFailed, Message
 from offboard.drone import DroneError
-from scenarios.ground import start_position
 from scenarios.loader import list_scenarios, load_scenario
 from scenarios.models import Scenario
-from scenarios.referee import Referee
 
 SYSTEM_ID = 250  # the doctor has 247, the virtual camera 246, MAVSDK 245, other ground stations 255
 COMPONENT_ID = 190  # MAV_COMP_ID_MISSIONPLANNER, which is what ground stations use
@@ -31,24 +29,14 @@ def equipment(
     """
     return Equipment(
         open_link=lambda: _MonitorLink(drone_url),
-        make_referee=_referee,
+        make_referee=lambda flown: FlightPlan(flown).new_referee(),
         scenario=scenario,
         list_scenarios=list_scenarios,
         load_scenario=load_scenario,
         runs=RunFolders(runs),
-        start_pose=_start_pose,
+        start_pose=lambda flown: FlightPlan(flown).start_pose,
         camera_hosts=camera_hosts,
     )
-
-
-def _referee(scenario: Scenario) -> Referee:
-    return Referee(scenario, load_airframe(scenario.airframe).envelope_m)
-
-
-def _start_pose(scenario: Scenario) -> tuple[float, float, float, float]:
-    x_m, y_m, ground_m = start_position(scenario)
-    height_m = load_airframe(scenario.airframe).envelope_m[2]
-    return (x_m, y_m, ground_m + height_m / 2, scenario.start.yaw_rad)
 
 
 class _MonitorLink(Link):

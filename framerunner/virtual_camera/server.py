@@ -12,6 +12,7 @@ from framerunner.virtual_camera.painter import VirtualCamera
 from offboard.drone import DroneError
 from sitl.video import VideoServer
 from wire.dialect import mavlink
+from wire.simulator_api import REFEREE_PATH, SCENARIO_PATH
 
 STALE_S = 0.5  # wall time without attitude or position, after which no image is served
 SYSTEM_ID = 246  # MAVSDK has 245, ground stations 255
@@ -58,15 +59,15 @@ class CameraServer:
         """
         loop = asyncio.get_running_loop()
         self._failed = loop.create_future()
-        self._video.add_json("/referee.json", self._referee_answer)
-        plan = self._camera.plan
-        self._video.add_json("/scenario.json", lambda _query: plan.model_dump(mode="json"))
+        self._video.add_json(REFEREE_PATH, self._referee_answer)
+        scenario = self._camera.plan.scenario
+        self._video.add_json(SCENARIO_PATH, lambda _query: scenario.model_dump(mode="json"))
         reader = threading.Thread(target=self._read, args=(loop,), name="telemetry", daemon=True)
         keeper: asyncio.Task[None] | None = None
         try:
             await self._video.start()
             self._say(
-                f"camera of {self._camera.scenario.name}: video on {self._video.url} (Ctrl-C stops); "
+                f"camera of {scenario.name}: video on {self._video.url} (Ctrl-C stops); "
                 f"listening for a vehicle on {self._link.url}"
             )
             reader.start()
@@ -160,7 +161,7 @@ class CameraServer:
                 self._link.send(command(self._vehicle, *asking))
 
     def _referee_answer(self, query: Mapping[str, str]) -> object:
-        return self._camera.standing(query.get("state", ""), query.get("ended"))
+        return self._camera.standing(query.get("state", ""), query.get("ended")).model_dump(mode="json")
 
 
 class _Rates:

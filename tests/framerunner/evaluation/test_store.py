@@ -7,7 +7,7 @@ import pytest
 from framerunner.errors import SettingError
 from framerunner.evaluation.plan import plan_level
 from framerunner.evaluation.store import FLIGHTS, open_folder, read_folder
-from framerunner.pictures import Track
+from framerunner.runs.track import Track
 from offboard.mission import load_mission
 from scenarios.loader import load_scenario
 from tests.framerunner.evaluation.flights import made_row
