@@ -54,7 +54,7 @@ def report(path, rows, **values):
     plan = plan_level("calm", 1, 6, load_mission("frame_challenge"))
     with open_folder(path, plan.identity) as folder:
         for scenario, row in zip(plan.scenarios, rows, strict=False):
-            folder.keep(scenario, replace(row, scenario=scenario.name))
+            folder.keep(scenario, row.model_copy(update={"scenario": scenario.name}))
         drawn = []
         page = Page("level calm", "frame_challenge", None, "framerunner evaluate", summarise(rows), None)
         write_report(folder, replace(page, **values), lambda done, total: drawn.append((done, total)))
