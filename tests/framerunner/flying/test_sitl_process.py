@@ -65,8 +65,8 @@ async def test_a_child_simulator_answers_and_is_gone_afterwards():
     async with SitlProcess("test-case-1", instance=instance) as sitl:
         pid = sitl._process.pid
         answer = await answering(sitl)
-        assert answer["scenario"] == "test-case-1"
-        assert answer["snapshot"]["motors_on"] is False
+        assert answer.scenario == "test-case-1"
+        assert answer.snapshot.motors_on is False
         assert str(14540 + instance) in sitl.drone_url
     assert not is_running(pid)
     assert ports_are_free(instance)
