@@ -7,6 +7,7 @@ import contextlib
 from collections.abc import AsyncIterator, Callable
 from typing import Protocol
 
+from errors import UserError
 from offboard.link.message_order import MessageOrder
 from vision.detector import detect
 from vision.types import CameraFrame, Detections, Image
@@ -17,7 +18,7 @@ FIRST_IMAGE_S = 5.0
 Detector = Callable[[Image, int | None], Detections]
 
 
-class CameraLostError(Exception):
+class CameraLostError(UserError):
     """There are no fresh images; the message is one line for people."""
 
 

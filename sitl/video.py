@@ -20,6 +20,7 @@ import cv2
 import numpy as np
 import numpy.typing as npt
 
+from errors import UserError
 from wire.mjpeg import STREAM_HEADERS, STREAM_START, write_part
 from wire.simulator_api import VIDEO_PATH
 
@@ -42,7 +43,7 @@ object-fit:contain;image-rendering:pixelated}</style>
 """
 
 
-class VideoError(Exception):
+class VideoError(UserError):
     """Video cannot be served; the message is one line for people."""
 
 

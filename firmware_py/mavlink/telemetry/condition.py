@@ -44,7 +44,6 @@ _SERVOS = 16
 _OUTPUTS = 32
 _BATCH = 4  # motors in one ESC message
 _RPM = 60.0 / 6.283185307179586  # of 1 rad/s
-_BY_PULSES = 0  # ESC_CONNECTION_TYPE_PPM
 
 
 def sys_status(autopilot: AutopilotPort) -> Message:
@@ -194,7 +193,7 @@ def esc_info(autopilot: AutopilotPort, time_us: int) -> Message:
         autopilot.state.time_us,
         time_us // 100_000 & 0xFFFF,
         motors,
-        _BY_PULSES,
+        mavlink.ESC_CONNECTION_TYPE_PPM,
         (1 << min(motors, 8)) - 1,
         [0] * _BATCH,
         [0] * _BATCH,
