@@ -48,15 +48,14 @@ lint-rooms: $(VENV)/installed-dev
 
 .PHONY: test-fast
 test-fast: $(VENV)/installed-dev ## the tests that need no real time, in parallel
-	$(BIN)/pytest -n 2 -m "not realtime and not pages"
-
-.PHONY: test-pages
-test-pages: $(VENV)/installed-dev ## the monitor's single pages in a browser, at length; not part of `make test`
-	$(BIN)/pytest -n 2 -m pages
+	$(BIN)/pytest -n 2 --dist loadfile -m "not realtime"
 
 .PHONY: test-realtime
-test-realtime: setup ## the tests that fly in real time, one after another
-	FRAMERUNNER_MAVPROXY=$(abspath $(MAVPROXY_VENV)/bin/mavproxy.py) $(BIN)/pytest -m realtime
+test-realtime: export FRAMERUNNER_MAVPROXY := $(abspath $(MAVPROXY_VENV)/bin/mavproxy.py)
+test-realtime: setup ## the tests that fly in real time: those that mostly wait, in pairs, and alone
+	$(BIN)/pytest -n 6 -m "realtime and not alone" tests/offboard
+	$(BIN)/pytest -n 2 --dist loadgroup -m "realtime and not alone" --ignore tests/offboard
+	$(BIN)/pytest -m alone
 
 .PHONY: bench
 bench: $(VENV)/installed ## time our flight, alone and beside MuJoCo and PyFlyt; options in BENCH="--peers none"

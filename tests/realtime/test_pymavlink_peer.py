@@ -12,12 +12,13 @@ pytestmark = pytest.mark.realtime
 
 ARM, SET_MODE, TAKEOFF, LAND = 400, 176, 22, 21
 ARMED = 128
+SIM_OPTIONS = ("--speed", "3")
 OFFBOARD, HOLD = 6 << 16, 4 << 16 | 3 << 24
 
 
 @pytest.fixture
 def airborne(peer):
-    """In offboard, armed, climbing done, at about a metre and a half over the ground."""
+    """In offboard, armed, climbing done, at about a metre and a half over the ground; it lands afterwards."""
     peer.fly(1.0)
     assert peer.command(SET_MODE, 1, 6) == 0
     assert peer.command(ARM, 1) == 0
@@ -25,7 +26,9 @@ def airborne(peer):
     peer.fly(5.5, down_m_s=-0.6)  # motors idle for a second, the climb grows for three
     peer.fly(1.5)
     assert peer.latest["LOCAL_POSITION_NED"].z < -1.0
-    return peer
+    yield peer
+    assert peer.command(LAND) == 0
+    peer.wait("HEARTBEAT", lambda beat: beat.get_srcComponent() == 1 and not beat.base_mode & ARMED, 20.0)
 
 
 def mean(messages, kind, field, last):
@@ -51,9 +54,6 @@ def test_body_velocities_move_the_drone_as_told(airborne):
 
     came = peer.fly(2.0, down_m_s=-0.5)
     assert mean(came, "LOCAL_POSITION_NED", "vz", 20) == pytest.approx(-0.5, abs=0.05)
-
-    assert peer.command(LAND) == 0
-    peer.wait("HEARTBEAT", lambda beat: not beat.base_mode & ARMED, 20.0)
 
 
 def test_setpoints_that_are_not_finite_or_in_another_frame_move_nothing(airborne):
@@ -89,6 +89,7 @@ def lost_packets(port):
     return int(line.split()[-1])
 
 
+@pytest.mark.alone
 def test_random_bytes_and_twenty_thousand_random_packets_do_no_harm(peer, sim, instance):
     rng = random.Random(540)
     kinds = sorted(mavlink.mavlink_map.values(), key=lambda kind: kind.id)
@@ -103,7 +104,7 @@ def test_random_bytes_and_twenty_thousand_random_packets_do_no_harm(peer, sim, i
             heartbeats += sum(each.get_type() == "HEARTBEAT" for each in peer.read(0.02))
     assert heartbeats >= 2  # it went on speaking meanwhile
 
-    came = peer.read(4.5)
+    came = peer.listen(4.5)
     beats = [m for m in came if m.get_type() == "HEARTBEAT" and m.get_srcComponent() == 1]
     assert 3 <= len(beats) <= 6
     assert not any(beat.base_mode & ARMED for beat in beats)

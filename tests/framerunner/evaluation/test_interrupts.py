@@ -18,7 +18,7 @@ def arguments(out, jobs):
 def place(tmp_path_factory):
     """A folder with scenarios and the results of an evaluation that nobody stopped."""
     folder = tmp_path_factory.mktemp("interrupts")
-    write_scenarios(folder / "short", range(1, 1 + COUNT), limit_s=3.0)
+    write_scenarios(folder / "short", range(1, 1 + COUNT))
     with program(folder, *arguments("whole", 1)) as running:
         assert running.process.wait(120) == 0, running.err
     return folder
