@@ -573,6 +573,10 @@ def test_a_broken_fence_holds():
     commander, now_us = _flying_commander()
     commander.situation.fence_breached = True
     _until(commander, now_us, lambda: commander.state is State.FAILSAFE_HOLD, limit_s=0.1)
+    commander.handle(Event.FORCE_DISARM)
+    now_us = _ticks(commander, commander.situation.now_us + 4000, 300)
+    commander.handle(Event.ARM)  # it is reacted to again in the next flight
+    _until(commander, now_us, lambda: commander.state is State.FAILSAFE_HOLD, limit_s=0.1)
 
 
 def _ticks(commander, start_us, count, **conditions):

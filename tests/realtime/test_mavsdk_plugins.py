@@ -72,7 +72,7 @@ class Drone:
         """A plugin that knows nothing yet."""
         return PLUGINS[name](self._system)
 
-    async def seen(self, stream, wanted, limit_s=15.0):
+    async def seen(self, stream, wanted, limit_s=40.0):
         """The first of a telemetry stream that is as wanted."""
         latest = None
         try:
@@ -93,7 +93,7 @@ class Drone:
         """Position and velocity now."""
         return await self.seen("position_velocity_ned", lambda _: True)
 
-    async def near(self, north_m, east_m, down_m, limit_s=15.0):
+    async def near(self, north_m, east_m, down_m, limit_s=40.0):
         await self.seen(
             "position_velocity_ned",
             lambda now: (
@@ -122,7 +122,7 @@ class Drone:
 
     async def come_down(self):
         await self.action.land()
-        await self.seen("armed", lambda armed: not armed, 25.0)
+        await self.seen("armed", lambda armed: not armed)
 
 
 @pytest.fixture
@@ -183,7 +183,7 @@ async def test_actions(drone):
 
     await action.return_to_launch()
     await drone.seen("flight_mode", lambda mode: mode == FlightMode.RETURN_TO_LAUNCH)
-    await drone.seen("armed", lambda armed: not armed, 30.0)
+    await drone.seen("armed", lambda armed: not armed)
     landed = (await drone.place()).position
     assert hypot(landed.north_m - ground.position.north_m, landed.east_m - ground.position.east_m) < 0.5
 
