@@ -50,11 +50,17 @@ lint-rooms: $(VENV)/installed-dev
 test-fast: $(VENV)/installed-dev ## the tests that need no real time, in parallel
 	$(BIN)/pytest -n 2 --dist loadfile -m "not realtime"
 
-.PHONY: test-realtime
-test-realtime: export FRAMERUNNER_MAVPROXY := $(abspath $(MAVPROXY_VENV)/bin/mavproxy.py)
-test-realtime: setup ## the tests that fly in real time: those that mostly wait, in pairs, and alone
+.PHONY: test-realtime test-realtime-links test-realtime-pairs test-realtime-alone
+test-realtime: test-realtime-links test-realtime-pairs test-realtime-alone ## the tests that fly in real time
+test-realtime-%: export FRAMERUNNER_MAVPROXY := $(abspath $(MAVPROXY_VENV)/bin/mavproxy.py)
+
+test-realtime-links: setup # these only wait
 	$(BIN)/pytest -n 6 -m "realtime and not alone" tests/offboard
+
+test-realtime-pairs: setup
 	$(BIN)/pytest -n 2 --dist loadgroup -m "realtime and not alone" --ignore tests/offboard
+
+test-realtime-alone: setup
 	$(BIN)/pytest -m alone
 
 .PHONY: bench
