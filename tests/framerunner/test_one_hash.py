@@ -1,10 +1,14 @@
 """Many runs of one flight, half of them beside others in other processes: one hash."""
 
+from math import inf, nextafter
+
 from framerunner.evaluation.backends import Pool
 from framerunner.evaluation.runner import fly_all
 from framerunner.evaluation.task import FlightTask, fly_task
+from framerunner.state_hash import StateHash
 from offboard.mission import load_mission
 from scenarios.loader import load_scenario
+from scenarios.truth import TrueState
 
 MISSION = load_mission("frame_challenge")
 LIMIT_S = 5.0
@@ -29,3 +33,17 @@ def test_twenty_runs_of_one_flight_have_one_hash():
     assert len(together) == 15
     assert len(hashes) == 1
     assert {row.state_sha256 for row in together if row.scenario not in own}.isdisjoint(hashes)
+
+
+def hash_of(numbers):
+    x, y, z, u, v, w, *attitude = numbers[1:11]
+    state_hash = StateHash()
+    state_hash.add(TrueState(int(numbers[0]), (x, y, z), (u, v, w), tuple(attitude), bool(numbers[11])))
+    return state_hash.hexdigest()
+
+
+def test_every_number_of_a_state_is_in_the_hash_to_the_last_bit():
+    numbers = [float(number) for number in range(1, 13)]
+    others = [[*numbers[:at], nextafter(numbers[at], inf), *numbers[at + 1 :]] for at in range(1, 11)]
+    others += [[2.0, *numbers[1:]], [*numbers[:11], 0.0]]
+    assert len({hash_of(numbers), *map(hash_of, others)}) == 13

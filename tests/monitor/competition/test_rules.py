@@ -80,6 +80,8 @@ def test_of_several_the_best_or_the_last_counts():
     assert choose(attempts, Rule()).order == 1
     assert choose(attempts, Rule(counting="last")).order == 2
     assert choose([], Rule()) is None
+    touched = [Attempt(1, "a", order, replace(CLEAN, contacts=3 - order)) for order in (1, 2)]
+    assert choose(touched, Rule()).order == 2  # it counts the same and touched less
 
 
 def test_the_rule_can_be_set():
