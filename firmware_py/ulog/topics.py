@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from math import atan2, hypot, nan
 
 from firmware_py.mavlink.port import AutopilotPort
-from firmware_py.mavlink.sensing import EARTH_FIELD_NED_GAUSS, pressure_hpa, temperature_k, to_body
+from firmware_py.mavlink.telemetry.sensing import EARTH_FIELD_NED_GAUSS, pressure_hpa, temperature_k, to_body
 from firmware_py.status import NAVIGATION_STATES, LandedState
 from firmware_py.types import GeodeticPoint
 from firmware_py.ulog.messages import Topic
