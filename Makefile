@@ -48,15 +48,20 @@ lint-rooms: $(VENV)/installed-dev
 
 .PHONY: test-fast
 test-fast: $(VENV)/installed-dev ## the tests that need no real time, in parallel
-	$(BIN)/pytest -n 2 -m "not realtime and not pages"
+	$(BIN)/pytest -n 2 --dist loadfile -m "not realtime"
 
-.PHONY: test-pages
-test-pages: $(VENV)/installed-dev ## the monitor's single pages in a browser, at length; not part of `make test`
-	$(BIN)/pytest -n 2 -m pages
+.PHONY: test-realtime test-realtime-links test-realtime-pairs test-realtime-alone
+test-realtime: test-realtime-links test-realtime-pairs test-realtime-alone ## the tests that fly in real time
+test-realtime-%: export FRAMERUNNER_MAVPROXY := $(abspath $(MAVPROXY_VENV)/bin/mavproxy.py)
 
-.PHONY: test-realtime
-test-realtime: setup ## the tests that fly in real time, one after another
-	FRAMERUNNER_MAVPROXY=$(abspath $(MAVPROXY_VENV)/bin/mavproxy.py) $(BIN)/pytest -m realtime
+test-realtime-links: setup # these only wait
+	$(BIN)/pytest -n 4 -m "realtime and not alone" tests/offboard
+
+test-realtime-pairs: setup
+	$(BIN)/pytest -n 2 --dist loadgroup -m "realtime and not alone" --ignore tests/offboard
+
+test-realtime-alone: setup
+	$(BIN)/pytest -m alone
 
 .PHONY: bench
 bench: $(VENV)/installed ## time our flight, alone and beside MuJoCo and PyFlyt; options in BENCH="--peers none"

@@ -1,7 +1,12 @@
 import signal
 
+import hypothesis
+
 
 def pytest_configure():
-    """A shell starts its background jobs deaf to Ctrl-C, and so would be all programs that tests start."""
+    """Find the same on a busy machine, and where a script started the tests in its background."""
+    hypothesis.settings.register_profile("any machine", deadline=None)
+    hypothesis.settings.load_profile("any machine")
+    # A shell starts its background jobs with SIGINT ignored, and so would be all programs that tests start.
     if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
         signal.signal(signal.SIGINT, signal.default_int_handler)

@@ -45,11 +45,11 @@ def ports_are_free(instance: int) -> bool:
 
 
 def free_instance(count: int = 1) -> int:
-    """An instance whose ports nobody has, and so the next ones; parallel workers begin at different ones."""
+    """The first of some instances whose ports nobody has; two parallel workers begin at 1 and at 5."""
     worker = int(os.environ.get("PYTEST_XDIST_WORKER", "gw0")[2:])
     for offset in range(9):
         instance = (4 * worker + offset) % 9 + 1
-        if all(ports_are_free(instance + number) for number in range(count)):
+        if instance + count <= 10 and all(ports_are_free(instance + number) for number in range(count)):
             return instance
     raise RuntimeError("no instance of 1 to 9 has all its ports free")
 
@@ -141,5 +141,5 @@ def simulator(folder: Path, instance: int, *options: str) -> Iterator[Program]:
     """`framerunner sim`, with all its ports open; its ground link goes to a port of its own."""
     ground = ("--ground-remote", f"127.0.0.1:{14550 + instance}")
     with program(folder, "sim", "--instance", str(instance), *ground, *options) as running:
-        running.wait_for("Ctrl-C stops")
+        running.wait_for("Ctrl-C stops", 60.0)
         yield running

@@ -448,7 +448,7 @@ ACTIONS = {
 }
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=60)
 @given(names=st.lists(st.sampled_from(sorted(ACTIONS)), max_size=25))
 def test_no_sequence_of_commands_breaks_the_rules(names):
     flight = Flight()

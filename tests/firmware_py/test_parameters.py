@@ -2,7 +2,7 @@ from math import inf, nan
 from pathlib import Path
 
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 from pydantic import ValidationError
 
@@ -65,7 +65,6 @@ def test_a_bad_value_is_refused_in_one_line_and_changes_nothing(name, value, mes
     assert parameters.version == 0
 
 
-@settings(deadline=None)
 @given(st.sampled_from(DECLARATIONS), st.floats())
 def test_whatever_is_set_stays_in_range(declared, value):
     parameters = Parameters()

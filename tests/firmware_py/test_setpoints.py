@@ -1,7 +1,7 @@
 from math import cos, inf, isnan, nan, pi, sin
 
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from firmware_py.setpoints import (
@@ -120,7 +120,6 @@ def test_yaw_rate_not_finite_is_no_yaw_rate():
     assert isnan(body((1.0, 0.0, 0.0), yaw_rate_rad_s=inf).yaw_rate_rad_s)
 
 
-@settings(deadline=None)
 @given(st.tuples(st.floats(), st.floats(), st.floats()), st.floats(), st.floats(-4, 4))
 def test_the_way_without_packets_gives_the_same(velocity, yaw_rate, heading):
     target = LocalTarget(BODY, BODY_VELOCITY, velocity_m_s=velocity, yaw_rate_rad_s=yaw_rate)
@@ -131,7 +130,6 @@ def test_the_way_without_packets_gives_the_same(velocity, yaw_rate, heading):
 any3 = st.tuples(st.floats(), st.floats(), st.floats())
 
 
-@settings(deadline=None)
 @given(st.integers(0, 255), st.integers(0, 0xFFFF), any3, any3, any3, st.floats(), st.floats())
 def test_whatever_comes_a_setpoint_is_finite_or_open_and_holds_every_axis(frame, mask, p, v, a, yaw, rate):
     result = setpoint_from_target(LocalTarget(frame, mask, p, v, a, yaw, rate), STATE, 5)

@@ -4,6 +4,7 @@ import asyncio
 import re
 
 import pytest
+import pytest_asyncio
 from playwright.async_api import expect
 
 from offboard.mission import load_mission, mermaid
@@ -11,7 +12,7 @@ from scenarios.loader import load_scenario
 from tests.chromium import Complaints
 from tests.monitor.page_server import JPEG, fake_monitor
 
-pytestmark = pytest.mark.pages
+pytestmark = pytest.mark.asyncio(loop_scope="session")
 MISSION = load_mission("frame_challenge")
 STATES = list(MISSION.leaves)
 MARKUP = "<img src=x onerror=alert(1)><b>bold</b>"
@@ -75,7 +76,7 @@ def status(drone_id=1, state="red.turning", figures=FIGURES, **more):
     return {"id": drone_id, **vehicle, "mission": mission, "figures": figures, **more}
 
 
-@pytest.fixture
+@pytest_asyncio.fixture(loop_scope="session")
 async def fake():
     async with fake_monitor() as monitor:
         monitor.welcome = [world(), chart(), {"kind": "status", "drones": [status()]}]

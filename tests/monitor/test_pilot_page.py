@@ -3,6 +3,7 @@
 import asyncio
 
 import pytest
+import pytest_asyncio
 from playwright.async_api import expect
 
 from monitor import pilot_seat
@@ -14,7 +15,7 @@ from tests.chromium import Complaints
 from tests.monitor.pilot_fakes import MISSION, FakeFleet
 from tests.monitor.pilot_server import served
 
-pytestmark = pytest.mark.pages
+pytestmark = pytest.mark.asyncio(loop_scope="session")
 PHONE = {"width": 390, "height": 844}
 FAKE_GAMEPAD = """
 window.pad = {
@@ -92,7 +93,7 @@ class Pilot:
         await expect(log).to_contain_text(text, timeout=20_000)
 
 
-@pytest.fixture
+@pytest_asyncio.fixture(loop_scope="session")
 async def monitor(monkeypatch, tmp_path, chromium):
     """Opens windows at a monitor with fake drones: `await monitor()`."""
     fleets = []

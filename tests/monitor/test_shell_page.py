@@ -1,9 +1,12 @@
 import asyncio
 import contextlib
 
+import pytest
+
 from tests.monitor.sample_page import EVIL
 from tests.monitor.serving import serving
 
+pytestmark = pytest.mark.asyncio(loop_scope="session")
 SAMPLE = "tests.monitor.sample_page"
 LINK_IS = "words => document.querySelector('#link .words').textContent === words"
 PHONE = {"width": 390, "height": 800}

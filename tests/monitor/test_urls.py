@@ -105,6 +105,7 @@ async def test_a_machine_without_a_network_is_told_its_own_address(monkeypatch):
             assert answer.status == 404
 
 
+@pytest.mark.asyncio(loop_scope="session")
 async def test_a_page_shows_the_code(monkeypatch, networks, chromium):
     async with serving(monkeypatch, "monitor.pages.join", bind="0.0.0.0") as served:
         for width, height in ((375, 812), (1920, 1080)):

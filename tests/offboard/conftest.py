@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import socket
 
 import pytest
@@ -10,15 +11,16 @@ from tests.offboard.udp_vehicle import UdpVehicle
 
 
 def free_port() -> int:
-    """A UDP port of this project's test range that nobody has."""
-    for port in range(25100, 25999):
+    """A UDP port of this project's test range that nobody has; parallel workers have ranges of their own."""
+    first = 25100 + 100 * (int(os.environ.get("PYTEST_XDIST_WORKER", "gw0")[2:]) % 9)
+    for port in range(first, first + 100):
         with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
             try:
                 probe.bind(("0.0.0.0", port))
             except OSError:
                 continue
             return port
-    raise RuntimeError("no free UDP port in 25100..25999")
+    raise RuntimeError(f"no free UDP port in {first}..{first + 99}")
 
 
 @pytest.fixture

@@ -6,8 +6,10 @@ from collections.abc import AsyncIterator
 from dataclasses import dataclass, field
 from itertools import pairwise, product
 from math import atan2, ceil, cos, exp, floor, hypot, pi, remainder, sin
+from textwrap import dedent
 
 from offboard.drone import DroneError, DroneState, VelocityCommand
+from offboard.mission import load_mission
 from vision.detector import measure
 from vision.types import NOT_SEEN, Detection, Detections
 
@@ -216,3 +218,43 @@ def crossings(path: list[tuple[float, float, float]], target: Target) -> list[fl
         if abs(sideways) < 0.19 and abs(z - target.z) < 0.09:
             found.append(hypot(sideways, z - target.z))
     return found
+
+
+RUNAWAY = dedent("""\
+    name: runaway
+    description: Flies on for ever
+    initial: rise
+    states:
+      rise:
+        enter:
+          - hover
+          - cmd.vel_z = 0.5
+        transitions:
+          - when: imu.z > 1.2
+            to: run
+      run:
+        during:
+          - cmd.vel_x = {}
+          - cmd.vel_y = {}
+          - cmd.vel_z = {}
+        transitions:
+          - when: seconds_in_state > 4
+            to: run_on
+      run_on:
+        during:
+          - cmd.vel_x = {}
+          - cmd.vel_y = {}
+          - cmd.vel_z = {}
+        transitions:
+          - when: seconds_in_state > 1000
+            to: end
+      end:
+        final: true
+    """)
+
+
+def runaway(folder, first, then=None):
+    """A mission that rises, flies with a velocity for four seconds, and then with another for ever."""
+    path = folder / "runaway.yaml"
+    path.write_text(RUNAWAY.format(*first, *(then or first)), encoding="utf-8")
+    return load_mission(str(path))

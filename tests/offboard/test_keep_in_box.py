@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from math import cos, pi, sin
-from textwrap import dedent
 from types import SimpleNamespace
 
 import pytest
@@ -14,9 +13,8 @@ from offboard.app import fly_mission
 from offboard.drone import DroneState, VelocityCommand
 from offboard.keep_in_box import Box, KeepInBox, OutsideBoxError, confine, flight_box, outside
 from offboard.mavsdk_drone import MavsdkDrone
-from offboard.mission import load_mission
 from scenarios.loader import load_scenario
-from tests.offboard.fakes import KinematicDrone
+from tests.offboard.fakes import KinematicDrone, runaway
 
 BOX = flight_box(load_scenario("test-case-1"))
 START = (-3.0, -3.0)
@@ -126,39 +124,12 @@ def test_a_drone_that_does_not_come_back_is_given_up_and_one_that_does_is_not():
         keeper.limit(VelocityCommand(), state(x=9.0, time_us=8_050_000))
 
 
-RUNAWAY = """
-    name: runaway
-    description: Flies on for ever
-    initial: rise
-    states:
-      rise:
-        enter:
-          - hover
-          - cmd.vel_z = 0.5
-        transitions:
-          - when: seconds_in_state > 3
-            to: run
-      run:
-        enter:
-          - cmd.vel_z = 0
-          - {}
-        transitions:
-          - when: seconds_in_state > 1000
-            to: end
-      end:
-        final: true
-"""
-
-
-@pytest.mark.parametrize("order", ["cmd.vel_x = 1", "cmd.vel_y = -1", "cmd.vel_z = 1", "cmd.vel_z = -1"])
-async def test_a_mission_that_runs_away_is_kept_in_and_told_of(tmp_path, order):
-    path = tmp_path / "runaway.yaml"
-    path.write_text(dedent(RUNAWAY).format(order), encoding="utf-8")
+@pytest.mark.parametrize("velocity", [(1, 0, 0), (0, -1, 0), (0, 0, 1), (0, 0, -1)])
+async def test_a_mission_that_runs_away_is_kept_in_and_told_of(tmp_path, velocity):
+    mission = runaway(tmp_path, velocity)
     drone, moments = KinematicDrone(0.0, 0.0, 0.5), []
     box = Box(BOX.low_m, BOX.high_m, (-4.0, -4.0))
-    outcome = await fly_mission(
-        drone, None, load_mission(str(path)), limit_s=30.0, observer=moments.append, box=box
-    )
+    outcome = await fly_mission(drone, None, mission, limit_s=30.0, observer=moments.append, box=box)
     assert (outcome.ended, drone.calls[-2:]) == ("timed out", ["hold", "close"])
     assert outcome.kept_in_box_s > 5.0
     assert moments[-1].remark.startswith("kept in the box: ")
@@ -167,12 +138,11 @@ async def test_a_mission_that_runs_away_is_kept_in_and_told_of(tmp_path, order):
 
 
 async def test_a_drone_carried_off_ends_in_hold(tmp_path):
-    path = tmp_path / "runaway.yaml"
-    path.write_text(dedent(RUNAWAY).format("hover"), encoding="utf-8")
+    mission = runaway(tmp_path, (0, 0, 0))
     drone = KinematicDrone(0.0, 0.0, 0.5)
     drone.x = 8.0  # and does not fly back, however it is told to
     drone.command = drone.commands.append
-    outcome = await fly_mission(drone, None, load_mission(str(path)), limit_s=30.0, box=BOX)
+    outcome = await fly_mission(drone, None, mission, limit_s=30.0, box=BOX)
     assert outcome.ended == "aborted"
     assert "2.0 m outside its box and does not come back" in outcome.reason
     assert drone.calls[-2:] == ["hold", "close"]

@@ -1,4 +1,7 @@
-"""What is wrong with a mission file is said by line, all at once, and never by a traceback."""
+"""Mission files: what is refused, and how one is flown.
+
+The mistakes of people who write their first missions are in `test_mission_mistakes.py`.
+"""
 
 from __future__ import annotations
 
@@ -62,7 +65,6 @@ BAD_GUARDS = [
     ("secondsinstate > 4", "unknown name 'secondsinstate'; did you mean 'seconds_in_state'?"),
     ("hover", "'hover' is an action, not a value"),
     ("memory.speed > 1", "no variable 'speed'; declared under 'variables': count word"),
-    ("fly2(0, 0, 2) < 0.2", "calls are not possible"),
     ("imu.x.real > 1", "'imu.x' has no 'real'; it is a plain value"),
     ("cam.red.__class__ == 1", "'cam.red' has no '__class__'"),
     ("__import__('os')", "calls are not possible"),
@@ -70,9 +72,6 @@ BAD_GUARDS = [
     ("goal_m[0] > 1", "[...] is not possible"),
     ("9 ** 9 ** 9 > 1", "** is not possible"),
     ("1 + 'a'.upper == 1", "must follow a name"),
-    ("frame_seen and", "something must follow 'and'"),
-    ("frame_seen = True", "'=' sets a value; to compare write '=='"),
-    ("true", "unknown name 'true'; write True"),
 ]
 
 
@@ -88,14 +87,9 @@ def test_a_bad_guard_is_refused_at_its_line(tmp_path, guard, message):
 BAD_ACTIONS = [
     ("hoover", "m.yaml:7:9: unknown action 'hoover'; did you mean 'hover'?"),
     ("imu", "'imu' is a value, not an action"),
-    ("cmd.velX = 1", "'cmd' has no 'velX'; did you mean 'cmd.vel_x'?"),
-    ("imu.x = 1", "'imu.x' can only be read"),
     ("cmd = 1", "'cmd' cannot be set as a whole; set cmd.on cmd.vel_x"),
     ("hover = 1", "'hover' is an action"),
-    ("colour = 'purple'", "colour cannot be 'purple'; it is one of 'red', 'green', 'blue'"),
-    ("memory.total = 1", "no variable 'total'"),
     ("cmd.vel_x = open", "unknown name 'open'"),
-    ("cmd.vel_x =", "nothing stands here"),
     ("cmd.__class__ = 1", "has no '__class__'"),
 ]
 
@@ -108,11 +102,6 @@ def test_a_bad_action_is_refused_at_its_line(tmp_path, action, message):
 
 
 BAD_CHARTS = [
-    (
-        "to: done",
-        "to: dune",
-        "m.yaml:12:13: target 'dune' of state 'up' is not a state; did you mean 'done'?",
-    ),
     ("initial: up\n", "", "has no 'initial'; name the state it starts in, such as 'up'"),
     (
         "initial: up",
@@ -123,16 +112,9 @@ BAD_CHARTS = [
     ("transitions:", "transition:", "state 'up' has no 'transition'; did you mean 'transitions'?"),
     ("name: little", "nam: little", "a mission has no 'nam'; did you mean 'name'?"),
     ("final: true", "final: maybe", "'final' is true or false, not 'maybe'"),
-    ("        to: done", "        too: done", "m.yaml:12:9: a transition has no 'too'; did you mean 'to'?"),
-    (
-        "    final: true",
-        "    # end",
-        "m.yaml:13:3: state 'done' has no way out; add 'transitions:', or 'final: true'",
-    ),
     ("  - hover", "  hover", "m.yaml"),
     ("states:", "states: {a: &x 1, b: *x}\nrest:", "alias '*x' is not allowed"),
     ("{count: 0,", "{count: open(),", "variable 'count' needs a number"),
-    ("  done:", "  Done:", "'Done' is not a name"),
     ("    during:", "    use: circle\n    during:", "unknown template 'circle'"),
     ("    during:", "    then: done\n    during:", "has 'then' or 'initial' but no states of its own"),
     (
@@ -152,11 +134,6 @@ BAD_CHARTS = [
     ("  done:", "  alone: {resume: alone}\n  done:", "state 'alone' is never reached"),
     ("        to: done", "        to: up\n    resume: done", "m.yaml:5:3: state 'up' has no way out"),
     ("  done:", "  alone:\n    transitions:\n      - to: done\n  done:", "state 'alone' is never reached"),
-    (
-        "      - when: seconds_in_state > 1\n        to: done",
-        "      - to: done\n      - when: frame_seen\n        to: done",
-        "m.yaml:12:15: this transition of 'up' is never reached: the one above always holds",
-    ),
     ("name: little", "name: [little", "YAML syntax"),
     (
         "name: little",
@@ -170,12 +147,6 @@ BAD_CHARTS = [
 def test_a_bad_chart_is_refused(tmp_path, old, new, message):
     assert old in MINIMAL
     assert message in problems(tmp_path, MINIMAL.replace(old, new, 1))
-
-
-def test_all_problems_come_at_once_in_order_of_lines(tmp_path):
-    text = MINIMAL.replace("- hover", "- hoover").replace("seconds_in_state", "second").replace("_off", "_of")
-    lines = problems(tmp_path, text).splitlines()
-    assert [line.split(":")[1] for line in lines] == ["7", "11", "15"]
 
 
 @pytest.mark.parametrize("text", ["", "- a\n- b\n", "just words", "{}", "a: " + "[" * 5000, "\0"])

@@ -1,4 +1,4 @@
-"""A simulator of its own for each test, and a MAVLink peer on its onboard port."""
+"""A simulator for each module, and a MAVLink peer on its onboard port."""
 
 from __future__ import annotations
 
@@ -6,6 +6,7 @@ import asyncio
 import signal
 import time
 from contextlib import asynccontextmanager
+from pathlib import Path
 
 import pytest
 from mavsdk.asyncio import ComponentType, Configuration, Mavsdk
@@ -44,6 +45,7 @@ class Peer:
     def __init__(self, port):
         self.link = mavutil.mavlink_connection(f"udpin:127.0.0.1:{port}", source_system=245)
         self.latest = {}
+        self.vehicle_s = 0.0
 
     def read(self, seconds):
         """Everything that comes within a time."""
@@ -52,9 +54,13 @@ class Peer:
         while (left_s := end_s - time.monotonic()) > 0:
             message = self.link.recv_match(blocking=True, timeout=min(left_s, 0.1))
             if message is not None:
-                self.latest[message.get_type()] = message
+                self._note(message)
                 came.append(message)
         return came
+
+    def _note(self, message):
+        self.latest[message.get_type()] = message
+        self.vehicle_s = max(self.vehicle_s, getattr(message, "time_boot_ms", 0) / 1000)
 
     def wait(self, kind, condition=lambda message: True, limit_s=10.0):
         """The next message of a type for which a condition holds."""
@@ -63,7 +69,7 @@ class Peer:
             message = self.link.recv_match(blocking=True, timeout=0.1)
             if message is None:
                 continue
-            self.latest[message.get_type()] = message
+            self._note(message)
             if message.get_type() == kind and condition(message):
                 return message
         raise AssertionError(
@@ -84,11 +90,16 @@ class Peer:
         )
 
     def fly(self, seconds, **velocity):
-        """Stream a setpoint at 20 Hz, reading meanwhile; everything that came."""
-        came = []
-        end_s = time.monotonic() + seconds
-        while time.monotonic() < end_s:
-            self.velocity(**velocity)
+        """Stream a setpoint 20 times a second for some seconds of the vehicle; everything that came."""
+        return self.listen(seconds, lambda: self.velocity(**velocity))
+
+    def listen(self, seconds, meanwhile=lambda: None):
+        """Everything that comes within some seconds of the vehicle, and 20 calls a second of `meanwhile`."""
+        came, end_s = [], self.vehicle_s + seconds
+        limit_s = time.monotonic() + 20.0 + 3.0 * seconds
+        while self.vehicle_s < end_s:
+            assert time.monotonic() < limit_s, f"the vehicle's time stands at {self.vehicle_s:g} s"
+            meanwhile()
             came += self.read(0.05)
         return came
 
@@ -102,16 +113,28 @@ class Peer:
         raise AssertionError(f"no such heartbeat within {limit_s:g} s")
 
 
-@pytest.fixture
+@pytest.hookimpl(tryfirst=True)
+def pytest_collection_modifyitems(items):
+    """Tests of a module share its simulator, so that one worker runs them."""
+    for item in items:
+        if item.path.parent == Path(__file__).parent:
+            item.add_marker(pytest.mark.xdist_group(item.path.stem))
+
+
+@pytest.fixture(scope="module")
 def instance():
     """An instance whose ports nobody has."""
     return free_instance()
 
 
-@pytest.fixture
-def sim(tmp_path, instance):
-    """A running simulator; it must not have complained when the test ends."""
-    with simulator(tmp_path, instance) as running:
+@pytest.fixture(scope="module")
+def sim(request, tmp_path_factory, instance):
+    """A running simulator with the module's `SIM_OPTIONS`; it must not have complained at the end.
+
+    Each test leaves the drone on the ground, disarmed, and nothing that the next would find.
+    """
+    options = getattr(request.module, "SIM_OPTIONS", ())
+    with simulator(tmp_path_factory.mktemp("sim"), instance, *options) as running:
         yield running
         assert running.process.poll() is None
         assert "Traceback" not in running.err

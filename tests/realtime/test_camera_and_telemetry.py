@@ -98,6 +98,7 @@ async def test_video_and_storage_are_told_and_what_is_not_there_is_refused(drone
     assert storage.total_storage_mib >= storage.available_storage_mib > 0.0
 
 
+@pytest.mark.alone
 async def test_every_rate_that_px4_lets_one_set_is_set_and_streamed(drone):
     telemetry = drone.telemetry
     for name in STREAMED:

@@ -15,8 +15,9 @@ ACCEPTED = 0
 
 
 def fly_all(peers, seconds, **velocity):
-    """Stream a setpoint to all at 20 Hz."""
-    for _ in range(round(seconds * 20)):
+    """Stream a setpoint to all 20 times a second, for some seconds of the vehicles."""
+    end_s = peers[0].vehicle_s + seconds
+    while peers[0].vehicle_s < end_s:
         for peer in peers:
             peer.velocity(**velocity)
             peer.read(0.05 / len(peers))

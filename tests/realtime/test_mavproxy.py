@@ -7,9 +7,11 @@ from pathlib import Path
 
 import pytest
 
-from tests.processes import ROOT, simulator, wait_until
+from tests.processes import ROOT, wait_until
 
 pytestmark = pytest.mark.realtime
+
+SIM_OPTIONS = ("--speed", "4")  # MAVProxy does not mind when time runs faster
 
 
 def mavproxy_path():
@@ -90,18 +92,15 @@ class MavProxy:
             self._process.wait()
 
 
-@pytest.fixture
-def sim(tmp_path, instance):
-    """MAVProxy does not mind when time runs faster."""
-    with simulator(tmp_path, instance, "--speed", "4") as running:
-        yield running
-        assert running.process.poll() is None
-        assert "Traceback" not in running.err
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory):
+    """Where the console finds files."""
+    return tmp_path_factory.mktemp("mavproxy")
 
 
-@pytest.fixture
-def mavproxy(tmp_path, sim, instance):
-    console = MavProxy(tmp_path, 14550 + instance)
+@pytest.fixture(scope="module")
+def mavproxy(folder, sim, instance):
+    console = MavProxy(folder, 14550 + instance)
     console.expect(rf"Detected vehicle {instance + 1}:1", 20.0)
     console.expect(r"Mode LOITER")
     yield console
@@ -129,7 +128,7 @@ def test_parameters_are_received_shown_and_set(mavproxy):
     mavproxy.ask("param fetch COM_OBL_RC_ACT", r"COM_OBL_RC_ACT = 5\b")
 
 
-def test_mission_fence_and_rally_points_are_loaded_and_listed(mavproxy, tmp_path):
+def test_mission_fence_and_rally_points_are_loaded_and_listed(mavproxy, folder):
     places = [
         (47.3977 + north / 1e4, 8.5455 + east / 1e4) for north, east in ((4, -4), (4, 4), (-4, 4), (-4, -4))
     ]
@@ -137,7 +136,7 @@ def test_mission_fence_and_rally_points_are_loaded_and_listed(mavproxy, tmp_path
     fence = [(5001, 3, (4, 0, 0, 0), *place, 0.0) for place in places]
     rally = [(5100, 3, (0, 0, 0, 0), *place, 20.0) for place in places[:2]]
     for module, items in (("wp", mission), ("fence", fence), ("rally", rally)):
-        name = plan_file(tmp_path / f"{module}.txt", *items)
+        name = plan_file(folder / f"{module}.txt", *items)
         mavproxy.type(f"{module} load {name}")
         mavproxy.expect(rf"Loaded {len(items)} .+ in [0-9.]+s")  # the vehicle has said that it has them all
         mavproxy.type(f"{module} list")
@@ -147,7 +146,7 @@ def test_mission_fence_and_rally_points_are_loaded_and_listed(mavproxy, tmp_path
         mavproxy.ask(f"{module} list", r"Requesting 0 ")
 
 
-def test_a_flight_with_modes_take_off_a_place_to_go_to_and_return(mavproxy, tmp_path):
+def test_a_flight_with_modes_take_off_a_place_to_go_to_and_return(mavproxy):
     for mode, main, sub in (("POSCTL", 3, 0), ("MISSION", 4, 4), ("LOITER", 4, 3)):
         mavproxy.type(f"long DO_SET_MODE 1 {main} {sub}")
         mavproxy.expect_all(r"DO_SET_MODE: ACCEPTED", rf"{mode}> |Mode {mode}")

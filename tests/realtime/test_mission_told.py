@@ -15,7 +15,7 @@ from wire.mission_codec import DocumentAssembler, decode_detections, decode_stat
 from wire.mission_messages import DocumentKind
 
 mavlink = mavutil.mavlink
-pytestmark = pytest.mark.realtime
+pytestmark = [pytest.mark.realtime, pytest.mark.alone]
 
 GROUND_PORT = 14550  # where `fly` has its simulator look for ground stations
 LATE_US = 300_000

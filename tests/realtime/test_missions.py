@@ -15,6 +15,7 @@ from tests.realtime.conftest import mavsdk_system
 
 pytestmark = pytest.mark.realtime
 
+SIM_OPTIONS = ("--speed", "4")
 METRES_PER_DEGREE = 111_194.93
 
 

@@ -12,7 +12,7 @@ from pymavlink import mavutil
 from tests.chromium import Complaints, chromium
 from tests.processes import free_instance, program
 
-pytestmark = pytest.mark.realtime
+pytestmark = [pytest.mark.realtime, pytest.mark.alone]
 
 VIEWERS = 9  # and the browser
 LATE_S = 0.3

@@ -73,8 +73,8 @@ class Flight:
 
 
 @pytest.fixture
-async def flight(tmp_path):
-    link = SimulatedLink(load_scenario("empty"), speed=1.0)
+async def flight(request, tmp_path):
+    link = SimulatedLink(load_scenario("empty"), speed=getattr(request, "param", 1.0))
     async with served(equipment(link), tmp_path) as url:
         flight = Flight(link, url)
         await flight.until(lambda: flight.simulation.autopilot.status.ready)
@@ -129,6 +129,7 @@ async def take_off(flight, hand):
     await flight.until(lambda: flight.still)
 
 
+@pytest.mark.alone
 async def test_silence_has_the_drone_hold_in_time_and_neutral_sticks_go_on_until_it_is_disarmed(flight):
     loop = asyncio.get_running_loop()
     async with hand_at(flight) as hand:
@@ -153,6 +154,7 @@ async def test_silence_has_the_drone_hold_in_time_and_neutral_sticks_go_on_until
             await asyncio.sleep(0.5)
 
 
+@pytest.mark.parametrize("flight", [2.0], indirect=True, ids=["twice real time"])
 async def test_keys_and_gamepad_fly_the_drone_to_where_they_point(flight):
     script = """
       window.pad = { id: "pad", connected: true, axes: [0, 0, 0, 0],

@@ -21,7 +21,7 @@ pytestmark = pytest.mark.realtime
 def flight(tmp_path):
     """A flight of test case 1 that has left the ground, its instance and the simulator's process id."""
     instance = free_instance()
-    with program(tmp_path, "fly", "test-case-1", "--instance", str(instance)) as running:
+    with program(tmp_path, "fly", "test-case-1", "--instance", str(instance), "--speed", "4") as running:
         running.wait_for("red.", 60.0)
         (sim,) = running.children()
         yield running, instance, sim

@@ -1,5 +1,5 @@
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 from pydantic import ValidationError
 
@@ -86,7 +86,6 @@ def test_faults_are_told_in_one_line(text, message):
     assert str(caught.value) == message
 
 
-@settings(deadline=None)
 @given(st.text(max_size=100) | st.binary(max_size=100))
 def test_any_text_gives_one_line(content):
     with pytest.raises(LevelError, match=r"\Af\.yaml:.+\Z"):
@@ -100,7 +99,6 @@ json_like = st.recursive(
 )
 
 
-@settings(deadline=None)
 @given(st.dictionaries(st.sampled_from([*Level.model_fields, "x"]), json_like, min_size=1))
 def test_wrong_values_in_known_fields_give_one_line(fields):
     with pytest.raises(LevelError, match=r"\Af\.yaml:.+\Z"):

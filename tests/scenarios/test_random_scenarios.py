@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 from scipy import stats
 
@@ -30,7 +30,6 @@ def places(scenario):
     return [(part.x_m, part.y_m) for part in (scenario.base, *scenario.frames)]
 
 
-@settings(deadline=None)
 @given(seeds)
 def test_calm_keeps_what_it_promises(seed):
     scenario = random_scenario(CALM, seed)
@@ -43,7 +42,6 @@ def test_calm_keeps_what_it_promises(seed):
     assert (scenario.arena, scenario.camera, scenario.light) == (Arena(), Camera(), Light())
 
 
-@settings(deadline=None)
 @given(seeds)
 def test_it_says_where_it_comes_from_and_round_trips(seed):
     scenario = random_scenario(CALM, seed)

@@ -1,6 +1,6 @@
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from scenarios.streams import MAX_SEED, SeedError, random_stream
@@ -19,13 +19,11 @@ def test_numbers_stay_as_they_are():
     assert numbers(MAX_SEED, "wind", 1) == [0.016727917582789242]
 
 
-@settings(deadline=None)
 @given(seeds, st.text(max_size=10), st.text(max_size=10))
 def test_streams_of_other_names_are_others(seed, name, other):
     assert (numbers(seed, name) == numbers(seed, other)) == (name == other)
 
 
-@settings(deadline=None)
 @given(st.sampled_from([0, 1, 2**31, 2**32 - 1, 2**32, 2**33, 2**62]), seeds)
 def test_streams_of_other_seeds_are_others(seed, other):
     assert (numbers(seed, "wind") == numbers(other, "wind")) == (seed == other)

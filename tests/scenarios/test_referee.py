@@ -114,9 +114,11 @@ def test_base_and_floor_are_no_frame_contacts():
 
 
 def test_time_outside_is_a_penalty():
-    report = Flight().motors(True).fly(UP, OUT, (7, 0, 1), (7, 0, 5), (0, 0, 5), (0, 0, 0.6)).land().report()
+    flight = Flight(step_us=30_000).motors(True)
+    report = flight.fly(UP, OUT, (7, 0, 1), (7, 0, 5), (0, 0, 5), (0, 0, 0.6)).land().report()
     assert report.verdict is Verdict.COMPLETED
-    assert report.outside_s == pytest.approx(2 + 4 + 7 + 1, abs=0.05)
+    legs_s = 3.0 * 2 / 3, 3.99, 6.99, 4.41 / 4.4  # in whole steps; the border is met within one
+    assert report.outside_s == pytest.approx(sum(legs_s), abs=1e-6)
     assert report.penalty_s == report.outside_s
     assert report.total_time_s == report.try_time_s + report.penalty_s
 

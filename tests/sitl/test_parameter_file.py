@@ -103,7 +103,7 @@ def test_a_file_that_cannot_be_written_leaves_what_was_there(path):
 CHANGEABLE = [each for each in DECLARATIONS if not each.constant and each.name != "MAV_SYS_ID"]
 
 
-@settings(max_examples=60, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@settings(max_examples=60, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(
     st.dictionaries(
         st.sampled_from([each.name for each in CHANGEABLE]), st.floats(0.0, 1.0, width=32), max_size=20

@@ -171,7 +171,7 @@ def naive(image: Image) -> dict[str, Detection]:
     return found
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=60)
 @given(
     image=hnp.arrays(
         np.uint8,

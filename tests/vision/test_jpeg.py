@@ -59,6 +59,7 @@ SCAN = BASE.index(b"\xff\xda")
         (BASE.replace(b"\xff\xc0", b"\xff\xc1"), "neither baseline nor progressive"),
         (BASE.replace(b"\xff\xc0\x00\x11\x08", b"\xff\xc0\x00\x11\x0c"), "not of eight bits"),
         (BASE.replace(b"\x00\x1e\x00\x32", b"\xff\xff\xff\xff"), "of 65535 x 65535 pixels; 16777216 are"),
+        (BASE.replace(b"\x00\x1e\x00\x32", b"\x10\x00\x10\x01"), "of 4097 x 4096 pixels; 16777216 are"),
         (BASE.replace(b"\x00\x1e\x00\x32", b"\x00\x00\x00\x32"), "of no size"),
         (BASE[:2] + BASE[-2:], "empty"),
         (BASE[:2] + b"\xff\x01" * 2000, "of more than 1000 markers"),

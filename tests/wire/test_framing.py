@@ -1,7 +1,7 @@
 import random
 
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from wire.dialect import mavlink
@@ -70,7 +70,6 @@ def test_an_unknown_flag_drops_the_packet():
     assert PacketReader().feed(bytes(data)) == []
 
 
-@settings(deadline=None)
 @given(st.lists(st.one_of(st.binary(max_size=300), st.just(packed()))))
 def test_whatever_the_pieces_nothing_raises_and_every_byte_is_accounted_for(pieces):
     reader = PacketReader()

@@ -20,7 +20,7 @@ speeds = st.floats(-12.0, 12.0)
 places = st.floats(-80.0, 80.0)
 
 
-@settings(deadline=None, max_examples=30)
+@settings(max_examples=30)
 @given(st.lists(st.tuples(speeds, speeds, speeds), min_size=1, max_size=3))
 def test_acceleration_and_jerk_keep_within_the_pace(wanted):
     pace, reference, state = Pace(3.0, 4.0, 2.0, 5.0), Reference(), VehicleState()
@@ -38,7 +38,7 @@ def test_acceleration_and_jerk_keep_within_the_pace(wanted):
             before = reference.acceleration_ned_m_s2
 
 
-@settings(deadline=None, max_examples=20)
+@settings(max_examples=20)
 @given(st.tuples(places, places, st.floats(-30.0, 0.0)))
 def test_a_journey_ends_at_its_target_and_passes_it_by_no_more_than_a_decimetre(target):
     traveller, state = Traveller(), VehicleState()

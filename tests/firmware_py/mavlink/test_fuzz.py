@@ -164,7 +164,7 @@ def messages():
     )
 
 
-@settings(max_examples=300, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@settings(max_examples=300, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(st.lists(messages(), min_size=1, max_size=8))
 def test_awkward_content_in_every_handled_message(airframe, make_peer, sent):
     autopilot = Autopilot(airframe, GeodeticPoint(47.397742, 8.545594, 489.0), stabiliser=Calm())
@@ -194,7 +194,7 @@ class Calm:
         return self.idle()
 
 
-@settings(max_examples=200, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@settings(max_examples=200, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(st.lists(st.binary(max_size=400), max_size=10))
 def test_random_bytes_are_no_messages(autopilot, make_peer, pieces):
     peer = make_peer(autopilot)

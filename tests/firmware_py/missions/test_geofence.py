@@ -167,7 +167,7 @@ def distance_to_edge(corners, north, east):
     return least
 
 
-@settings(max_examples=300, deadline=None)
+@settings(max_examples=300)
 @given(
     radii=st.lists(st.floats(5, 100), min_size=3, max_size=12),
     start=st.floats(0, tau),

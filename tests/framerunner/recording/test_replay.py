@@ -4,6 +4,7 @@ import asyncio
 import json
 import shutil
 import signal
+from pathlib import Path
 
 import aiohttp
 import numpy as np
@@ -30,14 +31,23 @@ try_limit_s: 4
 """
 
 
-@pytest.fixture
-def lockstep_folder(tmp_path, monkeypatch):
+@pytest.fixture(scope="module")
+def flown(tmp_path_factory):
     """What a short lockstep flight leaves, without a recording."""
+    path = tmp_path_factory.mktemp("lockstep")
+    (path / "short.yaml").write_text(SHORT, encoding="utf-8")
+    out = str(path / "runs")
+    assert run(["fly", str(path / "short.yaml"), "--lockstep", "--seed", "3", "--out", out]) == 1
+    (folder,) = (path / "runs").iterdir()
+    return folder
+
+
+@pytest.fixture
+def lockstep_folder(flown, tmp_path, monkeypatch):
+    """A copy of it."""
     monkeypatch.chdir(tmp_path)
     (tmp_path / "short.yaml").write_text(SHORT, encoding="utf-8")
-    assert run(["fly", "short.yaml", "--lockstep", "--seed", "3"]) == 1
-    (folder,) = (tmp_path / "runs").iterdir()
-    return folder
+    return Path(shutil.copytree(flown, tmp_path / "runs" / flown.name))
 
 
 def moment_at(time_us, state):

@@ -1,14 +1,16 @@
 """Calls, queue and penalties on the pages, on a judge's phone and before the audience."""
 
 import pytest
+import pytest_asyncio
 
 from tests.monitor.competition.harness import contest, event
 from tests.monitor.competition.test_pages import faults, open_page, text_of
 
+pytestmark = pytest.mark.asyncio(loop_scope="session")
 PHONE = (375, 812)
 
 
-@pytest.fixture
+@pytest_asyncio.fixture(loop_scope="session")
 async def running(tmp_path, monkeypatch):
     async with contest(f"sqlite:///{tmp_path}/contest.db", monkeypatch) as running:
         await running.log_in("Grace")

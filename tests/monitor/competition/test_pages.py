@@ -1,10 +1,12 @@
 """The contest's pages in a real browser."""
 
 import pytest
+import pytest_asyncio
 
 from tests.chromium import Complaints
 from tests.monitor.competition.harness import PASSWORD, contest, event
 
+pytestmark = pytest.mark.asyncio(loop_scope="session")
 EVIL = ('<img src=x onerror="window.hurt=1">', "<script>window.hurt=1</script>", "{{7*7}}\u200f&amp;<b>")
 SIZES = ((375, 812), (1366, 768), (1920, 1080))
 
@@ -33,7 +35,7 @@ SMALL = """() => [...document.querySelectorAll(CONTROLS)]
   .map((each) => each.outerHTML)""".replace("CONTROLS", repr(CONTROLS))
 
 
-@pytest.fixture
+@pytest_asyncio.fixture(loop_scope="session")
 async def running(tmp_path, monkeypatch):
     async with contest(f"sqlite:///{tmp_path}/contest.db", monkeypatch) as running:
         await running.log_in("Grace")

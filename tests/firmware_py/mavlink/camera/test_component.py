@@ -264,7 +264,7 @@ def test_a_mission_reaches_the_camera(viewer, album):
 AWKWARD = st.one_of(st.sampled_from([0.0, 1.0, -1.0, nan, inf, -inf, 3e38, 259.0]), st.floats(width=32))
 
 
-@settings(max_examples=200, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@settings(max_examples=200, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(
     st.lists(
         st.tuples(

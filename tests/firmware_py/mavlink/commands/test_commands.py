@@ -329,6 +329,13 @@ def test_termination_needs_an_armed_vehicle(autopilot, peer):
     assert autopilot.calls == [("terminate",)]
 
 
+@pytest.mark.parametrize(("command", "result"), [(246, DENIED), (310, DENIED), (401, REJECTED)])
+def test_reboot_actuator_test_and_checks_are_refused_while_armed(autopilot, peer, command, result):
+    autopilot.status.armed = True
+    assert acks(peer.ask(peer.long(command, 1))) == [(command, result)]
+    assert autopilot.texts == []
+
+
 def test_calibration_is_told_in_the_words_that_stations_follow(autopilot, peer):
     peer.ask(peer.long(241, 0, 0, 0, 0, 1))
     said = [text.text for text in autopilot.texts]

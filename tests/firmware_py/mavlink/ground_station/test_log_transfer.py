@@ -156,7 +156,7 @@ ASKED = st.one_of(
 )
 
 
-@settings(max_examples=60, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@settings(max_examples=60, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(st.lists(ASKED, max_size=12))
 def test_awkward_requests_break_nothing(make_link, asked):
     peer = make_link(logs())

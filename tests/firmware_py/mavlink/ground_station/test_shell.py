@@ -76,7 +76,7 @@ def test_mavsdk_asks_for_no_answer_and_wants_one(peer):
 LINES = st.one_of(st.binary(max_size=70), st.sampled_from([b"param set", b"param show ["]))
 
 
-@settings(max_examples=60, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@settings(max_examples=60, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(st.lists(LINES, max_size=10))
 def test_anything_typed_breaks_nothing(autopilot, make_peer, lines):
     peer = make_peer(autopilot, links=LINKS, node_options={"shell": True})

@@ -103,7 +103,7 @@ MESSAGES = st.one_of(
     simple(mavlink.MAVLink_mission_clear_all_message, PLANS),
     simple(mavlink.MAVLink_mission_set_current_message, SMALL),
 )
-FUZZ = settings(max_examples=100, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+FUZZ = settings(max_examples=100, suppress_health_check=[HealthCheck.function_scoped_fixture])
 
 
 def is_whole(store):
