@@ -12,13 +12,14 @@ import json
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from importlib import import_module
-from math import isfinite
 from socket import SO_SNDBUF, SOL_SOCKET
 from typing import TYPE_CHECKING
 
 import cv2
 import numpy as np
 import numpy.typing as npt
+
+from wire.finite_json import finite
 
 if TYPE_CHECKING:
     from aiohttp import web
@@ -236,7 +237,7 @@ class VideoServer:
             known = ", ".join(["/video", "/image.jpg", *self._texts, *self._documents])
             return web.Response(status=404, text=f"not here; there are {known}\n")
         try:
-            text = json.dumps(_finite(provider(request.query)), allow_nan=False)
+            text = json.dumps(finite(provider(request.query)), allow_nan=False)
         except Exception as error:  # a fault in a document must not harm the video
             return web.Response(status=500, text=f"{request.path}: {type(error).__name__}: {error!s:.200}\n")
         headers = {"Cache-Control": "no-store"}
@@ -248,14 +249,3 @@ def _part(shot: _Shot) -> bytes:
     jpeg = shot.compressed()
     head = f"Content-Type: image/jpeg\r\nContent-Length: {len(jpeg)}\r\nX-Time-Us: {shot.time_us}\r\n\r\n"
     return b"".join((head.encode(), jpeg, f"\r\n--{BOUNDARY}\r\n".encode()))
-
-
-def _finite(value: object) -> object:
-    """Replace numbers that JSON does not know by null, in dictionaries and sequences too."""
-    if isinstance(value, float):
-        return value if isfinite(value) else None
-    if isinstance(value, Mapping):
-        return {str(key): _finite(item) for key, item in value.items()}
-    if isinstance(value, list | tuple):
-        return [_finite(item) for item in value]
-    return value

@@ -10,7 +10,6 @@ from math import ceil, isfinite
 
 from firmware_py.mavlink.port import AutopilotPort
 from firmware_py.mavlink.scaling import boot_ms, degrees_e7, millimetres, whole
-from firmware_py.mavlink.standard_modes import standard_mode
 from firmware_py.status import LandedState
 from wire.dialect import Message, mavlink
 
@@ -129,7 +128,7 @@ def current_mode(autopilot: AutopilotPort, _time_us: int) -> Message:
     """CURRENT_MODE: the mode flown and the one asked for."""
     status = autopilot.status
     return mavlink.MAVLink_current_mode_message(
-        standard_mode(status.mode),
+        status.mode.value.standard,
         status.mode.custom_mode,
         status.intended_mode.custom_mode,
     )

@@ -14,16 +14,8 @@ from geometry.vectors import NAN3, Vec3
 from wire.dialect import mavlink
 
 FORCE_MAGIC = 21196.0  # param2 of COMPONENT_ARM_DISARM
-_STANDARD_MODES = {
-    mavlink.MAV_STANDARD_MODE_POSITION_HOLD: FlightMode.POSITION,
-    mavlink.MAV_STANDARD_MODE_ORBIT: FlightMode.ORBIT,
-    mavlink.MAV_STANDARD_MODE_ALTITUDE_HOLD: FlightMode.ALTITUDE,
-    mavlink.MAV_STANDARD_MODE_SAFE_RECOVERY: FlightMode.RETURN,
-    mavlink.MAV_STANDARD_MODE_MISSION: FlightMode.MISSION,
-    mavlink.MAV_STANDARD_MODE_LAND: FlightMode.LAND,
-    mavlink.MAV_STANDARD_MODE_TAKEOFF: FlightMode.TAKEOFF,
-}
-_MODES = {mode.value: mode for mode in FlightMode}
+_STANDARD_MODES = {mode.value.standard: mode for mode in FlightMode if mode.value.standard}
+_MODES = {(mode.value.main, mode.value.sub): mode for mode in FlightMode}
 _WARNING = mavlink.MAV_SEVERITY_WARNING
 _CRITICAL = mavlink.MAV_SEVERITY_CRITICAL
 _SMALLEST_ORBIT_M = 1.0

@@ -8,11 +8,13 @@ from math import cos, isfinite, pi, sin
 from typing import Any
 
 from framerunner.recording.collected import CollectedFlight
+from geometry.rotations import quaternion_from_yaw
 from offboard.app import Moment
 from offboard.engine import TransitionTaken
 from offboard.mission import Mission, mermaid
 from scenarios.models import COLOURS, Scenario
 from vision.types import Detection, Detections
+from wire.finite_json import finite
 
 Json = dict[str, Any]
 
@@ -48,7 +50,7 @@ def flight_json(
         flown: its mission, if it can be drawn.
         size_px: width and height of its images.
     """
-    result = _clean(flight.result)
+    result = finite(flight.result, longest=_LONGEST_TEXT)
     states = _states(flight, flown)
     numbers = {state: number for number, state in enumerate(states)}
     clock = _Clock(flight.began_us)
@@ -114,7 +116,7 @@ def _poses(flight: CollectedFlight, numbers: Mapping[str, int], clock: _Clock) -
             {
                 "t": clock.seconds(state.time_us),
                 "p": _rounded(state.x, state.y, state.z),
-                "q": _rounded(cos(state.yaw / 2), 0.0, 0.0, sin(state.yaw / 2)),
+                "q": _rounded(*quaternion_from_yaw(state.yaw)),
                 "v": _rounded(c * vx + s * vy, c * vy - s * vx, vz),
                 "r": _rounded(turn_rad / span_s if span_s > 0 else 0.0)[0],
                 "c": _rounded(*told) if flight.mission_is_known else None,
@@ -196,14 +198,3 @@ def _plain(value: object) -> object:
 def _rounded(*values: float) -> list[float | None]:
     """To a tenth of a millimetre, which is enough to look at; what is not finite is null."""
     return [round(value, 4) if isfinite(value) else None for value in values]
-
-
-def _clean(value: Any) -> Any:  # noqa: ANN401 - whatever stands in a result
-    """The same as JSON has it: numbers that are not finite are null, texts are not endless."""
-    if isinstance(value, Mapping):
-        return {str(key)[:_LONGEST_TEXT]: _clean(each) for key, each in value.items()}
-    if isinstance(value, list | tuple):
-        return [_clean(each) for each in value[:_LONGEST_TEXT]]
-    if isinstance(value, str):
-        return value[:_LONGEST_TEXT]
-    return _plain(value)

@@ -13,9 +13,9 @@ import cv2
 from firmware_py.airframe import load_airframe
 from framerunner.recording.errors import RecordingError
 from framerunner.recording.events import Event, Picture, time_of_event
+from geometry.alignment import Alignment, Pose
 from offboard.app import Moment
 from offboard.drone import DroneState, VelocityCommand
-from offboard.link.alignment import Alignment, Pose
 from scenarios.ground import start_position
 from scenarios.models import Scenario
 from vision.jpeg import MAX_PIXELS

@@ -6,7 +6,7 @@ No clock and no socket: time is the vehicle's, messages come in, images come out
 from __future__ import annotations
 
 from dataclasses import asdict
-from math import cos, isfinite, sin
+from math import isfinite
 
 from firmware_py.airframe import load_airframe
 from framerunner.vehicle_link import Message
@@ -18,9 +18,9 @@ from framerunner.virtual_camera.history import (
     quaternion_from_euler,
 )
 from framerunner.virtual_camera.lift import lifted
-from framerunner.virtual_camera.placement import Placement, yaw_of
-from geometry.vectors import Quaternion
-from offboard.link.alignment import Pose
+from framerunner.virtual_camera.placement import Placement
+from geometry.alignment import Pose
+from geometry.rotations import quaternion_from_yaw, yaw_of
 from scenarios.ground import start_position
 from scenarios.models import Scenario
 from scenarios.referee import Referee
@@ -38,12 +38,6 @@ def start_pose(scenario: Scenario) -> Pose:
     x_m, y_m, z_m = start_position(scenario)
     height_m = load_airframe(scenario.airframe).envelope_m[2]
     return Pose((x_m, y_m, z_m + height_m / 2), scenario.start.yaw_rad)
-
-
-def levelled(attitude_arena: Quaternion) -> Quaternion:
-    """The heading of an attitude, without roll and pitch: quaternions (w, x, y, z) of unit length."""
-    half = yaw_of(attitude_arena) / 2  # the formula is the same in arena axes
-    return (cos(half), 0.0, 0.0, sin(half))
 
 
 class VirtualCamera:
@@ -145,7 +139,7 @@ class VirtualCamera:
             return None
         self._next = index + 1
         self.images += 1
-        attitude = levelled(where.attitude_arena) if self._level else where.attitude_arena
+        attitude = quaternion_from_yaw(yaw_of(where.attitude_arena)) if self._level else where.attitude_arena
         return exposure_us, self._camera.render(where.position_arena_m, attitude)
 
     def standing(self, state: str = "", ended: str | None = None) -> dict[str, object]:

@@ -7,7 +7,6 @@ import sys
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import asdict
 from datetime import datetime
-from math import isfinite
 from typing import Any
 
 from sqlalchemy import func, select, update
@@ -39,6 +38,7 @@ from monitor.competition.rules import Correction, Rule, correct, read_report
 from monitor.competition.views import Board, TryDetail
 from monitor.competition.words import Refused, free_text, from_wire, name_key, shown, team_name
 from monitor.tries import TryEvent
+from wire.finite_json import finite
 
 MOST_TEAMS = 500
 MOST_JUDGEMENTS = 200  # of one try
@@ -381,20 +381,8 @@ def _team_change(team: tables.Team, entry: Entry) -> tables.TeamChange:
 
 def _json(report: Mapping[str, Any]) -> str:
     """A report as JSON, whatever came: numbers that are not finite are null, one too long is left out."""
-    text = json.dumps(_finite(report, 8), default=str)
+    text = json.dumps(finite(report, depth=8), default=str)
     return text if len(text) <= _LONGEST_REPORT else "{}"
-
-
-def _finite(value: object, depth: int) -> object:
-    if isinstance(value, float) and not isfinite(value):
-        return None
-    if depth == 0:
-        return None
-    if isinstance(value, Mapping):
-        return {str(key): _finite(each, depth - 1) for key, each in value.items()}
-    if isinstance(value, list | tuple):
-        return [_finite(each, depth - 1) for each in value]
-    return value
 
 
 def _loads(text: str) -> dict[str, Any]:
