@@ -9,15 +9,14 @@ from collections.abc import Callable, Sequence
 from functools import partial
 from typing import Any
 
-from pymavlink.dialects.v20 import common as mavlink
-
 from monitor.listener import Listener
 from monitor.ports import Equipment, Message
 from monitor.sticks import RATE_HZ, Sticks, manual_control
 from monitor.tries import TryEvent
 from monitor.vehicle.camera import host_of
-from monitor.vehicle.commands import OWN_SYSTEM
-from monitor.vehicle.vehicle import AUTOPILOT, Ears, Vehicle
+from monitor.vehicle.orders import OWN_SYSTEM
+from monitor.vehicle.vehicle import Vehicle, VehicleCallbacks
+from wire.vehicles import ground_station_heartbeat, is_vehicle
 
 _TICK_S = 0.1
 _BEAT_S = 1.0
@@ -172,7 +171,7 @@ class Fleet:
                 system = message.get_srcSystem()
                 vehicle = self._vehicles.get(system)
                 if vehicle is None:
-                    if not _is_vehicle(message) or not self._has_room(now_s):
+                    if system in (0, OWN_SYSTEM) or not is_vehicle(message) or not self._has_room(now_s):
                         continue
                     vehicle = self._meet(system, now_s)
                 vehicle.take(message, now_s, host)
@@ -199,8 +198,8 @@ class Fleet:
 
     def _meet(self, system: int, now_s: float) -> Vehicle:
         notice = partial(self.notice, system)
-        ears = Ears(self._listener.send, self._tell, notice, self._tell_try)
-        vehicle = Vehicle(system, self._equipment, ears, now_s, host_of(self._listener.url))
+        callbacks = VehicleCallbacks(self._listener.send, self._tell, notice, self._tell_try)
+        vehicle = Vehicle(system, self._equipment, callbacks, now_s, host_of(self._listener.url))
         self._vehicles[system] = vehicle
         self._vehicles = dict(sorted(self._vehicles.items()))
         self.notice(system, "info", f"drone {system} is heard")
@@ -230,7 +229,7 @@ class Fleet:
             now_s = loop.time()
             if now_s - beat_s >= _BEAT_S:
                 beat_s = now_s
-                self._listener.send(_heartbeat())
+                self._listener.send(ground_station_heartbeat())
             for vehicle in list(self._vehicles.values()):
                 try:
                     vehicle.tick(now_s)
@@ -258,23 +257,6 @@ class Fleet:
             self._listener.send(manual_control(drone_id, self._sticks[drone_id]))
             due_s = max(due_s + 1 / RATE_HZ, loop.time())  # what was missed is not made up for
             await asyncio.sleep(due_s - loop.time())
-
-
-def _is_vehicle(message: Message) -> bool:
-    """Whether this is the HEARTBEAT of an autopilot, not of a ground station, camera or companion."""
-    return bool(
-        message.get_msgId() == mavlink.MAVLINK_MSG_ID_HEARTBEAT
-        and message.get_srcComponent() == AUTOPILOT
-        and message.get_srcSystem() not in (0, OWN_SYSTEM)
-        and message.autopilot != mavlink.MAV_AUTOPILOT_INVALID
-        and message.type != mavlink.MAV_TYPE_GCS
-    )
-
-
-def _heartbeat() -> Message:
-    return mavlink.MAVLink_heartbeat_message(
-        mavlink.MAV_TYPE_GCS, mavlink.MAV_AUTOPILOT_INVALID, 0, 0, mavlink.MAV_STATE_ACTIVE, 3
-    )
 
 
 def _notice(drone_id: int | None, level: str, text: str) -> JsonMessage:

@@ -67,7 +67,7 @@ VTOL_TAKEOFF = Px4Mode(4, 10, "VTOL Takeoff", "VTOL take-off", navigation_state=
 ACRO = Px4Mode(5, 0, "Acro", "acro", "ACRO", 10, _MANUAL)
 OFFBOARD = Px4Mode(6, 0, "Offboard", "offboard", "OFFBOARD", 14, _STABILISED)
 STABILIZED = Px4Mode(7, 0, "Stabilized", "stabilised", "STABILIZED", 15, _BY_HAND)
-RATTITUDE = Px4Mode(8, 0, "Rattitude", "rattitude", "RATTITUDE", flags=_BY_HAND)
+RATTITUDE = Px4Mode(8, 0, "Rattitude", "rattitude", "RATTITUDE", flags=_MANUAL)
 SIMPLE = Px4Mode(9, 0, "Simple", "simple", flags=_BY_HAND)
 TERMINATION = Px4Mode(10, 0, "Termination", "terminated", navigation_state=13, flags=0)
 

@@ -11,7 +11,7 @@ from rich.table import Table
 from rich.text import Text
 
 from framerunner.doctor import names
-from framerunner.doctor.findings import Finding, Level, can_fly
+from framerunner.doctor.checks import Finding, Level, can_fly
 from framerunner.doctor.record import Record
 
 _MARKS = {Level.GOOD: "[green]ok[/]", Level.NOTE: "[yellow]note[/]", Level.MISSING: "[red]MISSING[/]"}

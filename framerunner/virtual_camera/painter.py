@@ -6,20 +6,11 @@ No clock and no socket: time is the vehicle's, messages come in, images come out
 from __future__ import annotations
 
 from dataclasses import asdict
-from math import isfinite
 
 from firmware_py.airframe import load_airframe
-from framerunner.vehicle_link import Message
-from framerunner.virtual_camera.history import (
-    AHEAD_US,
-    AttitudeReport,
-    PoseHistory,
-    PositionReport,
-    quaternion_from_euler,
-)
 from framerunner.virtual_camera.lift import lifted
 from framerunner.virtual_camera.placement import Placement
-from geometry.alignment import Pose
+from geometry.alignment import ORIGIN, Pose
 from geometry.rotations import quaternion_from_yaw, yaw_of
 from scenarios.ground import start_position
 from scenarios.models import Scenario
@@ -27,10 +18,11 @@ from scenarios.referee import Referee
 from scenarios.truth import TrueState
 from sitl.camera import Camera, Image
 from sitl.camera_feed import FIRST_EXPOSURE_US
+from wire.dialect import Message, mavlink
+from wire.vehicle_telemetry import AHEAD_US, VehicleTelemetry
 
 REFEREE_STEP_US = 20_000
 REPORT_GAP_US = 20_000  # between two reports: the one that shows that a time is over comes so much later
-ARMED_FLAG = 128  # MAV_MODE_FLAG_SAFETY_ARMED
 
 
 def start_pose(scenario: Scenario) -> Pose:
@@ -56,11 +48,9 @@ class VirtualCamera:
         plan: the scenario as given.
         scenario: what is to be seen; its frames may hang higher than in the plan.
         placement: of the arena at the vehicle.
-        history: of the vehicle's reports.
-        attitudes: reports of attitude so far.
-        positions: reports of position so far.
+        telemetry: what the vehicle tells.
         images: painted so far.
-        restarts: how often the vehicle began anew.
+        restarts: how often the vehicle has restarted.
     """
 
     def __init__(self, scenario: Scenario, *, level: bool = False, base: bool = True) -> None:
@@ -72,12 +62,12 @@ class VirtualCamera:
         self._envelope_m = load_airframe(scenario.airframe).envelope_m
         self._period_us = 1e6 / scenario.camera.rate_hz
         self._wait_us = max(0, round(scenario.camera.latency_s * 1e6) - REPORT_GAP_US)
-        self.attitudes = self.positions = self.images = self.restarts = 0
-        self._begin()
+        self.images = self.restarts = 0
+        self._restart()
 
-    def _begin(self) -> None:
+    def _restart(self) -> None:
         """Know nothing of the vehicle."""
-        self.history = PoseHistory()
+        self.telemetry = VehicleTelemetry()
         self.placement = Placement(start_pose(self.scenario))
         self._referee = Referee(self.scenario, self._envelope_m, self._lift_m)
         self._judged_us = 0
@@ -86,35 +76,15 @@ class VirtualCamera:
 
     def take(self, message: Message) -> None:
         """Take one of the vehicle's messages; those that tell nothing of its pose are passed over."""
-        kind = message.get_type()
-        if kind == "ATTITUDE_QUATERNION":
-            self.attitudes += 1
-            self.history.add_attitude(
-                AttitudeReport(
-                    message.time_boot_ms * 1000,
-                    (message.q1, message.q2, message.q3, message.q4),
-                    (message.rollspeed, message.pitchspeed, message.yawspeed),
-                )
-            )
-        elif kind == "ATTITUDE":
-            self.attitudes += 1
-            self._take_angles(message)
-        elif kind == "LOCAL_POSITION_NED":
-            self.positions += 1
-            self.history.add_position(
-                PositionReport(
-                    message.time_boot_ms * 1000,
-                    (message.x, message.y, message.z),
-                    (message.vx, message.vy, message.vz),
-                )
-            )
-        elif kind == "HEARTBEAT":
-            armed = bool(message.base_mode & ARMED_FLAG)
-            self.placement.see_heartbeat(self.history.newest_us or 0, armed)
-            return
+        telemetry = self.telemetry
+        telemetry.take(message)
+        if telemetry.restarts:
+            self.restarts += 1
+            self._restart()
+        elif message.get_msgId() == mavlink.MAVLINK_MSG_ID_HEARTBEAT:
+            self.placement.see_heartbeat(telemetry.time_us, telemetry.armed)
         else:
-            return
-        self._follow()
+            self._follow()
 
     def step(self) -> tuple[int, Image] | None:
         """Paint the image that is due.
@@ -124,16 +94,16 @@ class VirtualCamera:
         Returns:
             Time of exposure, microseconds of vehicle time, and the image; None if none is due.
         """
-        now_us, covered_us = self.history.newest_us, self.history.covered_us
-        if now_us is None or covered_us is None:
+        covered_us = self.telemetry.covered_us
+        if covered_us is None:
             return None
-        index = int((now_us - self._wait_us - FIRST_EXPOSURE_US) // self._period_us)
+        index = int((self.telemetry.time_us - self._wait_us - FIRST_EXPOSURE_US) // self._period_us)
         if index < self._next:
             return None
         exposure_us = round(FIRST_EXPOSURE_US + index * self._period_us)
         if exposure_us > covered_us + AHEAD_US:
             return None
-        pose = self.history.pose(exposure_us)
+        pose = self.telemetry.pose(exposure_us)
         where = None if pose is None else self.placement.arena_pose(pose)
         if where is None:
             return None
@@ -153,7 +123,7 @@ class VirtualCamera:
             "scenario": self.scenario.name,
             "source": "telemetry",
             "lift_m": self._lift_m,
-            "time_us": self.history.newest_us or 0,
+            "time_us": self.telemetry.time_us,
             "local_frame": self._local_frame(),
             "snapshot": asdict(self._referee.snapshot()),
             "report": self._referee.report(state, ended).as_dict(),
@@ -164,31 +134,15 @@ class VirtualCamera:
         alignment = self.placement.alignment
         if alignment is None:
             return None
-        origin = alignment.pose(Pose((0.0, 0.0, 0.0), 0.0))
+        origin = alignment.pose(ORIGIN)
         return {"origin_arena_m": origin.position_m, "yaw_rad": origin.yaw_rad}
-
-    def _take_angles(self, message: Message) -> None:
-        angles = (message.roll, message.pitch, message.yaw)
-        if not all(map(isfinite, angles)):
-            return
-        self.history.add_attitude(
-            AttitudeReport(
-                message.time_boot_ms * 1000,
-                quaternion_from_euler(*angles),
-                (message.rollspeed, message.pitchspeed, message.yawspeed),
-            )
-        )
 
     def _follow(self) -> None:
         """Let placement and referee see the vehicle where both kinds of reports have come to."""
-        if self.history.restarts:
-            self.restarts += 1
-            self._begin()
-            return
-        covered_us = self.history.covered_us
+        covered_us = self.telemetry.covered_us
         if covered_us is None or covered_us < self._judged_us + REFEREE_STEP_US:
             return
-        pose = self.history.pose(covered_us)
+        pose = self.telemetry.pose(covered_us)
         if pose is None:
             return
         self._judged_us = covered_us

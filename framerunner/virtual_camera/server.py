@@ -7,11 +7,12 @@ import threading
 import time
 from collections.abc import Callable, Mapping
 
-from framerunner.vehicle_link import Message, VehicleLink, command, companion_heartbeat, is_vehicle
+from framerunner.vehicle_link import VehicleLink
 from framerunner.virtual_camera.painter import VirtualCamera
 from offboard.drone import DroneError
 from sitl.video import VideoServer
-from wire.dialect import mavlink
+from wire.dialect import AUTOPILOT_COMPONENT_ID, Message, mavlink
+from wire.vehicles import companion_heartbeat, is_vehicle, request_rate
 
 STALE_S = 0.5  # wall time without attitude or position, after which no image is served
 SYSTEM_ID = 246  # MAVSDK has 245, ground stations 255
@@ -98,7 +99,7 @@ class CameraServer:
 
     def _take(self, messages: list[Message]) -> None:
         for message in messages:
-            if self._vehicle is None and message.get_type() == "HEARTBEAT" and is_vehicle(message):
+            if self._vehicle is None and is_vehicle(message):
                 self._vehicle = message.get_srcSystem()
                 self._say(f"vehicle {self._vehicle} found")
             if self._vehicle is None or not self._is_ours(message):
@@ -116,8 +117,7 @@ class CameraServer:
 
     def _is_ours(self, message: Message) -> bool:
         return bool(
-            message.get_srcSystem() == self._vehicle
-            and message.get_srcComponent() == mavlink.MAV_COMP_ID_AUTOPILOT1
+            message.get_srcSystem() == self._vehicle and message.get_srcComponent() == AUTOPILOT_COMPONENT_ID
         )
 
     async def _keep_house(self) -> None:
@@ -137,10 +137,10 @@ class CameraServer:
 
     def _ask_for_rates(self, span_s: float) -> None:
         """Ask for more where too little comes; a link that cannot carry it is told of and left alone."""
-        camera, rates = self._camera, self._rates
-        attitude_hz = (camera.attitudes - rates.attitudes) / span_s
-        position_hz = (camera.positions - rates.positions) / span_s
-        rates.attitudes, rates.positions = camera.attitudes, camera.positions
+        telemetry, rates = self._camera.telemetry, self._rates
+        attitude_hz = (telemetry.attitudes - rates.attitudes) / span_s
+        position_hz = (telemetry.positions - rates.positions) / span_s
+        rates.attitudes, rates.positions = telemetry.attitudes, telemetry.positions
         if min(attitude_hz, position_hz) >= ENOUGH_HZ or rates.asked > _ASKS:
             return
         rates.asked += 1
@@ -156,8 +156,7 @@ class CameraServer:
             (mavlink.MAVLINK_MSG_ID_LOCAL_POSITION_NED, position_hz),
         ):
             if rate_hz < ENOUGH_HZ:
-                asking = (mavlink.MAV_CMD_SET_MESSAGE_INTERVAL, number, 1e6 / WANTED_HZ)
-                self._link.send(command(self._vehicle, *asking))
+                self._link.send(request_rate(self._vehicle, number, WANTED_HZ))
 
     def _referee_answer(self, query: Mapping[str, str]) -> object:
         return self._camera.standing(query.get("state", ""), query.get("ended"))

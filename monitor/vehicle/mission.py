@@ -8,7 +8,6 @@ from typing import Annotated, Any
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from monitor.ports import Message
-from monitor.vehicle.texts import plain
 from wire.finite_json import finite
 from wire.mission_codec import DocumentAssembler, PayloadError, decode_detections, decode_state
 from wire.mission_messages import (
@@ -21,6 +20,7 @@ from wire.mission_messages import (
     DocumentKind,
     MissionState,
 )
+from wire.status_text import plain
 
 ALIVE_S = 2.0
 _TRANSITIONS = 10
