@@ -20,10 +20,10 @@ from wire.vehicles import ground_station_heartbeat, is_vehicle
 
 _TICK_S = 0.1
 _BEAT_S = 1.0
-_MOST_DRONES = 16
-_FORGOTTEN_S = 600.0  # so long a drone must be silent before another may take its place
+_MAX_DRONES = 16
+_FORGOTTEN_S = 600.0  # of silence, after which another drone may take its place
 _TEXTS = 30
-_MOST_FAULTS_TOLD = 10
+_MAX_FAULTS_TOLD = 10
 
 JsonMessage = dict[str, Any]
 _log = logging.getLogger(__name__)
@@ -139,7 +139,7 @@ class Fleet:
         if sticks is not None:
             self._sticks[drone_id] = sticks
             stream = self._streams.get(drone_id)
-            if stream is None or stream.done():  # one that failed is begun anew
+            if stream is None or stream.done():  # one that failed is started again
                 self._streams[drone_id] = asyncio.create_task(self._stream_sticks(drone_id))
             return
         self._sticks.pop(drone_id, None)
@@ -180,11 +180,11 @@ class Fleet:
 
     def _note_fault(self, what: str) -> None:
         self.faults += 1
-        if self.faults <= _MOST_FAULTS_TOLD:
+        if self.faults <= _MAX_FAULTS_TOLD:
             _log.exception("%s", what)
 
     def _has_room(self, now_s: float) -> bool:
-        if len(self._vehicles) < _MOST_DRONES:
+        if len(self._vehicles) < _MAX_DRONES:
             return True
         silent_id, silent = max(self._vehicles.items(), key=lambda item: item[1].age_s(now_s))
         if silent.age_s(now_s) > _FORGOTTEN_S:
@@ -193,7 +193,7 @@ class Fleet:
             return True
         if not self._said_full:
             self._said_full = True
-            self.notice(None, "warning", f"more than {_MOST_DRONES} drones; the others are not shown")
+            self.notice(None, "warning", f"more than {_MAX_DRONES} drones; the others are not shown")
         return False
 
     def _meet(self, system: int, now_s: float) -> Vehicle:

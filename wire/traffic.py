@@ -5,7 +5,7 @@ from __future__ import annotations
 from wire.dialect import Message, mavlink
 
 _WINDOW_US = 1_000_000
-_MOST_SENDERS = 64  # whose gaps are counted; a noisy network must not fill the memory
+_MAX_SENDERS = 64  # whose gaps are counted; a noisy network must not fill the memory
 _LATE = 128  # a number that far ahead is an old packet that came late
 
 
@@ -53,7 +53,7 @@ class Traffic:
         self.bytes_heard += size
         expected = self._next.get(sender)
         if expected is None:
-            if len(self._next) >= _MOST_SENDERS:
+            if len(self._next) >= _MAX_SENDERS:
                 return
         else:
             gap = (sequence - expected) % 256

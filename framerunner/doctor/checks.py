@@ -52,13 +52,13 @@ class Finding:
         level: whether the challenge can be flown with it.
         subject: a word or two.
         text: what is the case.
-        mend: what to do; empty if nothing.
+        advice: what to do; empty if nothing.
     """
 
     level: Level
     subject: str
     text: str
-    mend: str = ""
+    advice: str = ""
 
 
 def can_fly(findings: list[Finding]) -> bool:
@@ -121,10 +121,10 @@ def check_health(record: Record) -> Iterator[Finding]:
     elif not ready and not record.armed:
         reasons = "; ".join((*record.arming.failures, *((sick_names,) if sick_names else ())))
         words = f"not passed in {mode}" + (f": {reasons}" if reasons else "")
-        mend = "mend what is named, here and below"
+        advice = "mend what is named, here and below"
         if record.arming.armable_modes is None:
-            mend = "it does not tell why; fly may pass in offboard, which needs no global position"
-        yield Finding(Level.MISSING, "pre-arm checks", words, mend)
+            advice = "it does not tell why; fly may pass in offboard, which needs no global position"
+        yield Finding(Level.MISSING, "pre-arm checks", words, advice)
     elif sick_names:
         yield Finding(Level.NOTE, "health", f"not well: {sick_names}", "mend it before flying")
     else:
@@ -149,11 +149,11 @@ def check_streams(record: Record) -> Iterator[Finding]:
     for kinds, what in ((_ATTITUDES, "attitude"), (("LOCAL_POSITION_NED",), "local position")):
         rate_hz = max(record.rate_hz(kind) for kind in kinds)
         if rate_hz == 0.0:
-            mend = "give it GPS, optical flow, vision or motion capture; wait for its estimate"
-            yield Finding(Level.MISSING, what, f"no {' or '.join(kinds)} comes", mend)
+            advice = "give it GPS, optical flow, vision or motion capture; wait for its estimate"
+            yield Finding(Level.MISSING, what, f"no {' or '.join(kinds)} comes", advice)
         elif rate_hz < LOW_HZ:
-            mend = f"fly asks for {WANTED_HZ:g} Hz; see that the line can carry it"
-            yield Finding(Level.NOTE, what, f"only {rate_hz:.0f} Hz", mend)
+            advice = f"fly asks for {WANTED_HZ:g} Hz; see that the line can carry it"
+            yield Finding(Level.NOTE, what, f"only {rate_hz:.0f} Hz", advice)
         else:
             yield Finding(Level.GOOD, what, f"{rate_hz:.0f} Hz")
 
@@ -203,8 +203,8 @@ def check_limits(record: Record) -> Iterator[Finding]:
     yield from _fence(record)
     preflight_s = parameters.get("COM_DISARM_PRFLT", 0.0)
     if 0.0 < preflight_s < 5.0:
-        mend = "set it to 10: take-off begins by a slow ramp"
-        yield Finding(Level.MISSING, "COM_DISARM_PRFLT", f"{preflight_s:g} s", mend)
+        advice = "set it to 10: take-off begins by a slow ramp"
+        yield Finding(Level.MISSING, "COM_DISARM_PRFLT", f"{preflight_s:g} s", advice)
 
 
 def _fence(record: Record) -> Iterator[Finding]:
@@ -220,8 +220,8 @@ def _fence(record: Record) -> Iterator[Finding]:
     for name, least_m in limits:
         value = parameters.get(name, 0.0)
         if 0.0 < value < least_m:
-            mend = f"the challenge needs {least_m:g} m; set more, or 0"
-            yield Finding(Level.MISSING, name, f"fence at {value:g} m", mend)
+            advice = f"the challenge needs {least_m:g} m; set more, or 0"
+            yield Finding(Level.MISSING, name, f"fence at {value:g} m", advice)
 
 
 def check_failsafes(record: Record) -> Iterator[Finding]:
@@ -237,12 +237,12 @@ def check_failsafes(record: Record) -> Iterator[Finding]:
             words += f" or, without radio control, return{climbs}"
         elif action == 3:
             words += climbs
-        mend = "under a roof set COM_OBL_RC_ACT to 4 (land)" if "return" in words else ""
-        level = Level.NOTE if mend else Level.GOOD
-        yield Finding(level, "setpoints lost", f"{words}{after}", mend)
+        advice = "under a roof set COM_OBL_RC_ACT to 4 (land)" if "return" in words else ""
+        level = Level.NOTE if advice else Level.GOOD
+        yield Finding(level, "setpoints lost", f"{words}{after}", advice)
     if loss_s is not None and loss_s < 0.5:
-        mend = "set it to 1: the app's watchdog needs half a second"
-        yield Finding(Level.MISSING, "COM_OF_LOSS_T", f"{loss_s:g} s", mend)
+        advice = "set it to 1: the app's watchdog needs half a second"
+        yield Finding(Level.MISSING, "COM_OF_LOSS_T", f"{loss_s:g} s", advice)
     station = parameters.get("NAV_DLL_ACT")
     if station is not None:
         words = names.LINK_LOSS.get(int(station), f"action {station:g}")
@@ -261,7 +261,7 @@ def check_position(record: Record) -> Iterator[Finding]:
         return
     if not status.flags & mavlink.ESTIMATOR_PRED_POS_HORIZ_REL:
         yield Finding(
-            Level.MISSING, "position", "no sensor tells the drone where it is", _position_mend(record)
+            Level.MISSING, "position", "no sensor tells the drone where it is", _position_advice(record)
         )
         return
     source, accuracy_m = _position_source(record, status), status.pos_horiz_accuracy
@@ -270,7 +270,7 @@ def check_position(record: Record) -> Iterator[Finding]:
         return
     accuracy = f"estimated accuracy {accuracy_m:.1f} m" if isfinite(accuracy_m) else "unknown accuracy"
     text = f"by {source}, {accuracy}: the drone will stray; a frame's opening is 0.38 m wide"
-    yield Finding(Level.MISSING, "position", text, _position_mend(record))
+    yield Finding(Level.MISSING, "position", text, _position_advice(record))
 
 
 def check_height(record: Record) -> Iterator[Finding]:
@@ -286,8 +286,8 @@ def check_height(record: Record) -> Iterator[Finding]:
     accuracy = f"estimated accuracy {accuracy_m:.2f} m"
     if reference is None:
         fine = accuracy_m <= ACCURATE_M
-        mend = "" if fine else f"take height from vision or a range finder: {_GUIDE}"
-        yield Finding(Level.GOOD if fine else Level.MISSING, "height", accuracy, mend)
+        advice = "" if fine else f"take height from vision or a range finder: {_GUIDE}"
+        yield Finding(Level.GOOD if fine else Level.MISSING, "height", accuracy, advice)
         return
     wished = names.HEIGHT_SOURCE.get(int(reference), "unknown means")
     source = _height_source(record, status, wished)
@@ -296,7 +296,7 @@ def check_height(record: Record) -> Iterator[Finding]:
         return
     but = "" if source == wished else f", though EKF2_HGT_REF asks for {wished}"
     text = f"by {source}{but}, {accuracy}; in flight it wanders, and a frame's opening is 0.18 m high"
-    yield Finding(Level.MISSING, "height", text, _height_mend(record, wished))
+    yield Finding(Level.MISSING, "height", text, _height_advice(record, wished))
 
 
 def check_vision_settings(record: Record) -> Iterator[Finding]:
@@ -311,8 +311,8 @@ def check_vision_settings(record: Record) -> Iterator[Finding]:
     ]
     if slow:
         text = f"follows vision too slowly for the frames: {', '.join(slow)}"
-        mend = "set what docs/real-drone.md, section 7.3, advises, then restart the drone"
-        yield Finding(Level.MISSING, "estimator", text, mend)
+        advice = "set what docs/real-drone.md, section 7.3, advises, then restart the drone"
+        yield Finding(Level.MISSING, "estimator", text, advice)
 
 
 def check_still(record: Record) -> Iterator[Finding]:
@@ -327,7 +327,7 @@ def check_still(record: Record) -> Iterator[Finding]:
         yield Finding(Level.GOOD, "estimate", f"still within {wander_m:.2f} m")
 
 
-def _position_mend(record: Record) -> str:
+def _position_advice(record: Record) -> str:
     if int(record.parameters.get("EKF2_EV_CTRL", 0)) & _EV_POSITION:
         return (
             "EKF2_EV_CTRL asks for vision, but none is used: send ODOMETRY with estimator type VISION (not "
@@ -336,7 +336,7 @@ def _position_mend(record: Record) -> str:
     return f"give it its position by motion capture or visual odometry: {_GUIDE}"
 
 
-def _height_mend(record: Record, wished: str) -> str:
+def _height_advice(record: Record, wished: str) -> str:
     if wished != "vision":
         return f"take height from vision (EKF2_HGT_REF 3) or a range finder (2): {_GUIDE}"
     if not int(record.parameters.get("EKF2_EV_CTRL", 0)) & _EV_HEIGHT:

@@ -113,8 +113,8 @@ def _found(findings: list[Finding]) -> Table:
     for column in ("", "", "", ""):
         table.add_column(column)
     for finding in findings:
-        mend = f"[dim]{escape(finding.mend)}[/]"
-        table.add_row(_MARKS[finding.level], escape(finding.subject), escape(finding.text), mend)
+        advice = f"[dim]{escape(finding.advice)}[/]"
+        table.add_row(_MARKS[finding.level], escape(finding.subject), escape(finding.text), advice)
     return table
 
 

@@ -26,7 +26,7 @@ from wire.vehicle_telemetry import PositionReport, VehicleTelemetry
 from wire.vehicles import is_vehicle
 
 TICK_US = 50_000
-_TICKS_AT_MOST = 576_000  # eight hours: a log that holds more is damaged
+_MAX_TICKS = 576_000  # eight hours: a log that holds more is damaged
 
 
 class TlogRecording:
@@ -110,7 +110,7 @@ def _read_moments(path: Path, start: Pose) -> list[Moment]:
             moment = ticks.take(message)
             if moment is not None:
                 moments.append(moment)
-                if len(moments) > _TICKS_AT_MOST:
+                if len(moments) > _MAX_TICKS:
                     raise RecordingError(f"replay: '{path}' is longer than eight hours; it must be damaged")
     finally:
         log.close()

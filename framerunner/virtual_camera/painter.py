@@ -89,7 +89,7 @@ class VirtualCamera:
     def step(self) -> tuple[int, Image] | None:
         """Paint the image that is due.
 
-        After a hole in the telemetry only the latest exposure is made up for.
+        After a gap in the telemetry only the latest of the exposures that were missed is painted.
 
         Returns:
             Time of exposure, microseconds of vehicle time, and the image; None if none is due.

@@ -14,9 +14,9 @@ from monitor.vehicle.placement import Placement, Source
 from scenarios.models import Scenario
 from wire.vehicle_telemetry import VehicleTelemetry
 
-_PATIENCE_S = 5.0  # so long a drone has to show its own referee
+_PATIENCE_S = 5.0  # within which a drone has to show its own referee
 _FRESH_S = 1.0
-_NAMED_S = 3.0  # so long the drone has to say when it was switched on
+_NAMED_S = 3.0  # within which the drone has to say when it was switched on
 
 
 class Judging:
@@ -107,7 +107,7 @@ class Judging:
             self._tries.take_result(crc, content, now_s)
 
     def close(self) -> None:
-        """The vehicle begins anew."""
+        """The vehicle has restarted."""
         if self._tries is not None:
             self._tries.close()
 

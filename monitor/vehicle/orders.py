@@ -21,7 +21,7 @@ _TRIES = 3
 _PROGRESS_S = 5.0  # after "in progress" the answer is waited for this long
 _SHOWN_S = 3.0
 _LOOK_S = 0.05
-_REASON_S = 0.3  # so long after a refusal its reason may come as a text
+_REASON_S = 0.3  # after a refusal, within which its reason may come as a text
 _FORCE = 21196.0
 _WARNING = 4  # MAV_SEVERITY; what is less grave is no reason for a refusal
 

@@ -212,8 +212,8 @@ def test_the_height_is_said_to_come_from_what_is_used_not_from_what_is_wished():
     assert height.text.startswith(
         "by barometer, though EKF2_HGT_REF asks for vision, estimated accuracy 0.33 m"
     )
-    assert "not MOCAP" in finding_of(record, "position").mend
-    assert height.mend == "as for the position"
+    assert "not MOCAP" in finding_of(record, "position").advice
+    assert height.advice == "as for the position"
     tell(record, estimator_status(*GPS[0]))
     assert "the drone will stray" in finding_of(record, "position").text
 
@@ -228,7 +228,7 @@ def test_an_ideal_drone_with_a_position_from_gps_can_fly():
 def test_what_keeps_it_from_arming_in_offboard_is_named():
     record = healthy()
     tell(record, sys_status(health=0x2F))
-    assert "it does not tell why" in finding_of(record, "pre-arm checks").mend
+    assert "it does not tell why" in finding_of(record, "pre-arm checks").advice
     for message in (
         summary(0),
         event("check_modes_global_pos", "<IB", 0x38, 24),
