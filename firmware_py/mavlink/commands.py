@@ -21,7 +21,6 @@ from firmware_py.mavlink.message_requests import request_message, set_interval
 from firmware_py.mavlink.parameter_storage import preflight_storage
 from firmware_py.status import CommandResult
 from wire.dialect import BROADCAST, Message, mavlink
-from wire.px4_modes import numbers_of
 
 _TO_EVERYONE = (
     mavlink.MAV_CMD_REQUEST_PROTOCOL_VERSION,
@@ -120,7 +119,7 @@ def _receive_set_mode(exchange: Exchange, link: Link, message: Message) -> None:
     """The legacy SET_MODE, which QGroundControl uses; acknowledged as DO_SET_MODE, as PX4 does."""
     if message.target_system != exchange.system_id:
         return
-    main, sub = numbers_of(message.custom_mode)
+    main, sub = message.custom_mode >> 16 & 0xFF, message.custom_mode >> 24 & 0xFF
     if message.custom_mode & 0xFFFF:
         main = 0  # reserved bits are set, so this is no custom mode of PX4's
     result = set_mode(exchange, float(message.base_mode), float(main), float(sub))
