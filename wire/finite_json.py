@@ -8,6 +8,7 @@ from math import isfinite
 from typing import Any
 
 _UNLIMITED = 1 << 30
+_CONTAINERS = (dict, list, tuple, Mapping)
 
 
 def finite(value: Any, *, longest: int | None = None, depth: int = _UNLIMITED) -> Any:  # noqa: ANN401
@@ -37,16 +38,14 @@ def encode(value: Any, *, decimals: int | None = None) -> str:  # noqa: ANN401 -
 
 def _finite(value: Any, decimals: int | None, longest: int | None, depth: int) -> Any:  # noqa: ANN401
     if isinstance(value, float):
-        kept = value if decimals is None or not isfinite(value) else round(value, decimals)
-        return kept if isfinite(kept) else None
+        kept = value if isfinite(value) else None
+        return kept if kept is None or decimals is None else round(kept, decimals)
     if isinstance(value, str):
         return value[:longest]
-    if not isinstance(value, Mapping | list | tuple):
+    if not isinstance(value, _CONTAINERS):
         return value
     if depth <= 0:
         return None
-    if isinstance(value, Mapping):
-        return {
-            str(key)[:longest]: _finite(item, decimals, longest, depth - 1) for key, item in value.items()
-        }
-    return [_finite(item, decimals, longest, depth - 1) for item in value[:longest]]
+    if isinstance(value, (list, tuple)):
+        return [_finite(item, decimals, longest, depth - 1) for item in value[:longest]]
+    return {str(key)[:longest]: _finite(item, decimals, longest, depth - 1) for key, item in value.items()}

@@ -10,14 +10,12 @@ from __future__ import annotations
 from bisect import bisect_right, insort
 from collections.abc import Callable
 from dataclasses import dataclass
-from functools import cached_property
 from math import fsum, hypot, remainder, tau
 from operator import attrgetter
-from typing import Generic, Protocol, TypeVar
+from typing import Generic, NamedTuple, Protocol, TypeVar
 
 from geometry.rotations import (
     interpolated,
-    normalized,
     quaternion_from_euler,
     rotated_by_rate,
     rotation,
@@ -34,7 +32,7 @@ AHEAD_US = 60_000  # as far as a pose is carried on beyond the last report
 GAP_US = 300_000  # between two reports farther apart nothing is interpolated
 NEAR_US = 100_000  # a position counts for so long before the first and after the last report
 _MAX_PLAUSIBLE = 1e6  # metres, metres a second or radians a second
-_NORMS = (0.5, 2.0)  # of a quaternion that can be an attitude
+_MIN_NORM, _MAX_NORM = 0.5, 2.0  # of a quaternion that can be an attitude
 _UNKNOWN_MV = 0xFFFF
 _YEAR_2001_US = 978_307_200_000_000
 
@@ -59,8 +57,7 @@ class MessageOrder:
         return True
 
 
-@dataclass(frozen=True)
-class AttitudeReport:
+class AttitudeReport(NamedTuple):
     """What ATTITUDE or ATTITUDE_QUATERNION says.
 
     Attributes:
@@ -75,7 +72,7 @@ class AttitudeReport:
     rate_frd_rad_s: Vec3 = (0.0, 0.0, 0.0)
     by_angles: bool = False
 
-    @cached_property
+    @property
     def yaw_ned_rad(self) -> float:
         """Heading, clockwise from north."""
         return yaw_of(self.attitude_ned)
@@ -86,8 +83,7 @@ class AttitudeReport:
         return to_world(rotation(self.attitude_ned), *self.rate_frd_rad_s)[2]
 
 
-@dataclass(frozen=True, slots=True)
-class PositionReport:
+class PositionReport(NamedTuple):
     """What LOCAL_POSITION_NED says.
 
     Attributes:
@@ -264,8 +260,9 @@ class VehicleTelemetry:
         self, message: Message, attitude: Quaternion, now_s: float, *, by_angles: bool = False
     ) -> bool:
         rates = (message.rollspeed, message.pitchspeed, message.yawspeed)
-        least, most = _NORMS
-        if not (least < hypot(*attitude) < most and _size(rates) < _MAX_PLAUSIBLE):
+        w, x, y, z = attitude
+        norm = hypot(w, x, y, z)
+        if not (_MIN_NORM < norm < _MAX_NORM and _size(rates) < _MAX_PLAUSIBLE):  # nor is it with a NaN
             return False
         time_us = message.time_boot_ms * 1000
         self._follow_clock(time_us)
@@ -273,7 +270,8 @@ class VehicleTelemetry:
         newest = self._attitudes.newest
         if by_angles and newest is not None and newest.time_us == time_us and not newest.by_angles:
             return False
-        if not self._attitudes.add(AttitudeReport(time_us, normalized(attitude), rates, by_angles)):
+        unit = (w / norm, x / norm, y / norm, z / norm)
+        if not self._attitudes.add(AttitudeReport(time_us, unit, rates, by_angles)):
             return False
         self.attitude_heard_s = now_s
         return True
