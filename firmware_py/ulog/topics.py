@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from math import atan2, hypot, nan
 
 from firmware_py.mavlink.port import AutopilotPort
-from firmware_py.mavlink.sensing import earth_field_frd_gauss, pressure_hpa, temperature_k
+from firmware_py.mavlink.telemetry.sensing import earth_field_frd_gauss, pressure_hpa, temperature_k
 from firmware_py.status import NAVIGATION_STATES, LandedState
 from firmware_py.types import GeodeticPoint
 from firmware_py.ulog.messages import Topic
