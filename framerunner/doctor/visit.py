@@ -9,8 +9,8 @@ import time
 from collections.abc import Callable, Iterator
 
 from framerunner.doctor.record import Record
-from framerunner.vehicle_link import VehicleLink
 from wire.dialect import AUTOPILOT_COMPONENT_ID, Message, mavlink
+from wire.transports.vehicle_link import VehicleLink
 from wire.vehicles import command_long, companion_heartbeat, ground_station_heartbeat, request_message
 
 SYSTEM_ID = 247

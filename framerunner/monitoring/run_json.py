@@ -14,7 +14,6 @@ from offboard.engine import TransitionTaken
 from offboard.mission import Mission, mermaid
 from scenarios.models import COLOURS, Scenario
 from vision.types import Detection, Detections
-from wire.finite_json import finite
 
 Json = dict[str, Any]
 
@@ -50,17 +49,16 @@ def flight_json(
         flown: its mission, if it can be drawn.
         size_px: width and height of its images.
     """
-    result = finite(flight.result, longest=_LONGEST_TEXT)
+    result = flight.result
     states = _states(flight, flown)
     numbers = {state: number for number, state in enumerate(states)}
     clock = _Clock(flight.began_us)
-    lift_m = (result or {}).get("lift_m", 0.0)
     return {
         "name": name,
         "world": {
             "scenario": None if scenario is None else scenario.model_dump(mode="json"),
-            "lift_m": lift_m if isinstance(lift_m, int | float) else 0.0,
-            "source": str((result or {}).get("judged_by", "")),
+            "lift_m": 0.0 if result is None else result.lift_m,
+            "source": "" if result is None else result.judged_by,
         },
         "chart": _chart(flown),
         "states": states,
@@ -69,7 +67,7 @@ def flight_json(
         "transitions": _transitions(flight, clock, flown),
         "images": [clock.seconds(time_us) for time_us in flight.images.time_us],
         "crossings": [{"t": clock.seconds(each.time_us), "colour": each.colour} for each in flight.crossings],
-        "result": result,
+        "result": None if result is None else result.as_json(),
     }
 
 

@@ -5,16 +5,12 @@ No clock and no socket: time is the vehicle's, messages come in, images come out
 
 from __future__ import annotations
 
-from dataclasses import asdict
-
-from firmware_py.airframe import load_airframe
-from framerunner.virtual_camera.lift import lifted
+from framerunner.flying.plan import FlightPlan
 from framerunner.virtual_camera.placement import Placement
 from geometry.alignment import ORIGIN, Pose
 from geometry.rotations import quaternion_from_yaw, yaw_of
-from scenarios.ground import start_position
 from scenarios.models import Scenario
-from scenarios.referee import Referee
+from scenarios.result import LocalFrame, Standing
 from scenarios.truth import TrueState
 from sitl.camera import Camera, Image
 from sitl.camera_feed import FIRST_EXPOSURE_US
@@ -23,13 +19,6 @@ from wire.vehicle_telemetry import AHEAD_US, VehicleTelemetry
 
 REFEREE_STEP_US = 20_000
 REPORT_GAP_US = 20_000  # between two reports: the one that shows that a time is over comes so much later
-
-
-def start_pose(scenario: Scenario) -> Pose:
-    """Where the drone's centre is at first, arena axes."""
-    x_m, y_m, z_m = start_position(scenario)
-    height_m = load_airframe(scenario.airframe).envelope_m[2]
-    return Pose((x_m, y_m, z_m + height_m / 2), scenario.start.yaw_rad)
 
 
 class VirtualCamera:
@@ -45,8 +34,7 @@ class VirtualCamera:
         base: whether the drone starts from the scenario's base; else it starts from the floor.
 
     Attributes:
-        plan: the scenario as given.
-        scenario: what is to be seen; its frames may hang higher than in the plan.
+        plan: the flight that is seen; its frames are higher than declared if there is no base.
         placement: of the arena at the vehicle.
         telemetry: what the vehicle tells.
         images: painted so far.
@@ -54,12 +42,9 @@ class VirtualCamera:
     """
 
     def __init__(self, scenario: Scenario, *, level: bool = False, base: bool = True) -> None:
-        self._lift_m = 0.0 if base else scenario.base.top_m
-        self.plan = scenario
-        self.scenario = scenario = lifted(scenario, self._lift_m)
+        self.plan = FlightPlan(scenario, lift_m=0.0 if base else scenario.base.top_m)
         self._level = level
-        self._camera = Camera(scenario)
-        self._envelope_m = load_airframe(scenario.airframe).envelope_m
+        self._camera = Camera(self.plan.layout)
         self._period_us = 1e6 / scenario.camera.rate_hz
         self._wait_us = max(0, round(scenario.camera.latency_s * 1e6) - REPORT_GAP_US)
         self.images = self.restarts = 0
@@ -68,8 +53,9 @@ class VirtualCamera:
     def _restart(self) -> None:
         """Know nothing of the vehicle."""
         self.telemetry = VehicleTelemetry()
-        self.placement = Placement(start_pose(self.scenario))
-        self._referee = Referee(self.scenario, self._envelope_m, self._lift_m)
+        start = self.plan.start_pose
+        self.placement = Placement(Pose(start[:3], start[3]))
+        self._referee = self.plan.new_referee()
         self._judged_us = 0
         self._next = 0
         self._motors_on = False
@@ -112,30 +98,30 @@ class VirtualCamera:
         attitude = quaternion_from_yaw(yaw_of(where.attitude_arena)) if self._level else where.attitude_arena
         return exposure_us, self._camera.render(where.position_arena_m, attitude)
 
-    def standing(self, state: str = "", ended: str | None = None) -> dict[str, object]:
-        """What `/referee.json` tells, in the simulator's form.
+    def standing(self, state: str = "", ended: str | None = None) -> Standing:
+        """How the try stands, for `/referee.json`.
 
         Args:
             state: the mission's, for the report.
             ended: why the flight was broken off, if it was.
         """
-        return {
-            "scenario": self.scenario.name,
-            "source": "telemetry",
-            "lift_m": self._lift_m,
-            "time_us": self.telemetry.time_us,
-            "local_frame": self._local_frame(),
-            "snapshot": asdict(self._referee.snapshot()),
-            "report": self._referee.report(state, ended).as_dict(),
-        }
+        return Standing(
+            scenario=self.plan.scenario.name,
+            source="telemetry",
+            lift_m=self.plan.lift_m,
+            time_us=self.telemetry.time_us,
+            local_frame=self._local_frame(),
+            snapshot=self._referee.snapshot(),
+            report=self._referee.report(state, ended),
+        )
 
-    def _local_frame(self) -> dict[str, object] | None:
+    def _local_frame(self) -> LocalFrame | None:
         """Where in the arena the vehicle's local frame is; None as long as the arena has no place."""
         alignment = self.placement.alignment
         if alignment is None:
             return None
         origin = alignment.pose(ORIGIN)
-        return {"origin_arena_m": origin.position_m, "yaw_rad": origin.yaw_rad}
+        return LocalFrame(origin_arena_m=origin.position_m, yaw_rad=origin.yaw_rad)
 
     def _follow(self) -> None:
         """Let placement and referee see the vehicle where both kinds of reports have come to."""
@@ -152,7 +138,7 @@ class VirtualCamera:
             return
         armed = bool(self.placement.armed)
         if armed and not self._motors_on and self._referee.over:
-            self._referee = Referee(self.scenario, self._envelope_m, self._lift_m)  # a new try
+            self._referee = self.plan.new_referee()  # a new try
         self._motors_on = armed
         self._referee.update(
             TrueState(

@@ -11,7 +11,7 @@ from math import cos, sin
 from typing import Any
 
 from monitor.ports import Equipment, Message
-from monitor.referee_channel import RefereeAnswer, RefereeChannel
+from monitor.referee_channel import RefereeChannel
 from monitor.tries import TryEvent
 from monitor.vehicle.camera import CAMERAS, CameraWatch
 from monitor.vehicle.history import History
@@ -22,8 +22,10 @@ from monitor.vehicle.orders import Answer, CommandDesk, carry_out
 from monitor.vehicle.placement import Placement
 from monitor.vehicle.speech import Speech
 from scenarios.models import Scenario
+from scenarios.result import Standing
 from wire.dialect import AUTOPILOT_COMPONENT_ID, mavlink
 from wire.mission_messages import COMPONENT_ID as APP
+from wire.simulator_api import SimulatorApi
 from wire.vehicle_telemetry import VehicleTelemetry
 
 _FRESH_S = 1.0
@@ -136,8 +138,9 @@ class Vehicle:
         self._keep_history(now_s)
         if self._link.state(now_s) == "live":
             self._ask(now_s)
-        if self._camera.url is not None and self._channel_task is None:
-            self._open_channel(self._camera.url)
+        api = SimulatorApi.of_video(self._camera.url or "") if self._channel_task is None else None
+        if api is not None:
+            self._open_channel(api)
 
     async def do(self, what: str) -> Answer:
         """Order something; see `Fleet.do`."""
@@ -331,8 +334,8 @@ class Vehicle:
             if request is not None:
                 self._callbacks.send(request)
 
-    def _open_channel(self, url: str) -> None:
-        def hear(answer: RefereeAnswer) -> None:
+    def _open_channel(self, api: SimulatorApi) -> None:
+        def hear(answer: Standing) -> None:
             ahead_us = (answer.time_us or 0) - self.telemetry.time_us
             if ahead_us >= _OTHER_BOOT_US:
                 return
@@ -344,7 +347,7 @@ class Vehicle:
         def say(level: str, text: str) -> None:
             self._callbacks.notice(level, f"drone {self.id}: {text}")
 
-        self._channel = RefereeChannel(url, hear, say)
+        self._channel = RefereeChannel(api, hear, say)
         self._channel_task = asyncio.create_task(self._run_channel(self._channel))
 
     async def _run_channel(self, channel: RefereeChannel) -> None:
