@@ -8,9 +8,9 @@ from collections.abc import AsyncIterator, Callable
 from typing import Protocol
 
 from errors import UserError
-from offboard.link.message_order import MessageOrder
 from vision.detector import detect
 from vision.types import CameraFrame, Detections, Image
+from wire.vehicle_telemetry import MessageOrder
 
 CAMERA_DEAD_S = 1.0
 FIRST_IMAGE_S = 5.0

@@ -5,7 +5,6 @@ from __future__ import annotations
 from dataclasses import replace
 from math import hypot, isfinite, isnan, nan, sqrt
 
-from firmware_py.estimator import euler_angles
 from firmware_py.guidance.frames import level, rate_command, towards, yaw_rate
 from firmware_py.guidance.limits import SpeedLimits, clamp
 from firmware_py.types import (
@@ -18,6 +17,7 @@ from firmware_py.types import (
     TiltCommand,
     VehicleState,
 )
+from geometry.rotations import euler_from_quaternion
 from geometry.vectors import NAN3, Quaternion, Vec3
 
 _LARGEST = 1e6  # metres or m/s asked for are cut to this, which keeps all arithmetic finite
@@ -110,7 +110,7 @@ def _thrusting(state: VehicleState, wanted: Setpoint, limits: SpeedLimits) -> Co
         return ActuatorCommand(wanted.outputs)
     if wanted.rate_frd_rad_s is not None and wanted.attitude is None:
         return BodyRateCommand(wanted.rate_frd_rad_s, wanted.thrust)
-    roll_rad, pitch_rad, yaw_rad = euler_angles(wanted.attitude or state.attitude)
+    roll_rad, pitch_rad, yaw_rad = euler_from_quaternion(wanted.attitude or state.attitude)
     turn_rad_s = yaw_rate(state.yaw_rad, yaw_rad, wanted.yaw_rate_rad_s, limits)
     return TiltCommand(roll_rad, pitch_rad, turn_rad_s, wanted.thrust)
 

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from math import atan2, hypot, nan
 
 from firmware_py.mavlink.port import AutopilotPort
-from firmware_py.mavlink.telemetry.sensing import EARTH_FIELD_NED_GAUSS, pressure_hpa, temperature_k, to_body
+from firmware_py.mavlink.telemetry.sensing import earth_field_frd_gauss, pressure_hpa, temperature_k
 from firmware_py.status import NAVIGATION_STATES, LandedState
 from firmware_py.types import GeodeticPoint
 from firmware_py.ulog.messages import Topic
@@ -215,7 +215,7 @@ def _air_data(sample: Sample) -> Values | None:
 
 
 def _magnetometer(sample: Sample) -> Values:
-    field_gauss = to_body(EARTH_FIELD_NED_GAUSS, sample.autopilot.state.attitude)
+    field_gauss = earth_field_frd_gauss(sample.autopilot.state.attitude)
     return (sample.time_us, sample.time_us, *field_gauss)
 
 

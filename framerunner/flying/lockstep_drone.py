@@ -19,9 +19,9 @@ from struct import Struct
 from firmware_py.commander_table import CRITICAL
 from firmware_py.setpoints import setpoint_from_body_velocity
 from firmware_py.status import CommandResult, FlightMode, LandedState
+from geometry.alignment import Alignment, Pose
 from geometry.vectors import Vec3
 from offboard.drone import DroneError, DroneState, VelocityCommand
-from offboard.link.alignment import Alignment, Pose
 from scenarios.truth import TrueState
 from sitl.simulation import Simulation
 

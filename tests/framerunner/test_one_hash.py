@@ -4,8 +4,8 @@ from math import inf, nextafter
 
 from framerunner.evaluation.backends import Pool
 from framerunner.evaluation.runner import fly_all, fly_task
-from framerunner.flying.plan import FlightPlan
 from framerunner.flying.lockstep import StateHash
+from framerunner.flying.plan import FlightPlan
 from offboard.mission import load_mission
 from scenarios.loader import load_scenario
 from scenarios.truth import TrueState

@@ -12,7 +12,6 @@ from math import ceil, isfinite
 from firmware_py.mavlink.port import AutopilotPort
 from firmware_py.mavlink.scaling import boot_ms, whole
 from firmware_py.mavlink.service import Service
-from firmware_py.mavlink.telemetry.identity import standard_mode
 from firmware_py.status import LandedState
 from firmware_py.types import MotorSpeeds
 from wire.dialect import Message, mavlink
@@ -107,7 +106,7 @@ def current_mode(autopilot: AutopilotPort) -> Message:
     """CURRENT_MODE: the mode flown and the one asked for."""
     status = autopilot.status
     return mavlink.MAVLink_current_mode_message(
-        standard_mode(status.mode),
+        status.mode.value.standard,
         status.mode.custom_mode,
         status.intended_mode.custom_mode,
     )

@@ -8,6 +8,7 @@ from math import atan2, degrees, hypot
 from firmware_py.mavlink.port import AutopilotPort
 from firmware_py.mavlink.scaling import boot_ms, degrees_e7, millimetres, whole
 from firmware_py.mavlink.service import Service
+from geometry.rotations import rotation, to_body
 from geometry.vectors import Quaternion, Vec3
 from wire.dialect import Message, mavlink
 
@@ -34,16 +35,9 @@ def pressure_hpa(altitude_m: float) -> float:
     return float(_SEA_LEVEL_HPA * (temperature_k(altitude_m) / _SEA_LEVEL_K) ** _EXPONENT)
 
 
-def to_body(vector_ned: Vec3, attitude: Quaternion) -> Vec3:
-    """A world vector in body axes, by the inverse of the unit quaternion: v + 2w (v × q) + 2 q × (q × v)."""
-    w, qx, qy, qz = attitude
-    x, y, z = vector_ned
-    tx, ty, tz = 2 * (y * qz - z * qy), 2 * (z * qx - x * qz), 2 * (x * qy - y * qx)
-    return (
-        x + w * tx + ty * qz - tz * qy,
-        y + w * ty + tz * qx - tx * qz,
-        z + w * tz + tx * qy - ty * qx,
-    )
+def earth_field_frd_gauss(attitude: Quaternion) -> Vec3:
+    """Earth's magnetic field in body axes, by the attitude's unit quaternion."""
+    return to_body(rotation(attitude), *EARTH_FIELD_NED_GAUSS)
 
 
 def highres_imu(autopilot: AutopilotPort) -> Message:
@@ -54,7 +48,7 @@ def highres_imu(autopilot: AutopilotPort) -> Message:
         state.time_us,
         *state.specific_force_frd_m_s2,
         *state.angular_rate_frd_rad_s,
-        *to_body(EARTH_FIELD_NED_GAUSS, state.attitude),
+        *earth_field_frd_gauss(state.attitude),
         pressure_hpa(altitude_m),
         0.0,
         altitude_m,
@@ -66,7 +60,7 @@ def highres_imu(autopilot: AutopilotPort) -> Message:
 def scaled_imu(autopilot: AutopilotPort) -> Message:
     """SCALED_IMU: thousandths of g, rad/s and gauss, hundredths of a degree (0 would be unknown)."""
     state, place = autopilot.state, autopilot.global_position()
-    field_gauss = to_body(EARTH_FIELD_NED_GAUSS, state.attitude)
+    field_gauss = earth_field_frd_gauss(state.attitude)
     celsius = temperature_k(place.altitude_m if place else 0.0) - 273.15
     return mavlink.MAVLink_scaled_imu_message(
         boot_ms(state.time_us),

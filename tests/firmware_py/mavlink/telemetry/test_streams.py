@@ -5,7 +5,12 @@ import pytest
 
 from firmware_py.mavlink.node import MavlinkNode
 from firmware_py.mavlink.rates import GROUND, ONBOARD
-from firmware_py.mavlink.telemetry.sensing import pressure_hpa, temperature_k, to_body
+from firmware_py.mavlink.telemetry.sensing import (
+    EARTH_FIELD_NED_GAUSS,
+    earth_field_frd_gauss,
+    pressure_hpa,
+    temperature_k,
+)
 from firmware_py.status import FlightMode, LandedState, VehicleStatus
 from firmware_py.types import (
     BatteryState,
@@ -278,8 +283,9 @@ def test_standard_atmosphere():
 
 
 def test_field_turns_into_the_body():
+    north, east, down = EARTH_FIELD_NED_GAUSS
     quarter_right = (2**-0.5, 0.0, 0.0, 2**-0.5)  # looking east, north is on the left
-    assert to_body((1.0, 0.0, 0.5), quarter_right) == pytest.approx((0.0, -1.0, 0.5))
+    assert earth_field_frd_gauss(quarter_right) == pytest.approx((east, -north, down))
 
 
 def test_every_source_names_its_own_message(autopilot, peer):

@@ -2,7 +2,7 @@
 
 from pymavlink.dialects.v20 import common as mavlink
 
-from monitor.vehicle.texts import TextAssembler, plain
+from wire.status_text import TextAssembler, plain
 
 
 def said(text, *, number=0, place=0, severity=6):

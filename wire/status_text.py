@@ -4,18 +4,18 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from monitor.ports import Message
+from wire.dialect import Message
 
 _PIECE_BYTES = 50
-_MOST_PIECES = 10
-_LONGEST = 500
-_OPEN_S = 2.0  # so long a text waits for its next piece
-_MOST_OPEN = 4
+_MAX_PIECES = 10
+_MAX_CHARS = 500
+_OPEN_S = 2.0  # a text waits for its next piece this long
+_MAX_OPEN = 4
 
 
 @dataclass(frozen=True, slots=True)
 class Text:
-    """What a vehicle says to people.
+    """A text from a vehicle to people.
 
     Attributes:
         component: which of its components.
@@ -49,9 +49,9 @@ class TextAssembler:
         key = (component, message.id)
         done = self._make_room(key, now_s)
         parts = self._open.setdefault(key, _Open(message.severity, {}, now_s))
-        if message.chunk_seq < _MOST_PIECES:
+        if message.chunk_seq < _MAX_PIECES:
             parts.pieces[message.chunk_seq] = raw
-        if len(raw.split(b"\0", 1)[0]) < _PIECE_BYTES or message.chunk_seq >= _MOST_PIECES - 1:
+        if len(raw.split(b"\0", 1)[0]) < _PIECE_BYTES or message.chunk_seq >= _MAX_PIECES - 1:
             done += self._close(key)
         return done
 
@@ -62,7 +62,7 @@ class TextAssembler:
 
     def _make_room(self, key: tuple[int, int], now_s: float) -> list[Text]:
         done = self.expire(now_s)
-        if key not in self._open and len(self._open) >= _MOST_OPEN:
+        if key not in self._open and len(self._open) >= _MAX_OPEN:
             done += self._close(next(iter(self._open)))
         return done
 
@@ -73,7 +73,7 @@ class TextAssembler:
         return _text(key[0], parts.severity, joined)
 
 
-def plain(raw: bytes | str, longest: int = _LONGEST) -> str:
+def plain(raw: bytes | str, longest: int = _MAX_CHARS) -> str:
     """A text to be shown: no control characters, not too long.
 
     Args:
