@@ -10,6 +10,7 @@ from firmware_py.types import BatteryState
 
 _OK, _LOW, _CRITICAL, _EMERGENCY = 1, 2, 3, 4  # MAV_BATTERY_CHARGE_STATE
 _MAH_PER_A_S = 1000.0 / 3600.0
+_SUPPLY_UNCHECKED = 894_281  # of CBRK_SUPPLY_CHK
 
 
 @dataclass(frozen=True, slots=True)
@@ -41,6 +42,14 @@ def battery_settings(airframe: Airframe, parameters: Parameters) -> BatterySetti
         value("BAT_CRIT_THR"),
         value("BAT_EMERGEN_THR"),
     )
+
+
+def min_charge_to_arm(settings: BatterySettings, parameters: Parameters) -> float:
+    """The share of charge, 0..1, below which arming is refused."""
+    if parameters.integer("CBRK_SUPPLY_CHK") == _SUPPLY_UNCHECKED:
+        return 0.0
+    chosen = parameters.value("COM_ARM_BAT_MIN")
+    return chosen if chosen >= 0.0 else settings.critical
 
 
 class BatteryMonitor:

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+from typing import NamedTuple
+
 from firmware_py.commander_guards import (
     Cause,
     Choices,
@@ -23,7 +26,7 @@ from firmware_py.commander_table import (
 from firmware_py.parameters import Parameters
 from firmware_py.status import CommandResult, FlightMode
 
-_WATCH_PERIOD_US = 40_000  # of what is not urgent
+_CHECK_PERIOD_US = 40_000  # of what is not urgent
 
 _LINK_LOSS = (  # NAV_DLL_ACT and NAV_RCL_ACT
     Reaction.NOTHING,
@@ -69,27 +72,76 @@ _MANUAL_DISABLED = 4  # COM_RC_IN_MODE
 _TERMINATION_OFF = 121_212
 
 
+@dataclass(frozen=True, slots=True)
+class SlowChecks:
+    """What is checked ten times a second.
+
+    Attributes:
+        battery_warning: MAV_BATTERY_CHARGE_STATE, 1 ok to 4 emergency.
+        battery_arms: there is charge enough to arm.
+        has_mission: there is a mission that can be flown.
+        fence_breached: it is outside the geofence.
+    """
+
+    battery_warning: int = 1
+    battery_arms: bool = True
+    has_mission: bool = False
+    fence_breached: bool = False
+
+
+NOT_CHECKED = SlowChecks()
+"""Before the first check."""
+
+
+class Observation(NamedTuple):
+    """The vehicle in one control tick, as the commander is told of it; it never changes.
+
+    Attributes:
+        now_us: vehicle time.
+        sound: this tick's sample could be used.
+        placed: the horizontal position is known.
+        upright: its attitude is one to fly in.
+        landed: it stands on something.
+        target_reached: the take-off is at its height.
+        checks: the last slow checks; the same object until the next.
+    """
+
+    now_us: int
+    sound: bool
+    placed: bool
+    upright: bool
+    landed: bool
+    target_reached: bool
+    checks: SlowChecks = NOT_CHECKED
+
+
 class Commander:
-    """Keeps the state and what is known of the vehicle; the table decides.
+    """Remembers the state and what is known of the vehicle; the table decides.
 
     Attributes:
         state: where in the table it is.
         situation: what guards look at.
     """
 
-    __slots__ = ("_started", "_tick_rows", "_watch_us", "situation", "state")
+    __slots__ = ("_check_us", "_checks", "_started", "_tick_rows", "situation", "state")
 
     def __init__(self) -> None:
         self.state = State.DISARMED
         self._tick_rows = RULES[self.state, Event.TICK]
-        self._watch_us = 0
+        self._check_us = 0
         self._started = False
+        self._checks = NOT_CHECKED
         self.situation = Situation()
 
     @property
     def mode(self) -> FlightMode:
         """The mode flown; disarmed, the one last asked for."""
         return FLOWN_MODE.get(self.state, self.situation.intended)
+
+    @property
+    def intended_mode(self) -> FlightMode:
+        """The mode last asked for."""
+        return self.situation.intended
 
     @property
     def failsafe(self) -> bool:
@@ -107,29 +159,13 @@ class Commander:
         row = first_match(RULES[State.DISARMED, Event.ARM], self.situation)
         return "" if row is None or row.result is CommandResult.ACCEPTED else row.text
 
-    def tick(
-        self,
-        now_us: int,
-        *,
-        sound: bool,
-        upright: bool,
-        landed: bool,
-        target_reached: bool,
-        placed: bool = True,
-    ) -> Row | None:
+    def tick(self, seen: Observation) -> Row | None:
         """Take note of the vehicle and apply the table once.
-
-        Args:
-            now_us: vehicle time.
-            sound: this tick's sample could be used.
-            upright: its attitude is one to fly in.
-            landed: it stands on something.
-            target_reached: the take-off is at its height.
-            placed: the horizontal position is known.
 
         Returns:
             The rule that fired; None when nothing happens.
         """
+        now_us, sound, placed, upright, landed, target_reached, checks = seen
         now = self.situation
         if not self._started:
             self._started = True
@@ -148,19 +184,28 @@ class Commander:
             now.airborne_us = now_us
             now.flown = self.state is not State.DISARMED
         now.target_reached = target_reached
+        if checks is not self._checks:
+            self._take_checks(checks)
         row = first_match(self._tick_rows, now)
         if row is None:
             if self.state is State.OFFBOARD and setpoint_lost(now):
                 row = self._react(Cause.SETPOINTS)
-            elif now_us >= self._watch_us:
-                row = self._watch(now_us)
+            elif now_us >= self._check_us:
+                row = self._check(now_us)
         if row is not None:
             self._follow(row)
         return row
 
-    def _watch(self, now_us: int) -> Row | None:
+    def _take_checks(self, checks: SlowChecks) -> None:
+        self._checks, now = checks, self.situation
+        now.battery_warning = checks.battery_warning
+        now.battery_arms = checks.battery_arms
+        now.has_mission = checks.has_mission
+        now.fence_breached = checks.fence_breached
+
+    def _check(self, now_us: int) -> Row | None:
         """Look for what is not urgent."""
-        self._watch_us = now_us + _WATCH_PERIOD_US
+        self._check_us = now_us + _CHECK_PERIOD_US
         cause = None if self.state is State.DISARMED else trouble(self.situation)
         return None if cause is None else self._react(cause)
 
@@ -175,6 +220,10 @@ class Commander:
             raise LookupError(f"commander: no rule for {event.value} in {self.state.value}")
         self._follow(row)
         return row
+
+    def mission_known(self, *, valid: bool) -> None:
+        """Note whether there is a mission that can be flown; an upload may have come this moment."""
+        self.situation.has_mission = valid
 
     def setpoint_came(self, time_us: int) -> None:
         """Note a usable offboard setpoint; a time ahead of the vehicle's counts as now."""

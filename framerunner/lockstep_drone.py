@@ -12,7 +12,7 @@ from collections.abc import AsyncIterator, Callable, Sequence
 from math import isfinite
 
 from firmware_py.commander_table import CRITICAL
-from firmware_py.setpoints import setpoint_from_body_velocity
+from firmware_py.offboard_requests import SetpointRefusal, setpoint_from_body_velocity
 from firmware_py.status import CommandResult, FlightMode, LandedState
 from framerunner.link_precision import sent_yaw_rate, single, told_yaw
 from geometry.vectors import Vec3
@@ -218,8 +218,8 @@ class LockstepDrone:
             state.yaw_rad,
             state.time_us,
         )
-        if isinstance(setpoint, str):
-            self._autopilot.say(CRITICAL, setpoint)
+        if isinstance(setpoint, SetpointRefusal):
+            self._autopilot.say(CRITICAL, setpoint.text)
         else:
             self._autopilot.accept_setpoint(setpoint)
 

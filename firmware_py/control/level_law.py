@@ -16,11 +16,12 @@ from __future__ import annotations
 from math import cos, sin, sqrt
 
 from firmware_py.airframe import GRAVITY_M_S2, Airframe
+from firmware_py.commands import VelocityCommand
 from firmware_py.control.design import design
 from firmware_py.control.limits import FlightLimits
 from firmware_py.control.mixer import Mixer
 from firmware_py.control.weights import Weights
-from firmware_py.types import MotorOutput, RateCommand, VehicleState
+from firmware_py.types import MotorOutput, VehicleState
 from geometry.vectors import Vec3
 
 _NOTHING: Vec3 = (0.0, 0.0, 0.0)
@@ -101,7 +102,7 @@ class LevelLaw:
         r = state.angular_rate_frd_rad_s[2]
         self._xi_yaw -= sign * self._k_yaw * (1.0 - self._b_yaw) * r / self._ki_yaw
 
-    def step(self, state: VehicleState, command: RateCommand, grounded: bool) -> MotorOutput:
+    def step(self, state: VehicleState, command: VelocityCommand, grounded: bool) -> MotorOutput:
         """Return the motor commands for one control period.
 
         Args:

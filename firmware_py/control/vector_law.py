@@ -8,24 +8,24 @@ by the shortest way; body rates follow. So it is the linear design near hover an
 
 from __future__ import annotations
 
-from math import cos, isnan, sin, sqrt
+from math import cos, sin, sqrt
 
 from firmware_py.airframe import GRAVITY_M_S2, Airframe
+from firmware_py.commands import (
+    AccelerationCommand,
+    AttitudeCommand,
+    BodyRateCommand,
+    ControlCommand,
+    MotorCommand,
+    TiltCommand,
+    VelocityCommand,
+)
 from firmware_py.control.design import design_bandwidths
 from firmware_py.control.limits import FlightLimits
 from firmware_py.control.mixer import Mixer
 from firmware_py.control.observer import DisturbanceObserver
 from firmware_py.control.weights import Weights
-from firmware_py.types import (
-    AccelerationCommand,
-    ActuatorCommand,
-    BodyRateCommand,
-    Command,
-    MotorOutput,
-    RateCommand,
-    TiltCommand,
-    VehicleState,
-)
+from firmware_py.types import MotorOutput, VehicleState
 from geometry.rotations import Rotation, rotation, tilt_error, to_body, to_world
 from geometry.vectors import Vec3
 
@@ -94,7 +94,7 @@ class VectorLaw:
     def leave(self, state: VehicleState) -> None:
         """Give over in flight; what was learnt will be stale."""
 
-    def step(self, state: VehicleState, command: Command, grounded: bool) -> MotorOutput:
+    def step(self, state: VehicleState, command: ControlCommand, grounded: bool) -> MotorOutput:
         """Return the motor commands for one control period.
 
         Args:
@@ -118,7 +118,7 @@ class VectorLaw:
         own_roll = (i_yaw - i_pitch) * q * r + drag_roll * p * abs(p)
         own_pitch = (i_roll - i_yaw) * p * r + drag_pitch * q * abs(q)
         own_yaw = (i_pitch - i_roll) * p * q + drag_yaw * r * abs(r)
-        if type(command) is ActuatorCommand:
+        if type(command) is MotorCommand:
             output = self._straight_through(command)
             asked = self._mixer.wrench(output.speeds_rad_s)
         else:
@@ -149,20 +149,27 @@ class VectorLaw:
         )
         return output
 
-    def _wish(self, state: VehicleState, command: Command, m: Rotation, drag: Vec3) -> _Wish:
-        if type(command) is RateCommand:
+    def _wish(self, state: VehicleState, command: ControlCommand, m: Rotation, drag: Vec3) -> _Wish:
+        if type(command) is VelocityCommand:
             return self._follow_velocity(state, command, m, drag)
         if type(command) is AccelerationCommand:
             forward, right, down = command.acceleration_level_m_s2
             return self._point(state, (forward, right, GRAVITY_M_S2 - down), m, command.yaw_rate_rad_s)
         if type(command) is TiltCommand:
-            return self._hold_tilt(state, command, m, drag)
+            error = command.down_m_s - state.velocity_ned_m_s[2]
+            below = self._k_velocity[2] * error - drag[2] - self._force.d[2]
+            thrust_n = self._thrust(self._lift(GRAVITY_M_S2 - below), m)
+            return self._hold_tilt(state, command, thrust_n, m)
+        if type(command) is AttitudeCommand:
+            return self._hold_tilt(state, command, command.thrust * self._full_n, m)
         if type(command) is BodyRateCommand:
             p, q, r = command.rate_frd_rad_s
             return (command.thrust * self._full_n if command.thrust > 0.0 else 0.0, p, q, r)  # NaN: none
         raise TypeError(f"not a command of the stabiliser: {type(command).__name__}")
 
-    def _follow_velocity(self, state: VehicleState, command: RateCommand, m: Rotation, drag: Vec3) -> _Wish:
+    def _follow_velocity(
+        self, state: VehicleState, command: VelocityCommand, m: Rotation, drag: Vec3
+    ) -> _Wish:
         north, east, down = state.velocity_ned_m_s
         cos_yaw, sin_yaw = cos(state.yaw_rad), sin(state.yaw_rad)
         forward, right = cos_yaw * north + sin_yaw * east, cos_yaw * east - sin_yaw * north
@@ -199,7 +206,9 @@ class VectorLaw:
         self._turning += _TURN_LEARNT * (max(0.0, min(part, 1.0)) - self._turning)
         return self._turning * yaw_rate_rad_s
 
-    def _hold_tilt(self, state: VehicleState, command: TiltCommand, m: Rotation, drag: Vec3) -> _Wish:
+    def _hold_tilt(
+        self, state: VehicleState, command: TiltCommand | AttitudeCommand, thrust_n: float, m: Rotation
+    ) -> _Wish:
         """Tilt and thrust as asked; the limit of tilt is for what the loops above ask."""
         cos_roll = cos(command.roll_rad)
         down_level = (
@@ -207,12 +216,6 @@ class VectorLaw:
             -sin(command.roll_rad),
             cos(command.pitch_rad) * cos_roll,
         )
-        if isnan(command.thrust):
-            error = command.down_m_s - state.velocity_ned_m_s[2]
-            below = self._k_velocity[2] * error - drag[2] - self._force.d[2]
-            thrust_n = self._thrust(self._lift(GRAVITY_M_S2 - below), m)
-        else:
-            thrust_n = command.thrust * self._full_n
         return (thrust_n, *self._turn_to(state, down_level, m, command.yaw_rate_rad_s))
 
     def _point(self, state: VehicleState, specific: Vec3, m: Rotation, yaw_rate_rad_s: float) -> _Wish:
@@ -229,11 +232,11 @@ class VectorLaw:
 
     def _lift(self, up: float) -> float:
         """Vertical thrust per mass within what there is and may be used."""
-        least = min(_LEAST_LIFT * GRAVITY_M_S2, self._limits.least_thrust * self._full_lift)
+        least = min(_LEAST_LIFT * GRAVITY_M_S2, self._limits.min_thrust * self._full_lift)
         return max(least, min(up, self._most_lift()))
 
     def _most_lift(self) -> float:
-        return min(_MOST_THRUST, self._limits.most_thrust) * self._full_lift
+        return min(_MOST_THRUST, self._limits.max_thrust) * self._full_lift
 
     def _thrust(self, up: float, m: Rotation) -> float:
         """Thrust along the body's axis as it stands that lifts so much, N."""
@@ -263,7 +266,7 @@ class VectorLaw:
         x, y, z = to_body(m, *velocity_ned)
         return to_world(m, -forward * x * abs(x), -right * y * abs(y), -down * z * abs(z))
 
-    def _straight_through(self, command: ActuatorCommand) -> MotorOutput:
+    def _straight_through(self, command: MotorCommand) -> MotorOutput:
         outputs = [min(value, 1.0) if value > 0.0 else 0.0 for value in command.outputs]  # NaN: off
         outputs = (outputs + [0.0] * self._rotors)[: self._rotors]
         speeds = tuple([self._max_speed_rad_s * sqrt(value) for value in outputs])

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from math import copysign, floor, isfinite, isinf, isnan, nan
 
-from firmware_py.guidance.circles import Orbit, OrbitYaw
+from firmware_py.guidance.orbit import Orbit, OrbitYaw
 from firmware_py.mavlink import mission_commands
 from firmware_py.mavlink.command import Command, CommandHandler
 from firmware_py.mavlink.exchange import Exchange

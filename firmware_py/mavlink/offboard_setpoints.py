@@ -1,7 +1,7 @@
 """Offboard setpoints: positions, velocities, accelerations, attitudes, rates, motors.
 
-The rules are in `firmware_py.setpoints`. Differences from PX4: the same refusal is said once a second at
-most, not with every packet; SET_ACTUATOR_CONTROL_TARGET, which PX4 1.17 no longer knows, is flown.
+The rules are in `firmware_py.offboard_requests`. Differences from PX4: the same refusal is said once a
+second at most, not with every packet; SET_ACTUATOR_CONTROL_TARGET, which PX4 1.17 no longer knows, is flown.
 """
 
 from __future__ import annotations
@@ -10,15 +10,17 @@ from math import isfinite
 
 from firmware_py.mavlink.exchange import Exchange, Handler
 from firmware_py.mavlink.links import Link
-from firmware_py.setpoints import (
+from firmware_py.offboard_requests import (
     LocalTarget,
+    SetpointRefusal,
     TargetFrame,
     TargetMask,
     setpoint_from_attitude,
     setpoint_from_controls,
     setpoint_from_target,
 )
-from firmware_py.types import GeodeticPoint, Setpoint
+from firmware_py.setpoints import Setpoint
+from firmware_py.types import GeodeticPoint
 from geometry.vectors import NAN3, Vec3
 from wire.dialect import Message, mavlink
 
@@ -70,7 +72,8 @@ class SetpointService:
         relative = _ALTITUDES.get(message.coordinate_frame)
         if relative is None:
             frame = message.coordinate_frame
-            self._take(exchange, f"SET_POSITION_TARGET_GLOBAL_INT invalid coordinate frame {frame}")
+            text = f"SET_POSITION_TARGET_GLOBAL_INT invalid coordinate frame {frame}"
+            self._take(exchange, SetpointRefusal(text))
             return
         position: Vec3 | None = NAN3
         if not message.type_mask & _PLACE:
@@ -107,17 +110,19 @@ class SetpointService:
         )
         self._take(exchange, setpoint)
 
-    def _take(self, exchange: Exchange, setpoint: Setpoint | str) -> None:
-        if not isinstance(setpoint, str):
-            exchange.autopilot.accept_setpoint(setpoint)
+    def _take(self, exchange: Exchange, request: Setpoint | SetpointRefusal) -> None:
+        if isinstance(request, Setpoint):
+            exchange.autopilot.accept_setpoint(request)
             return
-        said_us = self._said_us.get(setpoint)
+        said_us = self._said_us.get(request.text)
         if said_us is None or exchange.time_us - said_us >= _SAY_AGAIN_US:
-            self._said_us[setpoint] = exchange.time_us
-            exchange.autopilot.say(mavlink.MAV_SEVERITY_CRITICAL, setpoint)
+            self._said_us[request.text] = exchange.time_us
+            exchange.autopilot.say(mavlink.MAV_SEVERITY_CRITICAL, request.text)
 
 
-def _from_target(exchange: Exchange, message: Message, frame: int, position_m: Vec3) -> Setpoint | str:
+def _from_target(
+    exchange: Exchange, message: Message, frame: int, position_m: Vec3
+) -> Setpoint | SetpointRefusal:
     target = LocalTarget(
         frame=frame,
         type_mask=message.type_mask,

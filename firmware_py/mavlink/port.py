@@ -6,10 +6,11 @@ from math import nan
 from typing import Protocol
 
 from firmware_py.airframe import Airframe
-from firmware_py.guidance.circles import Orbit
+from firmware_py.guidance.orbit import Orbit
 from firmware_py.missions.flight import IssuedCommand
 from firmware_py.missions.store import MissionStore
 from firmware_py.parameters import Parameters
+from firmware_py.setpoints import Setpoint
 from firmware_py.status import CommandResult, FlightMode, VehicleStatus
 from firmware_py.types import (
     BatteryState,
@@ -17,7 +18,6 @@ from firmware_py.types import (
     GeodeticPoint,
     ManualInput,
     MotorOutput,
-    Setpoint,
     StatusText,
     VehicleState,
 )

@@ -7,9 +7,9 @@ from math import hypot, isfinite, isnan, nan
 from firmware_py.geodesy import LocalProjection
 from firmware_py.mavlink.port import AutopilotPort
 from firmware_py.mavlink.scaling import boot_ms, degrees_e7, whole
+from firmware_py.setpoints import AttitudeSetpoint, BodyRateSetpoint, TrajectorySetpoint
 from firmware_py.status import FlightMode
-from firmware_py.types import Setpoint
-from geometry.vectors import Quaternion
+from geometry.vectors import NAN3, Quaternion
 from wire.dialect import Message, mavlink
 
 _GLOBAL_MODES = frozenset(
@@ -34,7 +34,7 @@ _NOT_TOLD = -1
 
 def position_target_local_ned(autopilot: AutopilotPort, _time_us: int) -> Message:
     """POSITION_TARGET_LOCAL_NED: what is followed now. A component not controlled is NaN and masked out."""
-    followed = autopilot.status.setpoint
+    followed = autopilot.status.setpoint.trajectory
     return mavlink.MAVLink_position_target_local_ned_message(
         boot_ms(autopilot.state.time_us),
         mavlink.MAV_FRAME_LOCAL_NED,
@@ -50,7 +50,7 @@ def position_target_local_ned(autopilot: AutopilotPort, _time_us: int) -> Messag
 def position_target_global_int(autopilot: AutopilotPort, _time_us: int) -> Message | None:
     """POSITION_TARGET_GLOBAL_INT, while armed in a mode that flies to a place, as PX4."""
     status = autopilot.status
-    followed, origin = status.setpoint, status.origin
+    followed, origin = status.setpoint.trajectory, status.origin
     north_m, east_m, down_m = followed.position_ned_m
     if not status.armed or status.mode not in _GLOBAL_MODES or origin is None:
         return None
@@ -78,14 +78,15 @@ def attitude_target(autopilot: AutopilotPort, _time_us: int) -> Message:
     """
     followed = autopilot.status.setpoint
     mask = 0
-    attitude, rates = followed.attitude, followed.rate_frd_rad_s
-    if attitude is None:
+    attitude, rates, thrust = _NO_ATTITUDE, NAN3, autopilot.output.throttle
+    if isinstance(followed, AttitudeSetpoint):
+        attitude, thrust = followed.attitude, followed.thrust
+    else:
         mask |= mavlink.ATTITUDE_TARGET_TYPEMASK_ATTITUDE_IGNORE
-        attitude = _NO_ATTITUDE
-    if rates is None:
+    if isinstance(followed, BodyRateSetpoint):
+        rates, thrust = followed.rate_frd_rad_s, followed.thrust
+    else:
         mask |= _RATES_IGNORED
-        rates = (nan, nan, nan)
-    thrust = autopilot.output.throttle if isnan(followed.thrust) else followed.thrust
     return mavlink.MAVLink_attitude_target_message(
         boot_ms(autopilot.state.time_us), mask, attitude, *rates, thrust
     )
@@ -119,7 +120,7 @@ def time_estimate_to_target(autopilot: AutopilotPort, _time_us: int) -> Message 
     )
 
 
-def _mask(followed: Setpoint) -> int:
+def _mask(followed: TrajectorySetpoint) -> int:
     """POSITION_TARGET_TYPEMASK: the components that are not controlled."""
     components = (*followed.position_ned_m, *followed.velocity_ned_m_s, *followed.acceleration_ned_m_s2)
     mask = sum(1 << bit for bit, value in enumerate(components) if isnan(value))

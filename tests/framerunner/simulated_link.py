@@ -19,7 +19,7 @@ from types import SimpleNamespace
 
 from mavsdk.exceptions import MavsdkError
 
-from firmware_py.setpoints import setpoint_from_body_velocity
+from firmware_py.offboard_requests import setpoint_from_body_velocity
 from firmware_py.status import CommandResult, FlightMode, LandedState
 from framerunner.flight import _start
 from offboard.app import Moment, Outcome, fly_mission

@@ -1,0 +1,194 @@
+"""What guidance can tell the stabiliser: the kinds of command, from a velocity down to the motors' outputs.
+
+World NED, body FRD, level axes (forward, right, down) turned with the yaw; SI units, radians.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import ClassVar
+
+from geometry.vectors import ZERO3, Vec3
+
+_DESCENT_SHARE = 0.7  # less than this share of the thrust that carries the weight means to go down
+
+
+class ControlCommand:
+    """What a stabiliser can be told.
+
+    Attributes:
+        is_for_motors: the motors get it unchanged, on the ground as in the air.
+        controls_climb: it holds a vertical velocity.
+    """
+
+    __slots__ = ()
+    is_for_motors: ClassVar[bool] = False
+    controls_climb: ClassVar[bool] = False
+
+    def vertical_intent(self, hover_thrust: float) -> float:
+        """The vertical velocity it asks for in m/s; else only the sign counts. Below zero is up.
+
+        Args:
+            hover_thrust: what carries the weight, as a share of the greatest thrust.
+        """
+        raise NotImplementedError
+
+    def with_limited_climb(self, limit: Callable[[float], float]) -> ControlCommand:
+        """The same with another climb, if it climbs by a velocity.
+
+        Args:
+            limit: from the vertical velocity asked for, below zero, to the one allowed, m/s.
+        """
+        del limit
+        return self
+
+    def straight_up(self) -> ControlCommand:
+        """What of it may be followed while the ground still touches: nothing sideways, no turn."""
+        return self
+
+
+@dataclass(frozen=True, slots=True)
+class VelocityCommand(ControlCommand):
+    """A velocity in level axes and a yaw rate.
+
+    Attributes:
+        velocity_level_m_s: forward, right, down; shape (3,).
+        yaw_rate_rad_s: clockwise seen from above.
+        acceleration_level_m_s2: feed-forward beside the velocity, shape (3,).
+    """
+
+    velocity_level_m_s: Vec3 = ZERO3
+    yaw_rate_rad_s: float = 0.0
+    acceleration_level_m_s2: Vec3 = ZERO3
+    controls_climb: ClassVar[bool] = True
+
+    def vertical_intent(self, hover_thrust: float) -> float:
+        """The velocity downwards, m/s."""
+        return self.velocity_level_m_s[2]
+
+    def with_limited_climb(self, limit: Callable[[float], float]) -> ControlCommand:
+        """The same with another climb and without feed-forward."""
+        forward_m_s, right_m_s, down_m_s = self.velocity_level_m_s
+        if down_m_s >= 0.0:
+            return self
+        return VelocityCommand((forward_m_s, right_m_s, limit(down_m_s)), self.yaw_rate_rad_s)
+
+    def straight_up(self) -> ControlCommand:
+        """Its vertical velocity only."""
+        return VelocityCommand((0.0, 0.0, self.velocity_level_m_s[2]))
+
+
+@dataclass(frozen=True, slots=True)
+class AccelerationCommand(ControlCommand):
+    """An acceleration in level axes and a yaw rate; the velocity is left to whoever commands it.
+
+    Attributes:
+        acceleration_level_m_s2: forward, right, down; shape (3,); zeros hover.
+        yaw_rate_rad_s: clockwise seen from above.
+    """
+
+    acceleration_level_m_s2: Vec3
+    yaw_rate_rad_s: float = 0.0
+
+    def vertical_intent(self, hover_thrust: float) -> float:
+        """The sign of the acceleration downwards."""
+        return self.acceleration_level_m_s2[2]
+
+    def straight_up(self) -> ControlCommand:
+        """Its vertical acceleration only."""
+        return AccelerationCommand((0.0, 0.0, self.acceleration_level_m_s2[2]))
+
+
+@dataclass(frozen=True, slots=True)
+class TiltCommand(ControlCommand):
+    """A tilt, a yaw rate and a vertical velocity.
+
+    Attributes:
+        roll_rad: right side down is positive.
+        pitch_rad: nose up is positive.
+        yaw_rate_rad_s: clockwise seen from above.
+        down_m_s: vertical velocity, positive down.
+    """
+
+    roll_rad: float
+    pitch_rad: float
+    yaw_rate_rad_s: float = 0.0
+    down_m_s: float = 0.0
+    controls_climb: ClassVar[bool] = True
+
+    def vertical_intent(self, hover_thrust: float) -> float:
+        """The velocity downwards, m/s."""
+        return self.down_m_s
+
+    def with_limited_climb(self, limit: Callable[[float], float]) -> ControlCommand:
+        """The same with another climb."""
+        if self.down_m_s >= 0.0:
+            return self
+        return TiltCommand(self.roll_rad, self.pitch_rad, self.yaw_rate_rad_s, limit(self.down_m_s))
+
+    def straight_up(self) -> ControlCommand:
+        """Its vertical velocity, level."""
+        return TiltCommand(0.0, 0.0, 0.0, self.down_m_s)
+
+
+@dataclass(frozen=True, slots=True)
+class AttitudeCommand(ControlCommand):
+    """A tilt, a yaw rate and a thrust.
+
+    Attributes:
+        roll_rad: right side down is positive.
+        pitch_rad: nose up is positive.
+        yaw_rate_rad_s: clockwise seen from above.
+        thrust: collective thrust along body up as a share of the greatest, 0..1.
+    """
+
+    roll_rad: float
+    pitch_rad: float
+    yaw_rate_rad_s: float
+    thrust: float
+
+    def vertical_intent(self, hover_thrust: float) -> float:
+        """The sign: up unless the thrust is clearly less than the weight."""
+        return _DESCENT_SHARE * hover_thrust - self.thrust
+
+    def straight_up(self) -> ControlCommand:
+        """Its thrust, level."""
+        return AttitudeCommand(0.0, 0.0, 0.0, self.thrust)
+
+
+@dataclass(frozen=True, slots=True)
+class BodyRateCommand(ControlCommand):
+    """Body rates and a thrust.
+
+    Attributes:
+        rate_frd_rad_s: roll, pitch and yaw rate, shape (3,).
+        thrust: collective thrust along body up as a share of the greatest, 0..1.
+    """
+
+    rate_frd_rad_s: Vec3
+    thrust: float
+
+    def vertical_intent(self, hover_thrust: float) -> float:
+        """The sign: up unless the thrust is clearly less than the weight."""
+        return _DESCENT_SHARE * hover_thrust - self.thrust
+
+    def straight_up(self) -> ControlCommand:
+        """Its thrust, without turning."""
+        return BodyRateCommand(ZERO3, self.thrust)
+
+
+@dataclass(frozen=True, slots=True)
+class MotorCommand(ControlCommand):
+    """Outputs of the motors, passed through unchanged.
+
+    Attributes:
+        outputs: one per rotor in the airframe's order, 0..1 of a rotor's full thrust.
+    """
+
+    outputs: tuple[float, ...]
+    is_for_motors: ClassVar[bool] = True
+
+    def vertical_intent(self, hover_thrust: float) -> float:
+        """The sign: up as soon as a motor turns."""
+        return -1.0 if max(self.outputs, default=0.0) > 0.0 else 1.0

@@ -1,0 +1,408 @@
+"""One control tick of the autopilot: estimate, observe, decide, guide, actuate.
+
+It reads no clock and opens nothing: time is what the sensors say, and who calls it decides how fast.
+"""
+
+from __future__ import annotations
+
+from collections import deque
+from math import cos, isnan, nan, radians
+
+from firmware_py.airframe import Airframe
+from firmware_py.battery import BatteryMonitor, battery_settings, min_charge_to_arm
+from firmware_py.commander import NOT_CHECKED, Commander, Observation, SlowChecks
+from firmware_py.commander_table import INFO, WARNING, Event, Row, State
+from firmware_py.commands import ControlCommand
+from firmware_py.estimator import Estimator
+from firmware_py.geodesy import GeoReference
+from firmware_py.ground_contact import LandDetector, LiftOff, StabiliserPort
+from firmware_py.guidance.modes import Guidance
+from firmware_py.guidance.orbit import Orbit
+from firmware_py.missions.flight import LegKind
+from firmware_py.missions.store import MissionStore
+from firmware_py.navigator import Navigator
+from firmware_py.offboard_requests import SetpointQueue
+from firmware_py.parameters import Parameters
+from firmware_py.status import CommandResult, LandedState, VehicleStatus
+from firmware_py.types import FlightRecord, GeodeticPoint, MotorOutput, MotorSpeeds, Sensors, StatusText
+from geometry.vectors import NAN3, Vec3
+
+_MAX_TEXTS = 100
+_CHECK_PERIOD_US = 100_000
+_READY_PERIOD_US = 100_000  # once armed, whether it could be armed again is of little interest
+
+_STAYS_ON_GROUND = frozenset(
+    {
+        State.HOLD,
+        State.FAILSAFE_HOLD,
+        State.LAND,
+        State.FAILSAFE_LAND,
+        State.FAILSAFE_DESCEND,
+        State.RETURN,
+        State.FAILSAFE_RETURN,
+    }
+)
+"""States that leave the ground only if their mode departs for a place above."""
+
+_AIRBORNE_STATES = {
+    State.TAKEOFF: LandedState.TAKEOFF,
+    State.LAND: LandedState.LANDING,
+    State.FAILSAFE_LAND: LandedState.LANDING,
+    State.FAILSAFE_DESCEND: LandedState.LANDING,
+}
+_STOPPED_STATES = frozenset({State.DISARMED, State.TERMINATED})
+_LEG_ENDS = {LegKind.RETURN: Event.MISSION_RETURNS, LegKind.DONE: Event.MISSION_DONE}
+
+
+class FlightLoop:
+    """Joins estimator, commander, guidance and stabiliser. Only the commander remembers decisions.
+
+    Args:
+        airframe: what it flies.
+        origin: where on Earth the sensors' positions count from.
+        parameters: changes act at the next tick.
+        period_s: time between calls of `step`.
+        stabiliser: None: the airframe's own design, by `prepare`.
+
+    Attributes:
+        status: arming, mode, home and so on, updated in place.
+        output: what the last step sent to the motors.
+        flight: times of the flight now or last.
+        missions: mission, fence and rally points.
+        estimator: knows the state, and the local frame's origin.
+        geo: where on Earth the local frame and home are.
+        commander: decides what is flown.
+        guidance: flies it.
+        navigator: mission, fence and return.
+        setpoints: of an offboard controller, waiting to be flown.
+        battery: counts what is drawn.
+        motors_stopped: it is disarmed or terminated.
+        now_us: vehicle time; it goes on while samples are unusable.
+    """
+
+    def __init__(
+        self,
+        airframe: Airframe,
+        origin: GeodeticPoint,
+        parameters: Parameters,
+        period_s: float,
+        stabiliser: StabiliserPort | None,
+    ) -> None:
+        self.status = VehicleStatus()
+        self.output = self._stopped = MotorOutput((0.0,) * len(airframe.rotors))
+        self.flight = FlightRecord()
+        self.missions = MissionStore()
+        self.estimator = Estimator()
+        self.geo = GeoReference(origin)
+        self.commander = Commander()
+        self.guidance = Guidance(airframe, parameters, period_s)
+        self.navigator = Navigator(self.missions, parameters)
+        self.setpoints = SetpointQueue()
+        self.battery = BatteryMonitor()
+        self.motors_stopped = True
+        self.now_us = 0
+        self._airframe = airframe
+        self._parameters = parameters
+        self._period_us = round(period_s * 1e6)
+        self._state = self.estimator.state
+        self._stabiliser = stabiliser
+        self._lift_off = LiftOff()
+        self._land_detector = LandDetector((airframe.hover_speed_rad_s / airframe.motor.max_speed_rad_s) ** 2)
+        self._texts: deque[StatusText] = deque(maxlen=_MAX_TEXTS)
+        self._checks = NOT_CHECKED
+        self._checks_due_us = self._ready_due_us = 0
+        self._state_entered = State.DISARMED
+        self._state_shown: State | None = None
+        self._airborne = LandedState.IN_AIR
+        self._takeoff_altitude_m = nan
+        self._orbit = Orbit()
+        self._configure()
+
+    @property
+    def landed(self) -> bool:
+        """Whether the vehicle stands on something."""
+        return self._land_detector.landed
+
+    def prepare(self) -> None:
+        """Design the stabiliser, if that has not been done."""
+        if self._stabiliser is None:
+            from firmware_py.control.stabiliser import Stabiliser
+
+            self._stabiliser = Stabiliser(self._airframe, self._period_us / 1e6)
+            self._limit_stabiliser()
+
+    def step(self, sensors: Sensors) -> MotorSpeeds:
+        """Fly one control tick; see `Autopilot.step`."""
+        if self._parameters.version != self._parameters_version:
+            self._configure()
+        sound = self._estimate(sensors)
+        seen = self._observe(sensors, sound)
+        self._decide(seen)
+        if self.motors_stopped:
+            self.output = self._stopped
+        elif sound:
+            self.output = self._actuate(self.guidance.step(self._state), seen.landed)
+        return self.output.speeds_rad_s
+
+    def handle(
+        self, event: Event, *, takeoff_altitude_m: float | None = None, orbit: Orbit | None = None
+    ) -> CommandResult:
+        """Take a command, between ticks.
+
+        Args:
+            event: what is commanded.
+            takeoff_altitude_m: of the next take-off, above mean sea level; NaN: MIS_TAKEOFF_ALT above home.
+            orbit: the circle to fly.
+        """
+        if takeoff_altitude_m is not None:
+            self._takeoff_altitude_m = takeoff_altitude_m
+        if orbit is not None:
+            self._orbit = orbit
+        self.commander.mission_known(valid=self.missions.valid)
+        row = self.commander.handle(event)
+        self._follow(row)
+        self._refresh_status()
+        return row.result
+
+    def say(self, severity: int, text: str) -> None:
+        """Leave a message for people, with MAV_SEVERITY."""
+        self._texts.append(StatusText(severity, text))
+
+    def take_texts(self) -> list[StatusText]:
+        """All messages since the last call, oldest first."""
+        texts = list(self._texts)
+        self._texts.clear()
+        return texts
+
+    def publish_places(self) -> None:
+        """Tell status and guidance where origin and home are."""
+        status, geo = self.status, self.geo
+        status.origin, status.home, status.home_ned_m = geo.origin, geo.home, geo.home_ned_m
+        self.guidance.set_home(geo.home_ned_m)
+
+    def _estimate(self, sensors: Sensors) -> bool:
+        """Update the state; whether the sample was usable."""
+        sound = self.estimator.update(sensors)
+        if not sound:
+            self.now_us += self._period_us
+            return False
+        self.now_us = max(self.now_us, self._state.time_us)
+        if self.geo.projection is None and self.estimator.origin_ned_m is not None:
+            self.geo.fix_origin(self.estimator.origin_ned_m)
+            self._set_home_here()
+        return True
+
+    def _observe(self, sensors: Sensors, sound: bool) -> Observation:
+        """What the commander is to know of this tick."""
+        now_us = self.now_us
+        if sound:
+            self._detect_land()
+        if now_us >= self._checks_due_us:
+            self._checks = self._check(sensors)
+        if self.setpoints.waiting is not None and self.setpoints.is_due(now_us):
+            self._accept_setpoint()
+        _, x, y, _ = self._state.attitude
+        return Observation(
+            now_us,
+            sound,
+            self.estimator.placed,
+            1.0 - 2.0 * (x * x + y * y) > self._upright_cosine,
+            self._land_detector.landed,
+            self.guidance.mode.target_reached,
+            self._checks,
+        )
+
+    def _decide(self, seen: Observation) -> None:
+        """Let the commander apply its table, and fly what it chose from now on."""
+        commander = self.commander
+        row = commander.tick(seen)
+        if row is not None:
+            self._follow(row)
+        if commander.state is State.MISSION:
+            self._advance_mission()
+        self._refresh_status()
+
+    def _actuate(self, command: ControlCommand, landed: bool) -> MotorOutput:
+        """Motors for a command, with the ground between if it stands."""
+        stabiliser = self._stabiliser
+        if stabiliser is None:
+            raise RuntimeError("the stabiliser is not designed yet; call prepare()")
+        if not landed or command.is_for_motors:
+            return self._lift_off.fly(stabiliser, self._state, command)
+        guidance = self.guidance
+        return self._lift_off.stand(
+            stabiliser,
+            self._state,
+            command,
+            guidance.command_down_m_s,
+            may_lift=self.commander.state not in _STAYS_ON_GROUND or guidance.mode.departs(self._state),
+            climb_ramp=guidance.mode.climb_ramp,
+        )
+
+    def _follow(self, row: Row) -> None:
+        """Do what a rule that fired entails."""
+        if row.text:
+            self.say(row.severity, row.text)
+        if row.target is None:
+            return
+        before, self._state_entered = self._state_entered, row.target
+        if before is State.DISARMED:
+            self._leave_disarmed()
+        self.motors_stopped = row.target in _STOPPED_STATES
+        if self.motors_stopped:
+            self.output = self._stopped
+            self._lift_off.rest()
+        self.navigator.observe(self._state, self.geo, landed=self.landed)
+        if row.target is State.OFFBOARD:
+            self._accept_setpoint()
+        self._enter(row.target, before, row.event)
+
+    def _leave_disarmed(self) -> None:
+        if self._stabiliser is not None:
+            self._stabiliser.reset()
+        self._set_home_here()
+        self._lift_off.arm(self.now_us)
+        self.flight.armed_us = self.now_us
+        self.flight.takeoff_us = self.flight.landed_us = 0
+        self.flight.number += 1
+
+    def _enter(self, target: State, before: State, event: Event) -> None:
+        """Fly the mode of a state entered; one without motors changes no guidance."""
+        if before is State.MISSION:
+            self.navigator.leave_mission()
+        if self.motors_stopped:
+            self.navigator.disarmed()
+            return
+        on_ground = self.status.landed_state is LandedState.ON_GROUND
+        if target is State.FAILSAFE_HOLD and before is State.TAKEOFF and on_ground:
+            return  # as PX4: a take-off that has begun goes on to its height and holds there
+        reached = before is State.TAKEOFF and event is Event.TICK
+        self.guidance.enter(
+            target,
+            self._state,
+            target_ned_m=self._target_of(target),
+            keep_target=reached or event is Event.MISSION_DONE,
+            orbit=self._orbit,
+        )
+        if target is State.MISSION:
+            self.navigator.enter_mission()
+
+    def _target_of(self, target: State) -> Vec3:
+        """Where a take-off or a return goes, NED metres; NaN for other states."""
+        if target in (State.RETURN, State.FAILSAFE_RETURN):
+            return self.navigator.return_place() or self.geo.home_ned_m
+        here = self.geo.to_geodetic(self._state.position_ned_m)
+        if target is not State.TAKEOFF or here is None or self.geo.home is None:
+            return NAN3
+        altitude_m = self._takeoff_altitude_m
+        if isnan(altitude_m):
+            height_m = self._parameters.value("MIS_TAKEOFF_ALT")
+            altitude_m = self.geo.home.altitude_m + height_m
+            self.say(INFO, f"Using default takeoff altitude: {height_m:.1f} m")
+        if altitude_m < here.altitude_m:
+            self.say(WARNING, "Already higher than takeoff altitude")
+        climb_m = altitude_m - here.altitude_m
+        return (nan, nan, self._state.position_ned_m[2] - climb_m)
+
+    def _advance_mission(self) -> None:
+        """Fly the mission's next leg, and tell the commander when it ends."""
+        self.navigator.observe(self._state, self.geo, landed=self.landed)
+        leg = self.navigator.next_leg()
+        if leg is None:
+            return
+        self.guidance.fly_leg(self._state, leg)
+        ended = _LEG_ENDS.get(leg.kind)
+        if ended is not None:
+            self._follow(self.commander.handle(ended))
+
+    def _accept_setpoint(self) -> None:
+        """Fly the setpoint that waits, if there is one."""
+        setpoint = self.setpoints.take()
+        if setpoint is not None:
+            self.guidance.accept(setpoint)
+
+    def _detect_land(self) -> None:
+        detector = self._land_detector
+        before = detector.landed
+        landed = detector.update(
+            self._state,
+            armed=not self.motors_stopped,
+            lifting=self._lift_off.ticks > 0,
+            command_down_m_s=self.guidance.command_down_m_s,
+            throttle=self.output.throttle,
+        )
+        if landed is before:
+            return
+        if landed:
+            self.flight.landed_us = self.now_us
+        else:
+            self.flight.takeoff_us = self.now_us
+            self.guidance.left_ground()
+        if not self.motors_stopped:
+            self.say(INFO, "Landing detected" if landed else "Takeoff detected")
+
+    def _check(self, sensors: Sensors) -> SlowChecks:
+        """Look at battery, fence and mission."""
+        self._checks_due_us = self.now_us + _CHECK_PERIOD_US
+        battery, navigator = self.battery, self.navigator
+        navigator.observe(self._state, self.geo, landed=self.landed)
+        battery.update(
+            self.now_us, sensors.battery_voltage_v, sensors.battery_current_a, self._battery_settings
+        )
+        breach = navigator.breach() if self.status.armed else None
+        if breach is not None and not self._checks.fence_breached:
+            self.say(WARNING, breach.text)
+        self._texts.extend(navigator.take_texts())
+        return SlowChecks(
+            battery.state.warning,
+            battery.state.remaining >= self._min_charge_to_arm,
+            self.missions.valid,
+            breach is not None,
+        )
+
+    def _set_home_here(self) -> None:
+        self.geo.set_home_at(self._state.position_ned_m)
+        self.publish_places()
+
+    def _configure(self) -> None:
+        """Take over the parameters; looked up by name only when one has changed."""
+        parameters, airframe = self._parameters, self._airframe
+        self._parameters_version = parameters.version
+        self.commander.configure(parameters)
+        self.guidance.configure(airframe, parameters)
+        self._battery_settings = battery_settings(airframe, parameters)
+        self._min_charge_to_arm = min_charge_to_arm(self._battery_settings, parameters)
+        self._limit_stabiliser()
+        self._lift_off.configure(parameters)
+        self._land_detector.configure(parameters)
+        tilt_deg = min(parameters.value("FD_FAIL_P"), parameters.value("FD_FAIL_R")) or 180.0  # 0: never
+        self._upright_cosine = cos(radians(tilt_deg))
+
+    def _limit_stabiliser(self) -> None:
+        if self._stabiliser is None:
+            return
+        value, limits = self._parameters.value, self._stabiliser.limits
+        limits.tilt_rad = radians(value("MPC_TILTMAX_AIR"))
+        limits.rate_rad_s = radians(min(value("MC_ROLLRATE_MAX"), value("MC_PITCHRATE_MAX")))
+        limits.min_thrust, limits.max_thrust = value("MPC_THR_MIN"), value("MPC_THR_MAX")
+
+    def _refresh_status(self) -> None:
+        status, commander = self.status, self.commander
+        state, intended = commander.state, commander.situation.intended
+        if state is not self._state_shown or intended is not status.intended_mode:
+            self._state_shown = state
+            self._airborne = _AIRBORNE_STATES.get(state, LandedState.IN_AIR)
+            status.armed = state is not State.DISARMED
+            status.mode = commander.mode
+            status.intended_mode = intended
+            status.failsafe = commander.failsafe
+        status.setpoint = self.guidance.mode.setpoint
+        status.landed_state = LandedState.ON_GROUND if self._land_detector.landed else self._airborne
+        if status.armed and self.now_us < self._ready_due_us:
+            return
+        self._ready_due_us = self.now_us + _READY_PERIOD_US
+        ready = commander.ready
+        status.not_ready = "" if ready else commander.refusal
+        if ready and not status.ready and not status.armed:
+            self.say(INFO, "Ready for takeoff!")
+        status.ready = ready
