@@ -1,95 +1,23 @@
-"""The autopilot as ground stations, apps and pilots see it: sensors in, motor speeds out, and commands.
-
-It reads no clock and opens nothing: time is what the sensors say, and who calls it decides how fast.
-"""
+"""The autopilot as ground stations, apps and pilots see it: the flight loop, and commands to it."""
 
 from __future__ import annotations
 
 from math import isinf, isnan, nan
 
-from firmware_py.airframe import Airframe
 from firmware_py.commander_table import BY_HAND, MODE_EVENT, WARNING, Event, State
 from firmware_py.flight_loop import FlightLoop
-from firmware_py.ground_contact import StabiliserPort
 from firmware_py.guidance.orbit import Orbit
 from firmware_py.missions.flight import IssuedCommand
-from firmware_py.parameters import Parameters
 from firmware_py.setpoints import Setpoint
 from firmware_py.status import CommandResult, FlightMode
-from firmware_py.types import GeodeticPoint, ManualInput, MotorOutput, MotorSpeeds, Sensors, StatusText
+from firmware_py.types import GeodeticPoint, ManualInput
 from geometry.vectors import Vec3
 
 _AUTO_BIT, _OFFBOARD_BIT = 1, 2  # of COM_RC_OVERRIDE
 
 
-class Autopilot:
-    """A whole autopilot for one vehicle: one method for each thing that may be asked of it.
-
-    Args:
-        airframe: what it flies.
-        origin: where on Earth the sensors' positions count from.
-        parameters: shared with the MAVLink services; the airframe's defaults if not given.
-        control_period_s: time between calls of `step`.
-        stabiliser: another one than the airframe's own design, for tests.
-
-    Attributes:
-        airframe: what it flies.
-        parameters: what a ground station may change; changes act at the next tick.
-        estimator: knows the local frame's origin.
-        state: the estimate of the vehicle, updated in place.
-        status: arming, mode, home and so on, updated in place.
-        battery: what is known of the battery.
-        flight: times of the flight now or last.
-        missions: mission, fence and rally points.
-        setpoints: of an offboard controller, as received.
-    """
-
-    def __init__(
-        self,
-        airframe: Airframe,
-        origin: GeodeticPoint,
-        parameters: Parameters | None = None,
-        control_period_s: float = 0.004,
-        *,
-        stabiliser: StabiliserPort | None = None,
-    ) -> None:
-        """Boot, disarmed; see the class for the arguments."""
-        self.airframe = airframe
-        self.parameters = parameters if parameters is not None else Parameters(defaults=airframe.parameters)
-        self._loop = loop = FlightLoop(airframe, origin, self.parameters, control_period_s, stabiliser)
-        self.estimator = loop.estimator
-        self.state = loop.estimator.state
-        self.status = loop.status
-        self.battery = loop.battery.state
-        self.flight = loop.flight
-        self.missions = loop.missions
-        self.setpoints = loop.setpoints
-        self._refusal_said = False
-
-    @property
-    def output(self) -> MotorOutput:
-        """What the last step sent to the motors."""
-        return self._loop.output
-
-    def prepare(self) -> None:
-        """Design the stabiliser, if that has not been done; arming does it at the latest.
-
-        It takes some tenths of a second, most of them to import SciPy, so a program in real time does it
-        before its clock runs, and after it has sent its first heartbeat.
-        """
-        self._loop.prepare()
-
-    def step(self, sensors: Sensors) -> MotorSpeeds:
-        """Fly one control tick.
-
-        Args:
-            sensors: this tick's sample. An unusable one (not finite, not newer than the last) is bridged
-                with the last motor speeds; soon after, the commander gives up.
-
-        Returns:
-            Rotor speeds in rad/s, in the airframe's order; zeros while disarmed.
-        """
-        return self._loop.step(sensors)
+class Autopilot(FlightLoop):
+    """A whole autopilot for one vehicle: `FlightLoop`, with one method for each thing that may be asked of it."""
 
     def arm(self, *, force: bool = False) -> CommandResult:
         """Arm. As in PX4, forcing from outside skips no check.
@@ -99,7 +27,7 @@ class Autopilot:
         """
         del force
         self.prepare()
-        return self._loop.handle(Event.ARM)
+        return self._handle(Event.ARM)
 
     def disarm(self, *, force: bool = False) -> CommandResult:
         """Disarm: on the ground, or anywhere at once if forced.
@@ -107,11 +35,11 @@ class Autopilot:
         Returns:
             ACCEPTED, or TEMPORARILY_REJECTED in the air.
         """
-        return self._loop.handle(Event.FORCE_DISARM if force else Event.DISARM)
+        return self._handle(Event.FORCE_DISARM if force else Event.DISARM)
 
     def terminate(self) -> CommandResult:
         """Stop the motors for good, wherever it is; always ACCEPTED."""
-        return self._loop.handle(Event.TERMINATE)
+        return self._handle(Event.TERMINATE)
 
     def set_mode(self, mode: FlightMode) -> CommandResult:
         """Change the mode: disarmed always; armed, only to one that can be flown now.
@@ -119,7 +47,7 @@ class Autopilot:
         Returns:
             ACCEPTED, or TEMPORARILY_REJECTED with a status text that says why.
         """
-        return self._loop.handle(
+        return self._handle(
             MODE_EVENT[mode],
             takeoff_altitude_m=nan if mode is FlightMode.TAKEOFF else None,
             orbit=self.orbit_here() if mode is FlightMode.ORBIT else None,
@@ -138,11 +66,11 @@ class Autopilot:
         if isinf(altitude_amsl_m):
             self.say(WARNING, "Takeoff denied: altitude is infinite")
             return CommandResult.DENIED
-        return self._loop.handle(Event.SET_TAKEOFF, takeoff_altitude_m=altitude_amsl_m)
+        return self._handle(Event.SET_TAKEOFF, takeoff_altitude_m=altitude_amsl_m)
 
     def land(self) -> CommandResult:
         """Land where it is; always ACCEPTED."""
-        return self._loop.handle(Event.SET_LAND)
+        return self._handle(Event.SET_LAND)
 
     def reposition(self, target_ned_m: Vec3, yaw_rad: float = nan, speed_m_s: float = nan) -> CommandResult:
         """Fly to a place and hold there.
@@ -155,15 +83,14 @@ class Autopilot:
         Returns:
             ACCEPTED, TEMPORARILY_REJECTED when hold cannot be entered, DENIED outside the fence.
         """
-        loop = self._loop
-        breach = loop.navigator.breach_at(target_ned_m) if not any(map(isnan, target_ned_m)) else None
+        breach = self._navigator.breach_at(target_ned_m) if not any(map(isnan, target_ned_m)) else None
         if breach is not None:
             self.say(WARNING, f"Reposition denied: {breach.text}")
             return CommandResult.DENIED
-        result = loop.handle(Event.SET_HOLD)
-        nowhere = loop.landed and all(map(isnan, target_ned_m))
+        result = self._handle(Event.SET_HOLD)
+        nowhere = self._land_detector.landed and all(map(isnan, target_ned_m))
         if result is CommandResult.ACCEPTED and self.status.armed and not nowhere:
-            loop.guidance.fly_to(self.state, target_ned_m, yaw_rad, speed_m_s)  # also from the ground
+            self._guidance.fly_to(self.state, target_ned_m, yaw_rad, speed_m_s)  # also from the ground
         return result
 
     def orbit(self, orbit: Orbit) -> CommandResult:
@@ -172,7 +99,7 @@ class Autopilot:
         Returns:
             ACCEPTED, or TEMPORARILY_REJECTED when that cannot be flown now.
         """
-        return self._loop.handle(Event.SET_ORBIT, orbit=orbit)
+        return self._handle(Event.SET_ORBIT, orbit=orbit)
 
     def orbit_here(self) -> Orbit:
         """The circle that is flown when no other was asked for: PX4's, 1 m around where it is."""
@@ -180,17 +107,17 @@ class Autopilot:
 
     def change_speed(self, speed_m_s: float) -> CommandResult:
         """Fly the present journey at another horizontal speed; NaN: MPC_XY_CRUISE again."""
-        self._loop.guidance.change_speed(speed_m_s)
+        self._guidance.change_speed(speed_m_s)
         return CommandResult.ACCEPTED
 
     def look_at(self, point_ned_m: Vec3 | None) -> CommandResult:
         """On journeys and in hold, turn the nose to a place, shape (3,); None: no more."""
-        self._loop.guidance.look_at(point_ned_m)
+        self._guidance.look_at(point_ned_m)
         return CommandResult.ACCEPTED
 
     def set_home(self, point: GeodeticPoint | None) -> CommandResult:
         """Set home to a place on Earth, or (None) to where the vehicle is."""
-        geo = self._loop.geo
+        geo = self._geo
         if geo.projection is None:
             self.say(WARNING, "Set home denied: no position estimate")
             return CommandResult.TEMPORARILY_REJECTED
@@ -199,14 +126,14 @@ class Autopilot:
         elif not geo.set_home(point):
             self.say(WARNING, "Set home denied: not a place on Earth")
             return CommandResult.DENIED
-        self._loop.publish_places()
+        self._publish_places()
         return CommandResult.ACCEPTED
 
     def set_origin(self, point: GeodeticPoint) -> CommandResult:
         """Say where on Earth the local frame's origin is."""
-        if not self._loop.geo.move_origin(point):
+        if not self._geo.move_origin(point):
             return CommandResult.DENIED
-        self._loop.publish_places()
+        self._publish_places()
         return CommandResult.ACCEPTED
 
     def accept_setpoint(self, setpoint: Setpoint) -> None:
@@ -217,55 +144,41 @@ class Autopilot:
         """
         if setpoint.is_usable:
             self._refusal_said = False
-            self.setpoints.put(setpoint, self._loop.now_us)
-            self._loop.commander.setpoint_came(setpoint.time_us)
+            self.setpoints.put(setpoint, self._now_us)
+            self._commander.setpoint_came(setpoint.time_us)
         elif not self._refusal_said:
             self._refusal_said = True
             self.say(WARNING, "Offboard setpoint ignored: nothing in it can be flown")
 
     def manual_input(self, sticks: ManualInput) -> None:
         """Take a pilot's sticks; moved in a mode that flies itself, they take over (COM_RC_OVERRIDE)."""
-        loop = self._loop
-        loop.guidance.take_sticks(sticks)
-        loop.commander.sticks_came()
-        state = loop.commander.state
-        if loop.motors_stopped or state in BY_HAND or loop.landed:
+        self._guidance.take_sticks(sticks)
+        self._commander.sticks_came()
+        state = self._commander.state
+        if self._motors_stopped or state in BY_HAND or self._land_detector.landed:
             return
         threshold = self.parameters.value("COM_RC_STICK_OV") / 100.0
         bit = _OFFBOARD_BIT if state is State.OFFBOARD else _AUTO_BIT
         moved = max(abs(sticks.forward), abs(sticks.right), abs(sticks.yaw)) > threshold
         if moved and self.parameters.integer("COM_RC_OVERRIDE") & bit:
-            loop.handle(Event.PILOT_TAKES_OVER)
+            self._handle(Event.PILOT_TAKES_OVER)
 
     def ground_station_heard(self) -> None:
         """Note a ground station's heartbeat."""
-        self._loop.commander.ground_station_heard()
+        self._commander.ground_station_heard()
 
     def follow_target(self, position_ned_m: Vec3, velocity_ned_m_s: Vec3) -> None:
         """Take a report of the target to follow, in the local frame."""
-        self._loop.guidance.report_target(self._loop.now_us, position_ned_m, velocity_ned_m_s)
-
-    def say(self, severity: int, text: str) -> None:
-        """Leave a message for people; the oldest go first when nobody takes them.
-
-        Args:
-            severity: MAV_SEVERITY.
-            text: one line.
-        """
-        self._loop.say(severity, text)
-
-    def take_texts(self) -> list[StatusText]:
-        """All messages since the last call, oldest first."""
-        return self._loop.take_texts()
+        self._guidance.report_target(self._now_us, position_ned_m, velocity_ned_m_s)
 
     def global_position(self) -> GeodeticPoint | None:
         """Where on Earth it believes to be; None before the first usable sample."""
-        return self._loop.geo.to_geodetic(self.state.position_ned_m)
+        return self._geo.to_geodetic(self.state.position_ned_m)
 
     def local_position(self, point: GeodeticPoint) -> Vec3 | None:
         """A place on Earth in the local frame, NED metres; None before the origin is known."""
-        return self._loop.geo.to_local(point)
+        return self._geo.to_local(point)
 
     def take_issued_commands(self) -> list[IssuedCommand]:
         """What the mission commands others, such as the camera, since the last call."""
-        return self._loop.navigator.take_issued()
+        return self._navigator.take_issued()

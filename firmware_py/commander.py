@@ -74,14 +74,7 @@ _TERMINATION_OFF = 121_212
 
 @dataclass(frozen=True, slots=True)
 class SlowChecks:
-    """What is checked ten times a second.
-
-    Attributes:
-        battery_warning: MAV_BATTERY_CHARGE_STATE, 1 ok to 4 emergency.
-        battery_arms: there is charge enough to arm.
-        has_mission: there is a mission that can be flown.
-        fence_breached: it is outside the geofence.
-    """
+    """What is checked ten times a second; see `Situation`."""
 
     battery_warning: int = 1
     battery_arms: bool = True

@@ -55,96 +55,104 @@ _LEG_ENDS = {LegKind.RETURN: Event.MISSION_RETURNS, LegKind.DONE: Event.MISSION_
 
 
 class FlightLoop:
-    """Joins estimator, commander, guidance and stabiliser. Only the commander remembers decisions.
+    """Joins estimator, commander, guidance and stabiliser. Of decisions only the commander keeps a memory.
 
     Args:
         airframe: what it flies.
         origin: where on Earth the sensors' positions count from.
-        parameters: changes act at the next tick.
-        period_s: time between calls of `step`.
-        stabiliser: None: the airframe's own design, by `prepare`.
+        parameters: shared with the MAVLink services; the airframe's defaults if not given.
+        control_period_s: time between calls of `step`.
+        stabiliser: another one than the airframe's own design, for tests.
 
     Attributes:
+        airframe: what it flies.
+        parameters: what a ground station may change; changes act at the next tick.
+        estimator: knows the local frame's origin.
+        state: the estimate of the vehicle, updated in place.
         status: arming, mode, home and so on, updated in place.
         output: what the last step sent to the motors.
+        battery: what is known of the battery.
         flight: times of the flight now or last.
         missions: mission, fence and rally points.
-        estimator: knows the state, and the local frame's origin.
-        geo: where on Earth the local frame and home are.
-        commander: decides what is flown.
-        guidance: flies it.
-        navigator: mission, fence and return.
-        setpoints: of an offboard controller, waiting to be flown.
-        battery: counts what is drawn.
-        motors_stopped: it is disarmed or terminated.
-        now_us: vehicle time; it goes on while samples are unusable.
+        setpoints: of an offboard controller, as received.
     """
 
     def __init__(
         self,
         airframe: Airframe,
         origin: GeodeticPoint,
-        parameters: Parameters,
-        period_s: float,
-        stabiliser: StabiliserPort | None,
+        parameters: Parameters | None = None,
+        control_period_s: float = 0.004,
+        *,
+        stabiliser: StabiliserPort | None = None,
     ) -> None:
+        """Boot, disarmed; see the class for the arguments."""
+        self.airframe = airframe
+        self.parameters = parameters if parameters is not None else Parameters(defaults=airframe.parameters)
+        self.estimator = Estimator()
+        self.state = self.estimator.state
         self.status = VehicleStatus()
         self.output = self._stopped = MotorOutput((0.0,) * len(airframe.rotors))
         self.flight = FlightRecord()
         self.missions = MissionStore()
-        self.estimator = Estimator()
-        self.geo = GeoReference(origin)
-        self.commander = Commander()
-        self.guidance = Guidance(airframe, parameters, period_s)
-        self.navigator = Navigator(self.missions, parameters)
         self.setpoints = SetpointQueue()
-        self.battery = BatteryMonitor()
-        self.motors_stopped = True
-        self.now_us = 0
-        self._airframe = airframe
-        self._parameters = parameters
-        self._period_us = round(period_s * 1e6)
-        self._state = self.estimator.state
+        self._battery = BatteryMonitor()
+        self.battery = self._battery.state
+        self._geo = GeoReference(origin)
+        self._commander = Commander()
+        self._guidance = Guidance(airframe, self.parameters, control_period_s)
+        self._navigator = Navigator(self.missions, self.parameters)
         self._stabiliser = stabiliser
         self._lift_off = LiftOff()
         self._land_detector = LandDetector((airframe.hover_speed_rad_s / airframe.motor.max_speed_rad_s) ** 2)
         self._texts: deque[StatusText] = deque(maxlen=_MAX_TEXTS)
+        self._period_us = round(control_period_s * 1e6)
+        self._now_us = 0  # goes on while samples are unusable
         self._checks = NOT_CHECKED
         self._checks_due_us = self._ready_due_us = 0
+        self._motors_stopped = True
         self._state_entered = State.DISARMED
         self._state_shown: State | None = None
         self._airborne = LandedState.IN_AIR
         self._takeoff_altitude_m = nan
         self._orbit = Orbit()
+        self._refusal_said = False
         self._configure()
 
-    @property
-    def landed(self) -> bool:
-        """Whether the vehicle stands on something."""
-        return self._land_detector.landed
-
     def prepare(self) -> None:
-        """Design the stabiliser, if that has not been done."""
+        """Design the stabiliser, if that has not been done; arming does it at the latest.
+
+        It takes some tenths of a second, most of them to import SciPy, so a program in real time does it
+        before its clock runs, and after it has sent its first heartbeat.
+        """
         if self._stabiliser is None:
             from firmware_py.control.stabiliser import Stabiliser
 
-            self._stabiliser = Stabiliser(self._airframe, self._period_us / 1e6)
+            self._stabiliser = Stabiliser(self.airframe, self._period_us / 1e6)
             self._limit_stabiliser()
 
     def step(self, sensors: Sensors) -> MotorSpeeds:
-        """Fly one control tick; see `Autopilot.step`."""
-        if self._parameters.version != self._parameters_version:
+        """Fly one control tick.
+
+        Args:
+            sensors: this tick's sample. An unusable one (not finite, not newer than the last) is bridged
+                with the last motor speeds; soon after, the commander gives up.
+
+        Returns:
+            Rotor speeds in rad/s, in the airframe's order; zeros while disarmed.
+        """
+        if self.parameters.version != self._parameters_version:
             self._configure()
         sound = self._estimate(sensors)
         seen = self._observe(sensors, sound)
         self._decide(seen)
-        if self.motors_stopped:
+        if self._motors_stopped:
             self.output = self._stopped
         elif sound:
-            self.output = self._actuate(self.guidance.step(self._state), seen.landed)
+            self.output = self._actuate(self._guidance.step(self.state), seen.landed)
         return self.output.speeds_rad_s
 
-    def handle(
+    def _handle(
         self, event: Event, *, takeoff_altitude_m: float | None = None, orbit: Orbit | None = None
     ) -> CommandResult:
         """Take a command, between ticks.
@@ -158,14 +166,19 @@ class FlightLoop:
             self._takeoff_altitude_m = takeoff_altitude_m
         if orbit is not None:
             self._orbit = orbit
-        self.commander.mission_known(valid=self.missions.valid)
-        row = self.commander.handle(event)
+        self._commander.mission_known(valid=self.missions.valid)
+        row = self._commander.handle(event)
         self._follow(row)
         self._refresh_status()
         return row.result
 
     def say(self, severity: int, text: str) -> None:
-        """Leave a message for people, with MAV_SEVERITY."""
+        """Leave a message for people; the oldest go first when nobody takes them.
+
+        Args:
+            severity: MAV_SEVERITY.
+            text: one line.
+        """
         self._texts.append(StatusText(severity, text))
 
     def take_texts(self) -> list[StatusText]:
@@ -174,47 +187,47 @@ class FlightLoop:
         self._texts.clear()
         return texts
 
-    def publish_places(self) -> None:
+    def _publish_places(self) -> None:
         """Tell status and guidance where origin and home are."""
-        status, geo = self.status, self.geo
+        status, geo = self.status, self._geo
         status.origin, status.home, status.home_ned_m = geo.origin, geo.home, geo.home_ned_m
-        self.guidance.set_home(geo.home_ned_m)
+        self._guidance.set_home(geo.home_ned_m)
 
     def _estimate(self, sensors: Sensors) -> bool:
         """Update the state; whether the sample was usable."""
         sound = self.estimator.update(sensors)
         if not sound:
-            self.now_us += self._period_us
+            self._now_us += self._period_us
             return False
-        self.now_us = max(self.now_us, self._state.time_us)
-        if self.geo.projection is None and self.estimator.origin_ned_m is not None:
-            self.geo.fix_origin(self.estimator.origin_ned_m)
+        self._now_us = max(self._now_us, self.state.time_us)
+        if self._geo.projection is None and self.estimator.origin_ned_m is not None:
+            self._geo.fix_origin(self.estimator.origin_ned_m)
             self._set_home_here()
         return True
 
     def _observe(self, sensors: Sensors, sound: bool) -> Observation:
         """What the commander is to know of this tick."""
-        now_us = self.now_us
+        now_us = self._now_us
         if sound:
             self._detect_land()
         if now_us >= self._checks_due_us:
             self._checks = self._check(sensors)
         if self.setpoints.waiting is not None and self.setpoints.is_due(now_us):
             self._accept_setpoint()
-        _, x, y, _ = self._state.attitude
+        _, x, y, _ = self.state.attitude
         return Observation(
             now_us,
             sound,
             self.estimator.placed,
             1.0 - 2.0 * (x * x + y * y) > self._upright_cosine,
             self._land_detector.landed,
-            self.guidance.mode.target_reached,
+            self._guidance.mode.target_reached,
             self._checks,
         )
 
     def _decide(self, seen: Observation) -> None:
         """Let the commander apply its table, and fly what it chose from now on."""
-        commander = self.commander
+        commander = self._commander
         row = commander.tick(seen)
         if row is not None:
             self._follow(row)
@@ -228,14 +241,14 @@ class FlightLoop:
         if stabiliser is None:
             raise RuntimeError("the stabiliser is not designed yet; call prepare()")
         if not landed or command.is_for_motors:
-            return self._lift_off.fly(stabiliser, self._state, command)
-        guidance = self.guidance
+            return self._lift_off.fly(stabiliser, self.state, command)
+        guidance = self._guidance
         return self._lift_off.stand(
             stabiliser,
-            self._state,
+            self.state,
             command,
             guidance.command_down_m_s,
-            may_lift=self.commander.state not in _STAYS_ON_GROUND or guidance.mode.departs(self._state),
+            may_lift=self._commander.state not in _STAYS_ON_GROUND or guidance.mode.departs(self.state),
             climb_ramp=guidance.mode.climb_ramp,
         )
 
@@ -248,11 +261,11 @@ class FlightLoop:
         before, self._state_entered = self._state_entered, row.target
         if before is State.DISARMED:
             self._leave_disarmed()
-        self.motors_stopped = row.target in _STOPPED_STATES
-        if self.motors_stopped:
+        self._motors_stopped = row.target in _STOPPED_STATES
+        if self._motors_stopped:
             self.output = self._stopped
             self._lift_off.rest()
-        self.navigator.observe(self._state, self.geo, landed=self.landed)
+        self._navigator.observe(self.state, self._geo, landed=self._land_detector.landed)
         if row.target is State.OFFBOARD:
             self._accept_setpoint()
         self._enter(row.target, before, row.event)
@@ -261,93 +274,93 @@ class FlightLoop:
         if self._stabiliser is not None:
             self._stabiliser.reset()
         self._set_home_here()
-        self._lift_off.arm(self.now_us)
-        self.flight.armed_us = self.now_us
+        self._lift_off.arm(self._now_us)
+        self.flight.armed_us = self._now_us
         self.flight.takeoff_us = self.flight.landed_us = 0
         self.flight.number += 1
 
     def _enter(self, target: State, before: State, event: Event) -> None:
         """Fly the mode of a state entered; one without motors changes no guidance."""
         if before is State.MISSION:
-            self.navigator.leave_mission()
-        if self.motors_stopped:
-            self.navigator.disarmed()
+            self._navigator.leave_mission()
+        if self._motors_stopped:
+            self._navigator.disarmed()
             return
         on_ground = self.status.landed_state is LandedState.ON_GROUND
         if target is State.FAILSAFE_HOLD and before is State.TAKEOFF and on_ground:
             return  # as PX4: a take-off that has begun goes on to its height and holds there
         reached = before is State.TAKEOFF and event is Event.TICK
-        self.guidance.enter(
+        self._guidance.enter(
             target,
-            self._state,
+            self.state,
             target_ned_m=self._target_of(target),
             keep_target=reached or event is Event.MISSION_DONE,
             orbit=self._orbit,
         )
         if target is State.MISSION:
-            self.navigator.enter_mission()
+            self._navigator.enter_mission()
 
     def _target_of(self, target: State) -> Vec3:
         """Where a take-off or a return goes, NED metres; NaN for other states."""
         if target in (State.RETURN, State.FAILSAFE_RETURN):
-            return self.navigator.return_place() or self.geo.home_ned_m
-        here = self.geo.to_geodetic(self._state.position_ned_m)
-        if target is not State.TAKEOFF or here is None or self.geo.home is None:
+            return self._navigator.return_place() or self._geo.home_ned_m
+        here = self._geo.to_geodetic(self.state.position_ned_m)
+        if target is not State.TAKEOFF or here is None or self._geo.home is None:
             return NAN3
         altitude_m = self._takeoff_altitude_m
         if isnan(altitude_m):
-            height_m = self._parameters.value("MIS_TAKEOFF_ALT")
-            altitude_m = self.geo.home.altitude_m + height_m
+            height_m = self.parameters.value("MIS_TAKEOFF_ALT")
+            altitude_m = self._geo.home.altitude_m + height_m
             self.say(INFO, f"Using default takeoff altitude: {height_m:.1f} m")
         if altitude_m < here.altitude_m:
             self.say(WARNING, "Already higher than takeoff altitude")
         climb_m = altitude_m - here.altitude_m
-        return (nan, nan, self._state.position_ned_m[2] - climb_m)
+        return (nan, nan, self.state.position_ned_m[2] - climb_m)
 
     def _advance_mission(self) -> None:
         """Fly the mission's next leg, and tell the commander when it ends."""
-        self.navigator.observe(self._state, self.geo, landed=self.landed)
-        leg = self.navigator.next_leg()
+        self._navigator.observe(self.state, self._geo, landed=self._land_detector.landed)
+        leg = self._navigator.next_leg()
         if leg is None:
             return
-        self.guidance.fly_leg(self._state, leg)
+        self._guidance.fly_leg(self.state, leg)
         ended = _LEG_ENDS.get(leg.kind)
         if ended is not None:
-            self._follow(self.commander.handle(ended))
+            self._follow(self._commander.handle(ended))
 
     def _accept_setpoint(self) -> None:
         """Fly the setpoint that waits, if there is one."""
         setpoint = self.setpoints.take()
         if setpoint is not None:
-            self.guidance.accept(setpoint)
+            self._guidance.accept(setpoint)
 
     def _detect_land(self) -> None:
         detector = self._land_detector
         before = detector.landed
         landed = detector.update(
-            self._state,
-            armed=not self.motors_stopped,
+            self.state,
+            armed=not self._motors_stopped,
             lifting=self._lift_off.ticks > 0,
-            command_down_m_s=self.guidance.command_down_m_s,
+            command_down_m_s=self._guidance.command_down_m_s,
             throttle=self.output.throttle,
         )
         if landed is before:
             return
         if landed:
-            self.flight.landed_us = self.now_us
+            self.flight.landed_us = self._now_us
         else:
-            self.flight.takeoff_us = self.now_us
-            self.guidance.left_ground()
-        if not self.motors_stopped:
+            self.flight.takeoff_us = self._now_us
+            self._guidance.left_ground()
+        if not self._motors_stopped:
             self.say(INFO, "Landing detected" if landed else "Takeoff detected")
 
     def _check(self, sensors: Sensors) -> SlowChecks:
         """Look at battery, fence and mission."""
-        self._checks_due_us = self.now_us + _CHECK_PERIOD_US
-        battery, navigator = self.battery, self.navigator
-        navigator.observe(self._state, self.geo, landed=self.landed)
+        self._checks_due_us = self._now_us + _CHECK_PERIOD_US
+        battery, navigator = self._battery, self._navigator
+        navigator.observe(self.state, self._geo, landed=self._land_detector.landed)
         battery.update(
-            self.now_us, sensors.battery_voltage_v, sensors.battery_current_a, self._battery_settings
+            self._now_us, sensors.battery_voltage_v, sensors.battery_current_a, self._battery_settings
         )
         breach = navigator.breach() if self.status.armed else None
         if breach is not None and not self._checks.fence_breached:
@@ -361,15 +374,15 @@ class FlightLoop:
         )
 
     def _set_home_here(self) -> None:
-        self.geo.set_home_at(self._state.position_ned_m)
-        self.publish_places()
+        self._geo.set_home_at(self.state.position_ned_m)
+        self._publish_places()
 
     def _configure(self) -> None:
         """Take over the parameters; looked up by name only when one has changed."""
-        parameters, airframe = self._parameters, self._airframe
+        parameters, airframe = self.parameters, self.airframe
         self._parameters_version = parameters.version
-        self.commander.configure(parameters)
-        self.guidance.configure(airframe, parameters)
+        self._commander.configure(parameters)
+        self._guidance.configure(airframe, parameters)
         self._battery_settings = battery_settings(airframe, parameters)
         self._min_charge_to_arm = min_charge_to_arm(self._battery_settings, parameters)
         self._limit_stabiliser()
@@ -381,13 +394,13 @@ class FlightLoop:
     def _limit_stabiliser(self) -> None:
         if self._stabiliser is None:
             return
-        value, limits = self._parameters.value, self._stabiliser.limits
+        value, limits = self.parameters.value, self._stabiliser.limits
         limits.tilt_rad = radians(value("MPC_TILTMAX_AIR"))
         limits.rate_rad_s = radians(min(value("MC_ROLLRATE_MAX"), value("MC_PITCHRATE_MAX")))
         limits.min_thrust, limits.max_thrust = value("MPC_THR_MIN"), value("MPC_THR_MAX")
 
     def _refresh_status(self) -> None:
-        status, commander = self.status, self.commander
+        status, commander = self.status, self._commander
         state, intended = commander.state, commander.situation.intended
         if state is not self._state_shown or intended is not status.intended_mode:
             self._state_shown = state
@@ -396,11 +409,11 @@ class FlightLoop:
             status.mode = commander.mode
             status.intended_mode = intended
             status.failsafe = commander.failsafe
-        status.setpoint = self.guidance.mode.setpoint
+        status.setpoint = self._guidance.mode.setpoint
         status.landed_state = LandedState.ON_GROUND if self._land_detector.landed else self._airborne
-        if status.armed and self.now_us < self._ready_due_us:
+        if status.armed and self._now_us < self._ready_due_us:
             return
-        self._ready_due_us = self.now_us + _READY_PERIOD_US
+        self._ready_due_us = self._now_us + _READY_PERIOD_US
         ready = commander.ready
         status.not_ready = "" if ready else commander.refusal
         if ready and not status.ready and not status.armed:

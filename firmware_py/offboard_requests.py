@@ -30,6 +30,7 @@ from geometry.vectors import NAN3, ZERO3, Quaternion, Vec3
 
 _LOCAL = "SET_POSITION_TARGET_LOCAL_NED"
 _MIN_LENGTH = 1e-3  # of a quaternion that still has a direction
+_BODY_VELOCITY = 0x5C7  # all is ignored but the velocity and the yaw rate
 _GRID_US = 10_000
 
 
@@ -179,28 +180,16 @@ def setpoint_from_controls(
 
 
 def setpoint_from_body_velocity(
-    velocity_level_m_s: Vec3, yaw_rate_rad_s: float, heading_rad: float, time_us: int
+    velocity_level_m_s: Vec3, yaw_rate_rad_s: float, state: VehicleState, time_us: int
 ) -> Setpoint | SetpointRefusal:
-    """The setpoint for a velocity in level axes that turn with the yaw, and a yaw rate.
-
-    The same as `setpoint_from_target` with BODY_NED and mask 0x5C7, without the packet.
-
-    Args:
-        velocity_level_m_s: forward, right, down; shape (3,).
-        yaw_rate_rad_s: clockwise from above.
-        heading_rad: yaw of the vehicle now.
-        time_us: vehicle time now.
-
-    Returns:
-        The setpoint, or a refusal.
-    """
-    velocity_ned_m_s = _level_to_ned(velocity_level_m_s, heading_rad)
-    return _checked(
-        TrajectorySetpoint(
-            time_us, velocity_ned_m_s=velocity_ned_m_s, yaw_rate_rad_s=_finite(yaw_rate_rad_s)
-        ),
-        velocity_level_m_s,
+    """The setpoint for a velocity in level axes (forward, right, down) and a clockwise yaw rate."""
+    target = LocalTarget(
+        TargetFrame.BODY_NED,
+        _BODY_VELOCITY,
+        velocity_m_s=velocity_level_m_s,
+        yaw_rate_rad_s=yaw_rate_rad_s,
     )
+    return setpoint_from_target(target, state, time_us)
 
 
 class SetpointQueue:
@@ -246,7 +235,7 @@ class SetpointQueue:
         return waiting
 
 
-def _checked(wanted: TrajectorySetpoint, body_velocity: Vec3 | None = None) -> Setpoint | SetpointRefusal:
+def _checked(wanted: TrajectorySetpoint, body_velocity: Vec3 | None) -> Setpoint | SetpointRefusal:
     """Refuse it without anything to follow, brake where an axis is open or the horizontal pair is half."""
     groups = (wanted.position_ned_m, wanted.velocity_ned_m_s, wanted.acceleration_ned_m_s2)
     if not any(_any_finite(group) for group in groups):

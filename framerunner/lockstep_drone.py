@@ -215,7 +215,7 @@ class LockstepDrone:
         setpoint = setpoint_from_body_velocity(
             single((command.forward_m_s, -command.left_m_s, -command.up_m_s)),
             sent_yaw_rate(-command.yaw_rate_rad_s),
-            state.yaw_rad,
+            state,
             state.time_us,
         )
         if isinstance(setpoint, SetpointRefusal):

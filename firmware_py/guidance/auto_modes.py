@@ -8,7 +8,7 @@ from math import isnan, nan
 from firmware_py.airframe import Airframe
 from firmware_py.commands import ControlCommand, TiltCommand
 from firmware_py.guidance.limits import clamp, velocity_command, velocity_towards, yaw_rate
-from firmware_py.guidance.mode import ClimbRamp, JourneyMode, Mode, ModeContext, ModeEntry
+from firmware_py.guidance.mode import JourneyMode, Mode, ModeContext, ModeEntry
 from firmware_py.guidance.orbit import Orbit, OrbitYaw
 from firmware_py.guidance.sticks import stick_settings
 from firmware_py.guidance.travel import passing_speed
@@ -27,6 +27,7 @@ class HoldMode(JourneyMode):
     """Brakes and holds place and yaw, or flies to a place and holds there."""
 
     __slots__ = ()
+    takes_off = True
 
     def enter(self, state: VehicleState, entry: ModeEntry) -> None:
         """Brake, or go on to the present target (after a take-off or a mission)."""
@@ -78,16 +79,12 @@ class HoldMode(JourneyMode):
         """Whether the target is well above."""
         return self._context.traveller.target_ned_m[2] < state.position_ned_m[2] - _ABOVE_M
 
-    @property
-    def climb_ramp(self) -> ClimbRamp:
-        """That of modes that take off by themselves."""
-        return self._auto_climb_ramp
-
 
 class TakeoffMode(Mode):
     """Climbs straight up to a height; one below the present height means to stay."""
 
     __slots__ = ("_climb_m_s", "_target_ned_m", "_yaw_rad")
+    takes_off = True
 
     def __init__(self, context: ModeContext, airframe: Airframe, parameters: Parameters) -> None:
         super().__init__(context, airframe, parameters)
@@ -117,11 +114,6 @@ class TakeoffMode(Mode):
     def departs(self, state: VehicleState) -> bool:
         """Whether the target is well above."""
         return self._target_ned_m[2] < state.position_ned_m[2] - _ABOVE_M
-
-    @property
-    def climb_ramp(self) -> ClimbRamp:
-        """That of modes that take off by themselves."""
-        return self._auto_climb_ramp
 
     @property
     def hold_target(self) -> tuple[Vec3, float] | None:

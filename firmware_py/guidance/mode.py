@@ -5,6 +5,7 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from dataclasses import dataclass, field
 from math import atan2, hypot
+from typing import ClassVar
 
 from firmware_py.airframe import Airframe
 from firmware_py.commands import ControlCommand, VelocityCommand
@@ -82,11 +83,13 @@ class Mode(ABC):
         parameters: see `configure`.
 
     Attributes:
+        takes_off: it leaves the ground by itself.
         setpoint: what is followed, for telemetry.
         target_reached: a take-off is at its height.
     """
 
     __slots__ = ("_context", "setpoint", "target_reached")
+    takes_off: ClassVar[bool] = False
 
     def __init__(self, context: ModeContext, airframe: Airframe, parameters: Parameters) -> None:
         self._context = context
@@ -114,12 +117,10 @@ class Mode(ABC):
     @property
     def climb_ramp(self) -> ClimbRamp:
         """How the climb of a take-off grows in this mode."""
-        return ClimbRamp(_RAMP_FROM_M_S - _WOUND_UP_M_S, self._context.limits.up_m_s)
-
-    @property
-    def _auto_climb_ramp(self) -> ClimbRamp:
-        """The same for modes that take off by themselves."""
-        return ClimbRamp(_RAMP_FROM_M_S, _CATCHING_UP * self._context.limits.auto_up_m_s)
+        limits = self._context.limits
+        if self.takes_off:
+            return ClimbRamp(_RAMP_FROM_M_S, _CATCHING_UP * limits.auto_up_m_s)
+        return ClimbRamp(_RAMP_FROM_M_S - _WOUND_UP_M_S, limits.up_m_s)
 
     @property
     def hold_target(self) -> tuple[Vec3, float] | None:

@@ -323,7 +323,7 @@ def test_an_offboard_descent_lands_and_disarms():
 def test_lost_setpoints_hold_then_land_then_disarm():
     flight = Flight().in_offboard()
     flight.run(0.2, NORTH)
-    last_us = flight.autopilot._loop.commander.situation.setpoint_us
+    last_us = flight.autopilot._commander.situation.setpoint_us
     while not flight.status.failsafe:
         assert flight.stabiliser.command.velocity_level_m_s == NORTH  # the last setpoint is flown on
         flight.tick()

@@ -228,9 +228,7 @@ class Offboard:
 
         def arrive():
             state = autopilot.state
-            autopilot.accept_setpoint(
-                setpoint_from_body_velocity(velocity, yaw_rate, state.yaw_rad, state.time_us)
-            )
+            autopilot.accept_setpoint(setpoint_from_body_velocity(velocity, yaw_rate, state, state.time_us))
 
         self._vehicle.up.send(now_us, arrive)
 
