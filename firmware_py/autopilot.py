@@ -17,7 +17,7 @@ _AUTO_BIT, _OFFBOARD_BIT = 1, 2  # of COM_RC_OVERRIDE
 
 
 class Autopilot(FlightLoop):
-    """A whole autopilot for one vehicle: `FlightLoop`, with one method for each thing that may be asked of it."""
+    """A whole autopilot for one vehicle: `FlightLoop`, and a method for each thing asked of it."""
 
     def arm(self, *, force: bool = False) -> CommandResult:
         """Arm. As in PX4, forcing from outside skips no check.

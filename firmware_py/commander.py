@@ -132,11 +132,6 @@ class Commander:
         return FLOWN_MODE.get(self.state, self.situation.intended)
 
     @property
-    def intended_mode(self) -> FlightMode:
-        """The mode last asked for."""
-        return self.situation.intended
-
-    @property
     def failsafe(self) -> bool:
         """Whether a failsafe chose the state."""
         return self.situation.cause is not None or self.state is State.TERMINATED

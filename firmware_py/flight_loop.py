@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from collections import deque
 from math import cos, isnan, nan, radians
+from typing import TYPE_CHECKING
 
 from firmware_py.airframe import Airframe
 from firmware_py.battery import BatteryMonitor, battery_settings, min_charge_to_arm
@@ -15,7 +16,7 @@ from firmware_py.commander_table import INFO, WARNING, Event, Row, State
 from firmware_py.commands import ControlCommand
 from firmware_py.estimator import Estimator
 from firmware_py.geodesy import GeoReference
-from firmware_py.ground_contact import LandDetector, LiftOff, StabiliserPort
+from firmware_py.ground_contact import LandDetector, LiftOff
 from firmware_py.guidance.modes import Guidance
 from firmware_py.guidance.orbit import Orbit
 from firmware_py.missions.flight import LegKind
@@ -26,6 +27,9 @@ from firmware_py.parameters import Parameters
 from firmware_py.status import CommandResult, LandedState, VehicleStatus
 from firmware_py.types import FlightRecord, GeodeticPoint, MotorOutput, MotorSpeeds, Sensors, StatusText
 from geometry.vectors import NAN3, Vec3
+
+if TYPE_CHECKING:
+    from firmware_py.control.stabiliser import Stabiliser
 
 _MAX_TEXTS = 100
 _CHECK_PERIOD_US = 100_000
@@ -84,7 +88,7 @@ class FlightLoop:
         parameters: Parameters | None = None,
         control_period_s: float = 0.004,
         *,
-        stabiliser: StabiliserPort | None = None,
+        stabiliser: Stabiliser | None = None,
     ) -> None:
         """Boot, disarmed; see the class for the arguments."""
         self.airframe = airframe

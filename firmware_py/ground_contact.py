@@ -8,13 +8,15 @@ times because the vehicle is light and its state clean.
 from __future__ import annotations
 
 from math import hypot, inf, radians
-from typing import Protocol
+from typing import TYPE_CHECKING
 
 from firmware_py.commands import ControlCommand
-from firmware_py.control.limits import FlightLimits
 from firmware_py.guidance.mode import ClimbRamp
 from firmware_py.parameters import Parameters
 from firmware_py.types import MotorOutput, VehicleState
+
+if TYPE_CHECKING:
+    from firmware_py.control.stabiliser import Stabiliser  # it imports SciPy
 
 _FALL_US = 100_000  # unasked motion longer than this is not standing
 _MOVING_M_S = 0.3  # while it stands
@@ -138,27 +140,6 @@ class LandDetector:
             self._last_still_us = state.time_us
 
 
-class StabiliserPort(Protocol):
-    """What the autopilot needs of a stabiliser.
-
-    Attributes:
-        limits: of the tilt; may be set in flight.
-    """
-
-    limits: FlightLimits
-
-    def reset(self) -> None:
-        """Forget all integrals."""
-
-    def idle(self) -> MotorOutput:
-        """Motors turning slowly, standing on the ground."""
-        ...
-
-    def step(self, state: VehicleState, command: ControlCommand, *, grounded: bool = False) -> MotorOutput:
-        """Motor commands for one control period."""
-        ...
-
-
 class LiftOff:
     """Stands between guidance and stabiliser while the vehicle is on the ground, and just after.
 
@@ -194,7 +175,7 @@ class LiftOff:
         """The motors stand."""
         self.ticks = 0
 
-    def fly(self, stabiliser: StabiliserPort, state: VehicleState, command: ControlCommand) -> MotorOutput:
+    def fly(self, stabiliser: Stabiliser, state: VehicleState, command: ControlCommand) -> MotorOutput:
         """Motors for a command in the air."""
         self.ticks = 0
         self._wanted = False
@@ -204,7 +185,7 @@ class LiftOff:
 
     def stand(
         self,
-        stabiliser: StabiliserPort,
+        stabiliser: Stabiliser,
         state: VehicleState,
         command: ControlCommand,
         down_m_s: float,

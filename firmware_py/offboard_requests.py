@@ -17,6 +17,7 @@ from enum import IntEnum, IntFlag
 from math import cos, isfinite, nan, sin
 
 from firmware_py.airframe import Airframe
+from firmware_py.guidance.limits import clamp
 from firmware_py.setpoints import (
     AttitudeSetpoint,
     BodyRateSetpoint,
@@ -32,6 +33,7 @@ _LOCAL = "SET_POSITION_TARGET_LOCAL_NED"
 _MIN_LENGTH = 1e-3  # of a quaternion that still has a direction
 _BODY_VELOCITY = 0x5C7  # all is ignored but the velocity and the yaw rate
 _GRID_US = 10_000
+_MAX_RATE_RAD_S = 30.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -136,6 +138,7 @@ def setpoint_from_attitude(
     """
     if not isfinite(thrust):
         return SetpointRefusal("SET_ATTITUDE_TARGET invalid: thrust is not a number")
+    thrust = clamp(thrust, 0.0, 1.0)
     if attitude is not None:
         length = sum(component * component for component in attitude) ** 0.5
         if not isfinite(length) or length < _MIN_LENGTH:
@@ -143,7 +146,7 @@ def setpoint_from_attitude(
         w, x, y, z = (component / length for component in attitude)
         return AttitudeSetpoint(time_us, (w, x, y, z), thrust, _finite(yaw_rate_rad_s))
     if rate_frd_rad_s is not None:
-        roll, pitch, yaw = (0.0 if not isfinite(rate) else rate for rate in rate_frd_rad_s)
+        roll, pitch, yaw = (_rate(rate) for rate in rate_frd_rad_s)
         return BodyRateSetpoint(time_us, (roll, pitch, yaw), thrust)
     return SetpointRefusal("SET_ATTITUDE_TARGET invalid: neither attitude nor rates")
 
@@ -176,7 +179,7 @@ def setpoint_from_controls(
         + yaw * rotor.yaw_sign
         for rotor in airframe.rotors
     ]
-    return MotorSetpoint(time_us, tuple([min(max(output, 0.0), 1.0) for output in outputs]))
+    return MotorSetpoint(time_us, tuple([clamp(output, 0.0, 1.0) for output in outputs]))
 
 
 def setpoint_from_body_velocity(
@@ -259,6 +262,10 @@ def _checked(wanted: TrajectorySetpoint, body_velocity: Vec3 | None) -> Setpoint
 
 def _finite(value: float) -> float:
     return value if isfinite(value) else nan
+
+
+def _rate(value: float) -> float:
+    return clamp(value, -_MAX_RATE_RAD_S, _MAX_RATE_RAD_S) if isfinite(value) else 0.0
 
 
 def _any_finite(vector: Vec3) -> bool:

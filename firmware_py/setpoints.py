@@ -6,9 +6,8 @@ A NaN in a component of a vector means "not controlled" (PX4's convention).
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from math import hypot, isfinite, isnan, nan, sqrt
-from typing import Self
 
 from firmware_py.commands import (
     AccelerationCommand,
@@ -32,7 +31,6 @@ from geometry.vectors import NAN3, ZERO3, Quaternion, Vec3
 
 _MAX = 1e6  # metres or m/s asked for are cut to this, which keeps all arithmetic finite
 _MAX_ACCELERATION_M_S2 = 50.0
-_MAX_RATE_RAD_S = 30.0
 _NORM_TOLERANCE = 0.1
 _BRAKING_SHARE = 0.6  # of the acceleration allowed, for slowing down before a place: the vehicle lags behind
 
@@ -52,12 +50,13 @@ class Setpoint(ABC):
     def is_usable(self) -> bool:
         """Whether it says anything that can be flown."""
 
-    @abstractmethod
-    def bounded(self, limits: SpeedLimits) -> Self:
+    def bounded(self, limits: SpeedLimits) -> Setpoint:
         """The same made safe to follow: finite or open, and within limits.
 
         A yaw rate is passed on as asked for, which is what PX4 echoes; it is limited when flown.
         """
+        del limits
+        return self
 
     @abstractmethod
     def command(self, state: VehicleState, limits: SpeedLimits) -> ControlCommand:
@@ -236,11 +235,6 @@ class AttitudeSetpoint(Setpoint):
         square = sum(component * component for component in self.attitude)
         return isfinite(self.thrust) and abs(square - 1.0) < _NORM_TOLERANCE  # false for NaN too
 
-    def bounded(self, limits: SpeedLimits) -> AttitudeSetpoint:
-        """The thrust cut to 0..1."""
-        thrust = clamp(self.thrust, 0.0, 1.0)
-        return replace(self, thrust=thrust, yaw_rate_rad_s=_finite(self.yaw_rate_rad_s))
-
     def command(self, state: VehicleState, limits: SpeedLimits) -> ControlCommand:
         """Its tilt, and a turn to its yaw."""
         roll_rad, pitch_rad, yaw_rad = euler_angles(self.attitude)
@@ -270,13 +264,6 @@ class BodyRateSetpoint(Setpoint):
         """Whether the thrust is finite."""
         return isfinite(self.thrust)
 
-    def bounded(self, limits: SpeedLimits) -> BodyRateSetpoint:
-        """Rates and thrust cut; a rate that is not finite is zero."""
-        roll, pitch, yaw = self.rate_frd_rad_s
-        return BodyRateSetpoint(
-            self.time_us, (_rate(roll), _rate(pitch), _rate(yaw)), clamp(self.thrust, 0.0, 1.0)
-        )
-
     def command(self, state: VehicleState, limits: SpeedLimits) -> ControlCommand:
         """The same."""
         return BodyRateCommand(self.rate_frd_rad_s, self.thrust)
@@ -296,10 +283,6 @@ class MotorSetpoint(Setpoint):
     def is_usable(self) -> bool:
         """Whether there are outputs, all finite."""
         return bool(self.outputs) and all(map(isfinite, self.outputs))
-
-    def bounded(self, limits: SpeedLimits) -> MotorSetpoint:
-        """Each output cut to 0..1."""
-        return MotorSetpoint(self.time_us, tuple([clamp(output, 0.0, 1.0) for output in self.outputs]))
 
     def command(self, state: VehicleState, limits: SpeedLimits) -> ControlCommand:
         """The same."""
@@ -338,7 +321,3 @@ def _velocity(velocity_m_s: Vec3, limits: SpeedLimits) -> Vec3:
 def _acceleration(value: float) -> float:
     bound = _MAX_ACCELERATION_M_S2
     return clamp(value, -bound, bound) if isfinite(value) else nan
-
-
-def _rate(value: float) -> float:
-    return clamp(value, -_MAX_RATE_RAD_S, _MAX_RATE_RAD_S) if isfinite(value) else 0.0

@@ -8,8 +8,8 @@ from math import isnan, nan
 from firmware_py.airframe import Airframe
 from firmware_py.commands import ControlCommand, TiltCommand
 from firmware_py.guidance.limits import clamp, velocity_command, velocity_towards, yaw_rate
-from firmware_py.guidance.mode import JourneyMode, Mode, ModeContext, ModeEntry
-from firmware_py.guidance.orbit import Orbit, OrbitYaw
+from firmware_py.guidance.mode import JourneyMode, Mode, ModeEntry
+from firmware_py.guidance.orbit import OrbitYaw
 from firmware_py.guidance.sticks import stick_settings
 from firmware_py.guidance.travel import passing_speed
 from firmware_py.missions.flight import Leg
@@ -26,7 +26,6 @@ _VELOCITY_VALID_US = 5_000_000  # without a position, the velocity is good enoug
 class HoldMode(JourneyMode):
     """Brakes and holds place and yaw, or flies to a place and holds there."""
 
-    __slots__ = ()
     takes_off = True
 
     def enter(self, state: VehicleState, entry: ModeEntry) -> None:
@@ -83,14 +82,7 @@ class HoldMode(JourneyMode):
 class TakeoffMode(Mode):
     """Climbs straight up to a height; one below the present height means to stay."""
 
-    __slots__ = ("_climb_m_s", "_target_ned_m", "_yaw_rad")
     takes_off = True
-
-    def __init__(self, context: ModeContext, airframe: Airframe, parameters: Parameters) -> None:
-        super().__init__(context, airframe, parameters)
-        self._target_ned_m = NAN3
-        self._yaw_rad = 0.0
-        self._climb_m_s = 0.0
 
     def enter(self, state: VehicleState, entry: ModeEntry) -> None:
         """Climb to the height of the entry's target, from here."""
@@ -124,8 +116,6 @@ class TakeoffMode(Mode):
 class LandMode(JourneyMode):
     """Descends to the ground, at a place or where it stops."""
 
-    __slots__ = ()
-
     def enter(self, state: VehicleState, entry: ModeEntry) -> None:
         """Land at the entry's target; NaN: where it stops."""
         self._begin(state)
@@ -140,12 +130,6 @@ class LandMode(JourneyMode):
 
 class DescendMode(JourneyMode):
     """Descends when the position is lost: brakes as long as the velocity is valid, then sinks level."""
-
-    __slots__ = ("_level_from_us",)
-
-    def __init__(self, context: ModeContext, airframe: Airframe, parameters: Parameters) -> None:
-        super().__init__(context, airframe, parameters)
-        self._level_from_us = 0
 
     def enter(self, state: VehicleState, entry: ModeEntry) -> None:
         """Begin here; telemetry goes on to tell the last setpoint."""
@@ -166,12 +150,6 @@ class DescendMode(JourneyMode):
 
 class OrbitMode(JourneyMode):
     """Circles around a point."""
-
-    __slots__ = ("_orbit", "_sticks")
-
-    def __init__(self, context: ModeContext, airframe: Airframe, parameters: Parameters) -> None:
-        super().__init__(context, airframe, parameters)
-        self._orbit = Orbit()
 
     def configure(self, airframe: Airframe, parameters: Parameters) -> None:
         """Take over what full sticks mean."""

@@ -160,8 +160,6 @@ class FollowMode(JourneyMode):
         follower: knows the target.
     """
 
-    __slots__ = ("follower",)
-
     def __init__(self, context: ModeContext, airframe: Airframe, parameters: Parameters) -> None:
         self.follower = TargetFollower(follow_settings(parameters))
         super().__init__(context, airframe, parameters)

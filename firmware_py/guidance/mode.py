@@ -88,7 +88,6 @@ class Mode(ABC):
         target_reached: a take-off is at its height.
     """
 
-    __slots__ = ("_context", "setpoint", "target_reached")
     takes_off: ClassVar[bool] = False
 
     def __init__(self, context: ModeContext, airframe: Airframe, parameters: Parameters) -> None:
@@ -131,11 +130,7 @@ class Mode(ABC):
 class JourneyMode(Mode):
     """A mode that leads a point which moves smoothly, and follows it; the stabiliser does the rest."""
 
-    __slots__ = ("_shown_ned_m",)
-
-    def __init__(self, context: ModeContext, airframe: Airframe, parameters: Parameters) -> None:
-        super().__init__(context, airframe, parameters)
-        self._shown_ned_m = NAN3  # the target that `setpoint` tells
+    _shown_ned_m = NAN3  # the target that `setpoint` tells
 
     def _begin(self, state: VehicleState) -> None:
         """Lead the point another way, from the velocity there is."""

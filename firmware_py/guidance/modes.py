@@ -25,11 +25,7 @@ from geometry.vectors import NAN3, Vec3
 class OffboardMode(Mode):
     """Follows the setpoints of an offboard controller."""
 
-    __slots__ = ("_constant",)
-
-    def __init__(self, context: ModeContext, airframe: Airframe, parameters: Parameters) -> None:
-        super().__init__(context, airframe, parameters)
-        self._constant: ControlCommand | None = None  # the command, if it is the same in every tick
+    _constant: ControlCommand | None = None  # the command, if it is the same in every tick
 
     def accept(self, setpoint: Setpoint) -> None:
         """Take the next setpoint, one that is usable; it is followed as soon as the mode is entered."""
@@ -57,17 +53,6 @@ class Guidance:
         mode: the one flown, or flown last.
         command_down_m_s: vertical velocity last asked for; for a thrust, its sign.
     """
-
-    __slots__ = (
-        "_context",
-        "_follow",
-        "_hold",
-        "_hover_thrust",
-        "_modes",
-        "_offboard",
-        "command_down_m_s",
-        "mode",
-    )
 
     def __init__(self, airframe: Airframe, parameters: Parameters, period_s: float = 0.004) -> None:
         self._context = context = ModeContext(speed_limits(airframe, parameters), period_s)

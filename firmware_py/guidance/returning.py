@@ -8,10 +8,9 @@ from math import hypot, nan, radians, tan
 
 from firmware_py.airframe import Airframe
 from firmware_py.commands import ControlCommand
-from firmware_py.guidance.mode import JourneyMode, ModeContext, ModeEntry
+from firmware_py.guidance.mode import JourneyMode, ModeEntry
 from firmware_py.parameters import Parameters
 from firmware_py.types import VehicleState
-from geometry.vectors import ZERO3
 
 _MAX_CONE_DEG = 89.0
 _AT_HOME_M = 0.5  # a landing goes straight down, so it begins over the place
@@ -79,20 +78,7 @@ class Phase(Enum):
 
 
 class ReturnMode(JourneyMode):
-    """Comes back to a place and lands there.
-
-    Attributes:
-        phase: how far it has come.
-    """
-
-    __slots__ = ("_configured", "_place_ned_m", "_settings", "_wait_since_us", "phase")
-
-    def __init__(self, context: ModeContext, airframe: Airframe, parameters: Parameters) -> None:
-        super().__init__(context, airframe, parameters)
-        self.phase = Phase.CLIMB
-        self._place_ned_m = ZERO3
-        self._settings = self._configured
-        self._wait_since_us = 0
+    """Comes back to a place and lands there."""
 
     def configure(self, airframe: Airframe, parameters: Parameters) -> None:
         """Take over heights and distances; a return under way keeps its own."""
@@ -102,7 +88,7 @@ class ReturnMode(JourneyMode):
         """Come back to the entry's target."""
         context, settings = self._context, self._configured
         self._settings, self._place_ned_m = settings, entry.target_ned_m
-        self.phase = Phase.CLIMB
+        self._phase, self._wait_since_us = Phase.CLIMB, 0
         place = entry.target_ned_m
         north_m, east_m, down_m = state.position_ned_m
         distance_m = hypot(place[0] - north_m, place[1] - east_m)
@@ -113,10 +99,10 @@ class ReturnMode(JourneyMode):
 
     def step(self, state: VehicleState) -> ControlCommand:
         """Go on to the next phase when this one is done, and fly it."""
-        before = self.phase
+        before = self._phase
         self._advance(state)
-        if self.phase is not Phase.LAND:
-            if self.phase is not before:
+        if self._phase is not Phase.LAND:
+            if self._phase is not before:
                 self._show_journey(state)
             return self._travel(state)
         if before is not Phase.LAND:
@@ -128,18 +114,18 @@ class ReturnMode(JourneyMode):
     def _advance(self, state: VehicleState) -> None:
         """Find the phase."""
         settings, traveller, place = self._settings, self._context.traveller, self._place_ned_m
-        if self.phase is Phase.LAND:
+        if self._phase is Phase.LAND:
             return
-        if self.phase is Phase.CLIMB and traveller.climb_m(state) < settings.height_acceptance_m:
-            self.phase = Phase.TRAVEL
+        if self._phase is Phase.CLIMB and traveller.climb_m(state) < settings.height_acceptance_m:
+            self._phase = Phase.TRAVEL
             traveller.go((place[0], place[1], traveller.target_ned_m[2]))
-        if self.phase is Phase.TRAVEL and traveller.distance_m(state) < _AT_HOME_M:
-            self.phase = Phase.DESCEND
+        if self._phase is Phase.TRAVEL and traveller.distance_m(state) < _AT_HOME_M:
+            self._phase = Phase.DESCEND
             lowest_m = min(settings.descend_altitude_m, place[2] - state.position_ned_m[2])
             traveller.go((place[0], place[1], place[2] - lowest_m), state.yaw_rad)
-        if self.phase is Phase.DESCEND and abs(traveller.climb_m(state)) < settings.height_acceptance_m:
-            self.phase = Phase.WAIT
+        if self._phase is Phase.DESCEND and abs(traveller.climb_m(state)) < settings.height_acceptance_m:
+            self._phase = Phase.WAIT
             self._wait_since_us = state.time_us
         waits = settings.delay_us < 0 or state.time_us - self._wait_since_us < settings.delay_us
-        if self.phase is Phase.WAIT and not waits:
-            self.phase = Phase.LAND
+        if self._phase is Phase.WAIT and not waits:
+            self._phase = Phase.LAND

@@ -14,7 +14,7 @@ from firmware_py.commands import (
     VelocityCommand,
 )
 from firmware_py.guidance.limits import level
-from firmware_py.guidance.mode import Mode, ModeContext, ModeEntry
+from firmware_py.guidance.mode import Mode, ModeEntry
 from firmware_py.guidance.reference import Pace, Reference
 from firmware_py.parameters import Parameters
 from firmware_py.setpoints import TrajectorySetpoint
@@ -112,8 +112,6 @@ def stick_settings(airframe: Airframe, parameters: Parameters) -> StickSettings:
 class ManualMode(Mode):
     """A mode flown by hand; telemetry shows no setpoint."""
 
-    __slots__ = ("_settings",)
-
     def configure(self, airframe: Airframe, parameters: Parameters) -> None:
         """Take over what full sticks mean."""
         self._settings = stick_settings(airframe, parameters)
@@ -126,8 +124,6 @@ class ManualMode(Mode):
 class StabilizedMode(ManualMode):
     """Tilt and thrust by hand."""
 
-    __slots__ = ()
-
     def step(self, state: VehicleState) -> ControlCommand:
         """The sticks' tilt and thrust."""
         sticks, settings = self._context.sticks, self._settings
@@ -137,8 +133,6 @@ class StabilizedMode(ManualMode):
 
 class AcroMode(ManualMode):
     """Body rates and thrust by hand."""
-
-    __slots__ = ()
 
     def step(self, state: VehicleState) -> ControlCommand:
         """The sticks' rates and thrust."""
@@ -151,15 +145,10 @@ class AcroMode(ManualMode):
 class AltitudeMode(ManualMode):
     """Tilt by hand, height held."""
 
-    __slots__ = ("_reference",)
-
-    def __init__(self, context: ModeContext, airframe: Airframe, parameters: Parameters) -> None:
-        super().__init__(context, airframe, parameters)
-        self._reference = Reference()
-
     def enter(self, state: VehicleState, entry: ModeEntry) -> None:
         """Begin as it moves now."""
         super().enter(state, entry)
+        self._reference = Reference()
         self._reference.start(state, self._settings.moving)
 
     def step(self, state: VehicleState) -> ControlCommand:
@@ -196,12 +185,6 @@ class AltitudeMode(ManualMode):
 
 class PositionMode(AltitudeMode):
     """Velocities in level axes by hand; with the sticks centred it brakes and stays."""
-
-    __slots__ = ("_level_held",)
-
-    def __init__(self, context: ModeContext, airframe: Airframe, parameters: Parameters) -> None:
-        super().__init__(context, airframe, parameters)
-        self._level_held = False
 
     def enter(self, state: VehicleState, entry: ModeEntry) -> None:
         """Begin as it moves now."""

@@ -19,7 +19,7 @@ from firmware_py.mavlink.mission_items import Refusal, item_message, read_item
 from firmware_py.mavlink.mission_messages import MissionAck, MissionCount
 from firmware_py.mavlink.mission_progress import MissionProgress
 from firmware_py.mavlink.mission_upload import GIVE_UP_US, RETRY_US, Outcome, Partner, Upload
-from firmware_py.missions.fence_shapes import fence_fault
+from firmware_py.missions.geofence import fence_fault
 from firmware_py.missions.items import PlanType
 from firmware_py.missions.store import Plan
 from wire.dialect import Message, mavlink
