@@ -1,6 +1,7 @@
 """What guidance can tell the stabiliser: the kinds of command, from a velocity down to the motors' outputs.
 
-World NED, body FRD, level axes (forward, right, down) turned with the yaw; SI units, radians.
+Vectors are of shape (3,): level axes are forward, right, down and turn with the yaw; body axes are FRD. A yaw
+rate is clockwise seen from above; a thrust is collective along body up, as a share of the greatest, 0..1.
 """
 
 from __future__ import annotations
@@ -50,13 +51,7 @@ class ControlCommand:
 
 @dataclass(frozen=True, slots=True)
 class VelocityCommand(ControlCommand):
-    """A velocity in level axes and a yaw rate.
-
-    Attributes:
-        velocity_level_m_s: forward, right, down; shape (3,).
-        yaw_rate_rad_s: clockwise seen from above.
-        acceleration_level_m_s2: feed-forward beside the velocity, shape (3,).
-    """
+    """A velocity with an acceleration as feed-forward, and a yaw rate."""
 
     velocity_level_m_s: Vec3 = ZERO3
     yaw_rate_rad_s: float = 0.0
@@ -81,12 +76,7 @@ class VelocityCommand(ControlCommand):
 
 @dataclass(frozen=True, slots=True)
 class AccelerationCommand(ControlCommand):
-    """An acceleration in level axes and a yaw rate; the velocity is left to whoever commands it.
-
-    Attributes:
-        acceleration_level_m_s2: forward, right, down; shape (3,); zeros hover.
-        yaw_rate_rad_s: clockwise seen from above.
-    """
+    """An acceleration (zeros hover) and a yaw rate; the velocity is left to whoever commands it."""
 
     acceleration_level_m_s2: Vec3
     yaw_rate_rad_s: float = 0.0
@@ -102,14 +92,7 @@ class AccelerationCommand(ControlCommand):
 
 @dataclass(frozen=True, slots=True)
 class TiltCommand(ControlCommand):
-    """A tilt, a yaw rate and a vertical velocity.
-
-    Attributes:
-        roll_rad: right side down is positive.
-        pitch_rad: nose up is positive.
-        yaw_rate_rad_s: clockwise seen from above.
-        down_m_s: vertical velocity, positive down.
-    """
+    """A tilt (right side down, nose up), a yaw rate and a vertical velocity."""
 
     roll_rad: float
     pitch_rad: float
@@ -134,14 +117,7 @@ class TiltCommand(ControlCommand):
 
 @dataclass(frozen=True, slots=True)
 class AttitudeCommand(ControlCommand):
-    """A tilt, a yaw rate and a thrust.
-
-    Attributes:
-        roll_rad: right side down is positive.
-        pitch_rad: nose up is positive.
-        yaw_rate_rad_s: clockwise seen from above.
-        thrust: collective thrust along body up as a share of the greatest, 0..1.
-    """
+    """A tilt (right side down, nose up), a yaw rate and a thrust."""
 
     roll_rad: float
     pitch_rad: float
@@ -159,12 +135,7 @@ class AttitudeCommand(ControlCommand):
 
 @dataclass(frozen=True, slots=True)
 class BodyRateCommand(ControlCommand):
-    """Body rates and a thrust.
-
-    Attributes:
-        rate_frd_rad_s: roll, pitch and yaw rate, shape (3,).
-        thrust: collective thrust along body up as a share of the greatest, 0..1.
-    """
+    """Roll, pitch and yaw rate, and a thrust."""
 
     rate_frd_rad_s: Vec3
     thrust: float
@@ -180,11 +151,7 @@ class BodyRateCommand(ControlCommand):
 
 @dataclass(frozen=True, slots=True)
 class MotorCommand(ControlCommand):
-    """Outputs of the motors, passed through unchanged.
-
-    Attributes:
-        outputs: one per rotor in the airframe's order, 0..1 of a rotor's full thrust.
-    """
+    """Outputs of the motors, passed through: 0..1 of a rotor's full thrust, in the airframe's order."""
 
     outputs: tuple[float, ...]
     is_for_motors: ClassVar[bool] = True

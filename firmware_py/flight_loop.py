@@ -133,7 +133,7 @@ class FlightLoop:
             from firmware_py.control.stabiliser import Stabiliser
 
             self._stabiliser = Stabiliser(self.airframe, self._period_us / 1e6)
-            self._limit_stabiliser()
+            self._parameters_version = -1  # it gets its limits with the next tick
 
     def step(self, sensors: Sensors) -> MotorSpeeds:
         """Fly one control tick.
@@ -206,7 +206,8 @@ class FlightLoop:
         self._now_us = max(self._now_us, self.state.time_us)
         if self._geo.projection is None and self.estimator.origin_ned_m is not None:
             self._geo.fix_origin(self.estimator.origin_ned_m)
-            self._set_home_here()
+            self._geo.set_home_at(self.state.position_ned_m)
+            self._publish_places()
         return True
 
     def _observe(self, sensors: Sensors, sound: bool) -> Observation:
@@ -217,7 +218,7 @@ class FlightLoop:
         if now_us >= self._checks_due_us:
             self._checks = self._check(sensors)
         if self.setpoints.waiting is not None and self.setpoints.is_due(now_us):
-            self._accept_setpoint()
+            self._guidance.accept(self.setpoints.take())
         _, x, y, _ = self.state.attitude
         return Observation(
             now_us,
@@ -271,13 +272,14 @@ class FlightLoop:
             self._lift_off.rest()
         self._navigator.observe(self.state, self._geo, landed=self._land_detector.landed)
         if row.target is State.OFFBOARD:
-            self._accept_setpoint()
+            self._guidance.accept(self.setpoints.take())
         self._enter(row.target, before, row.event)
 
     def _leave_disarmed(self) -> None:
         if self._stabiliser is not None:
             self._stabiliser.reset()
-        self._set_home_here()
+        self._geo.set_home_at(self.state.position_ned_m)
+        self._publish_places()
         self._lift_off.arm(self._now_us)
         self.flight.armed_us = self._now_us
         self.flight.takeoff_us = self.flight.landed_us = 0
@@ -332,12 +334,6 @@ class FlightLoop:
         if ended is not None:
             self._follow(self._commander.handle(ended))
 
-    def _accept_setpoint(self) -> None:
-        """Fly the setpoint that waits, if there is one."""
-        setpoint = self.setpoints.take()
-        if setpoint is not None:
-            self._guidance.accept(setpoint)
-
     def _detect_land(self) -> None:
         detector = self._land_detector
         before = detector.landed
@@ -377,10 +373,6 @@ class FlightLoop:
             breach is not None,
         )
 
-    def _set_home_here(self) -> None:
-        self._geo.set_home_at(self.state.position_ned_m)
-        self._publish_places()
-
     def _configure(self) -> None:
         """Take over the parameters; looked up by name only when one has changed."""
         parameters, airframe = self.parameters, self.airframe
@@ -389,19 +381,15 @@ class FlightLoop:
         self._guidance.configure(airframe, parameters)
         self._battery_settings = battery_settings(airframe, parameters)
         self._min_charge_to_arm = min_charge_to_arm(self._battery_settings, parameters)
-        self._limit_stabiliser()
+        if self._stabiliser is not None:
+            value, limits = parameters.value, self._stabiliser.limits
+            limits.tilt_rad = radians(value("MPC_TILTMAX_AIR"))
+            limits.rate_rad_s = radians(min(value("MC_ROLLRATE_MAX"), value("MC_PITCHRATE_MAX")))
+            limits.min_thrust, limits.max_thrust = value("MPC_THR_MIN"), value("MPC_THR_MAX")
         self._lift_off.configure(parameters)
         self._land_detector.configure(parameters)
         tilt_deg = min(parameters.value("FD_FAIL_P"), parameters.value("FD_FAIL_R")) or 180.0  # 0: never
         self._upright_cosine = cos(radians(tilt_deg))
-
-    def _limit_stabiliser(self) -> None:
-        if self._stabiliser is None:
-            return
-        value, limits = self.parameters.value, self._stabiliser.limits
-        limits.tilt_rad = radians(value("MPC_TILTMAX_AIR"))
-        limits.rate_rad_s = radians(min(value("MC_ROLLRATE_MAX"), value("MC_PITCHRATE_MAX")))
-        limits.min_thrust, limits.max_thrust = value("MPC_THR_MIN"), value("MPC_THR_MAX")
 
     def _refresh_status(self) -> None:
         status, commander = self.status, self._commander

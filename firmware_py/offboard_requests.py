@@ -13,7 +13,7 @@ vehicle, as the paper's drone does, so a setpoint that is sent again changes not
 from __future__ import annotations
 
 from dataclasses import dataclass
-from enum import IntEnum, IntFlag
+from enum import IntFlag
 from math import cos, isfinite, nan, sin
 
 from firmware_py.airframe import Airframe
@@ -28,6 +28,7 @@ from firmware_py.setpoints import (
 )
 from firmware_py.types import VehicleState
 from geometry.vectors import NAN3, ZERO3, Quaternion, Vec3
+from wire.dialect import mavlink
 
 _LOCAL = "SET_POSITION_TARGET_LOCAL_NED"
 _MIN_LENGTH = 1e-3  # of a quaternion that still has a direction
@@ -41,13 +42,6 @@ class SetpointRefusal:
     """A request that is no setpoint; the text is for people, in PX4's words."""
 
     text: str
-
-
-class TargetFrame(IntEnum):
-    """The MAV_FRAMEs that PX4 accepts for a local target."""
-
-    LOCAL_NED = 1
-    BODY_NED = 8
 
 
 class TargetMask(IntFlag):
@@ -95,11 +89,11 @@ def setpoint_from_target(
     """
     mask = target.type_mask
     body_velocity = None
-    if target.frame == TargetFrame.LOCAL_NED:
+    if target.frame == mavlink.MAV_FRAME_LOCAL_NED:
         position = _kept(target.position_m, mask, TargetMask.X)
         velocity = _kept(target.velocity_m_s, mask, TargetMask.VX)
         acceleration = _kept(target.acceleration_m_s2, mask, TargetMask.AX)
-    elif target.frame == TargetFrame.BODY_NED:
+    elif target.frame == mavlink.MAV_FRAME_BODY_NED:
         position = velocity = acceleration = NAN3
         if not mask & (TargetMask.VX | TargetMask.VY | TargetMask.VZ):
             body_velocity = target.velocity_m_s
@@ -187,7 +181,7 @@ def setpoint_from_body_velocity(
 ) -> Setpoint | SetpointRefusal:
     """The setpoint for a velocity in level axes (forward, right, down) and a clockwise yaw rate."""
     target = LocalTarget(
-        TargetFrame.BODY_NED,
+        mavlink.MAV_FRAME_BODY_NED,
         _BODY_VELOCITY,
         velocity_m_s=velocity_level_m_s,
         yaw_rate_rad_s=yaw_rate_rad_s,

@@ -217,13 +217,7 @@ class BodyVelocitySetpoint(Setpoint):
 
 @dataclass(frozen=True, slots=True)
 class AttitudeSetpoint(Setpoint):
-    """An attitude and a thrust.
-
-    Attributes:
-        attitude: unit quaternion (w, x, y, z), body FRD to world NED.
-        thrust: 0..1 of the greatest.
-        yaw_rate_rad_s: clockwise, beside the attitude.
-    """
+    """An attitude (body FRD to world NED), a thrust, 0..1 of the greatest, and a yaw rate beside them."""
 
     attitude: Quaternion
     thrust: float
@@ -249,12 +243,7 @@ class AttitudeSetpoint(Setpoint):
 
 @dataclass(frozen=True, slots=True)
 class BodyRateSetpoint(Setpoint):
-    """Body rates and a thrust.
-
-    Attributes:
-        rate_frd_rad_s: shape (3,).
-        thrust: 0..1 of the greatest.
-    """
+    """Body rates, shape (3,), and a thrust, 0..1 of the greatest."""
 
     rate_frd_rad_s: Vec3
     thrust: float
@@ -271,11 +260,7 @@ class BodyRateSetpoint(Setpoint):
 
 @dataclass(frozen=True, slots=True)
 class MotorSetpoint(Setpoint):
-    """Outputs of the motors themselves.
-
-    Attributes:
-        outputs: 0..1 of a rotor's full thrust, in the airframe's order.
-    """
+    """Outputs of the motors themselves, 0..1 of a rotor's full thrust, in the airframe's order."""
 
     outputs: tuple[float, ...]
 

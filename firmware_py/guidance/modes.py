@@ -137,9 +137,10 @@ class Guidance:
         self.command_down_m_s = command.vertical_intent(self._hover_thrust)
         return command
 
-    def accept(self, setpoint: Setpoint) -> None:
-        """Take the next offboard setpoint, one that is usable."""
-        self._offboard.accept(setpoint)
+    def accept(self, setpoint: Setpoint | None) -> None:
+        """Take the next offboard setpoint, one that is usable; None: there is none."""
+        if setpoint is not None:
+            self._offboard.accept(setpoint)
 
     def take_sticks(self, sticks: ManualInput) -> None:
         """Take a pilot's newest input."""

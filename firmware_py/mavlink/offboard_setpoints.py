@@ -13,7 +13,6 @@ from firmware_py.mavlink.links import Link
 from firmware_py.offboard_requests import (
     LocalTarget,
     SetpointRefusal,
-    TargetFrame,
     TargetMask,
     setpoint_from_attitude,
     setpoint_from_controls,
@@ -79,7 +78,7 @@ class SetpointService:
         if not message.type_mask & _PLACE:
             position = _place(exchange, message, relative=relative)
         if position is not None:  # without a home no height above it: no setpoint, as in PX4
-            self._take(exchange, _from_target(exchange, message, TargetFrame.LOCAL_NED, position))
+            self._take(exchange, _from_target(exchange, message, mavlink.MAV_FRAME_LOCAL_NED, position))
 
     def _attitude(self, exchange: Exchange, _link: Link, message: Message) -> None:
         if not exchange.is_for_us(message, or_everyone=True):
