@@ -18,6 +18,7 @@ from firmware_py.commander_table import (
     CAUSE_EVENT,
     FLOWN_MODE,
     RULES,
+    TICK_RULES,
     Event,
     Row,
     State,
@@ -116,11 +117,11 @@ class Commander:
         situation: what guards look at.
     """
 
-    __slots__ = ("_check_us", "_checks", "_started", "_tick_rows", "situation", "state")
+    __slots__ = ("_check_us", "_checks", "_started", "_tick_rules", "situation", "state")
 
     def __init__(self) -> None:
         self.state = State.DISARMED
-        self._tick_rows = RULES[self.state, Event.TICK]
+        self._tick_rules = TICK_RULES[self.state]
         self._check_us = 0
         self._started = False
         self._checks = NOT_CHECKED
@@ -156,8 +157,7 @@ class Commander:
         now_us, sound, placed, upright, landed, target_reached, checks = seen
         now = self.situation
         if not self._started:
-            self._started = True
-            now.unsound_us = now.sound_us = now.position_us = now.upright_us = now_us
+            self._start(now_us)
         now.now_us = now_us
         if sound:
             now.sound_us = now_us
@@ -174,15 +174,22 @@ class Commander:
         now.target_reached = target_reached
         if checks is not self._checks:
             self._take_checks(checks)
-        row = first_match(self._tick_rows, now)
-        if row is None:
-            if self.state is State.OFFBOARD and setpoint_lost(now):
-                row = self._react(Cause.SETPOINTS)
-            elif now_us >= self._check_us:
-                row = self._check(now_us)
+        for guard, rule in self._tick_rules:
+            if guard(now):
+                self._follow(rule)
+                return rule
+        row = None
+        if self.state is State.OFFBOARD and setpoint_lost(now):
+            row = self._react(Cause.SETPOINTS)
+        elif now_us >= self._check_us:
+            row = self._check(now_us)
         if row is not None:
             self._follow(row)
         return row
+
+    def _start(self, now_us: int) -> None:
+        self._started, now = True, self.situation
+        now.unsound_us = now.sound_us = now.position_us = now.upright_us = now_us
 
     def _take_checks(self, checks: SlowChecks) -> None:
         self._checks, now = checks, self.situation
@@ -267,7 +274,7 @@ class Commander:
             now.cause = row.cause  # a hold that becomes a landing keeps its cause
         now.follow_up = row.follow_up
         self.state = row.target
-        self._tick_rows = RULES[self.state, Event.TICK]
+        self._tick_rules = TICK_RULES[self.state]
         now.entered_us = now.now_us
 
 

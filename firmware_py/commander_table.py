@@ -431,7 +431,13 @@ RULES: dict[tuple[State, Event], tuple[Row, ...]] = {
     for state in State
     for event in Event
 }
-"""The same, by state and event: a tick tries only the rows that can hold."""
+"""The same, by state and event."""
+
+TICK_RULES: dict[State, tuple[tuple[Guard, Row], ...]] = {
+    state: tuple((row.guard, row) for row in RULES[state, Event.TICK] if row.guard is not None)
+    for state in State
+}
+"""The rules of a tick with their guards, which all of them have; this is looked through in every tick."""
 
 
 def first_match(rows: tuple[Row, ...], now: Situation) -> Row | None:

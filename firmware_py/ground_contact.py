@@ -93,6 +93,8 @@ class LandDetector:
         """
         if self.landed:
             self._watch_for_air(state, lifting)
+        elif armed and command_down_m_s <= _DESCENT_COMMAND_M_S:
+            self._last_unlike_us = state.time_us
         else:
             self._watch_for_ground(state, armed, command_down_m_s, throttle)
         return self.landed
@@ -115,9 +117,6 @@ class LandDetector:
     def _watch_for_ground(
         self, state: VehicleState, armed: bool, command_down_m_s: float, throttle: float
     ) -> None:
-        if armed and command_down_m_s <= _DESCENT_COMMAND_M_S:
-            self._last_unlike_us = state.time_us
-            return
         north_m_s, east_m_s, down_m_s = state.velocity_ned_m_s
         roll_rad_s, pitch_rad_s, _ = state.angular_rate_frd_rad_s
         like_ground = (

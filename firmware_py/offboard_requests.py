@@ -13,7 +13,7 @@ vehicle, as the paper's drone does, so a setpoint that is sent again changes not
 from __future__ import annotations
 
 from dataclasses import dataclass
-from enum import IntFlag
+from enum import IntEnum
 from math import cos, isfinite, nan, sin
 
 from firmware_py.airframe import Airframe
@@ -44,7 +44,7 @@ class SetpointRefusal:
     text: str
 
 
-class TargetMask(IntFlag):
+class TargetMask(IntEnum):
     """POSITION_TARGET_TYPEMASK: a set bit takes the component out."""
 
     X = 1

@@ -120,6 +120,21 @@ def level(state: VehicleState, vector_ned: Vec3) -> Vec3:
     return (cos_yaw * north + sin_yaw * east, cos_yaw * east - sin_yaw * north, down)
 
 
+def level_pair(state: VehicleState, one_ned: Vec3, other_ned: Vec3) -> tuple[Vec3, Vec3]:
+    """The same for two vectors."""
+    north, east, down = one_ned
+    other_north, other_east, other_down = other_ned
+    cos_yaw, sin_yaw = cos(state.yaw_rad), sin(state.yaw_rad)
+    return (
+        (cos_yaw * north + sin_yaw * east, cos_yaw * east - sin_yaw * north, down),
+        (
+            cos_yaw * other_north + sin_yaw * other_east,
+            cos_yaw * other_east - sin_yaw * other_north,
+            other_down,
+        ),
+    )
+
+
 def yaw_rate(yaw_now_rad: float, yaw_rad: float, yaw_rate_rad_s: float, limits: SpeedLimits) -> float:
     """The yaw rate that turns the shortest way to a yaw, and a yaw rate beside it; NaN: not asked for."""
     rate_rad_s = 0.0 if isnan(yaw_rate_rad_s) else yaw_rate_rad_s

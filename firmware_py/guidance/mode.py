@@ -9,7 +9,7 @@ from typing import ClassVar
 
 from firmware_py.airframe import Airframe
 from firmware_py.commands import ControlCommand, VelocityCommand
-from firmware_py.guidance.limits import SpeedLimits, clamp, level, yaw_rate
+from firmware_py.guidance.limits import SpeedLimits, clamp, level_pair, yaw_rate
 from firmware_py.guidance.orbit import Orbit
 from firmware_py.guidance.travel import Traveller
 from firmware_py.parameters import Parameters
@@ -164,11 +164,11 @@ class JourneyMode(Mode):
         context = self._context
         limits = context.limits
         max_rad_s = limits.auto_yaw_rate_rad_s
-        return VelocityCommand(
-            level(state, limits.clip(*velocity_ned_m_s)),
-            clamp(yaw_rate(state.yaw_rad, yaw_rad, turn_rad_s, limits), -max_rad_s, max_rad_s),
-            level(state, context.traveller.reference.acceleration_ned_m_s2),
+        velocity, acceleration = level_pair(
+            state, limits.clip(*velocity_ned_m_s), context.traveller.reference.acceleration_ned_m_s2
         )
+        turn_rad_s = yaw_rate(state.yaw_rad, yaw_rad, turn_rad_s, limits)
+        return VelocityCommand(velocity, clamp(turn_rad_s, -max_rad_s, max_rad_s), acceleration)
 
     def _show_journey(self, state: VehicleState) -> None:
         traveller = self._context.traveller

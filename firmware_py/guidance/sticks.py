@@ -13,7 +13,7 @@ from firmware_py.commands import (
     TiltCommand,
     VelocityCommand,
 )
-from firmware_py.guidance.limits import level
+from firmware_py.guidance.limits import level_pair
 from firmware_py.guidance.mode import Mode, ModeEntry
 from firmware_py.guidance.reference import Pace, Reference
 from firmware_py.parameters import Parameters
@@ -212,8 +212,9 @@ class PositionMode(AltitudeMode):
             self._level_held = settings.hold_level_m_s <= 0.0 or speed_m_s < settings.hold_level_m_s
         self._lead(state, (north_m_s, east_m_s), level_bound=self._level_held)
         velocity_ned_m_s = reference.chase(state, limits.position_gain, limits.height_gain)
+        velocity, acceleration = level_pair(
+            state, limits.clip(*velocity_ned_m_s), reference.acceleration_ned_m_s2
+        )
         return VelocityCommand(
-            level(state, limits.clip(*velocity_ned_m_s)),
-            settings.released(sticks.yaw) * settings.yaw_rate_rad_s,
-            level(state, reference.acceleration_ned_m_s2),
+            velocity, settings.released(sticks.yaw) * settings.yaw_rate_rad_s, acceleration
         )
