@@ -10,9 +10,8 @@ from importlib import import_module
 from math import degrees
 from typing import TYPE_CHECKING
 
-from firmware_py.mavlink.camera_model import CameraModel
-from firmware_py.mavlink.node import MavlinkNode
-from firmware_py.mavlink.video_links import VideoEncoding, VideoStream
+from firmware_py.mavlink.camera.model import CameraModel, VideoEncoding, VideoStream
+from firmware_py.mavlink.node import MavlinkNode, NodeOptions
 from geometry.axes import flip_vector
 from sitl.drone_files import flight_recorder, open_storage
 from sitl.link_hub import LinkHub
@@ -67,17 +66,18 @@ class ServedDrone:
         self._recorder = flight_recorder(storage, boot_unix_us)
         self.node = MavlinkNode(
             simulation.autopilot,
-            (),
-            system_id=settings.instance + 1,
-            boot_unix_us=boot_unix_us,
-            signing_key=settings.signing_key,
-            video=self._streams(),
-            storage=storage,
-            shell=settings.shell,
-            log_text=self._recorder.hear_text,
-            camera=_camera_model(simulation) if settings.camera else None,
-            captures=self._album,
-            failures=simulation.failures,
+            options=NodeOptions(
+                system_id=settings.instance + 1,
+                boot_unix_us=boot_unix_us,
+                signing_key=settings.signing_key,
+                video=self._streams(),
+                storage=storage,
+                shell=settings.shell,
+                log_text=self._recorder.hear_text,
+                camera=_camera_model(simulation) if settings.camera else None,
+                captures=self._album,
+                failures=simulation.failures,
+            ),
         )
         self._notice = notice
         self._hub = LinkHub(self.node, self._warn)

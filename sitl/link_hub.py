@@ -5,12 +5,12 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 
-from firmware_py.mavlink.links import LinkProfile
 from firmware_py.mavlink.node import MavlinkNode
 from sitl.link_input import LinkInput
 from sitl.link_urls import LinkUrl, is_loopback
 from sitl.links import Carrier, Receive, UdpAddresses, open_udp
 from sitl.stream_links import Closable, Joined, SerialLine, TcpClient, TcpServer
+from wire.link import LinkProfile
 
 
 class LinkHub:

@@ -17,7 +17,8 @@ from dataclasses import dataclass, replace
 from math import inf
 from urllib.parse import parse_qsl
 
-from firmware_py.mavlink.links import GROUND, NORMAL, ONBOARD, LinkProfile
+from firmware_py.mavlink.rates import GROUND, NORMAL, ONBOARD
+from wire.link import LinkProfile
 
 SCHEMES = ("udpout", "udpin", "tcpin", "tcpout", "serial")
 EXAMPLES = "udpout://192.168.1.20:14550, tcpin://127.0.0.1:5760, serial:///dev/ttyS1:57600?streams=onboard"

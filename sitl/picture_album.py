@@ -6,7 +6,7 @@ import errno
 from datetime import UTC, datetime
 from typing import TYPE_CHECKING, Protocol
 
-from firmware_py.mavlink.camera_model import PictureSpace
+from firmware_py.mavlink.camera.model import PictureSpace
 from firmware_py.storage import Path, Storage
 
 if TYPE_CHECKING:

@@ -5,9 +5,10 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-from firmware_py.mavlink.links import GROUND, ONBOARD, LinkProfile
+from firmware_py.mavlink.rates import GROUND, ONBOARD
 from sitl.link_urls import LinkError, LinkUrl, host_and_port, is_loopback
 from sitl.links import Address, UdpAddresses
+from wire.link import LinkProfile
 from wire.signing import SigningKey
 
 _LAST_ONBOARD_PORT = 14549  # PX4 sends all instances beyond the tenth there

@@ -10,8 +10,8 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from math import atan2, hypot, nan
 
-from firmware_py.mavlink.port import AutopilotPort
-from firmware_py.mavlink.sensing import EARTH_FIELD_NED_GAUSS, pressure_hpa, temperature_k, to_body
+from firmware_py.autopilot import Autopilot
+from firmware_py.mavlink.telemetry.sensing import EARTH_FIELD_NED_GAUSS, pressure_hpa, temperature_k, to_body
 from firmware_py.setpoints import AttitudeSetpoint, BodyRateSetpoint
 from firmware_py.status import NAVIGATION_STATES, LandedState
 from firmware_py.types import GeodeticPoint
@@ -45,7 +45,7 @@ class Sample:
         place: where on Earth; None: not known.
     """
 
-    autopilot: AutopilotPort
+    autopilot: Autopilot
     time_us: int
     unix_us: int
     place: GeodeticPoint | None

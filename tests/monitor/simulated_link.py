@@ -19,9 +19,9 @@ from dataclasses import asdict
 from math import inf, isfinite
 
 from firmware_py.airframe import load_airframe
-from firmware_py.mavlink import GROUND, ONBOARD, MavlinkNode
-from firmware_py.mavlink.camera_model import CameraModel
-from firmware_py.mavlink.video_links import VideoEncoding, VideoStream
+from firmware_py.mavlink.camera.model import CameraModel, VideoEncoding, VideoStream
+from firmware_py.mavlink.node import MavlinkNode, NodeOptions
+from firmware_py.mavlink.rates import GROUND, ONBOARD
 from geometry.axes import flip_vector
 from monitor.ports import Equipment, LinkFailed, Message
 from scenarios.ground import start_position
@@ -33,6 +33,7 @@ from sitl.camera_feed import CameraFeed
 from sitl.simulation import Simulation
 from sitl.video import VideoServer
 from sitl.world import CONTROL_PERIOD_US
+from tests.node_input import deliver
 from wire.dialect import mavlink
 from wire.mission_messages import COMPONENT_ID
 
@@ -74,10 +75,12 @@ class SimulatedDrone:
         self.node = MavlinkNode(
             self.simulation.autopilot,
             (GROUND, ONBOARD),
-            self.system_id,
-            boot_unix_us=BOOT_UNIX_US + 1_000_000_000 * self.boots,
-            video=streams,
-            camera=CameraModel(320, 240, 1.57, 10.0) if streams else None,
+            NodeOptions(
+                self.system_id,
+                boot_unix_us=BOOT_UNIX_US + 1_000_000_000 * self.boots,
+                video=streams,
+                camera=CameraModel(320, 240, 1.57, 10.0) if streams else None,
+            ),
         )
         self.boots += 1
 
@@ -104,7 +107,7 @@ class SimulatedDrone:
 
     def hear_app(self, message: Message) -> None:
         """Take a message of the app on its onboard link."""
-        self.node.receive(ONBOARD.name, message.pack(self._app))
+        deliver(self.node, ONBOARD.name, message.pack(self._app))
         self._app.seq = (self._app.seq + 1) % 256
 
     def referee_answer(self) -> dict[str, object]:
@@ -241,7 +244,7 @@ class SimulatedLink:
             data = self._waiting.popleft()
             for drone in self.drones:
                 if not self.muted:
-                    drone.node.receive(GROUND.name, data)
+                    deliver(drone.node, GROUND.name, data)
                 self._parse(drone.output(), messages)
 
     def _parse(self, datagrams: list[bytes], messages: list[Message]) -> None:

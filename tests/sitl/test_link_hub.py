@@ -9,7 +9,7 @@ import pytest
 
 from firmware_py.airframe import load_airframe
 from firmware_py.autopilot import Autopilot
-from firmware_py.mavlink import MavlinkNode
+from firmware_py.mavlink.node import MavlinkNode
 from firmware_py.types import GeodeticPoint
 from sitl.link_hub import LinkHub
 from sitl.link_urls import LinkError, parse_link

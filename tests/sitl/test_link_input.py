@@ -4,7 +4,8 @@ import pytest
 
 from firmware_py.airframe import load_airframe
 from firmware_py.autopilot import Autopilot
-from firmware_py.mavlink import GROUND, ONBOARD, MavlinkNode
+from firmware_py.mavlink.node import MavlinkNode
+from firmware_py.mavlink.rates import GROUND, ONBOARD
 from firmware_py.types import GeodeticPoint
 from sitl.link_input import LinkInput
 from wire.dialect import mavlink
@@ -44,7 +45,7 @@ class Inlet:
         return most_s
 
     def heard(self, link):
-        return self.node._links[link].traffic.messages_heard
+        return self.node._exchange.links[link].traffic.messages_heard
 
 
 @pytest.fixture
@@ -100,7 +101,7 @@ def test_what_is_dropped_is_told_but_not_each_time(inlet):
     assert len(inlet.said) == 2
     inlet.pass_time(30.0)
     assert len(inlet.said) == 2
-    status = inlet.node._links["onboard"]
+    status = inlet.node._exchange.links["onboard"]
     assert status.reader.overflows > 50
 
 

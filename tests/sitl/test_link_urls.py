@@ -4,7 +4,7 @@ from math import inf
 
 import pytest
 
-from firmware_py.mavlink.links import GROUND, NORMAL, ONBOARD
+from firmware_py.mavlink.rates import GROUND, NORMAL, ONBOARD
 from sitl.link_urls import LinkError, host_and_port, is_loopback, parse_link
 
 

@@ -8,9 +8,11 @@ from math import nan
 
 import pytest
 
-from firmware_py.mavlink import ONBOARD, MavlinkNode
+from firmware_py.mavlink.node import MavlinkNode
+from firmware_py.mavlink.rates import ONBOARD
 from scenarios.loader import load_scenario
 from sitl.simulation import Simulation
+from tests.node_input import deliver
 from wire.dialect import mavlink
 from wire.framing import PacketReader
 
@@ -104,7 +106,7 @@ class Replay:
         )
 
     def _send(self, message):
-        self.node.receive(ONBOARD.name, message.pack(self._peer))
+        deliver(self.node, ONBOARD.name, message.pack(self._peer))
 
     def of(self, kind):
         """What came of a kind of message, each with its time."""

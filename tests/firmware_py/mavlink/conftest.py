@@ -5,12 +5,14 @@ import pytest
 
 from firmware_py.airframe import Airframe, load_airframe
 from firmware_py.geodesy import LocalProjection, is_on_earth
-from firmware_py.mavlink import GROUND, ONBOARD, MavlinkNode
+from firmware_py.mavlink.node import MavlinkNode, NodeOptions
+from firmware_py.mavlink.rates import GROUND, ONBOARD
 from firmware_py.missions.store import MissionStore
 from firmware_py.parameters import Parameters
 from firmware_py.status import CommandResult, FlightMode, VehicleStatus
 from firmware_py.types import BatteryState, FlightRecord, GeodeticPoint, MotorOutput, StatusText, VehicleState
 from tests.firmware_py.mavlink.lossy import LossyPeer
+from tests.node_input import deliver
 from wire.dialect import mavlink
 from wire.framing import PacketReader
 
@@ -110,7 +112,7 @@ class Peer:
 
     def __init__(self, autopilot, *, system=245, component=191, links=(ONBOARD, GROUND), node_options=None):
         self.autopilot = autopilot
-        self.node = MavlinkNode(autopilot, links, **(node_options or {}))
+        self.node = MavlinkNode(autopilot, links, NodeOptions(**(node_options or {})))
         self.packer = mavlink.MAVLink(None, system, component)
         self.time_us = 0
         self._readers = {profile.name: PacketReader() for profile in links}
@@ -135,7 +137,7 @@ class Peer:
         ]
 
     def send(self, message, link="onboard", **options):
-        self.node.receive(link, message.pack(self.packer, **options))
+        deliver(self.node, link, message.pack(self.packer, **options))
 
     def ask(self, message, link="onboard"):
         """Send a message and give the answers, sent at once on that link."""

@@ -2,6 +2,7 @@
 
 import random
 
+from tests.node_input import deliver
 from wire.framing import PacketReader
 
 
@@ -67,7 +68,7 @@ class LossyPeer:
     def send(self, message, **options):
         """Send a message to the node, with luck."""
         for datagram in self.up.push(message.pack(self.peer.packer, **options)):
-            self.peer.node.receive(self.link, datagram)
+            deliver(self.peer.node, self.link, datagram)
 
     def take(self):
         """Messages that arrived from the node now, streams and all."""

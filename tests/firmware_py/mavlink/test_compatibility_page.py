@@ -5,11 +5,9 @@ from pathlib import Path
 
 import pytest
 
-from firmware_py.mavlink import GROUND, ONBOARD
-from firmware_py.mavlink.camera_model import CAMERA_COMPONENT_ID, CameraModel
-from firmware_py.mavlink.commands import COMMANDS
-from firmware_py.mavlink.node import MavlinkNode
-from firmware_py.mavlink.streams import DATED_SOURCES, SOURCES
+from firmware_py.mavlink.camera.model import CAMERA_COMPONENT_ID, CameraModel
+from firmware_py.mavlink.node import MavlinkNode, NodeOptions
+from firmware_py.mavlink.rates import GROUND, ONBOARD
 from wire.dialect import mavlink
 
 PAGE = (Path(__file__).parents[3] / "docs" / "px4-compatibility.md").read_text(encoding="utf-8")
@@ -25,21 +23,26 @@ COMMAND_NAMES = {
 def node(airframe):
     from tests.firmware_py.mavlink.conftest import FakeAutopilot
 
-    return MavlinkNode(FakeAutopilot(airframe), (ONBOARD, GROUND), camera=CameraModel(320, 240, 1.57, 10.0))
+    camera = CameraModel(320, 240, 1.57, 10.0)
+    return MavlinkNode(FakeAutopilot(airframe), (ONBOARD, GROUND), NodeOptions(camera=camera, shell=True))
 
 
 def test_every_message_that_is_handled_or_sent_is_on_the_page(node):
-    ids = set(SOURCES) | set(DATED_SOURCES) | set(node._exchange.sources)
-    ids |= {message_id for table in node._handlers.values() for message_id in table}
+    ids = {
+        message_id
+        for service in node.services
+        for message_id in (*service.sources, *service.replies, *service.handlers)
+    }
+    assert len(ids) >= 80
     ids |= set(ONBOARD.rates_hz) | set(GROUND.rates_hz)
     names = {mavlink.mavlink_map[number].msgname for number in ids if number in mavlink.mavlink_map}
     assert names - NAMED - {"COMMAND_LONG", "COMMAND_INT"} == set()
 
 
 def test_every_command_is_on_the_page(node):
-    camera = node._exchange.camera
+    (camera,) = (service for service in node.services if service.component_id == CAMERA_COMPONENT_ID)
     requests = {name for name in COMMAND_NAMES.values() if name.startswith("REQUEST_")}
-    own = {COMMAND_NAMES[number] for number in COMMANDS}
+    own = {COMMAND_NAMES[number] for service in node.services for number in service.commands}
     cameras = {COMMAND_NAMES[number] for number in camera._commands} - requests
     assert (own | cameras) - NAMED == set()
     assert CAMERA_COMPONENT_ID == 100

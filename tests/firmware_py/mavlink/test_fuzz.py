@@ -12,6 +12,7 @@ from firmware_py.autopilot import Autopilot
 from firmware_py.control.limits import FlightLimits
 from firmware_py.status import FlightMode
 from firmware_py.types import GeodeticPoint, MotorOutput, Sensors
+from tests.node_input import deliver
 from wire.dialect import mavlink
 
 LINKS = ("onboard", "ground")
@@ -77,7 +78,7 @@ def test_twenty_thousand_sound_packets_of_every_id_with_random_content(real, mak
         kind = kinds[count % len(kinds)]
         payload = aimed(kind, rng.randbytes(kind.unpacker.size), rng)
         source = (rng.randrange(2, 256), rng.randrange(256))
-        peer.node.receive(LINKS[count % 2], frame(kind, payload, count, source))
+        deliver(peer.node, LINKS[count % 2], frame(kind, payload, count, source))
         if count % 50 == 0:
             peer.time_us += 4000
             real.step(standing(1_200_000 + peer.time_us))
@@ -198,7 +199,7 @@ class Calm:
 def test_random_bytes_are_no_messages(autopilot, make_peer, pieces):
     peer = make_peer(autopilot)
     for piece in pieces:
-        peer.node.receive("ground", piece)
+        deliver(peer.node, "ground", piece)
     assert peer.take() == []
     assert autopilot.calls == []
     assert peer.node.failed_messages == 0

@@ -5,7 +5,8 @@ from hashlib import sha256
 
 import pytest
 
-from firmware_py.mavlink.links import GROUND, ONBOARD
+from firmware_py.mavlink.rates import GROUND, ONBOARD
+from tests.node_input import deliver
 from wire.dialect import mavlink
 from wire.signing import Signing, SigningKey
 
@@ -93,9 +94,9 @@ def test_a_wrong_signature_is_refused_everywhere(signed_peer, link):
 def test_nothing_is_heard_twice(signed_peer):
     give_key(signed_peer.packer)
     packet = signed_peer.long(mavlink.MAV_CMD_REQUEST_MESSAGE, 148).pack(signed_peer.packer)
-    signed_peer.node.receive("radio", packet)
+    deliver(signed_peer.node, "radio", packet)
     assert signed_peer.take()
-    signed_peer.node.receive("radio", packet)
+    deliver(signed_peer.node, "radio", packet)
     assert signed_peer.take() == []
 
 
@@ -130,7 +131,7 @@ def test_a_changed_packet_is_refused(signed_peer):
     for place in (-1, -7, -13):  # signature, timestamp, link id
         broken = bytearray(whole)
         broken[place] ^= 1
-        signed_peer.node.receive("radio", bytes(broken))
+        deliver(signed_peer.node, "radio", bytes(broken))
     assert signed_peer.take() == []
     assert signed_peer.node.refused_packets == 3
 

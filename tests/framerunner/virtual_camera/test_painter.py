@@ -7,14 +7,15 @@ import numpy as np
 import pytest
 from pymavlink.dialects.v20 import common as mavlink
 
-from firmware_py.mavlink.links import GROUND
 from firmware_py.mavlink.node import MavlinkNode
+from firmware_py.mavlink.rates import GROUND
 from framerunner.virtual_camera.lift import lifted
 from framerunner.virtual_camera.painter import VirtualCamera, start_pose
 from scenarios.loader import load_scenario
 from sitl.camera import Camera
 from sitl.camera_feed import CameraFeed
 from sitl.simulation import Simulation
+from tests.node_input import deliver
 from vision.detector import detect
 
 SCENARIO = load_scenario("test-case-1")
@@ -183,7 +184,7 @@ def fly_simulation(scenario, seconds):
         simulation.tick()
         order = orders.get(simulation.time_us)
         if order is not None:
-            node.receive(GROUND.name, pilot.command_long_encode(1, 1, order[0], 0, *order[1:]).pack(pilot))
+            deliver(node, GROUND.name, pilot.command_long_encode(1, 1, order[0], 0, *order[1:]).pack(pilot))
         node.update(simulation.autopilot.state.time_us)
         for _, data in node.take_output():
             for message in wire.parse_buffer(data) or ():

@@ -1,0 +1,1 @@
+"""The camera, a component of its own."""

@@ -1,0 +1,303 @@
+"""The camera: a component of its own beside the autopilot (https://mavlink.io/en/services/camera.html).
+
+It takes pictures and tells where its video is. It does not record, zoom, focus or track, and says so. Its
+video always runs, so it cannot be stopped.
+"""
+
+from __future__ import annotations
+
+from collections import OrderedDict
+from collections.abc import Callable
+from functools import partial
+from math import dist, inf, isfinite, isnan
+
+from firmware_py.autopilot import Autopilot
+from firmware_py.mavlink.camera import messages
+from firmware_py.mavlink.camera.model import (
+    CAMERA_COMPONENT_ID,
+    CameraModel,
+    CaptureSink,
+    CountingSink,
+    VideoStream,
+)
+from firmware_py.mavlink.service import Command, Service, SevenParams
+from firmware_py.status import CommandResult
+from geometry.vectors import Vec3
+from wire.dialect import Message, mavlink
+from wire.exchange import Exchange
+
+_REMEMBERED = 1000  # pictures that can be told again
+_MAX_INTERVAL_S = 86400.0
+_MAX_COUNT = 1_000_000
+_HEARTBEAT_US = 1_000_000
+
+_REQUESTS: dict[int, tuple[int, int]] = {
+    # Older than REQUEST_MESSAGE: the message, and which of their parameters holds its index (0: none).
+    mavlink.MAV_CMD_REQUEST_CAMERA_INFORMATION: (mavlink.MAVLINK_MSG_ID_CAMERA_INFORMATION, 0),
+    mavlink.MAV_CMD_REQUEST_CAMERA_SETTINGS: (mavlink.MAVLINK_MSG_ID_CAMERA_SETTINGS, 0),
+    mavlink.MAV_CMD_REQUEST_STORAGE_INFORMATION: (mavlink.MAVLINK_MSG_ID_STORAGE_INFORMATION, 1),
+    mavlink.MAV_CMD_REQUEST_CAMERA_CAPTURE_STATUS: (mavlink.MAVLINK_MSG_ID_CAMERA_CAPTURE_STATUS, 0),
+    mavlink.MAV_CMD_REQUEST_CAMERA_IMAGE_CAPTURE: (mavlink.MAVLINK_MSG_ID_CAMERA_IMAGE_CAPTURED, 1),
+    mavlink.MAV_CMD_REQUEST_VIDEO_STREAM_INFORMATION: (mavlink.MAVLINK_MSG_ID_VIDEO_STREAM_INFORMATION, 1),
+    mavlink.MAV_CMD_REQUEST_VIDEO_STREAM_STATUS: (mavlink.MAVLINK_MSG_ID_VIDEO_STREAM_STATUS, 1),
+}
+
+
+class Captures:
+    """Takes pictures when they are due and tells everybody.
+
+    Attributes:
+        count: pictures taken since boot.
+        interval_s: of the series under way; 0: none.
+    """
+
+    def __init__(
+        self, autopilot: Autopilot, exchange: Exchange, camera: CameraModel, sink: CaptureSink
+    ) -> None:
+        self._autopilot = autopilot
+        self._exchange = exchange
+        self._shortest_s = 1.0 / camera.rate_hz
+        self._sink = sink
+        self._told: OrderedDict[int, Message] = OrderedDict()
+        self._left = 0.0
+        self._due_us = 0
+        self._spacing_m = 0.0
+        self._last_place_ned_m: Vec3 | None = None
+        self.count = 0
+        self.interval_s = 0.0
+
+    def start(self, interval_s: float, count: int) -> CommandResult:
+        """Take pictures from now on, instead of a series under way.
+
+        Args:
+            interval_s: between them, in vehicle time; not less than the camera needs.
+            count: how many; 0: until stopped.
+
+        Returns:
+            ACCEPTED; FAILED if the one picture could not be taken; DENIED for a time or count that is none.
+        """
+        if not (0.0 <= interval_s <= _MAX_INTERVAL_S and 0 <= count <= _MAX_COUNT):
+            return CommandResult.DENIED
+        if count == 1:
+            return CommandResult.ACCEPTED if self._take() else CommandResult.FAILED
+        self.interval_s = max(interval_s, self._shortest_s)
+        self._left = count or inf
+        self._due_us = self._exchange.time_us
+        return CommandResult.ACCEPTED
+
+    def every(self, spacing_m: float) -> CommandResult:
+        """Take a picture each time the vehicle has gone so far; 0: no more."""
+        if not 0.0 <= spacing_m < inf:
+            return CommandResult.DENIED
+        self._spacing_m = spacing_m
+        self._last_place_ned_m = None
+        return CommandResult.ACCEPTED
+
+    def stop(self) -> None:
+        """End all series."""
+        self.interval_s = 0.0
+        self._spacing_m = 0.0
+
+    def told(self, index: int) -> Message | None:
+        """What was told of a picture; None if that is forgotten, or there is none."""
+        return self._told.get(index)
+
+    def update(self) -> None:
+        """Take what is due."""
+        if self.interval_s > 0.0 and self._exchange.time_us >= self._due_us:
+            self._take()
+            self._due_us = max(self._due_us + round(self.interval_s * 1e6), self._exchange.time_us)
+            self._left -= 1
+            if self._left <= 0:
+                self.interval_s = 0.0
+        if self._spacing_m > 0.0:
+            self._take_by_distance()
+
+    def _take_by_distance(self) -> None:
+        place = self._autopilot.state.position_ned_m
+        last = self._last_place_ned_m
+        if last is None or dist(place, last) >= self._spacing_m:
+            self._last_place_ned_m = place
+            self._take()
+
+    def _take(self) -> bool:
+        exchange, index = self._exchange, self.count
+        url = self._sink.capture(exchange.time_us, index)
+        message = messages.image_captured(self._autopilot, exchange, index, url)
+        if url is not None:
+            self.count += 1
+            self._told[index] = message
+            if len(self._told) > _REMEMBERED:
+                self._told.popitem(last=False)
+        exchange.broadcast(message, CAMERA_COMPONENT_ID)
+        return url is not None
+
+
+class CameraComponent(Service):
+    """Answers for the camera, sends its heartbeat and takes its pictures.
+
+    Args:
+        camera: which.
+        video: its streams, the one to be preferred first.
+        sink: who takes and keeps pictures; by default they are only counted.
+    """
+
+    component_id = CAMERA_COMPONENT_ID
+
+    def __init__(
+        self,
+        autopilot: Autopilot,
+        exchange: Exchange,
+        camera: CameraModel,
+        video: tuple[VideoStream, ...] = (),
+        sink: CaptureSink | None = None,
+    ) -> None:
+        self._autopilot = autopilot
+        self._exchange = exchange
+        self._camera = camera
+        self._video = video
+        self._sink: CaptureSink = sink if sink is not None else CountingSink()
+        self._captures = Captures(autopilot, exchange, camera, self._sink)
+        self._heartbeat_due_us = 0
+        self._last_single: tuple[int, int, float] | None = None
+        self._work: dict[int, Callable[[SevenParams], CommandResult]] = {
+            mavlink.MAV_CMD_DO_DIGICAM_CONTROL: self._digicam,
+            mavlink.MAV_CMD_DO_SET_CAM_TRIGG_DIST: self._trigger_distance,
+            mavlink.MAV_CMD_DO_SET_CAM_TRIGG_INTERVAL: self._trigger_interval,
+            mavlink.MAV_CMD_RESET_CAMERA_SETTINGS: self._stop_images,
+            mavlink.MAV_CMD_SET_CAMERA_MODE: self._set_mode,
+            mavlink.MAV_CMD_IMAGE_START_CAPTURE: self._start_images,
+            mavlink.MAV_CMD_IMAGE_STOP_CAPTURE: self._stop_images,
+            mavlink.MAV_CMD_VIDEO_START_CAPTURE: _cannot,
+            mavlink.MAV_CMD_VIDEO_STOP_CAPTURE: _cannot,
+            mavlink.MAV_CMD_VIDEO_START_STREAMING: self._start_streaming,
+            mavlink.MAV_CMD_VIDEO_STOP_STREAMING: _cannot,
+            mavlink.MAV_CMD_STORAGE_FORMAT: _cannot,
+            mavlink.MAV_CMD_SET_CAMERA_ZOOM: _cannot,
+            mavlink.MAV_CMD_SET_CAMERA_FOCUS: _cannot,
+        }
+        self.commands = {
+            **{number: partial(_run, work) for number, work in self._work.items()},
+            **{number: partial(self._answer, *asked) for number, asked in _REQUESTS.items()},
+            mavlink.MAV_CMD_IMAGE_START_CAPTURE: self._start_once,
+            mavlink.MAV_CMD_REQUEST_MESSAGE: self._request_message,
+        }
+
+    def update(self) -> None:
+        """Send the heartbeat and take pictures that are due."""
+        time_us = self._exchange.time_us
+        if time_us >= self._heartbeat_due_us:
+            self._heartbeat_due_us = time_us - time_us % _HEARTBEAT_US + _HEARTBEAT_US
+            beat = messages.heartbeat(self._autopilot.status.mode)
+            self._exchange.broadcast(beat, CAMERA_COMPONENT_ID)
+        self._captures.update()
+
+    def run(self, command: int, params: SevenParams) -> CommandResult:
+        """Do what a MAV_CMD to the camera says, from a mission for one; UNSUPPORTED if it is none of ours."""
+        work = self._work.get(command)
+        return CommandResult.UNSUPPORTED if work is None else work(params)
+
+    def takes_broadcast(self, command: int) -> bool:
+        """Whether a command to all components is the camera's, and not the autopilot's."""
+        return command in self.commands and command != mavlink.MAV_CMD_REQUEST_MESSAGE
+
+    def _start_once(self, command: Command) -> CommandResult:
+        """IMAGE_START_CAPTURE; the same single picture, which its number tells, is not taken again."""
+        _, _, count, number = command.params
+        if command.repeated and count == 1.0 and self._last_single == (*command.sender, number):
+            return CommandResult.ACCEPTED
+        result = self._start_images(command.all_params)
+        if result is CommandResult.ACCEPTED:
+            self._last_single = (*command.sender, number)
+        return result
+
+    def _request_message(self, command: Command) -> CommandResult:
+        message_id = command.params[0]
+        return self._send(command, int(message_id) if isfinite(message_id) else -1, command.params[1])
+
+    def _answer(self, message_id: int, place: int, command: Command) -> CommandResult:
+        """A request that is older than REQUEST_MESSAGE."""
+        return self._send(command, message_id, command.all_params[place - 1] if place else 0.0)
+
+    def _send(self, command: Command, message_id: int, argument: float) -> CommandResult:
+        index = int(argument) if isfinite(argument) and 0 <= argument < 1 << 31 else 0
+        answers = self._requested(message_id, index)
+        for answer in answers:
+            self._exchange.send(command.link, answer, CAMERA_COMPONENT_ID)
+        return CommandResult.ACCEPTED if answers else CommandResult.DENIED
+
+    def _requested(self, message_id: int, index: int) -> list[Message]:
+        time_us, captures = self._exchange.time_us, self._captures
+        match message_id:
+            case mavlink.MAVLINK_MSG_ID_CAMERA_INFORMATION:
+                streams = bool(self._video)
+                message = messages.information(self._camera, streams=streams, time_us=time_us)
+            case mavlink.MAVLINK_MSG_ID_CAMERA_SETTINGS:
+                message = messages.settings(time_us)
+            case mavlink.MAVLINK_MSG_ID_STORAGE_INFORMATION if index <= 1:
+                message = messages.storage_information(self._sink.space(), time_us)
+            case mavlink.MAVLINK_MSG_ID_CAMERA_CAPTURE_STATUS:
+                space = self._sink.space()
+                message = messages.capture_status(captures.interval_s, captures.count, space, time_us)
+            case mavlink.MAVLINK_MSG_ID_CAMERA_IMAGE_CAPTURED:
+                message = captures.told(index)
+            case _:
+                return self._of_streams(message_id, index)
+        return [] if message is None else [message]
+
+    def _of_streams(self, message_id: int, index: int) -> list[Message]:
+        """What is asked about a stream, numbered from 1, or about all, 0."""
+        streams = self._video
+        wanted = [(n, stream) for n, stream in enumerate(streams, start=1) if index in (0, n)]
+        told = [messages.stream_information(stream, n, len(streams)) for n, stream in wanted]
+        if message_id == mavlink.MAVLINK_MSG_ID_VIDEO_STREAM_INFORMATION:
+            return told
+        if message_id != mavlink.MAVLINK_MSG_ID_VIDEO_STREAM_STATUS:
+            return []
+        # MAVSDK 4.1 asks for nothing but the status, yet shows the last information that it hears: so that
+        # comes too, the preferred stream's last.
+        return [*reversed(told), *(messages.stream_status(stream, n) for n, stream in wanted)]
+
+    def _start_images(self, params: SevenParams) -> CommandResult:
+        interval_s = 0.0 if isnan(params[1]) else params[1]
+        return self._captures.start(interval_s, 1 if isnan(params[2]) else _whole_count(params[2]))
+
+    def _stop_images(self, _params: SevenParams) -> CommandResult:
+        self._captures.stop()
+        return CommandResult.ACCEPTED
+
+    def _digicam(self, params: SevenParams) -> CommandResult:
+        return self._captures.start(0.0, 1) if params[4] == 1.0 else CommandResult.UNSUPPORTED
+
+    def _trigger_distance(self, params: SevenParams) -> CommandResult:
+        result = self._captures.every(max(0.0, params[0]))
+        if result is CommandResult.ACCEPTED and params[2] == 1.0 and params[0] <= 0.0:
+            return self._captures.start(0.0, 1)
+        return result
+
+    def _trigger_interval(self, params: SevenParams) -> CommandResult:
+        if params[0] <= 0.0:
+            return self._stop_images(params)
+        return self._captures.start(params[0] / 1e3, 0)
+
+    def _set_mode(self, params: SevenParams) -> CommandResult:
+        image = params[1] == mavlink.CAMERA_MODE_IMAGE
+        return CommandResult.ACCEPTED if image else CommandResult.DENIED
+
+    def _start_streaming(self, params: SevenParams) -> CommandResult:
+        """It runs already, if it is there: stream 0 means all."""
+        there = isnan(params[0]) or 0 <= params[0] <= len(self._video)
+        return CommandResult.ACCEPTED if there and self._video else CommandResult.DENIED
+
+
+def _run(work: Callable[[SevenParams], CommandResult], command: Command) -> CommandResult:
+    return work(command.all_params)
+
+
+def _cannot(_params: SevenParams) -> CommandResult:
+    return CommandResult.UNSUPPORTED
+
+
+def _whole_count(number: float) -> int:
+    """A count as commands carry it; -1 for what is none."""
+    return int(number) if isfinite(number) and 0.0 <= number <= _MAX_COUNT else -1

@@ -1,0 +1,169 @@
+"""The messages of a camera component (https://mavlink.io/en/services/camera.html)."""
+
+from __future__ import annotations
+
+from math import nan
+
+from firmware_py.autopilot import Autopilot
+from firmware_py.mavlink.camera.model import CameraModel, PictureSpace, VideoEncoding, VideoStream
+from firmware_py.mavlink.scaling import boot_ms, degrees_e7, millimetres
+from firmware_py.mavlink.telemetry.identity import OWN_VERSION
+from firmware_py.status import FlightMode
+from wire.dialect import Message, mavlink
+from wire.exchange import Exchange
+
+_FLAGS = mavlink.CAMERA_CAP_FLAGS_CAPTURE_IMAGE
+_RUNNING = mavlink.VIDEO_STREAM_STATUS_FLAGS_RUNNING
+# MAVLink has no type for MJPEG over HTTP: the nearest is a stream over TCP of unknown encoding.
+_TYPES = {
+    VideoEncoding.MJPEG_HTTP: (mavlink.VIDEO_STREAM_TYPE_TCP_MPEG, mavlink.VIDEO_STREAM_ENCODING_UNKNOWN),
+    VideoEncoding.H264_RTP: (mavlink.VIDEO_STREAM_TYPE_RTPUDP, mavlink.VIDEO_STREAM_ENCODING_H264),
+}
+_INTERVAL_SET = 2  # image_status of CAMERA_CAPTURE_STATUS
+_URI_BYTES, _NAME_BYTES, _LABEL_BYTES, _FILE_BYTES = 160, 32, 32, 205
+
+
+def heartbeat(mode: FlightMode) -> Message:
+    """HEARTBEAT of a camera, which is no autopilot.
+
+    It tells the vehicle's mode too: MAVSDK's follow-me takes any component's heartbeat for the vehicle's,
+    and would end following with each one that tells none.
+
+    Args:
+        mode: the vehicle's.
+    """
+    return mavlink.MAVLink_heartbeat_message(
+        mavlink.MAV_TYPE_CAMERA,
+        mavlink.MAV_AUTOPILOT_INVALID,
+        mavlink.MAV_MODE_FLAG_CUSTOM_MODE_ENABLED,
+        mode.custom_mode,
+        mavlink.MAV_STATE_ACTIVE,
+        3,
+    )
+
+
+def information(camera: CameraModel, *, streams: bool, time_us: int) -> Message:
+    """CAMERA_INFORMATION.
+
+    Args:
+        camera: which.
+        streams: whether there is video to be watched.
+        time_us: vehicle time.
+    """
+    major, minor, patch = OWN_VERSION
+    flags = _FLAGS | (mavlink.CAMERA_CAP_FLAGS_HAS_VIDEO_STREAM if streams else 0)
+    return mavlink.MAVLink_camera_information_message(
+        boot_ms(time_us),
+        list(_padded(camera.vendor, _LABEL_BYTES)),
+        list(_padded(camera.name, _LABEL_BYTES)),
+        major | minor << 8 | patch << 16,
+        camera.focal_length_mm,
+        *camera.sensor_size_mm,
+        camera.width_px,
+        camera.height_px,
+        0,
+        flags,
+        0,
+        b"",
+    )
+
+
+def settings(time_us: int) -> Message:
+    """CAMERA_SETTINGS: it takes images, and has neither zoom nor focus."""
+    return mavlink.MAVLink_camera_settings_message(boot_ms(time_us), mavlink.CAMERA_MODE_IMAGE, nan, nan)
+
+
+def storage_information(space: PictureSpace | None, time_us: int) -> Message:
+    """STORAGE_INFORMATION: one storage, or none."""
+    if space is None:
+        return mavlink.MAVLink_storage_information_message(
+            boot_ms(time_us), 0, 0, mavlink.STORAGE_STATUS_EMPTY, 0.0, 0.0, 0.0, 0.0, 0.0
+        )
+    return mavlink.MAVLink_storage_information_message(
+        boot_ms(time_us),
+        1,
+        1,
+        mavlink.STORAGE_STATUS_READY,
+        space.total_mib,
+        space.used_mib,
+        max(0.0, space.total_mib - space.used_mib),
+        0.0,
+        0.0,
+        mavlink.STORAGE_TYPE_OTHER,
+        b"vehicle",
+        mavlink.STORAGE_USAGE_FLAG_SET | mavlink.STORAGE_USAGE_FLAG_PHOTO,
+    )
+
+
+def capture_status(interval_s: float, count: int, space: PictureSpace | None, time_us: int) -> Message:
+    """CAMERA_CAPTURE_STATUS; it never records.
+
+    Args:
+        interval_s: between the pictures of the series under way; 0: there is none.
+        count: of pictures taken since boot.
+        space: for pictures.
+        time_us: vehicle time.
+    """
+    available_mib = max(0.0, space.total_mib - space.used_mib) if space else 0.0
+    image_status = _INTERVAL_SET if interval_s > 0.0 else 0
+    return mavlink.MAVLink_camera_capture_status_message(
+        boot_ms(time_us), image_status, 0, interval_s, 0, available_mib, count
+    )
+
+
+def image_captured(autopilot: Autopilot, exchange: Exchange, index: int, url: str | None) -> Message:
+    """CAMERA_IMAGE_CAPTURED: a picture taken now, where, and its URL; None: it could not be taken."""
+    place, home = autopilot.global_position(), autopilot.status.home
+    altitude_m = place.altitude_m if place else 0.0
+    return mavlink.MAVLink_camera_image_captured_message(
+        boot_ms(exchange.time_us),
+        exchange.unix_us,
+        0,
+        degrees_e7(place.latitude_deg) if place else 0,
+        degrees_e7(place.longitude_deg) if place else 0,
+        millimetres(altitude_m),
+        millimetres(altitude_m - home.altitude_m) if home else 0,
+        autopilot.state.attitude,
+        index,
+        0 if url is None else 1,
+        (url or "").encode()[:_FILE_BYTES],
+    )
+
+
+def stream_information(stream: VideoStream, number: int, count: int) -> Message:
+    """VIDEO_STREAM_INFORMATION of one stream, numbered from 1."""
+    kind, encoding = _TYPES[stream.encoding]
+    return mavlink.MAVLink_video_stream_information_message(
+        number,
+        count,
+        kind,
+        _RUNNING,
+        stream.rate_hz,
+        stream.width_px,
+        stream.height_px,
+        0,
+        0,
+        round(stream.field_of_view_deg),
+        stream.encoding.value.encode()[:_NAME_BYTES],
+        stream.uri.encode()[:_URI_BYTES],
+        encoding,
+    )
+
+
+def stream_status(stream: VideoStream, number: int) -> Message:
+    """VIDEO_STREAM_STATUS of one stream: it always runs."""
+    return mavlink.MAVLink_video_stream_status_message(
+        number,
+        _RUNNING,
+        stream.rate_hz,
+        stream.width_px,
+        stream.height_px,
+        0,
+        0,
+        round(stream.field_of_view_deg),
+    )
+
+
+def _padded(text: str, length: int) -> bytes:
+    """A text in a fixed number of bytes, ended by a zero if it fits."""
+    return text.encode()[:length].ljust(length, b"\0")

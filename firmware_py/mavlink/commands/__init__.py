@@ -1,0 +1,1 @@
+"""Commands: one table from MAV_CMD to handler."""

@@ -1,0 +1,204 @@
+"""Commands that fly: arming, modes, take-off, places, circles, home, region of interest, termination."""
+
+from __future__ import annotations
+
+from math import copysign, floor, isfinite, isinf, isnan, nan
+
+from firmware_py.autopilot import Autopilot
+from firmware_py.guidance.orbit import Orbit, OrbitYaw
+from firmware_py.mavlink.service import Command, Service
+from firmware_py.mavlink.telemetry.identity import MODES_BY_STANDARD
+from firmware_py.status import CommandResult, FlightMode
+from firmware_py.types import GeodeticPoint
+from geometry.vectors import NAN3, Vec3
+from wire.dialect import mavlink
+
+FORCE_MAGIC = 21196.0  # param2 of COMPONENT_ARM_DISARM
+_MODES = {mode.value: mode for mode in FlightMode}
+_WARNING = mavlink.MAV_SEVERITY_WARNING
+_CRITICAL = mavlink.MAV_SEVERITY_CRITICAL
+_MIN_ORBIT_M = 1.0
+
+
+class FlightCommands(Service):
+    """Passes them to the autopilot."""
+
+    def __init__(self, autopilot: Autopilot) -> None:
+        self._autopilot = autopilot
+        self.commands = {
+            mavlink.MAV_CMD_NAV_RETURN_TO_LAUNCH: self._return,
+            mavlink.MAV_CMD_NAV_LAND: self._land,
+            mavlink.MAV_CMD_NAV_TAKEOFF: self._takeoff,
+            mavlink.MAV_CMD_DO_ORBIT: self._orbit,
+            mavlink.MAV_CMD_NAV_ROI: self._look_mode,
+            mavlink.MAV_CMD_DO_SET_MODE: self._set_mode,
+            mavlink.MAV_CMD_DO_CHANGE_SPEED: self._change_speed,
+            mavlink.MAV_CMD_DO_SET_HOME: self._set_home,
+            mavlink.MAV_CMD_DO_FLIGHTTERMINATION: self._terminate,
+            mavlink.MAV_CMD_DO_REPOSITION: self._reposition,
+            mavlink.MAV_CMD_DO_SET_ROI_LOCATION: self._look_at,
+            mavlink.MAV_CMD_DO_SET_ROI_NONE: self._look_ahead,
+            mavlink.MAV_CMD_DO_SET_ROI: self._look_mode,
+            mavlink.MAV_CMD_DO_SET_STANDARD_MODE: self._set_standard_mode,
+            mavlink.MAV_CMD_COMPONENT_ARM_DISARM: self._arm_disarm,
+            mavlink.MAV_CMD_DO_SET_GLOBAL_ORIGIN: self._set_origin,
+        }
+
+    def _arm_disarm(self, command: Command) -> CommandResult | None:
+        autopilot, wanted = self._autopilot, command.params[0]
+        if isnan(wanted):
+            return CommandResult.ACCEPTED  # PX4's odd answer: nothing happens
+        action = floor(wanted + 0.5) if isfinite(wanted) else -1
+        force = command.params[1] == FORCE_MAGIC
+        if action == 1:
+            return autopilot.arm(force=force)
+        if action == 0:
+            return autopilot.disarm(force=force)
+        autopilot.say(_CRITICAL, f"Unsupported ARM_DISARM param: {wanted:g}")
+        return None  # PX4 does not acknowledge this either
+
+    def _takeoff(self, command: Command) -> CommandResult:
+        if isinf(command.altitude_m):
+            return CommandResult.DENIED
+        return self._autopilot.takeoff(command.altitude_amsl_m(self._autopilot.status.home))
+
+    def _land(self, _command: Command) -> CommandResult:
+        return self._autopilot.land()
+
+    def _return(self, _command: Command) -> CommandResult:
+        return self._autopilot.set_mode(FlightMode.RETURN)
+
+    def _set_mode(self, command: Command) -> CommandResult:
+        """DO_SET_MODE: only PX4's custom modes are understood; what is no mode here is refused in words."""
+        base_mode, main, sub, _ = command.params
+        if not isfinite(base_mode) or not int(base_mode) & mavlink.MAV_MODE_FLAG_CUSTOM_MODE_ENABLED:
+            self._autopilot.say(_WARNING, "Mode change refused: only PX4 custom modes are understood")
+            return CommandResult.TEMPORARILY_REJECTED
+        numbers = (_small(main), _small(sub))
+        mode = _MODES.get(numbers)
+        if mode is None:
+            self._autopilot.say(_WARNING, f"Mode change refused: no mode {numbers[0]}.{numbers[1]} here")
+            return CommandResult.TEMPORARILY_REJECTED
+        return self._autopilot.set_mode(mode)
+
+    def _set_standard_mode(self, command: Command) -> CommandResult:
+        wanted = command.params[0]
+        mode = MODES_BY_STANDARD.get(_small(wanted))
+        if mode is None:
+            self._autopilot.say(_WARNING, f"Mode change refused: no standard mode {wanted:g} here")
+            return CommandResult.TEMPORARILY_REJECTED
+        return self._autopilot.set_mode(mode)
+
+    def _reposition(self, command: Command) -> CommandResult:
+        """DO_REPOSITION: param 2 must be 1, as in PX4; what is left open stays as it is."""
+        speed_m_s, flags, _, yaw_rad = command.params
+        if flags != 1.0:
+            return CommandResult.UNSUPPORTED
+        target = self._place(command, command.altitude_amsl_m(self._autopilot.status.home))
+        if target is None:
+            return CommandResult.DENIED
+        return self._autopilot.reposition(
+            target,
+            yaw_rad if isfinite(yaw_rad) else nan,
+            speed_m_s if isfinite(speed_m_s) and speed_m_s > 0 else nan,
+        )
+
+    def _orbit(self, command: Command) -> CommandResult:
+        """DO_ORBIT: a negative radius turns counter-clockwise; what is left open is as PX4 has it."""
+        autopilot = self._autopilot
+        radius_m, speed_m_s, yaw, _ = command.params
+        centre = self._place(command, command.altitude_m)
+        if centre is None:
+            return CommandResult.DENIED
+        radius_m = radius_m if isfinite(radius_m) and radius_m != 0.0 else _MIN_ORBIT_M
+        max_m = autopilot.parameters.value("MC_ORBIT_RAD_MAX")
+        if not _MIN_ORBIT_M <= abs(radius_m) <= max_m:
+            autopilot.say(_CRITICAL, f"Orbit refused: radius {radius_m:g} m, it must be 1 to {max_m:g} m")
+            return CommandResult.DENIED
+        speed_m_s = speed_m_s if isfinite(speed_m_s) else 1.0
+        max_m_s = autopilot.parameters.value("MPC_XY_CRUISE")
+        speed_m_s = min(max(speed_m_s, -max_m_s), max_m_s)
+        known = yaw in tuple(OrbitYaw)
+        behaviour = OrbitYaw(int(yaw) if known else autopilot.parameters.integer("MC_ORBIT_YAW_MOD"))
+        here = autopilot.state.position_ned_m
+        north_m, east_m, down_m = (
+            place if isnan(wanted) else wanted for wanted, place in zip(centre, here, strict=True)
+        )
+        return autopilot.orbit(
+            Orbit((north_m, east_m, down_m), abs(radius_m), copysign(1.0, radius_m) * speed_m_s, behaviour)
+        )
+
+    def _change_speed(self, command: Command) -> CommandResult:
+        speed_m_s = command.params[1]
+        return self._autopilot.change_speed(speed_m_s if isfinite(speed_m_s) and speed_m_s > 0 else nan)
+
+    def _set_home(self, command: Command) -> CommandResult:
+        if command.params[0] > 0.5:
+            return self._autopilot.set_home(None)
+        if not command.has_place or not isfinite(command.altitude_m):
+            return CommandResult.DENIED
+        return self._autopilot.set_home(
+            GeodeticPoint(command.latitude_deg, command.longitude_deg, command.altitude_m)
+        )
+
+    def _set_origin(self, command: Command) -> CommandResult:
+        return self._autopilot.set_origin(
+            GeodeticPoint(command.latitude_deg, command.longitude_deg, command.altitude_m)
+        )
+
+    def _look_at(self, command: Command) -> CommandResult:
+        place = self._place(command, command.altitude_m)
+        if place is None or any(map(isnan, place)):
+            return CommandResult.DENIED
+        return self._autopilot.look_at(place)
+
+    def _look_ahead(self, _command: Command) -> CommandResult:
+        return self._autopilot.look_at(None)
+
+    def _look_mode(self, command: Command) -> CommandResult:
+        """The older DO_SET_ROI: param 1 is the mode, of which none and a place can be had."""
+        mode = command.params[0]
+        if mode == mavlink.MAV_ROI_NONE:
+            return self._look_ahead(command)
+        return self._look_at(command) if mode == mavlink.MAV_ROI_LOCATION else CommandResult.UNSUPPORTED
+
+    def _terminate(self, command: Command) -> CommandResult:
+        if not command.params[0] > 0.5 or not self._autopilot.status.armed:
+            return CommandResult.DENIED
+        return self._autopilot.terminate()
+
+    def _place(self, command: Command, altitude_m: float) -> Vec3 | None:
+        """A command's place, NED metres with NaN for what is not given; None if it is no place on Earth.
+
+        Args:
+            command: with latitude and longitude.
+            altitude_m: above mean sea level. PX4 takes all commands so, whatever the frame. MAVSDK relies
+                on it for circles and home: it names a relative frame and means an absolute altitude. Where no
+                peer does so, take-off and places to fly to, the frame counts.
+        """
+        autopilot = self._autopilot
+        here = autopilot.global_position()
+        if here is None:
+            return None
+        if isnan(command.latitude_deg) and isnan(command.longitude_deg) and isnan(command.altitude_m):
+            return NAN3
+        local = autopilot.local_position(
+            GeodeticPoint(
+                command.latitude_deg if command.has_place else here.latitude_deg,
+                command.longitude_deg if command.has_place else here.longitude_deg,
+                here.altitude_m if isnan(altitude_m) else altitude_m,
+            )
+        )
+        if local is None:
+            return None
+        north_m, east_m, down_m = local
+        return (
+            north_m if command.has_place else nan,
+            east_m if command.has_place else nan,
+            nan if isnan(altitude_m) else down_m,
+        )
+
+
+def _small(number: float) -> int:
+    """A mode number; what cannot be one is 0, which is no mode."""
+    return int(number) if isfinite(number) and 0 <= number <= 255 else 0

@@ -1,0 +1,86 @@
+"""COMMAND_LONG and COMMAND_INT: one table from command to handler, one true COMMAND_ACK each.
+
+Differences from PX4, on purpose:
+
+* DO_SET_MODE gets one acknowledgement, the true one (PX4 sends an early ACCEPTED before it). A mode that does
+  not exist here is TEMPORARILY_REJECTED with the reason as text, also where PX4 accepts and does nothing.
+* Every unknown command is UNSUPPORTED; PX4 is silent to a few (gimbal and camera).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from math import nan
+
+from firmware_py.mavlink.service import Command, CommandHandler, Handler, Service
+from firmware_py.status import CommandResult
+from wire.dialect import BROADCAST, Message, mavlink
+from wire.exchange import Exchange
+from wire.link import Link
+
+_TO_EVERYONE = (
+    mavlink.MAV_CMD_REQUEST_PROTOCOL_VERSION,
+    mavlink.MAV_CMD_REQUEST_AUTOPILOT_CAPABILITIES,
+)
+
+
+class CommandService(Service):
+    """Takes one component's commands to their handlers and acknowledges them.
+
+    Args:
+        component_id: whose commands.
+        table: of all the component's services, by MAV_CMD.
+        takes_broadcast: whether a command to all components is this one's to answer.
+    """
+
+    def __init__(
+        self,
+        exchange: Exchange,
+        component_id: int,
+        table: Mapping[int, CommandHandler],
+        takes_broadcast: Callable[[int], bool],
+    ) -> None:
+        self._exchange = exchange
+        self.component_id = component_id
+        self._table = table
+        self._takes_broadcast = takes_broadcast
+        handlers: dict[int, Handler] = {
+            mavlink.MAVLINK_MSG_ID_COMMAND_LONG: self._receive_long,
+            mavlink.MAVLINK_MSG_ID_COMMAND_INT: self._receive_int,
+        }
+        if mavlink.MAV_CMD_DO_SET_MODE in table:
+            handlers[mavlink.MAVLINK_MSG_ID_SET_MODE] = self._receive_set_mode
+        self.handlers = handlers
+
+    def _receive_long(self, link: Link, message: Message) -> None:
+        self._receive(message, Command.from_long(link, message))
+
+    def _receive_int(self, link: Link, message: Message) -> None:
+        self._receive(message, Command.from_int(link, message))
+
+    def _receive(self, message: Message, command: Command) -> None:
+        """Run a command; one with a wrong target is ignored."""
+        number = message.command
+        or_everyone = number in _TO_EVERYONE and number in self._table
+        if not self._exchange.is_for_us(message, or_everyone=or_everyone, component_id=self.component_id):
+            return
+        if message.target_component != BROADCAST or self._takes_broadcast(number):
+            self._run(number, command)
+
+    def _receive_set_mode(self, link: Link, message: Message) -> None:
+        """The legacy SET_MODE, which QGroundControl uses; acknowledged as DO_SET_MODE, as PX4 does."""
+        if message.target_system != self._exchange.system_id:
+            return
+        main, sub = message.custom_mode >> 16 & 0xFF, message.custom_mode >> 24 & 0xFF
+        if message.custom_mode & 0xFFFF:
+            main = 0  # reserved bits are set, so this is no custom mode of PX4's
+        params = (float(message.base_mode), float(main), float(sub), nan)
+        sender = (message.get_srcSystem(), message.get_srcComponent())
+        self._run(mavlink.MAV_CMD_DO_SET_MODE, Command(link, params, sender=sender))
+
+    def _run(self, number: int, command: Command) -> None:
+        handler = self._table.get(number)
+        result = CommandResult.UNSUPPORTED if handler is None else handler(command)
+        if result is not None:
+            acknowledgement = mavlink.MAVLink_command_ack_message(number, int(result), 0, 0, *command.sender)
+            self._exchange.send(command.link, acknowledgement, self.component_id)

@@ -1,0 +1,310 @@
+"""Which events there are: what MAVLink's events service tells by a number and a few arguments.
+
+A receiver looks the number up in `all_events.json`, in the format of libevents
+(https://mavlink.io/en/services/events.html). What the commander says becomes events by itself: each of its
+texts is one; a text with a figure in it is matched by a pattern; what neither says stays a text only. Names
+and bits of the enumerations are PX4's, as ground stations expect them of a health report.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator
+from dataclasses import dataclass
+from enum import IntFlag
+from struct import pack
+from typing import Literal
+
+from firmware_py.commander_table import TABLE, Event
+from firmware_py.status import NAVIGATION_STATES, CommandResult, FlightMode
+
+COMPONENT = 1
+"""The upper eight bits of every id: the autopilot."""
+NAMESPACE = "framerunner"
+ARGUMENT_BYTES = 40
+PROTOCOL_LEVEL = 8
+"""A log level beyond MAV_SEVERITY: for programs, not shown to people."""
+
+_FNV_OFFSET, _FNV_PRIME = 0x811C9DC5, 0x01000193
+_FORMATS = {
+    "uint8_t": "B",
+    "uint16_t": "H",
+    "uint32_t": "I",
+    "int32_t": "i",
+    "float": "f",
+    "flight_mode_t": "B",
+    "health_component_t": "I",
+    "navigation_mode_group_t": "I",
+}
+
+Group = Literal["default", "arming_check", "health"]
+
+
+@dataclass(frozen=True, slots=True)
+class EventKind:
+    """A sort of event.
+
+    Attributes:
+        name: unique; the number is derived from it, so it must not change.
+        message: one line for people; {1} is the first argument, {1:.1m} one with a decimal and a unit.
+        group: `arming_check` and `health` are those of the health report.
+        arguments: (type, name) of each.
+        summary: it begins or ends a health report.
+        description: whole sentences.
+    """
+
+    name: str
+    message: str
+    group: Group = "default"
+    arguments: tuple[tuple[str, str], ...] = ()
+    summary: bool = False
+    description: str = ""
+
+    @property
+    def sub_id(self) -> int:
+        """The lower 24 bits of the id: those of the name's 32 bit FNV-1a hash, as PX4 takes them."""
+        value = _FNV_OFFSET
+        for byte in self.name.encode():
+            value = (value ^ byte) * _FNV_PRIME & 0xFFFFFFFF
+        return value & 0xFFFFFF
+
+    @property
+    def id(self) -> int:
+        """What EVENT carries."""
+        return COMPONENT << 24 | self.sub_id
+
+    def packed(self, *values: float) -> bytes:
+        """The arguments as EVENT carries them, padded to 40 bytes."""
+        layout = "<" + "".join(_FORMATS[kind] for kind, _ in self.arguments)
+        whole = (value if kind == "float" else int(value) for (kind, _), value in self._paired(values))
+        return pack(layout, *whole).ljust(ARGUMENT_BYTES, b"\0")
+
+    def _paired(self, values: tuple[float, ...]) -> list[tuple[tuple[str, str], float]]:
+        return list(zip(self.arguments, values, strict=True))
+
+
+@dataclass(frozen=True, slots=True)
+class Occurrence:
+    """One event that happened.
+
+    Attributes:
+        kind: what it is.
+        severity: MAV_SEVERITY, or `PROTOCOL_LEVEL`.
+        values: of the arguments.
+    """
+
+    kind: EventKind
+    severity: int
+    values: tuple[float, ...] = ()
+
+    @property
+    def log_levels(self) -> int:
+        """For people in the lower four bits, for logs in the upper ones."""
+        return self.severity << 4 | self.severity
+
+
+MODE_GROUPS = NAVIGATION_STATES
+"""Each mode is a group of its own, as in PX4."""
+
+ALL_MODES = sum(1 << group for group in MODE_GROUPS.values())
+
+_GROUP_NAMES: dict[FlightMode, str] = {
+    FlightMode.ALTITUDE: "altctl",
+    FlightMode.POSITION: "posctl",
+    FlightMode.HOLD: "loiter",
+    FlightMode.RETURN: "rtl",
+    FlightMode.STABILIZED: "stab",
+    FlightMode.FOLLOW: "follow_target",
+}
+
+
+class Part(IntFlag):
+    """Parts of the vehicle, as bits of `health_component_t`."""
+
+    NONE = 1 << 0
+    ABSOLUTE_PRESSURE = 1 << 1
+    GPS = 1 << 3
+    REMOTE_CONTROL = 1 << 7
+    BATTERY = 1 << 11
+    COMMUNICATION_LINKS = 1 << 12
+    ATTITUDE_ESTIMATE = 1 << 16
+    LOCAL_POSITION_ESTIMATE = 1 << 17
+    MISSION = 1 << 18
+    SYSTEM = 1 << 20
+    GLOBAL_POSITION_ESTIMATE = 1 << 24
+    MAGNETOMETER = 1 << 27
+    ACCEL = 1 << 28
+    GYRO = 1 << 29
+
+    @property
+    def index(self) -> int:
+        """Place of the bit."""
+        return int(self).bit_length() - 1
+
+
+_PART_LABELS: dict[Part, str] = {
+    Part.GPS: "Satellite positioning",
+    Part.REMOTE_CONTROL: "Sticks",
+    Part.ABSOLUTE_PRESSURE: "Barometer",
+    Part.ACCEL: "Accelerometer",
+    Part.GYRO: "Gyroscope",
+}
+
+
+def enums() -> dict[str, object]:
+    """The enumerations in libevents' format."""
+    return {
+        "flight_mode_t": {
+            "type": "uint8_t",
+            "description": "Flight mode",
+            "entries": {
+                str(number): {"name": mode.name.lower(), "description": mode.name.capitalize()}
+                for mode, number in MODE_GROUPS.items()
+            },
+        },
+        "navigation_mode_group_t": {
+            "type": "uint32_t",
+            "description": "Modes that share their checks before arming",
+            "is_bitfield": True,
+            "entries": {
+                str(1 << number): {
+                    "name": _GROUP_NAMES.get(mode, mode.name.lower()),
+                    "description": mode.name.capitalize(),
+                }
+                for mode, number in MODE_GROUPS.items()
+            },
+        },
+        "health_component_t": {
+            "type": "uint32_t",
+            "description": "Parts of the vehicle",
+            "is_bitfield": True,
+            "entries": {
+                str(int(part)): {
+                    "name": str(part.name).lower(),
+                    "description": _PART_LABELS.get(
+                        part, str(part.name).replace("_", " ").lower().capitalize()
+                    ),
+                }
+                for part in Part
+            },
+        },
+    }
+
+
+def navigation_mode_groups() -> dict[str, object]:
+    """Which custom modes each group holds."""
+    return {"groups": {str(group): [mode.custom_mode] for mode, group in MODE_GROUPS.items()}}
+
+
+_MAX_MESSAGE = 120  # libevents' limit
+_REFUSAL = "Arming denied: "
+
+MODE_CHANGED = EventKind("mode_changed", "Mode: {1}", arguments=(("flight_mode_t", "mode"),))
+
+_REPORT = (("uint8_t", "chunk_idx"),)
+ARMING_SUMMARY = EventKind(
+    "arming_check_summary",
+    "Arming check summary",
+    "arming_check",
+    (
+        *_REPORT,
+        ("health_component_t", "error"),
+        ("health_component_t", "warning"),
+        ("navigation_mode_group_t", "can_arm"),
+        ("navigation_mode_group_t", "can_run"),
+    ),
+    summary=True,
+)
+HEALTH_SUMMARY = EventKind(
+    "health_summary",
+    "Health summary",
+    "health",
+    (
+        *_REPORT,
+        ("health_component_t", "is_present"),
+        ("health_component_t", "error"),
+        ("health_component_t", "warning"),
+    ),
+    summary=True,
+)
+_CHECK_ARGUMENTS = (("navigation_mode_group_t", "modes"), ("uint8_t", "health_component_index"))
+OTHER_CHECK = EventKind("check_other", "Not ready to arm", "arming_check", _CHECK_ARGUMENTS)
+
+_PATTERNS: tuple[tuple[re.Pattern[str], EventKind], ...] = tuple(
+    (re.compile(pattern), EventKind(name, message, arguments=(("float", "value"),)))
+    for pattern, name, message in (
+        (
+            r"Using default takeoff altitude: ([\d.]+) m",
+            "takeoff_default_altitude",
+            "Using default takeoff altitude: {1:.1m_v}",
+        ),
+        (r"Mission item (\d+) reached", "mission_item_reached", "Mission item {1:.0} reached"),
+    )
+)
+_PLAIN = (
+    "Landing detected",
+    "Takeoff detected",
+    "Already higher than takeoff altitude",
+    "Takeoff denied: altitude is infinite",
+    "Offboard setpoint ignored: no position or velocity",
+)
+
+
+def _slug(text: str) -> str:
+    return re.sub(r"[^a-z0-9]+", "_", text.lower()).strip("_")
+
+
+def _escaped(text: str) -> str:
+    return re.sub(r"([\\<{])", r"\\\1", text)
+
+
+def _texts() -> dict[str, EventKind]:
+    said = [row.text for row in TABLE if row.text]
+    return {
+        text: EventKind(f"says_{_slug(text)}", _escaped(text)[:_MAX_MESSAGE]) for text in (*said, *_PLAIN)
+    }
+
+
+def _checks() -> dict[str, EventKind]:
+    reasons = [
+        row.text
+        for row in TABLE
+        if row.event is Event.ARM and row.text and row.result is not CommandResult.ACCEPTED
+    ]
+    return {
+        text: EventKind(f"check_{_slug(text)}", _reason(text), "arming_check", _CHECK_ARGUMENTS)
+        for text in reasons
+    }
+
+
+def _reason(refusal: str) -> str:
+    """A refusal without the words that each begins with, as reports show it below a heading."""
+    reason = refusal.removeprefix(_REFUSAL)
+    return _escaped(reason[:1].upper() + reason[1:])[:_MAX_MESSAGE]
+
+
+TEXTS: dict[str, EventKind] = _texts()
+"""Events by the text that says the same."""
+
+CHECKS: dict[str, EventKind] = _checks()
+"""Events of the arming report, by the text that refuses to arm."""
+
+
+def event_of(text: str) -> tuple[EventKind, tuple[float, ...]] | None:
+    """The event that says the same as a text, with its arguments; None when there is none."""
+    kind = TEXTS.get(text)
+    if kind is not None:
+        return kind, ()
+    for pattern, kind in _PATTERNS:
+        found = pattern.fullmatch(text)
+        if found is not None:
+            return kind, tuple(float(figure) for figure in found.groups())
+    return None
+
+
+def all_kinds() -> Iterator[EventKind]:
+    """Every sort of event there is."""
+    yield from (MODE_CHANGED, ARMING_SUMMARY, HEALTH_SUMMARY, OTHER_CHECK)
+    yield from (kind for _, kind in _PATTERNS)
+    yield from TEXTS.values()
+    yield from CHECKS.values()

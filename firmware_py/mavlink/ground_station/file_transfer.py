@@ -1,0 +1,431 @@
+"""MAVLink FTP: lists, reads and writes a vehicle's files, as PX4 answers.
+
+As PX4: the opcodes and errors; system 0 is answered; a request that changed something and comes again gets
+the same answer and changes nothing again; a burst pauses after 35 kB until the client asks on; what is unused
+for ten seconds is closed. `@PARAM/param.pck`, which MAVProxy asks for first, is a file not found.
+
+Different: sessions belong to clients, not to links, and a client may have four (PX4: one a link); the
+firmware's files (`etc`) cannot be written; what is written has a quota.
+"""
+
+from __future__ import annotations
+
+import errno
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from struct import pack
+from zlib import crc32
+
+from firmware_py.mavlink.ground_station.file_sessions import (
+    DATA_BYTES,
+    Answer,
+    Burst,
+    Client,
+    Clients,
+    FtpError,
+    Opcode,
+    RefusalError,
+    Request,
+    Session,
+    parse,
+    reason,
+)
+from firmware_py.mavlink.service import Service
+from firmware_py.storage import Entry, Path, Storage, parse_path, refuse, sound_name
+from wire.dialect import Message, mavlink
+from wire.exchange import Exchange
+from wire.link import Link
+
+_BURST_PACKETS = 8  # a link and update: some 480 kB/s at 250 updates a second
+_BURST_BYTES = 35_000  # PX4's figure
+_CRC_BYTES = 1 << 20  # at once; the rest of a large file in the next updates
+_CHECKSUMS = 8  # under way at a time
+_CHANGING = frozenset(
+    {
+        Opcode.TERMINATE_SESSION,
+        Opcode.OPEN_FILE_RO,
+        Opcode.CREATE_FILE,
+        Opcode.OPEN_FILE_WO,
+        Opcode.WRITE_FILE,
+        Opcode.REMOVE_FILE,
+        Opcode.CREATE_DIRECTORY,
+        Opcode.REMOVE_DIRECTORY,
+        Opcode.RENAME,
+    }
+)
+
+
+class FileTree:
+    """Storage and the firmware's own files as one tree. Its methods raise OSError as `Storage` does.
+
+    Args:
+        storage: what clients may change; None: nothing can be kept.
+        firmware_files: path to content, such as `etc/extras/parameters.json.xz`. Their top folders belong to
+            the firmware whole. Content is asked for when a client wants it.
+    """
+
+    def __init__(self, storage: Storage | None, firmware_files: Mapping[str, bytes]) -> None:
+        self._storage = storage
+        self._files = firmware_files
+        self._firmware = {parse_path(name.encode()): name for name in firmware_files}
+        self._folders = {path[:depth] for path in self._firmware for depth in range(1, len(path))}
+        self._tops = {path[0] for path in self._firmware}
+
+    def entry(self, path: Path) -> Entry:
+        """What is there."""
+        if not self._is_firmware(path):
+            return self._need_storage(path).entry(path)
+        if path in self._firmware:
+            return Entry(path[-1], len(self._files[self._firmware[path]]))
+        if path in self._folders:
+            return Entry(path[-1], 0, True)
+        raise refuse(errno.ENOENT, path)
+
+    def entries(self, path: Path) -> list[Entry]:
+        """What a folder holds, by name."""
+        if self._is_firmware(path):
+            if path in self._firmware:
+                raise refuse(errno.ENOTDIR, path)
+            self.entry(path)
+            return self._firmware_entries(path)
+        kept = [] if self._storage is None and not path else self._need_storage(path).entries(path)
+        if path:
+            return kept
+        own = self._firmware_entries(())
+        return sorted(
+            [each for each in kept if each.name not in self._tops] + own, key=lambda each: each.name
+        )
+
+    def read(self, path: Path, offset: int, count: int) -> bytes:
+        """At most `count` bytes of a file."""
+        if not self._is_firmware(path):
+            return self._need_storage(path).read(path, offset, count)
+        if path not in self._firmware:
+            raise refuse(errno.EISDIR if path in self._folders else errno.ENOENT, path)
+        return self._files[self._firmware[path]][offset : offset + count]
+
+    def writable(self, path: Path) -> Storage:
+        """The storage, for a path that a client may change.
+
+        Raises:
+            OSError: EACCES, the path is the firmware's or the root, or nothing can be kept.
+        """
+        if not path or self._is_firmware(path) or self._storage is None:
+            raise refuse(errno.EACCES, path)
+        return self._storage
+
+    def listing(self, path: Path, first: int) -> bytes:
+        """A page of a listing, as ListDirectory sends it: zero-terminated `Dname`, `Fname<tab>size` or `S`.
+
+        Args:
+            path: of a folder.
+            first: how many entries to leave out.
+
+        Returns:
+            As many as fit into one answer; empty: there are no more.
+        """
+        page = bytearray()
+        for entry in self.entries(path)[first:]:
+            line = _line(entry)
+            if len(page) + len(line) > DATA_BYTES:
+                break
+            page += line
+        return bytes(page)
+
+    def _is_firmware(self, path: Path) -> bool:
+        return bool(path) and path[0] in self._tops
+
+    def _need_storage(self, path: Path) -> Storage:
+        if self._storage is None:
+            raise refuse(errno.ENOENT, path)
+        return self._storage
+
+    def _firmware_entries(self, path: Path) -> list[Entry]:
+        depth = len(path) + 1
+        inside = [each for each in (*self._firmware, *self._folders) if len(each) == depth]
+        return [self.entry(each) for each in sorted(inside) if each[:-1] == path]
+
+
+def _line(entry: Entry) -> bytes:
+    if not sound_name(entry.name):
+        return b"S\0"
+    if entry.is_folder:
+        return b"D" + entry.name.encode() + b"\0"
+    return f"F{entry.name}\t{entry.size}\0".encode()
+
+
+@dataclass(slots=True)
+class _Checksum:
+    """A CRC-32 under way; it is answered when the whole file is read."""
+
+    client: Client
+    request: Request
+    path: Path
+    size: int
+    offset: int = 0
+    crc: int = 0xFFFFFFFF  # zlib's inverted zero: PX4's sum starts at 0 and is not inverted
+
+
+class FileOperations:
+    """Does what requests ask for at once. Its methods raise RefusalError and OSError, which become NAKs.
+
+    Args:
+        tree: of files.
+    """
+
+    def __init__(self, tree: FileTree, exchange: Exchange) -> None:
+        self._tree = tree
+        self._exchange = exchange
+        self.table: dict[int, Callable[[Client, Request], Answer]] = {
+            Opcode.NONE: self._nothing,
+            Opcode.TERMINATE_SESSION: self._terminate,
+            Opcode.RESET_SESSIONS: self._reset,
+            Opcode.LIST_DIRECTORY: self._list,
+            Opcode.OPEN_FILE_RO: self._open,
+            Opcode.READ_FILE: self._read,
+            Opcode.CREATE_FILE: self._open,
+            Opcode.WRITE_FILE: self._write,
+            Opcode.REMOVE_FILE: self._change,
+            Opcode.CREATE_DIRECTORY: self._change,
+            Opcode.REMOVE_DIRECTORY: self._change,
+            Opcode.OPEN_FILE_WO: self._open,
+            Opcode.TRUNCATE_FILE: self._change,
+            Opcode.RENAME: self._rename,
+        }
+
+    def reading(self, client: Client, request: Request) -> Session:
+        """The session that a request reads from."""
+        session = client.session(request.session, self._exchange.time_us)
+        if session.writable:
+            raise refuse(errno.EBADF, session.path)
+        return session
+
+    def _nothing(self, _client: Client, request: Request) -> Answer:
+        return Answer(request.data, session=request.session, offset=request.offset)
+
+    def _terminate(self, client: Client, request: Request) -> Answer:
+        client.session(request.session, self._exchange.time_us)
+        client.close([request.session], request.raw, self._exchange.time_us)
+        return Answer(session=request.session)
+
+    def _reset(self, client: Client, request: Request) -> Answer:
+        client.close(list(client.sessions), request.raw, self._exchange.time_us)
+        return Answer(session=request.session)
+
+    def _list(self, _client: Client, request: Request) -> Answer:
+        page = self._tree.listing(parse_path(request.path), request.offset)
+        if not page:
+            raise RefusalError(FtpError.EOF)
+        return Answer(page, session=request.session, offset=request.offset)
+
+    def _open(self, client: Client, request: Request) -> Answer:
+        number, time_us = request.session, self._exchange.time_us
+        twin = client.twin(number, request.raw, time_us)
+        if twin is not None:
+            return Answer(pack("<I", twin.size), session=number)
+        client.make_room(number, time_us)
+        path, writable = parse_path(request.path), request.opcode != Opcode.OPEN_FILE_RO
+        size = self._prepare(path, request.opcode)
+        client.sessions[number] = Session(path, size, writable, request.raw, time_us, time_us)
+        return Answer(pack("<I", size & 0xFFFFFFFF), session=number)
+
+    def _prepare(self, path: Path, opcode: int) -> int:
+        """Have a file as it is to be opened; its size before, as PX4 tells it."""
+        try:
+            entry = self._tree.entry(path)
+            if entry.is_folder:
+                raise refuse(errno.EISDIR, path)
+            size = entry.size
+        except FileNotFoundError:
+            if opcode == Opcode.OPEN_FILE_RO:
+                raise
+            self._tree.writable(path).create(path)
+            return 0
+        if opcode != Opcode.OPEN_FILE_RO:
+            storage = self._tree.writable(path)
+            if opcode == Opcode.CREATE_FILE:
+                storage.truncate(path, 0)
+        return size
+
+    def _read(self, client: Client, request: Request) -> Answer:
+        session = self.reading(client, request)
+        if request.offset >= session.size:
+            raise RefusalError(FtpError.EOF)
+        data = self._tree.read(session.path, request.offset, request.size)
+        return Answer(data, session=request.session, offset=request.offset)
+
+    def _write(self, client: Client, request: Request) -> Answer:
+        session = client.session(request.session, self._exchange.time_us)
+        if not session.writable:
+            raise refuse(errno.EBADF, session.path)
+        self._tree.writable(session.path).write(session.path, request.offset, request.data)
+        return Answer(pack("<I", len(request.data)), session=request.session, offset=request.offset)
+
+    def _change(self, _client: Client, request: Request) -> Answer:
+        path, offset = parse_path(request.path), 0
+        storage = self._tree.writable(path)
+        match request.opcode:
+            case Opcode.REMOVE_FILE:
+                storage.remove(path)
+            case Opcode.CREATE_DIRECTORY:
+                storage.make_folder(path)
+            case Opcode.REMOVE_DIRECTORY:
+                storage.remove_folder(path)
+            case Opcode.TRUNCATE_FILE:
+                offset = request.offset
+                storage.truncate(path, offset)
+        return Answer(session=request.session, offset=offset)
+
+    def _rename(self, _client: Client, request: Request) -> Answer:
+        names = request.strings
+        if len(names) < 2:
+            raise refuse(errno.EINVAL, ())
+        old, new = parse_path(names[0]), parse_path(names[1])
+        self._tree.writable(old)
+        self._tree.writable(new).rename(old, new)
+        return Answer(session=request.session)
+
+
+class FileTransferService(Service):
+    """Serves files.
+
+    Args:
+        storage: what clients may change; None: there are only the firmware's files.
+        firmware_files: path to content, such as `etc/extras/parameters.json.xz`, for `mftp://` addresses.
+    """
+
+    def __init__(
+        self, exchange: Exchange, storage: Storage | None, firmware_files: Mapping[str, bytes]
+    ) -> None:
+        self._exchange = exchange
+        self._tree = FileTree(storage, firmware_files)
+        self._operations = FileOperations(self._tree, exchange)
+        self._work: dict[int, Callable[[Client, Request], Answer | None]] = {
+            **self._operations.table,
+            Opcode.CALC_FILE_CRC32: self._checksum,
+            Opcode.BURST_READ_FILE: self._burst,
+        }
+        self._clients = Clients()
+        self._checksums: list[_Checksum] = []
+        self._idle_due_us = 0
+        self.handlers = {mavlink.MAVLINK_MSG_ID_FILE_TRANSFER_PROTOCOL: self._hear}
+
+    def update(self) -> None:
+        """Go on with bursts and checksums, and close what is unused."""
+        if not self._clients:
+            return
+        if self._checksums:
+            self._go_on(self._checksums[0])
+        room = dict.fromkeys(self._exchange.links, _BURST_PACKETS)
+        for client, number, session in self._clients.bursting():
+            self._send_burst(client, number, session, room)
+        if self._exchange.time_us >= self._idle_due_us:
+            self._idle_due_us = self._exchange.time_us + 1_000_000
+            self._clients.close_idle(self._exchange.time_us)
+
+    def _hear(self, link: Link, message: Message) -> None:
+        if not self._exchange.is_for_us(message, or_everyone=True):
+            return
+        request = parse(bytes(message.payload))
+        if request.opcode in (Opcode.ACK, Opcode.NAK):
+            return  # an answer, not a request
+        key = (link.profile.name, message.get_srcSystem(), message.get_srcComponent())
+        client = self._clients.client(key, self._exchange.time_us)
+        if request.raw == client.last_request:
+            self._send(client, client.last_reply)
+            return
+        answer = self._answer(client, request)
+        if answer is not None:
+            self._reply(client, request, answer)
+
+    def _answer(self, client: Client, request: Request) -> Answer | None:
+        """Do what is asked; None: the answer comes later."""
+        try:
+            if request.size > DATA_BYTES:
+                raise RefusalError(FtpError.INVALID_DATA_SIZE)
+            work = self._work.get(request.opcode)
+            if work is None:
+                raise RefusalError(FtpError.UNKNOWN_COMMAND)
+            return work(client, request)
+        except (RefusalError, OSError) as error:
+            return Answer(reason(error), ack=False, session=request.session, offset=request.offset)
+
+    def _reply(self, client: Client, request: Request, answer: Answer) -> None:
+        payload = answer.payload(request.sequence + 1, request.opcode)
+        again = request.opcode in _CHANGING and answer.data != bytes((FtpError.NO_SESSIONS_AVAILABLE,))
+        client.last_request, client.last_reply = (request.raw, payload) if again else (b"", b"")
+        self._send(client, payload)
+
+    def _send(self, client: Client, payload: bytes) -> None:
+        name, system, component = client.key
+        link = self._exchange.links.get(name)
+        if link is not None:
+            message = mavlink.MAVLink_file_transfer_protocol_message(0, system, component, payload)
+            self._exchange.send(link, message)
+
+    def _checksum(self, client: Client, request: Request) -> Answer | None:
+        path = parse_path(request.path)
+        entry = self._tree.entry(path)
+        if entry.is_folder:
+            raise refuse(errno.EISDIR, path)
+        if any(each.client is client for each in self._checksums):
+            return None  # asked again while it is worked out
+        if len(self._checksums) >= _CHECKSUMS:
+            raise RefusalError(FtpError.NO_SESSIONS_AVAILABLE)
+        self._checksums.append(_Checksum(client, request, path, entry.size))
+        self._go_on(self._checksums[-1])
+        return None
+
+    def _go_on(self, checksum: _Checksum) -> None:
+        """Read on, and answer at the end."""
+        count = min(_CRC_BYTES, checksum.size - checksum.offset)
+        try:
+            data = self._tree.read(checksum.path, checksum.offset, count)
+        except OSError as error:
+            answer = Answer(reason(error), ack=False, session=checksum.request.session)
+        else:
+            checksum.crc = crc32(data, checksum.crc)
+            checksum.offset += len(data)
+            if data and checksum.offset < checksum.size:
+                return
+            answer = Answer(pack("<I", checksum.crc ^ 0xFFFFFFFF), session=checksum.request.session)
+        self._checksums.remove(checksum)
+        self._reply(checksum.client, checksum.request, answer)
+
+    def _burst(self, client: Client, request: Request) -> None:
+        session = self._operations.reading(client, request)
+        if session.burst is None or session.burst.request != request.raw:  # else it came twice
+            session.burst = Burst(request.raw, request.sequence + 1, request.offset)
+
+    def _send_burst(self, client: Client, number: int, session: Session, room: dict[str, int]) -> None:
+        """Send the next packets of a burst, as many as its link has room for."""
+        link = self._exchange.links.get(client.key[0])
+        if link is None:
+            session.burst = None
+            return
+        while session.burst is not None and room[link.profile.name] > 0 and not link.congested:
+            room[link.profile.name] -= 1
+            self._send(client, self._burst_packet(session.burst, number, session))
+            session.used_us = client.used_us = self._exchange.time_us
+
+    def _burst_packet(self, burst: Burst, number: int, session: Session) -> bytes:
+        """The next packet; the burst is over after the last of the file, an error, or 35 kB."""
+        sequence, offset = burst.sequence, burst.offset
+        try:
+            if offset >= session.size:
+                raise RefusalError(FtpError.EOF)
+            data = self._tree.read(session.path, offset, DATA_BYTES)
+            if not data:
+                raise RefusalError(FtpError.EOF)  # it became shorter
+        except (RefusalError, OSError) as error:
+            session.burst = None
+            answer = Answer(reason(error), ack=False, session=number, offset=offset)
+            return answer.payload(sequence, Opcode.BURST_READ_FILE)
+        burst.sequence += 1
+        burst.offset += len(data)
+        burst.sent += len(data)
+        complete = burst.sent > _BURST_BYTES
+        if complete:
+            session.burst = None
+        answer = Answer(data, session=number, offset=offset, burst_complete=complete)
+        return answer.payload(sequence, Opcode.BURST_READ_FILE)

@@ -1,0 +1,234 @@
+"""SERIAL_CONTROL: a shell on the vehicle, as PX4's on device 10. Only where somebody switched it on.
+
+It knows a few commands of its own, about the vehicle only: nothing of the computer that it runs on can be
+reached. Lines are echoed and followed by a prompt, as nsh does. Different from PX4: what comes without the
+flag that asks for an answer is answered too, because MAVSDK 4.1 never sets it.
+"""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from fnmatch import fnmatchcase
+from math import degrees
+
+from firmware_py.autopilot import Autopilot
+from firmware_py.mavlink.service import Service
+from firmware_py.mavlink.telemetry.identity import FOLLOWED_PX4_VERSION, OWN_VERSION
+from firmware_py.parameters import ParameterError
+from wire.dialect import BROADCAST, Message, mavlink
+from wire.exchange import Exchange
+from wire.link import Link
+
+_PROMPT = b"nsh> "
+_PIECE = 70
+_PIECES = 4  # a link and update
+_MAX_LINE = 200
+_MAX_WAITING = 64  # lines
+_SHELLS = 8
+_PAYLOAD_START = 10  # of a MAVLink 2 packet
+_TARGET_PLACE = 79  # in the payload: an extension that pymavlink does not know
+_HELP = """\
+help                     what can be asked
+ver all                  versions
+status                   where the vehicle is and how it moves
+commander status         arming, mode, failsafe
+param show [PATTERN]     parameters, such as param show 'MPC_*'
+param set NAME VALUE     change a parameter
+"""
+_REPLY = mavlink.SERIAL_CONTROL_FLAG_REPLY
+_RESPOND = mavlink.SERIAL_CONTROL_FLAG_RESPOND
+
+
+class Console:
+    """What the shell knows: words in, text out. Nothing here reaches further than the vehicle.
+
+    Args:
+        system_id: of the vehicle.
+    """
+
+    def __init__(self, autopilot: Autopilot, system_id: int) -> None:
+        self._autopilot = autopilot
+        self._system_id = system_id
+        self._commands: dict[str, Callable[[list[str]], str]] = {
+            "help": self._help,
+            "ver": self._versions,
+            "status": self._status,
+            "commander": self._commander,
+            "param": self._parameters,
+            "reboot": self._reboot,
+        }
+
+    def answer(self, words: list[str]) -> str:
+        """The answer to the words of a line, ending with a newline unless it is empty."""
+        if not words:
+            return ""
+        command = self._commands.get(words[0])
+        if command is None:
+            return f"{words[0]}: command not found; try help\n"
+        return command(words[1:])
+
+    def _help(self, _words: list[str]) -> str:
+        return _HELP
+
+    def _versions(self, _words: list[str]) -> str:
+        own, followed = (".".join(map(str, version)) for version in (OWN_VERSION, FOLLOWED_PX4_VERSION))
+        return (
+            f"HW arch: simulated {self._autopilot.airframe.name}\n"
+            f"FW version: framerunner {own}, speaks as PX4 {followed}\n"
+            f"System id: {self._system_id}\n"
+        )
+
+    def _status(self, _words: list[str]) -> str:
+        state, place = self._autopilot.state, self._autopilot.global_position()
+        north_m, east_m, down_m = state.position_ned_m
+        speeds = " ".join(f"{speed:.2f}" for speed in state.velocity_ned_m_s)
+        angles = " ".join(
+            f"{degrees(angle):.1f}" for angle in (state.roll_rad, state.pitch_rad, state.yaw_rad)
+        )
+        where = "not known" if place is None else f"{place.latitude_deg:.7f} {place.longitude_deg:.7f}"
+        battery = self._autopilot.battery
+        return (
+            f"time: {state.time_us / 1e6:.3f} s\n"
+            f"position NED: {north_m:.2f} {east_m:.2f} {down_m:.2f} m\n"
+            f"velocity NED: {speeds} m/s\n"
+            f"roll pitch yaw: {angles} deg\n"
+            f"latitude longitude: {where}\n"
+            f"battery: {battery.voltage_v:.2f} V, {battery.remaining * 100:.0f} %\n"
+        )
+
+    def _commander(self, words: list[str]) -> str:
+        if words != ["status"]:
+            return "usage: commander status\n"
+        status = self._autopilot.status
+        return (
+            f"{'Armed' if status.armed else 'Disarmed'}\n"
+            f"navigation mode: {status.mode.name.capitalize()}\n"
+            f"user intended navigation mode: {status.intended_mode.name.capitalize()}\n"
+            f"in failsafe: {'yes' if status.failsafe else 'no'}\n"
+            f"landed: {status.landed_state.name.lower()}\n"
+        )
+
+    def _parameters(self, words: list[str]) -> str:
+        match words:
+            case ["show"]:
+                return self._show("*")
+            case ["show", pattern]:
+                return self._show(pattern.strip("'\""))
+            case ["set", name, text]:
+                return self._set(name, text)
+        return "usage: param show [PATTERN] | param set NAME VALUE\n"
+
+    def _show(self, pattern: str) -> str:
+        parameters = self._autopilot.parameters
+        lines = [
+            f"{'*' if parameters.value(declared.name) != declared.default else ' '} {declared.name:<16} "
+            f"{parameters.value(declared.name):g} {declared.unit}".rstrip()
+            for declared in parameters.declarations
+            if fnmatchcase(declared.name, pattern)
+        ]
+        return "\n".join([*lines, f"{len(lines)} of {len(parameters)} parameters; *: not the default"]) + "\n"
+
+    def _set(self, name: str, text: str) -> str:
+        parameters = self._autopilot.parameters
+        try:
+            parameters.set(name, float(text))
+        except ParameterError as error:
+            return f"{error}\n"
+        except ValueError:
+            return f"{name}: {text} is not a number\n"
+        return f"{name}: {parameters.value(name):g}\n"
+
+    def _reboot(self, _words: list[str]) -> str:
+        return "reboot: start the simulator again instead\n"
+
+
+@dataclass(slots=True)
+class _Shell:
+    """One user's shell.
+
+    Attributes:
+        link: by which they speak.
+        line: what was typed so far.
+        lines: typed, to be answered.
+        output: to be sent.
+    """
+
+    link: str
+    line: bytearray = field(default_factory=bytearray)
+    lines: deque[bytes] = field(default_factory=lambda: deque(maxlen=_MAX_WAITING))
+    output: bytearray = field(default_factory=lambda: bytearray(_PROMPT))
+
+
+class ShellService(Service):
+    """Answers what is typed."""
+
+    def __init__(self, autopilot: Autopilot, exchange: Exchange) -> None:
+        self._console = Console(autopilot, exchange.system_id)
+        self._exchange = exchange
+        self._shells: dict[tuple[str, int, int], _Shell] = {}
+        self.handlers = {mavlink.MAVLINK_MSG_ID_SERIAL_CONTROL: self._hear}
+
+    def update(self) -> None:
+        """Answer one line of each shell, and send what there is to send."""
+        for key, shell in list(self._shells.items()):
+            link = self._exchange.links.get(shell.link)
+            if link is None:
+                del self._shells[key]
+                continue
+            if shell.lines and not shell.output:
+                line = shell.lines.popleft()
+                shell.output += line + b"\r\n"
+                text = self._console.answer(line.decode("ascii", "replace").split())
+                shell.output += text.replace("\n", "\r\n").encode("ascii", "replace") + _PROMPT
+            self._send(link, shell)
+
+    def _send(self, link: Link, shell: _Shell) -> None:
+        for _ in range(_PIECES):
+            if not shell.output or link.congested:
+                return
+            piece = bytes(shell.output[:_PIECE])
+            del shell.output[:_PIECE]
+            message = mavlink.MAVLink_serial_control_message(
+                mavlink.SERIAL_CONTROL_DEV_SHELL,
+                _REPLY,
+                0,
+                0,
+                len(piece),
+                piece.ljust(_PIECE, b"\0"),
+            )
+            self._exchange.send(link, message)
+
+    def _hear(self, link: Link, message: Message) -> None:
+        meant = _target_system(message) in (BROADCAST, self._exchange.system_id)
+        if not meant or message.device != mavlink.SERIAL_CONTROL_DEV_SHELL or message.flags & _REPLY:
+            return
+        key = (link.profile.name, message.get_srcSystem(), message.get_srcComponent())
+        if not message.flags & _RESPOND and not message.count:  # nobody reads any longer
+            self._shells.pop(key, None)
+            return
+        if key not in self._shells:
+            if len(self._shells) >= _SHELLS:
+                del self._shells[next(iter(self._shells))]
+            self._shells[key] = _Shell(link.profile.name)
+        self._type(self._shells[key], bytes(message.data)[: message.count])
+
+    @staticmethod
+    def _type(shell: _Shell, data: bytes) -> None:
+        for code in data:
+            if code in (0x0A, 0x0D):
+                if shell.line or code == 0x0A:
+                    shell.lines.append(bytes(shell.line))
+                    shell.line.clear()
+            elif code in (0x08, 0x7F):
+                del shell.line[-1:]
+            elif 0x20 <= code < 0x7F and len(shell.line) < _MAX_LINE:
+                shell.line.append(code)
+
+
+def _target_system(message: Message) -> int:
+    packet = bytes(message.get_msgbuf())
+    if packet[0] != mavlink.PROTOCOL_MARKER_V2 or packet[1] <= _TARGET_PLACE:
+        return BROADCAST
+    return packet[_PAYLOAD_START + _TARGET_PLACE]

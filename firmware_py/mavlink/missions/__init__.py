@@ -1,0 +1,1 @@
+"""The mission protocol, and what a mission in flight tells and commands."""

@@ -1,0 +1,195 @@
+"""A mission in flight: whether it can be flown, where it is, what it has reached, what it commands."""
+
+from __future__ import annotations
+
+from math import isfinite
+
+from firmware_py.autopilot import Autopilot
+from firmware_py.geodesy import LocalProjection
+from firmware_py.mavlink.camera.model import CameraControl
+from firmware_py.mavlink.missions.messages import mission_current
+from firmware_py.mavlink.service import Command, Service
+from firmware_py.missions.checks import mission_faults
+from firmware_py.missions.flight import IssuedCommand, View
+from firmware_py.missions.geofence import Geofence
+from firmware_py.status import CommandResult, FlightMode, LandedState
+from firmware_py.types import GeodeticPoint
+from wire.dialect import Message, mavlink
+from wire.exchange import Exchange
+
+_REPEATS, _REPEAT_US = 10, 1_000_000  # of MISSION_ITEM_REACHED, as PX4
+_NO_TOTAL = 0xFFFF
+_ACTIVE, _SUSPENDED = 1, 2
+_ACTIVE_MODES = frozenset({FlightMode.MISSION, FlightMode.TAKEOFF, FlightMode.LAND})
+_WITHOUT_EFFECT = frozenset(  # every mission of MAVSDK has them, and there is no gimbal
+    {
+        mavlink.MAV_CMD_DO_MOUNT_CONFIGURE,
+        mavlink.MAV_CMD_DO_MOUNT_CONTROL,
+        mavlink.MAV_CMD_DO_GIMBAL_MANAGER_PITCHYAW,
+        mavlink.MAV_CMD_DO_GIMBAL_MANAGER_CONFIGURE,
+    }
+)
+
+
+class MissionExecution(Service):
+    """Checks missions when they change, starts them, tells where they are and passes on their commands.
+
+    Args:
+        camera: that the mission may command; None: there is none.
+    """
+
+    def __init__(self, autopilot: Autopilot, exchange: Exchange, camera: CameraControl | None) -> None:
+        self._autopilot = autopilot
+        self._exchange = exchange
+        self._camera = camera
+        self._fence = Geofence(autopilot.missions, autopilot.parameters)
+        self._view = View()
+        self._origin: GeodeticPoint | None = None
+        self._checked: tuple[int, int, bool] = (0, 0, False)
+        self._current_sent = 0
+        self._reached: int | None = None
+        self._repeats_left = 0
+        self._repeat_due_us = 0
+        self.commands = {
+            mavlink.MAV_CMD_MISSION_START: self._start,
+            mavlink.MAV_CMD_DO_SET_MISSION_CURRENT: self._set_current,
+        }
+        self.sources = {mavlink.MAVLINK_MSG_ID_MISSION_CURRENT: self._mission_current}
+
+    def check(self) -> None:
+        """Find out whether the mission can be flown, if that, the fence or home has changed."""
+        autopilot = self._autopilot
+        store, home_known = autopilot.missions, autopilot.status.home is not None
+        state = (store.mission.version, store.fence.version, home_known)
+        before = self._checked
+        if state == before:
+            return
+        self._checked = state
+        self._update_view(autopilot)
+        if state[1:] != before[1:]:
+            self._fence.breach_at(self._view.position_ned_m, self._view)
+        store.valid, texts = mission_faults(
+            store.mission.items, self._view, autopilot.parameters, self._fence
+        )
+        for text in (*self._fence.take_texts(), *texts):
+            autopilot.say(text.severity, text.text)
+        if state[0] != before[0]:
+            self._reached = None
+
+    def update(self) -> None:
+        """Broadcast what is new, and what was reached ten times more; pass on what the mission commands."""
+        store, exchange = self._autopilot.missions, self._exchange
+        self.check()
+        if store.current != self._current_sent and store.mission.items:
+            self.tell_current()
+        for seq in store.take_reached():
+            self._reached, self._repeats_left = seq, _REPEATS
+            self._tell_reached(seq)
+        if self._reached is not None and self._repeats_left and exchange.time_us >= self._repeat_due_us:
+            self._repeats_left -= 1
+            self._tell_reached(self._reached)
+        for issued in self._autopilot.take_issued_commands():
+            self._pass_on(issued)
+
+    def tell_current(self) -> None:
+        """Broadcast MISSION_CURRENT."""
+        self._current_sent = self._autopilot.missions.current
+        self._exchange.broadcast(self._mission_current())
+
+    def _tell_reached(self, seq: int) -> None:
+        self._repeat_due_us = self._exchange.time_us + _REPEAT_US
+        self._exchange.broadcast(mavlink.MAVLink_mission_item_reached_message(seq))
+
+    def _update_view(self, autopilot: Autopilot) -> None:
+        """Bring the view of the vehicle up to date."""
+        view, status = self._view, autopilot.status
+        if status.origin is not self._origin:
+            self._origin = status.origin
+            view.projection = None if status.origin is None else LocalProjection(status.origin)
+        view.position_ned_m = autopilot.state.position_ned_m
+        view.landed = status.landed_state is LandedState.ON_GROUND
+        view.home_ned_m = None if status.home is None else status.home_ned_m
+
+    def _mission_current(self) -> Message:
+        """MISSION_CURRENT, with the ids of all three plans."""
+        store, mode = self._autopilot.missions, self._autopilot.status.mode
+        return mission_current(
+            store.current,
+            len(store.mission.items) or _NO_TOTAL,
+            _mission_state(self._autopilot),
+            _ACTIVE if mode in _ACTIVE_MODES else _SUSPENDED,
+            (store.mission.opaque_id, store.fence.opaque_id, store.rally.opaque_id),
+        )
+
+    def _start(self, command: Command) -> CommandResult:
+        """MISSION_START: switch to mission mode and arm.
+
+        Param 1 is the item to begin with; -1, or not given: where the mission is. Param 2, the last item,
+        counts for nothing, as in PX4. TEMPORARILY_REJECTED: the mode or arming is refused.
+        """
+        autopilot = self._autopilot
+        store, first = autopilot.missions, command.params[0]
+        first = first if isfinite(first) else -1.0
+        if not store.valid:
+            autopilot.say(mavlink.MAV_SEVERITY_CRITICAL, "Mission start denied! No valid mission")
+            return CommandResult.DENIED
+        if not -1 <= first < len(store.mission.items):
+            autopilot.say(
+                mavlink.MAV_SEVERITY_CRITICAL,
+                f"Mission start denied! No item {first:g}, there are {len(store.mission.items)}",
+            )
+            return CommandResult.DENIED
+        if first >= 0:
+            store.select(int(first))
+        result = autopilot.set_mode(FlightMode.MISSION)
+        if result is CommandResult.ACCEPTED and not autopilot.status.armed:
+            result = autopilot.arm()
+        return result if result is CommandResult.ACCEPTED else CommandResult.TEMPORARILY_REJECTED
+
+    def _set_current(self, command: Command) -> CommandResult:
+        """DO_SET_MISSION_CURRENT, which PX4 does not know: param 1 is the item to fly next."""
+        autopilot, seq = self._autopilot, command.params[0]
+        if isfinite(seq) and autopilot.missions.select(int(seq)):
+            return CommandResult.ACCEPTED
+        count = len(autopilot.missions.mission.items)
+        autopilot.say(mavlink.MAV_SEVERITY_CRITICAL, f"No mission item {seq:g}, there are {count}")
+        return CommandResult.DENIED
+
+    def _pass_on(self, issued: IssuedCommand) -> None:
+        """Have a command of the mission done, and say if it could not be."""
+        result = self._do(issued)
+        if result is not CommandResult.ACCEPTED:
+            text = f"Mission command {issued.command} not done: {result.name.lower().replace('_', ' ')}"
+            self._autopilot.say(mavlink.MAV_SEVERITY_WARNING, text)
+
+    def _do(self, issued: IssuedCommand) -> CommandResult:
+        autopilot = self._autopilot
+        if issued.command in _WITHOUT_EFFECT:
+            return CommandResult.ACCEPTED
+        first, x, y, z = issued.params[0], *issued.params[4:]
+        match issued.command:
+            case mavlink.MAV_CMD_COMPONENT_ARM_DISARM:
+                return autopilot.arm() if first == 1.0 else autopilot.disarm()
+            case mavlink.MAV_CMD_DO_SET_HOME:
+                if first == 1.0:
+                    return autopilot.set_home(None)
+                known = isfinite(x) and isfinite(y) and isfinite(z)
+                return autopilot.set_home(GeodeticPoint(x, y, z)) if known else CommandResult.DENIED
+        if self._camera is None:
+            return CommandResult.UNSUPPORTED
+        return self._camera.run(issued.command, issued.params)
+
+
+def _mission_state(autopilot: Autopilot) -> int:
+    store = autopilot.missions
+    if not store.mission.items or not store.valid:
+        state = mavlink.MISSION_STATE_NO_MISSION
+    elif store.finished:
+        state = mavlink.MISSION_STATE_COMPLETE
+    elif autopilot.status.mode is FlightMode.MISSION:
+        state = mavlink.MISSION_STATE_ACTIVE
+    elif store.started:
+        state = mavlink.MISSION_STATE_PAUSED
+    else:
+        state = mavlink.MISSION_STATE_NOT_STARTED
+    return int(state)

@@ -1,0 +1,139 @@
+"""The one shape of all MAVLink services, and what their tables hold."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass
+from math import isfinite, nan
+from types import MappingProxyType
+from typing import Any, TypeVar
+
+from firmware_py.status import CommandResult
+from firmware_py.types import GeodeticPoint
+from wire.dialect import AUTOPILOT_COMPONENT_ID, BROADCAST, Message, mavlink
+from wire.link import Link
+
+_NOT_GIVEN = 0x7FFFFFFF  # of x and y in COMMAND_INT
+_RELATIVE_FRAMES = (mavlink.MAV_FRAME_GLOBAL_RELATIVE_ALT, mavlink.MAV_FRAME_GLOBAL_RELATIVE_ALT_INT)
+SevenParams = tuple[float, float, float, float, float, float, float]
+_EMPTY: Mapping[int, Any] = MappingProxyType({})
+Entry = TypeVar("Entry")
+
+
+@dataclass(frozen=True, slots=True)
+class Command:
+    """What COMMAND_LONG and COMMAND_INT say; NaN means "not given".
+
+    Attributes:
+        link: it came by.
+        params: params 1 to 4.
+        latitude_deg: param 5 or x.
+        longitude_deg: param 6 or y.
+        altitude_m: param 7 or z; above mean sea level unless the frame says above home.
+        frame: MAV_FRAME of COMMAND_INT.
+        params_567: params 5 to 7 as they came, for commands in which they are no place.
+        sender: system and component id.
+        repeated: it says that it is sent again, for want of an acknowledgement.
+    """
+
+    link: Link
+    params: tuple[float, float, float, float]
+    latitude_deg: float = nan
+    longitude_deg: float = nan
+    altitude_m: float = nan
+    frame: int = mavlink.MAV_FRAME_GLOBAL
+    params_567: tuple[float, float, float] = (nan, nan, nan)
+    sender: tuple[int, int] = (BROADCAST, BROADCAST)
+    repeated: bool = False
+
+    @classmethod
+    def from_long(cls, link: Link, message: Message) -> Command:
+        """The command of a COMMAND_LONG."""
+        p5, p6, p7 = message.param5, message.param6, message.param7
+        params = (message.param1, message.param2, message.param3, message.param4)
+        sender = (message.get_srcSystem(), message.get_srcComponent())
+        repeated = message.confirmation > 0
+        return cls(link, params, p5, p6, p7, params_567=(p5, p6, p7), sender=sender, repeated=repeated)
+
+    @classmethod
+    def from_int(cls, link: Link, message: Message) -> Command:
+        """The command of a COMMAND_INT."""
+        return cls(
+            link,
+            (message.param1, message.param2, message.param3, message.param4),
+            nan if message.x == _NOT_GIVEN else message.x / 1e7,
+            nan if message.y == _NOT_GIVEN else message.y / 1e7,
+            message.z,
+            message.frame,
+            (float(message.x), float(message.y), message.z),
+            (message.get_srcSystem(), message.get_srcComponent()),
+        )
+
+    @property
+    def all_params(self) -> SevenParams:
+        """Params 1 to 7 as they came."""
+        return (*self.params, *self.params_567)
+
+    @property
+    def has_place(self) -> bool:
+        """Whether latitude and longitude are given."""
+        return isfinite(self.latitude_deg) and isfinite(self.longitude_deg)
+
+    def altitude_amsl_m(self, home: GeodeticPoint | None) -> float:
+        """The altitude above mean sea level; NaN when it is not given or counts from a home not known."""
+        if self.frame not in _RELATIVE_FRAMES:
+            return self.altitude_m
+        return nan if home is None else self.altitude_m + home.altitude_m
+
+
+Handler = Callable[[Link, Message], None]
+"""Takes a message that came by a link."""
+
+CommandHandler = Callable[[Command], CommandResult | None]
+"""Does a command; None: it is not acknowledged."""
+
+Source = Callable[[], Message | None]
+"""Makes a message as it is now; None: there is nothing to tell yet."""
+
+Reply = Callable[[Link, int], list[Message]]
+"""Makes what REQUEST_MESSAGE asks for on a link, with an index as its second parameter; empty: denied."""
+
+
+class Service:
+    """One MAVLink service of one of the vehicle's components.
+
+    A service sets the tables that it has in its constructor, and overrides `update` if it sends something
+    that nobody asked for. No two services of a component have an entry for the same id. Most are
+    given `autopilot`, for which they speak, and `exchange`, the vehicle's links and time.
+
+    Attributes:
+        component_id: whose service it is.
+        handlers: by message id.
+        commands: by MAV_CMD; they are acknowledged with what the handler returns.
+        sources: by message id; what can be streamed and requested.
+        replies: by message id; what can only be requested.
+    """
+
+    component_id: int = AUTOPILOT_COMPONENT_ID
+    handlers: Mapping[int, Handler] = _EMPTY
+    commands: Mapping[int, CommandHandler] = _EMPTY
+    sources: Mapping[int, Source] = _EMPTY
+    replies: Mapping[int, Reply] = _EMPTY
+
+    def update(self) -> None:
+        """Send what is due; called at every update of the node."""
+
+
+def merged(tables: Iterable[Mapping[int, Entry]]) -> dict[int, Entry]:
+    """One table of all.
+
+    Raises:
+        ValueError: two of them have an entry for the same id.
+    """
+    all_entries: dict[int, Entry] = {}
+    for table in tables:
+        twice = all_entries.keys() & table.keys()
+        if twice:
+            raise ValueError(f"two services have an entry for id {min(twice)}")
+        all_entries.update(table)
+    return all_entries

@@ -1,0 +1,1 @@
+"""What the drone is to fly now: offboard setpoints and a pilot's sticks."""

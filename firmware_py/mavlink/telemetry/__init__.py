@@ -1,0 +1,1 @@
+"""Telemetry: what is streamed, and on which requests."""

@@ -1,0 +1,240 @@
+"""Telemetry of the vehicle's condition: health, landed or not, battery, mode, flight times, motors.
+
+Differences from PX4: innovation ratios and vibration are 0, because the state is exact, and so is the load,
+because the autopilot reads no clock. Motor speeds are those that were asked for; nothing measures them.
+"""
+
+from __future__ import annotations
+
+from functools import partial
+from math import ceil, isfinite
+
+from firmware_py.autopilot import Autopilot
+from firmware_py.mavlink.scaling import boot_ms, whole
+from firmware_py.mavlink.service import Service
+from firmware_py.mavlink.telemetry.identity import standard_mode
+from firmware_py.status import LandedState
+from firmware_py.types import MotorSpeeds
+from wire.dialect import Message, mavlink
+from wire.exchange import Exchange
+
+_POSITION = mavlink.MAV_SYS_STATUS_SENSOR_GPS | mavlink.MAV_SYS_STATUS_SENSOR_XY_POSITION_CONTROL
+_PRESENT = (
+    mavlink.MAV_SYS_STATUS_SENSOR_3D_GYRO
+    | mavlink.MAV_SYS_STATUS_SENSOR_3D_ACCEL
+    | mavlink.MAV_SYS_STATUS_SENSOR_3D_MAG
+    | mavlink.MAV_SYS_STATUS_SENSOR_ABSOLUTE_PRESSURE
+    | mavlink.MAV_SYS_STATUS_SENSOR_BATTERY
+    | _POSITION
+)
+# PX4 calls healthy what nothing is wrong with, there or not; but a remote control it misses.
+_HEALTHY = (
+    _PRESENT
+    | mavlink.MAV_SYS_STATUS_SENSOR_DIFFERENTIAL_PRESSURE
+    | mavlink.MAV_SYS_STATUS_SENSOR_ATTITUDE_STABILIZATION
+    | mavlink.MAV_SYS_STATUS_SENSOR_MOTOR_OUTPUTS
+    | mavlink.MAV_SYS_STATUS_AHRS
+    | mavlink.MAV_SYS_STATUS_LOGGING
+)
+_CHECKED = _HEALTHY | mavlink.MAV_SYS_STATUS_SENSOR_RC_RECEIVER
+_UNKNOWN_16 = 0xFFFF
+_TEMPERATURE_UNKNOWN = 0x7FFF
+_PWM_DISARMED_US, _PWM_LOW_US, _PWM_SPAN_US = 900, 1000, 1000
+_SERVOS = 16
+_OUTPUTS = 32
+_BATCH = 4  # motors in one ESC message
+_RPM = 60.0 / 6.283185307179586  # of 1 rad/s
+_BY_PULSES = 0  # ESC_CONNECTION_TYPE_PPM
+
+
+def sys_status(autopilot: Autopilot) -> Message:
+    """SYS_STATUS: the health bits that clients wait for, and the battery in short."""
+    status, battery = autopilot.status, autopilot.battery
+    missing = 0 if status.origin is not None else _POSITION
+    present = _PRESENT & ~missing
+    if status.armed and autopilot.parameters.value("SDLOG_MODE") >= 0:
+        present |= mavlink.MAV_SYS_STATUS_LOGGING
+    healthy = _HEALTHY & ~missing
+    if battery.warning > mavlink.MAV_BATTERY_CHARGE_STATE_OK:
+        healthy &= ~mavlink.MAV_SYS_STATUS_SENSOR_BATTERY
+    if status.ready:
+        healthy |= mavlink.MAV_SYS_STATUS_PREARM_CHECK
+    return mavlink.MAVLink_sys_status_message(
+        present,
+        present | _CHECKED & ~healthy,
+        healthy,
+        0,
+        whole(battery.voltage_v * 1e3, 16, signed=False),
+        whole(battery.current_a * 100, 16),
+        min(100, whole(ceil(battery.remaining * 100) if isfinite(battery.remaining) else -1, 8)),
+        0,
+        0,
+        0,
+        0,
+        0,
+        0,
+        0,
+        0,
+        mavlink.MAV_SYS_STATUS_RECOVERY_SYSTEM,
+    )
+
+
+def extended_sys_state(autopilot: Autopilot) -> Message:
+    """EXTENDED_SYS_STATE."""
+    return mavlink.MAVLink_extended_sys_state_message(
+        mavlink.MAV_VTOL_STATE_UNDEFINED, int(autopilot.status.landed_state)
+    )
+
+
+def battery_status(autopilot: Autopilot) -> Message:
+    """BATTERY_STATUS: one pack, whose whole voltage stands where the first cell's would, as PX4 tells it."""
+    battery = autopilot.battery
+    return mavlink.MAVLink_battery_status_message(
+        0,
+        mavlink.MAV_BATTERY_FUNCTION_ALL,
+        mavlink.MAV_BATTERY_TYPE_LIPO,
+        _TEMPERATURE_UNKNOWN,
+        [min(whole(battery.voltage_v * 1e3, 16, signed=False), _UNKNOWN_16 - 1)] + [_UNKNOWN_16] * 9,
+        whole(battery.current_a * 100, 16),
+        whole(battery.used_mah, 32),
+        -1,
+        min(100, whole(battery.remaining * 100, 8)),
+        0,
+        battery.warning,
+    )
+
+
+def current_mode(autopilot: Autopilot) -> Message:
+    """CURRENT_MODE: the mode flown and the one asked for."""
+    status = autopilot.status
+    return mavlink.MAVLink_current_mode_message(
+        standard_mode(status.mode),
+        status.mode.custom_mode,
+        status.intended_mode.custom_mode,
+    )
+
+
+def estimator_status(autopilot: Autopilot) -> Message:
+    """ESTIMATOR_STATUS: the flags PX4 shows, 895 in flight and 959 standing."""
+    status = autopilot.status
+    flags = mavlink.ESTIMATOR_ATTITUDE
+    if status.origin is not None:
+        flags |= (
+            mavlink.ESTIMATOR_VELOCITY_HORIZ
+            | mavlink.ESTIMATOR_VELOCITY_VERT
+            | mavlink.ESTIMATOR_POS_HORIZ_REL
+            | mavlink.ESTIMATOR_POS_HORIZ_ABS
+            | mavlink.ESTIMATOR_POS_VERT_ABS
+            | mavlink.ESTIMATOR_PRED_POS_HORIZ_REL
+            | mavlink.ESTIMATOR_PRED_POS_HORIZ_ABS
+        )
+    if status.landed_state is LandedState.ON_GROUND:
+        flags |= mavlink.ESTIMATOR_CONST_POS_MODE
+    elif status.origin is not None:
+        flags |= mavlink.ESTIMATOR_POS_VERT_AGL
+    return mavlink.MAVLink_estimator_status_message(
+        autopilot.state.time_us, flags, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
+    )
+
+
+def vibration(autopilot: Autopilot) -> Message:
+    """VIBRATION: none."""
+    return mavlink.MAVLink_vibration_message(autopilot.state.time_us, 0.0, 0.0, 0.0, 0, 0, 0)
+
+
+def flight_information(autopilot: Autopilot) -> Message:
+    """FLIGHT_INFORMATION: since when it is armed and in the air, in vehicle time as PX4; 0: it is not."""
+    status, flight = autopilot.status, autopilot.flight
+    flying = status.armed and flight.takeoff_us > flight.landed_us
+    return mavlink.MAVLink_flight_information_message(
+        boot_ms(autopilot.state.time_us),
+        flight.armed_us if status.armed else 0,
+        flight.takeoff_us if flying else 0,
+        flight.number,
+        boot_ms(flight.landed_us),
+    )
+
+
+def servo_output_raw(autopilot: Autopilot) -> Message:
+    """SERVO_OUTPUT_RAW: motor speeds as pulses, 900 µs disarmed, 1000 to 2000 µs from rest to full speed."""
+    pulses = _pulses(autopilot)
+    return mavlink.MAVLink_servo_output_raw_message(
+        autopilot.state.time_us & 0xFFFFFFFF, 0, *pulses, *[0] * (_SERVOS - len(pulses))
+    )
+
+
+def actuator_output_status(autopilot: Autopilot) -> Message:
+    """ACTUATOR_OUTPUT_STATUS: the same pulses."""
+    pulses = [float(pulse) for pulse in _pulses(autopilot)]
+    return mavlink.MAVLink_actuator_output_status_message(
+        autopilot.state.time_us, len(pulses), pulses + [0.0] * (_OUTPUTS - len(pulses))
+    )
+
+
+def esc_status(autopilot: Autopilot) -> Message:
+    """ESC_STATUS of the first four motors; each is said to draw its share of the current."""
+    speeds = _speeds(autopilot)
+    motors = len(speeds)
+    current_a = autopilot.battery.current_a / max(1, len(autopilot.airframe.rotors))
+    rest = _BATCH - motors
+    return mavlink.MAVLink_esc_status_message(
+        0,
+        autopilot.state.time_us,
+        [whole(speed * _RPM, 32) for speed in speeds] + [0] * rest,
+        [autopilot.battery.voltage_v] * motors + [0.0] * rest,
+        [current_a] * motors + [0.0] * rest,
+    )
+
+
+def esc_info(autopilot: Autopilot, time_us: int) -> Message:
+    """ESC_INFO of the first four motors: all there, nothing wrong, temperatures unknown."""
+    motors = len(autopilot.airframe.rotors)
+    return mavlink.MAVLink_esc_info_message(
+        0,
+        autopilot.state.time_us,
+        time_us // 100_000 & 0xFFFF,
+        motors,
+        _BY_PULSES,
+        (1 << min(motors, 8)) - 1,
+        [0] * _BATCH,
+        [0] * _BATCH,
+        [_TEMPERATURE_UNKNOWN] * _BATCH,
+    )
+
+
+def _speeds(autopilot: Autopilot) -> MotorSpeeds:
+    speeds = autopilot.output.speeds_rad_s[:_BATCH]
+    return speeds if autopilot.status.armed else (0.0,) * len(speeds)
+
+
+def _pulses(autopilot: Autopilot) -> list[int]:
+    speeds_rad_s = autopilot.output.speeds_rad_s[:_SERVOS]
+    if not autopilot.status.armed:
+        return [_PWM_DISARMED_US] * len(speeds_rad_s)
+    scale = _PWM_SPAN_US / autopilot.airframe.motor.max_speed_rad_s
+    return [whole(_PWM_LOW_US + scale * speed, 16, signed=False) for speed in speeds_rad_s]
+
+
+class ConditionTelemetry(Service):
+    """Streams what the functions of this module make."""
+
+    def __init__(self, autopilot: Autopilot, exchange: Exchange) -> None:
+        of_autopilot = {
+            message_id: partial(make, autopilot)
+            for message_id, make in {
+                mavlink.MAVLINK_MSG_ID_ACTUATOR_OUTPUT_STATUS: actuator_output_status,
+                mavlink.MAVLINK_MSG_ID_BATTERY_STATUS: battery_status,
+                mavlink.MAVLINK_MSG_ID_CURRENT_MODE: current_mode,
+                mavlink.MAVLINK_MSG_ID_ESC_STATUS: esc_status,
+                mavlink.MAVLINK_MSG_ID_ESTIMATOR_STATUS: estimator_status,
+                mavlink.MAVLINK_MSG_ID_EXTENDED_SYS_STATE: extended_sys_state,
+                mavlink.MAVLINK_MSG_ID_FLIGHT_INFORMATION: flight_information,
+                mavlink.MAVLINK_MSG_ID_SERVO_OUTPUT_RAW: servo_output_raw,
+                mavlink.MAVLINK_MSG_ID_SYS_STATUS: sys_status,
+                mavlink.MAVLINK_MSG_ID_VIBRATION: vibration,
+            }.items()
+        }
+        self.sources = {
+            **of_autopilot,
+            mavlink.MAVLINK_MSG_ID_ESC_INFO: lambda: esc_info(autopilot, exchange.time_us),
+        }

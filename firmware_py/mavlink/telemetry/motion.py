@@ -1,0 +1,276 @@
+"""Telemetry of motion: attitude, positions, velocities, and what of them is being followed."""
+
+from __future__ import annotations
+
+from functools import partial
+from math import degrees, hypot, isfinite, isnan, nan
+
+from firmware_py.autopilot import Autopilot
+from firmware_py.geodesy import LocalProjection
+from firmware_py.mavlink.scaling import boot_ms, degrees_e7, millimetres, whole
+from firmware_py.mavlink.service import Service
+from firmware_py.setpoints import AttitudeSetpoint, BodyRateSetpoint, TrajectorySetpoint
+from firmware_py.status import FlightMode
+from geometry.vectors import NAN3, Quaternion
+from wire.dialect import Message, mavlink
+
+_COVARIANCE_UNKNOWN = [nan] + [0.0] * 20
+_MILLI_G = 1000.0 / 9.80665  # of 1 m/s²
+_GLOBAL_MODES = frozenset(
+    {
+        FlightMode.TAKEOFF,
+        FlightMode.HOLD,
+        FlightMode.MISSION,
+        FlightMode.RETURN,
+        FlightMode.LAND,
+        FlightMode.FOLLOW,
+        FlightMode.ORBIT,
+    }
+)
+_NO_ATTITUDE: Quaternion = (nan, nan, nan, nan)
+_RATES_IGNORED = (
+    mavlink.ATTITUDE_TARGET_TYPEMASK_BODY_ROLL_RATE_IGNORE
+    | mavlink.ATTITUDE_TARGET_TYPEMASK_BODY_PITCH_RATE_IGNORE
+    | mavlink.ATTITUDE_TARGET_TYPEMASK_BODY_YAW_RATE_IGNORE
+)
+_NOT_TOLD = -1
+
+
+def attitude(autopilot: Autopilot) -> Message:
+    """ATTITUDE."""
+    state = autopilot.state
+    return mavlink.MAVLink_attitude_message(
+        boot_ms(state.time_us), state.roll_rad, state.pitch_rad, state.yaw_rad, *state.angular_rate_frd_rad_s
+    )
+
+
+def attitude_quaternion(autopilot: Autopilot) -> Message:
+    """ATTITUDE_QUATERNION."""
+    state = autopilot.state
+    return mavlink.MAVLink_attitude_quaternion_message(
+        boot_ms(state.time_us), *state.attitude, *state.angular_rate_frd_rad_s
+    )
+
+
+def local_position_ned(autopilot: Autopilot) -> Message | None:
+    """LOCAL_POSITION_NED, once a position is known."""
+    state = autopilot.state
+    if autopilot.status.origin is None:
+        return None
+    return mavlink.MAVLink_local_position_ned_message(
+        boot_ms(state.time_us), *state.position_ned_m, *state.velocity_ned_m_s
+    )
+
+
+def global_position_int(autopilot: Autopilot) -> Message | None:
+    """GLOBAL_POSITION_INT, once a position is known."""
+    state, home, place = autopilot.state, autopilot.status.home, autopilot.global_position()
+    if place is None:
+        return None
+    above_home_m = place.altitude_m - home.altitude_m if home else 0.0
+    north_m_s, east_m_s, down_m_s = state.velocity_ned_m_s
+    return mavlink.MAVLink_global_position_int_message(
+        boot_ms(state.time_us),
+        degrees_e7(place.latitude_deg),
+        degrees_e7(place.longitude_deg),
+        millimetres(place.altitude_m),
+        millimetres(above_home_m),
+        whole(north_m_s * 100, 16),
+        whole(east_m_s * 100, 16),
+        whole(down_m_s * 100, 16),
+        whole(degrees(state.yaw_rad) % 360 * 100, 16, signed=False) % 36000,
+    )
+
+
+def vfr_hud(autopilot: Autopilot) -> Message | None:
+    """VFR_HUD; airspeed NaN as PX4 has it without such a sensor."""
+    state, place = autopilot.state, autopilot.global_position()
+    if place is None:
+        return None
+    north_m_s, east_m_s, down_m_s = state.velocity_ned_m_s
+    return mavlink.MAVLink_vfr_hud_message(
+        nan,
+        hypot(north_m_s, east_m_s),
+        whole(degrees(state.yaw_rad) % 360, 16) % 360,
+        whole(autopilot.output.throttle * 100, 16, signed=False),
+        place.altitude_m,
+        -down_m_s,
+    )
+
+
+def altitude(autopilot: Autopilot) -> Message | None:
+    """ALTITUDE; the terrain is not known."""
+    state, home, place = autopilot.state, autopilot.status.home, autopilot.global_position()
+    if place is None:
+        return None
+    return mavlink.MAVLink_altitude_message(
+        state.time_us,
+        place.altitude_m,
+        place.altitude_m,
+        -state.position_ned_m[2],
+        place.altitude_m - home.altitude_m if home else nan,
+        nan,
+        nan,
+    )
+
+
+def odometry(autopilot: Autopilot) -> Message | None:
+    """ODOMETRY; velocity in the local frame, as PX4's."""
+    state = autopilot.state
+    if autopilot.status.origin is None:
+        return None
+    return mavlink.MAVLink_odometry_message(
+        state.time_us,
+        mavlink.MAV_FRAME_LOCAL_NED,
+        mavlink.MAV_FRAME_LOCAL_NED,
+        *state.position_ned_m,
+        state.attitude,
+        *state.velocity_ned_m_s,
+        *state.angular_rate_frd_rad_s,
+        _COVARIANCE_UNKNOWN,
+        _COVARIANCE_UNKNOWN,
+        0,
+        mavlink.MAV_ESTIMATOR_TYPE_AUTOPILOT,
+        0,
+    )
+
+
+def hil_state_quaternion(autopilot: Autopilot) -> Message | None:
+    """HIL_STATE_QUATERNION, the true state; the same as the estimate, whose sensors are exact."""
+    state, place = autopilot.state, autopilot.global_position()
+    if place is None:
+        return None
+    return mavlink.MAVLink_hil_state_quaternion_message(
+        state.time_us,
+        state.attitude,
+        *state.angular_rate_frd_rad_s,
+        degrees_e7(place.latitude_deg),
+        degrees_e7(place.longitude_deg),
+        millimetres(place.altitude_m),
+        *[whole(velocity_m_s * 100, 16) for velocity_m_s in state.velocity_ned_m_s],
+        0,
+        0,
+        *[whole(force * _MILLI_G, 16) for force in state.specific_force_frd_m_s2],
+    )
+
+
+def position_target_local_ned(autopilot: Autopilot) -> Message:
+    """POSITION_TARGET_LOCAL_NED: what is followed now. A component not controlled is NaN and masked out."""
+    followed = autopilot.status.setpoint.trajectory
+    return mavlink.MAVLink_position_target_local_ned_message(
+        boot_ms(autopilot.state.time_us),
+        mavlink.MAV_FRAME_LOCAL_NED,
+        _mask(followed),
+        *followed.position_ned_m,
+        *followed.velocity_ned_m_s,
+        *followed.acceleration_ned_m_s2,
+        followed.yaw_rad,
+        followed.yaw_rate_rad_s,
+    )
+
+
+def position_target_global_int(autopilot: Autopilot) -> Message | None:
+    """POSITION_TARGET_GLOBAL_INT, while armed in a mode that flies to a place, as PX4."""
+    status = autopilot.status
+    followed, origin = status.setpoint.trajectory, status.origin
+    north_m, east_m, down_m = followed.position_ned_m
+    if not status.armed or status.mode not in _GLOBAL_MODES or origin is None:
+        return None
+    if not (isfinite(north_m) and isfinite(east_m)):
+        return None
+    place = LocalProjection(origin).to_geodetic((north_m, east_m, down_m))
+    return mavlink.MAVLink_position_target_global_int_message(
+        boot_ms(autopilot.state.time_us),
+        mavlink.MAV_FRAME_GLOBAL_INT,
+        _mask(followed),
+        degrees_e7(place.latitude_deg),
+        degrees_e7(place.longitude_deg),
+        place.altitude_m,
+        *followed.velocity_ned_m_s,
+        *followed.acceleration_ned_m_s2,
+        followed.yaw_rad,
+        followed.yaw_rate_rad_s,
+    )
+
+
+def attitude_target(autopilot: Autopilot) -> Message:
+    """ATTITUDE_TARGET: attitude and rates if somebody asks for them, else masked; the thrust always.
+
+    A stabiliser that goes from velocity straight to motors has no attitude it aims at, so none is made up.
+    """
+    followed = autopilot.status.setpoint
+    mask = 0
+    attitude, rates, thrust = _NO_ATTITUDE, NAN3, autopilot.output.throttle
+    if isinstance(followed, AttitudeSetpoint):
+        attitude, thrust = followed.attitude, followed.thrust
+    else:
+        mask |= mavlink.ATTITUDE_TARGET_TYPEMASK_ATTITUDE_IGNORE
+    if isinstance(followed, BodyRateSetpoint):
+        rates, thrust = followed.rate_frd_rad_s, followed.thrust
+    else:
+        mask |= _RATES_IGNORED
+    return mavlink.MAVLink_attitude_target_message(
+        boot_ms(autopilot.state.time_us), mask, attitude, *rates, thrust
+    )
+
+
+def time_estimate_to_target(autopilot: Autopilot) -> Message | None:
+    """TIME_ESTIMATE_TO_TARGET: seconds that a return would take; -1 for what PX4 does not tell either.
+
+    Climb to RTL_RETURN_ALT, cruise home, descend, wait RTL_LAND_DELAY, land: distances over the speeds of
+    the parameters, without acceleration and without PX4's reserve.
+    """
+    status, state = autopilot.status, autopilot.state
+    if status.home is None:
+        return None
+    value = autopilot.parameters.value
+    height_m = status.home_ned_m[2] - state.position_ned_m[2]
+    distance_m = hypot(
+        state.position_ned_m[0] - status.home_ned_m[0], state.position_ned_m[1] - status.home_ned_m[1]
+    )
+    top_m = max(height_m, value("RTL_RETURN_ALT")) if distance_m > value("RTL_MIN_DIST") else height_m
+    slow_from_m = min(top_m, max(0.0, value("RTL_DESCEND_ALT")))
+    seconds = (
+        (top_m - height_m) / value("MPC_Z_V_AUTO_UP")
+        + distance_m / value("MPC_XY_CRUISE")
+        + (top_m - slow_from_m) / value("MPC_Z_V_AUTO_DN")
+        + max(0.0, value("RTL_LAND_DELAY"))
+        + slow_from_m / value("MPC_LAND_SPEED")
+    )
+    return mavlink.MAVLink_time_estimate_to_target_message(
+        whole(seconds, 32), _NOT_TOLD, _NOT_TOLD, _NOT_TOLD, _NOT_TOLD
+    )
+
+
+def _mask(followed: TrajectorySetpoint) -> int:
+    """POSITION_TARGET_TYPEMASK: the components that are not controlled."""
+    components = (*followed.position_ned_m, *followed.velocity_ned_m_s, *followed.acceleration_ned_m_s2)
+    mask = sum(1 << bit for bit, value in enumerate(components) if isnan(value))
+    if isnan(followed.yaw_rad):
+        mask |= int(mavlink.POSITION_TARGET_TYPEMASK_YAW_IGNORE)
+    if isnan(followed.yaw_rate_rad_s):
+        mask |= int(mavlink.POSITION_TARGET_TYPEMASK_YAW_RATE_IGNORE)
+    return mask
+
+
+class MotionTelemetry(Service):
+    """Streams what the functions of this module make."""
+
+    def __init__(self, autopilot: Autopilot) -> None:
+        self.sources = {
+            message_id: partial(make, autopilot)
+            for message_id, make in {
+                mavlink.MAVLINK_MSG_ID_ALTITUDE: altitude,
+                mavlink.MAVLINK_MSG_ID_ATTITUDE: attitude,
+                mavlink.MAVLINK_MSG_ID_ATTITUDE_QUATERNION: attitude_quaternion,
+                mavlink.MAVLINK_MSG_ID_ATTITUDE_TARGET: attitude_target,
+                mavlink.MAVLINK_MSG_ID_GLOBAL_POSITION_INT: global_position_int,
+                mavlink.MAVLINK_MSG_ID_HIL_STATE_QUATERNION: hil_state_quaternion,
+                mavlink.MAVLINK_MSG_ID_LOCAL_POSITION_NED: local_position_ned,
+                mavlink.MAVLINK_MSG_ID_ODOMETRY: odometry,
+                mavlink.MAVLINK_MSG_ID_POSITION_TARGET_GLOBAL_INT: position_target_global_int,
+                mavlink.MAVLINK_MSG_ID_POSITION_TARGET_LOCAL_NED: position_target_local_ned,
+                mavlink.MAVLINK_MSG_ID_TIME_ESTIMATE_TO_TARGET: time_estimate_to_target,
+                mavlink.MAVLINK_MSG_ID_VFR_HUD: vfr_hud,
+            }.items()
+        }

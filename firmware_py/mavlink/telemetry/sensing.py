@@ -1,0 +1,168 @@
+"""Telemetry of sensors. There are no noisy sensors yet: pressure and magnetic field follow from the state."""
+
+from __future__ import annotations
+
+from functools import partial
+from math import atan2, degrees, hypot
+
+from firmware_py.autopilot import Autopilot
+from firmware_py.mavlink.scaling import boot_ms, degrees_e7, millimetres, whole
+from firmware_py.mavlink.service import Service
+from geometry.vectors import Quaternion, Vec3
+from wire.dialect import Message, mavlink
+
+# North, east, down at PX4's simulated home (Zurich), gauss; World Magnetic Model 2025, two digits.
+EARTH_FIELD_NED_GAUSS: Vec3 = (0.22, 0.013, 0.43)
+_SEA_LEVEL_HPA = 1013.25
+_SEA_LEVEL_K = 288.15
+_LAPSE_K_M = 0.0065
+_EXPONENT = 5.25588  # g M / (R L)
+_MILLI_G = 1000.0 / 9.80665  # of 1 m/s²
+_RANGE_M = 100.0
+_MIN_DOWN = 0.01
+_UNKNOWN_8, _UNKNOWN_16 = 0xFF, 0xFFFF
+_IMU_FIELDS = 0b1_1011_1111_1111  # all but differential pressure
+
+
+def temperature_k(altitude_m: float) -> float:
+    """Air temperature of the International Standard Atmosphere, below 11 km (ISO 2533)."""
+    return _SEA_LEVEL_K - _LAPSE_K_M * min(max(altitude_m, -5000.0), 11000.0)
+
+
+def pressure_hpa(altitude_m: float) -> float:
+    """Static pressure of the International Standard Atmosphere, below 11 km: p0 (T / T0)^5.256 (ISO 2533)."""
+    return float(_SEA_LEVEL_HPA * (temperature_k(altitude_m) / _SEA_LEVEL_K) ** _EXPONENT)
+
+
+def to_body(vector_ned: Vec3, attitude: Quaternion) -> Vec3:
+    """A world vector in body axes, by the inverse of the unit quaternion: v + 2w (v × q) + 2 q × (q × v)."""
+    w, qx, qy, qz = attitude
+    x, y, z = vector_ned
+    tx, ty, tz = 2 * (y * qz - z * qy), 2 * (z * qx - x * qz), 2 * (x * qy - y * qx)
+    return (
+        x + w * tx + ty * qz - tz * qy,
+        y + w * ty + tz * qx - tx * qz,
+        z + w * tz + tx * qy - ty * qx,
+    )
+
+
+def highres_imu(autopilot: Autopilot) -> Message:
+    """HIGHRES_IMU."""
+    state, place = autopilot.state, autopilot.global_position()
+    altitude_m = place.altitude_m if place else 0.0
+    return mavlink.MAVLink_highres_imu_message(
+        state.time_us,
+        *state.specific_force_frd_m_s2,
+        *state.angular_rate_frd_rad_s,
+        *to_body(EARTH_FIELD_NED_GAUSS, state.attitude),
+        pressure_hpa(altitude_m),
+        0.0,
+        altitude_m,
+        temperature_k(altitude_m) - 273.15,
+        _IMU_FIELDS,
+    )
+
+
+def scaled_imu(autopilot: Autopilot) -> Message:
+    """SCALED_IMU: thousandths of g, rad/s and gauss, hundredths of a degree (0 would be unknown)."""
+    state, place = autopilot.state, autopilot.global_position()
+    field_gauss = to_body(EARTH_FIELD_NED_GAUSS, state.attitude)
+    celsius = temperature_k(place.altitude_m if place else 0.0) - 273.15
+    return mavlink.MAVLink_scaled_imu_message(
+        boot_ms(state.time_us),
+        *[whole(force * _MILLI_G, 16) for force in state.specific_force_frd_m_s2],
+        *[whole(rate * 1e3, 16) for rate in state.angular_rate_frd_rad_s],
+        *[whole(component * 1e3, 16) for component in field_gauss],
+        whole(celsius * 100, 16) or 1,
+    )
+
+
+def distance_sensor(autopilot: Autopilot) -> Message | None:
+    """DISTANCE_SENSOR: the range along body down to flat ground at the height where the vehicle booted.
+
+    PX4's own physics makes it from the state too. Beyond its range, or turned away, it says 0, as PX4.
+    """
+    state = autopilot.state
+    if autopilot.status.origin is None:
+        return None
+    _, qx, qy, _ = state.attitude
+    down = 1.0 - 2.0 * (qx * qx + qy * qy)  # of the body's down axis, in the world
+    range_m = -state.position_ned_m[2] / down if down > _MIN_DOWN else 0.0
+    if not 0.0 < range_m < _RANGE_M:
+        range_m = 0.0
+    return mavlink.MAVLink_distance_sensor_message(
+        boot_ms(state.time_us),
+        0,
+        round(_RANGE_M * 100),
+        round(range_m * 100),
+        mavlink.MAV_DISTANCE_SENSOR_LASER,
+        0,
+        mavlink.MAV_SENSOR_ROTATION_PITCH_270,
+        0,
+    )
+
+
+def gnss_integrity(autopilot: Autopilot) -> Message | None:
+    """GNSS_INTEGRITY: nothing watches for jamming or spoofing, and it says so."""
+    if autopilot.status.origin is None:
+        return None
+    return mavlink.MAVLink_gnss_integrity_message(
+        0, 0, 0, 0, 0, 0, _UNKNOWN_16, _UNKNOWN_16, _UNKNOWN_8, _UNKNOWN_8, _UNKNOWN_8, _UNKNOWN_8
+    )
+
+
+def scaled_pressure(autopilot: Autopilot) -> Message | None:
+    """SCALED_PRESSURE."""
+    place = autopilot.global_position()
+    if place is None:
+        return None
+    return mavlink.MAVLink_scaled_pressure_message(
+        boot_ms(autopilot.state.time_us),
+        pressure_hpa(place.altitude_m),
+        0.0,
+        whole((temperature_k(place.altitude_m) - 273.15) * 100, 16),
+    )
+
+
+def gps_raw_int(autopilot: Autopilot) -> Message:
+    """GPS_RAW_INT: a 3D fix with PX4's simulated figures, or no fix yet."""
+    state, place = autopilot.state, autopilot.global_position()
+    if place is None:
+        return mavlink.MAVLink_gps_raw_int_message(
+            state.time_us, mavlink.GPS_FIX_TYPE_NO_FIX, 0, 0, 0, 0xFFFF, 0xFFFF, 0xFFFF, 0xFFFF, 0
+        )
+    north_m_s, east_m_s, _ = state.velocity_ned_m_s
+    altitude_mm = millimetres(place.altitude_m)
+    return mavlink.MAVLink_gps_raw_int_message(
+        state.time_us,
+        mavlink.GPS_FIX_TYPE_3D_FIX,
+        degrees_e7(place.latitude_deg),
+        degrees_e7(place.longitude_deg),
+        altitude_mm,
+        70,
+        110,
+        whole(hypot(north_m_s, east_m_s) * 100, 16, signed=False),
+        whole(degrees(atan2(east_m_s, north_m_s)) % 360 * 100, 16, signed=False) % 36000,
+        10,
+        altitude_mm,
+        900,
+        1780,
+        400,
+    )
+
+
+class SensorTelemetry(Service):
+    """Streams what the functions of this module make."""
+
+    def __init__(self, autopilot: Autopilot) -> None:
+        self.sources = {
+            message_id: partial(make, autopilot)
+            for message_id, make in {
+                mavlink.MAVLINK_MSG_ID_DISTANCE_SENSOR: distance_sensor,
+                mavlink.MAVLINK_MSG_ID_GNSS_INTEGRITY: gnss_integrity,
+                mavlink.MAVLINK_MSG_ID_GPS_RAW_INT: gps_raw_int,
+                mavlink.MAVLINK_MSG_ID_HIGHRES_IMU: highres_imu,
+                mavlink.MAVLINK_MSG_ID_SCALED_IMU: scaled_imu,
+                mavlink.MAVLINK_MSG_ID_SCALED_PRESSURE: scaled_pressure,
+            }.items()
+        }

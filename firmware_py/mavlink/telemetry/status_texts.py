@@ -1,0 +1,78 @@
+"""STATUSTEXT: what the autopilot says, to the links where a ground station was heard, as PX4.
+
+Texts said before that wait for it, the latest few and five seconds long. Longer ones go in pieces of 50. As
+in PX4, a text that is sent as an event too ends with a tab, so that who reads events leaves it out.
+"""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Callable
+
+from firmware_py.autopilot import Autopilot
+from firmware_py.mavlink.service import Service
+from firmware_py.types import StatusText
+from wire.dialect import Message, mavlink
+from wire.exchange import Exchange
+
+_PIECE = 50
+_KEPT = 8
+_STALE_US = 5_000_000
+
+
+class StatusTextService(Service):
+    """Brings the autopilot's texts to people.
+
+    Args:
+        announce: tells a text as an event, if there is one that says the same, and answers whether.
+        log: called with vehicle time and each text, heard by anybody or not.
+    """
+
+    def __init__(
+        self,
+        autopilot: Autopilot,
+        exchange: Exchange,
+        announce: Callable[[StatusText], bool],
+        log: Callable[[int, StatusText], None] | None = None,
+    ) -> None:
+        self._autopilot = autopilot
+        self._exchange = exchange
+        self._announce = announce
+        self._log = log
+        self._last_id = 0
+        self._waiting: dict[str, deque[tuple[int, list[Message]]]] = {}
+
+    def update(self) -> None:
+        """Take the autopilot's new texts and send what can be sent."""
+        exchange = self._exchange
+        for said in self._autopilot.take_texts():
+            if self._log is not None:
+                self._log(exchange.time_us, said)
+            text = StatusText(said.severity, f"{said.text}\t") if self._announce(said) else said
+            pieces = self._pieces(text)
+            for name in exchange.links:
+                waiting = self._waiting.setdefault(name, deque(maxlen=_KEPT))
+                waiting.append((exchange.time_us, pieces))
+        for name, waiting in list(self._waiting.items()):
+            link = exchange.links.get(name)
+            if link is None:
+                del self._waiting[name]
+                continue
+            while waiting and link.gcs_heard:
+                said_us, pieces = waiting.popleft()
+                if exchange.time_us - said_us <= _STALE_US:
+                    for piece in pieces:
+                        exchange.send(link, piece)
+
+    def _pieces(self, text: StatusText) -> list[Message]:
+        data = text.text.encode("ascii", "replace")
+        severity = min(max(text.severity, 0), mavlink.MAV_SEVERITY_DEBUG)
+        if len(data) <= _PIECE:
+            return [mavlink.MAVLink_statustext_message(severity, data, 0, 0)]
+        self._last_id = self._last_id % 0xFFFF + 1
+        # One that fills its last piece needs an empty one after it, or the receiver waits for more.
+        starts = range(0, len(data) + 1, _PIECE)
+        return [
+            mavlink.MAVLink_statustext_message(severity, data[start : start + _PIECE], self._last_id, place)
+            for place, start in enumerate(starts)
+        ]

@@ -1,0 +1,131 @@
+"""Streams and requests: what goes out on each link by its schedule, and REQUEST_MESSAGE and its relatives.
+
+PX4 has streams that say nothing without a device that is not there. Their intervals can be set here too, with
+PX4's answer and PX4's silence. Difference from PX4: CURRENT_MODE, which PX4 denies on request, is sent.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from math import isfinite, nan
+
+from firmware_py.mavlink.service import Command, CommandHandler, Reply, Service, Source
+from firmware_py.status import CommandResult
+from wire.dialect import Message, mavlink
+from wire.exchange import Exchange
+from wire.framing import Packet
+from wire.link import Link
+
+_MAX_MESSAGE_ID = 0xFFFFFF
+_MAX_INTERVAL_US = 0x7FFFFFFF
+_LINK_NODE_STATUS = mavlink.MAVLINK_MSG_ID_LINK_NODE_STATUS  # the one message that differs from link to link
+_SILENT = """
+    ADSB_VEHICLE CAMERA_TRIGGER COLLISION DEBUG DEBUG_FLOAT_ARRAY DEBUG_VECT EFI_STATUS
+    GIMBAL_DEVICE_ATTITUDE_STATUS GIMBAL_DEVICE_INFORMATION GIMBAL_DEVICE_SET_ATTITUDE
+    GIMBAL_MANAGER_INFORMATION GIMBAL_MANAGER_STATUS GPS2_RAW GPS_STATUS HYGROMETER_SENSOR
+    LANDING_TARGET MAG_CAL_REPORT MANUAL_CONTROL MOUNT_ORIENTATION NAMED_VALUE_FLOAT
+    NAV_CONTROLLER_OUTPUT OBSTACLE_DISTANCE OPEN_DRONE_ID_ARM_STATUS OPEN_DRONE_ID_BASIC_ID
+    OPTICAL_FLOW_RAD ORBIT_EXECUTION_STATUS RAW_RPM RC_CHANNELS SCALED_IMU2 SCALED_IMU3 SCALED_PRESSURE2
+    SCALED_PRESSURE3 WIND_COV
+"""
+
+
+class StreamService(Service):
+    """Sends what is due on each link and what is asked for.
+
+    Args:
+        sources: of all services, by message id.
+        replies: of all services, by message id.
+    """
+
+    def __init__(
+        self, exchange: Exchange, sources: Mapping[int, Source], replies: Mapping[int, Reply]
+    ) -> None:
+        self._exchange = exchange
+        self._sources = sources
+        self._replies = replies
+        silent = (getattr(mavlink, f"MAVLINK_MSG_ID_{name}") for name in _SILENT.split())
+        self._streamable = frozenset({*sources, _LINK_NODE_STATUS, *silent})
+        self.commands = {
+            mavlink.MAV_CMD_GET_HOME_POSITION: self._requester(mavlink.MAVLINK_MSG_ID_HOME_POSITION),
+            mavlink.MAV_CMD_GET_MESSAGE_INTERVAL: self._get_interval,
+            mavlink.MAV_CMD_SET_MESSAGE_INTERVAL: self._set_interval,
+            mavlink.MAV_CMD_REQUEST_MESSAGE: lambda command: self._request(command.link, *command.params[:2]),
+            mavlink.MAV_CMD_REQUEST_PROTOCOL_VERSION: self._requester(
+                mavlink.MAVLINK_MSG_ID_PROTOCOL_VERSION
+            ),
+            mavlink.MAV_CMD_REQUEST_AUTOPILOT_CAPABILITIES: self._requester(
+                mavlink.MAVLINK_MSG_ID_AUTOPILOT_VERSION
+            ),
+        }
+
+    def update(self) -> None:
+        """Send what is due on each link; what goes to several is made once."""
+        exchange = self._exchange
+        time_us = exchange.time_us
+        packets: dict[int, Packet | None] = {}
+        for link in exchange.links.values():
+            for message_id in link.due(time_us):
+                if message_id not in packets or message_id == _LINK_NODE_STATUS:
+                    message = self._message(message_id, link)
+                    packets[message_id] = None if message is None else exchange.packet(message)
+                packet = packets[message_id]
+                if packet is not None:
+                    link.send_stream(packet)
+
+    def _can_stream(self, message_id: int) -> bool:
+        """Whether the interval of that message can be set."""
+        return message_id in self._streamable
+
+    def _message(self, message_id: int, link: Link) -> Message | None:
+        """The message as it is now; None when it does not exist or has nothing to tell yet."""
+        source = self._sources.get(message_id)
+        if source is not None:
+            return source()
+        return link.node_status(self._exchange.time_us) if message_id == _LINK_NODE_STATUS else None
+
+    def _request(self, link: Link, message_id: float, argument: float = nan) -> CommandResult:
+        """Send a message on a link; anything that is no message of ours is denied."""
+        wanted = _message_id(message_id)
+        messages = [] if wanted is None else self._requested(link, wanted, _message_id(argument) or 0)
+        for message in messages:
+            self._exchange.send(link, message)
+        return CommandResult.ACCEPTED if messages else CommandResult.DENIED
+
+    def _requested(self, link: Link, message_id: int, argument: int) -> list[Message]:
+        reply = self._replies.get(message_id)
+        if reply is not None:
+            return reply(link, argument)
+        if message_id == mavlink.MAVLINK_MSG_ID_MESSAGE_INTERVAL:
+            return [self._interval(link, argument)]
+        message = self._message(message_id, link)
+        return [] if message is None else [message]
+
+    def _requester(self, message_id: int) -> CommandHandler:
+        """The handler of a command that is older than REQUEST_MESSAGE and asks for one message."""
+        return lambda command: self._request(command.link, message_id)
+
+    def _get_interval(self, command: Command) -> CommandResult:
+        return self._request(command.link, mavlink.MAVLINK_MSG_ID_MESSAGE_INTERVAL, command.params[0])
+
+    def _set_interval(self, command: Command) -> CommandResult:
+        """0: default, -1: off. HEARTBEAT and what is unknown fail, as in PX4."""
+        wanted, interval_us = _message_id(command.params[0]), command.params[1]
+        if wanted is None or not self._can_stream(wanted) or wanted == mavlink.MAVLINK_MSG_ID_HEARTBEAT:
+            return CommandResult.FAILED
+        if not isfinite(interval_us):
+            return CommandResult.FAILED
+        kept_us = -1 if interval_us < 0 else min(round(interval_us), _MAX_INTERVAL_US)
+        command.link.schedule.set_interval(wanted, kept_us, self._exchange.time_us)
+        return CommandResult.ACCEPTED
+
+    def _interval(self, link: Link, message_id: int) -> Message:
+        """MESSAGE_INTERVAL: 0 for a message that does not exist, -1 for one that is off."""
+        interval_us = link.schedule.interval_us(message_id) if self._can_stream(message_id) else 0
+        return mavlink.MAVLink_message_interval_message(message_id & 0xFFFF, interval_us)
+
+
+def _message_id(number: float) -> int | None:
+    if not isfinite(number) or number % 1 or not 0 <= number <= _MAX_MESSAGE_ID:
+        return None
+    return int(number)
