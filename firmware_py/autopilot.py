@@ -143,11 +143,9 @@ class Autopilot(FlightLoop):
         usable one comes.
         """
         if setpoint.is_usable:
-            self._refusal_said = False
             self.setpoints.put(setpoint, self._now_us)
             self._commander.setpoint_came(setpoint.time_us)
-        elif not self._refusal_said:
-            self._refusal_said = True
+        elif self.setpoints.refuse():
             self.say(WARNING, "Offboard setpoint ignored: nothing in it can be flown")
 
     def manual_input(self, sticks: ManualInput) -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from math import nan
 from typing import NamedTuple
 
 from firmware_py.commander_guards import (
@@ -24,6 +25,7 @@ from firmware_py.commander_table import (
     State,
     first_match,
 )
+from firmware_py.guidance.orbit import Orbit
 from firmware_py.parameters import Parameters
 from firmware_py.status import CommandResult, FlightMode
 
@@ -115,9 +117,20 @@ class Commander:
     Attributes:
         state: where in the table it is.
         situation: what guards look at.
+        takeoff_altitude_m: of the next take-off, above mean sea level; NaN: MIS_TAKEOFF_ALT above home.
+        orbit: the circle to fly.
     """
 
-    __slots__ = ("_check_us", "_checks", "_started", "_tick_rules", "situation", "state")
+    __slots__ = (
+        "_check_us",
+        "_checks",
+        "_started",
+        "_tick_rules",
+        "orbit",
+        "situation",
+        "state",
+        "takeoff_altitude_m",
+    )
 
     def __init__(self) -> None:
         self.state = State.DISARMED
@@ -126,6 +139,8 @@ class Commander:
         self._started = False
         self._checks = NOT_CHECKED
         self.situation = Situation()
+        self.takeoff_altitude_m = nan
+        self.orbit = Orbit()
 
     @property
     def mode(self) -> FlightMode:
@@ -215,6 +230,13 @@ class Commander:
             raise LookupError(f"commander: no rule for {event.value} in {self.state.value}")
         self._follow(row)
         return row
+
+    def remember(self, takeoff_altitude_m: float | None, orbit: Orbit | None) -> None:
+        """Take what a command asks for; None: as before."""
+        if takeoff_altitude_m is not None:
+            self.takeoff_altitude_m = takeoff_altitude_m
+        if orbit is not None:
+            self.orbit = orbit
 
     def mission_known(self, *, valid: bool) -> None:
         """Note whether there is a mission that can be flown; an upload may have come this moment."""

@@ -49,7 +49,7 @@ class ControlCommand:
         return self
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(slots=True)
 class VelocityCommand(ControlCommand):
     """A velocity with an acceleration as feed-forward, and a yaw rate."""
 
@@ -74,7 +74,7 @@ class VelocityCommand(ControlCommand):
         return VelocityCommand((0.0, 0.0, self.velocity_level_m_s[2]))
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(slots=True)
 class AccelerationCommand(ControlCommand):
     """An acceleration (zeros hover) and a yaw rate; the velocity is left to whoever commands it."""
 
@@ -90,7 +90,7 @@ class AccelerationCommand(ControlCommand):
         return AccelerationCommand((0.0, 0.0, self.acceleration_level_m_s2[2]))
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(slots=True)
 class TiltCommand(ControlCommand):
     """A tilt (right side down, nose up), a yaw rate and a vertical velocity."""
 
@@ -115,7 +115,7 @@ class TiltCommand(ControlCommand):
         return TiltCommand(0.0, 0.0, 0.0, self.down_m_s)
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(slots=True)
 class AttitudeCommand(ControlCommand):
     """A tilt (right side down, nose up), a yaw rate and a thrust."""
 
@@ -133,7 +133,7 @@ class AttitudeCommand(ControlCommand):
         return AttitudeCommand(0.0, 0.0, 0.0, self.thrust)
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(slots=True)
 class BodyRateCommand(ControlCommand):
     """Roll, pitch and yaw rate, and a thrust."""
 
@@ -149,7 +149,7 @@ class BodyRateCommand(ControlCommand):
         return BodyRateCommand(ZERO3, self.thrust)
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(slots=True)
 class MotorCommand(ControlCommand):
     """Outputs of the motors, passed through: 0..1 of a rotor's full thrust, in the airframe's order."""
 

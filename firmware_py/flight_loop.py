@@ -10,7 +10,7 @@ from math import cos, isnan, nan, radians
 from typing import TYPE_CHECKING
 
 from firmware_py.airframe import Airframe
-from firmware_py.battery import BatteryMonitor, battery_settings, min_charge_to_arm
+from firmware_py.battery import BatteryMonitor
 from firmware_py.commander import NOT_CHECKED, Commander, Observation, SlowChecks
 from firmware_py.commander_table import INFO, WARNING, Event, Row, State
 from firmware_py.commands import ControlCommand
@@ -25,7 +25,14 @@ from firmware_py.navigator import Navigator
 from firmware_py.offboard_requests import SetpointQueue
 from firmware_py.parameters import Parameters
 from firmware_py.status import CommandResult, LandedState, VehicleStatus
-from firmware_py.types import FlightRecord, GeodeticPoint, MotorOutput, MotorSpeeds, Sensors, StatusText
+from firmware_py.types import (
+    FlightRecord,
+    GeodeticPoint,
+    MotorOutput,
+    MotorSpeeds,
+    Sensors,
+    StatusText,
+)
 from geometry.vectors import NAN3, Vec3
 
 if TYPE_CHECKING:
@@ -96,11 +103,11 @@ class FlightLoop:
         self.estimator = Estimator()
         self.state = self.estimator.state
         self.status = VehicleStatus()
-        self.output = self._stopped = MotorOutput((0.0,) * len(airframe.rotors))
+        self.output = MotorOutput((0.0,) * len(airframe.rotors))
         self.flight = FlightRecord()
         self.missions = MissionStore()
         self.setpoints = SetpointQueue()
-        self._battery = BatteryMonitor()
+        self._battery = BatteryMonitor(airframe, self.parameters)
         self.battery = self._battery.state
         self._geo = GeoReference(origin)
         self._commander = Commander()
@@ -118,9 +125,6 @@ class FlightLoop:
         self._state_entered = State.DISARMED
         self._state_shown: State | None = None
         self._airborne = LandedState.IN_AIR
-        self._takeoff_altitude_m = nan
-        self._orbit = Orbit()
-        self._refusal_said = False
         self._configure()
 
     def prepare(self) -> None:
@@ -147,13 +151,18 @@ class FlightLoop:
         """
         if self.parameters.version != self._parameters_version:
             self._configure()
-        sound = self._estimate(sensors)
+        sound = self.estimator.update(sensors)
         seen = self._observe(sensors, sound)
-        self._decide(seen)
-        if self._motors_stopped:
-            self.output = self._stopped
-        elif sound:
-            self.output = self._actuate(self._guidance.step(self.state), seen.landed)
+        commander = self._commander
+        row = commander.tick(seen)  # it decides
+        if row is not None:
+            self._follow(row)
+        if commander.state is State.MISSION:
+            self._advance_mission()
+        self._refresh_status()
+        if sound and not self._motors_stopped:
+            command = self._guidance.step(self.state)
+            self.output = self._actuate(command, seen.landed)
         return self.output.speeds_rad_s
 
     def _handle(
@@ -166,11 +175,8 @@ class FlightLoop:
             takeoff_altitude_m: of the next take-off, above mean sea level; NaN: MIS_TAKEOFF_ALT above home.
             orbit: the circle to fly.
         """
-        if takeoff_altitude_m is not None:
-            self._takeoff_altitude_m = takeoff_altitude_m
-        if orbit is not None:
-            self._orbit = orbit
         self._commander.mission_known(valid=self.missions.valid)
+        self._commander.remember(takeoff_altitude_m, orbit)
         row = self._commander.handle(event)
         self._follow(row)
         self._refresh_status()
@@ -197,48 +203,40 @@ class FlightLoop:
         status.origin, status.home, status.home_ned_m = geo.origin, geo.home, geo.home_ned_m
         self._guidance.set_home(geo.home_ned_m)
 
-    def _estimate(self, sensors: Sensors) -> bool:
-        """Update the state; whether the sample was usable."""
-        sound = self.estimator.update(sensors)
-        if not sound:
-            self._now_us += self._period_us
-            return False
-        self._now_us = max(self._now_us, self.state.time_us)
-        if self._geo.projection is None and self.estimator.origin_ned_m is not None:
-            self._geo.fix_origin(self.estimator.origin_ned_m)
-            self._geo.set_home_at(self.state.position_ned_m)
-            self._publish_places()
-        return True
-
     def _observe(self, sensors: Sensors, sound: bool) -> Observation:
         """What the commander is to know of this tick."""
-        now_us = self._now_us
-        if sound:
-            self._detect_land()
+        state, detector, now_us = self.state, self._land_detector, self._now_us
+        if not sound:
+            self._now_us = now_us = now_us + self._period_us
+        else:
+            if state.time_us > now_us:
+                self._now_us = now_us = state.time_us
+            if self._geo.projection is None:
+                self._fix_origin()
+            before = detector.landed
+            landed = detector.update(
+                state,
+                armed=not self._motors_stopped,
+                lifting=self._lift_off.ticks > 0,
+                command_down_m_s=self._guidance.command_down_m_s,
+                throttle=self.output.throttle,
+            )
+            if landed is not before:
+                self._change_ground_contact(landed)
         if now_us >= self._checks_due_us:
             self._checks = self._check(sensors)
         if self.setpoints.waiting is not None and self.setpoints.is_due(now_us):
             self._guidance.accept(self.setpoints.take())
-        _, x, y, _ = self.state.attitude
+        _, x, y, _ = state.attitude
         return Observation(
             now_us,
             sound,
             self.estimator.placed,
             1.0 - 2.0 * (x * x + y * y) > self._upright_cosine,
-            self._land_detector.landed,
+            detector.landed,
             self._guidance.mode.target_reached,
             self._checks,
         )
-
-    def _decide(self, seen: Observation) -> None:
-        """Let the commander apply its table, and fly what it chose from now on."""
-        commander = self._commander
-        row = commander.tick(seen)
-        if row is not None:
-            self._follow(row)
-        if commander.state is State.MISSION:
-            self._advance_mission()
-        self._refresh_status()
 
     def _actuate(self, command: ControlCommand, landed: bool) -> MotorOutput:
         """Motors for a command, with the ground between if it stands."""
@@ -268,7 +266,7 @@ class FlightLoop:
             self._leave_disarmed()
         self._motors_stopped = row.target in _STOPPED_STATES
         if self._motors_stopped:
-            self.output = self._stopped
+            self.output = MotorOutput((0.0,) * len(self.airframe.rotors))
             self._lift_off.rest()
         self._navigator.observe(self.state, self._geo, landed=self._land_detector.landed)
         if row.target is State.OFFBOARD:
@@ -301,7 +299,7 @@ class FlightLoop:
             self.state,
             target_ned_m=self._target_of(target),
             keep_target=reached or event is Event.MISSION_DONE,
-            orbit=self._orbit,
+            orbit=self._commander.orbit,
         )
         if target is State.MISSION:
             self._navigator.enter_mission()
@@ -313,7 +311,7 @@ class FlightLoop:
         here = self._geo.to_geodetic(self.state.position_ned_m)
         if target is not State.TAKEOFF or here is None or self._geo.home is None:
             return NAN3
-        altitude_m = self._takeoff_altitude_m
+        altitude_m = self._commander.takeoff_altitude_m
         if isnan(altitude_m):
             height_m = self.parameters.value("MIS_TAKEOFF_ALT")
             altitude_m = self._geo.home.altitude_m + height_m
@@ -334,18 +332,13 @@ class FlightLoop:
         if ended is not None:
             self._follow(self._commander.handle(ended))
 
-    def _detect_land(self) -> None:
-        detector = self._land_detector
-        before = detector.landed
-        landed = detector.update(
-            self.state,
-            armed=not self._motors_stopped,
-            lifting=self._lift_off.ticks > 0,
-            command_down_m_s=self._guidance.command_down_m_s,
-            throttle=self.output.throttle,
-        )
-        if landed is before:
-            return
+    def _fix_origin(self) -> None:
+        if self.estimator.origin_ned_m is not None:
+            self._geo.fix_origin(self.estimator.origin_ned_m)
+            self._geo.set_home_at(self.state.position_ned_m)
+            self._publish_places()
+
+    def _change_ground_contact(self, landed: bool) -> None:
         if landed:
             self.flight.landed_us = self._now_us
         else:
@@ -359,16 +352,14 @@ class FlightLoop:
         self._checks_due_us = self._now_us + _CHECK_PERIOD_US
         battery, navigator = self._battery, self._navigator
         navigator.observe(self.state, self._geo, landed=self._land_detector.landed)
-        battery.update(
-            self._now_us, sensors.battery_voltage_v, sensors.battery_current_a, self._battery_settings
-        )
+        battery.update(self._now_us, sensors.battery_voltage_v, sensors.battery_current_a)
         breach = navigator.breach() if self.status.armed else None
         if breach is not None and not self._checks.fence_breached:
             self.say(WARNING, breach.text)
         self._texts.extend(navigator.take_texts())
         return SlowChecks(
             battery.state.warning,
-            battery.state.remaining >= self._min_charge_to_arm,
+            battery.arms,
             self.missions.valid,
             breach is not None,
         )
@@ -379,8 +370,7 @@ class FlightLoop:
         self._parameters_version = parameters.version
         self._commander.configure(parameters)
         self._guidance.configure(airframe, parameters)
-        self._battery_settings = battery_settings(airframe, parameters)
-        self._min_charge_to_arm = min_charge_to_arm(self._battery_settings, parameters)
+        self._battery.configure(airframe, parameters)
         if self._stabiliser is not None:
             value, limits = parameters.value, self._stabiliser.limits
             limits.tilt_rad = radians(value("MPC_TILTMAX_AIR"))

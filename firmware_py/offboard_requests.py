@@ -32,7 +32,6 @@ from wire.dialect import mavlink
 
 _LOCAL = "SET_POSITION_TARGET_LOCAL_NED"
 _MIN_LENGTH = 1e-3  # of a quaternion that still has a direction
-_BODY_VELOCITY = 0x5C7  # all is ignored but the velocity and the yaw rate
 _GRID_US = 10_000
 _MAX_RATE_RAD_S = 30.0
 
@@ -179,14 +178,16 @@ def setpoint_from_controls(
 def setpoint_from_body_velocity(
     velocity_level_m_s: Vec3, yaw_rate_rad_s: float, state: VehicleState, time_us: int
 ) -> Setpoint | SetpointRefusal:
-    """The setpoint for a velocity in level axes (forward, right, down) and a clockwise yaw rate."""
-    target = LocalTarget(
-        mavlink.MAV_FRAME_BODY_NED,
-        _BODY_VELOCITY,
-        velocity_m_s=velocity_level_m_s,
-        yaw_rate_rad_s=yaw_rate_rad_s,
-    )
-    return setpoint_from_target(target, state, time_us)
+    """The setpoint for a velocity in level axes (forward, right, down) and a clockwise yaw rate.
+
+    The same as `setpoint_from_target` with BODY_NED and mask 0x5C7, without the packet.
+    """
+    velocity_ned_m_s = _level_to_ned(velocity_level_m_s, state.yaw_rad)
+    yaw_rate_rad_s = _finite(yaw_rate_rad_s)
+    if isfinite(sum(velocity_ned_m_s)) and isfinite(sum(velocity_level_m_s)):
+        return BodyVelocitySetpoint(time_us, velocity_level_m_s, nan, yaw_rate_rad_s, velocity_ned_m_s)
+    wanted = TrajectorySetpoint(time_us, NAN3, velocity_ned_m_s, NAN3, nan, yaw_rate_rad_s)
+    return _checked(wanted, velocity_level_m_s)
 
 
 class SetpointQueue:
@@ -200,17 +201,24 @@ class SetpointQueue:
         newest: the newest setpoint, flown or not.
     """
 
-    __slots__ = ("_slot", "newest", "waiting")
+    __slots__ = ("_refused", "_slot", "newest", "waiting")
 
     def __init__(self) -> None:
         self.waiting: Setpoint | None = None
         self.newest: Setpoint | None = None
         self._slot = 0
+        self._refused = False
 
     def put(self, setpoint: Setpoint, now_us: int) -> None:
         """Replace what waits."""
         self.waiting = self.newest = setpoint
         self._slot = now_us // _GRID_US
+        self._refused = False
+
+    def refuse(self) -> bool:
+        """Note that one cannot be flown; whether it is the first since one that can."""
+        first, self._refused = not self._refused, True
+        return first
 
     def newest_velocity(self) -> tuple[float, float, float, float] | None:
         """The newest setpoint as forward, right, down (m/s) and yaw rate (rad/s, clockwise; NaN: open).

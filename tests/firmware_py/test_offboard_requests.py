@@ -8,6 +8,7 @@ from firmware_py.offboard_requests import (
     LocalTarget,
     SetpointRefusal,
     TargetMask,
+    setpoint_from_body_velocity,
     setpoint_from_target,
 )
 from firmware_py.setpoints import Setpoint
@@ -120,6 +121,15 @@ def test_an_axis_left_open_brakes(mask):
 def test_yaw_rate_not_finite_is_no_yaw_rate():
     assert isnan(body((1.0, 0.0, 0.0), yaw_rate_rad_s=nan).yaw_rate_rad_s)
     assert isnan(body((1.0, 0.0, 0.0), yaw_rate_rad_s=inf).yaw_rate_rad_s)
+
+
+@settings(deadline=None)
+@given(st.tuples(st.floats(), st.floats(), st.floats()), st.floats(), st.floats(-4, 4))
+def test_the_way_without_packets_gives_the_same(velocity, yaw_rate, heading):
+    state = VehicleState(yaw_rad=heading)
+    target = LocalTarget(BODY, BODY_VELOCITY, velocity_m_s=velocity, yaw_rate_rad_s=yaw_rate)
+    by_message = setpoint_from_target(target, state, 7)
+    assert repr(setpoint_from_body_velocity(velocity, yaw_rate, state, 7)) == repr(by_message)
 
 
 any3 = st.tuples(st.floats(), st.floats(), st.floats())
