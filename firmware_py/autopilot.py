@@ -20,21 +20,13 @@ class Autopilot(FlightLoop):
     """A whole autopilot for one vehicle: `FlightLoop`, and a method for each thing asked of it."""
 
     def arm(self, *, force: bool = False) -> CommandResult:
-        """Arm. As in PX4, forcing from outside skips no check.
-
-        Returns:
-            ACCEPTED (also when armed already), or TEMPORARILY_REJECTED with a status text that says why.
-        """
+        """Arm, or say in a status text why not. As in PX4, forcing from outside skips no check."""
         del force
         self.prepare()
         return self._handle(Event.ARM)
 
     def disarm(self, *, force: bool = False) -> CommandResult:
-        """Disarm: on the ground, or anywhere at once if forced.
-
-        Returns:
-            ACCEPTED, or TEMPORARILY_REJECTED in the air.
-        """
+        """Disarm: on the ground, or anywhere at once if forced."""
         return self._handle(Event.FORCE_DISARM if force else Event.DISARM)
 
     def terminate(self) -> CommandResult:
@@ -42,11 +34,7 @@ class Autopilot(FlightLoop):
         return self._handle(Event.TERMINATE)
 
     def set_mode(self, mode: FlightMode) -> CommandResult:
-        """Change the mode: disarmed always; armed, only to one that can be flown now.
-
-        Returns:
-            ACCEPTED, or TEMPORARILY_REJECTED with a status text that says why.
-        """
+        """Change the mode: disarmed always; armed, to one that can be flown, or a status text says why not."""
         return self._handle(
             MODE_EVENT[mode],
             takeoff_altitude_m=nan if mode is FlightMode.TAKEOFF else None,
@@ -94,11 +82,7 @@ class Autopilot(FlightLoop):
         return result
 
     def orbit(self, orbit: Orbit) -> CommandResult:
-        """Circle around a point.
-
-        Returns:
-            ACCEPTED, or TEMPORARILY_REJECTED when that cannot be flown now.
-        """
+        """Circle around a point, if that can be flown now."""
         return self._handle(Event.SET_ORBIT, orbit=orbit)
 
     def orbit_here(self) -> Orbit:

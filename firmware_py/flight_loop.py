@@ -183,12 +183,7 @@ class FlightLoop:
         return row.result
 
     def say(self, severity: int, text: str) -> None:
-        """Leave a message for people; the oldest go first when nobody takes them.
-
-        Args:
-            severity: MAV_SEVERITY.
-            text: one line.
-        """
+        """Leave a line for people, with MAV_SEVERITY; the oldest go first when nobody takes them."""
         self._texts.append(StatusText(severity, text))
 
     def take_texts(self) -> list[StatusText]:

@@ -79,7 +79,7 @@ class LandDetector:
     def update(
         self, state: VehicleState, *, armed: bool, lifting: bool, command_down_m_s: float, throttle: float
     ) -> bool:
-        """Take one tick.
+        """Take one tick, and say whether the vehicle stands on something.
 
         Args:
             state: the vehicle now.
@@ -87,9 +87,6 @@ class LandDetector:
             lifting: the motors work to leave the ground.
             command_down_m_s: vertical speed now asked of the stabiliser, positive down.
             throttle: mean squared share of rotor speed, 0..1.
-
-        Returns:
-            Whether the vehicle stands on something.
         """
         if self.landed:
             self._watch_for_air(state, lifting)

@@ -82,9 +82,6 @@ def setpoint_from_target(
         target: the message.
         state: the vehicle now; its yaw and attitude turn body targets into the world.
         time_us: vehicle time of reception.
-
-    Returns:
-        The setpoint, or a refusal.
     """
     mask = target.type_mask
     body_velocity = None
@@ -125,9 +122,6 @@ def setpoint_from_attitude(
         yaw_rate_rad_s: clockwise, beside an attitude.
         thrust: 0..1 of the greatest.
         time_us: vehicle time now.
-
-    Returns:
-        The setpoint, or a refusal.
     """
     if not isfinite(thrust):
         return SetpointRefusal("SET_ATTITUDE_TARGET invalid: thrust is not a number")
@@ -156,9 +150,6 @@ def setpoint_from_controls(
         torque_frd: roll, pitch, yaw, each -1..1; shape (3,).
         thrust: 0..1.
         time_us: vehicle time now.
-
-    Returns:
-        The setpoint, or a refusal.
     """
     if not isfinite(sum(torque_frd) + thrust):
         return SetpointRefusal("SET_ACTUATOR_CONTROL_TARGET invalid: a control is not a number")

@@ -25,7 +25,7 @@ from firmware_py.types import MotorOutput, VehicleState
 from geometry.vectors import Vec3
 
 _NOTHING: Vec3 = (0.0, 0.0, 0.0)
-_LEAST_COSINE = 0.5  # thrust is raised for tilt up to 60 degrees
+_MIN_COSINE = 0.5  # thrust is raised for tilt up to 60 degrees
 
 
 class LevelLaw:
@@ -149,7 +149,7 @@ class LevelLaw:
         lift_n -= self._k_down * (down - self._b_vertical * want_down) + self._ki_down * self._xi_down
         lift_n -= self._mass_kg * below
         cosine = cos(roll_rad) * cos(pitch_rad)
-        thrust_n = lift_n / (cosine if cosine > _LEAST_COSINE else _LEAST_COSINE) if lift_n > 0.0 else 0.0
+        thrust_n = lift_n / (cosine if cosine > _MIN_COSINE else _MIN_COSINE) if lift_n > 0.0 else 0.0
         yaw_nm = -self._k_yaw * (r - self._b_yaw * want_yaw) - self._ki_yaw * self._xi_yaw
 
         output = self._mixer.mix(thrust_n, roll_nm, pitch_nm, yaw_nm)

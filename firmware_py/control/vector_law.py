@@ -29,11 +29,11 @@ from firmware_py.types import MotorOutput, VehicleState
 from geometry.rotations import Rotation, rotation, tilt_error, to_body, to_world
 from geometry.vectors import Vec3
 
-_LEAST_COSINE = 0.5  # thrust is raised for tilt up to 60 degrees, and fades from there to none on its side
-_LEAST_LIFT = 0.2  # of the weight at most is kept for falling (MPC_THR_MIN), a thrust to steer with
-_MOST_THRUST = 0.92  # of full thrust for following a velocity; the rest steers
-_MOST_FORCE_M_S2 = GRAVITY_M_S2  # unknown acceleration ever learnt: the ground's push at landing
-_MOST_MOMENT_RAD_S2 = 20.0
+_MIN_COSINE = 0.5  # thrust is raised for tilt up to 60 degrees, and fades from there to none on its side
+_MIN_LIFT = 0.2  # of the weight at most is kept for falling (MPC_THR_MIN), a thrust to steer with
+_MAX_THRUST = 0.92  # of full thrust for following a velocity; the rest steers
+_MAX_FORCE_M_S2 = GRAVITY_M_S2  # unknown acceleration ever learnt: the ground's push at landing
+_MAX_MOMENT_RAD_S2 = 20.0
 _TURN_LEARNT = 0.04  # per step: within a tenth of a second
 _TURN_NOTICED = 1e-5  # speed^2 x turn^2 x period: below a centripetal acceleration of 0.05 m/s^2
 
@@ -70,8 +70,8 @@ class VectorLaw:
         self._rate_limit_rad_s = airframe.limits.roll_pitch_rate_rad_s
         self._max_speed_rad_s = airframe.motor.max_speed_rad_s
         self._rotors = len(airframe.rotors)
-        self._force = DisturbanceObserver(weights.observer_force_rad_s, period_s, _MOST_FORCE_M_S2)
-        self._moment = DisturbanceObserver(weights.observer_moment_rad_s, period_s, _MOST_MOMENT_RAD_S2)
+        self._force = DisturbanceObserver(weights.observer_force_rad_s, period_s, _MAX_FORCE_M_S2)
+        self._moment = DisturbanceObserver(weights.observer_moment_rad_s, period_s, _MAX_MOMENT_RAD_S2)
         self._lag = period_s / (period_s + airframe.motor.time_constant_s)
         self._wrench = (airframe.weight_n, 0.0, 0.0, 0.0)  # thrust and moments now, behind their commands
         self._hover_n = airframe.weight_n
@@ -222,7 +222,7 @@ class VectorLaw:
         """Turn to a thrust per mass given as forward, right and up in level axes, m/s^2; up has priority."""
         ahead, aside, up = specific
         up = self._lift(up)
-        room = min(up * self._limits.tilt_tangent, sqrt(max(self._most_lift() ** 2 - up * up, 0.0)))
+        room = min(up * self._limits.tilt_tangent, sqrt(max(self._max_lift() ** 2 - up * up, 0.0)))
         level = sqrt(ahead * ahead + aside * aside)
         if level > room:
             ahead, aside, level = ahead * room / level, aside * room / level, room
@@ -232,17 +232,17 @@ class VectorLaw:
 
     def _lift(self, up: float) -> float:
         """Vertical thrust per mass within what there is and may be used."""
-        least = min(_LEAST_LIFT * GRAVITY_M_S2, self._limits.min_thrust * self._full_lift)
-        return max(least, min(up, self._most_lift()))
+        lowest = min(_MIN_LIFT * GRAVITY_M_S2, self._limits.min_thrust * self._full_lift)
+        return max(lowest, min(up, self._max_lift()))
 
-    def _most_lift(self) -> float:
-        return min(_MOST_THRUST, self._limits.max_thrust) * self._full_lift
+    def _max_lift(self) -> float:
+        return min(_MAX_THRUST, self._limits.max_thrust) * self._full_lift
 
     def _thrust(self, up: float, m: Rotation) -> float:
         """Thrust along the body's axis as it stands that lifts so much, N."""
         cosine = m[8]
-        if cosine < _LEAST_COSINE:
-            return self._mass_kg * up * max(cosine, 0.0) / _LEAST_COSINE**2
+        if cosine < _MIN_COSINE:
+            return self._mass_kg * up * max(cosine, 0.0) / _MIN_COSINE**2
         return self._mass_kg * up / cosine
 
     def _turn_to(self, state: VehicleState, down_level: Vec3, m: Rotation, yaw_rate_rad_s: float) -> Vec3:
@@ -252,12 +252,12 @@ class VectorLaw:
         roll, pitch = tilt_error(m, (cos_yaw * x - sin_yaw * y, sin_yaw * x + cos_yaw * y, z))
         p, q = self._k_attitude[0] * roll, self._k_attitude[1] * pitch
         rate = sqrt(p * p + q * q)
-        most_rad_s = min(self._rate_limit_rad_s, self._limits.rate_rad_s)
-        if rate > most_rad_s:
-            p, q = p * most_rad_s / rate, q * most_rad_s / rate
+        max_rad_s = min(self._rate_limit_rad_s, self._limits.rate_rad_s)
+        if rate > max_rad_s:
+            p, q = p * max_rad_s / rate, q * max_rad_s / rate
         # With the right side down a pitch rate also turns the heading, by its share of world down; yaw makes
         # up for it. Else a velocity kept in axes of the heading would feed back into the pitch it asks for.
-        r = -q * m[7] / max(m[8], _LEAST_COSINE)
+        r = -q * m[7] / max(m[8], _MIN_COSINE)
         return (p + m[6] * yaw_rate_rad_s, q + m[7] * yaw_rate_rad_s, r + m[8] * yaw_rate_rad_s)
 
     def _drag_ned(self, m: Rotation, velocity_ned: Vec3) -> Vec3:

@@ -17,7 +17,7 @@ from firmware_py.types import StatusText
 from geometry.vectors import Vec3
 
 _CRITICAL, _WARNING, _INFO = 2, 4, 6  # MAV_SEVERITY
-_LEAST_CLIMB_M = 0.5  # a first place no higher than this is no take-off: it climbs to MIS_TAKEOFF_ALT
+_MIN_CLIMB_M = 0.5  # a first place no higher than this is no take-off: it climbs to MIS_TAKEOFF_ALT
 _SAME_YAW_RAD = 0.01
 _CAMERA = frozenset(
     {
@@ -235,7 +235,7 @@ class MissionExecutor:
             return
         climb_m = here_ned_m[2] - target_ned_m[2]
         if view.landed or (climb_first and climb_m > self._arrival.height_m):
-            if climb_m < _LEAST_CLIMB_M:
+            if climb_m < _MIN_CLIMB_M:
                 climb_m = self._arrival.takeoff_m
             down_m = here_ned_m[2] - climb_m
             above_home_m = -down_m if view.home_ned_m is None else view.home_ned_m[2] - down_m
