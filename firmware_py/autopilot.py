@@ -34,7 +34,7 @@ class Autopilot(FlightLoop):
         return self._handle(Event.TERMINATE)
 
     def set_mode(self, mode: FlightMode) -> CommandResult:
-        """Change the mode: disarmed always; armed, to one that can be flown, or a status text says why not."""
+        """Change the mode: disarmed always; armed, to one that can be flown; else a text says why."""
         return self._handle(
             MODE_EVENT[mode],
             takeoff_altitude_m=nan if mode is FlightMode.TAKEOFF else None,
