@@ -66,6 +66,10 @@ bench: $(VENV)/installed ## time our flight, alone and beside MuJoCo and PyFlyt;
 parameters: $(VENV)/installed-dev ## write docs/parameters.md anew from the declarations
 	$(BIN)/python -m firmware_py.parameters.reference > docs/parameters.md
 
+.PHONY: result-schema
+result-schema: $(VENV)/installed-dev ## write docs/result.schema.json again from the type FlightResult
+	$(BIN)/python -m scenarios.result > docs/result.schema.json
+
 .PHONY: reference-flights
 reference-flights: $(VENV)/installed-dev ## store again the flights that tests compare with
 	$(BIN)/python -m tests.framerunner.reference_flights

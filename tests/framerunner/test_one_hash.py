@@ -2,7 +2,8 @@
 
 from framerunner.evaluation.backends import Pool
 from framerunner.evaluation.runner import fly_all
-from framerunner.evaluation.task import FlightTask, fly_task
+from framerunner.evaluation.task import fly_task
+from framerunner.flying.plan import FlightPlan
 from offboard.mission import load_mission
 from scenarios.loader import load_scenario
 
@@ -13,7 +14,7 @@ LIMIT_S = 5.0
 def task(number, name="test-case-1"):
     """The same flight under another name: a name is no input of the physics."""
     update = {"name": f"run-{number}", "try_limit_s": LIMIT_S}
-    return FlightTask(load_scenario(name).model_copy(update=update), MISSION)
+    return FlightPlan(load_scenario(name).model_copy(update=update), MISSION)
 
 
 def test_a_hundred_runs_of_one_flight_have_one_hash():
