@@ -5,7 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from enum import Enum, IntEnum
 
-from firmware_py.types import GeodeticPoint, Setpoint
+from firmware_py.setpoints import Setpoint, TrajectorySetpoint
+from firmware_py.types import GeodeticPoint
 from geometry.vectors import Vec3
 from wire import px4_modes
 
@@ -75,7 +76,7 @@ class VehicleStatus:
         home: where it was armed (first: where it booted); None before the first position.
         home_ned_m: the same in the local frame, shape (3,).
         origin: the local frame's origin on Earth; None before the first position.
-        setpoint: what is being followed now, for POSITION_TARGET_LOCAL_NED.
+        setpoint: what is followed now.
     """
 
     armed: bool = False
@@ -88,4 +89,4 @@ class VehicleStatus:
     home: GeodeticPoint | None = None
     home_ned_m: Vec3 = (0.0, 0.0, 0.0)
     origin: GeodeticPoint | None = None
-    setpoint: Setpoint = field(default_factory=lambda: Setpoint(0))
+    setpoint: Setpoint = field(default_factory=lambda: TrajectorySetpoint(0))

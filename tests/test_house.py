@@ -27,9 +27,6 @@ LARGE_FOLDERS = {
     "sitl": "world, camera, links and the program that runs them",
 }
 LARGE_CLASSES = {
-    "firmware_py/autopilot.py Autopilot": "one control tick, and what MAVLink asks of it",
-    "firmware_py/guidance/modes.py Guidance": "a method for each flight mode",
-    "firmware_py/mavlink/port.py AutopilotPort": "all that MAVLink services ask of an autopilot",
     "firmware_py/missions/executor.py MissionExecutor": "a method for each kind of mission item",
     "framerunner/flying/lockstep_drone.py LockstepDrone": "implements the port `Drone`",
     "monitor/competition/service.py CompetitionService": "a method for each request of the contest's pages",

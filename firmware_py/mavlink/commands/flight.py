@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from math import copysign, floor, isfinite, isinf, isnan, nan
 
-from firmware_py.guidance.circles import Orbit, OrbitYaw
-from firmware_py.mavlink.port import AutopilotPort
+from firmware_py.autopilot import Autopilot
+from firmware_py.guidance.orbit import Orbit, OrbitYaw
 from firmware_py.mavlink.service import Command, Service
 from firmware_py.status import CommandResult, FlightMode
 from firmware_py.types import GeodeticPoint
@@ -23,7 +23,7 @@ _MIN_ORBIT_M = 1.0
 class FlightCommands(Service):
     """Passes them to the autopilot."""
 
-    def __init__(self, autopilot: AutopilotPort) -> None:
+    def __init__(self, autopilot: Autopilot) -> None:
         self._autopilot = autopilot
         self.commands = {
             mavlink.MAV_CMD_NAV_RETURN_TO_LAUNCH: self._return,

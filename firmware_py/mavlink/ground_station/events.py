@@ -10,6 +10,7 @@ from __future__ import annotations
 from collections import deque
 from dataclasses import dataclass
 
+from firmware_py.autopilot import Autopilot
 from firmware_py.mavlink.ground_station.event_definitions import (
     ALL_MODES,
     ARMING_SUMMARY,
@@ -24,7 +25,6 @@ from firmware_py.mavlink.ground_station.event_definitions import (
     Part,
     event_of,
 )
-from firmware_py.mavlink.port import AutopilotPort
 from firmware_py.mavlink.scaling import boot_ms
 from firmware_py.mavlink.service import Command, Service
 from firmware_py.status import CommandResult, FlightMode
@@ -119,7 +119,7 @@ class HealthReport:
         return events
 
 
-def assess(autopilot: AutopilotPort) -> HealthReport:
+def assess(autopilot: Autopilot) -> HealthReport:
     """The report as it is now."""
     status = autopilot.status
     present, failing = _ALWAYS_THERE, Part(0)
@@ -145,7 +145,7 @@ def _check(reason: str, intended: FlightMode) -> Check:
 class EventService(Service):
     """Tells events, on all links."""
 
-    def __init__(self, autopilot: AutopilotPort, exchange: Exchange) -> None:
+    def __init__(self, autopilot: Autopilot, exchange: Exchange) -> None:
         self._autopilot = autopilot
         self._exchange = exchange
         self._sequence = _FIRST_SEQUENCE

@@ -6,7 +6,7 @@ somebody tells it, at boot or by the same message.
 
 from __future__ import annotations
 
-from firmware_py.mavlink.port import AutopilotPort
+from firmware_py.autopilot import Autopilot
 from firmware_py.mavlink.scaling import boot_ms
 from firmware_py.mavlink.service import Service
 from firmware_py.status import FlightMode, VehicleStatus
@@ -40,7 +40,7 @@ def system_status(status: VehicleStatus) -> int:
 class ConnectionService(Service):
     """Tells who we are and how we are, hears ground stations, and answers about time and signing."""
 
-    def __init__(self, autopilot: AutopilotPort, exchange: Exchange) -> None:
+    def __init__(self, autopilot: Autopilot, exchange: Exchange) -> None:
         self._autopilot = autopilot
         self._exchange = exchange
         self.handlers = {

@@ -5,7 +5,7 @@ from __future__ import annotations
 from functools import partial
 from math import atan2, degrees, hypot
 
-from firmware_py.mavlink.port import AutopilotPort
+from firmware_py.autopilot import Autopilot
 from firmware_py.mavlink.scaling import boot_ms, degrees_e7, millimetres, whole
 from firmware_py.mavlink.service import Service
 from geometry.rotations import rotation, to_body
@@ -40,7 +40,7 @@ def earth_field_frd_gauss(attitude: Quaternion) -> Vec3:
     return to_body(rotation(attitude), *EARTH_FIELD_NED_GAUSS)
 
 
-def highres_imu(autopilot: AutopilotPort) -> Message:
+def highres_imu(autopilot: Autopilot) -> Message:
     """HIGHRES_IMU."""
     state, place = autopilot.state, autopilot.global_position()
     altitude_m = place.altitude_m if place else 0.0
@@ -57,7 +57,7 @@ def highres_imu(autopilot: AutopilotPort) -> Message:
     )
 
 
-def scaled_imu(autopilot: AutopilotPort) -> Message:
+def scaled_imu(autopilot: Autopilot) -> Message:
     """SCALED_IMU: thousandths of g, rad/s and gauss, hundredths of a degree (0 would be unknown)."""
     state, place = autopilot.state, autopilot.global_position()
     field_gauss = earth_field_frd_gauss(state.attitude)
@@ -71,7 +71,7 @@ def scaled_imu(autopilot: AutopilotPort) -> Message:
     )
 
 
-def distance_sensor(autopilot: AutopilotPort) -> Message | None:
+def distance_sensor(autopilot: Autopilot) -> Message | None:
     """DISTANCE_SENSOR: the range along body down to flat ground at the height where the vehicle booted.
 
     PX4's own physics makes it from the state too. Beyond its range, or turned away, it says 0, as PX4.
@@ -96,7 +96,7 @@ def distance_sensor(autopilot: AutopilotPort) -> Message | None:
     )
 
 
-def gnss_integrity(autopilot: AutopilotPort) -> Message | None:
+def gnss_integrity(autopilot: Autopilot) -> Message | None:
     """GNSS_INTEGRITY: nothing watches for jamming or spoofing, and it says so."""
     if autopilot.status.origin is None:
         return None
@@ -105,7 +105,7 @@ def gnss_integrity(autopilot: AutopilotPort) -> Message | None:
     )
 
 
-def scaled_pressure(autopilot: AutopilotPort) -> Message | None:
+def scaled_pressure(autopilot: Autopilot) -> Message | None:
     """SCALED_PRESSURE."""
     place = autopilot.global_position()
     if place is None:
@@ -118,7 +118,7 @@ def scaled_pressure(autopilot: AutopilotPort) -> Message | None:
     )
 
 
-def gps_raw_int(autopilot: AutopilotPort) -> Message:
+def gps_raw_int(autopilot: Autopilot) -> Message:
     """GPS_RAW_INT: a 3D fix with PX4's simulated figures, or no fix yet."""
     state, place = autopilot.state, autopilot.global_position()
     if place is None:
@@ -148,7 +148,7 @@ def gps_raw_int(autopilot: AutopilotPort) -> Message:
 class SensorTelemetry(Service):
     """Streams what the functions of this module make."""
 
-    def __init__(self, autopilot: AutopilotPort) -> None:
+    def __init__(self, autopilot: Autopilot) -> None:
         self.sources = {
             message_id: partial(make, autopilot)
             for message_id, make in {

@@ -1,4 +1,4 @@
-"""Orbit around a point."""
+"""The circle of an orbit: the velocity that leads to it and along it, and where the nose points."""
 
 from __future__ import annotations
 
@@ -11,8 +11,8 @@ from firmware_py.guidance.reference import Pace
 from firmware_py.types import VehicleState
 from geometry.vectors import Vec3
 
-_SMALLEST_M = 0.5  # nearer to the centre than this, it says nothing about where to look
-_FASTEST_TURN_M_S2 = 2.0  # PX4 limits the centripetal acceleration of an orbit so
+_MIN_DISTANCE_M = 0.5  # nearer to the centre than this, it says nothing about where to look
+_MAX_CENTRIPETAL_M_S2 = 2.0  # PX4 limits the centripetal acceleration of an orbit so
 _NEAR_M = 3.0  # nearer to the circle than this, it goes along it
 
 
@@ -26,7 +26,7 @@ class OrbitYaw(IntEnum):
     STICKS = 4
 
 
-@dataclass(slots=True)
+@dataclass(frozen=True, slots=True)
 class Orbit:
     """A circle around a point.
 
@@ -44,10 +44,10 @@ class Orbit:
     yaw: OrbitYaw = OrbitYaw.CENTRE
     initial_yaw_rad: float = 0.0
 
-    def speed_within(self, most_m_s2: float) -> float:
+    def speed_within(self, max_m_s2: float) -> float:
         """The speed along it that turns no harder than this, m/s."""
-        most_m_s = (min(most_m_s2, _FASTEST_TURN_M_S2) * self.radius_m) ** 0.5
-        return clamp(self.speed_m_s, -most_m_s, most_m_s)
+        max_m_s = (min(max_m_s2, _MAX_CENTRIPETAL_M_S2) * self.radius_m) ** 0.5
+        return clamp(self.speed_m_s, -max_m_s, max_m_s)
 
     def velocity(self, place_ned_m: Vec3, pace: Pace, cruise_m_s: float) -> tuple[float, float]:
         """Velocity north and east (m/s) at a place: far from the circle towards it, near by along it."""
@@ -68,7 +68,7 @@ class Orbit:
         if self.yaw in (OrbitYaw.UNCONTROLLED, OrbitYaw.STICKS):
             return nan, stick_rad_s if self.yaw is OrbitYaw.STICKS else 0.0
         north_m, east_m, distance_m = self._from_centre(state.position_ned_m)
-        if distance_m < _SMALLEST_M:
+        if distance_m < _MIN_DISTANCE_M:
             return nan, 0.0
         north_m_s, east_m_s, _ = state.velocity_ned_m_s
         rate_rad_s = (north_m * east_m_s - east_m * north_m_s) / (distance_m * distance_m)

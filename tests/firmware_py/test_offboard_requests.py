@@ -4,18 +4,20 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from firmware_py.setpoints import (
+from firmware_py.offboard_requests import (
     LocalTarget,
+    SetpointRefusal,
     TargetMask,
     setpoint_from_body_velocity,
     setpoint_from_target,
 )
-from firmware_py.types import Setpoint, VehicleState
+from firmware_py.setpoints import Setpoint
+from firmware_py.types import VehicleState
 
 BODY_VELOCITY = 0x5C7
 LOCAL, BODY = 1, 8
 STATE = VehicleState(yaw_rad=pi / 6, attitude=(cos(pi / 12), 0.0, 0.0, sin(pi / 12)))
-INVALID = "SET_POSITION_TARGET_LOCAL_NED invalid"
+INVALID = SetpointRefusal("SET_POSITION_TARGET_LOCAL_NED invalid")
 
 
 def body(velocity, mask=BODY_VELOCITY, **fields):
@@ -34,7 +36,7 @@ def test_body_velocity_turns_with_the_yaw_only():
     tilted = VehicleState(yaw_rad=pi / 2, roll_rad=0.3, pitch_rad=0.2, attitude=(0.7, 0.2, 0.1, 0.67))
     setpoint = setpoint_from_target(LocalTarget(BODY, BODY_VELOCITY, velocity_m_s=(2.0, 1.0, 0.5)), tilted, 5)
     assert setpoint.velocity_ned_m_s == pytest.approx((-1.0, 2.0, 0.5))
-    assert all_nan(setpoint.position_ned_m)
+    assert all_nan(setpoint.trajectory.position_ned_m)
     assert all_nan(setpoint.acceleration_ned_m_s2)
     assert isnan(setpoint.yaw_rad)
     assert setpoint.time_us == 5
@@ -53,7 +55,7 @@ def test_one_ignored_body_velocity_drops_all_three(bit):
 
 
 def test_body_position_is_discarded():
-    assert all_nan(body((1.0, 0.0, 0.0), mask=0x5C0, position_m=(9.0, 9.0, 9.0)).position_ned_m)
+    assert all_nan(body((1.0, 0.0, 0.0), mask=0x5C0, position_m=(9.0, 9.0, 9.0)).trajectory.position_ned_m)
 
 
 def test_local_components_are_taken_as_masked():
@@ -81,7 +83,7 @@ def test_yaw_and_yaw_rate_may_both_be_given():
 @pytest.mark.parametrize("frame", [0, 2, 7, 9, 12, 13, 18, 21, 99, 255])
 def test_other_frames_are_refused(frame):
     refused = setpoint_from_target(LocalTarget(frame, BODY_VELOCITY, velocity_m_s=(1, 0, 0)), STATE, 5)
-    assert refused == f"SET_POSITION_TARGET_LOCAL_NED coordinate frame {frame} unsupported"
+    assert refused.text == f"SET_POSITION_TARGET_LOCAL_NED coordinate frame {frame} unsupported"
 
 
 def test_nothing_to_follow_is_refused():
@@ -91,7 +93,8 @@ def test_nothing_to_follow_is_refused():
 
 
 def test_force_is_refused_where_there_is_an_acceleration():
-    assert local(0xE3F, acceleration_m_s2=(1, 1, 1)) == "SET_POSITION_TARGET_LOCAL_NED force not supported"
+    refused = local(0xE3F, acceleration_m_s2=(1, 1, 1))
+    assert refused.text == "SET_POSITION_TARGET_LOCAL_NED force not supported"
     assert isinstance(local(0xFC7, velocity_m_s=(1, 1, 1)), Setpoint)
 
 
@@ -122,9 +125,10 @@ def test_yaw_rate_not_finite_is_no_yaw_rate():
 
 @given(st.tuples(st.floats(), st.floats(), st.floats()), st.floats(), st.floats(-4, 4))
 def test_the_way_without_packets_gives_the_same(velocity, yaw_rate, heading):
+    state = VehicleState(yaw_rad=heading)
     target = LocalTarget(BODY, BODY_VELOCITY, velocity_m_s=velocity, yaw_rate_rad_s=yaw_rate)
-    by_message = setpoint_from_target(target, VehicleState(yaw_rad=heading), 7)
-    assert repr(setpoint_from_body_velocity(velocity, yaw_rate, heading, 7)) == repr(by_message)
+    by_message = setpoint_from_target(target, state, 7)
+    assert repr(setpoint_from_body_velocity(velocity, yaw_rate, state, 7)) == repr(by_message)
 
 
 any3 = st.tuples(st.floats(), st.floats(), st.floats())
@@ -133,9 +137,10 @@ any3 = st.tuples(st.floats(), st.floats(), st.floats())
 @given(st.integers(0, 255), st.integers(0, 0xFFFF), any3, any3, any3, st.floats(), st.floats())
 def test_whatever_comes_a_setpoint_is_finite_or_open_and_holds_every_axis(frame, mask, p, v, a, yaw, rate):
     result = setpoint_from_target(LocalTarget(frame, mask, p, v, a, yaw, rate), STATE, 5)
-    if isinstance(result, str):
+    if isinstance(result, SetpointRefusal):
         return
-    groups = (result.position_ned_m, result.velocity_ned_m_s, result.acceleration_ned_m_s2)
+    told = result.trajectory
+    groups = (told.position_ned_m, told.velocity_ned_m_s, told.acceleration_ned_m_s2)
     assert not any(value in (inf, -inf) for group in groups for value in group)
     for axis in range(3):
         assert any(not isnan(group[axis]) for group in groups)

@@ -1,4 +1,4 @@
-from firmware_py.land_detector import LandDetector
+from firmware_py.ground_contact import LandDetector
 from firmware_py.types import VehicleState
 
 HOVER = 0.07
