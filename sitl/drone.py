@@ -15,7 +15,6 @@ from geometry.axes import flip_vector
 from scenarios.result import LocalFrame, Standing
 from sitl.drone_files import flight_recorder, open_storage
 from sitl.link_hub import LinkHub
-from sitl.link_urls import is_loopback
 from sitl.parameter_file import ParameterKeeper, open_parameters
 from sitl.picture_album import PictureAlbum
 from sitl.server_settings import ServerSettings
@@ -25,6 +24,7 @@ from sitl.time_grants import TimeGrants, Velocity
 from sitl.world import CONTROL_PERIOD_US
 from wire.dialect import mavlink
 from wire.simulator_api import REFEREE_PATH, SCENARIO_PATH, VIDEO_PATH
+from wire.transports.urls import is_loopback
 
 if TYPE_CHECKING:
     from sitl.camera_feed import CameraFeed

@@ -66,8 +66,8 @@ def monitor(
     from framerunner.monitoring.equipment import equipment
     from monitor.server import serve
     from monitor.settings import MonitorSettings
-    from offboard.link.url import parse_url
     from scenarios.loader import load_scenario
+    from wire.transports.urls import parse_url
 
     parse_url(drone)
     given = equipment(drone, None if scenario is None else load_scenario(scenario), runs, camera_host)

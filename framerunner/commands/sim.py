@@ -170,13 +170,12 @@ def _settings(
     if port is not None and not 1 <= port <= 65536 - count:
         raise SettingError(f"--video-port {port}: must be from 1 to {65536 - count}")
 
-    from sitl.link_urls import parse_link
-    from sitl.server_settings import ServerSettings, rtp_address
+    from sitl.server_settings import ServerSettings, parse_link, rtp_address
 
     links = tuple(parse_link(text) for text in chosen.link)
-    if count > 1 and any(url.scheme == "serial" for url in links):
+    if count > 1 and any(link.url.scheme == "serial" for link in links):
         raise SettingError(f"--count {count}: a serial line serves one drone; leave it out or use --count 1")
-    twice = next((url.text for number, url in enumerate(links) if url in links[:number]), None)
+    twice = next((link.url.text for number, link in enumerate(links) if link in links[:number]), None)
     if twice is not None:
         raise SettingError(f"--link {twice}: given twice; leave one out")
     settings = ServerSettings(

@@ -6,11 +6,10 @@ from pathlib import Path
 
 from framerunner.flying.plan import FlightPlan
 from framerunner.monitoring.run_library import RunFolders
-from framerunner.vehicle_link import VehicleLink
-from monitor.ports import Equipment, Link, LinkFailed, Message
-from offboard.drone import DroneError
+from monitor.ports import Equipment
 from scenarios.loader import list_scenarios, load_scenario
 from scenarios.models import Scenario
+from wire.transports.vehicle_link import VehicleLink
 
 SYSTEM_ID = 250  # the doctor has 247, the virtual camera 246, MAVSDK 245, other ground stations 255
 COMPONENT_ID = 190  # MAV_COMP_ID_MISSIONPLANNER, which is what ground stations use
@@ -28,8 +27,8 @@ def equipment(
         camera_hosts: see `Equipment`.
     """
     return Equipment(
-        open_link=lambda: _MonitorLink(drone_url),
         make_referee=lambda flown: FlightPlan(flown).new_referee(),
+        open_link=lambda: VehicleLink(drone_url, system_id=SYSTEM_ID, component_id=COMPONENT_ID),
         scenario=scenario,
         list_scenarios=list_scenarios,
         load_scenario=load_scenario,
@@ -37,30 +36,3 @@ def equipment(
         start_pose=lambda flown: FlightPlan(flown).start_pose,
         camera_hosts=camera_hosts,
     )
-
-
-class _MonitorLink(Link):
-    """A vehicle link in the monitor's words."""
-
-    def __init__(self, url: str) -> None:
-        self.url = url
-        try:
-            self._link = VehicleLink(url, system_id=SYSTEM_ID, component_id=COMPONENT_ID)
-        except DroneError as error:
-            raise LinkFailed(str(error)) from None
-
-    def receive(self, timeout_s: float) -> list[Message]:
-        try:
-            return self._link.receive(timeout_s)
-        except DroneError as error:
-            raise LinkFailed(str(error)) from None
-
-    @property
-    def host(self) -> str:
-        return self._link.host
-
-    def send(self, message: Message) -> None:
-        self._link.send(message)
-
-    def close(self) -> None:
-        self._link.close()

@@ -8,7 +8,6 @@ from __future__ import annotations
 from math import cos, isfinite, sin
 
 from framerunner.flying.plan import FlightPlan
-from framerunner.vehicle_link import Message
 from framerunner.virtual_camera.history import (
     AHEAD_US,
     AttitudeReport,
@@ -24,6 +23,7 @@ from scenarios.result import LocalFrame, Standing
 from scenarios.truth import TrueState
 from sitl.camera import Camera, Image
 from sitl.camera_feed import FIRST_EXPOSURE_US
+from wire.dialect import Message
 
 REFEREE_STEP_US = 20_000
 REPORT_GAP_US = 20_000  # between two reports: the one that shows that a time is over comes so much later

@@ -12,6 +12,7 @@ from pymavlink.dialects.v20 import common as mavlink
 from monitor.ports import Message
 from monitor.vehicle.texts import plain
 from wire.simulator_api import VIDEO_PATH
+from wire.transports.urls import LinkError, parse_url
 
 CAMERAS = range(mavlink.MAV_COMP_ID_CAMERA, mavlink.MAV_COMP_ID_CAMERA6 + 1)
 _ASK_EVERY_S = 2.0
@@ -161,11 +162,10 @@ def _plain_address(text: str) -> IPv4Address | IPv6Address:
 def host_of(link_url: str) -> str:
     """The host to which a link goes; "" if it listens, or goes over a wire."""
     try:
-        parts = urlsplit(link_url)
-        host = parts.hostname or ""
-    except ValueError:
+        url = parse_url(link_url)
+    except LinkError:
         return ""
-    return host if parts.scheme in ("udpout", "tcpout", "udp", "tcp") and host != "0.0.0.0" else ""
+    return url.address if url.scheme in ("udpout", "tcpout") and url.address != "0.0.0.0" else ""
 
 
 def request(system: int, component: int, message_id: int) -> Message:

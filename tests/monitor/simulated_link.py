@@ -23,7 +23,7 @@ from firmware_py.mavlink.node import MavlinkNode, NodeOptions
 from firmware_py.mavlink.rates import GROUND, ONBOARD
 from framerunner.flying.plan import FlightPlan
 from geometry.axes import flip_vector
-from monitor.ports import Equipment, LinkFailed, Message
+from monitor.ports import Equipment, Message
 from scenarios.loader import list_scenarios, load_scenario
 from scenarios.models import Scenario
 from scenarios.truth import TrueState
@@ -34,6 +34,7 @@ from sitl.world import CONTROL_PERIOD_US
 from tests.node_input import deliver
 from wire.dialect import mavlink
 from wire.mission_messages import COMPONENT_ID
+from wire.transports.urls import LinkError
 
 _BURST_TICKS = 5  # 20 ms of simulated time at once
 _TRUTHS = 5000  # 20 s
@@ -166,10 +167,10 @@ class SimulatedLink:
         self._parser.robust_parsing = True
 
     def open(self) -> SimulatedLink:
-        """What `Equipment.open_link` calls; raises `LinkFailed` while the link is broken."""
+        """What `Equipment.open_link` calls; raises `LinkError` while the link is broken."""
         self.opened += 1
         if self._problem is not None:
-            raise LinkFailed(self._problem)
+            raise LinkError(self._problem)
         return self
 
     def receive(self, timeout_s: float) -> list[Message]:
@@ -177,7 +178,7 @@ class SimulatedLink:
         messages: list[Message] = []
         with self._asked:
             if self._problem is not None:
-                raise LinkFailed(self._problem)
+                raise LinkError(self._problem)
             self._deliver(messages)
             for _ in range(self._due_ticks()):
                 for drone in self.drones:

@@ -8,8 +8,8 @@ import threading
 import pytest
 from pymavlink.dialects.v20 import common as mavlink
 
-from framerunner.vehicle_link import VehicleLink, command, companion_heartbeat, is_vehicle
-from offboard.drone import DroneError
+from wire.transports.urls import LinkError
+from wire.transports.vehicle_link import VehicleLink, command, companion_heartbeat, is_vehicle
 
 
 def free_port(kind=socket.SOCK_DGRAM):
@@ -108,7 +108,7 @@ def test_calling_over_tcp_and_the_other_side_hanging_up():
         vehicle.sendall(packet()[9:])
         assert next_message(link).get_srcSystem() == 3
         vehicle.close()
-        with pytest.raises(DroneError, match="closed the connection"):
+        with pytest.raises(LinkError, match="closed the connection"):
             link.receive(1.0)
         link.close()
 
@@ -171,24 +171,27 @@ def test_a_false_header_costs_no_packet_that_follows(noise):
     ("url", "words"),
     [
         ("udp://:14540", "bad drone address"),
-        ("serial:///dev/null:57600", "no serial line|not a serial line"),
-        ("serial:///dev/null:12345", "12345 is no usual baud rate"),
-        ("serial:///dev/not-there:57600", "does not exist"),
-        ("udpout://no.such.host.invalid:14550", "cannot open udpout://no.such.host.invalid:14550"),
+        ("serial:///dev/null:57600", "not a serial line"),
+        ("serial:///dev/null:12345", "12345 is not a usual baud rate"),
+        ("serial:///dev/not-there:57600", "cannot be opened .No such file or directory.; is it plugged in"),
+        (
+            "udpout://no.such.host.invalid:14550",
+            "UDP no.such.host.invalid:14550 cannot be sent to",
+        ),
     ],
 )
 def test_an_address_that_cannot_be_had_is_one_clear_line(url, words):
-    with pytest.raises(DroneError, match=words) as refused:
+    with pytest.raises(LinkError, match=words) as refused:
         open_link(url)
     assert "\n" not in str(refused.value)
 
 
 def test_nobody_at_the_tcp_port_and_a_taken_udp_port_are_one_clear_line():
-    with pytest.raises(DroneError, match="refused"):
+    with pytest.raises(LinkError, match="refused"):
         open_link(f"tcpout://127.0.0.1:{free_port(socket.SOCK_STREAM)}")
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as other:
         other.bind(("127.0.0.1", 0))
-        with pytest.raises(DroneError, match="another flight or ground station"):
+        with pytest.raises(LinkError, match="another flight or ground station"):
             open_link(f"udpin://127.0.0.1:{other.getsockname()[1]}")
 
 

@@ -1,11 +1,12 @@
-"""Addresses of links."""
+"""Links that a person asks for."""
 
 from math import inf
 
 import pytest
 
 from firmware_py.mavlink.rates import GROUND, NORMAL, ONBOARD
-from sitl.link_urls import LinkError, host_and_port, is_loopback, parse_link
+from sitl.server_settings import parse_link
+from wire.transports.urls import LinkError
 
 
 @pytest.mark.parametrize(
@@ -26,12 +27,12 @@ from sitl.link_urls import LinkError, host_and_port, is_loopback, parse_link
     ],
 )
 def test_good_addresses(text, parts, rates, bytes_s, trusted):
-    url = parse_link(f" {text} ")
-    assert (url.scheme, url.address, url.number) == parts
-    assert url.profile.name == url.text == text
-    assert url.profile.rates_hz == rates.rates_hz
-    assert url.profile.bytes_s == bytes_s
-    assert url.profile.trusted is trusted
+    link = parse_link(f" {text} ")
+    assert (link.url.scheme, link.url.address, link.url.number) == parts
+    assert link.profile.name == link.url.text == text
+    assert link.profile.rates_hz == rates.rates_hz
+    assert link.profile.bytes_s == bytes_s
+    assert link.profile.trusted is trusted
 
 
 @pytest.mark.parametrize(
@@ -56,18 +57,3 @@ def test_bad_addresses_are_refused_in_one_line(text, said):
         parse_link(text)
     assert said in str(error.value)
     assert "\n" not in str(error.value)
-
-
-def test_hosts_with_and_without_port():
-    assert host_and_port("station", 14550) == ("station", 14550)
-    assert host_and_port("10.0.0.1:14999", 14550) == ("10.0.0.1", 14999)
-    for bad in ("a:", ":5", "a:b", "a:70000", "a:0"):
-        with pytest.raises(LinkError):
-            host_and_port(bad, 14550)
-
-
-@pytest.mark.parametrize(
-    ("host", "own"), [("127.0.0.2", True), ("::1", True), ("0.0.0.0", False), ("x", False)]
-)
-def test_loopback(host, own):
-    assert is_loopback(host) is own
