@@ -58,7 +58,7 @@ test-realtime-links: setup # these only wait
 	$(BIN)/pytest -n 4 -m "realtime and not alone" tests/offboard
 
 test-realtime-pairs: setup
-	$(BIN)/pytest -n 2 --dist loadgroup -m "realtime and not alone" --ignore tests/offboard
+	$(BIN)/pytest -n 2 --dist loadfile -m "realtime and not alone" --ignore tests/offboard
 
 test-realtime-alone: setup
 	$(BIN)/pytest -m alone
@@ -70,6 +70,10 @@ bench: $(VENV)/installed ## time our flight, alone and beside MuJoCo and PyFlyt;
 .PHONY: parameters
 parameters: $(VENV)/installed-dev ## write docs/parameters.md anew from the declarations
 	$(BIN)/python -m firmware_py.parameters.reference > docs/parameters.md
+
+.PHONY: result-schema
+result-schema: $(VENV)/installed-dev ## write docs/result.schema.json again from the type FlightResult
+	$(BIN)/python -m scenarios.result > docs/result.schema.json
 
 .PHONY: reference-flights
 reference-flights: $(VENV)/installed-dev ## store again the flights that tests compare with

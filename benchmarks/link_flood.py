@@ -30,9 +30,8 @@ from rich.table import Table
 
 from scenarios.loader import load_scenario
 from sitl import server
-from sitl.link_urls import parse_link
 from sitl.pacer import Pacer
-from sitl.server_settings import ServerSettings
+from sitl.server_settings import ServerSettings, parse_link
 from sitl.simulation import Simulation
 from wire.dialect import mavlink
 from wire.traffic import Traffic

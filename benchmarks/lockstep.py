@@ -24,9 +24,10 @@ if hasattr(os, "sched_setaffinity"):
 import cv2
 
 from firmware_py.status import FlightMode
-from framerunner.lockstep import fly_lockstep
+from framerunner.flying.lockstep import fly_lockstep
+from framerunner.flying.plan import FlightPlan
 from offboard.app import Moment
-from offboard.mission import Mission, load_mission
+from offboard.mission import load_mission
 from scenarios.loader import load_scenario
 from scenarios.models import Scenario
 from sitl.camera import Camera
@@ -131,22 +132,20 @@ def hovering(scenario: Scenario) -> Simulation:
 
 def fly(scenario: Scenario, images: list[Image], poses: list[Pose]) -> tuple[float, float, float]:
     """Fly the challenge; processor, wall and simulated time, seconds. The first flight warms up."""
-    mission = load_mission("frame_challenge")
+    plan = FlightPlan(scenario, load_mission("frame_challenge"))
     moments: list[Moment] = []
-    fly_lockstep(
-        scenario, mission, observer=moments.append, on_image=lambda _time_us, image: images.append(image)
-    )
+    fly_lockstep(plan, observers=(moments.append,), on_image=lambda _time_us, image: images.append(image))
     for moment in moments[:: max(1, len(moments) // 500)]:
         state = moment.state
         poses.append(((state.x, state.y, state.z), attitude(state.yaw)))
     simulated_s = moments[-1].state.time_us / 1e6
-    timed = [timed_flight(scenario, mission) for _ in range(REPEATS)]
+    timed = [timed_flight(plan) for _ in range(REPEATS)]
     return min(cpu_s for cpu_s, _ in timed), min(wall_s for _, wall_s in timed), simulated_s
 
 
-def timed_flight(scenario: Scenario, mission: Mission) -> tuple[float, float]:
+def timed_flight(plan: FlightPlan) -> tuple[float, float]:
     wall_s, cpu_s = time.perf_counter(), time.process_time()
-    fly_lockstep(scenario, mission)
+    fly_lockstep(plan)
     return time.process_time() - cpu_s, time.perf_counter() - wall_s
 
 

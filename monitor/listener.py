@@ -10,12 +10,13 @@ from collections.abc import Callable, Sequence
 from itertools import groupby
 from operator import itemgetter
 
-from monitor.ports import Link, LinkFailed, Message
+from monitor.ports import Link, Message
+from wire.transports.urls import LinkError
 
-_WAIT_S = 0.02  # what is to be sent waits so long at most when nothing comes in
-_FIRST_PAUSE_S, _LONGEST_PAUSE_S = 0.5, 5.0
-_MOST_HEARD = 5000  # waiting for a loop that is busy; the oldest go first
-_MOST_TO_SEND = 256
+_WAIT_S = 0.02  # what is to be sent waits at most this long while nothing comes in
+_FIRST_PAUSE_S, _MAX_PAUSE_S = 0.5, 5.0
+_MAX_RECEIVED = 5000  # waiting for a loop that is busy; the oldest go first
+_MAX_TO_SEND = 256
 _END_S = 2.0
 
 Say = Callable[[str, str], None]
@@ -27,7 +28,7 @@ class Listener:
     All but the thread itself belongs to the loop.
 
     Args:
-        open_link: opens it; raises `LinkFailed`.
+        open_link: opens it; raises `LinkError`.
         take: called on the loop with what came, and the host it came from; "" over a wire.
         say: called on the loop with level and one line for people.
 
@@ -42,8 +43,8 @@ class Listener:
         self._open_link = open_link
         self._take = take
         self._say = say
-        self._heard: deque[tuple[str, Message]] = deque(maxlen=_MOST_HEARD)
-        self._to_send: deque[Message] = deque(maxlen=_MOST_TO_SEND)
+        self._received: deque[tuple[str, Message]] = deque(maxlen=_MAX_RECEIVED)
+        self._to_send: deque[Message] = deque(maxlen=_MAX_TO_SEND)
         self._is_called = False
         self._halt = threading.Event()
         self._failed_s: float | None = None
@@ -81,11 +82,11 @@ class Listener:
                     loop.call_soon_threadsafe(self._opened, link.url)
                     pause_s = _FIRST_PAUSE_S
                     self._carry(loop, link)
-                except LinkFailed as error:
+                except LinkError as error:
                     self._to_send.clear()
                     loop.call_soon_threadsafe(self._fail, str(error), time.monotonic())
                     self._halt.wait(pause_s)
-                    pause_s = min(2 * pause_s, _LONGEST_PAUSE_S)
+                    pause_s = min(2 * pause_s, _MAX_PAUSE_S)
         except RuntimeError as error:  # the loop is closed: nobody listens any more
             if not loop.is_closed():
                 loop.call_soon_threadsafe(_end, ended, error)
@@ -100,7 +101,7 @@ class Listener:
                 messages = link.receive(_WAIT_S)
                 if messages:
                     host = link.host
-                    self._heard.extend((host, message) for message in messages)
+                    self._received.extend((host, message) for message in messages)
                     if not self._is_called:
                         self._is_called = True
                         loop.call_soon_threadsafe(self._hand_over)
@@ -109,7 +110,7 @@ class Listener:
 
     def _hand_over(self) -> None:
         self._is_called = False
-        batch = [self._heard.popleft() for _ in range(len(self._heard))]
+        batch = [self._received.popleft() for _ in range(len(self._received))]
         for host, pairs in groupby(batch, key=itemgetter(0)):
             self._take([message for _, message in pairs], host)
 

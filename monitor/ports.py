@@ -7,14 +7,10 @@ from dataclasses import dataclass
 from typing import Any, Protocol
 
 from scenarios.models import Scenario
-from scenarios.report import RefereeReport, RefereeSnapshot
+from scenarios.result import RefereeReport, RefereeSnapshot
 from scenarios.truth import TrueState
 
 Message = Any  # pymavlink's classes are made by a generator and carry no types
-
-
-class LinkFailed(Exception):  # noqa: N818 - it is what happened, and is mended by opening the link again
-    """The link is gone or cannot be opened; the message is one line for people."""
 
 
 class Link(Protocol):
@@ -33,7 +29,7 @@ class Link(Protocol):
         ...
 
     def receive(self, timeout_s: float) -> list[Message]:
-        """Wait for messages of any system; empty if none came in time. Raises `LinkFailed`."""
+        """Wait for messages of any system; empty if none came in time. Raises `LinkError`."""
         ...
 
     def send(self, message: Message) -> None:
@@ -115,7 +111,7 @@ class Equipment:
     """All that the monitor is given.
 
     Attributes:
-        open_link: opens the link to the drones; called again when it failed. Raises `LinkFailed`.
+        open_link: opens the link to the drones; called again when it failed. Raises `LinkError`.
         make_referee: for a drone that brings none, following its telemetry.
         scenario: what is flown, if the one who starts the monitor said so.
         list_scenarios: names that can be drawn.

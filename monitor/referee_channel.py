@@ -5,80 +5,21 @@ from __future__ import annotations
 import asyncio
 import json
 from collections.abc import Callable
-from typing import Annotated, Any
-from urllib.parse import urlsplit, urlunsplit
+from typing import Any
 
 import aiohttp
-from pydantic import BaseModel, ConfigDict, Field, ValidationError
+from pydantic import ValidationError
 
-from monitor.standing import Standing
-from monitor.vehicle.mission import first_error
 from scenarios.models import Scenario
-from scenarios.report import RefereeSnapshot
+from scenarios.result import Standing, first_error
+from wire.simulator_api import SimulatorApi
 
 _PERIOD_S = 0.2
 _LONGEST_PAUSE_S = 5.0
 _TIMEOUT = aiohttp.ClientTimeout(total=2.0)
 _MOST_BYTES = 1_000_000
 
-Finite = Annotated[float, Field(allow_inf_nan=False, ge=-1e9, le=1e9)]
-Word = Annotated[str, Field(max_length=200)]
 Say = Callable[[str, str], None]
-
-
-class _Told(BaseModel):
-    model_config = ConfigDict(extra="ignore", frozen=True, allow_inf_nan=False)
-
-
-class _Snapshot(_Told):
-    began_us: int | None
-    try_time_s: Finite
-    penalty_s: Finite
-    crossed: list[Word] = Field(max_length=10)
-    next_colour: Word | None
-    contacts: int
-    inside: bool
-    motors_on: bool
-    settled: bool
-    over: bool
-
-
-class _Report(_Told):
-    model_config = ConfigDict(extra="allow", frozen=True, allow_inf_nan=False)
-
-    verdict: Word
-    reason: str = Field("", max_length=2000)
-    frames_crossed: list[Word] = Field([], max_length=10)
-    crossing_times_s: list[Finite] = Field([], max_length=10)
-    contacts: int = 0
-    try_time_s: Finite = 0.0
-    penalty_s: Finite = 0.0
-    total_time_s: Finite = 0.0
-
-
-class LocalFrame(_Told):
-    """Where in the arena the vehicle's local frame lies."""
-
-    origin_arena_m: tuple[Finite, Finite, Finite]
-    yaw_rad: Finite = 0.0
-
-
-class RefereeAnswer(_Told):
-    """What `/referee.json` says."""
-
-    scenario: str = Field(max_length=80)
-    source: str = Field("truth", max_length=40)
-    lift_m: Finite = 0.0
-    time_us: int | None = None
-    snapshot: _Snapshot
-    report: _Report
-    local_frame: LocalFrame | None = None
-
-    def standing(self) -> Standing:
-        """How the try stands."""
-        told = self.snapshot.model_dump()
-        told["crossed"] = tuple(told["crossed"])
-        return Standing(self.scenario, self.source, RefereeSnapshot(**told), self.report.model_dump())
 
 
 class _NotThereError(Exception):
@@ -89,7 +30,7 @@ class RefereeChannel:
     """Asks one drone's referee, five times a second while it answers.
 
     Args:
-        video_url: of the drone's video; the referee is at the same host and port.
+        api: of the simulator or virtual camera whose video the drone tells of.
         hear: called with each answer.
         say: called with level and one line for people.
 
@@ -99,10 +40,8 @@ class RefereeChannel:
         source: what the referee sees by; "" before its first answer.
     """
 
-    def __init__(self, video_url: str, hear: Callable[[RefereeAnswer], None], say: Say) -> None:
-        parts = urlsplit(video_url)
-        self._referee_url = urlunsplit((parts.scheme, parts.netloc, "/referee.json", "", ""))
-        self._scenario_url = urlunsplit((parts.scheme, parts.netloc, "/scenario.json", "", ""))
+    def __init__(self, api: SimulatorApi, hear: Callable[[Standing], None], say: Say) -> None:
+        self._api = api
         self._hear = hear
         self._say = say
         self._complaint = ""
@@ -125,11 +64,11 @@ class RefereeChannel:
                 await asyncio.sleep(pause_s)
 
     async def _ask(self, session: aiohttp.ClientSession) -> None:
-        content = await _fetch(session, self._referee_url)
+        content = await _fetch(session, self._api.referee_url)
         try:
-            answer = RefereeAnswer.model_validate(content)
+            answer = Standing.model_validate(content)
         except ValidationError as error:
-            self._complain(f"{self._referee_url}: {first_error(error)}")
+            self._complain(f"{self._api.referee_url}: {first_error(error)}")
             raise _NotThereError from None
         self.lift_m, self.source = answer.lift_m, answer.source
         if answer.scenario != self._asked_for:
@@ -140,14 +79,14 @@ class RefereeChannel:
         """Get what is flown there, once for each name; a referee without it is still a referee."""
         self.scenario = None
         try:
-            content = await _fetch(session, self._scenario_url)
+            content = await _fetch(session, self._api.scenario_url)
             scenario = Scenario.model_validate(content)
         except _NotThereError as error:
-            self._complain(f"{self._scenario_url}: {error}; the arena cannot be drawn")
+            self._complain(f"{self._api.scenario_url}: {error}; the arena cannot be drawn")
             self._asked_for = name
             return
         except ValidationError as error:
-            self._complain(f"{self._scenario_url}: {first_error(error)}; the arena cannot be drawn")
+            self._complain(f"{self._api.scenario_url}: {first_error(error)}; the arena cannot be drawn")
             self._asked_for = name
             return
         if scenario.name == name:  # else it changed in between: ask again

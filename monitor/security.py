@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import asyncio
-from ipaddress import ip_address
 from urllib.parse import urlsplit
 
 from starlette.datastructures import Headers, MutableHeaders
@@ -13,6 +12,7 @@ from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
 from monitor.addresses import Places, client_address
 from monitor.settings import ConnectionLimits
+from wire.transports.urls import is_loopback
 
 _FORWARDED = ("x-forwarded-for", "x-real-ip", "forwarded")
 _MERELY_READING = ("GET", "HEAD", "OPTIONS")
@@ -126,13 +126,7 @@ def _is_host(host: str) -> bool:
 
 
 def _is_local(host: str) -> bool:
-    name = urlsplit(f"//{host}").hostname or ""
-    if name == "localhost":
-        return True
-    try:
-        return ip_address(name).is_loopback
-    except ValueError:
-        return False
+    return is_loopback(urlsplit(f"//{host}").hostname or "")
 
 
 def _same_place(origin: str, host: str) -> bool:

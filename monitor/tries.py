@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from collections import OrderedDict
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from dataclasses import dataclass, field
-from typing import Any, Literal
+from typing import Literal
 
-from monitor.standing import Standing, number
+from scenarios.result import FlightResult, RefereeReport, Standing
 
 _TELL_EVERY_S = 1.0
 _GONE_S = 3.0
@@ -27,7 +27,7 @@ class TryEvent:
         drone_id: MAVLink system id.
         key: names this try and no other, also after a restart of drone or monitor.
         scenario: its name; "" if unknown.
-        report: `RefereeReport.as_dict()`, or the app's `result.json` where `final`.
+        report: of the referee; the app's `FlightResult` where `final`.
         source: what the referee saw by: "truth" or "telemetry".
         final: the report is the app's result; nothing else will come for this key.
     """
@@ -36,7 +36,7 @@ class TryEvent:
     drone_id: int
     key: str
     scenario: str
-    report: Mapping[str, Any]
+    report: RefereeReport
     source: str
     final: bool
 
@@ -49,15 +49,15 @@ class _Try:
     heard_s: float
     told_s: float
     ended: bool = False
-    result: Mapping[str, Any] | None = None
+    result: FlightResult | None = None
 
 
 @dataclass(slots=True)
-class _Result:
+class _UnclaimedResult:
     """A RESULT document that no try has claimed yet."""
 
     crc: int
-    content: Mapping[str, Any] = field(repr=False)
+    result: FlightResult = field(repr=False)
     came_s: float
 
 
@@ -80,11 +80,11 @@ class TryWatch:
         self._tell = tell
         self._began_s = now_s
         self._now: _Try | None = None
-        self._waiting: _Result | None = None
+        self._waiting: _UnclaimedResult | None = None
         self._known: OrderedDict[int, None] = OrderedDict()  # CRCs of results that were dealt with
 
     @property
-    def result(self) -> Mapping[str, Any] | None:
+    def result(self) -> FlightResult | None:
         """See the class."""
         return self._now.result if self._now is not None else None
 
@@ -112,18 +112,18 @@ class TryWatch:
             self._say("running", now)
         self._match(now_s)
 
-    def take_result(self, crc: int, content: Mapping[str, Any], now_s: float) -> None:
+    def take_result(self, crc: int, result: FlightResult, now_s: float) -> None:
         """Take a RESULT document; one that is merely said again changes nothing.
 
         Args:
             crc: names this version of it.
-            content: as in `result.json`.
+            result: what it says.
             now_s: loop time.
         """
         waiting = self._waiting
         if crc in self._known or (waiting is not None and waiting.crc == crc):
             return
-        self._waiting = _Result(crc, content, now_s)
+        self._waiting = _UnclaimedResult(crc, result, now_s)
         self._match(now_s)
 
     def tick(self, now_s: float) -> None:
@@ -161,37 +161,35 @@ class TryWatch:
         now, waiting = self._now, self._waiting
         if now is None or waiting is None or now.result is not None or now.standing is None:
             return
-        content, snapshot = waiting.content, now.standing.snapshot
-        time_s = number(content, "try_time_s")
-        scenario = content.get("scenario", now.standing.scenario)
-        if time_s is None or time_s <= 0.0 or (now.standing.scenario and scenario != now.standing.scenario):
+        result, standing = waiting.result, now.standing
+        is_other = bool(result.scenario and standing.scenario) and result.scenario != standing.scenario
+        if result.try_time_s <= 0.0 or is_other:
             return
-        alike_s = _SAME_S if content.get("judged_by") == now.standing.source else _ALIKE_S
-        if now.ended and not now.standing.ended:  # the referee was gone before it saw the end
+        alike_s = _SAME_S if result.judged_by == standing.source else _ALIKE_S
+        if now.ended and not standing.ended:  # the referee was gone before it saw the end
             alike_s = _ALIKE_S
-        elif not now.standing.ended:  # the app broke off, and the drone still flies
+        elif not standing.ended:  # the app broke off, and the drone still flies
             fresh = now_s - waiting.came_s < _TELL_EVERY_S
-            alike_s = _ALIKE_S if fresh and content.get("ended") != "finished" else -1.0
-        if abs(snapshot.try_time_s - time_s) <= alike_s:
+            alike_s = _ALIKE_S if fresh and result.ended != "finished" else -1.0
+        if abs(standing.snapshot.try_time_s - result.try_time_s) <= alike_s:
             self._finish(now, waiting)
 
-    def _finish(self, now: _Try, waiting: _Result) -> None:
-        now.result, now.ended = waiting.content, True
+    def _finish(self, now: _Try, waiting: _UnclaimedResult) -> None:
+        now.result, now.ended = waiting.result, True
         self._settle(waiting)
         self._say("ended", now)
 
-    def _take_alone(self, waiting: _Result, now_s: float) -> None:
+    def _take_alone(self, waiting: _UnclaimedResult, now_s: float) -> None:
         """Nobody but the app judged: its result is the try."""
-        time_s = number(waiting.content, "try_time_s")
-        if time_s is None or time_s <= 0.0:
+        if waiting.result.try_time_s <= 0.0:
             self._settle(waiting)
             return
         now = _Try(f"{self._id}-{self._boot}-result-{waiting.crc:08x}", None, None, now_s, now_s)
         self._now = now
-        self._say("began", now, content=waiting.content)
+        self._say("began", now, result=waiting.result)
         self._finish(now, waiting)
 
-    def _settle(self, waiting: _Result) -> None:
+    def _settle(self, waiting: _UnclaimedResult) -> None:
         self._known[waiting.crc] = None
         if len(self._known) > _KNOWN_RESULTS:
             self._known.popitem(last=False)
@@ -203,15 +201,17 @@ class TryWatch:
         kind: Literal["began", "running", "ended"],
         now: _Try,
         remark: str = "",
-        content: Mapping[str, Any] | None = None,
+        result: FlightResult | None = None,
     ) -> None:
-        standing, report = now.standing, now.result or content
-        final = now.result is not None
-        if report is not None:
-            scenario, source = str(report.get("scenario", "")), str(report.get("judged_by", ""))
+        standing, final = now.standing, now.result is not None
+        report: RefereeReport
+        result = now.result or result
+        if result is not None:
+            report, scenario, source = result, result.scenario, result.judged_by
         else:
             assert standing is not None
             report, scenario, source = standing.report, standing.scenario, standing.source
         if remark:
-            report = {**report, "reason": f"{report.get('reason', '')}; {remark}".removeprefix("; ")}
+            reason = f"{report.reason}; {remark}".removeprefix("; ")
+            report = report.model_copy(update={"reason": reason})
         self._tell(TryEvent(kind, self._id, now.key, scenario, report, source, final))

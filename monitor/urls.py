@@ -9,6 +9,8 @@ from urllib.parse import urlsplit
 
 import ifaddr
 
+from wire.transports.urls import is_loopback
+
 # Networks within this machine, of containers and virtual machines: no phone is in them.
 _VIRTUAL = ("docker", "br-", "veth", "virbr", "lxc", "lxdbr", "cni", "podman", "vmnet", "vboxnet")
 _ELSEWHERE = ("192.0.2.1", 9)  # TEST-NET-1 of RFC 5737; nothing is sent there
@@ -73,17 +75,9 @@ def urls_for_visitor(host: str, port: int, asked: str) -> list[str]:
     urls = urls_for_people(host, port)
     parts = urlsplit(asked)
     theirs = f"{parts.scheme}://{parts.netloc}/"
-    if _is_own(parts.hostname or "localhost"):
+    if is_loopback(parts.hostname or "localhost"):
         return urls
     return [theirs, *(url for url in urls if url != theirs)]
-
-
-def _is_own(name: str) -> bool:
-    """Whether a name in a URL means the machine of whoever uses it."""
-    try:
-        return ip_address(name).is_loopback
-    except ValueError:
-        return name == "localhost"
 
 
 def _first_choice() -> str:

@@ -17,18 +17,18 @@ from fastapi import Request
 from fastapi.responses import PlainTextResponse, Response, StreamingResponse
 
 from monitor.addresses import Places, client_address
-from monitor.video_stream import Shot, ShotCutter, StreamBrokenError
+from wire.mjpeg import JPEG_START, STREAM_HEADERS, STREAM_START, MjpegReader, Part, StreamError, write_part
 
 if TYPE_CHECKING:
     from monitor.server import Monitor
 
-MOST_WATCHERS = 100  # of one drone
-MOST_WATCHERS_PER_ADDRESS = 30
+MAX_VIEWERS = 100  # of one drone
+MAX_VIEWERS_PER_ADDRESS = 30
+MAX_IMAGE_BYTES = 4 << 20
 FIRST_IMAGE_S = 5.0
 _RETRY_S = 1.0
 _SILENCE_S = 5.0  # then the connection is made again
 _CHUNK_BYTES = 1 << 16
-_BOUNDARY = "frame"
 _FRAME_HEAD = struct.Struct("<qI")  # time of exposure in microseconds or -1, length of the JPEG
 _log = logging.getLogger(__name__)
 
@@ -42,17 +42,17 @@ class DroneVideo:
 
     def __init__(self, find_url: Callable[[], str | None]) -> None:
         self._find_url = find_url
-        self._latest: Shot | None = None
-        self._before: Shot | None = None  # the last one when nobody watched any more
+        self._latest: Part | None = None
+        self._before: Part | None = None  # the last one when nobody watched any more
         self._arrived = asyncio.Event()
-        self._places = Places(MOST_WATCHERS, MOST_WATCHERS_PER_ADDRESS)
+        self._places = Places(MAX_VIEWERS, MAX_VIEWERS_PER_ADDRESS)
         self._fetching: asyncio.Task[None] | None = None
 
     def problem(self, address: str) -> str:
         """Say in one line why nobody else may watch from an address; "" if somebody may."""
         return self._places.problem(address)
 
-    async def shots(self, address: str, *, kept: bool = False) -> AsyncGenerator[Shot, None]:
+    async def images(self, address: str, *, kept: bool = False) -> AsyncGenerator[Part, None]:
         """Give images as they come, the newest each time; without end, so close it.
 
         None come if there is no place for another watcher from this address.
@@ -66,7 +66,7 @@ class DroneVideo:
         if self._fetching is None:
             self._before, self._latest = self._latest or self._before, None
             self._fetching = asyncio.create_task(self._fetch())
-        last: Shot | None = None
+        last: Part | None = None
         try:
             if kept and self._latest is None and self._before is not None:
                 yield self._before
@@ -96,7 +96,7 @@ class DroneVideo:
                 if url is not None:
                     try:
                         await self._read(session, url)
-                    except (aiohttp.ClientError, StreamBrokenError, OSError, ValueError) as error:
+                    except (aiohttp.ClientError, OSError, ValueError) as error:
                         _log.info("video %s: %s", url, error)
                 await asyncio.sleep(_RETRY_S)
 
@@ -104,12 +104,12 @@ class DroneVideo:
         # A redirection could lead anywhere: it is not followed.
         async with session.get(url, allow_redirects=False) as response:
             if response.status != 200:
-                raise StreamBrokenError(f"status {response.status}")
-            cutter = ShotCutter(response.headers.get("Content-Type", ""))
+                raise StreamError(f"status {response.status}")
+            reader = MjpegReader(response.headers.get("Content-Type", ""), MAX_IMAGE_BYTES)
             async for chunk in response.content.iter_chunked(_CHUNK_BYTES):
-                shots = cutter.feed(chunk)
-                if shots:
-                    self._latest = shots[-1]
+                images = [part for part in reader.feed(chunk) if part.data.startswith(JPEG_START)]
+                if images:
+                    self._latest = images[-1]
                     self._arrived.set()  # wakes all that wait now
                     self._arrived.clear()
 
@@ -140,37 +140,33 @@ def register(monitor: Monitor) -> None:
         video = open_video(request, drone_id)
         if isinstance(video, Response):
             return video
-        return StreamingResponse(
-            _parts(video.shots(client_address(request.scope))),
-            media_type=f"multipart/x-mixed-replace; boundary={_BOUNDARY}",
-            headers={"Cache-Control": "no-store", "Connection": "close"},
-        )
+        return StreamingResponse(_parts(video.images(client_address(request.scope))), headers=STREAM_HEADERS)
 
     @monitor.web.get("/video/{drone_id}/frames")
     async def frames(request: Request, drone_id: int) -> Response:
         video = open_video(request, drone_id)
         if isinstance(video, Response):
             return video
-        shots = video.shots(client_address(request.scope), kept=True)
+        images = video.images(client_address(request.scope), kept=True)
         headers = {"Cache-Control": "no-store", "Connection": "close"}
-        return StreamingResponse(_frames(shots), media_type="application/octet-stream", headers=headers)
+        return StreamingResponse(_frames(images), media_type="application/octet-stream", headers=headers)
 
     @monitor.web.get("/video/{drone_id}/image.jpg")
     async def image(request: Request, drone_id: int) -> Response:
         video = open_video(request, drone_id)
         if isinstance(video, Response):
             return video
-        shots = video.shots(client_address(request.scope))
+        images = video.images(client_address(request.scope))
         try:
-            shot = await asyncio.wait_for(anext(shots), FIRST_IMAGE_S)
+            newest = await asyncio.wait_for(anext(images), FIRST_IMAGE_S)
         except (TimeoutError, StopAsyncIteration):
             return PlainTextResponse("no image came\n", 503, {"Retry-After": "1"})
         finally:
-            await shots.aclose()
+            await images.aclose()
         headers = {"Cache-Control": "no-store"}
-        if shot.time_us is not None:
-            headers["X-Time-Us"] = str(shot.time_us)
-        return Response(shot.jpeg, media_type="image/jpeg", headers=headers)
+        if newest.time_us is not None:
+            headers["X-Time-Us"] = str(newest.time_us)
+        return Response(newest.data, media_type="image/jpeg", headers=headers)
 
     async def end() -> None:
         try:
@@ -199,23 +195,21 @@ def _readable(url: str | None) -> str | None:
     return url if can_be_passed_on(url) else None
 
 
-async def _frames(shots: AsyncGenerator[Shot, None]) -> AsyncGenerator[bytes, None]:
+async def _frames(images: AsyncGenerator[Part, None]) -> AsyncGenerator[bytes, None]:
     """Write images for a page that shows each with what belongs to its moment: head, then JPEG."""
     try:
-        async for shot in shots:
-            time_us = -1 if shot.time_us is None else shot.time_us
-            yield _FRAME_HEAD.pack(time_us, len(shot.jpeg)) + shot.jpeg
+        async for image in images:
+            time_us = -1 if image.time_us is None else image.time_us
+            yield _FRAME_HEAD.pack(time_us, len(image.data)) + image.data
     finally:
-        await shots.aclose()
+        await images.aclose()
 
 
-async def _parts(shots: AsyncGenerator[Shot, None]) -> AsyncGenerator[bytes, None]:
-    """Write images as parts of a stream, the boundary behind each: so a browser shows it at once."""
+async def _parts(images: AsyncGenerator[Part, None]) -> AsyncGenerator[bytes, None]:
+    """Write images as an MJPEG stream."""
     try:
-        yield f"--{_BOUNDARY}\r\n".encode()
-        async for shot in shots:
-            stamp = "" if shot.time_us is None else f"X-Time-Us: {shot.time_us}\r\n"
-            head = f"Content-Type: image/jpeg\r\nContent-Length: {len(shot.jpeg)}\r\n{stamp}\r\n"
-            yield b"".join((head.encode(), shot.jpeg, f"\r\n--{_BOUNDARY}\r\n".encode()))
+        yield STREAM_START
+        async for image in images:
+            yield write_part(image.data, image.time_us)
     finally:
-        await shots.aclose()
+        await images.aclose()

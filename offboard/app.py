@@ -54,7 +54,7 @@ logger = logging.getLogger(__name__)
 
 
 @dataclass(frozen=True, slots=True)
-class Outcome:
+class MissionEnd:
     """How a flight ended.
 
     Attributes:
@@ -90,7 +90,7 @@ async def fly_mission(
     observer: Observer | None = None,
     eyes: Eyes | None = None,
     box: Box | None = None,
-) -> Outcome:
+) -> MissionEnd:
     """Connect, fly the mission, let go.
 
     If anything goes wrong after the start (drone, camera, mission, time limit, Ctrl-C), commanding stops,
@@ -157,7 +157,7 @@ class _Flight:
         self._pauses = 0
         self._remark = ""
 
-    async def run(self) -> Outcome:
+    async def run(self) -> MissionEnd:
         """Fly to the end, whichever it is."""
         try:
             timed_out = await self._fly()
@@ -311,7 +311,7 @@ class _Flight:
         finally:
             await _close(ticks)
 
-    async def _stop(self, ended: Literal["timed out", "aborted"], reason: str) -> Outcome:
+    async def _stop(self, ended: Literal["timed out", "aborted"], reason: str) -> MissionEnd:
         """Stop commanding and ask for hold."""
         if self._motors_asked:
             self._flying = False
@@ -321,10 +321,10 @@ class _Flight:
                 reason = f"{reason}; hold: {error}"
         return self._outcome(ended, reason)
 
-    def _outcome(self, ended: Literal["finished", "timed out", "aborted"], reason: str) -> Outcome:
+    def _outcome(self, ended: Literal["finished", "timed out", "aborted"], reason: str) -> MissionEnd:
         place, flight_time_s = self._engine.state, self._flight_time_s()
         kept_s = 0.0 if self._keeper is None else self._keeper.limited_us / MICROSECONDS
-        return Outcome(ended, reason, place, flight_time_s, self._ticks, self._pauses, kept_s)
+        return MissionEnd(ended, reason, place, flight_time_s, self._ticks, self._pauses, kept_s)
 
     def _flight_time_s(self) -> float:
         return 0.0 if self._started_us is None else (self._now_us - self._started_us) / MICROSECONDS

@@ -29,8 +29,9 @@ from offboard.link.telemetry import CHECKS, TelemetryFeed, ask_for_rates
 from offboard.link.ticks import TickSource, VehicleClock
 from offboard.link.tlog import TlogRecorder
 from offboard.link.tracking import CommandTracker
-from offboard.link.url import check_free, parse_url
 from offboard.link.watchdog import PATIENT, Watchdog
+from wire.transports.sockets import check_free
+from wire.transports.urls import LinkError, parse_url
 
 STAND_STILL_S = 0.5  # wall time without a tick after which the last velocity is not flown any longer
 LINK_LOST_S = 1.0  # wall time without telemetry
@@ -81,7 +82,7 @@ class MavsdkDrone:
             box: out of which nothing leads that is added to commands here; None: there is none.
 
         Raises:
-            DroneError: bad address.
+            LinkError: bad address.
         """
         self._url = parse_url(url)
         self._start_arena = Pose(start_arena[:3], start_arena[3])
@@ -145,9 +146,11 @@ class MavsdkDrone:
         Raises:
             DroneError: port taken, device missing, no vehicle within the limit.
         """
-        check_free(
-            self._url, "give another address" if self._system_id is None else "choose another --instance"
-        )
+        advice = "give another address" if self._system_id is None else "choose another --instance"
+        try:
+            check_free(self._url, advice)
+        except LinkError as error:
+            raise DroneError(str(error)) from None
         log_subscribe(_log)
         # As a ground station: PX4 sends the reasons of its refusals (STATUSTEXT) to no one else.
         configuration = Configuration.create_with_component_type(ComponentType.GROUND_STATION)
@@ -223,8 +226,7 @@ class MavsdkDrone:
                 disarmed by others.
         """
         while True:
-            follows = self._commanding and not self._pilot_has_it
-            command = self._sent if follows else None
+            command = self._sent if self._commanding and not self._pilot_has_it else None
             came = await self._ticks.next(STAND_STILL_S, command)
             if not came and not self._ticks.waits:
                 self._stand_still()
@@ -242,14 +244,13 @@ class MavsdkDrone:
 
         Offboard first, while disarmed: so the motors never run in another mode.
         """
-        feed = self._feed
         await self._stream_before_offboard()
         self._watchdog.start()
         try:
             await self._ask("offboard mode", self._stream.ask_for_offboard())
-            await self._confirm("offboard mode", lambda: feed.mode == "OFFBOARD")
+            await self._confirm("offboard mode", lambda: self._feed.mode == "OFFBOARD")
             await self._ask("arming", self._action.arm())
-            await self._confirm("arming", lambda: bool(feed.armed))
+            await self._confirm("arming", lambda: bool(self._feed.armed))
         except BaseException:
             self._watchdog.stop()
             await self._leave_offboard()
@@ -437,11 +438,10 @@ class MavsdkDrone:
         try:
             await self._until(shown, CONFIRM_S)
         except TimeoutError:
-            feed = self._feed
-            armed = "armed" if feed.armed else "disarmed"
+            armed = "armed" if self._feed.armed else "disarmed"
             raise DroneError(
-                f"{what} was acknowledged, but telemetry still shows mode {feed.mode}, {armed} "
-                f"after {CONFIRM_S:g} s{feed.recent_texts()}"
+                f"{what} was acknowledged, but telemetry still shows mode {self._feed.mode}, {armed} "
+                f"after {CONFIRM_S:g} s{self._feed.recent_texts()}"
             ) from None
 
     async def _shows(self, condition: Callable[[], bool], limit_s: float) -> bool:

@@ -10,7 +10,7 @@ from scenarios.boundary import Boundary
 from scenarios.crossing import Gate, Passage
 from scenarios.ground import ground_height
 from scenarios.models import COLOURS, Scenario
-from scenarios.report import Crossing, RefereeReport, RefereeSnapshot
+from scenarios.result import Crossing, RefereeReport, RefereeSnapshot
 from scenarios.touchdown import (
     HARD_HIT_M_S,
     TIPPED_OVER,

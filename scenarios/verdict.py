@@ -9,7 +9,7 @@ from scenarios.touchdown import Landing
 
 
 class Verdict(StrEnum):
-    """What a try was worth."""
+    """What a try was worth, best first; no referee says `error`."""
 
     CLEAN = "clean"
     COMPLETED = "completed"
@@ -17,6 +17,8 @@ class Verdict(StrEnum):
     CRASHED = "crashed"
     ABORTED = "aborted"
     WRONG_ORDER = "wrong order"
+    ERROR = "error"
+    """In evaluations: a fault of the program, not of the drone, ended the flight."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -5,7 +5,6 @@ from __future__ import annotations
 import asyncio
 import socket
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import asdict
 from importlib import import_module
 from math import degrees
 from typing import TYPE_CHECKING
@@ -13,9 +12,9 @@ from typing import TYPE_CHECKING
 from firmware_py.mavlink.camera.model import CameraModel, VideoEncoding, VideoStream
 from firmware_py.mavlink.node import MavlinkNode, NodeOptions
 from geometry.axes import flip_vector
+from scenarios.result import LocalFrame, Standing
 from sitl.drone_files import flight_recorder, open_storage
 from sitl.link_hub import LinkHub
-from sitl.link_urls import is_loopback
 from sitl.parameter_file import ParameterKeeper, open_parameters
 from sitl.picture_album import PictureAlbum
 from sitl.server_settings import ServerSettings
@@ -24,6 +23,8 @@ from sitl.solids import Solid
 from sitl.time_grants import TimeGrants, Velocity
 from sitl.world import CONTROL_PERIOD_US
 from wire.dialect import mavlink
+from wire.simulator_api import REFEREE_PATH, SCENARIO_PATH, VIDEO_PATH
+from wire.transports.urls import is_loopback
 
 if TYPE_CHECKING:
     from sitl.camera_feed import CameraFeed
@@ -116,8 +117,8 @@ class ServedDrone:
         video = VideoServer(
             self._settings.bind, self._settings.http_port, options="--instance (sim also: --video-port)"
         )
-        video.add_json("/referee.json", self._referee_answer)
-        video.add_json("/scenario.json", lambda _query: scenario.model_dump(mode="json"))
+        video.add_json(REFEREE_PATH, self._referee_answer)
+        video.add_json(SCENARIO_PATH, lambda _query: scenario.model_dump(mode="json"))
         if self._settings.video_rtp is not None:
             from sitl.rtp import RtpSender
 
@@ -187,7 +188,9 @@ class ServedDrone:
         settings, camera = self._settings, self.simulation.scenario.camera
         common = (camera.width_px, camera.height_px, camera.rate_hz, degrees(camera.horizontal_fov_rad))
         host = _seen_from_outside(settings)
-        page = VideoStream(f"http://{host}:{settings.http_port}/video", VideoEncoding.MJPEG_HTTP, *common)
+        page = VideoStream(
+            f"http://{host}:{settings.http_port}{VIDEO_PATH}", VideoEncoding.MJPEG_HTTP, *common
+        )
         if settings.video_rtp is None:
             return (page,)
         return (VideoStream(str(settings.video_rtp[1]), VideoEncoding.H264_RTP, *common), page)
@@ -196,22 +199,22 @@ class ServedDrone:
         """What `/referee.json?state=…&ended=…` tells: how the try stands, and the report if it ended now."""
         simulation = self.simulation
         referee = simulation.referee
-        return {
-            "scenario": simulation.scenario.name,
-            "source": "truth",
-            "lift_m": 0.0,
-            "time_us": simulation.time_us,
-            "local_frame": self._local_frame(),
-            "snapshot": asdict(referee.snapshot()),
-            "report": referee.report(query.get("state", ""), query.get("ended")).as_dict(),
-        }
+        standing = Standing(
+            scenario=simulation.scenario.name,
+            source="truth",
+            time_us=simulation.time_us,
+            local_frame=self._local_frame(),
+            snapshot=referee.snapshot(),
+            report=referee.report(query.get("state", ""), query.get("ended")),
+        )
+        return standing.model_dump(mode="json")
 
-    def _local_frame(self) -> dict[str, object] | None:
+    def _local_frame(self) -> LocalFrame | None:
         """Where in the arena the vehicle's local frame is; None before the estimator has fixed its origin."""
         origin_ned_m = self.simulation.autopilot.estimator.origin_ned_m
         if origin_ned_m is None:
             return None
-        return {"origin_arena_m": flip_vector(origin_ned_m), "yaw_rad": 0.0}
+        return LocalFrame(origin_arena_m=flip_vector(origin_ned_m))
 
 
 def _camera_model(simulation: Simulation) -> CameraModel:

@@ -2,15 +2,33 @@
 
 from __future__ import annotations
 
+import time
+from collections import deque
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 
 from firmware_py.mavlink.node import MavlinkNode
-from sitl.link_input import LinkInput
-from sitl.link_urls import LinkUrl, is_loopback
-from sitl.links import Carrier, Receive, UdpAddresses, open_udp
-from sitl.stream_links import Closable, Joined, SerialLine, TcpClient, TcpServer
+from sitl.links import (
+    Joined,
+    LastingLink,
+    Receive,
+    StreamLink,
+    StreamLinks,
+    TcpServer,
+    UdpAddresses,
+    UdpLink,
+    connect_tcp_async,
+    open_udp,
+)
+from sitl.server_settings import WantedLink
 from wire.link import LinkProfile
+from wire.transports.sockets import Stream, open_serial
+from wire.transports.urls import LinkUrl, is_loopback
+
+_INPUT_SHARE = 0.25  # of a core
+_MAX_SAVED_S = 0.004  # processor time for input after a quiet while: one control period
+_STEPS_A_TURN = 4  # at most some 0.4 ms
+_NOTICE_PERIOD_S = 10.0
 
 
 class LinkHub:
@@ -24,8 +42,8 @@ class LinkHub:
     def __init__(self, node: MavlinkNode, notice: Callable[[str], None] = lambda line: None) -> None:
         self._node = node
         self._input = LinkInput(node, notice)
-        self._carriers: dict[str, Carrier] = {}
-        self._opened: list[Closable] = []
+        self._carriers: dict[str, UdpLink | StreamLink] = {}
+        self._opened: list[UdpLink | StreamLinks] = []
         self._joined = 0
 
     async def open_udp(self, profile: LinkProfile, addresses: UdpAddresses) -> None:
@@ -39,37 +57,29 @@ class LinkHub:
         self._node.add_link(profile)
         self._carriers[profile.name] = link
 
-    async def open(self, url: LinkUrl) -> None:
+    async def open(self, link: WantedLink) -> None:
         """Open a link that a person asked for.
 
         Raises:
             LinkError: it cannot be opened.
         """
-        there = (url.address, url.number)
+        url, profile = link.url, link.profile
         if url.scheme == "udpout":
             here = "127.0.0.1" if is_loopback(url.address) else "0.0.0.0"
-            await self.open_udp(url.profile, UdpAddresses((here, 0), there))
+            await self.open_udp(profile, UdpAddresses((here, 0), url.place))
         elif url.scheme == "udpin":
-            await self.open_udp(url.profile, UdpAddresses(there, None))
-        elif url.scheme == "tcpin":
-            server = TcpServer(self._joiner(url.profile), self._leave)
-            self._opened.append(server)
-            await server.open(*there)
-        elif url.scheme == "tcpout":
-            self._opened.append(TcpClient(*there, self._joiner(url.profile), self._leave))
+            await self.open_udp(profile, UdpAddresses(url.place, None))
         else:
-            line = SerialLine()
-            self._opened.append(line)
-            await line.open(*there, self._joiner(url.profile), self._leave)
+            self._opened.append(self._open_stream(url, self._joiner(profile)))
 
-    async def open_all(self, urls: Sequence[LinkUrl]) -> None:
+    async def open_all(self, links: Sequence[WantedLink]) -> None:
         """Open links that a person asked for.
 
         Raises:
             LinkError: one cannot be opened.
         """
-        for url in urls:
-            await self.open(url)
+        for link in links:
+            await self.open(link)
 
     def read(self) -> None:
         """Read input that waits, as far as there is time, and send the answers."""
@@ -92,6 +102,17 @@ class LinkHub:
         for opened in self._opened:
             opened.close()
 
+    def _open_stream(self, url: LinkUrl, joined: Joined) -> StreamLinks:
+        if url.scheme == "tcpin":
+            return TcpServer(url.place, joined, self._leave)
+        if url.scheme == "tcpout":
+            return LastingLink(lambda: connect_tcp_async(url.place), joined, self._leave)
+
+        async def open_again() -> Stream:
+            return open_serial(*url.place)
+
+        return LastingLink(open_again, joined, self._leave, open_serial(*url.place))
+
     def _receiver(self, name: str) -> Receive:
         def receive(data: bytes) -> None:
             self._input.take(name, data)
@@ -100,7 +121,7 @@ class LinkHub:
         return receive
 
     def _joiner(self, profile: LinkProfile) -> Joined:
-        def join(carrier: Carrier) -> Receive:
+        def join(carrier: StreamLink) -> Receive:
             self._joined += 1
             name = f"{profile.name}#{self._joined}"
             self._node.add_link(replace(profile, name=name))
@@ -109,8 +130,75 @@ class LinkHub:
 
         return join
 
-    def _leave(self, carrier: Carrier) -> None:
+    def _leave(self, carrier: StreamLink) -> None:
         for name, known in list(self._carriers.items()):
             if known is carrier:
                 self._node.remove_link(name)
                 del self._carriers[name]
+
+
+class LinkInput:
+    """Input of all links of one vehicle, read so that no flood of it delays the control loop.
+
+    Reading and acting on input may take a quarter of one processor core. What comes faster waits, up to
+    64 KiB a link, and what finds no room there is dropped: a late command is worth less than a lost one.
+    Links take turns, so a flood on one delays the input of another by milliseconds.
+
+    Args:
+        node: reads it and acts on it.
+        notice: called with lines for people, when input was dropped.
+        clock: monotonic seconds.
+        processor_clock: processor time of this thread in seconds.
+    """
+
+    def __init__(
+        self,
+        node: MavlinkNode,
+        notice: Callable[[str], None],
+        clock: Callable[[], float] = time.monotonic,
+        processor_clock: Callable[[], float] = time.thread_time,
+    ) -> None:
+        self._node = node
+        self._notice = notice
+        self._clock, self._processor_clock = clock, processor_clock
+        self._waiting: deque[str] = deque()  # names of links, whose turn is next first
+        self._filled_s = clock()
+        self._saved_s = _MAX_SAVED_S
+        self._dropped_bytes: dict[str, int] = {}
+        self._noticed_s = -_NOTICE_PERIOD_S
+
+    def take(self, link: str, data: bytes) -> None:
+        """Take bytes that came in on a link, and act on them at once as far as there is time.
+
+        Args:
+            link: its name.
+            data: any piece of the stream.
+        """
+        dropped_bytes = self._node.add_input(link, data)
+        if dropped_bytes:
+            self._dropped_bytes[link] = self._dropped_bytes.get(link, 0) + dropped_bytes
+        if link not in self._waiting:
+            self._waiting.append(link)
+        self.work()
+
+    def work(self) -> None:
+        """Act on input that waits, as far as there is time; to be called at every control tick."""
+        now_s = self._clock()
+        self._saved_s = min(_MAX_SAVED_S, self._saved_s + _INPUT_SHARE * (now_s - self._filled_s))
+        self._filled_s = now_s
+        waiting = self._waiting
+        while waiting and self._saved_s > 0.0:
+            link = waiting.popleft()
+            began_s = self._processor_clock()
+            if self._node.process_input(link, _STEPS_A_TURN):
+                waiting.append(link)
+            self._saved_s -= self._processor_clock() - began_s
+        if self._dropped_bytes and now_s - self._noticed_s >= _NOTICE_PERIOD_S:
+            self._tell(now_s)
+
+    def _tell(self, now_s: float) -> None:
+        """Say what was dropped since it was last said."""
+        self._noticed_s = now_s
+        for link, dropped_bytes in self._dropped_bytes.items():
+            self._notice(f"too much input on link {link}: {dropped_bytes / 1000:.0f} kB dropped")
+        self._dropped_bytes.clear()

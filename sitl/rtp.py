@@ -1,13 +1,12 @@
 """Video out as H.264 in RTP over UDP, as QGroundControl and GStreamer want it (PX4's Gazebo sends the same).
 
 Images are compressed in a thread of their own, the newest only: when the encoder is late, images are left
-out and the flight does not notice. Every second begins anew with a key frame that carries the stream's
+out and the flight does not notice. Every second begins with a key frame that carries the stream's
 headers, so whoever starts listening sees something within a second.
 """
 
 from __future__ import annotations
 
-import socket
 import threading
 from fractions import Fraction
 
@@ -18,8 +17,8 @@ from av.video.frame import PictureType
 from av.video.stream import VideoStream
 
 from scenarios.models import Camera
-from sitl.links import Address
 from sitl.video import VideoError
+from wire.transports.sockets import Address, resolved_ipv4
 
 Image = npt.NDArray[np.uint8]
 
@@ -44,11 +43,12 @@ class RtpSender:
         speed: simulated seconds a second; stamps of the images count the watcher's seconds.
 
     Raises:
-        VideoError: the address is wrong, or the encoder cannot work with such images.
+        LinkError: there is no such host.
+        VideoError: the encoder cannot work with such images.
     """
 
     def __init__(self, remote: Address, camera: Camera, speed: float = 1.0) -> None:
-        self._host, self._port = _resolved(remote), remote[1]
+        self._host, self._port = resolved_ipv4(remote, "RTP")
         self._speed = speed
         self._newest: tuple[Image, int] | None = None
         self._wanted = threading.Condition()
@@ -140,16 +140,3 @@ class RtpSender:
             self._container.close()
         except (av.FFmpegError, OSError):
             pass
-
-
-def _resolved(remote: Address) -> str:
-    """The IPv4 address of a host."""
-    host, port = remote
-    try:
-        found = socket.getaddrinfo(host, port, family=socket.AF_INET, type=socket.SOCK_DGRAM)
-    except (OSError, UnicodeError) as error:
-        reason = getattr(error, "strerror", None) or error
-        raise VideoError(
-            f"RTP to {host}:{port} cannot be sent ({reason}); give a host's name or an IPv4 address"
-        ) from error
-    return str(found[0][4][0])

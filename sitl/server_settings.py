@@ -3,20 +3,72 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from math import inf
 from pathlib import Path
 
-from firmware_py.mavlink.rates import GROUND, ONBOARD
-from sitl.link_urls import LinkError, LinkUrl, host_and_port, is_loopback
-from sitl.links import Address, UdpAddresses
+from firmware_py.mavlink.rates import GROUND, NORMAL, ONBOARD
+from sitl.links import UdpAddresses
 from wire.link import LinkProfile
 from wire.signing import SigningKey
+from wire.transports.sockets import Address
+from wire.transports.urls import MAX_PORT, LinkError, LinkUrl, UrlRules, host_and_port, is_loopback, parse_url
 
 _LAST_ONBOARD_PORT = 14549  # PX4 sends all instances beyond the tenth there
 _GROUND_PORT = 14550  # of every instance, so that one ground station sees them all
 VIDEO_PORT = 8100  # 8080 is the monitor's
 _RTP_PORT = 5600  # where QGroundControl listens; the one after it is for RTCP
-_LAST_PORT = 65535
 _PORT_SCHEMES = ("udpin", "tcpin")
+_LINK = UrlRules(
+    "--link {}",
+    "udpout://192.168.1.20:14550, tcpin://127.0.0.1:5760, serial:///dev/ttyS1:57600?streams=onboard",
+    takes_options=True,
+    listens_on_names=True,
+)
+_PROFILES = {profile.name: profile for profile in (ONBOARD, GROUND, NORMAL)}
+_MIN_RATE, _MAX_RATE = 100, 10_000_000  # bytes a second
+
+
+@dataclass(frozen=True, slots=True)
+class WantedLink:
+    """A link that a person asked for.
+
+    Attributes:
+        url: where it goes.
+        profile: its streams and how much it carries.
+    """
+
+    url: LinkUrl
+    profile: LinkProfile
+
+
+def parse_link(text: str) -> WantedLink:
+    """Check `--link URL`, with `?streams=onboard|ground|normal&rate=BYTES` if wanted.
+
+    The rate is what streams may take a second.
+
+    Raises:
+        LinkError: one line that says what is wrong, with examples.
+    """
+    url = parse_url(text, _LINK)
+    is_serial = url.scheme == "serial"
+    profile = NORMAL if is_serial else GROUND
+    rate = url.number / 20 if is_serial else inf  # PX4's MAV_0_RATE = 0: half of the line, at ten bits a byte
+    for name, value in url.options:
+        if name == "streams" and value in _PROFILES:
+            profile = _PROFILES[value]
+        elif name == "rate" and value.isdecimal() and _MIN_RATE <= int(value) <= _MAX_RATE:
+            rate = float(value)
+        elif name == "rate":
+            raise LinkError(
+                f"--link {url.text}: rate {value} must be from {_MIN_RATE} to {_MAX_RATE} bytes/s"
+            )
+        else:
+            raise LinkError(
+                f"--link {url.text}: '{name}={value}' is not known; "
+                f"there are streams={'|'.join(_PROFILES)} and rate=BYTES"
+            )
+    trusted = is_serial or is_loopback(url.address)
+    return WantedLink(url, replace(profile, name=url.text, bytes_s=rate, trusted=trusted))
 
 
 def rtp_address(text: str, instance: int) -> Address:
@@ -55,7 +107,7 @@ class ServerSettings:
     video_port: int | None = None
     video_rtp: Address | None = None
     speed: float = 1.0
-    links: tuple[LinkUrl, ...] = ()
+    links: tuple[WantedLink, ...] = ()
     signing_key: SigningKey | None = None
     storage: Path | None = None
     shell: bool = False
@@ -90,7 +142,7 @@ class ServerSettings:
     @property
     def is_open(self) -> bool:
         """Whether somebody on another machine can command the drone without a key."""
-        links = [profile for profile, _ in self.standing_links] + [url.profile for url in self.links]
+        links = [profile for profile, _ in self.standing_links] + [link.profile for link in self.links]
         return self.signing_key is None and not all(link.trusted for link in links)
 
     def check(self, count: int) -> None:
@@ -102,10 +154,10 @@ class ServerSettings:
         for by in range(count):
             drone = self.shifted(by)
             ports = [addresses.remote for _, addresses in drone.standing_links]
-            ports += [drone.video_rtp, *((link.text, link.number) for link in drone.links)]
+            ports += [drone.video_rtp, *((link.url.text, link.url.number) for link in drone.links)]
             for place in ports:
-                if place is not None and place[1] > _LAST_PORT and not place[0].startswith("serial"):
-                    raise LinkError(f"{place[0]}: port {place[1]} of drone {by + 1} is above {_LAST_PORT}")
+                if place is not None and place[1] > MAX_PORT and not place[0].startswith("serial"):
+                    raise LinkError(f"{place[0]}: port {place[1]} of drone {by + 1} is above {MAX_PORT}")
 
     def shifted(self, by: int) -> ServerSettings:
         """Settings of another drone of the same program: every port it opens is higher by so much."""
@@ -129,5 +181,6 @@ def _own_file(path: Path | None, system_id: int) -> Path | None:
     return None if path is None else path.with_stem(f"{path.stem}-{system_id}")
 
 
-def _shifted(link: LinkUrl, by: int) -> LinkUrl:
-    return replace(link, number=link.number + by) if link.scheme in _PORT_SCHEMES else link
+def _shifted(link: WantedLink, by: int) -> WantedLink:
+    url = link.url
+    return replace(link, url=replace(url, number=url.number + by)) if url.scheme in _PORT_SCHEMES else link

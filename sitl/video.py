@@ -1,4 +1,4 @@
-"""Video out: MJPEG over HTTP, for browsers, for `cv2.VideoCapture` and for the navigator.
+"""The simulator's HTTP API: video for browsers, `cv2.VideoCapture` and the navigator, and JSON documents.
 
 `/video` is a stream of JPEG images, each with the vehicle time of its exposure in the header `X-Time-Us`;
 `/image.jpg` is the latest one, `/` a page that shows the stream. An image is compressed when the first
@@ -20,6 +20,9 @@ import cv2
 import numpy as np
 import numpy.typing as npt
 
+from wire.mjpeg import STREAM_HEADERS, STREAM_START, write_part
+from wire.simulator_api import VIDEO_PATH
+
 if TYPE_CHECKING:
     from aiohttp import web
 
@@ -27,7 +30,6 @@ Image = npt.NDArray[np.uint8]
 JsonProvider = Callable[[Mapping[str, str]], object]
 
 JPEG_QUALITY = 98  # of 3138 boxes none differs from the raw image's; at 95, 39 do, by a pixel
-BOUNDARY = "frame"
 _SEND_BUFFER_BYTES = 1 << 16  # the kernel would buffer seconds of video for a slow watcher
 _CLOSE_S = 1.0
 _PAGE = """<!doctype html>
@@ -45,7 +47,7 @@ class VideoError(Exception):
 
 
 @dataclass(slots=True)
-class _Shot:
+class _VideoImage:
     """An image and, once somebody wanted it, the same as JPEG."""
 
     image: Image
@@ -91,7 +93,7 @@ class VideoServer:
         self._options = options
         self._host = host
         self._port = port
-        self._shot: _Shot | None = None
+        self._newest: _VideoImage | None = None
         self._documents: dict[str, JsonProvider] = {}
         self._texts: dict[str, tuple[str, str]] = {}
         self._loop: asyncio.AbstractEventLoop | None = None
@@ -139,7 +141,7 @@ class VideoServer:
         web = await asyncio.to_thread(import_module, "aiohttp.web")
         app = web.Application()
         app.router.add_get("/", self._page)
-        app.router.add_get("/video", self._video, allow_head=False)
+        app.router.add_get(VIDEO_PATH, self._video, allow_head=False)
         app.router.add_get("/image.jpg", self._image)
         app.router.add_get("/{path:.+}", self._document)
         runner = web.AppRunner(app, access_log=None, shutdown_timeout=_CLOSE_S)
@@ -163,7 +165,7 @@ class VideoServer:
             image: BGR, shape (height, width, 3), uint8; must not be changed afterwards.
             time_us: vehicle time of its exposure, microseconds.
         """
-        self._shot = _Shot(image, time_us)
+        self._newest = _VideoImage(image, time_us)
         if self._loop is not None and not self._closing:
             self._loop.call_soon_threadsafe(self._wake)
 
@@ -179,35 +181,29 @@ class VideoServer:
         self._arrived.set()
         self._arrived.clear()
 
-    async def _next(self, last: _Shot | None) -> _Shot | None:
+    async def _next(self, last: _VideoImage | None) -> _VideoImage | None:
         """Wait for another image than the last; None when the server closes."""
         while not self._closing:
-            if self._shot is not None and self._shot is not last:
-                return self._shot
+            if self._newest is not None and self._newest is not last:
+                return self._newest
             await self._arrived.wait()
         return None
 
     async def _video(self, request: web.Request) -> web.StreamResponse:
         from aiohttp import web
 
-        response = web.StreamResponse(
-            headers={
-                "Content-Type": f"multipart/x-mixed-replace; boundary={BOUNDARY}",
-                "Cache-Control": "no-store",
-                "Connection": "close",
-            }
-        )
+        response = web.StreamResponse(headers=STREAM_HEADERS)
         if request.transport is not None:
             request.transport.get_extra_info("socket").setsockopt(SOL_SOCKET, SO_SNDBUF, _SEND_BUFFER_BYTES)
             # Zero: a write waits until all before it has gone to the kernel.
             request.transport.set_write_buffer_limits(high=0)
         try:
             await response.prepare(request)
-            await response.write(f"--{BOUNDARY}\r\n".encode())
-            shot = await self._next(None)
-            while shot is not None:
-                await response.write(_part(shot))
-                shot = await self._next(shot)
+            await response.write(STREAM_START)
+            image = await self._next(None)
+            while image is not None:
+                await response.write(write_part(image.compressed(), image.time_us))
+                image = await self._next(image)
         except ConnectionError:
             pass  # the watcher has gone
         return response
@@ -215,10 +211,10 @@ class VideoServer:
     async def _image(self, request: web.Request) -> web.Response:
         from aiohttp import web
 
-        if self._shot is None:
+        if self._newest is None:
             return web.Response(status=503, text="no image yet\n", headers={"Retry-After": "1"})
-        headers = {"X-Time-Us": str(self._shot.time_us), "Cache-Control": "no-store"}
-        return web.Response(body=self._shot.compressed(), content_type="image/jpeg", headers=headers)
+        headers = {"X-Time-Us": str(self._newest.time_us), "Cache-Control": "no-store"}
+        return web.Response(body=self._newest.compressed(), content_type="image/jpeg", headers=headers)
 
     async def _page(self, request: web.Request) -> web.Response:
         from aiohttp import web
@@ -233,7 +229,7 @@ class VideoServer:
             return web.Response(text=text, content_type=content_type)
         provider = self._documents.get(request.path)
         if provider is None:
-            known = ", ".join(["/video", "/image.jpg", *self._texts, *self._documents])
+            known = ", ".join([VIDEO_PATH, "/image.jpg", *self._texts, *self._documents])
             return web.Response(status=404, text=f"not here; there are {known}\n")
         try:
             text = json.dumps(_finite(provider(request.query)), allow_nan=False)
@@ -241,13 +237,6 @@ class VideoServer:
             return web.Response(status=500, text=f"{request.path}: {type(error).__name__}: {error!s:.200}\n")
         headers = {"Cache-Control": "no-store"}
         return web.Response(text=text, content_type="application/json", headers=headers)
-
-
-def _part(shot: _Shot) -> bytes:
-    """Return one image of the stream, with the boundary after it: so a browser shows it at once."""
-    jpeg = shot.compressed()
-    head = f"Content-Type: image/jpeg\r\nContent-Length: {len(jpeg)}\r\nX-Time-Us: {shot.time_us}\r\n\r\n"
-    return b"".join((head.encode(), jpeg, f"\r\n--{BOUNDARY}\r\n".encode()))
 
 
 def _finite(value: object) -> object:

@@ -15,7 +15,7 @@ from vision.decoder import ImageDecoder
 from vision.jpeg import ImageError
 from vision.latest import CameraError, Latest, first_line, shown
 from vision.types import CameraFrame
-from wire.mjpeg import MjpegParser, Part, StreamError, boundary_of
+from wire.mjpeg import MjpegReader, Part, StreamError
 
 _FEED_BYTES = 16 * 1024  # of the stream, between which others run
 _MAX_PARTS_PER_S = 1000
@@ -57,11 +57,11 @@ class HttpSource:
         self._session = aiohttp.ClientSession(timeout=limits, auto_decompress=False)
         try:
             response = await self._connect(self._session)
-            parser = MjpegParser(self._boundary(response))
+            reader = self._reader(response)
         except BaseException:
             await self._session.close()
             raise
-        self._task = asyncio.create_task(self._read(response, parser), name=self._name)
+        self._task = asyncio.create_task(self._read(response, reader), name=self._name)
         return self
 
     async def __aexit__(self, *exc_info: object) -> None:
@@ -123,24 +123,20 @@ class HttpSource:
             return ""
         return f" ({self._bad_frames} images were skipped; the last one is {self._last_refused})"
 
-    def _boundary(self, response: aiohttp.ClientResponse) -> str:
+    def _reader(self, response: aiohttp.ClientResponse) -> MjpegReader:
         if response.status != 200:
             raise CameraError(f"{self._name}: HTTP {response.status} {first_line(response.reason)}")
-        content_type = response.headers.get("Content-Type", "")
-        boundary = boundary_of(content_type)
-        if boundary is None:
-            raise CameraError(
-                f"{self._name}: not an MJPEG stream: Content-Type is {content_type[:60]!r}, "
-                "need multipart/x-mixed-replace with a boundary"
-            )
-        return boundary
+        try:
+            return MjpegReader(response.headers.get("Content-Type", ""))
+        except StreamError as error:
+            raise CameraError(f"{self._name}: {error}") from None
 
-    async def _read(self, response: aiohttp.ClientResponse, parser: MjpegParser) -> None:
+    async def _read(self, response: aiohttp.ClientResponse, reader: MjpegReader) -> None:
         parts, since_s = 0, time.monotonic()
         try:
             async for chunk in response.content.iter_any():
                 for at in range(0, len(chunk), _FEED_BYTES):
-                    found = parser.feed(chunk[at : at + _FEED_BYTES])
+                    found = reader.feed(chunk[at : at + _FEED_BYTES])
                     now_s = time.monotonic()
                     if found:
                         self._latest.put((found[-1], now_s))

@@ -1,7 +1,7 @@
-"""MJPEG over HTTP, the receiving end: from bytes to parts, without sockets.
+"""MJPEG over HTTP, JPEG images as parts of one multipart response: read and written, without sockets.
 
-Cameras are careless with boundaries and lengths, and a stream from a network is not to be trusted, so this
-takes what is common, holds no more than it must, and says what it cannot take.
+Cameras are careless with boundaries and lengths, and a stream from a network is not to be trusted:
+`MjpegReader` accepts what is common, holds no more than one part, and says what it cannot accept.
 """
 
 from __future__ import annotations
@@ -10,8 +10,19 @@ import re
 from dataclasses import dataclass
 
 MAX_PART_BYTES = 8 * 1024 * 1024
+JPEG_START = b"\xff\xd8\xff"
+_BOUNDARY = "frame"
+STREAM_HEADERS = {
+    "Content-Type": f"multipart/x-mixed-replace; boundary={_BOUNDARY}",
+    "Cache-Control": "no-store",
+    "Connection": "close",
+}
+STREAM_START = f"--{_BOUNDARY}\r\n".encode()
 _MAX_HEAD_BYTES = 16 * 1024
 _END_OF_HEAD = re.compile(rb"\r?\n\r?\n")
+_STREAM_TYPE = re.compile(
+    r"""\s*multipart/.*?boundary\s*=\s*(?:"([^"]{1,200})"|([^\s;"]{1,200}))""", re.IGNORECASE | re.DOTALL
+)
 
 
 class StreamError(ValueError):
@@ -23,25 +34,48 @@ class Part:
     """One part of the stream.
 
     Attributes:
-        data: its body, as received.
-        time_us: the header `X-Time-Us`, if there is a sound one: vehicle time, microseconds.
+        data: its body, as received; a JPEG if the camera is sound.
+        time_us: the header `X-Time-Us`, if there is a sound one: vehicle time of exposure, microseconds.
     """
 
     data: bytes
     time_us: int | None
 
 
-class MjpegParser:
-    """Cuts a multipart stream into its parts."""
+def write_part(jpeg: bytes, time_us: int | None) -> bytes:
+    """One image of a stream, with the boundary after it: so a browser shows it at once.
 
-    def __init__(self, boundary: str, max_part_bytes: int = MAX_PART_BYTES) -> None:
-        """Begin.
+    The response has `STREAM_HEADERS`; `STREAM_START` comes before the first part.
 
-        Args:
-            boundary: from the Content-Type; many cameras wrongly include the two dashes.
-            max_part_bytes: a part that is larger ends the stream.
-        """
-        self._delimiter = b"--" + boundary.removeprefix("--").encode("utf-8", "replace")
+    Args:
+        jpeg: the image.
+        time_us: vehicle time of its exposure, microseconds; None if unknown.
+    """
+    stamp = "" if time_us is None else f"X-Time-Us: {time_us}\r\n"
+    head = f"Content-Type: image/jpeg\r\nContent-Length: {len(jpeg)}\r\n{stamp}\r\n"
+    return b"".join((head.encode(), jpeg, b"\r\n", STREAM_START))
+
+
+class MjpegReader:
+    """Cuts a multipart stream into its parts.
+
+    Args:
+        content_type: of the response.
+        max_part_bytes: a part that is larger ends the stream.
+
+    Raises:
+        StreamError: it is another kind of response, or names no boundary.
+    """
+
+    def __init__(self, content_type: str, max_part_bytes: int = MAX_PART_BYTES) -> None:
+        found = _STREAM_TYPE.match(content_type)
+        if found is None:
+            raise StreamError(
+                f"not an MJPEG stream: Content-Type is {content_type[:60]!r}, "
+                "need multipart/x-mixed-replace with a boundary"
+            )
+        boundary = str(found[1] or found[2]).removeprefix("--")  # many cameras wrongly include the two dashes
+        self._delimiter = b"--" + boundary.encode("utf-8", "replace")
         self._max = max_part_bytes
         self._buffer = bytearray()
         self._searched = 0  # so far, the buffer holds no delimiter
@@ -103,14 +137,6 @@ class MjpegParser:
         del buffer[:length]
         self._head = None
         return Part(data.removesuffix(b"\r\n"), time_us)
-
-
-def boundary_of(content_type: str) -> str | None:
-    """Return the boundary of a multipart Content-Type; None if it is another type or has none."""
-    if not content_type.lower().lstrip().startswith("multipart/"):
-        return None
-    found = re.search(r"""boundary\s*=\s*(?:"([^"]{1,200})"|([^\s;"]{1,200}))""", content_type, re.IGNORECASE)
-    return (found.group(1) or found.group(2)) if found else None
 
 
 def _number(head: bytes, name: bytes) -> int | None:

@@ -11,7 +11,8 @@ from importlib import metadata
 
 from benchmarks.one_core import Stopwatch, pin_to_one_core
 from benchmarks.peers.job import CannotFlyError, Flight, Job, answer, keep_image
-from framerunner.lockstep import fly_lockstep
+from framerunner.flying.lockstep import fly_lockstep
+from framerunner.flying.plan import FlightPlan
 from offboard.app import Moment
 from offboard.mission import load_mission
 from scenarios.loader import load_scenario
@@ -82,7 +83,8 @@ def fly_once(job: Job, seconds: float) -> Timing:
     camera = scenario.camera.model_copy(update={"rate_hz": job.image_rate_hz})
     scenario = scenario.model_copy(update={"camera": camera, "try_limit_s": seconds + 0.5})
     timing = Timing(seconds)
-    fly_lockstep(scenario, load_mission("frame_challenge"), observer=timing.see, on_image=timing.see_image)
+    plan = FlightPlan(scenario, load_mission("frame_challenge"))
+    fly_lockstep(plan, observers=(timing.see,), on_image=timing.see_image)
     return timing
 
 

@@ -47,11 +47,11 @@ def camera(
     if not 1 <= port <= 65535:
         raise SettingError(f"--port {port}: must be from 1 to 65535")
 
-    from framerunner.vehicle_link import VehicleLink
     from framerunner.virtual_camera.painter import VirtualCamera
     from framerunner.virtual_camera.server import COMPONENT_ID, SYSTEM_ID, CameraServer
     from scenarios.loader import load_scenario
     from sitl.video import VideoServer
+    from wire.transports.vehicle_link import VehicleLink
 
     loaded = load_scenario(scenario)
     link = VehicleLink(drone, system_id=SYSTEM_ID, component_id=COMPONENT_ID)

@@ -40,7 +40,7 @@ def doctor(
     from framerunner.doctor.page import print_page
     from framerunner.doctor.record import Record
     from framerunner.doctor.visit import COMPONENT_ID, FIND_S, SYSTEM_ID, find, listen
-    from framerunner.vehicle_link import VehicleLink
+    from wire.transports.vehicle_link import VehicleLink
 
     record = Record()
     errors = Console(stderr=True)

@@ -4,18 +4,28 @@ from __future__ import annotations
 
 import asyncio
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 from cyclopts import Parameter
 
 from framerunner.commands.options import WholeNumber
 from framerunner.errors import SettingError
 
+if TYPE_CHECKING:
+    from wire.simulator_api import SimulatorApi
+
 _Drone = Annotated[
     str | None,
     Parameter(help="MAVLink URL of a drone that is there; without it a simulated one is started"),
 ]
 _Camera = Annotated[str | None, Parameter(help="URL, device or folder of its camera; needed with --drone")]
+_Simulator = Annotated[
+    str | None,
+    Parameter(
+        help="with --drone: http://HOST:PORT of the simulator that flies it: its referee judges, and without "
+        "--camera its camera is used. By default that of an http --camera, if there is one"
+    ),
+]
 _Lockstep = Annotated[
     bool,
     Parameter(negative=(), help="in simulated time, as fast as the machine can, the same each time; no log"),
@@ -41,6 +51,7 @@ def fly(
     mission: Annotated[str, Parameter(help="name or file of the mission")] = "frame_challenge",
     drone: _Drone = None,
     camera: _Camera = None,
+    simulator: _Simulator = None,
     speed: Annotated[float, Parameter(help="of the simulated drone: simulated seconds a second")] = 1.0,
     instance: Annotated[WholeNumber, Parameter(help="of the simulated drone: shifts its ports, 0 to 9")] = 0,
     lockstep: _Lockstep = False,
@@ -69,31 +80,42 @@ def fly(
 
         framerunner fly --drone udpin://0.0.0.0:14540 --camera 0
 
+        framerunner fly --drone udpin://0.0.0.0:14540 --simulator http://10.0.0.2:8100
+
         framerunner fly --drone serial:///dev/ttyUSB0:57600 --camera rtsp://10.0.0.2/1
     """
+    api = _simulator_api(simulator, drone)
+    if api is not None and camera is None:
+        camera = api.video_url
     _check(drone, camera, speed, instance, lockstep)
     _check_lockstep(seed, monitor, lockstep)
 
-    from framerunner.flight import FlightSettings, fly_once
+    from framerunner.flying.plan import FlightPlan
+    from framerunner.flying.real_time import RealTimeSettings
+    from framerunner.flying.run import FlightSettings, fly_once
     from offboard.mission import load_mission
     from offboard.pilot_file import read_pilot
     from scenarios.loader import load_scenario
 
-    settings = FlightSettings(
-        scenario=load_scenario(scenario),
-        mission=load_mission(mission, None if pilot is None else read_pilot(pilot)),
-        drone_url=drone,
-        camera_url=camera,
-        speed=speed,
-        instance=instance,
-        out=out,
-        lockstep=lockstep,
-        seed=seed or 0,
-        record=record,
-        video=video,
-        monitor=monitor,
-    )
-    return asyncio.run(fly_once(settings))
+    loaded = load_scenario(scenario)
+    chart = load_mission(mission, None if pilot is None else read_pilot(pilot))
+    plan = FlightPlan(loaded, chart, (seed or 0) if lockstep else None)
+    real_time = None if lockstep else RealTimeSettings(drone, camera, api, speed, instance)
+    return asyncio.run(fly_once(FlightSettings(plan, real_time, out, record, video, monitor)))
+
+
+def _simulator_api(url: str | None, drone: str | None) -> SimulatorApi | None:
+    """The simulator that flies a drone which is there already."""
+    if url is None:
+        return None
+    if drone is None:
+        raise SettingError("--simulator: is for a drone that is there already; name it with --drone")
+    from wire.simulator_api import SimulatorApi
+
+    try:
+        return SimulatorApi.at(url)
+    except ValueError as error:
+        raise SettingError(f"--simulator {error}") from None
 
 
 def _check(drone: str | None, camera: str | None, speed: float, instance: int, lockstep: bool) -> None:

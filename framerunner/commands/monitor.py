@@ -62,12 +62,12 @@ def monitor(
     if not 0 <= port <= 65535:
         raise SettingError(f"--port {port}: must be from 0 to 65535")
 
-    from framerunner.lifeline import until_standard_input_ends
+    from framerunner.flying.child_process import until_standard_input_ends
     from framerunner.monitoring.equipment import equipment
     from monitor.server import serve
     from monitor.settings import MonitorSettings
-    from offboard.link.url import parse_url
     from scenarios.loader import load_scenario
+    from wire.transports.urls import parse_url
 
     parse_url(drone)
     given = equipment(drone, None if scenario is None else load_scenario(scenario), runs, camera_host)

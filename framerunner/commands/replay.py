@@ -62,12 +62,9 @@ def replay(
 
 
 def _say_result(recorded: Recorded) -> None:
-    from framerunner.result_text import result_lines
+    from framerunner.flying.flight_result import result_lines
 
     if recorded.result is None:
         print("no result: the flight was not judged")
         return
-    try:
-        print(result_lines(recorded.result))
-    except (KeyError, TypeError, ValueError):
-        raise SettingError("replay: the flight's result is damaged or of another version") from None
+    print(result_lines(recorded.result))

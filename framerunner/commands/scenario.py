@@ -44,7 +44,7 @@ def show(
 
         framerunner scenario show my.yaml --out my.png
     """
-    from framerunner.pictures import scenario_picture
+    from framerunner.runs.pictures import scenario_picture
     from scenarios.loader import dump_yaml, load_scenario
 
     loaded = load_scenario(scenario)

@@ -16,7 +16,7 @@ from framerunner.errors import SettingError
 from framerunner.extras import advice, is_installed
 
 if TYPE_CHECKING:
-    from framerunner.monitor_process import MonitorProcess
+    from framerunner.monitoring.monitor_process import MonitorProcess
     from scenarios.models import Scenario
     from sitl.server import SimulatorServer
     from sitl.server_settings import ServerSettings
@@ -157,7 +157,7 @@ def _grants(descriptor: int | None) -> TimeGrants | None:
 
 
 def _monitor(video_port: int | None, count: int) -> MonitorProcess:
-    from framerunner.monitor_process import MonitorProcess
+    from framerunner.monitoring.monitor_process import MonitorProcess
 
     ports = () if video_port is None else range(video_port, video_port + count)
     return MonitorProcess(camera_hosts=[f"127.0.0.1:{port}" for port in ports])
@@ -170,13 +170,12 @@ def _settings(
     if port is not None and not 1 <= port <= 65536 - count:
         raise SettingError(f"--video-port {port}: must be from 1 to {65536 - count}")
 
-    from sitl.link_urls import parse_link
-    from sitl.server_settings import ServerSettings, rtp_address
+    from sitl.server_settings import ServerSettings, parse_link, rtp_address
 
     links = tuple(parse_link(text) for text in chosen.link)
-    if count > 1 and any(url.scheme == "serial" for url in links):
+    if count > 1 and any(link.url.scheme == "serial" for link in links):
         raise SettingError(f"--count {count}: a serial line serves one drone; leave it out or use --count 1")
-    twice = next((url.text for number, url in enumerate(links) if url in links[:number]), None)
+    twice = next((link.url.text for number, link in enumerate(links) if link in links[:number]), None)
     if twice is not None:
         raise SettingError(f"--link {twice}: given twice; leave one out")
     settings = ServerSettings(
@@ -240,7 +239,7 @@ def _read_key(path: Path | None) -> SigningKey | None:
 
 
 async def _run(server: SimulatorServer, *, monitor: MonitorProcess | None, lifeline: bool) -> None:
-    from framerunner.lifeline import until_standard_input_ends
+    from framerunner.flying.child_process import until_standard_input_ends
 
     async with AsyncExitStack() as stack:
         if monitor is not None:

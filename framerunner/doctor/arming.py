@@ -9,7 +9,7 @@ from __future__ import annotations
 import struct
 from dataclasses import dataclass
 
-from framerunner.vehicle_link import Message
+from wire.dialect import Message
 
 # Bits of PX4's navigation states. An offboard flight by velocity needs what a take-off needs: attitude,
 # height and local position. Offboard's own bit is never set while nobody sends setpoints.

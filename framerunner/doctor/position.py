@@ -11,8 +11,7 @@ from math import isfinite
 from framerunner.doctor import names
 from framerunner.doctor.findings import Finding, Level
 from framerunner.doctor.record import Record
-from framerunner.vehicle_link import Message
-from wire.dialect import mavlink
+from wire.dialect import Message, mavlink
 
 ACCURATE_M = 0.1  # standard deviation; PX4 with GPS says 0.3, with motion capture 0.01
 WANDER_M = 0.1

@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from framerunner.doctor.record import Record
-from framerunner.vehicle_link import AUTOPILOT_COMPONENT, Message, command
-from wire.dialect import mavlink
+from wire.dialect import Message, mavlink
+from wire.transports.vehicle_link import AUTOPILOT_COMPONENT, command
 
 PARAMETERS = (
     "BAT_CRIT_THR",

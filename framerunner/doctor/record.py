@@ -8,8 +8,8 @@ from dataclasses import dataclass, field
 from math import dist, isfinite
 
 from framerunner.doctor.arming import ArmingReport
-from framerunner.vehicle_link import AUTOPILOT_COMPONENT, Message, is_vehicle
-from wire.dialect import mavlink
+from wire.dialect import Message, mavlink
+from wire.transports.vehicle_link import AUTOPILOT_COMPONENT, is_vehicle
 
 TEXTS_KEPT = 12
 _HALF_TURN = 128

@@ -7,7 +7,7 @@ from collections.abc import Callable
 
 from framerunner.doctor.questions import open_questions, prearm_question, station_heartbeat
 from framerunner.doctor.record import Record
-from framerunner.vehicle_link import VehicleLink, companion_heartbeat
+from wire.transports.vehicle_link import VehicleLink, companion_heartbeat
 
 SYSTEM_ID = 247
 COMPONENT_ID = 190

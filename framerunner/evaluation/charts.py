@@ -12,9 +12,10 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
-from framerunner.evaluation.rows import ERROR, Row
+from framerunner.evaluation.rows import Row
 from framerunner.evaluation.statistics import crossing_offsets_m, mean_seconds_in_state
 from scenarios.models import COLOURS
+from scenarios.verdict import Verdict
 
 VERDICT_COLOURS = {
     "clean": "#117733",
@@ -35,7 +36,7 @@ _in_plain_words = mpl.rc_context({"text.parse_math": False})  # a state's name m
 @_in_plain_words
 def time_chart(rows: Sequence[Row]) -> str:
     """How long tries took, by verdict; every flight that was flown counts."""
-    flown = [row for row in rows if row.verdict != ERROR]
+    flown = [row for row in rows if row.verdict is not Verdict.ERROR]
     figure, axes = _sheet(2.9)
     verdicts = [verdict for verdict in VERDICT_COLOURS if any(row.verdict == verdict for row in flown)]
     times = [[row.try_time_s for row in flown if row.verdict == verdict] for verdict in verdicts]
@@ -83,8 +84,9 @@ def _name_axes(axes: Axes, across: str, up: str) -> None:
 @_in_plain_words
 def state_chart(rows: Sequence[Row]) -> str:
     """Where time goes: mean seconds in each kind of state, of flights that landed and that failed."""
-    flown = [row for row in rows if row.verdict != ERROR]
-    landed, failed = [row for row in flown if row.landed], [row for row in flown if not row.landed]
+    flown = [row for row in rows if row.verdict is not Verdict.ERROR]
+    landed = [row for row in flown if row.completed]
+    failed = [row for row in flown if not row.completed]
     parts = {"landed in time": mean_seconds_in_state(landed), "failed": mean_seconds_in_state(failed)}
     order = dict.fromkeys(state for row in flown for state in row.seconds_in_state)  # as they are flown
     states = [state for state in order if any(part.get(state, 0.0) >= 0.05 for part in parts.values())]

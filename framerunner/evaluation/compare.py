@@ -15,7 +15,7 @@ from framerunner.evaluation.statistics import CONFIDENCE, Rate, wilson
 from framerunner.evaluation.store import EvaluationFolder
 from scenarios.verdict import Verdict
 
-_RANK = {Verdict.CLEAN.value: 2, Verdict.COMPLETED.value: 1}
+_RANK = {Verdict.CLEAN: 2, Verdict.COMPLETED: 1}
 
 
 @dataclass(frozen=True, slots=True)
@@ -145,17 +145,17 @@ def compare(before: EvaluationFolder, after: EvaluationFolder) -> Comparison:
         for name in common_scenarios(before.identity, after.identity)
         if name in theirs and name in ours
     )
-    won = sum(pair.after.landed and not pair.before.landed for pair in pairs)
-    lost = sum(pair.before.landed and not pair.after.landed for pair in pairs)
-    both = [pair for pair in pairs if pair.before.landed and pair.after.landed]
+    won = sum(pair.after.completed and not pair.before.completed for pair in pairs)
+    lost = sum(pair.before.completed and not pair.after.completed for pair in pairs)
+    both = [pair for pair in pairs if pair.before.completed and pair.after.completed]
     return Comparison(
         path=before.path,
         mission=before.identity.mission,
         pairs=pairs,
         only_after=len(ours) - len(pairs),
         only_before=len(theirs) - len(pairs),
-        landed_before=wilson(sum(pair.before.landed for pair in pairs), len(pairs)),
-        landed_after=wilson(sum(pair.after.landed for pair in pairs), len(pairs)),
+        landed_before=wilson(sum(pair.before.completed for pair in pairs), len(pairs)),
+        landed_after=wilson(sum(pair.after.completed for pair in pairs), len(pairs)),
         won=won,
         lost=lost,
         p_value=mcnemar(won, lost),

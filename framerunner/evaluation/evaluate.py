@@ -14,13 +14,13 @@ from framerunner.evaluation.backends import Pool, check_pool
 from framerunner.evaluation.compare import check_comparable, compare
 from framerunner.evaluation.plan import Plan
 from framerunner.evaluation.progress import EvaluationProgress
-from framerunner.evaluation.rows import ERROR, Row
+from framerunner.evaluation.rows import Row, csv_text
 from framerunner.evaluation.runner import fly_all
 from framerunner.evaluation.statistics import summarise
 from framerunner.evaluation.store import EvaluationFolder, open_folder, read_folder
-from framerunner.evaluation.table_file import csv_text
 from framerunner.evaluation.tables import print_comparison, print_summary
 from framerunner.extras import advice, is_installed
+from scenarios.verdict import Verdict
 
 EXIT_INTERRUPTED = 130
 
@@ -119,7 +119,7 @@ def _report(settings: EvaluationSettings, folder: EvaluationFolder, before: Eval
         print_comparison(comparison)
     sys.stdout.flush()
     folder.write(folder.results, csv_text(rows))
-    code = 1 if ERROR in summary.verdicts else 0
+    code = 1 if Verdict.ERROR in summary.verdicts else 0
 
     if not is_installed("matplotlib"):
         _note(f"warning: report.html was not made: {advice('matplotlib')}")

@@ -14,7 +14,7 @@ from typing import Any, Self
 
 from firmware_py.airframe import load_airframe
 from framerunner.errors import SettingError
-from framerunner.evaluation.task import FlightTask
+from framerunner.flying.plan import FlightPlan
 from offboard.mission import Mission
 from offboard.pilot_file import PilotFile
 from scenarios.level import load_level
@@ -129,11 +129,11 @@ class Plan:
         """A folder that the same command finds again, and no other."""
         return Path("runs") / f"evaluate-{self.label}-{self.mission.name}-{self.identity.sha256[:6]}"
 
-    def tasks(self, done: Collection[str] = ()) -> Iterator[FlightTask]:
+    def tasks(self, done: Collection[str] = ()) -> Iterator[FlightPlan]:
         """Flights that are not yet done, in order."""
         for scenario, seed in zip(self.scenarios, self.seeds, strict=True):
             if scenario.name not in done:
-                yield FlightTask(scenario, self.mission, seed)
+                yield FlightPlan(scenario, self.mission, seed)
 
 
 def plan_level(level: str, first_seed: int, count: int, mission: Mission) -> Plan:

@@ -14,12 +14,12 @@ from markupsafe import Markup
 
 from framerunner.evaluation.charts import offset_chart, rate_colours, state_chart, time_chart
 from framerunner.evaluation.compare import Comparison
-from framerunner.evaluation.rows import ERROR, Row
+from framerunner.evaluation.rows import Row
 from framerunner.evaluation.statistics import Spread, Summary
 from framerunner.evaluation.store import EvaluationFolder
 from framerunner.evaluation.tables import comparison_lines
-from framerunner.pictures import Outcome
 from scenarios.loader import ScenarioError, load_scenario
+from scenarios.verdict import Verdict
 
 PICTURES_AT_MOST = 150
 """More would make a page that phones cannot show; some 60 kB each."""
@@ -146,7 +146,9 @@ def _failures(
                 advance(done, len(drawn))
                 picture = _picture(folder, row)
                 done += 1
-            command = replay_command(folder.scenario_file(row.scenario), page.mission, page.pilot, row.seed)
+            command = replay_command(
+                folder.scenario_file(row.scenario), page.mission, page.pilot, row.seed or 0
+            )
             failures.append(Failure(row, command, picture, _traceback(folder, row)))
         groups.append((cause.verdict, cause.cause, failures))
     return groups
@@ -157,20 +159,19 @@ def _picture(folder: EvaluationFolder, row: Row) -> str | None:
     track = folder.track(row.scenario)
     if len(track) == 0:
         return None
-    from framerunner.drawing import draw_track
+    from framerunner.runs.drawing import draw_track
 
     try:
         scenario = load_scenario(folder.scenario_file(row.scenario))
     except ScenarioError:
         return None  # somebody has tidied up; the page does without
     png = BytesIO()
-    outcome = Outcome.from_result(row.as_dict())
-    draw_track(scenario, track, outcome).savefig(png, format="png", dpi=_PICTURE_DPI)
+    draw_track(scenario, track, row).savefig(png, format="png", dpi=_PICTURE_DPI)
     return f"data:image/png;base64,{b64encode(png.getvalue()).decode()}"
 
 
 def _traceback(folder: EvaluationFolder, row: Row) -> str:
-    if row.verdict != ERROR:
+    if row.verdict is not Verdict.ERROR:
         return ""
     try:
         return folder.error_file(row.scenario).read_text(encoding="utf-8")

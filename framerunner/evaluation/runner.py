@@ -10,7 +10,7 @@ import time
 import warnings
 from collections.abc import Generator, Iterable, Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import lru_cache
 from multiprocessing import get_context
 from multiprocessing.connection import Connection
@@ -18,9 +18,9 @@ from typing import Any
 
 from framerunner.evaluation.backends import Pool, Workers, is_lost_worker, open_pool
 from framerunner.evaluation.rows import Row
-from framerunner.evaluation.task import FlightTask, broken_off, fly_task
+from framerunner.evaluation.task import broken_off, fly_task
+from framerunner.flying.plan import FlightPlan
 from offboard.mission import Mission
-from scenarios.models import Scenario
 
 _LOOK_UP_S = 0.5
 
@@ -31,22 +31,20 @@ class WorkerDiedError(Exception):
 
 @dataclass(frozen=True, slots=True)
 class Parcel:
-    """A task on its way.
+    """A flight on its way to who flies it: some 20 kB.
 
     Attributes:
-        scenario: the layout.
+        plan: without its mission.
         mission: packed once for all, and unpacked once in each process.
-        seed: of everything random.
         sender: process id of who sent it.
     """
 
-    scenario: Scenario
+    plan: FlightPlan
     mission: bytes
-    seed: int
     sender: int
 
 
-def fly_all(tasks: Iterable[FlightTask], pool: Pool) -> Generator[Row, None, None]:
+def fly_all(tasks: Iterable[FlightPlan], pool: Pool) -> Generator[Row, None, None]:
     """Fly all tasks.
 
     No more than a few are under way at a time, and nothing is kept here of those that are over. If a
@@ -70,7 +68,7 @@ def fly_all(tasks: Iterable[FlightTask], pool: Pool) -> Generator[Row, None, Non
     waiting = iter(tasks)
     with open_pool(pool) as workers:
         while True:
-            under_way: dict[str, FlightTask] = {}
+            under_way: dict[str, FlightPlan] = {}
             try:
                 yield from _fly_together(waiting, workers, under_way)
             except Exception as error:
@@ -82,7 +80,7 @@ def fly_all(tasks: Iterable[FlightTask], pool: Pool) -> Generator[Row, None, Non
 
 
 def _fly_together(
-    waiting: Iterator[FlightTask], workers: Workers, under_way: dict[str, FlightTask]
+    waiting: Iterator[FlightPlan], workers: Workers, under_way: dict[str, FlightPlan]
 ) -> Iterator[Row]:
     """Fly in the pool; `under_way` has what has been handed out and has not come back."""
     from joblib import delayed
@@ -113,14 +111,14 @@ class _Packer:
         self._mission: Mission | None = None
         self._packed = b""
 
-    def parcel(self, task: FlightTask) -> Parcel:
+    def parcel(self, task: FlightPlan) -> Parcel:
         """Make a task ready to be sent."""
         if task.mission is not self._mission:
             self._mission, self._packed = task.mission, pickle.dumps(task.mission)
-        return Parcel(task.scenario, self._packed, task.seed, os.getpid())
+        return Parcel(replace(task, mission=None), self._packed, os.getpid())
 
 
-def fly_alone(task: FlightTask) -> Row:
+def fly_alone(task: FlightPlan) -> Row:
     """Fly in a process of its own, which may die."""
     context = get_context("spawn")
     receiver, sender = context.Pipe(duplex=False)
@@ -159,7 +157,7 @@ def _fly_parcel(parcel: Parcel) -> Row:
     _prepare_process()
     if os.getppid() == parcel.sender:
         _end_with(parcel.sender)
-    return fly_task(FlightTask(parcel.scenario, _unpack(parcel.mission), parcel.seed))
+    return fly_task(replace(parcel.plan, mission=_unpack(parcel.mission)))
 
 
 @lru_cache(maxsize=1)

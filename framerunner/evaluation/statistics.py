@@ -7,8 +7,9 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from statistics import fmean, quantiles
 
-from framerunner.evaluation.rows import ERROR, LANDED, VERDICTS, Row
+from framerunner.evaluation.rows import Row
 from scenarios.models import COLOURS
+from scenarios.verdict import Verdict
 
 CONFIDENCE = 0.95
 
@@ -130,13 +131,13 @@ def spread(numbers: Sequence[float]) -> Spread | None:
 def summarise(rows: Sequence[Row]) -> Summary:
     """Count an evaluation's flights."""
     counts = Counter(row.verdict for row in rows)
-    landed = [row for row in rows if row.landed]
-    flown = [row for row in rows if row.verdict != ERROR]
+    landed = [row for row in rows if row.completed]
+    flown = [row for row in rows if row.verdict is not Verdict.ERROR]
     offsets = {colour: spread(crossing_offsets_m(flown, colour)) for colour in COLOURS}
     return Summary(
         flights=len(rows),
-        landed=wilson(sum(counts[verdict] for verdict in LANDED), len(rows)),
-        verdicts={verdict: wilson(counts[verdict], len(rows)) for verdict in VERDICTS if counts[verdict] > 0},
+        landed=wilson(len(landed), len(rows)),
+        verdicts={verdict: wilson(counts[verdict], len(rows)) for verdict in Verdict if counts[verdict] > 0},
         try_time_s=spread([row.try_time_s for row in landed]),
         offset_m={colour: found for colour, found in offsets.items() if found is not None},
         landing_error_m=spread([row.landing_error_m for row in landed if row.landing_error_m is not None]),
@@ -168,7 +169,7 @@ def causes(rows: Iterable[Row]) -> tuple[Cause, ...]:
     """Failures by verdict and cause, most frequent first."""
     groups: dict[tuple[str, str], list[Row]] = {}
     for row in rows:
-        if not row.landed:
+        if not row.completed:
             groups.setdefault((row.verdict, row.cause), []).append(row)
     found = [Cause(verdict, cause, tuple(group)) for (verdict, cause), group in groups.items()]
     return tuple(sorted(found, key=lambda cause: (-len(cause.rows), cause.verdict, cause.cause)))

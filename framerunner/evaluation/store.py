@@ -16,7 +16,7 @@ from typing import Any
 from framerunner.errors import SettingError
 from framerunner.evaluation.plan import Identity
 from framerunner.evaluation.rows import Row
-from framerunner.pictures import Track
+from framerunner.runs.track import Track
 from scenarios.loader import dump_yaml
 from scenarios.models import Scenario
 
@@ -214,7 +214,7 @@ def _read_rows(file: Path, identity: Identity) -> tuple[dict[str, Row], bool]:
         with file.open("r", encoding="utf-8", errors="replace") as lines:
             for line in lines:
                 try:
-                    row = Row.from_json(line)
+                    row = Row.model_validate_json(line)
                 except ValueError:
                     is_whole = False
                     continue

@@ -4,14 +4,13 @@ from __future__ import annotations
 
 import threading
 import traceback
-from dataclasses import dataclass
 from importlib import metadata
 
-from framerunner.evaluation.rows import ERROR, Row
-from framerunner.lockstep import fly_lockstep
-from framerunner.pictures import Track
-from offboard.mission import Mission
-from scenarios.models import Scenario
+from framerunner.evaluation.rows import Row
+from framerunner.flying.lockstep import fly_lockstep
+from framerunner.flying.plan import FlightPlan
+from framerunner.runs.track import Track
+from scenarios.verdict import Verdict
 
 TRACK_STEP_S = 0.2
 """Between two samples that are kept for a picture."""
@@ -19,26 +18,11 @@ _ONE_AT_A_TIME = threading.Lock()
 """A cluster's worker may have several threads; JSBSim promises nothing about being used by two of them."""
 
 
-@dataclass(frozen=True, slots=True)
-class FlightTask:
-    """What a flight depends on, and all that is sent to who flies it: some 20 kB.
-
-    Attributes:
-        scenario: the layout.
-        mission: checked.
-        seed: of everything random.
-    """
-
-    scenario: Scenario
-    mission: Mission
-    seed: int = 0
-
-
-def fly_task(task: FlightTask) -> Row:
+def fly_task(plan: FlightPlan) -> Row:
     """Fly, and tell of it, whatever happens.
 
     Args:
-        task: what to fly.
+        plan: what to fly; with a mission.
 
     Returns:
         The flight's row; with the verdict "error" and a traceback if the program failed.
@@ -48,28 +32,28 @@ def fly_task(task: FlightTask) -> Row:
     """
     try:
         with _ONE_AT_A_TIME:
-            flown = fly_lockstep(task.scenario, task.mission, seed=task.seed)
+            flown = fly_lockstep(plan)
         if flown.outcome.interrupted:
             raise KeyboardInterrupt
-        row = Row.from_result(flown.result)
-        row.to_json()  # what cannot be kept is found here, where it is the flight's fault
     except KeyboardInterrupt:
         raise
     except BaseException as error:  # a contestant's code may raise anything, SystemExit too
-        return broken_off(task, error)
-    return row if row.landed else Row.from_result(flown.result, thinned(flown.track))
+        return broken_off(plan, error)
+    track = None if flown.result.completed else thinned(flown.track)
+    return Row(**dict(flown.result), track=track)
 
 
-def broken_off(task: FlightTask, error: BaseException) -> Row:
+def broken_off(plan: FlightPlan, error: BaseException) -> Row:
     """The row of a flight that a fault of the program ended."""
     text = " ".join(str(error).split())
     kind = type(error).__name__
     return Row(
-        scenario=task.scenario.name,
-        mission=task.mission.name,
-        seed=task.seed,
-        verdict=ERROR,
+        scenario=plan.scenario.name,
+        mission="" if plan.mission is None else plan.mission.name,
+        seed=plan.seed,
+        verdict=Verdict.ERROR,
         reason=f"{kind}: {text}" if text else kind,
+        ended="error",
         version=metadata.version("framerunner"),
         traceback="".join(traceback.format_exception(error)),
     )

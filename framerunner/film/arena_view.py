@@ -14,11 +14,11 @@ import numpy as np
 import numpy.typing as npt
 
 from firmware_py.airframe import load_airframe
-from framerunner.drawing import STATE_COLOURS
 from framerunner.film.colours import MAT, PAPER, RIM, SHADOW, STEM, TATAMI, WHITE, Bgr, bgr, mixed
 from framerunner.film.drone_shape import DroneShape, Patch
 from framerunner.film.story import Floats, Instant, Story
 from framerunner.film.viewpoint import Viewpoint
+from framerunner.runs.drawing import STATE_COLOURS
 from scenarios.models import Light
 from sitl.camera_order import PaintTree
 from sitl.camera_scene import Face, build_scene

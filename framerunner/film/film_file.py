@@ -15,7 +15,7 @@ import numpy.typing as npt
 from av.codec import Codec
 from av.filter import Graph
 
-from framerunner.pictures import PictureError
+from framerunner.runs.pictures import PictureError
 
 if TYPE_CHECKING:
     from av.video.stream import VideoStream

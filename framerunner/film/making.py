@@ -13,10 +13,10 @@ from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, T
 from framerunner.film.film_file import FilmFile, GifFile, Mp4File, film_file, mp4_codec
 from framerunner.film.sheet import Sheet
 from framerunner.film.story import Story
+from framerunner.flying.plan import FlightPlan
 from framerunner.recording.collected import CollectedFlight, collect
 from framerunner.recording.errors import RecordingError
 from framerunner.recording.find import recorded_flight
-from framerunner.virtual_camera.lift import lifted
 from offboard.pilot_file import PilotFile
 from scenarios.loader import load_scenario
 from scenarios.models import Scenario
@@ -93,10 +93,8 @@ def _scenario(folder: Path) -> Scenario:
 
 def _hung(scenario: Scenario, flight: CollectedFlight) -> Scenario:
     """The scenario with its frames as high as they were hung for this drone."""
-    lift_m = (flight.result or {}).get("lift_m", 0.0)
-    if isinstance(lift_m, int | float) and abs(lift_m) < 10.0:
-        return lifted(scenario, float(lift_m))
-    return scenario
+    lift_m = 0.0 if flight.result is None else flight.result.lift_m
+    return FlightPlan(scenario, lift_m=lift_m).layout if abs(lift_m) < 10.0 else scenario
 
 
 def _film(story: Story, settings: FilmSettings) -> Made:

@@ -11,14 +11,14 @@ from framerunner.film.camera_view import CameraView
 from framerunner.film.colours import BAD, FAINT, FRAME, GOOD, INK, LINE, PAPER, WHITE, Bgr, mixed
 from framerunner.film.layout import lay_out
 from framerunner.film.letters import Letters
-from framerunner.film.story import Instant, Story, Verdict
+from framerunner.film.story import Instant, Story
 from framerunner.film.viewpoint import Flyby
 from scenarios.models import COLOURS
+from scenarios.result import FlightResult
 
 Image = npt.NDArray[np.uint8]
 
 _SHIFT = 4
-_GOOD_WORDS = ("clean", "completed")
 
 
 class Sheet:
@@ -95,8 +95,8 @@ class Sheet:
             self._letters.write(image, (x, y), group, 20 * unit, FAINT)
         if y + 34 * unit > box.bottom:
             return
-        if over and self._story.verdict is not None:
-            words = self._letters.shortened(_total(self._story.verdict), 20 * unit, box.width)
+        if over and self._story.result is not None:
+            words = self._letters.shortened(_total(self._story.result), 20 * unit, box.width)
             self._letters.write(image, (box.x, y + 36 * unit), words, 20 * unit, FAINT)
             return
         metres = zip("xyz", instant.position_arena_m, strict=True)
@@ -118,7 +118,7 @@ class Sheet:
         self._letters.write(image, (x, middle + 16 * unit), f"{time_s:.1f} s", size, INK, bold=True)
         x += self._letters.width("000.0 s", size, bold=True) + 22 * unit
         right = box.right - 16 * unit
-        if over and self._story.verdict is not None:
+        if over and self._story.result is not None:
             right = self._write_verdict(image, right) - 16 * unit
         elif not over:
             words = f"{self._speed:.3g}×"
@@ -153,18 +153,18 @@ class Sheet:
 
     def _write_verdict(self, image: Image, right: float) -> float:
         """The verdict at the right, in a chip; returns where it begins."""
-        verdict = self._story.verdict
-        if verdict is None:
+        result = self._story.result
+        if result is None:
             return right
         unit, box = self._layout.unit, self._layout.figures
         size, height = 27 * unit, 50 * unit
-        width = self._letters.width(verdict.word, size, bold=True) + 40 * unit
+        width = self._letters.width(result.verdict, size, bold=True) + 40 * unit
         middle = box.y + box.height / 2
-        colour = GOOD if verdict.word in _GOOD_WORDS else BAD
+        colour = GOOD if result.completed else BAD
         left = right - width
         _pill(image, (left, middle - height / 2), (width, height), colour)
         at = (left + 20 * unit, middle + 10 * unit)
-        self._letters.write(image, at, verdict.word, size, WHITE, bold=True)
+        self._letters.write(image, at, result.verdict, size, WHITE, bold=True)
         return left
 
     def _draw_strip(self) -> None:
@@ -191,11 +191,9 @@ class Sheet:
         return strip.x + round(min(1.0, max(0.0, share)) * strip.width)
 
 
-def _total(verdict: Verdict) -> str:
-    if verdict.total_time_s is None:
-        return ""
-    words = f"total {verdict.total_time_s:.1f} s"
-    return f"{words}, of it penalty {verdict.penalty_s:.1f} s" if verdict.penalty_s else words
+def _total(result: FlightResult) -> str:
+    words = f"total {result.total_time_s:.1f} s"
+    return f"{words}, of it penalty {result.penalty_s:.1f} s" if result.penalty_s else words
 
 
 def _dot(image: Image, centre_px: tuple[float, float], radius_px: float, colour: Bgr) -> None:

@@ -6,7 +6,6 @@ from bisect import bisect_right
 from collections.abc import Mapping
 from dataclasses import dataclass
 from math import cos, isfinite, pi, sin
-from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -15,6 +14,7 @@ from framerunner.recording.collected import CollectedFlight
 from framerunner.recording.errors import RecordingError
 from offboard.app import Moment
 from scenarios.models import Scenario
+from scenarios.result import FlightResult
 from vision.types import Detections
 
 Floats = npt.NDArray[np.float64]
@@ -54,21 +54,6 @@ class Instant:
     trail: int
 
 
-@dataclass(frozen=True, slots=True)
-class Verdict:
-    """What the referee said.
-
-    Attributes:
-        word: "clean", "crashed" ...
-        total_time_s: with penalties; None if it was not told.
-        penalty_s: None if it was not told.
-    """
-
-    word: str
-    total_time_s: float | None
-    penalty_s: float | None
-
-
 class Story:
     """A flight, to be looked at in any order.
 
@@ -86,7 +71,7 @@ class Story:
         begin_s: the first time to show, seconds since motors on.
         end_s: the last.
         try_end_s: when the try's clock stopped; None if nobody judged.
-        verdict: None if the flight was not judged.
+        result: None if the flight was not judged.
         kinds: last parts of the states' ids, in order of first appearance.
         trail_m: places flown through, arena metres, shape (n, 3).
         trail_kind: the kind of state of each, shape (n,).
@@ -102,12 +87,10 @@ class Story:
         self._moments = drawable
         self._times_s = [self._seconds(moment.state.time_us) for moment in self._moments]
         self._crossings = [(self._seconds(each.time_us), each.colour) for each in flight.crossings]
-        result = flight.result or {}
+        self.result: FlightResult | None = flight.result
         self.title = scenario.name
-        self.mission = str(result.get("mission", ""))[:60]
-        self.verdict = _verdict(result)
-        try_time_s = result.get("try_time_s")
-        self.try_end_s = float(try_time_s) if isinstance(try_time_s, int | float) else None
+        self.mission = "" if self.result is None else self.result.mission[:60]
+        self.try_end_s = None if self.result is None else self.result.try_time_s
         self.begin_s = max(self._times_s[0], -LEAD_IN_S)
         self.end_s = max(self._times_s[-1], self.begin_s + 0.1)
         self.kinds: list[str] = []
@@ -195,17 +178,6 @@ def _has_place(moment: Moment) -> bool:
     state = moment.state
     values = (state.x, state.y, state.z, state.yaw)
     return all(isfinite(value) and abs(value) < _FAR_OUTSIDE_M for value in values)
-
-
-def _verdict(result: Mapping[str, Any]) -> Verdict | None:
-    word = result.get("verdict")
-    if not isinstance(word, str) or not word:
-        return None
-    total_s, penalty_s = (
-        float(value) if isinstance(value, int | float) and isfinite(value) else None
-        for value in (result.get("total_time_s"), result.get("penalty_s"))
-    )
-    return Verdict(word[:20], total_s, penalty_s)
 
 
 def level_attitude(yaw_rad: float) -> tuple[Floats, Floats, Floats]:

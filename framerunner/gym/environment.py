@@ -13,6 +13,7 @@ from gymnasium import spaces
 from gymnasium.error import ResetNeeded
 
 from framerunner.errors import SettingError
+from framerunner.flying.plan import FlightPlan
 from framerunner.gym.flight import SteppedFlight
 from framerunner.gym.observation import LONGEST_TRY_S, Observation, observation_space, observe, rgb
 from framerunner.gym.reward import Scorer, final_reward
@@ -89,7 +90,7 @@ class FrameChallengeEnv(gymnasium.Env[Observation, Action]):
         """
         super().reset(seed=seed)
         self._flying = self._choose(options or {})
-        self._flight = SteppedFlight(self._flying)
+        self._flight = SteppedFlight(FlightPlan(self._flying))
         self._scorer = Scorer(self._flight.referee)
         return self._observe(self._flight), self._info(self._flight)
 
@@ -119,7 +120,7 @@ class FrameChallengeEnv(gymnasium.Env[Observation, Action]):
             report = flight.report()
             timed_out = report.verdict is Verdict.TIMED_OUT
             reward += final_reward(report)
-            info["report"] = report.as_dict()
+            info["report"] = report.model_dump(mode="json")
         return self._observe(flight), reward, over and not timed_out, timed_out, info
 
     def render(self) -> Image | None:

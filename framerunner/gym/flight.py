@@ -2,15 +2,15 @@
 
 from __future__ import annotations
 
-from framerunner.gym.run_through import run_through
-from framerunner.lockstep_drone import LockstepDrone
-from framerunner.lockstep_eyes import LockstepEyes
+from collections.abc import Coroutine
+
+from framerunner.flying.lockstep import LockstepVehicle
+from framerunner.flying.plan import FlightPlan
 from offboard.drone import DroneError, DroneState, VelocityCommand
-from scenarios.ground import is_over_base, start_position
-from scenarios.models import COLOURS, Scenario
+from scenarios.ground import is_over_base
+from scenarios.models import COLOURS
 from scenarios.referee import Referee
-from scenarios.report import RefereeReport
-from sitl.simulation import Simulation
+from scenarios.result import RefereeReport
 from vision.types import Detections, Image
 
 TAKEN_OFF_M = 0.3
@@ -23,7 +23,7 @@ class SteppedFlight:
     """A try that has begun: the drone stands on its start with its motors on.
 
     Args:
-        scenario: what is flown.
+        plan: what is flown; an agent takes the place of the mission.
 
     Attributes:
         state: of the drone, as telemetry told it at the present tick.
@@ -33,22 +33,14 @@ class SteppedFlight:
         DroneError: the drone does not get ready.
     """
 
-    def __init__(self, scenario: Scenario) -> None:
-        self._scenario = scenario
-        self._simulation = Simulation(scenario)
-        self._eyes = LockstepEyes(scenario, self._take)
+    def __init__(self, plan: FlightPlan) -> None:
+        vehicle = LockstepVehicle(plan, self._take)
+        self._plan = plan
+        self._simulation, self._drone, self._eyes = vehicle.simulation, vehicle.drone, vehicle.eyes
         self._image: Image | None = None
-        self._height_m = self._simulation.world.airframe.envelope_m[2]
-        x_m, y_m, surface_m = start_position(scenario)
-        self._start_z_m = surface_m + self._height_m / 2
-        self._drone = LockstepDrone(
-            self._simulation,
-            (x_m, y_m, self._start_z_m, scenario.start.yaw_rad),
-            observers=(self._eyes.follow,),
-        )
         self._taken_off = False
         self._colours = tuple(
-            colour for colour in COLOURS if colour in {frame.colour for frame in scenario.frames}
+            colour for colour in COLOURS if colour in {frame.colour for frame in plan.scenario.frames}
         )
         self.ended = ""
         run_through(self._drone.ready())
@@ -95,7 +87,7 @@ class SteppedFlight:
             else:
                 self._drone.command(command)
                 self.state = self._drone.next_state()
-                self._taken_off = self._taken_off or self.state.z > self._start_z_m + TAKEN_OFF_M
+                self._taken_off = self._taken_off or self.state.z > self._plan.start_pose[2] + TAKEN_OFF_M
         except DroneError as error:
             self.ended = str(error)
         if self.ended:
@@ -109,8 +101,8 @@ class SteppedFlight:
         base or lower, and is told to go down.
         """
         state = self.state
-        underside_m = state.z - self._height_m / 2
-        base = self._scenario.base
+        underside_m = state.z - self._plan.airframe.envelope_m[2] / 2
+        base = self._plan.scenario.base
         return (
             command.up_m_s < 0.0
             and self._taken_off
@@ -118,3 +110,20 @@ class SteppedFlight:
             and is_over_base(base, state.x, state.y)
             and len(self.referee.crossings) == len(self._colours)
         )
+
+
+def run_through(coroutine: Coroutine[object, None, None]) -> None:
+    """Run a coroutine of the lockstep drone, none of which ever waits, without an event loop.
+
+    Args:
+        coroutine: not yet begun.
+
+    Raises:
+        RuntimeError: it waits after all.
+    """
+    try:
+        coroutine.send(None)
+    except StopIteration:
+        return
+    coroutine.close()
+    raise RuntimeError("a coroutine of the lockstep drone waits for something; nothing can come of it here")

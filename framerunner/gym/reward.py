@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from scenarios.referee import Referee
-from scenarios.report import RefereeReport
+from scenarios.result import RefereeReport
 from scenarios.verdict import Verdict
 
 CROSSING = 1.0
@@ -49,6 +49,6 @@ class Scorer:
 
 def final_reward(report: RefereeReport) -> float:
     """What the verdict adds at the end of a try."""
-    if report.verdict in (Verdict.CLEAN, Verdict.COMPLETED):
+    if report.completed:
         return LANDING
     return FAILURE if report.verdict in (Verdict.CRASHED, Verdict.WRONG_ORDER) else 0.0

@@ -4,15 +4,12 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from firmware_py.airframe import load_airframe
+from framerunner.flying.plan import FlightPlan
 from framerunner.monitoring.run_library import RunFolders
-from framerunner.vehicle_link import VehicleLink
-from monitor.ports import Equipment, Link, LinkFailed, Message
-from offboard.drone import DroneError
-from scenarios.ground import start_position
+from monitor.ports import Equipment
 from scenarios.loader import list_scenarios, load_scenario
 from scenarios.models import Scenario
-from scenarios.referee import Referee
+from wire.transports.vehicle_link import VehicleLink
 
 SYSTEM_ID = 250  # the doctor has 247, the virtual camera 246, MAVSDK 245, other ground stations 255
 COMPONENT_ID = 190  # MAV_COMP_ID_MISSIONPLANNER, which is what ground stations use
@@ -30,49 +27,12 @@ def equipment(
         camera_hosts: see `Equipment`.
     """
     return Equipment(
-        open_link=lambda: _MonitorLink(drone_url),
-        make_referee=_referee,
+        make_referee=lambda flown: FlightPlan(flown).new_referee(),
+        open_link=lambda: VehicleLink(drone_url, system_id=SYSTEM_ID, component_id=COMPONENT_ID),
         scenario=scenario,
         list_scenarios=list_scenarios,
         load_scenario=load_scenario,
         runs=RunFolders(runs),
-        start_pose=_start_pose,
+        start_pose=lambda flown: FlightPlan(flown).start_pose,
         camera_hosts=camera_hosts,
     )
-
-
-def _referee(scenario: Scenario) -> Referee:
-    return Referee(scenario, load_airframe(scenario.airframe).envelope_m)
-
-
-def _start_pose(scenario: Scenario) -> tuple[float, float, float, float]:
-    x_m, y_m, ground_m = start_position(scenario)
-    height_m = load_airframe(scenario.airframe).envelope_m[2]
-    return (x_m, y_m, ground_m + height_m / 2, scenario.start.yaw_rad)
-
-
-class _MonitorLink(Link):
-    """A vehicle link in the monitor's words."""
-
-    def __init__(self, url: str) -> None:
-        self.url = url
-        try:
-            self._link = VehicleLink(url, system_id=SYSTEM_ID, component_id=COMPONENT_ID)
-        except DroneError as error:
-            raise LinkFailed(str(error)) from None
-
-    def receive(self, timeout_s: float) -> list[Message]:
-        try:
-            return self._link.receive(timeout_s)
-        except DroneError as error:
-            raise LinkFailed(str(error)) from None
-
-    @property
-    def host(self) -> str:
-        return self._link.host
-
-    def send(self, message: Message) -> None:
-        self._link.send(message)
-
-    def close(self) -> None:
-        self._link.close()

@@ -16,7 +16,7 @@ from pathlib import Path
 
 import cv2
 
-from framerunner.lifeline import end_with_standard_input
+from framerunner.flying.child_process import end_with_standard_input
 from framerunner.monitoring.run_json import FlownMission, flight_json
 from framerunner.recording.collected import CollectedFlight, ImageFile, collect
 from framerunner.recording.errors import RecordingError

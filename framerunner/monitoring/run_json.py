@@ -48,17 +48,16 @@ def flight_json(
         flown: its mission, if it can be drawn.
         size_px: width and height of its images.
     """
-    result = _clean(flight.result)
+    result = flight.result
     states = _states(flight, flown)
     numbers = {state: number for number, state in enumerate(states)}
     clock = _Clock(flight.began_us)
-    lift_m = (result or {}).get("lift_m", 0.0)
     return {
         "name": name,
         "world": {
             "scenario": None if scenario is None else scenario.model_dump(mode="json"),
-            "lift_m": lift_m if isinstance(lift_m, int | float) else 0.0,
-            "source": str((result or {}).get("judged_by", "")),
+            "lift_m": 0.0 if result is None else result.lift_m,
+            "source": "" if result is None else result.judged_by,
         },
         "chart": _chart(flown),
         "states": states,
@@ -67,7 +66,7 @@ def flight_json(
         "transitions": _transitions(flight, clock, flown),
         "images": [clock.seconds(time_us) for time_us in flight.images.time_us],
         "crossings": [{"t": clock.seconds(each.time_us), "colour": each.colour} for each in flight.crossings],
-        "result": result,
+        "result": None if result is None else result.as_json(),
     }
 
 
@@ -196,14 +195,3 @@ def _plain(value: object) -> object:
 def _rounded(*values: float) -> list[float | None]:
     """To a tenth of a millimetre, which is enough to look at; what is not finite is null."""
     return [round(value, 4) if isfinite(value) else None for value in values]
-
-
-def _clean(value: Any) -> Any:  # noqa: ANN401 - whatever stands in a result
-    """The same as JSON has it: numbers that are not finite are null, texts are not endless."""
-    if isinstance(value, Mapping):
-        return {str(key)[:_LONGEST_TEXT]: _clean(each) for key, each in value.items()}
-    if isinstance(value, list | tuple):
-        return [_clean(each) for each in value[:_LONGEST_TEXT]]
-    if isinstance(value, str):
-        return value[:_LONGEST_TEXT]
-    return _plain(value)

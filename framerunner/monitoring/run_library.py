@@ -12,7 +12,6 @@ from collections import OrderedDict
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from datetime import UTC, datetime
-from math import isfinite
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
@@ -20,13 +19,13 @@ from typing import Any
 from framerunner.monitoring.read_run import IMAGES, RECORDING, SPANS
 from framerunner.monitoring.readers import Readers
 from monitor.ports import RunError, RunInfo, RunNotReadError
+from scenarios.result import MAX_RESULT_BYTES, FlightResult
 
 KEPT_RUNS = 6
 """As many are kept unpacked, in a folder that vanishes with the program."""
 UNREADABLE = "unreadable"
 _FAILURE_KEPT_S = 60.0  # so long a run that could not be read is not tried again, unless it changes
 _MOST_FAILURES = 100
-_MOST_RESULT_BYTES = 1_000_000
 _MOST_NAME = 80
 _SIGNS = ("result.json", "flight.mcap", "flight.tlog")
 _FILES = (*_SIGNS, "scenario.yaml", "mission.yaml", "video.avi")
@@ -213,38 +212,33 @@ def _info(folder: Path) -> RunInfo:
         result = _result(folder / "result.json")
     except (OSError, ValueError, RecursionError):
         return RunInfo(folder.name, "", "", UNREADABLE, None, _started("", folder.name))
-    total_s = result.get("total_time_s")
-    judged = isinstance(total_s, int | float) and not isinstance(total_s, bool) and isfinite(total_s)
+    if result is None:
+        return RunInfo(folder.name, _scenario_of(folder.name), "", "", None, _started("", folder.name))
     return RunInfo(
         folder.name,
-        _text(result, "scenario") or _scenario_of(folder.name),
-        _text(result, "mission"),
-        _text(result, "verdict"),
-        float(total_s) if judged and total_s is not None else None,
-        _started(_text(result, "started"), folder.name),
+        result.scenario[:_MOST_NAME] or _scenario_of(folder.name),
+        result.mission[:_MOST_NAME],
+        result.verdict,
+        result.total_time_s if "total_time_s" in result.model_fields_set else None,
+        _started(result.started[:_MOST_NAME], folder.name),
     )
 
 
-def _result(path: Path) -> dict[str, Any]:
-    """What stands in a result; empty if there is none.
+def _result(path: Path) -> FlightResult | None:
+    """What makes sense in a result; None if there is none, or no verdict in it.
 
     Raises:
         ValueError: it is damaged.
         OSError: it cannot be read.
     """
     if not path.exists():
-        return {}
-    if path.is_symlink() or not path.is_file() or path.stat().st_size > _MOST_RESULT_BYTES:
+        return None
+    if path.is_symlink() or not path.is_file() or path.stat().st_size > MAX_RESULT_BYTES:
         raise ValueError("no result of ours")
     result = json.loads(path.read_text(encoding="utf-8"))
     if not isinstance(result, dict):
         raise ValueError("no object")
-    return result
-
-
-def _text(result: Mapping[str, Any], name: str) -> str:
-    value = result.get(name)
-    return value[:_MOST_NAME] if isinstance(value, str) else ""
+    return FlightResult.from_outside(result)
 
 
 def _scenario_of(name: str) -> str:

@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 from bisect import bisect_right
-from collections.abc import Mapping
 from dataclasses import dataclass
 from math import ceil
 from tempfile import TemporaryFile
 from types import TracebackType
-from typing import Any, BinaryIO, cast
+from typing import BinaryIO, cast
 
 import cv2
 import numpy as np
@@ -17,6 +16,7 @@ from framerunner.recording.errors import RecordingError
 from framerunner.recording.events import Crossed, Picture, Recorded
 from framerunner.recording.tlog_reader import TlogRecording
 from offboard.app import Moment
+from scenarios.result import FlightResult
 from vision.types import Image
 
 JPEG_QUALITY = 90
@@ -94,7 +94,7 @@ class CollectedFlight:
 
     Attributes:
         title: what was flown, for people.
-        result: what stands in `result.json`; None if the flight left none.
+        result: None if the flight left none.
         moments: every tick, in order of time; at least one.
         images: of the camera.
         crossings: of frames, in order of time.
@@ -104,7 +104,7 @@ class CollectedFlight:
     """
 
     title: str
-    result: Mapping[str, Any] | None
+    result: FlightResult | None
     moments: tuple[Moment, ...]
     images: ImageFile
     crossings: tuple[Crossed, ...]
@@ -156,9 +156,9 @@ def collect(recorded: Recorded, images: ImageFile | None = None) -> CollectedFli
     )
 
 
-def _began(moments: list[Moment], crossings: list[Crossed], result: Mapping[str, Any] | None) -> int:
+def _began(moments: list[Moment], crossings: list[Crossed], result: FlightResult | None) -> int:
     """When the motors went on: by the referee's own clock if crossings tell it, else by the mission's."""
-    times_s = result_times(result)
+    times_s = {} if result is None else result.times_s
     if crossings and crossings[0].colour in times_s:
         return crossings[0].time_us - round(times_s[crossings[0].colour] * 1e6)
     for moment in moments:
@@ -167,17 +167,6 @@ def _began(moments: list[Moment], crossings: list[Crossed], result: Mapping[str,
     return moments[0].state.time_us
 
 
-def _crossings_of(result: Mapping[str, Any] | None, began_us: int) -> list[Crossed]:
-    times_s = result_times(result)
+def _crossings_of(result: FlightResult | None, began_us: int) -> list[Crossed]:
+    times_s = {} if result is None else result.times_s
     return [Crossed(began_us + ceil(time_s * 1e6), colour) for colour, time_s in times_s.items()]
-
-
-def result_times(result: Mapping[str, Any] | None) -> dict[str, float]:
-    """When each colour was crossed, seconds since motors on; empty if the result does not say it well."""
-    if result is None:
-        return {}
-    colours, times_s = result.get("frames_crossed"), result.get("crossing_times_s")
-    if not isinstance(colours, list) or not isinstance(times_s, list) or len(colours) != len(times_s):
-        return {}
-    pairs = zip(colours, times_s, strict=True)
-    return {str(c)[:40]: float(t) for c, t in pairs if isinstance(t, int | float) and 0.0 <= t <= 1e6}

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import Any, Protocol
+from typing import Protocol
 
 from offboard.app import Moment
+from scenarios.result import FlightResult
 from vision.types import Image
 
 
@@ -48,8 +49,8 @@ class Recorded(Protocol):
         ...
 
     @property
-    def result(self) -> Mapping[str, Any] | None:
-        """What stands in `result.json`; None if the flight left none."""
+    def result(self) -> FlightResult | None:
+        """None if the flight left none."""
         ...
 
     def events(self) -> Iterator[Event]:

@@ -2,21 +2,18 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Iterator
 from contextlib import contextmanager
 from os import SEEK_END
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from typing import Any
 
 from mcap.writer import MCAP0_MAGIC
 
 from framerunner.recording.errors import RecordingError
 from framerunner.recording.events import Recorded
 from offboard.pilot_file import PilotFile
-
-_MAX_RESULT_BYTES = 1_000_000
+from scenarios.result import MAX_RESULT_BYTES, FlightResult, ResultError
 
 
 @contextmanager
@@ -44,7 +41,7 @@ def recorded_flight(path: Path, pilot: PilotFile | None = None) -> Iterator[Reco
         with _mcap(path / "flight.mcap") as recorded:
             yield recorded
         return
-    if result is not None and "state_sha256" in result and (path / "mission.yaml").is_file():
+    if result is not None and result.state_sha256 and (path / "mission.yaml").is_file():
         with (
             TemporaryDirectory(prefix="framerunner-replay-") as folder,
             _again(path, result, folder, pilot) as recorded,
@@ -61,7 +58,7 @@ def recorded_flight(path: Path, pilot: PilotFile | None = None) -> Iterator[Reco
     raise RecordingError(f"replay '{path}': holds no flight; name a folder that `framerunner fly` left")
 
 
-def _was_killed(path: Path, result: dict[str, Any] | None) -> bool:
+def _was_killed(path: Path, result: FlightResult | None) -> bool:
     """Whether log and video tell of a real-time flight whose recording was not finished."""
     if result is not None or not (path / "flight.tlog").is_file():
         return False
@@ -82,7 +79,7 @@ def _mcap(path: Path) -> Iterator[Recorded]:
 
 
 @contextmanager
-def _again(path: Path, result: dict[str, Any], folder: str, pilot: PilotFile | None) -> Iterator[Recorded]:
+def _again(path: Path, result: FlightResult, folder: str, pilot: PilotFile | None) -> Iterator[Recorded]:
     from framerunner.recording.again import fly_again
 
     target = Path(folder) / "flight.mcap"
@@ -91,7 +88,7 @@ def _again(path: Path, result: dict[str, Any], folder: str, pilot: PilotFile | N
         yield recorded
 
 
-def _tlog(path: Path, result: dict[str, Any] | None) -> Recorded:
+def _tlog(path: Path, result: FlightResult | None) -> Recorded:
     from rich.console import Console
 
     from framerunner.recording.tlog_reader import TlogRecording
@@ -103,7 +100,7 @@ def _tlog(path: Path, result: dict[str, Any] | None) -> Recorded:
         return TlogRecording(path, scenario, result)
 
 
-def read_result(folder: Path) -> dict[str, Any] | None:
+def read_result(folder: Path) -> FlightResult | None:
     """Read a run folder's `result.json`; None if it has none.
 
     Raises:
@@ -113,12 +110,8 @@ def read_result(folder: Path) -> dict[str, Any] | None:
     if not path.is_file():
         return None
     try:
-        if path.stat().st_size > _MAX_RESULT_BYTES:
-            raise ValueError(f"larger than {_MAX_RESULT_BYTES} bytes")
-        result = json.loads(path.read_text(encoding="utf-8"))
-    except (OSError, ValueError, RecursionError) as error:
+        with path.open("rb") as file:
+            return FlightResult.parse(file.read(MAX_RESULT_BYTES + 1))
+    except (OSError, ResultError) as error:
         reason = " ".join(str(error).split())
         raise RecordingError(f"replay '{path}': damaged: {reason:.120}") from None
-    if not isinstance(result, dict):
-        raise RecordingError(f"replay '{path}': damaged: must hold an object, not {type(result).__name__}")
-    return result

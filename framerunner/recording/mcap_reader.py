@@ -25,9 +25,10 @@ from framerunner.recording.schemas import CROSSING, DETECTIONS, IMAGE, MISSION, 
 from offboard.app import Moment
 from offboard.drone import DroneState, VelocityCommand
 from offboard.engine import TransitionTaken
+from scenarios.result import FlightResult, ResultError
 from vision.types import Detection, Detections
 
-_MAX_TEXT_BYTES = 1_000_000  # of a message or attachment that is no image
+_MAX_TEXT_BYTES = 1_000_000  # of a message that is no image
 Json = dict[str, Any]
 
 
@@ -59,7 +60,7 @@ class McapRecording:
             self._summary = summary_of(self._reader)
             about = self._about()
             self.title = f"{about['scenario']}: {about['mission']}"
-            self.result: Json | None = self._attached_result()
+            self.result: FlightResult | None = self._attached_result()
         except Exception as error:
             self._file.close()
             raise self._damaged(error) from None
@@ -86,12 +87,13 @@ class McapRecording:
         except Exception as error:
             raise self._damaged(error) from None
 
-    def _attached_result(self) -> Json | None:
+    def _attached_result(self) -> FlightResult | None:
         for each in self._reader.iter_attachments():
             if each.name == "result.json":
-                if len(each.data) > _MAX_TEXT_BYTES:
-                    raise RecordingError(f"its result has {len(each.data)} bytes")
-                return cast(Json, json.loads(each.data))
+                try:
+                    return FlightResult.parse(each.data)
+                except ResultError as error:
+                    raise RecordingError(f"its result: {error}") from None
         return None
 
     def _about(self) -> dict[str, str]:

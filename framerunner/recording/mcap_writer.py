@@ -8,12 +8,11 @@ a thread of their own, beside the flight.
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from concurrent.futures import Future, ThreadPoolExecutor
 from importlib import metadata
 from pathlib import Path
 from types import TracebackType
-from typing import Any
 
 import cv2
 from mcap.writer import CompressionType, Writer
@@ -41,6 +40,7 @@ from offboard.mission import Mission
 from offboard.pilot_file import PilotFile
 from scenarios.loader import dump_yaml
 from scenarios.models import Scenario
+from scenarios.result import FlightResult
 from vision.types import CameraFrame, Detections, Image
 
 METADATA = "framerunner"
@@ -137,11 +137,11 @@ class FlightRecording:
             self._size_px = (frame.image.shape[1], frame.image.shape[0])
             self._write(IMAGE, time_us, messages.image(frame.jpeg, "jpeg", time_us))
 
-    def finish(self, result: Mapping[str, Any], track_time_s: Sequence[float]) -> None:
+    def finish(self, result: FlightResult, track_time_s: Sequence[float]) -> None:
         """Add what is known only after the flight: crossings, the verdict, and the result as an attachment.
 
         Args:
-            result: as in `result.json`, without wall times.
+            result: without wall times.
             track_time_s: of the ticks seen, since motors on; it tells when the try began.
         """
         self._keep_compressed()
@@ -149,9 +149,8 @@ class FlightRecording:
         if self._first_us is not None and track_time_s:
             began_us = self._first_us - round(track_time_s[0] * 1e6)
             self._cross_frames(result, began_us)
-            self._log(end_us, "referee", str(result["reason"]))
-        text = json.dumps(result, indent=2, allow_nan=False) + "\n"
-        self._attach("result.json", "application/json", text, end_us)
+            self._log(end_us, "referee", result.reason)
+        self._attach("result.json", "application/json", result.text(), end_us)
 
     def close(self) -> None:
         """Finish the file, or take it away if there was nothing to record; a second time does nothing."""
@@ -214,12 +213,12 @@ class FlightRecording:
             self._compressing = None
             self._write(IMAGE, time_us, messages.image(data.result(), "png", time_us))
 
-    def _cross_frames(self, result: Mapping[str, Any], began_us: int) -> None:
+    def _cross_frames(self, result: FlightResult, began_us: int) -> None:
         rows = zip(
-            result["frames_crossed"],
-            result["crossing_times_s"],
-            result["crossing_offsets_m"],
-            result["crossing_sides"],
+            result.frames_crossed,
+            result.crossing_times_s,
+            result.crossing_offsets_m,
+            result.crossing_sides,
             strict=True,
         )
         for colour, time_s, offset_m, side in rows:

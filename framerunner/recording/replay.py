@@ -10,7 +10,7 @@ from rich.console import Console
 from rich.live import Live
 from rich.table import Table
 
-from framerunner.display import moment_table, place_in_words
+from framerunner.flying.display import moment_table, place_in_words
 from framerunner.recording.events import Crossed, Picture, Recorded, time_of_event
 from offboard.app import Moment
 from sitl.video import VideoServer

@@ -4,20 +4,20 @@ from __future__ import annotations
 
 import heapq
 import os
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
 import cv2
 
-from firmware_py.airframe import load_airframe
+from framerunner.flying.plan import FlightPlan
 from framerunner.recording.errors import RecordingError
 from framerunner.recording.events import Event, Picture, time_of_event
 from offboard.app import Moment
 from offboard.drone import DroneState, VelocityCommand
 from offboard.link.alignment import Alignment, Pose
-from scenarios.ground import start_position
 from scenarios.models import Scenario
+from scenarios.result import FlightResult
 from vision.jpeg import MAX_PIXELS
 from vision.types import Detections
 
@@ -42,7 +42,7 @@ class TlogRecording:
         RecordingError: the log holds no telemetry.
     """
 
-    def __init__(self, folder: Path, scenario: Scenario | None, result: Mapping[str, Any] | None) -> None:
+    def __init__(self, folder: Path, scenario: Scenario | None, result: FlightResult | None) -> None:
         self.title = folder.name
         self.result = result
         self._video = folder / "video.avi"
@@ -80,9 +80,8 @@ class TlogRecording:
 def _start(scenario: Scenario | None) -> Pose:
     if scenario is None:
         return Pose((0.0, 0.0, 0.0), 0.0)
-    x_m, y_m, z_m = start_position(scenario)
-    half_height_m = load_airframe(scenario.airframe).envelope_m[2] / 2
-    return Pose((x_m, y_m, z_m + half_height_m), scenario.start.yaw_rad)
+    start = FlightPlan(scenario).start_pose
+    return Pose(start[:3], start[3])
 
 
 def _read_moments(path: Path, start: Pose) -> list[Moment]:

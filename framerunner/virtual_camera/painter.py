@@ -5,11 +5,9 @@ No clock and no socket: time is the vehicle's, messages come in, images come out
 
 from __future__ import annotations
 
-from dataclasses import asdict
 from math import cos, isfinite, sin
 
-from firmware_py.airframe import load_airframe
-from framerunner.vehicle_link import Message
+from framerunner.flying.plan import FlightPlan
 from framerunner.virtual_camera.history import (
     AHEAD_US,
     AttitudeReport,
@@ -17,27 +15,19 @@ from framerunner.virtual_camera.history import (
     PositionReport,
     quaternion_from_euler,
 )
-from framerunner.virtual_camera.lift import lifted
 from framerunner.virtual_camera.placement import Placement, yaw_of
 from geometry.vectors import Quaternion
 from offboard.link.alignment import Pose
-from scenarios.ground import start_position
 from scenarios.models import Scenario
-from scenarios.referee import Referee
+from scenarios.result import LocalFrame, Standing
 from scenarios.truth import TrueState
 from sitl.camera import Camera, Image
 from sitl.camera_feed import FIRST_EXPOSURE_US
+from wire.dialect import Message
 
 REFEREE_STEP_US = 20_000
 REPORT_GAP_US = 20_000  # between two reports: the one that shows that a time is over comes so much later
 ARMED_FLAG = 128  # MAV_MODE_FLAG_SAFETY_ARMED
-
-
-def start_pose(scenario: Scenario) -> Pose:
-    """Where the drone's centre is at first, arena axes."""
-    x_m, y_m, z_m = start_position(scenario)
-    height_m = load_airframe(scenario.airframe).envelope_m[2]
-    return Pose((x_m, y_m, z_m + height_m / 2), scenario.start.yaw_rad)
 
 
 def levelled(attitude_arena: Quaternion) -> Quaternion:
@@ -59,8 +49,7 @@ class VirtualCamera:
         base: whether the drone starts from the scenario's base; else it starts from the floor.
 
     Attributes:
-        plan: the scenario as given.
-        scenario: what is to be seen; its frames may hang higher than in the plan.
+        plan: the flight that is seen; its frames are higher than declared if there is no base.
         placement: of the arena at the vehicle.
         history: of the vehicle's reports.
         attitudes: reports of attitude so far.
@@ -70,12 +59,9 @@ class VirtualCamera:
     """
 
     def __init__(self, scenario: Scenario, *, level: bool = False, base: bool = True) -> None:
-        self._lift_m = 0.0 if base else scenario.base.top_m
-        self.plan = scenario
-        self.scenario = scenario = lifted(scenario, self._lift_m)
+        self.plan = FlightPlan(scenario, lift_m=0.0 if base else scenario.base.top_m)
         self._level = level
-        self._camera = Camera(scenario)
-        self._envelope_m = load_airframe(scenario.airframe).envelope_m
+        self._camera = Camera(self.plan.layout)
         self._period_us = 1e6 / scenario.camera.rate_hz
         self._wait_us = max(0, round(scenario.camera.latency_s * 1e6) - REPORT_GAP_US)
         self.attitudes = self.positions = self.images = self.restarts = 0
@@ -84,8 +70,9 @@ class VirtualCamera:
     def _begin(self) -> None:
         """Know nothing of the vehicle."""
         self.history = PoseHistory()
-        self.placement = Placement(start_pose(self.scenario))
-        self._referee = Referee(self.scenario, self._envelope_m, self._lift_m)
+        start = self.plan.start_pose
+        self.placement = Placement(Pose(start[:3], start[3]))
+        self._referee = self.plan.new_referee()
         self._judged_us = 0
         self._next = 0
         self._motors_on = False
@@ -148,30 +135,30 @@ class VirtualCamera:
         attitude = levelled(where.attitude_arena) if self._level else where.attitude_arena
         return exposure_us, self._camera.render(where.position_arena_m, attitude)
 
-    def standing(self, state: str = "", ended: str | None = None) -> dict[str, object]:
-        """What `/referee.json` tells, in the simulator's form.
+    def standing(self, state: str = "", ended: str | None = None) -> Standing:
+        """How the try stands, for `/referee.json`.
 
         Args:
             state: the mission's, for the report.
             ended: why the flight was broken off, if it was.
         """
-        return {
-            "scenario": self.scenario.name,
-            "source": "telemetry",
-            "lift_m": self._lift_m,
-            "time_us": self.history.newest_us or 0,
-            "local_frame": self._local_frame(),
-            "snapshot": asdict(self._referee.snapshot()),
-            "report": self._referee.report(state, ended).as_dict(),
-        }
+        return Standing(
+            scenario=self.plan.scenario.name,
+            source="telemetry",
+            lift_m=self.plan.lift_m,
+            time_us=self.history.newest_us or 0,
+            local_frame=self._local_frame(),
+            snapshot=self._referee.snapshot(),
+            report=self._referee.report(state, ended),
+        )
 
-    def _local_frame(self) -> dict[str, object] | None:
+    def _local_frame(self) -> LocalFrame | None:
         """Where in the arena the vehicle's local frame is; None as long as the arena has no place."""
         alignment = self.placement.alignment
         if alignment is None:
             return None
         origin = alignment.pose(Pose((0.0, 0.0, 0.0), 0.0))
-        return {"origin_arena_m": origin.position_m, "yaw_rad": origin.yaw_rad}
+        return LocalFrame(origin_arena_m=origin.position_m, yaw_rad=origin.yaw_rad)
 
     def _take_angles(self, message: Message) -> None:
         angles = (message.roll, message.pitch, message.yaw)
@@ -204,7 +191,7 @@ class VirtualCamera:
             return
         armed = bool(self.placement.armed)
         if armed and not self._motors_on and self._referee.over:
-            self._referee = Referee(self.scenario, self._envelope_m, self._lift_m)  # a new try
+            self._referee = self.plan.new_referee()  # a new try
         self._motors_on = armed
         self._referee.update(
             TrueState(

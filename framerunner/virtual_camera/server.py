@@ -5,13 +5,15 @@ from __future__ import annotations
 import asyncio
 import threading
 import time
+from collections import deque
 from collections.abc import Callable, Mapping
 
-from framerunner.vehicle_link import Message, VehicleLink, command, companion_heartbeat, is_vehicle
 from framerunner.virtual_camera.painter import VirtualCamera
-from offboard.drone import DroneError
 from sitl.video import VideoServer
-from wire.dialect import mavlink
+from wire.dialect import Message, mavlink
+from wire.simulator_api import REFEREE_PATH, SCENARIO_PATH
+from wire.transports.urls import LinkError
+from wire.transports.vehicle_link import VehicleLink, command, companion_heartbeat, is_vehicle
 
 STALE_S = 0.5  # wall time without attitude or position, after which no image is served
 SYSTEM_ID = 246  # MAVSDK has 245, ground stations 255
@@ -44,6 +46,7 @@ class CameraServer:
         self._say = say
         self._watch = _Watch(say, link.url)
         self._vehicle: int | None = None
+        self._to_send: deque[Message] = deque()  # by the thread that reads
         self._halt = threading.Event()
         self._failed: asyncio.Future[None] | None = None
         self._rates = _Rates()
@@ -54,19 +57,19 @@ class CameraServer:
 
         Raises:
             VideoError: the TCP port is taken.
-            DroneError: the link failed.
+            LinkError: the link failed.
         """
         loop = asyncio.get_running_loop()
         self._failed = loop.create_future()
-        self._video.add_json("/referee.json", self._referee_answer)
-        plan = self._camera.plan
-        self._video.add_json("/scenario.json", lambda _query: plan.model_dump(mode="json"))
+        self._video.add_json(REFEREE_PATH, self._referee_answer)
+        scenario = self._camera.plan.scenario
+        self._video.add_json(SCENARIO_PATH, lambda _query: scenario.model_dump(mode="json"))
         reader = threading.Thread(target=self._read, args=(loop,), name="telemetry", daemon=True)
         keeper: asyncio.Task[None] | None = None
         try:
             await self._video.start()
             self._say(
-                f"camera of {self._camera.scenario.name}: video on {self._video.url} (Ctrl-C stops); "
+                f"camera of {scenario.name}: video on {self._video.url} (Ctrl-C stops); "
                 f"listening for a vehicle on {self._link.url}"
             )
             reader.start()
@@ -82,17 +85,19 @@ class CameraServer:
             self._link.close()
 
     def _read(self, loop: asyncio.AbstractEventLoop) -> None:
-        """On a thread of its own: wait for packets, hand them to the loop."""
+        """On a thread that alone uses the link: send, wait for packets, hand them to the loop."""
         while not self._halt.is_set():
             try:
+                while self._to_send:
+                    self._link.send(self._to_send.popleft())
                 messages = self._link.receive(_RECEIVE_S)
-            except DroneError as error:
+            except LinkError as error:
                 loop.call_soon_threadsafe(self._fail, error)
                 return
             if messages and not self._halt.is_set():
                 loop.call_soon_threadsafe(self._take, messages)
 
-    def _fail(self, error: DroneError) -> None:
+    def _fail(self, error: LinkError) -> None:
         if self._failed is not None and not self._failed.done():
             self._failed.set_exception(error)
 
@@ -123,13 +128,13 @@ class CameraServer:
     async def _keep_house(self) -> None:
         """Heartbeat once a second, rates, and the word when telemetry stays away."""
         beat_s = rates_s = time.monotonic()
-        self._link.send(companion_heartbeat())  # over udpout the vehicle does not know us before
+        self._to_send.append(companion_heartbeat())  # over udpout the vehicle does not know us before
         while True:
             await asyncio.sleep(_HOUSEKEEPING_S)
             now_s = time.monotonic()
             if now_s - beat_s >= 1.0:
                 beat_s = now_s
-                self._link.send(companion_heartbeat())
+                self._to_send.append(companion_heartbeat())
             self._watch.check(now_s)
             if self._vehicle is not None and now_s - rates_s >= _RATE_PERIOD_S:
                 self._ask_for_rates(now_s - rates_s)
@@ -157,10 +162,10 @@ class CameraServer:
         ):
             if rate_hz < ENOUGH_HZ:
                 asking = (mavlink.MAV_CMD_SET_MESSAGE_INTERVAL, number, 1e6 / WANTED_HZ)
-                self._link.send(command(self._vehicle, *asking))
+                self._to_send.append(command(self._vehicle, *asking))
 
     def _referee_answer(self, query: Mapping[str, str]) -> object:
-        return self._camera.standing(query.get("state", ""), query.get("ended"))
+        return self._camera.standing(query.get("state", ""), query.get("ended")).model_dump(mode="json")
 
 
 class _Rates:

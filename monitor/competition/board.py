@@ -6,7 +6,6 @@ import json
 from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
 
 from sqlalchemy import select
 from sqlalchemy.orm import Session
@@ -24,9 +23,9 @@ from monitor.competition.rules import (
     Attempt,
     Correction,
     Counting,
-    Result,
+    RankedTeam,
     Rule,
-    Standing,
+    TryScore,
     choose,
     correct,
     counted_cs,
@@ -52,6 +51,7 @@ from monitor.competition.views import (
     TryView,
 )
 from monitor.competition.words import from_wire
+from scenarios.result import RefereeReport
 
 MOST_TRIES_SHOWN = 500
 
@@ -61,9 +61,9 @@ class _Judged:
     """A try with what was said of it."""
 
     row: tables.Try
-    report: Mapping[str, Any]
-    referee: Result
-    result: Result
+    report: RefereeReport | None
+    referee: TryScore
+    result: TryScore
     correction: tables.Judgement | None
     judgements: int
 
@@ -245,7 +245,7 @@ def _judged_tries(session: Session) -> list[_Judged]:
 
 def _judge(row: tables.Try, said: Sequence[tables.Judgement]) -> _Judged:
     """Lay the last correction over what the referee says. `said`: oldest first."""
-    report = read_json(row.report)
+    report = stored_report(row.report)
     referee = read_report(report, row.frames.split())
     last = next((entry for entry in reversed(said) if entry.kind == "correction"), None)
     correction = None
@@ -255,13 +255,12 @@ def _judge(row: tables.Try, said: Sequence[tables.Judgement]) -> _Judged:
     return _Judged(row, report, referee, correct(referee, correction), last, len(said))
 
 
-def read_json(text: str) -> dict[str, Any]:
-    """A JSON object; empty if the text is something else."""
+def stored_report(text: str) -> RefereeReport | None:
+    """What the database has of a referee's report; None if nobody judged."""
     try:
-        value = json.loads(text)
+        return RefereeReport.from_outside(json.loads(text))
     except ValueError:
-        return {}
-    return value if isinstance(value, dict) else {}
+        return None
 
 
 def _attempt_numbers(tries: Sequence[_Judged]) -> dict[int, int]:
@@ -318,7 +317,7 @@ def _scenarios(
     return [(name, frames[name]) for name in dict.fromkeys(attempt.scenario for attempt in attempts)]
 
 
-def _row_view(row: Standing, flown: Mapping[tuple[int, str], int]) -> RowView:
+def _row_view(row: RankedTeam, flown: Mapping[tuple[int, str], int]) -> RowView:
     cells = []
     for cell in row.cells:
         result = cell.attempt.result if cell.attempt is not None else None
@@ -360,8 +359,8 @@ def _try_view(
         state=row.state,
         judged=judged.counts,
         barrier=barrier,
-        verdict=from_wire(judged.report.get("verdict"), 40),
-        reason=from_wire(judged.report.get("reason"), 500),
+        verdict="" if judged.report is None else judged.report.verdict,
+        reason="" if judged.report is None else from_wire(judged.report.reason, 500),
         source=row.source,
         final=row.final,
         referee=_result_view(judged.referee, rule),
@@ -373,7 +372,7 @@ def _try_view(
     )
 
 
-def _result_view(result: Result, rule: Rule) -> ResultView:
+def _result_view(result: TryScore, rule: Rule) -> ResultView:
     return ResultView(
         crossed=result.crossed,
         missing=result.missing,

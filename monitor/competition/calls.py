@@ -5,16 +5,16 @@ Functions on an open session; whoever calls them ends the transaction.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from datetime import datetime
-from typing import Any
 
 from sqlalchemy import func, select
 from sqlalchemy.orm import Session
 
 from monitor.competition import tables
 from monitor.competition.words import Refused
+from scenarios.result import RefereeReport
 
 _MOVED_M = 0.3  # a try whose drone moved less used nobody's call
 
@@ -117,14 +117,13 @@ def take_back(session: Session, call_id: int, entry: Entry) -> None:
     session.add(tables.Call(team_id=None, scenario="", kind="taken back", who=entry.who, at=entry.at))
 
 
-def use_call(session: Session, row: tables.Try, report: Mapping[str, Any], at: datetime) -> None:
+def use_call(session: Session, row: tables.Try, report: RefereeReport, at: datetime) -> None:
     """End the call that a try was flown on: who flies after it must be said again.
 
     A drone that did not move, or a try that a judge gave to somebody else, uses no call.
     """
     call = current_call(session)
-    path_m = report.get("path_length_m")
-    moved = not isinstance(path_m, int | float) or path_m >= _MOVED_M
+    moved = "path_length_m" not in report.model_fields_set or report.path_length_m >= _MOVED_M
     if call is not None and call.id == row.call_id and call.team_id == row.team_id and moved:
         session.add(tables.Call(team_id=None, scenario="", kind="used", who="", at=at))
 

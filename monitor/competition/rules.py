@@ -4,14 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from math import isfinite
-from typing import Any, Literal
+from typing import Literal
 
 from scenarios.models import COLOURS
+from scenarios.result import RefereeReport
 
 Counting = Literal["best", "last"]
 
-_DONE = ("clean", "completed")  # the verdicts with which a try is completed
 LONGEST_S = 36_000.0  # no time of a try is taken to be longer
 MOST_CONTACTS = 1_000
 
@@ -34,7 +33,7 @@ class Rule:
 
 
 @dataclass(frozen=True, slots=True)
-class Result:
+class TryScore:
     """What a try was worth, as the referee or a judge says.
 
     Attributes:
@@ -61,7 +60,7 @@ class Result:
 
 @dataclass(frozen=True, slots=True)
 class Correction:
-    """What a judge says of a try; None is "as the referee says". Fields as in `Result`."""
+    """What a judge says of a try; None is "as the referee says". Fields as in `TryScore`."""
 
     crossed: tuple[str, ...] | None = None
     contacts: int | None = None
@@ -84,7 +83,7 @@ class Attempt:
     team: int
     scenario: str
     order: int
-    result: Result
+    result: TryScore
 
 
 @dataclass(frozen=True, slots=True)
@@ -103,7 +102,7 @@ class Cell:
 
 
 @dataclass(frozen=True, slots=True)
-class Standing:
+class RankedTeam:
     """A row of the ranking.
 
     Attributes:
@@ -123,37 +122,39 @@ class Standing:
     cells: tuple[Cell, ...]
 
 
-def read_report(report: Mapping[str, Any], frames: Sequence[str]) -> Result:
+def read_report(report: RefereeReport | None, frames: Sequence[str]) -> TryScore:
     """Take from a referee's report what counts.
 
     Args:
-        report: `RefereeReport.as_dict()` or `result.json`, from a wire: what is not a sound number counts 0.
+        report: None if nobody judged the try; then all counts 0.
         frames: colours to cross, in order.
 
     Returns:
         The result. A frame crossed before its turn is not among those crossed.
     """
-    crossed = in_turn(report.get("frames_crossed"), frames)
-    return Result(
+    if report is None:
+        return TryScore(tuple(frames), (), 0, 0.0, 0.0, completed=False)
+    crossed = in_turn(report.frames_crossed, frames)
+    return TryScore(
         tuple(frames),
         crossed,
-        int(_number(report.get("contacts"), MOST_CONTACTS)),
-        _number(report.get("penalty_s"), LONGEST_S),
-        _number(report.get("try_time_s"), LONGEST_S),
-        report.get("verdict") in _DONE and len(crossed) == len(frames),
+        min(report.contacts, MOST_CONTACTS),
+        min(report.penalty_s, LONGEST_S),
+        min(report.try_time_s, LONGEST_S),
+        report.completed and len(crossed) == len(frames),
     )
 
 
-def in_turn(crossed: object, frames: Sequence[str]) -> tuple[str, ...]:
+def in_turn(crossed: Iterable[str], frames: Sequence[str]) -> tuple[str, ...]:
     """Those of the frames crossed that were crossed when it was their turn."""
     passed: list[str] = []
-    for colour in crossed if isinstance(crossed, list | tuple) else ():
+    for colour in crossed:
         if len(passed) < len(frames) and colour == frames[len(passed)]:
             passed.append(frames[len(passed)])
     return tuple(passed)
 
 
-def correct(result: Result, correction: Correction | None) -> Result:
+def correct(result: TryScore, correction: Correction | None) -> TryScore:
     """Lay a judge's correction over what the referee says.
 
     A try with a frame missing is never completed, whoever says so.
@@ -172,7 +173,7 @@ def correct(result: Result, correction: Correction | None) -> Result:
     return replace(corrected, completed=corrected.completed and not corrected.missing)
 
 
-def counted_cs(result: Result, rule: Rule) -> int:
+def counted_cs(result: TryScore, rule: Rule) -> int:
     """What a try counts, in hundredths of a second.
 
     Whole hundredths, as they are shown: totals that look the same are the same, in whatever order they are
@@ -207,7 +208,7 @@ def rank(
     scenarios: Sequence[tuple[str, Sequence[str]]],
     attempts: Iterable[Attempt],
     rule: Rule,
-) -> list[Standing]:
+) -> list[RankedTeam]:
     """Make the ranking.
 
     Args:
@@ -231,7 +232,7 @@ def rank(
             _cell(tries.get((team, scenario), []), scenario, frames, rule) for scenario, frames in drawn
         )
         contacts = sum(cell.attempt.result.contacts for cell in cells if cell.attempt is not None)
-        rows.append(Standing(0, team, name, sum(cell.counted_cs for cell in cells), contacts, cells))
+        rows.append(RankedTeam(0, team, name, sum(cell.counted_cs for cell in cells), contacts, cells))
     rows.sort(key=lambda row: (row.total_cs, row.contacts, row.name.casefold(), row.name, row.team))
     totals = [row.total_cs for row in rows]
     return [replace(row, rank=totals.index(row.total_cs) + 1) for row in rows]
@@ -242,12 +243,3 @@ def _cell(attempts: list[Attempt], scenario: str, frames: Sequence[str], rule: R
     if attempt is None:
         return Cell(scenario, not_completed_cs(len(frames), rule), None)
     return Cell(scenario, counted_cs(attempt.result, rule), attempt)
-
-
-def _number(value: object, most: float) -> float:
-    """A sound number from 0 to `most`; anything else is 0."""
-    if isinstance(value, bool) or not isinstance(value, int | float):
-        return 0.0
-    if isinstance(value, float) and not isfinite(value):
-        return 0.0
-    return float(min(max(value, 0), most))

@@ -17,7 +17,7 @@ from sqlalchemy.exc import SQLAlchemyError
 
 from monitor.competition.calls import Entry
 from monitor.competition.database import Database, DatabaseError
-from monitor.competition.rules import Result, read_report
+from monitor.competition.rules import TryScore, read_report
 from monitor.competition.store import Store
 from monitor.competition.views import Board, RunningView
 from monitor.competition.words import Refused, shown
@@ -67,7 +67,7 @@ class CompetitionService:
         self._latest: dict[str, tuple[TryEvent, datetime]] = {}
         self._arrived = asyncio.Event()
         self._opened = asyncio.Event()
-        self._flying: dict[int, Result] = {}
+        self._flying: dict[int, TryScore] = {}
         self._frames: dict[str, tuple[str, ...]] = {}
         self._listeners: set[Callable[[Message], None]] = set()
         self.problem = ""

@@ -2,17 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
-from math import isfinite
-from typing import TYPE_CHECKING, Any
+from collections.abc import Mapping
+from typing import TYPE_CHECKING
 
 from fastapi import HTTPException, Response
 from pydantic import Field
 from sqlalchemy.exc import SQLAlchemyError
 
 from monitor.competition.database import DatabaseError
-from monitor.competition.rules import LONGEST_S
 from monitor.competition.views import Board, CallView, QueueView, RankingView, RunningView, TryView, View
+from scenarios.result import RefereeReport
 
 if TYPE_CHECKING:
     from monitor.competition.service import CompetitionService
@@ -70,7 +69,7 @@ def register(monitor: Monitor) -> None:
 
 
 def stage_view(
-    board: Board, running: tuple[RunningView, ...], reports: Mapping[int, Mapping[str, Any]]
+    board: Board, running: tuple[RunningView, ...], reports: Mapping[int, RefereeReport | None]
 ) -> StageView:
     """Put it together.
 
@@ -81,7 +80,7 @@ def stage_view(
     """
 
     def flown(each: TryView | None) -> FlownView | None:
-        return None if each is None else _flown_view(each, reports.get(each.id, {}))
+        return None if each is None else _flown_view(each, reports.get(each.id))
 
     last = _last(board)
     against = _best(board, last.scenario, without=last.id) if last is not None else None
@@ -138,8 +137,9 @@ def _best(board: Board, scenario: str, without: int | None = None) -> TryView | 
     )
 
 
-def _flown_view(each: TryView, report: Mapping[str, Any]) -> FlownView:
+def _flown_view(each: TryView, report: RefereeReport | None) -> FlownView:
     result = each.result
+    times_s = {} if report is None else report.times_s
     return FlownView(
         id=each.id,
         drone_id=each.drone_id,
@@ -147,21 +147,10 @@ def _flown_view(each: TryView, report: Mapping[str, Any]) -> FlownView:
         scenario=each.scenario,
         frames=each.frames,
         crossed=result.crossed,
-        splits={colour: time_s for colour, time_s in _splits(report) if colour in result.crossed},
+        splits={colour: time_s for colour, time_s in times_s.items() if colour in result.crossed},
         try_time_s=result.try_time_s,
         penalty_s=result.penalty_s,
         total_s=result.total_s,
         completed=result.completed,
         verdict="corrected by a judge" if each.corrected_by else each.verdict,
     )
-
-
-def _splits(report: Mapping[str, Any]) -> Iterable[tuple[str, float]]:
-    """Colours and times of the crossings that a referee tells; from a wire, so nothing is certain of them."""
-    colours, times = report.get("frames_crossed"), report.get("crossing_times_s")
-    if not isinstance(colours, list) or not isinstance(times, list):
-        return
-    for colour, time_s in zip(colours, times, strict=False):
-        is_number = isinstance(time_s, int | float) and not isinstance(time_s, bool) and isfinite(time_s)
-        if isinstance(colour, str) and is_number and 0 <= time_s <= LONGEST_S:
-            yield colour, float(time_s)

@@ -7,7 +7,6 @@ import sys
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import asdict
 from datetime import datetime
-from math import isfinite
 from typing import Any
 
 from sqlalchemy import func, select, update
@@ -20,8 +19,8 @@ from monitor.competition.board import (
     present_round,
     read_board,
     read_detail,
-    read_json,
     rule_of,
+    stored_report,
 )
 from monitor.competition.calls import (
     Entry,
@@ -39,6 +38,7 @@ from monitor.competition.rules import Correction, Rule, correct, read_report
 from monitor.competition.views import Board, TryDetail
 from monitor.competition.words import Refused, free_text, from_wire, name_key, shown, team_name
 from monitor.tries import TryEvent
+from scenarios.result import RefereeReport
 
 MOST_TEAMS = 500
 MOST_JUDGEMENTS = 200  # of one try
@@ -81,11 +81,11 @@ class Store:
             raise _no_try(try_id)
         return detail
 
-    def reports(self, try_ids: Iterable[int]) -> dict[int, dict[str, Any]]:
+    def reports(self, try_ids: Iterable[int]) -> dict[int, RefereeReport | None]:
         """What the referee said of some tries, by their ids."""
         wanted = select(tables.Try.id, tables.Try.report).where(tables.Try.id.in_(list(try_ids)))
         with self._database.transaction() as session:
-            return {number: read_json(report) for number, report in session.execute(wanted)}
+            return {number: stored_report(report) for number, report in session.execute(wanted)}
 
     def interrupt(self) -> int:
         """Say of tries that seem to run that the monitor was stopped meanwhile. Returns how many."""
@@ -330,7 +330,7 @@ def _check(row: tables.Try, correction: Correction) -> None:
             known = ", ".join(frames) or "none"
             raise Refused(f"crossed {shown(colour)} is not a frame of this try; use {known}")
     if correction.completed:
-        referee = read_report(_loads(row.report), frames)
+        referee = read_report(stored_report(row.report), frames)
         missing = ", ".join(correct(referee, correction).missing)
         if missing:
             raise Refused(
@@ -379,24 +379,7 @@ def _team_change(team: tables.Team, entry: Entry) -> tables.TeamChange:
     )
 
 
-def _json(report: Mapping[str, Any]) -> str:
-    """A report as JSON, whatever came: numbers that are not finite are null, one too long is left out."""
-    text = json.dumps(_finite(report, 8), default=str)
+def _json(report: RefereeReport) -> str:
+    """A report as JSON; one too long is left out."""
+    text = json.dumps(report.as_json())
     return text if len(text) <= _LONGEST_REPORT else "{}"
-
-
-def _finite(value: object, depth: int) -> object:
-    if isinstance(value, float) and not isfinite(value):
-        return None
-    if depth == 0:
-        return None
-    if isinstance(value, Mapping):
-        return {str(key): _finite(each, depth - 1) for key, each in value.items()}
-    if isinstance(value, list | tuple):
-        return [_finite(each, depth - 1) for each in value]
-    return value
-
-
-def _loads(text: str) -> dict[str, Any]:
-    value = json.loads(text)
-    return value if isinstance(value, dict) else {}

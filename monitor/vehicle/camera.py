@@ -11,6 +11,8 @@ from pymavlink.dialects.v20 import common as mavlink
 
 from monitor.ports import Message
 from monitor.vehicle.texts import plain
+from wire.simulator_api import VIDEO_PATH
+from wire.transports.urls import LinkError, parse_url
 
 CAMERAS = range(mavlink.MAV_COMP_ID_CAMERA, mavlink.MAV_COMP_ID_CAMERA6 + 1)
 _ASK_EVERY_S = 2.0
@@ -20,7 +22,6 @@ _WEB_PORTS = (80, 443)
 _FIRST_FREE_PORT = 1024  # those below belong to other services
 # What the simulator and the virtual camera serve on this machine: one port an instance.
 _OWN_PORTS = range(8100, 8110)
-_OWN_PATH = "/video"
 
 
 class CameraWatch:
@@ -145,10 +146,10 @@ def _trusting(parts: SplitResult) -> str:
         is_own = parts.hostname == "localhost" or _plain_address(parts.hostname or "").is_loopback
     except ValueError:
         is_own = False
-    if not is_own or (parts.port in _OWN_PORTS and parts.path == _OWN_PATH):
+    if not is_own or (parts.port in _OWN_PORTS and parts.path == VIDEO_PATH):
         return ""
     first, last = _OWN_PORTS[0], _OWN_PORTS[-1]
-    return f"on this machine only {_OWN_PATH} at ports {first} to {last} is asked for"
+    return f"on this machine only {VIDEO_PATH} at ports {first} to {last} is asked for"
 
 
 def _plain_address(text: str) -> IPv4Address | IPv6Address:
@@ -161,11 +162,10 @@ def _plain_address(text: str) -> IPv4Address | IPv6Address:
 def host_of(link_url: str) -> str:
     """The host to which a link goes; "" if it listens, or goes over a wire."""
     try:
-        parts = urlsplit(link_url)
-        host = parts.hostname or ""
-    except ValueError:
+        url = parse_url(link_url)
+    except LinkError:
         return ""
-    return host if parts.scheme in ("udpout", "tcpout", "udp", "tcp") and host != "0.0.0.0" else ""
+    return url.address if url.scheme in ("udpout", "tcpout") and url.address != "0.0.0.0" else ""
 
 
 def request(system: int, component: int, message_id: int) -> Message:

@@ -9,6 +9,7 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from monitor.ports import Message
 from monitor.vehicle.texts import plain
+from scenarios.result import FlightResult, first_error
 from wire.mission_codec import DocumentAssembler, PayloadError, decode_detections, decode_state
 from wire.mission_messages import (
     DETECTIONS_TYPE,
@@ -65,7 +66,7 @@ class MissionView:
     Attributes:
         state: the last one told; None before.
         document: of the mission flown; None before.
-        result: the RESULT document and its CRC; None before.
+        result: the CRC of the RESULT document and what makes sense in it; None before.
         problem: the last payload that made no sense, for a notice; "" if none.
         problem_told: the notice was given.
     """
@@ -79,7 +80,7 @@ class MissionView:
         self._seen: JsonMessage | None = None
         self.state: MissionState | None = None
         self.document: MissionDocument | None = None
-        self.result: tuple[int, dict[str, Any]] | None = None
+        self.result: tuple[int, FlightResult] | None = None
         self.problem = ""
         self.problem_told = False
 
@@ -169,7 +170,11 @@ class MissionView:
         except ValidationError as error:
             self.problem = f"{document.kind.name.lower()} document: {first_error(error)}"
             return []
-        self.result = (document.crc, finite(dict(document.content)))
+        result = FlightResult.from_outside(dict(document.content))
+        if result is None:
+            self.problem = "result document: no verdict is told"
+        else:
+            self.result = (document.crc, result)
         return []
 
     def _chart(self) -> JsonMessage | None:
@@ -221,12 +226,6 @@ def finite(value: Any) -> Any:  # noqa: ANN401 - any JSON
     if isinstance(value, list | tuple):
         return [finite(part) for part in value]
     return value
-
-
-def first_error(error: ValidationError) -> str:
-    """What is wrong, in one line: field, then reason."""
-    first = error.errors(include_url=False, include_input=False)[0]
-    return f"{'.'.join(str(step) for step in first['loc'])}: {first['msg']}"
 
 
 def _box(box: Box) -> list[float | None] | None:

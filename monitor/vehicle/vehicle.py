@@ -13,7 +13,7 @@ from typing import Any
 from pymavlink.dialects.v20 import common as mavlink
 
 from monitor.ports import Equipment, Message
-from monitor.referee_channel import RefereeAnswer, RefereeChannel
+from monitor.referee_channel import RefereeChannel
 from monitor.tries import TryEvent
 from monitor.vehicle.asking import BootTime, RateWatch
 from monitor.vehicle.camera import CAMERAS, CameraWatch
@@ -28,7 +28,9 @@ from monitor.vehicle.placement import Placement
 from monitor.vehicle.speech import Speech
 from monitor.vehicle.traffic import Traffic
 from scenarios.models import Scenario
+from scenarios.result import Standing
 from wire.mission_messages import COMPONENT_ID as APP
+from wire.simulator_api import SimulatorApi
 
 AUTOPILOT = mavlink.MAV_COMP_ID_AUTOPILOT1
 _FRESH_S = 1.0
@@ -158,8 +160,9 @@ class Vehicle:
         self._keep_history(now_s)
         if self._traffic.state(now_s) == "live":
             self._ask(now_s)
-        if self._camera.url is not None and self._channel_task is None:
-            self._open_channel(self._camera.url)
+        api = SimulatorApi.of_video(self._camera.url or "") if self._channel_task is None else None
+        if api is not None:
+            self._open_channel(api)
 
     async def do(self, what: str) -> Answer:
         """Order something; see `Fleet.do`."""
@@ -342,8 +345,8 @@ class Vehicle:
             if question is not None:
                 self._ears.send(question)
 
-    def _open_channel(self, url: str) -> None:
-        def hear(answer: RefereeAnswer) -> None:
+    def _open_channel(self, api: SimulatorApi) -> None:
+        def hear(answer: Standing) -> None:
             ahead_us = (answer.time_us or 0) - self._motion.time_us
             if ahead_us >= _OTHER_BOOT_US:
                 return
@@ -355,7 +358,7 @@ class Vehicle:
         def say(level: str, text: str) -> None:
             self._ears.notice(level, f"drone {self.id}: {text}")
 
-        self._channel = RefereeChannel(url, hear, say)
+        self._channel = RefereeChannel(api, hear, say)
         self._channel_task = asyncio.create_task(self._run_channel(self._channel))
 
     async def _run_channel(self, channel: RefereeChannel) -> None:

@@ -21,7 +21,9 @@ from itertools import pairwise
 from math import cos, dist, sin
 from pathlib import Path
 
-from framerunner.lockstep import Flown, fly_lockstep
+from framerunner.flying.fly import Flown
+from framerunner.flying.lockstep import fly_lockstep
+from framerunner.flying.plan import FlightPlan
 from offboard.app import Moment
 from offboard.mission import load_mission
 from scenarios.loader import load_scenario
@@ -73,9 +75,8 @@ def fly(name: str) -> tuple[Flown, tuple[Tick, ...]]:
     """Fly a scenario in lockstep, once in a process however many tests look at it."""
     ticks: list[Tick] = []
     flown = fly_lockstep(
-        load_scenario(name),
-        load_mission("frame_challenge"),
-        observer=lambda moment: ticks.append(Tick.of(moment)),
+        FlightPlan(load_scenario(name), load_mission("frame_challenge")),
+        observers=(lambda moment: ticks.append(Tick.of(moment)),),
     )
     return flown, tuple(ticks)
 
@@ -127,7 +128,7 @@ def _store_all() -> None:
         changed = _changed(stored, ticks)
         store(name, ticks)
         states = sum(old.mission_state != new.mission_state for old, new in pairwise(ticks)) + 1
-        print(f"{name}: {flown.result['verdict']}, {len(ticks)} ticks, {states} states; {changed}")
+        print(f"{name}: {flown.result.verdict}, {len(ticks)} ticks, {states} states; {changed}")
 
 
 def _changed(stored: Sequence[Tick], ticks: Sequence[Tick]) -> str:

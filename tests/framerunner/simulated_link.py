@@ -21,8 +21,8 @@ from mavsdk.exceptions import MavsdkError
 
 from firmware_py.setpoints import setpoint_from_body_velocity
 from firmware_py.status import CommandResult, FlightMode, LandedState
-from framerunner.flight import _start
-from offboard.app import Moment, Outcome, fly_mission
+from framerunner.flying.plan import FlightPlan
+from offboard.app import MissionEnd, Moment, fly_mission
 from offboard.keep_in_box import Box, flight_box
 from offboard.link.setpoints import SetpointStream
 from offboard.link.telemetry import TelemetryFeed
@@ -254,7 +254,7 @@ class LinkedDrone(MavsdkDrone):
     """The adapter with the simulated link in place of MAVSDK's."""
 
     def __init__(self, vehicle: LinkedVehicle, scenario: Scenario, box: Box | None):
-        super().__init__("udpin://127.0.0.1:14540", start_arena=_start(scenario), box=box)
+        super().__init__("udpin://127.0.0.1:14540", start_arena=FlightPlan(scenario).start_pose, box=box)
         self._vehicle = vehicle
         self._feed = TelemetryFeed(vehicle.time_s)
         self._ticks = TickSource(self._feed)
@@ -325,7 +325,7 @@ class LinkedFlight:
         moments: every tick of the mission.
     """
 
-    outcome: Outcome
+    outcome: MissionEnd
     flown: int
     box: Box
     truths: list[TrueState]
@@ -371,7 +371,7 @@ def fly_over(
     box = flight_box(scenario)
     moments: list[Moment] = []
 
-    async def fly() -> Outcome:
+    async def fly() -> MissionEnd:
         kept_in = box if boxed else None
         drone = LinkedDrone(vehicle, scenario, kept_in)
         camera = _Camera(vehicle)

@@ -130,6 +130,18 @@ def test_a_drone_needs_a_camera_and_a_camera_a_drone(refused):
     assert "--drone" in refused("fly", "--camera", "http://127.0.0.1:1/video")
 
 
+def test_a_simulator_that_is_there_needs_the_url_of_its_drone_and_a_good_one_itself(refused):
+    assert "--drone" in refused("fly", "--simulator", "http://127.0.0.1:8100")
+    line = refused("fly", "--drone", "udpin://127.0.0.1:25099", "--simulator", "127.0.0.1:8100")
+    assert "--simulator '127.0.0.1:8100'" in line and "http://HOST:PORT" in line
+
+
+def test_a_simulator_that_is_not_there_is_refused_and_leaves_no_folder(refused):
+    line = refused("fly", "--drone", "udpin://127.0.0.1:25099", "--simulator", "http://127.0.0.1:9")
+    assert "--simulator http://127.0.0.1:9: nothing there answers" in line
+    assert not Path("runs").exists()
+
+
 @pytest.mark.parametrize("option", ["--speed", "--instance"])
 def test_options_of_the_simulator_do_not_go_with_a_drone(refused, option):
     assert option in refused("fly", "--drone", "udpin://127.0.0.1:25099", "--camera", ".", option, "2")

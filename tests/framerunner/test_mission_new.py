@@ -9,7 +9,8 @@ from pathlib import Path
 import pytest
 
 from framerunner.cli import run
-from framerunner.lockstep import fly_lockstep
+from framerunner.flying.lockstep import fly_lockstep
+from framerunner.flying.plan import FlightPlan
 from offboard.chart.vocabulary import Vocabulary
 from offboard.mission import load_mission
 from offboard.pilot import Pilot
@@ -30,7 +31,8 @@ def new(*arguments):
 
 
 def fly(scenario, mission, pilot=None):
-    return fly_lockstep(load_scenario(scenario), load_mission(mission, pilot and read_pilot(pilot)))
+    loaded = load_mission(mission, pilot and read_pilot(pilot))
+    return fly_lockstep(FlightPlan(load_scenario(scenario), loaded))
 
 
 def with_exercise_done(text):
@@ -64,7 +66,7 @@ def test_its_first_exercise_flies_the_whole_challenge():
     new("mine")
     path = Path("mine.yaml")
     path.write_text(with_exercise_done(path.read_text(encoding="utf-8")), encoding="utf-8")
-    assert fly("test-case-1", "mine.yaml").result["verdict"] == "clean"
+    assert fly("test-case-1", "mine.yaml").result.verdict == "clean"
 
 
 @pytest.mark.parametrize("python", [[], ["--python"]], ids=["yaml", "python"])
@@ -158,7 +160,7 @@ def test_the_examples_of_the_documents_are_good(kind):
         assert {"creep", "far_away", "careful_m_s"} <= set(dir(read_pilot("mine.py").pilot_class()))
     else:
         Path("mine.yaml").write_text(example, encoding="utf-8")
-        assert fly("empty", "mine.yaml").result["ended"] == "finished"
+        assert fly("empty", "mine.yaml").result.ended == "finished"
 
 
 def test_its_templates_are_shipped():

@@ -4,8 +4,9 @@ from math import inf, nextafter
 
 from framerunner.evaluation.backends import Pool
 from framerunner.evaluation.runner import fly_all
-from framerunner.evaluation.task import FlightTask, fly_task
-from framerunner.state_hash import StateHash
+from framerunner.evaluation.task import fly_task
+from framerunner.flying.lockstep import StateHash
+from framerunner.flying.plan import FlightPlan
 from offboard.mission import load_mission
 from scenarios.loader import load_scenario
 from scenarios.truth import TrueState
@@ -17,7 +18,7 @@ LIMIT_S = 5.0
 def task(number, name="test-case-1"):
     """The same flight under another name: a name is no input of the physics."""
     update = {"name": f"run-{number}", "try_limit_s": LIMIT_S}
-    return FlightTask(load_scenario(name).model_copy(update=update), MISSION)
+    return FlightPlan(load_scenario(name).model_copy(update=update), MISSION)
 
 
 def test_twenty_runs_of_one_flight_have_one_hash():

@@ -18,16 +18,14 @@ from contextlib import AsyncExitStack, asynccontextmanager
 from dataclasses import asdict
 from math import inf, isfinite
 
-from firmware_py.airframe import load_airframe
 from firmware_py.mavlink.camera.model import CameraModel, VideoEncoding, VideoStream
 from firmware_py.mavlink.node import MavlinkNode, NodeOptions
 from firmware_py.mavlink.rates import GROUND, ONBOARD
+from framerunner.flying.plan import FlightPlan
 from geometry.axes import flip_vector
-from monitor.ports import Equipment, LinkFailed, Message
-from scenarios.ground import start_position
+from monitor.ports import Equipment, Message
 from scenarios.loader import list_scenarios, load_scenario
 from scenarios.models import Scenario
-from scenarios.referee import Referee
 from scenarios.truth import TrueState
 from sitl.camera_feed import CameraFeed
 from sitl.simulation import Simulation
@@ -36,6 +34,7 @@ from sitl.world import CONTROL_PERIOD_US
 from tests.node_input import deliver
 from wire.dialect import mavlink
 from wire.mission_messages import COMPONENT_ID
+from wire.transports.urls import LinkError
 
 _BURST_TICKS = 5  # 20 ms of simulated time at once
 _TRUTHS = 5000  # 20 s
@@ -121,7 +120,7 @@ class SimulatedDrone:
             "time_us": simulation.time_us,
             "local_frame": origin_ned_m and {"origin_arena_m": flip_vector(origin_ned_m), "yaw_rad": 0.0},
             "snapshot": asdict(referee.snapshot()),
-            "report": referee.report().as_dict(),
+            "report": referee.report().as_json(),
         }
 
 
@@ -168,10 +167,10 @@ class SimulatedLink:
         self._parser.robust_parsing = True
 
     def open(self) -> SimulatedLink:
-        """What `Equipment.open_link` calls; raises `LinkFailed` while the link is broken."""
+        """What `Equipment.open_link` calls; raises `LinkError` while the link is broken."""
         self.opened += 1
         if self._problem is not None:
-            raise LinkFailed(self._problem)
+            raise LinkError(self._problem)
         return self
 
     def receive(self, timeout_s: float) -> list[Message]:
@@ -179,7 +178,7 @@ class SimulatedLink:
         messages: list[Message] = []
         with self._asked:
             if self._problem is not None:
-                raise LinkFailed(self._problem)
+                raise LinkError(self._problem)
             self._deliver(messages)
             for _ in range(self._due_ticks()):
                 for drone in self.drones:
@@ -277,27 +276,16 @@ def _answerer(link: SimulatedLink, drone: SimulatedDrone) -> Callable[[object], 
     return answer
 
 
-def make_referee(scenario: Scenario) -> Referee:
-    """The referee that the monitor is given."""
-    return Referee(scenario, load_airframe(scenario.airframe).envelope_m)
-
-
-def start_pose(scenario: Scenario) -> tuple[float, float, float, float]:
-    """Where the drone's centre is at first, and where it looks."""
-    x_m, y_m, ground_m = start_position(scenario)
-    return (x_m, y_m, ground_m + load_airframe(scenario.airframe).envelope_m[2] / 2, scenario.start.yaw_rad)
-
-
 def equipment(link: SimulatedLink, scenario: Scenario | None = None) -> Equipment:
     """What a monitor is given to watch these drones."""
     return Equipment(
         open_link=link.open,
-        make_referee=make_referee,
+        make_referee=lambda flown: FlightPlan(flown).new_referee(),
         scenario=scenario,
         list_scenarios=list_scenarios,
         load_scenario=load_scenario,
         runs=None,
-        start_pose=start_pose,
+        start_pose=lambda flown: FlightPlan(flown).start_pose,
         camera_hosts=link.camera_hosts,
     )
 

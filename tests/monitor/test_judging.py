@@ -3,10 +3,11 @@
 import pytest
 
 from firmware_py.status import FlightMode
+from framerunner.flying.plan import FlightPlan
 from monitor.vehicle.placement import Source
 from scenarios.loader import load_scenario
 from scenarios.truth import TrueState
-from tests.monitor.simulated_link import SimulatedLink, equipment, make_referee, served_link
+from tests.monitor.simulated_link import SimulatedLink, equipment, served_link
 from tests.monitor.vehicle.test_mission_view import tunnel
 from tests.monitor.watching import watching
 from wire.dialect import mavlink
@@ -42,15 +43,13 @@ async def test_the_drones_referee_is_followed_to_the_end():
         await watched.until(lambda: ended(watched), 30.0)
         truth = link.drones[0].simulation.referee
         event = ended(watched)[0]
-        assert event.report == link.drones[0].referee_answer()["report"] | {
-            key: list(value) for key, value in event.report.items() if isinstance(value, list)
-        }
+        assert event.report.as_json() == link.drones[0].referee_answer()["report"]
         assert (event.scenario, event.source, event.final) == (SCENARIO.name, "truth", False)
         assert event.key == f"1-170000000-{truth.snapshot().began_us}"
         figures = watched.status()["figures"]
         assert figures["try_time_s"] == truth.try_time_s
         assert (figures["verdict"], figures["over"], figures["final"]) == (
-            event.report["verdict"],
+            event.report.verdict,
             True,
             False,
         )
@@ -81,7 +80,7 @@ async def result_follows(watched, link):
 async def test_the_monitors_own_referee_judges_as_one_that_is_fed_directly(monkeypatch):
     link = SimulatedLink(SCENARIO, speed=6.0)
     Hop(link.drones[0], air_s=8.0)
-    fed = make_referee(SCENARIO)
+    fed = FlightPlan(SCENARIO).new_referee()
     async with watching(equipment(link, SCENARIO)) as watched:
         vehicle = await watched.until(lambda: watched.fleet._vehicles.get(1))
         await watched.until(lambda: vehicle._placement.source is Source.START)
@@ -105,7 +104,7 @@ async def test_the_monitors_own_referee_judges_as_one_that_is_fed_directly(monke
         await watched.until(lambda: ended(watched), 30.0)
         event = ended(watched)[0]
         truth = link.drones[0].simulation.referee.report()
-    told, expected = dict(event.report), fed.report().as_dict()
+    told, expected = event.report.as_json(), fed.report().as_json()
     assert told.pop("ignored_states") == expected.pop("ignored_states") == 0
     assert told == expected
     assert event.source == "telemetry"

@@ -7,10 +7,11 @@ from dataclasses import asdict
 import pytest
 from aiohttp import web
 
+from framerunner.flying.plan import FlightPlan
 from monitor.referee_channel import RefereeChannel
 from scenarios.loader import load_scenario
-from scenarios.report import RefereeSnapshot
-from tests.monitor.simulated_link import make_referee
+from scenarios.result import RefereeSnapshot
+from wire.simulator_api import SimulatorApi
 
 SCENARIO = load_scenario("test-case-1")
 SNAPSHOT = RefereeSnapshot(5, 1.0, 0.0, ("red",), "green", 0, True, True, False, False)
@@ -24,7 +25,7 @@ def good_answer():
         "time_us": 7,
         "local_frame": {"origin_arena_m": [1.0, 2.0, 3.0], "yaw_rad": 0.5},
         "snapshot": asdict(SNAPSHOT),
-        "report": make_referee(SCENARIO).report().as_dict(),
+        "report": FlightPlan(SCENARIO).new_referee().report().as_json(),
     }
 
 
@@ -61,8 +62,8 @@ async def asked(site):
     runner = web.AppRunner(app, access_log=None, shutdown_timeout=0.1)
     await runner.setup()
     await web.TCPSite(runner, "127.0.0.1", 0).start()
-    url = f"http://127.0.0.1:{runner.addresses[0][1]}/video"
-    site.channel = RefereeChannel(url, site.heard.append, lambda level, text: site.said.append(text))
+    api = SimulatorApi(f"http://127.0.0.1:{runner.addresses[0][1]}")
+    site.channel = RefereeChannel(api, site.heard.append, lambda level, text: site.said.append(text))
     task = asyncio.create_task(site.channel.run())
     try:
         yield
@@ -84,7 +85,7 @@ async def test_it_asks_five_times_a_second_and_for_the_scenario_once(site):
         assert site.channel.scenario == SCENARIO
     assert site.asked.count("/scenario.json") == 1
     told = site.heard[0]
-    assert told.standing().snapshot == SNAPSHOT
+    assert told.snapshot == SNAPSHOT
     assert told.local_frame.origin_arena_m == (1.0, 2.0, 3.0)
     assert (site.channel.lift_m, site.channel.source, site.said) == (0.25, "truth", [])
 

@@ -4,17 +4,17 @@ from dataclasses import replace
 
 import pytest
 
-from monitor.standing import Standing, figures
 from monitor.tries import TryWatch
-from scenarios.report import RefereeSnapshot
+from monitor.vehicle.judging import figures
+from scenarios.result import FlightResult, RefereeReport, RefereeSnapshot, Standing
 
 FLYING = RefereeSnapshot(5_000_000, 10.0, 0.0, ("red",), "green", 0, True, True, False, False)
-REPORT = {"verdict": "aborted", "reason": "still flying", "try_time_s": 10.0, "crossing_times_s": [4.0]}
-CLEAN = {**REPORT, "verdict": "clean", "reason": "all crossed"}
+REPORT = RefereeReport(verdict="aborted", reason="still flying", try_time_s=10.0, crossing_times_s=(4.0,))
+CLEAN = RefereeReport(**{**dict(REPORT), "verdict": "clean", "reason": "all crossed"})
 
 
 def standing(snapshot=FLYING, report=REPORT, *, source="truth", **changes):
-    return Standing("s", source, replace(snapshot, **changes), report)
+    return Standing(scenario="s", source=source, snapshot=replace(snapshot, **changes), report=report)
 
 
 def landed(time_s=40.0, **changes):
@@ -22,14 +22,8 @@ def landed(time_s=40.0, **changes):
 
 
 def result(time_s=40.0, **changes):
-    return {
-        "scenario": "s",
-        "judged_by": "truth",
-        "ended": "finished",
-        "verdict": "clean",
-        "try_time_s": time_s,
-        **changes,
-    }
+    told = {"scenario": "s", "judged_by": "truth", "ended": "finished", "verdict": "clean"}
+    return FlightResult.from_outside({**told, "try_time_s": time_s, **changes})
 
 
 @pytest.fixture
@@ -140,7 +134,7 @@ def test_a_referee_that_vanishes_ends_the_try_and_one_that_returns_goes_on(watch
     assert kinds(events) == [("began", False)]
     watch.tick(4.1)
     assert kinds(events)[-1] == ("ended", False)
-    assert events[-1].report["reason"] == "still flying; nothing was heard of it for 3 s"
+    assert events[-1].report.reason == "still flying; nothing was heard of it for 3 s"
     watch.see(standing(), 6.0)
     assert kinds(events)[-1] == ("running", False)
     watch.see(landed(), 8.0)
@@ -166,7 +160,7 @@ def test_the_next_try_ends_one_that_was_left(watch, events):
 def test_a_restart_ends_it(watch, events):
     watch.see(standing(), 1.0)
     watch.close()
-    assert events[-1].report["reason"].endswith("the drone started anew")
+    assert events[-1].report.reason.endswith("the drone started anew")
 
 
 def test_where_nobody_else_judges_the_apps_word_stands(watch, events):
@@ -230,7 +224,7 @@ def test_final_figures_are_those_of_the_result():
     shown = {
         key: told[key] for key in ("try_time_s", "penalty_s", "total_time_s", "verdict", "reason", "contacts")
     }
-    assert shown == {key: app[key] for key in shown}
+    assert shown == {key: getattr(app, key) for key in shown}
     assert (told["crossed"], told["crossing_times_s"]) == (["red", "green"], [1.5, 2.5])
     assert (told["final"], told["over"]) == (True, True)
     assert figures(None, app, None)["total_time_s"] == 41.75

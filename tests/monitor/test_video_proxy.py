@@ -5,8 +5,7 @@ import struct
 import pytest
 from aiohttp import web
 
-from monitor.video_proxy import can_be_passed_on
-from monitor.video_stream import MAX_IMAGE_BYTES, Shot, ShotCutter, StreamBrokenError
+from monitor.video_proxy import MAX_IMAGE_BYTES, can_be_passed_on
 from tests.monitor.serving import browser, serving
 
 JPEG = b"\xff\xd8\xff\xe0 an image \xff\xd9"
@@ -15,45 +14,6 @@ JPEG = b"\xff\xd8\xff\xe0 an image \xff\xd9"
 def part(number, body=JPEG, head=""):
     text = f"--x\r\nContent-Type: image/jpeg\r\nX-Time-Us: {number}\r\n{head}\r\n"
     return text.encode() + body + b"\r\n"
-
-
-@pytest.mark.parametrize("size", [1, 7, 1000])
-@pytest.mark.parametrize("head", ["", f"Content-Length: {len(JPEG)}\r\n"])
-def test_images_are_cut_whatever_the_pieces(size, head):
-    cutter = ShotCutter("multipart/x-mixed-replace; boundary=--x")
-    stream = b"noise" + part(1, head=head) + part(2, head=head) + b"--x"
-    shots = []
-    for at in range(0, len(stream), size):
-        shots += cutter.feed(stream[at : at + size])
-    assert [shot.time_us for shot in shots] == [1, 2]
-    assert all(shot.jpeg.rstrip(b"\r\n") == JPEG for shot in shots)
-
-
-def test_what_is_no_jpeg_is_dropped():
-    cutter = ShotCutter('multipart/x-mixed-replace; boundary="x"')
-    evil = b"<script>alert(1)</script>"
-    length = f"Content-Length: {len(evil)}\r\n"
-    sound = f"Content-Length: {len(JPEG)}\r\n"
-    assert cutter.feed(part(1, evil, length) + part(2, head=sound)) == [Shot(JPEG, 2)]
-
-
-@pytest.mark.parametrize(
-    "data",
-    [
-        part(1, head=f"Content-Length: {MAX_IMAGE_BYTES + 1}\r\n"),
-        part(1, b"\xff\xd8\xff" + bytes(MAX_IMAGE_BYTES)),
-        b"--x\r\n" + b"a: b\r\n" * 10_000,
-    ],
-)
-def test_what_is_too_large_is_refused(data):
-    with pytest.raises(StreamBrokenError, match=r"exceed|refused"):
-        ShotCutter("multipart/x-mixed-replace; boundary=x").feed(data)
-
-
-@pytest.mark.parametrize("kind", ["text/html", "image/jpeg", "multipart/mixed", ""])
-def test_another_kind_of_stream_is_refused(kind):
-    with pytest.raises(StreamBrokenError):
-        ShotCutter(kind)
 
 
 def test_only_http_is_passed_on():
@@ -79,6 +39,7 @@ class Camera:
         self.now = 0
         self.number = 0
         self.is_broken = self.hold = False
+        self.first = b""  # written before all images
         self.changed = asyncio.Event()
 
     def show(self):
@@ -92,6 +53,7 @@ class Camera:
         self.connections += 1
         self.now += 1
         try:
+            await response.write(self.first)
             while True:
                 if self.hold:
                     await asyncio.Event().wait()
@@ -162,6 +124,29 @@ async def test_one_image_is_had_alone(monkeypatch):
             assert answer.headers["Content-Type"] == "image/jpeg"
             assert answer.headers["X-Time-Us"] == "7"
             assert answer.headers["X-Content-Type-Options"] == "nosniff"
+
+
+EVIL = b"<script>alert(1)</script>"
+
+
+@pytest.mark.parametrize("head", ["", f"Content-Length: {len(EVIL)}\r\n"])
+async def test_what_is_no_jpeg_is_not_passed_on(monkeypatch, head):
+    async with camera() as source, serving(monkeypatch) as served, browser() as client:
+        served.fleet.video = source.url
+        source.first = part(1, EVIL, head)
+        source.number = 2
+        async with client.get(served.url + "video/1/image.jpg") as answer:
+            assert (await answer.read(), answer.headers["X-Time-Us"]) == (JPEG, "2")
+
+
+async def test_an_image_that_is_too_large_ends_the_connection(monkeypatch):
+    monkeypatch.setattr("monitor.video_proxy.FIRST_IMAGE_S", 0.5)
+    async with camera() as source, serving(monkeypatch) as served, browser() as client:
+        served.fleet.video = source.url
+        source.first = part(1, head=f"Content-Length: {MAX_IMAGE_BYTES + 1}\r\n")
+        async with client.get(served.url + "video/1/image.jpg") as answer:
+            assert answer.status == 503
+        await reached(lambda: source.now == 0 or source.show())
 
 
 async def next_frame(answer):

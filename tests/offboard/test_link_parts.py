@@ -1,4 +1,4 @@
-"""Addresses, axes, requests and telemetry, without a vehicle."""
+"""Axes, requests and telemetry, without a vehicle."""
 
 from __future__ import annotations
 
@@ -9,57 +9,14 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from offboard.drone import DroneError
 from offboard.link.alignment import Alignment, Pose
 from offboard.link.requests import Requests
 from offboard.link.telemetry import TelemetryFeed
-from offboard.link.url import check_free, parse_url
 
 finite = st.floats(-500, 500)
 angle = st.floats(-3.1, 3.1)
 vector = st.tuples(finite, finite, finite)
 poses = st.builds(Pose, vector, angle)
-
-
-@pytest.mark.parametrize(
-    "text",
-    [
-        "udpin://0.0.0.0:14540",
-        "udpout://192.168.1.10:14550",
-        "tcpout://localhost:5760",
-        "serial:///dev/ttyUSB0:57600",
-    ],
-)
-def test_good_addresses(text):
-    assert parse_url(text).text == text
-
-
-@pytest.mark.parametrize(
-    "text",
-    [
-        "",
-        "14540",
-        "udp://:14540",
-        "udpin://:14540",
-        "udpin://0.0.0.0",
-        "udpin://0.0.0.0:0",
-        "udpin://0.0.0.0:99999",
-        "udpin://localhost:14540",
-        "http://0.0.0.0:80",
-        "serial://ttyUSB0:57600",
-        "udpin://0.0.0.0:14540x",
-    ],
-)
-def test_bad_addresses_are_named(text):
-    with pytest.raises(DroneError, match=r"^bad drone address '") as caught:
-        parse_url(text)
-    assert f"'{text}'" in str(caught.value)
-    assert "\n" not in str(caught.value)
-
-
-def test_a_missing_serial_device_is_told():
-    with pytest.raises(DroneError, match="/dev/ttyNONE9 does not exist"):
-        check_free(parse_url("serial:///dev/ttyNONE9:57600"))
 
 
 @given(poses, poses)

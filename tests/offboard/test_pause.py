@@ -8,7 +8,7 @@ from textwrap import dedent
 
 import pytest
 
-from offboard.app import Moment, Outcome, fly_mission
+from offboard.app import MissionEnd, Moment, fly_mission
 from offboard.drone import DroneError, VelocityCommand
 from offboard.eyes import CameraLostError
 from offboard.mission import Mission, load_mission
@@ -65,7 +65,7 @@ class Flight:
         for name, value in fields.items():
             setattr(self.drone, name, value)
 
-    async def fly(self) -> Outcome:
+    async def fly(self) -> MissionEnd:
         return await fly_mission(
             self.drone, None, self.mission, limit_s=self.limit_s, observer=self._see, eyes=self.eyes
         )

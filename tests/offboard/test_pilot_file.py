@@ -7,7 +7,8 @@ from textwrap import dedent
 
 import pytest
 
-from framerunner.lockstep import fly_lockstep
+from framerunner.flying.lockstep import fly_lockstep
+from framerunner.flying.plan import FlightPlan
 from offboard.engine import MissionEngine, MissionRunError
 from offboard.mission import MissionError, load_mission
 from offboard.pilot import Imu, Pilot, PilotError, velocity_command
@@ -63,10 +64,11 @@ MISSION = dedent("""\
 
 FLY_WHAT_IS_SENT = """
 import pickle, sys
-from framerunner.lockstep import fly_lockstep
+from framerunner.flying.lockstep import fly_lockstep
+from framerunner.flying.plan import FlightPlan
 from scenarios.loader import load_scenario
 
-result = fly_lockstep(load_scenario("empty"), pickle.load(sys.stdin.buffer)).result
+result = fly_lockstep(FlightPlan(load_scenario("empty"), pickle.load(sys.stdin.buffer))).result
 print(result["state_sha256"], result["try_time_s"])
 """
 
@@ -233,10 +235,10 @@ def test_an_error_in_a_value_is_told_by_its_line_too(tmp_path, mission_file):
 def test_an_error_in_flight_ends_it_in_hold(tmp_path, mission_file):
     breaks = GOOD.replace("self.hover()\n", "self.hover()\n        self.memory.count /= self.imu.z < 0.6\n")
     mission = load_mission(mission_file, read_pilot(pilot_file(tmp_path, breaks)))
-    flown = fly_lockstep(load_scenario("empty"), mission)
+    flown = fly_lockstep(FlightPlan(load_scenario("empty"), mission))
     assert flown.outcome.ended == "aborted"
-    assert "my_pilot.py:24: ZeroDivisionError: " in flown.result["reason"]
-    assert flown.result["verdict"] == "aborted"
+    assert "my_pilot.py:24: ZeroDivisionError: " in flown.result.reason
+    assert flown.result.verdict == "aborted"
     assert flown.track.z[-1] > 0.5  # its motors were not stopped in the air
 
 
@@ -244,14 +246,14 @@ def test_a_mission_travels_and_flies_alike(tmp_path, mission_file):
     mission = load_mission(mission_file, read_pilot(pilot_file(tmp_path, GOOD)))
     mission_file.unlink()
     scenario = load_scenario("empty")
-    here = fly_lockstep(scenario, mission)
+    here = fly_lockstep(FlightPlan(scenario, mission))
     sent = pickle.dumps(mission)  # after a flight: what it built must not be sent
     flown = subprocess.run(
         [sys.executable, "-c", FLY_WHAT_IS_SENT], input=sent, capture_output=True, check=True
     )
     assert len(sent) < 10_000
     assert here.outcome.ended == "finished"
-    assert flown.stdout.decode().split() == [here.result["state_sha256"], str(here.result["try_time_s"])]
+    assert flown.stdout.decode().split() == [here.result.state_sha256, str(here.result.try_time_s)]
     assert pickle.loads(sent) == mission
 
 

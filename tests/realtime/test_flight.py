@@ -11,7 +11,8 @@ import cv2
 import pytest
 from pymavlink import mavutil
 
-from framerunner.lockstep import fly_lockstep
+from framerunner.flying.lockstep import fly_lockstep
+from framerunner.flying.plan import FlightPlan
 from framerunner.recording.find import recorded_flight
 from offboard.app import Moment
 from offboard.mission import load_mission
@@ -90,8 +91,8 @@ def busy_flight(tmp_path_factory):
 def lockstep_flight():
     """The same in lockstep: result, and what was seen at each tick."""
     moments = []
-    scenario, mission = load_scenario("test-case-3"), load_mission("frame_challenge")
-    return fly_lockstep(scenario, mission, observer=moments.append).result, moments
+    plan = FlightPlan(load_scenario("test-case-3"), load_mission("frame_challenge"))
+    return fly_lockstep(plan, observers=(moments.append,)).result, moments
 
 
 @pytest.mark.alone
@@ -146,9 +147,9 @@ def test_it_leaves_result_track_log_and_video(busy_flight, lockstep_flight):
     assert images(folder / "video.avi") > 8 * result["try_time_s"]
 
     assert (result["verdict"], result["try_time_s"], tuple(result["crossing_sides"])) == (
-        lockstep["verdict"],
-        pytest.approx(lockstep["try_time_s"], abs=0.01),
-        lockstep["crossing_sides"],
+        lockstep.verdict,
+        pytest.approx(lockstep.try_time_s, abs=0.01),
+        lockstep.crossing_sides,
     )
 
 

@@ -92,10 +92,10 @@ def test_a_clean_try():
 
 
 def test_a_report_is_plain_json():
-    data = json.loads(json.dumps(Flight().motors(True).fly(*LAP).land().report().as_dict()))
+    data = json.loads(json.dumps(Flight().motors(True).fly(*LAP).land().report().as_json()))
     assert data["verdict"] == "clean"
     assert data["frames_crossed"] == ["red", "green", "blue"]
-    assert json.loads(json.dumps(Flight().report().as_dict()))["landing_error_m"] is None
+    assert json.loads(json.dumps(Flight().report().as_json()))["landing_error_m"] is None
 
 
 def test_contacts_make_it_completed_and_a_gap_makes_a_new_one():

@@ -12,10 +12,12 @@ from firmware_py.autopilot import Autopilot
 from firmware_py.mavlink.node import MavlinkNode
 from firmware_py.types import GeodeticPoint
 from sitl.link_hub import LinkHub
-from sitl.link_urls import LinkError, parse_link
+from sitl.server_settings import parse_link
 from tests.processes import bound
 from wire.dialect import mavlink
 from wire.framing import PacketReader
+from wire.transports.sockets import MAX_UNSENT_BYTES
+from wire.transports.urls import LinkError
 
 STATION = mavlink.MAVLink(None, 255, 190)
 BEAT = mavlink.MAVLink_heartbeat_message(mavlink.MAV_TYPE_GCS, 8, 0, 0, 4, 3)
@@ -127,7 +129,7 @@ async def test_tcp_clients_hear_each_other():
 
 
 async def test_a_tcp_client_connects_when_the_server_comes_and_again_when_it_was_gone(monkeypatch):
-    monkeypatch.setattr("sitl.stream_links._RETRY_S", 0.02)
+    monkeypatch.setattr("sitl.links.RETRY_S", 0.02)
     port = free_port()
     async with drone_with(f"tcpout://127.0.0.1:{port}") as drone:
         for _ in range(2):
@@ -155,7 +157,7 @@ async def test_a_choked_tcp_client_costs_nothing_but_its_packets():
             if drone.time_us % 10_000_000 == 0:
                 await asyncio.sleep(0)
         (carrier,) = drone.hub._carriers.values()
-        assert carrier._writer.get_write_buffer_size() <= 1 << 18
+        assert len(carrier._stream._unsent) <= MAX_UNSENT_BYTES
         writer.close()
 
 
@@ -221,13 +223,54 @@ async def test_a_serial_line_carries_both_ways():
     os.close(theirs)
 
 
+async def test_a_serial_line_that_was_gone_is_opened_again(monkeypatch, tmp_path):
+    monkeypatch.setattr("sitl.links.RETRY_S", 0.02)
+    device = tmp_path / "tty"
+
+    def plug_in():
+        ours, theirs = pty.openpty()
+        os.set_blocking(ours, False)
+        device.unlink(missing_ok=True)
+        device.symlink_to(os.ttyname(theirs))
+        return ours, theirs
+
+    def read(ours):
+        try:
+            return os.read(ours, 4096)
+        except BlockingIOError:
+            return b""
+
+    line = plug_in()
+    async with drone_with(f"serial://{device}:57600") as drone:
+        await heard(drone, lambda: read(line[0]), "HEARTBEAT")
+        os.close(line[0])
+        os.close(line[1])
+        await asyncio.sleep(0.1)
+        assert drone.hub._carriers == {}
+        line = plug_in()
+        await heard(drone, lambda: read(line[0]), "HEARTBEAT")
+    os.close(line[0])
+    os.close(line[1])
+
+
+async def test_only_so_many_tcp_clients_are_let_in():
+    port = free_port()
+    async with drone_with(f"tcpin://127.0.0.1:{port}") as drone:
+        peers = [await tcp_peer(port) for _ in range(17)]
+        async with asyncio.timeout(5):
+            await asyncio.wait([peer.task for peer in peers], return_when=asyncio.FIRST_COMPLETED)
+        assert len(drone.hub._carriers) == 16
+        for peer in peers:
+            peer.leave()
+
+
 @pytest.mark.parametrize(
     ("url", "said"),
     [
         ("serial:///dev/null:57600", "not a serial line"),
         ("serial:///dev/not-there:57600", "No such file"),
         ("serial:///dev/null:57601", "baud rate"),
-        ("tcpin://192.0.2.1:5760", "192.0.2.1:5760"),
+        ("tcpin://192.0.2.1:5760", "192.0.2.1:5760 cannot be listened on (Cannot assign requested address);"),
     ],
 )
 async def test_what_cannot_be_opened_is_said_in_one_line(url, said):

@@ -7,7 +7,7 @@ from firmware_py.autopilot import Autopilot
 from firmware_py.mavlink.node import MavlinkNode
 from firmware_py.mavlink.rates import GROUND, ONBOARD
 from firmware_py.types import GeodeticPoint
-from sitl.link_input import LinkInput
+from sitl.link_hub import LinkInput
 from wire.dialect import mavlink
 
 BEAT = mavlink.MAVLink_heartbeat_message(mavlink.MAV_TYPE_GCS, 8, 0, 0, 4, 3)

@@ -1,11 +1,13 @@
 """UDP links over real sockets."""
 
 import asyncio
+import os
 import socket
 
 import pytest
 
-from sitl.links import MAX_PARTNERS, LinkError, UdpAddresses, UdpLink, open_udp
+from sitl.links import MAX_PEERS, UdpAddresses, UdpLink, open_udp
+from wire.transports.urls import LinkError
 
 PACKET = bytes((0xFD, 0, 0))
 
@@ -53,42 +55,57 @@ async def test_a_taken_port_is_said_in_one_line():
         assert "\n" not in str(error.value)
 
 
-class FakeTransport(asyncio.DatagramTransport):
+class FakeSocket:
+    """Hands out one datagram at a time and notes to whom others go."""
+
     def __init__(self):
-        super().__init__()
         self.sent = []
+        self.peer = None
+        self.data = b""
+        self._pipe = os.pipe()
 
-    def is_closing(self):
-        return False
+    def fileno(self):
+        return self._pipe[0]
 
-    def sendto(self, data, addr=None):
-        self.sent.append(addr)
+    def read(self):
+        return self.data
+
+    def write(self, data, to=None):
+        self.sent.append(to)
+
+    def close(self):
+        for each in self._pipe:
+            os.close(each)
 
 
 @pytest.fixture
-def link():
-    """A link that speaks to home, its clock in seconds, and to whom its next datagram goes."""
+async def link():
+    """A link that speaks to home: how to hear, its clock in seconds, and to whom its next datagram goes."""
     now = [0.0]
-    link = UdpLink(("home", 1), lambda data: None, clock=lambda: now[0])
-    transport = FakeTransport()
-    link.connection_made(transport)
+    transport = FakeSocket()
+    link = UdpLink(transport, ("home", 1), lambda data: None, clock=lambda: now[0])
+
+    def hear(data, peer):
+        transport.data, transport.peer = data, peer
+        link._read()
 
     def targets():
         transport.sent.clear()
         link.send(b"")
         return transport.sent
 
-    return link, now, targets
+    yield hear, now, targets
+    link.close()
 
 
-def test_speaks_to_home_and_to_all_who_spoke_lately(link):
-    link, now, targets = link
+async def test_speaks_to_home_and_to_all_who_spoke_lately(link):
+    hear, now, targets = link
     assert targets() == [("home", 1)]
-    link.datagram_received(PACKET, ("a", 1))
-    link.datagram_received(PACKET, ("home", 1))
+    hear(PACKET, ("a", 1))
+    hear(PACKET, ("home", 1))
     assert targets() == [("home", 1), ("a", 1)]
     now[0] = 3.0
-    link.datagram_received(PACKET, ("b", 2))
+    hear(PACKET, ("b", 2))
     assert targets() == [("home", 1), ("a", 1), ("b", 2)]
     now[0] = 5.1
     assert targets() == [("home", 1), ("b", 2)]
@@ -96,15 +113,15 @@ def test_speaks_to_home_and_to_all_who_spoke_lately(link):
     assert targets() == [("home", 1)]
 
 
-def test_what_is_not_mavlink_makes_no_partner(link):
-    link, _, targets = link
+async def test_what_is_not_mavlink_makes_no_peer(link):
+    hear, _, targets = link
     for noise in (b"", b"GET / HTTP/1.1", bytes(20)):
-        link.datagram_received(noise, ("a", 1))
+        hear(noise, ("a", 1))
     assert targets() == [("home", 1)]
 
 
-def test_partners_are_few(link):
-    link, _, targets = link
+async def test_peers_are_few(link):
+    hear, _, targets = link
     for port in range(20):
-        link.datagram_received(PACKET, ("a", port))
-    assert len(targets()) == 1 + MAX_PARTNERS
+        hear(PACKET, ("a", port))
+    assert len(targets()) == 1 + MAX_PEERS

@@ -9,7 +9,7 @@ import pytest
 
 from scenarios.models import Camera
 from sitl.rtp import RtpSender
-from sitl.video import VideoError
+from wire.transports.urls import LinkError
 
 CAMERA = Camera(width_px=320, height_px=240, rate_hz=10.0)
 RED, GREEN, BLUE = (0, 0, 255), (0, 255, 0), (255, 0, 0)
@@ -142,6 +142,6 @@ def test_stamps_count_the_watchers_seconds():
 
 
 def test_an_unknown_host_is_said_in_one_line():
-    with pytest.raises(VideoError, match="RTP to no such host:5600 cannot be sent") as error:
+    with pytest.raises(LinkError, match="RTP no such host:5600 cannot be sent to") as error:
         RtpSender(("no such host", 5600), CAMERA)
     assert "\n" not in str(error.value)

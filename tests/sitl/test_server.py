@@ -11,14 +11,14 @@ import pytest
 from scenarios.loader import load_scenario
 from scenarios.models import Scenario
 from sitl.fleet import side_by_side
-from sitl.link_urls import LinkError, parse_link
 from sitl.server import SimulatorServer, _Notices
-from sitl.server_settings import ServerSettings
+from sitl.server_settings import ServerSettings, parse_link
 from sitl.simulation import Simulation
 from sitl.video import VideoError
 from sitl.world import CONTROL_PERIOD_US
 from tests.processes import bound, free_instance
 from wire.signing import SigningKey
+from wire.transports.urls import LinkError
 
 GREETING = "Ctrl-C stops"
 

@@ -149,7 +149,7 @@ class Open(StillVehicle):
 
 def test_the_page_names_what_is_missing_and_the_exit_code_is_one(monkeypatch, capsys):
     monkeypatch.setattr(visit, "time", next(Open.clocks))
-    monkeypatch.setattr("framerunner.vehicle_link.VehicleLink", Open)
+    monkeypatch.setattr("wire.transports.vehicle_link.VehicleLink", Open)
     monkeypatch.setenv("COLUMNS", "160")
     assert run(["doctor", "--drone", "udpin://0.0.0.0:14540"]) == 1
     page = capsys.readouterr().out

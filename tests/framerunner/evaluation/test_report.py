@@ -13,11 +13,10 @@ import pytest
 from framerunner.cli import build_app
 from framerunner.evaluation.plan import plan_level
 from framerunner.evaluation.report import Page, picked_for_pictures, replay_command, write_report
-from framerunner.evaluation.rows import COLUMNS
+from framerunner.evaluation.rows import COLUMNS, csv_text
 from framerunner.evaluation.statistics import summarise
 from framerunner.evaluation.store import open_folder
-from framerunner.evaluation.table_file import csv_text
-from framerunner.pictures import Track
+from framerunner.runs.track import Track
 from offboard.mission import load_mission
 from tests.framerunner.evaluation.flights import made_row
 
@@ -55,7 +54,7 @@ def report(path, rows, **values):
     plan = plan_level("calm", 1, 6, load_mission("frame_challenge"))
     with open_folder(path, plan.identity) as folder:
         for scenario, row in zip(plan.scenarios, rows, strict=False):
-            folder.keep(scenario, replace(row, scenario=scenario.name))
+            folder.keep(scenario, row.model_copy(update={"scenario": scenario.name}))
         drawn = []
         page = Page("level calm", "frame_challenge", None, "framerunner evaluate", summarise(rows), None)
         write_report(folder, replace(page, **values), lambda done, total: drawn.append((done, total)))

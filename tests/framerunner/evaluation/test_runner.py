@@ -8,9 +8,9 @@ from framerunner.errors import SettingError
 from framerunner.evaluation import backends
 from framerunner.evaluation.backends import Pool, check_pool
 from framerunner.evaluation.plan import plan_files
+from framerunner.evaluation.rows import csv_text
 from framerunner.evaluation.runner import fly_all, fly_alone
-from framerunner.evaluation.table_file import csv_text
-from framerunner.evaluation.task import FlightTask
+from framerunner.flying.plan import FlightPlan
 from offboard.mission import load_mission
 from offboard.pilot_file import PilotFile
 from tests.framerunner.evaluation.flights import short_scenario, write_scenarios
@@ -71,7 +71,7 @@ def test_a_dask_cluster_of_processes_flies_as_one_does(plan, alone, tmp_path):
 def test_flights_are_handed_out_only_as_others_come_back(jobs):
     mission = load_mission("frame_challenge")
     seeds = itertools.count()
-    endless = (FlightTask(short_scenario(next(seeds), 0.2), mission) for _ in itertools.repeat(None))
+    endless = (FlightPlan(short_scenario(next(seeds), 0.2), mission) for _ in itertools.repeat(None))
     rows = fly_all(endless, Pool(jobs=jobs))
     names = {next(rows).scenario for _ in range(3)}
     rows.close()
@@ -89,7 +89,7 @@ def deadly(victim, end):
 def test_a_flight_that_ends_its_process_is_found_and_the_others_fly(plan, alone):
     victim = plan.scenarios[1]
     mission = deadly(victim, "os.kill(os.getpid(), signal.SIGKILL)")
-    rows = list(fly_all((FlightTask(each, mission) for each in plan.scenarios), Pool(jobs=2)))
+    rows = list(fly_all((FlightPlan(each, mission) for each in plan.scenarios), Pool(jobs=2)))
     assert len(rows) == len(plan)
     (dead,) = [row for row in rows if row.verdict == "error"]
     assert dead.scenario == victim.name
@@ -100,7 +100,7 @@ def test_a_flight_that_ends_its_process_is_found_and_the_others_fly(plan, alone)
 
 def test_a_flight_alone_may_end_its_process(plan):
     victim = plan.scenarios[0]
-    row = fly_alone(FlightTask(victim, deadly(victim, "os._exit(7)")))
+    row = fly_alone(FlightPlan(victim, deadly(victim, "os._exit(7)")))
     assert (row.verdict, row.cause) == ("error", "WorkerDiedError")
     assert row.reason.endswith("(exit code 7)")
 

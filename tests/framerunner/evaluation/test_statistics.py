@@ -6,10 +6,10 @@ import pytest
 
 from framerunner.evaluation.compare import compare, mcnemar, mean_difference
 from framerunner.evaluation.plan import Identity
-from framerunner.evaluation.rows import ERROR
 from framerunner.evaluation.statistics import spread, summarise, wilson
 from framerunner.evaluation.store import FLIGHTS, EvaluationFolder
 from framerunner.evaluation.tables import comparison_lines
+from scenarios.verdict import Verdict
 from tests.framerunner.evaluation.flights import made_row
 
 
@@ -38,7 +38,7 @@ def test_a_summary_counts_each_flight_where_it_belongs():
         made_row("c", "timed out"),
         made_row("d", "timed out", mission_state="red.turning"),
         made_row("e", "timed out"),
-        made_row("f", ERROR, reason="ValueError: no", frames_crossed=(), crossing_offsets_m=()),
+        made_row("f", Verdict.ERROR, reason="ValueError: no", frames_crossed=(), crossing_offsets_m=()),
     ]
     summary = summarise(rows)
     assert (summary.landed.count, summary.landed.total) == (2, 6)
@@ -61,7 +61,7 @@ def test_a_summary_counts_each_flight_where_it_belongs():
 
 
 def test_a_summary_of_failures_only():
-    summary = summarise([made_row("a", ERROR, reason="X", frames_crossed=(), crossing_offsets_m=())])
+    summary = summarise([made_row("a", Verdict.ERROR, reason="X", frames_crossed=(), crossing_offsets_m=())])
     assert (summary.try_time_s, summary.landing_error_m, summary.offset_m) == (None, None, {})
     assert summary.seconds_in_state == {}
 

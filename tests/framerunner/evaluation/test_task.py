@@ -7,9 +7,10 @@ import pytest
 
 from framerunner.evaluation import task as task_module
 from framerunner.evaluation.rows import COLUMNS, Row
-from framerunner.evaluation.task import FlightTask, fly_task, thinned
-from framerunner.lockstep import fly_lockstep
-from framerunner.pictures import Track
+from framerunner.evaluation.task import fly_task, thinned
+from framerunner.flying.lockstep import fly_lockstep
+from framerunner.flying.plan import FlightPlan
+from framerunner.runs.track import Track
 from offboard.mission import load_mission
 from offboard.pilot_file import PilotFile
 from tests.framerunner.evaluation.flights import made_row, short_scenario
@@ -27,28 +28,28 @@ class MyPilot(Pilot):
 
 
 def task(seed=1, pilot=None):
-    return FlightTask(short_scenario(seed), load_mission("frame_challenge", pilot))
+    return FlightPlan(short_scenario(seed), load_mission("frame_challenge", pilot))
 
 
 def test_a_row_has_the_result_s_fields_and_order():
     flight = task()
-    result = fly_lockstep(flight.scenario, flight.mission).result
+    result = fly_lockstep(flight).result
     row = fly_task(flight)
-    assert tuple(result) == COLUMNS
-    assert row.as_dict() == result
-    assert (row.verdict, row.landed, row.cause) == ("timed out", False, "take_off.set_base")
+    assert tuple(result.as_json()) == COLUMNS
+    assert json.loads(row.to_json()) == result.as_json()
+    assert (row.verdict, row.completed, row.cause) == ("timed out", False, "take_off.set_base")
     assert row.traceback == ""
 
 
 def test_a_row_of_before_the_box_can_be_read():
     told = json.loads(made_row("calm-1").to_json())
     del told["kept_in_box_s"]
-    assert Row.from_json(json.dumps(told)) == made_row("calm-1")
+    assert Row.model_validate_json(json.dumps(told)) == made_row("calm-1")
 
 
 def test_a_failed_flight_brings_its_track_thinned_out():
     flight = task()
-    whole = fly_lockstep(flight.scenario, flight.mission).track
+    whole = fly_lockstep(flight).track
     track = fly_task(flight).track
     assert len(track) < len(whole) / 2
     assert (track.time_s[0], track.time_s[-1]) == (round(whole.time_s[0], 3), round(whole.time_s[-1], 3))
@@ -56,10 +57,10 @@ def test_a_failed_flight_brings_its_track_thinned_out():
 
 def test_a_row_survives_json():
     row = made_row(seconds_in_state={"turning": 3.1999999999999997})
-    assert Row.from_json(row.to_json()) == row
+    assert Row.model_validate_json(row.to_json()) == row
     for line in ("", "{}", "[]", "1", row.to_json()[:-1]):
         with pytest.raises(ValueError, match=r".*"):
-            Row.from_json(line)
+            Row.model_validate_json(line)
 
 
 def test_a_fault_of_the_program_is_a_row_with_its_traceback():
@@ -79,15 +80,15 @@ def test_a_contestant_s_code_may_raise_anything():
 
 def test_a_number_that_cannot_be_kept_is_the_flight_s_fault(monkeypatch):
     flight = task()
-    flown = fly_lockstep(flight.scenario, flight.mission)
-    broken = replace(flown, result={**flown.result, "path_length_m": float("nan")})
-    monkeypatch.setattr(task_module, "fly_lockstep", lambda *_args, **_options: broken)
-    assert fly_task(flight).verdict == "error"
+    monkeypatch.setattr("scenarios.referee.PENALTY_S_PER_S", float("nan"))
+    row = fly_task(flight)
+    assert row.verdict == "error"
+    assert "penalty_s" in row.reason
 
 
 def test_ctrl_c_is_no_verdict(monkeypatch):
     flight = task()
-    flown = fly_lockstep(flight.scenario, flight.mission)
+    flown = fly_lockstep(flight)
     stopped = replace(flown, outcome=replace(flown.outcome, ended="aborted", reason="interrupted"))
     monkeypatch.setattr(task_module, "fly_lockstep", lambda *_args, **_options: stopped)
     with pytest.raises(KeyboardInterrupt):

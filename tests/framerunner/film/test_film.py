@@ -9,7 +9,7 @@ import pytest
 from framerunner.cli import run
 from framerunner.film import film_file as film_file_module
 from framerunner.film.film_file import Mp4File, film_file
-from framerunner.pictures import PictureError
+from framerunner.runs.pictures import PictureError
 from tests.framerunner.recording.logs import write_log
 
 

@@ -34,13 +34,13 @@ def near(image, colour, tolerance=25):
 
 
 def test_the_story_tells_the_times_of_the_result(story, flight):
-    times = dict(zip(flight.result["frames_crossed"], flight.result["crossing_times_s"], strict=True))
+    times = dict(zip(flight.result.frames_crossed, flight.result.crossing_times_s, strict=True))
     end = story.at(story.end_s)
     assert end.crossed == pytest.approx(times, abs=1e-5)
     assert story.at(times["green"] - 0.01).crossed == pytest.approx({"red": times["red"]}, abs=1e-5)
-    assert story.try_end_s == flight.result["try_time_s"]
+    assert story.try_end_s == flight.result.try_time_s
     assert story.begin_s == -1.0
-    assert story.verdict.word == "clean"
+    assert story.result.verdict == "clean"
     assert story.stretches[0][0] == story.begin_s
     assert story.stretches[-1][1] == story.end_s
     assert all(a[1] == b[0] for a, b in zip(story.stretches, story.stretches[1:], strict=False))

@@ -50,7 +50,7 @@ def slow_reader(tmp_path):
     said = tmp_path / "pid"
     code = (
         "import os, time\n"
-        "from framerunner.lifeline import end_with_standard_input\n"
+        "from framerunner.flying.child_process import end_with_standard_input\n"
         "end_with_standard_input(lambda: None)\n"
         f"open({str(said)!r}, 'w').write(str(os.getpid()) + '\\n')\n"
         "while True: sum(range(10**6))\n"

@@ -5,7 +5,9 @@ from pathlib import Path
 
 import pytest
 
-from framerunner.lockstep import Flown, fly_lockstep
+from framerunner.flying.fly import Flown
+from framerunner.flying.lockstep import fly_lockstep
+from framerunner.flying.plan import FlightPlan
 from framerunner.recording.mcap_writer import FlightRecording
 from offboard.mission import load_mission
 from scenarios.loader import load_scenario
@@ -38,7 +40,7 @@ def record(path):
             images.append((time_us, image.copy()))
             recording.see_image(time_us, image)
 
-        flown = fly_lockstep(scenario, mission, seed=SEED, observer=observe, on_image=keep)
+        flown = fly_lockstep(FlightPlan(scenario, mission, SEED), observers=(observe,), on_image=keep)
         recording.finish(flown.result, flown.track.time_s)
     assert recording.problem == ""
     return Recorded(path, flown, moments, images)

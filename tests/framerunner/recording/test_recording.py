@@ -20,17 +20,19 @@ from offboard.app import Moment
 from offboard.drone import DroneState, VelocityCommand
 from offboard.mission import load_mission
 from scenarios.loader import load_scenario, parse_scenario
+from scenarios.result import FlightResult
 from tests.framerunner.recording.conftest import record
 from vision.detector import detect
 from vision.types import CameraFrame, Detection, Detections
 
-RESULT = {
-    "reason": "clean after 9.0 s",
-    "frames_crossed": ["red", "green"],
-    "crossing_times_s": [1.5, 4.25],
-    "crossing_offsets_m": [0.01, 0.02],
-    "crossing_sides": ["front", "back"],
-}
+RESULT = FlightResult(
+    verdict="clean",
+    reason="clean after 9.0 s",
+    frames_crossed=("red", "green"),
+    crossing_times_s=(1.5, 4.25),
+    crossing_offsets_m=(0.01, 0.02),
+    crossing_sides=("front", "back"),
+)
 
 
 def messages(path, *topics):
@@ -111,7 +113,7 @@ def test_states_follow_each_other_without_a_gap(recorded):
     assert states[-1]["state"] == recorded.flown.outcome.mission_state
     texts = [content["message"] for _, _, content in messages(recorded.path, "/log")]
     assert texts[0] == "take_off.start"
-    assert texts[-1] == recorded.flown.result["reason"]
+    assert texts[-1] == recorded.flown.result.reason
 
 
 def test_images_are_kept_without_loss(recorded):
@@ -131,7 +133,7 @@ def test_a_recording_gives_back_what_the_flight_s_observer_saw(recorded):
     assert any(moment.detections.red.seen for moment in moments)
     pictures = [event for event in events if isinstance(event, Picture)]
     assert [picture.time_us for picture in pictures] == [time_us for time_us, _ in recorded.images]
-    assert recording.result == json.loads(json.dumps(recorded.flown.result))
+    assert recording.result == recorded.flown.result
     assert recording.title == "test-case-1: frame_challenge"
 
 
@@ -148,7 +150,7 @@ def test_a_recording_stands_alone(recorded):
     assert attached.keys() == {"scenario.yaml", "mission.yaml", "result.json"}
     assert parse_scenario(attached["scenario.yaml"]).try_limit_s == 5.0
     assert "frame_challenge" in attached["mission.yaml"]
-    assert json.loads(attached["result.json"])["state_sha256"] == recorded.flown.result["state_sha256"]
+    assert json.loads(attached["result.json"])["state_sha256"] == recorded.flown.result.state_sha256
     assert about.metadata["seed"] == "7"
 
 

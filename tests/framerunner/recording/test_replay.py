@@ -12,11 +12,11 @@ import pytest
 from mcap.writer import Writer
 
 from framerunner.cli import run
-from framerunner.recorder import VideoFile
 from framerunner.recording import replay as replay_module
 from framerunner.recording.events import Crossed, Picture
 from framerunner.recording.find import recorded_flight
 from framerunner.recording.replay import replay
+from framerunner.runs.recorder import VideoFile
 from offboard.app import Moment
 from offboard.drone import DroneState, VelocityCommand
 from sitl.video import VideoServer
@@ -78,7 +78,7 @@ def test_a_recording_is_shown_state_by_state_and_ends_with_its_result(recorded, 
     flown = list(dict.fromkeys(moment.mission_state for moment in recorded.moments))
     assert states_in(said.err) == flown
     result = recorded.flown.result
-    assert said.out.startswith(f"{result['reason']}\ntry 5.0 s, ")
+    assert said.out.startswith(f"{result.reason}\ntry 5.0 s, ")
 
 
 def test_a_run_folder_is_shown_from_its_recording(recorded, tmp_path, capsys):
@@ -95,7 +95,7 @@ def test_a_lockstep_flight_without_a_recording_is_flown_again(lockstep_folder, c
     assert "timed out" in said.out
     assert {path.name for path in lockstep_folder.iterdir()} == before
     with recorded_flight(lockstep_folder) as flight:
-        assert flight.result["seed"] == 3
+        assert flight.result.seed == 3
         assert sum(isinstance(event, Picture) for event in flight.events()) > 30
 
 
@@ -121,8 +121,8 @@ def test_the_recording_of_the_command_holds_the_flight_of_the_result(lockstep_fo
     (folder,) = (tmp_path / "again").iterdir()
     plain = json.loads((lockstep_folder / "result.json").read_text(encoding="utf-8"))
     with recorded_flight(folder) as flight:
-        assert flight.result["state_sha256"] == plain["state_sha256"]
-        assert "wall_time_s" not in flight.result
+        assert flight.result.state_sha256 == plain["state_sha256"]
+        assert "wall_time_s" not in flight.result.as_json()
 
 
 def test_a_real_time_flight_is_shown_from_its_log_and_video(tmp_path, capsys):
@@ -168,6 +168,13 @@ def foreign_mcap(path):
         writer.finish()
 
 
+RESULTS = {
+    "result": '{"verdict": ',
+    "strange result": '{"verdict": "clean", "try_time_s": "x"}',
+    "result only": '{"verdict": "clean"}',
+}
+
+
 def damage(tmp_path, recorded, how):
     """Make something that is no flight, and return what to replay."""
     path = tmp_path / "flight.mcap"
@@ -177,11 +184,8 @@ def damage(tmp_path, recorded, how):
         path.write_bytes(data[:middle] + bytes([data[middle] ^ 0x55]) + data[middle + 1 :])
     elif how == "foreign":
         foreign_mcap(path)
-    elif how == "result":
-        (tmp_path / "result.json").write_text('{"verdict": ', encoding="utf-8")
-        return tmp_path
-    elif how == "result only":
-        (tmp_path / "result.json").write_text('{"verdict": "clean"}', encoding="utf-8")
+    elif how in RESULTS:
+        (tmp_path / "result.json").write_text(RESULTS[how], encoding="utf-8")
         return tmp_path
     elif how == "log":
         (tmp_path / "flight.tlog").write_bytes(b"\xfd not MAVLink at all" * 50)
@@ -204,6 +208,7 @@ def damage(tmp_path, recorded, how):
         ("empty", "not an MCAP file"),
         ("foreign", "not one of framerunner's; open it with Foxglove"),
         ("result", "result.json': damaged"),
+        ("strange result", "result.json': damaged: try_time_s: Input should be"),
         ("result only", "fly it again with --record"),
         ("log", "holds no position"),
         ("nothing", "holds no flight"),
@@ -298,4 +303,4 @@ def test_ctrl_c_ends_a_replay(recorded, tmp_path):
 
 def test_the_seed_of_a_flight_is_in_its_recording(recorded):
     with recorded_flight(recorded.path) as flight:
-        assert flight.result["seed"] == SEED
+        assert flight.result.seed == SEED

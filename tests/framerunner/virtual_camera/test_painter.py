@@ -9,8 +9,9 @@ from pymavlink.dialects.v20 import common as mavlink
 
 from firmware_py.mavlink.node import MavlinkNode
 from firmware_py.mavlink.rates import GROUND
-from framerunner.virtual_camera.lift import lifted
-from framerunner.virtual_camera.painter import VirtualCamera, start_pose
+from framerunner.flying.plan import FlightPlan
+from framerunner.virtual_camera.painter import VirtualCamera
+from offboard.link.alignment import Pose
 from scenarios.loader import load_scenario
 from sitl.camera import Camera
 from sitl.camera_feed import CameraFeed
@@ -19,7 +20,8 @@ from tests.node_input import deliver
 from vision.detector import detect
 
 SCENARIO = load_scenario("test-case-1")
-START = start_pose(SCENARIO)
+START_POSE = FlightPlan(SCENARIO).start_pose
+START = Pose(START_POSE[:3], START_POSE[3])
 
 
 def heartbeat(armed):
@@ -148,29 +150,29 @@ def test_the_referee_follows_a_flight_through_a_frame_and_back():
             c, s = cos(START.yaw_rad), sin(START.yaw_rad)
             north, left = c * (px - x) + s * (py - y), -s * (px - x) + c * (py - y)
             tell(camera, reports(time_us, north, -left, pz - z))
-    assert camera.standing()["snapshot"]["crossed"] == ("red",)
-    assert camera.standing()["snapshot"]["motors_on"]
+    assert camera.standing().snapshot.crossed == ("red",)
+    assert camera.standing().snapshot.motors_on
     for step in range(150):
         time_us += 20_000
         tell(camera, reports(time_us, armed=False if step % 50 == 0 else None))
     standing = camera.standing("landing.stop")
-    assert standing["scenario"] == "test-case-1" and standing["source"] == "telemetry"
-    assert standing["snapshot"]["settled"]
-    assert standing["report"]["landed_on_base"]
-    assert standing["report"]["landing_error_m"] == pytest.approx(0.0, abs=1e-3)
-    assert standing["report"]["frames_crossed"] == ("red",)
+    assert standing.scenario == "test-case-1" and standing.source == "telemetry"
+    assert standing.snapshot.settled
+    assert standing.report.landed_on_base
+    assert standing.report.landing_error_m == pytest.approx(0.0, abs=1e-3)
+    assert standing.report.frames_crossed == ("red",)
 
 
 def test_without_a_base_all_hangs_as_high_above_where_the_drone_stands_as_above_the_floor():
     camera = VirtualCamera(SCENARIO, base=False)
-    lift_m = camera.standing()["lift_m"]
+    lift_m = camera.standing().lift_m
     assert lift_m == SCENARIO.base.top_m
-    assert camera.scenario == lifted(SCENARIO, lift_m)
-    assert camera.scenario.name == SCENARIO.name
-    for frame, raised in zip(SCENARIO.frames, camera.scenario.frames, strict=True):
+    layout = camera.plan.layout
+    assert layout.name == SCENARIO.name
+    for frame, raised in zip(SCENARIO.frames, layout.frames, strict=True):
         assert raised.z_m - lift_m == pytest.approx(frame.z_m)
-    assert camera.scenario.arena.height_m - lift_m == pytest.approx(SCENARIO.arena.height_m)
-    assert start_pose(camera.scenario) == START
+    assert layout.arena.height_m - lift_m == pytest.approx(SCENARIO.arena.height_m)
+    assert camera.plan.start_pose == START_POSE
 
 
 def fly_simulation(scenario, seconds):

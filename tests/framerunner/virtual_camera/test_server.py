@@ -10,10 +10,10 @@ import pytest
 
 from framerunner.virtual_camera.painter import VirtualCamera
 from framerunner.virtual_camera.server import CameraServer
-from offboard.drone import DroneError
 from scenarios.loader import load_scenario
 from sitl.video import VideoServer
 from wire.dialect import mavlink
+from wire.transports.urls import LinkError
 
 SCENARIO = load_scenario("test-case-1")
 
@@ -33,7 +33,7 @@ class Link:
 
     def receive(self, timeout_s):
         if self.broken:
-            raise DroneError("a wire failed: cut")
+            raise LinkError("a wire failed: cut")
         if self.mute:
             time.sleep(timeout_s)
             return []
@@ -72,7 +72,7 @@ async def serving(link):
         yield video, said, running
     finally:
         running.cancel()
-        with suppress(asyncio.CancelledError, DroneError):
+        with suppress(asyncio.CancelledError, LinkError):
             await running
         assert link.closed
 
@@ -112,5 +112,5 @@ async def test_a_link_that_fails_ends_it_in_one_line():
     async with serving(link) as (_, said, running):
         await until(lambda: any("vehicle 3 found" in line for line in said))
         link.broken = True
-        with pytest.raises(DroneError, match="a wire failed: cut"):
+        with pytest.raises(LinkError, match="a wire failed: cut"):
             await running

@@ -10,6 +10,7 @@ from monitor import server
 from monitor.settings import MonitorSettings
 from monitor.tries import TryEvent
 from scenarios.models import Frame, Scenario
+from scenarios.result import RefereeReport
 
 PASSWORD = "only for these tests"
 COLOURS = ("red", "green", "blue")
@@ -54,8 +55,10 @@ def report(verdict="clean", time_s=40.0, crossed=COLOURS, contacts=0, penalty_s=
     }
 
 
-def event(kind, key, scenario_name="case-1", drone_id=1, final=False, **values):
+def event(kind, key, scenario_name="case-1", drone_id=1, final=False, told=None, **values):
+    """What the fleet tells; `told` are further fields of the report, as anybody may have sent them."""
     given = report(**values) if kind == "ended" else report(**{"verdict": "aborted", "crossed": (), **values})
+    given = RefereeReport.from_outside({**given, **(told or {})})
     return TryEvent(kind, drone_id, key, scenario_name, given, "truth", final)
 
 

@@ -19,8 +19,8 @@ def board():
     store = Store(Database("sqlite://"))
     for key, name in (("1", '=HYPERLINK("http://x")'), ("2", 'Comma, "quoted"'), ("3", "الصقور")):
         store.call(store.add_team(name, "", ADA), "", ADA)
-        told = event("ended", key, time_s=30.0 + int(key), contacts=int(key))
-        told.report["reason"] = "-1+1\nsecond line"
+        words = {"reason": "-1+1\nsecond line"}
+        told = event("ended", key, time_s=30.0 + int(key), contacts=int(key), told=words)
         store.take(told, COLOURS, NOW)
     yield store.board()
     store.close()

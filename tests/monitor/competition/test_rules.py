@@ -9,8 +9,8 @@ from hypothesis import strategies as st
 from monitor.competition.rules import (
     Attempt,
     Correction,
-    Result,
     Rule,
+    TryScore,
     choose,
     correct,
     counted_cs,
@@ -18,10 +18,11 @@ from monitor.competition.rules import (
     rank,
     read_report,
 )
+from scenarios.result import RefereeReport
 
 COLOURS = ("red", "green", "blue")
 CASES = [("a", COLOURS), ("b", COLOURS), ("c", COLOURS)]
-CLEAN = Result(COLOURS, COLOURS, 0, 0.0, 40.0, completed=True)
+CLEAN = TryScore(COLOURS, COLOURS, 0, 0.0, 40.0, completed=True)
 
 seconds = st.floats(0, 180).map(lambda value: round(value, 3))
 subsets = st.sets(st.sampled_from(COLOURS)).map(lambda some: tuple(c for c in COLOURS if c in some))
@@ -31,7 +32,7 @@ subsets = st.sets(st.sampled_from(COLOURS)).map(lambda some: tuple(c for c in CO
 def results(draw):
     crossed = draw(subsets)
     completed = crossed == COLOURS and draw(st.booleans())
-    return Result(COLOURS, crossed, draw(st.integers(0, 9)), draw(seconds), draw(seconds), completed)
+    return TryScore(COLOURS, crossed, draw(st.integers(0, 9)), draw(seconds), draw(seconds), completed)
 
 
 @st.composite
@@ -96,9 +97,8 @@ def test_the_rule_can_be_set():
         (["red", "green", "blue"], COLOURS),
         (["red", "blue", "green"], ("red", "green")),
         (["blue", "red"], ("red",)),
-        (["red", "red", "mauve", 7, None], ("red",)),
-        ("red", ()),
-        (None, ()),
+        (["red", "red", "mauve"], ("red",)),
+        ([], ()),
     ],
 )
 def test_a_frame_before_its_turn_is_missing(crossed, counted):
@@ -106,17 +106,19 @@ def test_a_frame_before_its_turn_is_missing(crossed, counted):
 
 
 @pytest.mark.parametrize("value", [nan, inf, -1, "12", None, True, [], 10**400])
-def test_rubbish_in_a_report_counts_nothing_bad(value):
+@pytest.mark.parametrize("told", [{}, {"verdict": "clean"}])
+def test_rubbish_in_a_report_counts_nothing_bad(value, told):
     report = dict.fromkeys(("contacts", "penalty_s", "try_time_s", "verdict", "frames_crossed"), value)
-    result = read_report(report, COLOURS)
+    result = read_report(RefereeReport.from_outside({**report, **told}), COLOURS)
     assert not result.completed
     assert 0 <= result.try_time_s <= 36000 and 0 <= result.penalty_s <= 36000 and 0 <= result.contacts <= 1000
     assert counted_cs(result, Rule()) == 36000
 
 
 def test_a_verdict_without_its_frames_is_not_believed():
-    assert not read_report({"verdict": "clean", "frames_crossed": ["red"]}, COLOURS).completed
-    assert read_report({"verdict": "clean", "frames_crossed": ["red"]}, ("red",)).completed
+    report = RefereeReport(verdict="clean", frames_crossed=("red",))
+    assert not read_report(report, COLOURS).completed
+    assert read_report(report, ("red",)).completed
 
 
 def test_a_correction_is_laid_over_the_referee():

@@ -256,8 +256,7 @@ def test_everything_is_there_after_reopening(database_url):
     "value", [nan, inf, "\x00\ud800", {"a": {"b": nan}}, 10**400, b"x", None, "x" * 200_000]
 )
 def test_whatever_a_referee_sends_is_survived(store, value):
-    told = event("ended", "k")
-    told.report.update(reason=value, try_time_s=value, contacts=value)
+    told = event("ended", "k", told={"reason": value, "try_time_s": value, "contacts": value})
     store.take(told, COLOURS, NOW)
     (each,) = store.board().tries
     assert each.state == "ended" and 0 <= each.result.try_time_s <= 36000

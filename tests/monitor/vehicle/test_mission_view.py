@@ -6,7 +6,7 @@ import pytest
 from pymavlink.dialects.v20 import common as mavlink
 
 from monitor.vehicle.mission import MissionView
-from tests.monitor.simulated_link import all_finite
+from scenarios.result import FlightResult
 from wire.mission_codec import encode_detections, encode_state, split_document
 from wire.mission_messages import (
     DETECTIONS_TYPE,
@@ -140,7 +140,7 @@ def test_a_result_is_kept_with_its_crc(view):
     crc, pieces = documents(DocumentKind.RESULT, {"verdict": "clean", "try_time_s": 40.5})
     for piece in pieces:
         assert view.take(piece, 10.0) == []
-    assert view.result == (crc, {"verdict": "clean", "try_time_s": 40.5})
+    assert view.result == (crc, FlightResult(verdict="clean", try_time_s=40.5))
 
 
 @pytest.mark.parametrize(
@@ -174,8 +174,16 @@ def test_a_history_of_another_form_is_told_once(view, content):
 
 
 def test_numbers_are_finite_whatever_the_app_says(view):
-    _, pieces = documents(DocumentKind.RESULT, {"a": [{"b": inf}], "c": nan})
+    told = {"verdict": "clean", "a": [{"b": inf}], "total_time_s": nan, "seconds_in_state": {"c": inf}}
+    _, pieces = documents(DocumentKind.RESULT, told)
     for piece in pieces:
         view.take(piece, 10.0)
-    assert view.result is not None
-    assert all_finite(view.result[1])
+    assert view.result[1].as_json() == {"verdict": "clean"}
+
+
+def test_a_result_without_a_verdict_is_told_to_be_none(view):
+    _, pieces = documents(DocumentKind.RESULT, {"try_time_s": 40.5})
+    for piece in pieces:
+        view.take(piece, 10.0)
+    assert view.result is None
+    assert view.problem == "result document: no verdict is told"

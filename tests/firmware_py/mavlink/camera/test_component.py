@@ -5,6 +5,7 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
+from firmware_py.mavlink.camera.component import CameraComponent
 from firmware_py.mavlink.camera.model import CameraModel, PictureSpace, VideoEncoding, VideoStream
 from firmware_py.status import CommandResult, FlightMode
 from firmware_py.types import GeodeticPoint, VehicleState
@@ -254,7 +255,7 @@ def test_other_commands(viewer, command, params, result):
 
 
 def test_a_mission_reaches_the_camera(viewer, album):
-    (camera,) = (service for service in viewer.node.services if service.component_id == 100)
+    (camera,) = (service for service in viewer.node.services if isinstance(service, CameraComponent))
     assert camera.run(START, (0.0, 0.0, 1.0, nan, nan, nan, nan)) is CommandResult.ACCEPTED
     assert len(album.taken) == 1
     assert camera.run(400, (1.0,) * 7) is CommandResult.UNSUPPORTED

@@ -1,0 +1,200 @@
+"""What the terminal shows during a flight."""
+
+from __future__ import annotations
+
+import asyncio
+import sys
+import time
+from math import isfinite
+from types import TracebackType
+
+from rich.console import Console
+from rich.live import Live
+from rich.markup import escape
+from rich.status import Status
+from rich.table import Table
+
+from framerunner.flying.judges import Judge
+from framerunner.runs.recorder import FlightRecorder
+from offboard.app import Moment
+from scenarios.result import RefereeSnapshot
+from vision.types import Detection
+
+_REFRESH_S = 0.2
+_LINE_S = 10.0
+_PROGRESS_QUIET_S = 1.0
+_PROGRESS_REFRESH_S = 0.25
+_PROGRESS_LINE_S = 2.0
+
+
+class FlightDisplay:
+    """A live table in a terminal; elsewhere a line at every change of state and every ten seconds.
+
+    Shown while it is entered as a context.
+
+    Args:
+        title: scenario and mission.
+        limit_s: of the try.
+        recorder: knows the latest tick.
+        judge: knows how the try stands.
+    """
+
+    def __init__(self, title: str, limit_s: float, recorder: FlightRecorder, judge: Judge) -> None:
+        self._title = title
+        self._limit_s = limit_s
+        self._recorder = recorder
+        self._judge = judge
+        self._console = Console(file=sys.stderr)
+        self._line_state = ""  # what the last line said
+        self._line_s = -_LINE_S
+        self._showing: asyncio.Task[None] | None = None
+
+    async def __aenter__(self) -> FlightDisplay:
+        """Begin to show."""
+        self._showing = asyncio.create_task(self._show())
+        return self
+
+    async def __aexit__(self, *_: object) -> None:
+        """Take the table away."""
+        if self._showing is not None:
+            self._showing.cancel()
+            await asyncio.gather(self._showing, return_exceptions=True)
+
+    async def _show(self) -> None:
+        if not self._console.is_terminal:
+            while True:
+                self._print_line(await self._judge.standing())
+                await asyncio.sleep(_REFRESH_S)
+        with Live(console=self._console, auto_refresh=False, transient=True) as live:
+            while True:
+                live.update(self._table(await self._judge.standing()), refresh=True)
+                await asyncio.sleep(_REFRESH_S)
+
+    def _print_line(self, standing: RefereeSnapshot | None) -> None:
+        moment = self._recorder.latest
+        if moment is None:
+            return
+        time_s = moment.flight_time_s
+        paused = pause_in_words(moment)
+        if moment.mission_state + paused == self._line_state and time_s - self._line_s < _LINE_S:
+            return
+        self._line_state, self._line_s = moment.mission_state + paused, time_s
+        crossed = ", ".join(standing.crossed) if standing else ""
+        place, told = place_in_words(moment), paused or moment.remark
+        print(
+            f"{time_s:6.1f} s  {moment.mission_state:22s} {place}  crossed: {crossed or 'none'}"
+            f"{'  ' if told else ''}{told}",
+            file=sys.stderr,
+            flush=True,
+        )
+
+    def _table(self, standing: RefereeSnapshot | None) -> Table:
+        moment = self._recorder.latest
+        if moment is None:
+            table = _empty_table(self._title)
+            table.add_row("state", "connecting, waiting until the drone is ready")
+            return table
+        table = moment_table(self._title, moment, f"{moment.flight_time_s:.1f} s of {self._limit_s:g} s")
+        if standing is not None:
+            crossed = ", ".join(standing.crossed) or "none"
+            table.add_row("crossed", f"{crossed}   contacts: {standing.contacts}")
+        return table
+
+
+def moment_table(title: str, moment: Moment, time: str) -> Table:
+    """A tick of a flight as a table.
+
+    Args:
+        title: scenario and mission.
+        moment: the tick.
+        time: how to say its time.
+    """
+    table = _empty_table(title)
+    table.add_row("state", escape(moment.mission_state))
+    if moment.paused:
+        table.add_row("[yellow]paused[/]", escape(pause_in_words(moment).removeprefix("paused: ")))
+    elif moment.remark:
+        table.add_row("[yellow]limited[/]", escape(moment.remark))
+    table.add_row("time", time)
+    table.add_row("drone", f"{place_in_words(moment)}  {escape(moment.state.mode)}")
+    for colour in ("red", "green", "blue"):
+        detection: Detection = getattr(moment.detections, colour)
+        table.add_row(f"[{colour}]{colour}[/]", _seen(detection))
+    return table
+
+
+def _empty_table(title: str) -> Table:
+    table = Table(title=escape(title), show_header=False, min_width=60)
+    table.add_column(style="bold")
+    table.add_column()
+    return table
+
+
+def place_in_words(moment: Moment) -> str:
+    """Where the drone is."""
+    state = moment.state
+    return f"x {state.x:5.2f}  y {state.y:5.2f}  z {state.z:4.2f} m  yaw {state.yaw:5.2f} rad"
+
+
+def pause_in_words(moment: Moment) -> str:
+    """Who has the drone while the mission waits, and why it went on waiting; empty when it does not wait."""
+    if not moment.paused:
+        return ""
+    mode = moment.state.mode
+    if moment.remark:
+        return f"paused: given back ({mode}), but {moment.remark}"
+    return f"paused: the pilot has the sticks ({mode})"
+
+
+def _seen(detection: Detection) -> str:
+    if not detection.seen:
+        return "not seen"
+    if not isfinite(detection.d):
+        return "seen in part"
+    return f"{detection.d:.2f} m away, {detection.a:.0f} degrees aside"
+
+
+class LockstepProgress:
+    """A status line in a terminal, elsewhere a line every two seconds; nothing in the first second.
+
+    Args:
+        limit_s: of the try.
+    """
+
+    def __init__(self, limit_s: float) -> None:
+        self._limit_s = limit_s
+        self._console = Console(stderr=True)
+        self._status: Status | None = None
+        self._started_s = time.monotonic()
+        self._next_s = self._started_s + _PROGRESS_QUIET_S
+
+    def __enter__(self) -> LockstepProgress:
+        """Begin to count the first second."""
+        return self
+
+    def __exit__(
+        self, _kind: type[BaseException] | None, _error: BaseException | None, _trace: TracebackType | None
+    ) -> None:
+        """Take the status line away."""
+        if self._status is not None:
+            self._status.stop()
+
+    def see(self, moment: Moment) -> None:
+        """Take a tick of the flight."""
+        now_s = time.monotonic()
+        if now_s < self._next_s:
+            return
+        speed = moment.flight_time_s / (now_s - self._started_s)
+        text = (
+            f"{moment.flight_time_s:6.1f} s of {self._limit_s:g} s  {moment.mission_state:22s} "
+            f"{speed:.0f} times real time"
+        )
+        if not self._console.is_terminal:
+            self._next_s = now_s + _PROGRESS_LINE_S
+            self._console.print(text, markup=False, highlight=False)
+            return
+        self._next_s = now_s + _PROGRESS_REFRESH_S
+        if self._status is None:
+            self._status = self._console.status(text)
+            self._status.start()
+        self._status.update(text)

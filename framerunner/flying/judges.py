@@ -1,0 +1,195 @@
+"""Where the verdict comes from: the simulator, which knows the truth, or a drone's own telemetry."""
+
+from __future__ import annotations
+
+import asyncio
+from math import cos, sin
+from typing import TYPE_CHECKING, Protocol
+
+from pydantic import ValidationError
+
+from framerunner.errors import SettingError
+from framerunner.flying.plan import FlightPlan
+from offboard.app import Moment
+from scenarios.referee import Referee
+from scenarios.result import RefereeReport, RefereeSnapshot, Standing
+from scenarios.truth import TrueState
+from wire.simulator_api import SimulatorApi
+
+if TYPE_CHECKING:  # a flight in lockstep asks nobody over HTTP
+    import aiohttp
+
+_ANSWER_S = 2.0
+_POLL_S = 0.1
+# Vehicle time. A heartbeat a second tells each link of the disarming; then the referee needs at most 2 s.
+_SETTLE_LIMIT_US = 5_000_000
+_CLOCK_STOPPED_S = 3.0  # wall time without progress of vehicle time
+
+
+class Judge(Protocol):
+    """A referee, wherever it is.
+
+    Attributes:
+        source: by what it judges: "truth" or "telemetry".
+    """
+
+    source: str
+
+    def see(self, moment: Moment) -> None:
+        """Take a tick of the flight."""
+
+    async def standing(self) -> RefereeSnapshot | None:
+        """How the try stands now; None if it cannot be had."""
+
+    async def report(self, mission_state: str, ended: str | None) -> RefereeReport:
+        """The report, when the drone has come to rest."""
+        ...
+
+
+class TruthJudge:
+    """Asks the simulator's referee, which sees the true state of every control tick.
+
+    Should the simulator die, the verdict comes from the telemetry seen so far.
+
+    Args:
+        api: of the simulator.
+        session: for asking.
+        plan: of the flight, for the substitute.
+        source: by what its referee judges, as it says itself.
+    """
+
+    def __init__(
+        self, api: SimulatorApi, session: aiohttp.ClientSession, plan: FlightPlan, source: str = "truth"
+    ) -> None:
+        self.source = source
+        self._api = api
+        self._session = session
+        self._substitute = TelemetryJudge(plan.new_referee())
+
+    def see(self, moment: Moment) -> None:
+        """The referee sees for itself; the substitute follows."""
+        self._substitute.see(moment)
+
+    async def standing(self) -> RefereeSnapshot | None:
+        """Ask for the snapshot."""
+        answer = await ask_referee(self._api, self._session)
+        return None if answer is None else answer.snapshot
+
+    async def report(self, mission_state: str, ended: str | None) -> RefereeReport:
+        """Ask for the report once the drone is at rest.
+
+        A mission that finished has seen the motors stop; the referee's own link may tell it later. A flight
+        that was broken off may go on, in hold, with the motors on: that is not waited for.
+        """
+        await self._settle(motors_stopped=ended is None)
+        parameters = {"state": mission_state, **({"ended": ended} if ended else {})}
+        answer = await ask_referee(self._api, self._session, parameters)
+        if answer is None:
+            self.source = self._substitute.source
+            return await self._substitute.report(mission_state, ended)
+        return answer.report
+
+    async def _settle(self, *, motors_stopped: bool) -> None:
+        """Wait until the referee sees the drone at rest, for 5 s of vehicle time at most.
+
+        Args:
+            motors_stopped: the motors are known to be off, whatever the referee has heard yet.
+        """
+        loop = asyncio.get_running_loop()
+        began_us = newest_us = -1
+        newest_s = loop.time()
+        while (answer := await ask_referee(self._api, self._session)) is not None:
+            now, time_us = answer.snapshot, answer.time_us or 0
+            if now.settled or now.over or (now.motors_on and not motors_stopped):
+                return
+            if began_us < 0:
+                began_us = time_us
+            if time_us > newest_us:
+                newest_us, newest_s = time_us, loop.time()
+            if time_us - began_us > _SETTLE_LIMIT_US or loop.time() - newest_s > _CLOCK_STOPPED_S:
+                return
+            await asyncio.sleep(_POLL_S)
+
+
+class TelemetryJudge:
+    """Judges by what the drone says of itself; contacts with frames remain unseen.
+
+    Args:
+        referee: is shown what telemetry tells.
+    """
+
+    source = "telemetry"
+
+    def __init__(self, referee: Referee) -> None:
+        self._referee = referee
+
+    def see(self, moment: Moment) -> None:
+        """Follow the drone's state."""
+        state = moment.state
+        half = state.yaw / 2
+        self._referee.update(
+            TrueState(
+                state.time_us,
+                (state.x, state.y, state.z),
+                state.velocity_arena_m_s,
+                (cos(half), 0.0, 0.0, sin(half)),
+                state.armed,
+            )
+        )
+
+    async def standing(self) -> RefereeSnapshot | None:
+        """From the last tick."""
+        return self._referee.snapshot()
+
+    async def report(self, mission_state: str, ended: str | None) -> RefereeReport:
+        """Judge what was seen."""
+        return self._referee.report(mission_state, ended)
+
+
+async def ask_referee(
+    api: SimulatorApi, session: aiohttp.ClientSession, parameters: dict[str, str] | None = None
+) -> Standing | None:
+    """Get a simulator's `referee.json`; None if there is none."""
+    import aiohttp
+
+    timeout = aiohttp.ClientTimeout(total=_ANSWER_S)
+    try:
+        async with session.get(api.referee_url, params=parameters, timeout=timeout) as response:
+            if response.status != 200:
+                return None
+            return Standing.model_validate_json(await response.read())
+    except (aiohttp.ClientError, TimeoutError, ValidationError):
+        return None
+
+
+async def choose_judge(
+    plan: FlightPlan, api: SimulatorApi | None, session: aiohttp.ClientSession, *, named: bool = False
+) -> tuple[Judge, FlightPlan]:
+    """Take the referee of the simulator that flies, or judge by telemetry.
+
+    Args:
+        plan: of the flight; a simulator with another scenario cannot judge it.
+        api: where the simulator may be; None: the drone is none.
+        session: for asking.
+        named: whether somebody said that a simulator is there; else it is not missed.
+
+    Returns:
+        The judge, and the plan with its frames as high as the simulator has them.
+
+    Raises:
+        SettingError: the simulator that was named does not judge this scenario.
+    """
+    answer = None if api is None else await ask_referee(api, session)
+    if api is not None and answer is not None and answer.scenario == plan.scenario.name:
+        plan = plan.lifted(answer.lift_m)
+        return TruthJudge(api, session, plan, answer.source), plan  # a virtual camera's lives on telemetry
+    if api is not None and named:
+        raise SettingError(
+            f"--simulator {api.url}: "
+            + (
+                "nothing there answers as a simulator; check the address, or leave it out"
+                if answer is None
+                else f"flies the scenario {answer.scenario}; start it with --scenario {plan.scenario.name}"
+            )
+        )
+    return TelemetryJudge(plan.new_referee()), plan

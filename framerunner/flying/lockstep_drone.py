@@ -1,0 +1,352 @@
+"""The `Drone` port onto a simulation in the same process: simulated time only, no sockets, no waiting.
+
+What a link does in time is kept, so that a mission flies as it does in real time: telemetry comes a little
+later than what it tells, mode and arming are learnt from heartbeats once a second, and motors are switched on
+in the same order. What is asked of the vehicle goes through the functions that packets go through.
+
+Numbers become what they are on a link: MAVLink carries single precision, MAVSDK goes through degrees. The
+paper's navigator decides by single pixels, so even a ten-millionth of a metre may turn a flight. With the
+link's rounding in it, a lockstep flight is the same as one over UDP until something else differs.
+"""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import AsyncIterator, Callable, Sequence
+from math import degrees, isfinite, pi, radians
+from struct import Struct
+
+from firmware_py.commander_table import CRITICAL
+from firmware_py.setpoints import setpoint_from_body_velocity
+from firmware_py.status import CommandResult, FlightMode, LandedState
+from geometry.vectors import Vec3
+from offboard.drone import DroneError, DroneState, VelocityCommand
+from offboard.link.alignment import Alignment, Pose
+from scenarios.truth import TrueState
+from sitl.simulation import Simulation
+
+TICK_US = 50_000
+HEARTBEAT_US = 1_000_000
+POSITION_US = 20_000
+"""Between two position messages; a tick, made by an attitude message, has the last one before it."""
+POSITION_PHASE_US = 16_000
+"""Beside the ticks' grid, for the reason that the camera's is."""
+TELEMETRY_DELAY_US = 4_000
+"""From a state to the setpoint that answers it: one control tick, as measured over UDP and MAVSDK."""
+STREAM_BEFORE_OFFBOARD_US = 300_000
+RESEND_US = 60_000
+"""A velocity holds until changed, so it is sent again; just later than the next tick's would come."""
+LINK_LOST_US = 1_000_000
+READY_LIMIT_US = 30_000_000
+CONFIRM_LIMIT_US = 6_000_000
+LAND_LIMIT_US = 120_000_000
+SETTLE_LIMIT_US = 3_000_000
+_NEVER_US = 1 << 62
+_TEXTS_KEPT = 8
+_ONE = Struct("<f")
+_THREE = Struct("<3f")
+
+TruthObserver = Callable[[TrueState], None]
+
+
+class LockstepDrone:
+    """A simulated vehicle that moves on only while something is awaited of it.
+
+    Its coroutines never wait for an event, so a flight runs straight through. Only when its task has been
+    cancelled (Ctrl-C) do its ticks give way, so that the flight hears of it.
+
+    Args:
+        simulation: just made, disarmed.
+        start_arena: where the drone stands: x, y, z (metres) and yaw (radians), arena axes.
+        observers: called with the truth of every control tick.
+        telemetry_delay_us: see `TELEMETRY_DELAY_US`; below the 50 ms between ticks.
+
+    Raises:
+        ValueError: a delay that the ticks cannot have.
+    """
+
+    def __init__(
+        self,
+        simulation: Simulation,
+        start_arena: tuple[float, float, float, float],
+        *,
+        observers: Sequence[TruthObserver] = (),
+        telemetry_delay_us: int = TELEMETRY_DELAY_US,
+    ) -> None:
+        if not 0 <= telemetry_delay_us < TICK_US:
+            raise ValueError(f"telemetry_delay_us {telemetry_delay_us}: must be from 0 to below {TICK_US}")
+        self._simulation = simulation
+        self._autopilot = simulation.autopilot
+        self._start_arena = Pose(start_arena[:3], start_arena[3])
+        self._observers = tuple(observers)
+        self._delay_us = telemetry_delay_us
+        self._alignment: Alignment | None = None
+        self._heartbeat_us = 0
+        self._position_us = POSITION_PHASE_US
+        self._position_ned_m: Vec3 = (0.0, 0.0, 0.0)
+        self._velocity_ned_m_s: Vec3 = (0.0, 0.0, 0.0)
+        self._tick_us = TICK_US
+        self._sample: DroneState | None = None
+        self._armed = False
+        self._mode = FlightMode.HOLD
+        self._command = VelocityCommand()
+        self._commanding = False
+        self._resend_us = _NEVER_US
+
+    async def connect(self) -> None:
+        """Nothing to find."""
+
+    async def ready(self) -> None:
+        """Let time pass until the vehicle can be armed; then fix the axes.
+
+        Raises:
+            DroneError: it does not get ready, or is armed already.
+        """
+        status = self._autopilot.status
+        if status.armed:
+            raise DroneError("the vehicle is armed already; land and disarm it, then put it on its start")
+        if not self._passes(lambda: status.ready, READY_LIMIT_US):
+            limit_s = READY_LIMIT_US / 1e6
+            raise DroneError(f"not ready within {limit_s:g} s: pre-arm checks not passed{self._said()}")
+        self._alignment = Alignment(
+            self._start_arena, Pose(self._position_ned_m, told_yaw(self._autopilot.state.yaw_rad))
+        )
+
+    async def ticks(self) -> AsyncIterator[DroneState]:
+        """States at 20 Hz of vehicle time.
+
+        Raises:
+            DroneError: as `next_state`.
+        """
+        task = asyncio.current_task()
+        while True:
+            if task is not None and task.cancelling():
+                await asyncio.sleep(0)
+            yield self.next_state()
+
+    def next_state(self) -> DroneState:
+        """Let time pass until the next tick, and return its state; for whoever has no event loop.
+
+        Raises:
+            DroneError: not ready yet, values not finite, a failsafe took over or disarmed the vehicle.
+        """
+        if self._alignment is None:
+            raise DroneError("the drone's ticks were asked for before it was ready; call ready() first")
+        self._sample = None
+        lost_us = self._simulation.time_us + LINK_LOST_US
+        while (told := self._sample) is None:
+            if self._simulation.time_us >= lost_us:
+                raise DroneError("link lost: the vehicle's clock stands still")
+            self._advance(lost_us)
+        self._pass(self._delay_us)
+        self._check(told)
+        return told
+
+    async def motors_on(self) -> None:
+        """Enter offboard with zero setpoints, then arm; both count when a heartbeat shows them.
+
+        Raises:
+            DroneError: refused, or not shown.
+        """
+        self._send(VelocityCommand())
+        self._pass(STREAM_BEFORE_OFFBOARD_US)
+        self._ask("offboard mode", self._autopilot.set_mode(FlightMode.OFFBOARD))
+        self._confirm("offboard mode", lambda: self._mode is FlightMode.OFFBOARD)
+        self._ask("arming", self._autopilot.arm())
+        self._confirm("arming", lambda: self._armed)
+        self._commanding = True
+
+    async def motors_off(self) -> None:
+        """Stop the motors at once (forced disarm), in the air too.
+
+        Raises:
+            DroneError: refused, or not shown.
+        """
+        self._fall_silent()
+        self._ask("stopping the motors", self._autopilot.disarm(force=True))
+        self._confirm("stopping the motors", lambda: not self._armed)
+
+    async def land(self) -> None:
+        """Let the vehicle land until it has disarmed itself.
+
+        Raises:
+            DroneError: landing was broken off or takes too long.
+        """
+        self._fall_silent()
+        self._ask("landing", self._autopilot.land())
+        self._confirm("landing", lambda: self._mode is FlightMode.LAND or not self._armed)
+        ended = self._passes(lambda: not self._armed or self._mode is not FlightMode.LAND, LAND_LIMIT_US)
+        if self._armed and ended:
+            raise DroneError(f"landing was broken off: mode {self._mode.name}{self._said()}")
+        if not ended:
+            raise DroneError(f"still not landed after {LAND_LIMIT_US / 1e6:g} s{self._said()}")
+
+    async def hold(self) -> None:
+        """Stop commanding and ask for hold, unless another hand has the vehicle already.
+
+        Raises:
+            DroneError: refused, or not shown.
+        """
+        self._fall_silent()
+        if self._mode is FlightMode.OFFBOARD:
+            self._ask("hold", self._autopilot.set_mode(FlightMode.HOLD))
+            self._confirm("hold", lambda: self._mode is FlightMode.HOLD)
+
+    async def refuse(self) -> None:
+        """No pilot takes this drone, so none gives it back: as `hold`."""
+        await self.hold()
+
+    def command(self, command: VelocityCommand) -> None:
+        """Set the velocity to fly from now on. Without motors on it is passed over."""
+        if self._commanding:
+            self._send(command)
+
+    async def close(self) -> None:
+        """Let go of the vehicle."""
+        self._fall_silent()
+
+    def settle(self) -> None:
+        """Let the drone come to rest, if its motors are off, so that the referee can judge."""
+        simulation, status = self._simulation, self._autopilot.status
+        self._passes(lambda: simulation.referee.settled or status.armed, SETTLE_LIMIT_US)
+
+    def _fall_silent(self) -> None:
+        self._commanding = False
+        self._resend_us = _NEVER_US
+
+    def _send(self, command: VelocityCommand) -> None:
+        self._command = command
+        state = self._autopilot.state
+        self._resend_us = state.time_us + RESEND_US
+        setpoint = setpoint_from_body_velocity(
+            single((command.forward_m_s, -command.left_m_s, -command.up_m_s)),
+            sent_yaw_rate(-command.yaw_rate_rad_s),
+            state.yaw_rad,
+            state.time_us,
+        )
+        if isinstance(setpoint, str):
+            self._autopilot.say(CRITICAL, setpoint)
+        else:
+            self._autopilot.accept_setpoint(setpoint)
+
+    def _advance(self, until_us: int = 0) -> None:
+        """Let time pass: a control tick, and more until a time or until the link does something by itself."""
+        simulation, observers, state = self._simulation, self._observers, self._autopilot.state
+        until_us = min(until_us, self._resend_us, self._heartbeat_us, self._tick_us, self._position_us)
+        while True:
+            simulation.tick()
+            truth = simulation.truth
+            for observe in observers:
+                observe(truth)
+            if state.time_us >= until_us or simulation.time_us >= until_us + TICK_US:  # its clock may stand
+                break
+        self._exchange(state.time_us)
+
+    def _exchange(self, now_us: int) -> None:
+        """What a link brings by itself at this time."""
+        if now_us >= self._resend_us:
+            self._send(self._command)
+        if now_us >= self._heartbeat_us:
+            self._heartbeat_us += HEARTBEAT_US
+            self._armed = self._autopilot.status.armed
+            self._mode = self._autopilot.status.mode
+        if now_us >= self._tick_us:
+            self._tick_us += TICK_US
+            self._sample = self._told()
+        if now_us >= self._position_us:
+            self._position_us += POSITION_US
+            self._position_ned_m = single(self._autopilot.state.position_ned_m)
+            self._velocity_ned_m_s = single(self._autopilot.state.velocity_ned_m_s)
+
+    def _pass(self, duration_us: int) -> None:
+        """Let so much time pass."""
+        end_us = self._simulation.time_us + duration_us
+        while self._simulation.time_us < end_us:
+            self._advance()
+
+    def _passes(self, condition: Callable[[], bool], limit_us: int) -> bool:
+        """Let time pass until a condition holds; False if it does not within the limit."""
+        end_us = self._simulation.time_us + limit_us
+        while not condition():
+            if self._simulation.time_us >= end_us:
+                return False
+            self._advance()
+        return True
+
+    def _ask(self, what: str, answer: CommandResult) -> None:
+        if answer is not CommandResult.ACCEPTED:
+            raise DroneError(f"{what} was refused: {answer.name}{self._said()}")
+
+    def _confirm(self, what: str, shown: Callable[[], bool]) -> None:
+        self._pass(self._delay_us)
+        if not self._passes(shown, CONFIRM_LIMIT_US):
+            armed = "armed" if self._armed else "disarmed"
+            raise DroneError(
+                f"{what} was acknowledged, but telemetry still shows mode {self._mode.name}, {armed} "
+                f"after {CONFIRM_LIMIT_US / 1e6:g} s{self._said()}"
+            )
+
+    def _told(self) -> DroneState | None:
+        """What telemetry has told by now; None before the axes are fixed."""
+        if self._alignment is None:
+            return None
+        state = self._autopilot.state
+        pose = self._alignment.pose(Pose(self._position_ned_m, told_yaw(state.yaw_rad)))
+        x, y, z = pose.position_m
+        return DroneState(
+            state.time_us,
+            x,
+            y,
+            z,
+            pose.yaw_rad,
+            self._alignment.vector(self._velocity_ned_m_s),
+            self._armed,
+            self._mode is FlightMode.OFFBOARD,
+            self._mode.name,
+            self._autopilot.status.landed_state is LandedState.ON_GROUND,
+        )
+
+    def _check(self, state: DroneState) -> None:
+        vx, vy, vz = state.velocity_arena_m_s
+        if not isfinite(state.x + state.y + state.z + state.yaw + vx + vy + vz):
+            raise DroneError("the vehicle's position, velocity or heading is not finite")
+        if not self._commanding:
+            return
+        if not state.armed:
+            raise DroneError(f"the vehicle was disarmed by others{self._said()}")
+        if not state.offboard:
+            raise DroneError(f"the pilot or a failsafe took over: mode {state.mode}{self._said()}")
+
+    def _said(self) -> str:
+        """What the vehicle said since it was last asked, for the end of an error message."""
+        texts = list(dict.fromkeys(text.text for text in self._autopilot.take_texts()))[-_TEXTS_KEPT:]
+        return f"; the vehicle says: {' | '.join(texts)}" if texts else ""
+
+
+def single(vector: Vec3) -> Vec3:
+    """A vector, shape (3,), rounded to single precision."""
+    x, y, z = _THREE.unpack(_THREE.pack(*vector))
+    return (x, y, z)
+
+
+def told_yaw(yaw_rad: float) -> float:
+    """A yaw as ATTITUDE and then MAVSDK's degrees bring it, radians.
+
+    MAVSDK multiplies by 180/pi in single precision. A product of two singles is exact in double precision,
+    so rounding it once gives the same.
+    """
+    return radians(_rounded(_DEGREES * _rounded(yaw_rad)))
+
+
+def sent_yaw_rate(yaw_rate_rad_s: float) -> float:
+    """A yaw rate as it is on the wire after MAVSDK has turned it from degrees, rad/s."""
+    return _rounded(_RADIANS * _rounded(degrees(yaw_rate_rad_s)))
+
+
+def _rounded(value: float) -> float:
+    rounded: float = _ONE.unpack(_ONE.pack(value))[0]
+    return rounded
+
+
+_DEGREES = _rounded(180.0 / _rounded(pi))
+_RADIANS = _rounded(_rounded(pi) / 180.0)

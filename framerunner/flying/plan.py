@@ -1,0 +1,92 @@
+"""What is known of a flight before it begins. Whoever flies, judges or shows one derives it here."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import TYPE_CHECKING
+
+from firmware_py.airframe import Airframe, load_airframe
+from offboard.keep_in_box import Box, flight_box
+from scenarios.ground import start_position
+from scenarios.models import Scenario
+from scenarios.referee import Referee
+
+if TYPE_CHECKING:  # it brings the statechart library, which the virtual camera does without
+    from offboard.mission import Mission
+
+StartPose = tuple[float, float, float, float]
+"""x, y, z of the drone's centre (metres) and yaw (radians), arena axes."""
+
+
+@dataclass(frozen=True)
+class FlightPlan:
+    """One flight: where, with what, by which rules.
+
+    Attributes:
+        scenario: the layout, as declared.
+        mission: the chart that flies; None if something else does: an agent, a pilot.
+        seed: of everything random; None in real time, which does not repeat.
+        lift_m: how much higher than declared the frames and the ceiling are. A drone that starts from the
+            floor, without a base, counts heights from there, and its app takes that for the base's top.
+            Lifted by the base's height, all is as high above the real floor as the scenario says.
+    """
+
+    scenario: Scenario
+    mission: Mission | None = None
+    seed: int | None = 0
+    lift_m: float = 0.0
+
+    @property
+    def chart(self) -> Mission:
+        """The mission, of a plan that must have one.
+
+        Raises:
+            ValueError: it has none.
+        """
+        if self.mission is None:
+            raise ValueError("the plan has no mission to be flown")
+        return self.mission
+
+    @cached_property
+    def airframe(self) -> Airframe:
+        """The drone.
+
+        Raises:
+            AirframeError: the scenario names none that there is.
+        """
+        return load_airframe(self.scenario.airframe)
+
+    @cached_property
+    def start_pose(self) -> StartPose:
+        """Where the drone stands at first, on the base if its start is over it."""
+        x_m, y_m, surface_m = start_position(self.scenario)
+        return (x_m, y_m, surface_m + self.airframe.envelope_m[2] / 2, self.scenario.start.yaw_rad)
+
+    @cached_property
+    def layout(self) -> Scenario:
+        """The scenario with its frames and ceiling where they are, `lift_m` higher."""
+        scenario, lift_m = self.scenario, self.lift_m
+        if not lift_m:
+            return scenario
+        frames = tuple(frame.model_copy(update={"z_m": frame.z_m + lift_m}) for frame in scenario.frames)
+        arena = scenario.arena.model_copy(update={"height_m": scenario.arena.height_m + lift_m})
+        return scenario.model_copy(update={"frames": frames, "arena": arena})
+
+    @property
+    def box(self) -> Box:
+        """Where the drone is kept, whatever its mission asks for."""
+        return flight_box(self.scenario, self.lift_m)
+
+    @property
+    def limit_s(self) -> float:
+        """Longest try, motors on to motors off."""
+        return self.scenario.try_limit_s
+
+    def new_referee(self) -> Referee:
+        """A referee for one try."""
+        return Referee(self.layout, self.airframe.envelope_m, self.lift_m)
+
+    def lifted(self, lift_m: float) -> FlightPlan:
+        """The same flight with the frames so much higher than declared."""
+        return replace(self, lift_m=lift_m)

@@ -1,0 +1,177 @@
+"""The simulator as a child process, whose time waits for this program at each tick.
+
+See `sitl.time_grants`. What the app is given at a tick is then a function of vehicle time alone, as in
+lockstep: the image that was sent last, the telemetry of that tick; and the setpoint that answers it arrives
+one control period later.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import socket
+from typing import Self
+
+from framerunner.errors import SettingError
+from framerunner.flying.child_process import ChildProcess
+from framerunner.flying.lockstep_drone import TELEMETRY_DELAY_US, sent_yaw_rate, single
+from offboard.drone import DroneError, VelocityCommand
+from offboard.eyes import CameraEyes
+from sitl.server_settings import VIDEO_PORT
+from sitl.time_grants import FREE_US, Grant, Held, Velocity
+from sitl.world import CONTROL_PERIOD_US
+from wire.simulator_api import SimulatorApi
+
+START_S = 20.0
+ANSWER_S = 20.0  # wall time in which a simulator runs 50 ms, on the busiest machine
+_LAST_WORDS_S = 3.0
+IMAGE_S = 2.0  # wall time for an image to come and be looked at
+_ANSWER_US = CONTROL_PERIOD_US + TELEMETRY_DELAY_US - 1
+"""From a multiple of 50 ms to the last control tick before the one that flies the answer."""
+
+
+class SitlProcess(ChildProcess):
+    """`framerunner sim` as a child process.
+
+    Args:
+        scenario: name or file.
+        speed: simulated seconds a second.
+        instance: shifts its ports.
+        links: more links, as `--link` takes them.
+
+    Attributes:
+        clock: its time, which waits for this program once asked to.
+        system_id: MAVLink id of its drone.
+        drone_url: where its MAVLink arrives.
+        api: where it serves video and referee.
+    """
+
+    def __init__(
+        self, scenario: str, speed: float = 1.0, instance: int = 0, links: tuple[str, ...] = ()
+    ) -> None:
+        here, there = socket.socketpair()
+        arguments = [
+            *("sim", "--lifeline", "--scenario", scenario),
+            *("--speed", f"{speed:g}", "--instance", str(instance), "--video-rtp", "off"),
+            *("--time-grants", str(there.fileno())),
+            *(word for link in links for word in ("--link", link)),
+        ]
+        super().__init__("the simulator", arguments, handed=there)
+        self.clock = SimulatorClock(here)
+        self.system_id = instance + 1
+        self.drone_url = f"udpin://127.0.0.1:{14540 + instance}"
+        self.api = SimulatorApi(f"http://127.0.0.1:{VIDEO_PORT + instance}")
+
+    async def __aenter__(self) -> Self:
+        """Start it, and wait until it says that all its ports are open.
+
+        Raises:
+            SettingError: it cannot start; its own words are the reason.
+        """
+        await super().__aenter__()
+        try:
+            await self.guard(asyncio.create_task(self.clock.up()))
+        except BaseException:
+            await self.__aexit__()
+            raise
+        return self
+
+    async def __aexit__(self, *_: object) -> None:
+        """Stop it."""
+        self.clock.close()
+        await super().__aexit__()
+
+
+class SimulatorClock:
+    """This program's end of the simulator's time grants.
+
+    Args:
+        channel: connected to the simulator.
+
+    Attributes:
+        images_missed: ticks without the image that belongs to them: it did not come in time.
+        setpoints_missed: setpoints that did not arrive in time.
+    """
+
+    def __init__(self, channel: socket.socket) -> None:
+        self.images_missed = 0
+        self.setpoints_missed = 0
+        self._channel = channel
+        self._reader: asyncio.StreamReader | None = None
+        self._writer: asyncio.StreamWriter | None = None
+        self._eyes: CameraEyes | None = None
+
+    def look_through(self, eyes: CameraEyes) -> None:
+        """Wait at each tick until these have seen the image that was sent last."""
+        self._eyes = eyes
+
+    async def up(self) -> None:
+        """Wait until the simulator says that it is up.
+
+        Raises:
+            SettingError: it does not.
+        """
+        self._reader, self._writer = await asyncio.open_connection(sock=self._channel)
+        try:
+            line = await asyncio.wait_for(self._reader.readline(), START_S)
+        except TimeoutError:
+            raise SettingError(f"the simulator did not start within {START_S:g} s") from None
+        if not line:  # it has ended; whoever guards it knows its last words
+            await asyncio.sleep(START_S)
+
+    async def stop(self) -> int:
+        """Let time stand still; returns the time of the last control tick, microseconds.
+
+        Raises:
+            DroneError: the simulator is gone.
+        """
+        return (await self._granted(Grant(0))).time_us
+
+    async def advance(self, tick_us: int, command: VelocityCommand | None) -> None:
+        """Let time go on to a tick and the control period after it; then wait for the image.
+
+        Args:
+            tick_us: multiple of 50 ms.
+            command: must arrive first; None: nothing must.
+
+        Raises:
+            DroneError: the simulator is gone.
+        """
+        setpoint = None if command is None else _sent(command)
+        held = await self._granted(Grant(tick_us + _ANSWER_US, setpoint))
+        if held.setpoint_missed:
+            self.setpoints_missed += 1
+        if self._eyes is not None and not await self._eyes.seen(held.image_us, IMAGE_S):
+            self.images_missed += 1
+
+    def release(self) -> None:
+        """Let time go on by itself."""
+        if self._writer is not None and not self._writer.is_closing():
+            self._writer.write(Grant(FREE_US).line())
+
+    def close(self) -> None:
+        """Close the channel."""
+        if self._writer is not None:
+            self._writer.close()
+        else:
+            self._channel.close()
+
+    async def _granted(self, grant: Grant) -> Held:
+        assert self._reader is not None, "up() comes first"
+        assert self._writer is not None
+        try:
+            self._writer.write(grant.line())
+            line = await asyncio.wait_for(self._reader.readline(), ANSWER_S)
+        except TimeoutError:
+            raise DroneError(f"the simulator did not answer for {ANSWER_S:g} s") from None
+        except OSError:
+            line = b""
+        if not line:
+            await asyncio.sleep(_LAST_WORDS_S)  # whoever guards it has better words
+            raise DroneError("the simulator has ended")
+        return Held.parse(line)
+
+
+def _sent(command: VelocityCommand) -> Velocity:
+    """A command as the autopilot receives it."""
+    forward, right, down = single((command.forward_m_s, -command.left_m_s, -command.up_m_s))
+    return (forward, right, down, sent_yaw_rate(-command.yaw_rate_rad_s))

@@ -1,0 +1,1 @@
+"""What a flight leaves behind: its folder, track, video and pictures."""

@@ -1,0 +1,213 @@
+"""Keeps what a flight shows of itself: its track, its times, its images."""
+
+from __future__ import annotations
+
+import time
+from collections import deque
+from collections.abc import AsyncIterator, Callable
+from concurrent.futures import Future, ThreadPoolExecutor
+from datetime import UTC, datetime
+from pathlib import Path
+from typing import TYPE_CHECKING, Protocol
+
+import cv2
+
+from framerunner.runs.run_folder import RunFolder
+from framerunner.runs.track import Track
+from offboard.app import Moment
+from scenarios.result import FlightResult
+from vision.types import CameraFrame, Image
+
+if TYPE_CHECKING:
+    from framerunner.recording.mcap_writer import FlightRecording
+
+_MAX_WAITING_BYTES = 12 << 20  # of images that wait to be compressed: 50 of 320 x 240 pixels
+
+
+class FrameSource(Protocol):
+    """A camera source, as in `vision.sources`."""
+
+    def frames(self) -> AsyncIterator[CameraFrame]:
+        """Images as they come."""
+        ...
+
+
+class FlightRecorder:
+    """Remembers the latest tick of a flight and how fast wall time went by."""
+
+    def __init__(self) -> None:
+        self._first: tuple[float, int] | None = None
+        self._last: tuple[float, int] | None = None
+        self.latest: Moment | None = None
+
+    def see(self, moment: Moment) -> None:
+        """Take a tick."""
+        self._last = (time.monotonic(), moment.state.time_us)
+        self._first = self._first or self._last
+        self.latest = moment
+
+    @property
+    def wall_time_s(self) -> float:
+        """Wall time from the first to the last tick."""
+        return 0.0 if self._first is None or self._last is None else self._last[0] - self._first[0]
+
+    @property
+    def real_time_factor(self) -> float | None:
+        """Vehicle time a wall time; None before two ticks."""
+        if self._first is None or self._last is None or self.wall_time_s <= 0.0:
+            return None
+        return (self._last[1] - self._first[1]) / 1e6 / self.wall_time_s
+
+
+class VideoFile:
+    """Writes images to a video file (motion JPEG in AVI: every player has it), beside the flight.
+
+    Args:
+        path: the video; made with the first image.
+        rate_hz: images a second, for players.
+
+    Attributes:
+        problem: why the file is not whole, known when it is closed; empty if it is.
+    """
+
+    def __init__(self, path: Path, rate_hz: float) -> None:
+        self.problem = ""
+        self._path = path
+        self._rate_hz = rate_hz
+        self._writer: cv2.VideoWriter | None = None
+        self._worker = ThreadPoolExecutor(1, "video")
+        self._size: tuple[int, ...] = ()
+        self._under_way: deque[Future[None]] = deque()
+
+    def write(self, image: Image, *, wait: bool = True) -> None:
+        """Add an image; one of another size than the first is left out.
+
+        Args:
+            image: BGR; it must not be changed afterwards.
+            wait: for room, if many images wait to be compressed; if not, the image is left out then.
+        """
+        self._size = self._size or image.shape
+        if image.shape != self._size:
+            return
+        while self._under_way and self._under_way[0].done():
+            self._under_way.popleft().result()
+        if len(self._under_way) * image.nbytes > _MAX_WAITING_BYTES:
+            if not wait:
+                return
+            self._under_way.popleft().result()
+        self._under_way.append(self._worker.submit(self._compress, image))
+
+    def close(self) -> None:
+        """Finish the file."""
+        self._worker.shutdown()
+        if self._writer is not None:
+            self._writer.release()
+            self._writer = None
+            if not _is_whole_avi(self._path):
+                self.problem = f"'{self._path}' is not whole: the disk did not take it"
+
+    def _compress(self, image: Image) -> None:
+        if self._writer is None:
+            height, width = image.shape[:2]
+            codec = cv2.VideoWriter.fourcc(*"MJPG")
+            self._writer = cv2.VideoWriter(str(self._path), codec, self._rate_hz, (width, height))
+        self._writer.write(image)
+
+
+def _is_whole_avi(path: Path) -> bool:
+    """Whether the length that stands in the file's head was written, and that much is there.
+
+    OpenCV does not tell of failed writes; the length is written last, after the index.
+    """
+    try:
+        with path.open("rb") as file:
+            head = file.read(12)
+        written = int.from_bytes(head[4:8], "little") + 8
+        return head[:4] == b"RIFF" and written <= path.stat().st_size
+    except OSError:
+        return False
+
+
+class RecordingCamera:
+    """Hands images on and writes them to a video file.
+
+    Args:
+        source: where images come from.
+        path: the video; made with the first image.
+        rate_hz: images a second, for players.
+        on_frame: called with each image.
+    """
+
+    def __init__(
+        self,
+        source: FrameSource,
+        path: Path,
+        rate_hz: float,
+        on_frame: Callable[[CameraFrame], None] | None = None,
+    ) -> None:
+        self._source = source
+        self._on_frame = on_frame
+        self._video = VideoFile(path, rate_hz)
+
+    async def frames(self) -> AsyncIterator[CameraFrame]:
+        """Images as they come, each written before it is handed on."""
+        async for frame in self._source.frames():
+            self._video.write(frame.image, wait=False)
+            if self._on_frame is not None:
+                self._on_frame(frame)
+            yield frame
+
+    def close(self) -> None:
+        """Finish the file."""
+        self._video.close()
+
+    @property
+    def problem(self) -> str:
+        """Why the video is not whole, known when it is closed; empty if it is."""
+        return self._video.problem
+
+
+class RunRecords:
+    """Everything that keeps what a flight shows of itself.
+
+    Attributes:
+        folder: where it is kept.
+        recorder: the latest tick and the pace.
+        recording: the MCAP file; None without `--record`.
+    """
+
+    def __init__(self, folder: RunFolder, recording: FlightRecording | None) -> None:
+        self._started = datetime.now(UTC)
+        self.folder = folder
+        self.recorder = FlightRecorder()
+        self.recording = recording
+
+    def see(self, moment: Moment) -> None:
+        """Take a tick."""
+        self.recorder.see(moment)
+        if self.recording is not None:
+            self.recording.see(moment)
+
+    def see_image(self, time_us: int, image: Image) -> None:
+        """Take a raw image, of the simulated camera."""
+        if self.recording is not None:
+            self.recording.see_image(time_us, image)
+
+    def see_frame(self, frame: CameraFrame) -> None:
+        """Take an image of a camera source."""
+        if self.recording is not None:
+            self.recording.see_frame(frame)
+
+    def complete(self, result: FlightResult) -> FlightResult:
+        """What stands in `result.json`: a result with what tells of wall time."""
+        wall = {
+            "wall_time_s": self.recorder.wall_time_s,
+            "real_time_factor": self.recorder.real_time_factor,
+            "started": self._started.isoformat(timespec="seconds"),
+        }
+        return result.model_copy(update=wall)
+
+    def finish(self, result: FlightResult, track: Track) -> None:
+        """Add what is known only after the flight."""
+        if self.recording is not None:
+            self.recording.finish(result, track.time_s)

@@ -1,0 +1,163 @@
+"""The folder that a flight leaves behind. A file that cannot be written costs one line, never the verdict."""
+
+from __future__ import annotations
+
+import os
+import shlex
+import sys
+from collections.abc import Callable
+from datetime import datetime
+from pathlib import Path
+
+from framerunner.errors import SettingError
+from framerunner.extras import advice
+from framerunner.runs.pictures import PictureError, track_picture
+from framerunner.runs.track import Track
+from offboard.mission import Mission
+from offboard.pilot_file import PilotFile
+from scenarios.loader import dump_yaml
+from scenarios.models import Scenario
+from scenarios.result import FlightResult
+
+
+class RunFolder:
+    """`<out>/<time>-<scenario>/`, made when a flight begins.
+
+    Args:
+        out: folder of all runs; made if it is not there.
+        scenario: name for people.
+
+    Attributes:
+        stopped_before_start: somebody stopped the flight before its first tick; set by whoever flies.
+
+    Raises:
+        SettingError: the folder cannot be made.
+    """
+
+    def __init__(self, out: Path, scenario: str) -> None:
+        stamp = datetime.now().astimezone().strftime("%Y%m%d-%H%M%S")
+        path = out / f"{stamp}-{scenario}"
+        self.stopped_before_start = False
+        self._made_out = not out.exists()
+        try:
+            out.mkdir(parents=True, exist_ok=True)
+            number = 1
+            while True:
+                try:
+                    path.mkdir()
+                    break
+                except FileExistsError:  # two flights within a second
+                    number += 1
+                    path = out / f"{stamp}-{scenario}-{number}"
+        except OSError as error:
+            raise SettingError(
+                f"--out {out}: cannot be written to ({error.strerror}); choose another"
+            ) from None
+        self.path = path
+        self.result = path / "result.json"
+        self.track = path / "track.png"
+        self.tlog = path / "flight.tlog"
+        self.video = path / "video.avi"
+        self.hang_report = path / "hang.txt"
+        self.scenario = path / "scenario.yaml"
+        self.mission = path / "mission.yaml"
+        self.pilot = path / "pilot.py"
+        self.recording = path / "flight.mcap"
+
+    def write_plan(self, scenario: Scenario, mission: Mission) -> None:
+        """Write what is to be flown, so that the flight can be judged, replayed and flown again.
+
+        Raises:
+            SettingError: the disk does not take it; nothing of it stays.
+        """
+        source = mission.path.read_bytes()
+        try:
+            self.scenario.write_text(dump_yaml(scenario), encoding="utf-8")
+            self.mission.write_bytes(source)
+            if isinstance(mission.pilot, PilotFile):
+                self.pilot.write_text(mission.pilot.text, encoding="utf-8")
+        except OSError as error:
+            raise SettingError(
+                f"--out {self.path.parent}: cannot be written to ({error.strerror}); free some space "
+                "or choose another"
+            ) from None
+
+    def write_result(self, result: FlightResult) -> None:
+        """Write `result.json` whole or not at all.
+
+        Raises:
+            OSError: the disk does not take it.
+        """
+        part = self.result.with_suffix(".part")
+        try:
+            part.write_text(result.text(), encoding="utf-8")
+            os.replace(part, self.result)
+        except OSError:
+            part.unlink(missing_ok=True)
+            raise
+
+    def remove_if_empty(self) -> None:
+        """Take away empty files, and the folder if no result, log or recording remains.
+
+        All goes if the flight was stopped before it began; `out` too, if it was made for this flight.
+        """
+        for path in self.path.iterdir():
+            if path.stat().st_size == 0 or self.stopped_before_start:
+                path.unlink()
+        if not any(path.exists() for path in (self.result, self.tlog, self.recording)):
+            for path in (self.scenario, self.mission, self.pilot):
+                path.unlink(missing_ok=True)
+            if not any(self.path.iterdir()):
+                self.path.rmdir()
+                if self._made_out and not any(self.path.parent.iterdir()):
+                    self.path.parent.rmdir()
+
+
+def write_outcome(folder: RunFolder, scenario: Scenario, track: Track, result: FlightResult) -> None:
+    """Write `result.json` and `track.png`; say on standard error what could not be written.
+
+    Args:
+        folder: of the flight.
+        scenario: what was flown, its frames where they were.
+        track: where the drone was.
+        result: of the flight.
+    """
+    _try(folder.result, lambda: folder.write_result(result))
+    _try(folder.track, lambda: track_picture(scenario, track, result, folder.track))
+
+
+def warn(problem: str) -> None:
+    """Say in one line what a flight does not leave; nothing if there is no problem."""
+    if problem:
+        print(f"warning: {problem}", file=sys.stderr, flush=True)
+
+
+def left_lines(folder: RunFolder, result: FlightResult) -> list[str]:
+    """Say where a flight's files are, and how to see it again; nothing that is not there.
+
+    Args:
+        folder: of the flight; it may be gone.
+        result: of the flight.
+    """
+    lines = [f"left in {folder.path}/"] if folder.path.is_dir() else []
+    # A lockstep flight is flown again from its plan.
+    shown_from = (folder.recording, folder.tlog) if result.seed is None else (folder.result,)
+    if any(path.is_file() and path.stat().st_size for path in shown_from):
+        command = shlex.join(["framerunner", "replay", str(folder.path)])
+        lines.append(f"see it again: {command}")
+    return lines
+
+
+def _try(path: Path, write: Callable[[], None]) -> None:
+    try:
+        write()
+    except PictureError as error:
+        path.unlink(missing_ok=True)  # half a picture
+        warn(str(error))
+    except ModuleNotFoundError as error:
+        missing = advice(error.name or "")
+        if missing is None:
+            raise
+        warn(f"{path.name} was not drawn: {missing}")
+    except OSError as error:
+        warn(f"cannot write '{path}': {error.strerror or error}")

@@ -1,0 +1,114 @@
+"""Where a drone was during a flight."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from itertools import groupby
+from math import isfinite
+
+from geometry.vectors import Vec3
+from offboard.app import Moment
+
+
+@dataclass(frozen=True, slots=True)
+class Track:
+    """Where a drone was; all sequences have the same length.
+
+    Attributes:
+        time_s: since motors on, not decreasing, shape (n,).
+        x: arena metres, shape (n,); a sample that is not finite leaves a gap in the drawn path.
+        y: see x.
+        z: see x.
+        mission_state: the state's id at each sample, such as "red.turning"; "" where there is none.
+    """
+
+    time_s: Sequence[float] = ()
+    x: Sequence[float] = ()
+    y: Sequence[float] = ()
+    z: Sequence[float] = ()
+    mission_state: Sequence[str] = ()
+
+    def __post_init__(self) -> None:
+        """Refuse sequences of different lengths.
+
+        Raises:
+            ValueError: they differ.
+        """
+        lengths = {name: len(getattr(self, name)) for name in ("time_s", "x", "y", "z", "mission_state")}
+        if len(set(lengths.values())) > 1:
+            raise ValueError(f"a track's sequences must have one length, not {lengths}")
+
+    def __len__(self) -> int:
+        """Number of samples."""
+        return len(self.time_s)
+
+    def is_drawable(self, index: int) -> bool:
+        """Whether a sample has a place."""
+        return isfinite(self.x[index]) and isfinite(self.y[index]) and isfinite(self.z[index])
+
+    def place_at(self, time_s: float) -> Vec3 | None:
+        """Where the drone was at a time, on the straight line between the samples around it.
+
+        Returns:
+            Arena metres, shape (3,); None before the first and after the last sample that has a place.
+        """
+        known = [i for i in range(len(self)) if self.is_drawable(i)]
+        for i, j in zip(known, known[1:] or known, strict=False):
+            if not self.time_s[i] <= time_s <= self.time_s[j]:
+                continue
+            span_s = self.time_s[j] - self.time_s[i]
+            part = (time_s - self.time_s[i]) / span_s if span_s > 0 else 0.0
+            x, y, z = (values[i] + part * (values[j] - values[i]) for values in (self.x, self.y, self.z))
+            return (x, y, z)
+        return None
+
+    def stretches(self) -> Iterator[tuple[str, range]]:
+        """Stretches flown in one kind of state, in order of time.
+
+        The kind is the last part of the state's id: the drone turns for green as it does for red, and a dozen
+        colours can be told apart, three dozen cannot. Each stretch reaches to the first sample of the next.
+        """
+        kinds = (state.rpartition(".")[2] for state in self.mission_state)
+        for kind, group in groupby(enumerate(kinds), key=lambda pair: pair[1]):
+            indices = [index for index, _ in group]
+            yield kind, range(indices[0], min(indices[-1] + 2, len(self)))
+
+    def seconds_in_state(self) -> dict[str, float]:
+        """Time spent in each kind of state, seconds, in order of first appearance."""
+        spent_s: dict[str, float] = {}
+        for kind, indices in self.stretches():
+            duration_s = self.time_s[indices[-1]] - self.time_s[indices[0]]
+            spent_s[kind] = spent_s.get(kind, 0.0) + duration_s
+        return spent_s
+
+
+class TrackRecorder:
+    """Remembers where the drone was at every tick of a flight."""
+
+    def __init__(self) -> None:
+        self._time_us: list[int] = []
+        self._x: list[float] = []
+        self._y: list[float] = []
+        self._z: list[float] = []
+        self._mission_state: list[str] = []
+
+    def see(self, moment: Moment) -> None:
+        """Take a tick."""
+        state = moment.state
+        self._time_us.append(state.time_us)
+        self._x.append(state.x)
+        self._y.append(state.y)
+        self._z.append(state.z)
+        self._mission_state.append(moment.mission_state)
+
+    def track(self, began_us: int | None) -> Track:
+        """Return where the drone was.
+
+        Args:
+            began_us: vehicle time from which to count, microseconds; None for the first tick's.
+        """
+        if began_us is None:
+            began_us = self._time_us[0] if self._time_us else 0
+        time_s = [(time_us - began_us) / 1e6 for time_us in self._time_us]
+        return Track(time_s, self._x, self._y, self._z, self._mission_state)

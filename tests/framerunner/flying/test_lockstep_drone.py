@@ -1,0 +1,161 @@
+"""The lockstep adapter of the drone port, without a mission."""
+
+import asyncio
+from dataclasses import replace
+from math import nan
+
+import pytest
+
+from firmware_py.status import CommandResult, FlightMode
+from framerunner.flying.lockstep import LockstepEyes
+from framerunner.flying.lockstep_drone import TICK_US, LockstepDrone
+from offboard.drone import DroneError, VelocityCommand
+from offboard.eyes import CameraLostError
+from scenarios.loader import load_scenario
+from sitl.simulation import Simulation
+
+START = (1.0, 2.0, 0.5, 0.3)  # not where the simulation has it: the axes must be turned to this
+
+
+@pytest.fixture
+def simulation():
+    return Simulation(load_scenario("empty"))
+
+
+@pytest.fixture
+def drone(simulation):
+    return LockstepDrone(simulation, START)
+
+
+async def fly(drone, command, ticks):
+    states = []
+    async for state in drone.ticks():
+        states.append(state)
+        drone.command(command)
+        if len(states) == ticks:
+            return states
+    return states
+
+
+async def in_the_air(drone):
+    await drone.connect()
+    await drone.ready()
+    await drone.motors_on()
+    return await fly(drone, VelocityCommand(up_m_s=0.5), 60)
+
+
+async def test_ticks_stand_on_the_50_ms_grid_in_the_arenas_axes(drone):
+    await drone.ready()
+    states = await fly(drone, VelocityCommand(), 6)
+    assert [state.time_us // TICK_US - states[0].time_us // TICK_US for state in states] == list(range(6))
+    assert all(state.time_us % TICK_US < 4_000 for state in states)
+    told = states[-1]
+    assert (told.x, told.y, told.z, told.yaw) == pytest.approx(START, abs=1e-4)
+    assert (told.armed, told.offboard, told.landed) == (False, False, True)
+
+
+async def test_motors_run_only_in_offboard_and_a_velocity_holds_until_changed(drone, simulation):
+    await drone.ready()
+    await drone.motors_on()
+    assert simulation.autopilot.status.mode is FlightMode.OFFBOARD
+    drone.command(VelocityCommand(forward_m_s=0.4, up_m_s=0.4))
+    ticks = drone.ticks()
+    states = [await anext(ticks) for _ in range(80)]  # 4 s without another command
+    assert all(state.armed and state.offboard for state in states)
+    vx, vy, vz = states[-1].velocity_arena_m_s
+    assert (vx, vy) == pytest.approx((0.4 * 0.955, 0.4 * 0.296), abs=0.02)  # forward is along START's yaw
+    assert vz == pytest.approx(0.4, abs=0.02)
+
+
+async def test_motors_off_land_and_hold(drone, simulation):
+    assert (await in_the_air(drone))[-1].z > START[2] + 0.5
+    await drone.hold()
+    assert simulation.autopilot.status.mode is FlightMode.HOLD
+    await drone.land()
+    assert not simulation.autopilot.status.armed
+    drone.settle()
+    assert simulation.referee.settled
+    await drone.motors_on()
+    await drone.motors_off()
+    assert not simulation.autopilot.status.armed
+
+
+async def test_says_who_took_over(drone, simulation):
+    await in_the_air(drone)
+    simulation.autopilot.set_mode(FlightMode.HOLD)
+    with pytest.raises(DroneError, match="the pilot or a failsafe took over: mode HOLD"):
+        await fly(drone, VelocityCommand(), 25)
+
+
+async def test_says_that_it_was_disarmed(drone, simulation):
+    await in_the_air(drone)
+    simulation.autopilot.disarm(force=True)
+    with pytest.raises(DroneError, match=r"disarmed by others; the vehicle says: .*Disarmed by external"):
+        await fly(drone, VelocityCommand(), 25)
+
+
+async def test_a_command_that_is_no_number_brakes_as_a_packet_with_it_does(drone):
+    await in_the_air(drone)
+    states = await fly(drone, VelocityCommand(up_m_s=nan), 40)
+    assert states[-1].velocity_arena_m_s[2] == pytest.approx(0.0, abs=0.02)
+
+
+async def test_refuses_an_armed_vehicle_and_ticks_before_ready(drone, simulation):
+    with pytest.raises(DroneError, match=r"call ready\(\) first"):
+        await anext(drone.ticks())
+    await drone.ready()
+    simulation.autopilot.arm()
+    for _ in range(2):
+        simulation.tick()
+    with pytest.raises(DroneError, match="armed already"):
+        await drone.ready()
+
+
+async def test_says_what_the_vehicle_refuses(drone, simulation, monkeypatch):
+    await drone.ready()
+    monkeypatch.setattr(simulation.autopilot, "arm", lambda: CommandResult.TEMPORARILY_REJECTED)
+    with pytest.raises(DroneError, match=r"arming was refused: TEMPORARILY_REJECTED; .*Ready for takeoff"):
+        await drone.motors_on()
+
+
+async def test_says_that_the_vehicles_clock_stands_still(drone, simulation, monkeypatch):
+    await drone.ready()
+    sample = replace(simulation.world.sensors(), position_ned_m=(nan, nan, nan))
+    monkeypatch.setattr(simulation.world, "sensors", lambda: sample)
+    with pytest.raises(DroneError, match="link lost: the vehicle's clock stands still"):
+        await fly(drone, VelocityCommand(), 25)
+    with pytest.raises(
+        DroneError, match="offboard mode was acknowledged, but telemetry still shows mode HOLD"
+    ):
+        await drone.motors_on()
+
+
+async def test_ctrl_c_reaches_a_flight_that_never_waits(drone):
+    await drone.ready()
+    task = asyncio.current_task()
+
+    async def interrupted():
+        async for _ in drone.ticks():
+            asyncio.current_task().cancel()
+
+    flight = asyncio.create_task(interrupted())
+    with pytest.raises(asyncio.CancelledError):
+        await flight
+    assert task.cancelling() == 0
+
+
+@pytest.mark.parametrize("delay_us", [-1, 50_000])
+def test_refuses_a_delay_that_does_not_fit_between_ticks(simulation, delay_us):
+    with pytest.raises(ValueError, match=f"telemetry_delay_us {delay_us}"):
+        LockstepDrone(simulation, START, telemetry_delay_us=delay_us)
+
+
+def test_a_camera_without_fresh_images_is_lost(simulation):
+    eyes = LockstepEyes(simulation.scenario)
+    assert not eyes.latest(900_000).red.seen
+    for _ in range(50):
+        simulation.tick()
+        eyes.follow(simulation.truth)
+    assert eyes.latest(simulation.time_us).time_us == 136_000
+    with pytest.raises(CameraLostError, match=r"no image for 1\.1 s"):
+        eyes.latest(1_250_000)

@@ -1,0 +1,248 @@
+"""What is told of a mission while it is flown."""
+
+from __future__ import annotations
+
+import logging
+from dataclasses import replace
+from math import inf
+
+import numpy as np
+import pytest
+
+from framerunner.flying.mission_teller import HISTORY, MissionTeller
+from offboard.app import Moment, fly_mission
+from offboard.drone import DroneState, VelocityCommand
+from offboard.engine import TransitionTaken
+from offboard.mission import load_mission, mermaid
+from scenarios.result import FlightResult
+from tests.offboard.fakes import START_1, TEST_CASE_1, GeometricEyes, KinematicDrone
+from vision.types import CameraFrame, Detection, Detections
+from wire.mission_codec import DocumentAssembler
+from wire.mission_messages import DocumentKind
+
+MISSION = load_mission("frame_challenge")
+LEAVES = list(MISSION.leaves)
+START = (-3.0, -3.0, 0.53, 1.0)
+
+
+class Listener:
+    """Stands where the companion is; keeps what it is to send."""
+
+    def __init__(self):
+        self.states, self.detections, self.texts, self.documents, self.farewells = [], [], [], [], []
+
+    def tell_state(self, state):
+        self.states.append(state)
+
+    def tell_detections(self, detections):
+        self.detections.append(detections)
+
+    def say(self, text):
+        self.texts.append(text)
+
+    def tell_document(self, kind, pieces):
+        assembler = DocumentAssembler()
+        (document,) = [document for piece in pieces if (document := assembler.take(piece))]
+        assert document.kind == kind
+        self.documents.append(document)
+
+    async def farewell(self, kind):
+        self.farewells.append(kind)
+
+    def contents(self, kind):
+        return [document.content for document in self.documents if document.kind == kind]
+
+
+def make_teller(source="name: frame_challenge\n"):
+    listener = Listener()
+    return listener, MissionTeller(listener, MISSION, source, "test-case-1", START)
+
+
+def moment(tick, mission_state="red.turning", **changes):
+    flying = changes.pop("flying", True)
+    state = DroneState(50_000 * tick, 1.0, 2.0, 3.0, 0.5, armed=flying, offboard=flying)
+    return replace(
+        Moment(state, VelocityCommand(0.1, 0.2, 0.3, 0.4), Detections(), mission_state, 0.0), **changes
+    )
+
+
+def taken(number, source="red.turning", target="red.frame_visible", values=()):
+    return TransitionTaken(source, target, "frame.d < 1", values, 50_000 * number, 0.05 * number)
+
+
+def test_the_mission_is_told_before_it_begins():
+    listener, _ = make_teller("name: x # ü\n")
+    (document,) = listener.documents
+    assert document.content == {
+        "name": "frame_challenge",
+        "description": MISSION.description,
+        "scenario": "test-case-1",
+        "states": LEAVES,
+        "mermaid": mermaid(MISSION),
+        "source": "name: x # ü\n",
+    }
+    (state,) = listener.states
+    assert (state.mission_crc, state.state_index, state.flying) == (document.crc, -1, False)
+    assert state.pose_arena == START
+
+
+def test_a_mission_that_is_too_large_is_told_without_its_text(caplog):
+    noise = np.random.default_rng(1).integers(33, 0x2000, 60_000)
+    listener, _ = make_teller("".join(map(chr, noise)))
+    (content,) = listener.contents(DocumentKind.MISSION)
+    assert (content["source"], content["mermaid"], content["states"]) == ("", mermaid(MISSION), LEAVES)
+    assert "pieces; at most 255 can be told" in caplog.text
+
+
+def test_the_state_is_told_every_second_tick_and_at_once_when_it_changes():
+    listener, teller = make_teller()
+    listener.states.clear()
+    for tick in range(4):
+        teller.see(moment(tick))
+    assert [state.time_us for state in listener.states] == [0, 100_000]
+    teller.see(moment(4, paused=True))
+    teller.see(moment(5, flying=False))
+    teller.see(moment(6, "red.frame_visible", transition=taken(6)))
+    teller.see(moment(7, "landing.stop", transition=taken(7, "red.frame_visible", "landing.stop")))
+    teller.see(moment(8, "landing.stop"))
+    teller.see(moment(9, "landing.stop"))
+    assert [state.time_us // 50_000 for state in listener.states] == [0, 2, 4, 5, 6, 7, 9]
+    assert [state.flying for state in listener.states[:5]] == [True, True, False, False, True]
+    assert [state.paused for state in listener.states[:4]] == [False, False, True, False]
+    last = listener.states[-1]
+    assert (last.state_index, last.transitions, last.finished) == (LEAVES.index("landing.stop"), 2, True)
+    assert (last.entered_us, listener.states[0].finished) == (350_000, False)
+    assert (last.command, last.pose_arena) == ((0.1, 0.2, 0.3, 0.4), (1.0, 2.0, 3.0, 0.5))
+
+
+def test_each_new_state_is_said_once():
+    listener, teller = make_teller()
+    for tick, state in enumerate(("red.turning", "red.turning", "red.crossing", "red.turning")):
+        teller.see(moment(tick, state))
+    assert listener.texts == ["mission: red.turning", "mission: red.crossing", "mission: red.turning"]
+
+
+def test_a_state_that_leads_to_itself_is_entered_anew():
+    listener, teller = make_teller()
+    teller.see(moment(1))
+    teller.see(moment(2, transition=taken(2, target="red.turning")))
+    assert [(state.entered_us, state.transitions) for state in listener.states[1:]] == [
+        (50_000, 0),
+        (100_000, 1),
+    ]
+    assert len(listener.texts) == 1
+
+
+def test_the_history_keeps_the_last_ten_with_the_values_of_their_guards():
+    listener, teller = make_teller()
+
+    class Odd:
+        def __str__(self):
+            raise ValueError("no words")
+
+    values = (
+        ("frame.d", 0.44),
+        ("frame.a", inf),
+        ("frame_seen", True),
+        ("memory.count", np.float64(2.5)),
+        ("memory.name", "x" * 200),
+        ("memory.large", 10**5000),
+        ("memory.odd", Odd()),
+        ("memory.none", None),
+    )
+    for number in range(12):
+        teller.see(moment(number, transition=taken(number, values=values)))
+    histories = listener.contents(DocumentKind.HISTORY)
+    assert [len(history["transitions"]) for history in histories] == [*range(1, HISTORY), *[HISTORY] * 3]
+    told = histories[-1]["transitions"]
+    assert [transition["time_us"] // 50_000 for transition in told] == list(range(2, 12))
+    assert told[-1] == {
+        "from": "red.turning",
+        "to": "red.frame_visible",
+        "time_us": 550_000,
+        "when": "frame.d < 1",
+        "values": [
+            ["frame.d", 0.44],
+            ["frame.a", None],
+            ["frame_seen", True],
+            ["memory.count", 2.5],
+            ["memory.name", "x" * 80],
+            ["memory.large", "int"],
+            ["memory.odd", "Odd"],
+            ["memory.none", None],
+        ],
+        "seconds": pytest.approx(0.55),
+    }
+
+
+def test_each_image_s_detections_are_told_once_with_the_image_s_size():
+    listener, teller = make_teller()
+    first = Detections(red=Detection(10.0, -10.0, 20.0, -20.0, 1.5, 30.0), time_us=7)
+    teller.see(moment(0, detections=first))
+    assert listener.detections == []  # how large the image is was not known yet
+    teller.see_frame(CameraFrame(np.zeros((240, 320, 3), np.uint8), 7, 0.0))
+    second = replace(first, time_us=None)
+    for tick, seen in enumerate((first, first, second, second)):
+        teller.see(moment(tick, detections=seen))
+    assert [(told.time_us, told.width_px, told.height_px) for told in listener.detections] == [
+        (7, 320, 240),
+        (None, 320, 240),
+    ]
+    assert listener.detections[0].red == (10.0, -10.0, 20.0, -20.0, 1.5, 30.0)
+    assert listener.detections[0].blue == (-inf, inf, -inf, inf, inf, inf)
+    teller.see(moment(5, "landing.stop", detections=Detections()))
+    assert len(listener.detections) == 2
+
+
+async def test_the_result_is_told_and_nothing_else_follows_until_it_is_out():
+    listener, teller = make_teller()
+    result = {"seed": None, "verdict": "clean", "crossing_times_s": [1.5, 2.5], "total_time_s": 88.9}
+    await teller.tell_result(FlightResult(**result))
+    assert listener.contents(DocumentKind.RESULT) == [result]
+    assert listener.farewells == [DocumentKind.RESULT]
+
+
+async def test_a_result_that_cannot_be_told_is_passed_over(caplog):
+    listener, teller = make_teller()
+    await teller.tell_result(FlightResult(verdict="clean", contact_frames=("x" * 200,) * 9000))
+    assert listener.farewells == []
+    assert "not told: result document: 1827" in caplog.text
+
+
+def test_a_fault_in_telling_does_not_reach_the_flight(caplog):
+    listener, teller = make_teller()
+    listener.say = lambda text: 1 / 0
+    told = len(listener.states)
+    with caplog.at_level(logging.WARNING):
+        for tick in range(5):
+            teller.see(moment(tick))
+    assert len(listener.states) == told + 1
+    assert [record.message.partition(":")[0] for record in caplog.records] == [
+        "the mission is not told of any more"
+    ]
+
+
+async def test_a_whole_flight_is_told_in_order():
+    listener, teller = make_teller()
+    drone = KinematicDrone(*START_1[:2], START_1[2])
+    seen = []
+
+    def observe(moment):
+        seen.append((moment.state.time_us, moment.mission_state))
+        teller.see(moment)
+
+    eyes = GeometricEyes(drone, TEST_CASE_1)
+    outcome = await fly_mission(drone, None, MISSION, observer=observe, eyes=eyes)
+    assert outcome.ended == "finished"
+    changes = [now for now, before in zip(seen, [(0, ""), *seen], strict=False) if now[1] != before[1]]
+    assert listener.texts == [f"mission: {state}" for _, state in changes]
+    entered = {(state.entered_us, state.state_index) for state in listener.states[1:]}
+    assert entered == {(time_us, LEAVES.index(state)) for time_us, state in changes}
+    histories = listener.contents(DocumentKind.HISTORY)
+    assert [history["transitions"][-1]["to"] for history in histories] == [state for _, state in changes[1:]]
+    closing = next(last for h in histories if (last := h["transitions"][-1])["to"] == "red.frame_close")
+    assert closing["values"][0][0] == "frame.d" and 0.3 < closing["values"][0][1] < 0.45
+    gaps = np.diff([state.time_us for state in listener.states[1:]])
+    assert gaps.max() <= 100_000
+    assert listener.states[-1].finished and not listener.states[-1].flying
+    assert len(seen) / 2 <= len(listener.states) <= len(seen) / 2 + 2 * len(changes) + 10

@@ -1,0 +1,119 @@
+"""The simulator as a program: it starts, serves, and is gone with all its ports when it should be."""
+
+import asyncio
+import os
+import signal
+import subprocess
+
+import aiohttp
+import pytest
+
+from framerunner.errors import SettingError
+from framerunner.flying.judges import ask_referee
+from framerunner.flying.simulator_process import SitlProcess
+from tests.processes import bound, free_instance, is_running, ports_are_free, program, simulator
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM], ids=lambda number: number.name)
+def test_a_signal_ends_the_simulator_and_frees_its_ports(tmp_path, number):
+    instance = free_instance()
+    with simulator(tmp_path, instance) as sim:
+        assert not ports_are_free(instance)
+        assert sim.end(number) == 130
+        assert sim.err.splitlines()[-1] == "interrupted"
+        assert "Traceback" not in sim.err
+    assert ports_are_free(instance)
+
+
+def test_two_simulators_run_side_by_side(tmp_path):
+    folders = [tmp_path / "one", tmp_path / "two"]
+    for folder in folders:
+        folder.mkdir()
+    first = free_instance()
+    with simulator(folders[0], first):
+        second = free_instance()
+        assert second != first
+        with bound(14540 + first) as app, bound(14540 + second) as other, simulator(folders[1], second):
+            for instance, station in ((first, app), (second, other)):
+                station.settimeout(5.0)
+                packet = station.recv(300)
+                assert packet[0] == 0xFD
+                assert packet[5] == instance + 1  # the system's id
+
+
+def test_with_a_lifeline_it_ends_when_its_standard_input_ends(tmp_path):
+    instance = free_instance()
+    with program(tmp_path, "sim", "--lifeline", "--instance", str(instance), stdin=subprocess.PIPE) as sim:
+        sim.wait_for("Ctrl-C stops")
+        sim.process.stdin.write(b"still here\n")
+        sim.process.stdin.flush()
+        with pytest.raises(subprocess.TimeoutExpired):
+            sim.process.wait(0.5)
+        sim.process.stdin.close()
+        assert sim.process.wait(10) == 0
+        assert "Traceback" not in sim.err
+    assert ports_are_free(instance)
+
+
+async def answering(sitl):
+    async with aiohttp.ClientSession() as session:
+        return await ask_referee(sitl.api, session)
+
+
+async def test_a_child_simulator_answers_and_is_gone_afterwards():
+    instance = free_instance()
+    async with SitlProcess("test-case-1", instance=instance) as sitl:
+        pid = sitl._process.pid
+        answer = await answering(sitl)
+        assert answer.scenario == "test-case-1"
+        assert answer.snapshot.motors_on is False
+        assert str(14540 + instance) in sitl.drone_url
+    assert not is_running(pid)
+    assert ports_are_free(instance)
+
+
+async def test_its_own_last_words_are_the_reason_when_it_cannot_start():
+    with pytest.raises(SettingError, match=r"code 2: unknown scenario .no-such-place"):
+        async with SitlProcess("no-such-place", instance=free_instance()):
+            pytest.fail("it has not started")
+
+
+async def test_its_death_ends_what_is_done_with_it():
+    async with SitlProcess("empty", instance=free_instance()) as sitl:
+        work = asyncio.create_task(asyncio.sleep(30))
+        os.kill(sitl._process.pid, signal.SIGKILL)
+        with pytest.raises(SettingError, match="code -9"):
+            await sitl.guard(work)
+        assert work.cancelled()
+
+
+async def test_work_that_answers_a_cancellation_with_a_result_is_heard():
+    async def flight():
+        try:
+            await asyncio.sleep(30)
+        except asyncio.CancelledError:
+            asyncio.current_task().uncancel()
+            await asyncio.sleep(0.1)
+            return "aborted"
+
+    async def guarded():
+        outcome = await sitl.guard(asyncio.create_task(flight()))
+        await asyncio.sleep(0)  # what comes after it is not cancelled
+        return outcome
+
+    async with SitlProcess("empty", instance=free_instance()) as sitl:
+        task = asyncio.create_task(guarded())
+        await asyncio.sleep(0.1)
+        task.cancel()
+        assert await task == "aborted"
+
+
+async def test_work_that_is_cancelled_stays_cancelled():
+    async with SitlProcess("empty", instance=free_instance()) as sitl:
+        work = asyncio.create_task(asyncio.sleep(30))
+        task = asyncio.create_task(sitl.guard(work))
+        await asyncio.sleep(0.1)
+        task.cancel()
+        with pytest.raises(asyncio.CancelledError):
+            await task
+        assert work.cancelled()

@@ -1,0 +1,67 @@
+"""The folder that a flight leaves."""
+
+import json
+import re
+
+import pytest
+
+from framerunner.errors import SettingError
+from framerunner.runs.run_folder import RunFolder
+from scenarios.result import FlightResult
+
+
+def test_its_name_says_when_and_what(tmp_path):
+    folder = RunFolder(tmp_path / "runs" / "today", "test-case-1")
+    assert folder.path.is_dir()
+    assert re.fullmatch(r"\d{8}-\d{6}-test-case-1", folder.path.name)
+
+
+def test_two_flights_in_one_second_have_a_folder_each(tmp_path):
+    paths = {RunFolder(tmp_path, "empty").path for _ in range(5)}
+    assert len(paths) == 5
+    assert all(path.is_dir() for path in paths)
+
+
+def test_a_place_that_cannot_be_written_to_is_said(tmp_path):
+    (tmp_path / "file").write_text("", encoding="utf-8")
+    with pytest.raises(SettingError, match=r"--out .*file.*choose another"):
+        RunFolder(tmp_path / "file", "empty")
+
+
+def test_a_result_is_written_whole_or_not_at_all(tmp_path):
+    folder = RunFolder(tmp_path, "empty")
+    result = FlightResult(verdict="clean", seed=None)
+    folder.write_result(result)
+    assert json.loads(folder.result.read_text(encoding="utf-8")) == {"seed": None, "verdict": "clean"}
+    with pytest.raises(ValueError, match="JSON"):
+        folder.write_result(
+            result.model_copy(update={"try_time_s": float("nan")})
+        )  # no reader of JSON takes NaN
+    assert json.loads(folder.result.read_text(encoding="utf-8"))["verdict"] == "clean"
+    assert [path.name for path in folder.path.iterdir()] == ["result.json"]
+
+
+def test_a_flight_that_did_not_begin_leaves_nothing(tmp_path):
+    folder = RunFolder(tmp_path, "empty")
+    folder.scenario.write_text("name: empty\n", encoding="utf-8")
+    folder.hang_report.write_text("", encoding="utf-8")
+    folder.remove_if_empty()
+    assert not folder.path.exists()
+
+
+def test_a_flight_that_was_stopped_before_it_began_leaves_nothing(tmp_path):
+    folder = RunFolder(tmp_path / "runs", "empty")
+    folder.tlog.write_bytes(b"while it was connecting")
+    folder.video.write_bytes(b"from the ground")
+    folder.stopped_before_start = True
+    folder.remove_if_empty()
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_what_was_recorded_stays(tmp_path):
+    folder = RunFolder(tmp_path, "empty")
+    folder.scenario.write_text("name: empty\n", encoding="utf-8")
+    folder.hang_report.write_text("", encoding="utf-8")
+    folder.tlog.write_bytes(b"\xfd")
+    folder.remove_if_empty()
+    assert {path.name for path in folder.path.iterdir()} == {"scenario.yaml", "flight.tlog"}

@@ -1,0 +1,126 @@
+"""URLs of links, and sockets that never block."""
+
+import pytest
+
+from wire.transports.sockets import (
+    MAX_UNSENT_BYTES,
+    OneClient,
+    Stream,
+    check_free,
+    connect_tcp,
+    listen_tcp,
+)
+from wire.transports.urls import LinkError, LinkUrl, UrlRules, host_and_port, is_loopback, parse_url
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "udpin://0.0.0.0:14540",
+        "udpout://192.168.1.10:14550",
+        "tcpout://localhost:5760",
+        "serial:///dev/ttyUSB0:57600",
+    ],
+)
+def test_good_addresses(text):
+    assert parse_url(f" {text} ").text == text
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "",
+        "14540",
+        "udp://:14540",
+        "udpin://:14540",
+        "udpin://0.0.0.0",
+        "udpin://0.0.0.0:0",
+        "udpin://0.0.0.0:99999",
+        "udpin://localhost:14540",
+        "http://0.0.0.0:80",
+        "serial://ttyUSB0:57600",
+        "udpin://0.0.0.0:14540x",
+        "udpin://0.0.0.0:14540?streams=onboard",
+    ],
+)
+def test_bad_addresses_are_named(text):
+    with pytest.raises(LinkError, match=r"^bad drone address '") as caught:
+        parse_url(text)
+    assert f"'{text}'" in str(caught.value)
+    assert "\n" not in str(caught.value)
+
+
+def test_a_program_says_what_it_accepts():
+    rules = UrlRules("--at {}", "tcpin://a:1", takes_options=True, listens_on_names=True)
+    url = parse_url("tcpin://localhost:1?a=b&c=", rules)
+    assert url == LinkUrl("tcpin://localhost:1?a=b&c=", "tcpin", "localhost", 1, (("a", "b"), ("c", "")))
+    with pytest.raises(LinkError, match=r"^--at x: not the URL of a link; examples: tcpin://a:1$"):
+        parse_url("x", rules)
+    with pytest.raises(LinkError, match=r"^--at serial://COM3:57600: a serial line looks like"):
+        parse_url("serial://COM3:57600", rules)
+    assert parse_url("serial://COM3:57600").address == "COM3"
+
+
+def test_hosts_with_and_without_port():
+    assert host_and_port("station", 14550) == ("station", 14550)
+    assert host_and_port("10.0.0.1:14999", 14550) == ("10.0.0.1", 14999)
+    for bad in ("a:", ":5", "a:b", "a:70000", "a:0"):
+        with pytest.raises(LinkError):
+            host_and_port(bad, 14550)
+
+
+@pytest.mark.parametrize(
+    ("host", "own"), [("127.0.0.2", True), ("::1", True), ("0.0.0.0", False), ("x", False)]
+)
+def test_loopback(host, own):
+    assert is_loopback(host) is own
+
+
+def test_a_missing_serial_device_is_told():
+    with pytest.raises(LinkError, match=r"/dev/ttyNONE9 cannot be opened .*; is it plugged in"):
+        check_free(parse_url("serial:///dev/ttyNONE9:57600"), "")
+
+
+def connected():
+    with listen_tcp(("127.0.0.1", 0)) as listener:
+        client = connect_tcp(listener.getsockname())
+        return client, Stream.of(*listener.accept())
+
+
+def test_what_is_not_read_waits_up_to_a_limit_and_is_then_lost_whole():
+    client, server = connected()
+    packet = bytes(range(256)) * 4
+    for _ in range(10_000):
+        client.write(packet)
+    assert client.has_unsent()
+    assert len(client._unsent) <= MAX_UNSENT_BYTES
+    received = bytearray()
+    while (data := server.read()) or client.has_unsent():
+        received += data
+        client.flush()
+    assert received == packet * (len(received) // len(packet))
+    client.close()
+    with pytest.raises(ConnectionResetError, match="the other side closed the connection"):
+        server.read()
+    server.write(packet)  # to nobody
+    server.write(packet)
+    assert not server.has_unsent()
+    server.close()
+
+
+def test_one_client_after_the_other():
+    server = OneClient(listen_tcp(("127.0.0.1", 0)))
+    place = server._listener.getsockname()
+    assert server.read() == b""
+    server.write(b"to nobody")
+    first, second = connect_tcp(place), connect_tcp(place)
+    assert server.read() == b""  # lets the first in
+    first.write(b"a")
+    second.write(b"b")
+    assert (server.read(), server.read()) == (b"a", b"")
+    server.write(b"c")
+    assert first.read() == b"c"
+    first.close()
+    assert (server.read(), server.read(), server.read()) == (b"", b"", b"b")
+    second.close()
+    server.close()

@@ -1,0 +1,1 @@
+"""Links: their URLs, and UDP, TCP and serial transports that carry bytes."""

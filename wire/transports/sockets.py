@@ -1,0 +1,286 @@
+"""UDP, TCP and serial lines as transports of bytes that never block.
+
+A thread waits for them with `select.poll`, an asyncio loop with `add_reader`; both by `fileno`, which may be
+another one after each `read`. `read` gives b"" when there is nothing now and raises `OSError` when the link
+has gone. What cannot be sent is lost in whole writes without an error, as on a radio. Functions that open
+something raise `LinkError`: one line with what cannot be opened, why, and what to do.
+"""
+
+from __future__ import annotations
+
+import errno
+import os
+import socket
+import termios
+import tty
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
+from pathlib import Path
+from typing import cast
+
+from wire.transports.urls import LinkError, LinkUrl
+
+Address = tuple[str, int]
+
+MAX_UNSENT_BYTES = 1 << 18  # of a stream; whoever reads slower loses packets
+_CONNECT_S = 5.0
+_READ_BYTES = 1 << 16
+
+
+class UdpSocket:
+    """A UDP socket, bound or connected.
+
+    Attributes:
+        peer: who sent what was read last; None before.
+    """
+
+    def __init__(self, opened: socket.socket) -> None:
+        opened.setblocking(False)
+        self._socket = opened
+        self.peer: Address | None = None
+
+    def fileno(self) -> int:
+        """The descriptor to wait for."""
+        return self._socket.fileno()
+
+    def read(self) -> bytes:
+        """The next datagram."""
+        try:
+            data, self.peer = self._socket.recvfrom(_READ_BYTES)
+        except (BlockingIOError, ConnectionRefusedError):  # refused: nobody listens there yet
+            return b""
+        return data
+
+    def write(self, data: bytes, to: Address | None = None) -> None:
+        """Send a datagram to the peer it is connected to, or to another."""
+        with suppress(OSError):
+            if to is None:
+                self._socket.send(data)
+            else:
+                self._socket.sendto(data, to)
+
+    def close(self) -> None:
+        """Let go of the port."""
+        self._socket.close()
+
+
+class Stream:
+    """A TCP connection or a serial line.
+
+    Args:
+        descriptor: of the open connection or device; this object closes it.
+        peer: address of the other end; None on a serial line.
+    """
+
+    def __init__(self, descriptor: int, peer: Address | None = None) -> None:
+        os.set_blocking(descriptor, False)
+        self._descriptor = descriptor
+        self.peer = peer
+        self._unsent = bytearray()
+
+    @classmethod
+    def of(cls, connection: socket.socket, peer: Address) -> Stream:
+        """Take over a TCP connection."""
+        connection.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
+        return cls(connection.detach(), peer)
+
+    def fileno(self) -> int:
+        """The descriptor to wait for."""
+        return self._descriptor
+
+    def read(self) -> bytes:
+        """The next bytes; sends on what waits, too."""
+        if self._unsent:
+            self.flush()
+        try:
+            data = os.read(self._descriptor, _READ_BYTES)
+        except BlockingIOError:
+            return b""
+        if not data:
+            why = "the serial line has gone" if self.peer is None else "the other side closed the connection"
+            raise ConnectionResetError(errno.ECONNRESET, why)
+        return data
+
+    def write(self, data: bytes) -> None:
+        """Send bytes, or keep them for `flush` while there is room for them."""
+        if len(self._unsent) + len(data) <= MAX_UNSENT_BYTES:
+            self._unsent += data
+            self.flush()
+
+    def has_unsent(self) -> bool:
+        """Whether bytes wait until the other end takes more."""
+        return bool(self._unsent)
+
+    def flush(self) -> None:
+        """Send what waits, as far as the other end takes it."""
+        try:
+            del self._unsent[: os.write(self._descriptor, self._unsent)]
+        except BlockingIOError:
+            return
+        except OSError:
+            self._unsent.clear()  # that it is gone shows in `read`
+
+    def close(self) -> None:
+        """Let go of the connection or device."""
+        os.close(self._descriptor)
+
+
+class OneClient:
+    """A TCP server that takes one client after the other, and loses what is sent while there is none."""
+
+    def __init__(self, listener: socket.socket) -> None:
+        self._listener = listener
+        self._client: Stream | None = None
+        self.peer: Address | None = None
+
+    def fileno(self) -> int:
+        """The descriptor to wait for: of the client or, without one, for the next."""
+        return (self._client or self._listener).fileno()
+
+    def read(self) -> bytes:
+        """The client's next bytes; lets the next client in when that has gone."""
+        try:
+            if self._client is not None:
+                return self._client.read()
+            self._client = Stream.of(*self._listener.accept())
+            self.peer = self._client.peer
+        except BlockingIOError:
+            pass
+        except ConnectionError:
+            if self._client is not None:
+                self._client.close()
+            self._client = None
+        return b""
+
+    def write(self, data: bytes) -> None:
+        """Send bytes to the client."""
+        if self._client is not None:
+            self._client.write(data)
+
+    def close(self) -> None:
+        """Let go of client and port."""
+        if self._client is not None:
+            self._client.close()
+        self._listener.close()
+
+
+def bind_udp(place: Address, advice: str) -> UdpSocket:
+    """A UDP socket that listens; `advice` says what people can do when the port is taken."""
+    with _explained(f"UDP {_name(place)} cannot be opened", advice):
+        family, address = _local(place, socket.SOCK_DGRAM)
+        opened = socket.socket(family, socket.SOCK_DGRAM)
+        try:
+            opened.bind(address)
+        except OSError:
+            opened.close()
+            raise
+    return UdpSocket(opened)
+
+
+def connect_udp(place: Address) -> UdpSocket:
+    """A UDP socket that sends to one address and hears only what comes from there."""
+    address = resolved_ipv4(place)
+    opened = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
+    with _explained(f"UDP {_name(place)} cannot be sent to", "check host and network"):
+        try:
+            opened.connect(address)
+        except OSError:
+            opened.close()
+            raise
+    return UdpSocket(opened)
+
+
+def resolved_ipv4(place: Address, what: str = "UDP") -> Address:
+    """Look up where UDP goes, once: with a name, `sendto` would look it up, blocking, for every packet."""
+    with _explained(f"{what} {_name(place)} cannot be sent to", "give a host's name or an IPv4 address"):
+        found = socket.getaddrinfo(*place, family=socket.AF_INET, type=socket.SOCK_DGRAM)
+    return cast(Address, found[0][4])
+
+
+def listen_tcp(place: Address) -> socket.socket:
+    """A socket that takes TCP connections and does not block."""
+    with _explained(f"TCP {_name(place)} cannot be listened on", "choose another port"):
+        family, address = _local(place, socket.SOCK_STREAM)
+        listener = socket.create_server(address, family=family)
+    listener.setblocking(False)
+    return listener
+
+
+def connect_tcp(place: Address) -> Stream:
+    """Connect to a TCP server; waits five seconds at most."""
+    with _explained(f"TCP {_name(place)} cannot be connected to", "is the server running?"):
+        connection = socket.create_connection(place, _CONNECT_S)
+        return Stream.of(connection, connection.getpeername())
+
+
+def open_serial(path: str, baud: int) -> Stream:
+    """A serial line: eight bits, no parity, no flow control."""
+    speed = getattr(termios, f"B{baud}", None)
+    if not speed:
+        raise LinkError(f"serial {path}:{baud}: {baud} is not a usual baud rate, such as 57600 or 921600")
+    with _explained(f"serial {path} cannot be opened", "is it plugged in, and may you use it?"):
+        line = os.open(path, os.O_RDWR | os.O_NOCTTY | os.O_NONBLOCK)
+    try:
+        tty.setraw(line, termios.TCSANOW)
+        settings = termios.tcgetattr(line)
+        settings[2] = (settings[2] | termios.CLOCAL | termios.CREAD) & ~(termios.CSTOPB | termios.CRTSCTS)
+        settings[4] = settings[5] = speed
+        termios.tcsetattr(line, termios.TCSANOW, settings)
+    except (termios.error, OSError):
+        os.close(line)
+        raise LinkError(f"serial {path}: this is not a serial line") from None
+    return Stream(line)
+
+
+def open_drone(url: LinkUrl) -> UdpSocket | Stream | OneClient:
+    """Open the link on which a drone is, as a ground station does."""
+    if url.scheme == "udpin":
+        return bind_udp(url.place, _advice(url, "give another address"))
+    if url.scheme == "udpout":
+        return connect_udp(url.place)
+    if url.scheme == "tcpin":
+        return OneClient(listen_tcp(url.place))
+    if url.scheme == "tcpout":
+        return connect_tcp(url.place)
+    return open_serial(*url.place)
+
+
+def check_free(url: LinkUrl, advice: str) -> None:
+    """See that a drone's port or device can be had before MAVSDK is told to open it.
+
+    MAVSDK binds a UDP port that another program holds without complaint, and the last binder gets all
+    packets; so the port is bound here first, exclusively, and let go. `advice` is for a port that is taken.
+    """
+    if url.scheme == "udpin":
+        bind_udp(url.place, _advice(url, advice)).close()
+    elif url.scheme == "serial" and url.address.startswith("/"):
+        with _explained(f"serial {url.address} cannot be opened", "is it plugged in?"):
+            Path(url.address).stat()
+
+
+def _advice(url: LinkUrl, otherwise: str) -> str:
+    return f"is another flight or ground station on UDP port {url.number}? Close it or {otherwise}"
+
+
+def _local(place: Address, kind: socket.SocketKind) -> tuple[socket.AddressFamily, Address]:
+    """Look a local address up, IPv4 first: a name may stand for both."""
+    found = socket.getaddrinfo(*place, type=kind, flags=socket.AI_PASSIVE)
+    family, _, _, _, address = min(found, key=lambda each: each[0] != socket.AF_INET)
+    return family, cast(Address, address)
+
+
+def _name(place: Address) -> str:
+    return f"{place[0]}:{place[1]}"
+
+
+@contextmanager
+def _explained(problem: str, advice: str) -> Iterator[None]:
+    """Make one line of a failure: what the problem is, why, and what to do."""
+    try:
+        yield
+    except (OSError, UnicodeError) as error:
+        reason: object = error
+        if isinstance(error, OSError):  # some texts of Python's own repeat the address
+            number = error.errno or 0
+            reason = os.strerror(number) if number > 0 else error.strerror or error
+        raise LinkError(f"{problem} ({reason}); {advice}") from None

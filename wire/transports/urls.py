@@ -1,0 +1,126 @@
+"""URLs of MAVLink links, checked before anything is opened.
+
+    udpin://HOST:PORT       listens there and sends to whoever sent something
+    udpout://HOST:PORT      sends there first, from a port that the system chooses
+    tcpin://HOST:PORT       a TCP server
+    tcpout://HOST:PORT      a TCP client
+    serial:///dev/tty:BAUD  a serial line
+
+All programs read this grammar; what only some of them accept is said by their `UrlRules`.
+"""
+
+from __future__ import annotations
+
+import ipaddress
+import re
+from dataclasses import dataclass
+from urllib.parse import parse_qsl
+
+SCHEMES = ("udpin", "udpout", "tcpin", "tcpout", "serial")
+MAX_PORT = 65535
+_URL = re.compile(r"(?P<scheme>[a-z]+)://(?P<address>[^?]+):(?P<number>[0-9]{1,9})(?:\?(?P<options>.*))?\Z")
+
+
+class LinkError(Exception):
+    """A link that cannot be opened or has failed; the message is one line for people."""
+
+
+@dataclass(frozen=True, slots=True)
+class UrlRules:
+    """What a program accepts.
+
+    Attributes:
+        subject: names field and value in messages; `{}` stands for the value.
+        examples: of good URLs.
+        takes_options: NAME=VALUE may follow after a `?`.
+        listens_on_names: udpin and tcpin take a host's name, not only an IP address.
+        devices: how a serial device may begin.
+    """
+
+    subject: str
+    examples: str
+    takes_options: bool = False
+    listens_on_names: bool = False
+    devices: tuple[str, ...] = ("/",)
+
+
+# MAVSDK reads these too: it listens on IP addresses only, and on Windows a serial device is COM3.
+DRONE = UrlRules(
+    "bad drone address '{}'",
+    "udpin://0.0.0.0:14540, udpout://192.168.1.10:14550, tcpout://host:5760, serial:///dev/ttyUSB0:57600",
+    devices=("/", "COM", "com"),
+)
+
+
+@dataclass(frozen=True, slots=True)
+class LinkUrl:
+    """A checked URL.
+
+    Attributes:
+        text: as people wrote it, without spaces around it.
+        scheme: one of `SCHEMES`.
+        address: host, or path of a device.
+        number: port, or baud rate.
+        options: names and values after the `?`; the caller checks them.
+    """
+
+    text: str
+    scheme: str
+    address: str
+    number: int
+    options: tuple[tuple[str, str], ...] = ()
+
+    @property
+    def place(self) -> tuple[str, int]:
+        """Address and number."""
+        return (self.address, self.number)
+
+
+def parse_url(text: str, rules: UrlRules = DRONE) -> LinkUrl:
+    """Check a link's URL.
+
+    Raises:
+        LinkError: one line with the field, the value and what is accepted.
+    """
+    text = text.strip()
+    subject = rules.subject.format(text)
+    match = _URL.match(text)
+    if not match or match["scheme"] not in SCHEMES or (match["options"] and not rules.takes_options):
+        raise LinkError(f"{subject}: not the URL of a link; examples: {rules.examples}")
+    scheme, address, number = match["scheme"], match["address"], int(match["number"])
+    if scheme == "serial":
+        if not address.startswith(rules.devices):
+            raise LinkError(f"{subject}: a serial line looks like serial:///dev/ttyUSB0:57600")
+    elif not 0 < number <= MAX_PORT:
+        raise LinkError(f"{subject}: port {number} must be from 1 to {MAX_PORT}")
+    elif scheme in ("udpin", "tcpin") and not rules.listens_on_names and not _is_ip(address):
+        raise LinkError(f"{subject}: '{address}' must be an IP address to listen on, such as 0.0.0.0")
+    options = parse_qsl(match["options"] or "", keep_blank_values=True)
+    return LinkUrl(text, scheme, address, number, tuple(options))
+
+
+def host_and_port(text: str, default_port: int) -> tuple[str, int]:
+    """Split HOST or HOST:PORT.
+
+    Raises:
+        LinkError: the port is no port.
+    """
+    host, colon, port = text.rpartition(":")
+    if not colon:
+        return (text, default_port)
+    if not host or not port.isdecimal() or not 0 < int(port) <= MAX_PORT:
+        raise LinkError(f"{text}: must be a host, or host:port with a port from 1 to {MAX_PORT}")
+    return (host, int(port))
+
+
+def is_loopback(host: str) -> bool:
+    """Whether a host is this machine's own address, which nobody outside can reach or hear."""
+    return host == "localhost" or (_is_ip(host) and ipaddress.ip_address(host).is_loopback)
+
+
+def _is_ip(host: str) -> bool:
+    try:
+        ipaddress.ip_address(host)
+    except ValueError:
+        return False
+    return True

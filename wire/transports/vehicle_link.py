@@ -1,0 +1,114 @@
+"""A MAVLink link to a vehicle for programs that listen more than they speak, such as monitor and doctor.
+
+`fly` commands through MAVSDK. A program that measures a link must see every packet with its sequence number,
+and must send nothing of its own accord, so it reads the link itself.
+"""
+
+from __future__ import annotations
+
+import select
+
+from wire.dialect import Message, mavlink
+from wire.framing import PacketReader
+from wire.transports.sockets import Address, UdpSocket, open_drone
+from wire.transports.urls import LinkError, parse_url
+
+AUTOPILOT_COMPONENT = mavlink.MAV_COMP_ID_AUTOPILOT1
+
+
+class VehicleLink:
+    """One link, used by one thread. Several vehicles may be heard on it.
+
+    Args:
+        url: as `fly --drone` takes it.
+        system_id: own MAVLink system id; no vehicle should have it.
+        component_id: own component id.
+
+    Attributes:
+        url: as given.
+
+    Raises:
+        LinkError: bad address, port taken, nobody answers, no such device.
+    """
+
+    def __init__(self, url: str, *, system_id: int, component_id: int) -> None:
+        parsed = parse_url(url)
+        self._transport = open_drone(parsed)
+        # Several vehicles may send to a UDP port; elsewhere all are behind the same other end.
+        self._udp_port = self._transport if parsed.scheme == "udpin" else None
+        self._peers: dict[int, Address] = {}  # by system id
+        self.url = parsed.text
+        self._codec = mavlink.MAVLink(None, srcSystem=system_id, srcComponent=component_id)
+        self._reader = PacketReader()
+
+    def receive(self, timeout_s: float) -> list[Message]:
+        """Wait for messages; what cannot be understood is passed over.
+
+        Args:
+            timeout_s: wall time to wait at most.
+
+        Raises:
+            LinkError: the link has failed.
+        """
+        transport = self._transport
+        waiting = select.poll()
+        waiting.register(transport, select.POLLIN)
+        waiting.poll(timeout_s * 1000)
+        try:
+            data = transport.read()
+        except OSError as error:
+            raise LinkError(f"{self.url} failed: {error.strerror or error}") from None
+        messages = self._reader.feed(data)
+        if transport.peer is not None:
+            for message in messages:
+                self._peers[message.get_srcSystem()] = transport.peer
+        return messages
+
+    def send(self, message: Message) -> None:
+        """Send a message to the system it is for, or to all; lost if nobody is there yet."""
+        data = message.pack(self._codec)
+        self._codec.seq = (self._codec.seq + 1) % 256
+        if not isinstance(self._udp_port, UdpSocket):
+            self._transport.write(data)
+            return
+        peer = self._peers.get(getattr(message, "target_system", getattr(message, "target", 0)))
+        for address in set(self._peers.values()) if peer is None else (peer,):
+            self._udp_port.write(data, address)
+
+    @property
+    def host(self) -> str:
+        """IP address of whoever sent what was received last; "" before, and on a serial line."""
+        peer = self._transport.peer
+        return "" if peer is None else peer[0]
+
+    def close(self) -> None:
+        """Let go of the port or device."""
+        self._transport.close()
+
+
+def is_vehicle(heartbeat: Message) -> bool:
+    """Whether a HEARTBEAT comes from an autopilot, not from a ground station, camera or companion."""
+    return bool(
+        heartbeat.get_srcComponent() == AUTOPILOT_COMPONENT
+        and heartbeat.autopilot != mavlink.MAV_AUTOPILOT_INVALID
+        and heartbeat.type != mavlink.MAV_TYPE_GCS
+    )
+
+
+def companion_heartbeat() -> Message:
+    """What a companion computer says of itself. From a system id of its own it changes nothing at PX4."""
+    return mavlink.MAVLink_heartbeat_message(
+        mavlink.MAV_TYPE_ONBOARD_CONTROLLER, mavlink.MAV_AUTOPILOT_INVALID, 0, 0, mavlink.MAV_STATE_ACTIVE, 3
+    )
+
+
+def command(system_id: int, number: int, *parameters: float) -> Message:
+    """A COMMAND_LONG to a vehicle's autopilot.
+
+    Args:
+        system_id: of the vehicle.
+        number: MAV_CMD.
+        *parameters: the first ones of seven; the others are 0.
+    """
+    filled = (*parameters, *([0.0] * (7 - len(parameters))))
+    return mavlink.MAVLink_command_long_message(system_id, AUTOPILOT_COMPONENT, number, 0, *filled)
