@@ -6,7 +6,7 @@ VENV := .venv
 MAVPROXY_VENV := .venv-mavproxy
 BENCH_VENV := .venv-bench
 BIN := $(VENV)/bin
-ROOMS := wire geometry scenarios firmware_py sitl vision offboard monitor framerunner
+ROOMS := errors wire geometry scenarios firmware_py sitl vision offboard monitor framerunner
 LOCK := uv pip compile --universal --python-version 3.11 --generate-hashes --quiet --custom-compile-command 'make lock'
 LOCK_PROJECT := $(LOCK) pyproject.toml locks/build.in
 # Everything but this project has a hash and is refused if it differs; the folder itself can have none.
@@ -70,6 +70,10 @@ bench: $(VENV)/installed ## time our flight, alone and beside MuJoCo and PyFlyt;
 .PHONY: parameters
 parameters: $(VENV)/installed-dev ## write docs/parameters.md anew from the declarations
 	$(BIN)/python -m firmware_py.parameters.reference > docs/parameters.md
+
+.PHONY: messages
+messages: $(VENV)/installed-dev ## generate wire/extra_messages.py again from wire/extra_messages.xml
+	$(BIN)/python -m tests.wire.generate_messages
 
 .PHONY: result-schema
 result-schema: $(VENV)/installed-dev ## write docs/result.schema.json again from the type FlightResult

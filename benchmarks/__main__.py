@@ -19,8 +19,8 @@ from benchmarks.contenders import IMAGE_RATES_HZ, chosen
 from benchmarks.parts import part_rows
 from benchmarks.report import as_json, machine, show_comparison, show_parts
 from benchmarks.run import compare_all, job_for, measure_parts
-from scenarios.loader import ScenarioError, load_scenario
-from scenarios.models import Scenario
+from scenarios.loader import load_scenario
+from scenarios.models import Scenario, ScenarioError
 from sitl.world import PHYSICS_RATE_HZ
 
 EXIT_INCOMPLETE = 1

@@ -15,7 +15,6 @@ import sys
 import time
 from collections.abc import Callable
 from dataclasses import asdict, dataclass
-from math import cos, sin
 
 os.environ.update({"OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1"})  # before NumPy is imported
 if hasattr(os, "sched_setaffinity"):
@@ -26,6 +25,7 @@ import cv2
 from firmware_py.status import FlightMode
 from framerunner.flying.lockstep import fly_lockstep
 from framerunner.flying.plan import FlightPlan
+from geometry.rotations import quaternion_from_yaw
 from offboard.app import Moment
 from offboard.mission import load_mission
 from scenarios.loader import load_scenario
@@ -137,7 +137,7 @@ def fly(scenario: Scenario, images: list[Image], poses: list[Pose]) -> tuple[flo
     fly_lockstep(plan, observers=(moments.append,), on_image=lambda _time_us, image: images.append(image))
     for moment in moments[:: max(1, len(moments) // 500)]:
         state = moment.state
-        poses.append(((state.x, state.y, state.z), attitude(state.yaw)))
+        poses.append(((state.x, state.y, state.z), quaternion_from_yaw(state.yaw)))
     simulated_s = moments[-1].state.time_us / 1e6
     timed = [timed_flight(plan) for _ in range(REPEATS)]
     return min(cpu_s for cpu_s, _ in timed), min(wall_s for _, wall_s in timed), simulated_s
@@ -147,10 +147,6 @@ def timed_flight(plan: FlightPlan) -> tuple[float, float]:
     wall_s, cpu_s = time.perf_counter(), time.process_time()
     fly_lockstep(plan)
     return time.process_time() - cpu_s, time.perf_counter() - wall_s
-
-
-def attitude(yaw_rad: float) -> tuple[float, float, float, float]:
-    return (cos(yaw_rad / 2), 0.0, 0.0, sin(yaw_rad / 2))
 
 
 def best(work: Callable[[], object], times: int) -> float:

@@ -14,6 +14,7 @@ from typing import Annotated, Literal, Self
 import yaml
 from pydantic import BaseModel, ConfigDict, Field, StringConstraints, ValidationError, model_validator
 
+from errors import UserError
 from firmware_py.control.weights import Weights
 from geometry.vectors import Vec3
 
@@ -23,7 +24,7 @@ ParameterName = Annotated[str, StringConstraints(pattern=r"^[A-Z][A-Z0-9_]{0,15}
 """A parameter's name as PX4 and MAVLink have them: 16 characters at most."""
 
 
-class AirframeError(ValueError):
+class AirframeError(UserError):
     """An airframe that cannot be used; the message is one line for people."""
 
 
@@ -142,7 +143,10 @@ def load_airframe(name_or_path: str) -> Airframe:
         path = Path(name_or_path)
         if not path.is_file():
             raise AirframeError(f"airframe: no file '{name_or_path}'")
-        text = path.read_text(encoding="utf-8")
+        try:
+            text = path.read_text(encoding="utf-8")
+        except (OSError, UnicodeDecodeError) as error:
+            raise AirframeError(f"airframe: cannot read '{name_or_path}': {error}") from error
     else:
         known = sorted(entry.name[:-5] for entry in folder.iterdir() if entry.name.endswith(".yaml"))
         if name_or_path not in known:

@@ -10,6 +10,7 @@ from firmware_py.types import BatteryState
 
 _OK, _LOW, _CRITICAL, _EMERGENCY = 1, 2, 3, 4  # MAV_BATTERY_CHARGE_STATE
 _MAH_PER_A_S = 1000.0 / 3600.0
+_SUPPLY_UNCHECKED = 894_281  # of CBRK_SUPPLY_CHK
 
 
 @dataclass(frozen=True, slots=True)
@@ -50,23 +51,31 @@ class BatteryMonitor:
         state: what is known, updated in place.
     """
 
-    __slots__ = ("_started", "_time_us", "state")
+    __slots__ = ("_min_charge_to_arm", "_settings", "_started", "_time_us", "state")
 
-    def __init__(self) -> None:
+    def __init__(self, airframe: Airframe, parameters: Parameters) -> None:
         self.state = BatteryState()
         self._started = False
         self._time_us = 0
+        self.configure(airframe, parameters)
 
-    def update(self, time_us: int, voltage_v: float, current_a: float, settings: BatterySettings) -> None:
-        """Take a measurement.
+    def configure(self, airframe: Airframe, parameters: Parameters) -> None:
+        """Take over changed parameters."""
+        self._settings = battery_settings(airframe, parameters)
+        if parameters.integer("CBRK_SUPPLY_CHK") == _SUPPLY_UNCHECKED:
+            self._min_charge_to_arm = 0.0
+        else:
+            chosen = parameters.value("COM_ARM_BAT_MIN")
+            self._min_charge_to_arm = chosen if chosen >= 0.0 else self._settings.critical
 
-        Args:
-            time_us: of the measurement.
-            voltage_v: at the terminals.
-            current_a: drawn.
-            settings: of this battery.
-        """
-        state = self.state
+    @property
+    def arms(self) -> bool:
+        """Whether there is charge enough to arm."""
+        return self.state.remaining >= self._min_charge_to_arm
+
+    def update(self, time_us: int, voltage_v: float, current_a: float) -> None:
+        """Take a measurement: the voltage at the terminals, and the current drawn."""
+        state, settings = self.state, self._settings
         period_s = (time_us - self._time_us) / 1e6 if self._started else 0.0
         self._started, self._time_us = True, time_us
         state.voltage_v, state.current_a, state.cells = voltage_v, current_a, settings.cells

@@ -2,6 +2,10 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+from math import nan
+from typing import NamedTuple
+
 from firmware_py.commander_guards import (
     Cause,
     Choices,
@@ -15,15 +19,17 @@ from firmware_py.commander_table import (
     CAUSE_EVENT,
     FLOWN_MODE,
     RULES,
+    TICK_RULES,
     Event,
     Row,
     State,
     first_match,
 )
+from firmware_py.guidance.orbit import Orbit
 from firmware_py.parameters import Parameters
 from firmware_py.status import CommandResult, FlightMode
 
-_WATCH_PERIOD_US = 40_000  # of what is not urgent
+_CHECK_PERIOD_US = 40_000  # of what is not urgent
 
 _LINK_LOSS = (  # NAV_DLL_ACT and NAV_RCL_ACT
     Reaction.NOTHING,
@@ -69,22 +75,72 @@ _MANUAL_DISABLED = 4  # COM_RC_IN_MODE
 _TERMINATION_OFF = 121_212
 
 
+@dataclass(frozen=True, slots=True)
+class SlowChecks:
+    """What is checked ten times a second; see `Situation`."""
+
+    battery_warning: int = 1
+    battery_arms: bool = True
+    has_mission: bool = False
+    fence_breached: bool = False
+
+
+NOT_CHECKED = SlowChecks()
+"""Before the first check."""
+
+
+class Observation(NamedTuple):
+    """The vehicle in one control tick, as the commander is told of it; it never changes.
+
+    Attributes:
+        now_us: vehicle time.
+        sound: this tick's sample could be used.
+        placed: the horizontal position is known.
+        upright: its attitude is one to fly in.
+        landed: it stands on something.
+        target_reached: the take-off is at its height.
+        checks: the last slow checks; the same object until the next.
+    """
+
+    now_us: int
+    sound: bool
+    placed: bool
+    upright: bool
+    landed: bool
+    target_reached: bool
+    checks: SlowChecks = NOT_CHECKED
+
+
 class Commander:
-    """Keeps the state and what is known of the vehicle; the table decides.
+    """Remembers the state and what is known of the vehicle; the table decides.
 
     Attributes:
         state: where in the table it is.
         situation: what guards look at.
+        takeoff_altitude_m: of the next take-off, above mean sea level; NaN: MIS_TAKEOFF_ALT above home.
+        orbit: the circle to fly.
     """
 
-    __slots__ = ("_started", "_tick_rows", "_watch_us", "situation", "state")
+    __slots__ = (
+        "_check_us",
+        "_checks",
+        "_started",
+        "_tick_rules",
+        "orbit",
+        "situation",
+        "state",
+        "takeoff_altitude_m",
+    )
 
     def __init__(self) -> None:
         self.state = State.DISARMED
-        self._tick_rows = RULES[self.state, Event.TICK]
-        self._watch_us = 0
+        self._tick_rules = TICK_RULES[self.state]
+        self._check_us = 0
         self._started = False
+        self._checks = NOT_CHECKED
         self.situation = Situation()
+        self.takeoff_altitude_m = nan
+        self.orbit = Orbit()
 
     @property
     def mode(self) -> FlightMode:
@@ -107,33 +163,16 @@ class Commander:
         row = first_match(RULES[State.DISARMED, Event.ARM], self.situation)
         return "" if row is None or row.result is CommandResult.ACCEPTED else row.text
 
-    def tick(
-        self,
-        now_us: int,
-        *,
-        sound: bool,
-        upright: bool,
-        landed: bool,
-        target_reached: bool,
-        placed: bool = True,
-    ) -> Row | None:
+    def tick(self, seen: Observation) -> Row | None:
         """Take note of the vehicle and apply the table once.
-
-        Args:
-            now_us: vehicle time.
-            sound: this tick's sample could be used.
-            upright: its attitude is one to fly in.
-            landed: it stands on something.
-            target_reached: the take-off is at its height.
-            placed: the horizontal position is known.
 
         Returns:
             The rule that fired; None when nothing happens.
         """
+        now_us, sound, placed, upright, landed, target_reached, checks = seen
         now = self.situation
         if not self._started:
-            self._started = True
-            now.unsound_us = now.sound_us = now.position_us = now.upright_us = now_us
+            self._start(now_us)
         now.now_us = now_us
         if sound:
             now.sound_us = now_us
@@ -148,19 +187,35 @@ class Commander:
             now.airborne_us = now_us
             now.flown = self.state is not State.DISARMED
         now.target_reached = target_reached
-        row = first_match(self._tick_rows, now)
-        if row is None:
-            if self.state is State.OFFBOARD and setpoint_lost(now):
-                row = self._react(Cause.SETPOINTS)
-            elif now_us >= self._watch_us:
-                row = self._watch(now_us)
+        if checks is not self._checks:
+            self._take_checks(checks)
+        for guard, rule in self._tick_rules:
+            if guard(now):
+                self._follow(rule)
+                return rule
+        row = None
+        if self.state is State.OFFBOARD and setpoint_lost(now):
+            row = self._react(Cause.SETPOINTS)
+        elif now_us >= self._check_us:
+            row = self._check(now_us)
         if row is not None:
             self._follow(row)
         return row
 
-    def _watch(self, now_us: int) -> Row | None:
+    def _start(self, now_us: int) -> None:
+        self._started, now = True, self.situation
+        now.unsound_us = now.sound_us = now.position_us = now.upright_us = now_us
+
+    def _take_checks(self, checks: SlowChecks) -> None:
+        self._checks, now = checks, self.situation
+        now.battery_warning = checks.battery_warning
+        now.battery_arms = checks.battery_arms
+        now.has_mission = checks.has_mission
+        now.fence_breached = checks.fence_breached
+
+    def _check(self, now_us: int) -> Row | None:
         """Look for what is not urgent."""
-        self._watch_us = now_us + _WATCH_PERIOD_US
+        self._check_us = now_us + _CHECK_PERIOD_US
         cause = None if self.state is State.DISARMED else trouble(self.situation)
         return None if cause is None else self._react(cause)
 
@@ -175,6 +230,17 @@ class Commander:
             raise LookupError(f"commander: no rule for {event.value} in {self.state.value}")
         self._follow(row)
         return row
+
+    def remember(self, takeoff_altitude_m: float | None, orbit: Orbit | None) -> None:
+        """Take what a command asks for; None: as before."""
+        if takeoff_altitude_m is not None:
+            self.takeoff_altitude_m = takeoff_altitude_m
+        if orbit is not None:
+            self.orbit = orbit
+
+    def mission_known(self, *, valid: bool) -> None:
+        """Note whether there is a mission that can be flown; an upload may have come this moment."""
+        self.situation.has_mission = valid
 
     def setpoint_came(self, time_us: int) -> None:
         """Note a usable offboard setpoint; a time ahead of the vehicle's counts as now."""
@@ -230,7 +296,7 @@ class Commander:
             now.cause = row.cause  # a hold that becomes a landing keeps its cause
         now.follow_up = row.follow_up
         self.state = row.target
-        self._tick_rows = RULES[self.state, Event.TICK]
+        self._tick_rules = TICK_RULES[self.state]
         now.entered_us = now.now_us
 
 

@@ -228,7 +228,7 @@ def manual_lost(now: Situation) -> bool:
 
 
 def manual_present(now: Situation) -> bool:
-    """Sticks come."""
+    """Manual control input is being received."""
     return not manual_lost(now)
 
 

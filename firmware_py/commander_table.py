@@ -177,7 +177,8 @@ _FLYING = _ARMED - _at(State.TERMINATED)
 _DOWNWARD = _at(State.LAND, State.FAILSAFE_LAND, State.FAILSAFE_DESCEND)
 _HOMEWARD = _at(State.RETURN, State.FAILSAFE_RETURN)
 _LANDING = _DOWNWARD | _HOMEWARD
-_BY_HAND = _at(State.MANUAL, State.STABILIZED, State.ACRO, State.ALTITUDE, State.POSITION)
+BY_HAND = _at(State.MANUAL, State.STABILIZED, State.ACRO, State.ALTITUDE, State.POSITION)
+"""States flown by a pilot's sticks."""
 _BLIND = _at(State.MANUAL, State.STABILIZED, State.ACRO, State.ALTITUDE)  # no position needed
 
 _HARD_FAILURES = (
@@ -273,7 +274,7 @@ def _reactions(cause: Cause, *, from_sticks: bool = False) -> tuple[Row, ...]:
 
 _MANUAL_NOT_THERE = (
     Row(
-        _BY_HAND,
+        BY_HAND,
         Event.MANUAL_LOST,
         when.reacts(Cause.MANUAL, Reaction.NOTHING),
         State.FAILSAFE_HOLD,
@@ -324,7 +325,7 @@ _PROGRESS = (
     Row(_at(State.MISSION), Event.MISSION_RETURNS, None, State.RETURN, FlightMode.RETURN),
     Row(frozenset(State), Event.MISSION_RETURNS),
     Row(
-        _FLYING - _BY_HAND,
+        _FLYING - BY_HAND,
         Event.PILOT_TAKES_OVER,
         None,
         State.POSITION,
@@ -393,7 +394,7 @@ _STAYS = (
     State.RETURN,
     State.MISSION,
     State.OFFBOARD,
-    *sorted(_BY_HAND, key=lambda s: s.value),
+    *sorted(BY_HAND, key=lambda s: s.value),
 )
 _SETS = tuple(
     row
@@ -430,7 +431,13 @@ RULES: dict[tuple[State, Event], tuple[Row, ...]] = {
     for state in State
     for event in Event
 }
-"""The same, by state and event: a tick tries only the rows that can hold."""
+"""The same, by state and event."""
+
+TICK_RULES: dict[State, tuple[tuple[Guard, Row], ...]] = {
+    state: tuple((row.guard, row) for row in RULES[state, Event.TICK] if row.guard is not None)
+    for state in State
+}
+"""The rules of a tick with their guards, which all of them have; this is looked through in every tick."""
 
 
 def first_match(rows: tuple[Row, ...], now: Situation) -> Row | None:

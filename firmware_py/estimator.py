@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from math import asin, atan2, copysign, isfinite, isnan, pi
+from math import isfinite, isnan
 
 from firmware_py.types import Sensors, VehicleState
-from geometry.vectors import Quaternion, Vec3
+from geometry.rotations import euler_from_quaternion
+from geometry.vectors import Vec3
 
 _LONGEST_S = 0.1  # between samples that can be counted on
 _NORM_TOLERANCE = 0.05  # of the attitude quaternion's squared length; more than rounding, so it is a fault
@@ -52,7 +53,7 @@ class Estimator:
         state.position_ned_m = (position[0] - origin[0], position[1] - origin[1], position[2] - origin[2])
         state.velocity_ned_m_s = sensors.velocity_ned_m_s
         state.attitude = sensors.attitude
-        state.roll_rad, state.pitch_rad, state.yaw_rad = euler_angles(sensors.attitude)
+        state.roll_rad, state.pitch_rad, state.yaw_rad = euler_from_quaternion(sensors.attitude)
         state.angular_rate_frd_rad_s = sensors.angular_rate_frd_rad_s
         state.specific_force_frd_m_s2 = sensors.specific_force_frd_m_s2
         return True
@@ -83,23 +84,6 @@ class Estimator:
             ),
             velocity_ned_m_s=(north_m_s, east_m_s, sensors.velocity_ned_m_s[2]),
         )
-
-
-def euler_angles(attitude: Quaternion) -> Vec3:
-    """Aerospace Euler angles (Z-Y-X) of an attitude.
-
-    Args:
-        attitude: unit quaternion (w, x, y, z), body FRD to world NED.
-
-    Returns:
-        Roll, pitch, yaw in radians, shape (3,); roll and yaw in -pi..pi, pitch in -pi/2..pi/2.
-    """
-    w, x, y, z = attitude
-    sin_pitch = 2.0 * (w * y - z * x)
-    roll_rad = atan2(2.0 * (w * x + y * z), 1.0 - 2.0 * (x * x + y * y))
-    pitch_rad = asin(sin_pitch) if -1.0 < sin_pitch < 1.0 else copysign(0.5 * pi, sin_pitch)
-    yaw_rad = atan2(2.0 * (w * z + x * y), 1.0 - 2.0 * (y * y + z * z))
-    return (roll_rad, pitch_rad, yaw_rad)
 
 
 def _is_sound(sensors: Sensors) -> bool:

@@ -7,12 +7,13 @@ equations 20-14, 20-15, 22-4, 22-5 and 25-2.
 
 from __future__ import annotations
 
-from math import asin, atan2, cos, degrees, hypot, radians, remainder, sin
+from math import asin, atan2, cos, degrees, hypot, isfinite, radians, remainder, sin
 
 from firmware_py.types import GeodeticPoint
-from geometry.vectors import Vec3
+from geometry.vectors import ZERO3, Vec3
 
 EARTH_RADIUS_M = 6_371_000.0
+_LATITUDE_DEG, _LONGITUDE_DEG, _ALTITUDE_M = 90.0, 180.0, 100_000.0
 
 
 class LocalProjection:
@@ -67,3 +68,73 @@ class LocalProjection:
         cos_angle = self._sin_latitude * sin_latitude + self._cos_latitude * cos_latitude * cos(turn_rad)
         scale_m = EARTH_RADIUS_M * atan2(sin_angle, cos_angle) / sin_angle
         return (north * scale_m, east * scale_m, down_m)
+
+
+class GeoReference:
+    """Where on Earth the local frame and home are.
+
+    Args:
+        sensor_origin: where on Earth the sensors' positions count from.
+
+    Attributes:
+        projection: of the local frame; None before its origin is known.
+        home: None before the origin is known.
+        home_ned_m: the same in the local frame, shape (3,).
+    """
+
+    __slots__ = ("_sensor_projection", "home", "home_ned_m", "projection")
+
+    def __init__(self, sensor_origin: GeodeticPoint) -> None:
+        self._sensor_projection = LocalProjection(sensor_origin)
+        self.projection: LocalProjection | None = None
+        self.home: GeodeticPoint | None = None
+        self.home_ned_m: Vec3 = ZERO3
+
+    @property
+    def origin(self) -> GeodeticPoint | None:
+        """Where on Earth the local frame's origin is; None before it is known."""
+        return None if self.projection is None else self.projection.origin
+
+    def fix_origin(self, origin_ned_m: Vec3) -> None:
+        """Take the local frame's origin, given in the sensors' frame."""
+        self.projection = LocalProjection(self._sensor_projection.to_geodetic(origin_ned_m))
+
+    def move_origin(self, point: GeodeticPoint) -> bool:
+        """Say where on Earth the local frame's origin is; False before there is one."""
+        if self.projection is None or not is_on_earth(point):
+            return False
+        self.projection = LocalProjection(point)
+        self.home = self.to_geodetic(self.home_ned_m)
+        return True
+
+    def set_home_at(self, position_ned_m: Vec3) -> None:
+        """Home is a place in the local frame."""
+        self.home, self.home_ned_m = self.to_geodetic(position_ned_m), position_ned_m
+
+    def set_home(self, point: GeodeticPoint) -> bool:
+        """Home is a place on Earth; False if that cannot be."""
+        local = self.to_local(point)
+        if local is None:
+            return False
+        self.home, self.home_ned_m = point, local
+        return True
+
+    def to_geodetic(self, position_ned_m: Vec3) -> GeodeticPoint | None:
+        """A local place on Earth; None before the origin is known."""
+        return None if self.projection is None else self.projection.to_geodetic(position_ned_m)
+
+    def to_local(self, point: GeodeticPoint) -> Vec3 | None:
+        """A place on Earth in the local frame; None before the origin is known or for no place on Earth."""
+        if self.projection is None or not is_on_earth(point):
+            return None
+        return self.projection.to_local(point)
+
+
+def is_on_earth(point: GeodeticPoint) -> bool:
+    """Whether the numbers can be a place: finite and in range."""
+    return (
+        isfinite(point.latitude_deg + point.longitude_deg + point.altitude_m)
+        and abs(point.latitude_deg) <= _LATITUDE_DEG
+        and abs(point.longitude_deg) <= _LONGITUDE_DEG
+        and abs(point.altitude_m) <= _ALTITUDE_M
+    )

@@ -1,26 +1,22 @@
-"""The navigator: flies the stored mission, watches the fence, and knows where a return goes."""
+"""The navigator: gives the legs of the stored mission, checks the fence, and knows where a return goes."""
 
 from __future__ import annotations
 
-from firmware_py.commander_table import Event
-from firmware_py.guidance.modes import Guidance
+from firmware_py.geodesy import GeoReference
 from firmware_py.missions import rally
 from firmware_py.missions.executor import MissionExecutor
-from firmware_py.missions.flight import IssuedCommand, Leg, LegKind, View
+from firmware_py.missions.flight import IssuedCommand, Leg, View
 from firmware_py.missions.geofence import Breach, Geofence
 from firmware_py.missions.store import MissionStore
 from firmware_py.parameters import Parameters
-from firmware_py.places import Places
-from firmware_py.status import VehicleStatus
 from firmware_py.types import StatusText, VehicleState
 from geometry.vectors import Vec3
 
-_ISSUED_KEPT = 100
-_ENDS = {LegKind.RETURN: Event.MISSION_RETURNS, LegKind.DONE: Event.MISSION_DONE}
+_MAX_ISSUED = 100
 
 
 class Navigator:
-    """Joins missions to guidance.
+    """Joins mission, fence and rally points.
 
     Args:
         store: mission, fence and rally points.
@@ -31,7 +27,7 @@ class Navigator:
         view: the vehicle as missions see it.
     """
 
-    __slots__ = ("_executor", "_fence", "_issued", "_leg", "_parameters", "_texts", "store", "view")
+    __slots__ = ("_executor", "_fence", "_issued", "_leg", "_parameters", "store", "view")
 
     def __init__(self, store: MissionStore, parameters: Parameters) -> None:
         self.store = store
@@ -41,9 +37,8 @@ class Navigator:
         self._fence = Geofence(store, parameters)
         self._leg: Leg | None = None
         self._issued: list[IssuedCommand] = []
-        self._texts: list[StatusText] = []
 
-    def look(self, state: VehicleState, status: VehicleStatus, places: Places, *, landed: bool) -> None:
+    def observe(self, state: VehicleState, geo: GeoReference, *, landed: bool) -> None:
         """Bring the view up to date."""
         view = self.view
         view.time_us = state.time_us
@@ -51,8 +46,8 @@ class Navigator:
         view.velocity_ned_m_s = state.velocity_ned_m_s
         view.yaw_rad = state.yaw_rad
         view.landed = landed
-        view.projection = places.projection
-        view.home_ned_m = status.home_ned_m if status.home is not None else None
+        view.projection = geo.projection
+        view.home_ned_m = geo.home_ned_m if geo.home is not None else None
 
     def enter_mission(self) -> None:
         """Begin the mission, or go on with it."""
@@ -67,13 +62,13 @@ class Navigator:
         """The motors have stopped."""
         self._executor.disarmed()
 
-    def fly_mission(self, state: VehicleState, guidance: Guidance) -> Event | None:
-        """Take the mission one tick further, and say when it ends."""
+    def next_leg(self) -> Leg | None:
+        """Take the mission one tick further; the leg to fly from now on, None: as before."""
         leg = self._executor.step(self.view)
-        if leg is not self._leg:
-            self._leg = leg
-            guidance.follow_leg(state, leg)
-        return _ENDS.get(leg.kind)
+        if leg is self._leg:
+            return None
+        self._leg = leg
+        return leg
 
     def breach(self) -> Breach | None:
         """What part of the fence is broken now; None: none."""
@@ -88,18 +83,15 @@ class Navigator:
         found = rally.destination(self.view, self.store, self._parameters)
         return None if found is None else found.position_ned_m
 
-    def collect(self) -> None:
-        """Sort what the mission had to tell: texts, and commands to others."""
+    def take_texts(self) -> list[StatusText]:
+        """What people are to be told since the last call; commands to others are kept for `take_issued`."""
+        texts = []
         for event in self._executor.take_events():
             if isinstance(event, StatusText):
-                self._texts.append(event)
-            elif len(self._issued) < _ISSUED_KEPT:
+                texts.append(event)
+            elif len(self._issued) < _MAX_ISSUED:
                 self._issued.append(event)
-
-    def take_texts(self) -> list[StatusText]:
-        """What people are to be told since the last call."""
-        taken, self._texts = self._texts, []
-        return taken
+        return texts
 
     def take_issued(self) -> list[IssuedCommand]:
         """Commands to others since the last call."""

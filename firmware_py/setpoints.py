@@ -1,250 +1,308 @@
-"""From what an offboard controller asks for to a `Setpoint`: PX4's rules for frames, masks and refusals.
+"""What can be followed: setpoints as types, how each is made safe to follow, and the command it becomes.
 
-Pure functions, shared by the MAVLink service and by an adapter that flies in the same process.
-
-Two rules of PX4 seen from outside: a request with nothing finite in it is refused and counts as no setpoint;
-a request that leaves an axis open, or gives only one of the horizontal pair, is taken but braked, because its
-position controller cannot fly it. So one NaN or infinity among three velocities stops the vehicle in the air.
-
-One difference: PX4 turns a body velocity into the world once, at reception. Here it goes on to turn with the
-vehicle, as the paper's drone does, so a setpoint that is sent again changes nothing.
+A NaN in a component of a vector means "not controlled" (PX4's convention).
 """
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from dataclasses import dataclass
-from enum import IntEnum, IntFlag
-from math import cos, isfinite, nan, sin
+from math import hypot, isfinite, isnan, nan, sqrt
 
-from firmware_py.airframe import Airframe
-from firmware_py.types import Setpoint, VehicleState
-from geometry.vectors import NAN3, Quaternion, Vec3
+from firmware_py.commands import (
+    AccelerationCommand,
+    AttitudeCommand,
+    BodyRateCommand,
+    ControlCommand,
+    MotorCommand,
+    VelocityCommand,
+)
+from firmware_py.guidance.limits import (
+    SpeedLimits,
+    clamp,
+    level,
+    velocity_command,
+    velocity_towards,
+    yaw_rate,
+)
+from firmware_py.types import VehicleState
+from geometry.rotations import euler_from_quaternion
+from geometry.vectors import NAN3, ZERO3, Quaternion, Vec3
 
-ZERO3: Vec3 = (0.0, 0.0, 0.0)
-_LOCAL = "SET_POSITION_TARGET_LOCAL_NED"
-_SHORTEST = 1e-3  # of a quaternion that still has a direction
-
-
-class TargetFrame(IntEnum):
-    """The MAV_FRAMEs that PX4 accepts for a local target."""
-
-    LOCAL_NED = 1
-    BODY_NED = 8
-
-
-class TargetMask(IntFlag):
-    """POSITION_TARGET_TYPEMASK: a set bit takes the component out."""
-
-    X = 1
-    Y = 2
-    Z = 4
-    VX = 8
-    VY = 16
-    VZ = 32
-    AX = 64
-    AY = 128
-    AZ = 256
-    FORCE = 512
-    YAW = 1024
-    YAW_RATE = 2048
+_MAX = 1e6  # metres or m/s asked for are cut to this, which keeps all arithmetic finite
+_MAX_ACCELERATION_M_S2 = 50.0
+_NORM_TOLERANCE = 0.1
+_BRAKING_SHARE = 0.6  # of the acceleration allowed, for slowing down before a place: the vehicle lags behind
 
 
 @dataclass(frozen=True, slots=True)
-class LocalTarget:
-    """The fields of SET_POSITION_TARGET_LOCAL_NED; vectors of shape (3,), metres, seconds, radians."""
+class Setpoint(ABC):
+    """What a mode follows, or an offboard controller asks for.
 
-    frame: int
-    type_mask: int
-    position_m: Vec3 = ZERO3
-    velocity_m_s: Vec3 = ZERO3
-    acceleration_m_s2: Vec3 = ZERO3
-    yaw_rad: float = 0.0
-    yaw_rate_rad_s: float = 0.0
-
-
-def setpoint_from_target(target: LocalTarget, state: VehicleState, time_us: int) -> Setpoint | str:
-    """Turn a target message into a setpoint.
-
-    Args:
-        target: the message.
-        state: the vehicle now; its yaw and attitude turn body targets into the world.
-        time_us: vehicle time of reception.
-
-    Returns:
-        The setpoint, or the reason for refusing it, in PX4's words.
+    Attributes:
+        time_us: vehicle time of reception, microseconds.
     """
-    mask = target.type_mask
-    level = NAN3
-    if target.frame == TargetFrame.LOCAL_NED:
-        position = _kept(target.position_m, mask, TargetMask.X)
-        velocity = _kept(target.velocity_m_s, mask, TargetMask.VX)
-        acceleration = _kept(target.acceleration_m_s2, mask, TargetMask.AX)
-    elif target.frame == TargetFrame.BODY_NED:
-        position = velocity = acceleration = NAN3
-        if not mask & (TargetMask.VX | TargetMask.VY | TargetMask.VZ):
-            level = _all_finite(target.velocity_m_s)
-            velocity = _level_to_ned(target.velocity_m_s, state.yaw_rad)
-        if not mask & (TargetMask.AX | TargetMask.AY | TargetMask.AZ):
-            acceleration = _body_to_ned(target.acceleration_m_s2, state.attitude)
-    else:
-        return f"{_LOCAL} coordinate frame {target.frame} unsupported"
-    if mask & TargetMask.FORCE and _any_finite(acceleration):
-        return f"{_LOCAL} force not supported"
-    return _settled(
-        Setpoint(
-            time_us,
-            position,
-            velocity,
+
+    time_us: int
+
+    @property
+    @abstractmethod
+    def is_usable(self) -> bool:
+        """Whether it says anything that can be flown."""
+
+    def bounded(self, limits: SpeedLimits) -> Setpoint:
+        """The same made safe to follow: finite or open, and within limits.
+
+        A yaw rate is passed on as asked for, which is what PX4 echoes; it is limited when flown.
+        """
+        del limits
+        return self
+
+    @abstractmethod
+    def command(self, state: VehicleState, limits: SpeedLimits) -> ControlCommand:
+        """What the stabiliser has to follow in this tick; for a setpoint that is `bounded`."""
+
+    def constant_command(self, limits: SpeedLimits) -> ControlCommand | None:
+        """The command, if it is the same in every tick."""
+        del limits
+        return None
+
+    @property
+    def trajectory(self) -> TrajectorySetpoint:
+        """What telemetry says of place and velocity: here a velocity of zero."""
+        return TrajectorySetpoint(self.time_us, velocity_ned_m_s=ZERO3)
+
+
+@dataclass(frozen=True, slots=True)
+class TrajectorySetpoint(Setpoint):
+    """A place, a velocity or an acceleration in the local frame.
+
+    Attributes:
+        position_ned_m: shape (3,).
+        velocity_ned_m_s: alone or as feed-forward beside a position, shape (3,).
+        acceleration_ned_m_s2: flown if there is neither of the others, shape (3,).
+        yaw_rad: clockwise from north.
+        yaw_rate_rad_s: clockwise.
+    """
+
+    position_ned_m: Vec3 = NAN3
+    velocity_ned_m_s: Vec3 = NAN3
+    acceleration_ned_m_s2: Vec3 = NAN3
+    yaw_rad: float = nan
+    yaw_rate_rad_s: float = nan
+
+    @property
+    def is_usable(self) -> bool:
+        """Whether any component is controlled."""
+        values = self.position_ned_m + self.velocity_ned_m_s + self.acceleration_ned_m_s2
+        return not all(map(isnan, values))
+
+    def bounded(self, limits: SpeedLimits) -> TrajectorySetpoint:
+        """An infinite component counts as not controlled, and a velocity that is not controlled is zero.
+
+        So the vehicle brakes and hovers on that axis, as PX4's does. An acceleration alone keeps the velocity
+        open.
+        """
+        yaw_rad, yaw_rate_rad_s = _finite(self.yaw_rad), _finite(self.yaw_rate_rad_s)
+        acceleration_only = all(map(isnan, self.position_ned_m + self.velocity_ned_m_s)) and self.is_usable
+        north_m_s2, east_m_s2, down_m_s2 = self.acceleration_ned_m_s2
+        acceleration = (_acceleration(north_m_s2), _acceleration(east_m_s2), _acceleration(down_m_s2))
+        if acceleration_only:
+            north, east, down = acceleration
+            acceleration = (_or_zero(north), _or_zero(east), _or_zero(down))
+            return TrajectorySetpoint(self.time_us, NAN3, NAN3, acceleration, yaw_rad, yaw_rate_rad_s)
+        north_m, east_m, down_m = self.position_ned_m
+        return TrajectorySetpoint(
+            self.time_us,
+            (_place(north_m), _place(east_m), _place(down_m)),
+            _velocity(self.velocity_ned_m_s, limits),
             acceleration,
-            nan if mask & TargetMask.YAW else _finite(target.yaw_rad),
-            nan if mask & TargetMask.YAW_RATE else _finite(target.yaw_rate_rad_s),
-            level,
+            yaw_rad,
+            yaw_rate_rad_s,
         )
-    )
 
+    def command(self, state: VehicleState, limits: SpeedLimits) -> ControlCommand:
+        """The velocity towards the place, or the velocity, or the acceleration."""
+        if isnan(self.velocity_ned_m_s[0]):
+            return AccelerationCommand(
+                level(state, self.acceleration_ned_m_s2),
+                yaw_rate(state.yaw_rad, self.yaw_rad, self.yaw_rate_rad_s, limits),
+            )
+        if isnan(self.position_ned_m[0]) or isnan(self.position_ned_m[1]):
+            velocity_ned_m_s = velocity_towards(
+                self.position_ned_m, state.position_ned_m, self.velocity_ned_m_s, limits
+            )
+        else:
+            velocity_ned_m_s = self._approach(state, limits)
+        return velocity_command(state, velocity_ned_m_s, self.yaw_rad, limits, self.yaw_rate_rad_s)
 
-def setpoint_from_attitude(
-    attitude: Quaternion | None,
-    rate_frd_rad_s: Vec3 | None,
-    yaw_rate_rad_s: float,
-    thrust: float,
-    time_us: int,
-) -> Setpoint | str:
-    """The setpoint for an attitude or for body rates, with a thrust.
+    @property
+    def trajectory(self) -> TrajectorySetpoint:
+        """Itself."""
+        return self
 
-    Args:
-        attitude: unit quaternion (w, x, y, z), body FRD to world NED; None: not asked for.
-        rate_frd_rad_s: body rates, shape (3,); None: not asked for. Flown only without an attitude.
-        yaw_rate_rad_s: clockwise, beside an attitude.
-        thrust: 0..1 of the most there is.
-        time_us: vehicle time now.
-
-    Returns:
-        The setpoint, or the reason for refusing it.
-    """
-    if not isfinite(thrust):
-        return "SET_ATTITUDE_TARGET invalid: thrust is not a number"
-    if attitude is not None:
-        length = sum(component * component for component in attitude) ** 0.5
-        if not isfinite(length) or length < _SHORTEST:
-            return "SET_ATTITUDE_TARGET invalid: attitude is no quaternion"
-        w, x, y, z = (component / length for component in attitude)
-        return Setpoint(time_us, yaw_rate_rad_s=_finite(yaw_rate_rad_s), attitude=(w, x, y, z), thrust=thrust)
-    if rate_frd_rad_s is not None:
-        roll, pitch, yaw = (0.0 if not isfinite(rate) else rate for rate in rate_frd_rad_s)
-        return Setpoint(time_us, rate_frd_rad_s=(roll, pitch, yaw), thrust=thrust)
-    return "SET_ATTITUDE_TARGET invalid: neither attitude nor rates"
-
-
-def setpoint_from_controls(
-    airframe: Airframe, torque_frd: Vec3, thrust: float, time_us: int
-) -> Setpoint | str:
-    """The setpoint for normalised torques and thrust, mixed straight to the motors.
-
-    Each rotor gets the thrust plus its lever's share of roll and pitch and its spin's of yaw.
-
-    Args:
-        airframe: where the rotors are.
-        torque_frd: roll, pitch, yaw, each -1..1; shape (3,).
-        thrust: 0..1.
-        time_us: vehicle time now.
-
-    Returns:
-        The setpoint, or the reason for refusing it.
-    """
-    if not isfinite(sum(torque_frd) + thrust):
-        return "SET_ACTUATOR_CONTROL_TARGET invalid: a control is not a number"
-    roll, pitch, yaw = torque_frd
-    arm_x_m = max(abs(rotor.position_frd_m[0]) for rotor in airframe.rotors) or 1.0
-    arm_y_m = max(abs(rotor.position_frd_m[1]) for rotor in airframe.rotors) or 1.0
-    outputs = [
-        thrust
-        - roll * rotor.position_frd_m[1] / arm_y_m
-        + pitch * rotor.position_frd_m[0] / arm_x_m
-        + yaw * rotor.yaw_sign
-        for rotor in airframe.rotors
-    ]
-    return Setpoint(time_us, outputs=tuple([min(max(output, 0.0), 1.0) for output in outputs]))
-
-
-def setpoint_from_body_velocity(
-    velocity_level_m_s: Vec3, yaw_rate_rad_s: float, heading_rad: float, time_us: int
-) -> Setpoint | str:
-    """The setpoint for a velocity in level axes that turn with the yaw, and a yaw rate.
-
-    The same as `setpoint_from_target` with BODY_NED and mask 0x5C7, without the packet.
-
-    Args:
-        velocity_level_m_s: forward, right, down; shape (3,).
-        yaw_rate_rad_s: clockwise from above.
-        heading_rad: yaw of the vehicle now.
-        time_us: vehicle time now.
-
-    Returns:
-        The setpoint, or the reason for refusing it.
-    """
-    velocity_ned_m_s = _level_to_ned(velocity_level_m_s, heading_rad)
-    return _settled(
-        Setpoint(
-            time_us,
-            velocity_ned_m_s=velocity_ned_m_s,
-            yaw_rate_rad_s=_finite(yaw_rate_rad_s),
-            velocity_level_m_s=_all_finite(velocity_level_m_s),
+    def _approach(self, state: VehicleState, limits: SpeedLimits) -> Vec3:
+        """Velocity NED to a place: proportional near by, and never faster than it can brake."""
+        north_m, east_m, down_m = self.position_ned_m
+        distance_m = hypot(north_m - state.position_ned_m[0], east_m - state.position_ned_m[1])
+        north_m_s, east_m_s, down_m_s = velocity_towards(
+            (nan, nan, down_m), state.position_ned_m, self.velocity_ned_m_s, limits
         )
-    )
+        if distance_m > 0.0:
+            share = braking_speed(distance_m, limits) / distance_m
+            north_m_s += share * (north_m - state.position_ned_m[0])
+            east_m_s += share * (east_m - state.position_ned_m[1])
+        return (north_m_s, east_m_s, down_m_s)
 
 
-def _settled(setpoint: Setpoint) -> Setpoint | str:
-    """Refuse it without anything to follow, brake where an axis is open or the horizontal pair is half."""
-    groups = (setpoint.position_ned_m, setpoint.velocity_ned_m_s, setpoint.acceleration_ned_m_s2)
-    if not any(_any_finite(group) for group in groups):
-        return f"{_LOCAL} invalid"
-    pairs_whole = all(isfinite(group[0]) == isfinite(group[1]) for group in groups)
-    axes_held = all(any(isfinite(group[axis]) for group in groups) for axis in range(3))
-    if pairs_whole and axes_held:
-        return setpoint
-    return Setpoint(
-        setpoint.time_us,
-        velocity_ned_m_s=ZERO3,
-        yaw_rad=setpoint.yaw_rad,
-        yaw_rate_rad_s=setpoint.yaw_rate_rad_s,
-    )
+@dataclass(frozen=True, slots=True)
+class BodyVelocitySetpoint(Setpoint):
+    """A velocity in level axes that turn with the yaw.
+
+    Attributes:
+        velocity_level_m_s: forward, right, down; shape (3,), finite.
+        yaw_rad: clockwise from north.
+        yaw_rate_rad_s: clockwise.
+        velocity_ned_m_s: what the velocity was at reception, for telemetry, shape (3,).
+        acceleration_ned_m_s2: asked for beside it, for telemetry; not flown; shape (3,).
+    """
+
+    velocity_level_m_s: Vec3
+    yaw_rad: float = nan
+    yaw_rate_rad_s: float = nan
+    velocity_ned_m_s: Vec3 = NAN3
+    acceleration_ned_m_s2: Vec3 = NAN3
+
+    @property
+    def is_usable(self) -> bool:
+        """Whether all of the velocity is finite."""
+        forward, right, down = self.velocity_level_m_s
+        return isfinite(forward + right + down)
+
+    def bounded(self, limits: SpeedLimits) -> BodyVelocitySetpoint:
+        """Cut to the limits."""
+        north_m_s2, east_m_s2, down_m_s2 = self.acceleration_ned_m_s2
+        return BodyVelocitySetpoint(
+            self.time_us,
+            limits.clip(*self.velocity_level_m_s),
+            _finite(self.yaw_rad),
+            _finite(self.yaw_rate_rad_s),
+            _velocity(self.velocity_ned_m_s, limits),
+            (_acceleration(north_m_s2), _acceleration(east_m_s2), _acceleration(down_m_s2)),
+        )
+
+    def command(self, state: VehicleState, limits: SpeedLimits) -> ControlCommand:
+        """The velocity as it is."""
+        turn_rad_s = yaw_rate(state.yaw_rad, self.yaw_rad, self.yaw_rate_rad_s, limits)
+        return VelocityCommand(self.velocity_level_m_s, turn_rad_s)
+
+    def constant_command(self, limits: SpeedLimits) -> ControlCommand | None:
+        """The command, unless a yaw is to be turned to."""
+        if not isnan(self.yaw_rad):
+            return None
+        return VelocityCommand(self.velocity_level_m_s, yaw_rate(0.0, nan, self.yaw_rate_rad_s, limits))
+
+    @property
+    def trajectory(self) -> TrajectorySetpoint:
+        """The velocity as it was at reception."""
+        return TrajectorySetpoint(
+            self.time_us,
+            NAN3,
+            self.velocity_ned_m_s,
+            self.acceleration_ned_m_s2,
+            self.yaw_rad,
+            self.yaw_rate_rad_s,
+        )
+
+
+@dataclass(frozen=True, slots=True)
+class AttitudeSetpoint(Setpoint):
+    """An attitude (body FRD to world NED), a thrust, 0..1 of the greatest, and a yaw rate beside them."""
+
+    attitude: Quaternion
+    thrust: float
+    yaw_rate_rad_s: float = nan
+
+    @property
+    def is_usable(self) -> bool:
+        """Whether the quaternion is of unit length and the thrust finite."""
+        square = sum(component * component for component in self.attitude)
+        return isfinite(self.thrust) and abs(square - 1.0) < _NORM_TOLERANCE  # false for NaN too
+
+    def command(self, state: VehicleState, limits: SpeedLimits) -> ControlCommand:
+        """Its tilt, and a turn to its yaw."""
+        roll_rad, pitch_rad, yaw_rad = euler_from_quaternion(self.attitude)
+        turn_rad_s = yaw_rate(state.yaw_rad, yaw_rad, self.yaw_rate_rad_s, limits)
+        return AttitudeCommand(roll_rad, pitch_rad, turn_rad_s, self.thrust)
+
+    @property
+    def trajectory(self) -> TrajectorySetpoint:
+        """A velocity of zero, and the yaw rate."""
+        return TrajectorySetpoint(self.time_us, velocity_ned_m_s=ZERO3, yaw_rate_rad_s=self.yaw_rate_rad_s)
+
+
+@dataclass(frozen=True, slots=True)
+class BodyRateSetpoint(Setpoint):
+    """Body rates, shape (3,), and a thrust, 0..1 of the greatest."""
+
+    rate_frd_rad_s: Vec3
+    thrust: float
+
+    @property
+    def is_usable(self) -> bool:
+        """Whether the thrust is finite."""
+        return isfinite(self.thrust)
+
+    def command(self, state: VehicleState, limits: SpeedLimits) -> ControlCommand:
+        """The same."""
+        return BodyRateCommand(self.rate_frd_rad_s, self.thrust)
+
+
+@dataclass(frozen=True, slots=True)
+class MotorSetpoint(Setpoint):
+    """Outputs of the motors themselves, 0..1 of a rotor's full thrust, in the airframe's order."""
+
+    outputs: tuple[float, ...]
+
+    @property
+    def is_usable(self) -> bool:
+        """Whether there are outputs, all finite."""
+        return bool(self.outputs) and all(map(isfinite, self.outputs))
+
+    def command(self, state: VehicleState, limits: SpeedLimits) -> ControlCommand:
+        """The same."""
+        return MotorCommand(self.outputs)
+
+
+def braking_speed(distance_m: float, limits: SpeedLimits) -> float:
+    """The speed from which one can stop in a distance.
+
+    Near the target it is proportional, farther away it follows v^2 = 2 a s; where the slopes meet it changes
+    over, so that the deceleration never exceeds a.
+    """
+    gain, max_m_s2 = limits.position_gain, _BRAKING_SHARE * limits.pace.level_m_s2
+    if distance_m * gain * gain <= max_m_s2:
+        return gain * distance_m
+    return sqrt(2.0 * max_m_s2 * distance_m - (max_m_s2 / gain) ** 2)
 
 
 def _finite(value: float) -> float:
     return value if isfinite(value) else nan
 
 
-def _all_finite(vector: Vec3) -> Vec3:
-    return vector if isfinite(vector[0] + vector[1] + vector[2]) else NAN3
+def _or_zero(value: float) -> float:
+    return clamp(value, -_MAX, _MAX) if isfinite(value) else 0.0
 
 
-def _any_finite(vector: Vec3) -> bool:
-    return isfinite(vector[0]) or isfinite(vector[1]) or isfinite(vector[2])
+def _place(metres: float) -> float:
+    return clamp(metres, -_MAX, _MAX) if isfinite(metres) else nan
 
 
-def _kept(vector: Vec3, mask: int, first_bit: int) -> Vec3:
-    x, y, z = vector
-    return (
-        nan if mask & first_bit else _finite(x),
-        nan if mask & first_bit << 1 else _finite(y),
-        nan if mask & first_bit << 2 else _finite(z),
-    )
+def _velocity(velocity_m_s: Vec3, limits: SpeedLimits) -> Vec3:
+    north_m_s, east_m_s, down_m_s = velocity_m_s
+    return limits.clip(_or_zero(north_m_s), _or_zero(east_m_s), _or_zero(down_m_s))
 
 
-def _level_to_ned(vector: Vec3, yaw_rad: float) -> Vec3:
-    forward, right, down = vector
-    c, s = cos(yaw_rad), sin(yaw_rad)
-    return (_finite(c * forward - s * right), _finite(s * forward + c * right), _finite(down))
-
-
-def _body_to_ned(vector: Vec3, attitude: Quaternion) -> Vec3:
-    """Rotate by the unit quaternion (w, x, y, z): v' = v + 2w (q × v) + 2 q × (q × v)."""
-    w, qx, qy, qz = attitude
-    x, y, z = vector
-    tx, ty, tz = 2 * (qy * z - qz * y), 2 * (qz * x - qx * z), 2 * (qx * y - qy * x)
-    return (
-        _finite(x + w * tx + qy * tz - qz * ty),
-        _finite(y + w * ty + qz * tx - qx * tz),
-        _finite(z + w * tz + qx * ty - qy * tx),
-    )
+def _acceleration(value: float) -> float:
+    bound = _MAX_ACCELERATION_M_S2
+    return clamp(value, -bound, bound) if isfinite(value) else nan

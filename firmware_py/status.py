@@ -5,52 +5,41 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from enum import Enum, IntEnum
 
-from firmware_py.types import GeodeticPoint, Setpoint
+from firmware_py.setpoints import Setpoint, TrajectorySetpoint
+from firmware_py.types import GeodeticPoint
 from geometry.vectors import Vec3
+from wire import px4_modes
 
 
 class FlightMode(Enum):
-    """Flight modes with PX4's numbers; the value is (main mode, sub mode)."""
+    """PX4's flight modes that this autopilot flies."""
 
-    MANUAL = (1, 0)
-    ALTITUDE = (2, 0)
-    POSITION = (3, 0)
-    ORBIT = (3, 1)
-    TAKEOFF = (4, 2)
-    HOLD = (4, 3)
-    MISSION = (4, 4)
-    RETURN = (4, 5)
-    LAND = (4, 6)
-    FOLLOW = (4, 8)
-    ACRO = (5, 0)
-    OFFBOARD = (6, 0)
-    STABILIZED = (7, 0)
-    TERMINATION = (10, 0)
+    MANUAL = px4_modes.MANUAL
+    ALTITUDE = px4_modes.ALTITUDE
+    POSITION = px4_modes.POSITION
+    ORBIT = px4_modes.ORBIT
+    TAKEOFF = px4_modes.TAKEOFF
+    HOLD = px4_modes.HOLD
+    MISSION = px4_modes.MISSION
+    RETURN = px4_modes.RETURN
+    LAND = px4_modes.LAND
+    FOLLOW = px4_modes.FOLLOW
+    ACRO = px4_modes.ACRO
+    OFFBOARD = px4_modes.OFFBOARD
+    STABILIZED = px4_modes.STABILIZED
+    TERMINATION = px4_modes.TERMINATION
 
     @property
     def custom_mode(self) -> int:
-        """HEARTBEAT.custom_mode as PX4 packs it: main << 16 | sub << 24."""
-        main, sub = self.value
-        return int(main) << 16 | int(sub) << 24
+        """HEARTBEAT.custom_mode as PX4 packs it."""
+        return self.value.custom_mode
 
 
 NAVIGATION_STATES: dict[FlightMode, int] = {
-    FlightMode.MANUAL: 0,
-    FlightMode.ALTITUDE: 1,
-    FlightMode.POSITION: 2,
-    FlightMode.MISSION: 3,
-    FlightMode.HOLD: 4,
-    FlightMode.RETURN: 5,
-    FlightMode.ACRO: 10,
-    FlightMode.TERMINATION: 13,
-    FlightMode.OFFBOARD: 14,
-    FlightMode.STABILIZED: 15,
-    FlightMode.TAKEOFF: 17,
-    FlightMode.LAND: 18,
-    FlightMode.FOLLOW: 19,
-    FlightMode.ORBIT: 21,
+    mode: mode.value.navigation_state
+    for mode in sorted(FlightMode, key=lambda mode: mode.value.navigation_state)
 }
-"""PX4's number of each mode inside (its navigation state), as logs and events have it."""
+"""PX4's number of each mode inside (its navigation state), as logs and events have it, in PX4's order."""
 
 
 class LandedState(IntEnum):
@@ -87,7 +76,7 @@ class VehicleStatus:
         home: where it was armed (first: where it booted); None before the first position.
         home_ned_m: the same in the local frame, shape (3,).
         origin: the local frame's origin on Earth; None before the first position.
-        setpoint: what is being followed now, for POSITION_TARGET_LOCAL_NED.
+        setpoint: what is followed now.
     """
 
     armed: bool = False
@@ -100,4 +89,4 @@ class VehicleStatus:
     home: GeodeticPoint | None = None
     home_ned_m: Vec3 = (0.0, 0.0, 0.0)
     origin: GeodeticPoint | None = None
-    setpoint: Setpoint = field(default_factory=lambda: Setpoint(0))
+    setpoint: Setpoint = field(default_factory=lambda: TrajectorySetpoint(0))

@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from math import nan
 
-from geometry.vectors import NAN3, Quaternion, Vec3
+from geometry.vectors import Quaternion, Vec3
 
 MotorSpeeds = tuple[float, ...]
 
@@ -60,113 +59,6 @@ class VehicleState:
     yaw_rad: float = 0.0
     angular_rate_frd_rad_s: Vec3 = (0.0, 0.0, 0.0)
     specific_force_frd_m_s2: Vec3 = (0.0, 0.0, -9.80665)
-
-
-@dataclass(frozen=True, slots=True)
-class Setpoint:
-    """What an offboard controller asks for; NaN in a component means "not controlled" (PX4's convention).
-
-    Attributes:
-        time_us: vehicle time of reception, microseconds.
-        position_ned_m: in the local frame, shape (3,).
-        velocity_ned_m_s: shape (3,). Used alone or as feed-forward beside a position.
-        acceleration_ned_m_s2: shape (3,).
-        yaw_rad: clockwise from north.
-        yaw_rate_rad_s: clockwise.
-        velocity_level_m_s: forward, right, down in level axes that turn with the yaw, shape (3,), if the
-            velocity was given so; then it is flown, and velocity_ned_m_s is what it was at reception.
-        attitude: unit quaternion (w, x, y, z), body FRD to world NED, if an attitude is asked for.
-        rate_frd_rad_s: body rates, shape (3,), if rates are asked for.
-        thrust: 0..1, with an attitude or rates.
-        outputs: motor outputs 0..1, if they are asked for directly; else empty.
-    """
-
-    time_us: int
-    position_ned_m: Vec3 = NAN3
-    velocity_ned_m_s: Vec3 = NAN3
-    acceleration_ned_m_s2: Vec3 = NAN3
-    yaw_rad: float = nan
-    yaw_rate_rad_s: float = nan
-    velocity_level_m_s: Vec3 = NAN3
-    attitude: Quaternion | None = None
-    rate_frd_rad_s: Vec3 | None = None
-    thrust: float = nan
-    outputs: tuple[float, ...] = ()
-
-
-@dataclass(frozen=True, slots=True)
-class RateCommand:
-    """What the stabiliser follows: velocity in level axes turned with the yaw, and a yaw rate.
-
-    Attributes:
-        velocity_level_m_s: forward, right, down; shape (3,).
-        yaw_rate_rad_s: clockwise seen from above.
-        acceleration_level_m_s2: feed-forward beside the velocity, shape (3,).
-    """
-
-    velocity_level_m_s: Vec3 = (0.0, 0.0, 0.0)
-    yaw_rate_rad_s: float = 0.0
-    acceleration_level_m_s2: Vec3 = (0.0, 0.0, 0.0)
-
-
-@dataclass(frozen=True, slots=True)
-class AccelerationCommand:
-    """An acceleration in level axes turned with the yaw, and a yaw rate; velocity is left to whoever asks.
-
-    Attributes:
-        acceleration_level_m_s2: forward, right, down; shape (3,); zeros hover.
-        yaw_rate_rad_s: clockwise seen from above.
-    """
-
-    acceleration_level_m_s2: Vec3
-    yaw_rate_rad_s: float = 0.0
-
-
-@dataclass(frozen=True, slots=True)
-class TiltCommand:
-    """An attitude by its tilt, a yaw rate, and either a thrust or a vertical velocity.
-
-    Attributes:
-        roll_rad: right side down is positive.
-        pitch_rad: nose up is positive.
-        yaw_rate_rad_s: clockwise seen from above.
-        thrust: collective thrust along body up as a share of the most there is, 0..1; NaN: hold `down_m_s`.
-        down_m_s: vertical velocity, positive down.
-    """
-
-    roll_rad: float
-    pitch_rad: float
-    yaw_rate_rad_s: float = 0.0
-    thrust: float = nan
-    down_m_s: float = 0.0
-
-
-@dataclass(frozen=True, slots=True)
-class BodyRateCommand:
-    """Body rates and a thrust.
-
-    Attributes:
-        rate_frd_rad_s: roll, pitch and yaw rate, shape (3,).
-        thrust: collective thrust along body up as a share of the most there is, 0..1.
-    """
-
-    rate_frd_rad_s: Vec3
-    thrust: float
-
-
-@dataclass(frozen=True, slots=True)
-class ActuatorCommand:
-    """Motor outputs straight through.
-
-    Attributes:
-        outputs: one per rotor in the airframe's order, 0..1 of a rotor's full thrust.
-    """
-
-    outputs: tuple[float, ...]
-
-
-Command = RateCommand | AccelerationCommand | TiltCommand | BodyRateCommand | ActuatorCommand
-"""What a stabiliser can be told."""
 
 
 @dataclass(frozen=True, slots=True)

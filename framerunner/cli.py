@@ -102,11 +102,12 @@ def _reason(error: Exception) -> str | None:
     """What to tell people of a failure; None for a fault of this program."""
     from cyclopts import CycloptsError
 
+    from errors import UserError
     from framerunner.extras import advice
 
     if isinstance(error, CycloptsError):
         return " ".join(str(error).split()) + " Try --help."
-    if _is_foreseen(error):
+    if isinstance(error, UserError):
         return str(error)
     if isinstance(error, ModuleNotFoundError):
         return advice(error.name or "")
@@ -125,30 +126,6 @@ def _refuse(reason: str) -> int:
 def _forget_output() -> None:
     """Throw away what could not be written; Python must not complain about it again at exit."""
     os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
-
-
-def _is_foreseen(error: Exception) -> bool:
-    """Whether an error is a room's own, whose message is made for people.
-
-    Compared by name, so that a command does not import rooms it has no use for.
-    """
-    foreseen = {
-        "AirframeError",
-        "CameraError",
-        "CameraLostError",
-        "DroneError",
-        "DynamicsError",
-        "LinkError",
-        "MissionError",
-        "MonitorError",
-        "ParameterFileError",
-        "PictureError",
-        "ScenarioError",
-        "SettingError",
-        "StorageFolderError",
-        "VideoError",
-    }
-    return any(kind.__name__ in foreseen for kind in type(error).__mro__)
 
 
 def _handle_signals() -> None:

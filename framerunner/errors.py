@@ -1,5 +1,7 @@
 """Errors of the front door."""
 
+from errors import UserError
 
-class SettingError(ValueError):
+
+class SettingError(UserError):
     """A setting that cannot be used; the message is one line for people."""

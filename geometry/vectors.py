@@ -9,3 +9,4 @@ Quaternion = tuple[float, float, float, float]
 """(w, x, y, z), unit length."""
 
 NAN3: Vec3 = (nan, nan, nan)
+ZERO3: Vec3 = (0.0, 0.0, 0.0)

@@ -15,6 +15,7 @@ from starlette.exceptions import HTTPException
 from starlette.requests import HTTPConnection
 from starlette.websockets import WebSocket
 
+from errors import UserError
 from monitor.addresses import visitor_key
 from monitor.sessions import SessionFile, StoredSession
 
@@ -29,7 +30,7 @@ _MINUTE_S = 60.0
 _INVISIBLE = ("C", "Zl", "Zp")  # control and format characters, line ends
 
 
-class LoginRefusedError(Exception):
+class LoginRefusedError(UserError):
     """A log-in failed; the message is one line for people.
 
     Attributes:

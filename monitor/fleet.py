@@ -9,22 +9,21 @@ from collections.abc import Callable, Sequence
 from functools import partial
 from typing import Any
 
-from pymavlink.dialects.v20 import common as mavlink
-
 from monitor.listener import Listener
 from monitor.ports import Equipment, Message
 from monitor.sticks import RATE_HZ, Sticks, manual_control
 from monitor.tries import TryEvent
 from monitor.vehicle.camera import host_of
-from monitor.vehicle.commands import OWN_SYSTEM
-from monitor.vehicle.vehicle import AUTOPILOT, Ears, Vehicle
+from monitor.vehicle.orders import OWN_SYSTEM
+from monitor.vehicle.vehicle import Vehicle, VehicleCallbacks
+from wire.vehicles import ground_station_heartbeat, is_vehicle
 
 _TICK_S = 0.1
 _BEAT_S = 1.0
-_MOST_DRONES = 16
-_FORGOTTEN_S = 600.0  # so long a drone must be silent before another may take its place
+_MAX_DRONES = 16
+_FORGOTTEN_S = 600.0  # of silence, after which another drone may take its place
 _TEXTS = 30
-_MOST_FAULTS_TOLD = 10
+_MAX_FAULTS_TOLD = 10
 
 JsonMessage = dict[str, Any]
 _log = logging.getLogger(__name__)
@@ -140,7 +139,7 @@ class Fleet:
         if sticks is not None:
             self._sticks[drone_id] = sticks
             stream = self._streams.get(drone_id)
-            if stream is None or stream.done():  # one that failed is begun anew
+            if stream is None or stream.done():  # one that failed is started again
                 self._streams[drone_id] = asyncio.create_task(self._stream_sticks(drone_id))
             return
         self._sticks.pop(drone_id, None)
@@ -172,7 +171,7 @@ class Fleet:
                 system = message.get_srcSystem()
                 vehicle = self._vehicles.get(system)
                 if vehicle is None:
-                    if not _is_vehicle(message) or not self._has_room(now_s):
+                    if system in (0, OWN_SYSTEM) or not is_vehicle(message) or not self._has_room(now_s):
                         continue
                     vehicle = self._meet(system, now_s)
                 vehicle.take(message, now_s, host)
@@ -181,11 +180,11 @@ class Fleet:
 
     def _note_fault(self, what: str) -> None:
         self.faults += 1
-        if self.faults <= _MOST_FAULTS_TOLD:
+        if self.faults <= _MAX_FAULTS_TOLD:
             _log.exception("%s", what)
 
     def _has_room(self, now_s: float) -> bool:
-        if len(self._vehicles) < _MOST_DRONES:
+        if len(self._vehicles) < _MAX_DRONES:
             return True
         silent_id, silent = max(self._vehicles.items(), key=lambda item: item[1].age_s(now_s))
         if silent.age_s(now_s) > _FORGOTTEN_S:
@@ -194,13 +193,13 @@ class Fleet:
             return True
         if not self._said_full:
             self._said_full = True
-            self.notice(None, "warning", f"more than {_MOST_DRONES} drones; the others are not shown")
+            self.notice(None, "warning", f"more than {_MAX_DRONES} drones; the others are not shown")
         return False
 
     def _meet(self, system: int, now_s: float) -> Vehicle:
         notice = partial(self.notice, system)
-        ears = Ears(self._listener.send, self._tell, notice, self._tell_try)
-        vehicle = Vehicle(system, self._equipment, ears, now_s, host_of(self._listener.url))
+        callbacks = VehicleCallbacks(self._listener.send, self._tell, notice, self._tell_try)
+        vehicle = Vehicle(system, self._equipment, callbacks, now_s, host_of(self._listener.url))
         self._vehicles[system] = vehicle
         self._vehicles = dict(sorted(self._vehicles.items()))
         self.notice(system, "info", f"drone {system} is heard")
@@ -230,7 +229,7 @@ class Fleet:
             now_s = loop.time()
             if now_s - beat_s >= _BEAT_S:
                 beat_s = now_s
-                self._listener.send(_heartbeat())
+                self._listener.send(ground_station_heartbeat())
             for vehicle in list(self._vehicles.values()):
                 try:
                     vehicle.tick(now_s)
@@ -258,23 +257,6 @@ class Fleet:
             self._listener.send(manual_control(drone_id, self._sticks[drone_id]))
             due_s = max(due_s + 1 / RATE_HZ, loop.time())  # what was missed is not made up for
             await asyncio.sleep(due_s - loop.time())
-
-
-def _is_vehicle(message: Message) -> bool:
-    """Whether this is the HEARTBEAT of an autopilot, not of a ground station, camera or companion."""
-    return bool(
-        message.get_msgId() == mavlink.MAVLINK_MSG_ID_HEARTBEAT
-        and message.get_srcComponent() == AUTOPILOT
-        and message.get_srcSystem() not in (0, OWN_SYSTEM)
-        and message.autopilot != mavlink.MAV_AUTOPILOT_INVALID
-        and message.type != mavlink.MAV_TYPE_GCS
-    )
-
-
-def _heartbeat() -> Message:
-    return mavlink.MAVLink_heartbeat_message(
-        mavlink.MAV_TYPE_GCS, mavlink.MAV_AUTOPILOT_INVALID, 0, 0, mavlink.MAV_STATE_ACTIVE, 3
-    )
 
 
 def _notice(drone_id: int | None, level: str, text: str) -> JsonMessage:

@@ -7,12 +7,12 @@ import json
 import logging
 from collections import deque
 from collections.abc import Iterable, Mapping
-from math import isfinite
 from typing import TYPE_CHECKING, Any
 
 from starlette.websockets import WebSocket, WebSocketDisconnect
 
 from monitor.addresses import Places, client_address
+from wire import finite_json
 
 if TYPE_CHECKING:
     from monitor.fleet import Fleet
@@ -194,17 +194,4 @@ async def _send(websocket: WebSocket, viewer: Viewer) -> None:
 
 def encode(message: Mapping[str, Any]) -> str:
     """Write a message as JSON; numbers that are not finite become null, poses lose needless digits."""
-    decimals = _POSE_DECIMALS if message["kind"] == "pose" else None
-    return json.dumps(_tidy(message, decimals), separators=(",", ":"), allow_nan=False)
-
-
-def _tidy(value: Any, decimals: int | None) -> Any:  # noqa: ANN401 - whatever JSON can hold
-    if isinstance(value, float):
-        if not isfinite(value):
-            return None
-        return value if decimals is None else round(value, decimals)
-    if isinstance(value, Mapping):
-        return {key: _tidy(item, decimals) for key, item in value.items()}
-    if isinstance(value, list | tuple):
-        return [_tidy(item, decimals) for item in value]
-    return value
+    return finite_json.encode(message, decimals=_POSE_DECIMALS if message["kind"] == "pose" else None)

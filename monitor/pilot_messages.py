@@ -7,6 +7,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Any
 
+from errors import UserError
 from monitor.sticks import Sticks
 
 LONGEST_MESSAGE = 1000  # bytes; one holds some 80
@@ -18,7 +19,7 @@ _AXES = ("forward", "right", "up", "yaw")
 _LAST_SYSTEM = 255
 
 
-class PilotMessageError(ValueError):
+class PilotMessageError(UserError):
     """A message that no page of ours sends; its text is one line for people."""
 
 

@@ -6,6 +6,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, Protocol
 
+from errors import UserError
 from scenarios.models import Scenario
 from scenarios.result import RefereeReport, RefereeSnapshot
 from scenarios.truth import TrueState
@@ -98,7 +99,7 @@ class RunLibrary(Protocol):
         """Break off what is being read, and read nothing more."""
 
 
-class RunError(Exception):
+class RunError(UserError):
     """A run that cannot be shown; the message is one line for people."""
 
 

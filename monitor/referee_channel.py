@@ -23,7 +23,7 @@ Say = Callable[[str, str], None]
 
 
 class _NotThereError(Exception):
-    """Nothing usable was answered; the message says what, for people."""
+    """Nothing usable was answered; the message says what."""
 
 
 class RefereeChannel:

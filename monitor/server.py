@@ -1,29 +1,38 @@
-"""The monitor as a web server: drones, pages and the live channel, served until cancelled."""
+"""The monitor's web application: guard, files, the modules' own routes, and NiceGUI behind them."""
 
 from __future__ import annotations
 
-import asyncio
-from collections.abc import Callable, Coroutine
+import contextlib
+import logging
+import re
+import socket
+from collections.abc import Callable, Coroutine, Iterator
 from dataclasses import dataclass, field
+from functools import partial
 from importlib import import_module
-from typing import TYPE_CHECKING, Any
+from ipaddress import ip_address, ip_network
+from pathlib import Path
+from typing import Any, cast
 
-from monitor.listening import listen
-from monitor.qr_code import terminal_code
-from monitor.settings import MonitorSettings
-from monitor.urls import is_for_others, url_of, urls_for_people
+import nicegui
+import uvicorn
+from fastapi import FastAPI
+from nicegui import Client, core, ui
+from starlette.responses import Response
+from starlette.staticfiles import StaticFiles
+from starlette.types import ASGIApp, Scope
+from uvicorn.middleware.proxy_headers import ProxyHeadersMiddleware
 
-if TYPE_CHECKING:
-    import socket
-
-    import uvicorn
-    from fastapi import FastAPI
-
-    from monitor.access import Access
-    from monitor.fleet import Fleet
-    from monitor.ports import Equipment
+from monitor.access import Access
+from monitor.connections import Connections, Gate
+from monitor.fleet import Fleet
+from monitor.ports import Equipment
+from monitor.security import Guard
+from monitor.sessions import SessionFile, session_path
+from monitor.settings import BACKLOG, MonitorSettings
 
 Job = Callable[[], Coroutine[Any, Any, None]]
+
 # Each has `register(monitor)`. One line a module.
 MODULES = (
     "monitor.live_channel",
@@ -43,6 +52,14 @@ MODULES = (
     "monitor.pages.stage",
     "monitor.pages.join",
 )
+
+_STATIC = Path(__file__).parent / "static"
+_ELEMENTS = Path(nicegui.__file__).parent / "elements"
+_LIBRARIES = {"three": "scene", "echart": "echart", "mermaid": "mermaid"}
+_HASHED = re.compile(r"-[\w-]{8}\.js$")  # the bundler names a file by its content
+_RECONNECT_S = 10.0
+_END_S = 1
+_MAX_MESSAGE_BYTES = 1 << 17  # of a WebSocket; pages send some hundred bytes
 
 
 @dataclass
@@ -68,63 +85,132 @@ class Monitor:
     jobs: list[Job] = field(default_factory=list)
 
 
-async def serve(equipment: Equipment, settings: MonitorSettings, say: Callable[[str], None]) -> None:
-    """Serve the monitor until cancelled.
+class _Files(StaticFiles):
+    """Files that a browser asks after each time, and gets again only if they changed."""
 
-    Args:
-        equipment: the link to the drones and what else the monitor needs.
-        settings: where it listens and stores.
-        say: takes lines for people: the address, and judges' links.
-
-    Raises:
-        MonitorError: a setting cannot be used, or the port is taken.
-    """
-    settings.check()
-    with listen(settings.bind, settings.port) as listener:
-        # Reading the libraries takes more than a second; whoever else lives on this loop goes on meanwhile.
-        await asyncio.to_thread(_import_all)
-        from monitor.assembly import assemble, make_server  # noqa: PLC0415 - see above
-
-        host, port = listener.getsockname()[:2]
-        reachable = urls_for_people(host, port)
-        urls = reachable or [url_of("127.0.0.1", port)]
-        qr_codes = settings.qr_codes and bool(reachable) and is_for_others(host)
-
-        def invite(secret: str) -> None:
-            link = f"{urls[0]}login?token={secret}"
-            say(f"judges log in at {link}")
-            if qr_codes:
-                say(f"one judge's phone reads it here; the next judge gets another\n{terminal_code(link)}")
-
-        def started() -> None:
-            for url in urls:
-                say(f"monitor: {url}")
-            if not reachable:
-                say("this machine is in no network: phones cannot open it yet")
-            if qr_codes:
-                say(f"phones that look on read it here, or at {urls[0]}join\n{terminal_code(urls[0])}")
-            monitor.access.invite()
-
-        monitor = assemble(equipment, settings, (host, port), invite)
-        server = make_server(monitor.web, settings, started)
-        await _run(server, listener, [monitor.fleet.run, *monitor.jobs])
+    async def get_response(self, path: str, scope: Scope) -> Response:
+        response = await super().get_response(path, scope)
+        response.headers["Cache-Control"] = "no-cache"
+        return response
 
 
-def _import_all() -> None:
-    for name in ("monitor.assembly", *MODULES):
+class _Library(StaticFiles):
+    """A bundle of NiceGUI's: parts named by their content are kept for good."""
+
+    async def get_response(self, path: str, scope: Scope) -> Response:
+        response = await super().get_response(path, scope)
+        forever = _HASHED.search(path) is not None
+        response.headers["Cache-Control"] = "public, max-age=31536000, immutable" if forever else "no-cache"
+        return response
+
+
+class _Server(uvicorn.Server):
+    """Leaves signals to the command line, and reports when it listens."""
+
+    def __init__(self, config: uvicorn.Config, started: Callable[[], None]) -> None:
+        super().__init__(config)
+        self._tell_started = started
+
+    @contextlib.contextmanager
+    def capture_signals(self) -> Iterator[None]:
+        yield
+
+    async def startup(self, sockets: list[socket.socket] | None = None) -> None:
+        await super().startup(sockets)
+        self._tell_started()
+
+
+def import_modules() -> None:
+    """Import all that `assemble` needs, which takes more than a second."""
+    for name in MODULES:
         import_module(name)
 
 
-async def _run(server: uvicorn.Server, listener: socket.socket, jobs: list[Job]) -> None:
-    """Run the server and what belongs to it until cancelled or one of them fails."""
-    serving = asyncio.create_task(server.serve([listener]))
-    running = [asyncio.create_task(job()) for job in jobs]
-    try:
-        done, _ = await asyncio.wait([serving, *running], return_when=asyncio.FIRST_COMPLETED)
-        for task in done:
-            task.result()
-    finally:
-        server.should_exit = True
-        for task in running:
-            task.cancel()
-        await asyncio.gather(serving, *running, return_exceptions=True)
+def assemble(
+    equipment: Equipment, settings: MonitorSettings, place: tuple[str, int], invite: Callable[[str], None]
+) -> Monitor:
+    """Make the monitor; nothing runs yet.
+
+    Args:
+        equipment: the link to the drones and what else the monitor needs.
+        settings: as started.
+        place: address and port it listens on.
+        invite: told the secret of each one-time link for judges.
+    """
+    local_only = ip_address(place[0]).is_loopback and not settings.trusted_proxies
+    cookie = f"framerunner-judge-{place[1]}"  # browsers keep one jar for all ports
+    # Nobody comes back to a port that the system chose.
+    path = session_path(settings.database) if settings.port != 0 else None
+    access = Access(
+        settings.password,
+        all_may_fly=local_only,
+        cookie=cookie,
+        hear_invitation=invite,
+        kept=SessionFile(path, cookie) if path is not None else None,
+    )
+    web = FastAPI(title="framerunner", docs_url=None, redoc_url=None, openapi_url=None)
+    web.add_middleware(Guard, local_only=local_only, limits=settings.limits)
+    monitor = Monitor(settings, equipment, Fleet(equipment), access, place, web)
+    _add_static_files(web)
+    for name in MODULES:
+        import_module(name).register(monitor)
+    _add_nicegui(web)
+    return monitor
+
+
+def make_server(web: ASGIApp, settings: MonitorSettings, started: Callable[[], None]) -> uvicorn.Server:
+    """Return the server of a web application.
+
+    Args:
+        web: the application.
+        settings: as started.
+        started: called once it listens.
+    """
+    proxies = [ip_network(each) for each in settings.trusted_proxies]
+
+    def is_proxy(address: str) -> bool:
+        return any(ip_address(address) in each for each in proxies)
+
+    connections = Connections(settings.limits, is_proxy)
+    if proxies:
+        web = cast(ASGIApp, ProxyHeadersMiddleware(cast(Any, web), [str(each) for each in proxies]))
+    config = uvicorn.Config(
+        cast(Any, connections.watch(web)),
+        http=cast(Any, partial(Gate, connections)),
+        log_config=None,
+        log_level="critical",
+        access_log=False,
+        server_header=False,
+        proxy_headers=False,
+        backlog=BACKLOG,  # asyncio accepts so many before any of them can be refused
+        timeout_keep_alive=settings.limits.keep_alive_s,
+        timeout_graceful_shutdown=_END_S,
+        ws_max_size=_MAX_MESSAGE_BYTES,
+        ws_per_message_deflate=False,  # would compress the same pose once for each viewer
+    )
+    return _Server(config, started)
+
+
+def _add_static_files(web: FastAPI) -> None:
+    """Serve the monitor's own files and the libraries that come with NiceGUI."""
+    web.mount("/static", _Files(directory=_STATIC))
+    for name, element in _LIBRARIES.items():
+        web.mount(f"/lib/{name}", _Library(directory=_ELEMENTS / element / "dist"))
+
+
+def _add_nicegui(web: FastAPI) -> None:
+    """Mount NiceGUI's pages behind everything else. Its application is global: reset it."""
+    core.app.middleware_stack = None
+    core.app.user_middleware.clear()
+    core.app._shutdown_handlers.clear()
+    Client.instances.clear()  # pages opened before reload
+    logging.getLogger("nicegui").setLevel(logging.ERROR)  # it warns of every address that is not there
+    ui.run_with(
+        web,
+        title="framerunner",
+        dark=None,
+        language="en-US",
+        reconnect_timeout=_RECONNECT_S,
+        gzip_middleware_factory=None,  # costs more time than it saves in the networks this is made for
+        show_welcome_message=False,
+    )

@@ -4,12 +4,14 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 
+from errors import UserError
 from monitor.addresses import is_address_or_network
 
 SHORTEST_PASSWORD = 8
+BACKLOG = 100  # connections accepted at once; must leave room below the limit of open files
 
 
-class MonitorError(Exception):
+class MonitorError(UserError):
     """The monitor cannot be started; the message is one line for people."""
 
 

@@ -5,9 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from math import isfinite
 
-from pymavlink.dialects.v20 import common as mavlink
-
-from monitor.ports import Message
+from wire.dialect import Message, mavlink
 
 RATE_HZ = 25.0
 _FULL = 1000

@@ -6,8 +6,10 @@ from collections.abc import AsyncIterator
 from dataclasses import dataclass
 from typing import Protocol
 
+from errors import UserError
 
-class DroneError(Exception):
+
+class DroneError(UserError):
     """The drone cannot do what was asked; the message is one line for people."""
 
 

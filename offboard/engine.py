@@ -15,6 +15,7 @@ from math import isfinite
 
 from statemachine import StateChart
 
+from errors import UserError
 from offboard.chart.expressions import Evaluate, compile_value, names_in
 from offboard.chart.native import RESUME, TICK
 from offboard.chart.spec import Action, Leaf, Transition
@@ -30,7 +31,7 @@ Act = Callable[[Pilot], None]
 DONE = "done"
 
 
-class MissionRunError(Exception):
+class MissionRunError(UserError):
     """The mission cannot go on; the message is one line with the state and the reason."""
 
 

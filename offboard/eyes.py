@@ -7,9 +7,10 @@ import contextlib
 from collections.abc import AsyncIterator, Callable
 from typing import Protocol
 
-from offboard.link.message_order import MessageOrder
+from errors import UserError
 from vision.detector import detect
 from vision.types import CameraFrame, Detections, Image
+from wire.vehicle_telemetry import MessageOrder
 
 CAMERA_DEAD_S = 1.0
 FIRST_IMAGE_S = 5.0
@@ -17,7 +18,7 @@ FIRST_IMAGE_S = 5.0
 Detector = Callable[[Image, int | None], Detections]
 
 
-class CameraLostError(Exception):
+class CameraLostError(UserError):
     """There are no fresh images; the message is one line for people."""
 
 

@@ -9,6 +9,7 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 from math import cos, hypot, sin
 
+from errors import UserError
 from geometry.vectors import Vec3
 from offboard.drone import DroneState, VelocityCommand
 from scenarios.models import Scenario
@@ -37,7 +38,7 @@ MAX_STEP_US = 200_000  # between two ticks of one piece of flight
 STILL = VelocityCommand()
 
 
-class OutsideBoxError(Exception):
+class OutsideBoxError(UserError):
     """The drone is outside and does not come back; the message is one line for people."""
 
 

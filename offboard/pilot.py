@@ -12,6 +12,7 @@ from dataclasses import dataclass
 from math import cos, isfinite, isnan, sin, sqrt
 from types import SimpleNamespace
 
+from errors import UserError
 from geometry.vectors import Vec3
 from offboard.drone import VelocityCommand
 from scenarios.models import COLOURS, Colour
@@ -23,7 +24,7 @@ LOOK_TURN_PX = 80.0  # pixels aside that make 1 rad/s: the paper's gains, for it
 LOOK_CLIMB_PX = 120.0  # pixels above that make 1 m/s
 
 
-class PilotError(Exception):
+class PilotError(UserError):
     """A mission computed something that must not be flown; the message is one line for people."""
 
 

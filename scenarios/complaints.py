@@ -13,7 +13,7 @@ from pydantic import BaseModel
 from scenarios.models import Scenario, field_path
 from scenarios.yaml_tree import Path, YamlTree
 
-LONGEST_VALUE = 60  # characters of a value or path shown in a message
+MAX_VALUE_LENGTH = 60  # characters of a value or path shown in a message
 
 _COMPARISONS = {
     "greater_than": "must be above {gt}",
@@ -73,7 +73,7 @@ def describe_faults(source: str, tree: YamlTree, faults: list[Fault]) -> str:
 def shorten(text: str) -> str:
     """Make a value or path fit for a message: one line of printable characters, not too long."""
     line = "".join(char if char.isprintable() else "?" for char in " ".join(text.split()))
-    return line if len(line) <= LONGEST_VALUE else line[: LONGEST_VALUE - 1] + "…"
+    return line if len(line) <= MAX_VALUE_LENGTH else line[: MAX_VALUE_LENGTH - 1] + "…"
 
 
 def show(value: object) -> str:
@@ -91,10 +91,10 @@ def _describe(fault: Fault) -> str:
         return f"{name} {fault.context['value']} {fault.context['message']}"
     shown = "empty" if fault.value is None else show(fault.value)
     if fault.kind in _COMPARISONS:
-        mend = _COMPARISONS[fault.kind].format_map(fault.context)
+        advice = _COMPARISONS[fault.kind].format_map(fault.context)
     else:
-        mend = _TYPES.get(fault.kind, fault.text)
-    return f"{name} is {shown}: {mend}"
+        advice = _TYPES.get(fault.kind, fault.text)
+    return f"{name} is {shown}: {advice}"
 
 
 def _nearest_field(path: Path) -> str:

@@ -11,8 +11,7 @@ from typing import Self
 from pydantic import Field, ValidationError, model_validator
 
 from scenarios.complaints import Fault, describe_faults, shorten, show
-from scenarios.loader import ScenarioError
-from scenarios.models import Arena, Frame, Part, refusal
+from scenarios.models import Arena, Frame, Part, ScenarioError, refusal
 from scenarios.yaml_file import FileKind, is_path, packaged
 
 STEPS_PER_UNIT = 1000  # what is drawn is a whole number of millimetres or milliradians
@@ -124,7 +123,7 @@ def parse_level(content: bytes | str, source: str = "level") -> Level:
         source: what to call it in messages, usually the file's path.
 
     Raises:
-        LevelError: it is not a valid level; the message names source, line, field, value and mend.
+        LevelError: it is not a valid level; the message names source, line, field, value and what to do.
     """
     tree = _KIND.parse(content, source)
     try:

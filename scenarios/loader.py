@@ -1,4 +1,4 @@
-"""Scenarios by name or from files, with faults told by file, line and field."""
+"""Scenarios by name or from files, with faults reported by file, line and field."""
 
 from __future__ import annotations
 
@@ -11,15 +11,12 @@ from typing import Any
 from pydantic import ValidationError
 
 from scenarios.complaints import Fault, describe_faults, shorten, show
-from scenarios.models import Scenario
+from scenarios.level import list_levels, load_level
+from scenarios.models import Scenario, ScenarioError
 from scenarios.yaml_file import FileKind, is_path, packaged
 from scenarios.yaml_tree import to_yaml
 
 _SOME_SEED = re.compile(r"[0-9]{1,19}")
-
-
-class ScenarioError(ValueError):
-    """A scenario that cannot be used; the message is one line for people."""
 
 
 _KIND = FileKind("scenario", ScenarioError)
@@ -58,7 +55,7 @@ def parse_scenario(content: bytes | str, source: str = "scenario") -> Scenario:
         source: what to call it in messages, usually the file's path.
 
     Raises:
-        ScenarioError: it is not a valid scenario; the message names source, line, field, value and mend.
+        ScenarioError: it is not a valid scenario; the message names line, field, value and what to do.
     """
     tree = _KIND.parse(content, source)
     try:
@@ -80,8 +77,7 @@ def json_schema() -> dict[str, Any]:
 
 def _random(name: str, known: list[str]) -> Scenario:
     """The scenario that `random_scenario` gives this name."""
-    from scenarios.level import list_levels, load_level  # noqa: PLC0415 - they import this module
-    from scenarios.random_scenarios import random_scenario  # noqa: PLC0415 - and numpy
+    from scenarios.random_scenarios import random_scenario  # noqa: PLC0415 - it imports numpy
 
     level, _, seed = name.rpartition("-")
     levels = list_levels()

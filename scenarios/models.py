@@ -7,6 +7,7 @@ from typing import Annotated, Literal, Self
 from pydantic import BaseModel, ConfigDict, Field, model_validator
 from pydantic_core import PydanticCustomError
 
+from errors import UserError
 from geometry.vectors import Vec3
 
 Colour = Literal["red", "green", "blue"]
@@ -16,12 +17,16 @@ Metres = Annotated[float, Field(ge=-1000, le=1000, allow_inf_nan=False)]
 Radians = Annotated[float, Field(ge=-6.3, le=6.3, allow_inf_nan=False)]
 
 
+class ScenarioError(UserError):
+    """A scenario that cannot be used; the message is one line for people."""
+
+
 def refusal(value: float | str, message: str, *at: str | int) -> PydanticCustomError:
     """A validation error that knows where below the validated part the bad value stands.
 
     Args:
         value: the bad value, which may be a default.
-        message: what is wrong and how to mend it, one line that goes on from the value.
+        message: what is wrong and how to correct it, one line that goes on from the value.
         *at: keys and indices from the validated part to the value; the loader finds its line with them.
     """
     context = {"field": field_path(at), "value": value, "message": message, "at": at}

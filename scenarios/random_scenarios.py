@@ -63,7 +63,7 @@ def random_scenario(level: Level, seed: int) -> Scenario:
 def _places(layout: Layout, stream: Generator) -> list[Steps]:
     """Draw the places of base and frames.
 
-    All are drawn anew when two are too near: mending only the last one would favour some layouts.
+    All are drawn again when two are too near: redrawing only the last one would favour some layouts.
     """
     count = 1 + len(COLOURS)
     apart_steps_2 = (layout.apart_m * STEPS_PER_UNIT) ** 2

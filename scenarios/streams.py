@@ -11,10 +11,12 @@ import hashlib
 
 from numpy.random import PCG64, Generator, SeedSequence
 
+from errors import UserError
+
 MAX_SEED = 2**63 - 1  # fits the integers of every file format and database
 
 
-class SeedError(ValueError):
+class SeedError(UserError):
     """A seed out of range; the message is one line for people."""
 
 

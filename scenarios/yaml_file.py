@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from importlib import resources
 from pathlib import Path
 
+from errors import UserError
 from scenarios.complaints import shorten, show
 from scenarios.yaml_tree import YamlError, YamlTree, parse_yaml
 
@@ -24,7 +25,7 @@ class FileKind:
     """
 
     name: str
-    error: type[ValueError]
+    error: type[UserError]
 
     def read(self, path: Path, known: list[str]) -> bytes:
         """Read a file that may be anything, but never more than is allowed.
@@ -47,8 +48,6 @@ class FileKind:
         except FileNotFoundError:
             raise error(f"{name}: no such file; give a path or one of: {', '.join(known)}") from None
         except (OSError, ValueError) as failure:
-            if isinstance(failure, error):
-                raise
             reason = failure.strerror if isinstance(failure, OSError) else str(failure)
             raise error(f"{name}: cannot be read: {reason}") from None
 

@@ -18,8 +18,8 @@ Value = str | int | float | bool | None | dict[str, "Value"] | tuple["Value", ..
 
 MAX_DEPTH = 12
 MAX_VALUES = 20_000
-LONGEST_MESSAGE = 200
-LONGEST_INTEGER = 20  # characters; a longer one is read as a float, which has a range
+MAX_MESSAGE_LENGTH = 200
+MAX_INTEGER_LENGTH = 20  # characters; a longer one is read as a float, which has a range
 
 _NUMBER = r"[-+]?(?:\.[0-9]+|[0-9]+(?:\.[0-9]*)?)(?:[eE][-+]?[0-9]+)?"
 _SCALARS = (  # tag, what it looks like, its first characters; the first match counts
@@ -41,7 +41,9 @@ class YamlError(ValueError):
     """
 
     def __init__(self, message: str, line: int, column: int | None = None) -> None:
-        super().__init__(message if len(message) <= LONGEST_MESSAGE else message[: LONGEST_MESSAGE - 1] + "…")
+        super().__init__(
+            message if len(message) <= MAX_MESSAGE_LENGTH else message[: MAX_MESSAGE_LENGTH - 1] + "…"
+        )
         self.line = line
         self.column = column
 
@@ -198,6 +200,6 @@ def _scalar(text: str) -> Value:
         return None
     if kind == "bool":
         return text.lower() == "true"
-    if kind == "int" and len(text) <= LONGEST_INTEGER:
+    if kind == "int" and len(text) <= MAX_INTEGER_LENGTH:
         return int(text)
     return float(text.lower().replace(".inf", "inf").replace(".nan", "nan"))

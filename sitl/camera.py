@@ -18,11 +18,12 @@ import cv2
 import numpy as np
 import numpy.typing as npt
 
+from geometry.rotations import RotationRows, normalized, rotation, rotation_rows
 from geometry.vectors import Quaternion, Vec3
 from scenarios.models import Scenario
 from sitl.camera_clip import clip_half_plane
 from sitl.camera_drones import DRONE_BGR, outlines
-from sitl.camera_mesh import SHIFT, SUBPIXELS, Matrix, Mesh, MeshFace, Pinhole, Projection
+from sitl.camera_mesh import SHIFT, SUBPIXELS, Mesh, MeshFace, Pinhole, Projection
 from sitl.camera_order import PaintTree
 from sitl.camera_scene import GROUND_BGR, SKY_BGR, UNDERGROUND_BGR, build_scene
 from sitl.solids import Solid
@@ -82,7 +83,7 @@ class Camera:
         Raises:
             ValueError: a number is not finite, or the quaternion is zero.
         """
-        rotation = _rotation(attitude_arena)
+        rotation = _rows(attitude_arena)
         eye = self._eye(position_arena_m, rotation)
         if eye[2] <= 0.0:
             return self._without_margin(self._underground.copy())
@@ -114,14 +115,14 @@ class Camera:
     def _without_margin(canvas: Image) -> Image:
         return canvas[_MARGIN_PX:-_MARGIN_PX, _MARGIN_PX:-_MARGIN_PX]
 
-    def _eye(self, position: Vec3, rotation: Matrix) -> Vec3:
+    def _eye(self, position: Vec3, rotation: RotationRows) -> Vec3:
         if not all(map(isfinite, position)):
             raise ValueError(f"position_arena_m: every component must be finite, got {position}")
         x, y, z = self._settings.position_flu_m
         ex, ey, ez = (p + r[0] * x + r[1] * y + r[2] * z for p, r in zip(position, rotation, strict=True))
         return (ex, ey, ez)
 
-    def _paint_background(self, canvas: Image, rotation: Matrix) -> None:
+    def _paint_background(self, canvas: Image, rotation: RotationRows) -> None:
         """Paint the haze and the ground: bands between lines parallel to the horizon."""
         focal, (cu, cv) = self._pinhole.focal_px, self._pinhole.centre_px
         fwd_z, left_z, up_z = rotation[2]
@@ -175,14 +176,9 @@ def _paint(canvas: Image, projection: Projection, faces: Iterable[MeshFace]) -> 
             cv2.fillConvexPoly(canvas, outline, face.colour, cv2.LINE_8, SHIFT)
 
 
-def _rotation(attitude: Quaternion) -> Matrix:
-    """Return the rotation matrix of a quaternion of any length, row by row."""
+def _rows(attitude: Quaternion) -> RotationRows:
+    """The rotation matrix of a quaternion of any length but zero."""
     norm = hypot(*attitude)
     if not isfinite(norm) or norm == 0.0:
         raise ValueError(f"attitude_arena: need a finite quaternion other than zero, got {attitude}")
-    w, x, y, z = (component / norm for component in attitude)
-    return (
-        (1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)),
-        (2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)),
-        (2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)),
-    )
+    return rotation_rows(rotation(normalized(attitude)))

@@ -14,8 +14,9 @@ import cv2
 import numpy as np
 import numpy.typing as npt
 
+from geometry.rotations import RotationRows
 from geometry.vectors import Vec3
-from sitl.camera_mesh import SUBPIXELS, Matrix, Pinhole
+from sitl.camera_mesh import SUBPIXELS, Pinhole
 from sitl.solids import Solid
 
 DRONE_BGR = (64, 62, 60)  # no colour that the detector looks for
@@ -25,7 +26,7 @@ Outline = npt.NDArray[np.int32]
 
 
 def outlines(
-    drones: Sequence[Solid], eye_m: Vec3, rotation: Matrix, pinhole: Pinhole
+    drones: Sequence[Solid], eye_m: Vec3, rotation: RotationRows, pinhole: Pinhole
 ) -> list[tuple[float, Outline]]:
     """What is seen of some drones.
 
@@ -60,7 +61,9 @@ def _corners(box: Solid) -> list[Vec3]:
     return [(x + c * i * a - s * j * b, y + s * i * a + c * j * b, z + k * h) for i, j, k in _SIGNS]
 
 
-def _point(point_m: Vec3, eye_m: Vec3, rotation: Matrix, pinhole: Pinhole) -> tuple[float, float] | None:
+def _point(
+    point_m: Vec3, eye_m: Vec3, rotation: RotationRows, pinhole: Pinhole
+) -> tuple[float, float] | None:
     """Where a point is in the image, pixels; None if it is not before the camera or far beside the image."""
     offset = [p - e for p, e in zip(point_m, eye_m, strict=True)]
     forward, left, up = (sum(rotation[i][axis] * offset[i] for i in range(3)) for axis in range(3))

@@ -12,13 +12,13 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
+from geometry.rotations import RotationRows
 from geometry.vectors import Vec3
 from sitl.camera_clip import clip_near, clip_window
 from sitl.camera_scene import Bgr, Face
 
 Floats = npt.NDArray[np.float64]
 Ints = npt.NDArray[np.int32]
-Matrix = tuple[Vec3, Vec3, Vec3]
 
 SHIFT = 4
 """Corners are given to OpenCV in sixteenths of a pixel (its `shift` argument)."""
@@ -80,7 +80,7 @@ class Mesh:
         self._window = (-_FARTHEST, -8.0 * pinhole.height_px * SUBPIXELS, _FARTHEST, _FARTHEST)
         self._borders = _borders(pinhole, self._window)
 
-    def project(self, eye_arena_m: Vec3, rotation: Matrix) -> Projection:
+    def project(self, eye_arena_m: Vec3, rotation: RotationRows) -> Projection:
         """Project all faces.
 
         Args:
@@ -103,7 +103,7 @@ class Mesh:
         pixels = np.rint(flat, out=flat).T.astype(np.int32, order="C")
         return Projection(projected, pixels, seen.tobytes(), crossing.tolist(), near_m, self._window)
 
-    def _matrix(self, eye_arena_m: Vec3, rotation: Matrix) -> Floats:
+    def _matrix(self, eye_arena_m: Vec3, rotation: RotationRows) -> Floats:
         """Return the matrix from (x, y, z, 1) to (u w, v w, w), shape (3, 4), u and v in subpixels."""
         focal = self._pinhole.focal_px * SUBPIXELS
         cu, cv = (centre * SUBPIXELS for centre in self._pinhole.centre_px)

@@ -158,7 +158,7 @@ class ServedDrone:
 
         def received() -> Velocity | None:
             self._hub.read()  # a flooded link may have left a setpoint waiting
-            return self.simulation.autopilot.intake.newest_velocity()
+            return self.simulation.autopilot.setpoints.newest_velocity()
 
         await grants.hold(self.simulation.time_us - CONTROL_PERIOD_US, self._image_us, received)
 

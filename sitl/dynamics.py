@@ -9,6 +9,7 @@ from pathlib import Path
 
 import jsbsim
 
+from errors import UserError
 from firmware_py.airframe import Airframe
 from geometry.vectors import Quaternion, Vec3
 from sitl.airframe_xml import (
@@ -22,7 +23,7 @@ from sitl.airframe_xml import (
 METRES_PER_FOOT = 0.3048
 
 
-class DynamicsError(RuntimeError):
+class DynamicsError(UserError):
     """JSBSim refused the model; the message is one line for people."""
 
 

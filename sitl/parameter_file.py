@@ -14,6 +14,7 @@ from pathlib import Path
 from struct import pack, unpack
 from tempfile import NamedTemporaryFile
 
+from errors import UserError
 from firmware_py.parameters import Parameter, ParameterError, Parameters
 
 SAVE_DELAY_S = 0.5
@@ -24,7 +25,7 @@ _DECIDED_BY_INSTANCE = "MAV_SYS_ID"
 _NAMED_IN_NOTICE = 5
 
 
-class ParameterFileError(Exception):
+class ParameterFileError(UserError):
     """A file that cannot be read or written; the message is one line for people."""
 
 

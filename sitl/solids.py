@@ -10,10 +10,9 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from math import cos, sin, sqrt
 
+from geometry.rotations import RotationRows
 from geometry.vectors import Vec3
 from scenarios.models import Frame, Scenario
-
-Matrix = tuple[Vec3, Vec3, Vec3]
 
 _CYCLES = ((0, 1, 2), (1, 2, 0), (2, 0, 1))
 
@@ -98,7 +97,7 @@ def base_solid(scenario: Scenario) -> Solid:
 
 
 def touch(
-    solid: Solid, centre_m: Vec3, rotation: Matrix, half_extents_m: Vec3, entered: Vec3 | None = None
+    solid: Solid, centre_m: Vec3, rotation: RotationRows, half_extents_m: Vec3, entered: Vec3 | None = None
 ) -> Touch | None:
     """Tell whether and how a box overlaps a solid.
 
@@ -117,7 +116,7 @@ def touch(
     offset = solid.offset(centre_m)
     r0, r1, r2 = rotation
     # The moving box's axes seen from the solid, as rows of the relative rotation.
-    turn: Matrix = (
+    turn: RotationRows = (
         (c * r0[0] + s * r1[0], c * r0[1] + s * r1[1], c * r0[2] + s * r1[2]),
         (c * r1[0] - s * r0[0], c * r1[1] - s * r0[1], c * r1[2] - s * r0[2]),
         r2,
@@ -141,7 +140,7 @@ def touch(
     )
 
 
-def _least_overlap(offset: Vec3, turn: Matrix, a: Vec3, b: Vec3) -> tuple[float, Vec3] | None:
+def _least_overlap(offset: Vec3, turn: RotationRows, a: Vec3, b: Vec3) -> tuple[float, Vec3] | None:
     """Return depth and normal (from the solid outwards, in its axes) of least overlap; None when apart."""
     # Faces of the solid first: they part the boxes in nearly every case.
     best_depth, best_normal = 1e9, (0.0, 0.0, 0.0)
@@ -191,7 +190,7 @@ def _reach(normal: Vec3, columns: list[Vec3], a: Vec3, b: Vec3) -> float:
     return reach
 
 
-def _touching_point(offset: Vec3, turn: Matrix, a: Vec3, b: Vec3) -> Vec3:
+def _touching_point(offset: Vec3, turn: RotationRows, a: Vec3, b: Vec3) -> Vec3:
     """Return the point of the moving box nearest to the solid's point nearest to the box's centre."""
     near = [min(max(offset[i], -a[i]), a[i]) - offset[i] for i in range(3)]
     inside = []

@@ -13,11 +13,12 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path as DiskPath
 
+from errors import UserError
 from firmware_py.storage import Entry, Path, refuse, sound_name
 from sitl.storage import StorageLimits, Usage
 
 
-class StorageFolderError(OSError):
+class StorageFolderError(UserError):
     """A folder that cannot be used; the message is one line for people."""
 
 

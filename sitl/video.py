@@ -12,7 +12,6 @@ import json
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from importlib import import_module
-from math import isfinite
 from socket import SO_SNDBUF, SOL_SOCKET
 from typing import TYPE_CHECKING
 
@@ -20,6 +19,8 @@ import cv2
 import numpy as np
 import numpy.typing as npt
 
+from errors import UserError
+from wire.finite_json import finite
 from wire.mjpeg import STREAM_HEADERS, STREAM_START, write_part
 from wire.simulator_api import VIDEO_PATH
 
@@ -42,7 +43,7 @@ object-fit:contain;image-rendering:pixelated}</style>
 """
 
 
-class VideoError(Exception):
+class VideoError(UserError):
     """Video cannot be served; the message is one line for people."""
 
 
@@ -232,19 +233,8 @@ class VideoServer:
             known = ", ".join([VIDEO_PATH, "/image.jpg", *self._texts, *self._documents])
             return web.Response(status=404, text=f"not here; there are {known}\n")
         try:
-            text = json.dumps(_finite(provider(request.query)), allow_nan=False)
+            text = json.dumps(finite(provider(request.query)), allow_nan=False)
         except Exception as error:  # a fault in a document must not harm the video
             return web.Response(status=500, text=f"{request.path}: {type(error).__name__}: {error!s:.200}\n")
         headers = {"Cache-Control": "no-store"}
         return web.Response(text=text, content_type="application/json", headers=headers)
-
-
-def _finite(value: object) -> object:
-    """Replace numbers that JSON does not know by null, in dictionaries and sequences too."""
-    if isinstance(value, float):
-        return value if isfinite(value) else None
-    if isinstance(value, Mapping):
-        return {str(key): _finite(item) for key, item in value.items()}
-    if isinstance(value, list | tuple):
-        return [_finite(item) for item in value]
-    return value

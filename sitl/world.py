@@ -5,17 +5,18 @@ No clock, socket or thread: `step` advances simulated time by one control period
 
 from __future__ import annotations
 
-from math import atan2, dist, hypot
+from math import dist, hypot
 
 from firmware_py.airframe import Airframe
 from firmware_py.types import MotorSpeeds, Sensors
 from geometry.axes import flip_quaternion, flip_vector, flip_yaw
-from geometry.vectors import Quaternion, Vec3
+from geometry.rotations import rotation, rotation_rows, to_body, to_world, yaw_of
+from geometry.vectors import Vec3
 from scenarios.ground import is_over_base, start_position
 from scenarios.models import Scenario
 from scenarios.truth import TrueState
 from sitl.dynamics import Dynamics
-from sitl.solids import Matrix, Solid, base_solid, frame_solids, touch
+from sitl.solids import Solid, base_solid, frame_solids, touch
 
 PHYSICS_RATE_HZ = 500
 STEPS_PER_CONTROL = 2
@@ -128,9 +129,8 @@ class World:
 
     def box(self, name: str) -> Solid:
         """The drone's own box, upright and as it is headed now, for others to run into."""
-        w, x, y, z = self._dynamics.attitude()
-        yaw_rad = atan2(2 * (w * z + x * y), 1 - 2 * (y * y + z * z))
-        return Solid(name, self._position_arena_m, flip_yaw(yaw_rad), self._half_m)
+        yaw_rad = flip_yaw(yaw_of(self._dynamics.attitude()))
+        return Solid(name, self._position_arena_m, yaw_rad, self._half_m)
 
     def meet(self, neighbours: tuple[Solid, ...]) -> None:
         """Tell what else is near that moves: the boxes of other drones, until told otherwise."""
@@ -202,13 +202,14 @@ class World:
                 self._touching = {}
                 dynamics.push(_NOTHING, _NOTHING)
             return
-        rotation = _rotation(flip_quaternion(dynamics.attitude()))
-        spin = _turn(rotation, flip_vector(dynamics.angular_rate_frd_rad_s()))
+        turn = rotation(flip_quaternion(dynamics.attitude()))
+        rows = rotation_rows(turn)
+        spin = to_world(turn, *flip_vector(dynamics.angular_rate_frd_rad_s()))
         motion = flip_vector(dynamics.velocity_ned_m_s())
         force, moment = [0.0, 0.0, 0.0], [0.0, 0.0, 0.0]
         touching: dict[Solid, Vec3] = {}
         for solid in near:
-            found = touch(solid, position, rotation, self._half_m, self._touching.get(solid))
+            found = touch(solid, position, rows, self._half_m, self._touching.get(solid))
             if found is None:
                 continue
             touching[solid] = found.normal_arena
@@ -220,8 +221,8 @@ class World:
                 moment[i] += twist[i]
         self._touching = touching
         dynamics.push(
-            flip_vector(_turn_back(rotation, (force[0], force[1], force[2]))),
-            flip_vector(_turn_back(rotation, (moment[0], moment[1], moment[2]))),
+            flip_vector(to_body(turn, force[0], force[1], force[2])),
+            flip_vector(to_body(turn, moment[0], moment[1], moment[2])),
         )
 
     def _touch_force(self, depth_m: float, normal: Vec3, velocity_m_s: Vec3) -> Vec3:
@@ -255,27 +256,6 @@ class _Group:
     def gap_m(self, point_m: Vec3) -> float:
         """From a point to the ball, below zero inside."""
         return dist(point_m, self._centre_arena_m) - self._radius_m
-
-
-def _rotation(quaternion: Quaternion) -> Matrix:
-    w, x, y, z = quaternion
-    return (
-        (1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)),
-        (2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)),
-        (2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)),
-    )
-
-
-def _turn(m: Matrix, v: Vec3) -> Vec3:
-    return (_dot(m[0], v), _dot(m[1], v), _dot(m[2], v))
-
-
-def _turn_back(m: Matrix, v: Vec3) -> Vec3:
-    return (
-        m[0][0] * v[0] + m[1][0] * v[1] + m[2][0] * v[2],
-        m[0][1] * v[0] + m[1][1] * v[1] + m[2][1] * v[2],
-        m[0][2] * v[0] + m[1][2] * v[1] + m[2][2] * v[2],
-    )
 
 
 def _dot(a: Vec3, b: Vec3) -> float:

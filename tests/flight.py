@@ -7,8 +7,9 @@ from dataclasses import dataclass
 from math import asin, atan2, cos, hypot, sin
 
 from firmware_py.airframe import Airframe, load_airframe
+from firmware_py.commands import ControlCommand
 from firmware_py.control.stabiliser import Stabiliser
-from firmware_py.types import Command, MotorOutput, VehicleState
+from firmware_py.types import MotorOutput, VehicleState
 from geometry.vectors import Vec3
 from sitl.dynamics import Dynamics
 
@@ -44,7 +45,7 @@ def state_of(dynamics: Dynamics, time_us: int) -> VehicleState:
     )
 
 
-Told = Command | Callable[[VehicleState], Command]
+Told = ControlCommand | Callable[[VehicleState], ControlCommand]
 """A command, or what makes one of the state."""
 
 

@@ -7,12 +7,13 @@ from collections.abc import AsyncIterator
 from typing import Generic, Protocol, Self, TypeVar
 from urllib.parse import urlsplit
 
+from errors import UserError
 from vision.types import CameraFrame
 
 T = TypeVar("T")
 
 
-class CameraError(Exception):
+class CameraError(UserError):
     """A camera cannot be opened or has failed; the message is one line that names it."""
 
 

@@ -6,9 +6,9 @@ import json
 import struct
 import zlib
 from collections.abc import Mapping
-from math import isfinite
 from typing import Any
 
+from wire.finite_json import finite
 from wire.mission_messages import Box, Document, DocumentKind, MissionDetections, MissionState
 
 VERSION = 1
@@ -124,7 +124,7 @@ def split_document(kind: DocumentKind, content: Mapping[str, Any]) -> tuple[int,
     """
     what = f"{kind.name.lower()} document"
     try:
-        text = json.dumps(_finite(content), ensure_ascii=False, allow_nan=False, separators=(",", ":"))
+        text = json.dumps(finite(content), ensure_ascii=False, allow_nan=False, separators=(",", ":"))
     except (TypeError, ValueError, RecursionError) as error:
         raise PayloadError(f"{what}: cannot be written as JSON: {error}") from None
     plain = text.encode("utf-8", "replace")  # half a surrogate pair becomes "?"
@@ -213,17 +213,6 @@ def _check(payload: bytes, least: int, most: int, what: str) -> None:
 def _box(numbers: list[float]) -> Box:
     n, s, e, w, d, a = numbers
     return (n, s, e, w, d, a)
-
-
-def _finite(value: object) -> object:
-    """A copy in which numbers that JSON does not have are None."""
-    if isinstance(value, float):
-        return value if isfinite(value) else None
-    if isinstance(value, Mapping):
-        return {key: _finite(item) for key, item in value.items()}
-    if isinstance(value, list | tuple):
-        return [_finite(item) for item in value]
-    return value
 
 
 def _unpack(packed: bytes, what: str) -> dict[str, Any]:

@@ -16,15 +16,16 @@ from __future__ import annotations
 from math import cos, sin, sqrt
 
 from firmware_py.airframe import GRAVITY_M_S2, Airframe
+from firmware_py.commands import VelocityCommand
 from firmware_py.control.design import design
 from firmware_py.control.limits import FlightLimits
 from firmware_py.control.mixer import Mixer
 from firmware_py.control.weights import Weights
-from firmware_py.types import MotorOutput, RateCommand, VehicleState
+from firmware_py.types import MotorOutput, VehicleState
 from geometry.vectors import Vec3
 
 _NOTHING: Vec3 = (0.0, 0.0, 0.0)
-_LEAST_COSINE = 0.5  # thrust is raised for tilt up to 60 degrees
+_MIN_COSINE = 0.5  # thrust is raised for tilt up to 60 degrees
 
 
 class LevelLaw:
@@ -101,7 +102,7 @@ class LevelLaw:
         r = state.angular_rate_frd_rad_s[2]
         self._xi_yaw -= sign * self._k_yaw * (1.0 - self._b_yaw) * r / self._ki_yaw
 
-    def step(self, state: VehicleState, command: RateCommand, grounded: bool) -> MotorOutput:
+    def step(self, state: VehicleState, command: VelocityCommand, grounded: bool) -> MotorOutput:
         """Return the motor commands for one control period.
 
         Args:
@@ -148,7 +149,7 @@ class LevelLaw:
         lift_n -= self._k_down * (down - self._b_vertical * want_down) + self._ki_down * self._xi_down
         lift_n -= self._mass_kg * below
         cosine = cos(roll_rad) * cos(pitch_rad)
-        thrust_n = lift_n / (cosine if cosine > _LEAST_COSINE else _LEAST_COSINE) if lift_n > 0.0 else 0.0
+        thrust_n = lift_n / (cosine if cosine > _MIN_COSINE else _MIN_COSINE) if lift_n > 0.0 else 0.0
         yaw_nm = -self._k_yaw * (r - self._b_yaw * want_yaw) - self._ki_yaw * self._xi_yaw
 
         output = self._mixer.mix(thrust_n, roll_nm, pitch_nm, yaw_nm)

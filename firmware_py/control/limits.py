@@ -13,8 +13,8 @@ class FlightLimits:
 
     Attributes:
         rate_rad_s: of roll and pitch together, where an attitude is turned to by the vector law.
-        least_thrust: where the height is controlled, as a share of full thrust.
-        most_thrust: the same.
+        min_thrust: where the height is controlled, as a share of full thrust.
+        max_thrust: the same.
         tilt_squared: square of the limit, for small angles.
         tilt_tangent: its tangent, horizontal thrust per vertical thrust.
     """
@@ -22,8 +22,8 @@ class FlightLimits:
     __slots__ = (
         "_airframe_tilt_rad",
         "_tilt_rad",
-        "least_thrust",
-        "most_thrust",
+        "max_thrust",
+        "min_thrust",
         "rate_rad_s",
         "tilt_squared",
         "tilt_tangent",
@@ -33,8 +33,8 @@ class FlightLimits:
         self._airframe_tilt_rad = airframe_tilt_rad
         self.tilt_rad = airframe_tilt_rad
         self.rate_rad_s = inf
-        self.least_thrust = 0.0
-        self.most_thrust = 1.0
+        self.min_thrust = 0.0
+        self.max_thrust = 1.0
 
     @property
     def tilt_rad(self) -> float:

@@ -9,12 +9,13 @@ from __future__ import annotations
 from math import radians
 
 from firmware_py.airframe import Airframe
+from firmware_py.commands import ControlCommand, VelocityCommand
 from firmware_py.control.level_law import LevelLaw
 from firmware_py.control.limits import FlightLimits
 from firmware_py.control.mixer import Mixer
 from firmware_py.control.vector_law import VectorLaw
 from firmware_py.control.weights import Weights
-from firmware_py.types import Command, MotorOutput, RateCommand, VehicleState
+from firmware_py.types import MotorOutput, VehicleState
 
 LEVEL_LAW_TILT_RAD = radians(35.0)
 """An airframe that never tilts farther follows velocities by the level law."""
@@ -37,22 +38,22 @@ class Stabiliser:
         self.limits = FlightLimits(airframe.limits.tilt_rad)
         self._idle = MotorOutput(mixer.mix(0.0, 0.0, 0.0, 0.0).speeds_rad_s)
         self._vector = VectorLaw(airframe, period_s, weights, self.limits, mixer)
-        self._rate_law: LevelLaw | VectorLaw = self._vector
+        self._velocity_law: LevelLaw | VectorLaw = self._vector
         if airframe.limits.tilt_rad <= LEVEL_LAW_TILT_RAD:
-            self._rate_law = LevelLaw(airframe, period_s, weights, self.limits, mixer)
-        self._law = self._rate_law  # which flies now
+            self._velocity_law = LevelLaw(airframe, period_s, weights, self.limits, mixer)
+        self._law = self._velocity_law  # which flies now
 
     def reset(self) -> None:
         """Forget all that was learnt: at arming and on the ground."""
-        self._rate_law.reset()
-        if self._law is not self._rate_law:
+        self._velocity_law.reset()
+        if self._law is not self._velocity_law:
             self._law.reset()
 
     def idle(self) -> MotorOutput:
         """Return motors turning slowly, as an armed drone's do on the ground."""
         return self._idle
 
-    def step(self, state: VehicleState, command: Command, *, grounded: bool = False) -> MotorOutput:
+    def step(self, state: VehicleState, command: ControlCommand, *, grounded: bool = False) -> MotorOutput:
         """Return the motor commands for one control period.
 
         Args:
@@ -60,10 +61,10 @@ class Stabiliser:
             command: what to follow.
             grounded: it still stands on something; what is learnt in flight is held.
         """
-        if type(command) is RateCommand:
-            if self._law is not self._rate_law:
-                self._change(self._rate_law, state)
-            return self._rate_law.step(state, command, grounded)
+        if type(command) is VelocityCommand:
+            if self._law is not self._velocity_law:
+                self._change(self._velocity_law, state)
+            return self._velocity_law.step(state, command, grounded)
         if self._law is not self._vector:
             self._change(self._vector, state)
         return self._vector.step(state, command, grounded)

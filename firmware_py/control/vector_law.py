@@ -8,32 +8,32 @@ by the shortest way; body rates follow. So it is the linear design near hover an
 
 from __future__ import annotations
 
-from math import cos, isnan, sin, sqrt
+from math import cos, sin, sqrt
 
 from firmware_py.airframe import GRAVITY_M_S2, Airframe
+from firmware_py.commands import (
+    AccelerationCommand,
+    AttitudeCommand,
+    BodyRateCommand,
+    ControlCommand,
+    MotorCommand,
+    TiltCommand,
+    VelocityCommand,
+)
 from firmware_py.control.design import design_bandwidths
 from firmware_py.control.limits import FlightLimits
 from firmware_py.control.mixer import Mixer
 from firmware_py.control.observer import DisturbanceObserver
 from firmware_py.control.weights import Weights
-from firmware_py.types import (
-    AccelerationCommand,
-    ActuatorCommand,
-    BodyRateCommand,
-    Command,
-    MotorOutput,
-    RateCommand,
-    TiltCommand,
-    VehicleState,
-)
+from firmware_py.types import MotorOutput, VehicleState
 from geometry.rotations import Rotation, rotation, tilt_error, to_body, to_world
 from geometry.vectors import Vec3
 
-_LEAST_COSINE = 0.5  # thrust is raised for tilt up to 60 degrees, and fades from there to none on its side
-_LEAST_LIFT = 0.2  # of the weight at most is kept for falling (MPC_THR_MIN), a thrust to steer with
-_MOST_THRUST = 0.92  # of full thrust for following a velocity; the rest steers
-_MOST_FORCE_M_S2 = GRAVITY_M_S2  # unknown acceleration ever learnt: the ground's push at landing
-_MOST_MOMENT_RAD_S2 = 20.0
+_MIN_COSINE = 0.5  # thrust is raised for tilt up to 60 degrees, and fades from there to none on its side
+_MIN_LIFT = 0.2  # of the weight at most is kept for falling (MPC_THR_MIN), a thrust to steer with
+_MAX_THRUST = 0.92  # of full thrust for following a velocity; the rest steers
+_MAX_FORCE_M_S2 = GRAVITY_M_S2  # unknown acceleration ever learnt: the ground's push at landing
+_MAX_MOMENT_RAD_S2 = 20.0
 _TURN_LEARNT = 0.04  # per step: within a tenth of a second
 _TURN_NOTICED = 1e-5  # speed^2 x turn^2 x period: below a centripetal acceleration of 0.05 m/s^2
 
@@ -70,8 +70,8 @@ class VectorLaw:
         self._rate_limit_rad_s = airframe.limits.roll_pitch_rate_rad_s
         self._max_speed_rad_s = airframe.motor.max_speed_rad_s
         self._rotors = len(airframe.rotors)
-        self._force = DisturbanceObserver(weights.observer_force_rad_s, period_s, _MOST_FORCE_M_S2)
-        self._moment = DisturbanceObserver(weights.observer_moment_rad_s, period_s, _MOST_MOMENT_RAD_S2)
+        self._force = DisturbanceObserver(weights.observer_force_rad_s, period_s, _MAX_FORCE_M_S2)
+        self._moment = DisturbanceObserver(weights.observer_moment_rad_s, period_s, _MAX_MOMENT_RAD_S2)
         self._lag = period_s / (period_s + airframe.motor.time_constant_s)
         self._wrench = (airframe.weight_n, 0.0, 0.0, 0.0)  # thrust and moments now, behind their commands
         self._hover_n = airframe.weight_n
@@ -94,7 +94,7 @@ class VectorLaw:
     def leave(self, state: VehicleState) -> None:
         """Give over in flight; what was learnt will be stale."""
 
-    def step(self, state: VehicleState, command: Command, grounded: bool) -> MotorOutput:
+    def step(self, state: VehicleState, command: ControlCommand, grounded: bool) -> MotorOutput:
         """Return the motor commands for one control period.
 
         Args:
@@ -118,7 +118,7 @@ class VectorLaw:
         own_roll = (i_yaw - i_pitch) * q * r + drag_roll * p * abs(p)
         own_pitch = (i_roll - i_yaw) * p * r + drag_pitch * q * abs(q)
         own_yaw = (i_pitch - i_roll) * p * q + drag_yaw * r * abs(r)
-        if type(command) is ActuatorCommand:
+        if type(command) is MotorCommand:
             output = self._straight_through(command)
             asked = self._mixer.wrench(output.speeds_rad_s)
         else:
@@ -149,20 +149,27 @@ class VectorLaw:
         )
         return output
 
-    def _wish(self, state: VehicleState, command: Command, m: Rotation, drag: Vec3) -> _Wish:
-        if type(command) is RateCommand:
+    def _wish(self, state: VehicleState, command: ControlCommand, m: Rotation, drag: Vec3) -> _Wish:
+        if type(command) is VelocityCommand:
             return self._follow_velocity(state, command, m, drag)
         if type(command) is AccelerationCommand:
             forward, right, down = command.acceleration_level_m_s2
             return self._point(state, (forward, right, GRAVITY_M_S2 - down), m, command.yaw_rate_rad_s)
         if type(command) is TiltCommand:
-            return self._hold_tilt(state, command, m, drag)
+            error = command.down_m_s - state.velocity_ned_m_s[2]
+            below = self._k_velocity[2] * error - drag[2] - self._force.d[2]
+            thrust_n = self._thrust(self._lift(GRAVITY_M_S2 - below), m)
+            return self._hold_tilt(state, command, thrust_n, m)
+        if type(command) is AttitudeCommand:
+            return self._hold_tilt(state, command, command.thrust * self._full_n, m)
         if type(command) is BodyRateCommand:
             p, q, r = command.rate_frd_rad_s
             return (command.thrust * self._full_n if command.thrust > 0.0 else 0.0, p, q, r)  # NaN: none
         raise TypeError(f"not a command of the stabiliser: {type(command).__name__}")
 
-    def _follow_velocity(self, state: VehicleState, command: RateCommand, m: Rotation, drag: Vec3) -> _Wish:
+    def _follow_velocity(
+        self, state: VehicleState, command: VelocityCommand, m: Rotation, drag: Vec3
+    ) -> _Wish:
         north, east, down = state.velocity_ned_m_s
         cos_yaw, sin_yaw = cos(state.yaw_rad), sin(state.yaw_rad)
         forward, right = cos_yaw * north + sin_yaw * east, cos_yaw * east - sin_yaw * north
@@ -199,7 +206,9 @@ class VectorLaw:
         self._turning += _TURN_LEARNT * (max(0.0, min(part, 1.0)) - self._turning)
         return self._turning * yaw_rate_rad_s
 
-    def _hold_tilt(self, state: VehicleState, command: TiltCommand, m: Rotation, drag: Vec3) -> _Wish:
+    def _hold_tilt(
+        self, state: VehicleState, command: TiltCommand | AttitudeCommand, thrust_n: float, m: Rotation
+    ) -> _Wish:
         """Tilt and thrust as asked; the limit of tilt is for what the loops above ask."""
         cos_roll = cos(command.roll_rad)
         down_level = (
@@ -207,19 +216,13 @@ class VectorLaw:
             -sin(command.roll_rad),
             cos(command.pitch_rad) * cos_roll,
         )
-        if isnan(command.thrust):
-            error = command.down_m_s - state.velocity_ned_m_s[2]
-            below = self._k_velocity[2] * error - drag[2] - self._force.d[2]
-            thrust_n = self._thrust(self._lift(GRAVITY_M_S2 - below), m)
-        else:
-            thrust_n = command.thrust * self._full_n
         return (thrust_n, *self._turn_to(state, down_level, m, command.yaw_rate_rad_s))
 
     def _point(self, state: VehicleState, specific: Vec3, m: Rotation, yaw_rate_rad_s: float) -> _Wish:
         """Turn to a thrust per mass given as forward, right and up in level axes, m/s^2; up has priority."""
         ahead, aside, up = specific
         up = self._lift(up)
-        room = min(up * self._limits.tilt_tangent, sqrt(max(self._most_lift() ** 2 - up * up, 0.0)))
+        room = min(up * self._limits.tilt_tangent, sqrt(max(self._max_lift() ** 2 - up * up, 0.0)))
         level = sqrt(ahead * ahead + aside * aside)
         if level > room:
             ahead, aside, level = ahead * room / level, aside * room / level, room
@@ -229,17 +232,17 @@ class VectorLaw:
 
     def _lift(self, up: float) -> float:
         """Vertical thrust per mass within what there is and may be used."""
-        least = min(_LEAST_LIFT * GRAVITY_M_S2, self._limits.least_thrust * self._full_lift)
-        return max(least, min(up, self._most_lift()))
+        lowest = min(_MIN_LIFT * GRAVITY_M_S2, self._limits.min_thrust * self._full_lift)
+        return max(lowest, min(up, self._max_lift()))
 
-    def _most_lift(self) -> float:
-        return min(_MOST_THRUST, self._limits.most_thrust) * self._full_lift
+    def _max_lift(self) -> float:
+        return min(_MAX_THRUST, self._limits.max_thrust) * self._full_lift
 
     def _thrust(self, up: float, m: Rotation) -> float:
         """Thrust along the body's axis as it stands that lifts so much, N."""
         cosine = m[8]
-        if cosine < _LEAST_COSINE:
-            return self._mass_kg * up * max(cosine, 0.0) / _LEAST_COSINE**2
+        if cosine < _MIN_COSINE:
+            return self._mass_kg * up * max(cosine, 0.0) / _MIN_COSINE**2
         return self._mass_kg * up / cosine
 
     def _turn_to(self, state: VehicleState, down_level: Vec3, m: Rotation, yaw_rate_rad_s: float) -> Vec3:
@@ -249,12 +252,12 @@ class VectorLaw:
         roll, pitch = tilt_error(m, (cos_yaw * x - sin_yaw * y, sin_yaw * x + cos_yaw * y, z))
         p, q = self._k_attitude[0] * roll, self._k_attitude[1] * pitch
         rate = sqrt(p * p + q * q)
-        most_rad_s = min(self._rate_limit_rad_s, self._limits.rate_rad_s)
-        if rate > most_rad_s:
-            p, q = p * most_rad_s / rate, q * most_rad_s / rate
+        max_rad_s = min(self._rate_limit_rad_s, self._limits.rate_rad_s)
+        if rate > max_rad_s:
+            p, q = p * max_rad_s / rate, q * max_rad_s / rate
         # With the right side down a pitch rate also turns the heading, by its share of world down; yaw makes
         # up for it. Else a velocity kept in axes of the heading would feed back into the pitch it asks for.
-        r = -q * m[7] / max(m[8], _LEAST_COSINE)
+        r = -q * m[7] / max(m[8], _MIN_COSINE)
         return (p + m[6] * yaw_rate_rad_s, q + m[7] * yaw_rate_rad_s, r + m[8] * yaw_rate_rad_s)
 
     def _drag_ned(self, m: Rotation, velocity_ned: Vec3) -> Vec3:
@@ -263,7 +266,7 @@ class VectorLaw:
         x, y, z = to_body(m, *velocity_ned)
         return to_world(m, -forward * x * abs(x), -right * y * abs(y), -down * z * abs(z))
 
-    def _straight_through(self, command: ActuatorCommand) -> MotorOutput:
+    def _straight_through(self, command: MotorCommand) -> MotorOutput:
         outputs = [min(value, 1.0) if value > 0.0 else 0.0 for value in command.outputs]  # NaN: off
         outputs = (outputs + [0.0] * self._rotors)[: self._rotors]
         speeds = tuple([self._max_speed_rad_s * sqrt(value) for value in outputs])

@@ -12,11 +12,11 @@ from math import hypot, inf, sqrt
 from firmware_py.types import VehicleState
 from geometry.vectors import Vec3
 
-_EAGERNESS = 5.0  # 1/s, acceleration per difference of velocity when that is small
+_VELOCITY_GAIN = 5.0  # 1/s, acceleration per velocity error when that is small
 _STANDING_M_S = 0.02  # slower than this, the vehicle stands
 _REST: Vec3 = (0.0, 0.0, 0.0)
 _ARRIVED_M = 1e-3  # and as many metres a second
-_LEASH_M = 1.0  # farther ahead of the vehicle than this, the point begins to wait
+_MAX_LEAD_M = 1.0  # farther ahead of the vehicle than this, the point begins to wait
 
 
 @dataclass(frozen=True, slots=True)
@@ -110,10 +110,10 @@ class Reference:
         north_m_s, east_m_s, down_m_s = self.velocity_ned_m_s
         walk_s = period_s
         # Only a point that leads waits: one that has been overtaken would wait for ever.
-        if ahead_m > _LEASH_M and (
+        if ahead_m > _MAX_LEAD_M and (
             ahead_north_m * north_m_s + ahead_east_m * east_m_s + ahead_down_m * down_m_s > 0.0
         ):
-            walk_s *= max(0.0, 2.0 - ahead_m / _LEASH_M)
+            walk_s *= max(0.0, 2.0 - ahead_m / _MAX_LEAD_M)
         self.position_ned_m = (
             north_m + north_m_s * walk_s if level_bound else here[0],
             east_m + east_m_s * walk_s if level_bound else here[1],
@@ -130,23 +130,23 @@ class Reference:
         self.velocity_ned_m_s = self.acceleration_ned_m_s2 = _REST
         return True
 
-    def chase(self, state: VehicleState, gain: float, height_gain: float, most_m_s: float = inf) -> Vec3:
+    def chase(self, state: VehicleState, gain: float, height_gain: float, max_m_s: float = inf) -> Vec3:
         """The velocity NED that follows the point, shape (3,), m/s.
 
         Args:
             state: the vehicle now.
             gain: velocity per horizontal distance to the point, 1/s.
             height_gain: the same vertically.
-            most_m_s: horizontal speed not exceeded to catch up with the point.
+            max_m_s: horizontal speed not exceeded to catch up with the point.
         """
         north_m, east_m, down_m = self.position_ned_m
         here_north_m, here_east_m, here_down_m = state.position_ned_m
         north_m_s, east_m_s, down_m_s = self.velocity_ned_m_s
-        most_m_s = max(most_m_s, hypot(north_m_s, east_m_s))
+        max_m_s = max(max_m_s, hypot(north_m_s, east_m_s))
         north_m_s += gain * (north_m - here_north_m)
         east_m_s += gain * (east_m - here_east_m)
         speed_m_s = hypot(north_m_s, east_m_s)
-        share = most_m_s / speed_m_s if speed_m_s > most_m_s else 1.0
+        share = max_m_s / speed_m_s if speed_m_s > max_m_s else 1.0
         return (share * north_m_s, share * east_m_s, down_m_s + height_gain * (down_m - here_down_m))
 
     def _speed_up(self, wanted_ned_m_s: Vec3, pace: Pace, period_s: float) -> None:
@@ -181,15 +181,15 @@ class Reference:
         )
 
 
-def _pull(missing_m_s: float, most_m_s2: float, jerk_m_s3: float) -> float:
+def _pull(missing_m_s: float, max_m_s2: float, jerk_m_s3: float) -> float:
     """The acceleration towards a velocity: so much that with its jerk it fades out in time.
 
     Linear near by, then a^2 = 2 j v, as `v^2 = 2 a s` is for places.
     """
-    near_m_s = jerk_m_s3 / _EAGERNESS**2
+    near_m_s = jerk_m_s3 / _VELOCITY_GAIN**2
     if missing_m_s <= near_m_s:
-        return min(most_m_s2, _EAGERNESS * missing_m_s)
-    return min(most_m_s2, sqrt(2.0 * jerk_m_s3 * (missing_m_s - 0.5 * near_m_s)))
+        return min(max_m_s2, _VELOCITY_GAIN * missing_m_s)
+    return min(max_m_s2, sqrt(2.0 * jerk_m_s3 * (missing_m_s - 0.5 * near_m_s)))
 
 
 def stopping_speed(
@@ -198,9 +198,9 @@ def stopping_speed(
     """The speed from which another (by default: none) can be reached within a distance.
 
     Braking with a takes v^2 / 2a, and building the braking up takes a time t more, in which it goes on: the
-    distance is d = (v^2 - w^2) / 2a + (v - w) t, solved for v. t is a / j and what the eagerness adds; half
+    distance is d = (v^2 - w^2) / 2a + (v - w) t, solved for v. t is a / j and what the gain adds; half
     as much again, because a short journey still speeds up when it should begin to brake.
     """
-    delay_s = acceleration_m_s2 / jerk_m_s3 + 1.5 / _EAGERNESS
+    delay_s = acceleration_m_s2 / jerk_m_s3 + 1.5 / _VELOCITY_GAIN
     root_s = passing_m_s / acceleration_m_s2 + delay_s
     return acceleration_m_s2 * (sqrt(root_s * root_s + 2.0 * distance_m / acceleration_m_s2) - delay_s)

@@ -1,4 +1,4 @@
-"""Return: climb, come home, come down, land. Heights follow PX4's cone around home."""
+"""The return mode: climb, come home, come down, land. Heights follow PX4's cone around home."""
 
 from __future__ import annotations
 
@@ -6,13 +6,14 @@ from dataclasses import dataclass
 from enum import Enum
 from math import hypot, nan, radians, tan
 
-from firmware_py.guidance.limits import SpeedLimits
-from firmware_py.guidance.travel import Traveller
+from firmware_py.airframe import Airframe
+from firmware_py.commands import ControlCommand
+from firmware_py.guidance.mode import JourneyMode, ModeEntry
 from firmware_py.parameters import Parameters
 from firmware_py.types import VehicleState
-from geometry.vectors import Vec3
 
-_STEEPEST_DEG = 89.0
+_MAX_CONE_DEG = 89.0
+_AT_HOME_M = 0.5  # a landing goes straight down, so it begins over the place
 
 
 @dataclass(frozen=True, slots=True)
@@ -53,17 +54,17 @@ def return_height_m(settings: ReturnSettings, distance_m: float, height_m: float
         distance_m: horizontal distance to home.
         height_m: above home now.
     """
-    most_m = settings.return_altitude_m
+    max_m = settings.return_altitude_m
     if settings.cone_deg <= 0:
-        return max(height_m, most_m)
+        return max(height_m, max_m)
     if distance_m <= settings.acceptance_m:
         wanted_m = 2.0 * distance_m
     else:
-        wanted_m = most_m
+        wanted_m = max_m
         if distance_m <= settings.near_m:
-            wanted_m = min(wanted_m, distance_m / tan(radians(min(settings.cone_deg, _STEEPEST_DEG))))
+            wanted_m = min(wanted_m, distance_m / tan(radians(min(settings.cone_deg, _MAX_CONE_DEG))))
         wanted_m = max(wanted_m, 2.0 * settings.acceptance_m)
-    return max(height_m, min(wanted_m, most_m))
+    return max(height_m, min(wanted_m, max_m))
 
 
 class Phase(Enum):
@@ -76,54 +77,55 @@ class Phase(Enum):
     LAND = "land"
 
 
-class ReturnHome:
-    """A return, from where it is to the ground at home.
+class ReturnMode(JourneyMode):
+    """Comes back to a place and lands there."""
 
-    Attributes:
-        phase: how far it has come.
-        traveller: flies all but the landing.
-    """
+    def configure(self, airframe: Airframe, parameters: Parameters) -> None:
+        """Take over heights and distances; a return under way keeps its own."""
+        self._configured = return_settings(parameters)
 
-    __slots__ = ("_home_ned_m", "_settings", "_wait_since_us", "phase", "traveller")
-
-    def __init__(self, traveller: Traveller) -> None:
-        self.phase = Phase.CLIMB
-        self.traveller = traveller
-        self._home_ned_m: Vec3 = (0.0, 0.0, 0.0)
-        self._settings: ReturnSettings | None = None
-        self._wait_since_us = 0
-
-    def start(
-        self, state: VehicleState, home_ned_m: Vec3, settings: ReturnSettings, limits: SpeedLimits
-    ) -> None:
-        """Begin here; home is in the local frame, shape (3,)."""
-        self._home_ned_m, self._settings = home_ned_m, settings
-        self.phase = Phase.CLIMB
+    def enter(self, state: VehicleState, entry: ModeEntry) -> None:
+        """Come back to the entry's target."""
+        context, settings = self._context, self._configured
+        self._settings, self._place_ned_m = settings, entry.target_ned_m
+        self._phase, self._wait_since_us = Phase.CLIMB, 0
+        place = entry.target_ned_m
         north_m, east_m, down_m = state.position_ned_m
-        distance_m = hypot(home_ned_m[0] - north_m, home_ned_m[1] - east_m)
-        height_m = return_height_m(settings, distance_m, home_ned_m[2] - down_m)
-        self.traveller.start(state, limits)
-        self.traveller.go((nan, nan, home_ned_m[2] - height_m), self.traveller.yaw_rad)
+        distance_m = hypot(place[0] - north_m, place[1] - east_m)
+        height_m = return_height_m(settings, distance_m, place[2] - down_m)
+        self._begin(state)
+        context.traveller.go((nan, nan, place[2] - height_m), context.traveller.yaw_rad)
+        self._show_journey(state)
 
-    def advance(self, state: VehicleState) -> Phase:
-        """Go on to the next phase when this one is done, and say which it is."""
-        settings, traveller, home = self._settings, self.traveller, self._home_ned_m
-        if settings is None or self.phase is Phase.LAND:
-            return self.phase
-        if self.phase is Phase.CLIMB and traveller.climb_m(state) < settings.height_acceptance_m:
-            self.phase = Phase.TRAVEL
-            traveller.go((home[0], home[1], traveller.target_ned_m[2]))
-        if self.phase is Phase.TRAVEL and traveller.distance_m(state) < _AT_HOME_M:
-            self.phase = Phase.DESCEND
-            lowest_m = min(settings.descend_altitude_m, home[2] - state.position_ned_m[2])
-            traveller.go((home[0], home[1], home[2] - lowest_m), state.yaw_rad)
-        if self.phase is Phase.DESCEND and abs(traveller.climb_m(state)) < settings.height_acceptance_m:
-            self.phase = Phase.WAIT
+    def step(self, state: VehicleState) -> ControlCommand:
+        """Go on to the next phase when this one is done, and fly it."""
+        before = self._phase
+        self._advance(state)
+        if self._phase is not Phase.LAND:
+            if self._phase is not before:
+                self._show_journey(state)
+            return self._travel(state)
+        if before is not Phase.LAND:
+            traveller = self._context.traveller
+            traveller.go((*traveller.target_ned_m[:2], nan), traveller.yaw_rad)
+            self._show_journey(state)
+        return self._sink(state)
+
+    def _advance(self, state: VehicleState) -> None:
+        """Find the phase."""
+        settings, traveller, place = self._settings, self._context.traveller, self._place_ned_m
+        if self._phase is Phase.LAND:
+            return
+        if self._phase is Phase.CLIMB and traveller.climb_m(state) < settings.height_acceptance_m:
+            self._phase = Phase.TRAVEL
+            traveller.go((place[0], place[1], traveller.target_ned_m[2]))
+        if self._phase is Phase.TRAVEL and traveller.distance_m(state) < _AT_HOME_M:
+            self._phase = Phase.DESCEND
+            lowest_m = min(settings.descend_altitude_m, place[2] - state.position_ned_m[2])
+            traveller.go((place[0], place[1], place[2] - lowest_m), state.yaw_rad)
+        if self._phase is Phase.DESCEND and abs(traveller.climb_m(state)) < settings.height_acceptance_m:
+            self._phase = Phase.WAIT
             self._wait_since_us = state.time_us
         waits = settings.delay_us < 0 or state.time_us - self._wait_since_us < settings.delay_us
-        if self.phase is Phase.WAIT and not waits:
-            self.phase = Phase.LAND
-        return self.phase
-
-
-_AT_HOME_M = 0.5  # a landing goes straight down, so it begins over the place
+        if self._phase is Phase.WAIT and not waits:
+            self._phase = Phase.LAND

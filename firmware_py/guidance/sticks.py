@@ -1,24 +1,31 @@
-"""Flying by hand: what a pilot's sticks mean in each manual mode."""
+"""The manual modes: what a pilot's sticks mean in each."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from math import cos, hypot, nan, radians, sin
+from math import cos, hypot, radians, sin
 
 from firmware_py.airframe import Airframe
-from firmware_py.guidance.frames import level
-from firmware_py.guidance.limits import SpeedLimits
+from firmware_py.commands import (
+    AttitudeCommand,
+    BodyRateCommand,
+    ControlCommand,
+    TiltCommand,
+    VelocityCommand,
+)
+from firmware_py.guidance.limits import level_pair
+from firmware_py.guidance.mode import Mode, ModeEntry
 from firmware_py.guidance.reference import Pace, Reference
 from firmware_py.parameters import Parameters
-from firmware_py.types import BodyRateCommand, ManualInput, RateCommand, Setpoint, TiltCommand, VehicleState
-from geometry.vectors import Vec3
+from firmware_py.setpoints import TrajectorySetpoint
+from firmware_py.types import ManualInput, VehicleState
 
 _FULL_THRUST = 1.0
 
 
 @dataclass(frozen=True, slots=True)
 class StickSettings:
-    """What full sticks mean: m/s, rad, rad/s; thrusts as shares of the most there is.
+    """What full sticks mean: m/s, rad, rad/s; thrusts as shares of the greatest.
 
     Attributes:
         forward_m_s: horizontal speed in position mode.
@@ -27,7 +34,7 @@ class StickSettings:
         tilt_rad: in modes that control the tilt.
         yaw_rate_rad_s: acro mode apart.
         acro_rate_frd_rad_s: body rates in acro mode, shape (3,).
-        least_thrust: throttle down, where height is not controlled.
+        min_thrust: throttle down, where height is not controlled.
         hover_thrust: throttle in the middle.
         dead: nearer to its middle than this, a stick is let go.
         hold_level_m_s: let go, it keeps its place from below this horizontal speed; 0: at once.
@@ -42,7 +49,7 @@ class StickSettings:
     tilt_rad: float
     yaw_rate_rad_s: float
     acro_rate_frd_rad_s: tuple[float, float, float]
-    least_thrust: float
+    min_thrust: float
     hover_thrust: float
     dead: float
     hold_level_m_s: float
@@ -50,15 +57,37 @@ class StickSettings:
     moving: Pace
     braking: Pace
 
+    def released(self, stick: float) -> float:
+        """A stick's value with the dead zone around its centre taken out, -1..1."""
+        dead = self.dead
+        if -dead <= stick <= dead:
+            return 0.0
+        return (stick - dead) / (1.0 - dead) if stick > 0.0 else (stick + dead) / (1.0 - dead)
+
+    def tilt(self, sticks: ManualInput) -> tuple[float, float, float]:
+        """Roll and pitch (rad) and yaw rate (rad/s) in modes that control the tilt."""
+        return (
+            sticks.right * self.tilt_rad,
+            -sticks.forward * self.tilt_rad,
+            self.released(sticks.yaw) * self.yaw_rate_rad_s,
+        )
+
+    def thrust(self, sticks: ManualInput) -> float:
+        """The thrust in modes that do not control the height; the middle carries the weight."""
+        low, middle = self.min_thrust, self.hover_thrust
+        if sticks.up < 0.0:
+            return middle + sticks.up * (middle - low)
+        return middle + sticks.up * (_FULL_THRUST - middle)
+
 
 def stick_settings(airframe: Airframe, parameters: Parameters) -> StickSettings:
     """What airframe and parameters say."""
     value, can = parameters.value, airframe.limits
     forward_m_s = min(can.speed_horizontal_m_s, value("MPC_VEL_MANUAL"))
     back_m_s, side_m_s = value("MPC_VEL_MAN_BACK"), value("MPC_VEL_MAN_SIDE")
-    most_m_s2 = value("MPC_ACC_HOR_MAX")
+    max_m_s2 = value("MPC_ACC_HOR_MAX")
     moving = Pace(
-        min(value("MPC_ACC_HOR"), most_m_s2),
+        min(value("MPC_ACC_HOR"), max_m_s2),
         value("MPC_ACC_UP_MAX"),
         value("MPC_ACC_DOWN_MAX"),
         value("MPC_JERK_MAX"),
@@ -76,41 +105,97 @@ def stick_settings(airframe: Airframe, parameters: Parameters) -> StickSettings:
         value("MPC_HOLD_MAX_XY"),
         value("MPC_HOLD_MAX_Z"),
         moving,
-        replace(moving, level_m_s2=most_m_s2),
+        replace(moving, level_m_s2=max_m_s2),
     )
 
 
-class StickFlight:
-    """Turns sticks into commands.
+class ManualMode(Mode):
+    """A mode flown by hand; telemetry shows no setpoint."""
 
-    Args:
-        settings: what full sticks mean.
-        period_s: of control.
+    def configure(self, airframe: Airframe, parameters: Parameters) -> None:
+        """Take over what full sticks mean."""
+        self._settings = stick_settings(airframe, parameters)
 
-    Attributes:
-        settings: see above.
-        home_ned_m: near its height a descent is slow, shape (3,).
-        reference: the point that the sticks lead.
-    """
-
-    __slots__ = ("_level_held", "_period_s", "home_ned_m", "reference", "settings")
-
-    def __init__(self, settings: StickSettings, period_s: float) -> None:
-        self.settings = settings
-        self.home_ned_m: Vec3 = (0.0, 0.0, 0.0)
-        self.reference = Reference()
-        self._period_s = period_s
-        self._level_held = False
-
-    def start(self, state: VehicleState) -> None:
+    def enter(self, state: VehicleState, entry: ModeEntry) -> None:
         """Begin as it moves now."""
-        self.reference.start(state, self.settings.moving)
+        self.setpoint = TrajectorySetpoint(state.time_us)
+
+
+class StabilizedMode(ManualMode):
+    """Tilt and thrust by hand."""
+
+    def step(self, state: VehicleState) -> ControlCommand:
+        """The sticks' tilt and thrust."""
+        sticks, settings = self._context.sticks, self._settings
+        roll_rad, pitch_rad, yaw_rate_rad_s = settings.tilt(sticks)
+        return AttitudeCommand(roll_rad, pitch_rad, yaw_rate_rad_s, settings.thrust(sticks))
+
+
+class AcroMode(ManualMode):
+    """Body rates and thrust by hand."""
+
+    def step(self, state: VehicleState) -> ControlCommand:
+        """The sticks' rates and thrust."""
+        sticks, settings = self._context.sticks, self._settings
+        roll_rad_s, pitch_rad_s, yaw_rad_s = settings.acro_rate_frd_rad_s
+        rates = (sticks.right * roll_rad_s, -sticks.forward * pitch_rad_s, sticks.yaw * yaw_rad_s)
+        return BodyRateCommand(rates, settings.thrust(sticks))
+
+
+class AltitudeMode(ManualMode):
+    """Tilt by hand, height held."""
+
+    def enter(self, state: VehicleState, entry: ModeEntry) -> None:
+        """Begin as it moves now."""
+        super().enter(state, entry)
+        self._reference = Reference()
+        self._reference.start(state, self._settings.moving)
+
+    def step(self, state: VehicleState) -> ControlCommand:
+        """The sticks' tilt, and the vertical velocity of the throttle."""
+        context = self._context
+        limits = context.limits
+        self._lead(state, (0.0, 0.0), level_bound=False)
+        velocity_ned_m_s = self._reference.chase(state, limits.position_gain, limits.height_gain)
+        roll_rad, pitch_rad, yaw_rate_rad_s = self._settings.tilt(context.sticks)
+        return TiltCommand(roll_rad, pitch_rad, yaw_rate_rad_s, limits.clip(*velocity_ned_m_s)[2])
+
+    def _lead(self, state: VehicleState, level_ned_m_s: tuple[float, float], *, level_bound: bool) -> None:
+        """Move the point by the throttle and a horizontal velocity."""
+        context, settings = self._context, self._settings
+        limits = context.limits
+        up = settings.released(context.sticks.up)
+        if up > 0.0:
+            wanted_down_m_s = -up * limits.up_m_s
+        else:  # slower near the ground, as a landing
+            height_m = context.home_ned_m[2] - state.position_ned_m[2]
+            wanted_down_m_s = -up * limits.landing_m_s(height_m, limits.down_m_s)
+        bound = settings.hold_vertical_m_s
+        height_bound = up == 0.0 and (bound <= 0.0 or abs(state.velocity_ned_m_s[2]) < bound)
+        pace = settings.braking if level_ned_m_s == (0.0, 0.0) else settings.moving
+        self._reference.move(
+            state,
+            (*level_ned_m_s, wanted_down_m_s),
+            pace,
+            context.period_s,
+            level_bound=level_bound,
+            height_bound=height_bound,
+        )
+
+
+class PositionMode(AltitudeMode):
+    """Velocities in level axes by hand; with the sticks centred it brakes and stays."""
+
+    def enter(self, state: VehicleState, entry: ModeEntry) -> None:
+        """Begin as it moves now."""
+        super().enter(state, entry)
         self._level_held = False
 
-    def position(self, state: VehicleState, sticks: ManualInput, limits: SpeedLimits) -> RateCommand:
-        """Velocities in level axes; let go, it brakes and stays."""
-        settings, reference = self.settings, self.reference
-        forward, right = self.released(sticks.forward), self.released(sticks.right)
+    def step(self, state: VehicleState) -> ControlCommand:
+        """The sticks' velocity, or the place held."""
+        settings, reference = self._settings, self._reference
+        sticks, limits = self._context.sticks, self._context.limits
+        forward, right = settings.released(sticks.forward), settings.released(sticks.right)
         size = hypot(forward, right)
         if size > 1.0:
             forward, right = forward / size, right / size
@@ -120,89 +205,16 @@ class StickFlight:
         north_m_s, east_m_s, _ = limits.clip(
             cos_yaw * forward_m_s - sin_yaw * right_m_s, sin_yaw * forward_m_s + cos_yaw * right_m_s, 0.0
         )
-        moves = size > 0.0
         speed_m_s = hypot(state.velocity_ned_m_s[0], state.velocity_ned_m_s[1])
-        if moves:
+        if size > 0.0:
             self._level_held = False
         elif not self._level_held:
             self._level_held = settings.hold_level_m_s <= 0.0 or speed_m_s < settings.hold_level_m_s
-        self._lead(state, sticks, limits, (north_m_s, east_m_s), level_bound=self._level_held)
+        self._lead(state, (north_m_s, east_m_s), level_bound=self._level_held)
         velocity_ned_m_s = reference.chase(state, limits.position_gain, limits.height_gain)
-        return RateCommand(
-            level(state, limits.clip(*velocity_ned_m_s)),
-            self.released(sticks.yaw) * settings.yaw_rate_rad_s,
-            level(state, reference.acceleration_ned_m_s2),
+        velocity, acceleration = level_pair(
+            state, limits.clip(*velocity_ned_m_s), reference.acceleration_ned_m_s2
         )
-
-    def altitude(self, state: VehicleState, sticks: ManualInput, limits: SpeedLimits) -> TiltCommand:
-        """Tilt by hand, height held."""
-        self._lead(state, sticks, limits, (0.0, 0.0), level_bound=False)
-        down_m_s = limits.clip(*self.reference.chase(state, limits.position_gain, limits.height_gain))[2]
-        roll_rad, pitch_rad, yaw_rate_rad_s = self._tilt(sticks)
-        return TiltCommand(roll_rad, pitch_rad, yaw_rate_rad_s, nan, down_m_s)
-
-    def stabilized(self, sticks: ManualInput) -> TiltCommand:
-        """Tilt and thrust by hand; the middle of the throttle carries the weight."""
-        roll_rad, pitch_rad, yaw_rate_rad_s = self._tilt(sticks)
-        return TiltCommand(roll_rad, pitch_rad, yaw_rate_rad_s, self._thrust(sticks))
-
-    def acro(self, sticks: ManualInput) -> BodyRateCommand:
-        """Body rates and thrust by hand."""
-        roll_rad_s, pitch_rad_s, yaw_rad_s = self.settings.acro_rate_frd_rad_s
-        rates = (sticks.right * roll_rad_s, -sticks.forward * pitch_rad_s, sticks.yaw * yaw_rad_s)
-        return BodyRateCommand(rates, self._thrust(sticks))
-
-    def released(self, stick: float) -> float:
-        """A stick's value with the dead zone around its centre taken out, -1..1."""
-        dead = self.settings.dead
-        if -dead <= stick <= dead:
-            return 0.0
-        return (stick - dead) / (1.0 - dead) if stick > 0.0 else (stick + dead) / (1.0 - dead)
-
-    def _lead(
-        self,
-        state: VehicleState,
-        sticks: ManualInput,
-        limits: SpeedLimits,
-        level_ned_m_s: tuple[float, float],
-        *,
-        level_bound: bool,
-    ) -> None:
-        """Move the point by the throttle and a horizontal velocity."""
-        settings, reference = self.settings, self.reference
-        up = self.released(sticks.up)
-        if up > 0.0:
-            wanted_down_m_s = -up * limits.up_m_s
-        else:  # slower near the ground, as a landing
-            height_m = self.home_ned_m[2] - state.position_ned_m[2]
-            wanted_down_m_s = -up * limits.landing_m_s(height_m, limits.down_m_s)
-        bound = settings.hold_vertical_m_s
-        height_bound = up == 0.0 and (bound <= 0.0 or abs(state.velocity_ned_m_s[2]) < bound)
-        pace = settings.braking if level_ned_m_s == (0.0, 0.0) else settings.moving
-        reference.move(
-            state,
-            (*level_ned_m_s, wanted_down_m_s),
-            pace,
-            self._period_s,
-            level_bound=level_bound,
-            height_bound=height_bound,
+        return VelocityCommand(
+            velocity, settings.released(sticks.yaw) * settings.yaw_rate_rad_s, acceleration
         )
-
-    def _tilt(self, sticks: ManualInput) -> tuple[float, float, float]:
-        settings = self.settings
-        return (
-            sticks.right * settings.tilt_rad,
-            -sticks.forward * settings.tilt_rad,
-            self.released(sticks.yaw) * settings.yaw_rate_rad_s,
-        )
-
-    def _thrust(self, sticks: ManualInput) -> float:
-        low, middle = self.settings.least_thrust, self.settings.hover_thrust
-        if sticks.up < 0.0:
-            return middle + sticks.up * (middle - low)
-        return middle + sticks.up * (_FULL_THRUST - middle)
-
-    def shown(self, time_us: int) -> Setpoint:
-        """What is followed, for telemetry."""
-        reference = self.reference
-        return Setpoint(time_us, reference.position_ned_m, reference.velocity_ned_m_s)

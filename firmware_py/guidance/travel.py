@@ -2,21 +2,19 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from enum import IntEnum
 from math import atan2, hypot, isnan, nan, pi, remainder, tau
 
 from firmware_py.guidance.limits import SpeedLimits, clamp
 from firmware_py.guidance.reference import Reference
 from firmware_py.types import VehicleState
-from geometry.vectors import NAN3, Vec3
+from geometry.vectors import NAN3, ZERO3, Vec3
 
 _FACING_M = 1.0  # nearer than this, the way to a place says nothing about where to look
 _FACING_M_S = 0.5  # slower than this, the way it moves says nothing either
 _STOPPED_M_S = 0.05
 _ALIGNED_RAD = 0.2
-_LEAST_GAIN = 0.5
-_REST: Vec3 = (0.0, 0.0, 0.0)
+_MIN_GAIN = 0.5
 
 
 class YawMode(IntEnum):
@@ -30,43 +28,32 @@ class YawMode(IntEnum):
     FIXED = 5
 
 
-@dataclass(slots=True)
-class Heading:
-    """Where to look on a journey that does not say it.
-
-    Attributes:
-        mode: MPC_YAW_MODE.
-        home_ned_m: shape (3,).
-    """
-
-    mode: YawMode = YawMode.TO_PLACE
-    home_ned_m: Vec3 = (0.0, 0.0, 0.0)
-
-
 class Traveller:
     """A journey to one target, or a halt.
 
     Attributes:
         target_ned_m: where to, shape (3,); a component that is NaN is braked and then stays as it is.
         speed_m_s: horizontal speed on the way; NaN: the cruising speed.
-        yaw_rad: where to look; NaN: as `heading` says.
+        yaw_rad: where to look; NaN: as `yaw_mode` says.
         pass_m_s: speed with which the target may be passed; 0: stop there.
         drift_ned_m_s: velocity of the target itself, shape (3,).
-        heading: where to look when `yaw_rad` is open.
+        yaw_mode: where to look when `yaw_rad` is open.
+        home_ned_m: shape (3,), for yaw modes that look to it or away from it.
         reference: the point that is followed.
     """
 
     __slots__ = (
         "_arrived_ned_m",
-        "_fresh",
+        "_restarts",
         "_turning",
         "_yaw_rad",
         "drift_ned_m_s",
-        "heading",
+        "home_ned_m",
         "pass_m_s",
         "reference",
         "speed_m_s",
         "target_ned_m",
+        "yaw_mode",
         "yaw_rad",
     )
 
@@ -75,34 +62,35 @@ class Traveller:
         self.speed_m_s = nan
         self.yaw_rad = nan
         self.pass_m_s = 0.0
-        self.drift_ned_m_s = _REST
-        self.heading = Heading()
+        self.drift_ned_m_s = ZERO3
+        self.yaw_mode = YawMode.TO_PLACE
+        self.home_ned_m: Vec3 = ZERO3
         self.reference = Reference()
         self._yaw_rad = 0.0
         self._turning = False
         self._arrived_ned_m = NAN3  # the target at which the point stands
-        self._fresh = True  # the point has not been put where the vehicle is
+        self._restarts = True  # the point is put where the vehicle is in the next step
 
     def start(self, state: VehicleState, limits: SpeedLimits) -> None:
         """Begin, with the next step, as it moves then: brake and stay, until told where to."""
-        self._fresh = True
+        self._restarts = True
         turn_rad_s = state.angular_rate_frd_rad_s[2]
         self._yaw_rad = state.yaw_rad
         if abs(turn_rad_s) > limits.auto_yaw_rate_rad_s:  # it would swing back
-            self._yaw_rad += turn_rad_s / max(limits.yaw_gain, _LEAST_GAIN)
+            self._yaw_rad += turn_rad_s / max(limits.yaw_gain, _MIN_GAIN)
         self.go((nan, nan, nan), self._yaw_rad)
 
     def go(self, target_ned_m: Vec3, yaw_rad: float = nan, speed_m_s: float = nan) -> None:
         """Change where it goes; the velocity goes on smoothly."""
         self.target_ned_m, self.yaw_rad, self.speed_m_s = target_ned_m, yaw_rad, speed_m_s
         self.pass_m_s = 0.0
-        self.drift_ned_m_s = _REST
+        self.drift_ned_m_s = ZERO3
         self._arrived_ned_m = NAN3
-        self._turning = self.heading.mode is YawMode.TURN_FIRST and isnan(yaw_rad)
+        self._turning = self.yaw_mode is YawMode.TURN_FIRST and isnan(yaw_rad)
 
     def resume(self) -> None:
         """Go on to the same target from where the vehicle is then."""
-        self._fresh = True
+        self._restarts = True
 
     def distance_m(self, state: VehicleState) -> float:
         """Horizontal distance to the target."""
@@ -117,12 +105,12 @@ class Traveller:
     @property
     def is_at_rest(self) -> bool:
         """Whether the point stands."""
-        return not self._fresh and hypot(*self.reference.velocity_ned_m_s) < _STOPPED_M_S
+        return not self._restarts and hypot(*self.reference.velocity_ned_m_s) < _STOPPED_M_S
 
     def led(self, state: VehicleState, limits: SpeedLimits) -> Reference:
         """The point to lead; at the first call since `start` it is where the vehicle is."""
-        if self._fresh:
-            self._fresh = False
+        if self._restarts:
+            self._restarts = False
             self.reference.start(state, limits.pace)
         return self.reference
 
@@ -133,7 +121,7 @@ class Traveller:
 
         Without `height_bound` the height is left to the vertical `drift_ned_m_s`.
         """
-        if self.target_ned_m is self._arrived_ned_m and self.drift_ned_m_s is _REST and not self._fresh:
+        if self.target_ned_m is self._arrived_ned_m and self.drift_ned_m_s is ZERO3 and not self._restarts:
             return self._stay(state, limits)
         reference, pace = self.led(state, limits), limits.pace
         place = reference.position_ned_m
@@ -196,7 +184,7 @@ class Traveller:
         return self._turning
 
     def _look(self, state: VehicleState, north_m: float, east_m: float) -> None:
-        mode, home = self.heading.mode, self.heading.home_ned_m
+        mode, home = self.yaw_mode, self.home_ned_m
         nearest = _FACING_M
         if mode is YawMode.FIXED:
             return

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
+from firmware_py.autopilot import Autopilot
 from firmware_py.mavlink.camera.component import CameraComponent
 from firmware_py.mavlink.camera.model import CAMERA_COMPONENT_ID, CameraModel, CaptureSink, VideoStream
 from firmware_py.mavlink.commands.flight import FlightCommands
@@ -21,7 +22,6 @@ from firmware_py.mavlink.missions.execution import MissionExecution
 from firmware_py.mavlink.missions.protocol import MissionService
 from firmware_py.mavlink.parameters.extended import ExtendedParameterService
 from firmware_py.mavlink.parameters.protocol import ParameterService
-from firmware_py.mavlink.port import AutopilotPort
 from firmware_py.mavlink.service import Handler, Service, merged
 from firmware_py.mavlink.setpoints.manual_control import ManualControlService
 from firmware_py.mavlink.setpoints.offboard import OffboardService
@@ -73,7 +73,7 @@ class NodeOptions:
     failures: FailureSink | None = None
 
 
-def _services(autopilot: AutopilotPort, exchange: Exchange, options: NodeOptions) -> tuple[Service, ...]:
+def _services(autopilot: Autopilot, exchange: Exchange, options: NodeOptions) -> tuple[Service, ...]:
     """All services of the vehicle, in the order in which they are updated."""
     camera = None
     if options.camera is not None:
@@ -147,7 +147,7 @@ class MavlinkNode:
 
     def __init__(
         self,
-        autopilot: AutopilotPort,
+        autopilot: Autopilot,
         links: Sequence[LinkProfile] = (),
         options: NodeOptions = NodeOptions(),  # frozen
     ) -> None:

@@ -8,17 +8,16 @@ from math import hypot, isfinite, isnan, nan, radians, remainder, tau
 
 from firmware_py.missions import route
 from firmware_py.missions.arrival import Arrival, hold_us, is_behind
+from firmware_py.missions.camera import CameraTriggers, RegionOfInterest
 from firmware_py.missions.flight import IssuedCommand, Leg, LegKind, View
 from firmware_py.missions.items import Do, MissionItem
-from firmware_py.missions.pictures import Pictures
-from firmware_py.missions.regions import Gaze
 from firmware_py.missions.store import MissionStore
 from firmware_py.parameters import Parameters
 from firmware_py.types import StatusText
 from geometry.vectors import Vec3
 
 _CRITICAL, _WARNING, _INFO = 2, 4, 6  # MAV_SEVERITY
-_LEAST_CLIMB_M = 0.5  # a first place no higher than this is no take-off: it climbs to MIS_TAKEOFF_ALT
+_MIN_CLIMB_M = 0.5  # a first place no higher than this is no take-off: it climbs to MIS_TAKEOFF_ALT
 _SAME_YAW_RAD = 0.01
 _CAMERA = frozenset(
     {
@@ -60,10 +59,10 @@ class MissionExecutor:
 
     __slots__ = (
         "_arrival",
+        "_camera",
         "_climb_first",
         "_events",
         "_gate_ned_m",
-        "_gaze",
         "_home_ned_m",
         "_item",
         "_jumps",
@@ -71,7 +70,7 @@ class MissionExecutor:
         "_leg",
         "_parameters",
         "_phase",
-        "_pictures",
+        "_region",
         "_replay",
         "_restart",
         "_seen",
@@ -84,8 +83,8 @@ class MissionExecutor:
         self._parameters = parameters
         self._arrival = Arrival(parameters)
         self._events: list[IssuedCommand | StatusText] = []
-        self._pictures = Pictures()
-        self._gaze = Gaze()
+        self._camera = CameraTriggers()
+        self._region = RegionOfInterest()
         self._jumps: dict[int, int] = {}
         self._leg = Leg(LegKind.DONE, (0.0, 0.0, 0.0))
         self._item: MissionItem | None = None
@@ -128,7 +127,7 @@ class MissionExecutor:
         if self._phase is _Phase.OVER or self._phase is _Phase.WAIT or self._item is None:
             return self._leg
         self._arrival.configure(self._parameters)
-        self._pictures.move(view.position_ned_m)
+        self._camera.move(view.position_ned_m)
         self._look(view)
         if self._is_done(self._item, view):
             self._go_on(self._item, view)
@@ -136,7 +135,7 @@ class MissionExecutor:
 
     def leave(self) -> None:
         """The mode has ended: no more pictures; the current item begins anew when it is entered again."""
-        self._pictures.stop()
+        self._camera.stop()
         self._left_at = self._store.current
         self._item = None
         self._phase = _Phase.OVER
@@ -147,11 +146,11 @@ class MissionExecutor:
 
     def take_events(self) -> list[IssuedCommand | StatusText]:
         """Texts and commands to others since the last call."""
-        if not self._events and not self._pictures.commands:
+        if not self._events and not self._camera.commands:
             return []
-        events = [*self._events, *self._pictures.commands]
+        events = [*self._events, *self._camera.commands]
         self._events.clear()
-        self._pictures.commands.clear()
+        self._camera.commands.clear()
         return events
 
     # Beginning and changing the mission
@@ -161,7 +160,7 @@ class MissionExecutor:
         store = self._store
         self._seen = (store.mission.version, store.selections)
         self._home_ned_m = view.home_ned_m
-        self._gaze.release()
+        self._region.release()
         self._item = None
         if not store.valid or view.projection is None:
             wish = "refusing takeoff" if view.landed else "loitering"
@@ -182,7 +181,7 @@ class MissionExecutor:
         self._say(_INFO, "Executing Mission")
         self._speed_m_s = route.speed_before(items, store.current)
         for item in route.settings_before(items, store.current):
-            self._pictures.pass_on(item)
+            self._camera.pass_on(item)
         trigger = route.trigger_before(items, store.current)
         self._replay = None
         if trigger is not None:
@@ -236,7 +235,7 @@ class MissionExecutor:
             return
         climb_m = here_ned_m[2] - target_ned_m[2]
         if view.landed or (climb_first and climb_m > self._arrival.height_m):
-            if climb_m < _LEAST_CLIMB_M:
+            if climb_m < _MIN_CLIMB_M:
                 climb_m = self._arrival.takeoff_m
             down_m = here_ned_m[2] - climb_m
             above_home_m = -down_m if view.home_ned_m is None else view.home_ned_m[2] - down_m
@@ -291,13 +290,13 @@ class MissionExecutor:
             self._speed_m_s = route.commanded_speed(item)
             self._leg = replace(self._leg, speed_m_s=self._speed_m_s)
         elif command in _REGIONS:
-            self._gaze.turn(item, view)
+            self._region.turn(item, view)
         elif command in _CAMERA:
-            self._pictures.pass_on(item)
+            self._camera.pass_on(item)
         elif command == Do.SET_CAM_TRIGG_DIST:
-            self._pictures.start_by_distance(item, view.position_ned_m)
+            self._camera.start_by_distance(item, view.position_ned_m)
         elif command == Do.SET_CAM_TRIGG_INTERVAL:
-            self._pictures.start_by_time(item)
+            self._camera.start_by_time(item)
         elif command in (Do.SET_HOME, Do.ARM_DISARM):
             self._events.append(IssuedCommand(command, (*item.params, item.x, item.y, item.z)))
         elif command in _ABSENT:
@@ -381,7 +380,7 @@ class MissionExecutor:
         """Yaw towards the region of interest; not while climbing, taking off or landing."""
         if self._phase is not _Phase.ITEM or self._leg.kind is not LegKind.FLY:
             return
-        yaw_rad = self._gaze.yaw_rad(view, self._leg.target_ned_m, self._arrival.radius_m)
+        yaw_rad = self._region.yaw_rad(view, self._leg.target_ned_m, self._arrival.radius_m)
         if isnan(yaw_rad):
             return
         if not abs(remainder(yaw_rad - self._leg.yaw_rad, tau)) <= _SAME_YAW_RAD:  # also when it was NaN

@@ -53,21 +53,19 @@ def destination(view: View, store: MissionStore, parameters: Parameters) -> Dest
     rtl_type = parameters.integer("RTL_TYPE")
     best = Destination(DestinationKind.HOME, home_ned_m)
     follows_mission = rtl_type in (_MISSION_PATH, _FEWEST_ITEMS)
-    least_m = (
-        inf if rtl_type == _NOT_HOME or follows_mission else _distance_m(view.position_ned_m, home_ned_m)
-    )
+    min_m = inf if rtl_type == _NOT_HOME or follows_mission else _distance_m(view.position_ned_m, home_ned_m)
     if rtl_type != _HOME_OR_RALLY:
         for landing in _landing(view, store):
             distance_m = _distance_m(view.position_ned_m, landing.position_ned_m)
-            if distance_m + _NEARER_M < least_m:
-                best, least_m = landing, distance_m
+            if distance_m + _NEARER_M < min_m:
+                best, min_m = landing, distance_m
     if follows_mission:
         return best
     for point in _rally_points(view, store):
         distance_m = _distance_m(view.position_ned_m, point.position_ned_m)
         of_home = _distance_m(home_ned_m, point.position_ned_m) <= _OF_HOME_M
-        if not of_home and distance_m + _NEARER_M < least_m:
-            best, least_m = point, distance_m
+        if not of_home and distance_m + _NEARER_M < min_m:
+            best, min_m = point, distance_m
     return best
 
 

@@ -8,10 +8,12 @@ from typing import Literal, Self
 
 from pydantic import BaseModel, ConfigDict, Field, model_validator
 
+from errors import UserError
+
 ParameterKind = Literal["int32", "float"]
 
 
-class ParameterError(ValueError):
+class ParameterError(UserError):
     """A parameter that cannot be set so; the message is one line for people."""
 
 

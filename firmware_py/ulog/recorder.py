@@ -9,7 +9,7 @@ import errno
 from collections.abc import Callable
 from dataclasses import dataclass
 
-from firmware_py.mavlink.port import AutopilotPort
+from firmware_py.autopilot import Autopilot
 from firmware_py.mavlink.telemetry.identity import FOLLOWED_PX4_VERSION, OWN_VERSION, packed_version
 from firmware_py.storage import Path, Storage
 from firmware_py.types import StatusText
@@ -62,10 +62,10 @@ class UlogRecorder:
         self._groups = _by_rate()
         self._due_us = 0
         self._flush_us = 0
-        self._heard: AutopilotPort | None = None
+        self._heard: Autopilot | None = None
         self._nav: tuple[object, ...] = ()
 
-    def update(self, autopilot: AutopilotPort) -> None:
+    def update(self, autopilot: Autopilot) -> None:
         """Log what is due; called every control tick, after the autopilot's step."""
         status = autopilot.status
         if self.path is None:
@@ -89,7 +89,7 @@ class UlogRecorder:
             self._flush_us = time_us + _FLUSH_US
             self._flush(autopilot)
 
-    def finish(self, autopilot: AutopilotPort) -> None:
+    def finish(self, autopilot: Autopilot) -> None:
         """Hand over what is left of a log, when the program ends in flight."""
         if self.path is not None:
             self._end(autopilot, autopilot.state.time_us)
@@ -103,7 +103,7 @@ class UlogRecorder:
         if self.path is not None and self._heard is not None:
             self._buffer += messages.parameter(self._heard.parameters.declaration(name), value)
 
-    def _begin(self, autopilot: AutopilotPort) -> None:
+    def _begin(self, autopilot: Autopilot) -> None:
         if self._heard is None:
             self._heard = autopilot
             autopilot.parameters.on_change(self._hear_parameter)
@@ -116,7 +116,7 @@ class UlogRecorder:
             group.next_us = time_us
         self._buffer = bytearray(self._definitions(autopilot, time_us))
 
-    def _definitions(self, autopilot: AutopilotPort, time_us: int) -> bytes:
+    def _definitions(self, autopilot: Autopilot, time_us: int) -> bytes:
         """All that comes before the data."""
         parameters = autopilot.parameters
         own = ".".join(map(str, OWN_VERSION))
@@ -143,18 +143,18 @@ class UlogRecorder:
         parts += [each.topic.subscription() for each in LOGGED]
         return b"".join(parts)
 
-    def _end(self, autopilot: AutopilotPort, time_us: int) -> None:
+    def _end(self, autopilot: Autopilot, time_us: int) -> None:
         sample = self._sample(autopilot, time_us)
         for each in LOGGED:
             self._log(each, sample)
         self._flush(autopilot)
         self.path = None
 
-    def _sample(self, autopilot: AutopilotPort, time_us: int) -> Sample:
+    def _sample(self, autopilot: Autopilot, time_us: int) -> Sample:
         unix_us = self._boot_unix_us + time_us if self._boot_unix_us else 0
         return Sample(autopilot, time_us, unix_us, autopilot.global_position())
 
-    def _log_due(self, autopilot: AutopilotPort, time_us: int) -> None:
+    def _log_due(self, autopilot: Autopilot, time_us: int) -> None:
         sample = self._sample(autopilot, time_us)
         for group in self._groups:
             if time_us >= group.next_us:
@@ -169,7 +169,7 @@ class UlogRecorder:
             self._buffer += logged.topic.header
             self._buffer += logged.topic.values.pack(*values)
 
-    def _flush(self, autopilot: AutopilotPort) -> None:
+    def _flush(self, autopilot: Autopilot) -> None:
         """Hand over what was gathered; a log that was erased meanwhile begins anew."""
         path = self.path
         if path is None:

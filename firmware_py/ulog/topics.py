@@ -10,8 +10,9 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from math import atan2, hypot, nan
 
-from firmware_py.mavlink.port import AutopilotPort
-from firmware_py.mavlink.telemetry.sensing import EARTH_FIELD_NED_GAUSS, pressure_hpa, temperature_k, to_body
+from firmware_py.autopilot import Autopilot
+from firmware_py.mavlink.telemetry.sensing import earth_field_frd_gauss, pressure_hpa, temperature_k
+from firmware_py.setpoints import AttitudeSetpoint, BodyRateSetpoint
 from firmware_py.status import NAVIGATION_STATES, LandedState
 from firmware_py.types import GeodeticPoint
 from firmware_py.ulog.messages import Topic
@@ -44,7 +45,7 @@ class Sample:
         place: where on Earth; None: not known.
     """
 
-    autopilot: AutopilotPort
+    autopilot: Autopilot
     time_us: int
     unix_us: int
     place: GeodeticPoint | None
@@ -61,7 +62,7 @@ def _attitude(sample: Sample) -> Values:
 
 def _attitude_setpoint(sample: Sample) -> Values | None:
     followed = sample.autopilot.status.setpoint
-    if followed.attitude is None:
+    if not isinstance(followed, AttitudeSetpoint):
         return None
     yaw_rate_rad_s = followed.yaw_rate_rad_s
     return (sample.time_us, yaw_rate_rad_s, *followed.attitude, 0.0, 0.0, -followed.thrust)
@@ -69,7 +70,7 @@ def _attitude_setpoint(sample: Sample) -> Values | None:
 
 def _rates_setpoint(sample: Sample) -> Values | None:
     followed = sample.autopilot.status.setpoint
-    if followed.rate_frd_rad_s is None:
+    if not isinstance(followed, BodyRateSetpoint):
         return None
     return (sample.time_us, *followed.rate_frd_rad_s, 0.0, 0.0, -followed.thrust)
 
@@ -132,7 +133,7 @@ def _local_position(sample: Sample) -> Values | None:
 
 
 def _local_position_setpoint(sample: Sample) -> Values:
-    followed = sample.autopilot.status.setpoint
+    followed = sample.autopilot.status.setpoint.trajectory
     return (
         sample.time_us,
         *followed.position_ned_m,
@@ -215,7 +216,7 @@ def _air_data(sample: Sample) -> Values | None:
 
 
 def _magnetometer(sample: Sample) -> Values:
-    field_gauss = to_body(EARTH_FIELD_NED_GAUSS, sample.autopilot.state.attitude)
+    field_gauss = earth_field_frd_gauss(sample.autopilot.state.attitude)
     return (sample.time_us, sample.time_us, *field_gauss)
 
 

@@ -35,8 +35,7 @@ def doctor(
     from rich.console import Console
     from rich.progress import BarColumn, Progress, TextColumn
 
-    from framerunner.doctor.checks import examine
-    from framerunner.doctor.findings import can_fly
+    from framerunner.doctor.checks import can_fly, examine
     from framerunner.doctor.page import print_page
     from framerunner.doctor.record import Record
     from framerunner.doctor.visit import COMPONENT_ID, FIND_S, SYSTEM_ID, find, listen

@@ -64,7 +64,7 @@ def monitor(
 
     from framerunner.flying.child_process import until_standard_input_ends
     from framerunner.monitoring.equipment import equipment
-    from monitor.server import serve
+    from monitor.run import serve
     from monitor.settings import MonitorSettings
     from scenarios.loader import load_scenario
     from wire.transports.urls import parse_url

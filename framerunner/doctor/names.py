@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from wire.dialect import mavlink
+from wire.px4_modes import mode_words
 
 AUTOPILOTS = {mavlink.MAV_AUTOPILOT_PX4: "PX4", mavlink.MAV_AUTOPILOT_ARDUPILOTMEGA: "ArduPilot"}
 STATES = (
@@ -57,28 +58,11 @@ OFFBOARD_LOSS = {
 LINK_LOSS = {0: "nothing", 1: "hold", 2: "return", 3: "land", 5: "terminate", 6: "disarm"}
 LOW_BATTERY = {0: "warns", 2: "lands", 3: "returns, then lands"}
 HEIGHT_SOURCE = {0: "barometer", 1: "GPS", 2: "range finder", 3: "vision"}
-_PX4_MODES = {
-    1: "manual",
-    2: "altitude",
-    3: "position",
-    4: "auto",
-    5: "acro",
-    6: "offboard",
-    7: "stabilised",
-    10: "terminated",
-}
-_PX4_AUTO = {2: "take-off", 3: "hold", 4: "mission", 5: "return", 6: "land", 8: "follow"}
-_PX4_SUB = {(3, 1): "orbit", (3, 2): "slow position"}
-OFFBOARD_MODE = 6 << 16
 
 
 def mode_name(custom_mode: int, listed: dict[int, str]) -> str:
-    """A PX4 flight mode in a word: as the vehicle lists it, else as PX4 numbers it."""
-    if listed.get(custom_mode):
-        return listed[custom_mode]
-    main, sub = custom_mode >> 16 & 0xFF, custom_mode >> 24 & 0xFF
-    name = _PX4_SUB.get((main, sub)) or (_PX4_AUTO.get(sub) if main == 4 else _PX4_MODES.get(main))
-    return name or f"mode {main}/{sub}"
+    """A PX4 flight mode inside a sentence: as the vehicle lists it, else as PX4 numbers it."""
+    return listed.get(custom_mode) or mode_words(custom_mode)
 
 
 def kind_name(vehicle_type: int) -> str:

@@ -11,7 +11,7 @@ from rich.table import Table
 from rich.text import Text
 
 from framerunner.doctor import names
-from framerunner.doctor.findings import Finding, Level, can_fly
+from framerunner.doctor.checks import Finding, Level, can_fly
 from framerunner.doctor.record import Record
 
 _MARKS = {Level.GOOD: "[green]ok[/]", Level.NOTE: "[yellow]note[/]", Level.MISSING: "[red]MISSING[/]"}
@@ -113,8 +113,8 @@ def _found(findings: list[Finding]) -> Table:
     for column in ("", "", "", ""):
         table.add_column(column)
     for finding in findings:
-        mend = f"[dim]{escape(finding.mend)}[/]"
-        table.add_row(_MARKS[finding.level], escape(finding.subject), escape(finding.text), mend)
+        advice = f"[dim]{escape(finding.advice)}[/]"
+        table.add_row(_MARKS[finding.level], escape(finding.subject), escape(finding.text), advice)
     return table
 
 

@@ -5,15 +5,74 @@ from __future__ import annotations
 import struct
 from collections import deque
 from dataclasses import dataclass, field
-from math import dist, isfinite
+from math import dist
 
-from framerunner.doctor.arming import ArmingReport
-from wire.dialect import Message, mavlink
-from wire.transports.vehicle_link import AUTOPILOT_COMPONENT, is_vehicle
+from wire.dialect import AUTOPILOT_COMPONENT_ID, Message, mavlink
+from wire.status_text import TextAssembler
+from wire.vehicle_telemetry import VehicleTelemetry
+from wire.vehicles import is_vehicle
 
 TEXTS_KEPT = 12
 _HALF_TURN = 128
-_CHUNK_CHARS = 50
+# Bits of PX4's navigation states. An offboard flight by velocity needs what a take-off needs: attitude,
+# height and local position. Offboard's own bit is never set while nobody sends setpoints.
+TAKEOFF_MODE = 1 << 17
+_ARGUMENTS = struct.Struct("<BIIII")  # chunk, errors, warnings, modes that can be armed, that can be flown
+_CHECK_ARGUMENTS = struct.Struct("<IB")  # modes, component
+_ERROR_LEVEL = 3
+_AUTOPILOT_EVENTS = 1
+
+
+def event_id(name: str) -> int:
+    """Number of one of the autopilot's events: component 1, then 24 bits of its name's FNV-1a hash."""
+    number = 0x811C9DC5
+    for byte in name.encode():
+        number = (number ^ byte) * 0x01000193 & 0xFFFFFFFF
+    return _AUTOPILOT_EVENTS << 24 | number & 0xFFFFFF
+
+
+SUMMARY = event_id("commander_arming_check_summary")
+REASONS = {
+    event_id("check_modes_attitude"): "no valid attitude",
+    event_id("check_modes_angular_velocity"): "no valid angular velocity",
+    event_id("check_modes_local_alt"): "no valid height",
+    event_id("check_modes_local_pos"): "no valid local position",
+    event_id("check_modes_manual_control"): "no manual control input",
+    event_id("check_rc_dl_no_dllink"): "no ground station is heard",
+}
+
+
+@dataclass(slots=True)
+class ArmingReport:
+    """PX4's latest report of its arming checks: in which modes it could be armed, whichever it is in now.
+
+    PX4 sends it as EVENTs: a summary, then an event for each failed check, then a summary of its sensors'
+    health (https://mavlink.io/en/services/events.html; the arguments are those of PX4 1.14 and later).
+
+    Attributes:
+        armable_modes: bits of the navigation states in which it can be armed; None before the first report.
+        failures: what keeps it from being armed for a flight in offboard, in words.
+    """
+
+    armable_modes: int | None = None
+    failures: tuple[str, ...] = ()
+
+    @property
+    def ready_for_offboard(self) -> bool:
+        """Whether it can be armed in offboard as soon as setpoints come; False as long as it is unknown."""
+        return self.armable_modes is not None and bool(self.armable_modes & TAKEOFF_MODE)
+
+    def take(self, event: Message) -> None:
+        """Take an EVENT; those of other subjects are passed over."""
+        arguments = bytes(event.arguments)
+        if event.id == SUMMARY:
+            self.armable_modes = _ARGUMENTS.unpack_from(arguments)[3]
+            self.failures = ()
+        elif event.id in REASONS and event.log_levels & 0xF <= _ERROR_LEVEL:
+            modes, _component = _CHECK_ARGUMENTS.unpack_from(arguments)
+            words = REASONS[event.id]
+            if modes & TAKEOFF_MODE and words not in self.failures:
+                self.failures = (*self.failures, words)
 
 
 class StreamCounter:
@@ -70,6 +129,7 @@ class Record:
         clock_ms: vehicle's time stamps of attitude, first and latest; with wall time, seconds.
         places: local positions heard, NED metres.
         arming: what it says of its arming checks.
+        telemetry: its state.
     """
 
     system_id: int | None = None
@@ -86,7 +146,8 @@ class Record:
     clock_ms: list[tuple[int, float]] = field(default_factory=list)
     places: list[tuple[float, float, float]] = field(default_factory=list)
     arming: ArmingReport = field(default_factory=ArmingReport)
-    _pieces: dict[int, str] = field(default_factory=dict)
+    telemetry: VehicleTelemetry = field(default_factory=VehicleTelemetry)
+    _texts: TextAssembler = field(default_factory=TextAssembler)
 
     def take(self, message: Message, now_s: float) -> None:
         """Take a message.
@@ -97,14 +158,16 @@ class Record:
         """
         kind = message.get_type()
         if kind == "HEARTBEAT":
-            self._take_heartbeat(message)
-        if message.get_srcSystem() != self.system_id or message.get_srcComponent() != AUTOPILOT_COMPONENT:
+            self._note_sender(message)
+        if message.get_srcSystem() != self.system_id or message.get_srcComponent() != AUTOPILOT_COMPONENT_ID:
             return
         self.packets.take(message.get_seq())
         self.octets += len(message.get_msgbuf())
         self.latest[kind] = message
         self.counts[kind] = self.counts.get(kind, 0) + 1
         self.times_s[kind] = (self.times_s.get(kind, (now_s, now_s))[0], now_s)
+        if self.telemetry.take(message, now_s) and kind == "LOCAL_POSITION_NED":
+            self.places.append((message.x, message.y, message.z))
         taker = _TAKERS.get(kind)
         if taker is not None:
             taker(self, message, now_s)
@@ -118,8 +181,7 @@ class Record:
     @property
     def armed(self) -> bool:
         """Motors on, by the latest heartbeat."""
-        heartbeat = self.latest.get("HEARTBEAT")
-        return heartbeat is not None and bool(heartbeat.base_mode & mavlink.MAV_MODE_FLAG_SAFETY_ARMED)
+        return self.telemetry.armed
 
     @property
     def real_time_factor(self) -> float | None:
@@ -134,7 +196,7 @@ class Record:
         """How far the position wandered from its first report."""
         return max((dist(self.places[0], place) for place in self.places), default=0.0)
 
-    def _take_heartbeat(self, message: Message) -> None:
+    def _note_sender(self, message: Message) -> None:
         sender = (message.get_srcSystem(), message.get_srcComponent())
         if is_vehicle(message):
             if self.system_id is None:
@@ -148,22 +210,11 @@ class Record:
         stamp = (message.time_boot_ms, now_s)
         self.clock_ms[1:] = [stamp]
 
-    def _take_place(self, message: Message, _now_s: float) -> None:
-        place = (message.x, message.y, message.z)
-        if all(map(isfinite, place)):
-            self.places.append(place)
-
-    def _take_text(self, message: Message, _now_s: float) -> None:
-        """Put texts of more than fifty characters together again."""
-        text = message.text
-        if message.id:
-            text = self._pieces.pop(message.id, "") + text if message.chunk_seq else text
-            if len(message.text) == _CHUNK_CHARS:
-                self._pieces[message.id] = text
-                return
-        clean = " ".join("".join(c if c.isprintable() else " " for c in text).split())
-        if clean and (message.severity, clean) not in self.texts:
-            self.texts.append((message.severity, clean))
+    def _take_text(self, message: Message, now_s: float) -> None:
+        for told in self._texts.take(message, AUTOPILOT_COMPONENT_ID, now_s):
+            text = (told.severity, " ".join(told.text.split()))
+            if text not in self.texts:
+                self.texts.append(text)
 
     def _take_parameter(self, message: Message, _now_s: float) -> None:
         self.parameters[message.param_id] = parameter_value(message)
@@ -178,7 +229,6 @@ class Record:
 
 _TAKERS = {
     "ATTITUDE": Record._take_clock,
-    "LOCAL_POSITION_NED": Record._take_place,
     "STATUSTEXT": Record._take_text,
     "EVENT": Record._take_event,
     "PARAM_VALUE": Record._take_parameter,

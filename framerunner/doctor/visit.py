@@ -1,13 +1,17 @@
-"""The visit: find the drone, listen, ask, for some seconds of wall time."""
+"""The visit: find the drone, listen, ask, for some seconds of wall time.
+
+Nothing here changes the drone: messages are requested and parameters read.
+"""
 
 from __future__ import annotations
 
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 
-from framerunner.doctor.questions import open_questions, prearm_question, station_heartbeat
 from framerunner.doctor.record import Record
-from wire.transports.vehicle_link import VehicleLink, companion_heartbeat
+from wire.dialect import AUTOPILOT_COMPONENT_ID, Message, mavlink
+from wire.transports.vehicle_link import VehicleLink
+from wire.vehicles import command_long, companion_heartbeat, ground_station_heartbeat, request_message
 
 SYSTEM_ID = 247
 COMPONENT_ID = 190
@@ -16,6 +20,47 @@ _ASK_AGAIN_S = 1.0
 _QUESTION_GAP_S = 0.02  # a serial line should not choke on questions
 _PREARM_S = 0.5
 _PREARM_AGAIN_S = 2.0  # while no report of its arming checks has come
+PARAMETERS = (
+    "BAT_CRIT_THR",
+    "BAT_LOW_THR",
+    "COM_DISARM_LAND",
+    "COM_DISARM_PRFLT",
+    "COM_LOW_BAT_ACT",
+    "COM_OBL_RC_ACT",
+    "COM_OF_LOSS_T",
+    "COM_RCL_EXCEPT",
+    "COM_RC_IN_MODE",
+    "EKF2_DELAY_MAX",
+    "EKF2_EVP_NOISE",
+    "EKF2_EVV_NOISE",
+    "EKF2_EV_CTRL",
+    "EKF2_GPS_CTRL",
+    "EKF2_HGT_REF",
+    "EKF2_RNG_CTRL",
+    "EKF2_TAU_POS",
+    "EKF2_TAU_VEL",
+    "GF_ACTION",
+    "GF_MAX_HOR_DIST",
+    "GF_MAX_VER_DIST",
+    "MC_YAWRATE_MAX",
+    "MPC_THR_HOVER",
+    "MPC_TKO_RAMP_T",
+    "MPC_XY_VEL_I_ACC",
+    "MPC_XY_VEL_MAX",
+    "MPC_XY_VEL_P_ACC",
+    "MPC_Z_VEL_MAX_DN",
+    "MPC_Z_VEL_MAX_UP",
+    "NAV_DLL_ACT",
+    "NAV_RCL_ACT",
+    "RTL_RETURN_ALT",
+)
+_ONCE = (
+    ("AUTOPILOT_VERSION", mavlink.MAVLINK_MSG_ID_AUTOPILOT_VERSION),
+    ("HOME_POSITION", mavlink.MAVLINK_MSG_ID_HOME_POSITION),
+    ("GPS_GLOBAL_ORIGIN", mavlink.MAVLINK_MSG_ID_GPS_GLOBAL_ORIGIN),
+    ("ESTIMATOR_STATUS", mavlink.MAVLINK_MSG_ID_ESTIMATOR_STATUS),
+    ("AVAILABLE_MODES", mavlink.MAVLINK_MSG_ID_AVAILABLE_MODES),
+)
 
 Progress = Callable[[str, float], None]
 
@@ -65,7 +110,7 @@ def listen(link: VehicleLink, record: Record, seconds: float, progress: Progress
         progress("listening and asking", (now_s - began_s) / seconds)
         if now_s - beat_s >= 1.0:
             beat_s = now_s
-            link.send(companion_heartbeat() if record.armed else station_heartbeat())
+            link.send(companion_heartbeat() if record.armed else ground_station_heartbeat())
         if now_s > prearm_s and not record.armed and record.arming.armable_modes is None:
             prearm_s = now_s + _PREARM_AGAIN_S
             link.send(prearm_question(record))
@@ -85,3 +130,23 @@ def _hear(link: VehicleLink, record: Record) -> None:
     now_s = time.monotonic()
     for message in messages:
         record.take(message, now_s)
+
+
+def open_questions(record: Record) -> Iterator[Message]:
+    """What has not been answered yet, one message after the other."""
+    system_id = record.system_id
+    assert system_id is not None, "the vehicle is known before it is asked"
+    for name, number in _ONCE:
+        if name not in record.latest:
+            yield request_message(system_id, number)
+    for name in PARAMETERS:
+        if name not in record.parameters:
+            yield mavlink.MAVLink_param_request_read_message(
+                system_id, AUTOPILOT_COMPONENT_ID, name.encode(), -1
+            )
+
+
+def prearm_question(record: Record) -> Message:
+    """Ask a disarmed drone to check itself and to say what it finds."""
+    assert record.system_id is not None
+    return command_long(record.system_id, mavlink.MAV_CMD_RUN_PREARM_CHECKS)

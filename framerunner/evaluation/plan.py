@@ -12,14 +12,14 @@ from importlib import metadata
 from pathlib import Path
 from typing import Any, Self
 
-from firmware_py.airframe import load_airframe
+from firmware_py.airframe import AirframeError, load_airframe
 from framerunner.errors import SettingError
 from framerunner.flying.plan import FlightPlan
 from offboard.mission import Mission
 from offboard.pilot_file import PilotFile
 from scenarios.level import load_level
-from scenarios.loader import ScenarioError, load_scenario
-from scenarios.models import Scenario
+from scenarios.loader import load_scenario
+from scenarios.models import Scenario, ScenarioError
 from scenarios.random_scenarios import random_scenario
 from scenarios.yaml_file import SUFFIXES
 
@@ -204,7 +204,7 @@ def _checked(scenarios: list[Scenario]) -> list[Scenario]:
             continue
         try:
             load_airframe(scenario.airframe)
-        except ValueError as error:
+        except AirframeError as error:
             raise ScenarioError(f"scenario {scenario.name}: {error}") from None
         known.add(scenario.airframe)
     return scenarios

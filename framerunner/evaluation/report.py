@@ -18,7 +18,8 @@ from framerunner.evaluation.rows import Row
 from framerunner.evaluation.statistics import Spread, Summary
 from framerunner.evaluation.store import EvaluationFolder
 from framerunner.evaluation.tables import comparison_lines
-from scenarios.loader import ScenarioError, load_scenario
+from scenarios.loader import load_scenario
+from scenarios.models import ScenarioError
 from scenarios.verdict import Verdict
 
 PICTURES_AT_MOST = 150

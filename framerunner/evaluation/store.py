@@ -185,9 +185,7 @@ def _identity(path: Path, option: str) -> Identity | None:
         return Identity.from_dict(data)
     except (FileNotFoundError, NotADirectoryError):
         return None
-    except (OSError, ValueError, TypeError, KeyError, AttributeError) as error:
-        if isinstance(error, SettingError):
-            raise
+    except (OSError, ValueError, TypeError, KeyError, AttributeError):
         raise SettingError(f"{option} {path}: its {IDENTITY} cannot be read; choose another") from None
 
 

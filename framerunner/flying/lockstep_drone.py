@@ -17,11 +17,11 @@ from math import degrees, isfinite, pi, radians
 from struct import Struct
 
 from firmware_py.commander_table import CRITICAL
-from firmware_py.setpoints import setpoint_from_body_velocity
+from firmware_py.offboard_requests import SetpointRefusal, setpoint_from_body_velocity
 from firmware_py.status import CommandResult, FlightMode, LandedState
+from geometry.alignment import Alignment, Pose
 from geometry.vectors import Vec3
 from offboard.drone import DroneError, DroneState, VelocityCommand
-from offboard.link.alignment import Alignment, Pose
 from scenarios.truth import TrueState
 from sitl.simulation import Simulation
 
@@ -221,11 +221,11 @@ class LockstepDrone:
         setpoint = setpoint_from_body_velocity(
             single((command.forward_m_s, -command.left_m_s, -command.up_m_s)),
             sent_yaw_rate(-command.yaw_rate_rad_s),
-            state.yaw_rad,
+            state,
             state.time_us,
         )
-        if isinstance(setpoint, str):
-            self._autopilot.say(CRITICAL, setpoint)
+        if isinstance(setpoint, SetpointRefusal):
+            self._autopilot.say(CRITICAL, setpoint.text)
         else:
             self._autopilot.accept_setpoint(setpoint)
 

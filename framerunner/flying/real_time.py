@@ -47,7 +47,7 @@ class RealTimeSettings:
 
 
 @dataclass(frozen=True, slots=True)
-class _Vehicle:
+class _Endpoints:
     """Where drone, camera and API are.
 
     Attributes:
@@ -134,11 +134,11 @@ async def _vehicle(
     records: RunRecords,
     stack: AsyncExitStack,
     monitor_url: str | None,
-) -> _Vehicle:
+) -> _Endpoints:
     """Find the drone that is there, or start a simulator."""
     if settings.drone_url is not None and settings.camera_url is not None:
         api = settings.simulator or SimulatorApi.of_video(settings.camera_url)
-        return _Vehicle(settings.drone_url, settings.camera_url, api, None, shared_with=monitor_url)
+        return _Endpoints(settings.drone_url, settings.camera_url, api, None, shared_with=monitor_url)
     from framerunner.flying.simulator_process import SitlProcess
 
     # The simulator reads the very scenario that was checked here, whatever becomes of its file.
@@ -148,12 +148,12 @@ async def _vehicle(
     )
     camera = plan.scenario.camera
     size_px = (camera.width_px, camera.height_px)
-    return _Vehicle(sitl.drone_url, sitl.api.video_url, sitl.api, size_px, sitl)
+    return _Endpoints(sitl.drone_url, sitl.api.video_url, sitl.api, size_px, sitl)
 
 
 def _drone(
     plan: FlightPlan,
-    vehicle: _Vehicle,
+    vehicle: _Endpoints,
     records: RunRecords,
     stack: AsyncExitStack,
     companion: Companion,
@@ -176,7 +176,7 @@ def _drone(
 
 async def _camera(
     plan: FlightPlan,
-    vehicle: _Vehicle,
+    vehicle: _Endpoints,
     records: RunRecords,
     stack: AsyncExitStack,
     teller: MissionTeller,

@@ -22,8 +22,8 @@ from framerunner.recording.collected import CollectedFlight, ImageFile, collect
 from framerunner.recording.errors import RecordingError
 from framerunner.recording.find import recorded_flight
 from offboard.mission import MissionError, load_mission
-from scenarios.loader import ScenarioError, load_scenario
-from scenarios.models import Scenario
+from scenarios.loader import load_scenario
+from scenarios.models import Scenario, ScenarioError
 
 RECORDING = "recording.json"
 IMAGES = "images"

@@ -8,6 +8,7 @@ from math import cos, isfinite, pi, sin
 from typing import Any
 
 from framerunner.recording.collected import CollectedFlight
+from geometry.rotations import quaternion_from_yaw
 from offboard.app import Moment
 from offboard.engine import TransitionTaken
 from offboard.mission import Mission, mermaid
@@ -113,7 +114,7 @@ def _poses(flight: CollectedFlight, numbers: Mapping[str, int], clock: _Clock) -
             {
                 "t": clock.seconds(state.time_us),
                 "p": _rounded(state.x, state.y, state.z),
-                "q": _rounded(cos(state.yaw / 2), 0.0, 0.0, sin(state.yaw / 2)),
+                "q": _rounded(*quaternion_from_yaw(state.yaw)),
                 "v": _rounded(c * vx + s * vy, c * vy - s * vx, vz),
                 "r": _rounded(turn_rad / span_s if span_s > 0 else 0.0)[0],
                 "c": _rounded(*told) if flight.mission_is_known else None,

@@ -1,7 +1,7 @@
 """Errors of recordings."""
 
-from framerunner.errors import SettingError
+from errors import UserError
 
 
-class RecordingError(SettingError):
+class RecordingError(UserError):
     """A recording that cannot be written or shown; the message is one line for people."""

@@ -6,25 +6,26 @@ import heapq
 import os
 from collections.abc import Iterator
 from pathlib import Path
-from typing import Any
 
 import cv2
 
 from framerunner.flying.plan import FlightPlan
 from framerunner.recording.errors import RecordingError
 from framerunner.recording.events import Event, Picture, time_of_event
+from geometry.alignment import Alignment, Pose
 from offboard.app import Moment
 from offboard.drone import DroneState, VelocityCommand
-from offboard.link.alignment import Alignment, Pose
 from scenarios.models import Scenario
 from scenarios.result import FlightResult
 from vision.jpeg import MAX_PIXELS
 from vision.types import Detections
+from wire.dialect import Message, mavlink
+from wire.px4_modes import OFFBOARD, px4_name
+from wire.vehicle_telemetry import PositionReport, VehicleTelemetry
+from wire.vehicles import is_vehicle
 
 TICK_US = 50_000
-_TICKS_AT_MOST = 576_000  # eight hours: a log that holds more is damaged
-_ARMED = 128  # MAV_MODE_FLAG_SAFETY_ARMED
-_NO_AUTOPILOT = 8  # MAV_AUTOPILOT_INVALID: a ground station, a camera, this app's own companion
+_MAX_TICKS = 576_000  # eight hours: a log that holds more is damaged
 
 
 class TlogRecording:
@@ -97,68 +98,64 @@ def _read_moments(path: Path, start: Pose) -> list[Moment]:
         log = mavutil.mavlink_connection(str(path), notimestamps=False)
     except Exception as error:  # the library raises whatever comes
         raise RecordingError(f"replay: '{path}' cannot be read: {error}") from None
-    vehicle = _Vehicle(start, mavutil.interpret_px4_mode)
+    ticks = _Ticks(start)
     moments: list[Moment] = []
     try:
         while True:
             message = log.recv_match(type=["HEARTBEAT", "ATTITUDE", "LOCAL_POSITION_NED"])
             if message is None:
                 return moments
-            moment = vehicle.take(message)
+            moment = ticks.take(message)
             if moment is not None:
                 moments.append(moment)
-                if len(moments) > _TICKS_AT_MOST:
+                if len(moments) > _MAX_TICKS:
                     raise RecordingError(f"replay: '{path}' is longer than eight hours; it must be damaged")
     finally:
         log.close()
 
 
-class _Vehicle:
-    """What the log has told of the vehicle so far."""
+class _Ticks:
+    """Makes ticks of what the log tells of the vehicle."""
 
-    def __init__(self, start: Pose, mode_name: Any) -> None:  # noqa: ANN401 - an untyped library's function
+    def __init__(self, start: Pose) -> None:
         self._start = start
-        self._mode_name = mode_name
+        self._telemetry = VehicleTelemetry()
         self._alignment: Alignment | None = None
-        self._yaw_rad: float | None = None
-        self._mode = ""
-        self._armed = False
         self._armed_us = 0
         self._next_us = 0
 
-    def take(self, message: Any) -> Moment | None:  # noqa: ANN401 - as above
-        """Take a message; a position after a yaw makes a moment, if one is due."""
-        kind = message.get_type()
-        if kind == "HEARTBEAT":
-            if message.autopilot != _NO_AUTOPILOT:
-                armed = bool(message.base_mode & _ARMED)
-                if armed and not self._armed:
-                    self._armed_us = self._next_us
-                self._armed = armed
-                self._mode = self._mode_name(message.base_mode, message.custom_mode)
+    def take(self, message: Message) -> Moment | None:
+        """Take a message; a position after an attitude makes a moment, if one is due."""
+        telemetry, kind = self._telemetry, message.get_msgId()
+        if kind == mavlink.MAVLINK_MSG_ID_HEARTBEAT and not is_vehicle(message):
             return None
-        if kind == "ATTITUDE":
-            self._yaw_rad = message.yaw
+        was_armed = telemetry.armed
+        is_newest = telemetry.take(message)
+        if telemetry.armed and not was_armed:
+            self._armed_us = self._next_us
+        position = telemetry.position
+        if kind != mavlink.MAVLINK_MSG_ID_LOCAL_POSITION_NED or not is_newest or position is None:
             return None
-        time_us = message.time_boot_ms * 1000
-        if self._yaw_rad is None or time_us < self._next_us:
+        if telemetry.attitude is None or position.time_us < self._next_us:
             return None
-        self._next_us = (time_us // TICK_US + 1) * TICK_US
-        return self._moment(message, self._yaw_rad, time_us)
+        self._next_us = (position.time_us // TICK_US + 1) * TICK_US
+        return self._moment(position)
 
-    def _moment(self, position: Any, yaw_rad: float, time_us: int) -> Moment:  # noqa: ANN401
-        ned = Pose((position.x, position.y, position.z), yaw_rad)
+    def _moment(self, position: PositionReport) -> Moment:
+        telemetry = self._telemetry
+        ned = Pose(position.position_ned_m, position.yaw_ned_rad)
         if self._alignment is None:
             self._alignment = Alignment(self._start, ned)
         pose = self._alignment.pose(ned)
+        mode = px4_name(telemetry.custom_mode) if telemetry.mode_name else ""
         state = DroneState(
-            time_us,
+            position.time_us,
             *pose.position_m,
             pose.yaw_rad,
-            self._alignment.vector((position.vx, position.vy, position.vz)),
-            self._armed,
-            self._mode == "OFFBOARD",
-            self._mode,
+            self._alignment.vector(position.velocity_ned_m_s),
+            telemetry.armed,
+            telemetry.mode is OFFBOARD,
+            mode,
         )
-        flight_time_s = max(0.0, (time_us - self._armed_us) / 1e6) if self._armed_us else 0.0
-        return Moment(state, VelocityCommand(), Detections(), self._mode.lower(), flight_time_s)
+        flight_time_s = max(0.0, (position.time_us - self._armed_us) / 1e6) if self._armed_us else 0.0
+        return Moment(state, VelocityCommand(), Detections(), mode.lower(), flight_time_s)

@@ -8,6 +8,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from errors import UserError
 from framerunner.runs.track import Track
 from scenarios.models import Scenario
 from scenarios.result import FlightResult
@@ -18,7 +19,7 @@ if TYPE_CHECKING:
 SUFFIXES = (".png", ".svg", ".pdf")
 
 
-class PictureError(ValueError):
+class PictureError(UserError):
     """A picture that cannot be made; the message is one line for people."""
 
 

@@ -5,35 +5,20 @@ No clock and no socket: time is the vehicle's, messages come in, images come out
 
 from __future__ import annotations
 
-from math import cos, isfinite, sin
-
 from framerunner.flying.plan import FlightPlan
-from framerunner.virtual_camera.history import (
-    AHEAD_US,
-    AttitudeReport,
-    PoseHistory,
-    PositionReport,
-    quaternion_from_euler,
-)
-from framerunner.virtual_camera.placement import Placement, yaw_of
-from geometry.vectors import Quaternion
-from offboard.link.alignment import Pose
+from framerunner.virtual_camera.placement import Placement
+from geometry.alignment import ORIGIN, Pose
+from geometry.rotations import quaternion_from_yaw, yaw_of
 from scenarios.models import Scenario
 from scenarios.result import LocalFrame, Standing
 from scenarios.truth import TrueState
 from sitl.camera import Camera, Image
 from sitl.camera_feed import FIRST_EXPOSURE_US
-from wire.dialect import Message
+from wire.dialect import Message, mavlink
+from wire.vehicle_telemetry import AHEAD_US, VehicleTelemetry
 
 REFEREE_STEP_US = 20_000
 REPORT_GAP_US = 20_000  # between two reports: the one that shows that a time is over comes so much later
-ARMED_FLAG = 128  # MAV_MODE_FLAG_SAFETY_ARMED
-
-
-def levelled(attitude_arena: Quaternion) -> Quaternion:
-    """The heading of an attitude, without roll and pitch: quaternions (w, x, y, z) of unit length."""
-    half = yaw_of(attitude_arena) / 2  # the formula is the same in arena axes
-    return (cos(half), 0.0, 0.0, sin(half))
 
 
 class VirtualCamera:
@@ -51,11 +36,9 @@ class VirtualCamera:
     Attributes:
         plan: the flight that is seen; its frames are higher than declared if there is no base.
         placement: of the arena at the vehicle.
-        history: of the vehicle's reports.
-        attitudes: reports of attitude so far.
-        positions: reports of position so far.
+        telemetry: what the vehicle tells.
         images: painted so far.
-        restarts: how often the vehicle began anew.
+        restarts: how often the vehicle has restarted.
     """
 
     def __init__(self, scenario: Scenario, *, level: bool = False, base: bool = True) -> None:
@@ -64,12 +47,12 @@ class VirtualCamera:
         self._camera = Camera(self.plan.layout)
         self._period_us = 1e6 / scenario.camera.rate_hz
         self._wait_us = max(0, round(scenario.camera.latency_s * 1e6) - REPORT_GAP_US)
-        self.attitudes = self.positions = self.images = self.restarts = 0
-        self._begin()
+        self.images = self.restarts = 0
+        self._restart()
 
-    def _begin(self) -> None:
+    def _restart(self) -> None:
         """Know nothing of the vehicle."""
-        self.history = PoseHistory()
+        self.telemetry = VehicleTelemetry()
         start = self.plan.start_pose
         self.placement = Placement(Pose(start[:3], start[3]))
         self._referee = self.plan.new_referee()
@@ -79,60 +62,40 @@ class VirtualCamera:
 
     def take(self, message: Message) -> None:
         """Take one of the vehicle's messages; those that tell nothing of its pose are passed over."""
-        kind = message.get_type()
-        if kind == "ATTITUDE_QUATERNION":
-            self.attitudes += 1
-            self.history.add_attitude(
-                AttitudeReport(
-                    message.time_boot_ms * 1000,
-                    (message.q1, message.q2, message.q3, message.q4),
-                    (message.rollspeed, message.pitchspeed, message.yawspeed),
-                )
-            )
-        elif kind == "ATTITUDE":
-            self.attitudes += 1
-            self._take_angles(message)
-        elif kind == "LOCAL_POSITION_NED":
-            self.positions += 1
-            self.history.add_position(
-                PositionReport(
-                    message.time_boot_ms * 1000,
-                    (message.x, message.y, message.z),
-                    (message.vx, message.vy, message.vz),
-                )
-            )
-        elif kind == "HEARTBEAT":
-            armed = bool(message.base_mode & ARMED_FLAG)
-            self.placement.see_heartbeat(self.history.newest_us or 0, armed)
-            return
+        telemetry = self.telemetry
+        telemetry.take(message)
+        if telemetry.restarts:
+            self.restarts += 1
+            self._restart()
+        elif message.get_msgId() == mavlink.MAVLINK_MSG_ID_HEARTBEAT:
+            self.placement.see_heartbeat(telemetry.time_us, telemetry.armed)
         else:
-            return
-        self._follow()
+            self._follow()
 
     def step(self) -> tuple[int, Image] | None:
         """Paint the image that is due.
 
-        After a hole in the telemetry only the latest exposure is made up for.
+        After a gap in the telemetry only the latest of the exposures that were missed is painted.
 
         Returns:
             Time of exposure, microseconds of vehicle time, and the image; None if none is due.
         """
-        now_us, covered_us = self.history.newest_us, self.history.covered_us
-        if now_us is None or covered_us is None:
+        covered_us = self.telemetry.covered_us
+        if covered_us is None:
             return None
-        index = int((now_us - self._wait_us - FIRST_EXPOSURE_US) // self._period_us)
+        index = int((self.telemetry.time_us - self._wait_us - FIRST_EXPOSURE_US) // self._period_us)
         if index < self._next:
             return None
         exposure_us = round(FIRST_EXPOSURE_US + index * self._period_us)
         if exposure_us > covered_us + AHEAD_US:
             return None
-        pose = self.history.pose(exposure_us)
+        pose = self.telemetry.pose(exposure_us)
         where = None if pose is None else self.placement.arena_pose(pose)
         if where is None:
             return None
         self._next = index + 1
         self.images += 1
-        attitude = levelled(where.attitude_arena) if self._level else where.attitude_arena
+        attitude = quaternion_from_yaw(yaw_of(where.attitude_arena)) if self._level else where.attitude_arena
         return exposure_us, self._camera.render(where.position_arena_m, attitude)
 
     def standing(self, state: str = "", ended: str | None = None) -> Standing:
@@ -146,7 +109,7 @@ class VirtualCamera:
             scenario=self.plan.scenario.name,
             source="telemetry",
             lift_m=self.plan.lift_m,
-            time_us=self.history.newest_us or 0,
+            time_us=self.telemetry.time_us,
             local_frame=self._local_frame(),
             snapshot=self._referee.snapshot(),
             report=self._referee.report(state, ended),
@@ -157,31 +120,15 @@ class VirtualCamera:
         alignment = self.placement.alignment
         if alignment is None:
             return None
-        origin = alignment.pose(Pose((0.0, 0.0, 0.0), 0.0))
+        origin = alignment.pose(ORIGIN)
         return LocalFrame(origin_arena_m=origin.position_m, yaw_rad=origin.yaw_rad)
-
-    def _take_angles(self, message: Message) -> None:
-        angles = (message.roll, message.pitch, message.yaw)
-        if not all(map(isfinite, angles)):
-            return
-        self.history.add_attitude(
-            AttitudeReport(
-                message.time_boot_ms * 1000,
-                quaternion_from_euler(*angles),
-                (message.rollspeed, message.pitchspeed, message.yawspeed),
-            )
-        )
 
     def _follow(self) -> None:
         """Let placement and referee see the vehicle where both kinds of reports have come to."""
-        if self.history.restarts:
-            self.restarts += 1
-            self._begin()
-            return
-        covered_us = self.history.covered_us
+        covered_us = self.telemetry.covered_us
         if covered_us is None or covered_us < self._judged_us + REFEREE_STEP_US:
             return
-        pose = self.history.pose(covered_us)
+        pose = self.telemetry.pose(covered_us)
         if pose is None:
             return
         self._judged_us = covered_us

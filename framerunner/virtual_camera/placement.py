@@ -6,9 +6,10 @@ from collections import deque
 from dataclasses import dataclass
 from math import atan2, cos, sin
 
-from framerunner.virtual_camera.history import VehiclePose
+from geometry.alignment import Alignment, Pose
+from geometry.rotations import yaw_of
 from geometry.vectors import Quaternion, Vec3
-from offboard.link.alignment import Alignment, Pose
+from wire.vehicle_telemetry import VehiclePose
 
 HELD_AFTER_FLIGHT_US = 10_000_000  # the verdict is made by then; later the vehicle is put back on its start
 _PENDING = 200  # poses between two heartbeats
@@ -79,9 +80,11 @@ class Placement:
         """A pose in arena axes; None as long as the arena has no place."""
         if self.alignment is None:
             return None
-        turned = self.alignment.pose(Pose(pose.position_ned_m, 0.0))
-        velocity = self.alignment.vector(pose.velocity_ned_m_s)
-        return ArenaPose(turned.position_m, velocity, self.alignment.attitude(pose.attitude_ned))
+        return ArenaPose(
+            self.alignment.position(pose.position_ned_m),
+            self.alignment.vector(pose.velocity_ned_m_s),
+            self.alignment.attitude(pose.attitude_ned),
+        )
 
     def _confirm(self, time_us: int) -> None:
         """The poses since the last heartbeat were taken disarmed."""
@@ -91,12 +94,6 @@ class Placement:
         if self._landed_us is not None and time_us - self._landed_us < HELD_AFTER_FLIGHT_US:
             return
         self.alignment = Alignment(self._start, self._rest)
-
-
-def yaw_of(attitude: Quaternion) -> float:
-    """Heading of an attitude in its own upright axes, from their x towards their y, radians."""
-    w, x, y, z = attitude
-    return atan2(2 * (w * z + x * y), 1 - 2 * (y * y + z * z))
 
 
 def _mean(poses: deque[tuple[Vec3, float]]) -> Pose:

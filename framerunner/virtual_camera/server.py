@@ -10,10 +10,11 @@ from collections.abc import Callable, Mapping
 
 from framerunner.virtual_camera.painter import VirtualCamera
 from sitl.video import VideoServer
-from wire.dialect import Message, mavlink
+from wire.dialect import AUTOPILOT_COMPONENT_ID, Message, mavlink
 from wire.simulator_api import REFEREE_PATH, SCENARIO_PATH
 from wire.transports.urls import LinkError
-from wire.transports.vehicle_link import VehicleLink, command, companion_heartbeat, is_vehicle
+from wire.transports.vehicle_link import VehicleLink
+from wire.vehicles import companion_heartbeat, is_vehicle, request_rate
 
 STALE_S = 0.5  # wall time without attitude or position, after which no image is served
 SYSTEM_ID = 246  # MAVSDK has 245, ground stations 255
@@ -103,7 +104,7 @@ class CameraServer:
 
     def _take(self, messages: list[Message]) -> None:
         for message in messages:
-            if self._vehicle is None and message.get_type() == "HEARTBEAT" and is_vehicle(message):
+            if self._vehicle is None and is_vehicle(message):
                 self._vehicle = message.get_srcSystem()
                 self._say(f"vehicle {self._vehicle} found")
             if self._vehicle is None or not self._is_ours(message):
@@ -121,8 +122,7 @@ class CameraServer:
 
     def _is_ours(self, message: Message) -> bool:
         return bool(
-            message.get_srcSystem() == self._vehicle
-            and message.get_srcComponent() == mavlink.MAV_COMP_ID_AUTOPILOT1
+            message.get_srcSystem() == self._vehicle and message.get_srcComponent() == AUTOPILOT_COMPONENT_ID
         )
 
     async def _keep_house(self) -> None:
@@ -142,10 +142,10 @@ class CameraServer:
 
     def _ask_for_rates(self, span_s: float) -> None:
         """Ask for more where too little comes; a link that cannot carry it is told of and left alone."""
-        camera, rates = self._camera, self._rates
-        attitude_hz = (camera.attitudes - rates.attitudes) / span_s
-        position_hz = (camera.positions - rates.positions) / span_s
-        rates.attitudes, rates.positions = camera.attitudes, camera.positions
+        telemetry, rates = self._camera.telemetry, self._rates
+        attitude_hz = (telemetry.attitudes - rates.attitudes) / span_s
+        position_hz = (telemetry.positions - rates.positions) / span_s
+        rates.attitudes, rates.positions = telemetry.attitudes, telemetry.positions
         if min(attitude_hz, position_hz) >= ENOUGH_HZ or rates.asked > _ASKS:
             return
         rates.asked += 1
@@ -161,8 +161,7 @@ class CameraServer:
             (mavlink.MAVLINK_MSG_ID_LOCAL_POSITION_NED, position_hz),
         ):
             if rate_hz < ENOUGH_HZ:
-                asking = (mavlink.MAV_CMD_SET_MESSAGE_INTERVAL, number, 1e6 / WANTED_HZ)
-                self._to_send.append(command(self._vehicle, *asking))
+                self._to_send.append(request_rate(self._vehicle, number, WANTED_HZ))
 
     def _referee_answer(self, query: Mapping[str, str]) -> object:
         return self._camera.standing(query.get("state", ""), query.get("ended")).model_dump(mode="json")

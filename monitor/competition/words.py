@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import unicodedata
 
+from errors import UserError
+
 _CONTROL = frozenset({"Cc", "Cs", "Zl", "Zp"})
 _TURNING = frozenset("\u202a\u202b\u202c\u202d\u202e\u2066\u2067\u2068\u2069")  # turn the text around them
 
 
-class Refused(ValueError):  # noqa: N818 - it says what happened
+class Refused(UserError):  # noqa: N818 - it says what happened
     """What was asked for is not done; the message is one line with field, value and mend.
 
     Attributes:

@@ -7,12 +7,12 @@ from collections.abc import Collection
 from ipaddress import IPv4Address, IPv6Address, ip_address
 from urllib.parse import SplitResult, urlsplit
 
-from pymavlink.dialects.v20 import common as mavlink
-
 from monitor.ports import Message
-from monitor.vehicle.texts import plain
+from wire.dialect import mavlink
 from wire.simulator_api import VIDEO_PATH
+from wire.status_text import plain
 from wire.transports.urls import LinkError, parse_url
+from wire.vehicles import request_message
 
 CAMERAS = range(mavlink.MAV_COMP_ID_CAMERA, mavlink.MAV_COMP_ID_CAMERA6 + 1)
 _ASK_EVERY_S = 2.0
@@ -62,7 +62,7 @@ class CameraWatch:
         self._asked_s = now_s
         self._asks += 1
         wanted = mavlink.MAVLINK_MSG_ID_VIDEO_STREAM_INFORMATION
-        return request(self._id, self._component, wanted)
+        return request_message(self._id, wanted, self._component)
 
     def take(self, message: Message, host: str) -> None:
         """Take VIDEO_STREAM_INFORMATION; the first stream that can be shown counts.
@@ -166,10 +166,3 @@ def host_of(link_url: str) -> str:
     except LinkError:
         return ""
     return url.address if url.scheme in ("udpout", "tcpout") and url.address != "0.0.0.0" else ""
-
-
-def request(system: int, component: int, message_id: int) -> Message:
-    """Write REQUEST_MESSAGE."""
-    return mavlink.MAVLink_command_long_message(
-        system, component, mavlink.MAV_CMD_REQUEST_MESSAGE, 0, message_id, 0, 0, 0, 0, 0, 0
-    )

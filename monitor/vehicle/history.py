@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 from collections import deque
-from math import atan2, dist, isfinite
+from math import dist, isfinite
 from typing import Any
+
+from geometry.rotations import yaw_of
 
 RECENT_S = 60.0  # what the plots show; every sample of it is kept
 MAX_OLDER = 2000  # samples before that, for the trail; when it is full every second one goes
@@ -31,10 +33,8 @@ class History:
         if is_on and not self._was_on:
             self.clear()
         self._was_on = is_on
-        w, x, y, z = pose["q"]
-        yaw_rad = atan2(2 * (w * z + x * y), 1 - 2 * (y * y + z * z))
         command = pose["c"] or [None] * 4
-        row = [round(time_s, 3), *pose["p"], round(yaw_rad, 3), *pose["v"], pose["r"], *command]
+        row = [round(time_s, 3), *pose["p"], round(yaw_of(pose["q"]), 3), *pose["v"], pose["r"], *command]
         finite = [value if value is None or isfinite(value) else None for value in row]
         self._recent.append([*finite, 1 if is_on else 0, pose["s"]])
         while time_s - self._recent[0][_TIME] > RECENT_S:

@@ -9,17 +9,16 @@ from geometry.vectors import Quaternion, Vec3
 from monitor.ports import Equipment, Referee
 from monitor.referee_channel import RefereeChannel
 from monitor.tries import TryEvent, TryWatch
-from monitor.vehicle.condition import Condition
-from monitor.vehicle.motion import Motion
 from monitor.vehicle.placement import Placement, Source
 from scenarios.models import Scenario
 from scenarios.result import FlightResult, Standing
 from scenarios.truth import TrueState
+from wire.vehicle_telemetry import VehicleTelemetry
 
 JsonMessage = dict[str, Any]
-_PATIENCE_S = 5.0  # so long a drone has to show its own referee
+_PATIENCE_S = 5.0  # within which a drone has to show its own referee
 _FRESH_S = 1.0
-_NAMED_S = 3.0  # so long the drone has to say when it was switched on
+_NAMED_S = 3.0  # within which the drone has to say when it was switched on
 
 
 class OwnReferee:
@@ -112,27 +111,23 @@ class Judging:
         if self._tries is not None:
             self._tries.see(standing, now_s)
 
-    def follow(self, motion: Motion, condition: Condition, placement: Placement) -> None:
+    def follow(self, telemetry: VehicleTelemetry, placement: Placement) -> None:
         """Show the monitor's own referee the latest telemetry, if it is the one who judges."""
-        position, attitude_ned = motion.position, motion.attitude_ned
-        if (
-            self._answered_s > 0
-            or placement.source < Source.START
-            or position is None
-            or attitude_ned is None
-        ):
+        position, attitude = telemetry.position, telemetry.attitude
+        if self._answered_s > 0 or placement.source < Source.START or position is None or attitude is None:
             return
         if self._own is None:
             scenario = self._equipment.scenario
             if scenario is None:
                 return
             self._own = OwnReferee(scenario, self._equipment.make_referee)
+        alignment = placement.alignment
         self._own.follow(
             position.time_us,
-            placement.position(position.position_ned_m),
-            placement.vector(position.velocity_ned_m_s),
-            placement.attitude(attitude_ned),
-            armed=condition.armed,
+            alignment.position(position.position_ned_m),
+            alignment.vector(position.velocity_ned_m_s),
+            alignment.attitude(attitude.attitude_ned),
+            armed=telemetry.armed,
         )
 
     def tick(self, boot_unix_us: int | None, now_s: float, wall_boot_us: int) -> None:
@@ -165,15 +160,15 @@ class Judging:
             self._tries.take_result(crc, result, now_s)
 
     def close(self) -> None:
-        """The vehicle begins anew."""
+        """The vehicle has restarted."""
         if self._tries is not None:
             self._tries.close()
 
-    def motors_on(self, condition: Condition, now_s: float) -> bool:
+    def motors_on(self, telemetry: VehicleTelemetry, now_s: float) -> bool:
         """Whether the motors run: a referee knows it sooner than a heartbeat tells."""
         if self.standing is not None and now_s - self._answered_s < _FRESH_S:
             return self.standing.snapshot.motors_on
-        return condition.armed
+        return telemetry.armed
 
     def figures(self, channel: RefereeChannel | None) -> JsonMessage | None:
         """The Game Monitor's figures; None if nothing is known."""

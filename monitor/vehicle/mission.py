@@ -8,8 +8,8 @@ from typing import Annotated, Any
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from monitor.ports import Message
-from monitor.vehicle.texts import plain
 from scenarios.result import FlightResult, first_error
+from wire.finite_json import finite
 from wire.mission_codec import DocumentAssembler, PayloadError, decode_detections, decode_state
 from wire.mission_messages import (
     DETECTIONS_TYPE,
@@ -21,6 +21,7 @@ from wire.mission_messages import (
     DocumentKind,
     MissionState,
 )
+from wire.status_text import plain
 
 ALIVE_S = 2.0
 _TRANSITIONS = 10
@@ -215,17 +216,6 @@ class MissionView:
             "height": seen.height_px,
             "boxes": {colour: _box(box) for colour, box in boxes},
         }
-
-
-def finite(value: Any) -> Any:  # noqa: ANN401 - any JSON
-    """The same JSON with null for numbers that are not finite."""
-    if isinstance(value, float):
-        return value if isfinite(value) else None
-    if isinstance(value, dict):
-        return {key: finite(part) for key, part in value.items()}
-    if isinstance(value, list | tuple):
-        return [finite(part) for part in value]
-    return value
 
 
 def _box(box: Box) -> list[float | None] | None:

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from enum import IntEnum
-from math import cos, hypot, isfinite, sin
+from math import hypot, isfinite
 
-from geometry.axes import flip_quaternion, flip_vector, flip_yaw
-from geometry.vectors import Quaternion, Vec3
-from monitor.vehicle.motion import Motion, Position
+from geometry.alignment import ORIGIN, Alignment, Pose
+from geometry.vectors import Vec3
+from wire.vehicle_telemetry import PositionReport, VehicleTelemetry
 
 ArenaPose = tuple[float, float, float, float]  # x, y, z (m) and yaw (rad), arena axes
 
@@ -25,33 +25,34 @@ class Source(IntEnum):
 
 
 class Placement:
-    """A turn about the vertical and a shift, from local NED to arena axes.
+    """Chooses the best alignment that is known.
 
     Attributes:
-        source: what it rests on.
+        source: what the alignment rests on.
+        alignment: from local NED to arena axes.
     """
 
     def __init__(self) -> None:
         self.source = Source.GUESS
         self._slowest_m_s = 1e9
-        self._lay(0.0, (0.0, 0.0, 0.0))
+        self.alignment = Alignment(ORIGIN, ORIGIN)
 
     def lay_by_frame(self, origin_arena_m: Vec3, yaw_rad: float) -> None:
         """The referee says where the local origin is, and how much north is turned from x (to the left)."""
         if isfinite(sum(origin_arena_m) + yaw_rad):
             self.source = Source.REFEREE
-            self._lay(yaw_rad, origin_arena_m)
+            self.alignment = Alignment(Pose(origin_arena_m, yaw_rad), ORIGIN)
 
-    def lay_by_start(self, start_arena: ArenaPose, motion: Motion) -> None:
+    def lay_by_start(self, start_arena: ArenaPose, telemetry: VehicleTelemetry) -> None:
         """It stands on its start: there is where it says to be now. One that moves is being carried."""
-        position = motion.position
-        if self.source > Source.START or position is None or motion.attitude_ned is None:
+        position = telemetry.position
+        if self.source > Source.START or position is None or telemetry.attitude is None:
             return
         if hypot(*position.velocity_ned_m_s) < _CARRIED_M_S:
             self.source = Source.START
             self._lay_by_pair(start_arena, position)
 
-    def lay_by_app(self, pose_arena: ArenaPose, position: Position) -> None:
+    def lay_by_app(self, pose_arena: ArenaPose, position: PositionReport) -> None:
         """The app says where it was when the vehicle was here; the pair from the stillest moment counts."""
         if self.source > Source.APP or not isfinite(sum(pose_arena)):
             return
@@ -62,33 +63,6 @@ class Placement:
         self.source = Source.APP
         self._lay_by_pair(pose_arena, position)
 
-    def position(self, position_ned_m: Vec3) -> Vec3:
-        """A local NED position in arena axes."""
-        x, y, z = self._turned(flip_vector(position_ned_m))
-        dx, dy, dz = self._shift
-        return (x + dx, y + dy, z + dz)
-
-    def vector(self, vector_ned: Vec3) -> Vec3:
-        """A local NED velocity in arena axes."""
-        return self._turned(flip_vector(vector_ned))
-
-    def attitude(self, attitude_ned: Quaternion) -> Quaternion:
-        """An attitude, body FRD to NED, as body FLU to arena: quaternions (w, x, y, z)."""
-        w, x, y, z = flip_quaternion(attitude_ned)
-        c, s = self._half_cos, self._half_sin
-        return (c * w - s * z, c * x - s * y, c * y + s * x, c * z + s * w)
-
-    def _lay_by_pair(self, pose_arena: ArenaPose, position: Position) -> None:
-        x, y, z, yaw_rad = pose_arena
-        self._lay(yaw_rad - flip_yaw(position.yaw_ned_rad), (0.0, 0.0, 0.0))
-        here_x, here_y, here_z = self._turned(flip_vector(position.position_ned_m))
-        self._shift = (x - here_x, y - here_y, z - here_z)
-
-    def _lay(self, turn_rad: float, shift: Vec3) -> None:
-        self._cos, self._sin = cos(turn_rad), sin(turn_rad)
-        self._half_cos, self._half_sin = cos(turn_rad / 2), sin(turn_rad / 2)
-        self._shift = shift
-
-    def _turned(self, vector: Vec3) -> Vec3:
-        x, y, z = vector
-        return (self._cos * x - self._sin * y, self._sin * x + self._cos * y, z)
+    def _lay_by_pair(self, pose_arena: ArenaPose, position: PositionReport) -> None:
+        here_ned = Pose(position.position_ned_m, position.yaw_ned_rad)
+        self.alignment = Alignment(Pose(pose_arena[:3], pose_arena[3]), here_ned)

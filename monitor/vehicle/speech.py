@@ -6,15 +6,14 @@ from collections import deque
 from collections.abc import Callable
 from typing import Any
 
-from pymavlink.dialects.v20 import common as mavlink
-
 from monitor.ports import Message
 from monitor.vehicle.orders import is_warning
-from monitor.vehicle.texts import Text, TextAssembler
+from wire.dialect import mavlink
 from wire.mission_messages import COMPONENT_ID as APP
+from wire.status_text import Text, TextAssembler
 
 _KEPT = 16
-_MOST_A_SECOND = 20  # a drone that says more is shouting
+_MAX_PER_SECOND = 20  # what a drone says beyond that is left out
 
 JsonMessage = dict[str, Any]
 
@@ -63,7 +62,7 @@ class Speech:
         if now_s - self._second_s >= 1.0:
             self._second_s, self._told = now_s, 0
         self._told += 1
-        if self._told > _MOST_A_SECOND:
+        if self._told > _MAX_PER_SECOND:
             return
         self._tell(
             {

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
 
+from errors import UserError
+
 
 @dataclass(frozen=True, slots=True)
 class Place:
@@ -45,7 +47,7 @@ class Problem:
         return "".join(c if c.isprintable() else c.encode("unicode_escape").decode() for c in line)
 
 
-class MissionError(Exception):
+class MissionError(UserError):
     """A mission file cannot be flown; the message has one line for each problem."""
 
     def __init__(self, problems: list[Problem]) -> None:

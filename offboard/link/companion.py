@@ -18,8 +18,7 @@ from collections import deque
 from math import inf
 from typing import Any
 
-from pymavlink.dialects.v20 import common as mavlink
-
+from wire.dialect import AUTOPILOT_COMPONENT_ID, mavlink
 from wire.mission_codec import PayloadError, encode_detections, encode_state
 from wire.mission_messages import (
     COMPONENT_ID,
@@ -30,6 +29,7 @@ from wire.mission_messages import (
     MissionDetections,
     MissionState,
 )
+from wire.vehicles import companion_heartbeat
 
 BEAT_S = 0.05  # wall time; what is not told at a tick is told at a beat
 PIECES_A_BEAT = 2  # of new documents: 6 kB/s at most, so that a slow link has room for setpoints
@@ -41,7 +41,6 @@ _MOST_CHUNKS = 4
 _TUNNEL_BYTES = 128
 _PACKETS_A_BEAT = 1000
 _MAVLINK_2 = 0xFD  # the first byte of a packet
-_AUTOPILOT = 1
 
 logger = logging.getLogger(__name__)
 
@@ -86,7 +85,7 @@ class Companion:
     def announce(self, system_id: int) -> None:
         """Speak as a component of this vehicle from now on (within a running event loop)."""
         self._sender = mavlink.MAVLink(None, srcSystem=system_id, srcComponent=COMPONENT_ID)
-        self._autopilot = bytes((system_id, _AUTOPILOT))
+        self._autopilot = bytes((system_id, AUTOPILOT_COMPONENT_ID))
         if self._task is None:
             self._task = asyncio.create_task(self._beat_on(), name="companion")
 
@@ -140,13 +139,7 @@ class Companion:
     def beat(self) -> None:
         """Send what is due besides the ticks: heartbeat, pieces of documents, a state that has grown old."""
         if self._hear_autopilot():
-            self._send(
-                mavlink.MAVLink_heartbeat_message(
-                    mavlink.MAV_TYPE_ONBOARD_CONTROLLER,
-                    mavlink.MAV_AUTOPILOT_INVALID,
-                    *(0, 0, mavlink.MAV_STATE_ACTIVE, 3),
-                )
-            )
+            self._send(companion_heartbeat())
         if self._peer is None:
             return
         if self._state and time.monotonic() - self._state_s > SILENT_S:

@@ -23,8 +23,8 @@ from typing import Any
 from mavsdk.asyncio import MavsdkError
 
 from geometry.vectors import Vec3
-from offboard.link.message_order import MessageOrder
 from wire.mission_messages import TEXT_PREFIX
+from wire.vehicle_telemetry import MessageOrder
 
 TICK_US = 50_000
 TEXTS_KEPT = 8

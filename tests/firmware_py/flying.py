@@ -9,8 +9,16 @@ from math import acos, atan2, degrees, hypot, nan
 from firmware_py.airframe import load_airframe
 from firmware_py.autopilot import Autopilot
 from firmware_py.parameters import Parameters
+from firmware_py.setpoints import (
+    AttitudeSetpoint,
+    BodyRateSetpoint,
+    BodyVelocitySetpoint,
+    MotorSetpoint,
+    Setpoint,
+    TrajectorySetpoint,
+)
 from firmware_py.status import CommandResult, FlightMode, LandedState
-from firmware_py.types import GeodeticPoint, ManualInput, Sensors, Setpoint
+from firmware_py.types import GeodeticPoint, ManualInput, Sensors
 from geometry.vectors import Vec3
 from scenarios.models import Scenario
 from sitl.world import World
@@ -19,6 +27,12 @@ ORIGIN = GeodeticPoint(47.397742, 8.545594, 489.0)
 TICKS_PER_S = 250
 _STREAM_TICKS = 12  # setpoints and sticks come at 20 Hz
 _SAMPLE_TICKS = 5
+_KINDS = {
+    "attitude": AttitudeSetpoint,
+    "rate_frd_rad_s": BodyRateSetpoint,
+    "outputs": MotorSetpoint,
+    "velocity_level_m_s": BodyVelocitySetpoint,
+}
 
 
 @dataclass(frozen=True, slots=True)
@@ -133,7 +147,8 @@ class Flight:
 
     def send(self, **setpoint: object) -> None:
         """Send a setpoint from now on, again and again."""
-        self.setpoint = Setpoint(0, **setpoint)
+        kind = next((_KINDS[name] for name in setpoint if name in _KINDS), TrajectorySetpoint)
+        self.setpoint = kind(0, **setpoint)
         self._stream()
 
     def steer(self, seconds: float, **sticks: float) -> list[Sample]:

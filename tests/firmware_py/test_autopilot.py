@@ -9,10 +9,12 @@ from hypothesis import strategies as st
 
 from firmware_py.airframe import load_airframe
 from firmware_py.autopilot import Autopilot
+from firmware_py.commands import VelocityCommand
 from firmware_py.control.limits import FlightLimits
 from firmware_py.parameters import Parameters
+from firmware_py.setpoints import TrajectorySetpoint
 from firmware_py.status import CommandResult, FlightMode, LandedState
-from firmware_py.types import GeodeticPoint, MotorOutput, RateCommand, Sensors, Setpoint
+from firmware_py.types import GeodeticPoint, MotorOutput, Sensors
 
 AIRFRAME = load_airframe("abejorro")
 ORIGIN = GeodeticPoint(47.397742, 8.545594, 489.0)
@@ -77,7 +79,9 @@ class Flight:
         return self
 
     def feed(self, velocity, **parts):
-        self.autopilot.accept_setpoint(Setpoint(self.sensors.time_us, velocity_ned_m_s=velocity, **parts))
+        self.autopilot.accept_setpoint(
+            TrajectorySetpoint(self.sensors.time_us, velocity_ned_m_s=velocity, **parts)
+        )
 
     def airborne(self):
         """Ready, taken off and holding."""
@@ -97,7 +101,7 @@ class Flight:
         self.texts.clear()
         return self
 
-    def _move(self, command: RateCommand | None):
+    def _move(self, command: VelocityCommand | None):
         north, east, down = self.sensors.position_ned_m
         if command is None:
             falls = self.height_m > 0
@@ -280,7 +284,7 @@ def test_offboard_on_the_ground_idles_until_told_to_climb(velocity):
     assert flight.height_m == 0.0
     flight.feed((0.3, 0.0, -0.25), yaw_rate_rad_s=1.0)
     flight.tick()
-    assert flight.stabiliser.command == RateCommand((0.0, 0.0, -0.25), 0.0)  # straight up first
+    assert flight.stabiliser.command == VelocityCommand((0.0, 0.0, -0.25), 0.0)  # straight up first
     assert flight.stabiliser.grounded
     flight.run(0.1)
     assert flight.status.landed_state is LandedState.IN_AIR
@@ -373,7 +377,7 @@ def test_setpoints_lost_on_the_ground_end_disarmed():
 
 def test_what_cannot_be_flown_is_refused_once_and_counts_as_no_setpoint():
     flight = Flight().in_offboard()
-    flight.run(1.5, (nan, nan, nan), attitude=(1.0, 0.0, 0.0, 0.0))  # an attitude without a thrust
+    flight.run(1.5, (nan, nan, nan))
     assert flight.status.failsafe
     assert flight.texts == [
         "Offboard setpoint ignored: nothing in it can be flown",

@@ -6,8 +6,9 @@ import pytest
 
 from firmware_py.airframe import load_airframe
 from firmware_py.autopilot import Autopilot
+from firmware_py.setpoints import TrajectorySetpoint
 from firmware_py.status import CommandResult, FlightMode, LandedState
-from firmware_py.types import GeodeticPoint, Setpoint
+from firmware_py.types import GeodeticPoint
 from scenarios.models import Scenario
 from sitl.world import World
 
@@ -31,7 +32,9 @@ class Flight:
     def run(self, seconds, velocity=None):
         for tick in range(round(seconds * 250)):
             if velocity is not None and tick % 12 == 0:
-                self.autopilot.accept_setpoint(Setpoint(self.world.time_us, velocity_ned_m_s=velocity))
+                self.autopilot.accept_setpoint(
+                    TrajectorySetpoint(self.world.time_us, velocity_ned_m_s=velocity)
+                )
             self.world.step(self.autopilot.step(self.world.sensors()))
         return self
 

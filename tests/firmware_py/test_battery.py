@@ -25,21 +25,21 @@ def test_what_parameters_leave_open_is_the_airframes():
     ("voltage_v", "remaining"), [(17.0, 1.0), (16.2, 1.0), (15.3, 0.5), (14.4, 0.0), (9.0, 0.0)]
 )
 def test_the_voltage_at_rest_tells_the_charge(voltage_v, remaining):
-    monitor = BatteryMonitor()
-    monitor.update(0, voltage_v, 0.0, settings())
+    monitor = BatteryMonitor(X500, Parameters(defaults=X500.parameters))
+    monitor.update(0, voltage_v, 0.0)
     assert monitor.state.remaining == pytest.approx(remaining)
 
 
 def test_the_sag_under_load_is_no_charge_lost():
-    monitor = BatteryMonitor()
-    monitor.update(0, 15.3 - 20.0 * X500.battery.resistance_ohm, 20.0, settings())
+    monitor = BatteryMonitor(X500, Parameters(defaults=X500.parameters))
+    monitor.update(0, 15.3 - 20.0 * X500.battery.resistance_ohm, 20.0)
     assert monitor.state.remaining == pytest.approx(0.5)
 
 
 def test_what_is_drawn_is_counted():
-    monitor = BatteryMonitor()
+    monitor = BatteryMonitor(X500, Parameters(defaults=X500.parameters))
     for tenth in range(601):
-        monitor.update(tenth * 100_000, 16.0, 12.0, settings())
+        monitor.update(tenth * 100_000, 16.0, 12.0)
     assert monitor.state.used_mah == pytest.approx(200.0)
 
 

@@ -4,7 +4,7 @@ from itertools import product
 import pytest
 
 from firmware_py import commander_guards as when
-from firmware_py.commander import Commander
+from firmware_py.commander import Commander, Observation
 from firmware_py.commander_guards import NEVER_US, Cause, Choices, Reaction, Situation, Timeouts
 from firmware_py.commander_table import (
     CAUSE_EVENT,
@@ -580,9 +580,9 @@ def test_a_broken_fence_holds():
 
 
 def _ticks(commander, start_us, count, **conditions):
-    conditions = {"sound": True, "upright": True, "landed": True, "target_reached": False} | conditions
+    seen = Observation(0, sound=True, placed=True, upright=True, landed=True, target_reached=False)
     for tick in range(count):
-        commander.tick(start_us + 4000 * tick, **conditions)
+        commander.tick(seen._replace(now_us=start_us + 4000 * tick, **conditions))
     return start_us + 4000 * count
 
 

@@ -1,11 +1,9 @@
 from dataclasses import replace
-from math import cos, inf, nan, pi, sin
+from math import inf, nan
 
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
 
-from firmware_py.estimator import Estimator, euler_angles
+from firmware_py.estimator import Estimator
 from firmware_py.types import Sensors
 
 REST = Sensors(
@@ -20,33 +18,6 @@ def test_positions_count_from_the_first_sample():
     assert estimator.update(replace(REST, time_us=8000, position_ned_m=(2.0, 2.5, -4.0)))
     assert estimator.state.position_ned_m == (1.0, 0.5, -1.0)
     assert estimator.state.time_us == 8000
-
-
-@given(yaw=st.floats(-pi, pi), pitch=st.floats(-1.5, 1.5), roll=st.floats(-pi, pi))
-def test_euler_angles_of_a_quaternion_made_from_them(yaw, pitch, roll):
-    cy, sy, cp, sp, cr, sr = (
-        cos(yaw / 2),
-        sin(yaw / 2),
-        cos(pitch / 2),
-        sin(pitch / 2),
-        cos(roll / 2),
-        sin(roll / 2),
-    )
-    attitude = (
-        cr * cp * cy + sr * sp * sy,
-        sr * cp * cy - cr * sp * sy,
-        cr * sp * cy + sr * cp * sy,
-        cr * cp * sy - sr * sp * cy,
-    )
-    for found, given_rad in zip(euler_angles(attitude), (roll, pitch, yaw), strict=True):
-        assert cos(found) == pytest.approx(cos(given_rad), abs=1e-6)
-        assert sin(found) == pytest.approx(sin(given_rad), abs=1e-6)
-
-
-def test_straight_up_and_down_have_a_pitch():
-    half = 0.5**0.5
-    assert euler_angles((half, 0.0, half + 1e-12, 0.0))[1] == pytest.approx(pi / 2)
-    assert euler_angles((half, 0.0, -half - 1e-12, 0.0))[1] == pytest.approx(-pi / 2)
 
 
 @pytest.mark.parametrize("bad", [nan, inf, -inf])

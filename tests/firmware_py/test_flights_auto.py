@@ -5,7 +5,7 @@ from math import atan2, cos, degrees, dist, hypot, isnan, nan, radians, remainde
 
 import pytest
 
-from firmware_py.guidance.circles import Orbit, OrbitYaw
+from firmware_py.guidance.orbit import Orbit, OrbitYaw
 from firmware_py.missions.items import PlanType
 from firmware_py.status import CommandResult, FlightMode
 from firmware_py.types import GeodeticPoint

@@ -19,7 +19,7 @@ from types import SimpleNamespace
 
 from mavsdk.exceptions import MavsdkError
 
-from firmware_py.setpoints import setpoint_from_body_velocity
+from firmware_py.offboard_requests import setpoint_from_body_velocity
 from firmware_py.status import CommandResult, FlightMode, LandedState
 from framerunner.flying.plan import FlightPlan
 from offboard.app import MissionEnd, Moment, fly_mission
@@ -228,9 +228,7 @@ class Offboard:
 
         def arrive():
             state = autopilot.state
-            autopilot.accept_setpoint(
-                setpoint_from_body_velocity(velocity, yaw_rate, state.yaw_rad, state.time_us)
-            )
+            autopilot.accept_setpoint(setpoint_from_body_velocity(velocity, yaw_rate, state, state.time_us))
 
         self._vehicle.up.send(now_us, arrive)
 

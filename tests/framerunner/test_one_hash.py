@@ -3,8 +3,7 @@
 from math import inf, nextafter
 
 from framerunner.evaluation.backends import Pool
-from framerunner.evaluation.runner import fly_all
-from framerunner.evaluation.task import fly_task
+from framerunner.evaluation.runner import fly_all, fly_task
 from framerunner.flying.lockstep import StateHash
 from framerunner.flying.plan import FlightPlan
 from offboard.mission import load_mission

@@ -3,7 +3,7 @@
 import asyncio
 from contextlib import asynccontextmanager, suppress
 
-from monitor.server import serve
+from monitor.run import serve
 from monitor.settings import MonitorSettings
 
 

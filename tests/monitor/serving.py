@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 import aiohttp
 
 from monitor.ports import Equipment
-from monitor.server import serve
+from monitor.run import serve
 from monitor.settings import MonitorSettings
 
 
@@ -81,7 +81,7 @@ async def serving(monkeypatch, *modules, bind="127.0.0.1", port=0, password=None
 
     own = ("monitor.live_channel", "monitor.video_proxy", "monitor.pages.login")
     monkeypatch.setattr("monitor.server.MODULES", (*own, *modules))
-    monkeypatch.setattr("monitor.assembly.Fleet", make_fleet)
+    monkeypatch.setattr("monitor.server.Fleet", make_fleet)
     lines: list[str] = []
     up = asyncio.Event()
 

@@ -86,17 +86,17 @@ async def test_the_monitors_own_referee_judges_as_one_that_is_fed_directly(monke
         await watched.until(lambda: vehicle._placement.source is Source.START)
         follow = vehicle._judging.follow
 
-        def follow_and_feed(motion, condition, placement):
-            follow(motion, condition, placement)
+        def follow_and_feed(telemetry, placement):
+            follow(telemetry, placement)
             pose = vehicle.pose(0.0)
-            position = motion.position
+            position, alignment = telemetry.position, placement.alignment
             fed.update(
                 TrueState(
                     position.time_us,
-                    placement.position(position.position_ned_m),
-                    placement.vector(position.velocity_ned_m_s),
+                    alignment.position(position.position_ned_m),
+                    alignment.vector(position.velocity_ned_m_s),
                     tuple(pose["q"]),
-                    condition.armed,
+                    telemetry.armed,
                 )
             )
 

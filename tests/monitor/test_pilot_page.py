@@ -103,7 +103,7 @@ async def monitor(monkeypatch, tmp_path, chromium):
         del fleets[-1].status[2]
         return fleets[-1]
 
-    monkeypatch.setattr("monitor.assembly.Fleet", make_fleet)
+    monkeypatch.setattr("monitor.server.Fleet", make_fleet)
     monkeypatch.setattr(pilot_seat, "SILENT_S", 20.0)  # a busy machine is not a page that fell silent
     monkeypatch.setattr(pilot_seat, "FORSAKEN_S", 60.0)
     async with served(EQUIPMENT, tmp_path) as url:

@@ -186,9 +186,8 @@ def sim(request, tmp_path, instance):
 def station(sim, instance):
     station = Station(14550 + instance, instance + 1)
     station.wait("HEARTBEAT", 20.0)
-    extra_messages.complete(
-        mavutil.mavlink
-    )  # pymavlink has changed to MAVLink 2; it lacks COMPONENT_METADATA
+    # pymavlink has changed to MAVLink 2; it lacks COMPONENT_METADATA.
+    mavutil.mavlink.mavlink_map.update(extra_messages.mavlink_map)
     yield station
     station.link.close()
 

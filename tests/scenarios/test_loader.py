@@ -7,14 +7,13 @@ from hypothesis import strategies as st
 
 from scenarios.level import load_level
 from scenarios.loader import (
-    ScenarioError,
     dump_yaml,
     json_schema,
     list_scenarios,
     load_scenario,
     parse_scenario,
 )
-from scenarios.models import COLOURS, Base, Frame, Scenario, Start
+from scenarios.models import COLOURS, Base, Frame, Scenario, ScenarioError, Start
 from scenarios.random_scenarios import random_scenario
 from scenarios.yaml_file import MAX_BYTES
 from scenarios.yaml_tree import to_yaml

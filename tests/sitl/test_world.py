@@ -5,8 +5,8 @@ from math import hypot, pi
 import pytest
 
 from firmware_py.airframe import load_airframe
+from firmware_py.commands import VelocityCommand
 from firmware_py.control.stabiliser import Stabiliser
-from firmware_py.types import RateCommand
 from scenarios.models import Base, Frame, Scenario, Start
 from sitl.world import CONTROL_PERIOD_US, World
 from tests.flight import state_of
@@ -62,8 +62,8 @@ def test_time_is_exact():
 def test_same_inputs_give_the_same_states_bit_for_bit():
     def states():
         flight = Flight(world(frames=(Frame(colour="red", x_m=1.0, y_m=0.1, z_m=1.0),)))
-        flight.fly(1.0, RateCommand((0.0, 0.0, -0.8)))
-        flight.fly(3.0, RateCommand((1.0, 0.1, 0.0), 0.3))
+        flight.fly(1.0, VelocityCommand((0.0, 0.0, -0.8)))
+        flight.fly(3.0, VelocityCommand((1.0, 0.1, 0.0), 0.3))
         return [(t.position_arena_m, t.attitude_arena, t.contacts) for t in flight.truths]
 
     first = states()
@@ -72,11 +72,11 @@ def test_same_inputs_give_the_same_states_bit_for_bit():
 
 def test_flies_through_a_frame_without_touching():
     flight = Flight(world(frames=(Frame(colour="red", x_m=1.0, y_m=0.0, z_m=1.5),)))
-    flight.fly(3.0, RateCommand((0.0, 0.0, -0.322)))
-    height = flight.fly(1.0, RateCommand()).position_arena_m[2]
-    flight.fly(1.0, RateCommand((0.0, 0.0, height - 1.5)))
-    flight.fly(1.0, RateCommand())
-    last = flight.fly(5.0, RateCommand((0.4, 0.0, 0.0)))
+    flight.fly(3.0, VelocityCommand((0.0, 0.0, -0.322)))
+    height = flight.fly(1.0, VelocityCommand()).position_arena_m[2]
+    flight.fly(1.0, VelocityCommand((0.0, 0.0, height - 1.5)))
+    flight.fly(1.0, VelocityCommand())
+    last = flight.fly(5.0, VelocityCommand((0.4, 0.0, 0.0)))
     assert last.position_arena_m[0] > 1.5
     assert not any("red" in truth.contacts for truth in flight.truths)
 
@@ -86,10 +86,10 @@ def test_a_frame_is_solid(speed_m_s):
     """Flown at beside its opening, the drone touches it, loses speed and does not come out behind it."""
     frame = Frame(colour="blue", x_m=1.2, y_m=0.2, z_m=1.0)
     flight = Flight(world(base=Base(x_m=-4), frames=(frame,)))
-    flight.fly(1.6, RateCommand((0.0, 0.0, -0.65)))
-    flight.fly(1.0, RateCommand())
+    flight.fly(1.6, VelocityCommand((0.0, 0.0, -0.65)))
+    flight.fly(1.0, VelocityCommand())
     before = len(flight.truths)
-    flight.fly(1.0 + 1.2 / speed_m_s, RateCommand((speed_m_s, 0.0, 0.0)))
+    flight.fly(1.0 + 1.2 / speed_m_s, VelocityCommand((speed_m_s, 0.0, 0.0)))
     touched = [truth for truth in flight.truths if "blue" in truth.contacts]
     assert touched
     # The drone's front face stays short of the bar's far side (it gives by a spring's travel).
@@ -99,8 +99,8 @@ def test_a_frame_is_solid(speed_m_s):
 
 def test_the_side_of_the_base_is_solid():
     flight = Flight(world(base=Base(x_m=1.5), start=Start(x_m=0)))
-    flight.fly(1.0, RateCommand((0.0, 0.0, -0.3)))
-    flight.fly(3.0, RateCommand((0.6, 0.0, 0.0)))
+    flight.fly(1.0, VelocityCommand((0.0, 0.0, -0.3)))
+    flight.fly(3.0, VelocityCommand((0.6, 0.0, 0.0)))
     assert any("base" in truth.contacts for truth in flight.truths)
     assert max(truth.position_arena_m[0] for truth in flight.truths) < 1.5 - 0.25 - 0.125 + 0.03
     assert max(truth.position_arena_m[2] for truth in flight.truths) < 0.6
@@ -109,7 +109,7 @@ def test_the_side_of_the_base_is_solid():
 def test_motors_off_above_the_base_falls_onto_it_and_stays():
     w = world(base=Base(), start=Start())
     flight = Flight(w)
-    flight.fly(1.0, RateCommand((0.0, 0.0, -0.2)))
+    flight.fly(1.0, VelocityCommand((0.0, 0.0, -0.2)))
     for _ in range(500):
         w.step((0.0, 0.0, 0.0, 0.0))
     truth = w.truth(w.sensors(), motors_on=False)
@@ -121,8 +121,8 @@ def test_motors_off_above_the_base_falls_onto_it_and_stays():
 def test_a_drone_past_the_edge_falls_off():
     w = world(base=Base(x_m=0.0), start=Start(x_m=0.24, yaw_rad=pi / 4))
     flight = Flight(w)
-    flight.fly(1.0, RateCommand((0.0, 0.0, -0.2)))
-    flight.fly(1.0, RateCommand((0.1, 0.1, 0.0)))
+    flight.fly(1.0, VelocityCommand((0.0, 0.0, -0.2)))
+    flight.fly(1.0, VelocityCommand((0.1, 0.1, 0.0)))
     for _ in range(750):
         w.step((0.0, 0.0, 0.0, 0.0))
     assert w.truth(w.sensors(), motors_on=False).position_arena_m[2] < 0.3

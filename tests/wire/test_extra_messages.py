@@ -1,5 +1,6 @@
 import pytest
 
+from tests.wire.generate_messages import MODULE, generate
 from wire.dialect import mavlink
 from wire.framing import PacketReader
 
@@ -12,6 +13,60 @@ KNOWN = {
     "REQUEST_EVENT": (412, 33, 6),
     "RESPONSE_EVENT_ERROR": (413, 77, 7),
 }
+
+# Fields, and the packet that system 7 sends first.
+PACKETS = {
+    "link_node_status": (
+        tuple(range(1, 12)),
+        "fd24000000070108000001000000000000000400000005000000090000000a0000000b00000006000700080002031df9",
+    ),
+    "esc_info": (
+        (1, 2, 3, 4, 5, 6, [7, 8, 9, 10], [11, 12, 13, 14], [-15, 16, -17, 18]),
+        "fd2e000000070122010002000000000000000b0000000c0000000d0000000e000000"
+        "03000700080009000a00f1ff1000efff120001040506e9f6",
+    ),
+    "esc_status": (
+        (1, 2, [-3, 4, -5, 6], [7.5, 8.0, 9.0, 10.0], [11.0, 12.0, 13.0, 14.5]),
+        "fd3900000007012301000200000000000000fdffffff04000000fbffffff06000000"
+        "0000f04000000041000010410000204100003041000040410000504100006841017253",
+    ),
+    "protocol_version": (
+        (200, 100, 203, list(range(8)), list(range(8, 16))),
+        "fd1600000007012c0100c8006400cb00000102030405060708090a0b0c0d0e0fdc14",
+    ),
+    "time_estimate_to_target": (
+        (-1, 2, 3, 4, 5),
+        "fd1100000007017c0100ffffffff02000000030000000400000005d620",
+    ),
+    "component_information": (
+        (1, 2, b"general", 3, b"other"),
+        "fd7500000007018b010001000000020000000300000067656e6572616c" + "00" * 93 + "6f746865724937",
+    ),
+    "component_metadata": (
+        (1, 2, b"mftp://general.json.xz"),
+        "fd1e00000007018d010001000000020000006d6674703a2f2f67656e6572616c2e6a736f6e2e787a8d9a",
+    ),
+    "event": (
+        (1, 2, 3, 4, 5, 6, [7, *[0] * 38, 8]),
+        "fd3500000007019a01000300000004000000050001020607" + "00" * 38 + "08dac7",
+    ),
+    "current_event_sequence": ((65526, 1), "fd0300000007019b0100f6ff010538"),
+    "request_event": ((1, 2, 3, 4), "fd0600000007019c01000300040001027983"),
+    "response_event_error": ((1, 2, 3, 4, 0), "fd0600000007019d01000300040001023406"),
+}
+
+
+def test_the_module_is_what_the_definitions_give():
+    assert MODULE.read_text(encoding="utf-8") == generate()
+
+
+@pytest.mark.parametrize("name", PACKETS)
+def test_packets_are_these_bytes_and_are_read_again(name):
+    fields, packet = PACKETS[name]
+    message = getattr(mavlink, f"MAVLink_{name}_message")(*fields)
+    assert message.pack(mavlink.MAVLink(None, 7, 1)).hex() == packet
+    (heard,) = PacketReader().feed(bytes.fromhex(packet))
+    assert heard.to_dict() == message.to_dict()
 
 
 @pytest.mark.parametrize("name", KNOWN)

@@ -9,7 +9,8 @@ import pytest
 from pymavlink.dialects.v20 import common as mavlink
 
 from wire.transports.urls import LinkError
-from wire.transports.vehicle_link import VehicleLink, command, companion_heartbeat, is_vehicle
+from wire.transports.vehicle_link import VehicleLink
+from wire.vehicles import companion_heartbeat, is_vehicle, request_message
 
 
 def free_port(kind=socket.SOCK_DGRAM):
@@ -50,7 +51,7 @@ def test_of_several_vehicles_on_one_port_each_gets_what_is_for_it():
             vehicle.sendto(packet(system=system), ("127.0.0.1", port))
             assert next_message(link).get_srcSystem() == system
         for system, vehicle in vehicles.items():
-            link.send(command(system, mavlink.MAV_CMD_REQUEST_MESSAGE, 148))
+            link.send(request_message(system, 148))
             link.send(mavlink.MAVLink_manual_control_message(system, 0, 0, 500, 0, 0))
             assert [parsed(vehicle.recv(300)).get_type() for _ in range(2)] == [
                 "COMMAND_LONG",
@@ -73,7 +74,7 @@ def test_listening_on_udp_hears_and_answers_the_last_speaker():
         vehicle.sendto(packet(), ("127.0.0.1", port))
         heard = next_message(link)
         assert (heard.get_srcSystem(), is_vehicle(heard)) == (3, True)
-        link.send(command(3, mavlink.MAV_CMD_REQUEST_MESSAGE, 148))
+        link.send(request_message(3, 148))
         vehicle.settimeout(5)
         asked = parsed(vehicle.recv(300))
         assert (asked.command, asked.param1, asked.param7) == (512, 148, 0)

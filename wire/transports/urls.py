@@ -16,12 +16,14 @@ import re
 from dataclasses import dataclass
 from urllib.parse import parse_qsl
 
+from errors import UserError
+
 SCHEMES = ("udpin", "udpout", "tcpin", "tcpout", "serial")
 MAX_PORT = 65535
 _URL = re.compile(r"(?P<scheme>[a-z]+)://(?P<address>[^?]+):(?P<number>[0-9]{1,9})(?:\?(?P<options>.*))?\Z")
 
 
-class LinkError(Exception):
+class LinkError(UserError):
     """A link that cannot be opened or has failed; the message is one line for people."""
 
 

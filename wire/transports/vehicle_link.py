@@ -13,8 +13,6 @@ from wire.framing import PacketReader
 from wire.transports.sockets import Address, UdpSocket, open_drone
 from wire.transports.urls import LinkError, parse_url
 
-AUTOPILOT_COMPONENT = mavlink.MAV_COMP_ID_AUTOPILOT1
-
 
 class VehicleLink:
     """One link, used by one thread. Several vehicles may be heard on it.
@@ -84,31 +82,3 @@ class VehicleLink:
     def close(self) -> None:
         """Let go of the port or device."""
         self._transport.close()
-
-
-def is_vehicle(heartbeat: Message) -> bool:
-    """Whether a HEARTBEAT comes from an autopilot, not from a ground station, camera or companion."""
-    return bool(
-        heartbeat.get_srcComponent() == AUTOPILOT_COMPONENT
-        and heartbeat.autopilot != mavlink.MAV_AUTOPILOT_INVALID
-        and heartbeat.type != mavlink.MAV_TYPE_GCS
-    )
-
-
-def companion_heartbeat() -> Message:
-    """What a companion computer says of itself. From a system id of its own it changes nothing at PX4."""
-    return mavlink.MAVLink_heartbeat_message(
-        mavlink.MAV_TYPE_ONBOARD_CONTROLLER, mavlink.MAV_AUTOPILOT_INVALID, 0, 0, mavlink.MAV_STATE_ACTIVE, 3
-    )
-
-
-def command(system_id: int, number: int, *parameters: float) -> Message:
-    """A COMMAND_LONG to a vehicle's autopilot.
-
-    Args:
-        system_id: of the vehicle.
-        number: MAV_CMD.
-        *parameters: the first ones of seven; the others are 0.
-    """
-    filled = (*parameters, *([0.0] * (7 - len(parameters))))
-    return mavlink.MAVLink_command_long_message(system_id, AUTOPILOT_COMPONENT, number, 0, *filled)

@@ -11,6 +11,7 @@ from collections.abc import Callable
 from functools import partial
 from math import dist, inf, isfinite, isnan
 
+from firmware_py.autopilot import Autopilot
 from firmware_py.mavlink.camera import messages
 from firmware_py.mavlink.camera.model import (
     CAMERA_COMPONENT_ID,
@@ -19,7 +20,6 @@ from firmware_py.mavlink.camera.model import (
     CountingSink,
     VideoStream,
 )
-from firmware_py.mavlink.port import AutopilotPort
 from firmware_py.mavlink.service import Command, Service, SevenParams
 from firmware_py.status import CommandResult
 from geometry.vectors import Vec3
@@ -52,7 +52,7 @@ class Captures:
     """
 
     def __init__(
-        self, autopilot: AutopilotPort, exchange: Exchange, camera: CameraModel, sink: CaptureSink
+        self, autopilot: Autopilot, exchange: Exchange, camera: CameraModel, sink: CaptureSink
     ) -> None:
         self._autopilot = autopilot
         self._exchange = exchange
@@ -146,7 +146,7 @@ class CameraComponent(Service):
 
     def __init__(
         self,
-        autopilot: AutopilotPort,
+        autopilot: Autopilot,
         exchange: Exchange,
         camera: CameraModel,
         video: tuple[VideoStream, ...] = (),

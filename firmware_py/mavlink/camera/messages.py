@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from math import nan
 
+from firmware_py.autopilot import Autopilot
 from firmware_py.mavlink.camera.model import CameraModel, PictureSpace, VideoEncoding, VideoStream
-from firmware_py.mavlink.port import AutopilotPort
 from firmware_py.mavlink.scaling import boot_ms, degrees_e7, millimetres
 from firmware_py.mavlink.telemetry.identity import OWN_VERSION
 from firmware_py.status import FlightMode
@@ -111,7 +111,7 @@ def capture_status(interval_s: float, count: int, space: PictureSpace | None, ti
     )
 
 
-def image_captured(autopilot: AutopilotPort, exchange: Exchange, index: int, url: str | None) -> Message:
+def image_captured(autopilot: Autopilot, exchange: Exchange, index: int, url: str | None) -> Message:
     """CAMERA_IMAGE_CAPTURED: a picture taken now, where, and its URL; None: it could not be taken."""
     place, home = autopilot.global_position(), autopilot.status.home
     altitude_m = place.altitude_m if place else 0.0

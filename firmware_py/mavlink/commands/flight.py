@@ -4,17 +4,17 @@ from __future__ import annotations
 
 from math import copysign, floor, isfinite, isinf, isnan, nan
 
-from firmware_py.guidance.circles import Orbit, OrbitYaw
-from firmware_py.mavlink.port import AutopilotPort
+from firmware_py.autopilot import Autopilot
+from firmware_py.guidance.orbit import Orbit, OrbitYaw
 from firmware_py.mavlink.service import Command, Service
-from firmware_py.mavlink.telemetry.identity import MODES_BY_STANDARD
 from firmware_py.status import CommandResult, FlightMode
 from firmware_py.types import GeodeticPoint
 from geometry.vectors import NAN3, Vec3
 from wire.dialect import mavlink
 
 FORCE_MAGIC = 21196.0  # param2 of COMPONENT_ARM_DISARM
-_MODES = {mode.value: mode for mode in FlightMode}
+_STANDARD_MODES = {mode.value.standard: mode for mode in FlightMode if mode.value.standard}
+_MODES = {(mode.value.main, mode.value.sub): mode for mode in FlightMode}
 _WARNING = mavlink.MAV_SEVERITY_WARNING
 _CRITICAL = mavlink.MAV_SEVERITY_CRITICAL
 _MIN_ORBIT_M = 1.0
@@ -23,7 +23,7 @@ _MIN_ORBIT_M = 1.0
 class FlightCommands(Service):
     """Passes them to the autopilot."""
 
-    def __init__(self, autopilot: AutopilotPort) -> None:
+    def __init__(self, autopilot: Autopilot) -> None:
         self._autopilot = autopilot
         self.commands = {
             mavlink.MAV_CMD_NAV_RETURN_TO_LAUNCH: self._return,
@@ -83,7 +83,7 @@ class FlightCommands(Service):
 
     def _set_standard_mode(self, command: Command) -> CommandResult:
         wanted = command.params[0]
-        mode = MODES_BY_STANDARD.get(_small(wanted))
+        mode = _STANDARD_MODES.get(_small(wanted))
         if mode is None:
             self._autopilot.say(_WARNING, f"Mode change refused: no standard mode {wanted:g} here")
             return CommandResult.TEMPORARILY_REJECTED

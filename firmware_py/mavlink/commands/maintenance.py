@@ -9,7 +9,7 @@ from __future__ import annotations
 from math import floor, isfinite
 from typing import Protocol
 
-from firmware_py.mavlink.port import AutopilotPort
+from firmware_py.autopilot import Autopilot
 from firmware_py.mavlink.service import Command, Service
 from firmware_py.status import CommandResult
 from wire.dialect import mavlink
@@ -40,7 +40,7 @@ class MaintenanceCommands(Service):
         failures: breaks parts; None: nothing can be broken.
     """
 
-    def __init__(self, autopilot: AutopilotPort, failures: FailureSink | None) -> None:
+    def __init__(self, autopilot: Autopilot, failures: FailureSink | None) -> None:
         self._autopilot = autopilot
         self._failures = failures
         self.commands = {

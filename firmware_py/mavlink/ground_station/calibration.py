@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from firmware_py.mavlink.port import AutopilotPort
+from firmware_py.autopilot import Autopilot
 from firmware_py.mavlink.service import Command, Service
 from firmware_py.status import CommandResult
 from wire.dialect import mavlink
@@ -14,7 +14,7 @@ _ACCELEROMETER, _LEVEL = 1.0, 2.0  # param 5
 class CalibrationService(Service):
     """Says that it is done."""
 
-    def __init__(self, autopilot: AutopilotPort) -> None:
+    def __init__(self, autopilot: Autopilot) -> None:
         self._autopilot = autopilot
         self.commands = {mavlink.MAV_CMD_PREFLIGHT_CALIBRATION: self._calibrate}
 

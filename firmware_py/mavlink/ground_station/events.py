@@ -10,6 +10,7 @@ from __future__ import annotations
 from collections import deque
 from dataclasses import dataclass
 
+from firmware_py.autopilot import Autopilot
 from firmware_py.mavlink.ground_station.event_definitions import (
     ALL_MODES,
     ARMING_SUMMARY,
@@ -24,7 +25,6 @@ from firmware_py.mavlink.ground_station.event_definitions import (
     Part,
     event_of,
 )
-from firmware_py.mavlink.port import AutopilotPort
 from firmware_py.mavlink.scaling import boot_ms
 from firmware_py.mavlink.service import Command, Service
 from firmware_py.status import CommandResult, FlightMode
@@ -38,8 +38,6 @@ _KEPT = 20
 _SEQUENCE_PERIOD_US = 3_000_000
 _HEALTH_PERIOD_US = 100_000  # between looks
 _REPORT_GAP_US = 2_000_000  # between reports that nobody asked for
-_FLAG_RESET = 1  # MAV_EVENT_CURRENT_SEQUENCE_FLAGS_RESET
-_UNAVAILABLE = 0  # MAV_EVENT_ERROR_REASON_UNAVAILABLE
 _LEAST_SEVERE = mavlink.MAV_SEVERITY_DEBUG
 _UNARMABLE = sum(
     1 << MODE_GROUPS[mode]
@@ -121,7 +119,7 @@ class HealthReport:
         return events
 
 
-def assess(autopilot: AutopilotPort) -> HealthReport:
+def assess(autopilot: Autopilot) -> HealthReport:
     """The report as it is now."""
     status = autopilot.status
     present, failing = _ALWAYS_THERE, Part(0)
@@ -147,7 +145,7 @@ def _check(reason: str, intended: FlightMode) -> Check:
 class EventService(Service):
     """Tells events, on all links."""
 
-    def __init__(self, autopilot: AutopilotPort, exchange: Exchange) -> None:
+    def __init__(self, autopilot: Autopilot, exchange: Exchange) -> None:
         self._autopilot = autopilot
         self._exchange = exchange
         self._sequence = _FIRST_SEQUENCE
@@ -198,7 +196,7 @@ class EventService(Service):
             self.send(Occurrence(MODE_CHANGED, mavlink.MAV_SEVERITY_INFO, (MODE_GROUPS[mode],)))
         if now_us >= self._sequence_due_us:
             self._sequence_due_us = now_us + _SEQUENCE_PERIOD_US
-            flags = 0 if self._recent else _FLAG_RESET
+            flags = 0 if self._recent else mavlink.MAV_EVENT_CURRENT_SEQUENCE_FLAGS_RESET
             message = mavlink.MAVLink_current_event_sequence_message(self._sequence, flags)
             self._exchange.broadcast(message)
         if now_us >= self._health_due_us:
@@ -242,5 +240,5 @@ class EventService(Service):
             request.get_srcComponent(),
             sequence,
             after[0] if after else self._sequence,
-            _UNAVAILABLE,
+            mavlink.MAV_EVENT_ERROR_REASON_UNAVAILABLE,
         )

@@ -13,6 +13,7 @@ from collections.abc import Iterator, Mapping
 from functools import lru_cache
 from zlib import crc32
 
+from firmware_py.autopilot import Autopilot
 from firmware_py.mavlink.ground_station.event_definitions import (
     COMPONENT,
     NAMESPACE,
@@ -21,7 +22,6 @@ from firmware_py.mavlink.ground_station.event_definitions import (
     enums,
     navigation_mode_groups,
 )
-from firmware_py.mavlink.port import AutopilotPort
 from firmware_py.mavlink.scaling import boot_ms
 from firmware_py.mavlink.service import Service
 from firmware_py.parameters import DECLARATIONS, Parameter, Parameters
@@ -183,7 +183,7 @@ def _event(kind: EventKind) -> dict[str, object]:
 class MetadataService(Service):
     """Says where the files are."""
 
-    def __init__(self, autopilot: AutopilotPort, exchange: Exchange) -> None:
+    def __init__(self, autopilot: Autopilot, exchange: Exchange) -> None:
         self._autopilot = autopilot
         self._exchange = exchange
         self.replies = {

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from math import atan2, degrees, hypot
 
-from firmware_py.mavlink.port import AutopilotPort
+from firmware_py.autopilot import Autopilot
 from firmware_py.mavlink.scaling import degrees_e7, whole
 from firmware_py.mavlink.service import Service
 from firmware_py.status import LandedState, VehicleStatus
@@ -26,7 +26,7 @@ _EPOCH_2019_S = 1_546_300_800
 class RemoteIdService(Service):
     """Tells others where the vehicle and its operator are."""
 
-    def __init__(self, autopilot: AutopilotPort, exchange: Exchange) -> None:
+    def __init__(self, autopilot: Autopilot, exchange: Exchange) -> None:
         self._autopilot = autopilot
         self._exchange = exchange
         self.sources = {

@@ -13,7 +13,7 @@ from dataclasses import dataclass, field
 from fnmatch import fnmatchcase
 from math import degrees
 
-from firmware_py.mavlink.port import AutopilotPort
+from firmware_py.autopilot import Autopilot
 from firmware_py.mavlink.service import Service
 from firmware_py.mavlink.telemetry.identity import FOLLOWED_PX4_VERSION, OWN_VERSION
 from firmware_py.parameters import ParameterError
@@ -48,7 +48,7 @@ class Console:
         system_id: of the vehicle.
     """
 
-    def __init__(self, autopilot: AutopilotPort, system_id: int) -> None:
+    def __init__(self, autopilot: Autopilot, system_id: int) -> None:
         self._autopilot = autopilot
         self._system_id = system_id
         self._commands: dict[str, Callable[[list[str]], str]] = {
@@ -164,7 +164,7 @@ class _Shell:
 class ShellService(Service):
     """Answers what is typed."""
 
-    def __init__(self, autopilot: AutopilotPort, exchange: Exchange) -> None:
+    def __init__(self, autopilot: Autopilot, exchange: Exchange) -> None:
         self._console = Console(autopilot, exchange.system_id)
         self._exchange = exchange
         self._shells: dict[tuple[str, int, int], _Shell] = {}

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from math import isfinite
 
+from firmware_py.autopilot import Autopilot
 from firmware_py.geodesy import LocalProjection
 from firmware_py.mavlink.camera.model import CameraControl
 from firmware_py.mavlink.missions.messages import mission_current
-from firmware_py.mavlink.port import AutopilotPort
 from firmware_py.mavlink.service import Command, Service
 from firmware_py.missions.checks import mission_faults
 from firmware_py.missions.flight import IssuedCommand, View
@@ -38,7 +38,7 @@ class MissionExecution(Service):
         camera: that the mission may command; None: there is none.
     """
 
-    def __init__(self, autopilot: AutopilotPort, exchange: Exchange, camera: CameraControl | None) -> None:
+    def __init__(self, autopilot: Autopilot, exchange: Exchange, camera: CameraControl | None) -> None:
         self._autopilot = autopilot
         self._exchange = exchange
         self._camera = camera
@@ -100,7 +100,7 @@ class MissionExecution(Service):
         self._repeat_due_us = self._exchange.time_us + _REPEAT_US
         self._exchange.broadcast(mavlink.MAVLink_mission_item_reached_message(seq))
 
-    def _update_view(self, autopilot: AutopilotPort) -> None:
+    def _update_view(self, autopilot: Autopilot) -> None:
         """Bring the view of the vehicle up to date."""
         view, status = self._view, autopilot.status
         if status.origin is not self._origin:
@@ -180,7 +180,7 @@ class MissionExecution(Service):
         return self._camera.run(issued.command, issued.params)
 
 
-def _mission_state(autopilot: AutopilotPort) -> int:
+def _mission_state(autopilot: Autopilot) -> int:
     store = autopilot.missions
     if not store.mission.items or not store.valid:
         state = mavlink.MISSION_STATE_NO_MISSION

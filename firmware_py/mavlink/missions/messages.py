@@ -12,7 +12,7 @@ from math import isfinite, isinf, isnan, nan
 from struct import pack
 
 from firmware_py.mavlink.scaling import whole
-from firmware_py.missions.fence_shapes import FEWEST_VERTICES, vertex_count
+from firmware_py.missions.geofence import MIN_VERTICES, vertex_count
 from firmware_py.missions.items import (
     CIRCLES,
     GLOBAL_FRAMES,
@@ -104,8 +104,8 @@ def _faults(item: MissionItem) -> Iterator[Refusal]:
         yield Refusal(mavlink.MAV_MISSION_INVALID_PARAM2, f"count {second:g} of jumps is none")
     if item.command in CIRCLES and not (isfinite(first) and first >= 0.0):
         yield Refusal(mavlink.MAV_MISSION_INVALID_PARAM1, f"radius {first:g} is none")
-    if item.command in POLYGONS and vertex_count(item) < FEWEST_VERTICES:
-        yield Refusal(mavlink.MAV_MISSION_ERROR, f"a polygon needs {FEWEST_VERTICES} vertices")
+    if item.command in POLYGONS and vertex_count(item) < MIN_VERTICES:
+        yield Refusal(mavlink.MAV_MISSION_ERROR, f"a polygon needs {MIN_VERTICES} vertices")
 
 
 def _is_angle(angle_deg: float, largest_deg: float, *, optional: bool) -> bool:

@@ -15,11 +15,11 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 from functools import partial
 
+from firmware_py.autopilot import Autopilot
 from firmware_py.mavlink.missions.execution import MissionExecution
 from firmware_py.mavlink.missions.messages import Refusal, item_message, mission_ack, mission_count, read_item
-from firmware_py.mavlink.port import AutopilotPort
 from firmware_py.mavlink.service import Service
-from firmware_py.missions.fence_shapes import fence_fault
+from firmware_py.missions.geofence import fence_fault
 from firmware_py.missions.items import MissionItem, PlanType
 from firmware_py.missions.store import Plan
 from wire.dialect import Message, mavlink
@@ -118,7 +118,7 @@ class Outcome:
 class MissionService(Service):
     """Missions, fences and rally points over MAVLink; one upload at a time on all links together."""
 
-    def __init__(self, autopilot: AutopilotPort, exchange: Exchange, execution: MissionExecution) -> None:
+    def __init__(self, autopilot: Autopilot, exchange: Exchange, execution: MissionExecution) -> None:
         self._autopilot = autopilot
         self._exchange = exchange
         self._execution = execution

@@ -8,8 +8,8 @@ from __future__ import annotations
 
 from struct import pack, unpack
 
+from firmware_py.autopilot import Autopilot
 from firmware_py.mavlink.parameters.protocol import BY_NAME, TYPES, Listings, Refusals
-from firmware_py.mavlink.port import AutopilotPort
 from firmware_py.mavlink.service import Service
 from firmware_py.parameters import Parameter, ParameterError
 from wire.dialect import Message, mavlink
@@ -22,7 +22,7 @@ _VALUE_BYTES = 128
 class ExtendedParameterService(Service):
     """Answers for the parameters."""
 
-    def __init__(self, autopilot: AutopilotPort, exchange: Exchange) -> None:
+    def __init__(self, autopilot: Autopilot, exchange: Exchange) -> None:
         self._parameters = autopilot.parameters
         self._exchange = exchange
         self._listings = Listings(exchange, len(self._parameters), self._message)

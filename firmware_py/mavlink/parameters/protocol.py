@@ -10,7 +10,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from struct import pack, unpack
 
-from firmware_py.mavlink.port import AutopilotPort
+from firmware_py.autopilot import Autopilot
 from firmware_py.mavlink.service import Command, Service
 from firmware_py.parameters import Parameter, ParameterError
 from firmware_py.status import CommandResult
@@ -46,7 +46,7 @@ class Refusals:
 
     __slots__ = ("_autopilot", "_exchange", "_said", "_said_us")
 
-    def __init__(self, autopilot: AutopilotPort, exchange: Exchange) -> None:
+    def __init__(self, autopilot: Autopilot, exchange: Exchange) -> None:
         self._autopilot = autopilot
         self._exchange = exchange
         self._said = ""
@@ -113,7 +113,7 @@ class Listings:
 class ParameterService(Service):
     """Answers for the parameters and sends the lists that were asked for."""
 
-    def __init__(self, autopilot: AutopilotPort, exchange: Exchange) -> None:
+    def __init__(self, autopilot: Autopilot, exchange: Exchange) -> None:
         self._autopilot = autopilot
         self._parameters = autopilot.parameters
         self._exchange = exchange

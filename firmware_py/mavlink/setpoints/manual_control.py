@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from firmware_py.mavlink.port import AutopilotPort
+from firmware_py.autopilot import Autopilot
 from firmware_py.mavlink.scaling import boot_ms
 from firmware_py.mavlink.service import Service
 from firmware_py.types import ManualInput
@@ -23,7 +23,7 @@ _STALE_US = 500_000  # COM_RC_LOSS_T's default
 class ManualControlService(Service):
     """Takes sticks to the autopilot; tells a remote control's channels, and nothing without one, as PX4."""
 
-    def __init__(self, autopilot: AutopilotPort, exchange: Exchange) -> None:
+    def __init__(self, autopilot: Autopilot, exchange: Exchange) -> None:
         self._autopilot = autopilot
         self._exchange = exchange
         self._pulses_us: list[int] = []  # of the channels that are given, from the first on

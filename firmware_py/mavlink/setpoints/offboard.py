@@ -1,24 +1,25 @@
 """Offboard setpoints: positions, velocities, accelerations, attitudes, rates, motors; and a target to follow.
 
-The rules are in `firmware_py.setpoints`. Differences from PX4: the same refusal is said once a second at
-most, not with every packet; SET_ACTUATOR_CONTROL_TARGET, which PX4 1.17 no longer knows, is flown.
+The rules are in `firmware_py.offboard_requests`. Differences from PX4: the same refusal is said once a
+second at most, not with every packet; SET_ACTUATOR_CONTROL_TARGET, which PX4 1.17 no longer knows, is flown.
 """
 
 from __future__ import annotations
 
 from math import isfinite
 
-from firmware_py.mavlink.port import AutopilotPort
+from firmware_py.autopilot import Autopilot
 from firmware_py.mavlink.service import Service
-from firmware_py.setpoints import (
+from firmware_py.offboard_requests import (
     LocalTarget,
-    TargetFrame,
+    SetpointRefusal,
     TargetMask,
     setpoint_from_attitude,
     setpoint_from_controls,
     setpoint_from_target,
 )
-from firmware_py.types import GeodeticPoint, Setpoint
+from firmware_py.setpoints import Setpoint
+from firmware_py.types import GeodeticPoint
 from geometry.vectors import NAN3, Vec3
 from wire.dialect import Message, mavlink
 from wire.exchange import Exchange
@@ -46,7 +47,7 @@ _HAS_VELOCITY = 1 << 1  # est_capabilities of FOLLOW_TARGET
 class OffboardService(Service):
     """Takes setpoints to the autopilot, refusals to people."""
 
-    def __init__(self, autopilot: AutopilotPort, exchange: Exchange) -> None:
+    def __init__(self, autopilot: Autopilot, exchange: Exchange) -> None:
         self._autopilot = autopilot
         self._exchange = exchange
         self._said_us: dict[str, int] = {}  # one key for each frame number and some more: bounded
@@ -70,13 +71,14 @@ class OffboardService(Service):
         relative = _ALTITUDES.get(message.coordinate_frame)
         if relative is None:
             frame = message.coordinate_frame
-            self._take(f"SET_POSITION_TARGET_GLOBAL_INT invalid coordinate frame {frame}")
+            text = f"SET_POSITION_TARGET_GLOBAL_INT invalid coordinate frame {frame}"
+            self._take(SetpointRefusal(text))
             return
         position: Vec3 | None = NAN3
         if not message.type_mask & _PLACE:
             position = self._place(message, relative=relative)
         if position is not None:  # without a home no height above it: no setpoint, as in PX4
-            self._take(self._from_target(message, TargetFrame.LOCAL_NED, position))
+            self._take(self._from_target(message, mavlink.MAV_FRAME_LOCAL_NED, position))
 
     def _attitude(self, _link: Link, message: Message) -> None:
         if not self._exchange.is_for_us(message, or_everyone=True):
@@ -106,16 +108,16 @@ class OffboardService(Service):
         )
         self._take(setpoint)
 
-    def _take(self, setpoint: Setpoint | str) -> None:
-        if not isinstance(setpoint, str):
-            self._autopilot.accept_setpoint(setpoint)
+    def _take(self, request: Setpoint | SetpointRefusal) -> None:
+        if isinstance(request, Setpoint):
+            self._autopilot.accept_setpoint(request)
             return
-        said_us = self._said_us.get(setpoint)
+        said_us = self._said_us.get(request.text)
         if said_us is None or self._exchange.time_us - said_us >= _SAY_AGAIN_US:
-            self._said_us[setpoint] = self._exchange.time_us
-            self._autopilot.say(mavlink.MAV_SEVERITY_CRITICAL, setpoint)
+            self._said_us[request.text] = self._exchange.time_us
+            self._autopilot.say(mavlink.MAV_SEVERITY_CRITICAL, request.text)
 
-    def _from_target(self, message: Message, frame: int, position_m: Vec3) -> Setpoint | str:
+    def _from_target(self, message: Message, frame: int, position_m: Vec3) -> Setpoint | SetpointRefusal:
         target = LocalTarget(
             frame=frame,
             type_mask=message.type_mask,

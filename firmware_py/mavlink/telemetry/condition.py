@@ -9,10 +9,9 @@ from __future__ import annotations
 from functools import partial
 from math import ceil, isfinite
 
-from firmware_py.mavlink.port import AutopilotPort
+from firmware_py.autopilot import Autopilot
 from firmware_py.mavlink.scaling import boot_ms, whole
 from firmware_py.mavlink.service import Service
-from firmware_py.mavlink.telemetry.identity import standard_mode
 from firmware_py.status import LandedState
 from firmware_py.types import MotorSpeeds
 from wire.dialect import Message, mavlink
@@ -44,10 +43,9 @@ _SERVOS = 16
 _OUTPUTS = 32
 _BATCH = 4  # motors in one ESC message
 _RPM = 60.0 / 6.283185307179586  # of 1 rad/s
-_BY_PULSES = 0  # ESC_CONNECTION_TYPE_PPM
 
 
-def sys_status(autopilot: AutopilotPort) -> Message:
+def sys_status(autopilot: Autopilot) -> Message:
     """SYS_STATUS: the health bits that clients wait for, and the battery in short."""
     status, battery = autopilot.status, autopilot.battery
     missing = 0 if status.origin is not None else _POSITION
@@ -79,14 +77,14 @@ def sys_status(autopilot: AutopilotPort) -> Message:
     )
 
 
-def extended_sys_state(autopilot: AutopilotPort) -> Message:
+def extended_sys_state(autopilot: Autopilot) -> Message:
     """EXTENDED_SYS_STATE."""
     return mavlink.MAVLink_extended_sys_state_message(
         mavlink.MAV_VTOL_STATE_UNDEFINED, int(autopilot.status.landed_state)
     )
 
 
-def battery_status(autopilot: AutopilotPort) -> Message:
+def battery_status(autopilot: Autopilot) -> Message:
     """BATTERY_STATUS: one pack, whose whole voltage stands where the first cell's would, as PX4 tells it."""
     battery = autopilot.battery
     return mavlink.MAVLink_battery_status_message(
@@ -104,17 +102,17 @@ def battery_status(autopilot: AutopilotPort) -> Message:
     )
 
 
-def current_mode(autopilot: AutopilotPort) -> Message:
+def current_mode(autopilot: Autopilot) -> Message:
     """CURRENT_MODE: the mode flown and the one asked for."""
     status = autopilot.status
     return mavlink.MAVLink_current_mode_message(
-        standard_mode(status.mode),
+        status.mode.value.standard,
         status.mode.custom_mode,
         status.intended_mode.custom_mode,
     )
 
 
-def estimator_status(autopilot: AutopilotPort) -> Message:
+def estimator_status(autopilot: Autopilot) -> Message:
     """ESTIMATOR_STATUS: the flags PX4 shows, 895 in flight and 959 standing."""
     status = autopilot.status
     flags = mavlink.ESTIMATOR_ATTITUDE
@@ -137,12 +135,12 @@ def estimator_status(autopilot: AutopilotPort) -> Message:
     )
 
 
-def vibration(autopilot: AutopilotPort) -> Message:
+def vibration(autopilot: Autopilot) -> Message:
     """VIBRATION: none."""
     return mavlink.MAVLink_vibration_message(autopilot.state.time_us, 0.0, 0.0, 0.0, 0, 0, 0)
 
 
-def flight_information(autopilot: AutopilotPort) -> Message:
+def flight_information(autopilot: Autopilot) -> Message:
     """FLIGHT_INFORMATION: since when it is armed and in the air, in vehicle time as PX4; 0: it is not."""
     status, flight = autopilot.status, autopilot.flight
     flying = status.armed and flight.takeoff_us > flight.landed_us
@@ -155,7 +153,7 @@ def flight_information(autopilot: AutopilotPort) -> Message:
     )
 
 
-def servo_output_raw(autopilot: AutopilotPort) -> Message:
+def servo_output_raw(autopilot: Autopilot) -> Message:
     """SERVO_OUTPUT_RAW: motor speeds as pulses, 900 µs disarmed, 1000 to 2000 µs from rest to full speed."""
     pulses = _pulses(autopilot)
     return mavlink.MAVLink_servo_output_raw_message(
@@ -163,7 +161,7 @@ def servo_output_raw(autopilot: AutopilotPort) -> Message:
     )
 
 
-def actuator_output_status(autopilot: AutopilotPort) -> Message:
+def actuator_output_status(autopilot: Autopilot) -> Message:
     """ACTUATOR_OUTPUT_STATUS: the same pulses."""
     pulses = [float(pulse) for pulse in _pulses(autopilot)]
     return mavlink.MAVLink_actuator_output_status_message(
@@ -171,7 +169,7 @@ def actuator_output_status(autopilot: AutopilotPort) -> Message:
     )
 
 
-def esc_status(autopilot: AutopilotPort) -> Message:
+def esc_status(autopilot: Autopilot) -> Message:
     """ESC_STATUS of the first four motors; each is said to draw its share of the current."""
     speeds = _speeds(autopilot)
     motors = len(speeds)
@@ -186,7 +184,7 @@ def esc_status(autopilot: AutopilotPort) -> Message:
     )
 
 
-def esc_info(autopilot: AutopilotPort, time_us: int) -> Message:
+def esc_info(autopilot: Autopilot, time_us: int) -> Message:
     """ESC_INFO of the first four motors: all there, nothing wrong, temperatures unknown."""
     motors = len(autopilot.airframe.rotors)
     return mavlink.MAVLink_esc_info_message(
@@ -194,7 +192,7 @@ def esc_info(autopilot: AutopilotPort, time_us: int) -> Message:
         autopilot.state.time_us,
         time_us // 100_000 & 0xFFFF,
         motors,
-        _BY_PULSES,
+        mavlink.ESC_CONNECTION_TYPE_PPM,
         (1 << min(motors, 8)) - 1,
         [0] * _BATCH,
         [0] * _BATCH,
@@ -202,12 +200,12 @@ def esc_info(autopilot: AutopilotPort, time_us: int) -> Message:
     )
 
 
-def _speeds(autopilot: AutopilotPort) -> MotorSpeeds:
+def _speeds(autopilot: Autopilot) -> MotorSpeeds:
     speeds = autopilot.output.speeds_rad_s[:_BATCH]
     return speeds if autopilot.status.armed else (0.0,) * len(speeds)
 
 
-def _pulses(autopilot: AutopilotPort) -> list[int]:
+def _pulses(autopilot: Autopilot) -> list[int]:
     speeds_rad_s = autopilot.output.speeds_rad_s[:_SERVOS]
     if not autopilot.status.armed:
         return [_PWM_DISARMED_US] * len(speeds_rad_s)
@@ -218,7 +216,7 @@ def _pulses(autopilot: AutopilotPort) -> list[int]:
 class ConditionTelemetry(Service):
     """Streams what the functions of this module make."""
 
-    def __init__(self, autopilot: AutopilotPort, exchange: Exchange) -> None:
+    def __init__(self, autopilot: Autopilot, exchange: Exchange) -> None:
         of_autopilot = {
             message_id: partial(make, autopilot)
             for message_id, make in {

@@ -6,7 +6,7 @@ somebody tells it, at boot or by the same message.
 
 from __future__ import annotations
 
-from firmware_py.mavlink.port import AutopilotPort
+from firmware_py.autopilot import Autopilot
 from firmware_py.mavlink.scaling import boot_ms
 from firmware_py.mavlink.service import Service
 from firmware_py.status import FlightMode, VehicleStatus
@@ -19,28 +19,11 @@ _MAX_UNIX_US = 1 << 62
 _DATE_DIFFERENCE_US = 60_000_000  # by which a date must be later than ours
 _CUSTOM = mavlink.MAV_MODE_FLAG_CUSTOM_MODE_ENABLED
 _ARMED = mavlink.MAV_MODE_FLAG_SAFETY_ARMED
-_MANUAL = mavlink.MAV_MODE_FLAG_MANUAL_INPUT_ENABLED
-_STABILISED = mavlink.MAV_MODE_FLAG_STABILIZE_ENABLED
-_AUTO = (
-    mavlink.MAV_MODE_FLAG_AUTO_ENABLED
-    | mavlink.MAV_MODE_FLAG_GUIDED_ENABLED
-    | mavlink.MAV_MODE_FLAG_STABILIZE_ENABLED
-)
-_FLAGS = {
-    FlightMode.ACRO: _MANUAL,
-    FlightMode.MANUAL: _MANUAL | _STABILISED,
-    FlightMode.STABILIZED: _MANUAL | _STABILISED,
-    FlightMode.ALTITUDE: _MANUAL | _STABILISED,
-    FlightMode.POSITION: _MANUAL | _STABILISED,
-    FlightMode.ORBIT: _STABILISED,
-    FlightMode.OFFBOARD: _STABILISED,
-    FlightMode.TERMINATION: 0,
-}
 
 
 def base_mode(status: VehicleStatus) -> int:
     """HEARTBEAT.base_mode as PX4 sets it: 29 disarmed and 157 armed in auto modes, 17 and 145 in offboard."""
-    return int(_CUSTOM | _FLAGS.get(status.mode, _AUTO) | (_ARMED if status.armed else 0))
+    return int(_CUSTOM | status.mode.value.flags | (_ARMED if status.armed else 0))
 
 
 def system_status(status: VehicleStatus) -> int:
@@ -57,7 +40,7 @@ def system_status(status: VehicleStatus) -> int:
 class ConnectionService(Service):
     """Tells who we are and how we are, hears ground stations, and answers about time and signing."""
 
-    def __init__(self, autopilot: AutopilotPort, exchange: Exchange) -> None:
+    def __init__(self, autopilot: Autopilot, exchange: Exchange) -> None:
         self._autopilot = autopilot
         self._exchange = exchange
         self.handlers = {

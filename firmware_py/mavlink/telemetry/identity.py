@@ -7,11 +7,8 @@ SET_POSITION_TARGET_GLOBAL_INT, which PX4 understands too without saying so.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from types import MappingProxyType
-
 from firmware_py.mavlink.service import Service
-from firmware_py.status import FlightMode
+from firmware_py.status import NAVIGATION_STATES, FlightMode
 from wire.dialect import Message, mavlink
 from wire.exchange import Exchange
 
@@ -41,40 +38,8 @@ _NOT_SELECTABLE = mavlink.MAV_MODE_PROPERTY_NOT_USER_SELECTABLE
 _BASIC = (FlightMode.ALTITUDE, FlightMode.POSITION)
 _NAME_BYTES = 35
 
-STANDARD_MODES: Mapping[FlightMode, int] = MappingProxyType(
-    {
-        FlightMode.ALTITUDE: int(mavlink.MAV_STANDARD_MODE_ALTITUDE_HOLD),
-        FlightMode.POSITION: int(mavlink.MAV_STANDARD_MODE_POSITION_HOLD),
-        FlightMode.ORBIT: int(mavlink.MAV_STANDARD_MODE_ORBIT),
-        FlightMode.MISSION: int(mavlink.MAV_STANDARD_MODE_MISSION),
-        FlightMode.RETURN: int(mavlink.MAV_STANDARD_MODE_SAFE_RECOVERY),
-        FlightMode.LAND: int(mavlink.MAV_STANDARD_MODE_LAND),
-        FlightMode.TAKEOFF: int(mavlink.MAV_STANDARD_MODE_TAKEOFF),
-    }
-)
-"""Modes that mean the same on every autopilot; the others have a name."""
-
-MODES_BY_STANDARD: Mapping[int, FlightMode] = MappingProxyType(
-    {number: mode for mode, number in STANDARD_MODES.items()}
-)
-
-# In PX4's order. A standard mode goes without a name, as MAVLink wants it.
-_LISTED: tuple[tuple[FlightMode, str], ...] = (
-    (FlightMode.MANUAL, "Manual"),
-    (FlightMode.ALTITUDE, ""),
-    (FlightMode.POSITION, ""),
-    (FlightMode.MISSION, ""),
-    (FlightMode.HOLD, "Hold"),
-    (FlightMode.RETURN, ""),
-    (FlightMode.ACRO, "Acro"),
-    (FlightMode.TERMINATION, "Termination"),
-    (FlightMode.OFFBOARD, "Offboard"),
-    (FlightMode.STABILIZED, "Stabilized"),
-    (FlightMode.TAKEOFF, ""),
-    (FlightMode.LAND, ""),
-    (FlightMode.FOLLOW, "Follow Target"),
-    (FlightMode.ORBIT, ""),
-)
+_LISTED = tuple(NAVIGATION_STATES)
+_PX4_NAMES = {FlightMode.FOLLOW: "Follow Target"}  # where PX4's differs from the ground stations'
 
 
 def packed_version(version: tuple[int, int, int]) -> int:
@@ -107,11 +72,6 @@ def protocol_version() -> Message:
     return mavlink.MAVLink_protocol_version_message(200, 100, 203, no_hash, no_hash)
 
 
-def standard_mode(mode: FlightMode) -> int:
-    """MAV_STANDARD_MODE of a mode; 0 for one that is PX4's own."""
-    return STANDARD_MODES.get(mode, 0)
-
-
 def available_modes(index: int) -> list[Message]:
     """AVAILABLE_MODES.
 
@@ -127,14 +87,16 @@ def available_modes(index: int) -> list[Message]:
 
 
 def _available(place: int) -> Message:
-    mode, name = _LISTED[place]
+    mode = _LISTED[place]
+    # A standard mode goes without a name, as MAVLink wants it.
+    name = "" if mode.value.standard else _PX4_NAMES.get(mode, mode.value.title)
     properties = 0 if mode in _BASIC else _ADVANCED
     if mode is FlightMode.TERMINATION:
         properties |= _NOT_SELECTABLE
     return mavlink.MAVLink_available_modes_message(
         len(_LISTED),
         place + 1,
-        standard_mode(mode),
+        mode.value.standard,
         mode.custom_mode,
         properties,
         name.encode().ljust(_NAME_BYTES, b"\0"),

@@ -5,13 +5,13 @@ from __future__ import annotations
 from functools import partial
 from math import degrees, hypot, isfinite, isnan, nan
 
+from firmware_py.autopilot import Autopilot
 from firmware_py.geodesy import LocalProjection
-from firmware_py.mavlink.port import AutopilotPort
 from firmware_py.mavlink.scaling import boot_ms, degrees_e7, millimetres, whole
 from firmware_py.mavlink.service import Service
+from firmware_py.setpoints import AttitudeSetpoint, BodyRateSetpoint, TrajectorySetpoint
 from firmware_py.status import FlightMode
-from firmware_py.types import Setpoint
-from geometry.vectors import Quaternion
+from geometry.vectors import NAN3, Quaternion
 from wire.dialect import Message, mavlink
 
 _COVARIANCE_UNKNOWN = [nan] + [0.0] * 20
@@ -36,7 +36,7 @@ _RATES_IGNORED = (
 _NOT_TOLD = -1
 
 
-def attitude(autopilot: AutopilotPort) -> Message:
+def attitude(autopilot: Autopilot) -> Message:
     """ATTITUDE."""
     state = autopilot.state
     return mavlink.MAVLink_attitude_message(
@@ -44,7 +44,7 @@ def attitude(autopilot: AutopilotPort) -> Message:
     )
 
 
-def attitude_quaternion(autopilot: AutopilotPort) -> Message:
+def attitude_quaternion(autopilot: Autopilot) -> Message:
     """ATTITUDE_QUATERNION."""
     state = autopilot.state
     return mavlink.MAVLink_attitude_quaternion_message(
@@ -52,7 +52,7 @@ def attitude_quaternion(autopilot: AutopilotPort) -> Message:
     )
 
 
-def local_position_ned(autopilot: AutopilotPort) -> Message | None:
+def local_position_ned(autopilot: Autopilot) -> Message | None:
     """LOCAL_POSITION_NED, once a position is known."""
     state = autopilot.state
     if autopilot.status.origin is None:
@@ -62,7 +62,7 @@ def local_position_ned(autopilot: AutopilotPort) -> Message | None:
     )
 
 
-def global_position_int(autopilot: AutopilotPort) -> Message | None:
+def global_position_int(autopilot: Autopilot) -> Message | None:
     """GLOBAL_POSITION_INT, once a position is known."""
     state, home, place = autopilot.state, autopilot.status.home, autopilot.global_position()
     if place is None:
@@ -82,7 +82,7 @@ def global_position_int(autopilot: AutopilotPort) -> Message | None:
     )
 
 
-def vfr_hud(autopilot: AutopilotPort) -> Message | None:
+def vfr_hud(autopilot: Autopilot) -> Message | None:
     """VFR_HUD; airspeed NaN as PX4 has it without such a sensor."""
     state, place = autopilot.state, autopilot.global_position()
     if place is None:
@@ -98,7 +98,7 @@ def vfr_hud(autopilot: AutopilotPort) -> Message | None:
     )
 
 
-def altitude(autopilot: AutopilotPort) -> Message | None:
+def altitude(autopilot: Autopilot) -> Message | None:
     """ALTITUDE; the terrain is not known."""
     state, home, place = autopilot.state, autopilot.status.home, autopilot.global_position()
     if place is None:
@@ -114,7 +114,7 @@ def altitude(autopilot: AutopilotPort) -> Message | None:
     )
 
 
-def odometry(autopilot: AutopilotPort) -> Message | None:
+def odometry(autopilot: Autopilot) -> Message | None:
     """ODOMETRY; velocity in the local frame, as PX4's."""
     state = autopilot.state
     if autopilot.status.origin is None:
@@ -135,7 +135,7 @@ def odometry(autopilot: AutopilotPort) -> Message | None:
     )
 
 
-def hil_state_quaternion(autopilot: AutopilotPort) -> Message | None:
+def hil_state_quaternion(autopilot: Autopilot) -> Message | None:
     """HIL_STATE_QUATERNION, the true state; the same as the estimate, whose sensors are exact."""
     state, place = autopilot.state, autopilot.global_position()
     if place is None:
@@ -154,9 +154,9 @@ def hil_state_quaternion(autopilot: AutopilotPort) -> Message | None:
     )
 
 
-def position_target_local_ned(autopilot: AutopilotPort) -> Message:
+def position_target_local_ned(autopilot: Autopilot) -> Message:
     """POSITION_TARGET_LOCAL_NED: what is followed now. A component not controlled is NaN and masked out."""
-    followed = autopilot.status.setpoint
+    followed = autopilot.status.setpoint.trajectory
     return mavlink.MAVLink_position_target_local_ned_message(
         boot_ms(autopilot.state.time_us),
         mavlink.MAV_FRAME_LOCAL_NED,
@@ -169,10 +169,10 @@ def position_target_local_ned(autopilot: AutopilotPort) -> Message:
     )
 
 
-def position_target_global_int(autopilot: AutopilotPort) -> Message | None:
+def position_target_global_int(autopilot: Autopilot) -> Message | None:
     """POSITION_TARGET_GLOBAL_INT, while armed in a mode that flies to a place, as PX4."""
     status = autopilot.status
-    followed, origin = status.setpoint, status.origin
+    followed, origin = status.setpoint.trajectory, status.origin
     north_m, east_m, down_m = followed.position_ned_m
     if not status.armed or status.mode not in _GLOBAL_MODES or origin is None:
         return None
@@ -193,27 +193,28 @@ def position_target_global_int(autopilot: AutopilotPort) -> Message | None:
     )
 
 
-def attitude_target(autopilot: AutopilotPort) -> Message:
+def attitude_target(autopilot: Autopilot) -> Message:
     """ATTITUDE_TARGET: attitude and rates if somebody asks for them, else masked; the thrust always.
 
     A stabiliser that goes from velocity straight to motors has no attitude it aims at, so none is made up.
     """
     followed = autopilot.status.setpoint
     mask = 0
-    attitude, rates = followed.attitude, followed.rate_frd_rad_s
-    if attitude is None:
+    attitude, rates, thrust = _NO_ATTITUDE, NAN3, autopilot.output.throttle
+    if isinstance(followed, AttitudeSetpoint):
+        attitude, thrust = followed.attitude, followed.thrust
+    else:
         mask |= mavlink.ATTITUDE_TARGET_TYPEMASK_ATTITUDE_IGNORE
-        attitude = _NO_ATTITUDE
-    if rates is None:
+    if isinstance(followed, BodyRateSetpoint):
+        rates, thrust = followed.rate_frd_rad_s, followed.thrust
+    else:
         mask |= _RATES_IGNORED
-        rates = (nan, nan, nan)
-    thrust = autopilot.output.throttle if isnan(followed.thrust) else followed.thrust
     return mavlink.MAVLink_attitude_target_message(
         boot_ms(autopilot.state.time_us), mask, attitude, *rates, thrust
     )
 
 
-def time_estimate_to_target(autopilot: AutopilotPort) -> Message | None:
+def time_estimate_to_target(autopilot: Autopilot) -> Message | None:
     """TIME_ESTIMATE_TO_TARGET: seconds that a return would take; -1 for what PX4 does not tell either.
 
     Climb to RTL_RETURN_ALT, cruise home, descend, wait RTL_LAND_DELAY, land: distances over the speeds of
@@ -241,7 +242,7 @@ def time_estimate_to_target(autopilot: AutopilotPort) -> Message | None:
     )
 
 
-def _mask(followed: Setpoint) -> int:
+def _mask(followed: TrajectorySetpoint) -> int:
     """POSITION_TARGET_TYPEMASK: the components that are not controlled."""
     components = (*followed.position_ned_m, *followed.velocity_ned_m_s, *followed.acceleration_ned_m_s2)
     mask = sum(1 << bit for bit, value in enumerate(components) if isnan(value))
@@ -255,7 +256,7 @@ def _mask(followed: Setpoint) -> int:
 class MotionTelemetry(Service):
     """Streams what the functions of this module make."""
 
-    def __init__(self, autopilot: AutopilotPort) -> None:
+    def __init__(self, autopilot: Autopilot) -> None:
         self.sources = {
             message_id: partial(make, autopilot)
             for message_id, make in {

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from firmware_py.mavlink.port import AutopilotPort
+from firmware_py.autopilot import Autopilot
 from firmware_py.mavlink.scaling import degrees_e7, millimetres
 from firmware_py.mavlink.service import Service
 from firmware_py.types import GeodeticPoint
@@ -14,7 +14,7 @@ from wire.link import Link
 class PlaceService(Service):
     """HOME_POSITION, GPS_GLOBAL_ORIGIN and SET_GPS_GLOBAL_ORIGIN."""
 
-    def __init__(self, autopilot: AutopilotPort, exchange: Exchange) -> None:
+    def __init__(self, autopilot: Autopilot, exchange: Exchange) -> None:
         self._autopilot = autopilot
         self._exchange = exchange
         self._origin: GeodeticPoint | None = None  # as last told

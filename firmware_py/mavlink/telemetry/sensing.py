@@ -5,9 +5,10 @@ from __future__ import annotations
 from functools import partial
 from math import atan2, degrees, hypot
 
-from firmware_py.mavlink.port import AutopilotPort
+from firmware_py.autopilot import Autopilot
 from firmware_py.mavlink.scaling import boot_ms, degrees_e7, millimetres, whole
 from firmware_py.mavlink.service import Service
+from geometry.rotations import rotation, to_body
 from geometry.vectors import Quaternion, Vec3
 from wire.dialect import Message, mavlink
 
@@ -34,19 +35,12 @@ def pressure_hpa(altitude_m: float) -> float:
     return float(_SEA_LEVEL_HPA * (temperature_k(altitude_m) / _SEA_LEVEL_K) ** _EXPONENT)
 
 
-def to_body(vector_ned: Vec3, attitude: Quaternion) -> Vec3:
-    """A world vector in body axes, by the inverse of the unit quaternion: v + 2w (v × q) + 2 q × (q × v)."""
-    w, qx, qy, qz = attitude
-    x, y, z = vector_ned
-    tx, ty, tz = 2 * (y * qz - z * qy), 2 * (z * qx - x * qz), 2 * (x * qy - y * qx)
-    return (
-        x + w * tx + ty * qz - tz * qy,
-        y + w * ty + tz * qx - tx * qz,
-        z + w * tz + tx * qy - ty * qx,
-    )
+def earth_field_frd_gauss(attitude: Quaternion) -> Vec3:
+    """Earth's magnetic field in body axes, by the attitude's unit quaternion."""
+    return to_body(rotation(attitude), *EARTH_FIELD_NED_GAUSS)
 
 
-def highres_imu(autopilot: AutopilotPort) -> Message:
+def highres_imu(autopilot: Autopilot) -> Message:
     """HIGHRES_IMU."""
     state, place = autopilot.state, autopilot.global_position()
     altitude_m = place.altitude_m if place else 0.0
@@ -54,7 +48,7 @@ def highres_imu(autopilot: AutopilotPort) -> Message:
         state.time_us,
         *state.specific_force_frd_m_s2,
         *state.angular_rate_frd_rad_s,
-        *to_body(EARTH_FIELD_NED_GAUSS, state.attitude),
+        *earth_field_frd_gauss(state.attitude),
         pressure_hpa(altitude_m),
         0.0,
         altitude_m,
@@ -63,10 +57,10 @@ def highres_imu(autopilot: AutopilotPort) -> Message:
     )
 
 
-def scaled_imu(autopilot: AutopilotPort) -> Message:
+def scaled_imu(autopilot: Autopilot) -> Message:
     """SCALED_IMU: thousandths of g, rad/s and gauss, hundredths of a degree (0 would be unknown)."""
     state, place = autopilot.state, autopilot.global_position()
-    field_gauss = to_body(EARTH_FIELD_NED_GAUSS, state.attitude)
+    field_gauss = earth_field_frd_gauss(state.attitude)
     celsius = temperature_k(place.altitude_m if place else 0.0) - 273.15
     return mavlink.MAVLink_scaled_imu_message(
         boot_ms(state.time_us),
@@ -77,7 +71,7 @@ def scaled_imu(autopilot: AutopilotPort) -> Message:
     )
 
 
-def distance_sensor(autopilot: AutopilotPort) -> Message | None:
+def distance_sensor(autopilot: Autopilot) -> Message | None:
     """DISTANCE_SENSOR: the range along body down to flat ground at the height where the vehicle booted.
 
     PX4's own physics makes it from the state too. Beyond its range, or turned away, it says 0, as PX4.
@@ -102,7 +96,7 @@ def distance_sensor(autopilot: AutopilotPort) -> Message | None:
     )
 
 
-def gnss_integrity(autopilot: AutopilotPort) -> Message | None:
+def gnss_integrity(autopilot: Autopilot) -> Message | None:
     """GNSS_INTEGRITY: nothing watches for jamming or spoofing, and it says so."""
     if autopilot.status.origin is None:
         return None
@@ -111,7 +105,7 @@ def gnss_integrity(autopilot: AutopilotPort) -> Message | None:
     )
 
 
-def scaled_pressure(autopilot: AutopilotPort) -> Message | None:
+def scaled_pressure(autopilot: Autopilot) -> Message | None:
     """SCALED_PRESSURE."""
     place = autopilot.global_position()
     if place is None:
@@ -124,7 +118,7 @@ def scaled_pressure(autopilot: AutopilotPort) -> Message | None:
     )
 
 
-def gps_raw_int(autopilot: AutopilotPort) -> Message:
+def gps_raw_int(autopilot: Autopilot) -> Message:
     """GPS_RAW_INT: a 3D fix with PX4's simulated figures, or no fix yet."""
     state, place = autopilot.state, autopilot.global_position()
     if place is None:
@@ -154,7 +148,7 @@ def gps_raw_int(autopilot: AutopilotPort) -> Message:
 class SensorTelemetry(Service):
     """Streams what the functions of this module make."""
 
-    def __init__(self, autopilot: AutopilotPort) -> None:
+    def __init__(self, autopilot: Autopilot) -> None:
         self.sources = {
             message_id: partial(make, autopilot)
             for message_id, make in {

@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections import deque
 from collections.abc import Callable
 
-from firmware_py.mavlink.port import AutopilotPort
+from firmware_py.autopilot import Autopilot
 from firmware_py.mavlink.service import Service
 from firmware_py.types import StatusText
 from wire.dialect import Message, mavlink
@@ -30,7 +30,7 @@ class StatusTextService(Service):
 
     def __init__(
         self,
-        autopilot: AutopilotPort,
+        autopilot: Autopilot,
         exchange: Exchange,
         announce: Callable[[StatusText], bool],
         log: Callable[[int, StatusText], None] | None = None,

@@ -5,15 +5,16 @@ from math import hypot, nan, pi, radians
 import pytest
 
 from firmware_py.airframe import load_airframe
-from firmware_py.control.stabiliser import Stabiliser
-from firmware_py.types import (
+from firmware_py.commands import (
     AccelerationCommand,
-    ActuatorCommand,
+    AttitudeCommand,
     BodyRateCommand,
-    RateCommand,
+    MotorCommand,
     TiltCommand,
-    VehicleState,
+    VelocityCommand,
 )
+from firmware_py.control.stabiliser import Stabiliser
+from firmware_py.types import VehicleState
 from tests.flight import PERIOD_S, Hover
 
 NAMES = ["abejorro", "x500"]
@@ -26,13 +27,13 @@ def hover_share(airframe):
 @pytest.fixture(params=NAMES)
 def hover(request):
     flight = Hover(load_airframe(request.param))
-    flight.fly(2.0, RateCommand())
+    flight.fly(2.0, VelocityCommand())
     return flight
 
 
 def test_acceleration_tilts_the_thrust_vector_and_leaves_the_velocity_alone():
     hover = Hover(load_airframe("x500"))
-    hover.fly(2.0, RateCommand())
+    hover.fly(2.0, VelocityCommand())
     samples = hover.fly(1.5, AccelerationCommand((2.0, -1.0, 0.0)))
     early, late = samples[125], samples[250]  # the tilt is reached, drag is small
     assert late.forward_m_s - early.forward_m_s == pytest.approx(1.0, abs=0.1)
@@ -45,7 +46,7 @@ def test_acceleration_tilts_the_thrust_vector_and_leaves_the_velocity_alone():
 
 def test_upward_acceleration():
     hover = Hover(load_airframe("x500"))
-    hover.fly(1.0, RateCommand())
+    hover.fly(1.0, VelocityCommand())
     samples = hover.fly(0.6, AccelerationCommand((0.0, 0.0, -1.0)))
     assert samples[149].down_m_s - samples[50].down_m_s == pytest.approx(-0.4, abs=0.1)
 
@@ -63,16 +64,16 @@ def test_tilt_and_yaw_rate_are_held_with_the_vertical_velocity(hover):
 def test_a_tilt_asked_for_directly_may_exceed_the_limit_of_velocity_flight():
     hover = Hover(load_airframe("x500"))
     hover.stabiliser.limits.tilt_rad = radians(20)
-    last = hover.fly(1.0, TiltCommand(radians(40), 0.0, 0.0, 0.7))[-1]
+    last = hover.fly(1.0, AttitudeCommand(radians(40), 0.0, 0.0, 0.7))[-1]
     assert last.state.roll_rad == pytest.approx(radians(40), abs=0.02)
 
 
 def test_thrust_is_a_share_of_all_there_is(hover):
     share = hover_share(hover.airframe)
-    level = hover.fly(1.0, TiltCommand(0.0, 0.0, 0.0, share))[-1]
+    level = hover.fly(1.0, AttitudeCommand(0.0, 0.0, 0.0, share))[-1]
     assert abs(level.down_m_s) < 0.02
     assert level.output.throttle == pytest.approx(share, rel=1e-3)
-    rising = hover.fly(0.3, TiltCommand(0.0, 0.0, 0.0, 1.2 * share))[-1]
+    rising = hover.fly(0.3, AttitudeCommand(0.0, 0.0, 0.0, 1.2 * share))[-1]
     assert rising.down_m_s < -0.3
 
 
@@ -87,7 +88,7 @@ def test_body_rates_are_followed(hover, axis):
 
 def test_body_rates_hold_against_an_unknown_moment():
     hover = Hover(load_airframe("x500"))
-    hover.fly(1.0, RateCommand())
+    hover.fly(1.0, VelocityCommand())
     hover.dynamics.push((0.0, 0.0, 0.0), (0.2, -0.2, 0.05))
     last = hover.fly(2.5, BodyRateCommand((0.0, 0.0, 0.0), 0.59))[-1]
     assert last.state.angular_rate_frd_rad_s == pytest.approx((0.0, 0.0, 0.0), abs=0.01)
@@ -97,14 +98,14 @@ def test_a_roll_over_the_top_and_back(hover):
     share = hover_share(hover.airframe)
     highest = max(sample.tilt_rad for sample in hover.fly(1.5, BodyRateCommand((4.3, 0.0, 0.0), share)))
     assert highest > radians(120)
-    last = hover.fly(5.0, RateCommand())[-1]
+    last = hover.fly(5.0, VelocityCommand())[-1]
     assert last.tilt_rad < radians(1)
     assert hypot(*last.state.velocity_ned_m_s) < 0.05
 
 
 def test_actuators_go_straight_through(hover):
     maximum = hover.airframe.motor.max_speed_rad_s
-    output = hover.stabiliser.step(VehicleState(), ActuatorCommand((0.0, 0.25, 1.0, 4.0)))
+    output = hover.stabiliser.step(VehicleState(), MotorCommand((0.0, 0.25, 1.0, 4.0)))
     assert output.speeds_rad_s == pytest.approx((0.0, maximum / 2, maximum, maximum))
     assert output.throttle == pytest.approx(2.25 / 4)
 
@@ -112,7 +113,7 @@ def test_actuators_go_straight_through(hover):
 @pytest.mark.parametrize("outputs", [(), (nan,) * 4, (-1.0,) * 4, (0.0,) * 16])
 def test_odd_actuator_outputs_stop_the_motors(outputs):
     stabiliser = Stabiliser(load_airframe("x500"), PERIOD_S)
-    assert stabiliser.step(VehicleState(), ActuatorCommand(outputs)).speeds_rad_s == (0.0,) * 4
+    assert stabiliser.step(VehicleState(), MotorCommand(outputs)).speeds_rad_s == (0.0,) * 4
 
 
 @pytest.mark.parametrize("thrust", [nan, -1.0, 0.0])
@@ -127,16 +128,16 @@ def others(airframe):
     return [
         AccelerationCommand((0.0, 0.0, 0.0)),
         TiltCommand(0.0, 0.0),
-        TiltCommand(0.0, 0.0, 0.0, share),
+        AttitudeCommand(0.0, 0.0, 0.0, share),
         BodyRateCommand((0.0, 0.0, 0.0), share),
-        ActuatorCommand((share,) * 4),
+        MotorCommand((share,) * 4),
     ]
 
 
 @pytest.mark.parametrize("kind", range(5))
 def test_changing_between_commands_makes_no_bump_at_hover(hover, kind):
     hover.fly(0.3, others(hover.airframe)[kind])
-    back = hover.fly(1.0, RateCommand())
+    back = hover.fly(1.0, VelocityCommand())
     for sample in hover.samples[450:]:
         assert sample.output.throttle == pytest.approx(hover_share(hover.airframe), rel=0.02)
         assert sample.tilt_rad < radians(0.3)
@@ -145,9 +146,9 @@ def test_changing_between_commands_makes_no_bump_at_hover(hover, kind):
 
 def test_velocity_is_taken_over_at_speed_without_a_jolt(hover):
     speed = 1.5
-    steady = hover.fly(6.0, RateCommand((speed, 0.0, 0.0)))[-1]
+    steady = hover.fly(6.0, VelocityCommand((speed, 0.0, 0.0)))[-1]
     hover.fly(0.1, TiltCommand(0.0, steady.state.pitch_rad))
-    after = hover.fly(2.0, RateCommand((speed, 0.0, 0.0)))
+    after = hover.fly(2.0, VelocityCommand((speed, 0.0, 0.0)))
     assert all(abs(sample.forward_m_s - speed) < 0.06 for sample in after)
     assert all(abs(sample.down_m_s) < 0.06 for sample in after)
 
@@ -156,8 +157,8 @@ def test_acceleration_feed_forward_helps_a_velocity_along():
     for name in NAMES:
         plain, helped = Hover(load_airframe(name)), Hover(load_airframe(name))
         for flight, feed in ((plain, 0.0), (helped, 2.0)):
-            flight.fly(1.0, RateCommand())
-            flight.fly(0.3, RateCommand((0.3, 0.0, 0.0), 0.0, (feed, 0.0, 0.0)))
+            flight.fly(1.0, VelocityCommand())
+            flight.fly(0.3, VelocityCommand((0.3, 0.0, 0.0), 0.0, (feed, 0.0, 0.0)))
         assert helped.samples[-1].forward_m_s > plain.samples[-1].forward_m_s + 0.05
 
 

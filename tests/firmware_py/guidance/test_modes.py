@@ -6,12 +6,15 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from firmware_py.airframe import load_airframe
-from firmware_py.guidance.modes import Guidance, SpeedLimits, bounded, manners, speed_limits, usable
+from firmware_py.commander_table import State
+from firmware_py.guidance.limits import SpeedLimits, speed_limits
+from firmware_py.guidance.modes import Guidance
 from firmware_py.parameters import Parameters
-from firmware_py.types import Setpoint, VehicleState
+from firmware_py.setpoints import AttitudeSetpoint, BodyRateSetpoint, MotorSetpoint, TrajectorySetpoint
+from firmware_py.types import VehicleState
 
 LIMITS = SpeedLimits(2.0, 1.5, 1.0, 2.0, 1.2, 0.7)
-MANNERS = manners(load_airframe("abejorro"), Parameters())
+AIRFRAME = load_airframe("abejorro")
 
 any_float = st.floats(allow_nan=True, allow_infinity=True)
 any_vec3 = st.tuples(any_float, any_float, any_float)
@@ -21,15 +24,21 @@ def at(north=0.0, east=0.0, down=0.0, yaw=0.0, velocity=(0.0, 0.0, 0.0)):
     return VehicleState(position_ned_m=(north, east, down), velocity_ned_m_s=velocity, yaw_rad=yaw)
 
 
+def limited():
+    guidance = Guidance(AIRFRAME, Parameters())
+    guidance._context.limits = LIMITS
+    return guidance
+
+
 def offboard(**setpoint):
-    guidance = Guidance(LIMITS, MANNERS)
-    guidance.enter_offboard()
-    guidance.accept(Setpoint(0, **setpoint))
+    guidance = limited()
+    guidance.enter(State.OFFBOARD, at())
+    guidance.accept(TrajectorySetpoint(0, **setpoint))
     return guidance
 
 
 def test_limits_are_the_smaller_of_airframe_and_parameters():
-    airframe = load_airframe("abejorro")
+    airframe = AIRFRAME
     limits = speed_limits(airframe, Parameters())
     assert limits.horizontal_m_s == airframe.limits.speed_horizontal_m_s
     assert limits.up_m_s == airframe.limits.speed_up_m_s
@@ -88,37 +97,38 @@ def test_whatever_is_asked_the_command_is_finite_and_limited(position, velocity,
     assert hypot(forward, right) <= LIMITS.horizontal_m_s * (1 + 1e-9)
     assert -LIMITS.up_m_s <= down <= LIMITS.down_m_s
     assert abs(command.yaw_rate_rad_s) <= LIMITS.yaw_rate_rad_s
-    assert all(map(isfinite, guidance.setpoint.velocity_ned_m_s))
+    assert all(map(isfinite, guidance.mode.setpoint.velocity_ned_m_s))
 
 
 def test_what_counts_as_a_setpoint():
-    assert usable(Setpoint(0, velocity_ned_m_s=(nan, 0.0, nan)))
-    assert usable(Setpoint(0, position_ned_m=(nan, nan, -1.0)))
-    assert not usable(Setpoint(0, yaw_rad=1.0))
-    assert usable(Setpoint(0, acceleration_ned_m_s2=(1.0, 0.0, 0.0)))
-    assert not usable(Setpoint(0, attitude=(1.0, 0.0, 0.0, 0.0)))  # without a thrust
-    assert not usable(Setpoint(0, attitude=(nan, 0.0, 0.0, 0.0), thrust=0.5))
-    assert usable(Setpoint(0, rate_frd_rad_s=(0.0, 0.0, 0.0), thrust=0.5))
-    assert not usable(Setpoint(0, outputs=(0.5, nan, 0.5, 0.5)))
+    assert TrajectorySetpoint(0, velocity_ned_m_s=(nan, 0.0, nan)).is_usable
+    assert TrajectorySetpoint(0, position_ned_m=(nan, nan, -1.0)).is_usable
+    assert not TrajectorySetpoint(0, yaw_rad=1.0).is_usable
+    assert TrajectorySetpoint(0, acceleration_ned_m_s2=(1.0, 0.0, 0.0)).is_usable
+    assert not AttitudeSetpoint(0, attitude=(1.0, 0.0, 0.0, 0.0), thrust=nan).is_usable
+    assert not AttitudeSetpoint(0, attitude=(nan, 0.0, 0.0, 0.0), thrust=0.5).is_usable
+    assert BodyRateSetpoint(0, rate_frd_rad_s=(0.0, 0.0, 0.0), thrust=0.5).is_usable
+    assert not MotorSetpoint(0, outputs=(0.5, nan, 0.5, 0.5)).is_usable
 
 
 def test_infinity_is_not_controlled_and_so_brakes():
-    safe = bounded(Setpoint(0, position_ned_m=(inf, nan, 1.0), velocity_ned_m_s=(inf, 1.0, -inf)), LIMITS)
+    told = TrajectorySetpoint(0, position_ned_m=(inf, nan, 1.0), velocity_ned_m_s=(inf, 1.0, -inf))
+    safe = told.bounded(LIMITS)
     assert safe.position_ned_m[0] != safe.position_ned_m[0]
     assert safe.velocity_ned_m_s == (0.0, 1.0, 0.0)
 
 
 def test_hold_brakes_gently_and_then_keeps_the_place():
-    guidance = Guidance(LIMITS, MANNERS)
+    guidance = limited()
     state = at(velocity=(1.0, 0.0, 0.0), yaw=0.3)
-    guidance.enter_hold(state)
+    guidance.enter(State.HOLD, state)
     speeds = []
     for _ in range(500):
         speeds.append(guidance.step(state).velocity_level_m_s[0])
-        state.position_ned_m = guidance.traveller.reference.position_ned_m
+        state.position_ned_m = guidance._context.traveller.reference.position_ned_m
     assert all(after < before + 1e-3 for before, after in pairwise(speeds))
     assert speeds[0] == pytest.approx(cos(0.3), rel=0.01)
-    north_m, east_m, _ = guidance.setpoint.position_ned_m
+    north_m, east_m, _ = guidance.mode.setpoint.position_ned_m
     assert 0.3 < north_m < 0.8
     command = guidance.step(at(north_m - 0.2, east_m, 0.1, yaw=0.0))
     assert command.velocity_level_m_s == pytest.approx((0.2, 0.0, -0.1), abs=0.01)
@@ -126,36 +136,36 @@ def test_hold_brakes_gently_and_then_keeps_the_place():
 
 
 def test_hold_of_what_stands_keeps_that_very_place():
-    guidance = Guidance(LIMITS, MANNERS)
-    guidance.enter_hold(at(1.0, 2.0, -3.0))
+    guidance = limited()
+    guidance.enter(State.HOLD, at(1.0, 2.0, -3.0))
     guidance.step(at(1.0, 2.0, -3.0))
-    assert guidance.setpoint.position_ned_m == (1.0, 2.0, -3.0)
+    assert guidance.mode.setpoint.position_ned_m == (1.0, 2.0, -3.0)
     assert guidance.step(at(0.5, 2.0, -3.1)).velocity_level_m_s == pytest.approx((0.5, 0.0, 0.1))
 
 
 def test_takeoff_climbs_straight_up_says_when_it_is_there_and_hold_keeps_its_height():
-    guidance = Guidance(LIMITS, MANNERS)
-    guidance.enter_takeoff(at(1.0, 2.0, 0.0), -2.5)
+    guidance = limited()
+    guidance.enter(State.TAKEOFF, at(1.0, 2.0, 0.0), target_ned_m=(nan, nan, -2.5))
     command = guidance.step(at(1.1, 2.0, 0.0))
     assert command.velocity_level_m_s == pytest.approx((-0.1, 0.0, -1.2))
-    assert not guidance.target_reached
+    assert not guidance.mode.target_reached
     guidance.step(at(1.0, 2.0, -2.4))
-    assert guidance.target_reached
-    guidance.enter_hold(at(1.0, 2.0, -2.4), keep_target=True)
+    assert guidance.mode.target_reached
+    guidance.enter(State.HOLD, at(1.0, 2.0, -2.4), keep_target=True)
     guidance.step(at(1.0, 2.0, -2.4))
-    assert guidance.setpoint.position_ned_m == (1.0, 2.0, -2.5)
+    assert guidance.mode.setpoint.position_ned_m == (1.0, 2.0, -2.5)
 
 
 def test_takeoff_to_below_stays():
-    guidance = Guidance(LIMITS, MANNERS)
-    guidance.enter_takeoff(at(down=-5.0), -2.5)
+    guidance = limited()
+    guidance.enter(State.TAKEOFF, at(down=-5.0), target_ned_m=(nan, nan, -2.5))
     assert guidance.step(at(down=-5.0)).velocity_level_m_s == (0.0, 0.0, 0.0)
-    assert guidance.target_reached
+    assert guidance.mode.target_reached
 
 
 def test_land_descends_ever_faster_to_its_speed_and_keeps_its_place():
-    guidance = Guidance(LIMITS, MANNERS)
-    guidance.enter_land(at(1.0, 1.0, -3.0))
+    guidance = limited()
+    guidance.enter(State.LAND, at(1.0, 1.0, -3.0))
     sinks = [guidance.step(at(1.0, 1.0, -3.0)).velocity_level_m_s[2] for _ in range(500)]
     assert all(after > before - 1e-3 for before, after in pairwise(sinks))
     command = guidance.step(at(0.8, 1.0, -2.0))
@@ -164,9 +174,9 @@ def test_land_descends_ever_faster_to_its_speed_and_keeps_its_place():
 
 
 def test_setpoints_are_shown_only_while_followed():
-    guidance = Guidance(LIMITS, MANNERS)
-    guidance.enter_hold(at())
-    guidance.accept(Setpoint(7, velocity_ned_m_s=(9.0, 0.0, 0.0)))
-    assert guidance.setpoint.time_us == 0
-    guidance.enter_offboard()
-    assert guidance.setpoint.velocity_ned_m_s == (2.0, 0.0, 0.0)
+    guidance = limited()
+    guidance.enter(State.HOLD, at())
+    guidance.accept(TrajectorySetpoint(7, velocity_ned_m_s=(9.0, 0.0, 0.0)))
+    assert guidance.mode.setpoint.time_us == 0
+    guidance.enter(State.OFFBOARD, at())
+    assert guidance.mode.setpoint.velocity_ned_m_s == (2.0, 0.0, 0.0)

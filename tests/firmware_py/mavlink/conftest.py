@@ -4,12 +4,11 @@ from math import nan
 import pytest
 
 from firmware_py.airframe import Airframe, load_airframe
-from firmware_py.geodesy import LocalProjection
+from firmware_py.geodesy import LocalProjection, is_on_earth
 from firmware_py.mavlink.node import MavlinkNode, NodeOptions
 from firmware_py.mavlink.rates import GROUND, ONBOARD
 from firmware_py.missions.store import MissionStore
 from firmware_py.parameters import Parameters
-from firmware_py.places import is_on_earth
 from firmware_py.status import CommandResult, FlightMode, VehicleStatus
 from firmware_py.types import BatteryState, FlightRecord, GeodeticPoint, MotorOutput, StatusText, VehicleState
 from tests.firmware_py.mavlink.lossy import LossyPeer

@@ -4,9 +4,8 @@ import pytest
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
-from firmware_py.missions.fence_shapes import fence_fault
 from firmware_py.missions.flight import View
-from firmware_py.missions.geofence import BreachKind, Geofence
+from firmware_py.missions.geofence import BreachKind, Geofence, fence_fault
 from firmware_py.missions.items import Do, PlanType
 from firmware_py.missions.store import MissionStore
 from firmware_py.parameters import Parameters

@@ -4,10 +4,8 @@ import struct
 
 import pytest
 
-from framerunner.doctor.arming import SUMMARY, event_id
-from framerunner.doctor.checks import examine
-from framerunner.doctor.findings import Level, can_fly
-from framerunner.doctor.record import Record
+from framerunner.doctor.checks import Level, can_fly, examine
+from framerunner.doctor.record import SUMMARY, Record, event_id
 from wire.dialect import mavlink
 
 GOOD_PARAMETERS = {
@@ -58,6 +56,12 @@ def summary(armable_modes):
     return event("commander_arming_check_summary", "<BIIII", 0, 0x1100000, 0x80, armable_modes, armable_modes)
 
 
+def tell(record, message):
+    """Let a record know a message of which it counts nothing."""
+    record.latest[message.get_type()] = message
+    record.telemetry.take(message)
+
+
 def healthy(**parameters):
     record = Record(system_id=1)
     for message in (
@@ -67,7 +71,7 @@ def healthy(**parameters):
         estimator_status(),
         mavlink.MAVLink_extended_sys_state_message(0, mavlink.MAV_LANDED_STATE_ON_GROUND),
     ):
-        record.latest[message.get_type()] = message
+        tell(record, message)
     for name, count in (("ATTITUDE", 301), ("LOCAL_POSITION_NED", 181)):
         record.counts[name], record.times_s[name] = count, (0.0, 6.0)
     for number in range(200):
@@ -106,7 +110,7 @@ def test_a_healthy_drone_can_fly():
 )
 def test_what_a_message_shows_to_be_missing(message, subject):
     record = healthy()
-    record.latest[message.get_type()] = message
+    tell(record, message)
     assert missing(record) == {subject}
     assert not can_fly(examine(record))
 
@@ -124,7 +128,7 @@ def test_what_a_message_shows_to_be_missing(message, subject):
 )
 def test_parameters_that_would_end_the_flight(name, value):
     record = healthy(**{name: value})
-    record.latest["ESTIMATOR_STATUS"] = estimator_status(*VISION_AND_GPS[0])
+    tell(record, estimator_status(*VISION_AND_GPS[0]))
     assert missing(record) == {name}
 
 
@@ -189,8 +193,8 @@ def test_the_verdict_on_what_px4_says_of_its_estimate(told, parameters, lacks):
     estimate, passed, armable_modes = told
     record = healthy(**parameters)
     record.counts["DISTANCE_SENSOR"] = 60
-    record.latest["ESTIMATOR_STATUS"] = estimator_status(*estimate)
-    record.latest["SYS_STATUS"] = sys_status(health=ALL if passed else ALL & ~0x10000000)
+    tell(record, estimator_status(*estimate))
+    tell(record, sys_status(health=ALL if passed else ALL & ~0x10000000))
     record.arming.take(summary(armable_modes))
     assert missing(record) == lacks
 
@@ -203,28 +207,28 @@ def finding_of(record, subject):
 def test_the_height_is_said_to_come_from_what_is_used_not_from_what_is_wished():
     record = healthy()
     assert finding_of(record, "height").text == "by vision, estimated accuracy 0.00 m"
-    record.latest["ESTIMATOR_STATUS"] = estimator_status(*VISION_WANTED[0])
+    tell(record, estimator_status(*VISION_WANTED[0]))
     height = finding_of(record, "height")
     assert height.text.startswith(
         "by barometer, though EKF2_HGT_REF asks for vision, estimated accuracy 0.33 m"
     )
-    assert "not MOCAP" in finding_of(record, "position").mend
-    assert height.mend == "as for the position"
-    record.latest["ESTIMATOR_STATUS"] = estimator_status(*GPS[0])
+    assert "not MOCAP" in finding_of(record, "position").advice
+    assert height.advice == "as for the position"
+    tell(record, estimator_status(*GPS[0]))
     assert "the drone will stray" in finding_of(record, "position").text
 
 
 def test_an_ideal_drone_with_a_position_from_gps_can_fly():
     record = healthy()
     del record.parameters["EKF2_HGT_REF"], record.parameters["EKF2_EV_CTRL"]
-    record.latest["ESTIMATOR_STATUS"] = estimator_status(959, 0.0, 0.0)
+    tell(record, estimator_status(959, 0.0, 0.0))
     assert missing(record) == set()
 
 
 def test_what_keeps_it_from_arming_in_offboard_is_named():
     record = healthy()
-    record.latest["SYS_STATUS"] = sys_status(health=0x2F)
-    assert "it does not tell why" in finding_of(record, "pre-arm checks").mend
+    tell(record, sys_status(health=0x2F))
+    assert "it does not tell why" in finding_of(record, "pre-arm checks").advice
     for message in (
         summary(0),
         event("check_modes_global_pos", "<IB", 0x38, 24),
@@ -246,7 +250,7 @@ def test_the_summary_is_known_by_its_number():
 def test_a_fence_of_px4_without_a_global_position_is_noted():
     record = healthy(GF_MAX_VER_DIST=3.5)
     assert notes(record) == {"fence"}
-    record.latest["ESTIMATOR_STATUS"] = estimator_status(*VISION_AND_GPS[0])
+    tell(record, estimator_status(*VISION_AND_GPS[0]))
     assert notes(record) == set()
 
 
@@ -260,7 +264,7 @@ def test_a_return_under_a_roof_is_warned_of(action):
 
 def test_a_silent_drone_is_judged_by_what_there_is():
     record = Record(system_id=1)
-    record.latest["HEARTBEAT"] = heartbeat()
+    tell(record, heartbeat())
     assert missing(record) == {"health", "attitude", "local position"}
     assert "parameters" in notes(record)
 

@@ -7,9 +7,8 @@ import pytest
 
 from framerunner.cli import run
 from framerunner.doctor import visit
-from framerunner.doctor.arming import SUMMARY
-from framerunner.doctor.questions import PARAMETERS
-from framerunner.doctor.record import Record
+from framerunner.doctor.record import SUMMARY, Record
+from framerunner.doctor.visit import PARAMETERS
 from wire.dialect import mavlink
 
 HARMLESS = {"HEARTBEAT", "COMMAND_LONG", "PARAM_REQUEST_READ"}

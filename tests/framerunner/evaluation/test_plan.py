@@ -9,7 +9,8 @@ from framerunner.evaluation.plan import Identity, plan_files, plan_level
 from offboard.mission import load_mission
 from offboard.pilot_file import PilotFile
 from scenarios.level import LevelError, load_level
-from scenarios.loader import ScenarioError, load_scenario
+from scenarios.loader import load_scenario
+from scenarios.models import ScenarioError
 from scenarios.random_scenarios import random_scenario
 from tests.framerunner.evaluation.flights import write_scenarios
 

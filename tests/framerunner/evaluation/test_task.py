@@ -5,9 +5,9 @@ from dataclasses import replace
 
 import pytest
 
-from framerunner.evaluation import task as task_module
+from framerunner.evaluation import runner as runner_module
 from framerunner.evaluation.rows import COLUMNS, Row
-from framerunner.evaluation.task import fly_task, thinned
+from framerunner.evaluation.runner import fly_task, thinned
 from framerunner.flying.lockstep import fly_lockstep
 from framerunner.flying.plan import FlightPlan
 from framerunner.runs.track import Track
@@ -90,7 +90,7 @@ def test_ctrl_c_is_no_verdict(monkeypatch):
     flight = task()
     flown = fly_lockstep(flight)
     stopped = replace(flown, outcome=replace(flown.outcome, ended="aborted", reason="interrupted"))
-    monkeypatch.setattr(task_module, "fly_lockstep", lambda *_args, **_options: stopped)
+    monkeypatch.setattr(runner_module, "fly_lockstep", lambda *_args, **_options: stopped)
     with pytest.raises(KeyboardInterrupt):
         fly_task(flight)
 

@@ -16,8 +16,7 @@ from framerunner.errors import SettingError
 from framerunner.gym.environment import FrameChallengeEnv
 from framerunner.gym.reward import CONTACT, CROSSING, FAILURE, LANDING
 from scenarios.level import LevelError
-from scenarios.loader import ScenarioError
-from scenarios.models import Scenario
+from scenarios.models import Scenario, ScenarioError
 
 UP = np.array([0.0, 0.0, 1.0, 0.0], np.float32)
 STILL = np.zeros(4, np.float32)

@@ -11,7 +11,7 @@ from firmware_py.mavlink.node import MavlinkNode
 from firmware_py.mavlink.rates import GROUND
 from framerunner.flying.plan import FlightPlan
 from framerunner.virtual_camera.painter import VirtualCamera
-from offboard.link.alignment import Pose
+from geometry.alignment import Pose
 from scenarios.loader import load_scenario
 from sitl.camera import Camera
 from sitl.camera_feed import CameraFeed

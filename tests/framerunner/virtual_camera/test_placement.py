@@ -6,9 +6,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from framerunner.virtual_camera.history import VehiclePose, quaternion_from_euler
 from framerunner.virtual_camera.placement import HELD_AFTER_FLIGHT_US, Placement
-from offboard.link.alignment import Pose
+from geometry.alignment import Pose
+from geometry.rotations import quaternion_from_euler
+from wire.vehicle_telemetry import VehiclePose
 
 START = Pose((-3.0, -3.0, 0.55), 1.0)
 places = st.tuples(st.floats(-500, 500), st.floats(-500, 500), st.floats(-50, 50))

@@ -6,7 +6,7 @@ from types import SimpleNamespace
 
 import aiohttp
 
-from monitor import server
+from monitor import run, server
 from monitor.settings import MonitorSettings
 from monitor.tries import TryEvent
 from scenarios.models import Frame, Scenario
@@ -136,11 +136,11 @@ class Contest:
 @asynccontextmanager
 async def contest(database, monkeypatch, port=0):
     """A monitor, its database open; port 0 is a free one."""
-    monkeypatch.setattr("monitor.assembly.Fleet", FakeFleet)
+    monkeypatch.setattr("monitor.server.Fleet", FakeFleet)
     monkeypatch.setattr(server, "MODULES", MODULES)
     said = []
     serving = asyncio.create_task(
-        server.serve(EQUIPMENT, MonitorSettings(port=port, database=database, password=PASSWORD), said.append)
+        run.serve(EQUIPMENT, MonitorSettings(port=port, database=database, password=PASSWORD), said.append)
     )
     try:
         async with asyncio.timeout(30):

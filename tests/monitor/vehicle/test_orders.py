@@ -6,7 +6,7 @@ import pytest
 
 from firmware_py.status import FlightMode
 from monitor.sticks import Sticks
-from monitor.vehicle.commands import CommandDesk
+from monitor.vehicle.orders import CommandDesk
 from scenarios.loader import load_scenario
 from tests.monitor.simulated_link import SimulatedLink, equipment
 from tests.monitor.watching import watching

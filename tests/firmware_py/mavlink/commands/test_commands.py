@@ -2,7 +2,7 @@ from math import inf, isnan, nan
 
 import pytest
 
-from firmware_py.guidance.circles import OrbitYaw
+from firmware_py.guidance.orbit import OrbitYaw
 from firmware_py.status import CommandResult, FlightMode, VehicleStatus
 from firmware_py.types import GeodeticPoint
 from tests.firmware_py.mavlink.conftest import HOME

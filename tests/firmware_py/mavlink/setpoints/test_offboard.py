@@ -2,6 +2,7 @@ from math import nan, pi
 
 import pytest
 
+from firmware_py.setpoints import BodyRateSetpoint
 from firmware_py.types import VehicleState
 from tests.firmware_py.mavlink.conftest import HOME
 from wire.dialect import mavlink
@@ -65,7 +66,7 @@ def test_an_attitude_with_a_thrust(autopilot, peer):
 def test_rates_with_a_thrust(autopilot, peer):
     peer.send(attitude(mask=128))
     (setpoint,) = autopilot.setpoints
-    assert setpoint.attitude is None
+    assert isinstance(setpoint, BodyRateSetpoint)
     assert setpoint.rate_frd_rad_s == pytest.approx((0.1, 0.2, 0.3))
 
 

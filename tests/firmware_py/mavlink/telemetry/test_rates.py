@@ -4,7 +4,7 @@ from collections import Counter
 
 import pytest
 
-from firmware_py.types import Setpoint
+from firmware_py.setpoints import TrajectorySetpoint
 from wire.dialect import mavlink
 
 SECONDS = 30.0
@@ -52,7 +52,7 @@ NOT_IN_PX4 = [27, 140, 9999]
 @pytest.fixture
 def holding(autopilot):
     autopilot.status.armed = True
-    autopilot.status.setpoint = Setpoint(0, position_ned_m=(1.0, 2.0, -3.0))
+    autopilot.status.setpoint = TrajectorySetpoint(0, position_ned_m=(1.0, 2.0, -3.0))
     return autopilot
 
 
@@ -70,7 +70,7 @@ def test_names_and_rates_on_both_links_are_px4s(holding, make_peer):
 
 
 def test_disarmed_there_is_no_global_target(autopilot, make_peer):
-    autopilot.status.setpoint = Setpoint(0, position_ned_m=(1.0, 2.0, -3.0))
+    autopilot.status.setpoint = TrajectorySetpoint(0, position_ned_m=(1.0, 2.0, -3.0))
     names = {m.get_type() for _, m in make_peer(autopilot).advance(3.0)}
     assert "POSITION_TARGET_GLOBAL_INT" not in names
     assert "POSITION_TARGET_LOCAL_NED" in names

@@ -5,14 +5,19 @@ import pytest
 
 from firmware_py.mavlink.node import MavlinkNode
 from firmware_py.mavlink.rates import GROUND, ONBOARD
-from firmware_py.mavlink.telemetry.sensing import pressure_hpa, temperature_k, to_body
+from firmware_py.mavlink.telemetry.sensing import (
+    EARTH_FIELD_NED_GAUSS,
+    earth_field_frd_gauss,
+    pressure_hpa,
+    temperature_k,
+)
+from firmware_py.setpoints import AttitudeSetpoint, TrajectorySetpoint
 from firmware_py.status import FlightMode, LandedState, VehicleStatus
 from firmware_py.types import (
     BatteryState,
     FlightRecord,
     GeodeticPoint,
     MotorOutput,
-    Setpoint,
     VehicleState,
 )
 from wire.dialect import mavlink
@@ -129,13 +134,16 @@ def test_a_flights_times_are_those_of_the_flight_under_way(autopilot, peer):
 
 def test_targets_on_earth_and_of_attitude(autopilot, peer):
     status = autopilot.status
-    status.armed, status.setpoint = True, Setpoint(0, position_ned_m=(100.0, 0.0, -5.0), yaw_rad=0.5)
+    status.armed, status.setpoint = (
+        True,
+        TrajectorySetpoint(0, position_ned_m=(100.0, 0.0, -5.0), yaw_rad=0.5),
+    )
     place = latest(peer, "POSITION_TARGET_GLOBAL_INT")
     assert (place.coordinate_frame, place.type_mask, place.alt) == (5, 0x9F8, 494.0)
     assert place.lat_int - 473977420 == pytest.approx(8983, abs=20)  # 100 m north
     attitude = latest(peer, "ATTITUDE_TARGET")
     assert attitude.type_mask == 128 | 7
-    status.setpoint = Setpoint(0, attitude=(1.0, 0.0, 0.0, 0.0), thrust=0.4)
+    status.setpoint = AttitudeSetpoint(0, attitude=(1.0, 0.0, 0.0, 0.0), thrust=0.4)
     attitude = latest(peer, "ATTITUDE_TARGET")
     assert attitude.type_mask == 7
     assert attitude.thrust == pytest.approx(0.4)
@@ -217,7 +225,7 @@ def test_motion_is_packed_in_mavlinks_units(autopilot, peer):
 
 
 def test_the_target_is_masked_where_nothing_is_controlled(autopilot, peer):
-    autopilot.status.setpoint = Setpoint(0, velocity_ned_m_s=(1.0, 0.0, -0.5), yaw_rate_rad_s=0.2)
+    autopilot.status.setpoint = TrajectorySetpoint(0, velocity_ned_m_s=(1.0, 0.0, -0.5), yaw_rate_rad_s=0.2)
     target = latest(peer, "POSITION_TARGET_LOCAL_NED")
     assert target.type_mask == 0x5C7
     assert (target.vx, target.vz) == (1.0, -0.5)
@@ -278,13 +286,14 @@ def test_standard_atmosphere():
 
 
 def test_field_turns_into_the_body():
+    north, east, down = EARTH_FIELD_NED_GAUSS
     quarter_right = (2**-0.5, 0.0, 0.0, 2**-0.5)  # looking east, north is on the left
-    assert to_body((1.0, 0.0, 0.5), quarter_right) == pytest.approx((0.0, -1.0, 0.5))
+    assert earth_field_frd_gauss(quarter_right) == pytest.approx((east, -north, down))
 
 
 def test_every_source_names_its_own_message(autopilot, peer):
     autopilot.status.armed = True
-    autopilot.status.setpoint = Setpoint(0, position_ned_m=(0.0, 0.0, -1.0))
+    autopilot.status.setpoint = TrajectorySetpoint(0, position_ned_m=(0.0, 0.0, -1.0))
     peer.send(mavlink.MAVLink_rc_channels_override_message(1, 1, *[1500] * 8))
     made = {
         message_id: source().get_msgId()

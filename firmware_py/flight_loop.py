@@ -1,0 +1,398 @@
+"""One control tick of the autopilot: estimate, observe, decide, guide, actuate.
+
+It reads no clock and opens nothing: time is what the sensors say, and who calls it decides how fast.
+"""
+
+from __future__ import annotations
+
+from collections import deque
+from math import cos, isnan, nan, radians
+from typing import TYPE_CHECKING
+
+from firmware_py.airframe import Airframe
+from firmware_py.battery import BatteryMonitor
+from firmware_py.commander import NOT_CHECKED, Commander, Observation, SlowChecks
+from firmware_py.commander_table import INFO, WARNING, Event, Row, State
+from firmware_py.commands import ControlCommand
+from firmware_py.estimator import Estimator
+from firmware_py.geodesy import GeoReference
+from firmware_py.ground_contact import LandDetector, LiftOff
+from firmware_py.guidance.modes import Guidance
+from firmware_py.guidance.orbit import Orbit
+from firmware_py.missions.flight import LegKind
+from firmware_py.missions.store import MissionStore
+from firmware_py.navigator import Navigator
+from firmware_py.offboard_requests import SetpointQueue
+from firmware_py.parameters import Parameters
+from firmware_py.status import CommandResult, LandedState, VehicleStatus
+from firmware_py.types import (
+    FlightRecord,
+    GeodeticPoint,
+    MotorOutput,
+    MotorSpeeds,
+    Sensors,
+    StatusText,
+)
+from geometry.vectors import NAN3, Vec3
+
+if TYPE_CHECKING:
+    from firmware_py.control.stabiliser import Stabiliser
+
+_MAX_TEXTS = 100
+_CHECK_PERIOD_US = 100_000
+_READY_PERIOD_US = 100_000  # once armed, whether it could be armed again is of little interest
+
+_STAYS_ON_GROUND = frozenset(
+    {
+        State.HOLD,
+        State.FAILSAFE_HOLD,
+        State.LAND,
+        State.FAILSAFE_LAND,
+        State.FAILSAFE_DESCEND,
+        State.RETURN,
+        State.FAILSAFE_RETURN,
+    }
+)
+"""States that leave the ground only if their mode departs for a place above."""
+
+_AIRBORNE_STATES = {
+    State.TAKEOFF: LandedState.TAKEOFF,
+    State.LAND: LandedState.LANDING,
+    State.FAILSAFE_LAND: LandedState.LANDING,
+    State.FAILSAFE_DESCEND: LandedState.LANDING,
+}
+_STOPPED_STATES = frozenset({State.DISARMED, State.TERMINATED})
+_LEG_ENDS = {LegKind.RETURN: Event.MISSION_RETURNS, LegKind.DONE: Event.MISSION_DONE}
+
+
+class FlightLoop:
+    """Joins estimator, commander, guidance and stabiliser. Of decisions only the commander keeps a memory.
+
+    Args:
+        airframe: what it flies.
+        origin: where on Earth the sensors' positions count from.
+        parameters: shared with the MAVLink services; the airframe's defaults if not given.
+        control_period_s: time between calls of `step`.
+        stabiliser: another one than the airframe's own design, for tests.
+
+    Attributes:
+        airframe: what it flies.
+        parameters: what a ground station may change; changes act at the next tick.
+        estimator: knows the local frame's origin.
+        state: the estimate of the vehicle, updated in place.
+        status: arming, mode, home and so on, updated in place.
+        output: what the last step sent to the motors.
+        battery: what is known of the battery.
+        flight: times of the flight now or last.
+        missions: mission, fence and rally points.
+        setpoints: of an offboard controller, as received.
+    """
+
+    def __init__(
+        self,
+        airframe: Airframe,
+        origin: GeodeticPoint,
+        parameters: Parameters | None = None,
+        control_period_s: float = 0.004,
+        *,
+        stabiliser: Stabiliser | None = None,
+    ) -> None:
+        """Boot, disarmed; see the class for the arguments."""
+        self.airframe = airframe
+        self.parameters = parameters if parameters is not None else Parameters(defaults=airframe.parameters)
+        self.estimator = Estimator()
+        self.state = self.estimator.state
+        self.status = VehicleStatus()
+        self.output = MotorOutput((0.0,) * len(airframe.rotors))
+        self.flight = FlightRecord()
+        self.missions = MissionStore()
+        self.setpoints = SetpointQueue()
+        self._battery = BatteryMonitor(airframe, self.parameters)
+        self.battery = self._battery.state
+        self._geo = GeoReference(origin)
+        self._commander = Commander()
+        self._guidance = Guidance(airframe, self.parameters, control_period_s)
+        self._navigator = Navigator(self.missions, self.parameters)
+        self._stabiliser = stabiliser
+        self._lift_off = LiftOff()
+        self._land_detector = LandDetector((airframe.hover_speed_rad_s / airframe.motor.max_speed_rad_s) ** 2)
+        self._texts: deque[StatusText] = deque(maxlen=_MAX_TEXTS)
+        self._period_us = round(control_period_s * 1e6)
+        self._now_us = 0  # goes on while samples are unusable
+        self._checks = NOT_CHECKED
+        self._checks_due_us = self._ready_due_us = 0
+        self._motors_stopped = True
+        self._state_entered = State.DISARMED
+        self._state_shown: State | None = None
+        self._airborne = LandedState.IN_AIR
+        self._configure()
+
+    def prepare(self) -> None:
+        """Design the stabiliser, if that has not been done; arming does it at the latest.
+
+        It takes some tenths of a second, most of them to import SciPy, so a program in real time does it
+        before its clock runs, and after it has sent its first heartbeat.
+        """
+        if self._stabiliser is None:
+            from firmware_py.control.stabiliser import Stabiliser
+
+            self._stabiliser = Stabiliser(self.airframe, self._period_us / 1e6)
+            self._parameters_version = -1  # it gets its limits with the next tick
+
+    def step(self, sensors: Sensors) -> MotorSpeeds:
+        """Fly one control tick.
+
+        Args:
+            sensors: this tick's sample. An unusable one (not finite, not newer than the last) is bridged
+                with the last motor speeds; soon after, the commander gives up.
+
+        Returns:
+            Rotor speeds in rad/s, in the airframe's order; zeros while disarmed.
+        """
+        if self.parameters.version != self._parameters_version:
+            self._configure()
+        sound = self.estimator.update(sensors)
+        seen = self._observe(sensors, sound)
+        commander = self._commander
+        row = commander.tick(seen)  # it decides
+        if row is not None:
+            self._follow(row)
+        if commander.state is State.MISSION:
+            self._advance_mission()
+        self._refresh_status()
+        if sound and not self._motors_stopped:
+            command = self._guidance.step(self.state)
+            self.output = self._actuate(command, seen.landed)
+        return self.output.speeds_rad_s
+
+    def _handle(
+        self, event: Event, *, takeoff_altitude_m: float | None = None, orbit: Orbit | None = None
+    ) -> CommandResult:
+        """Take a command, between ticks.
+
+        Args:
+            event: what is commanded.
+            takeoff_altitude_m: of the next take-off, above mean sea level; NaN: MIS_TAKEOFF_ALT above home.
+            orbit: the circle to fly.
+        """
+        self._commander.mission_known(valid=self.missions.valid)
+        self._commander.remember(takeoff_altitude_m, orbit)
+        row = self._commander.handle(event)
+        self._follow(row)
+        self._refresh_status()
+        return row.result
+
+    def say(self, severity: int, text: str) -> None:
+        """Leave a line for people, with MAV_SEVERITY; the oldest go first when nobody takes them."""
+        self._texts.append(StatusText(severity, text))
+
+    def take_texts(self) -> list[StatusText]:
+        """All messages since the last call, oldest first."""
+        texts = list(self._texts)
+        self._texts.clear()
+        return texts
+
+    def _publish_places(self) -> None:
+        """Tell status and guidance where origin and home are."""
+        status, geo = self.status, self._geo
+        status.origin, status.home, status.home_ned_m = geo.origin, geo.home, geo.home_ned_m
+        self._guidance.set_home(geo.home_ned_m)
+
+    def _observe(self, sensors: Sensors, sound: bool) -> Observation:
+        """What the commander is to know of this tick."""
+        state, detector, now_us = self.state, self._land_detector, self._now_us
+        if not sound:
+            self._now_us = now_us = now_us + self._period_us
+        else:
+            if state.time_us > now_us:
+                self._now_us = now_us = state.time_us
+            if self._geo.projection is None:
+                self._fix_origin()
+            before = detector.landed
+            landed = detector.update(
+                state,
+                armed=not self._motors_stopped,
+                lifting=self._lift_off.ticks > 0,
+                command_down_m_s=self._guidance.command_down_m_s,
+                throttle=self.output.throttle,
+            )
+            if landed is not before:
+                self._change_ground_contact(landed)
+        if now_us >= self._checks_due_us:
+            self._checks = self._check(sensors)
+        if self.setpoints.waiting is not None and self.setpoints.is_due(now_us):
+            self._guidance.accept(self.setpoints.take())
+        _, x, y, _ = state.attitude
+        return Observation(
+            now_us,
+            sound,
+            self.estimator.placed,
+            1.0 - 2.0 * (x * x + y * y) > self._upright_cosine,
+            detector.landed,
+            self._guidance.mode.target_reached,
+            self._checks,
+        )
+
+    def _actuate(self, command: ControlCommand, landed: bool) -> MotorOutput:
+        """Motors for a command, with the ground between if it stands."""
+        stabiliser = self._stabiliser
+        if stabiliser is None:
+            raise RuntimeError("the stabiliser is not designed yet; call prepare()")
+        if not landed or command.is_for_motors:
+            return self._lift_off.fly(stabiliser, self.state, command)
+        guidance = self._guidance
+        return self._lift_off.stand(
+            stabiliser,
+            self.state,
+            command,
+            guidance.command_down_m_s,
+            may_lift=self._commander.state not in _STAYS_ON_GROUND or guidance.mode.departs(self.state),
+            climb_ramp=guidance.mode.climb_ramp,
+        )
+
+    def _follow(self, row: Row) -> None:
+        """Do what a rule that fired entails."""
+        if row.text:
+            self.say(row.severity, row.text)
+        if row.target is None:
+            return
+        before, self._state_entered = self._state_entered, row.target
+        if before is State.DISARMED:
+            self._leave_disarmed()
+        self._motors_stopped = row.target in _STOPPED_STATES
+        if self._motors_stopped:
+            self.output = MotorOutput((0.0,) * len(self.airframe.rotors))
+            self._lift_off.rest()
+        self._navigator.observe(self.state, self._geo, landed=self._land_detector.landed)
+        if row.target is State.OFFBOARD:
+            self._guidance.accept(self.setpoints.take())
+        self._enter(row.target, before, row.event)
+
+    def _leave_disarmed(self) -> None:
+        if self._stabiliser is not None:
+            self._stabiliser.reset()
+        self._geo.set_home_at(self.state.position_ned_m)
+        self._publish_places()
+        self._lift_off.arm(self._now_us)
+        self.flight.armed_us = self._now_us
+        self.flight.takeoff_us = self.flight.landed_us = 0
+        self.flight.number += 1
+
+    def _enter(self, target: State, before: State, event: Event) -> None:
+        """Fly the mode of a state entered; one without motors changes no guidance."""
+        if before is State.MISSION:
+            self._navigator.leave_mission()
+        if self._motors_stopped:
+            self._navigator.disarmed()
+            return
+        on_ground = self.status.landed_state is LandedState.ON_GROUND
+        if target is State.FAILSAFE_HOLD and before is State.TAKEOFF and on_ground:
+            return  # as PX4: a take-off that has begun goes on to its height and holds there
+        reached = before is State.TAKEOFF and event is Event.TICK
+        self._guidance.enter(
+            target,
+            self.state,
+            target_ned_m=self._target_of(target),
+            keep_target=reached or event is Event.MISSION_DONE,
+            orbit=self._commander.orbit,
+        )
+        if target is State.MISSION:
+            self._navigator.enter_mission()
+
+    def _target_of(self, target: State) -> Vec3:
+        """Where a take-off or a return goes, NED metres; NaN for other states."""
+        if target in (State.RETURN, State.FAILSAFE_RETURN):
+            return self._navigator.return_place() or self._geo.home_ned_m
+        here = self._geo.to_geodetic(self.state.position_ned_m)
+        if target is not State.TAKEOFF or here is None or self._geo.home is None:
+            return NAN3
+        altitude_m = self._commander.takeoff_altitude_m
+        if isnan(altitude_m):
+            height_m = self.parameters.value("MIS_TAKEOFF_ALT")
+            altitude_m = self._geo.home.altitude_m + height_m
+            self.say(INFO, f"Using default takeoff altitude: {height_m:.1f} m")
+        if altitude_m < here.altitude_m:
+            self.say(WARNING, "Already higher than takeoff altitude")
+        climb_m = altitude_m - here.altitude_m
+        return (nan, nan, self.state.position_ned_m[2] - climb_m)
+
+    def _advance_mission(self) -> None:
+        """Fly the mission's next leg, and tell the commander when it ends."""
+        self._navigator.observe(self.state, self._geo, landed=self._land_detector.landed)
+        leg = self._navigator.next_leg()
+        if leg is None:
+            return
+        self._guidance.fly_leg(self.state, leg)
+        ended = _LEG_ENDS.get(leg.kind)
+        if ended is not None:
+            self._follow(self._commander.handle(ended))
+
+    def _fix_origin(self) -> None:
+        if self.estimator.origin_ned_m is not None:
+            self._geo.fix_origin(self.estimator.origin_ned_m)
+            self._geo.set_home_at(self.state.position_ned_m)
+            self._publish_places()
+
+    def _change_ground_contact(self, landed: bool) -> None:
+        if landed:
+            self.flight.landed_us = self._now_us
+        else:
+            self.flight.takeoff_us = self._now_us
+            self._guidance.left_ground()
+        if not self._motors_stopped:
+            self.say(INFO, "Landing detected" if landed else "Takeoff detected")
+
+    def _check(self, sensors: Sensors) -> SlowChecks:
+        """Look at battery, fence and mission."""
+        self._checks_due_us = self._now_us + _CHECK_PERIOD_US
+        battery, navigator = self._battery, self._navigator
+        navigator.observe(self.state, self._geo, landed=self._land_detector.landed)
+        battery.update(self._now_us, sensors.battery_voltage_v, sensors.battery_current_a)
+        breach = navigator.breach() if self.status.armed else None
+        if breach is not None and not self._checks.fence_breached:
+            self.say(WARNING, breach.text)
+        self._texts.extend(navigator.take_texts())
+        return SlowChecks(
+            battery.state.warning,
+            battery.arms,
+            self.missions.valid,
+            breach is not None,
+        )
+
+    def _configure(self) -> None:
+        """Take over the parameters; looked up by name only when one has changed."""
+        parameters, airframe = self.parameters, self.airframe
+        self._parameters_version = parameters.version
+        self._commander.configure(parameters)
+        self._guidance.configure(airframe, parameters)
+        self._battery.configure(airframe, parameters)
+        if self._stabiliser is not None:
+            value, limits = parameters.value, self._stabiliser.limits
+            limits.tilt_rad = radians(value("MPC_TILTMAX_AIR"))
+            limits.rate_rad_s = radians(min(value("MC_ROLLRATE_MAX"), value("MC_PITCHRATE_MAX")))
+            limits.min_thrust, limits.max_thrust = value("MPC_THR_MIN"), value("MPC_THR_MAX")
+        self._lift_off.configure(parameters)
+        self._land_detector.configure(parameters)
+        tilt_deg = min(parameters.value("FD_FAIL_P"), parameters.value("FD_FAIL_R")) or 180.0  # 0: never
+        self._upright_cosine = cos(radians(tilt_deg))
+
+    def _refresh_status(self) -> None:
+        status, commander = self.status, self._commander
+        state, intended = commander.state, commander.situation.intended
+        if state is not self._state_shown or intended is not status.intended_mode:
+            self._state_shown = state
+            self._airborne = _AIRBORNE_STATES.get(state, LandedState.IN_AIR)
+            status.armed = state is not State.DISARMED
+            status.mode = commander.mode
+            status.intended_mode = intended
+            status.failsafe = commander.failsafe
+        status.setpoint = self._guidance.mode.setpoint
+        status.landed_state = LandedState.ON_GROUND if self._land_detector.landed else self._airborne
+        if status.armed and self._now_us < self._ready_due_us:
+            return
+        self._ready_due_us = self._now_us + _READY_PERIOD_US
+        ready = commander.ready
+        status.not_ready = "" if ready else commander.refusal
+        if ready and not status.ready and not status.armed:
+            self.say(INFO, "Ready for takeoff!")
+        status.ready = ready

@@ -1,0 +1,122 @@
+"""Runs the monitor: drones, pages and the live channel, served until cancelled."""
+
+from __future__ import annotations
+
+import asyncio
+import socket
+from collections.abc import Callable
+from typing import TYPE_CHECKING
+
+from monitor.qr_code import terminal_code
+from monitor.settings import BACKLOG, MonitorError, MonitorSettings
+from monitor.urls import is_for_others, url_of, urls_for_people
+
+if TYPE_CHECKING:
+    import uvicorn
+
+    from monitor.ports import Equipment
+    from monitor.server import Job
+
+
+_MAX_UNSENT_BYTES = 1 << 16  # that the kernel takes for a slow viewer, beyond what is on its way
+
+
+async def serve(equipment: Equipment, settings: MonitorSettings, say: Callable[[str], None]) -> None:
+    """Serve the monitor until cancelled.
+
+    Args:
+        equipment: the link to the drones and what else the monitor needs.
+        settings: where it listens and stores.
+        say: takes lines for people: the address, and judges' links.
+
+    Raises:
+        MonitorError: a setting cannot be used, or the port is taken.
+    """
+    settings.check()
+    with _listen(settings.bind, settings.port) as listener:
+        # Importing the libraries takes more than a second; other tasks of this loop run meanwhile.
+        await asyncio.to_thread(_import_server)
+        from monitor.server import assemble, make_server  # noqa: PLC0415 - see above
+
+        host, port = listener.getsockname()[:2]
+        reachable = urls_for_people(host, port)
+        urls = reachable or [url_of("127.0.0.1", port)]
+        qr_codes = settings.qr_codes and bool(reachable) and is_for_others(host)
+
+        def invite(secret: str) -> None:
+            link = f"{urls[0]}login?token={secret}"
+            say(f"judges log in at {link}")
+            if qr_codes:
+                say(f"one judge's phone reads it here; the next judge gets another\n{terminal_code(link)}")
+
+        def started() -> None:
+            for url in urls:
+                say(f"monitor: {url}")
+            if not reachable:
+                say("this machine is in no network: phones cannot open it yet")
+            if qr_codes:
+                say(f"phones that look on read it here, or at {urls[0]}join\n{terminal_code(urls[0])}")
+            monitor.access.invite()
+
+        monitor = assemble(equipment, settings, (host, port), invite)
+        server = make_server(monitor.web, settings, started)
+        await _run(server, listener, [monitor.fleet.run, *monitor.jobs])
+
+
+def _listen(bind: str, port: int) -> socket.socket:
+    """Open the listening socket, before anything slow is done: so a taken port is reported at once.
+
+    Args:
+        bind: address or name of an interface.
+        port: TCP port; 0 lets the system choose.
+
+    Raises:
+        MonitorError: it is taken, or the address is not ours.
+    """
+    try:
+        family, kind, protocol, _, address = socket.getaddrinfo(
+            bind, port, type=socket.SOCK_STREAM, flags=socket.AI_PASSIVE
+        )[0]
+        listener = socket.socket(family, kind, protocol)
+    except OSError as error:
+        raise MonitorError(
+            f"monitor: --bind {bind}: {(error.strerror or str(error)).lower()}; "
+            "give an address of this machine, such as 127.0.0.1 or 0.0.0.0"
+        ) from error
+    try:
+        listener.setsockopt(
+            socket.SOL_SOCKET, socket.SO_REUSEADDR, 1
+        )  # a killed monitor's port is free at once
+        if hasattr(socket, "TCP_NOTSENT_LOWAT"):
+            listener.setsockopt(socket.IPPROTO_TCP, socket.TCP_NOTSENT_LOWAT, _MAX_UNSENT_BYTES)
+        listener.bind(address)
+        listener.listen(BACKLOG)
+        listener.setblocking(False)
+    except OSError as error:
+        listener.close()
+        reason = (error.strerror or str(error)).lower()
+        raise MonitorError(
+            f"monitor: cannot listen on {bind} port {port}: {reason}; choose another with --port"
+        ) from error
+    return listener
+
+
+def _import_server() -> None:
+    from monitor.server import import_modules  # noqa: PLC0415 - see `serve`
+
+    import_modules()
+
+
+async def _run(server: uvicorn.Server, listener: socket.socket, jobs: list[Job]) -> None:
+    """Run the server and what belongs to it until cancelled or one of them fails."""
+    serving = asyncio.create_task(server.serve([listener]))
+    running = [asyncio.create_task(job()) for job in jobs]
+    try:
+        done, _ = await asyncio.wait([serving, *running], return_when=asyncio.FIRST_COMPLETED)
+        for task in done:
+            task.result()
+    finally:
+        server.should_exit = True
+        for task in running:
+            task.cancel()
+        await asyncio.gather(serving, *running, return_exceptions=True)

@@ -1,0 +1,61 @@
+"""Telemetry that comes late, doubled or swapped, without a vehicle."""
+
+from __future__ import annotations
+
+import asyncio
+import json
+from types import SimpleNamespace
+
+from offboard.link.telemetry import TelemetryFeed
+from wire.vehicle_telemetry import MessageOrder
+
+
+def test_what_is_older_is_dropped_and_a_jump_of_seconds_is_a_restart():
+    order = MessageOrder()
+    stamps_ms = (10_000, 10_020, 10_010, 10_020, 9_000, 7_100, 10_040, 6_000, 6_020, 6_010)
+    assert [ms for ms in stamps_ms if order.is_next(ms * 1000)] == [
+        10_000,
+        10_020,
+        10_020,
+        10_040,
+        6_000,
+        6_020,
+    ]
+
+
+class Plugin:
+    """What `TelemetryFeed` subscribes to."""
+
+    def __init__(self):
+        self.called = {}
+
+    def __getattr__(self, name):
+        return lambda callback: self.called.__setitem__(name, callback)
+
+    def subscribe_message(self, name, callback):
+        self.called[name] = callback
+
+    def attitude(self, ms):
+        self.called["subscribe_attitude_euler"](SimpleNamespace(yaw_deg=0.0, timestamp_us=ms * 1000), None)
+
+    def position(self, ms, x):
+        told = {"time_boot_ms": ms, "x": x, "y": 0.0, "z": None, "vx": 0.0, "vy": 0.0, "vz": 0.0}
+        self.called["LOCAL_POSITION_NED"](SimpleNamespace(fields_json=json.dumps(told)), None)
+
+
+async def test_ticks_and_positions_never_go_back():
+    feed, plugin = TelemetryFeed(), Plugin()
+    feed.subscribe(plugin, plugin)
+    plugin.position(10_040, 1.0)
+    plugin.attitude(10_050)
+    plugin.position(10_020, 0.9)  # late
+    plugin.attitude(10_040)
+    assert (feed.sample.time_us, feed.sample.position_us) == (10_050_000, 10_040_000)
+    assert feed.position_ned_m[0] == 1.0
+    plugin.attitude(10_100)
+    assert (feed.sample.time_us, feed.sample.position_ned_m[0]) == (10_100_000, 1.0)
+    assert feed.position_ned_m[2] != feed.position_ned_m[2]  # null: not a number
+    assert (feed.attitudes, feed.positions) == (2, 1)
+    plugin.attitude(1_000)  # restarted
+    assert feed.sample.time_us == 1_000_000
+    await asyncio.sleep(0)
