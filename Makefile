@@ -58,7 +58,7 @@ test-realtime-links: setup # these only wait
 	$(BIN)/pytest -n 4 -m "realtime and not alone" tests/offboard
 
 test-realtime-pairs: setup
-	$(BIN)/pytest -n 2 --dist loadgroup -m "realtime and not alone" --ignore tests/offboard
+	$(BIN)/pytest -n 2 --dist loadfile -m "realtime and not alone" --ignore tests/offboard
 
 test-realtime-alone: setup
 	$(BIN)/pytest -m alone

@@ -6,7 +6,6 @@ import asyncio
 import signal
 import time
 from contextlib import asynccontextmanager
-from pathlib import Path
 
 import pytest
 from mavsdk.asyncio import ComponentType, Configuration, Mavsdk
@@ -111,14 +110,6 @@ class Peer:
                 if message.get_type() == "HEARTBEAT" and wanted(message):
                     return message
         raise AssertionError(f"no such heartbeat within {limit_s:g} s")
-
-
-@pytest.hookimpl(tryfirst=True)
-def pytest_collection_modifyitems(items):
-    """Tests of a module share its simulator, so that one worker runs them."""
-    for item in items:
-        if item.path.parent == Path(__file__).parent:
-            item.add_marker(pytest.mark.xdist_group(item.path.stem))
 
 
 @pytest.fixture(scope="module")
