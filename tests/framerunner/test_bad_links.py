@@ -7,7 +7,7 @@ from scenarios.loader import load_scenario
 from tests.framerunner.simulated_link import Impairment, fly_over
 from tests.offboard.fakes import runaway
 
-SEEDS = range(4)
+SEEDS = range(20)
 IMPAIRMENTS = {
     "5 % lost": Impairment(loss=0.05),
     "20 % lost": Impairment(loss=0.2),
@@ -37,7 +37,7 @@ def silence_later(impairment, seed):
     begin_s, end_s = impairment.silent_s
     if end_s == 0.0:
         return impairment
-    late_s = 1.5 * seed
+    late_s = 0.3 * seed
     return Impairment(silent_s=(begin_s + late_s, end_s + late_s))
 
 
@@ -69,8 +69,9 @@ def test_a_flight_with_swapped_datagrams_is_completed(mission):
 def test_no_mission_leads_out_over_a_slow_and_lossy_link(tmp_path, first, then):
     mission = runaway(tmp_path, first, then)
     scenario = before_a_low_frame().model_copy(update={"frames": (), "try_limit_s": 14.0})
-    flight = fly_over(SLOW_AND_LOSSY, scenario, mission)
-    assert flight.outcome.kept_in_box_s > 1.0
-    assert flight.ended_safely
-    assert flight.farthest_outside_m < 0.01
-    assert flight.lowest_m() > 0.1
+    for seed in range(3):
+        flight = fly_over(SLOW_AND_LOSSY, scenario, mission, seed=seed)
+        assert flight.outcome.kept_in_box_s > 1.0
+        assert flight.ended_safely
+        assert flight.farthest_outside_m < 0.01
+        assert flight.lowest_m() > 0.1

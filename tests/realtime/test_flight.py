@@ -79,7 +79,7 @@ def busy_flight(tmp_path_factory):
     """Test case 3, three times as fast as real, on a busy machine with viewers: folder and words."""
     folder, instance = tmp_path_factory.mktemp("flight"), free_instance()
     options = ("--instance", str(instance), "--speed", "3", "--record")
-    with disturbed(instance, busy=2, viewers=3), program(folder, "fly", "test-case-3", *options) as flight:
+    with disturbed(instance, busy=3, viewers=5), program(folder, "fly", "test-case-3", *options) as flight:
         code = flight.process.wait(300.0)
         assert code == 0, flight.err + flight.out
     assert ports_are_free(instance)
