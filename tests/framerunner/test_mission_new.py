@@ -47,19 +47,19 @@ def with_exercise_done(text):
 def test_the_starter_crosses_red_and_comes_home(scenario):
     new("mine")
     result = fly(scenario, "mine.yaml").result
-    assert result["ended"] == "finished", result["reason"]
-    assert result["frames_crossed"] == ("red",)
-    assert result["landed_on_base"]
-    assert result["landing_error_m"] < 0.15
+    assert result.ended == "finished", result.reason
+    assert result.frames_crossed == ("red",)
+    assert result.landed_on_base
+    assert result.landing_error_m < 0.15
 
 
 def test_the_starter_with_python_does_so_too():
     new("mine", "--python")
     result = fly("test-case-1", "mine.yaml", "mine.py").result
-    assert result["ended"] == "finished", result["reason"]
-    assert result["frames_crossed"] == ("red",)
-    assert result["landed_on_base"]
-    assert result["seconds_in_state"]["circle"] > 1.0  # its own primitive did fly
+    assert result.ended == "finished", result.reason
+    assert result.frames_crossed == ("red",)
+    assert result.landed_on_base
+    assert result.seconds_in_state["circle"] > 1.0  # its own primitive did fly
 
 
 def test_its_first_exercise_flies_the_whole_challenge():

@@ -69,7 +69,7 @@ from framerunner.flying.plan import FlightPlan
 from scenarios.loader import load_scenario
 
 result = fly_lockstep(FlightPlan(load_scenario("empty"), pickle.load(sys.stdin.buffer))).result
-print(result["state_sha256"], result["try_time_s"])
+print(result.state_sha256, result.try_time_s)
 """
 
 

@@ -129,7 +129,7 @@ def test_a_long_text_is_not_parsed(tmp_path):
 
 
 def test_a_log_of_more_hours_than_any_battery_lasts_is_refused(tmp_path, monkeypatch):
-    monkeypatch.setattr("framerunner.recording.tlog_reader._TICKS_AT_MOST", 50)
+    monkeypatch.setattr("framerunner.recording.tlog_reader._MAX_TICKS", 50)
     write_log(tmp_path / "flight.tlog")
     with pytest.raises(RecordingError, match="longer than eight hours"):
         read_all(tmp_path)
