@@ -48,7 +48,11 @@ lint-rooms: $(VENV)/installed-dev
 
 .PHONY: test-fast
 test-fast: $(VENV)/installed-dev ## the tests that need no real time, in parallel
-	$(BIN)/pytest -n 2 --dist loadfile -m "not realtime"
+	$(BIN)/pytest -n 2 --dist worksteal -m "not realtime and not pages"
+
+.PHONY: test-pages
+test-pages: $(VENV)/installed-dev ## the monitor's single pages in a browser, at length; not part of `make test`
+	$(BIN)/pytest -n 2 --dist worksteal -m pages
 
 .PHONY: test-realtime test-realtime-links test-realtime-pairs test-realtime-alone
 test-realtime: test-realtime-links test-realtime-pairs test-realtime-alone ## the tests that fly in real time
