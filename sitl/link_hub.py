@@ -200,5 +200,5 @@ class LinkInput:
         """Say what was dropped since it was last said."""
         self._noticed_s = now_s
         for link, dropped_bytes in self._dropped_bytes.items():
-            self._notice(f"too much input on link {link}: {dropped_bytes / 1000:.0f} kB dropped")
+            self._notice(f"too much input on link {link}: {dropped_bytes} bytes dropped")
         self._dropped_bytes.clear()
