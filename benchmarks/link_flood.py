@@ -34,7 +34,7 @@ from sitl.pacer import Pacer
 from sitl.server_settings import ServerSettings, parse_link
 from sitl.simulation import Simulation
 from wire.dialect import mavlink
-from wire.traffic import Traffic
+from wire.link import Traffic
 
 LINKS = ("udp", "udp, 60 kB", "tcp", "serial")
 TCP_PORT = 5790

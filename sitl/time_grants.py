@@ -19,9 +19,8 @@ from dataclasses import asdict, dataclass
 
 FREE_US = 1 << 62
 _POLL_S = 0.0005
-_POLLS = (
-    4000  # at least 2 s; a setpoint comes over a socket of its own, and one that was lost again in 0.05 s
-)
+# At least 2 s: a setpoint comes over a socket of its own, and one that was lost is sent again in 0.05 s.
+_POLLS = 4000
 
 Velocity = tuple[float, float, float, float]
 """Forward, right, down in level axes (m/s) and yaw rate (rad/s, clockwise)."""

@@ -189,6 +189,40 @@ def test_no_modules_import_each_other_in_a_circle():
     assert circles == {}
 
 
+def names_bound(path):
+    """Names that a module binds at its top level, in any branch."""
+    found, waiting = set(), [*ast.parse(path.read_text(encoding="utf-8")).body]
+    while waiting:
+        node = waiting.pop()
+        if isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef | ast.ClassDef):
+            found.add(node.name)
+        elif isinstance(node, ast.Import | ast.ImportFrom):
+            found.update(alias.asname or alias.name.partition(".")[0] for alias in node.names)
+        else:
+            if isinstance(node, ast.Name) and isinstance(node.ctx, ast.Store):
+                found.add(node.id)
+            waiting += ast.iter_child_nodes(node)
+    return found
+
+
+def test_what_is_imported_exists():
+    """Of our own modules, late imports and those of programs that no test runs too."""
+    files = [path for folder in (*ROOMS, "benchmarks", "tests") for path in (ROOT / folder).rglob("*.py")]
+    bound = {module_name(path): names_bound(path) for path in files}
+    packages = {name.rpartition(".")[0] for name in bound}
+    missing = [
+        f"{name_of(path)}:{node.lineno} {node.module}.{alias.name}"
+        for path in files
+        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8")))
+        if isinstance(node, ast.ImportFrom)
+        and node.module.partition(".")[0] in {*ROOMS, "benchmarks", "tests"}
+        for alias in node.names
+        if alias.name not in bound.get(node.module, set())
+        and not {f"{node.module}.{alias.name}"} & {*bound, *packages}
+    ]
+    assert missing == []
+
+
 def test_errors_for_people_are_user_errors():
     """The command line prints a UserError; any other error ends in a traceback."""
     strays = [

@@ -98,11 +98,6 @@ class Judging:
         self._result: tuple[int, FlightResult] | None = None
         self.standing: Standing | None = None
 
-    @property
-    def has_own(self) -> bool:
-        """Whether the monitor's own referee judges."""
-        return self._own is not None
-
     def hear(self, standing: Standing, now_s: float) -> None:
         """Take what the vehicle's referee says; from now on it alone counts."""
         self._own = None
