@@ -13,6 +13,9 @@ LOCK_PROJECT := $(LOCK) pyproject.toml locks/build.in
 INSTALL_LOCKED := $(BIN)/pip install --require-hashes --requirement
 INSTALL_PROJECT := $(BIN)/pip install --no-deps --no-build-isolation --editable .
 
+# The tests start hundreds of processes; without stored bytecode each of them compiles the project again.
+unexport PYTHONDONTWRITEBYTECODE
+
 .DEFAULT_GOAL := help
 .DELETE_ON_ERROR:
 .NOTPARALLEL:
@@ -48,11 +51,7 @@ lint-rooms: $(VENV)/installed-dev
 
 .PHONY: test-fast
 test-fast: $(VENV)/installed-dev ## the tests that need no real time, in parallel
-	$(BIN)/pytest -n 2 --dist worksteal -m "not realtime and not pages"
-
-.PHONY: test-pages
-test-pages: $(VENV)/installed-dev ## the monitor's single pages in a browser, at length; not part of `make test`
-	$(BIN)/pytest -n 2 --dist worksteal -m pages
+	$(BIN)/pytest -n 3 --dist worksteal -m "not realtime"
 
 .PHONY: test-realtime test-realtime-links test-realtime-pairs test-realtime-alone
 test-realtime: test-realtime-links test-realtime-pairs test-realtime-alone ## the tests that fly in real time
@@ -62,10 +61,10 @@ test-realtime-links: setup # these only wait
 	$(BIN)/pytest -n 4 -m "realtime and not alone" tests/offboard
 
 test-realtime-pairs: setup
-	$(BIN)/pytest -n 2 --dist loadfile -m "realtime and not alone" --ignore tests/offboard
+	$(BIN)/pytest -n 2 --dist loadfile -m "realtime and not alone" tests/realtime
 
 test-realtime-alone: setup
-	$(BIN)/pytest -m alone
+	$(BIN)/pytest -m alone tests/realtime
 
 .PHONY: bench
 bench: $(VENV)/installed ## time our flight, alone and beside MuJoCo and PyFlyt; options in BENCH="--peers none"

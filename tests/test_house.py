@@ -130,6 +130,16 @@ def test_modules_have_at_most_500_lines():
     assert {name: count for name, count in lines.items() if count > 500} == {}
 
 
+def test_make_test_runs_every_real_time_test():
+    """`make test-realtime` names two folders, so that its workers need not read all tests."""
+    marked = {
+        path.relative_to(ROOT / "tests").parts[0]
+        for path in (ROOT / "tests").rglob("test_*.py")
+        if "pytest.mark." + "realtime" in path.read_text(encoding="utf-8")
+    }
+    assert marked == {"realtime", "offboard"}
+
+
 def test_folders_have_at_most_20_modules():
     modules = Counter(name_of(path.parent) for path in MODULES if path.name != "__init__.py")
     assert {name for name, count in modules.items() if count > 20} == set(LARGE_FOLDERS)

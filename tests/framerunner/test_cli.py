@@ -329,7 +329,6 @@ def test_sigterm_is_not_lost_where_python_drops_exceptions():
     assert (done.stdout, done.stderr, done.returncode) == ("stopped\n", "", 0)
 
 
-@pytest.mark.realtime
 @pytest.mark.parametrize("seconds", [0.1, 0.4, 0.8, 1.6])
 def test_sigterm_while_a_flight_starts_ends_it_without_a_traceback(tmp_path, seconds):
     program = [sys.executable, "-m", "framerunner", "fly", "round-1", "--lockstep"]

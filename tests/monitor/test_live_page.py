@@ -12,7 +12,7 @@ from scenarios.loader import load_scenario
 from tests.chromium import Complaints
 from tests.monitor.page_server import JPEG, fake_monitor
 
-pytestmark = [pytest.mark.pages, pytest.mark.asyncio(loop_scope="session")]
+pytestmark = pytest.mark.asyncio(loop_scope="session")
 MISSION = load_mission("frame_challenge")
 STATES = list(MISSION.leaves)
 MARKUP = "<img src=x onerror=alert(1)><b>bold</b>"

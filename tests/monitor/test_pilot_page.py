@@ -15,7 +15,7 @@ from tests.chromium import Complaints
 from tests.monitor.pilot_fakes import MISSION, FakeFleet
 from tests.monitor.pilot_server import served
 
-pytestmark = [pytest.mark.pages, pytest.mark.asyncio(loop_scope="session")]
+pytestmark = pytest.mark.asyncio(loop_scope="session")
 PHONE = {"width": 390, "height": 844}
 FAKE_GAMEPAD = """
 window.pad = {

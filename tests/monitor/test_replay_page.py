@@ -11,7 +11,7 @@ from monitor.ports import RunInfo
 from tests.chromium import Complaints
 from tests.monitor.replay_runs import END_S, MARKUP, Library, a_run, info_of, serving_runs
 
-pytestmark = [pytest.mark.pages, pytest.mark.asyncio(loop_scope="session")]
+pytestmark = pytest.mark.asyncio(loop_scope="session")
 PATIENCE_MS = 30_000
 expect.set_options(timeout=PATIENCE_MS)
 LAPTOP, PHONE = {"width": 1366, "height": 768}, {"width": 390, "height": 844}

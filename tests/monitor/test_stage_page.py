@@ -17,7 +17,7 @@ from tests.monitor.test_live_page import (
     world,
 )
 
-pytestmark = [pytest.mark.pages, pytest.mark.asyncio(loop_scope="session")]
+pytestmark = pytest.mark.asyncio(loop_scope="session")
 PROJECTOR = {"width": 1920, "height": 1080}
 FRAMES = ["red", "green", "blue"]
 TRY = {"id": 7, "drone_id": 1, "team_name": "Adler", "scenario": "test-case-1", "frames": FRAMES}
