@@ -1,4 +1,4 @@
-"""The verdict on a try: one word, and one sentence that says why."""
+"""The verdict on a try: one of a few names, and a sentence with the reason."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from scenarios.touchdown import Landing
 
 
 class Verdict(StrEnum):
-    """What a try was worth, best first; no referee says `error`."""
+    """What a try was worth, best first; a referee never returns `error`."""
 
     CLEAN = "clean"
     COMPLETED = "completed"
@@ -35,8 +35,8 @@ class TryFacts:
         taken_off: the drone left the ground.
         motors_on: the motors are on now.
         settled: the motors are off and the drone is at rest.
-        timed_out: the try went past its limit.
-        wrong_order: what was crossed too early, or "".
+        timed_out: the try exceeded its limit.
+        wrong_order: which frame was crossed too early, or "".
         crash: what happened to the drone, or "".
         landing: where it came to rest after a flight.
     """
@@ -60,15 +60,13 @@ def judge(facts: TryFacts, mission_state: str = "", ended: str | None = None) ->
     """Give the verdict.
 
     The first rule that holds decides:
-    1. `wrong order`: a frame was crossed before its turn. It cannot be made good, whatever comes later.
-    2. `crashed`: see `CrashWatch`; lying on its side or back at rest is a crash too.
-    3. `timed out`: the try went past its limit.
+    1. `wrong order`: a frame was crossed too early, whatever followed.
+    2. `crashed`: see `CrashWatch`; coming to rest on its side or back is a crash too.
+    3. `timed out`: the try exceeded its limit.
     4. `clean` or `completed`: all frames crossed in order, and standing on the base with the motors off.
        Clean has neither contacts nor time outside.
-    5. `aborted`: the try stopped short of its task without one of the above. Here belong a mission that was
-       broken off, motors cut in the air that did no harm, landing beside the base (nothing is broken, but
-       the flight gave its task up), and landing with a frame never crossed (no frame came before its turn,
-       so the order is not wrong: the rest is missing).
+    5. `aborted`: all else. Examples are a mission that was broken off, motors cut in the air without a crash,
+       landing beside the base, and landing with a frame not crossed.
 
     Args:
         facts: what the referee saw.
@@ -122,7 +120,7 @@ def _flaws(facts: TryFacts) -> list[str]:
 
 
 def _shortfall(facts: TryFacts) -> str:
-    """Say what a try that nobody broke off lacks; the first that holds."""
+    """What a try that was not broken off lacks; the first that holds."""
     lacks = (
         (not facts.began, "the motors were never on"),
         (facts.motors_on, "the motors were still on"),

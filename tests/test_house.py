@@ -34,7 +34,6 @@ LARGE_CLASSES = {
     "monitor/pilot_seat.py PilotSeat": "a method for each order of a pilot",
     "monitor/vehicle/vehicle.py Vehicle": "a method for each kind of message from a vehicle",
     "offboard/mavsdk_drone.py MavsdkDrone": "implements the port `Drone`",
-    "scenarios/referee.py Referee": "a method for each phase of a try and each rule",
 }
 HASHED = re.compile(r"\S+==[^\n]* \\\n( {4}--hash=sha256:[0-9a-f]{64}( \\)?\n)+( {4}#.*\n?)*\Z")
 

@@ -7,7 +7,7 @@ import io
 from collections.abc import Iterable, Sequence
 
 from monitor.competition.views import Board, RankingView
-from scenarios.spreadsheet import cell
+from scenarios.result import spreadsheet_cell
 
 _TRY_COLUMNS = (
     *("try", "round", "team", "scenario", "attempt", "drone", "state", "judged", "verdict"),
@@ -64,4 +64,4 @@ def _safe(value: object) -> str:
         return "true" if value else "false"
     if not isinstance(value, str):
         return str(value)
-    return cell(value)
+    return spreadsheet_cell(value)

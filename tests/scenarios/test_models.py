@@ -1,8 +1,16 @@
 import pytest
 from pydantic import ValidationError
 
-from scenarios.ground import ground_height, is_over_base, start_position
-from scenarios.models import Base, Frame, Scenario, Start, field_path
+from scenarios.models import (
+    Base,
+    Frame,
+    Scenario,
+    Start,
+    field_path,
+    ground_height,
+    is_over_base,
+    start_position,
+)
 
 
 def test_opening_is_what_the_bars_leave():

@@ -3,7 +3,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from pydantic import ValidationError
 
-from scenarios.level import Level, LevelError, Range, list_levels, load_level, parse_level
+from scenarios.random_scenarios import Level, LevelError, Range, list_levels, load_level, parse_level
 from scenarios.yaml_file import MAX_BYTES
 from scenarios.yaml_tree import to_yaml
 
@@ -45,15 +45,16 @@ def test_a_level_loads_by_path(tmp_path):
         ("name: a: b", "f.yaml:1:8: not valid YAML: mapping values are not allowed here"),
         (b"name: a\n# \xff", "f.yaml:2: not UTF-8 text; save the file as UTF-8"),
         ("#" * (MAX_BYTES + 1), "f.yaml: 1000001 bytes is too large for a level; 1000000 at most"),
-        (CALM + "wnd: 1\n", "f.yaml:20: wnd 1 is not a known field; known here: name, description, layout"),
+        (CALM + "wnd: 1\n", "f.yaml:20: wnd is not a known field; known here: name, description, layout"),
+        (CALM + "  apart: 1\n", "f.yaml:20: layout.apart is not a known field; did you mean apart_m?"),
         (
-            CALM + "  apart: 1\n",
-            "f.yaml:20: layout.apart 1 is not a known field; known here: x_m, y_m, apart_m, frame_z_m, "
+            CALM + "  near: 1\n",
+            "f.yaml:20: layout.near is not a known field; known here: x_m, y_m, apart_m, frame_z_m, "
             "frame_yaw_rad, start_yaw_rad",
         ),
         (
             CALM.replace("    high: 4.0", "    high: 4.0\n    hihg: 4.0", 1),
-            "f.yaml:7: layout.x_m.hihg 4.0 is not a known field; known here: low, high",
+            "f.yaml:7: layout.x_m.hihg is not a known field; did you mean high?",
         ),
         (CALM.replace("1.5", "0.0"), "f.yaml:10: layout.apart_m is 0.0: must be above 0.0"),
         (CALM.replace("1.5", ".nan"), "f.yaml:10: layout.apart_m is NaN: must be a finite number"),

@@ -5,9 +5,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from scenarios.models import Frame, Scenario
+from scenarios.models import Frame, Scenario, TrueState
 from scenarios.referee import Referee
-from scenarios.truth import TrueState
 from scenarios.verdict import Verdict
 
 ENVELOPE = (0.25, 0.25, 0.045)

@@ -1,8 +1,7 @@
 import pytest
 
-from scenarios.models import Base, Scenario, Start
+from scenarios.models import Base, Scenario, Start, TrueState
 from scenarios.touchdown import CrashWatch, find_landing, is_resting, up_component
-from scenarios.truth import TrueState
 
 ENVELOPE = (0.25, 0.25, 0.045)
 SCENARIO = Scenario(name="a", base=Base(x_m=1.0, y_m=0.0), start=Start(x_m=1.0))

@@ -75,7 +75,7 @@ def test_an_empty_text_holds_nothing():
 @pytest.mark.parametrize(
     ("text", "line", "words"),
     [
-        ("a: 1\nb: 2\na: 3", 3, "stands twice, first on line 1"),
+        ("a: 1\nb: 2\na: 3", 3, "is given twice, first on line 1"),
         ("a: &x 1\nb: *x", 1, "anchor &x"),
         ("a: 1\nb: *x", 2, "alias *x"),
         ("a:\n  !!python/name:os.system x", 2, "tag"),
