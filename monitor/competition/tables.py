@@ -1,25 +1,30 @@
-"""The tables of the contest. Nothing in them is deleted, and what a judge says is only ever added."""
+"""The tables of the contest, and how those of an older framerunner are brought up to date.
+
+No row is ever deleted, and what judges enter is only added.
+"""
 
 from __future__ import annotations
 
 from datetime import UTC, datetime
 
-from sqlalchemy import DateTime, Dialect, ForeignKey, String, Text, UniqueConstraint
+from sqlalchemy import Connection, DateTime, Dialect, ForeignKey, String, Text, UniqueConstraint, text
 from sqlalchemy.orm import DeclarativeBase, Mapped, mapped_column
 from sqlalchemy.types import TypeDecorator
+
+from monitor.competition.views import Counting
 
 PREFIX = "competition_"  # so that a database may hold other things too
 SCHEMA_VERSION = 2
 
 
 class UtcTime(TypeDecorator[datetime]):
-    """A moment with its time zone, also in SQLite, which keeps none."""
+    """A moment with its time zone, also in SQLite, which stores none."""
 
     impl = DateTime(timezone=True)
     cache_ok = True
 
     def process_result_value(self, value: datetime | None, dialect: Dialect) -> datetime | None:
-        """As read: always UTC."""
+        """Return a value that was read in UTC."""
         if value is None:
             return None
         return value.replace(tzinfo=UTC) if value.tzinfo is None else value.astimezone(UTC)
@@ -28,7 +33,15 @@ class UtcTime(TypeDecorator[datetime]):
 class Table(DeclarativeBase):
     """Base of all tables."""
 
-    type_annotation_map = {datetime: UtcTime()}  # noqa: RUF012 - SQLAlchemy's way
+    type_annotation_map = {datetime: UtcTime()}  # noqa: RUF012 - SQLAlchemy's form
+
+
+class Entered:
+    """The columns of what is only added: `who` entered it, "" for the monitor itself, and when."""
+
+    id: Mapped[int] = mapped_column(primary_key=True, sort_order=-1)
+    who: Mapped[str] = mapped_column(String(100), sort_order=1)
+    at: Mapped[datetime] = mapped_column(sort_order=1)
 
 
 class Schema(Table):
@@ -43,7 +56,7 @@ class Team(Table):
     """A team.
 
     Attributes:
-        name_key: the name as it is compared, so that no two differ by case or spaces only.
+        name_key: the name for comparison, so that no two differ by case or spaces only.
         members: free text; may be "".
         withdrawn: out of the contest; its tries are kept.
     """
@@ -57,62 +70,52 @@ class Team(Table):
     withdrawn: Mapped[bool] = mapped_column(default=False)
 
 
-class TeamChange(Table):
-    """A team as somebody wrote it: the first is its entry."""
+class TeamChange(Entered, Table):
+    """A team after it was added or changed."""
 
     __tablename__ = PREFIX + "team_changes"
 
-    id: Mapped[int] = mapped_column(primary_key=True)
     team_id: Mapped[int] = mapped_column(ForeignKey(Team.id), index=True)
     name: Mapped[str] = mapped_column(String(60))
     members: Mapped[str] = mapped_column(Text)
     withdrawn: Mapped[bool]
-    who: Mapped[str] = mapped_column(String(100))
-    at: Mapped[datetime]
 
 
-class Draw(Table):
-    """Scenarios drawn for a round; the last of a round is the one that holds.
+class Draw(Entered, Table):
+    """Scenarios drawn for a round; the last row of a round is valid.
 
     Attributes:
-        scenarios: names, in the order drawn, one a line.
-        pool: names that were in the pot, one a line.
+        scenarios: those drawn, in order, one a line: name and frames, separated by spaces.
+        pool: names that could be drawn, one a line.
     """
 
     __tablename__ = PREFIX + "draws"
 
-    id: Mapped[int] = mapped_column(primary_key=True)
     round: Mapped[int] = mapped_column(index=True)
     scenarios: Mapped[str] = mapped_column(Text)
     pool: Mapped[str] = mapped_column(Text)
-    who: Mapped[str] = mapped_column(String(100))
-    at: Mapped[datetime]
 
 
-class Call(Table):
-    """A team called to the start, or the end of a call; the last row is the one that holds.
+class Call(Entered, Table):
+    """A team called to the start, or the end of a call; the last row is valid.
 
     Attributes:
-        team_id: None when nobody is called any more.
+        team_id: None when no team is called any more.
         scenario: "" for whatever the drone flies.
         kind: "call"; "used" when a try was flown on it; "taken back" by a judge.
-        queue_place: where in the queue the team stood when it was called, from 0; None if it stood in none.
-        who: "" where nobody did it: the call was used.
+        queue_place: the team's index in the queue when it was called; None if it was not in the queue.
     """
 
     __tablename__ = PREFIX + "next"
 
-    id: Mapped[int] = mapped_column(primary_key=True)
     team_id: Mapped[int | None] = mapped_column(ForeignKey(Team.id))
     scenario: Mapped[str] = mapped_column(String(80))
     kind: Mapped[str] = mapped_column(String(20), server_default="call")
     queue_place: Mapped[int | None]
-    who: Mapped[str] = mapped_column(String(100))
-    at: Mapped[datetime]
 
 
-class Queue(Table):
-    """The order in which teams are to fly, as somebody set it; the last row is the one that holds.
+class Queue(Entered, Table):
+    """The order in which teams are to fly; the last row is valid.
 
     Attributes:
         teams: ids, the first flies first, separated by spaces.
@@ -120,24 +123,21 @@ class Queue(Table):
 
     __tablename__ = PREFIX + "queues"
 
-    id: Mapped[int] = mapped_column(primary_key=True)
     teams: Mapped[str] = mapped_column(Text)
-    who: Mapped[str] = mapped_column(String(100))
-    at: Mapped[datetime]
 
 
 class Try(Table):
     """A try.
 
     Attributes:
-        key: the fleet's; names this try and no other.
+        key: the fleet's; unique.
         round: in which it was flown; 0 before the first draw.
-        team_id: None until a judge says whose it was.
-        call_id: the call on which it began; None if nobody was called.
+        team_id: None until a judge assigns it.
+        call_id: the call on which it began; None if no team was called.
         frames: colours to cross, in order, separated by spaces.
         state: "running", "ended", or "interrupted" when the monitor was stopped meanwhile.
-        report: JSON as the referee gave it.
-        source: what the referee saw by.
+        report: the referee's, as JSON.
+        source: of the referee's states.
         final: the report is the app's result.
         started: when the monitor saw it begin.
         ended: when it saw its end.
@@ -161,14 +161,14 @@ class Try(Table):
     ended: Mapped[datetime | None]
 
 
-class Judgement(Table):
-    """What a judge said of a try: a correction, or whose it was.
+class Judgement(Entered, Table):
+    """A judge's entry on a try: a correction, or the team that flew it.
 
     Attributes:
         number: counts those of a try from 1; two judges cannot write the same.
         kind: "correction" or "team".
-        team_id: whose it is, where `kind` is "team"; None for nobody's.
-        crossed: colours crossed in their turn, separated by spaces; None, here and below, is "as the
+        team_id: where `kind` is "team", the team; None for none.
+        crossed: colours crossed in the right order, separated by spaces; None, here and below, is "as the
             referee says".
         contacts: with frames.
         penalty_s: seconds.
@@ -179,7 +179,6 @@ class Judgement(Table):
     __tablename__ = PREFIX + "judgements"
     __table_args__ = (UniqueConstraint("try_id", "number"),)
 
-    id: Mapped[int] = mapped_column(primary_key=True)
     try_id: Mapped[int] = mapped_column(ForeignKey(Try.id), index=True)
     number: Mapped[int]
     kind: Mapped[str] = mapped_column(String(20))
@@ -190,19 +189,38 @@ class Judgement(Table):
     try_time_s: Mapped[float | None]
     completed: Mapped[bool | None]
     remarks: Mapped[str] = mapped_column(Text, default="")
-    who: Mapped[str] = mapped_column(String(100))
-    at: Mapped[datetime]
 
 
-class SettingsChange(Table):
-    """The rule as somebody set it; the last row holds, the defaults where there is none."""
+class SettingsChange(Entered, Table):
+    """The rule as a judge set it; the last row is valid, the defaults where there is none."""
 
     __tablename__ = PREFIX + "settings_changes"
 
-    id: Mapped[int] = mapped_column(primary_key=True)
     limit_s: Mapped[float]
     missing_frame_s: Mapped[float]
     scenarios: Mapped[int]
-    counting: Mapped[str] = mapped_column(String(10))
-    who: Mapped[str] = mapped_column(String(100))
-    at: Mapped[datetime]
+    counting: Mapped[Counting] = mapped_column(String(10))
+
+
+# By the version that they start from. They must be valid for SQLite and PostgreSQL.
+_ADDED_TABLES: dict[int, tuple[type[Table], ...]] = {1: (Queue,)}
+_STATEMENTS: dict[int, tuple[str, ...]] = {
+    1: (
+        f"ALTER TABLE {PREFIX}next ADD COLUMN kind VARCHAR(20) DEFAULT 'call' NOT NULL",
+        f"ALTER TABLE {PREFIX}next ADD COLUMN queue_place INTEGER",
+        f"ALTER TABLE {PREFIX}tries ADD COLUMN call_id INTEGER REFERENCES {PREFIX}next (id)",
+        # Version 1 wrote the end of a call as a call of no team: by nobody when a try had used it.
+        f"UPDATE {PREFIX}next SET kind = 'used' WHERE team_id IS NULL AND who = ''",
+        f"UPDATE {PREFIX}next SET kind = 'taken back' WHERE team_id IS NULL AND who <> ''",
+    ),
+}
+
+
+def migrate(connection: Connection, version: int) -> None:
+    """Bring tables of a version from 1 up to date, within the connection's transaction; no data is lost."""
+    for older in range(version, SCHEMA_VERSION):
+        for table in _ADDED_TABLES[older]:
+            Table.metadata.tables[table.__tablename__].create(connection)
+        for statement in _STATEMENTS[older]:
+            connection.execute(text(statement))
+    connection.execute(Schema.__table__.update().values(version=SCHEMA_VERSION))  # type: ignore[attr-defined]

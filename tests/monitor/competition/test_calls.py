@@ -7,7 +7,7 @@ import pytest
 from monitor.competition.calls import Entry
 from monitor.competition.database import Database
 from monitor.competition.store import Store
-from monitor.competition.words import Refused
+from monitor.competition.validation import Refused
 from tests.monitor.competition.harness import COLOURS, event
 
 NOW = datetime(2030, 5, 17, 12, 0, tzinfo=UTC)

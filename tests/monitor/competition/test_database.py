@@ -5,7 +5,7 @@ from pathlib import Path
 import pytest
 from sqlalchemy import create_engine, text
 
-from monitor.competition import migrations
+from monitor.competition import tables
 from monitor.competition.calls import Entry
 from monitor.competition.database import Database, DatabaseError
 from monitor.competition.store import Store
@@ -122,7 +122,7 @@ def test_an_older_contest_is_brought_up_to_date_as_a_whole_or_not_at_all(tmp_pat
     file = tmp_path / "x.db"
     version_1(file)
     before = columns(file)
-    monkeypatch.setitem(migrations._STATEMENTS, 1, (*migrations._STATEMENTS[1], "select * from nowhere"))
+    monkeypatch.setitem(tables._STATEMENTS, 1, (*tables._STATEMENTS[1], "select * from nowhere"))
     assert "nowhere" in refusal(f"sqlite:///{file}")
     assert columns(file) == before
     monkeypatch.undo()

@@ -6,8 +6,8 @@ import pytest
 
 from monitor.competition.calls import Entry
 from monitor.competition.database import Database
-from monitor.competition.export import _safe, ranking_csv, tries_csv
 from monitor.competition.store import Store
+from monitor.competition.views import _safe, ranking_csv, tries_csv
 from tests.monitor.competition.harness import COLOURS, event
 
 NOW = datetime(2030, 5, 17, 12, 0, tzinfo=UTC)

@@ -25,9 +25,9 @@ async def main():
     while service._board is None:
         await asyncio.sleep(0.01)
     service.subscribe(hear)
-    service.hear(event("began", "still flying", time_s=0.0))
-    service.hear(event("began", "flown", time_s=0.0))
-    service.hear(event("ended", "flown", time_s=33.25))
+    service.on_try_event(event("began", "still flying", time_s=0.0))
+    service.on_try_event(event("began", "flown", time_s=0.0))
+    service.on_try_event(event("ended", "flown", time_s=33.25))
     await work
 
 asyncio.run(main())

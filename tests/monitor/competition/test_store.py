@@ -1,5 +1,6 @@
 """What is kept of a contest, in SQLite and, where a server is given, in PostgreSQL."""
 
+from dataclasses import asdict
 from datetime import UTC, datetime, timedelta
 from math import inf, nan
 
@@ -9,8 +10,9 @@ from monitor.competition import tables
 from monitor.competition.calls import Entry
 from monitor.competition.database import Database
 from monitor.competition.rules import Correction, Rule
-from monitor.competition.store import MOST_JUDGEMENTS, MOST_TEAMS, Store
-from monitor.competition.words import Refused
+from monitor.competition.store import MAX_JUDGEMENTS, MAX_TEAMS, Store
+from monitor.competition.validation import Refused
+from monitor.competition.views import RuleView
 from tests.monitor.competition.harness import COLOURS, event
 
 NOW = datetime(2030, 5, 17, 12, 0, tzinfo=UTC)
@@ -159,8 +161,8 @@ def test_teams_are_unique_in_any_letters_and_limited(store, monkeypatch):
     with pytest.raises(Refused, match="taken"):
         store.change_team(second, "FALKEN", None, None, ADA)
     store.change_team(first, "FALKEN", None, None, ADA)  # its own
-    assert MOST_TEAMS == 500
-    monkeypatch.setattr("monitor.competition.store.MOST_TEAMS", 3)
+    assert MAX_TEAMS == 500
+    monkeypatch.setattr("monitor.competition.store.MAX_TEAMS", 3)
     store.add_team("Third", "", ADA)
     with pytest.raises(Refused, match="3 is the most"):
         store.add_team("One more", "", ADA)
@@ -206,11 +208,10 @@ def test_without_a_draw_what_is_flown_makes_the_round(store):
 
 def test_the_rule_is_kept_and_changes_the_ranking(store):
     team = store.add_team("Falken", "", ADA)
-    assert store.rule() == Rule()
-    store.set_rule(Rule(100.0, 10.0, 2, "last"), BOB)
-    assert store.rule() == Rule(100.0, 10.0, 2, "last")
-    board = store.board()
-    assert (board.rule.who, board.rule.at) == ("Bob", BOB.at)
+    assert store.board().rule == RuleView(**asdict(Rule()), who="", at=None)
+    rule = Rule(100.0, 10.0, 2, "last")
+    store.set_rule(rule, BOB)
+    assert store.board().rule == RuleView(**asdict(rule), who="Bob", at=BOB.at)
     assert row_of(store, team).total_s == 2 * 130.0
 
 
@@ -282,11 +283,11 @@ def test_what_does_not_exist_is_named(store):
 def test_a_try_cannot_be_changed_without_end(store):
     number = fly(store, "k")
     with store._database.transaction() as session:
-        for count in range(MOST_JUDGEMENTS):
+        for count in range(MAX_JUDGEMENTS):
             session.add(
                 tables.Judgement(
                     try_id=number, number=count + 1, kind="team", team_id=None, who="x", at=NOW, remarks=""
                 )
             )
     with pytest.raises(Refused, match="200 is the most"):
-        store.correct(number, MOST_JUDGEMENTS, Correction(), "", ADA)
+        store.correct(number, MAX_JUDGEMENTS, Correction(), "", ADA)

@@ -1,6 +1,6 @@
 import pytest
 
-from monitor.competition.words import Refused, free_text, from_wire, name_key, shown, team_name
+from monitor.competition.validation import Refused, free_text, from_wire, name_key, shown, team_name
 
 
 @pytest.mark.parametrize("name", ["A", "x" * 60, "Équipe Ñandú 🚁", "الصقور", "ฝูงบิน", "<b>", "=1+1", "👩‍🚀"])
