@@ -31,23 +31,6 @@ class Passage:
     side: Side
 
 
-@dataclass(frozen=True, slots=True)
-class Crossing:
-    """The first passage of a try through a frame; fields as in `Passage`.
-
-    Attributes:
-        colour: the frame.
-        time_s: since motors on.
-        offset_m: distance of the drone's centre from the opening's centre.
-        side: the side it came from.
-    """
-
-    colour: str
-    time_s: float
-    offset_m: float
-    side: Side
-
-
 class Gate:
     """Follows a path past one frame.
 
@@ -56,17 +39,6 @@ class Gate:
     came from, so touching the plane and going back is no passage, and a path cut into more steps passes as
     often as before. Only the drone's centre counts: what its edges touch is a contact.
     """
-
-    __slots__ = (
-        "_centre",
-        "_cos",
-        "_distance_m",
-        "_half_height_m",
-        "_half_width_m",
-        "_offset_m",
-        "_side",
-        "_sin",
-    )
 
     def __init__(self, frame: Frame) -> None:
         width_m, height_m = frame.opening_m
@@ -120,8 +92,6 @@ class Gate:
 class Boundary:
     """The arena's four sides and its ceiling. The floor is no side: nothing is outside for being too low."""
 
-    __slots__ = ("_ceiling_m", "_half_x_m", "_half_y_m")
-
     def __init__(self, arena: Arena) -> None:
         self._half_x_m = arena.length_x_m / 2
         self._half_y_m = arena.width_y_m / 2
@@ -170,8 +140,6 @@ class PathWatch:
         outside_us: time outside the arena.
         longest_gap_us: longest step.
     """
-
-    __slots__ = ("_boundary", "_gates", "_inside", "_slack_m", "length_m", "longest_gap_us", "outside_us")
 
     def __init__(self, arena: Arena, frames: Sequence[Frame]) -> None:
         self._boundary = Boundary(arena)

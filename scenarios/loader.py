@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from scenarios.models import Scenario, ScenarioError
-from scenarios.random_scenarios import list_levels, load_level, random_scenario
+from scenarios.random_scenarios import LEVEL_FILES, load_level, random_scenario
 from scenarios.yaml_file import FileKind
 from scenarios.yaml_tree import to_yaml
 
@@ -59,7 +59,7 @@ def json_schema() -> dict[str, Any]:
 def _random(name: str) -> Scenario:
     """The scenario that `random_scenario` gives this name."""
     level, _, seed = name.rpartition("-")
-    levels = list_levels()
+    levels = LEVEL_FILES.names()
     if level in levels and re.fullmatch(r"0|[1-9][0-9]{0,30}", seed):
         return random_scenario(load_level(level), int(seed))
     nearest = []

@@ -98,40 +98,23 @@ class Level(Part):
     layout: Layout = Field(description="places and headings of base, start and frames")
 
 
-_FILES = FileKind("level", Level, LevelError, folder="levels")
-
-
-def list_levels() -> list[str]:
-    """Names of the levels that are installed with the package, sorted."""
-    return _FILES.names()
+LEVEL_FILES = FileKind("level", Level, LevelError, folder="levels")
 
 
 def load_level(name_or_path: str | Path) -> Level:
     """Load an installed level, or any YAML file.
 
     Args:
-        name_or_path: a name of `list_levels`, or a path: it has a directory or ends in .yaml or .yml.
+        name_or_path: a name of `LEVEL_FILES`, or a path: it has a directory or ends in .yaml or .yml.
 
     Raises:
-        LevelError: there is no such level, or the file is not a valid one.
+        LevelError: there is no such level, or the file is not a valid one; the message names file, line,
+            field, value and what to do.
     """
-    level = _FILES.load(name_or_path)
+    level = LEVEL_FILES.load(name_or_path)
     if level is None:
-        raise _FILES.unknown(str(name_or_path))
+        raise LEVEL_FILES.unknown(str(name_or_path))
     return level
-
-
-def parse_level(content: bytes | str, source: str = "level") -> Level:
-    """Check the content of a level file.
-
-    Args:
-        content: YAML, as UTF-8 when bytes.
-        source: the file's name in messages.
-
-    Raises:
-        LevelError: it is not a valid level; the message names source, line, field, value and what to do.
-    """
-    return _FILES.parse(content, source)
 
 
 def random_stream(seed: int, name: str) -> Generator:

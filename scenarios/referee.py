@@ -6,7 +6,7 @@ from enum import Enum
 from math import isfinite
 
 from geometry.vectors import Vec3
-from scenarios.crossing import Boundary, Crossing, Passage, PathWatch
+from scenarios.crossing import Boundary, Passage, PathWatch
 from scenarios.models import COLOURS, Scenario, TrueState, ground_height
 from scenarios.result import RefereeReport, RefereeSnapshot
 from scenarios.touchdown import (
@@ -76,7 +76,7 @@ class Referee:
         self._stop_us: int | None = None
         self._still_since_us: int | None = None
         self._taken_off = False
-        self._crossings: list[Crossing] = []
+        self._crossings: dict[str, tuple[float, Passage]] = {}  # seconds since motors on
         self._contacts: list[str] = []
         self._touched_us: dict[str, int] = {}
         self._wrong_order = ""
@@ -133,17 +133,16 @@ class Referee:
 
     def _cross(self, colour: str, passage: Passage, step_us: int) -> None:
         """Record a passage, if it is the first one through this frame."""
-        if any(crossing.colour == colour for crossing in self._crossings):
+        if colour in self._crossings:
             return
         time_s = (self._time_us - self._start_us + passage.fraction * step_us) * 1e-6
         expected = self._next_colour()
         if colour != expected and not self._wrong_order:
             self._wrong_order = f"crossed {colour} before {expected} at {time_s:.1f} s"
-        self._crossings.append(Crossing(colour, time_s, passage.offset_m, passage.side))
+        self._crossings[colour] = (time_s, passage)
 
     def _next_colour(self) -> str | None:
-        crossed = {crossing.colour for crossing in self._crossings}
-        return next((colour for colour in self._expected if colour not in crossed), None)
+        return next((colour for colour in self._expected if colour not in self._crossings), None)
 
     def _watch(self, state: TrueState) -> None:
         """Look for contacts with frames and for crashes."""
@@ -214,8 +213,8 @@ class Referee:
         return min(end_us - self._start_us, self._limit_us) * 1e-6
 
     @property
-    def crossings(self) -> tuple[Crossing, ...]:
-        """First crossings so far, in order of time."""
+    def crossed(self) -> tuple[str, ...]:
+        """Colours crossed so far, in order of their first crossing."""
         return tuple(self._crossings)
 
     def snapshot(self) -> RefereeSnapshot:
@@ -224,7 +223,7 @@ class Referee:
             began_us=None if self._phase is _Phase.WAITING else self._start_us,
             try_time_s=self.try_time_s,
             penalty_s=self._path.outside_us * 1e-6 * PENALTY_S_PER_S,
-            crossed=tuple(crossing.colour for crossing in self._crossings),
+            crossed=self.crossed,
             next_colour=self._next_colour(),
             contacts=len(self._contacts),
             inside=self._boundary.margin(self._position_m) >= 0.0,
@@ -242,7 +241,7 @@ class Referee:
         """
         facts = TryFacts(
             expected=self._expected,
-            crossed=tuple(crossing.colour for crossing in self._crossings),
+            crossed=self.crossed,
             contact_frames=tuple(self._contacts),
             outside_s=self._path.outside_us * 1e-6,
             try_time_s=self.try_time_s,
@@ -257,13 +256,14 @@ class Referee:
         )
         verdict, reason = judge(facts, mission_state, ended)
         penalty_s = facts.outside_s * PENALTY_S_PER_S
+        crossings = self._crossings.values()
         return RefereeReport(
             verdict=verdict,
             reason=reason,
             frames_crossed=facts.crossed,
-            crossing_times_s=tuple(crossing.time_s for crossing in self._crossings),
-            crossing_offsets_m=tuple(crossing.offset_m for crossing in self._crossings),
-            crossing_sides=tuple(crossing.side for crossing in self._crossings),
+            crossing_times_s=tuple(time_s for time_s, _ in crossings),
+            crossing_offsets_m=tuple(passage.offset_m for _, passage in crossings),
+            crossing_sides=tuple(passage.side for _, passage in crossings),
             contacts=len(self._contacts),
             contact_frames=facts.contact_frames,
             outside_s=facts.outside_s,

@@ -86,17 +86,6 @@ class CrashWatch:
     being within 2 cm of the ground.
     """
 
-    __slots__ = (
-        "_envelope_m",
-        "_floor_m",
-        "_inverted_since_us",
-        "_lying_since_us",
-        "_near_m",
-        "_scenario",
-        "_sinking_m_s",
-        "_touched",
-    )
-
     def __init__(self, scenario: Scenario, envelope_m: Vec3, floor_m: float = 0.0) -> None:
         self._scenario = scenario
         self._envelope_m = envelope_m

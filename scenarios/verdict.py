@@ -77,8 +77,16 @@ def judge(facts: TryFacts, mission_state: str = "", ended: str | None = None) ->
         The verdict and a sentence without a full stop.
     """
     verdict = _verdict(facts)
-    details = _details(verdict, facts, ended)
-    where = f" in {_one_line(mission_state)}" if mission_state.strip() else ""
+    if verdict in {Verdict.CLEAN, Verdict.COMPLETED}:
+        details = _flaws(facts)
+    else:
+        details = [facts.wrong_order] if facts.wrong_order else []
+        if facts.crash:
+            details.append(f"the drone {facts.crash}")
+        if verdict is Verdict.ABORTED:
+            details.append(_one_line(ended or "") or _shortfall(facts))
+    state = _one_line(mission_state)
+    where = f" in {state}" if state else ""
     why = f" ({'; '.join(details)})" if details else ""
     crossed = ", ".join(facts.crossed) or "none"
     return verdict, f"{verdict} after {facts.try_time_s:.1f} s{where}{why}; crossed: {crossed}"
@@ -94,19 +102,7 @@ def _verdict(facts: TryFacts) -> Verdict:
     landed_on_base = facts.landing is not None and facts.landing.surface == "base"
     if facts.crossed != facts.expected or not landed_on_base:
         return Verdict.ABORTED
-    clean = not facts.contact_frames and facts.outside_s == 0.0
-    return Verdict.CLEAN if clean else Verdict.COMPLETED
-
-
-def _details(verdict: Verdict, facts: TryFacts, ended: str | None) -> list[str]:
-    if verdict in {Verdict.CLEAN, Verdict.COMPLETED}:
-        return _flaws(facts)
-    details = [facts.wrong_order] if facts.wrong_order else []
-    if facts.crash:
-        details.append(f"the drone {facts.crash}")
-    if verdict is Verdict.ABORTED:
-        details.append(_one_line(ended) if ended and ended.strip() else _shortfall(facts))
-    return details
+    return Verdict.COMPLETED if _flaws(facts) else Verdict.CLEAN
 
 
 def _flaws(facts: TryFacts) -> list[str]:
@@ -126,13 +122,12 @@ def _shortfall(facts: TryFacts) -> str:
         (facts.motors_on, "the motors were still on"),
         (not facts.settled, "not yet at rest after the motors stopped"),
         (not facts.taken_off, "never took off"),
+        (facts.landing is None, "did not come to rest on base or floor"),
     )
     for holds, words in lacks:
         if holds:
             return words
-    if facts.landing is None:
-        return "did not come to rest on base or floor"
-    if facts.landing.surface != "base":
+    if facts.landing is not None and facts.landing.surface != "base":
         return f"landed {facts.landing.error_m:.2f} m from the base's centre, not on the base"
     missing = ", ".join(colour for colour in facts.expected if colour not in facts.crossed)
     return f"landed on the base without crossing {missing}"

@@ -107,7 +107,7 @@ class SteppedFlight:
             and self._taken_off
             and underside_m < base.top_m + STOP_ABOVE_BASE_M
             and is_over_base(base, state.x, state.y)
-            and len(self.referee.crossings) == len(self._colours)
+            and len(self.referee.crossed) == len(self._colours)
         )
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections import defaultdict
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import asdict, dataclass, replace
 
 from monitor.competition.views import CellView, Counting, RowView
 from scenarios.models import COLOURS
@@ -111,16 +111,10 @@ def correct(result: TryScore, correction: Correction | None) -> TryScore:
     """Apply a judge's correction to the referee's result. A try with a frame missing is never completed."""
     if correction is None:
         return result
-    crossed = result.crossed if correction.crossed is None else correction.crossed
-    corrected = replace(
-        result,
-        crossed=tuple(colour for colour in result.frames if colour in crossed),
-        contacts=result.contacts if correction.contacts is None else correction.contacts,
-        penalty_s=result.penalty_s if correction.penalty_s is None else correction.penalty_s,
-        try_time_s=result.try_time_s if correction.try_time_s is None else correction.try_time_s,
-        completed=result.completed if correction.completed is None else correction.completed,
-    )
-    return replace(corrected, completed=corrected.completed and not corrected.missing)
+    given = {name: value for name, value in asdict(correction).items() if value is not None}
+    corrected = replace(result, **given)
+    crossed = tuple(colour for colour in result.frames if colour in corrected.crossed)
+    return replace(corrected, crossed=crossed, completed=corrected.completed and not corrected.missing)
 
 
 def counted_cs(result: TryScore, rule: Rule) -> int:

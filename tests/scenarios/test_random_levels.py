@@ -3,14 +3,14 @@ from hypothesis import given
 from hypothesis import strategies as st
 from pydantic import ValidationError
 
-from scenarios.random_scenarios import Level, LevelError, Range, list_levels, load_level, parse_level
+from scenarios.random_scenarios import LEVEL_FILES, Level, LevelError, Range, load_level
 from scenarios.yaml_file import MAX_BYTES
 from scenarios.yaml_tree import to_yaml
 
 CALM = to_yaml(load_level("calm").model_dump())
 
 
-@pytest.mark.parametrize("name", list_levels())
+@pytest.mark.parametrize("name", LEVEL_FILES.names())
 def test_each_level_is_named_as_its_file_and_described(name):
     level = load_level(name)
     assert level.name == name
@@ -83,14 +83,14 @@ def test_a_level_loads_by_path(tmp_path):
 )
 def test_faults_are_told_in_one_line(text, message):
     with pytest.raises(LevelError) as caught:
-        parse_level(text, "f.yaml")
+        LEVEL_FILES.parse(text, "f.yaml")
     assert str(caught.value) == message
 
 
 @given(st.text(max_size=100) | st.binary(max_size=100))
 def test_any_text_gives_one_line(content):
     with pytest.raises(LevelError, match=r"\Af\.yaml:.+\Z"):
-        parse_level(content, "f.yaml")
+        LEVEL_FILES.parse(content, "f.yaml")
 
 
 json_like = st.recursive(
@@ -103,7 +103,7 @@ json_like = st.recursive(
 @given(st.dictionaries(st.sampled_from([*Level.model_fields, "x"]), json_like, min_size=1))
 def test_wrong_values_in_known_fields_give_one_line(fields):
     with pytest.raises(LevelError, match=r"\Af\.yaml:.+\Z"):
-        parse_level(to_yaml(fields), "f.yaml")
+        LEVEL_FILES.parse(to_yaml(fields), "f.yaml")
 
 
 @pytest.mark.parametrize(
