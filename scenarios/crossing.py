@@ -18,17 +18,11 @@ Side = Literal["front", "back"]
 
 @dataclass(frozen=True, slots=True)
 class Passage:
-    """One passage through an opening.
+    """One passage through an opening."""
 
-    Attributes:
-        fraction: where on the last step the plane was met, 0 (its start) to 1 (its end).
-        offset_m: distance from the opening's centre, in the frame's plane.
-        side: the side it came from; the front is where the frame's normal (its local x axis) points.
-    """
-
-    fraction: float
-    offset_m: float
-    side: Side
+    fraction: float  # of the last step before the plane was met, 0 to 1
+    offset_m: float  # distance from the opening's centre, in the frame's plane
+    side: Side  # from which it came; the front is where the frame's normal (its local x axis) points
 
 
 class Gate:
@@ -134,11 +128,6 @@ class PathWatch:
 
     Frames and boundary are checked only when the drone may have reached the nearest of them since the last
     check; this runs at 250 Hz.
-
-    Attributes:
-        length_m: of the path.
-        outside_us: time outside the arena.
-        longest_gap_us: longest step.
     """
 
     def __init__(self, arena: Arena, frames: Sequence[Frame]) -> None:
@@ -148,7 +137,7 @@ class PathWatch:
         self._slack_m = 0.0  # the drone can go this far before the next check
         self.length_m = 0.0
         self.outside_us = 0.0
-        self.longest_gap_us = 0
+        self.longest_gap_us = 0  # between two points
 
     def restart(self, point_m: Vec3) -> None:
         """Go on at a point (arena axes) that is not joined to the last one."""

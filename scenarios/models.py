@@ -193,23 +193,14 @@ class Scenario(Part):
 
 @dataclass(slots=True)
 class TrueState:
-    """State of the drone at one instant, in arena axes: simulated, or from a real drone's telemetry.
+    """State of the drone at one instant, simulated or from a real drone's telemetry."""
 
-    Attributes:
-        time_us: vehicle time, microseconds.
-        position_arena_m: centre of the drone, shape (3,).
-        velocity_arena_m_s: its velocity, shape (3,).
-        attitude_arena: unit quaternion (w, x, y, z), body FLU to arena.
-        motors_on: whether the motors are armed.
-        contacts: what the drone touches: names of frames ("red"), "base" or "floor".
-    """
-
-    time_us: int
-    position_arena_m: Vec3
+    time_us: int  # vehicle time
+    position_arena_m: Vec3  # of the drone's centre
     velocity_arena_m_s: Vec3
-    attitude_arena: Quaternion
+    attitude_arena: Quaternion  # unit quaternion (w, x, y, z), body FLU to arena
     motors_on: bool
-    contacts: tuple[str, ...] = ()
+    contacts: tuple[str, ...] = ()  # what the drone touches: names of frames ("red"), "base" or "floor"
 
 
 def is_over_base(base: Base, x_m: float, y_m: float) -> bool:

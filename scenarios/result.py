@@ -40,31 +40,18 @@ class ResultError(ValueError):
 
 @dataclass(frozen=True, slots=True)
 class RefereeSnapshot:
-    """How the try stands now, for displays.
+    """How the try stands now, for displays."""
 
-    Attributes:
-        began_us: vehicle time of motors on, microseconds; None before.
-        try_time_s: from motors on to motors off, or to now.
-        penalty_s: so far.
-        crossed: colours crossed so far.
-        next_colour: the frame to cross next; None when all are crossed.
-        contacts: contacts with frames so far.
-        inside: whether the drone is inside the arena.
-        motors_on: whether the try is being flown.
-        settled: motors off and at rest.
-        over: no later state can change the verdict.
-    """
-
-    began_us: int | None
-    try_time_s: Seconds
+    began_us: int | None  # vehicle time of motors on; None before
+    try_time_s: Seconds  # from motors on to motors off, or to now
     penalty_s: Seconds
-    crossed: Annotated[tuple[Text, ...], Field(max_length=10)]
-    next_colour: Text | None
-    contacts: int
-    inside: bool
+    crossed: Annotated[tuple[Text, ...], Field(max_length=10)]  # colours
+    next_colour: Text | None  # the frame to cross next; None when all are crossed
+    contacts: int  # with frames
+    inside: bool  # the drone is inside the arena
     motors_on: bool
-    settled: bool
-    over: bool
+    settled: bool  # motors off and at rest
+    over: bool  # no later state can change the verdict
 
 
 class _Record(BaseModel):
@@ -122,10 +109,7 @@ class RefereeReport(_Record):
 
     @classmethod
     def from_outside(cls, content: object) -> Self | None:
-        """Read what was received from another system; a field with an invalid value is left out.
-
-        Args:
-            content: as `json.loads` returns it.
+        """Read what was received, as `json.loads` returns it; a field with an invalid value is left out.
 
         Returns:
             None if it has no valid verdict.
@@ -228,25 +212,15 @@ class LocalFrame(_Record):
 
 
 class Standing(_Record):
-    """How a try stands, as `/referee.json` has it.
+    """How a try stands, as `/referee.json` has it."""
 
-    Attributes:
-        scenario: its name; "" if unknown.
-        source: of the referee's states: "truth" or "telemetry".
-        lift_m: how much higher than in the scenario the frames are.
-        time_us: vehicle time, microseconds; None if unknown.
-        local_frame: None while it is unknown.
-        snapshot: how the try stands.
-        report: what it would be worth if it ended now.
-    """
-
-    scenario: str = Field(max_length=80)
-    source: str = Field("truth", max_length=40)
-    lift_m: Metres = 0.0
-    time_us: int | None = None
-    local_frame: LocalFrame | None = None
+    scenario: str = Field(max_length=80)  # its name; "" if unknown
+    source: str = Field("truth", max_length=40)  # of the referee's states: "truth" or "telemetry"
+    lift_m: Metres = 0.0  # how much higher than in the scenario the frames are
+    time_us: int | None = None  # vehicle time
+    local_frame: LocalFrame | None = None  # None while it is unknown
     snapshot: RefereeSnapshot
-    report: RefereeReport
+    report: RefereeReport  # what the try would be worth if it ended now
 
     @property
     def ended(self) -> bool:

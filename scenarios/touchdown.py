@@ -22,15 +22,10 @@ Surface = Literal["base", "floor"]
 
 @dataclass(frozen=True, slots=True)
 class Landing:
-    """Where the drone came to rest.
+    """Where the drone came to rest."""
 
-    Attributes:
-        surface: what it stands on.
-        error_m: plan distance of its centre from the base's centre.
-    """
-
-    surface: Surface
-    error_m: float
+    surface: Surface  # what it stands on
+    error_m: float  # plan distance of its centre from the base's centre
 
 
 def up_component(attitude: Quaternion) -> float:
@@ -58,10 +53,10 @@ def find_landing(
         scenario: what is flown.
         envelope_m: length, width and height of the drone.
         position_m: of its centre, arena axes, shape (3,).
-        floor_m: height of the floor, arena axes; without a base it is where the base's top would be.
+        floor_m: height of the floor, arena axes; see `Referee`.
 
     Returns:
-        The landing, or None when it is too high above base and floor.
+        None when it is too high above base and floor.
     """
     x_m, y_m, z_m = position_m
     base = scenario.base

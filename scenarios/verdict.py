@@ -23,37 +23,21 @@ class Verdict(StrEnum):
 
 @dataclass(frozen=True, slots=True)
 class TryFacts:
-    """What the referee saw.
+    """What the referee saw."""
 
-    Attributes:
-        expected: colours to cross, in order.
-        crossed: colours crossed, each once, in order of its first crossing.
-        contact_frames: the frame of each contact.
-        outside_s: time outside the arena.
-        try_time_s: motors on to motors off, or to now.
-        began: the motors were on.
-        taken_off: the drone left the ground.
-        motors_on: the motors are on now.
-        settled: the motors are off and the drone is at rest.
-        timed_out: the try exceeded its limit.
-        wrong_order: which frame was crossed too early, or "".
-        crash: what happened to the drone, or "".
-        landing: where it came to rest after a flight.
-    """
-
-    expected: tuple[str, ...]
-    crossed: tuple[str, ...]
-    contact_frames: tuple[str, ...]
+    expected: tuple[str, ...]  # colours to cross, in order
+    crossed: tuple[str, ...]  # colours crossed, each once, in order of its first crossing
+    contact_frames: tuple[str, ...]  # the frame of each contact
     outside_s: float
-    try_time_s: float
-    began: bool
+    try_time_s: float  # motors on to motors off, or to now
+    began: bool  # the motors were on
     taken_off: bool
-    motors_on: bool
-    settled: bool
-    timed_out: bool
-    wrong_order: str
-    crash: str
-    landing: Landing | None
+    motors_on: bool  # now
+    settled: bool  # the motors are off and the drone is at rest
+    timed_out: bool  # the try exceeded its limit
+    wrong_order: str  # which frame was crossed too early, or ""
+    crash: str  # what happened to the drone, or ""
+    landing: Landing | None  # where it came to rest after a flight
 
 
 def judge(facts: TryFacts, mission_state: str = "", ended: str | None = None) -> tuple[Verdict, str]:

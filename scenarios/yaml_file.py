@@ -51,19 +51,12 @@ Model = TypeVar("Model", bound=BaseModel)
 
 @dataclass(frozen=True, slots=True)
 class FileKind(Generic[Model]):
-    """A kind of file.
+    """A kind of file. All methods raise its error, with one line for people."""
 
-    Attributes:
-        name: "scenario" or the like, for messages.
-        model: what a file must hold.
-        error: raised by all methods, with one line for people.
-        folder: of this package, with the files that are installed with it.
-    """
-
-    name: str
+    name: str  # "scenario" or the like, for messages
     model: type[Model]
     error: type[UserError]
-    folder: str
+    folder: str  # of this package, with the files that are installed with it
 
     def names(self) -> list[str]:
         """Names of the installed files, sorted."""
@@ -93,8 +86,8 @@ class FileKind(Generic[Model]):
 
         Args:
             name: as given.
-            nearest: the name that was probably meant, if it is none of `names`.
-            others: what else could have been given.
+            nearest: the name that was probably meant, if it is not in `names`.
+            others: further names that can be given, in words.
         """
         names = self.names()
         nearest = nearest or difflib.get_close_matches(name.lower(), names, n=1, cutoff=0.5)
@@ -103,12 +96,7 @@ class FileKind(Generic[Model]):
         return self.error(f"unknown {self.name} {_show(name)}{hint} Known: {known}")
 
     def parse(self, content: bytes | str, source: str) -> Model:
-        """Check the content of a file.
-
-        Args:
-            content: YAML, as UTF-8 when bytes.
-            source: the file's name in messages.
-        """
+        """Check the content of a file: YAML, as UTF-8 when bytes. `source`: its name in messages."""
         tree = self._tree(content, source)
         try:
             return self.model.model_validate(tree.value, strict=True)

@@ -33,12 +33,7 @@ _PATTERNS = tuple((tag, re.compile(rf"(?:{shape})\Z"), tuple(first)) for tag, sh
 
 
 class YamlError(ValueError):
-    """YAML that cannot be read.
-
-    Attributes:
-        line: counted from 1.
-        column: counted from 1; None where the line is enough.
-    """
+    """YAML that cannot be read, with its line and, where it helps, its column, counted from 1."""
 
     def __init__(self, message: str, line: int, column: int | None = None) -> None:
         is_short = len(message) <= MAX_MESSAGE_LENGTH
@@ -49,15 +44,10 @@ class YamlError(ValueError):
 
 @dataclass(slots=True)
 class YamlTree:
-    """The content of a YAML text.
+    """The content of a YAML text."""
 
-    Attributes:
-        value: its data; lists are tuples. None when the text is empty.
-        lines: the line (from 1) of each value's key or list item, by path.
-    """
-
-    value: Value = None
-    lines: dict[Path, int] = field(default_factory=dict)
+    value: Value = None  # lists are tuples; None when the text is empty
+    lines: dict[Path, int] = field(default_factory=dict)  # of each value's key or list item, from 1
 
     def line(self, path: Path) -> int:
         """Line of a value or, where it is missing, of the part in which it should be."""

@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import asyncio
 import json
-from collections.abc import Awaitable, Callable
 from typing import TYPE_CHECKING, Any
 
 from fastapi import APIRouter, FastAPI, HTTPException, Request, Response
@@ -27,7 +26,7 @@ from monitor.competition.validation import (
     JudgementForm,
     NextForm,
     QueueForm,
-    Refused,
+    RefusedError,
     SettingsForm,
     TeamChangeForm,
     TeamForm,
@@ -55,7 +54,7 @@ def register(monitor: Monitor) -> None:
     monitor.fleet.on_try(service.on_try_event)
     monitor.jobs.append(service.run)
     monitor.web.state.competition = service
-    for error in (Refused, DatabaseError, SQLAlchemyError):
+    for error in (RefusedError, DatabaseError, SQLAlchemyError):
         monitor.web.add_exception_handler(error, _on_error)
     _add_channel(monitor.web, service)
     judges = _Judges(service, monitor.access)
@@ -72,7 +71,7 @@ def json_response(value: BaseModel | list[Any] | dict[str, Any]) -> Response:
 
 async def _on_error(request: Request, error: Exception) -> Response:
     """Answer in one line what went wrong."""
-    status = error.status if isinstance(error, Refused) else 503
+    status = error.status if isinstance(error, RefusedError) else 503
     text = "the database refused this; reload the page, then try again"
     return JSONResponse({"detail": text if isinstance(error, SQLAlchemyError) else str(error)}, status)
 
@@ -230,13 +229,13 @@ def _of_round(rankings: tuple[RankingView, ...], number: str) -> RankingView:
         if number in {"", str(ranking.round)}:
             return ranking
     known = ", ".join(str(ranking.round) for ranking in rankings)
-    raise Refused(f"round {shown(number)} does not exist; choose one of {known}", 404)
+    raise RefusedError(f"round {shown(number)} does not exist; choose one of {known}", 404)
 
 
 def _id(what: str, text: str) -> int:
     """The number of a try or team, from an address."""
     if not (text.isascii() and text.isdigit() and len(text) <= 10 and int(text) <= _MAX_ID):
-        raise Refused(f"{what} {shown(text)} does not exist; choose one of the list", 404)
+        raise RefusedError(f"{what} {shown(text)} does not exist; choose one of the list", 404)
     return int(text)
 
 
@@ -262,33 +261,26 @@ def _add_channel(web: FastAPI, service: CompetitionService) -> None:
             places.give_back(address)
 
 
-class _Watcher:
-    """The messages that a page has not received yet: the newest of each kind."""
-
-    def __init__(self) -> None:
-        self._newest: dict[str, str] = {}
-        self._arrived = asyncio.Event()
-
-    def put(self, message: Message) -> None:
-        """Queue a message; never waits."""
-        self._newest[message["kind"]] = json.dumps(message)
-        self._arrived.set()
-
-    async def send(self, send_text: Callable[[str], Awaitable[None]]) -> None:
-        """Send what is queued, until cancelled or the page is gone."""
-        while True:
-            await self._arrived.wait()
-            self._arrived.clear()
-            while self._newest:
-                await send_text(self._newest.pop(next(iter(self._newest))))
-
-
 async def _serve_watcher(service: CompetitionService, websocket: WebSocket) -> None:
-    watcher = _Watcher()
-    unsubscribe = service.subscribe(watcher.put)
+    """Send a page the newest message of each kind, until it is gone."""
+    newest: dict[str, str] = {}
+    arrived = asyncio.Event()
+
+    def put(message: Message) -> None:
+        newest[message["kind"]] = json.dumps(message)
+        arrived.set()
+
+    async def send() -> None:
+        while True:
+            await arrived.wait()
+            arrived.clear()
+            while newest:
+                await websocket.send_text(newest.pop(next(iter(newest))))
+
+    unsubscribe = service.subscribe(put)
     for message in service.messages():
-        watcher.put(message)
-    sending = asyncio.create_task(watcher.send(websocket.send_text))
+        put(message)
+    sending = asyncio.create_task(send())
     try:
         while (await websocket.receive())["type"] != "websocket.disconnect":
             pass  # nothing is expected of a page

@@ -54,19 +54,14 @@ MAX_TRIES_SHOWN = 500
 
 @dataclass(frozen=True, slots=True)
 class _Judged:
-    """A try with its results before and after the last correction.
-
-    Attributes:
-        correction: the last one; None if there is none.
-        judgements: how often judges changed it.
-    """
+    """A try with its results before and after the last correction."""
 
     row: tables.Try
     report: RefereeReport | None
     referee: TryScore
     result: TryScore
-    correction: tables.Judgement | None
-    judgements: int
+    correction: tables.Judgement | None  # the last one
+    judgements: int  # how often judges changed it
 
     @property
     def counts(self) -> bool:

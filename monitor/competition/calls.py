@@ -10,7 +10,7 @@ from sqlalchemy import func, select
 from sqlalchemy.orm import Session
 
 from monitor.competition import tables
-from monitor.competition.validation import Refused
+from monitor.competition.validation import RefusedError
 from scenarios.result import RefereeReport
 
 _MOVED_M = 0.3  # a try whose drone moved less uses no call
@@ -73,11 +73,11 @@ def take_back(session: Session, call_id: int, entry: Entry) -> None:
     """Take a call back: its tries have no team then, and the team returns to its place in the queue.
 
     Raises:
-        Refused: it is no longer the last call.
+        RefusedError: it is no longer the last call.
     """
     call = last_call(session)
     if call is None or call.id != call_id:
-        raise Refused("this call is over or was taken back meanwhile; reload the page", 409)
+        raise RefusedError("this call is over or was taken back meanwhile; reload the page", 409)
     for row in tries_of(session, call):
         row.team_id = None
         number = count_judgements(session, row) + 1

@@ -26,23 +26,14 @@ class Rule:
 
 @dataclass(frozen=True, slots=True)
 class TryScore:
-    """What a try was worth, as the referee or a judge says.
+    """What a try was worth, as the referee or a judge says."""
 
-    Attributes:
-        frames: colours to cross, in order.
-        crossed: those of them that were crossed in the right order.
-        contacts: with frames.
-        penalty_s: added to the try time, seconds.
-        try_time_s: motors on to motors off, seconds.
-        completed: all frames crossed in order, and landed on the base within the limit.
-    """
-
-    frames: tuple[str, ...]
-    crossed: tuple[str, ...]
+    frames: tuple[str, ...]  # colours to cross, in order
+    crossed: tuple[str, ...]  # those of them that were crossed in the right order
     contacts: int
     penalty_s: float
-    try_time_s: float
-    completed: bool
+    try_time_s: float  # motors on to motors off
+    completed: bool  # all frames crossed in order, and landed on the base within the limit
 
     @property
     def missing(self) -> tuple[str, ...]:
@@ -63,28 +54,16 @@ class Correction:
 
 @dataclass(frozen=True, slots=True)
 class Attempt:
-    """A judged try of a team.
-
-    Attributes:
-        team: its id.
-        scenario: name of what was flown.
-        id: of the try; later tries have higher ones.
-        result: after correction.
-    """
+    """A judged try of a team."""
 
     team: int
     scenario: str
-    id: int
-    result: TryScore
+    id: int  # of the try; later tries have higher ones
+    result: TryScore  # after correction
 
 
 def read_report(report: RefereeReport | None, frames: Sequence[str]) -> TryScore:
-    """Take from a referee's report what counts.
-
-    Args:
-        report: None if the try was not judged; then all counts 0.
-        frames: colours to cross, in order.
-    """
+    """Take from a referee's report what counts: all 0 without a report. `frames`: to cross, in order."""
     if report is None:
         return TryScore(tuple(frames), (), 0, 0.0, 0.0, completed=False)
     crossed = crossed_in_order(report.frames_crossed, frames)
@@ -172,21 +151,21 @@ def rank(
         tries[attempt.team, attempt.scenario].append(attempt)
     rows = []
     for team, name in teams.items():
-        chosen = [choose(tries[team, scenario], rule) for scenario, _ in drawn]
-        cells = tuple(
-            _cell(scenario, frames, attempt, len(tries[team, scenario]), rule)
-            for (scenario, frames), attempt in zip(drawn, chosen, strict=True)
-        )
-        flown = [attempt for attempt in chosen if attempt is not None]
+        cells, contacts = [], 0
+        for scenario, frames in drawn:
+            flown = tries[team, scenario]
+            chosen = choose(flown, rule)
+            cells.append(_cell(scenario, frames, chosen, len(flown), rule))
+            contacts += chosen.result.contacts if chosen is not None else 0
         rows.append(
             RowView(
                 rank=0,
                 team=team,
                 name=name,
                 total_s=sum(round(cell.counted_s * 100) for cell in cells) / 100,
-                contacts=sum(attempt.result.contacts for attempt in flown),
-                flown=len(flown),
-                cells=cells,
+                contacts=contacts,
+                flown=sum(1 for cell in cells if cell.attempt is not None),
+                cells=tuple(cells),
             )
         )
     rows.sort(key=lambda row: (row.total_s, row.contacts, row.name.casefold(), row.name, row.team))

@@ -19,7 +19,7 @@ from monitor.competition.calls import Entry
 from monitor.competition.database import Database, DatabaseError
 from monitor.competition.rules import TryScore, read_report
 from monitor.competition.store import Store
-from monitor.competition.validation import Refused, shown
+from monitor.competition.validation import RefusedError, shown
 from monitor.competition.views import Board, RunningView
 from monitor.tries import TryEvent
 from scenarios.models import COLOURS
@@ -168,7 +168,7 @@ class CompetitionService:
         """Let the store change something, and notify listeners once it is on the disk.
 
         Raises:
-            Refused: the store refuses it.
+            RefusedError: the store refuses it.
             DatabaseError: the database does not answer.
         """
         answer = await self.read(work)
@@ -194,25 +194,22 @@ class CompetitionService:
     async def draw(self, pool: Sequence[str], count: int, entry: Entry) -> int:
         """Draw scenarios at random, for the present round if it has no tries yet, else for the next.
 
-        Args:
-            pool: names to draw from.
-            count: how many.
-            entry: who and when.
-
         Returns:
             The round.
 
         Raises:
-            Refused: a name is unknown, its scenario lacks a frame, or the pool holds too few.
+            RefusedError: a name is unknown, its scenario lacks a frame, or the pool holds too few.
         """
         names = list(dict.fromkeys(pool))
         if count > len(names):
-            raise Refused(f"count {count} is more than the {len(names)} scenarios of the pool; tick more")
+            raise RefusedError(
+                f"count {count} is more than the {len(names)} scenarios of the pool; tick more"
+            )
         frames = {name: await self.frames(name) for name in names}
         for name, colours in frames.items():
             if colours != COLOURS:
                 has = f"only the {' and the '.join(colours)} frame" if colours else "no frames"
-                raise Refused(
+                raise RefusedError(
                     f"scenario {shown(name)} cannot be drawn: it has {has}, a try needs a red, "
                     "a green and a blue one; take it out of the pool"
                 )
@@ -220,18 +217,22 @@ class CompetitionService:
         return await self.change(lambda store: store.draw(drawn, names, entry))
 
     async def frames(self, scenario: str) -> tuple[str, ...]:
-        """Colours to cross in a scenario, in order. Raises `Refused` if it is unknown."""
+        """Colours to cross in a scenario, in order. Raises `RefusedError` if it is unknown."""
         known = self._frames.get(scenario)
         if known is not None:
             return known
         given = self._equipment.scenario
         if given is None or given.name != scenario:
             if _NAME.match(scenario) is None:
-                raise Refused(f"scenario {shown(scenario)} is no name; use small letters, digits, - and _")
+                raise RefusedError(
+                    f"scenario {shown(scenario)} is no name; use small letters, digits, - and _"
+                )
             try:
                 given = await asyncio.to_thread(self._equipment.load_scenario, scenario)
             except Exception as error:  # the loader is passed in, and its errors are not known here
-                raise Refused(f"scenario {shown(scenario)} is unknown; choose one of the list") from error
+                raise RefusedError(
+                    f"scenario {shown(scenario)} is unknown; choose one of the list"
+                ) from error
         colours = {frame.colour for frame in given.frames}
         frames = tuple(colour for colour in COLOURS if colour in colours)
         if len(self._frames) < _MAX_REMEMBERED:
@@ -249,7 +250,7 @@ class CompetitionService:
     async def _scenarios_to_draw(self) -> tuple[str, ...]:
         names = []
         for name in await asyncio.to_thread(self._equipment.list_scenarios):
-            with suppress(Refused):
+            with suppress(RefusedError):
                 if await self.frames(name) == COLOURS:
                     names.append(name)
         return tuple(names)
@@ -265,7 +266,7 @@ class CompetitionService:
             return
         try:
             frames = await self.frames(event.scenario)
-        except Refused:
+        except RefusedError:
             frames = COLOURS  # the scenario's file is not known here; a try needs all frames
         try:
             try_id = await self.read(lambda store: store.take(event, frames, at))

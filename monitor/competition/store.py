@@ -30,7 +30,7 @@ from monitor.competition.calls import (
 )
 from monitor.competition.database import Database
 from monitor.competition.rules import Correction, Rule, correct, read_report
-from monitor.competition.validation import Refused, free_text, from_wire, name_key, shown, team_name
+from monitor.competition.validation import RefusedError, free_text, from_wire, name_key, shown, team_name
 from monitor.competition.views import Board, TryDetail
 from monitor.tries import TryEvent
 from scenarios.result import RefereeReport
@@ -47,9 +47,6 @@ class Store:
 
     Methods that take an `Entry` record who did it and when. Those that take `seen` refuse a request if the
     number that the judge saw has changed meanwhile.
-
-    Args:
-        database: where it is kept.
     """
 
     def __init__(self, database: Database) -> None:
@@ -72,7 +69,7 @@ class Store:
             return read_board(session, self._version, sys.maxsize)
 
     def detail(self, try_id: int) -> TryDetail:
-        """A try with its history. Raises `Refused` if it does not exist."""
+        """A try with its history. Raises `RefusedError` if it does not exist."""
         with self._database.transaction() as session:
             detail = read_detail(session, try_id)
         if detail is None:
@@ -92,16 +89,7 @@ class Store:
             return int(session.execute(running).rowcount)  # type: ignore[attr-defined]
 
     def take(self, event: TryEvent, frames: Sequence[str], at: datetime) -> int:
-        """Record an event of the fleet.
-
-        Args:
-            event: of a try.
-            frames: colours to cross in its scenario, in order.
-            at: now.
-
-        Returns:
-            The try's id.
-        """
+        """Record an event of the fleet at a time; `frames` are those of its scenario. Returns the try's id."""
         with self._database.transaction() as session:
             row = session.scalars(select(tables.Try).where(tables.Try.key == event.key)).first()
             if row is None:
@@ -119,18 +107,15 @@ class Store:
             return row.id
 
     def add_team(self, name: str, members: str, entry: Entry) -> int:
-        """Add a team.
-
-        Returns:
-            Its id.
+        """Add a team. Returns its id.
 
         Raises:
-            Refused: the name is bad or taken, or there are too many.
+            RefusedError: the name is bad or taken, or there are too many.
         """
         name, members = team_name(name), free_text(members, "members", MAX_MEMBERS)
         with _unique_name(name), self._database.transaction() as session:
             if (session.scalar(select(func.count(tables.Team.id))) or 0) >= MAX_TEAMS:
-                raise Refused(f"name {shown(name)} would be team {MAX_TEAMS + 1}; {MAX_TEAMS} is the most")
+                raise RefusedError(f"name {shown(name)} cannot be added; {MAX_TEAMS} teams is the limit")
             team = tables.Team(name=name, name_key=name_key(name), members=members, withdrawn=False)
             session.add(team)
             session.flush()
@@ -143,7 +128,7 @@ class Store:
         """Change a team; None leaves a field as it is.
 
         Raises:
-            Refused: the team does not exist, or the name is bad or taken.
+            RefusedError: the team does not exist, or the name is bad or taken.
         """
         with _unique_name(name or ""), self._database.transaction() as session:
             team = _team(session, team_id)
@@ -162,7 +147,7 @@ class Store:
         """Call a team to the start; None for none. `scenario` "" is whatever the drone flies.
 
         Raises:
-            Refused: the team does not exist, or it is withdrawn.
+            RefusedError: the team does not exist, or it is withdrawn.
         """
         with self._database.transaction() as session:
             if team_id is not None:
@@ -170,7 +155,7 @@ class Store:
             call_team(session, team_id, scenario, entry)
 
     def take_back(self, call_id: int, entry: Entry) -> None:
-        """Take the last call back; its tries have no team then. Raises `Refused` if it is not the last."""
+        """Take the last call back; its tries lose their team. Raises `RefusedError` if it is not the last."""
         with _one_judge(), self._database.transaction() as session:
             take_back(session, call_id, entry)
 
@@ -178,28 +163,22 @@ class Store:
         """Set the order in which teams are to fly: their ids, the first flies first.
 
         Raises:
-            Refused: the queue is no longer number `seen`; a team is named twice, does not exist or is
+            RefusedError: the queue is no longer number `seen`; a team is named twice, does not exist or is
                 withdrawn.
         """
         with self._database.transaction() as session:
             if queue_number(session) != seen:
-                raise Refused("the queue was changed meanwhile; look at it again", 409)
+                raise RefusedError("the queue was changed meanwhile; look at it again", 409)
             for team_id in teams:
                 _active_team(session, team_id)
                 if teams.count(team_id) > 1:
-                    raise Refused(f"team {team_id} is in the queue twice; name each team once")
+                    raise RefusedError(f"team {team_id} is in the queue twice; name each team once")
             write_queue(session, teams, entry)
 
     def draw(self, scenarios: Mapping[str, Sequence[str]], pool: Sequence[str], entry: Entry) -> int:
-        """Record a draw. It replaces that of a round without tries, else the next round begins.
+        """Record a draw: names and frames of the scenarios drawn, and the names that could be drawn.
 
-        Args:
-            scenarios: names drawn, in order, and the frames of each.
-            pool: names that could be drawn.
-            entry: who and when.
-
-        Returns:
-            The round.
+        It replaces that of a round without tries, else the next round begins. Returns the round.
         """
         with self._database.transaction() as session:
             present = present_round(session.scalars(select(tables.Draw)))
@@ -219,7 +198,7 @@ class Store:
         """Record a judge's correction, which replaces an earlier one.
 
         Raises:
-            Refused: the try does not exist, its judgements are no longer `seen`, or values contradict.
+            RefusedError: the try does not exist, its judgements are no longer `seen`, or values contradict.
         """
         remarks = free_text(remarks, "remarks", MAX_REMARKS)
         crossed = None if correction.crossed is None else " ".join(correction.crossed)
@@ -254,11 +233,11 @@ def _unique_name(name: str) -> Iterator[None]:
     try:
         yield
     except IntegrityError as error:
-        raise Refused(f"name {shown(name)} is taken, if only in other letters; choose another") from error
+        raise RefusedError(f"name {shown(name)} is taken, in upper or lower case; choose another") from error
 
 
-def _changed_meanwhile() -> Refused:
-    return Refused("another judge changed this try meanwhile; look at it again, then save", 409)
+def _changed_meanwhile() -> RefusedError:
+    return RefusedError("another judge changed this try meanwhile; look at it again, then save", 409)
 
 
 def _add_try(session: Session, event: TryEvent, frames: Sequence[str], at: datetime) -> tables.Try:
@@ -291,7 +270,7 @@ def _add_judgement(session: Session, row: tables.Try, seen: int, entry: Entry, *
     if count != seen:
         raise _changed_meanwhile()
     if count >= MAX_JUDGEMENTS:
-        raise Refused(f"try {row.id} was changed {count} times; {MAX_JUDGEMENTS} is the most")
+        raise RefusedError(f"try {row.id} was changed {count} times; {MAX_JUDGEMENTS} is the limit")
     session.add(tables.Judgement(try_id=row.id, number=count + 1, **values, **asdict(entry)))
 
 
@@ -300,12 +279,12 @@ def _check(row: tables.Try, correction: Correction) -> None:
     for colour in correction.crossed or ():
         if colour not in frames:
             known = ", ".join(frames) or "none"
-            raise Refused(f"crossed {shown(colour)} is not a frame of this try; use {known}")
+            raise RefusedError(f"crossed {shown(colour)} is not a frame of this try; use {known}")
     if correction.completed:
         referee = read_report(stored_report(row.report), frames)
         missing = ", ".join(correct(referee, correction).missing)
         if missing:
-            raise Refused(
+            raise RefusedError(
                 f"completed true contradicts the crossings: {missing} not crossed; "
                 "tick them or take completed away"
             )
@@ -314,13 +293,13 @@ def _check(row: tables.Try, correction: Correction) -> None:
 def _team(session: Session, team_id: int) -> tables.Team:
     team = session.get(tables.Team, team_id)
     if team is None:
-        raise Refused(f"team {team_id} does not exist; choose one of the list", 404)
+        raise RefusedError(f"team {team_id} does not exist; choose one of the list", 404)
     return team
 
 
 def _active_team(session: Session, team_id: int) -> None:
     if _team(session, team_id).withdrawn:
-        raise Refused(f"team {team_id} is withdrawn; take it back in first")
+        raise RefusedError(f"team {team_id} is withdrawn; take it back in first")
 
 
 def _try(session: Session, try_id: int) -> tables.Try:
@@ -330,8 +309,8 @@ def _try(session: Session, try_id: int) -> tables.Try:
     return row
 
 
-def _no_try(try_id: int) -> Refused:
-    return Refused(f"try {try_id} does not exist; choose one of the list", 404)
+def _no_try(try_id: int) -> RefusedError:
+    return RefusedError(f"try {try_id} does not exist; choose one of the list", 404)
 
 
 def _team_change(team: tables.Team, entry: Entry) -> tables.TeamChange:

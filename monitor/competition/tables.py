@@ -1,6 +1,6 @@
 """The tables of the contest, and how those of an older framerunner are brought up to date.
 
-No row is ever deleted, and what judges enter is only added.
+No row is ever deleted, and what judges enter is only added. Lists in a text are separated by spaces.
 """
 
 from __future__ import annotations
@@ -53,21 +53,15 @@ class Schema(Table):
 
 
 class Team(Table):
-    """A team.
-
-    Attributes:
-        name_key: the name for comparison, so that no two differ by case or spaces only.
-        members: free text; may be "".
-        withdrawn: out of the contest; its tries are kept.
-    """
+    """A team."""
 
     __tablename__ = PREFIX + "teams"
 
     id: Mapped[int] = mapped_column(primary_key=True)
     name: Mapped[str] = mapped_column(String(60))
-    name_key: Mapped[str] = mapped_column(String(300), unique=True)
-    members: Mapped[str] = mapped_column(Text, default="")
-    withdrawn: Mapped[bool] = mapped_column(default=False)
+    name_key: Mapped[str] = mapped_column(String(300), unique=True)  # see `validation.name_key`
+    members: Mapped[str] = mapped_column(Text, default="")  # free text
+    withdrawn: Mapped[bool] = mapped_column(default=False)  # out of the contest; its tries are kept
 
 
 class TeamChange(Entered, Table):
@@ -82,108 +76,67 @@ class TeamChange(Entered, Table):
 
 
 class Draw(Entered, Table):
-    """Scenarios drawn for a round; the last row of a round is valid.
-
-    Attributes:
-        scenarios: those drawn, in order, one a line: name and frames, separated by spaces.
-        pool: names that could be drawn, one a line.
-    """
+    """Scenarios drawn for a round; the last row of a round is valid."""
 
     __tablename__ = PREFIX + "draws"
 
     round: Mapped[int] = mapped_column(index=True)
-    scenarios: Mapped[str] = mapped_column(Text)
-    pool: Mapped[str] = mapped_column(Text)
+    scenarios: Mapped[str] = mapped_column(Text)  # in order, one a line: name and frames
+    pool: Mapped[str] = mapped_column(Text)  # names that could be drawn, one a line
 
 
 class Call(Entered, Table):
-    """A team called to the start, or the end of a call; the last row is valid.
-
-    Attributes:
-        team_id: None when no team is called any more.
-        scenario: "" for whatever the drone flies.
-        kind: "call"; "used" when a try was flown on it; "taken back" by a judge.
-        queue_place: the team's index in the queue when it was called; None if it was not in the queue.
-    """
+    """A team called to the start, or the end of a call; the last row is valid."""
 
     __tablename__ = PREFIX + "next"
 
-    team_id: Mapped[int | None] = mapped_column(ForeignKey(Team.id))
-    scenario: Mapped[str] = mapped_column(String(80))
+    team_id: Mapped[int | None] = mapped_column(ForeignKey(Team.id))  # None at the end of a call
+    scenario: Mapped[str] = mapped_column(String(80))  # "" for whatever the drone flies
+    # "call"; its end: "used" when a try was flown on it, "taken back" by a judge
     kind: Mapped[str] = mapped_column(String(20), server_default="call")
-    queue_place: Mapped[int | None]
+    queue_place: Mapped[int | None]  # index in the queue before the call; None if it was not in the queue
 
 
 class Queue(Entered, Table):
-    """The order in which teams are to fly; the last row is valid.
-
-    Attributes:
-        teams: ids, the first flies first, separated by spaces.
-    """
+    """The order in which teams are to fly; the last row is valid."""
 
     __tablename__ = PREFIX + "queues"
 
-    teams: Mapped[str] = mapped_column(Text)
+    teams: Mapped[str] = mapped_column(Text)  # ids, the first flies first
 
 
 class Try(Table):
-    """A try.
-
-    Attributes:
-        key: the fleet's; unique.
-        round: in which it was flown; 0 before the first draw.
-        team_id: None until a judge assigns it.
-        call_id: the call on which it began; None if no team was called.
-        frames: colours to cross, in order, separated by spaces.
-        state: "running", "ended", or "interrupted" when the monitor was stopped meanwhile.
-        report: the referee's, as JSON.
-        source: of the referee's states.
-        final: the report is the app's result.
-        started: when the monitor saw it begin.
-        ended: when it saw its end.
-    """
+    """A try; more in `TryView`."""
 
     __tablename__ = PREFIX + "tries"
 
     id: Mapped[int] = mapped_column(primary_key=True)
-    key: Mapped[str] = mapped_column(String(200), unique=True)
+    key: Mapped[str] = mapped_column(String(200), unique=True)  # see `TryEvent`
     drone_id: Mapped[int]
     round: Mapped[int] = mapped_column(index=True)
     team_id: Mapped[int | None] = mapped_column(ForeignKey(Team.id), index=True)
-    call_id: Mapped[int | None] = mapped_column(ForeignKey(Call.id))
+    call_id: Mapped[int | None] = mapped_column(ForeignKey(Call.id))  # on which it began
     scenario: Mapped[str] = mapped_column(String(80))
-    frames: Mapped[str] = mapped_column(String(80))
+    frames: Mapped[str] = mapped_column(String(80))  # colours to cross, in order
     state: Mapped[str] = mapped_column(String(20), index=True)
-    report: Mapped[str] = mapped_column(Text)
+    report: Mapped[str] = mapped_column(Text)  # the referee's, as JSON
     source: Mapped[str] = mapped_column(String(40))
     final: Mapped[bool] = mapped_column(default=False)
-    started: Mapped[datetime]
+    started: Mapped[datetime]  # when the monitor saw it begin
     ended: Mapped[datetime | None]
 
 
 class Judgement(Entered, Table):
-    """A judge's entry on a try: a correction, or the team that flew it.
-
-    Attributes:
-        number: counts those of a try from 1; two judges cannot write the same.
-        kind: "correction" or "team".
-        team_id: where `kind` is "team", the team; None for none.
-        crossed: colours crossed in the right order, separated by spaces; None, here and below, is "as the
-            referee says".
-        contacts: with frames.
-        penalty_s: seconds.
-        try_time_s: seconds.
-        completed: all frames crossed and landed in time.
-    """
+    """A judge's entry on a try: a correction, in which None is "as the referee says", or its team."""
 
     __tablename__ = PREFIX + "judgements"
     __table_args__ = (UniqueConstraint("try_id", "number"),)
 
     try_id: Mapped[int] = mapped_column(ForeignKey(Try.id), index=True)
-    number: Mapped[int]
-    kind: Mapped[str] = mapped_column(String(20))
+    number: Mapped[int]  # counts those of a try from 1; two judges cannot write the same
+    kind: Mapped[str] = mapped_column(String(20))  # "correction" or "team"
     team_id: Mapped[int | None] = mapped_column(ForeignKey(Team.id))
-    crossed: Mapped[str | None] = mapped_column(String(80))
+    crossed: Mapped[str | None] = mapped_column(String(80))  # colours
     contacts: Mapped[int | None]
     penalty_s: Mapped[float | None]
     try_time_s: Mapped[float | None]

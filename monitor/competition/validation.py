@@ -47,7 +47,7 @@ _HINTS = {
 }
 
 
-class Refused(UserError):  # noqa: N818 - it says what happened
+class RefusedError(UserError):
     """A request is refused; the message is one line with field, value and what to do.
 
     Attributes:
@@ -143,15 +143,15 @@ def read_form(model: type[Form], body: bytes) -> Form:
     """Read a form from JSON.
 
     Raises:
-        Refused: it is invalid; the message names the first bad field, its value and what to do.
+        RefusedError: it is invalid; the message names the first bad field, its value and what to do.
     """
     try:
         return model.model_validate_json(body)
     except ValidationError as error:
         detail = error.errors(include_url=False)[0]
-        raise Refused(_one_line(model, detail["type"], detail["loc"], detail["input"])) from error
+        raise RefusedError(_one_line(model, detail["type"], detail["loc"], detail["input"])) from error
     except (UnicodeError, RecursionError) as error:
-        raise Refused("the body is not JSON in UTF-8; send an object") from error
+        raise RefusedError("the body is not JSON in UTF-8; send an object") from error
 
 
 def _one_line(model: type[FormModel], kind: str, path: tuple[int | str, ...], value: object) -> str:
@@ -172,15 +172,15 @@ def team_name(value: str) -> str:
     """Check a team's name and collapse its spaces.
 
     Raises:
-        Refused: it is empty, too long or has control characters.
+        RefusedError: it is empty, too long or has control characters.
     """
     if any(_is_control(character) for character in value):
-        raise Refused(f"name {shown(value)} holds control characters; leave them out")
+        raise RefusedError(f"name {shown(value)} has control characters; remove them")
     name = " ".join(value.split())
     if not any(unicodedata.category(character)[0] in "LNPS" for character in name):
-        raise Refused(f"name {shown(name)} shows nothing; give 1 to 60 characters")
+        raise RefusedError(f"name {shown(name)} shows nothing; give 1 to 60 characters")
     if len(name) > 60:
-        raise Refused(f"name {shown(name)} has {len(name)} characters; use 60 or fewer")
+        raise RefusedError(f"name {shown(name)} has {len(name)} characters; use 60 or fewer")
     return name
 
 
@@ -195,13 +195,13 @@ def free_text(value: str, field: str, max_length: int) -> str:
     """Check a text of several lines.
 
     Raises:
-        Refused: it is too long or has control characters other than line ends and tabs.
+        RefusedError: it is too long or has control characters other than line ends and tabs.
     """
     text = value.replace("\r\n", "\n").replace("\r", "\n").strip()
     if len(text) > max_length:
-        raise Refused(f"{field} {shown(text)} has {len(text)} characters; use {max_length} or fewer")
+        raise RefusedError(f"{field} {shown(text)} has {len(text)} characters; use {max_length} or fewer")
     if any(_is_control(character) for character in text if character not in "\n\t"):
-        raise Refused(f"{field} {shown(text)} holds control characters; leave them out")
+        raise RefusedError(f"{field} {shown(text)} has control characters; remove them")
     return text
 
 

@@ -7,7 +7,7 @@ import pytest
 from monitor.competition.calls import Entry
 from monitor.competition.database import Database
 from monitor.competition.store import Store
-from monitor.competition.validation import Refused
+from monitor.competition.validation import RefusedError
 from tests.monitor.competition.harness import COLOURS, event
 
 NOW = datetime(2030, 5, 17, 12, 0, tzinfo=UTC)
@@ -55,7 +55,7 @@ def test_the_order_of_the_queue_is_kept_and_named(store, teams):
 def test_who_saw_another_queue_is_refused(store, teams):
     seen = store.board().queue.number
     store.set_queue(seen, teams[::-1], ADA)
-    with pytest.raises(Refused, match="changed meanwhile") as refusal:
+    with pytest.raises(RefusedError, match="changed meanwhile") as refusal:
         store.set_queue(seen, teams[:1], BOB)
     assert refusal.value.status == 409 and queue_of(store) == teams[::-1]
 
@@ -67,7 +67,7 @@ def test_a_queue_names_teams_that_take_part_and_each_once(store, teams):
         ([teams[0]], "withdrawn"),
         ([99], "team 99 does not exist"),
     ):
-        with pytest.raises(Refused, match=words):
+        with pytest.raises(RefusedError, match=words):
             set_queue(store, queue)
     assert queue_of(store) == teams[1:]  # who withdraws leaves it
 
@@ -150,11 +150,11 @@ def test_a_call_is_taken_back_once_and_by_who_saw_it(store, teams):
     seen = store.board().last_call.id
     store.call(teams[1], "", ADA)
     for call in (seen, 99):
-        with pytest.raises(Refused, match="taken back meanwhile") as refusal:
+        with pytest.raises(RefusedError, match="taken back meanwhile") as refusal:
             store.take_back(call, BOB)
         assert refusal.value.status == 409
     take_back(store)
-    with pytest.raises(Refused, match="taken back meanwhile"):
+    with pytest.raises(RefusedError, match="taken back meanwhile"):
         store.take_back(seen, BOB)
 
 

@@ -10,7 +10,7 @@ import pytest
 from monitor.competition.database import DatabaseError
 from monitor.competition.service import CompetitionService
 from monitor.competition.store import Store
-from monitor.competition.validation import Refused
+from monitor.competition.validation import RefusedError
 from tests.monitor.competition.harness import COLOURS, EQUIPMENT, event
 
 
@@ -185,7 +185,7 @@ async def test_a_draw_takes_from_the_pool_and_every_one_can_come_first(url):
 )
 async def test_a_bad_draw_is_refused(url, pool, count, words):
     async with serving(url) as service:
-        with pytest.raises(Refused, match=words):
+        with pytest.raises(RefusedError, match=words):
             await service.draw(pool, count, service.entry("Ada"))
         assert service._board.draws == ()
 

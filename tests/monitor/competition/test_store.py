@@ -11,7 +11,7 @@ from monitor.competition.calls import Entry
 from monitor.competition.database import Database
 from monitor.competition.rules import Correction, Rule
 from monitor.competition.store import MAX_JUDGEMENTS, MAX_TEAMS, Store
-from monitor.competition.validation import Refused
+from monitor.competition.validation import RefusedError
 from monitor.competition.views import RuleView
 from tests.monitor.competition.harness import COLOURS, event
 
@@ -112,7 +112,7 @@ def test_the_quicker_judge_wins(store):
         lambda: store.correct(number, 0, Correction(contacts=5), "", BOB),
         lambda: store.assign(number, 0, None, BOB),
     ):
-        with pytest.raises(Refused, match="another judge") as refusal:
+        with pytest.raises(RefusedError, match="another judge") as refusal:
             change()
         assert refusal.value.status == 409
     assert store.board().tries[0].result.contacts == 1
@@ -122,10 +122,10 @@ def test_two_servers_cannot_write_the_same_judgement(database_url):
     one, other = Store(Database(database_url)), Store(Database(database_url))
     number = fly(one, "k")
     one.correct(number, 0, Correction(contacts=1), "", ADA)
-    with pytest.raises(Refused, match="another judge"):
+    with pytest.raises(RefusedError, match="another judge"):
         other.correct(number, 0, Correction(contacts=2), "", BOB)
     one.add_team("Falken", "", ADA)
-    with pytest.raises(Refused, match="taken"):
+    with pytest.raises(RefusedError, match="taken"):
         other.add_team("FALKEN", "", BOB)
     one.close()
     other.close()
@@ -140,7 +140,7 @@ def test_two_servers_cannot_write_the_same_judgement(database_url):
 )
 def test_contradictions_are_refused(store, correction, words):
     number = fly(store, "k")
-    with pytest.raises(Refused, match=words):
+    with pytest.raises(RefusedError, match=words):
         store.correct(number, 0, correction, "", ADA)
     assert store.detail(number).history == ()
 
@@ -155,16 +155,16 @@ def test_a_try_can_be_completed_by_a_judge_who_saw_it(store):
 def test_teams_are_unique_in_any_letters_and_limited(store, monkeypatch):
     first = store.add_team("Falken", "", ADA)
     for name in ("falken", "FALKEN ", "Fal\u200bken"):
-        with pytest.raises(Refused, match="taken"):
+        with pytest.raises(RefusedError, match="taken"):
             store.add_team(name, "", ADA)
     second = store.add_team("Adler", "", ADA)
-    with pytest.raises(Refused, match="taken"):
+    with pytest.raises(RefusedError, match="taken"):
         store.change_team(second, "FALKEN", None, None, ADA)
     store.change_team(first, "FALKEN", None, None, ADA)  # its own
     assert MAX_TEAMS == 500
     monkeypatch.setattr("monitor.competition.store.MAX_TEAMS", 3)
     store.add_team("Third", "", ADA)
-    with pytest.raises(Refused, match="3 is the most"):
+    with pytest.raises(RefusedError, match="3 teams is the limit"):
         store.add_team("One more", "", ADA)
     assert len(store.board().teams) == 3
 
@@ -174,7 +174,7 @@ def test_a_team_that_is_withdrawn_is_not_ranked_and_not_called(store):
     store.change_team(team, None, None, True, ADA)
     board = store.board()
     assert board.rankings[0].rows == () and board.teams[0].withdrawn
-    with pytest.raises(Refused, match="withdrawn"):
+    with pytest.raises(RefusedError, match="withdrawn"):
         store.call(team, "", ADA)
     store.change_team(team, None, "Ann", False, ADA)
     assert row_of(store, team).name == "Falken"
@@ -272,11 +272,11 @@ def test_what_does_not_exist_is_named(store):
         lambda: store.call(7, "", ADA),
         lambda: store.change_team(7, "A", None, None, ADA),
     ):
-        with pytest.raises(Refused, match=r"(try|team) 7 does not exist") as refusal:
+        with pytest.raises(RefusedError, match=r"(try|team) 7 does not exist") as refusal:
             work()
         assert refusal.value.status == 404
     number = fly(store, "k")
-    with pytest.raises(Refused, match="team 9 does not exist"):
+    with pytest.raises(RefusedError, match="team 9 does not exist"):
         store.assign(number, 0, 9, ADA)
 
 
@@ -289,5 +289,5 @@ def test_a_try_cannot_be_changed_without_end(store):
                     try_id=number, number=count + 1, kind="team", team_id=None, who="x", at=NOW, remarks=""
                 )
             )
-    with pytest.raises(Refused, match="200 is the most"):
+    with pytest.raises(RefusedError, match="200 is the limit"):
         store.correct(number, MAX_JUDGEMENTS, Correction(), "", ADA)

@@ -1,6 +1,6 @@
 import pytest
 
-from monitor.competition.validation import Refused, free_text, from_wire, name_key, shown, team_name
+from monitor.competition.validation import RefusedError, free_text, from_wire, name_key, shown, team_name
 
 
 @pytest.mark.parametrize("name", ["A", "x" * 60, "Équipe Ñandú 🚁", "الصقور", "ฝูงบิน", "<b>", "=1+1", "👩‍🚀"])
@@ -25,7 +25,7 @@ def test_names_of_all_kinds_are_taken(name):
     ],
 )
 def test_names_that_show_nothing_or_control_something_are_refused_in_one_line(name):
-    with pytest.raises(Refused, match=r"^name ") as refusal:
+    with pytest.raises(RefusedError, match=r"^name ") as refusal:
         team_name(name)
     words = str(refusal.value)
     assert len(words.splitlines()) == 1 and "\x1b" not in words and refusal.value.status == 422
@@ -45,9 +45,9 @@ def test_different_names_differ():
 
 def test_remarks_may_have_lines_but_no_other_controls():
     assert free_text(" a\r\nb\tc\n", "remarks", 10) == "a\nb\tc"
-    with pytest.raises(Refused, match=r"remarks .* 11 characters; use 10"):
+    with pytest.raises(RefusedError, match=r"remarks .* 11 characters; use 10"):
         free_text("x" * 11, "remarks", 10)
-    with pytest.raises(Refused, match="control"):
+    with pytest.raises(RefusedError, match="control"):
         free_text("a\x07", "remarks", 10)
 
 
