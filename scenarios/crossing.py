@@ -43,17 +43,12 @@ class Gate:
         self._sin = sin(frame.yaw_rad)
         self._offset_m = self._cos * frame.x_m + self._sin * frame.y_m
         self._side = 0  # 1 front, -1 back, 0 not known yet
-        self._distance_m = 0.0
+        self.distance_m = 0.0  # from the last point to the frame's plane; a shorter path cannot pass it
 
     def restart(self, point_m: Vec3) -> None:
         """Start a new path at a point; it is not joined to the last one."""
         self._side = 0
         self.follow(point_m, point_m)
-
-    @property
-    def distance_m(self) -> float:
-        """From the last point to the frame's plane; a shorter path cannot pass it."""
-        return abs(self._distance_m)
 
     def follow(self, start_m: Vec3, end_m: Vec3) -> Passage | None:
         """Follow the path by one step.
@@ -67,7 +62,7 @@ class Gate:
         """
         before_m = self._cos * start_m[0] + self._sin * start_m[1] - self._offset_m
         now_m = self._cos * end_m[0] + self._sin * end_m[1] - self._offset_m
-        self._distance_m = now_m
+        self.distance_m = abs(now_m)
         came_from = self._side
         if now_m == 0.0 or ((came_from > 0.0) == (now_m > 0.0) and came_from):
             return None

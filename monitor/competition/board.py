@@ -10,15 +10,7 @@ from dataclasses import asdict, dataclass
 from sqlalchemy import ColumnElement, select
 from sqlalchemy.orm import Session
 
-from monitor.competition import tables
-from monitor.competition.calls import (
-    current_call,
-    flying_on,
-    last_call,
-    queue_number,
-    read_queue,
-    tries_of,
-)
+from monitor.competition import calls, tables
 from monitor.competition.rules import (
     Attempt,
     Correction,
@@ -78,6 +70,7 @@ def read_board(session: Session, version: int, max_tries: int = MAX_TRIES_SHOWN)
     present = present_round(draws)
     rounds = sorted({present, *(draw.round for draw in draws), *(judged.row.round for judged in tries)})
     attempts = _attempt_numbers(tries)
+    queue = tuple(QueuedView(team=each, team_name=_name(teams, each)) for each in calls.read_queue(session))
     countable = {number: _countable(number, draws, tries, rule) for number in rounds}
     return Board(
         version=version,
@@ -86,10 +79,7 @@ def read_board(session: Session, version: int, max_tries: int = MAX_TRIES_SHOWN)
         teams=tuple(TeamView.model_validate(team) for team in teams.values()),
         called=_call_view(session, teams),
         last_call=_last_call_view(session, teams),
-        queue=QueueView(
-            number=queue_number(session),
-            teams=tuple(QueuedView(team=team, team_name=_name(teams, team)) for team in read_queue(session)),
-        ),
+        queue=QueueView(number=calls.queue_number(session), teams=queue),
         draws=tuple(_draw_view(draw) for draw in reversed(draws)),
         tries=tuple(
             _try_view(judged, teams, attempts.get(judged.row.id, 0), rule, countable[judged.row.round])
@@ -342,10 +332,10 @@ def _draw_view(draw: tables.Draw) -> DrawView:
 
 
 def _call_view(session: Session, teams: Mapping[int, tables.Team]) -> CallView | None:
-    row = current_call(session)
+    row = calls.current_call(session)
     if row is None or row.team_id is None:
         return None
-    flying = flying_on(session, row)
+    flying = calls.flying_on(session, row)
     return CallView(
         id=row.id,
         team=row.team_id,
@@ -358,8 +348,8 @@ def _call_view(session: Session, teams: Mapping[int, tables.Team]) -> CallView |
 
 
 def _last_call_view(session: Session, teams: Mapping[int, tables.Team]) -> LastCallView | None:
-    row = last_call(session)
+    row = calls.last_call(session)
     if row is None or row.team_id is None:
         return None
-    tries = tuple(each.id for each in tries_of(session, row))
+    tries = tuple(each.id for each in calls.tries_of(session, row))
     return LastCallView(id=row.id, team=row.team_id, team_name=_name(teams, row.team_id), tries=tries)

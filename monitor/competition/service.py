@@ -268,6 +268,7 @@ class CompetitionService:
             frames = await self.frames(event.scenario)
         except RefusedError:
             frames = COLOURS  # the scenario's file is not known here; a try needs all frames
+        fault: Exception | None = None
         try:
             try_id = await self.read(lambda store: store.take(event, frames, at))
         except (DatabaseError, SQLAlchemyError) as error:
@@ -277,15 +278,13 @@ class CompetitionService:
             return
         except Exception as error:  # one faulty try must not end the contest
             _log.exception("a try could not be recorded")
-            self._drop(event)
-            self._report_problem(error)
-            return
-        self._drop(event)
-        await self._show(event, try_id, frames)
-
-    def _drop(self, event: TryEvent) -> None:
+            fault = error
         if event.kind != "running":
             self._events.popleft()
+        if fault is None:
+            await self._show(event, try_id, frames)
+        else:
+            self._report_problem(fault)
 
     async def _show(self, event: TryEvent, try_id: int, frames: Sequence[str]) -> None:
         if event.kind == "ended":

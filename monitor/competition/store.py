@@ -14,20 +14,9 @@ from sqlalchemy import func, select, update
 from sqlalchemy.exc import IntegrityError
 from sqlalchemy.orm import Session
 
-from monitor.competition import tables
+from monitor.competition import calls, tables
 from monitor.competition.board import present_round, read_board, read_detail, stored_report
-from monitor.competition.calls import (
-    Entry,
-    call_team,
-    count_judgements,
-    current_call,
-    flying_on,
-    queue_number,
-    take_back,
-    use_call,
-    withdraw,
-    write_queue,
-)
+from monitor.competition.calls import Entry
 from monitor.competition.database import Database
 from monitor.competition.rules import Correction, Rule, correct, read_report
 from monitor.competition.validation import RefusedError, free_text, from_wire, name_key, shown, team_name
@@ -89,7 +78,7 @@ class Store:
             return int(session.execute(running).rowcount)  # type: ignore[attr-defined]
 
     def take(self, event: TryEvent, frames: Sequence[str], at: datetime) -> int:
-        """Record an event of the fleet at a time; `frames` are those of its scenario. Returns the try's id."""
+        """Record an event of the fleet; `frames` are those of its scenario. Returns the try's id."""
         with self._database.transaction() as session:
             row = session.scalars(select(tables.Try).where(tables.Try.key == event.key)).first()
             if row is None:
@@ -103,7 +92,7 @@ class Store:
                 row.state = "running"
             elif row.state != "ended":
                 row.state, row.ended = "ended", at
-                use_call(session, row, event.report, at)
+                calls.use_call(session, row, event.report, at)
             return row.id
 
     def add_team(self, name: str, members: str, entry: Entry) -> int:
@@ -140,7 +129,7 @@ class Store:
             if withdrawn is not None:
                 team.withdrawn = withdrawn
                 if withdrawn:
-                    withdraw(session, team, entry)
+                    calls.withdraw(session, team, entry)
             session.add(_team_change(team, entry))
 
     def call(self, team_id: int | None, scenario: str, entry: Entry) -> None:
@@ -152,12 +141,12 @@ class Store:
         with self._database.transaction() as session:
             if team_id is not None:
                 _active_team(session, team_id)
-            call_team(session, team_id, scenario, entry)
+            calls.call_team(session, team_id, scenario, entry)
 
     def take_back(self, call_id: int, entry: Entry) -> None:
         """Take the last call back; its tries lose their team. Raises `RefusedError` if it is not the last."""
         with _one_judge(), self._database.transaction() as session:
-            take_back(session, call_id, entry)
+            calls.take_back(session, call_id, entry)
 
     def set_queue(self, seen: int, teams: Sequence[int], entry: Entry) -> None:
         """Set the order in which teams are to fly: their ids, the first flies first.
@@ -167,13 +156,13 @@ class Store:
                 withdrawn.
         """
         with self._database.transaction() as session:
-            if queue_number(session) != seen:
+            if calls.queue_number(session) != seen:
                 raise RefusedError("the queue was changed meanwhile; look at it again", 409)
             for team_id in teams:
                 _active_team(session, team_id)
                 if teams.count(team_id) > 1:
                     raise RefusedError(f"team {team_id} is in the queue twice; name each team once")
-            write_queue(session, teams, entry)
+            calls.write_queue(session, teams, entry)
 
     def draw(self, scenarios: Mapping[str, Sequence[str]], pool: Sequence[str], entry: Entry) -> int:
         """Record a draw: names and frames of the scenarios drawn, and the names that could be drawn.
@@ -242,8 +231,10 @@ def _changed_meanwhile() -> RefusedError:
 
 def _add_try(session: Session, event: TryEvent, frames: Sequence[str], at: datetime) -> tables.Try:
     scenario = from_wire(event.scenario, 80)
-    call = current_call(session)
-    if call is not None and (call.scenario not in {"", scenario} or flying_on(session, call) is not None):
+    call = calls.current_call(session)
+    if call is not None and (
+        call.scenario not in {"", scenario} or calls.flying_on(session, call) is not None
+    ):
         call = None  # it is for another scenario, or another drone flies on it already
     row = tables.Try(
         key=event.key,
@@ -266,7 +257,7 @@ def _add_try(session: Session, event: TryEvent, frames: Sequence[str], at: datet
 
 
 def _add_judgement(session: Session, row: tables.Try, seen: int, entry: Entry, **values: object) -> None:
-    count = count_judgements(session, row)
+    count = calls.count_judgements(session, row)
     if count != seen:
         raise _changed_meanwhile()
     if count >= MAX_JUDGEMENTS:

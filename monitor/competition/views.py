@@ -293,10 +293,8 @@ def _csv(columns: Sequence[str], rows: Iterable[Sequence[object]]) -> str:
 
 def _safe(value: object) -> str:
     """A value as text that no spreadsheet takes for a formula."""
-    if value is None:
-        return ""
+    if isinstance(value, str):
+        return spreadsheet_cell(value)
     if isinstance(value, bool):
         return "true" if value else "false"
-    if not isinstance(value, str):
-        return str(value)
-    return spreadsheet_cell(value)
+    return "" if value is None else str(value)
