@@ -56,11 +56,11 @@ def test_a_stop_in_the_plane_passes_once_when_left_on_the_other_side():
     assert [(passage.side, passage.offset_m) for passage in found] == [("back", pytest.approx(0.1))]
 
 
-def test_a_path_that_begins_in_the_plane_has_come_from_nowhere():
+def test_a_path_that_begins_in_the_plane_has_no_passage():
     assert passages(FRAME, [(0, 0, 1), (1, 0, 1)]) == []
 
 
-def test_there_and_back_are_two_passages():
+def test_forward_and_back_are_two_passages():
     sides = [p.side for p in passages(FRAME, [(-1, 0, 1), (1, 0, 1), (1, 0, 1), (-1, 0, 1)])]
     assert sides == ["back", "front"]
 
@@ -91,7 +91,7 @@ def clear_of_edges(path):
 
 
 @given(points, st.floats(-3, 3), st.floats(-3, 3), st.floats(-pi, pi))
-def test_turning_and_shifting_the_scene_changes_nothing(path, dx, dy, turn):
+def test_rotating_and_translating_the_scene_changes_nothing(path, dx, dy, turn):
     assume(clear_of_edges(path))
 
     def move(x, y):

@@ -13,7 +13,7 @@ from scenarios.models import (
 )
 
 
-def test_opening_is_what_the_bars_leave():
+def test_the_opening_excludes_the_bars():
     frame = Frame(colour="red", x_m=0, y_m=0, z_m=1)
     assert frame.opening_m == pytest.approx((0.38, 0.18))
 

@@ -81,7 +81,7 @@ def test_a_level_loads_by_path(tmp_path):
         ),
     ],
 )
-def test_faults_are_told_in_one_line(text, message):
+def test_faults_give_one_line(text, message):
     with pytest.raises(LevelError) as caught:
         LEVEL_FILES.parse(text, "f.yaml")
     assert str(caught.value) == message
@@ -119,7 +119,7 @@ def test_wrong_values_in_known_fields_give_one_line(fields):
         ("/", "/: is a directory; give a level file"),
     ],
 )
-def test_names_that_lead_nowhere(name, message):
+def test_unknown_names_are_refused(name, message):
     with pytest.raises(LevelError) as caught:
         load_level(name)
     assert str(caught.value).startswith(message)

@@ -29,7 +29,7 @@ def places(scenario):
 
 
 @given(seeds)
-def test_calm_keeps_what_it_promises(seed):
+def test_scenarios_of_calm_are_within_its_limits(seed):
     scenario = random_scenario(CALM, seed)
     assert all(abs(value) <= 4 for place in places(scenario) for value in place)
     assert all(math.dist(*pair) >= 1.5 for pair in itertools.combinations(places(scenario), 2))
@@ -41,7 +41,7 @@ def test_calm_keeps_what_it_promises(seed):
 
 
 @given(seeds)
-def test_it_says_where_it_comes_from_and_round_trips(seed):
+def test_it_names_its_level_and_seed_and_round_trips(seed):
     scenario = random_scenario(CALM, seed)
     assert scenario.name == f"calm-{seed}"
     assert scenario.description == f"Random scenario of level calm, seed {seed}."
@@ -51,7 +51,7 @@ def test_it_says_where_it_comes_from_and_round_trips(seed):
     assert all(value == round(value, 3) for value in drawn)
 
 
-def test_calm_17_stays_as_it_is():
+def test_calm_17_never_changes():
     scenario = random_scenario(CALM, 17)
     assert places(scenario) == [(3.356, -2.251), (-1.088, -0.083), (-1.51, 1.82), (-2.403, -2.574)]
     assert [frame.z_m for frame in scenario.frames] == [2.265, 2.002, 2.189]
@@ -74,7 +74,7 @@ def test_another_process_draws_the_same(hash_seed):
     assert done.stdout == "".join(here)
 
 
-def test_numpys_global_random_state_has_no_part():
+def test_numpys_global_random_state_has_no_effect():
     np.random.seed(1)
     first = random_scenario(CALM, 9)
     np.random.seed(2)
@@ -138,7 +138,7 @@ def test_places_fill_the_square_and_no_part_is_favoured(many):
             assert stats.ks_2samp(own, others).pvalue > 0.001
 
 
-def test_what_is_drawn_apart_does_not_correlate(many):
+def test_independent_draws_do_not_correlate(many):
     columns = [
         [
             *itertools.chain(*places(scenario)),
@@ -153,7 +153,7 @@ def test_what_is_drawn_apart_does_not_correlate(many):
     assert np.abs(matrix).max() < 5 / math.sqrt(len(many))
 
 
-def test_ends_of_a_range_come_up():
+def test_both_ends_of_a_range_are_drawn():
     narrow = with_layout(frame_z_m=CALM.layout.frame_z_m.model_copy(update={"low": 2.499}))
     heights = {frame.z_m for seed in range(10) for frame in random_scenario(narrow, seed).frames}
     assert heights == {2.499, 2.5}
@@ -188,19 +188,19 @@ def numbers(seed, name, count=4):
     return [stream.random() for _ in range(count)]
 
 
-def test_numbers_stay_as_they_are():
+def test_random_numbers_never_change():
     # Results of old seeds can be compared only while these numbers are the same: on every machine, for ever.
     assert numbers(1, "wind", 3) == [0.9660842807621509, 0.9907271339130758, 0.20296987957631096]
     assert numbers(MAX_SEED, "wind", 1) == [0.016727917582789242]
 
 
 @given(st.integers(0, MAX_SEED), st.text(max_size=10), st.text(max_size=10))
-def test_streams_of_other_names_are_others(seed, name, other):
+def test_streams_differ_by_name(seed, name, other):
     assert (numbers(seed, name) == numbers(seed, other)) == (name == other)
 
 
 @given(st.sampled_from([0, 1, 2**31, 2**32 - 1, 2**32, 2**33, 2**62]), st.integers(0, MAX_SEED))
-def test_streams_of_other_seeds_are_others(seed, other):
+def test_streams_differ_by_seed(seed, other):
     assert (numbers(seed, "wind") == numbers(other, "wind")) == (seed == other)
 
 

@@ -39,7 +39,7 @@ def test_up_component_is_the_cosine_of_the_tilt():
         ((1.0, 0.0, 1.0), None, None),
     ],
 )
-def test_where_it_stands(position, surface, error_m):
+def test_landing_surface_and_error(position, surface, error_m):
     landing = find_landing(SCENARIO, ENVELOPE, position)
     if surface is None:
         assert landing is None
@@ -53,7 +53,7 @@ def test_where_it_stands(position, surface, error_m):
     ("x_m", "height_m", "surface"),
     [(1.07, 0.53, "base"), (1.07, 0.2, "base"), (1.4, 0.53, "floor"), (1.4, 0.2, "floor"), (1.4, 0.9, None)],
 )
-def test_where_it_stands_on_a_floor_without_a_base(x_m, height_m, surface):
+def test_landing_surface_on_a_floor_without_a_base(x_m, height_m, surface):
     landing = find_landing(SCENARIO, ENVELOPE, (x_m, 0.0, height_m), SCENARIO.base.top_m)
     assert (landing.surface if landing else None) == surface
 

@@ -1,4 +1,4 @@
-"""Who is called, who flies and who is next, as it is kept."""
+"""Who is called, who flies and who is next, as stored."""
 
 from datetime import UTC, datetime, timedelta
 
@@ -17,7 +17,7 @@ BOB = Entry("Bob", NOW + timedelta(minutes=1))
 
 @pytest.fixture
 def teams(store):
-    """Three teams, which stand in the queue."""
+    """Three teams, which are in the queue."""
     ids = [store.add_team(name, "", ADA) for name in ("Falken", "Adler", "Spatzen")]
     store.set_queue(0, ids, ADA)
     return ids
@@ -52,7 +52,7 @@ def test_the_order_of_the_queue_is_kept_and_named(store, teams):
     assert store.board().queue == queue  # the same order is no change
 
 
-def test_who_saw_another_queue_is_refused(store, teams):
+def test_a_request_for_an_older_queue_is_refused(store, teams):
     seen = store.board().queue.number
     store.set_queue(seen, teams[::-1], ADA)
     with pytest.raises(RefusedError, match="changed meanwhile") as refusal:
@@ -72,7 +72,7 @@ def test_a_queue_names_teams_that_take_part_and_each_once(store, teams):
     assert queue_of(store) == teams[1:]  # who withdraws leaves it
 
 
-def test_next_is_not_who_flies(store, teams):
+def test_the_next_team_is_not_the_flying_one(store, teams):
     first, second, third = teams
     store.call(first, "", ADA)
     board = store.board()
@@ -93,7 +93,7 @@ def test_next_is_not_who_flies(store, teams):
     assert store.board().called is None
 
 
-def test_a_second_call_of_who_flies_is_for_the_next_try(store, teams):
+def test_a_second_call_of_the_flying_team_is_for_its_next_try(store, teams):
     store.call(teams[0], "", ADA)
     begin(store)
     store.call(teams[0], "", ADA)
@@ -135,7 +135,7 @@ def test_a_wrong_call_is_taken_back_while_the_drone_flies_and_after(store, teams
     assert rows[second] == 0  # no try was used
 
 
-def test_a_try_that_a_judge_gave_to_another_team_stays_its_own(store, teams):
+def test_a_try_assigned_to_another_team_stays_with_it(store, teams):
     first, second, _ = teams
     store.call(second, "", ADA)
     number = begin(store)
@@ -145,7 +145,7 @@ def test_a_try_that_a_judge_gave_to_another_team_stays_its_own(store, teams):
     assert store.board().tries[0].team == first and queue_of(store) == teams
 
 
-def test_a_call_is_taken_back_once_and_by_who_saw_it(store, teams):
+def test_a_call_is_taken_back_once_and_by_a_judge_who_saw_it(store, teams):
     store.call(teams[0], "", ADA)
     seen = store.board().last_call.id
     store.call(teams[1], "", ADA)
@@ -158,7 +158,7 @@ def test_a_call_is_taken_back_once_and_by_who_saw_it(store, teams):
         store.take_back(seen, BOB)
 
 
-def test_who_was_called_and_has_not_flown_goes_back_when_another_is_called(store, teams):
+def test_a_called_team_that_has_not_flown_returns_to_the_queue_when_another_is_called(store, teams):
     first, second, third = teams
     store.call(first, "", ADA)
     store.call(third, "", ADA)

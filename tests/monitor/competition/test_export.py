@@ -38,7 +38,7 @@ def test_the_ranking_has_a_header_and_names_that_are_no_formulas(board):
     assert rows[0]["scenario 2 state"] == "not flown" and rows[0]["scenario 2 try"] == ""
 
 
-def test_the_tries_have_all_that_is_known(board):
+def test_the_tries_have_all_values(board):
     rows = read(tries_csv(board))
     assert [row["try"] for row in rows] == ["1", "2", "3"]
     assert rows[2]["team"] == "الصقور" and rows[2]["contacts"] == "3" and rows[2]["try_time_s"] == "33.0"

@@ -65,7 +65,7 @@ def test_what_was_not_flown_counts_as_if_all_frames_were_missing():
     assert [cell.counted_s for cell in row.cells] == [300.0, 360.0, 360.0]  # the third is still to be drawn
 
 
-def test_ties_share_a_rank_and_stand_by_contacts_then_name():
+def test_ties_share_a_rank_and_are_ordered_by_contacts_then_name():
     attempts = [Attempt(team, "a", team, replace(CLEAN, contacts=team == 1)) for team in (1, 2, 3)]
     rows = rank({1: "Alpha", 2: "zulu", 3: "Beta", 4: "Last"}, CASES, attempts, Rule())
     assert [(row.rank, row.name) for row in rows] == [(1, "Beta"), (1, "zulu"), (1, "Alpha"), (4, "Last")]
@@ -101,13 +101,13 @@ def test_the_rule_can_be_set():
         ([], ()),
     ],
 )
-def test_a_frame_before_its_turn_is_missing(crossed, counted):
+def test_a_frame_crossed_too_early_is_missing(crossed, counted):
     assert crossed_in_order(crossed, COLOURS) == counted
 
 
 @pytest.mark.parametrize("value", [nan, inf, -1, "12", None, True, [], 10**400])
 @pytest.mark.parametrize("told", [{}, {"verdict": "clean"}])
-def test_rubbish_in_a_report_counts_nothing_bad(value, told):
+def test_invalid_values_in_a_report_count_as_not_completed(value, told):
     report = dict.fromkeys(("contacts", "penalty_s", "try_time_s", "verdict", "frames_crossed"), value)
     result = read_report(RefereeReport.from_outside({**report, **told}), COLOURS)
     assert not result.completed
@@ -115,13 +115,13 @@ def test_rubbish_in_a_report_counts_nothing_bad(value, told):
     assert counted_cs(result, Rule()) == 36000
 
 
-def test_a_verdict_without_its_frames_is_not_believed():
+def test_a_verdict_without_its_frames_is_not_completed():
     report = RefereeReport(verdict="clean", frames_crossed=("red",))
     assert not read_report(report, COLOURS).completed
     assert read_report(report, ("red",)).completed
 
 
-def test_a_correction_is_laid_over_the_referee():
+def test_a_correction_replaces_the_referees_values():
     corrected = correct(CLEAN, Correction(contacts=2, penalty_s=5.0))
     assert corrected == replace(CLEAN, contacts=2, penalty_s=5.0)
     assert correct(CLEAN, None) == correct(CLEAN, Correction()) == CLEAN
@@ -173,7 +173,7 @@ def test_more_time_or_penalty_never_counts_less(result, time_s, penalty_s):
 
 
 @given(results(), st.sampled_from(COLOURS))
-def test_a_frame_less_never_counts_less(result, colour):
+def test_one_frame_fewer_never_counts_less(result, colour):
     fewer = tuple(each for each in result.crossed if each != colour)
     less = replace(result, crossed=fewer, completed=result.completed and fewer == result.crossed)
     if result.try_time_s + result.penalty_s <= 180:
@@ -187,7 +187,7 @@ def test_completed_within_the_limit_is_never_worse_than_not_completed(time_s, pe
 
 
 @given(results(), results())
-def test_a_full_correction_hides_the_referee(referee, judged):
+def test_a_full_correction_replaces_all_values_of_the_referee(referee, judged):
     everything = Correction(
         judged.crossed, judged.contacts, judged.penalty_s, judged.try_time_s, judged.completed
     )
@@ -195,7 +195,7 @@ def test_a_full_correction_hides_the_referee(referee, judged):
     assert correct(correct(referee, everything), everything) == judged
 
 
-def test_five_hundred_teams_are_ranked_quickly_and_rightly():
+def test_five_hundred_teams_are_ranked_quickly_and_correctly():
     chance = random.Random(1)
     attempts = [
         Attempt(team, name, team, replace(CLEAN, try_time_s=chance.uniform(20, 170)))

@@ -39,9 +39,9 @@ def url(tmp_path):
     return f"sqlite:///{tmp_path}/contest.db"
 
 
-async def test_a_bad_database_ends_the_service_in_words():
+async def test_a_bad_database_ends_the_service_with_one_line():
     with pytest.raises(DatabaseError, match="not the URL of a database"):
-        async with serving("rubbish"):
+        async with serving("no url"):
             pass
 
 
@@ -63,7 +63,7 @@ async def test_requests_wait_until_the_database_is_open_but_not_for_ever(url, mo
     assert service.running == () and service.messages()[0]["version"] == 0
 
 
-async def test_listeners_hear_only_what_is_committed(url):
+async def test_listeners_get_only_what_is_committed(url):
     async with serving(url) as service:
         seen = []
 
@@ -81,7 +81,7 @@ async def test_listeners_hear_only_what_is_committed(url):
         assert seen[0][0] < seen[1][0]
 
 
-async def test_a_running_try_is_told_every_time_without_reading_everything(url):
+async def test_events_of_a_running_try_are_sent_without_reading_everything(url):
     async with serving(url) as service:
         heard = []
         service.subscribe(heard.append)
@@ -98,7 +98,7 @@ async def test_a_running_try_is_told_every_time_without_reading_everything(url):
         await until(lambda: not service.running)
 
 
-async def test_a_listener_that_left_hears_nothing(url):
+async def test_a_removed_listener_gets_no_messages(url):
     async with serving(url) as service:
         heard = []
         service.subscribe(heard.append)()
@@ -107,7 +107,7 @@ async def test_a_listener_that_left_hears_nothing(url):
         assert heard == []
 
 
-async def test_a_slow_database_stalls_nobody_else(url):
+async def test_a_slow_database_delays_no_page(url):
     async with serving(url) as service:
         free = threading.Event()
         blocked = asyncio.create_task(service.read(lambda _: free.wait(20)))
@@ -123,7 +123,7 @@ async def test_a_slow_database_stalls_nobody_else(url):
         await until(lambda: service._board.tries)
 
 
-async def test_results_wait_for_a_database_that_is_away(url, monkeypatch):
+async def test_results_wait_for_a_database_that_is_unreachable(url, monkeypatch):
     monkeypatch.setattr("monitor.competition.service._RETRY_S", 0.01)
     away = True
     take = Store.take
@@ -159,7 +159,7 @@ async def test_one_bad_try_does_not_end_the_contest(url, monkeypatch):
         assert service._board.tries[0].judged
 
 
-async def test_a_draw_takes_from_the_pool_and_every_one_can_come_first(url):
+async def test_a_draw_takes_from_the_pool_and_each_can_be_first(url):
     async with serving(url, random=Random(1)) as service:
         pool = ["case-1", "case-2", "case-3", "calm-17"]
         first = set()
@@ -190,12 +190,12 @@ async def test_a_bad_draw_is_refused(url, pool, count, words):
         assert service._board.draws == ()
 
 
-async def test_the_pot_holds_what_has_all_frames(url):
+async def test_scenarios_with_all_frames_can_be_drawn(url):
     async with serving(url) as service:
         assert service.scenarios == ("case-1", "case-2", "case-3", "case-4")
 
 
-async def test_every_order_can_come_of_shuffling(url):
+async def test_shuffling_can_give_every_order(url):
     async with serving(url, random=Random(1)) as service:
         orders = {tuple(service.shuffled([1, 2, 3])) for _ in range(100)}
         assert len(orders) == 6 and all(sorted(order) == [1, 2, 3] for order in orders)
@@ -203,8 +203,8 @@ async def test_every_order_can_come_of_shuffling(url):
 
 async def test_frames_are_those_of_the_scenario_or_all(url):
     async with serving(url) as service:
-        for key, name in (("a", "two-1"), ("b", "somebody-elses"), ("c", "../x"), ("d", "")):
+        for key, name in (("a", "two-1"), ("b", "unknown"), ("c", "../x"), ("d", "")):
             service.on_try_event(event("ended", key, name))
         await until(lambda: len(service._board.tries) == 4)
         frames = {each.scenario: each.frames for each in service._board.tries}
-        assert frames == {"two-1": COLOURS[:2], "somebody-elses": COLOURS, "../x": COLOURS, "": COLOURS}
+        assert frames == {"two-1": COLOURS[:2], "unknown": COLOURS, "../x": COLOURS, "": COLOURS}

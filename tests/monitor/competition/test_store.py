@@ -1,4 +1,4 @@
-"""What is kept of a contest, in SQLite and, where a server is given, in PostgreSQL."""
+"""What is stored of a contest, in SQLite and, where a server is given, in PostgreSQL."""
 
 from dataclasses import asdict
 from datetime import UTC, datetime, timedelta
@@ -56,7 +56,7 @@ def test_a_call_for_another_scenario_is_left_alone(store):
     assert board.called is not None and board.called.team == team
 
 
-def test_a_call_is_for_one_drone_and_outlives_a_try_that_did_not_move(store):
+def test_a_call_is_for_one_drone_and_stays_after_a_try_that_did_not_move(store):
     team = store.add_team("Falken", "", ADA)
     store.call(team, "", ADA)
     store.take(event("began", "first", time_s=0.0), COLOURS, NOW)
@@ -65,12 +65,12 @@ def test_a_call_is_for_one_drone_and_outlives_a_try_that_did_not_move(store):
     store.take(event("ended", "first", verdict="aborted", crossed=(), path_m=0.0), COLOURS, NOW)
     assert store.board().called is not None
     store.take(event("ended", "second"), COLOURS, NOW)
-    assert store.board().called is not None  # it was nobody's
+    assert store.board().called is not None  # it had no team
     fly(store, "third")
     assert store.board().called is None
 
 
-def test_the_final_result_takes_the_place_of_the_first_and_nothing_that_comes_late(store):
+def test_the_final_result_replaces_the_first_and_late_events_are_ignored(store):
     fly(store, "k", time_s=40.0)
     store.take(event("ended", "k", time_s=40.02, final=True), COLOURS, NOW)
     store.take(event("ended", "k", time_s=55.0), COLOURS, NOW)
@@ -79,7 +79,7 @@ def test_the_final_result_takes_the_place_of_the_first_and_nothing_that_comes_la
     assert (each.state, each.final, each.result.try_time_s) == ("ended", True, 40.02)
 
 
-def test_a_correction_stays_on_top_of_a_final_result(store):
+def test_a_correction_stays_valid_after_a_final_result(store):
     number = fly(store, "k", time_s=40.0)
     store.correct(number, 0, Correction(contacts=2), "touched red", ADA)
     store.take(event("ended", "k", time_s=40.5, contacts=0, final=True), COLOURS, NOW)
@@ -105,7 +105,7 @@ def test_every_change_is_kept_with_who_and_when(store):
     assert store.board().tries[0].result.completed  # the last says: as the referee says
 
 
-def test_the_quicker_judge_wins(store):
+def test_the_first_of_two_judges_wins(store):
     number = fly(store, "k")
     store.correct(number, 0, Correction(contacts=1), "", ADA)
     for change in (
@@ -152,7 +152,7 @@ def test_a_try_can_be_completed_by_a_judge_who_saw_it(store):
     assert store.board().tries[0].result.counted_s == 51.5
 
 
-def test_teams_are_unique_in_any_letters_and_limited(store, monkeypatch):
+def test_team_names_are_unique_ignoring_case_and_teams_are_limited(store, monkeypatch):
     first = store.add_team("Falken", "", ADA)
     for name in ("falken", "FALKEN ", "Fal\u200bken"):
         with pytest.raises(RefusedError, match="taken"):
@@ -180,7 +180,7 @@ def test_a_team_that_is_withdrawn_is_not_ranked_and_not_called(store):
     assert row_of(store, team).name == "Falken"
 
 
-def test_a_round_is_drawn_again_until_somebody_flew_in_it(store):
+def test_a_round_is_drawn_again_until_a_try_is_flown_in_it(store):
     team = store.add_team("Falken", "", ADA)
     three = dict.fromkeys(("case-1", "case-2", "case-3"), COLOURS)
     assert store.board().round == 0
@@ -229,7 +229,7 @@ def test_a_try_that_ran_when_the_monitor_stopped_is_to_be_judged_by_hand(store):
     assert store.interrupt() == 0
 
 
-def test_a_try_found_interrupted_goes_on_when_the_fleet_still_knows_it(store):
+def test_an_interrupted_try_continues_with_the_next_event(store):
     store.take(event("began", "k", time_s=0.0), COLOURS, NOW)
     store.interrupt()
     store.take(event("running", "k", time_s=17.0), COLOURS, NOW)
@@ -256,7 +256,7 @@ def test_everything_is_there_after_reopening(database_url):
 @pytest.mark.parametrize(
     "value", [nan, inf, "\x00\ud800", {"a": {"b": nan}}, 10**400, b"x", None, "x" * 200_000]
 )
-def test_whatever_a_referee_sends_is_survived(store, value):
+def test_any_report_of_a_referee_is_stored(store, value):
     told = event("ended", "k", told={"reason": value, "try_time_s": value, "contacts": value})
     store.take(told, COLOURS, NOW)
     (each,) = store.board().tries
@@ -280,7 +280,7 @@ def test_what_does_not_exist_is_named(store):
         store.assign(number, 0, 9, ADA)
 
 
-def test_a_try_cannot_be_changed_without_end(store):
+def test_a_try_cannot_be_changed_more_than_200_times(store):
     number = fly(store, "k")
     with store._database.transaction() as session:
         for count in range(MAX_JUDGEMENTS):

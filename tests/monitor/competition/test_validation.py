@@ -24,7 +24,7 @@ def test_names_of_all_kinds_are_taken(name):
         "\x1b[31m",
     ],
 )
-def test_names_that_show_nothing_or_control_something_are_refused_in_one_line(name):
+def test_invisible_names_and_control_characters_are_refused_in_one_line(name):
     with pytest.raises(RefusedError, match=r"^name ") as refusal:
         team_name(name)
     words = str(refusal.value)
@@ -51,7 +51,7 @@ def test_remarks_may_have_lines_but_no_other_controls():
         free_text("a\x07", "remarks", 10)
 
 
-def test_texts_from_a_wire_are_made_harmless():
+def test_received_texts_are_cut_and_lose_control_characters():
     assert from_wire("truth\x00\ud800\n" + "x" * 100, 20) == "truth" + "x" * 12
     assert from_wire(None, 5) == from_wire(17, 5) == ""
 
