@@ -7,9 +7,8 @@ from dataclasses import dataclass
 from typing import Any, Protocol
 
 from errors import UserError
-from scenarios.models import Scenario
+from scenarios.models import Scenario, TrueState
 from scenarios.result import RefereeReport, RefereeSnapshot
-from scenarios.truth import TrueState
 
 Message = Any  # pymavlink's classes are made by a generator and carry no types
 

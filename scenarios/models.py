@@ -1,14 +1,15 @@
-"""What is flown: the scenario and its parts, as frozen, validated data in arena axes."""
+"""Data types in arena axes: the scenario and its parts, the ground under a point, the drone's true state."""
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import Annotated, Literal, Self
 
 from pydantic import BaseModel, ConfigDict, Field, model_validator
 from pydantic_core import PydanticCustomError
 
 from errors import UserError
-from geometry.vectors import Vec3
+from geometry.vectors import Quaternion, Vec3
 
 Colour = Literal["red", "green", "blue"]
 COLOURS: tuple[Colour, ...] = ("red", "green", "blue")
@@ -22,25 +23,25 @@ class ScenarioError(UserError):
 
 
 def refusal(value: float | str, message: str, *at: str | int) -> PydanticCustomError:
-    """A validation error that knows where below the validated part the bad value stands.
+    """Make a validation error that has the path of the bad value, so that a file's line can be named.
 
     Args:
         value: the bad value, which may be a default.
-        message: what is wrong and how to correct it, one line that goes on from the value.
-        *at: keys and indices from the validated part to the value; the loader finds its line with them.
+        message: what is wrong and how to correct it; one line that continues after the value.
+        *at: keys and indices from the validated part to the value.
     """
     context = {"field": field_path(at), "value": value, "message": message, "at": at}
     return PydanticCustomError("refused", "{field} {value} {message}", context)
 
 
 def field_path(at: tuple[str | int, ...]) -> str:
-    """Write keys and indices as people do: ("frames", 1, "x_m") is "frames[1].x_m"."""
+    """Write keys and indices as one text: ("frames", 1, "x_m") is "frames[1].x_m"."""
     text = "".join(f"[{step}]" if isinstance(step, int) else f".{step}" for step in at)
     return text.removeprefix(".")
 
 
 class Part(BaseModel):
-    """Base of all scenario parts: frozen and finite, and an unknown field is an error."""
+    """Base of all scenario parts: frozen, finite numbers, and an unknown field is an error."""
 
     model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
 
@@ -64,7 +65,7 @@ class Base(Part):
 
 
 class Start(Part):
-    """Where the drone stands at first; its height follows from what is under it."""
+    """The drone's start pose; its height follows from what is under it."""
 
     x_m: Metres = Field(0.0, description="centre of the drone")
     y_m: Metres = Field(0.0, description="centre of the drone")
@@ -111,7 +112,7 @@ class Camera(Part):
     height_px: int = Field(240, ge=16, le=4096, description="rows of the image")
     horizontal_fov_rad: float = Field(1.57, gt=0.1, lt=3.0, description="angle of view over the width")
     rate_hz: float = Field(10.0, gt=0, le=120, description="images a second of simulated time")
-    latency_s: float = Field(0.05, ge=0, le=2, description="from exposure to the image's way out")
+    latency_s: float = Field(0.05, ge=0, le=2, description="from exposure to sending the image")
     position_flu_m: Vec3 = Field((0.08, 0.0, 0.0), description="in body axes forward, left, up")
     near_m: float = Field(0.01, gt=0, description="nothing nearer is drawn")
     far_m: float = Field(20.0, gt=0, description="nothing farther is drawn")
@@ -126,8 +127,8 @@ class Camera(Part):
 class Light(Part):
     """One sun and ambient light."""
 
-    sun_direction_arena: Vec3 = Field((-0.5, 0.1, -0.9), description="the way its light travels; any length")
-    ambient: float = Field(0.5, ge=0, le=1, description="brightness of what the sun does not reach")
+    sun_direction_arena: Vec3 = Field((-0.5, 0.1, -0.9), description="direction of its light; any length")
+    ambient: float = Field(0.5, ge=0, le=1, description="brightness of surfaces in shadow")
 
     @model_validator(mode="after")
     def _sun_has_direction(self) -> Self:
@@ -147,7 +148,7 @@ class Origin(Part):
 
 
 class Scenario(Part):
-    """Everything that is given before a flight."""
+    """All that is given before a flight."""
 
     name: str = Field(
         pattern=r"^[a-z0-9][a-z0-9_-]*$", max_length=80, description="small letters, digits, - and _"
@@ -155,7 +156,7 @@ class Scenario(Part):
     description: str = Field("", description="what this scenario is and where its numbers come from")
     arena: Arena = Field(Arena(), description="the flying space")
     base: Base = Field(Base(), description="where to land")
-    start: Start = Field(Start(), description="where the drone stands at first")
+    start: Start = Field(Start(), description="the drone's start pose")
     frames: tuple[Frame, ...] = Field((), description="at most one of each colour, in any order")
     camera: Camera = Field(Camera(), description="the drone's camera")
     light: Light = Field(Light(), description="sun and sky")
@@ -165,32 +166,55 @@ class Scenario(Part):
 
     @model_validator(mode="after")
     def _one_frame_a_colour(self) -> Self:
-        seen: set[str] = set()
-        for index, frame in enumerate(self.frames):
-            if frame.colour in seen:
-                raise refusal(
-                    frame.colour, "stands twice; give each frame its own colour", "frames", index, "colour"
-                )
-            seen.add(frame.colour)
+        colours = [frame.colour for frame in self.frames]
+        for index, colour in enumerate(colours):
+            if colour in colours[:index]:
+                message = "is used twice; give each frame its own colour"
+                raise refusal(colour, message, "frames", index, "colour")
         return self
 
     @model_validator(mode="after")
     def _all_inside_arena(self) -> Self:
-        half_x_m, half_y_m = self.arena.length_x_m / 2, self.arena.width_y_m / 2
+        arena = self.arena
         placed: list[tuple[Part, tuple[str | int, ...]]] = [(self.start, ("start",)), (self.base, ("base",))]
         placed += [(frame, ("frames", index)) for index, frame in enumerate(self.frames)]
         for part, at in placed:
-            for field, limit_m in (("x_m", half_x_m), ("y_m", half_y_m)):
+            for field, limit_m in (("x_m", arena.length_x_m / 2), ("y_m", arena.width_y_m / 2)):
                 value_m: float = getattr(part, field)
                 if abs(value_m) > limit_m:
-                    raise refusal(
-                        value_m,
-                        f"is outside the arena; keep within ±{limit_m} or enlarge the arena",
-                        *at,
-                        field,
-                    )
+                    message = f"is outside the arena; keep within ±{limit_m} or enlarge the arena"
+                    raise refusal(value_m, message, *at, field)
         for index, frame in enumerate(self.frames):
-            if frame.z_m > self.arena.height_m:
-                limit_m = self.arena.height_m
-                raise refusal(frame.z_m, f"is above the arena; use {limit_m} or less", "frames", index, "z_m")
+            if frame.z_m > arena.height_m:
+                message = f"is above the arena; use {arena.height_m} or less"
+                raise refusal(frame.z_m, message, "frames", index, "z_m")
         return self
+
+
+@dataclass(slots=True)
+class TrueState:
+    """State of the drone at one instant, simulated or from a real drone's telemetry."""
+
+    time_us: int  # vehicle time
+    position_arena_m: Vec3  # of the drone's centre
+    velocity_arena_m_s: Vec3
+    attitude_arena: Quaternion  # unit quaternion (w, x, y, z), body FLU to arena
+    motors_on: bool
+    contacts: tuple[str, ...] = ()  # what the drone touches: names of frames ("red"), "base" or "floor"
+
+
+def is_over_base(base: Base, x_m: float, y_m: float) -> bool:
+    """Whether a point in plan is over the base's square, border included (the base is never turned)."""
+    half_m = base.edge_m / 2
+    return abs(x_m - base.x_m) <= half_m and abs(y_m - base.y_m) <= half_m
+
+
+def ground_height(scenario: Scenario, x_m: float, y_m: float, floor_m: float = 0.0) -> float:
+    """Height of the base or floor under a point in plan, metres; the floor is at `floor_m`."""
+    return scenario.base.top_m if is_over_base(scenario.base, x_m, y_m) else floor_m
+
+
+def start_position(scenario: Scenario) -> Vec3:
+    """Point on the base or floor under the drone's centre at the start, arena axes, metres, shape (3,)."""
+    x_m, y_m = scenario.start.x_m, scenario.start.y_m
+    return (x_m, y_m, ground_height(scenario, x_m, y_m))

@@ -1,16 +1,14 @@
-"""The referee: watches true states, and says what a try was worth."""
+"""The referee: follows the drone's states and judges the try."""
 
 from __future__ import annotations
 
 from enum import Enum
-from math import dist, isfinite
+from math import isfinite
 
 from geometry.vectors import Vec3
-from scenarios.boundary import Boundary
-from scenarios.crossing import Gate, Passage
-from scenarios.ground import ground_height
-from scenarios.models import COLOURS, Scenario
-from scenarios.result import Crossing, RefereeReport, RefereeSnapshot
+from scenarios.crossing import Boundary, Passage, PathWatch
+from scenarios.models import COLOURS, Scenario, TrueState, ground_height
+from scenarios.result import RefereeReport, RefereeSnapshot
 from scenarios.touchdown import (
     HARD_HIT_M_S,
     TIPPED_OVER,
@@ -20,7 +18,6 @@ from scenarios.touchdown import (
     is_resting,
     up_component,
 )
-from scenarios.truth import TrueState
 from scenarios.verdict import TryFacts, judge
 
 PENALTY_S_PER_S = 1.0  # outside the arena time counts double
@@ -29,9 +26,6 @@ TAKEN_OFF_M = 0.1  # rise that makes a take-off
 IN_AIR_M = 0.3  # height above ground at which a try that begins is already a flight
 REST_US = 300_000  # how long the drone must be still; a fall passes through zero speed for less
 SETTLE_LIMIT_US = 2_000_000  # after this it counts as settled however it moves
-MAX_GAP_US = 1_000_000  # across a longer hole in the states no crossing is believed
-
-_SLACK_KEPT_M = 0.01  # of the way to the nearest plane, so that rounding cannot lose a passage
 
 
 class _Phase(Enum):
@@ -42,16 +36,15 @@ class _Phase(Enum):
 
 
 class Referee:
-    """Watches one try.
+    """Judges one try.
 
-    Feed it with `update` at any rate, from the simulated truth or a real drone's telemetry (contacts empty).
-    Between two states the drone is taken to fly straight. A try runs from motors on to motors off; motors on
-    again before the drone has come to rest goes on with the same try, and motors off without a take-off lets
-    a new one begin. It is over with a crash, past the limit, or at rest after a flight: later states change
-    nothing.
+    Call `update` with states at any rate, from the simulated truth or a real drone's telemetry (contacts
+    empty). A try runs from motors on to motors off; motors on again before the drone has come to rest
+    continues the same try, and motors off without a take-off lets a new one begin. It is over with a crash,
+    past the limit, or at rest after a flight: later states change nothing.
 
-    Crossings count while the motors are on. A frame crossed again is harmless; one crossed before its turn
-    makes the order wrong for good. The frames' turns are red, green, blue, those that the scenario has.
+    Crossings count while the motors are on. Only the first crossing of each frame counts; one crossed too
+    early makes the order wrong, whatever follows. The order is red, green, blue, those that the scenario has.
 
     Args:
         scenario: what is flown.
@@ -65,9 +58,8 @@ class Referee:
         self._floor_m = floor_m
         self._limit_us = round(scenario.try_limit_s * 1e6)
         self._boundary = Boundary(scenario.arena)
-        frames = {frame.colour: frame for frame in scenario.frames}
-        self._expected = tuple(colour for colour in COLOURS if colour in frames)
-        self._gates = tuple((colour, Gate(frames[colour])) for colour in self._expected)
+        self._frames = sorted(scenario.frames, key=lambda frame: COLOURS.index(frame.colour))
+        self._expected = tuple(frame.colour for frame in self._frames)
         self._ignored = 0
         self._over = False
         self._time_us = -1
@@ -77,27 +69,23 @@ class Referee:
 
     def _reset(self) -> None:
         """Forget the try, if there was one."""
+        self._path = PathWatch(self._scenario.arena, self._frames)
         self._crash_watch = CrashWatch(self._scenario, self._envelope_m, self._floor_m)
         self._start_us = 0
         self._start_height_m = 0.0
         self._stop_us: int | None = None
         self._still_since_us: int | None = None
         self._taken_off = False
-        self._crossings: list[Crossing] = []
+        self._crossings: dict[str, tuple[float, Passage]] = {}  # seconds since motors on
         self._contacts: list[str] = []
         self._touched_us: dict[str, int] = {}
-        self._inside = True
-        self._outside_us = 0.0
-        self._path_m = 0.0
-        self._slack_m = 0.0
-        self._longest_gap_us = 0
         self._wrong_order = ""
         self._crash = ""
         self._timed_out = False
         self._landing: Landing | None = None
 
     def update(self, state: TrueState) -> None:
-        """Look at the next state. States that are not finite or go back in time are counted and ignored."""
+        """Take the next state. States that are not finite or go back in time are counted and ignored."""
         if self._over:
             return
         if state.time_us < self._time_us or not _is_finite(state):
@@ -114,7 +102,7 @@ class Referee:
         self._position_m = state.position_arena_m
 
     def _begin(self, state: TrueState) -> None:
-        """Start a try: the motors have come on."""
+        """Start a try: the motors are on now."""
         self._reset()
         self._phase = _Phase.FLYING
         self._start_us = state.time_us
@@ -122,35 +110,16 @@ class Referee:
         self._start_height_m = z_m
         underside_m = z_m - self._envelope_m[2] / 2
         self._taken_off = underside_m - ground_height(self._scenario, x_m, y_m, self._floor_m) > IN_AIR_M
-        self._restart_path(state)
+        self._path.restart(state.position_arena_m)
         self._watch(state)
-
-    def _restart_path(self, state: TrueState) -> None:
-        """Do not join the next point to those before this one."""
-        self._inside = self._boundary.holds(state.position_arena_m)
-        self._slack_m = 0.0
-        self._forget_sides(state)
-
-    def _forget_sides(self, state: TrueState) -> None:
-        """Let the path past the frames begin here, whatever was crossed before."""
-        for _, gate in self._gates:
-            gate.forget()
-            gate.follow(state.position_arena_m, state.position_arena_m)
 
     def _fly(self, state: TrueState) -> None:
         """Take the step from the last state, at which the motors were on."""
-        start_m, end_m = self._position_m, state.position_arena_m
+        position_m = state.position_arena_m
         step_us = state.time_us - self._time_us
-        self._longest_gap_us = max(self._longest_gap_us, step_us)
-        if step_us > MAX_GAP_US:
-            self._forget_sides(state)
-            self._slack_m = 0.0
-        step_m = dist(start_m, end_m)
-        self._path_m += step_m
-        self._slack_m -= step_m
-        if self._slack_m <= 0.0:
-            self._follow_path(start_m, end_m, step_us)
-        if end_m[2] - self._start_height_m > TAKEN_OFF_M:
+        for colour, passage in self._path.follow(self._position_m, position_m, step_us):
+            self._cross(colour, passage, step_us)
+        if position_m[2] - self._start_height_m > TAKEN_OFF_M:
             self._taken_off = True
         self._watch(state)
         if self._over:
@@ -162,45 +131,29 @@ class Referee:
             self._stop_us = state.time_us
             self._still_since_us = None
 
-    def _follow_path(self, start_m: Vec3, end_m: Vec3, step_us: int) -> None:
-        """Look at frames and arena, and note how far the drone can go before that is needed again."""
-        nearest_m = self._boundary.margin(end_m)
-        for colour, gate in self._gates:
-            passage = gate.follow(start_m, end_m)
-            if passage is not None:
-                self._cross(colour, passage, step_us)
-            nearest_m = min(nearest_m, gate.distance_m)
-        inside = self._boundary.holds(end_m)
-        if not (inside and self._inside):
-            self._outside_us += self._boundary.outside_share(start_m, end_m) * step_us
-        self._inside = inside
-        self._slack_m = max(nearest_m - _SLACK_KEPT_M, 0.0)
-
     def _cross(self, colour: str, passage: Passage, step_us: int) -> None:
-        """Note a passage, if it is the first one through this frame."""
-        if any(crossing.colour == colour for crossing in self._crossings):
+        """Record a passage, if it is the first one through this frame."""
+        if colour in self._crossings:
             return
         time_s = (self._time_us - self._start_us + passage.fraction * step_us) * 1e-6
-        turn = self._next_colour()
-        if colour != turn and not self._wrong_order:
-            self._wrong_order = f"crossed {colour} before {turn} at {time_s:.1f} s"
-        self._crossings.append(Crossing(colour, time_s, passage.offset_m, passage.side))
+        expected = self._next_colour()
+        if colour != expected and not self._wrong_order:
+            self._wrong_order = f"crossed {colour} before {expected} at {time_s:.1f} s"
+        self._crossings[colour] = (time_s, passage)
 
     def _next_colour(self) -> str | None:
-        """The frame whose turn it is."""
-        crossed = {crossing.colour for crossing in self._crossings}
-        return next((colour for colour in self._expected if colour not in crossed), None)
+        return next((colour for colour in self._expected if colour not in self._crossings), None)
 
     def _watch(self, state: TrueState) -> None:
         """Look for contacts with frames and for crashes."""
         if state.contacts:
-            self._note_contacts(state)
+            self._count_contacts(state)
         crash = self._crash_watch.follow(state, self._taken_off)
         if crash is not None:
             self._crash = crash
             self._over = True
 
-    def _note_contacts(self, state: TrueState) -> None:
+    def _count_contacts(self, state: TrueState) -> None:
         for name in state.contacts:
             if name not in self._expected:
                 continue
@@ -210,14 +163,14 @@ class Referee:
             self._touched_us[name] = state.time_us
 
     def _come_to_rest(self, state: TrueState) -> None:
-        """Follow the drone after motors off until it lies still, or the motors come on again."""
+        """Follow the drone after motors off until it is still, or the motors are on again."""
         self._watch(state)
         if self._over or self._stop_us is None:
             return
         if state.motors_on:
             self._phase = _Phase.FLYING
             self._stop_us = None
-            self._restart_path(state)
+            self._path.restart(state.position_arena_m)
             return
         if not is_resting(state.velocity_arena_m_s):
             self._still_since_us = None
@@ -228,7 +181,7 @@ class Referee:
             self._settle(state)
 
     def _settle(self, state: TrueState) -> None:
-        """Judge where and how the drone lies; without a take-off a new try may begin."""
+        """Judge where and how the drone came to rest; without a take-off a new try may begin."""
         self._phase = _Phase.SETTLED
         if not self._taken_off:
             return
@@ -238,18 +191,17 @@ class Referee:
         elif -state.velocity_arena_m_s[2] > HARD_HIT_M_S:
             self._crash = "fell with its motors off"
         else:
-            self._landing = find_landing(
-                self._scenario, self._envelope_m, state.position_arena_m, self._floor_m
-            )
+            position_m = state.position_arena_m
+            self._landing = find_landing(self._scenario, self._envelope_m, position_m, self._floor_m)
 
     @property
     def settled(self) -> bool:
-        """Whether the motors are off and the drone at rest, within 2 s of vehicle time."""
+        """Whether the motors are off and the drone at rest, at the latest 2 s (vehicle time) after them."""
         return self._phase is _Phase.SETTLED
 
     @property
     def over(self) -> bool:
-        """Whether nothing that comes can change the verdict: crashed, past the limit, or landed."""
+        """Whether no later state can change the verdict: crashed, past the limit, or landed."""
         return self._over
 
     @property
@@ -261,21 +213,20 @@ class Referee:
         return min(end_us - self._start_us, self._limit_us) * 1e-6
 
     @property
-    def crossings(self) -> tuple[Crossing, ...]:
-        """First crossings so far, in order of time."""
+    def crossed(self) -> tuple[str, ...]:
+        """Colours crossed so far, in order of their first crossing."""
         return tuple(self._crossings)
 
     def snapshot(self) -> RefereeSnapshot:
         """How the try stands now."""
-        crossed = tuple(crossing.colour for crossing in self._crossings)
         return RefereeSnapshot(
             began_us=None if self._phase is _Phase.WAITING else self._start_us,
             try_time_s=self.try_time_s,
-            penalty_s=self._outside_us * 1e-6 * PENALTY_S_PER_S,
-            crossed=crossed,
+            penalty_s=self._path.outside_us * 1e-6 * PENALTY_S_PER_S,
+            crossed=self.crossed,
             next_colour=self._next_colour(),
             contacts=len(self._contacts),
-            inside=self._boundary.holds(self._position_m),
+            inside=self._boundary.margin(self._position_m) >= 0.0,
             motors_on=self._phase is _Phase.FLYING,
             settled=self.settled,
             over=self.over,
@@ -288,35 +239,11 @@ class Referee:
             mission_state: state the mission is in, such as "red.turning".
             ended: why the flight was broken off, in a few words ("link lost"), when it was.
         """
-        facts = self._facts()
-        verdict, reason = judge(facts, mission_state, ended)
-        penalty_s = facts.outside_s * PENALTY_S_PER_S
-        return RefereeReport(
-            verdict=verdict,
-            reason=reason,
-            frames_crossed=facts.crossed,
-            crossing_times_s=tuple(crossing.time_s for crossing in self._crossings),
-            crossing_offsets_m=tuple(crossing.offset_m for crossing in self._crossings),
-            crossing_sides=tuple(crossing.side for crossing in self._crossings),
-            contacts=len(self._contacts),
-            contact_frames=facts.contact_frames,
-            outside_s=facts.outside_s,
-            try_time_s=facts.try_time_s,
-            penalty_s=penalty_s,
-            total_time_s=facts.try_time_s + penalty_s,
-            landed_on_base=self._landing is not None and self._landing.surface == "base",
-            landing_error_m=self._landing.error_m if self._landing else None,
-            path_length_m=self._path_m,
-            ignored_states=self._ignored,
-            longest_gap_s=self._longest_gap_us * 1e-6,
-        )
-
-    def _facts(self) -> TryFacts:
-        return TryFacts(
+        facts = TryFacts(
             expected=self._expected,
-            crossed=tuple(crossing.colour for crossing in self._crossings),
+            crossed=self.crossed,
             contact_frames=tuple(self._contacts),
-            outside_s=self._outside_us * 1e-6,
+            outside_s=self._path.outside_us * 1e-6,
             try_time_s=self.try_time_s,
             began=self._phase is not _Phase.WAITING,
             taken_off=self._taken_off,
@@ -326,6 +253,28 @@ class Referee:
             wrong_order=self._wrong_order,
             crash=self._crash,
             landing=self._landing,
+        )
+        verdict, reason = judge(facts, mission_state, ended)
+        penalty_s = facts.outside_s * PENALTY_S_PER_S
+        crossings = self._crossings.values()
+        return RefereeReport(
+            verdict=verdict,
+            reason=reason,
+            frames_crossed=facts.crossed,
+            crossing_times_s=tuple(time_s for time_s, _ in crossings),
+            crossing_offsets_m=tuple(passage.offset_m for _, passage in crossings),
+            crossing_sides=tuple(passage.side for _, passage in crossings),
+            contacts=len(self._contacts),
+            contact_frames=facts.contact_frames,
+            outside_s=facts.outside_s,
+            try_time_s=facts.try_time_s,
+            penalty_s=penalty_s,
+            total_time_s=facts.try_time_s + penalty_s,
+            landed_on_base=self._landing is not None and self._landing.surface == "base",
+            landing_error_m=self._landing.error_m if self._landing else None,
+            path_length_m=self._path.length_m,
+            ignored_states=self._ignored,
+            longest_gap_s=self._path.longest_gap_us * 1e-6,
         )
 
 

@@ -1,8 +1,10 @@
-"""What a referee tells of a try, and the result of a flight: as types, as JSON, and as a JSON Schema."""
+"""A referee's report on a try and the result of a flight: types, JSON, JSON Schema, cells of a CSV file."""
 
 from __future__ import annotations
 
 import json
+import re
+import unicodedata
 from dataclasses import dataclass
 from typing import Annotated, Any, Literal, Self
 
@@ -17,8 +19,8 @@ MAX_RESULT_BYTES = 1_000_000
 _MAX_TEXT = 2000  # characters; a longer text is cut
 
 
-def _sound_text(value: object) -> object:
-    """A text that every file takes: not endless, and without half a surrogate pair."""
+def _limit_text(value: object) -> object:
+    """Make a text that can be written to any file: cut, and without half a surrogate pair."""
     return value[:_MAX_TEXT].encode("utf-8", "replace").decode() if isinstance(value, str) else value
 
 
@@ -28,70 +30,40 @@ Metres = Annotated[float, Field(ge=-1e9, json_schema_extra={"unit": "m"}, **_LIM
 Ratio = Annotated[float, Field(ge=0.0, **_LIMITS)]
 Count = Annotated[int, Field(ge=0, le=10**9, strict=True)]
 Flag = Annotated[bool, Field(strict=True)]
-Text = Annotated[str, BeforeValidator(_sound_text)]
+Text = Annotated[str, BeforeValidator(_limit_text)]
 Ended = Literal["finished", "timed out", "aborted", "error", ""]
 
 
 class ResultError(ValueError):
-    """A result that makes no sense; the message is one line: field, then reason."""
-
-
-@dataclass(frozen=True, slots=True)
-class Crossing:
-    """The first passage through a frame.
-
-    Attributes:
-        colour: the frame.
-        time_s: since motors on.
-        offset_m: distance of the drone's centre from the opening's centre, in the frame's plane.
-        side: the side it came from; "front" is where the frame's normal points.
-    """
-
-    colour: str
-    time_s: float
-    offset_m: float
-    side: Side
+    """An invalid result; the message is one line: field, then reason."""
 
 
 @dataclass(frozen=True, slots=True)
 class RefereeSnapshot:
-    """How the try stands now, for displays.
+    """How the try stands now, for displays."""
 
-    Attributes:
-        began_us: vehicle time of motors on, microseconds; None before.
-        try_time_s: since motors on; stands still after motors off.
-        penalty_s: so far.
-        crossed: colours crossed so far.
-        next_colour: the frame whose turn it is; None when all are crossed.
-        contacts: contacts with frames so far.
-        inside: whether the drone is inside the arena.
-        motors_on: whether the try is being flown.
-        settled: motors off and at rest.
-        over: nothing that comes can change the verdict.
-    """
-
-    began_us: int | None
-    try_time_s: Seconds
+    began_us: int | None  # vehicle time of motors on; None before
+    try_time_s: Seconds  # from motors on to motors off, or to now
     penalty_s: Seconds
-    crossed: Annotated[tuple[Text, ...], Field(max_length=10)]
-    next_colour: Text | None
-    contacts: int
-    inside: bool
+    crossed: Annotated[tuple[Text, ...], Field(max_length=10)]  # colours
+    next_colour: Text | None  # the frame to cross next; None when all are crossed
+    contacts: int  # with frames
+    inside: bool  # the drone is inside the arena
     motors_on: bool
-    settled: bool
-    over: bool
+    settled: bool  # motors off and at rest
+    over: bool  # no later state can change the verdict
 
 
-class _Told(BaseModel):
-    """Frozen and finite; fields of other versions are passed over."""
+class _Record(BaseModel):
+    """Frozen and finite; fields of other versions are ignored."""
 
     model_config = ConfigDict(frozen=True, extra="ignore", allow_inf_nan=False)
 
 
-class RefereeReport(_Told):
-    """What a try was worth, as a referee says."""
+class RefereeReport(_Record):
+    """What a try was worth, as judged by a referee."""
 
-    verdict: Verdict = Field(description="see docs/evaluation.md; `error` stands in evaluations only")
+    verdict: Verdict = Field(description="see docs/evaluation.md; `error` occurs in evaluations only")
     reason: Text = Field("", description="one sentence with the mission's state")
     frames_crossed: tuple[Text, ...] = Field(
         (), max_length=10, description="colours in order of their first crossing, wrong ones included"
@@ -130,20 +102,17 @@ class RefereeReport(_Told):
 
     @property
     def times_s(self) -> dict[str, float]:
-        """When each colour was crossed, since motors on; empty if names and times do not match."""
+        """Time of each colour's crossing since motors on; empty if colours and times differ in number."""
         if len(self.frames_crossed) != len(self.crossing_times_s):
             return {}
         return dict(zip(self.frames_crossed, self.crossing_times_s, strict=True))
 
     @classmethod
     def from_outside(cls, content: object) -> Self | None:
-        """Read what anybody may have sent: a field that makes no sense is left out.
-
-        Args:
-            content: as `json.loads` returns it.
+        """Read what was received, as `json.loads` returns it; a field with an invalid value is left out.
 
         Returns:
-            None if there is no verdict in it.
+            None if it has no valid verdict.
         """
         for _ in range(2):
             try:
@@ -156,23 +125,23 @@ class RefereeReport(_Told):
         return None
 
     def as_json(self) -> dict[str, Any]:
-        """The fields that are known, in order, as plain data for JSON."""
+        """The fields that were set, in order, as plain data for JSON."""
         return self.model_dump(mode="json", exclude_unset=True)
 
 
-class Timing(_Told):
+class Timing(_Record):
     """Whether the machine kept up with a flight in real time."""
 
-    kept_up: Flag = Field(description="nothing came late and the wanted speed was reached")
+    kept_up: Flag = Field(description="nothing was late and the requested speed was reached")
     vehicle_time_waits: Flag = Field(description="the simulator's time waits for the app at each tick")
-    speed: Ratio = Field(description="vehicle time a wall time, as a part of the wanted speed")
-    late_ticks: Count = Field(description="ticks of the mission that came late")
-    late_images: Count = Field(description="images that came after the tick they were for")
-    late_setpoints: Count = Field(description="setpoints that came after the tick they were for")
+    speed: Ratio = Field(description="vehicle time per wall time, divided by the requested speed")
+    late_ticks: Count = Field(description="ticks of the mission that were late")
+    late_images: Count = Field(description="images received after the tick they were for")
+    late_setpoints: Count = Field(description="setpoints received after the tick they were for")
     oldest_image_s: Seconds = Field(description="age of the oldest image that a tick had to use")
 
 
-class _What(_Told):
+class _Flown(_Record):
     """What was flown; the first fields of a result."""
 
     scenario: Text = Field("", description="name of the scenario")
@@ -182,33 +151,33 @@ class _What(_Told):
     )
 
 
-class FlightResult(RefereeReport, _What):
-    """The result of a flight, as it stands in `result.json`.
+class FlightResult(RefereeReport, _Flown):
+    """The result of a flight, as `result.json` has it.
 
-    A field that was never set is not written: `state_sha256` is of lockstep flights; `timing`, and `lift_m`
-    where frames were lifted, are of flights in real time; wall times are not known to recordings.
+    A field that was never set is not written: `state_sha256` is set in lockstep flights; `timing`, and
+    `lift_m` where frames were lifted, in real time; recordings have no wall times.
     """
 
-    mission_state: Text = Field("", description="where the mission was in the end, such as red.turning")
-    ended: Ended = Field("", description="how the mission ended; `error` stands in evaluations only")
+    mission_state: Text = Field("", description="the mission's last state, such as red.turning")
+    ended: Ended = Field("", description="how the mission ended; `error` occurs in evaluations only")
     seconds_in_state: dict[Text, Seconds] = Field(
         default_factory=dict, max_length=10_000, description="time spent in each kind of state"
     )
     kept_in_box_s: Seconds = Field(
-        0.0, description="for how long commands were changed to keep the drone in its box"
+        0.0, description="time during which commands were changed to keep the drone in its box"
     )
-    judged_by: Text = Field("", description="what the referee saw by: truth or telemetry")
+    judged_by: Text = Field("", description="source of the referee's states: truth or telemetry")
     state_sha256: str = Field(
         "", max_length=64, description="over the true state of every control tick of a lockstep flight"
     )
     lift_m: Metres = Field(
-        0.0, description="how much higher the frames hung than the scenario says, for want of a base"
+        0.0, description="how much higher than in the scenario the frames were, for lack of a base"
     )
     timing: Timing | None = Field(None, description="of a flight in real time")
     version: Text = Field("", description="of the framerunner that flew")
     wall_time_s: Seconds | None = Field(None, description="wall time from the first to the last tick")
     real_time_factor: Ratio | None = Field(
-        None, description="vehicle time a wall time; null before two ticks"
+        None, description="vehicle time per wall time; null before two ticks"
     )
     started: Text = Field("", description="when the flight began, ISO 8601, UTC")
 
@@ -217,7 +186,7 @@ class FlightResult(RefereeReport, _What):
         """Read the text of a `result.json`.
 
         Raises:
-            ResultError: it is too long, no JSON, or a field makes no sense.
+            ResultError: it is too long, no JSON, or a field is invalid.
         """
         if len(text) > MAX_RESULT_BYTES:
             raise ResultError(f"larger than {MAX_RESULT_BYTES} bytes")
@@ -235,48 +204,65 @@ class FlightResult(RefereeReport, _What):
         return json.dumps(self.as_json(), indent=2, allow_nan=False) + "\n"
 
 
-class LocalFrame(_Told):
-    """Where in the arena a vehicle's local frame lies."""
+class LocalFrame(_Record):
+    """A vehicle's local frame in the arena: position of its origin, and yaw of its north axis."""
 
     origin_arena_m: tuple[Metres, Metres, Metres]
     yaw_rad: float = 0.0
 
 
-class Standing(_Told):
-    """How a try stands, as `/referee.json` tells.
+class Standing(_Record):
+    """How a try stands, as `/referee.json` has it."""
 
-    Attributes:
-        scenario: its name; "" if unknown.
-        source: what the referee sees by: "truth" or "telemetry".
-        lift_m: how much higher the frames hang than the scenario says.
-        time_us: vehicle time, microseconds; None if not told.
-        local_frame: None as long as the arena has no place in it.
-        snapshot: how the try stands.
-        report: what it would be worth if it ended now.
-    """
-
-    scenario: str = Field(max_length=80)
-    source: str = Field("truth", max_length=40)
-    lift_m: Metres = 0.0
-    time_us: int | None = None
-    local_frame: LocalFrame | None = None
+    scenario: str = Field(max_length=80)  # its name; "" if unknown
+    source: str = Field("truth", max_length=40)  # of the referee's states: "truth" or "telemetry"
+    lift_m: Metres = 0.0  # how much higher than in the scenario the frames are
+    time_us: int | None = None  # vehicle time
+    local_frame: LocalFrame | None = None  # None while it is unknown
     snapshot: RefereeSnapshot
-    report: RefereeReport
+    report: RefereeReport  # what the try would be worth if it ended now
 
     @property
     def ended(self) -> bool:
-        """Nothing more comes of this try: judged, or the motors off and at rest."""
+        """Whether the try is over: judged, or the motors off and at rest."""
         now = self.snapshot
         return now.began_us is not None and (now.over or (now.settled and not now.motors_on))
 
 
 def first_error(error: ValidationError) -> str:
-    """What is wrong, in one line: field, then reason."""
+    """The first error in one line: field, then reason."""
     first = error.errors(include_url=False, include_input=False)[0]
     return f"{'.'.join(str(step) for step in first['loc'])}: {first['msg']}".removeprefix(": ")
 
 
-_NOT_ALWAYS = ("state_sha256", "lift_m", "timing", "wall_time_s", "real_time_factor", "started")
+_FORMULA = frozenset("=+-@")
+_INVISIBLE = frozenset({"Cc", "Cf", "Zs", "Zl", "Zp"})
+
+
+def spreadsheet_cell(text: str) -> str:
+    """Put a ' before each part of a text that a spreadsheet would take for a formula.
+
+    A cell that begins with = + - or @ is a formula, which may fetch a page or start a program; spaces,
+    invisible characters and full-width forms (＝) before or instead of it do not prevent that. Where a comma
+    is the decimal separator, a semicolon begins the next cell, so what follows one counts as well.
+
+    Args:
+        text: from any source; not a number, whose sign would be taken for a formula's.
+    """
+    if _is_formula(text) or text[:1] in {"\t", "\r"}:
+        return f"'{text}"
+    parts = re.split(r"([;\n\r])", text)
+    return "".join(f"'{part}" if _is_formula(part) else part for part in parts)
+
+
+def _is_formula(text: str) -> bool:
+    for character in text:
+        if unicodedata.category(character) not in _INVISIBLE:
+            return unicodedata.normalize("NFKC", character)[0] in _FORMULA
+    return False
+
+
+_OPTIONAL = ("state_sha256", "lift_m", "timing", "wall_time_s", "real_time_factor", "started")
 
 
 class _SchemaWithoutTitles(GenerateJsonSchema):
@@ -290,7 +276,7 @@ class _SchemaWithoutTitles(GenerateJsonSchema):
 def json_schema() -> str:
     """The JSON Schema of `result.json`, as `docs/result.schema.json` has it."""
     schema = FlightResult.model_json_schema(schema_generator=_SchemaWithoutTitles, mode="serialization")
-    schema["required"] = [name for name in FlightResult.model_fields if name not in _NOT_ALWAYS]
+    schema["required"] = [name for name in FlightResult.model_fields if name not in _OPTIONAL]
     about = {"$schema": "https://json-schema.org/draft/2020-12/schema"}
     return json.dumps({**about, **schema}, indent=2) + "\n"
 

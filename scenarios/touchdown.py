@@ -1,4 +1,4 @@
-"""How a flight meets the ground: crashes while it lasts, and where the drone stands in the end."""
+"""Contact with the ground: crashes during a try, and where the drone lands."""
 
 from __future__ import annotations
 
@@ -7,32 +7,25 @@ from math import hypot
 from typing import Literal
 
 from geometry.vectors import Quaternion, Vec3
-from scenarios.ground import ground_height, is_over_base
-from scenarios.models import Scenario
-from scenarios.truth import TrueState
+from scenarios.models import Scenario, TrueState, ground_height, is_over_base
 
 HARD_HIT_M_S = 2.0  # a fall of 0.2 m; cutting the motors just above the base gives little over 1 m/s
 UPSIDE_DOWN_US = 500_000
-LYING_US = 5_000_000  # longer than an autopilot takes to disarm by itself after a landing
+LYING_US = 5_000_000  # longer than an autopilot takes to disarm after a landing
 RESTING_M_S = 0.05
-TOUCHING_M = 0.02  # how near the ground counts as touching when nobody reports contacts
+TOUCHING_M = 0.02  # how near the ground counts as touching when no contacts are reported
 TIPPED_OVER = 0.5  # cosine of the tilt at rest: more than 60 degrees
-STANDING_TOLERANCE_M = 0.3  # error of a real drone's height that is forgiven when it stands
+STANDING_TOLERANCE_M = 0.3  # accepted height error of a real drone that stands
 
 Surface = Literal["base", "floor"]
 
 
 @dataclass(frozen=True, slots=True)
 class Landing:
-    """Where the drone came to rest.
+    """Where the drone came to rest."""
 
-    Attributes:
-        surface: what it stands on.
-        error_m: plan distance of its centre from the base's centre.
-    """
-
-    surface: Surface
-    error_m: float
+    surface: Surface  # what it stands on
+    error_m: float  # plan distance of its centre from the base's centre
 
 
 def up_component(attitude: Quaternion) -> float:
@@ -42,7 +35,7 @@ def up_component(attitude: Quaternion) -> float:
 
 
 def is_resting(velocity_m_s: Vec3) -> bool:
-    """Whether a velocity is none, but for noise."""
+    """Whether a velocity is zero but for noise."""
     vx, vy, vz = velocity_m_s
     return vx * vx + vy * vy + vz * vz < RESTING_M_S * RESTING_M_S
 
@@ -50,21 +43,20 @@ def is_resting(velocity_m_s: Vec3) -> bool:
 def find_landing(
     scenario: Scenario, envelope_m: Vec3, position_m: Vec3, floor_m: float = 0.0
 ) -> Landing | None:
-    """Say what a drone at rest stands on, by its position alone, so that it serves a real drone as well.
+    """Find what a drone at rest stands on, by its position alone, so that it works for a real drone too.
 
-    It stands on the base when its centre is over the base's square and not high above its top. How low it
-    seems to be does not matter: the base is solid, so a lower height is an error of the estimate, or the
-    floor that stands in for a base is soft. The error is measured from the base's centre, since the base is
-    what has to be met; in all challenge scenarios that is the start as well.
+    It stands on the base when its centre is over the base's square and not high above its top. A height below
+    the top counts too: the base is solid, so it is an error of the estimate, or the floor used instead of a
+    base is soft. In all challenge scenarios the base's centre is the start as well.
 
     Args:
         scenario: what is flown.
         envelope_m: length, width and height of the drone.
         position_m: of its centre, arena axes, shape (3,).
-        floor_m: height of the floor, arena axes; without a base it is where the base's top would be.
+        floor_m: height of the floor, arena axes; see `Referee`.
 
     Returns:
-        The landing, or None when there is nothing under it to stand on.
+        None when it is too high above base and floor.
     """
     x_m, y_m, z_m = position_m
     base = scenario.base
@@ -78,27 +70,16 @@ def find_landing(
 
 
 class CrashWatch:
-    """Watches one try for crashes.
+    """Detects a crash during one try.
 
     A crash is one of:
-    - meeting the floor or the base at more than 2 m/s downward (frames are solid but no crash: a contact);
+    - hitting the floor or the base at more than 2 m/s downward (hitting a frame is a contact, no crash);
     - half a second upside-down;
     - after take-off, lying still on the floor for 5 s with the motors on, away from the base.
 
-    What is touched comes from `TrueState.contacts` or, when these are empty as for a real drone, from being
-    within 2 cm of the ground.
+    The surface touched is taken from `TrueState.contacts` or, when these are empty as for a real drone, from
+    being within 2 cm of the ground.
     """
-
-    __slots__ = (
-        "_envelope_m",
-        "_floor_m",
-        "_inverted_since_us",
-        "_lying_since_us",
-        "_near_m",
-        "_scenario",
-        "_sinking_m_s",
-        "_touched",
-    )
 
     def __init__(self, scenario: Scenario, envelope_m: Vec3, floor_m: float = 0.0) -> None:
         self._scenario = scenario
@@ -111,10 +92,10 @@ class CrashWatch:
         self._lying_since_us: int | None = None
 
     def follow(self, state: TrueState, taken_off: bool) -> str | None:
-        """Look at the next state.
+        """Take the next state.
 
         Returns:
-            What happened, to be read after "the drone", if the drone has crashed now.
+            What happened, as the predicate to "the drone", if it crashed now; else None.
         """
         sinking_before_m_s, self._sinking_m_s = self._sinking_m_s, -state.velocity_arena_m_s[2]
         _, x, y, _ = state.attitude_arena

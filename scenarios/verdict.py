@@ -1,4 +1,4 @@
-"""The verdict on a try: one word, and one sentence that says why."""
+"""The verdict on a try: one of a few names, and a sentence with the reason."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from scenarios.touchdown import Landing
 
 
 class Verdict(StrEnum):
-    """What a try was worth, best first; no referee says `error`."""
+    """What a try was worth, best first; a referee never returns `error`."""
 
     CLEAN = "clean"
     COMPLETED = "completed"
@@ -23,52 +23,34 @@ class Verdict(StrEnum):
 
 @dataclass(frozen=True, slots=True)
 class TryFacts:
-    """What the referee saw.
+    """What the referee saw."""
 
-    Attributes:
-        expected: colours to cross, in order.
-        crossed: colours crossed, each once, in order of its first crossing.
-        contact_frames: the frame of each contact.
-        outside_s: time outside the arena.
-        try_time_s: motors on to motors off, or to now.
-        began: the motors were on.
-        taken_off: the drone left the ground.
-        motors_on: the motors are on now.
-        settled: the motors are off and the drone is at rest.
-        timed_out: the try went past its limit.
-        wrong_order: what was crossed too early, or "".
-        crash: what happened to the drone, or "".
-        landing: where it came to rest after a flight.
-    """
-
-    expected: tuple[str, ...]
-    crossed: tuple[str, ...]
-    contact_frames: tuple[str, ...]
+    expected: tuple[str, ...]  # colours to cross, in order
+    crossed: tuple[str, ...]  # colours crossed, each once, in order of its first crossing
+    contact_frames: tuple[str, ...]  # the frame of each contact
     outside_s: float
-    try_time_s: float
-    began: bool
+    try_time_s: float  # motors on to motors off, or to now
+    began: bool  # the motors were on
     taken_off: bool
-    motors_on: bool
-    settled: bool
-    timed_out: bool
-    wrong_order: str
-    crash: str
-    landing: Landing | None
+    motors_on: bool  # now
+    settled: bool  # the motors are off and the drone is at rest
+    timed_out: bool  # the try exceeded its limit
+    wrong_order: str  # which frame was crossed too early, or ""
+    crash: str  # what happened to the drone, or ""
+    landing: Landing | None  # where it came to rest after a flight
 
 
 def judge(facts: TryFacts, mission_state: str = "", ended: str | None = None) -> tuple[Verdict, str]:
     """Give the verdict.
 
     The first rule that holds decides:
-    1. `wrong order`: a frame was crossed before its turn. It cannot be made good, whatever comes later.
-    2. `crashed`: see `CrashWatch`; lying on its side or back at rest is a crash too.
-    3. `timed out`: the try went past its limit.
+    1. `wrong order`: a frame was crossed too early, whatever followed.
+    2. `crashed`: see `CrashWatch`; coming to rest on its side or back is a crash too.
+    3. `timed out`: the try exceeded its limit.
     4. `clean` or `completed`: all frames crossed in order, and standing on the base with the motors off.
        Clean has neither contacts nor time outside.
-    5. `aborted`: the try stopped short of its task without one of the above. Here belong a mission that was
-       broken off, motors cut in the air that did no harm, landing beside the base (nothing is broken, but
-       the flight gave its task up), and landing with a frame never crossed (no frame came before its turn,
-       so the order is not wrong: the rest is missing).
+    5. `aborted`: all else. Examples are a mission that was broken off, motors cut in the air without a crash,
+       landing beside the base, and landing with a frame not crossed.
 
     Args:
         facts: what the referee saw.
@@ -79,8 +61,16 @@ def judge(facts: TryFacts, mission_state: str = "", ended: str | None = None) ->
         The verdict and a sentence without a full stop.
     """
     verdict = _verdict(facts)
-    details = _details(verdict, facts, ended)
-    where = f" in {_one_line(mission_state)}" if mission_state.strip() else ""
+    if verdict in {Verdict.CLEAN, Verdict.COMPLETED}:
+        details = _flaws(facts)
+    else:
+        details = [facts.wrong_order] if facts.wrong_order else []
+        if facts.crash:
+            details.append(f"the drone {facts.crash}")
+        if verdict is Verdict.ABORTED:
+            details.append(_one_line(ended or "") or _shortfall(facts))
+    state = _one_line(mission_state)
+    where = f" in {state}" if state else ""
     why = f" ({'; '.join(details)})" if details else ""
     crossed = ", ".join(facts.crossed) or "none"
     return verdict, f"{verdict} after {facts.try_time_s:.1f} s{where}{why}; crossed: {crossed}"
@@ -96,19 +86,7 @@ def _verdict(facts: TryFacts) -> Verdict:
     landed_on_base = facts.landing is not None and facts.landing.surface == "base"
     if facts.crossed != facts.expected or not landed_on_base:
         return Verdict.ABORTED
-    clean = not facts.contact_frames and facts.outside_s == 0.0
-    return Verdict.CLEAN if clean else Verdict.COMPLETED
-
-
-def _details(verdict: Verdict, facts: TryFacts, ended: str | None) -> list[str]:
-    if verdict in {Verdict.CLEAN, Verdict.COMPLETED}:
-        return _flaws(facts)
-    details = [facts.wrong_order] if facts.wrong_order else []
-    if facts.crash:
-        details.append(f"the drone {facts.crash}")
-    if verdict is Verdict.ABORTED:
-        details.append(_one_line(ended) if ended and ended.strip() else _shortfall(facts))
-    return details
+    return Verdict.COMPLETED if _flaws(facts) else Verdict.CLEAN
 
 
 def _flaws(facts: TryFacts) -> list[str]:
@@ -122,19 +100,18 @@ def _flaws(facts: TryFacts) -> list[str]:
 
 
 def _shortfall(facts: TryFacts) -> str:
-    """Say what a try that nobody broke off lacks; the first that holds."""
+    """What a try that was not broken off lacks; the first that holds."""
     lacks = (
         (not facts.began, "the motors were never on"),
         (facts.motors_on, "the motors were still on"),
         (not facts.settled, "not yet at rest after the motors stopped"),
         (not facts.taken_off, "never took off"),
+        (facts.landing is None, "did not come to rest on base or floor"),
     )
     for holds, words in lacks:
         if holds:
             return words
-    if facts.landing is None:
-        return "did not come to rest on base or floor"
-    if facts.landing.surface != "base":
+    if facts.landing is not None and facts.landing.surface != "base":
         return f"landed {facts.landing.error_m:.2f} m from the base's centre, not on the base"
     missing = ", ".join(colour for colour in facts.expected if colour not in facts.crossed)
     return f"landed on the base without crossing {missing}"

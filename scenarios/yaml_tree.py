@@ -1,4 +1,4 @@
-"""YAML to plain data that still knows on which line each value stands, and back.
+"""YAML to plain data with the line of each value, and back.
 
 Only the plain part of YAML is read: mappings with unique text keys, lists and scalars. Anchors, aliases,
 tags, several documents and deep nesting are refused, so a file cannot grow when it is read. Scalars follow
@@ -22,7 +22,7 @@ MAX_MESSAGE_LENGTH = 200
 MAX_INTEGER_LENGTH = 20  # characters; a longer one is read as a float, which has a range
 
 _NUMBER = r"[-+]?(?:\.[0-9]+|[0-9]+(?:\.[0-9]*)?)(?:[eE][-+]?[0-9]+)?"
-_SCALARS = (  # tag, what it looks like, its first characters; the first match counts
+_SCALARS = (  # tag, pattern, its first characters; the first match counts
     ("tag:yaml.org,2002:bool", r"true|True|TRUE|false|False|FALSE", "tTfF"),
     ("tag:yaml.org,2002:int", r"[-+]?[0-9]+", "-+0123456789"),
     ("tag:yaml.org,2002:float", rf"{_NUMBER}|[-+]?\.(?:inf|Inf|INF)|\.(?:nan|NaN|NAN)", "-+.0123456789"),
@@ -33,35 +33,24 @@ _PATTERNS = tuple((tag, re.compile(rf"(?:{shape})\Z"), tuple(first)) for tag, sh
 
 
 class YamlError(ValueError):
-    """YAML that cannot be read.
-
-    Attributes:
-        line: where, counted from 1.
-        column: where, counted from 1; None where the line says it all.
-    """
+    """YAML that cannot be read, with its line and, where it helps, its column, counted from 1."""
 
     def __init__(self, message: str, line: int, column: int | None = None) -> None:
-        super().__init__(
-            message if len(message) <= MAX_MESSAGE_LENGTH else message[: MAX_MESSAGE_LENGTH - 1] + "…"
-        )
+        is_short = len(message) <= MAX_MESSAGE_LENGTH
+        super().__init__(message if is_short else message[: MAX_MESSAGE_LENGTH - 1] + "…")
         self.line = line
         self.column = column
 
 
 @dataclass(slots=True)
 class YamlTree:
-    """What a YAML text holds.
+    """The content of a YAML text."""
 
-    Attributes:
-        value: its data; lists are tuples. None when the text is empty.
-        lines: the line (from 1) of each value's key or list item, by path.
-    """
-
-    value: Value = None
-    lines: dict[Path, int] = field(default_factory=dict)
+    value: Value = None  # lists are tuples; None when the text is empty
+    lines: dict[Path, int] = field(default_factory=dict)  # of each value's key or list item, from 1
 
     def line(self, path: Path) -> int:
-        """Line of a value or, where it is not in the text, of what should hold it."""
+        """Line of a value or, where it is missing, of the part in which it should be."""
         while path not in self.lines and path:
             path = path[:-1]
         return self.lines.get(path, 1)
@@ -80,10 +69,8 @@ def parse_yaml(text: str) -> YamlTree:
         raise YamlError(f"character U+{ord(text[error.position]):04X} is not allowed in YAML", line) from None
     except yaml.MarkedYAMLError as error:
         mark = error.problem_mark or error.context_mark
-        if mark is None:
-            raise YamlError(f"not valid YAML: {error.problem or error.context}", 1) from None
-        message = f"not valid YAML: {error.problem or error.context}"
-        raise YamlError(message, mark.line + 1, mark.column + 1) from None
+        place = (1,) if mark is None else (mark.line + 1, mark.column + 1)
+        raise YamlError(f"not valid YAML: {error.problem or error.context}", *place) from None
 
 
 def to_yaml(value: object) -> str:
@@ -93,19 +80,19 @@ def to_yaml(value: object) -> str:
 
 
 class _Dumper(yaml.SafeDumper):
-    """Quotes what would otherwise be read as another type."""
+    """Quotes texts that would be read as another type."""
 
     yaml_implicit_resolvers: dict[str, list[tuple[str, re.Pattern[str]]]] = {}  # noqa: RUF012 (PyYAML's form)
 
     def ignore_aliases(self, data: object) -> bool:
-        """Write equal values out in full: aliases are refused when reading."""
+        """Repeat equal values: aliases are refused when reading."""
         return True
 
 
 def _represent_text(dumper: _Dumper, text: str) -> yaml.ScalarNode:
-    r"""Double-quote a text with unusual line breaks: there they are escaped, elsewhere readers change them.
+    """Double-quote a text with unusual line breaks, so that they are escaped and not changed by readers.
 
-    U+0085, U+2028 and U+2029 are line breaks of YAML 1.1; a reader gives "\\n" for the first.
+    U+0085, U+2028 and U+2029 are line breaks of YAML 1.1.
     """
     style = '"' if _UNUSUAL_BREAK.search(text) else None
     return dumper.represent_scalar("tag:yaml.org,2002:str", text, style)
@@ -117,7 +104,7 @@ for _tag, _pattern, _first in _PATTERNS:
 
 
 class _Builder:
-    """Builds the tree from parser events, so that what is refused is refused before it takes memory."""
+    """Builds the tree from parser events, so that a file is refused before it takes memory."""
 
     def __init__(self, events: Iterator[yaml.Event]) -> None:
         self._events = events
@@ -125,14 +112,14 @@ class _Builder:
         self._count = 0
 
     def build(self) -> YamlTree:
-        """Read the only document."""
+        """Build the tree of the only document."""
         value: Value = None
         documents = 0
         for event in self._events:
             if isinstance(event, yaml.DocumentStartEvent):
                 documents += 1
                 if documents > 1:
-                    raise YamlError("a second document starts; keep one to a file", _line(event))
+                    raise YamlError("a second document starts; keep one per file", _line(event))
                 first = next(self._events)
                 self._lines[()] = _line(first)
                 value = self._value(first, ())
@@ -171,9 +158,8 @@ class _Builder:
             key = str(event.value)
             at = (*path, key)
             if key in data:
-                raise YamlError(
-                    f"{key} stands twice, first on line {self._lines[at]}; keep one", _line(event)
-                )
+                message = f"{key} is given twice, first on line {self._lines[at]}; keep one"
+                raise YamlError(message, _line(event))
             self._lines[at] = _line(event)
             data[key] = self._value(next(self._events), at)
         return data

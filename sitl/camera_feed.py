@@ -5,8 +5,7 @@ from __future__ import annotations
 from collections import deque
 from collections.abc import Callable, Sequence
 
-from scenarios.models import Scenario
-from scenarios.truth import TrueState
+from scenarios.models import Scenario, TrueState
 from sitl.camera import Camera, Image
 from sitl.solids import Solid
 

@@ -10,8 +10,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from math import dist
 
-from scenarios.ground import is_over_base
-from scenarios.models import Scenario, Start
+from scenarios.models import Scenario, Start, is_over_base
 from sitl.solids import Solid
 from sitl.world import World
 

@@ -12,9 +12,7 @@ from firmware_py.types import MotorSpeeds, Sensors
 from geometry.axes import flip_quaternion, flip_vector, flip_yaw
 from geometry.rotations import rotation, rotation_rows, to_body, to_world, yaw_of
 from geometry.vectors import Vec3
-from scenarios.ground import is_over_base, start_position
-from scenarios.models import Scenario
-from scenarios.truth import TrueState
+from scenarios.models import Scenario, TrueState, is_over_base, start_position
 from sitl.dynamics import Dynamics
 from sitl.solids import Solid, base_solid, frame_solids, touch
 

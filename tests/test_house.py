@@ -29,12 +29,10 @@ LARGE_FOLDERS = {
 LARGE_CLASSES = {
     "firmware_py/missions/executor.py MissionExecutor": "a method for each kind of mission item",
     "framerunner/flying/lockstep_drone.py LockstepDrone": "implements the port `Drone`",
-    "monitor/competition/service.py CompetitionService": "a method for each request of the contest's pages",
     "monitor/fleet.py Fleet": "a method for each kind of message from a vehicle",
     "monitor/pilot_seat.py PilotSeat": "a method for each order of a pilot",
     "monitor/vehicle/vehicle.py Vehicle": "a method for each kind of message from a vehicle",
     "offboard/mavsdk_drone.py MavsdkDrone": "implements the port `Drone`",
-    "scenarios/referee.py Referee": "a method for each phase of a try and each rule",
 }
 HASHED = re.compile(r"\S+==[^\n]* \\\n( {4}--hash=sha256:[0-9a-f]{64}( \\)?\n)+( {4}#.*\n?)*\Z")
 

@@ -100,9 +100,8 @@ def random(
         framerunner scenario random --level calm --seed 17 --out calm-17.yaml
     """
     from framerunner.errors import SettingError
-    from scenarios.level import load_level
     from scenarios.loader import dump_yaml
-    from scenarios.random_scenarios import random_scenario
+    from scenarios.random_scenarios import load_level, random_scenario
 
     drawn = random_scenario(load_level(level), seed)
     if out is None:

@@ -17,10 +17,9 @@ from framerunner.errors import SettingError
 from framerunner.flying.plan import FlightPlan
 from offboard.mission import Mission
 from offboard.pilot_file import PilotFile
-from scenarios.level import load_level
 from scenarios.loader import load_scenario
 from scenarios.models import Scenario, ScenarioError
-from scenarios.random_scenarios import random_scenario
+from scenarios.random_scenarios import load_level, random_scenario
 from scenarios.yaml_file import SUFFIXES
 
 

@@ -10,8 +10,7 @@ from io import StringIO
 from pydantic import Field
 
 from framerunner.runs.track import Track
-from scenarios.result import FlightResult
-from scenarios.spreadsheet import cell
+from scenarios.result import FlightResult, spreadsheet_cell
 from scenarios.verdict import Verdict
 
 _NO_COLUMNS = ("lift_m", "timing", "wall_time_s", "real_time_factor", "started")  # of flights in real time
@@ -61,11 +60,11 @@ def _cell(row: Row, name: str) -> str:
         return ""  # it was not flown to its end: its numbers would be no results
     value = getattr(row, name)
     if isinstance(value, Mapping):
-        return ";".join(f"{cell(key)}={number}" for key, number in value.items())
+        return ";".join(f"{spreadsheet_cell(key)}={number}" for key, number in value.items())
     if isinstance(value, tuple):
-        return ";".join(cell(part) if isinstance(part, str) else str(part) for part in value)
+        return ";".join(spreadsheet_cell(part) if isinstance(part, str) else str(part) for part in value)
     if isinstance(value, str):
-        return cell(value)
+        return spreadsheet_cell(value)
     if isinstance(value, bool):
         return "true" if value else "false"
     return "" if value is None else str(value)

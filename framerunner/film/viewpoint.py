@@ -9,8 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from framerunner.film.story import Floats
-from scenarios.ground import start_position
-from scenarios.models import Scenario
+from scenarios.models import Scenario, start_position
 
 if TYPE_CHECKING:
     from framerunner.film.story import Story

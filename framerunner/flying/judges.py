@@ -11,9 +11,9 @@ from pydantic import ValidationError
 from framerunner.errors import SettingError
 from framerunner.flying.plan import FlightPlan
 from offboard.app import Moment
+from scenarios.models import TrueState
 from scenarios.referee import Referee
 from scenarios.result import RefereeReport, RefereeSnapshot, Standing
-from scenarios.truth import TrueState
 from wire.simulator_api import SimulatorApi
 
 if TYPE_CHECKING:  # a flight in lockstep asks nobody over HTTP

@@ -16,9 +16,8 @@ from framerunner.flying.lockstep_drone import LockstepDrone, TruthObserver
 from framerunner.flying.plan import FlightPlan
 from offboard.app import Moment, Observer
 from offboard.eyes import CAMERA_DEAD_S, CameraLostError
-from scenarios.models import Scenario
+from scenarios.models import Scenario, TrueState
 from scenarios.result import RefereeReport, RefereeSnapshot
-from scenarios.truth import TrueState
 from sitl.camera_feed import CameraFeed
 from sitl.simulation import Simulation
 from vision.detector import detect

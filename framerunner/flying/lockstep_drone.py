@@ -22,7 +22,7 @@ from firmware_py.status import CommandResult, FlightMode, LandedState
 from geometry.alignment import Alignment, Pose
 from geometry.vectors import Vec3
 from offboard.drone import DroneError, DroneState, VelocityCommand
-from scenarios.truth import TrueState
+from scenarios.models import TrueState
 from sitl.simulation import Simulation
 
 TICK_US = 50_000

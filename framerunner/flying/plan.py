@@ -8,8 +8,7 @@ from typing import TYPE_CHECKING
 
 from firmware_py.airframe import Airframe, load_airframe
 from offboard.keep_in_box import Box, flight_box
-from scenarios.ground import start_position
-from scenarios.models import Scenario
+from scenarios.models import Scenario, start_position
 from scenarios.referee import Referee
 
 if TYPE_CHECKING:  # it brings the statechart library, which the virtual camera does without

@@ -18,10 +18,9 @@ from framerunner.gym.flight import SteppedFlight
 from framerunner.gym.observation import LONGEST_TRY_S, Observation, observation_space, observe, rgb
 from framerunner.gym.reward import Scorer, final_reward
 from offboard.drone import VelocityCommand
-from scenarios.level import load_level
 from scenarios.loader import load_scenario
 from scenarios.models import Camera, Scenario
-from scenarios.random_scenarios import random_scenario
+from scenarios.random_scenarios import load_level, random_scenario
 from scenarios.verdict import Verdict
 from vision.types import Image
 
@@ -141,7 +140,7 @@ class FrameChallengeEnv(gymnasium.Env[Observation, Action]):
             chosen = _scenario(options["scenario"])
         elif "level" in options or self._scenario is None:
             level = load_level(options["level"]) if "level" in options else self._level
-            # Not `integers`: numpy promises the same numbers for `random` only, see scenarios/streams.py.
+            # Not `integers`: numpy promises the same numbers for `random` only, see `random_stream`.
             chosen = random_scenario(level, int(self.np_random.random() * _SEEDS))
         else:
             chosen = self._scenario

@@ -7,8 +7,7 @@ from collections.abc import Coroutine
 from framerunner.flying.lockstep import LockstepVehicle
 from framerunner.flying.plan import FlightPlan
 from offboard.drone import DroneError, DroneState, VelocityCommand
-from scenarios.ground import is_over_base
-from scenarios.models import COLOURS
+from scenarios.models import COLOURS, is_over_base
 from scenarios.referee import Referee
 from scenarios.result import RefereeReport
 from vision.types import Detections, Image
@@ -108,7 +107,7 @@ class SteppedFlight:
             and self._taken_off
             and underside_m < base.top_m + STOP_ABOVE_BASE_M
             and is_over_base(base, state.x, state.y)
-            and len(self.referee.crossings) == len(self._colours)
+            and len(self.referee.crossed) == len(self._colours)
         )
 
 

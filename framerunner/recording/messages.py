@@ -218,7 +218,7 @@ def _value(name: str, value: object) -> Message:
 
 
 def crossing(time_us: int, colour: str, time_s: float, offset_m: float, side: str) -> Message:
-    """A frame was crossed; see `scenarios.result.Crossing`."""
+    """A frame was crossed; see `scenarios.crossing.Passage`."""
     return {
         "timestamp": time_of(time_us),
         "colour": colour,

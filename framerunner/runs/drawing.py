@@ -18,8 +18,7 @@ from matplotlib.patheffects import withStroke
 from matplotlib.ticker import MaxNLocator
 
 from framerunner.runs.track import Track
-from scenarios.ground import start_position
-from scenarios.models import Frame, Scenario
+from scenarios.models import Frame, Scenario, start_position
 from scenarios.result import FlightResult
 
 _Dash = Literal["-"] | tuple[float, Sequence[float]]

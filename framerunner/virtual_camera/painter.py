@@ -9,9 +9,8 @@ from framerunner.flying.plan import FlightPlan
 from framerunner.virtual_camera.placement import Placement
 from geometry.alignment import ORIGIN, Pose
 from geometry.rotations import quaternion_from_yaw, yaw_of
-from scenarios.models import Scenario
+from scenarios.models import Scenario, TrueState
 from scenarios.result import LocalFrame, Standing
-from scenarios.truth import TrueState
 from sitl.camera import Camera, Image
 from sitl.camera_feed import FIRST_EXPOSURE_US
 from wire.dialect import Message, mavlink

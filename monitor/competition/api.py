@@ -1,229 +1,226 @@
-"""The contest over HTTP at `/api/competition`: all may read, judges may write."""
+"""The contest over HTTP at `/api/competition`, and the WebSocket `/ws/competition` that reports changes.
+
+Everybody may read, judges may write.
+"""
 
 from __future__ import annotations
 
+import asyncio
 import json
-from collections.abc import Awaitable
-from typing import TYPE_CHECKING, Any, TypeVar
+from typing import TYPE_CHECKING, Any
 
-from fastapi import APIRouter, HTTPException, Request, Response
+from fastapi import APIRouter, FastAPI, HTTPException, Request, Response
+from fastapi.responses import JSONResponse
 from pydantic import BaseModel
 from sqlalchemy.exc import SQLAlchemyError
+from starlette.websockets import WebSocket, WebSocketDisconnect
 
+from monitor.addresses import Places, client_address
 from monitor.competition.calls import Entry
-from monitor.competition.channel import add_channel
 from monitor.competition.database import DatabaseError
-from monitor.competition.export import ranking_csv, tries_csv
-from monitor.competition.forms import (
-    MOST_BODY_BYTES,
+from monitor.competition.rules import Correction, Rule
+from monitor.competition.service import CompetitionService, Message
+from monitor.competition.validation import (
     DrawForm,
     Form,
     JudgementForm,
     NextForm,
     QueueForm,
+    RefusedError,
     SettingsForm,
     TeamChangeForm,
     TeamForm,
     TeamOfTryForm,
     UndoForm,
     read_form,
+    shown,
 )
-from monitor.competition.rules import Correction, Rule
-from monitor.competition.service import CompetitionService
-from monitor.competition.views import RankingStateView, RankingView, StateView
-from monitor.competition.words import Refused, shown
+from monitor.competition.views import RankingStateView, RankingView, StateView, ranking_csv, tries_csv
 
 if TYPE_CHECKING:
     from monitor.access import Access
     from monitor.server import Monitor
 
-Answer = TypeVar("Answer")
-_MOST_ID = 2**31 - 1  # of a database's integer
+MAX_BODY_BYTES = 65_536
+MAX_WATCHERS = 300
+MAX_WATCHERS_PER_ADDRESS = 90
+_MAX_ID = 2**31 - 1  # of a database's integer
+_TRY_AGAIN_LATER = 1013  # status code of a WebSocket
 
 
 def register(monitor: Monitor) -> None:
     """Add the contest to a monitor: its database, its interface and its live channel."""
     service = CompetitionService(monitor.settings.database, monitor.equipment)
-    monitor.fleet.on_try(service.hear)
+    monitor.fleet.on_try(service.on_try_event)
     monitor.jobs.append(service.run)
     monitor.web.state.competition = service
-    add_channel(monitor.web, service)
-    monitor.web.include_router(reading_routes(service))
+    for error in (RefusedError, DatabaseError, SQLAlchemyError):
+        monitor.web.add_exception_handler(error, _on_error)
+    _add_channel(monitor.web, service)
     judges = _Judges(service, monitor.access)
-    monitor.web.include_router(organising_routes(service, judges))
-    monitor.web.include_router(judging_routes(service, judges))
+    monitor.web.include_router(_reading_routes(service))
+    monitor.web.include_router(_organising_routes(service, judges))
+    monitor.web.include_router(_judging_routes(service, judges))
 
 
-def reading_routes(service: CompetitionService) -> APIRouter:
-    """What everybody may read."""
+def json_response(value: BaseModel | list[Any] | dict[str, Any]) -> Response:
+    """Answer with JSON that no browser keeps."""
+    text = value.model_dump_json(by_alias=True) if isinstance(value, BaseModel) else json.dumps(value)
+    return Response(text, media_type="application/json", headers={"Cache-Control": "no-store"})
+
+
+async def _on_error(request: Request, error: Exception) -> Response:
+    """Answer in one line what went wrong."""
+    status = error.status if isinstance(error, RefusedError) else 503
+    text = "the database refused this; reload the page, then try again"
+    return JSONResponse({"detail": text if isinstance(error, SQLAlchemyError) else str(error)}, status)
+
+
+def _reading_routes(service: CompetitionService) -> APIRouter:
     routes = APIRouter(prefix="/api/competition")
 
     @routes.get("/state")
     async def state() -> Response:
-        return _json(await _words(_state(service)))
+        view = StateView(
+            board=await service.board(),
+            running=service.running,
+            problem=service.problem,
+            scenarios=service.scenarios,
+        )
+        return json_response(view)
 
     @routes.get("/teams")
     async def teams() -> Response:
-        return _json([team.model_dump(mode="json") for team in (await _words(_state(service))).board.teams])
+        return json_response([team.model_dump(mode="json") for team in (await service.board()).teams])
 
     @routes.get("/tries")
     async def tries() -> Response:
-        board = (await _words(_state(service))).board
-        return _json([each.model_dump(mode="json") for each in board.tries])
+        return json_response([each.model_dump(mode="json") for each in (await service.board()).tries])
 
     @routes.get("/tries.csv")
     async def tries_as_csv() -> Response:
-        return _csv("tries.csv", tries_csv(await _words(service.read(lambda store: store.everything()))))
+        return _csv("tries.csv", tries_csv(await service.read(lambda store: store.everything())))
 
     @routes.get("/tries/{try_id}")
     async def one_try(try_id: str) -> Response:
-        number = await _words(_ident("try", try_id))
-        return _json(await _words(service.read(lambda store: store.detail(number))))
+        number = _id("try", try_id)
+        return json_response(await service.read(lambda store: store.detail(number)))
 
     @routes.get("/ranking")
     async def ranking(round: str = "") -> Response:  # noqa: A002 - its name in the address
-        return _json(await _words(_ranking(service, round)))
+        board = await service.board()
+        view = RankingStateView(
+            version=board.version,
+            ranking=_of_round(board.rankings, round),
+            rounds=tuple(ranking.round for ranking in board.rankings),
+            rule=board.rule,
+            called=board.called,
+            queue=board.queue,
+            running=service.running,
+            problem=service.problem,
+        )
+        return json_response(view)
 
     @routes.get("/ranking.csv")
     async def ranking_as_csv(round: str = "") -> Response:  # noqa: A002
-        return _csv("ranking.csv", ranking_csv((await _words(_ranking(service, round))).ranking))
+        return _csv("ranking.csv", ranking_csv(_of_round((await service.board()).rankings, round)))
 
     return routes
 
 
 class _Judges:
-    """Reads what judges send. Everybody else's request is refused before its body is looked at."""
+    """Reads judges' requests. All others are refused before the body is read."""
 
     def __init__(self, service: CompetitionService, access: Access) -> None:
         self._service = service
         self._access = access
 
-    async def asked(self, request: Request, model: type[Form]) -> tuple[Form, Entry]:
-        """What a judge asks for, and who it is, now."""
+    async def read(self, request: Request, model: type[Form]) -> tuple[Form, Entry]:
+        """Return the form, and who sent it now."""
         judge = self._access.require_judge(request)
         if request.headers.get("content-type", "").partition(";")[0].strip().lower() != "application/json":
             raise HTTPException(415, "the body must be JSON; send Content-Type: application/json")
         body = await request.body()
-        if len(body) > MOST_BODY_BYTES:
-            raise HTTPException(413, f"the body has {len(body)} bytes; send at most {MOST_BODY_BYTES}")
-        try:
-            return read_form(model, body), self._service.entry(judge.name)
-        except Refused as error:
-            raise HTTPException(error.status, str(error)) from error
+        if len(body) > MAX_BODY_BYTES:
+            raise HTTPException(413, f"the body has {len(body)} bytes; send at most {MAX_BODY_BYTES}")
+        return read_form(model, body), self._service.entry(judge.name)
 
 
-def organising_routes(service: CompetitionService, judges: _Judges) -> APIRouter:
+def _organising_routes(service: CompetitionService, judges: _Judges) -> APIRouter:
     """Teams, calls and the queue, the draw, the rule."""
     routes = APIRouter(prefix="/api/competition")
 
     @routes.post("/teams")
     async def add_team(request: Request) -> Response:
-        form, entry = await judges.asked(request, TeamForm)
-        team = await _words(service.change(lambda store: store.add_team(form.name, form.members, entry)))
-        return _json({"team": team})
+        form, entry = await judges.read(request, TeamForm)
+        team = await service.change(lambda store: store.add_team(form.name, form.members, entry))
+        return json_response({"team": team})
 
     @routes.post("/teams/{team_id}")
     async def change_team(request: Request, team_id: str) -> Response:
-        form, entry = await judges.asked(request, TeamChangeForm)
-        number = await _words(_ident("team", team_id))
+        form, entry = await judges.read(request, TeamChangeForm)
+        number = _id("team", team_id)
         values = (form.name, form.members, form.withdrawn)
-        await _words(service.change(lambda store: store.change_team(number, *values, entry)))
-        return _json({"team": number})
+        await service.change(lambda store: store.change_team(number, *values, entry))
+        return json_response({"team": number})
 
     @routes.post("/next")
     async def call(request: Request) -> Response:
-        form, entry = await judges.asked(request, NextForm)
+        form, entry = await judges.read(request, NextForm)
         if form.scenario:
-            await _words(service.frames(form.scenario))
-        await _words(service.change(lambda store: store.call(form.team, form.scenario, entry)))
-        return _json({"team": form.team, "scenario": form.scenario})
+            await service.frames(form.scenario)
+        await service.change(lambda store: store.call(form.team, form.scenario, entry))
+        return json_response({"team": form.team, "scenario": form.scenario})
 
     @routes.post("/next/undo")
     async def take_back(request: Request) -> Response:
-        form, entry = await judges.asked(request, UndoForm)
-        await _words(service.change(lambda store: store.take_back(form.call, entry)))
-        return _json({"call": form.call})
+        form, entry = await judges.read(request, UndoForm)
+        await service.change(lambda store: store.take_back(form.call, entry))
+        return json_response({"call": form.call})
 
     @routes.post("/queue")
     async def set_queue(request: Request) -> Response:
-        form, entry = await judges.asked(request, QueueForm)
+        form, entry = await judges.read(request, QueueForm)
         teams = service.shuffled(form.teams) if form.shuffle else form.teams
-        await _words(service.change(lambda store: store.set_queue(form.seen, teams, entry)))
-        return _json({"teams": teams})
+        await service.change(lambda store: store.set_queue(form.seen, teams, entry))
+        return json_response({"teams": teams})
 
     @routes.post("/draw")
     async def draw(request: Request) -> Response:
-        form, entry = await judges.asked(request, DrawForm)
-        count = form.count or (await _words(_state(service))).board.rule.scenarios
-        number = await _words(service.draw(form.pool, count, entry.who))
-        return _json({"round": number})
+        form, entry = await judges.read(request, DrawForm)
+        count = form.count or (await service.board()).rule.scenarios
+        return json_response({"round": await service.draw(form.pool, count, entry)})
 
     @routes.post("/settings")
     async def set_rule(request: Request) -> Response:
-        form, entry = await judges.asked(request, SettingsForm)
-        rule = Rule(form.limit_s, form.missing_frame_s, form.scenarios, form.counting)
-        await _words(service.change(lambda store: store.set_rule(rule, entry)))
-        return _json(form)
+        form, entry = await judges.read(request, SettingsForm)
+        await service.change(lambda store: store.set_rule(Rule(**form.model_dump()), entry))
+        return json_response(form)
 
     return routes
 
 
-def judging_routes(service: CompetitionService, judges: _Judges) -> APIRouter:
-    """What judges say of a try."""
+def _judging_routes(service: CompetitionService, judges: _Judges) -> APIRouter:
+    """Judges' entries on a try."""
     routes = APIRouter(prefix="/api/competition")
 
     @routes.post("/tries/{try_id}/judgement")
     async def judge(request: Request, try_id: str) -> Response:
-        form, entry = await judges.asked(request, JudgementForm)
-        number = await _words(_ident("try", try_id))
+        form, entry = await judges.read(request, JudgementForm)
+        number = _id("try", try_id)
         crossed = None if form.crossed is None else tuple(form.crossed)
-        said = Correction(crossed, form.contacts, form.penalty_s, form.try_time_s, form.completed)
-        await _words(
-            service.change(lambda store: store.correct(number, form.seen, said, form.remarks, entry))
-        )
-        return _json({"try": number})
+        values = Correction(crossed, form.contacts, form.penalty_s, form.try_time_s, form.completed)
+        await service.change(lambda store: store.correct(number, form.seen, values, form.remarks, entry))
+        return json_response({"try": number})
 
     @routes.post("/tries/{try_id}/team")
     async def assign(request: Request, try_id: str) -> Response:
-        form, entry = await judges.asked(request, TeamOfTryForm)
-        number = await _words(_ident("try", try_id))
-        await _words(service.change(lambda store: store.assign(number, form.seen, form.team, entry)))
-        return _json({"try": number})
+        form, entry = await judges.read(request, TeamOfTryForm)
+        number = _id("try", try_id)
+        await service.change(lambda store: store.assign(number, form.seen, form.team, entry))
+        return json_response({"try": number})
 
     return routes
-
-
-async def _words(work: Awaitable[Answer]) -> Answer:
-    """Do it; what goes wrong is answered in one line."""
-    try:
-        return await work
-    except Refused as error:
-        raise HTTPException(error.status, str(error)) from error
-    except DatabaseError as error:
-        raise HTTPException(503, str(error)) from error
-    except SQLAlchemyError as error:
-        raise HTTPException(503, "the database refused this; look anew, then try again") from error
-
-
-async def _state(service: CompetitionService) -> StateView:
-    board = await service.board()
-    return StateView(
-        board=board, running=service.running, problem=service.problem, scenarios=service.scenarios
-    )
-
-
-async def _ranking(service: CompetitionService, number: str) -> RankingStateView:
-    board = await service.board()
-    return RankingStateView(
-        version=board.version,
-        ranking=_of_round(board.rankings, number),
-        rounds=tuple(ranking.round for ranking in board.rankings),
-        rule=board.rule,
-        called=board.called,
-        queue=board.queue,
-        running=service.running,
-        problem=service.problem,
-    )
 
 
 def _of_round(rankings: tuple[RankingView, ...], number: str) -> RankingView:
@@ -232,21 +229,64 @@ def _of_round(rankings: tuple[RankingView, ...], number: str) -> RankingView:
         if number in {"", str(ranking.round)}:
             return ranking
     known = ", ".join(str(ranking.round) for ranking in rankings)
-    raise Refused(f"round {shown(number)} does not exist; choose one of {known}", 404)
+    raise RefusedError(f"round {shown(number)} does not exist; choose one of {known}", 404)
 
 
-async def _ident(what: str, text: str) -> int:
+def _id(what: str, text: str) -> int:
     """The number of a try or team, from an address."""
-    if not (text.isascii() and text.isdigit() and len(text) <= 10 and int(text) <= _MOST_ID):
-        raise Refused(f"{what} {shown(text)} does not exist; choose one of the list", 404)
+    if not (text.isascii() and text.isdigit() and len(text) <= 10 and int(text) <= _MAX_ID):
+        raise RefusedError(f"{what} {shown(text)} does not exist; choose one of the list", 404)
     return int(text)
-
-
-def _json(value: BaseModel | list[Any] | dict[str, Any]) -> Response:
-    text = value.model_dump_json(by_alias=True) if isinstance(value, BaseModel) else json.dumps(value)
-    return Response(text, media_type="application/json", headers={"Cache-Control": "no-store"})
 
 
 def _csv(name: str, text: str) -> Response:
     headers = {"Content-Disposition": f'attachment; filename="{name}"', "Cache-Control": "no-store"}
     return Response(text.encode(), media_type="text/csv; charset=utf-8", headers=headers)
+
+
+def _add_channel(web: FastAPI, service: CompetitionService) -> None:
+    """Add the WebSocket: it reports that the contest changed; pages then request what they show."""
+    places = Places(MAX_WATCHERS, MAX_WATCHERS_PER_ADDRESS)
+
+    @web.websocket("/ws/competition")
+    async def live(websocket: WebSocket) -> None:
+        await websocket.accept()
+        address = client_address(websocket.scope)
+        if places.take(address):
+            await websocket.close(_TRY_AGAIN_LATER, "too many are watching")
+            return
+        try:
+            await _serve_watcher(service, websocket)
+        finally:
+            places.give_back(address)
+
+
+async def _serve_watcher(service: CompetitionService, websocket: WebSocket) -> None:
+    """Send a page the newest message of each kind, until it is gone."""
+    newest: dict[str, str] = {}
+    arrived = asyncio.Event()
+
+    def put(message: Message) -> None:
+        newest[message["kind"]] = json.dumps(message)
+        arrived.set()
+
+    async def send() -> None:
+        while True:
+            await arrived.wait()
+            arrived.clear()
+            while newest:
+                await websocket.send_text(newest.pop(next(iter(newest))))
+
+    unsubscribe = service.subscribe(put)
+    for message in service.messages():
+        put(message)
+    sending = asyncio.create_task(send())
+    try:
+        while (await websocket.receive())["type"] != "websocket.disconnect":
+            pass  # nothing is expected of a page
+    except (WebSocketDisconnect, RuntimeError):
+        pass
+    finally:
+        unsubscribe()
+        sending.cancel()
+        await asyncio.gather(sending, return_exceptions=True)

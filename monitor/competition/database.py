@@ -1,4 +1,4 @@
-"""The database of the contest: opening it, and saying in one line why it does not open or answer."""
+"""The contest's database: opened, with errors in one line."""
 
 from __future__ import annotations
 
@@ -13,11 +13,10 @@ from sqlalchemy.exc import ArgumentError, IntegrityError, NoSuchModuleError, SQL
 from sqlalchemy.orm import Session, sessionmaker
 from sqlalchemy.pool import StaticPool
 
-from monitor.competition.migrations import migrate
-from monitor.competition.tables import PREFIX, SCHEMA_VERSION, Schema, Table
+from monitor.competition.tables import PREFIX, SCHEMA_VERSION, Schema, Table, migrate
 from monitor.settings import MonitorError
 
-_ANSWER_S = 5  # a server that does not answer by then is taken to be away
+_ANSWER_S = 5  # after this a server counts as not reachable
 
 
 class DatabaseError(MonitorError):
@@ -31,7 +30,7 @@ class Database:
         url: any of SQLAlchemy's, such as "sqlite:///framerunner.db".
 
     Raises:
-        DatabaseError: in words, when it cannot be used.
+        DatabaseError: it cannot be used.
     """
 
     def __init__(self, url: str) -> None:
@@ -48,7 +47,7 @@ class Database:
             raise DatabaseError(f"database {self.shown_url}: {_one_line(error)}; {_EXAMPLES}") from error
         self._sessions = sessionmaker(self._engine, expire_on_commit=False)
         try:
-            with self._in_words():
+            with self._explained():
                 self._prepare()
         except DatabaseError:
             self._engine.dispose()
@@ -56,21 +55,21 @@ class Database:
 
     @contextmanager
     def transaction(self) -> Iterator[Session]:
-        """All or nothing, and on the disk when it is left.
+        """A transaction: all or nothing, and on the disk at its end.
 
         Raises:
             DatabaseError: the database does not answer or refuses. What a constraint refuses is raised as
                 SQLAlchemy's `IntegrityError`.
         """
-        with self._in_words(), self._sessions.begin() as session:
+        with self._explained(), self._sessions.begin() as session:
             yield session
 
     def close(self) -> None:
-        """Let go."""
+        """Close all connections."""
         self._engine.dispose()
 
     def _prepare(self) -> None:
-        """Make the tables, or bring older ones up to date: all of it or nothing."""
+        """Create the tables, or bring older ones up to date: all or nothing."""
         with self._engine.begin() as connection:
             if connection.dialect.name == "sqlite":
                 # Its driver begins no transaction before a change of tables.
@@ -91,21 +90,34 @@ class Database:
         if versions != [SCHEMA_VERSION]:
             held = f"version {versions[0]}" if len(versions) == 1 else "no version that is known here"
             raise DatabaseError(
-                f"database {self.shown_url}: its contest has tables of {held}, this framerunner knows "
+                f"database {self.shown_url}: its contest has tables of {held}, this framerunner uses "
                 f"version {SCHEMA_VERSION}; update framerunner or name another database"
             )
 
     @contextmanager
-    def _in_words(self) -> Iterator[None]:
+    def _explained(self) -> Iterator[None]:
         try:
             yield
         except IntegrityError:
             raise
         except SQLAlchemyError as error:
-            mend = f"; {_mend(error)}" if _mend(error) else ""
-            raise DatabaseError(f"database {self.shown_url}: {_one_line(error)}{mend}") from error
+            text = str(error).lower()
+            hint = next((f"; {hint}" for part, hint in _HINTS if part in text), "")
+            raise DatabaseError(f"database {self.shown_url}: {_one_line(error)}{hint}") from error
 
 
+_HINTS = (  # part of the driver's message, what to do
+    ("unable to open database file", "does its folder exist, and may you write there?"),
+    ("readonly", "it cannot be written; name another file or change its permissions"),
+    ("not a database", "the file is something else; name another"),
+    ("disk is full", "free some space; writing is retried"),
+    ("disk i/o error", "is the disk full or gone? Writing is retried"),
+    ("database is locked", "another program is writing to it"),
+    ("could not translate host", "is the host's name right?"),
+    ("connection refused", "is the server running there?"),
+    ("timeout expired", "is the server reachable?"),
+    ("password authentication", "are user and password right?"),
+)
 _EXAMPLES = 'give a URL such as "sqlite:///framerunner.db" or "postgresql+psycopg://user:password@host/name"'
 
 
@@ -113,7 +125,7 @@ def _parse(url: str) -> URL:
     try:
         parsed = make_url(url)
     except (ArgumentError, ValueError) as error:
-        # The text may hold a password: it is not repeated where it cannot be understood.
+        # A text that cannot be parsed may hold a password: it is not repeated.
         raise DatabaseError(f"database: what was given is not the URL of a database; {_EXAMPLES}") from error
     # psycopg is what the package's extra installs; SQLAlchemy's own choice depends on its version.
     plain = parsed.drivername in {"postgresql", "postgres"}
@@ -139,7 +151,7 @@ def _engine(url: URL) -> Engine:
 
 
 def _set_up_sqlite(connection: Connection, record: object) -> None:
-    """Each commit is on the disk before it counts; readers never wait for the writer."""
+    """Write each commit to the disk before it returns; readers never wait for the writer."""
     cursor = connection.cursor()
     try:
         for pragma in ("journal_mode=WAL", "synchronous=FULL", "foreign_keys=ON", "busy_timeout=5000"):
@@ -148,25 +160,8 @@ def _set_up_sqlite(connection: Connection, record: object) -> None:
         cursor.close()
 
 
-def _mend(error: SQLAlchemyError) -> str:
-    text = str(error).lower()
-    hints = (
-        ("unable to open database file", "does its folder exist, and may you write there?"),
-        ("readonly", "it cannot be written; name another file or change its permissions"),
-        ("not a database", "the file is something else; name another"),
-        ("disk is full", "free some space; it goes on by itself"),
-        ("disk i/o error", "is the disk full or gone? It goes on by itself"),
-        ("database is locked", "another program is writing to it"),
-        ("could not translate host", "is the host's name right?"),
-        ("connection refused", "is the server running there?"),
-        ("timeout expired", "is the server reachable?"),
-        ("password authentication", "are user and password right?"),
-    )
-    return next((hint for words, hint in hints if words in text), "")
-
-
 def _one_line(error: Exception) -> str:
-    """What the driver says, without SQLAlchemy's additions and the values of a statement."""
+    """The driver's message, without SQLAlchemy's additions and the values of a statement."""
     cause = getattr(error, "orig", None) or error
     text = " ".join(re.sub(r"\(Background on this error.*", "", str(cause), flags=re.DOTALL).split())
     return text[:200].rstrip(" .;:") or type(cause).__name__

@@ -1,4 +1,4 @@
-"""The contest while the monitor runs: hears of tries, does what judges ask, and tells who watches."""
+"""The contest while the monitor runs: records tries, does what judges request, and notifies listeners."""
 
 from __future__ import annotations
 
@@ -19,8 +19,8 @@ from monitor.competition.calls import Entry
 from monitor.competition.database import Database, DatabaseError
 from monitor.competition.rules import TryScore, read_report
 from monitor.competition.store import Store
+from monitor.competition.validation import RefusedError, shown
 from monitor.competition.views import Board, RunningView
-from monitor.competition.words import Refused, shown
 from monitor.tries import TryEvent
 from scenarios.models import COLOURS
 
@@ -31,22 +31,26 @@ Answer = TypeVar("Answer")
 Message = dict[str, Any]
 
 _ANSWER_S = 15.0
-_AGAIN_S = 1.0
-_MOST_REMEMBERED = 500
+_RETRY_S = 1.0
+_MAX_REMEMBERED = 500
 _NAME = re.compile(r"[a-z0-9][a-z0-9_-]{0,79}\Z")  # of a scenario; never a path
 _log = logging.getLogger(__name__)
 
 
 class CompetitionService:
-    """The one place through which the contest changes. Belongs to the loop on which `run` runs.
+    """Everything that changes the contest calls this. Used on the event loop on which `run` runs.
 
-    All work on the database is done by one thread, so that a slow one stalls no page.
+    All work on the database is done by one thread, so that a slow database delays no page.
 
     Args:
         url: of the database.
-        equipment: knows the scenarios.
+        equipment: with the scenarios.
         now: the wall clock, UTC.
         random: draws the scenarios.
+
+    Attributes:
+        problem: what is wrong with the database, in one line; "" while it works.
+        scenarios: names of those that can be drawn: they have all frames of the challenge.
     """
 
     def __init__(
@@ -85,12 +89,10 @@ class CompetitionService:
     @property
     def running(self) -> tuple[RunningView, ...]:
         """The tries that are being flown."""
-        if self._board is None:
-            return ()
         views = []
-        for each in self._board.tries:
+        for each in self._board.tries if self._board is not None else ():
             if each.state == "running":
-                now = self._flying.get(each.id)
+                now = self._flying.get(each.id, each.referee)
                 views.append(
                     RunningView(
                         id=each.id,
@@ -100,43 +102,37 @@ class CompetitionService:
                         barrier=each.barrier,
                         drone_id=each.drone_id,
                         frames=each.frames,
-                        crossed=now.crossed if now is not None else each.referee.crossed,
-                        contacts=now.contacts if now is not None else each.referee.contacts,
-                        penalty_s=now.penalty_s if now is not None else each.referee.penalty_s,
-                        try_time_s=now.try_time_s if now is not None else each.referee.try_time_s,
+                        crossed=now.crossed,
+                        contacts=now.contacts,
+                        penalty_s=now.penalty_s,
+                        try_time_s=now.try_time_s,
                     )
                 )
         return tuple(views)
 
-    @property
-    def listeners(self) -> int:
-        """How many listen."""
-        return len(self._listeners)
-
-    def subscribe(self, hear: Callable[[Message], None]) -> Callable[[], None]:
-        """Hear of changes.
+    def subscribe(self, listener: Callable[[Message], None]) -> Callable[[], None]:
+        """Notify a listener of changes.
 
         Args:
-            hear: called on the loop with {"kind": "changed", "version", "problem"} or {"kind": "running",
-                "tries"}; must not block.
+            listener: called on the loop with {"kind": "changed", "version", "problem"} or
+                {"kind": "running", "tries"}; must not block.
 
         Returns:
             Ends it.
         """
-        self._listeners.add(hear)
-        return lambda: self._listeners.discard(hear)
+        self._listeners.add(listener)
+        return lambda: self._listeners.discard(listener)
 
-    def news(self) -> list[Message]:
-        """What a new listener is told first."""
+    def messages(self) -> list[Message]:
+        """The present state as messages: "changed", then "running"."""
         version = self._board.version if self._board is not None else 0
-        running = [view.model_dump() for view in self.running]
         return [
             {"kind": "changed", "version": version, "problem": self.problem},
-            {"kind": "running", "tries": running},
+            {"kind": "running", "tries": [view.model_dump() for view in self.running]},
         ]
 
-    def hear(self, event: TryEvent) -> None:
-        """Take what the fleet tells of a try; it is written down in its turn."""
+    def on_try_event(self, event: TryEvent) -> None:
+        """Queue an event of the fleet; `run` records it."""
         if event.kind == "running":
             self._latest[event.key] = (event, self._now())
         else:
@@ -145,7 +141,7 @@ class CompetitionService:
         self._arrived.set()
 
     async def run(self) -> None:
-        """Open the database and write down what is heard, until cancelled.
+        """Open the database and record the fleet's events, until cancelled.
 
         Raises:
             DatabaseError: it cannot be opened, in one line.
@@ -162,28 +158,28 @@ class CompetitionService:
             self._opened.set()
             while True:
                 await self._arrived.wait()
-                await self._write_next()
+                await self._record_next()
         finally:
             if self._store is not None:
                 self._worker.submit(self._store.close)
             self._worker.shutdown(wait=False)
 
     async def change(self, work: Callable[[Store], Answer]) -> Answer:
-        """Have the store do something, and tell everybody once it is on the disk.
+        """Let the store change something, and notify listeners once it is on the disk.
 
         Raises:
-            Refused: the store refuses it.
+            RefusedError: the store refuses it.
             DatabaseError: the database does not answer.
         """
         answer = await self.read(work)
         try:
             await self._refresh()
-        except (DatabaseError, SQLAlchemyError) as error:  # what was asked for is kept all the same
-            self._tell_problem(error)
+        except (DatabaseError, SQLAlchemyError) as error:  # the change is on the disk all the same
+            self._report_problem(error)
         return answer
 
     async def read(self, work: Callable[[Store], Answer]) -> Answer:
-        """Have the store do something that changes nothing. Raises as `change` does."""
+        """Let the store do something that changes nothing. Raises as `change` does."""
         store = self._store
         if store is None:
             await self.board()
@@ -192,54 +188,54 @@ class CompetitionService:
         try:
             return await asyncio.wait_for(asyncio.shield(doing), _ANSWER_S)
         except TimeoutError as error:
-            raise DatabaseError(
-                f"the database has not answered for {_ANSWER_S:.0f} s; look later whether it was kept"
-            ) from error
+            message = f"the database has not answered for {_ANSWER_S:.0f} s; check later what was kept"
+            raise DatabaseError(message) from error
 
-    async def draw(self, pool: Sequence[str], count: int, who: str) -> int:
-        """Draw scenarios at random, for the present round if nobody has flown in it, else for the next.
-
-        Args:
-            pool: names to draw from.
-            count: how many.
-            who: asks for it.
+    async def draw(self, pool: Sequence[str], count: int, entry: Entry) -> int:
+        """Draw scenarios at random, for the present round if it has no tries yet, else for the next.
 
         Returns:
             The round.
 
         Raises:
-            Refused: a name is unknown, its scenario lacks a frame, or the pool holds too few.
+            RefusedError: a name is unknown, its scenario lacks a frame, or the pool holds too few.
         """
         names = list(dict.fromkeys(pool))
         if count > len(names):
-            raise Refused(f"count {count} is more than the {len(names)} scenarios of the pool; tick more")
+            raise RefusedError(
+                f"count {count} is more than the {len(names)} scenarios of the pool; tick more"
+            )
         frames = {name: await self.frames(name) for name in names}
         for name, colours in frames.items():
             if colours != COLOURS:
-                raise Refused(
-                    f"scenario {shown(name)} cannot be drawn: it has {_listed(colours)}, a try needs a red, "
+                has = f"only the {' and the '.join(colours)} frame" if colours else "no frames"
+                raise RefusedError(
+                    f"scenario {shown(name)} cannot be drawn: it has {has}, a try needs a red, "
                     "a green and a blue one; take it out of the pool"
                 )
         drawn = {name: frames[name] for name in self._random.sample(names, count)}
-        entry = Entry(who, self._now())
         return await self.change(lambda store: store.draw(drawn, names, entry))
 
     async def frames(self, scenario: str) -> tuple[str, ...]:
-        """Colours to cross in a scenario, in order. Raises `Refused` if it is unknown."""
+        """Colours to cross in a scenario, in order. Raises `RefusedError` if it is unknown."""
         known = self._frames.get(scenario)
         if known is not None:
             return known
         given = self._equipment.scenario
         if given is None or given.name != scenario:
             if _NAME.match(scenario) is None:
-                raise Refused(f"scenario {shown(scenario)} is no name; use small letters, digits, - and _")
+                raise RefusedError(
+                    f"scenario {shown(scenario)} is no name; use small letters, digits, - and _"
+                )
             try:
                 given = await asyncio.to_thread(self._equipment.load_scenario, scenario)
-            except Exception as error:  # the loader is handed in; it has errors of its own
-                raise Refused(f"scenario {shown(scenario)} is unknown; choose one of the list") from error
+            except Exception as error:  # the loader is passed in, and its errors are not known here
+                raise RefusedError(
+                    f"scenario {shown(scenario)} is unknown; choose one of the list"
+                ) from error
         colours = {frame.colour for frame in given.frames}
         frames = tuple(colour for colour in COLOURS if colour in colours)
-        if len(self._frames) < _MOST_REMEMBERED:
+        if len(self._frames) < _MAX_REMEMBERED:
             self._frames[scenario] = frames
         return frames
 
@@ -247,21 +243,20 @@ class CompetitionService:
         """Teams in a random order."""
         return self._random.sample(teams, len(teams))
 
+    def entry(self, who: str) -> Entry:
+        """An entry by a judge, now."""
+        return Entry(who, self._now())
+
     async def _scenarios_to_draw(self) -> tuple[str, ...]:
-        """Names of the scenarios that have all frames of the challenge."""
         names = []
         for name in await asyncio.to_thread(self._equipment.list_scenarios):
-            with suppress(Refused):
+            with suppress(RefusedError):
                 if await self.frames(name) == COLOURS:
                     names.append(name)
         return tuple(names)
 
-    def entry(self, who: str) -> Entry:
-        """Somebody, now."""
-        return Entry(who, self._now())
-
-    async def _write_next(self) -> None:
-        """Write down the oldest thing heard. A beginning or end is tried until the database has it."""
+    async def _record_next(self) -> None:
+        """Record the oldest event. A beginning or end is tried until the database has it."""
         if self._events:
             event, at = self._events[0]
         elif self._latest:
@@ -271,27 +266,25 @@ class CompetitionService:
             return
         try:
             frames = await self.frames(event.scenario)
-        except Refused:
-            frames = COLOURS  # of a file of its own; what the rule asks for
+        except RefusedError:
+            frames = COLOURS  # the scenario's file is not known here; a try needs all frames
+        fault: Exception | None = None
         try:
             try_id = await self.read(lambda store: store.take(event, frames, at))
         except (DatabaseError, SQLAlchemyError) as error:
-            if event.kind == "running":
-                return
-            self._tell_problem(error)
-            await asyncio.sleep(_AGAIN_S)
+            if event.kind != "running":
+                self._report_problem(error)
+                await asyncio.sleep(_RETRY_S)
             return
-        except Exception as error:  # a fault of ours in one try must not end the contest
-            _log.exception("a try could not be written down")
-            self._drop(event)
-            self._tell_problem(error)
-            return
-        self._drop(event)
-        await self._show(event, try_id, frames)
-
-    def _drop(self, event: TryEvent) -> None:
+        except Exception as error:  # one faulty try must not end the contest
+            _log.exception("a try could not be recorded")
+            fault = error
         if event.kind != "running":
             self._events.popleft()
+        if fault is None:
+            await self._show(event, try_id, frames)
+        else:
+            self._report_problem(fault)
 
     async def _show(self, event: TryEvent, try_id: int, frames: Sequence[str]) -> None:
         if event.kind == "ended":
@@ -299,34 +292,29 @@ class CompetitionService:
         else:
             self._flying[try_id] = read_report(event.report, frames)
         if event.kind == "running" and any(view.id == try_id for view in self.running):
-            self._tell(self.news()[1])
+            self._send(self.messages()[1])
         else:
             try:
                 await self._refresh()
             except (DatabaseError, SQLAlchemyError) as error:
-                self._tell_problem(error)
+                self._report_problem(error)
 
     async def _refresh(self) -> None:
-        """Read everything anew and tell that it changed."""
+        """Read everything again and send that it changed."""
         board = await self.read(lambda store: store.board())
         if self._board is None or board.version > self._board.version:
             self._board = board
         self.problem = ""
-        for message in self.news():
-            self._tell(message)
+        for message in self.messages():
+            self._send(message)
 
-    def _tell_problem(self, error: Exception) -> None:
+    def _report_problem(self, error: Exception) -> None:
         waiting = len(self._events)
         many = f"{waiting} changes of tries wait" if waiting != 1 else "one change of a try waits"
         self.problem = f"{error}; {many} to be written" if waiting else str(error)
         _log.error("%s", self.problem)
-        self._tell(self.news()[0])
+        self._send(self.messages()[0])
 
-    def _tell(self, message: Message) -> None:
-        for hear in tuple(self._listeners):
-            hear(message)
-
-
-def _listed(colours: Sequence[str]) -> str:
-    """Frames of a scenario in words."""
-    return "no frames" if not colours else f"only the {' and the '.join(colours)} frame"
+    def _send(self, message: Message) -> None:
+        for listener in tuple(self._listeners):
+            listener(message)

@@ -1,15 +1,14 @@
-"""What the audience is shown of a contest: who flies, split times, the best, the ranking."""
+"""What the audience is shown of a contest: who flies, split times, the best tries, the ranking."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
 from typing import TYPE_CHECKING
 
-from fastapi import HTTPException, Response
+from fastapi import Response
 from pydantic import Field
-from sqlalchemy.exc import SQLAlchemyError
 
-from monitor.competition.database import DatabaseError
+from monitor.competition.api import json_response
 from monitor.competition.views import Board, CallView, QueueView, RankingView, RunningView, TryView, View
 from scenarios.result import RefereeReport
 
@@ -23,7 +22,7 @@ class FlownView(View):
 
     id: int
     drone_id: int
-    team_name: str = Field(description='"" if nobody knows')
+    team_name: str = Field(description='"" if unknown')
     scenario: str
     frames: tuple[str, ...] = Field(description="colours to cross, in order")
     crossed: tuple[str, ...]
@@ -43,9 +42,9 @@ class StageView(View):
     queue: QueueView
     last: FlownView | None = Field(description="the newest try that is over and judged")
     interrupted: FlownView | None = Field(
-        description="the newest try as last seen, if the monitor was stopped meanwhile and nobody judged it"
+        description="the newest try as last seen, if the monitor was stopped meanwhile and it was not judged"
     )
-    last_against: FlownView | None = Field(description="the best try at the same scenario but for the last")
+    last_against: FlownView | None = Field(description="the best other try at the scenario of the last")
     best: tuple[FlownView, ...] = Field(description="the best try at each scenario")
     ranking: RankingView
     complete: bool = Field(description="every team has flown every scenario of the round")
@@ -57,88 +56,52 @@ def register(monitor: Monitor) -> None:
 
     @monitor.web.get("/api/competition/stage")
     async def stage() -> Response:
-        try:
-            board = await service.board()
-            wanted = {each.id for each in _shown(board)}
-            reports = await service.read(lambda store: store.reports(wanted)) if wanted else {}
-        except (DatabaseError, SQLAlchemyError) as error:
-            raise HTTPException(503, str(error)) from error
-        view = stage_view(board, service.running, reports)
-        text = view.model_dump_json(by_alias=True)
-        return Response(text, media_type="application/json", headers={"Cache-Control": "no-store"})
+        board = await service.board()
+        last, interrupted, against, *best = _select(board)
+        wanted = {each.id for each in (last, interrupted, against, *best) if each is not None}
+        reports = await service.read(lambda store: store.reports(wanted)) if wanted else {}
+        cells = [cell for row in board.rankings[0].rows for cell in row.cells]
+        view = StageView(
+            running=service.running,
+            called=board.called,
+            queue=board.queue,
+            last=_flown_view(last, reports),
+            interrupted=_flown_view(interrupted, reports),
+            last_against=_flown_view(against, reports),
+            best=tuple(flown for each in best if (flown := _flown_view(each, reports)) is not None),
+            ranking=board.rankings[0],
+            complete=bool(cells) and all(cell.state != "not flown" for cell in cells),
+        )
+        return json_response(view)
 
 
-def stage_view(
-    board: Board, running: tuple[RunningView, ...], reports: Mapping[int, RefereeReport | None]
-) -> StageView:
-    """Put it together.
-
-    Args:
-        board: the contest.
-        running: tries that are being flown.
-        reports: what the referee said of tries, by their ids; for split times.
-    """
-
-    def flown(each: TryView | None) -> FlownView | None:
-        return None if each is None else _flown_view(each, reports.get(each.id))
-
-    last = _last(board)
-    against = _best(board, last.scenario, without=last.id) if last is not None else None
-    best = (flown(_best(board, name)) for name in _scenarios(board))
-    ranking = board.rankings[0]
-    cells = [cell for row in ranking.rows for cell in row.cells]
-    return StageView(
-        running=running,
-        called=board.called,
-        queue=board.queue,
-        last=flown(last),
-        interrupted=flown(_interrupted(board)),
-        last_against=flown(against),
-        best=tuple(each for each in best if each is not None),
-        ranking=ranking,
-        complete=bool(cells) and all(cell.state != "not flown" for cell in cells),
-    )
-
-
-def _shown(board: Board) -> list[TryView]:
-    """The tries whose split times are shown."""
-    last = _last(board)
-    against = _best(board, last.scenario, without=last.id) if last is not None else None
-    tries = (last, against, _interrupted(board), *(_best(board, name) for name in _scenarios(board)))
-    return [each for each in tries if each is not None]
-
-
-def _last(board: Board) -> TryView | None:
-    return next((each for each in board.tries if _is_over(each)), None)
-
-
-def _interrupted(board: Board) -> TryView | None:
+def _select(board: Board) -> list[TryView | None]:
+    """The tries that are shown: `last`, `interrupted` and `last_against`, then those of `best`."""
+    over = [each for each in board.tries if each.judged and each.state != "running"]
+    last = over[0] if over else None
     newest = board.tries[0] if board.tries else None
-    return newest if newest is not None and newest.state == "interrupted" and not newest.judged else None
+    is_open = newest is not None and newest.state == "interrupted" and not newest.judged
+    against = None
+    if last is not None:
+        against = _best([each for each in over if each.scenario == last.scenario and each is not last])
+    scenarios = dict.fromkeys(each.scenario for each in over)
+    best = (_best([each for each in over if each.scenario == scenario]) for scenario in scenarios)
+    return [last, newest if is_open else None, against, *best]
 
 
-def _is_over(each: TryView) -> bool:
-    return each.judged and each.state != "running"
-
-
-def _scenarios(board: Board) -> list[str]:
-    return list(dict.fromkeys(each.scenario for each in board.tries if _is_over(each)))
-
-
-def _best(board: Board, scenario: str, without: int | None = None) -> TryView | None:
-    """The try at a scenario that counts least; those without a team only where no team has flown it."""
-    tries = [
-        each for each in board.tries if _is_over(each) and each.scenario == scenario and each.id != without
-    ]
+def _best(tries: list[TryView]) -> TryView | None:
+    """The try that counts least; those without a team only if no team has flown."""
     of_teams = [each for each in tries if each.team is not None]
-    worth = [each for each in of_teams or tries if each.result.crossed]
+    crossed = [each for each in of_teams or tries if each.result.crossed]
     return min(
-        worth, key=lambda each: (not each.result.completed, each.result.counted_s, each.id), default=None
+        crossed, key=lambda each: (not each.result.completed, each.result.counted_s, each.id), default=None
     )
 
 
-def _flown_view(each: TryView, report: RefereeReport | None) -> FlownView:
-    result = each.result
+def _flown_view(each: TryView | None, reports: Mapping[int, RefereeReport | None]) -> FlownView | None:
+    if each is None:
+        return None
+    result, report = each.result, reports.get(each.id)
     times_s = {} if report is None else report.times_s
     return FlownView(
         id=each.id,

@@ -1,18 +1,24 @@
-"""What the pages and the interface at `/api/competition` are told, as documented models."""
+"""What `/api/competition` sends: documented models, and CSV files made of them."""
 
 from __future__ import annotations
 
+import csv
+import io
+from collections.abc import Iterable, Sequence
 from datetime import datetime
+from typing import Literal
 
 from pydantic import BaseModel, ConfigDict, Field
 
-from monitor.competition.rules import Counting
+from scenarios.result import spreadsheet_cell
+
+Counting = Literal["best", "last"]
 
 
 class View(BaseModel):
-    """Base of all that is told."""
+    """Base of all views; they are made from rows and other objects, too."""
 
-    model_config = ConfigDict(frozen=True)
+    model_config = ConfigDict(frozen=True, from_attributes=True)
 
 
 class TeamView(View):
@@ -27,8 +33,8 @@ class TeamView(View):
 class ResultView(View):
     """What a try was worth."""
 
-    crossed: tuple[str, ...] = Field(description="frames crossed in their turn")
-    missing: tuple[str, ...] = Field(description="frames not crossed in their turn")
+    crossed: tuple[str, ...] = Field(description="frames crossed in the right order")
+    missing: tuple[str, ...] = Field(description="the other frames")
     contacts: int
     penalty_s: float
     try_time_s: float
@@ -43,9 +49,9 @@ class TryView(View):
     id: int
     attempt: int = Field(description="counts the team's tries at this scenario from 1; 0 without a team")
     round: int = Field(description="in which it was flown; 0 before the first draw")
-    team: int | None = Field(description="id; null until a judge says whose it was")
+    team: int | None = Field(description="id; null until a judge assigns it")
     team_name: str
-    scenario: str = Field(description='"" where nobody knows')
+    scenario: str = Field(description='"" if unknown')
     drone_id: int
     frames: tuple[str, ...] = Field(description="colours to cross, in order")
     state: str = Field(description='"running", "ended", or "interrupted": to be judged by hand')
@@ -53,24 +59,24 @@ class TryView(View):
     barrier: str = Field(
         description='why no ranking has it: "no team", "withdrawn", "no scenario", "not drawn"; "" if one has'
     )
-    verdict: str = Field(description="the referee's word")
-    reason: str = Field(description="the referee's sentence")
-    source: str = Field(description='what the referee saw by: "truth" or "telemetry"')
+    verdict: str = Field(description="the referee's")
+    reason: str = Field(description="the referee's, one sentence")
+    source: str = Field(description='of the referee\'s states: "truth" or "telemetry"')
     final: bool = Field(description="the referee's values are those of the app's result")
     referee: ResultView
     result: ResultView = Field(description="after correction")
-    corrected_by: str = Field(description='who corrected it last; "" for nobody')
-    judgements: int = Field(description="how often judges changed it; a correction must carry this number")
+    corrected_by: str = Field(description='who corrected it last; "" if it was not corrected')
+    judgements: int = Field(description="how often judges changed it; a correction must have this number")
     started: datetime
     ended: datetime | None
 
 
 class JudgementView(View):
-    """What a judge said of a try; null is "as the referee says"."""
+    """A judge's entry on a try; null is "as the referee says"."""
 
     number: int
     kind: str = Field(description='"correction" or "team"')
-    team_name: str = Field(description='whose it is, where `kind` is "team"; "" for nobody\'s')
+    team_name: str = Field(description='where `kind` is "team", the team; "" for none')
     crossed: tuple[str, ...] | None
     contacts: int | None
     penalty_s: float | None
@@ -87,21 +93,7 @@ class DrawView(View):
     round: int
     scenarios: tuple[str, ...]
     commands: tuple[str, ...] = Field(description="what a team types to fly each")
-    pool: tuple[str, ...] = Field(description="what was in the pot")
-    who: str
-    at: datetime
-
-
-class CallView(View):
-    """The team that is called to the start; the next try that begins is its."""
-
-    id: int
-    team: int
-    team_name: str
-    scenario: str = Field(description='"" for whatever the drone flies')
-    attempt: int | None = Field(
-        description="id of the try that the team flies on this call now", serialization_alias="try"
-    )
+    pool: tuple[str, ...] = Field(description="names that could be drawn")
     who: str
     at: datetime
 
@@ -113,30 +105,40 @@ class QueuedView(View):
     team_name: str
 
 
-class QueueView(View):
-    """Who flies after the team that is called."""
+class CallView(QueuedView):
+    """The team that is called to the start; the next try that begins is assigned to it."""
 
-    number: int = Field(description="names this state of the queue; who sets another must carry it")
+    id: int
+    scenario: str = Field(description='"" for whatever the drone flies')
+    attempt: int | None = Field(
+        description="id of the try that the team flies on this call now", serialization_alias="try"
+    )
+    who: str
+    at: datetime
+
+
+class QueueView(View):
+    """The teams that fly after the one that is called."""
+
+    number: int = Field(description="of this state of the queue; a request to change it must have it")
     teams: tuple[QueuedView, ...] = Field(description="the first flies first")
 
 
-class LastCallView(View):
+class LastCallView(QueuedView):
     """The call that a judge can still take back."""
 
     id: int
-    team: int
-    team_name: str
-    tries: tuple[int, ...] = Field(description="flown on it: they would become nobody's")
+    tries: tuple[int, ...] = Field(description="flown on it: they would have no team")
 
 
 class RuleView(View):
     """The combination rule."""
 
     limit_s: float = Field(description="what a try that is not completed counts at least")
-    missing_frame_s: float = Field(description="and for each frame missing")
+    missing_frame_s: float = Field(description="what it counts more for each frame missing")
     scenarios: int = Field(description="how many make a round")
     counting: Counting = Field(description="which of several tries at one scenario counts")
-    who: str = Field(description='who set it last; "" for the defaults')
+    who: str = Field(description='who set it; "" for the defaults')
     at: datetime | None
 
 
@@ -149,11 +151,11 @@ class RivalView(View):
 
 
 class TryDetail(View):
-    """A try with all that judges said of it."""
+    """A try with all judges' entries."""
 
     attempt: TryView = Field(serialization_alias="try")
     rival: RivalView | None = Field(description="of the other tries the one that would count; null for none")
-    correction: JudgementView | None = Field(description="the one that holds")
+    correction: JudgementView | None = Field(description="the last one")
     rule: RuleView
     history: tuple[JudgementView, ...] = Field(description="newest first")
 
@@ -176,7 +178,7 @@ class RowView(View):
     team: int
     name: str
     total_s: float
-    contacts: int
+    contacts: int = Field(description="of the tries that count")
     flown: int = Field(description="scenarios with a judged try")
     cells: tuple[CellView, ...]
 
@@ -193,7 +195,7 @@ class RunningView(View):
     """A try that is being flown; sent every second."""
 
     id: int
-    team: int | None = Field(description="id; null until a judge says whose it is")
+    team: int | None = Field(description="id; null until a judge assigns it")
     team_name: str
     scenario: str
     barrier: str = Field(description="as of a try")
@@ -221,22 +223,78 @@ class Board(View):
 
 
 class StateView(View):
-    """All that a page needs at first."""
+    """The contest and the tries being flown."""
 
     board: Board
     running: tuple[RunningView, ...]
-    problem: str = Field(description='what the database says; "" while it works')
+    problem: str = Field(description='what is wrong with the database; "" while it works')
     scenarios: tuple[str, ...] = Field(description="names that can be drawn: those with all three frames")
 
 
 class RankingStateView(View):
-    """A ranking and what is going on."""
+    """A ranking, the queue and the tries being flown."""
 
     version: int
     ranking: RankingView
-    rounds: tuple[int, ...] = Field(description="that there are, the present one first")
+    rounds: tuple[int, ...] = Field(description="the present one first")
     rule: RuleView
     called: CallView | None
     queue: QueueView
     running: tuple[RunningView, ...]
     problem: str
+
+
+_TRY_COLUMNS = (
+    *("try", "round", "team", "scenario", "attempt", "drone", "state", "judged", "verdict"),
+    *("crossed", "missing", "contacts", "penalty_s", "try_time_s", "total_s", "completed", "counted_s"),
+    *("corrected_by", "source", "final", "started", "ended", "reason"),
+)
+
+
+def ranking_csv(ranking: RankingView) -> str:
+    """The ranking of a round; for each scenario what it counts and the try that counts."""
+    columns = ["rank", "team", "total_s", "contacts", "flown"]
+    for number, name in enumerate(ranking.scenarios, 1):
+        scenario = name or f"scenario {number}"
+        columns += [f"{scenario} counted_s", f"{scenario} state", f"{scenario} try"]
+    rows: list[list[object]] = []
+    for row in ranking.rows:
+        values: list[object] = [row.rank, row.name, f"{row.total_s:.2f}", row.contacts, row.flown]
+        for flown in row.cells:
+            values += [f"{flown.counted_s:.2f}", flown.state, flown.attempt]
+        rows.append(values)
+    return _csv(columns, rows)
+
+
+def tries_csv(board: Board) -> str:
+    """The tries of a board, oldest first, after correction."""
+    rows: list[list[object]] = []
+    for each in reversed(board.tries):
+        result = each.result
+        rows.append(
+            [
+                *(each.id, each.round, each.team_name, each.scenario, each.attempt or "", each.drone_id),
+                *(each.state, each.judged, each.verdict, " ".join(result.crossed), " ".join(result.missing)),
+                *(result.contacts, result.penalty_s, result.try_time_s, result.total_s, result.completed),
+                *(result.counted_s, each.corrected_by, each.source, each.final, each.started.isoformat()),
+                *(each.ended.isoformat() if each.ended is not None else "", each.reason),
+            ]
+        )
+    return _csv(_TRY_COLUMNS, rows)
+
+
+def _csv(columns: Sequence[str], rows: Iterable[Sequence[object]]) -> str:
+    text = io.StringIO()
+    writer = csv.writer(text, lineterminator="\r\n")
+    writer.writerow([_safe(column) for column in columns])
+    writer.writerows([_safe(value) for value in row] for row in rows)
+    return text.getvalue()
+
+
+def _safe(value: object) -> str:
+    """A value as text that no spreadsheet takes for a formula."""
+    if isinstance(value, str):
+        return spreadsheet_cell(value)
+    if isinstance(value, bool):
+        return "true" if value else "false"
+    return "" if value is None else str(value)

@@ -10,9 +10,8 @@ from monitor.ports import Equipment, Referee
 from monitor.referee_channel import RefereeChannel
 from monitor.tries import TryEvent, TryWatch
 from monitor.vehicle.placement import Placement, Source
-from scenarios.models import Scenario
+from scenarios.models import Scenario, TrueState
 from scenarios.result import FlightResult, Standing
-from scenarios.truth import TrueState
 from wire.vehicle_telemetry import VehicleTelemetry
 
 JsonMessage = dict[str, Any]

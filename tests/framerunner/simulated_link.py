@@ -29,8 +29,7 @@ from offboard.link.telemetry import TelemetryFeed
 from offboard.link.ticks import TickSource
 from offboard.mavsdk_drone import MavsdkDrone
 from offboard.mission import Mission
-from scenarios.models import Scenario
-from scenarios.truth import TrueState
+from scenarios.models import Scenario, TrueState
 from sitl.camera_feed import CameraFeed
 from sitl.simulation import Simulation
 from vision.types import CameraFrame

@@ -8,7 +8,7 @@ from framerunner.flying.lockstep import StateHash
 from framerunner.flying.plan import FlightPlan
 from offboard.mission import load_mission
 from scenarios.loader import load_scenario
-from scenarios.truth import TrueState
+from scenarios.models import TrueState
 
 MISSION = load_mission("frame_challenge")
 LIMIT_S = 5.0

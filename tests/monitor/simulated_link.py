@@ -25,8 +25,7 @@ from framerunner.flying.plan import FlightPlan
 from geometry.axes import flip_vector
 from monitor.ports import Equipment, Message
 from scenarios.loader import list_scenarios, load_scenario
-from scenarios.models import Scenario
-from scenarios.truth import TrueState
+from scenarios.models import Scenario, TrueState
 from sitl.camera_feed import CameraFeed
 from sitl.simulation import Simulation
 from sitl.video import VideoServer

@@ -6,7 +6,7 @@ from firmware_py.status import FlightMode
 from framerunner.flying.plan import FlightPlan
 from monitor.vehicle.placement import Source
 from scenarios.loader import load_scenario
-from scenarios.truth import TrueState
+from scenarios.models import TrueState
 from tests.monitor.simulated_link import SimulatedLink, equipment, served_link
 from tests.monitor.vehicle.test_mission_view import tunnel
 from tests.monitor.watching import watching

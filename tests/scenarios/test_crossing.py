@@ -5,10 +5,11 @@ import pytest
 from hypothesis import assume, given
 from hypothesis import strategies as st
 
-from scenarios.crossing import Gate
-from scenarios.models import Frame
+from scenarios.crossing import Boundary, Gate
+from scenarios.models import Arena, Frame
 
 FRAME = Frame(colour="red", x_m=0, y_m=0, z_m=1)  # its plane is x = 0
+BOUNDARY = Boundary(Arena())  # x and y within ±5, z up to 4
 
 
 def passages(frame, points):
@@ -55,19 +56,19 @@ def test_a_stop_in_the_plane_passes_once_when_left_on_the_other_side():
     assert [(passage.side, passage.offset_m) for passage in found] == [("back", pytest.approx(0.1))]
 
 
-def test_a_path_that_begins_in_the_plane_has_come_from_nowhere():
+def test_a_path_that_begins_in_the_plane_has_no_passage():
     assert passages(FRAME, [(0, 0, 1), (1, 0, 1)]) == []
 
 
-def test_there_and_back_are_two_passages():
+def test_forward_and_back_are_two_passages():
     sides = [p.side for p in passages(FRAME, [(-1, 0, 1), (1, 0, 1), (1, 0, 1), (-1, 0, 1)])]
     assert sides == ["back", "front"]
 
 
-def test_after_forgetting_points_are_not_joined():
+def test_a_restarted_path_is_not_joined_to_earlier_points():
     gate = Gate(FRAME)
-    gate.follow((-1, 0, 1), (-1, 0, 1))
-    gate.forget()
+    gate.restart((-1, 0, 1))
+    gate.restart((1, 0, 1))
     assert gate.follow((-1, 0, 1), (1, 0, 1)) is None
     assert gate.follow((1, 0, 1), (-1, 0, 1)) is not None
 
@@ -90,7 +91,7 @@ def clear_of_edges(path):
 
 
 @given(points, st.floats(-3, 3), st.floats(-3, 3), st.floats(-pi, pi))
-def test_turning_and_shifting_the_scene_changes_nothing(path, dx, dy, turn):
+def test_rotating_and_translating_the_scene_changes_nothing(path, dx, dy, turn):
     assume(clear_of_edges(path))
 
     def move(x, y):
@@ -130,3 +131,49 @@ def test_an_offset_is_within_the_opening(path):
     for passage in passages(FRAME, path):
         assert passage.offset_m <= hypot(0.19, 0.09) + 1e-9
         assert 0 <= passage.fraction <= 1
+
+
+@pytest.mark.parametrize(
+    ("start", "end", "share"),
+    [
+        ((0, 0, 1), (4, 4, 3), 0.0),
+        ((4, 0, 1), (6, 0, 1), 0.5),
+        ((6, 0, 1), (4, 0, 1), 0.5),
+        ((6, 0, 1), (7, 0, 1), 1.0),
+        ((-10, 0, 1), (10, 0, 1), 0.5),  # in and out again within a step
+        ((4, 6, 1), (6, 4, 1), 1.0),  # past the corner
+        ((0, 0, 3), (0, 0, 7), 0.75),
+        ((0, 0, -1), (0, 0, -9), 0.0),  # the floor is no side
+        ((5, 5, 4), (5, -5, 4), 0.0),  # along the border
+        ((6, 0, 1), (6, 0, 1), 1.0),
+        ((1, 1, 1), (1, 1, 1), 0.0),
+    ],
+)
+def test_share_of_a_step_outside(start, end, share):
+    assert BOUNDARY.outside_share(start, end) == pytest.approx(share)
+
+
+def test_the_margin_is_the_distance_from_the_nearest_side():
+    assert BOUNDARY.margin((5, -5, 4)) == 0.0
+    assert BOUNDARY.margin((5.001, 0, 1)) == pytest.approx(-0.001)
+    assert BOUNDARY.margin((0, 0, 4.001)) == pytest.approx(-0.001)
+    assert BOUNDARY.margin((0, -3, -9)) == 2.0
+
+
+coordinate = st.floats(-12, 12)
+point = st.tuples(coordinate, coordinate, coordinate)
+
+
+@given(point, point, st.floats(0, 1))
+def test_two_parts_of_a_step_are_outside_as_long_as_the_whole(start, end, cut):
+    middle = tuple(a + (b - a) * cut for a, b in zip(start, end, strict=True))
+    parts = cut * BOUNDARY.outside_share(start, middle) + (1 - cut) * BOUNDARY.outside_share(middle, end)
+    assert parts == pytest.approx(BOUNDARY.outside_share(start, end), abs=1e-5)
+
+
+@given(point, point)
+def test_a_step_between_points_inside_is_inside(start, end):
+    share = BOUNDARY.outside_share(start, end)
+    assert 0.0 <= share <= 1.0
+    if BOUNDARY.margin(start) >= 0 and BOUNDARY.margin(end) >= 0:
+        assert share == 0.0

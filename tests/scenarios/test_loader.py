@@ -5,7 +5,6 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from scenarios.level import load_level
 from scenarios.loader import (
     dump_yaml,
     json_schema,
@@ -14,7 +13,7 @@ from scenarios.loader import (
     parse_scenario,
 )
 from scenarios.models import COLOURS, Base, Frame, Scenario, ScenarioError, Start
-from scenarios.random_scenarios import random_scenario
+from scenarios.random_scenarios import load_level, random_scenario
 from scenarios.yaml_file import MAX_BYTES
 from scenarios.yaml_tree import to_yaml
 
@@ -27,7 +26,7 @@ def layout(scenario):
     return (start.x_m, start.y_m, start.yaw_rad), frames
 
 
-def test_the_package_brings_these_scenarios():
+def test_these_scenarios_are_installed():
     assert list_scenarios() == NAMES
 
 
@@ -168,7 +167,7 @@ FRAME = "name: a\nframes:\n  - {colour: red, x_m: 1, y_m: 1, z_m: 1}\n"
         ),
         (
             FRAME + "  - {colour: red, x_m: 2, y_m: 2, z_m: 2}",
-            "f.yaml:4: frames[1].colour red stands twice; give each frame its own colour",
+            "f.yaml:4: frames[1].colour red is used twice; give each frame its own colour",
         ),
         (
             FRAME.replace("z_m: 1", "z_m: 0.1"),
@@ -186,20 +185,20 @@ FRAME = "name: a\nframes:\n  - {colour: red, x_m: 1, y_m: 1, z_m: 1}\n"
             FRAME.replace("z_m: 1", "z_m: 5"),
             "f.yaml:3: frames[0].z_m 5.0 is above the arena; use 4.0 or less",
         ),
-        ("name: a\nname: b", "f.yaml:2: name stands twice, first on line 1; keep one"),
+        ("name: a\nname: b", "f.yaml:2: name is given twice, first on line 1; keep one"),
         ("name: a: b", "f.yaml:1:8: not valid YAML: mapping values are not allowed here"),
         (b"name: a\n# \xff", "f.yaml:2: not UTF-8 text; save the file as UTF-8"),
         ("#" * (MAX_BYTES + 1), "f.yaml: 1000001 bytes is too large for a scenario; 1000000 at most"),
     ],
 )
-def test_faults_are_told_in_one_line(text, message):
+def test_faults_give_one_line(text, message):
     with pytest.raises(ScenarioError) as caught:
         parse_scenario(text, "f.yaml")
     assert str(caught.value) == message
 
 
 def complaint(content):
-    """The message a content gives, or a valid scenario's empty one."""
+    """The error message of a content, or an empty one if it is valid."""
     try:
         parse_scenario(content, "f.yaml")
     except ScenarioError as error:
@@ -248,14 +247,14 @@ def test_wrong_values_in_known_fields_give_one_line_or_load(fields):
         ("bad\0.yaml", "bad?.yaml: cannot be read:"),
     ],
 )
-def test_names_that_lead_nowhere(name, message):
+def test_unknown_names_are_refused(name, message):
     with pytest.raises(ScenarioError) as caught:
         load_scenario(name)
     assert str(caught.value).startswith(message)
     assert len(str(caught.value).splitlines()) == 1
 
 
-def test_a_random_scenario_is_known_by_its_level_and_seed():
+def test_a_random_scenario_is_loaded_by_its_level_and_seed():
     assert load_scenario("calm-17") == random_scenario(load_level("calm"), 17)
     assert load_scenario("calm-0").name == "calm-0"
 
@@ -277,7 +276,7 @@ def test_a_random_scenario_is_known_by_its_level_and_seed():
         ("calm-" + "9" * 5000, "unknown scenario"),
     ],
 )
-def test_random_names_that_lead_nowhere(name, message):
+def test_unknown_random_names_are_refused(name, message):
     with pytest.raises(ScenarioError) as caught:
         load_scenario(name)
     assert str(caught.value).startswith(message)
@@ -285,7 +284,7 @@ def test_random_names_that_lead_nowhere(name, message):
     assert len(str(caught.value).splitlines()) == 1
 
 
-def test_what_is_no_file_is_refused(tmp_path):
+def test_directories_pipes_and_large_files_are_refused(tmp_path):
     with pytest.raises(ScenarioError, match="is a directory"):
         load_scenario(tmp_path)
     fifo = tmp_path / "pipe.yaml"

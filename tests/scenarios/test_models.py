@@ -1,11 +1,19 @@
 import pytest
 from pydantic import ValidationError
 
-from scenarios.ground import ground_height, is_over_base, start_position
-from scenarios.models import Base, Frame, Scenario, Start, field_path
+from scenarios.models import (
+    Base,
+    Frame,
+    Scenario,
+    Start,
+    field_path,
+    ground_height,
+    is_over_base,
+    start_position,
+)
 
 
-def test_opening_is_what_the_bars_leave():
+def test_the_opening_excludes_the_bars():
     frame = Frame(colour="red", x_m=0, y_m=0, z_m=1)
     assert frame.opening_m == pytest.approx((0.38, 0.18))
 

@@ -3,9 +3,8 @@
 import pytest
 
 from framerunner.cli import run
-from scenarios.level import load_level
 from scenarios.loader import dump_yaml, load_scenario
-from scenarios.random_scenarios import random_scenario
+from scenarios.random_scenarios import load_level, random_scenario
 
 DRAW = ["scenario", "random", "--level", "calm", "--seed"]
 

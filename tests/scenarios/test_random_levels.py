@@ -3,14 +3,14 @@ from hypothesis import given
 from hypothesis import strategies as st
 from pydantic import ValidationError
 
-from scenarios.level import Level, LevelError, Range, list_levels, load_level, parse_level
+from scenarios.random_scenarios import LEVEL_FILES, Level, LevelError, Range, load_level
 from scenarios.yaml_file import MAX_BYTES
 from scenarios.yaml_tree import to_yaml
 
 CALM = to_yaml(load_level("calm").model_dump())
 
 
-@pytest.mark.parametrize("name", list_levels())
+@pytest.mark.parametrize("name", LEVEL_FILES.names())
 def test_each_level_is_named_as_its_file_and_described(name):
     level = load_level(name)
     assert level.name == name
@@ -45,15 +45,16 @@ def test_a_level_loads_by_path(tmp_path):
         ("name: a: b", "f.yaml:1:8: not valid YAML: mapping values are not allowed here"),
         (b"name: a\n# \xff", "f.yaml:2: not UTF-8 text; save the file as UTF-8"),
         ("#" * (MAX_BYTES + 1), "f.yaml: 1000001 bytes is too large for a level; 1000000 at most"),
-        (CALM + "wnd: 1\n", "f.yaml:20: wnd 1 is not a known field; known here: name, description, layout"),
+        (CALM + "wnd: 1\n", "f.yaml:20: wnd is not a known field; known here: name, description, layout"),
+        (CALM + "  apart: 1\n", "f.yaml:20: layout.apart is not a known field; did you mean apart_m?"),
         (
-            CALM + "  apart: 1\n",
-            "f.yaml:20: layout.apart 1 is not a known field; known here: x_m, y_m, apart_m, frame_z_m, "
+            CALM + "  near: 1\n",
+            "f.yaml:20: layout.near is not a known field; known here: x_m, y_m, apart_m, frame_z_m, "
             "frame_yaw_rad, start_yaw_rad",
         ),
         (
             CALM.replace("    high: 4.0", "    high: 4.0\n    hihg: 4.0", 1),
-            "f.yaml:7: layout.x_m.hihg 4.0 is not a known field; known here: low, high",
+            "f.yaml:7: layout.x_m.hihg is not a known field; did you mean high?",
         ),
         (CALM.replace("1.5", "0.0"), "f.yaml:10: layout.apart_m is 0.0: must be above 0.0"),
         (CALM.replace("1.5", ".nan"), "f.yaml:10: layout.apart_m is NaN: must be a finite number"),
@@ -80,16 +81,16 @@ def test_a_level_loads_by_path(tmp_path):
         ),
     ],
 )
-def test_faults_are_told_in_one_line(text, message):
+def test_faults_give_one_line(text, message):
     with pytest.raises(LevelError) as caught:
-        parse_level(text, "f.yaml")
+        LEVEL_FILES.parse(text, "f.yaml")
     assert str(caught.value) == message
 
 
 @given(st.text(max_size=100) | st.binary(max_size=100))
 def test_any_text_gives_one_line(content):
     with pytest.raises(LevelError, match=r"\Af\.yaml:.+\Z"):
-        parse_level(content, "f.yaml")
+        LEVEL_FILES.parse(content, "f.yaml")
 
 
 json_like = st.recursive(
@@ -102,7 +103,7 @@ json_like = st.recursive(
 @given(st.dictionaries(st.sampled_from([*Level.model_fields, "x"]), json_like, min_size=1))
 def test_wrong_values_in_known_fields_give_one_line(fields):
     with pytest.raises(LevelError, match=r"\Af\.yaml:.+\Z"):
-        parse_level(to_yaml(fields), "f.yaml")
+        LEVEL_FILES.parse(to_yaml(fields), "f.yaml")
 
 
 @pytest.mark.parametrize(
@@ -118,7 +119,7 @@ def test_wrong_values_in_known_fields_give_one_line(fields):
         ("/", "/: is a directory; give a level file"),
     ],
 )
-def test_names_that_lead_nowhere(name, message):
+def test_unknown_names_are_refused(name, message):
     with pytest.raises(LevelError) as caught:
         load_level(name)
     assert str(caught.value).startswith(message)

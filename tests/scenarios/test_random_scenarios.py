@@ -11,11 +11,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy import stats
 
-from scenarios.level import LevelError, load_level
 from scenarios.loader import dump_yaml, parse_scenario
 from scenarios.models import COLOURS, Arena, Camera, Light
-from scenarios.random_scenarios import random_scenario
-from scenarios.streams import MAX_SEED
+from scenarios.random_scenarios import MAX_SEED, LevelError, load_level, random_scenario, random_stream
 
 ROOT = Path(__file__).parents[2]
 CALM = load_level("calm")
@@ -31,7 +29,7 @@ def places(scenario):
 
 
 @given(seeds)
-def test_calm_keeps_what_it_promises(seed):
+def test_scenarios_of_calm_are_within_its_limits(seed):
     scenario = random_scenario(CALM, seed)
     assert all(abs(value) <= 4 for place in places(scenario) for value in place)
     assert all(math.dist(*pair) >= 1.5 for pair in itertools.combinations(places(scenario), 2))
@@ -43,7 +41,7 @@ def test_calm_keeps_what_it_promises(seed):
 
 
 @given(seeds)
-def test_it_says_where_it_comes_from_and_round_trips(seed):
+def test_it_names_its_level_and_seed_and_round_trips(seed):
     scenario = random_scenario(CALM, seed)
     assert scenario.name == f"calm-{seed}"
     assert scenario.description == f"Random scenario of level calm, seed {seed}."
@@ -53,7 +51,7 @@ def test_it_says_where_it_comes_from_and_round_trips(seed):
     assert all(value == round(value, 3) for value in drawn)
 
 
-def test_calm_17_stays_as_it_is():
+def test_calm_17_never_changes():
     scenario = random_scenario(CALM, 17)
     assert places(scenario) == [(3.356, -2.251), (-1.088, -0.083), (-1.51, 1.82), (-2.403, -2.574)]
     assert [frame.z_m for frame in scenario.frames] == [2.265, 2.002, 2.189]
@@ -64,8 +62,8 @@ def test_calm_17_stays_as_it_is():
 @pytest.mark.parametrize("hash_seed", ["0", "4242"])
 def test_another_process_draws_the_same(hash_seed):
     program = (
-        "from scenarios.level import load_level; from scenarios.loader import dump_yaml\n"
-        "from scenarios.random_scenarios import random_scenario\n"
+        "from scenarios.loader import dump_yaml\n"
+        "from scenarios.random_scenarios import load_level, random_scenario\n"
         "for seed in (7, 3, 12345678901234): print(dump_yaml(random_scenario(load_level('calm'), seed)))"
     )
     environment = {**os.environ, "PYTHONHASHSEED": hash_seed, "PYTHONUTF8": "1"}
@@ -76,7 +74,7 @@ def test_another_process_draws_the_same(hash_seed):
     assert done.stdout == "".join(here)
 
 
-def test_numpys_global_random_state_has_no_part():
+def test_numpys_global_random_state_has_no_effect():
     np.random.seed(1)
     first = random_scenario(CALM, 9)
     np.random.seed(2)
@@ -140,7 +138,7 @@ def test_places_fill_the_square_and_no_part_is_favoured(many):
             assert stats.ks_2samp(own, others).pvalue > 0.001
 
 
-def test_what_is_drawn_apart_does_not_correlate(many):
+def test_independent_draws_do_not_correlate(many):
     columns = [
         [
             *itertools.chain(*places(scenario)),
@@ -155,7 +153,7 @@ def test_what_is_drawn_apart_does_not_correlate(many):
     assert np.abs(matrix).max() < 5 / math.sqrt(len(many))
 
 
-def test_ends_of_a_range_come_up():
+def test_both_ends_of_a_range_are_drawn():
     narrow = with_layout(frame_z_m=CALM.layout.frame_z_m.model_copy(update={"low": 2.499}))
     heights = {frame.z_m for seed in range(10) for frame in random_scenario(narrow, seed).frames}
     assert heights == {2.499, 2.5}
@@ -170,7 +168,7 @@ def test_impossible_distances_are_refused_in_one_line():
     )
 
 
-@pytest.mark.parametrize("seed", [-1, MAX_SEED + 1])
+@pytest.mark.parametrize("seed", [-1, MAX_SEED + 1, -(10**30)])
 def test_a_seed_out_of_range_is_refused_in_one_line(seed):
     with pytest.raises(LevelError) as caught:
         random_scenario(CALM, seed)
@@ -178,5 +176,42 @@ def test_a_seed_out_of_range_is_refused_in_one_line(seed):
 
 
 def test_reading_scenarios_does_not_load_numpy():
-    program = "import sys, scenarios.loader, scenarios.level; sys.exit('numpy' in sys.modules)"
+    program = (
+        "import sys; from scenarios.loader import load_scenario; load_scenario('empty')\n"
+        "sys.exit('numpy' in sys.modules)"
+    )
     assert subprocess.run([sys.executable, "-c", program], cwd=ROOT, check=False).returncode == 0
+
+
+def numbers(seed, name, count=4):
+    stream = random_stream(seed, name)
+    return [stream.random() for _ in range(count)]
+
+
+def test_random_numbers_never_change():
+    # Results of old seeds can be compared only while these numbers are the same: on every machine, for ever.
+    assert numbers(1, "wind", 3) == [0.9660842807621509, 0.9907271339130758, 0.20296987957631096]
+    assert numbers(MAX_SEED, "wind", 1) == [0.016727917582789242]
+
+
+@given(st.integers(0, MAX_SEED), st.text(max_size=10), st.text(max_size=10))
+def test_streams_differ_by_name(seed, name, other):
+    assert (numbers(seed, name) == numbers(seed, other)) == (name == other)
+
+
+@given(st.sampled_from([0, 1, 2**31, 2**32 - 1, 2**32, 2**33, 2**62]), st.integers(0, MAX_SEED))
+def test_streams_differ_by_seed(seed, other):
+    assert (numbers(seed, "wind") == numbers(other, "wind")) == (seed == other)
+
+
+def test_drawing_from_one_stream_leaves_another_alone():
+    busy, quiet = random_stream(5, "noise"), random_stream(5, "wind")
+    busy.random(1000)
+    assert [quiet.random() for _ in range(4)] == numbers(5, "wind")
+
+
+def test_streams_of_neighbouring_seeds_and_names_do_not_correlate():
+    streams = [(seed, name) for seed in (0, 1, 2, 2**32) for name in ("wind", "wind2", "noise")]
+    series = np.array([random_stream(seed, name).random(2000) for seed, name in streams])
+    correlations = np.corrcoef(series)[np.triu_indices(len(streams), 1)]
+    assert np.abs(correlations).max() < 5 / np.sqrt(2000)

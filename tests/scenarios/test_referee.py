@@ -5,9 +5,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from scenarios.models import Frame, Scenario
+from scenarios.models import Frame, Scenario, TrueState
 from scenarios.referee import Referee
-from scenarios.truth import TrueState
 from scenarios.verdict import Verdict
 
 ENVELOPE = (0.25, 0.25, 0.045)
@@ -141,7 +140,7 @@ def test_motors_off_exactly_at_the_limit_is_within_it():
     assert flight.report().verdict is Verdict.CLEAN
 
 
-def test_coming_to_rest_after_the_limit_is_no_matter():
+def test_only_motors_off_must_be_within_the_limit():
     flight = Flight().motors(True).fly(*LAP)
     flight.wait((60_000_000 - flight.time_us) / 1e6 - 0.1)
     assert flight.land().report().verdict is Verdict.CLEAN
@@ -168,7 +167,7 @@ def test_a_frame_crossed_again_is_harmless():
     assert report.crossing_times_s[0] == pytest.approx(1.46, abs=0.02)
 
 
-def test_only_frames_that_are_there_are_asked_for():
+def test_only_the_scenarios_frames_are_required():
     scenario = Scenario(name="one", frames=(Frame(colour="blue", x_m=3, y_m=0, z_m=1),))
     assert Flight(scenario).motors(True).fly(*LAP).land().report().verdict is Verdict.CLEAN
     assert Flight(EMPTY).motors(True).fly(UP, HOME).land().report().verdict is Verdict.CLEAN
@@ -271,7 +270,7 @@ def test_bad_states_are_ignored_and_counted():
     assert report.ignored_states == 8
 
 
-def test_a_hole_in_the_states_gives_no_crossing():
+def test_a_gap_in_the_states_gives_no_crossing():
     flight = Flight().motors(True).fly(UP)
     flight.time_us += 5_000_000
     flight.position = OUT
@@ -323,7 +322,7 @@ def test_the_rate_of_states_hardly_matters(parts):
         max_size=40,
     )
 )
-def test_whatever_is_seen_the_report_is_consistent(rows):
+def test_the_report_on_any_states_is_consistent(rows):
     referee = Referee(COURSE, ENVELOPE)
     time_us = 0
     for step_us, position, velocity, attitude, motors_on, contacts in rows:

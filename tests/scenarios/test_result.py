@@ -8,7 +8,15 @@ import jsonschema
 import pytest
 from pydantic import ValidationError
 
-from scenarios.result import MAX_RESULT_BYTES, FlightResult, RefereeReport, ResultError, Timing, json_schema
+from scenarios.result import (
+    MAX_RESULT_BYTES,
+    FlightResult,
+    RefereeReport,
+    ResultError,
+    Timing,
+    json_schema,
+    spreadsheet_cell,
+)
 
 SCHEMA = Path(__file__).parents[2] / "docs" / "result.schema.json"
 LOCKSTEP = {
@@ -84,7 +92,7 @@ def test_a_result_of_an_older_version_is_read():
     assert result.as_json() == old
 
 
-def test_what_is_added_later_stands_in_its_place():
+def test_fields_added_later_are_written_in_order():
     wall = {"wall_time_s": 1.5, "real_time_factor": None, "started": "2026"}
     result = FlightResult(verdict="clean", timing=Timing(**TIMING)).model_copy(update=wall)
     assert list(result.as_json().items()) == [("verdict", "clean"), ("timing", TIMING), *wall.items()]
@@ -116,7 +124,7 @@ def test_numbers_are_finite(value):
 
 
 @pytest.mark.parametrize("value", [nan, inf, -1, "12", True, [], 10**400, {"a": nan}])
-def test_what_makes_no_sense_is_left_out_of_a_report_from_outside(value):
+def test_invalid_values_are_left_out_of_a_received_report(value):
     told = RefereeReport.from_outside({"verdict": "clean", "contacts": value, "penalty_s": 1.5, "x": value})
     assert told.as_json() == {"verdict": "clean", "penalty_s": 1.5}
 
@@ -129,7 +137,7 @@ def test_what_has_no_verdict_is_no_report(content):
 
 
 def test_a_text_is_cut_and_has_no_half_characters():
-    """A contestant's fault may say anything, and the flight's result must be written all the same."""
+    """An error in a contestant's code may have any text, and the result must be written all the same."""
     report = RefereeReport(verdict="aborted", reason="\ud800" + "x" * 10_000)
     assert report.reason == "?" + "x" * 1999
 
@@ -138,3 +146,23 @@ def test_times_by_colour():
     report = RefereeReport.from_outside(LOCKSTEP)
     assert report.times_s == {"red": 20.5, "green": 40.25, "blue": 60.125}
     assert RefereeReport.from_outside({**LOCKSTEP, "crossing_times_s": [1.0]}).times_s == {}
+
+
+@pytest.mark.parametrize("sign", "=+-@＝＋－＠﹦﹢﹣﹫")
+@pytest.mark.parametrize(
+    "before", ["", " ", "\t", "\r", "\n", "\u00a0", "\u3000", "\u200b", "\ufeff", "\u2066"]
+)
+def test_what_a_spreadsheet_takes_for_a_formula_is_marked(before, sign):
+    assert spreadsheet_cell(f"{before}{sign}cmd|'/c calc'!A1") == f"'{before}{sign}cmd|'/c calc'!A1"
+
+
+@pytest.mark.parametrize(
+    "text", ["", "calm-17", "a=1", "no frame: 3 - 2", "red.turning", "'=1", "¡hola!", "  "]
+)
+def test_other_texts_are_unchanged(text):
+    assert spreadsheet_cell(text) == text
+
+
+def test_a_cell_that_begins_behind_a_semicolon_or_in_a_new_line_counts():
+    assert spreadsheet_cell("a; =1;b\n+2;-") == "a;' =1;b\n'+2;'-"
+    assert spreadsheet_cell("\tx") == "'\tx"

@@ -1,8 +1,7 @@
 import pytest
 
-from scenarios.models import Base, Scenario, Start
+from scenarios.models import Base, Scenario, Start, TrueState
 from scenarios.touchdown import CrashWatch, find_landing, is_resting, up_component
-from scenarios.truth import TrueState
 
 ENVELOPE = (0.25, 0.25, 0.045)
 SCENARIO = Scenario(name="a", base=Base(x_m=1.0, y_m=0.0), start=Start(x_m=1.0))
@@ -40,7 +39,7 @@ def test_up_component_is_the_cosine_of_the_tilt():
         ((1.0, 0.0, 1.0), None, None),
     ],
 )
-def test_where_it_stands(position, surface, error_m):
+def test_landing_surface_and_error(position, surface, error_m):
     landing = find_landing(SCENARIO, ENVELOPE, position)
     if surface is None:
         assert landing is None
@@ -54,7 +53,7 @@ def test_where_it_stands(position, surface, error_m):
     ("x_m", "height_m", "surface"),
     [(1.07, 0.53, "base"), (1.07, 0.2, "base"), (1.4, 0.53, "floor"), (1.4, 0.2, "floor"), (1.4, 0.9, None)],
 )
-def test_where_it_stands_on_a_floor_without_a_base(x_m, height_m, surface):
+def test_landing_surface_on_a_floor_without_a_base(x_m, height_m, surface):
     landing = find_landing(SCENARIO, ENVELOPE, (x_m, 0.0, height_m), SCENARIO.base.top_m)
     assert (landing.surface if landing else None) == surface
 

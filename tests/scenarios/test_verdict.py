@@ -112,7 +112,7 @@ def test_verdict_and_reason(changes, ended, verdict, reason):
         ({"taken_off": False}, "never took off"),
     ],
 )
-def test_what_a_try_lacks_is_said(changes, words):
+def test_the_reason_names_what_a_try_lacks(changes, words):
     verdict, reason = judge(replace(GOOD, landing=None, **changes))
     assert verdict is Verdict.ABORTED
     assert words in reason

@@ -68,14 +68,14 @@ def test_lines_are_those_of_keys_and_items():
     assert tree.line(("frames", 1, "missing", "deeper")) == 6
 
 
-def test_an_empty_text_holds_nothing():
+def test_an_empty_text_has_no_value():
     assert parse_yaml("# only a comment\n").value is None
 
 
 @pytest.mark.parametrize(
     ("text", "line", "words"),
     [
-        ("a: 1\nb: 2\na: 3", 3, "stands twice, first on line 1"),
+        ("a: 1\nb: 2\na: 3", 3, "is given twice, first on line 1"),
         ("a: &x 1\nb: *x", 1, "anchor &x"),
         ("a: 1\nb: *x", 2, "alias *x"),
         ("a:\n  !!python/name:os.system x", 2, "tag"),
@@ -88,7 +88,7 @@ def test_an_empty_text_holds_nothing():
         ("a: [" + "1, " * 30_000 + "]", 1, "more than"),
     ],
 )
-def test_what_is_refused_says_where(text, line, words):
+def test_refused_yaml_names_its_line(text, line, words):
     with pytest.raises(YamlError) as caught:
         parse_yaml(text)
     assert caught.value.line == line

@@ -3,8 +3,7 @@
 import numpy as np
 import pytest
 
-from scenarios.models import Camera, Frame, Scenario
-from scenarios.truth import TrueState
+from scenarios.models import Camera, Frame, Scenario, TrueState
 from sitl.camera_feed import CameraFeed
 
 TICK_US = 4_000

@@ -6,9 +6,8 @@ from math import dist
 import pytest
 
 from firmware_py.airframe import load_airframe
-from scenarios.ground import ground_height, is_over_base
 from scenarios.loader import list_scenarios, load_scenario
-from scenarios.models import Start
+from scenarios.models import Start, ground_height, is_over_base
 from sitl.fleet import Fleet, side_by_side
 from sitl.world import World
 

@@ -1,9 +1,8 @@
 """Short flights and made-up rows for the tests of evaluations."""
 
 from framerunner.evaluation.rows import Row
-from scenarios.level import load_level
 from scenarios.loader import dump_yaml
-from scenarios.random_scenarios import random_scenario
+from scenarios.random_scenarios import load_level, random_scenario
 
 LIMIT_S = 1.0
 

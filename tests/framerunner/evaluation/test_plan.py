@@ -8,10 +8,9 @@ from framerunner.errors import SettingError
 from framerunner.evaluation.plan import Identity, plan_files, plan_level
 from offboard.mission import load_mission
 from offboard.pilot_file import PilotFile
-from scenarios.level import LevelError, load_level
 from scenarios.loader import load_scenario
 from scenarios.models import ScenarioError
-from scenarios.random_scenarios import random_scenario
+from scenarios.random_scenarios import LevelError, load_level, random_scenario
 from tests.framerunner.evaluation.flights import write_scenarios
 
 PILOT = "from offboard.pilot import Pilot\n\n\nclass Mine(Pilot):\n    pass\n"

@@ -15,8 +15,8 @@ import framerunner.gym
 from framerunner.errors import SettingError
 from framerunner.gym.environment import FrameChallengeEnv
 from framerunner.gym.reward import CONTACT, CROSSING, FAILURE, LANDING
-from scenarios.level import LevelError
 from scenarios.models import Scenario, ScenarioError
+from scenarios.random_scenarios import LevelError
 
 UP = np.array([0.0, 0.0, 1.0, 0.0], np.float32)
 STILL = np.zeros(4, np.float32)

@@ -1,4 +1,4 @@
-"""A monitor with a contest and a fleet that tests speak for."""
+"""A monitor with a contest and a fleet whose events the tests send."""
 
 import asyncio
 from contextlib import asynccontextmanager
@@ -56,14 +56,14 @@ def report(verdict="clean", time_s=40.0, crossed=COLOURS, contacts=0, penalty_s=
 
 
 def event(kind, key, scenario_name="case-1", drone_id=1, final=False, told=None, **values):
-    """What the fleet tells; `told` are further fields of the report, as anybody may have sent them."""
+    """An event of the fleet; `told` are further fields of the report, valid or not."""
     given = report(**values) if kind == "ended" else report(**{"verdict": "aborted", "crossed": (), **values})
     given = RefereeReport.from_outside({**given, **(told or {})})
     return TryEvent(kind, drone_id, key, scenario_name, given, "truth", final)
 
 
 class FakeFleet:
-    """A fleet without drones; `tell` says what it would."""
+    """A fleet without drones; `tell` sends its events."""
 
     newest = None
 
@@ -107,14 +107,14 @@ class Contest:
             assert answer.url.path != "/login"
 
     async def judge(self, name):
-        """Another judge, a session of its own."""
+        """Another judge with a separate session."""
         session = aiohttp.ClientSession(self.url, cookie_jar=aiohttp.CookieJar(unsafe=True))
         async with session.post("/login", data={"name": name, "secret": PASSWORD}) as answer:
             assert answer.url.path != "/login"
         return session
 
     async def until(self, path, holds, seconds=10.0):
-        """What `path` answers once it is as wished."""
+        """The answer of `path` once the condition holds."""
         async with asyncio.timeout(seconds):
             while True:
                 status, answer = await self.get(path)
@@ -135,7 +135,7 @@ class Contest:
 
 @asynccontextmanager
 async def contest(database, monkeypatch, port=0):
-    """A monitor, its database open; port 0 is a free one."""
+    """A monitor with an open database; port 0 is a free one."""
     monkeypatch.setattr("monitor.server.Fleet", FakeFleet)
     monkeypatch.setattr(server, "MODULES", MODULES)
     said = []

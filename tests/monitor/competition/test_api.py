@@ -165,7 +165,7 @@ async def test_what_does_not_exist_is_404(running):
     assert (await running.post("next", {"team": 99}))[0] == 404
 
 
-async def test_everybody_sees_who_is_called_and_the_queue(running):
+async def test_viewers_see_who_is_called_and_the_queue(running):
     await running.log_in()
     teams = [(await running.post("teams", {"name": name}))[1]["team"] for name in ("A", "B", "C")]
     assert (await running.post("queue", {"seen": 0, "teams": teams, "shuffle": True}))[0] == 200
@@ -188,7 +188,7 @@ async def test_everybody_sees_who_is_called_and_the_queue(running):
     assert (await running.get("tries/1"))[1]["try"]["team"] is None
 
 
-async def test_the_quicker_of_two_judges_wins(running):
+async def test_the_first_of_two_requests_wins(running):
     await running.log_in("Ada")
     bob = await running.judge("Bob")
     await running.fly("k")
@@ -203,7 +203,7 @@ async def test_the_quicker_of_two_judges_wins(running):
     assert len(history) == 1
 
 
-async def test_pages_are_told_of_changes_and_of_a_running_try(running):
+async def test_pages_get_changes_and_a_running_try(running):
     await running.log_in()
     async with running.http.ws_connect("/ws/competition") as socket:
         first = [await socket.receive_json(timeout=5) for _ in range(2)]

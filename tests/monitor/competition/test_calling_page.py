@@ -27,7 +27,7 @@ async def until_text(page, selector, words):
     )
 
 
-async def test_who_flies_who_is_called_and_who_is_next_are_three_things(running, chromium):
+async def test_the_flying_the_called_and_the_next_team_are_separate(running, chromium):
     judge = await open_page(chromium, running, "competition", judge="Ada", size=PHONE)
     audience = await open_page(chromium, running, "ranking", size=(1920, 1080))
     team = await open_page(chromium, running, "competition", size=PHONE)

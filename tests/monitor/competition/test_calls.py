@@ -1,4 +1,4 @@
-"""Who is called, who flies and who is next, as it is kept."""
+"""Who is called, who flies and who is next, as stored."""
 
 from datetime import UTC, datetime, timedelta
 
@@ -7,7 +7,7 @@ import pytest
 from monitor.competition.calls import Entry
 from monitor.competition.database import Database
 from monitor.competition.store import Store
-from monitor.competition.words import Refused
+from monitor.competition.validation import RefusedError
 from tests.monitor.competition.harness import COLOURS, event
 
 NOW = datetime(2030, 5, 17, 12, 0, tzinfo=UTC)
@@ -17,7 +17,7 @@ BOB = Entry("Bob", NOW + timedelta(minutes=1))
 
 @pytest.fixture
 def teams(store):
-    """Three teams, which stand in the queue."""
+    """Three teams, which are in the queue."""
     ids = [store.add_team(name, "", ADA) for name in ("Falken", "Adler", "Spatzen")]
     store.set_queue(0, ids, ADA)
     return ids
@@ -52,10 +52,10 @@ def test_the_order_of_the_queue_is_kept_and_named(store, teams):
     assert store.board().queue == queue  # the same order is no change
 
 
-def test_who_saw_another_queue_is_refused(store, teams):
+def test_a_request_for_an_older_queue_is_refused(store, teams):
     seen = store.board().queue.number
     store.set_queue(seen, teams[::-1], ADA)
-    with pytest.raises(Refused, match="changed meanwhile") as refusal:
+    with pytest.raises(RefusedError, match="changed meanwhile") as refusal:
         store.set_queue(seen, teams[:1], BOB)
     assert refusal.value.status == 409 and queue_of(store) == teams[::-1]
 
@@ -67,12 +67,12 @@ def test_a_queue_names_teams_that_take_part_and_each_once(store, teams):
         ([teams[0]], "withdrawn"),
         ([99], "team 99 does not exist"),
     ):
-        with pytest.raises(Refused, match=words):
+        with pytest.raises(RefusedError, match=words):
             set_queue(store, queue)
     assert queue_of(store) == teams[1:]  # who withdraws leaves it
 
 
-def test_next_is_not_who_flies(store, teams):
+def test_the_next_team_is_not_the_flying_one(store, teams):
     first, second, third = teams
     store.call(first, "", ADA)
     board = store.board()
@@ -93,7 +93,7 @@ def test_next_is_not_who_flies(store, teams):
     assert store.board().called is None
 
 
-def test_a_second_call_of_who_flies_is_for_the_next_try(store, teams):
+def test_a_second_call_of_the_flying_team_is_for_its_next_try(store, teams):
     store.call(teams[0], "", ADA)
     begin(store)
     store.call(teams[0], "", ADA)
@@ -135,7 +135,7 @@ def test_a_wrong_call_is_taken_back_while_the_drone_flies_and_after(store, teams
     assert rows[second] == 0  # no try was used
 
 
-def test_a_try_that_a_judge_gave_to_another_team_stays_its_own(store, teams):
+def test_a_try_assigned_to_another_team_stays_with_it(store, teams):
     first, second, _ = teams
     store.call(second, "", ADA)
     number = begin(store)
@@ -145,20 +145,20 @@ def test_a_try_that_a_judge_gave_to_another_team_stays_its_own(store, teams):
     assert store.board().tries[0].team == first and queue_of(store) == teams
 
 
-def test_a_call_is_taken_back_once_and_by_who_saw_it(store, teams):
+def test_a_call_is_taken_back_once_and_by_a_judge_who_saw_it(store, teams):
     store.call(teams[0], "", ADA)
     seen = store.board().last_call.id
     store.call(teams[1], "", ADA)
     for call in (seen, 99):
-        with pytest.raises(Refused, match="taken back meanwhile") as refusal:
+        with pytest.raises(RefusedError, match="taken back meanwhile") as refusal:
             store.take_back(call, BOB)
         assert refusal.value.status == 409
     take_back(store)
-    with pytest.raises(Refused, match="taken back meanwhile"):
+    with pytest.raises(RefusedError, match="taken back meanwhile"):
         store.take_back(seen, BOB)
 
 
-def test_who_was_called_and_has_not_flown_goes_back_when_another_is_called(store, teams):
+def test_a_called_team_that_has_not_flown_returns_to_the_queue_when_another_is_called(store, teams):
     first, second, third = teams
     store.call(first, "", ADA)
     store.call(third, "", ADA)

@@ -5,7 +5,7 @@ from pathlib import Path
 import pytest
 from sqlalchemy import create_engine, text
 
-from monitor.competition import migrations
+from monitor.competition import tables
 from monitor.competition.calls import Entry
 from monitor.competition.database import Database, DatabaseError
 from monitor.competition.store import Store
@@ -63,7 +63,7 @@ def test_a_file_that_cannot_be_written_is_refused(tmp_path):
     assert "cannot be written" in words
 
 
-def test_a_newer_version_is_refused_in_words(database_url):
+def test_a_newer_version_is_refused_in_one_line(database_url):
     Database(database_url).close()
     engine = create_engine(database_url)
     with engine.begin() as connection:
@@ -83,7 +83,7 @@ def version_1(file):
     connection.close()
 
 
-def test_an_older_contest_goes_on(tmp_path):
+def test_an_older_contest_is_migrated(tmp_path):
     file = tmp_path / "x.db"
     version_1(file)
     database = Database(f"sqlite:///{file}")
@@ -122,7 +122,7 @@ def test_an_older_contest_is_brought_up_to_date_as_a_whole_or_not_at_all(tmp_pat
     file = tmp_path / "x.db"
     version_1(file)
     before = columns(file)
-    monkeypatch.setitem(migrations._STATEMENTS, 1, (*migrations._STATEMENTS[1], "select * from nowhere"))
+    monkeypatch.setitem(tables._STATEMENTS, 1, (*tables._STATEMENTS[1], "select * from nowhere"))
     assert "nowhere" in refusal(f"sqlite:///{file}")
     assert columns(file) == before
     monkeypatch.undo()
@@ -147,7 +147,7 @@ def test_other_tables_of_a_database_are_left_alone(tmp_path):
         assert connection.execute("select id from teams").fetchall() == [(7,)]
 
 
-def test_sqlite_keeps_what_it_committed_and_minds_its_references(tmp_path):
+def test_sqlite_writes_commits_to_disk_and_checks_foreign_keys(tmp_path):
     database = Database(f"sqlite:///{tmp_path}/x.db")
     with database.transaction() as session:
         values = {
@@ -158,7 +158,7 @@ def test_sqlite_keeps_what_it_committed_and_minds_its_references(tmp_path):
     database.close()
 
 
-def test_a_database_that_is_locked_is_told_in_words(tmp_path):
+def test_a_locked_database_gives_one_line(tmp_path):
     url = f"sqlite:///{tmp_path}/x.db"
     database = Database(url)
     with database.transaction() as session:
@@ -175,7 +175,7 @@ def test_a_database_that_is_locked_is_told_in_words(tmp_path):
     database.close()
 
 
-def test_a_full_disk_is_told_in_words_and_what_fits_again_is_written(tmp_path):
+def test_a_full_disk_gives_one_line_and_later_writes_succeed(tmp_path):
     database = Database(f"sqlite:///{tmp_path}/x.db")
     fill = text("create table filling as select zeroblob(100000) as bytes")
     with database.transaction() as session:

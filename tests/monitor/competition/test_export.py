@@ -6,8 +6,8 @@ import pytest
 
 from monitor.competition.calls import Entry
 from monitor.competition.database import Database
-from monitor.competition.export import _safe, ranking_csv, tries_csv
 from monitor.competition.store import Store
+from monitor.competition.views import _safe, ranking_csv, tries_csv
 from tests.monitor.competition.harness import COLOURS, event
 
 NOW = datetime(2030, 5, 17, 12, 0, tzinfo=UTC)
@@ -38,7 +38,7 @@ def test_the_ranking_has_a_header_and_names_that_are_no_formulas(board):
     assert rows[0]["scenario 2 state"] == "not flown" and rows[0]["scenario 2 try"] == ""
 
 
-def test_the_tries_have_all_that_is_known(board):
+def test_the_tries_have_all_values(board):
     rows = read(tries_csv(board))
     assert [row["try"] for row in rows] == ["1", "2", "3"]
     assert rows[2]["team"] == "الصقور" and rows[2]["contacts"] == "3" and rows[2]["try_time_s"] == "33.0"

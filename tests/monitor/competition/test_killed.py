@@ -1,4 +1,4 @@
-"""A server that is killed loses no try that it said it had judged."""
+"""A server that is killed loses no try that it showed as judged."""
 
 import asyncio
 import signal
@@ -19,15 +19,15 @@ async def main():
         if message["kind"] == "changed" and any(each.state == "ended" for each in service._board.tries):
             sys.stdout.write("shown\\n")
             sys.stdout.flush()
-            while True:  # whoever kills does it now; nothing more is written
+            while True:  # killed here; nothing more is written
                 pass
     work = asyncio.create_task(service.run())
     while service._board is None:
         await asyncio.sleep(0.01)
     service.subscribe(hear)
-    service.hear(event("began", "still flying", time_s=0.0))
-    service.hear(event("began", "flown", time_s=0.0))
-    service.hear(event("ended", "flown", time_s=33.25))
+    service.on_try_event(event("began", "still flying", time_s=0.0))
+    service.on_try_event(event("began", "flown", time_s=0.0))
+    service.on_try_event(event("ended", "flown", time_s=33.25))
     await work
 
 asyncio.run(main())

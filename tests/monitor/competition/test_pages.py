@@ -56,7 +56,7 @@ async def open_page(browser, running, path, *, judge="", size=(1366, 768)):
 
 
 def faults(page):
-    """What a page complained of, but the live channel, which this monitor has not."""
+    """Errors of a page, without those about the live channel, which this monitor does not have."""
     return [each for each in page.complaints if "/ws/live" not in each]
 
 
@@ -183,7 +183,7 @@ async def test_a_whole_contest_by_hand(running, chromium):
     assert [each for each in faults(page) if "422" not in each] == []
 
 
-async def test_another_judge_was_quicker(running, chromium):
+async def test_a_form_that_another_judge_saved_meanwhile_is_refused(running, chromium):
     await running.fly("k")
     page = await open_page(chromium, running, "competition/try/1", judge="Ada", size=(390, 844))
     await page.wait_for_selector(".counts:has-text('Counts')")
@@ -203,7 +203,7 @@ async def test_another_judge_was_quicker(running, chromium):
     assert [entry["who"] for entry in kept["history"]] == ["Ada", "Grace"]
 
 
-async def test_a_try_that_does_not_exist_is_said(running, chromium):
+async def test_a_try_that_does_not_exist_gives_a_message(running, chromium):
     page = await open_page(chromium, running, "competition/try/99", judge="Ada")
     await page.wait_for_selector(".line:has-text('try 99 does not exist')")
     assert await page.locator("#main form:visible").count() == 0
@@ -249,7 +249,7 @@ async def test_the_clock_of_a_try_runs_until_its_result_stands_there(running, ch
     assert await page.locator(".clock").count() == 0
 
 
-async def test_a_monitor_that_went_away_is_told_and_found_again(tmp_path, monkeypatch, chromium):
+async def test_pages_show_a_lost_connection_and_reconnect(tmp_path, monkeypatch, chromium):
     database = f"sqlite:///{tmp_path}/contest.db"
     async with contest(database, monkeypatch) as first:
         await first.log_in()

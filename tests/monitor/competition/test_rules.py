@@ -14,7 +14,7 @@ from monitor.competition.rules import (
     choose,
     correct,
     counted_cs,
-    in_turn,
+    crossed_in_order,
     rank,
     read_report,
 )
@@ -44,7 +44,7 @@ def rounds(draw):
 
 
 def totals(teams, attempts):
-    return {row.team: row.total_cs for row in rank(teams, CASES, attempts, Rule())}
+    return {row.team: row.total_s for row in rank(teams, CASES, attempts, Rule())}
 
 
 def test_a_total_is_the_sum_of_three():
@@ -54,18 +54,18 @@ def test_a_total_is_the_sum_of_three():
         Attempt(1, "c", 3, replace(CLEAN, crossed=("red",), completed=False, try_time_s=20.0)),
     ]
     (row,) = rank({1: "One"}, CASES, attempts, Rule())
-    assert [cell.counted_cs for cell in row.cells] == [4000, 5275, 18000 + 12000]
-    assert row.total_cs == 39275
+    assert [cell.counted_s for cell in row.cells] == [40.0, 52.75, 180.0 + 120.0]
+    assert row.total_s == 392.75
 
 
 def test_what_was_not_flown_counts_as_if_all_frames_were_missing():
-    assert totals({1: "One"}, []) == {1: 3 * 36000}
+    assert totals({1: "One"}, []) == {1: 3 * 360.0}
     two = [("a", COLOURS[:2]), ("b", COLOURS)]
     (row,) = rank({1: "One"}, two, [], Rule())
-    assert [cell.counted_cs for cell in row.cells] == [30000, 36000, 36000]  # the third is still to be drawn
+    assert [cell.counted_s for cell in row.cells] == [300.0, 360.0, 360.0]  # the third is still to be drawn
 
 
-def test_ties_share_a_rank_and_stand_by_contacts_then_name():
+def test_ties_share_a_rank_and_are_ordered_by_contacts_then_name():
     attempts = [Attempt(team, "a", team, replace(CLEAN, contacts=team == 1)) for team in (1, 2, 3)]
     rows = rank({1: "Alpha", 2: "zulu", 3: "Beta", 4: "Last"}, CASES, attempts, Rule())
     assert [(row.rank, row.name) for row in rows] == [(1, "Beta"), (1, "zulu"), (1, "Alpha"), (4, "Last")]
@@ -78,11 +78,11 @@ def test_times_that_look_the_same_are_a_tie():
 
 def test_of_several_the_best_or_the_last_counts():
     attempts = [Attempt(1, "a", 1, CLEAN), Attempt(1, "a", 2, replace(CLEAN, try_time_s=60.0))]
-    assert choose(attempts, Rule()).order == 1
-    assert choose(attempts, Rule(counting="last")).order == 2
+    assert choose(attempts, Rule()).id == 1
+    assert choose(attempts, Rule(counting="last")).id == 2
     assert choose([], Rule()) is None
     touched = [Attempt(1, "a", order, replace(CLEAN, contacts=3 - order)) for order in (1, 2)]
-    assert choose(touched, Rule()).order == 2  # it counts the same and touched less
+    assert choose(touched, Rule()).id == 2  # it counts the same and touched less
 
 
 def test_the_rule_can_be_set():
@@ -101,13 +101,13 @@ def test_the_rule_can_be_set():
         ([], ()),
     ],
 )
-def test_a_frame_before_its_turn_is_missing(crossed, counted):
-    assert in_turn(crossed, COLOURS) == counted
+def test_a_frame_crossed_too_early_is_missing(crossed, counted):
+    assert crossed_in_order(crossed, COLOURS) == counted
 
 
 @pytest.mark.parametrize("value", [nan, inf, -1, "12", None, True, [], 10**400])
 @pytest.mark.parametrize("told", [{}, {"verdict": "clean"}])
-def test_rubbish_in_a_report_counts_nothing_bad(value, told):
+def test_invalid_values_in_a_report_count_as_not_completed(value, told):
     report = dict.fromkeys(("contacts", "penalty_s", "try_time_s", "verdict", "frames_crossed"), value)
     result = read_report(RefereeReport.from_outside({**report, **told}), COLOURS)
     assert not result.completed
@@ -115,13 +115,13 @@ def test_rubbish_in_a_report_counts_nothing_bad(value, told):
     assert counted_cs(result, Rule()) == 36000
 
 
-def test_a_verdict_without_its_frames_is_not_believed():
+def test_a_verdict_without_its_frames_is_not_completed():
     report = RefereeReport(verdict="clean", frames_crossed=("red",))
     assert not read_report(report, COLOURS).completed
     assert read_report(report, ("red",)).completed
 
 
-def test_a_correction_is_laid_over_the_referee():
+def test_a_correction_replaces_the_referees_values():
     corrected = correct(CLEAN, Correction(contacts=2, penalty_s=5.0))
     assert corrected == replace(CLEAN, contacts=2, penalty_s=5.0)
     assert correct(CLEAN, None) == correct(CLEAN, Correction()) == CLEAN
@@ -144,7 +144,7 @@ def test_the_order_of_tries_and_teams_changes_nothing(given_round, shuffler):
 def test_the_order_of_scenarios_changes_no_total(given_round):
     teams, attempts = given_round
     backwards = rank(teams, CASES[::-1], attempts, Rule())
-    assert {row.team: row.total_cs for row in backwards} == totals(teams, attempts)
+    assert {row.team: row.total_s for row in backwards} == totals(teams, attempts)
 
 
 @given(rounds())
@@ -153,8 +153,8 @@ def test_ranks_say_how_many_are_better(given_round):
     rows = rank(teams, CASES, attempts, Rule())
     assert sorted(row.team for row in rows) == sorted(teams)
     for row in rows:
-        assert row.rank == 1 + sum(other.total_cs < row.total_cs for other in rows)
-        assert row.total_cs == sum(cell.counted_cs for cell in row.cells)
+        assert row.rank == 1 + sum(other.total_s < row.total_s for other in rows)
+        assert round(row.total_s * 100) == sum(round(cell.counted_s * 100) for cell in row.cells)
 
 
 @given(rounds(), st.sampled_from("abc"), results())
@@ -173,7 +173,7 @@ def test_more_time_or_penalty_never_counts_less(result, time_s, penalty_s):
 
 
 @given(results(), st.sampled_from(COLOURS))
-def test_a_frame_less_never_counts_less(result, colour):
+def test_one_frame_fewer_never_counts_less(result, colour):
     fewer = tuple(each for each in result.crossed if each != colour)
     less = replace(result, crossed=fewer, completed=result.completed and fewer == result.crossed)
     if result.try_time_s + result.penalty_s <= 180:
@@ -187,7 +187,7 @@ def test_completed_within_the_limit_is_never_worse_than_not_completed(time_s, pe
 
 
 @given(results(), results())
-def test_a_full_correction_hides_the_referee(referee, judged):
+def test_a_full_correction_replaces_all_values_of_the_referee(referee, judged):
     everything = Correction(
         judged.crossed, judged.contacts, judged.penalty_s, judged.try_time_s, judged.completed
     )
@@ -195,7 +195,7 @@ def test_a_full_correction_hides_the_referee(referee, judged):
     assert correct(correct(referee, everything), everything) == judged
 
 
-def test_five_hundred_teams_are_ranked_quickly_and_rightly():
+def test_five_hundred_teams_are_ranked_quickly_and_correctly():
     chance = random.Random(1)
     attempts = [
         Attempt(team, name, team, replace(CLEAN, try_time_s=chance.uniform(20, 170)))
@@ -203,4 +203,4 @@ def test_five_hundred_teams_are_ranked_quickly_and_rightly():
         for name in "abc"
     ]
     rows = rank({team: str(team) for team in range(500)}, CASES, attempts, Rule())
-    assert [row.total_cs for row in rows] == sorted(row.total_cs for row in rows)
+    assert [row.total_s for row in rows] == sorted(row.total_s for row in rows)

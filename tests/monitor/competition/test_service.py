@@ -8,10 +8,9 @@ from random import Random
 import pytest
 
 from monitor.competition.database import DatabaseError
-from monitor.competition.rules import Rule
 from monitor.competition.service import CompetitionService
 from monitor.competition.store import Store
-from monitor.competition.words import Refused
+from monitor.competition.validation import RefusedError
 from tests.monitor.competition.harness import COLOURS, EQUIPMENT, event
 
 
@@ -40,18 +39,18 @@ def url(tmp_path):
     return f"sqlite:///{tmp_path}/contest.db"
 
 
-async def test_a_bad_database_ends_the_service_in_words():
+async def test_a_bad_database_ends_the_service_with_one_line():
     with pytest.raises(DatabaseError, match="not the URL of a database"):
-        async with serving("rubbish"):
+        async with serving("no url"):
             pass
 
 
 async def test_requests_wait_until_the_database_is_open_but_not_for_ever(url, monkeypatch):
     service = CompetitionService(url, EQUIPMENT)
-    early = asyncio.create_task(service.change(lambda store: store.rule()))
+    early = asyncio.create_task(service.change(lambda store: store.board().rule))
     board = asyncio.create_task(service.board())
     work = asyncio.create_task(service.run())
-    assert await early == Rule() and (await board).version > 0
+    assert (await early).who == "" and (await board).version > 0
     work.cancel()
     await asyncio.gather(work, return_exceptions=True)
 
@@ -60,11 +59,11 @@ async def test_requests_wait_until_the_database_is_open_but_not_for_ever(url, mo
     with pytest.raises(DatabaseError, match="being opened"):
         await service.board()
     with pytest.raises(DatabaseError, match="being opened"):
-        await service.change(lambda store: store.rule())
-    assert service.running == () and service.news()[0]["version"] == 0
+        await service.change(lambda store: store.board().rule)
+    assert service.running == () and service.messages()[0]["version"] == 0
 
 
-async def test_listeners_hear_only_what_is_committed(url):
+async def test_listeners_get_only_what_is_committed(url):
     async with serving(url) as service:
         seen = []
 
@@ -74,41 +73,41 @@ async def test_listeners_hear_only_what_is_committed(url):
                 seen.append((message["version"], [each.state for each in other.board().tries]))
 
         service.subscribe(hear)
-        service.hear(event("began", "k", time_s=0.0))
+        service.on_try_event(event("began", "k", time_s=0.0))
         await until(lambda: seen)
-        service.hear(event("ended", "k"))
+        service.on_try_event(event("ended", "k"))
         await until(lambda: len(seen) >= 2)
         assert [states for _, states in seen] == [["running"], ["ended"]]
         assert seen[0][0] < seen[1][0]
 
 
-async def test_a_running_try_is_told_every_time_without_reading_everything(url):
+async def test_events_of_a_running_try_are_sent_without_reading_everything(url):
     async with serving(url) as service:
         heard = []
         service.subscribe(heard.append)
-        service.hear(event("began", "k", time_s=0.0))
+        service.on_try_event(event("began", "k", time_s=0.0))
         await until(lambda: service.running)
         version = service._board.version
         for time_s in (1.0, 2.0, 3.0):
-            service.hear(event("running", "k", time_s=time_s, crossed=("red",)))
+            service.on_try_event(event("running", "k", time_s=time_s, crossed=("red",)))
             await until(lambda now=time_s: service.running[0].try_time_s == now)
         assert service._board.version == version
         assert [m["tries"][0]["try_time_s"] for m in heard if m["kind"] == "running"][-3:] == [1.0, 2.0, 3.0]
         assert service.running[0].crossed == ("red",)
-        service.hear(event("ended", "k"))
+        service.on_try_event(event("ended", "k"))
         await until(lambda: not service.running)
 
 
-async def test_a_listener_that_left_hears_nothing(url):
+async def test_a_removed_listener_gets_no_messages(url):
     async with serving(url) as service:
         heard = []
         service.subscribe(heard.append)()
-        service.hear(event("ended", "k"))
+        service.on_try_event(event("ended", "k"))
         await until(lambda: service._board.tries)
         assert heard == []
 
 
-async def test_a_slow_database_stalls_nobody_else(url):
+async def test_a_slow_database_delays_no_page(url):
     async with serving(url) as service:
         free = threading.Event()
         blocked = asyncio.create_task(service.read(lambda _: free.wait(20)))
@@ -118,14 +117,14 @@ async def test_a_slow_database_stalls_nobody_else(url):
             assert service._board.tries == ()  # pages are answered from what was read before
             await asyncio.sleep(0)
         assert asyncio.get_running_loop().time() - started < 5.0 and not blocked.done()
-        service.hear(event("ended", "k"))
+        service.on_try_event(event("ended", "k"))
         free.set()
         await blocked
         await until(lambda: service._board.tries)
 
 
-async def test_results_wait_for_a_database_that_is_away(url, monkeypatch):
-    monkeypatch.setattr("monitor.competition.service._AGAIN_S", 0.01)
+async def test_results_wait_for_a_database_that_is_unreachable(url, monkeypatch):
+    monkeypatch.setattr("monitor.competition.service._RETRY_S", 0.01)
     away = True
     take = Store.take
 
@@ -138,9 +137,9 @@ async def test_results_wait_for_a_database_that_is_away(url, monkeypatch):
     async with serving(url) as service:
         problems = []
         service.subscribe(lambda message: problems.append(message.get("problem")))
-        service.hear(event("began", "k", time_s=0.0))
-        service.hear(event("running", "k", time_s=1.0))
-        service.hear(event("ended", "k"))
+        service.on_try_event(event("began", "k", time_s=0.0))
+        service.on_try_event(event("running", "k", time_s=1.0))
+        service.on_try_event(event("ended", "k"))
         await until(lambda: problems)
         assert "connection refused; 2 changes of tries wait" in service.problem
         away = False
@@ -154,18 +153,18 @@ async def test_one_bad_try_does_not_end_the_contest(url, monkeypatch):
         Store, "take", lambda self, told, *rest: 1 / 0 if told.key == "bad" else take(self, told, *rest)
     )
     async with serving(url) as service:
-        service.hear(event("ended", "bad"))
-        service.hear(event("ended", "good"))
+        service.on_try_event(event("ended", "bad"))
+        service.on_try_event(event("ended", "good"))
         await until(lambda: service._board.tries)
         assert service._board.tries[0].judged
 
 
-async def test_a_draw_takes_from_the_pool_and_every_one_can_come_first(url):
+async def test_a_draw_takes_from_the_pool_and_each_can_be_first(url):
     async with serving(url, random=Random(1)) as service:
         pool = ["case-1", "case-2", "case-3", "calm-17"]
         first = set()
         for _ in range(15):
-            await service.draw([*pool, "case-1"], 3, "Ada")
+            await service.draw([*pool, "case-1"], 3, service.entry("Ada"))
             draw = service._board.draws[0]
             assert len(set(draw.scenarios)) == 3 and set(draw.scenarios) <= set(pool)
             assert draw.pool == tuple(pool) and draw.who == "Ada"
@@ -186,17 +185,17 @@ async def test_a_draw_takes_from_the_pool_and_every_one_can_come_first(url):
 )
 async def test_a_bad_draw_is_refused(url, pool, count, words):
     async with serving(url) as service:
-        with pytest.raises(Refused, match=words):
-            await service.draw(pool, count, "Ada")
+        with pytest.raises(RefusedError, match=words):
+            await service.draw(pool, count, service.entry("Ada"))
         assert service._board.draws == ()
 
 
-async def test_the_pot_holds_what_has_all_frames(url):
+async def test_scenarios_with_all_frames_can_be_drawn(url):
     async with serving(url) as service:
         assert service.scenarios == ("case-1", "case-2", "case-3", "case-4")
 
 
-async def test_every_order_can_come_of_shuffling(url):
+async def test_shuffling_can_give_every_order(url):
     async with serving(url, random=Random(1)) as service:
         orders = {tuple(service.shuffled([1, 2, 3])) for _ in range(100)}
         assert len(orders) == 6 and all(sorted(order) == [1, 2, 3] for order in orders)
@@ -204,8 +203,8 @@ async def test_every_order_can_come_of_shuffling(url):
 
 async def test_frames_are_those_of_the_scenario_or_all(url):
     async with serving(url) as service:
-        for key, name in (("a", "two-1"), ("b", "somebody-elses"), ("c", "../x"), ("d", "")):
-            service.hear(event("ended", key, name))
+        for key, name in (("a", "two-1"), ("b", "unknown"), ("c", "../x"), ("d", "")):
+            service.on_try_event(event("ended", key, name))
         await until(lambda: len(service._board.tries) == 4)
         frames = {each.scenario: each.frames for each in service._board.tries}
-        assert frames == {"two-1": COLOURS[:2], "somebody-elses": COLOURS, "../x": COLOURS, "": COLOURS}
+        assert frames == {"two-1": COLOURS[:2], "unknown": COLOURS, "../x": COLOURS, "": COLOURS}

@@ -1,4 +1,4 @@
-"""What the audience's page is told: split times, the best try to compare with, and when the round is over."""
+"""What the audience's page gets: split times, the best try to compare with, and when the round is over."""
 
 import pytest
 
@@ -87,11 +87,11 @@ async def test_the_round_is_complete_when_every_team_has_flown_every_scenario(ru
         {"frames_crossed": ["red", "green"], "crossing_times_s": [-1.0, 1e12]},
     ],
 )
-def test_split_times_that_are_none_are_left_out(report):
+def test_invalid_split_times_are_left_out(report):
     assert RefereeReport.from_outside({"verdict": "clean", **report}).times_s == {}
 
 
-async def test_a_try_that_the_monitors_end_interrupted_is_told_as_last_seen(tmp_path, monkeypatch):
+async def test_an_interrupted_try_is_shown_as_last_seen(tmp_path, monkeypatch):
     monkeypatch.setattr(harness, "MODULES", (*harness.MODULES, "monitor.competition.stage"))
     database = f"sqlite:///{tmp_path}/contest.db"
     going = event("running", "a", time_s=40.0, crossed=("red",), told={"crossing_times_s": [31.0]})
@@ -104,6 +104,6 @@ async def test_a_try_that_the_monitors_end_interrupted_is_told_as_last_seen(tmp_
         told = await stage(after)
         assert (told["interrupted"]["try_time_s"], told["interrupted"]["splits"]) == (40.0, {"red": 31.0})
         assert told["last"] is None
-        after.fleet.tell(going)  # it flies on, and somebody judges it
+        after.fleet.tell(going)  # it continues and is judged
         await after.until("tries", lambda all_: all_[0]["state"] == "running")
         assert (await stage(after))["interrupted"] is None

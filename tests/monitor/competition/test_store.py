@@ -1,5 +1,6 @@
-"""What is kept of a contest, in SQLite and, where a server is given, in PostgreSQL."""
+"""What is stored of a contest, in SQLite and, where a server is given, in PostgreSQL."""
 
+from dataclasses import asdict
 from datetime import UTC, datetime, timedelta
 from math import inf, nan
 
@@ -9,8 +10,9 @@ from monitor.competition import tables
 from monitor.competition.calls import Entry
 from monitor.competition.database import Database
 from monitor.competition.rules import Correction, Rule
-from monitor.competition.store import MOST_JUDGEMENTS, MOST_TEAMS, Store
-from monitor.competition.words import Refused
+from monitor.competition.store import MAX_JUDGEMENTS, MAX_TEAMS, Store
+from monitor.competition.validation import RefusedError
+from monitor.competition.views import RuleView
 from tests.monitor.competition.harness import COLOURS, event
 
 NOW = datetime(2030, 5, 17, 12, 0, tzinfo=UTC)
@@ -54,7 +56,7 @@ def test_a_call_for_another_scenario_is_left_alone(store):
     assert board.called is not None and board.called.team == team
 
 
-def test_a_call_is_for_one_drone_and_outlives_a_try_that_did_not_move(store):
+def test_a_call_is_for_one_drone_and_stays_after_a_try_that_did_not_move(store):
     team = store.add_team("Falken", "", ADA)
     store.call(team, "", ADA)
     store.take(event("began", "first", time_s=0.0), COLOURS, NOW)
@@ -63,12 +65,12 @@ def test_a_call_is_for_one_drone_and_outlives_a_try_that_did_not_move(store):
     store.take(event("ended", "first", verdict="aborted", crossed=(), path_m=0.0), COLOURS, NOW)
     assert store.board().called is not None
     store.take(event("ended", "second"), COLOURS, NOW)
-    assert store.board().called is not None  # it was nobody's
+    assert store.board().called is not None  # it had no team
     fly(store, "third")
     assert store.board().called is None
 
 
-def test_the_final_result_takes_the_place_of_the_first_and_nothing_that_comes_late(store):
+def test_the_final_result_replaces_the_first_and_late_events_are_ignored(store):
     fly(store, "k", time_s=40.0)
     store.take(event("ended", "k", time_s=40.02, final=True), COLOURS, NOW)
     store.take(event("ended", "k", time_s=55.0), COLOURS, NOW)
@@ -77,7 +79,7 @@ def test_the_final_result_takes_the_place_of_the_first_and_nothing_that_comes_la
     assert (each.state, each.final, each.result.try_time_s) == ("ended", True, 40.02)
 
 
-def test_a_correction_stays_on_top_of_a_final_result(store):
+def test_a_correction_stays_valid_after_a_final_result(store):
     number = fly(store, "k", time_s=40.0)
     store.correct(number, 0, Correction(contacts=2), "touched red", ADA)
     store.take(event("ended", "k", time_s=40.5, contacts=0, final=True), COLOURS, NOW)
@@ -103,14 +105,14 @@ def test_every_change_is_kept_with_who_and_when(store):
     assert store.board().tries[0].result.completed  # the last says: as the referee says
 
 
-def test_the_quicker_judge_wins(store):
+def test_the_first_of_two_judges_wins(store):
     number = fly(store, "k")
     store.correct(number, 0, Correction(contacts=1), "", ADA)
     for change in (
         lambda: store.correct(number, 0, Correction(contacts=5), "", BOB),
         lambda: store.assign(number, 0, None, BOB),
     ):
-        with pytest.raises(Refused, match="another judge") as refusal:
+        with pytest.raises(RefusedError, match="another judge") as refusal:
             change()
         assert refusal.value.status == 409
     assert store.board().tries[0].result.contacts == 1
@@ -120,10 +122,10 @@ def test_two_servers_cannot_write_the_same_judgement(database_url):
     one, other = Store(Database(database_url)), Store(Database(database_url))
     number = fly(one, "k")
     one.correct(number, 0, Correction(contacts=1), "", ADA)
-    with pytest.raises(Refused, match="another judge"):
+    with pytest.raises(RefusedError, match="another judge"):
         other.correct(number, 0, Correction(contacts=2), "", BOB)
     one.add_team("Falken", "", ADA)
-    with pytest.raises(Refused, match="taken"):
+    with pytest.raises(RefusedError, match="taken"):
         other.add_team("FALKEN", "", BOB)
     one.close()
     other.close()
@@ -138,7 +140,7 @@ def test_two_servers_cannot_write_the_same_judgement(database_url):
 )
 def test_contradictions_are_refused(store, correction, words):
     number = fly(store, "k")
-    with pytest.raises(Refused, match=words):
+    with pytest.raises(RefusedError, match=words):
         store.correct(number, 0, correction, "", ADA)
     assert store.detail(number).history == ()
 
@@ -150,19 +152,19 @@ def test_a_try_can_be_completed_by_a_judge_who_saw_it(store):
     assert store.board().tries[0].result.counted_s == 51.5
 
 
-def test_teams_are_unique_in_any_letters_and_limited(store, monkeypatch):
+def test_team_names_are_unique_ignoring_case_and_teams_are_limited(store, monkeypatch):
     first = store.add_team("Falken", "", ADA)
     for name in ("falken", "FALKEN ", "Fal\u200bken"):
-        with pytest.raises(Refused, match="taken"):
+        with pytest.raises(RefusedError, match="taken"):
             store.add_team(name, "", ADA)
     second = store.add_team("Adler", "", ADA)
-    with pytest.raises(Refused, match="taken"):
+    with pytest.raises(RefusedError, match="taken"):
         store.change_team(second, "FALKEN", None, None, ADA)
     store.change_team(first, "FALKEN", None, None, ADA)  # its own
-    assert MOST_TEAMS == 500
-    monkeypatch.setattr("monitor.competition.store.MOST_TEAMS", 3)
+    assert MAX_TEAMS == 500
+    monkeypatch.setattr("monitor.competition.store.MAX_TEAMS", 3)
     store.add_team("Third", "", ADA)
-    with pytest.raises(Refused, match="3 is the most"):
+    with pytest.raises(RefusedError, match="3 teams is the limit"):
         store.add_team("One more", "", ADA)
     assert len(store.board().teams) == 3
 
@@ -172,13 +174,13 @@ def test_a_team_that_is_withdrawn_is_not_ranked_and_not_called(store):
     store.change_team(team, None, None, True, ADA)
     board = store.board()
     assert board.rankings[0].rows == () and board.teams[0].withdrawn
-    with pytest.raises(Refused, match="withdrawn"):
+    with pytest.raises(RefusedError, match="withdrawn"):
         store.call(team, "", ADA)
     store.change_team(team, None, "Ann", False, ADA)
     assert row_of(store, team).name == "Falken"
 
 
-def test_a_round_is_drawn_again_until_somebody_flew_in_it(store):
+def test_a_round_is_drawn_again_until_a_try_is_flown_in_it(store):
     team = store.add_team("Falken", "", ADA)
     three = dict.fromkeys(("case-1", "case-2", "case-3"), COLOURS)
     assert store.board().round == 0
@@ -206,11 +208,10 @@ def test_without_a_draw_what_is_flown_makes_the_round(store):
 
 def test_the_rule_is_kept_and_changes_the_ranking(store):
     team = store.add_team("Falken", "", ADA)
-    assert store.rule() == Rule()
-    store.set_rule(Rule(100.0, 10.0, 2, "last"), BOB)
-    assert store.rule() == Rule(100.0, 10.0, 2, "last")
-    board = store.board()
-    assert (board.rule.who, board.rule.at) == ("Bob", BOB.at)
+    assert store.board().rule == RuleView(**asdict(Rule()), who="", at=None)
+    rule = Rule(100.0, 10.0, 2, "last")
+    store.set_rule(rule, BOB)
+    assert store.board().rule == RuleView(**asdict(rule), who="Bob", at=BOB.at)
     assert row_of(store, team).total_s == 2 * 130.0
 
 
@@ -228,7 +229,7 @@ def test_a_try_that_ran_when_the_monitor_stopped_is_to_be_judged_by_hand(store):
     assert store.interrupt() == 0
 
 
-def test_a_try_found_interrupted_goes_on_when_the_fleet_still_knows_it(store):
+def test_an_interrupted_try_continues_with_the_next_event(store):
     store.take(event("began", "k", time_s=0.0), COLOURS, NOW)
     store.interrupt()
     store.take(event("running", "k", time_s=17.0), COLOURS, NOW)
@@ -255,7 +256,7 @@ def test_everything_is_there_after_reopening(database_url):
 @pytest.mark.parametrize(
     "value", [nan, inf, "\x00\ud800", {"a": {"b": nan}}, 10**400, b"x", None, "x" * 200_000]
 )
-def test_whatever_a_referee_sends_is_survived(store, value):
+def test_any_report_of_a_referee_is_stored(store, value):
     told = event("ended", "k", told={"reason": value, "try_time_s": value, "contacts": value})
     store.take(told, COLOURS, NOW)
     (each,) = store.board().tries
@@ -271,22 +272,22 @@ def test_what_does_not_exist_is_named(store):
         lambda: store.call(7, "", ADA),
         lambda: store.change_team(7, "A", None, None, ADA),
     ):
-        with pytest.raises(Refused, match=r"(try|team) 7 does not exist") as refusal:
+        with pytest.raises(RefusedError, match=r"(try|team) 7 does not exist") as refusal:
             work()
         assert refusal.value.status == 404
     number = fly(store, "k")
-    with pytest.raises(Refused, match="team 9 does not exist"):
+    with pytest.raises(RefusedError, match="team 9 does not exist"):
         store.assign(number, 0, 9, ADA)
 
 
-def test_a_try_cannot_be_changed_without_end(store):
+def test_a_try_cannot_be_changed_more_than_200_times(store):
     number = fly(store, "k")
     with store._database.transaction() as session:
-        for count in range(MOST_JUDGEMENTS):
+        for count in range(MAX_JUDGEMENTS):
             session.add(
                 tables.Judgement(
                     try_id=number, number=count + 1, kind="team", team_id=None, who="x", at=NOW, remarks=""
                 )
             )
-    with pytest.raises(Refused, match="200 is the most"):
-        store.correct(number, MOST_JUDGEMENTS, Correction(), "", ADA)
+    with pytest.raises(RefusedError, match="200 is the limit"):
+        store.correct(number, MAX_JUDGEMENTS, Correction(), "", ADA)

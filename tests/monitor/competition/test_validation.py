@@ -1,6 +1,6 @@
 import pytest
 
-from monitor.competition.words import Refused, free_text, from_wire, name_key, shown, team_name
+from monitor.competition.validation import RefusedError, free_text, from_wire, name_key, shown, team_name
 
 
 @pytest.mark.parametrize("name", ["A", "x" * 60, "Équipe Ñandú 🚁", "الصقور", "ฝูงบิน", "<b>", "=1+1", "👩‍🚀"])
@@ -24,8 +24,8 @@ def test_names_of_all_kinds_are_taken(name):
         "\x1b[31m",
     ],
 )
-def test_names_that_show_nothing_or_control_something_are_refused_in_one_line(name):
-    with pytest.raises(Refused, match=r"^name ") as refusal:
+def test_invisible_names_and_control_characters_are_refused_in_one_line(name):
+    with pytest.raises(RefusedError, match=r"^name ") as refusal:
         team_name(name)
     words = str(refusal.value)
     assert len(words.splitlines()) == 1 and "\x1b" not in words and refusal.value.status == 422
@@ -45,13 +45,13 @@ def test_different_names_differ():
 
 def test_remarks_may_have_lines_but_no_other_controls():
     assert free_text(" a\r\nb\tc\n", "remarks", 10) == "a\nb\tc"
-    with pytest.raises(Refused, match=r"remarks .* 11 characters; use 10"):
+    with pytest.raises(RefusedError, match=r"remarks .* 11 characters; use 10"):
         free_text("x" * 11, "remarks", 10)
-    with pytest.raises(Refused, match="control"):
+    with pytest.raises(RefusedError, match="control"):
         free_text("a\x07", "remarks", 10)
 
 
-def test_texts_from_a_wire_are_made_harmless():
+def test_received_texts_are_cut_and_lose_control_characters():
     assert from_wire("truth\x00\ud800\n" + "x" * 100, 20) == "truth" + "x" * 12
     assert from_wire(None, 5) == from_wire(17, 5) == ""
 
