@@ -7,9 +7,8 @@ import socket
 from collections.abc import Callable
 from typing import TYPE_CHECKING
 
-from monitor.qr_code import terminal_code
 from monitor.settings import BACKLOG, MonitorError, MonitorSettings
-from monitor.urls import is_for_others, url_of, urls_for_people
+from monitor.urls import is_for_others, terminal_code, url_of, urls_for_people
 
 if TYPE_CHECKING:
     import uvicorn

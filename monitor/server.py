@@ -23,33 +23,25 @@ from starlette.staticfiles import StaticFiles
 from starlette.types import ASGIApp, Scope
 from uvicorn.middleware.proxy_headers import ProxyHeadersMiddleware
 
-from monitor.access import Access
+from monitor.access import Access, SessionFile, session_path
 from monitor.connections import Connections, Gate
 from monitor.fleet import Fleet
 from monitor.ports import Equipment
 from monitor.security import Guard
-from monitor.sessions import SessionFile, session_path
 from monitor.settings import BACKLOG, MonitorSettings
 
 Job = Callable[[], Coroutine[Any, Any, None]]
 
-# Each has `register(monitor)`. One line a module.
+# Each has `register(monitor)`.
 MODULES = (
     "monitor.live_channel",
     "monitor.video_proxy",
-    "monitor.pages.login",
-    "monitor.pages.live",
-    "monitor.pages.chart",
-    "monitor.pilot",
-    "monitor.pages.pilot",
+    "monitor.pilot_channel",
     "monitor.replay_api",
-    "monitor.pages.replay",
     "monitor.competition.api",
     "monitor.competition.stage",
-    "monitor.pages.competition",
-    "monitor.pages.judge",
-    "monitor.pages.ranking",
-    "monitor.pages.stage",
+    "monitor.pages.login",
+    "monitor.pages.table",
     "monitor.pages.join",
 )
 

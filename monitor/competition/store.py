@@ -37,7 +37,7 @@ from monitor.competition.database import Database
 from monitor.competition.rules import Correction, Rule, correct, read_report
 from monitor.competition.views import Board, TryDetail
 from monitor.competition.words import Refused, free_text, from_wire, name_key, shown, team_name
-from monitor.tries import TryEvent
+from monitor.vehicle.tries import TryEvent
 from scenarios.result import RefereeReport
 
 MOST_TEAMS = 500

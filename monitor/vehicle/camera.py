@@ -7,8 +7,7 @@ from collections.abc import Collection
 from ipaddress import IPv4Address, IPv6Address, ip_address
 from urllib.parse import SplitResult, urlsplit
 
-from monitor.ports import Message
-from wire.dialect import mavlink
+from wire.dialect import Message, mavlink
 from wire.simulator_api import VIDEO_PATH
 from wire.status_text import plain
 from wire.transports.urls import LinkError, parse_url

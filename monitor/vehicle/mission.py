@@ -7,8 +7,8 @@ from typing import Annotated, Any
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
-from monitor.ports import Message
 from scenarios.result import FlightResult, first_error
+from wire.dialect import Message
 from wire.finite_json import finite
 from wire.mission_codec import DocumentAssembler, PayloadError, decode_detections, decode_state
 from wire.mission_messages import (

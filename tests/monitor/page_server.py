@@ -15,8 +15,7 @@ from aiohttp import WSMsgType, web
 
 import monitor
 from monitor.access import Visitor
-from monitor.pages import live, stage
-from monitor.pages.shell import HEAD, header_html
+from monitor.pages.shell import HEAD, header_html, style_links
 
 STATIC = Path(monitor.__file__).parent / "static"
 ELEMENTS = Path(nicegui.__file__).parent / "elements"
@@ -94,7 +93,7 @@ class FakeMonitor:
         name, module = PAGES[request.path]
         is_bare = name == "stage"
         header = "" if is_bare else header_html(Visitor("", may_judge=False, may_fly=False), request.path)
-        style = stage.STYLE if is_bare else live.STYLE
+        style = style_links("monitor", "stage") if is_bare else style_links("monitor")
         return web.Response(
             content_type="text/html",
             text=f'<!doctype html><html lang="en"><head><meta name="viewport" content="width=device-width">'

@@ -135,5 +135,5 @@ async def serving_runs(monkeypatch, library):
     """The monitor with the replay's modules and a library; yields a `Served`."""
     plain = serving_module.equipment()
     monkeypatch.setattr(serving_module, "equipment", lambda: dataclasses.replace(plain, runs=library))
-    async with serving(monkeypatch, "monitor.replay_api", "monitor.pages.replay") as served:
+    async with serving(monkeypatch, "monitor.replay_api", "monitor.pages.table") as served:
         yield served

@@ -23,7 +23,7 @@ from firmware_py.mavlink.node import MavlinkNode, NodeOptions
 from firmware_py.mavlink.rates import GROUND, ONBOARD
 from framerunner.flying.plan import FlightPlan
 from geometry.axes import flip_vector
-from monitor.ports import Equipment, Message
+from monitor.ports import Equipment
 from scenarios.loader import list_scenarios, load_scenario
 from scenarios.models import Scenario
 from scenarios.truth import TrueState
@@ -32,7 +32,7 @@ from sitl.simulation import Simulation
 from sitl.video import VideoServer
 from sitl.world import CONTROL_PERIOD_US
 from tests.node_input import deliver
-from wire.dialect import mavlink
+from wire.dialect import Message, mavlink
 from wire.mission_messages import COMPONENT_ID
 from wire.transports.urls import LinkError
 
@@ -125,7 +125,7 @@ class SimulatedDrone:
 
 
 class SimulatedLink:
-    """`monitor.ports.Link` to drones in this process; system ids count from 1.
+    """In place of a `VehicleLink`: to drones in this process; system ids count from 1.
 
     Attributes:
         drones: by place, 0 for system 1.

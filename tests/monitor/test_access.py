@@ -3,8 +3,16 @@ from pathlib import Path
 import pytest
 from starlette.requests import HTTPConnection
 
-from monitor.access import LONGEST_NAME, SESSION_S, TRIES_A_MINUTE, Access, LoginRefusedError, Visitor
-from monitor.sessions import SessionFile, session_path
+from monitor.access import (
+    MAX_NAME_LENGTH,
+    SESSION_S,
+    TRIES_A_MINUTE,
+    Access,
+    LoginRefusedError,
+    SessionFile,
+    Visitor,
+    session_path,
+)
 from tests.monitor.serving import browser, serving
 
 SAMPLE = "tests.monitor.sample_page"
@@ -43,7 +51,7 @@ async def test_a_restart_keeps_judges_logged_in_until_their_session_ends(tmp_pat
     wall.now_s = 1e9
 
     def start(password=PASSWORD, cookie="judge-8080"):
-        # The clock of each start begins anew, as a machine's does; Unix time goes on.
+        # The clock starts at 0 each time, as a machine's does; Unix time goes on.
         kept = SessionFile(path, cookie, wall)
         return Access(password, all_may_fly=False, clock=Clock(), cookie=cookie, kept=kept)
 
@@ -126,7 +134,7 @@ async def test_a_one_time_link_is_good_once_and_a_new_one_is_made():
     assert min(len(link) for link in links) >= 43  # 256 bits
 
 
-@pytest.mark.parametrize("name", ["", "  ", "x" * (LONGEST_NAME + 1), "a\nb", "a\u202eb", "a\x00b"])
+@pytest.mark.parametrize("name", ["", "  ", "x" * (MAX_NAME_LENGTH + 1), "a\nb", "a\u202eb", "a\x00b"])
 async def test_a_name_that_cannot_be_read_is_refused(name):
     access = Access(PASSWORD, all_may_fly=True)
     with pytest.raises(LoginRefusedError) as refused:

@@ -7,7 +7,7 @@ from math import hypot
 
 import pytest
 
-from monitor.sticks import Sticks
+from monitor.vehicle.commands import Sticks
 from scenarios.loader import load_scenario
 from tests.monitor.simulated_link import SimulatedLink, all_finite, equipment, served_link
 from tests.monitor.watching import watching
@@ -133,16 +133,16 @@ async def test_two_drones_are_told_apart():
     assert watched.notices()[:2] == ["drone 1 is heard", "drone 2 is heard"]
 
 
-async def test_a_restart_is_noticed_and_all_begins_anew(link):
+async def test_a_restart_is_reported_and_resets_all(link):
     async with watching(equipment(link, SCENARIO)) as watched:
         await fly_a_little(watched, link)
         link.restart()
-        await watched.until(lambda: "drone 1 has started anew" in watched.notices())
+        await watched.until(lambda: "drone 1 has restarted" in watched.notices())
         await watched.until_ready(link)
         with link.lock:
             assert error_m(link.drones[0], watched.pose()) < 0.01
         assert not watched.status()["armed"]
-    assert watched.notices().count("drone 1 has started anew") == 1
+    assert watched.notices().count("drone 1 has restarted") == 1
 
 
 async def test_a_silent_drone_is_stale_then_lost_then_back():

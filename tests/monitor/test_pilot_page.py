@@ -10,7 +10,7 @@ from monitor import pilot_seat
 from monitor.access import Access, Visitor
 from monitor.pilot_seat import NEUTRAL
 from monitor.ports import Equipment
-from monitor.sticks import Sticks
+from monitor.vehicle.commands import Sticks
 from tests.chromium import Complaints
 from tests.monitor.pilot_fakes import MISSION, FakeFleet
 from tests.monitor.pilot_server import served
@@ -105,7 +105,7 @@ async def monitor(monkeypatch, tmp_path, chromium):
 
     monkeypatch.setattr("monitor.server.Fleet", make_fleet)
     monkeypatch.setattr(pilot_seat, "SILENT_S", 20.0)  # a busy machine is not a page that fell silent
-    monkeypatch.setattr(pilot_seat, "FORSAKEN_S", 60.0)
+    monkeypatch.setattr(pilot_seat, "ABANDONED_S", 60.0)
     async with served(EQUIPMENT, tmp_path) as url:
 
         async def open_window(viewport=None, touch=False):

@@ -5,10 +5,9 @@ from contextlib import suppress
 
 import pytest
 
-from monitor.pilot_desk import Browser, PilotDesk
-from monitor.pilot_messages import Order
-from monitor.pilot_seat import NEUTRAL, Clock, Hands, Person
-from monitor.sticks import Sticks
+from monitor.pilot_channel import PilotDesk
+from monitor.pilot_seat import NEUTRAL, Browser, Clock, Control, Order
+from monitor.vehicle.commands import Sticks
 from tests.monitor.pilot_fakes import MISSION, FakeFleet
 
 FORWARD = Sticks(0.5, 0.0, 0.0, 0.0)
@@ -103,7 +102,7 @@ async def test_taking_sends_neutral_sticks_before_it_asks_for_position_mode(game
     answer = await task
     assert answer.ok and "drone 1" in answer.text
     assert game.fleet.orders == ["position"]
-    assert game.seat().hands is Hands.ON
+    assert game.seat().control is Control.ACTIVE
     assert game.fleet.pilots[1] == "Ana"
 
 
@@ -129,7 +128,7 @@ async def test_a_refusal_comes_back_in_the_vehicles_words_and_frees_the_seat(gam
     game.fleet.refuse["position"] = "Switching to Position is currently not available: no position"
     answer = await game.order(ana, "take")
     assert not answer.ok and answer.text == game.fleet.refuse["position"]
-    assert game.seat().person is None and game.seat().hands is Hands.OFF
+    assert game.seat().holder is None and game.seat().control is Control.NONE
 
 
 async def test_silence_for_half_a_second_centres_the_sticks_and_asks_for_hold(game):
@@ -165,7 +164,7 @@ async def test_a_closed_page_has_the_drone_hold_at_once(game):
     ana = game.browser("Ana")
     await game.take(ana)
     game.desk.sticks(ana, FORWARD)
-    game.desk.go(ana)
+    game.desk.remove(ana)
     assert game.last_sticks() == NEUTRAL
     await game.settle()
     assert game.fleet.orders[-1] == "hold"
@@ -181,7 +180,7 @@ async def test_hold_is_asked_for_until_the_drone_obeys(game):
     assert (1, "error", "drone 1 does not hold: drone 1 does not answer") in game.fleet.notices
     del game.fleet.refuse["hold"]
     await game.pass_time(1.1)
-    assert game.seat().hands is Hands.OFF and game.fleet.orders.count("hold") == 4
+    assert game.seat().control is Control.NONE and game.fleet.orders.count("hold") == 4
 
 
 async def test_a_failsafe_that_flies_the_drone_is_not_disturbed_by_silence(game):
@@ -199,9 +198,9 @@ async def test_a_page_that_closes_while_it_takes_the_sticks_leaves_a_drone_that_
     task = asyncio.create_task(game.desk.do(ana, Order(1, "take")))
     await game.pass_time(0.5, ana)
     assert game.fleet.orders == ["position"]
-    game.desk.go(ana)
+    game.desk.remove(ana)
     await game.settle()
-    assert game.fleet.orders == ["position", "hold"] and game.seat().person is None
+    assert game.fleet.orders == ["position", "hold"] and game.seat().holder is None
     assert not (await task).ok
 
 
@@ -211,7 +210,7 @@ async def test_giving_back_lets_the_waiting_mission_go_on(game):
     game.fleet.status[1]["mission"] = MISSION
     answer = await game.order(ana, "give")
     assert answer.ok and answer.text == "the mission frame_challenge goes on"
-    assert game.fleet.orders == ["position", "offboard"] and game.seat().person is None
+    assert game.fleet.orders == ["position", "offboard"] and game.seat().holder is None
 
 
 @pytest.mark.parametrize("mission", [None, MISSION | {"paused": False}, MISSION | {"alive": False}])
@@ -250,11 +249,11 @@ async def test_giving_back_and_closing_the_page_does_not_interrupt_the_giving(ga
     game.fleet.gates["offboard"] = asyncio.Event()
     task = asyncio.create_task(game.desk.do(ana, Order(1, "give")))
     await game.settle()
-    game.desk.go(ana)
+    game.desk.remove(ana)
     game.fleet.gates["offboard"].set()
     assert (await task).ok
     await game.pass_time(1.0)
-    assert game.fleet.orders == ["position", "offboard"] and game.seat().hands is Hands.OFF
+    assert game.fleet.orders == ["position", "offboard"] and game.seat().control is Control.NONE
 
 
 async def test_neutral_sticks_go_on_until_the_drone_is_disarmed(game):
@@ -281,7 +280,7 @@ async def test_a_taken_seat_is_refused_until_its_holder_was_silent_for_five_seco
     assert not (await game.order(ben, "take")).ok
     await game.pass_time(0.3)
     await game.take(ben)
-    assert game.seat().person is ben
+    assert game.seat().holder is ben
     game.desk.sticks(ana, FORWARD)
     assert game.last_sticks() == NEUTRAL
 
@@ -291,7 +290,7 @@ async def test_a_judge_takes_over_at_any_time_and_the_pilot_is_told(game):
     await game.take(ana)
     await game.pass_time(0.1, ana, FORWARD)
     await game.take(judge)
-    assert game.seat().person is judge and game.last_sticks() == NEUTRAL
+    assert game.seat().holder is judge and game.last_sticks() == NEUTRAL
     assert not game.told["Ana"][-1]["yours"]
     assert (1, "warning", "Judge took the sticks of drone 1 from Ana") in game.fleet.notices
 
@@ -328,7 +327,7 @@ async def test_hold_overtakes_an_order_under_way_and_others_wait(game):
     assert not answer.ok and answer.text == "drone 1 has not answered to take yet"
     assert (await game.order(ana, "hold")).ok
     assert not (await taking).ok
-    assert game.seat().hands is Hands.OFF and game.seat().person is ana
+    assert game.seat().control is Control.NONE and game.seat().holder is ana
 
 
 async def test_after_hold_the_sticks_fly_only_when_taken_again(game):
@@ -336,7 +335,7 @@ async def test_after_hold_the_sticks_fly_only_when_taken_again(game):
     await game.take(ana)
     assert (await game.order(ana, "hold")).ok
     await game.pass_time(0.1, ana, FORWARD)
-    assert game.last_sticks() == NEUTRAL and game.seat().person is ana
+    assert game.last_sticks() == NEUTRAL and game.seat().holder is ana
 
 
 async def test_after_a_take_off_by_button_the_pilot_flies_on(game):
@@ -385,15 +384,15 @@ async def test_a_fault_in_one_seat_does_not_stop_the_dead_man_of_another(game, c
     await game.take(ben, number=2)
     game.seat(1).tick = lambda: 1 / 0
     await game.pass_time(0.6)
-    assert game.seat(2).hands is Hands.OFF and game.fleet.orders[-1] == "hold"
-    assert "looking after its pilot failed" in caplog.text
+    assert game.seat(2).control is Control.NONE and game.fleet.orders[-1] == "hold"
+    assert "the update of its seat failed" in caplog.text
 
 
 async def test_the_watch_runs_by_itself_while_a_browser_is_there():
     fleet, told = FakeFleet(), []
     desk = PilotDesk(fleet)
     ana = Browser("Ana", False, told.append)
-    desk.come(ana)
+    desk.add(ana)
     loop = asyncio.get_running_loop()
     task = asyncio.create_task(desk.do(ana, Order(1, "take")))
     while not task.done():
@@ -403,8 +402,8 @@ async def test_the_watch_runs_by_itself_while_a_browser_is_there():
     async with asyncio.timeout(5.0):
         await fleet.held.wait()
     assert loop.time() - silent_since_s > 0.4
-    desk.go(ana)
+    desk.remove(ana)
 
 
 def test_people_are_told_apart_by_who_they_are_and_not_by_their_names():
-    assert Person("Ana") != Person("Ana")
+    assert Browser("Ana") != Browser("Ana")

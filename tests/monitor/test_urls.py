@@ -8,8 +8,14 @@ import pytest
 from ifaddr import IP, Adapter
 
 from monitor import urls
-from monitor.qr_code import terminal_code
-from monitor.urls import is_for_others, network_addresses, url_of, urls_for_people, urls_for_visitor
+from monitor.urls import (
+    is_for_others,
+    network_addresses,
+    terminal_code,
+    url_of,
+    urls_for_people,
+    urls_for_visitor,
+)
 from tests.monitor.serving import browser, serving
 
 ADAPTERS = (
@@ -26,7 +32,7 @@ LINK = "http://192.168.178.123:8080/login?token=" + "aB3_-xYz" * 5 + "abc"
 def networks(monkeypatch):
     """A machine with a cable, a wireless network that leads elsewhere, and what no phone reaches."""
     monkeypatch.setattr(urls.ifaddr, "get_adapters", lambda: ADAPTERS)
-    monkeypatch.setattr(urls, "_first_choice", lambda: "192.168.1.5")
+    monkeypatch.setattr(urls, "_default_address", lambda: "192.168.1.5")
 
 
 def read_code(image):

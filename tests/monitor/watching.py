@@ -6,7 +6,7 @@ import asyncio
 from contextlib import asynccontextmanager
 
 from monitor.fleet import Fleet
-from monitor.tries import TryEvent
+from monitor.vehicle.tries import TryEvent
 
 
 class Watched:

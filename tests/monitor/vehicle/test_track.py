@@ -1,10 +1,12 @@
-"""Local axes laid into the arena: by the referee, by the start, by the app."""
+"""Where a vehicle is in the arena: by the referee, by the start, by the app; and where it was."""
 
+from itertools import pairwise
 from math import cos, pi, sin
 
 import pytest
 
-from monitor.vehicle.placement import Placement, Source
+from monitor.vehicle import track
+from monitor.vehicle.track import History, Placement, Source
 from wire.dialect import mavlink
 from wire.vehicle_telemetry import PositionReport, VehicleTelemetry
 
@@ -62,3 +64,63 @@ def test_one_that_is_carried_lays_nothing():
     placement = Placement()
     placement.lay_by_start((1.0, 1.0, 1.0, 0.0), telemetry)
     assert placement.source is Source.GUESS
+
+
+def pose(t, x=0.0, on=True, state=3, yaw=0.5):
+    q = [cos(yaw / 2), 0.0, 0.0, sin(yaw / 2)]
+    return {
+        "t": t,
+        "p": [x, 1.0, 2.0],
+        "q": q,
+        "v": [0.1, 0.2, 0.3],
+        "r": 0.4,
+        "c": None,
+        "on": on,
+        "s": state,
+    }
+
+
+def test_a_sample_has_all_that_the_plots_show():
+    kept = History()
+    kept.add(pose(5.0, x=-1.5))
+    kept.add(pose(5.0, x=9.0))  # nothing new came
+    kept.add({**pose(5.1), "c": [1.0, 2.0, 3.0, 4.0]})
+    none = [None] * 4
+    assert kept.rows() == [
+        [5.0, -1.5, 1.0, 2.0, 0.5, 0.1, 0.2, 0.3, 0.4, *none, 1, 3],
+        [5.1, 0.0, 1.0, 2.0, 0.5, 0.1, 0.2, 0.3, 0.4, 1.0, 2.0, 3.0, 4.0, 1, 3],
+    ]
+
+
+def test_a_flight_begins_with_the_motors():
+    kept = History()
+    for t in (1.0, 2.0):
+        kept.add(pose(t, on=False))
+    for t in (3.0, 4.0):
+        kept.add(pose(t))
+    kept.add(pose(5.0, on=False))
+    assert [row[0] for row in kept.rows()] == [3.0, 4.0, 5.0]
+    kept.add(pose(6.0))
+    assert [row[0] for row in kept.rows()] == [6.0]
+
+
+def test_the_past_is_bounded_and_the_whole_trail_stays(monkeypatch):
+    monkeypatch.setattr(track, "MAX_OLDER", 50)
+    kept = History()
+    for step in range(20_000):
+        kept.add(pose(0.1 * step, x=0.02 * step))
+    rows = kept.rows()
+    recent = [row for row in rows if row[0] >= rows[-1][0] - track.RECENT_S]
+    assert len(recent) == pytest.approx(600, abs=2)
+    assert len(rows) <= 50 + len(recent)
+    assert rows[0][0] == 0.0
+    gaps = [after[1] - before[1] for before, after in pairwise(rows)]
+    assert max(gaps) < 40.0
+
+
+def test_where_it_hovers_only_a_change_of_state_is_kept():
+    kept = History()
+    for step in range(3000):
+        kept.add(pose(0.1 * step, state=step // 1000))
+    older = [row for row in kept.rows() if row[0] < 0.1 * 2999 - track.RECENT_S]
+    assert [(row[0], row[14]) for row in older] == [(0.0, 0), (100.0, 1), (200.0, 2)]

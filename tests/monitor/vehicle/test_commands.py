@@ -5,8 +5,7 @@ import asyncio
 import pytest
 
 from firmware_py.status import FlightMode
-from monitor.sticks import Sticks
-from monitor.vehicle.orders import CommandDesk
+from monitor.vehicle.commands import CommandSender, Sticks
 from scenarios.loader import load_scenario
 from tests.monitor.simulated_link import SimulatedLink, equipment
 from tests.monitor.watching import watching
@@ -118,27 +117,27 @@ def ack(number, result, target=250):
 
 async def test_in_progress_waits_longer_and_others_answers_are_not_ours():
     sent = []
-    desk = CommandDesk(1, sent.append)
-    asked = asyncio.create_task(desk.ask(22))
+    sender = CommandSender(1, sent.append)
+    asked = asyncio.create_task(sender.request(22))
     await asyncio.sleep(0)
-    desk.take(ack(22, 0, target=255))  # of another ground station
-    desk.take(ack(400, 0))
-    desk.take(ack(22, 5))  # in progress
+    sender.take(ack(22, 0, target=255))  # of another ground station
+    sender.take(ack(400, 0))
+    sender.take(ack(22, 5))  # in progress
     await asyncio.sleep(0.8)
     assert not asked.done()
     assert len(sent) == 1
-    desk.take(ack(22, 2))
+    sender.take(ack(22, 2))
     assert await asked == 2
 
 
 async def test_stopping_does_not_wait_for_its_turn():
     sent = []
-    desk = CommandDesk(1, sent.append)
-    arming = asyncio.create_task(desk.ask(400, 1.0))
+    sender = CommandSender(1, sent.append)
+    arming = asyncio.create_task(sender.request(400, 1.0))
     await asyncio.sleep(0)
-    stopping = asyncio.create_task(desk.ask(400, 0.0, 21196.0, urgent=True))
+    stopping = asyncio.create_task(sender.request(400, 0.0, 21196.0, urgent=True))
     await asyncio.sleep(0)
     assert [(m.param1, m.param2) for m in sent] == [(1.0, 0.0), (0.0, 21196.0)]
-    desk.take(ack(400, 0))
+    sender.take(ack(400, 0))
     assert await stopping == 0
     assert await arming is None

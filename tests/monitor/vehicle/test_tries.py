@@ -4,8 +4,7 @@ from dataclasses import replace
 
 import pytest
 
-from monitor.tries import TryWatch
-from monitor.vehicle.judging import figures
+from monitor.vehicle.tries import TryWatch, figures
 from scenarios.result import FlightResult, RefereeReport, RefereeSnapshot, Standing
 
 FLYING = RefereeSnapshot(5_000_000, 10.0, 0.0, ("red",), "green", 0, True, True, False, False)
@@ -160,7 +159,7 @@ def test_the_next_try_ends_one_that_was_left(watch, events):
 def test_a_restart_ends_it(watch, events):
     watch.see(standing(), 1.0)
     watch.close()
-    assert events[-1].report.reason.endswith("the drone started anew")
+    assert events[-1].report.reason.endswith("the drone restarted")
 
 
 def test_where_nobody_else_judges_the_apps_word_stands(watch, events):

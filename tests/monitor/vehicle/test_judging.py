@@ -4,7 +4,7 @@ import pytest
 
 from firmware_py.status import FlightMode
 from framerunner.flying.plan import FlightPlan
-from monitor.vehicle.placement import Source
+from monitor.vehicle.track import Source
 from scenarios.loader import load_scenario
 from scenarios.truth import TrueState
 from tests.monitor.simulated_link import SimulatedLink, equipment, served_link
