@@ -34,7 +34,7 @@ class BusyError(RunError):
 def register(monitor: Monitor) -> None:
     """Add the addresses of recorded flights."""
     answers = _Answers(monitor.equipment.runs)
-    monitor.jobs.append(answers.close_at_end)
+    monitor.at_end(answers.close)
     monitor.web.add_api_route("/api/runs", answers.listing)
     monitor.web.add_api_route("/api/runs/{name}", answers.run)
     monitor.web.add_api_route("/api/runs/{name}/result.json", answers.result)
@@ -84,13 +84,10 @@ class _Answers:
         self._queue = None if library is None else _ReadingQueue(library)
         self._packed: OrderedDict[str, tuple[object, bytes, str]] = OrderedDict()
 
-    async def close_at_end(self) -> None:
-        """Wait until cancelled, then stop what the library is reading."""
-        try:
-            await asyncio.Event().wait()
-        finally:
-            if self._library is not None:
-                self._library.close()
+    def close(self) -> None:
+        """Stop what the library is reading."""
+        if self._library is not None:
+            self._library.close()
 
     async def listing(self, request: Request) -> Response:
         """All runs, newest first; none if there is no library."""

@@ -34,8 +34,8 @@ def register(monitor: Monitor) -> None:
         found = urls(request)
         codes = _codes(found) if found else _NO_NETWORK if for_others else _LOCAL_ONLY
         content = f"<h1>Open it on a phone</h1>{codes}"
-        visitor, styles = monitor.access.visitor(request), style_links("competition")
-        return html_page(visitor, "/join", "On a phone", content, styles=styles, classes="join")
+        visitor, head = monitor.access.visitor(request), style_links("competition")
+        return html_page(visitor, "/join", "On a phone", content, head=head, classes="join")
 
     @monitor.web.get("/join.svg")
     async def code(request: Request) -> Response:

@@ -41,7 +41,7 @@ def shell(monitor: Monitor, request: Request, title: str, here: str) -> Iterator
         monitor: the running monitor.
         request: the page's request.
         title: for the browser's tab.
-        here: path that is marked in the navigation.
+        here: path that is marked in the navigation; "": no header and navigation, for a projector.
 
     Yields:
         The visitor who opened the page.
@@ -49,7 +49,8 @@ def shell(monitor: Monitor, request: Request, title: str, here: str) -> Iterator
     visitor = monitor.access.visitor(request)
     ui.page_title(f"{title} – framerunner")
     ui.add_head_html(HEAD)
-    ui.add_body_html(header_html(visitor, here))
+    if here:
+        ui.add_body_html(header_html(visitor, here))
     main = ui.element("main").classes("page")
     main.props["id"] = "main"
     main.props["tabindex"] = "-1"  # the skip link moves the focus here
@@ -57,42 +58,24 @@ def shell(monitor: Monitor, request: Request, title: str, here: str) -> Iterator
         yield visitor
 
 
-@contextmanager
-def bare(title: str) -> Iterator[None]:
-    """As `shell`, without header and navigation: for a projector."""
-    ui.page_title(f"{title} – framerunner")
-    ui.add_head_html(HEAD)
-    main = ui.element("main").classes("page")
-    main.props["id"] = "main"
-    with main:
-        yield
-
-
 def html_page(
-    visitor: Visitor,
-    here: str,
-    title: str,
-    content: str,
-    *,
-    styles: str = "",
-    classes: str = "",
-    status: int = 200,
+    visitor: Visitor, here: str, title: str, content: str, *, head: str = "", classes: str, status: int = 200
 ) -> HTMLResponse:
-    """A page with the same frame but without NiceGUI and JavaScript of its own; browsers do not store it.
+    """A page with the same frame, but without NiceGUI and its own JavaScript; browsers do not store it.
 
     Args:
         visitor: who opened the page.
         here: path that is marked in the navigation.
         title: for the browser's tab.
         content: HTML within `<main>`.
-        styles: HTML for the head, of `style_links`.
-        classes: further CSS classes of `<main>`.
+        head: further HTML for the head.
+        classes: CSS classes of `<main>`.
         status: HTTP status.
     """
     return HTMLResponse(
         f'<!doctype html><html lang="en"><head><meta charset="utf-8"><title>{title} – framerunner</title>'
         '<meta name="viewport" content="width=device-width, initial-scale=1">'
-        f"{HEAD}{styles}</head><body>{header_html(visitor, here)}"
+        f"{HEAD}{head}</head><body>{header_html(visitor, here)}"
         f'<main class="page {classes}" id="main" tabindex="-1">{content}</main></body></html>',
         status_code=status,
         headers={"Cache-Control": "no-store"},

@@ -10,7 +10,6 @@ from typing import Any
 import aiohttp
 from pydantic import ValidationError
 
-from geometry.vectors import Quaternion, Vec3
 from monitor.ports import Referee
 from scenarios.models import Scenario
 from scenarios.result import Standing, first_error
@@ -124,31 +123,16 @@ class TelemetryReferee:
         self._scenario = scenario
         self._make = make_referee
         self._referee = make_referee(scenario)
-        self._armed = False
+        self._motors_on = False
         self._has_state = False
 
-    def follow(
-        self,
-        time_us: int,
-        position_arena_m: Vec3,
-        velocity_arena_m_s: Vec3,
-        attitude: Quaternion,
-        armed: bool,
-    ) -> None:
-        """Take a state; arming after a try is over begins the next one.
-
-        Args:
-            time_us: vehicle time.
-            position_arena_m: shape (3,).
-            velocity_arena_m_s: shape (3,).
-            attitude: unit quaternion (w, x, y, z), body FLU to arena.
-            armed: motors on.
-        """
-        if armed and not self._armed and self._referee.snapshot().over:
+    def follow(self, state: TrueState) -> None:
+        """Take a state; when the motors come on after a try is over, the next one begins."""
+        if state.motors_on and not self._motors_on and self._referee.snapshot().over:
             self._referee = self._make(self._scenario)
-        self._armed = armed
+        self._motors_on = state.motors_on
         self._has_state = True
-        self._referee.update(TrueState(time_us, position_arena_m, velocity_arena_m_s, attitude, armed))
+        self._referee.update(state)
 
     def standing(self) -> Standing | None:
         """How the try stands; None before the first state."""

@@ -12,6 +12,7 @@ from monitor.vehicle.referees import RefereeChannel, TelemetryReferee
 from monitor.vehicle.track import Placement, Source
 from scenarios.models import Scenario
 from scenarios.result import FlightResult, RefereeReport, Standing
+from scenarios.truth import TrueState
 from wire.vehicle_telemetry import VehicleTelemetry
 
 _TELL_EVERY_S = 1.0
@@ -264,13 +265,14 @@ class Judging:
                 return
             self._on_telemetry = TelemetryReferee(scenario, self._equipment.make_referee)
         alignment = placement.alignment
-        self._on_telemetry.follow(
+        state = TrueState(
             position.time_us,
             alignment.position(position.position_ned_m),
             alignment.vector(position.velocity_ned_m_s),
             alignment.attitude(attitude.attitude_ned),
-            armed=telemetry.armed,
+            telemetry.armed,
         )
+        self._on_telemetry.follow(state)
 
     def tick(self, boot_unix_us: int | None, now_s: float, wall_boot_us: int) -> None:
         """Update the try; to be called several times a second.

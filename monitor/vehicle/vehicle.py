@@ -12,7 +12,7 @@ from typing import Any
 from monitor.ports import Equipment
 from monitor.vehicle.camera import CAMERAS, CameraWatch
 from monitor.vehicle.commands import Answer, CommandSender, StickStream, carry_out
-from monitor.vehicle.link_quality import BootTimeRequest, LinkQuality, RateWatch
+from monitor.vehicle.link_quality import LinkQuality, RateWatch, RepeatedRequest
 from monitor.vehicle.mission import MissionView
 from monitor.vehicle.referees import RefereeChannel
 from monitor.vehicle.texts import Texts
@@ -24,8 +24,10 @@ from wire.dialect import AUTOPILOT_COMPONENT_ID, Message, mavlink
 from wire.mission_messages import COMPONENT_ID as APP
 from wire.simulator_api import SimulatorApi
 from wire.vehicle_telemetry import VehicleTelemetry
+from wire.vehicles import request_message
 
 _FRESH_S = 1.0
+_MAX_BOOT_TIME_REQUESTS = 5
 _OTHER_BOOT_US = 10_000_000  # a referee whose clock is so far ahead reports the boot before
 
 JsonMessage = dict[str, Any]
@@ -99,7 +101,8 @@ class Vehicle:
         self._history_source = self._placement.source
         self._mission = MissionView(self.id)
         self._judging = Judging(self.id, self._equipment, self._callbacks.tell_try, now_s)
-        self._boot_time = BootTimeRequest(self.id)
+        boot_time = request_message(self.id, mavlink.MAVLINK_MSG_ID_SYSTEM_TIME)
+        self._boot_time = RepeatedRequest(boot_time, _MAX_BOOT_TIME_REQUESTS)
         self._rates = RateWatch(self.id, now_s)
         self._restarts = self._telemetry.restarts
         self._has_flown = False
@@ -300,8 +303,8 @@ class Vehicle:
     def _send_requests(self, now_s: float) -> None:
         telemetry = self._telemetry
         requests = [
-            self._boot_time.request(telemetry.boot_unix_us, now_s),
-            self.camera.question(now_s),
+            self._boot_time.due(now_s) if telemetry.boot_unix_us is None else None,
+            self.camera.request(now_s),
             *self._rates.requests((telemetry.attitudes, telemetry.positions), now_s),
         ]
         for request in requests:

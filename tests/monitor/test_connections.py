@@ -138,8 +138,8 @@ async def test_one_address_cannot_take_all_connections(monkeypatch):
 
 
 async def test_one_address_cannot_take_all_places_of_viewers(monkeypatch):
-    for module, kind in (("live_channel", "VIEWERS"), ("competition.channel", "WATCHERS")):
-        monkeypatch.setattr(f"monitor.{module}.MOST_{kind}_PER_ADDRESS", 2)
+    monkeypatch.setattr("monitor.live_channel.MAX_VIEWERS_PER_ADDRESS", 2)
+    monkeypatch.setattr("monitor.competition.channel.MOST_WATCHERS_PER_ADDRESS", 2)
     async with serving(monkeypatch, "monitor.competition.api") as served, browser() as client:
         elsewhere = aiohttp.TCPConnector(local_addr=(OTHER, 0))
         async with aiohttp.ClientSession(connector=elsewhere) as other:

@@ -4,7 +4,7 @@ import math
 
 import pytest
 
-from monitor.live_channel import MOST_PENDING, LiveChannel, Viewer, encode
+from monitor.live_channel import MAX_PENDING, LiveChannel, Viewer, encode
 from tests.monitor.serving import StubFleet, browser, serving
 
 
@@ -51,7 +51,7 @@ async def test_who_lets_events_pile_up_is_dropped():
     channel, slow, other = LiveChannel(StubFleet()), Viewer(["text"]), Viewer(["text"])
     channel.enter(slow)
     channel.enter(other)
-    for number in range(MOST_PENDING + 1):
+    for number in range(MAX_PENDING + 1):
         channel.tell({"kind": "text", "id": 1, "text": str(number)})
         assert json.loads(await other.next())["text"] == str(number)
     assert await slow.next() is None
@@ -110,7 +110,7 @@ async def test_a_page_may_ask_for_some_kinds_only(monkeypatch):
 
 
 async def test_too_many_viewers_are_turned_away(monkeypatch):
-    monkeypatch.setattr("monitor.live_channel.MOST_VIEWERS", 1)
+    monkeypatch.setattr("monitor.live_channel.MAX_VIEWERS", 1)
     async with (
         serving(monkeypatch) as served,
         browser() as client,

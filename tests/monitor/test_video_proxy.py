@@ -5,7 +5,7 @@ import struct
 import pytest
 from aiohttp import web
 
-from monitor.video_proxy import MAX_IMAGE_BYTES, can_be_passed_on
+from monitor.video_proxy import MAX_IMAGE_BYTES, can_be_forwarded
 from tests.monitor.serving import browser, serving
 
 JPEG = b"\xff\xd8\xff\xe0 an image \xff\xd9"
@@ -16,8 +16,8 @@ def part(number, body=JPEG, head=""):
     return text.encode() + body + b"\r\n"
 
 
-def test_only_http_is_passed_on():
-    assert can_be_passed_on("http://127.0.0.1:8100/video")
+def test_only_http_is_forwarded():
+    assert can_be_forwarded("http://127.0.0.1:8100/video")
     for url in (
         None,
         "",
@@ -28,7 +28,7 @@ def test_only_http_is_passed_on():
         "http://[",
         "http://",
     ):
-        assert not can_be_passed_on(url)
+        assert not can_be_forwarded(url)
 
 
 class Camera:
@@ -190,7 +190,7 @@ async def test_a_drone_that_was_away_is_seen_again(monkeypatch):
     ("path", "video", "status", "words"),
     [
         ("2", None, 404, "no drone 2"),
-        ("1", None, 404, "tells of no video"),
+        ("1", None, 404, "has no video"),
         ("1", "rtsp://10.0.0.1/live", 404, "is rtsp; only MJPEG over http"),
         ("1", "5600", 404, "only MJPEG over http"),
     ],

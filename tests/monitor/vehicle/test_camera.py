@@ -1,4 +1,4 @@
-"""Where video may be asked for, when the drone names the address."""
+"""From where video may be fetched when the drone sends the URL."""
 
 import pytest
 from pymavlink.dialects.v20 import common as mavlink
@@ -31,7 +31,7 @@ def test_the_host_that_the_packets_come_from_may_be_asked_for_a_camera_s_address
         ("http://192.168.1.8/video", "192.168.1.7", "packets come from 192.168.1.7"),
         ("http://127.0.0.1:8100/video", "192.168.1.7", "packets come from 192.168.1.7"),
         ("http://192.168.1.7/video", "127.0.0.1", "packets come from 127.0.0.1"),
-        ("http://192.168.1.7/video", "", "nobody knows where"),
+        ("http://192.168.1.7/video", "", "not known where"),
         ("http://169.254.169.254/latest/meta-data", "10.0.0.1", "packets come from"),
         ("http://0.0.0.0:8100/video", "127.0.0.1", "packets come from"),
         ("http://127.0.0.1:7777/admin?delete=all", "127.0.0.1", "more than a plain path"),
@@ -84,29 +84,29 @@ def told(uri, number=1):
 
 def test_a_camera_is_asked_until_it_answers_and_its_first_http_stream_counts():
     watch = CameraWatch(1)
-    assert watch.question(0.0) is None
+    assert watch.request(0.0) is None
     watch.see(100)
-    asked = watch.question(0.0)
+    asked = watch.request(0.0)
     assert (asked.target_system, asked.target_component) == (1, 100)
     assert (asked.command, asked.param1) == (512, 269)
-    assert watch.question(1.0) is None
-    assert watch.question(2.5) is not None
+    assert watch.request(1.0) is None
+    assert watch.request(2.5) is not None
     watch.take(told(b"5600"), "127.0.0.1")
     watch.take(told(b"http://127.0.0.1:8100/video", 2), "127.0.0.1")
     watch.take(told(b"http://127.0.0.1:8101/video", 3), "127.0.0.1")
     assert watch.url == "http://127.0.0.1:8100/video"
-    assert watch.question(99.0) is None
+    assert watch.request(99.0) is None
 
 
 def test_a_camera_that_never_answers_is_left_alone():
     watch = CameraWatch(1)
     watch.see(100)
-    assert sum(watch.question(3.0 * count) is not None for count in range(50)) == 8
+    assert sum(watch.request(3.0 * count) is not None for count in range(50)) == 8
 
 
 def test_a_refused_address_is_told():
     watch = CameraWatch(1)
     watch.take(told(b"http://8.8.8.8/video"), "127.0.0.1")
     assert watch.url is None
-    assert "http://8.8.8.8/video is not asked for" in watch.problem
+    assert "http://8.8.8.8/video is not fetched" in watch.problem
     assert "--camera-host" in watch.problem

@@ -1,4 +1,4 @@
-"""Where the monitor asks when a drone names an address: real datagrams, and a real server that counts."""
+"""From where the monitor fetches when a drone sends a URL: real datagrams, and a real server that counts."""
 
 import asyncio
 import socket
@@ -83,9 +83,7 @@ async def test_only_a_camera_s_own_address_is_asked(address, service_address, pl
                 def told():
                     drone.speak()
                     return (
-                        asked
-                        if confirmed
-                        else [each for each in watched.notices() if "not asked for" in each]
+                        asked if confirmed else [each for each in watched.notices() if "not fetched" in each]
                     )
 
                 await watched.until(told)

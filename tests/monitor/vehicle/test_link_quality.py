@@ -2,7 +2,9 @@
 
 import pytest
 
-from monitor.vehicle.link_quality import BootTimeRequest, LinkQuality, RateWatch
+from monitor.vehicle.link_quality import LinkQuality, RateWatch, RepeatedRequest
+from wire.dialect import mavlink
+from wire.vehicles import request_message
 
 
 def heard(sequences, rate_hz=50.0):
@@ -70,14 +72,10 @@ def test_a_drone_that_says_nothing_yet_is_not_asked():
     assert watch.requests((0, 0), 10.0) == []
 
 
-def test_the_boot_time_is_asked_for_until_it_is_known():
-    boot = BootTimeRequest(1)
-    assert wanted([boot.request(None, 0.0)]) == [(1, 512, 2, 0)]
-    assert boot.request(None, 1.0) is None
-    assert boot.request(None, 2.0) is not None
-    assert boot.request(1_700_000_000_000_000, 100.0) is None
-
-
-def test_a_drone_without_a_date_is_left_alone():
-    boot = BootTimeRequest(1)
-    assert sum(boot.request(None, 3.0 * count) is not None for count in range(40)) == 5
+def test_a_request_is_repeated_every_two_seconds_and_not_for_ever():
+    message = request_message(1, mavlink.MAVLINK_MSG_ID_SYSTEM_TIME)
+    request = RepeatedRequest(message, 5)
+    assert request.due(0.0) is message
+    assert request.due(1.0) is None
+    assert request.due(2.0) is message
+    assert sum(request.due(3.0 * count) is not None for count in range(2, 40)) == 3

@@ -186,4 +186,4 @@ def test_a_result_without_a_verdict_is_told_to_be_none(view):
     for piece in pieces:
         view.take(piece, 10.0)
     assert view.result is None
-    assert view.problem == "result document: no verdict is told"
+    assert view.problem == "result document: it has no verdict"
