@@ -68,12 +68,7 @@ class Visitor:
 
 
 class StoredSession(BaseModel):
-    """A session in the file. Its secret cannot be computed from what is stored.
-
-    Attributes:
-        name: of the judge.
-        ends_unix_s: when it ends, Unix time.
-    """
+    """A judge's session in the file. Its secret cannot be computed from what is stored."""
 
     model_config = ConfigDict(frozen=True, extra="ignore")
 

@@ -81,10 +81,7 @@ class Fleet:
         return {"kind": "status", "drones": [vehicle.status(now_s) for vehicle in self._vehicles.values()]}
 
     def subscribe(self, hear: Callable[[JsonMessage], None]) -> Callable[[], None]:
-        """Receive all messages except pose and status.
-
-        Args:
-            hear: called on the loop; must not block.
+        """Receive all messages except pose and status: `hear` is called on the loop and must not block.
 
         Returns:
             Ends the subscription.
@@ -107,12 +104,7 @@ class Fleet:
         return vehicle.camera.url if vehicle is not None else None
 
     async def do(self, drone_id: int, what: str) -> Answer:
-        """Carry out an order and check that telemetry shows it.
-
-        Args:
-            drone_id: which.
-            what: arm, disarm, take_off, land, hold, stop_motors, position or offboard.
-        """
+        """Carry out one of `vehicle.commands.ORDERS`, such as "land", and check that telemetry shows it."""
         vehicle = self._vehicles.get(drone_id)
         if vehicle is None:
             return Answer(False, f"no drone {drone_id} is heard")
@@ -131,12 +123,9 @@ class Fleet:
             vehicle.pilot = name
 
     def notice(self, drone_id: int | None, level: str, text: str) -> None:
-        """Send all watchers a notice.
+        """Send all watchers one line about a drone or, if None, about no single one.
 
-        Args:
-            drone_id: which drone it is about; None: none.
-            level: "info", "warning" or "error".
-            text: one line.
+        Levels are "info", "warning" and "error".
         """
         self._tell(_notice(drone_id, level, text))
 

@@ -38,7 +38,7 @@ class Order:
     """An order of a browser to a drone.
 
     Attributes:
-        drone_id: which.
+        drone_id: MAVLink system id.
         what: one of `ORDERS`.
         confirmed: the person has confirmed it.
     """
@@ -73,12 +73,7 @@ class Control(Enum):
 
 @dataclass(slots=True)
 class Clock:
-    """Time, which tests replace.
-
-    Attributes:
-        now_s: seconds that never go back.
-        wait: waits so many seconds.
-    """
+    """Time, which tests replace: seconds that never go back, and waiting for some seconds."""
 
     now_s: Callable[[], float]
     wait: Callable[[float], Awaitable[None]] = field(default=asyncio.sleep)
@@ -86,19 +81,12 @@ class Clock:
 
 @dataclass(frozen=True, slots=True)
 class _DroneView:
-    """What a seat needs of a drone's status.
+    """What a seat needs of a drone's status."""
 
-    Attributes:
-        mode: in capitals.
-        armed: motors may turn.
-        live: the link is live.
-        waiting_mission: name of a paused mission; "" without one.
-    """
-
-    mode: str = ""
+    mode: str = ""  # in capitals
     armed: bool = False
-    live: bool = False
-    waiting_mission: str = ""
+    live: bool = False  # the link
+    waiting_mission: str = ""  # name of a paused mission
 
     @property
     def is_manual(self) -> bool:
@@ -161,9 +149,9 @@ class PilotSeat:
     no others are: an autopilot that has received sticks takes their end for a failure.
 
     Args:
-        drone_id: which drone.
-        fleet: with the drone.
-        changed: called with `drone_id` when holder or `flying` may have changed.
+        drone_id: which drone of the fleet.
+        fleet: all drones.
+        changed: called with `drone_id` when `holder` or `flying` may have changed.
         clock: time.
 
     Attributes:

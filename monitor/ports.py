@@ -30,23 +30,14 @@ class Referee(Protocol):
 
 @dataclass(frozen=True, slots=True)
 class RunInfo:
-    """A run folder, for a list.
+    """A run folder, for a list."""
 
-    Attributes:
-        name: of the folder; identifies the run everywhere.
-        scenario: its name.
-        mission: its name; "" if unknown.
-        verdict: of the referee; "" if the flight was not judged.
-        total_time_s: with penalties; None if not judged.
-        started: ISO 8601; "" if unknown.
-    """
-
-    name: str
+    name: str  # of the folder; identifies the run everywhere
     scenario: str
-    mission: str
-    verdict: str
-    total_time_s: float | None
-    started: str
+    mission: str  # "" if unknown
+    verdict: str  # of the referee; "" if the flight was not judged
+    total_time_s: float | None  # with penalties; None if not judged
+    started: str  # ISO 8601; "" if unknown
 
 
 class RunLibrary(Protocol):

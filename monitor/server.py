@@ -90,20 +90,11 @@ class Monitor:
 
 
 class _Files(StaticFiles):
-    """Files that a browser revalidates each time."""
+    """Files that a browser revalidates each time; not so those of libraries that are named by their content."""
 
     async def get_response(self, path: str, scope: Scope) -> Response:
         response = await super().get_response(path, scope)
-        response.headers["Cache-Control"] = "no-cache"
-        return response
-
-
-class _Library(StaticFiles):
-    """A bundle of NiceGUI's; a browser keeps parts that are named by their content."""
-
-    async def get_response(self, path: str, scope: Scope) -> Response:
-        response = await super().get_response(path, scope)
-        is_hashed = _HASHED.search(path) is not None
+        is_hashed = self.directory != _STATIC and _HASHED.search(path) is not None
         response.headers["Cache-Control"] = "public, max-age=31536000, immutable" if is_hashed else "no-cache"
         return response
 
@@ -127,14 +118,7 @@ class _Server(uvicorn.Server):
 def assemble(
     equipment: Equipment, settings: MonitorSettings, place: tuple[str, int], invite: Callable[[str], None]
 ) -> Monitor:
-    """Make the monitor; nothing runs yet.
-
-    Args:
-        equipment: the link to the drones and what else the monitor needs.
-        settings: as started.
-        place: address and port it listens on.
-        invite: called with the secret of each one-time link for judges.
-    """
+    """Make the monitor, to listen on `place`; `invite` is called with the secret of each one-time link."""
     local_only = ip_address(place[0]).is_loopback and not settings.trusted_proxies
     cookie = f"framerunner-judge-{place[1]}"  # browsers share cookies between ports
     # A port that the system chose is another one after a restart.
@@ -187,7 +171,7 @@ def _add_static_files(web: FastAPI) -> None:
     """Serve the monitor's own files and the libraries that come with NiceGUI."""
     web.mount("/static", _Files(directory=_STATIC))
     for name, element in _LIBRARIES.items():
-        web.mount(f"/lib/{name}", _Library(directory=_ELEMENTS / element / "dist"))
+        web.mount(f"/lib/{name}", _Files(directory=_ELEMENTS / element / "dist"))
 
 
 def _add_nicegui(web: FastAPI) -> None:

@@ -17,29 +17,17 @@ class MonitorError(UserError):
 
 @dataclass(frozen=True, slots=True)
 class ConnectionLimits:
-    """Limits of the server's clients: seconds (`_s`), bytes, and numbers.
+    """Limits of the server's clients."""
 
-    Attributes:
-        head_s: from the connection, or the first byte of its next request, to the end of the request's head.
-        keep_alive_s: from the end of a request to the end of the next one's head.
-        body_s: from the head to the end of the body.
-        stalled_s: how long a client may leave data unread.
-        close_s: from closing a connection to its end.
-        head_bytes: of a request's head.
-        body_bytes: of a request's body.
-        total: connections.
-        per_address: connections from one address, and requests under way from one address behind a proxy.
-    """
-
-    head_s: float = 10.0
-    keep_alive_s: int = 30
-    body_s: float = 20.0
-    stalled_s: float = 30.0
-    close_s: float = 5.0
+    head_s: float = 10.0  # from the connection, or the first byte of a later request, to the end of its head
+    keep_alive_s: int = 30  # from the end of a request to the end of the next one's head
+    body_s: float = 20.0  # from the head to the end of the body
+    stalled_s: float = 30.0  # how long a client may leave data unread
+    close_s: float = 5.0  # from closing a connection to its end
     head_bytes: int = 65_536
     body_bytes: int = 65_536
-    total: int = 1000
-    per_address: int = 250
+    total: int = 1000  # connections
+    per_address: int = 250  # connections from an address; simultaneous requests from one behind a proxy
 
 
 @dataclass(frozen=True, slots=True)

@@ -8,7 +8,8 @@ from __future__ import annotations
 import asyncio
 import logging
 import struct
-from collections.abc import AsyncGenerator, Callable
+from collections.abc import AsyncGenerator, Awaitable, Callable
+from contextlib import aclosing
 from typing import TYPE_CHECKING
 from urllib.parse import urlsplit
 
@@ -91,7 +92,7 @@ class DroneVideo:
         async with aiohttp.ClientSession(timeout=timeout, cookie_jar=jar, auto_decompress=False) as session:
             while True:
                 url = self._find_url()
-                if url is not None:
+                if url is not None and can_be_forwarded(url):
                     try:
                         await self._read(session, url)
                     except (aiohttp.ClientError, OSError, ValueError) as error:
@@ -124,61 +125,32 @@ def register(monitor: Monitor) -> None:
     """Add `/video/ID`, `/video/ID/frames` and `/video/ID/image.jpg`."""
     videos: dict[int, DroneVideo] = {}
 
-    def find_url(drone_id: int) -> str | None:
-        url = monitor.fleet.video_url(drone_id)
-        return url if can_be_forwarded(url) else None
-
-    def open_video(request: Request, drone_id: int) -> DroneVideo | Response:
-        problem = _problem(monitor, drone_id)
-        if problem is not None:
-            return PlainTextResponse(f"{problem}\n", 404)
-        if drone_id not in videos:
-            videos[drone_id] = DroneVideo(lambda: find_url(drone_id))
-        problem = videos[drone_id].problem(client_address(request.scope))
-        return PlainTextResponse(f"{problem}\n", 503) if problem else videos[drone_id]
-
-    @monitor.web.get("/video/{drone_id}")
-    async def stream(request: Request, drone_id: int) -> Response:
-        video = open_video(request, drone_id)
-        if isinstance(video, Response):
-            return video
-        return StreamingResponse(_parts(video.images(client_address(request.scope))), headers=STREAM_HEADERS)
-
-    @monitor.web.get("/video/{drone_id}/frames")
-    async def frames(request: Request, drone_id: int) -> Response:
-        video = open_video(request, drone_id)
-        if isinstance(video, Response):
-            return video
-        images = video.images(client_address(request.scope), kept=True)
-        headers = {"Cache-Control": "no-store", "Connection": "close"}
-        return StreamingResponse(_frames(images), media_type="application/octet-stream", headers=headers)
-
-    @monitor.web.get("/video/{drone_id}/image.jpg")
-    async def image(request: Request, drone_id: int) -> Response:
-        video = open_video(request, drone_id)
-        if isinstance(video, Response):
-            return video
-        images = video.images(client_address(request.scope))
-        try:
-            newest = await asyncio.wait_for(anext(images), FIRST_IMAGE_S)
-        except (TimeoutError, StopAsyncIteration):
-            return PlainTextResponse("no image came\n", 503, {"Retry-After": "1"})
-        finally:
-            await images.aclose()
-        headers = {"Cache-Control": "no-store"}
-        if newest.time_us is not None:
-            headers["X-Time-Us"] = str(newest.time_us)
-        return Response(newest.data, media_type="image/jpeg", headers=headers)
+    def add(path: str, answer: Callable[[DroneVideo, str], Awaitable[Response]]) -> None:
+        @monitor.web.get(path)
+        async def respond(request: Request, drone_id: int) -> Response:
+            problem = _problem(monitor, drone_id)
+            if problem:
+                return PlainTextResponse(f"{problem}\n", 404)
+            if drone_id not in videos:
+                videos[drone_id] = DroneVideo(lambda: monitor.fleet.video_url(drone_id))
+            address = client_address(request.scope)
+            problem = videos[drone_id].problem(address)
+            if problem:
+                return PlainTextResponse(f"{problem}\n", 503)
+            return await answer(videos[drone_id], address)
 
     def stop() -> None:
         for video in videos.values():
             video.stop()
 
+    add("/video/{drone_id}", _stream)
+    add("/video/{drone_id}/frames", _frames)
+    add("/video/{drone_id}/image.jpg", _image)
     monitor.at_end(stop)
 
 
-def _problem(monitor: Monitor, drone_id: int) -> str | None:
-    """Why a drone's video cannot be shown; None if it can."""
+def _problem(monitor: Monitor, drone_id: int) -> str:
+    """Why a drone's video cannot be shown; "" if it can."""
     if drone_id not in monitor.fleet.drone_ids():
         return f"no drone {drone_id} was heard"
     url = monitor.fleet.video_url(drone_id)
@@ -187,24 +159,42 @@ def _problem(monitor: Monitor, drone_id: int) -> str | None:
     if not can_be_forwarded(url):
         kind = url.partition("://")[0] if "://" in url else "another kind"
         return f"the video of drone {drone_id} is {kind[:20]}; only MJPEG over http can be shown"
-    return None
+    return ""
 
 
-async def _frames(images: AsyncGenerator[Part, None]) -> AsyncGenerator[bytes, None]:
-    """Each image as time of exposure, length and JPEG."""
-    try:
-        async for image in images:
-            time_us = -1 if image.time_us is None else image.time_us
-            yield _FRAME_HEAD.pack(time_us, len(image.data)) + image.data
-    finally:
-        await images.aclose()
+async def _stream(video: DroneVideo, address: str) -> Response:
+    """The images as an MJPEG stream."""
 
-
-async def _parts(images: AsyncGenerator[Part, None]) -> AsyncGenerator[bytes, None]:
-    """Images as an MJPEG stream."""
-    try:
+    async def parts() -> AsyncGenerator[bytes, None]:
         yield STREAM_START
-        async for image in images:
-            yield write_part(image.data, image.time_us)
-    finally:
-        await images.aclose()
+        async with aclosing(video.images(address)) as images:
+            async for image in images:
+                yield write_part(image.data, image.time_us)
+
+    return StreamingResponse(parts(), headers=STREAM_HEADERS)
+
+
+async def _frames(video: DroneVideo, address: str) -> Response:
+    """Each image as time of exposure, length and JPEG."""
+
+    async def parts() -> AsyncGenerator[bytes, None]:
+        async with aclosing(video.images(address, kept=True)) as images:
+            async for image in images:
+                time_us = -1 if image.time_us is None else image.time_us
+                yield _FRAME_HEAD.pack(time_us, len(image.data)) + image.data
+
+    headers = {"Cache-Control": "no-store", "Connection": "close"}
+    return StreamingResponse(parts(), media_type="application/octet-stream", headers=headers)
+
+
+async def _image(video: DroneVideo, address: str) -> Response:
+    """The newest image."""
+    async with aclosing(video.images(address)) as images:
+        try:
+            newest = await asyncio.wait_for(anext(images), FIRST_IMAGE_S)
+        except (TimeoutError, StopAsyncIteration):
+            return PlainTextResponse("no image came\n", 503, {"Retry-After": "1"})
+    headers = {"Cache-Control": "no-store"}
+    if newest.time_us is not None:
+        headers["X-Time-Us"] = str(newest.time_us)
+    return Response(newest.data, media_type="image/jpeg", headers=headers)

@@ -99,16 +99,12 @@ def use_module(path: str, **data: object) -> None:
     """
     ui.add_body_html(
         f'<script type="application/json" id="data-{escape(PurePosixPath(path).stem)}" '
-        f'data-module="/static/{escape(path)}">{json_block(data)}</script>'
+        f'data-module="/static/{escape(path)}">{_json_block(data)}</script>'
     )
 
 
-def json_block(data: object) -> str:
-    """JSON that can stand in a `<script>`: nothing in it can end the element or begin a comment.
-
-    Raises:
-        ValueError: a number is not finite.
-    """
+def _json_block(data: object) -> str:
+    """JSON that can stand in a `<script>`: nothing in it can end the element or begin a comment."""
     text = json.dumps(data, ensure_ascii=True, allow_nan=False)
     return text.replace("<", "\\u003c").replace(">", "\\u003e").replace("&", "\\u0026")
 

@@ -27,7 +27,6 @@ class CameraWatch:
     """Requests the URL of a vehicle's video until its camera answers.
 
     Args:
-        drone_id: the vehicle's system id.
         link_host: the host to which the link is opened; "" if it only listens.
         confirmed: HOST or HOST:PORT that the operator allows.
 
@@ -56,12 +55,7 @@ class CameraWatch:
         return None if self._request is None or self._answered else self._request.due(now_s)
 
     def take(self, message: Message, host: str) -> None:
-        """Take VIDEO_STREAM_INFORMATION; the first stream that can be shown counts.
-
-        Args:
-            message: as parsed.
-            host: IP address of its sender; "" on a serial line.
-        """
+        """Take VIDEO_STREAM_INFORMATION from a host; the first stream that can be shown counts."""
         self._answered = True
         url = plain(bytes(message._uri_raw), 200)
         if self.url is not None or not url.startswith(("http:", "https:")):
@@ -123,11 +117,7 @@ def _other_host(name: str, host: str, link_host: str) -> str:
         return "its host must be given in numbers"
     if host and address == _plain_address(host):
         return ""
-    return (
-        f"the drone's packets come from {host}"
-        if host
-        else "it is not known where the drone's packets come from"
-    )
+    return f"the drone's packets come from {host or 'an unknown host'}"
 
 
 def _other_service(parts: SplitResult) -> str:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import asyncio
 from collections import defaultdict
 from collections.abc import Callable
+from contextlib import nullcontext
 from dataclasses import dataclass, field
 from math import isfinite, nan
 from typing import NamedTuple
@@ -130,13 +131,16 @@ class CommandSender:
         Returns:
             MAV_RESULT; None: no answer.
         """
-        if urgent:
-            earlier = self._pending.get(number)
-            if earlier is not None and not earlier.answer.done():
-                earlier.answer.cancel()
-            return await self._request(number, parameters)
-        async with self._locks[number]:
-            return await self._request(number, parameters)
+        earlier = self._pending.get(number)
+        if urgent and earlier is not None and not earlier.answer.done():
+            earlier.answer.cancel()
+        async with nullcontext() if urgent else self._locks[number]:
+            pending = self._pending[number] = _Pending()
+            try:
+                return await self._send_until_answered(pending, number, parameters)
+            finally:
+                if self._pending.get(number) is pending:
+                    del self._pending[number]
 
     def take(self, message: Message) -> None:
         """Take a COMMAND_ACK of the autopilot."""
@@ -148,21 +152,18 @@ class CommandSender:
         else:
             pending.answer.set_result(message.result)
 
-    async def _request(self, number: int, parameters: tuple[float, ...]) -> int | None:
-        pending = self._pending[number] = _Pending()
-        try:
-            for confirmation in range(_TRIES):
-                self._send(command_long(self._system, number, *parameters, confirmation=confirmation))
-                await asyncio.wait([pending.answer], timeout=_ANSWER_S)
-                while pending.in_progress and not pending.answer.done():
-                    pending.in_progress = False
-                    await asyncio.wait([pending.answer], timeout=_PROGRESS_S)
-                if pending.answer.done():
-                    return None if pending.answer.cancelled() else pending.answer.result()
-            return None
-        finally:
-            if self._pending.get(number) is pending:
-                del self._pending[number]
+    async def _send_until_answered(
+        self, pending: _Pending, number: int, parameters: tuple[float, ...]
+    ) -> int | None:
+        for confirmation in range(_TRIES):
+            self._send(command_long(self._system, number, *parameters, confirmation=confirmation))
+            await asyncio.wait([pending.answer], timeout=_ANSWER_S)
+            while pending.in_progress and not pending.answer.done():
+                pending.in_progress = False
+                await asyncio.wait([pending.answer], timeout=_PROGRESS_S)
+            if pending.answer.done():
+                return None if pending.answer.cancelled() else pending.answer.result()
+        return None
 
 
 @dataclass(frozen=True, slots=True)
@@ -210,14 +211,7 @@ ORDERS: dict[str, tuple[tuple[_Step, ...], str]] = {
 
 
 async def carry_out(what: str, sender: CommandSender, telemetry: VehicleTelemetry, texts: Texts) -> Answer:
-    """Carry out one of `ORDERS` and check that telemetry shows it.
-
-    Args:
-        what: the order.
-        sender: to the vehicle.
-        telemetry: of the vehicle, kept up to date meanwhile.
-        texts: of the vehicle, with the reasons of refusals.
-    """
+    """Carry out one of `ORDERS` and check that the telemetry, which is updated meanwhile, shows it."""
     if what not in ORDERS:
         return Answer(False, f"{what!r} is no order; there are {', '.join(sorted(ORDERS))}")
     steps, done = ORDERS[what]

@@ -109,12 +109,7 @@ class RateWatch:
         self._requests = 0
 
     def requests(self, counts: tuple[int, int], now_s: float) -> list[Message]:
-        """The messages to send now.
-
-        Args:
-            counts: attitudes and positions so far.
-            now_s: loop time.
-        """
+        """The messages to send now, by the numbers of attitudes and positions so far."""
         span_s = now_s - self._since_s
         if span_s < _RATE_SPAN_S:
             return []

@@ -115,12 +115,7 @@ class MissionView:
         return [round(value, 4) for value in state.command] if isfinite(sum(state.command)) else None
 
     def as_dict(self, time_us: int, now_s: float) -> JsonMessage | None:
-        """The field `mission` of the message "status"; None before the first state.
-
-        Args:
-            time_us: vehicle time now.
-            now_s: loop time.
-        """
+        """The field `mission` of the message "status" at a vehicle time; None before the first state."""
         state, document = self.state, self._document
         if state is None:
             return None

@@ -19,10 +19,6 @@ JsonMessage = dict[str, Any]
 class Texts:
     """Turns STATUSTEXT into messages "text".
 
-    Args:
-        drone_id: system id.
-        tell: takes messages for the pages.
-
     Attributes:
         warnings: how many the autopilot has sent.
     """

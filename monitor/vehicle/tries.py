@@ -74,14 +74,7 @@ class _UnclaimedResult:
 
 
 class TryWatch:
-    """Follows the tries of one drone during one boot.
-
-    Args:
-        drone_id: MAVLink system id.
-        boot: identifies this boot of the drone.
-        tell: called with each event.
-        now_s: loop time.
-    """
+    """Follows the tries of a drone during one boot, which `boot` identifies; `tell` takes the events."""
 
     def __init__(self, drone_id: int, boot: str, tell: Callable[[TryEvent], None], now_s: float) -> None:
         self._id = drone_id
@@ -104,7 +97,7 @@ class TryWatch:
             return
         now = self._now
         if now is None or now.began_us != began_us:
-            self._end_by_the_next(now)
+            self._end_before_next()
             now = _Try(f"{self._id}-{self._boot}-{began_us}", began_us, standing, now_s, now_s)
             self._now = now
             self._say("began", now)
@@ -147,12 +140,14 @@ class TryWatch:
             now.ended = True
             self._say("ended", now, "the drone restarted")
 
-    def _end_by_the_next(self, now: _Try | None) -> None:
+    def _end_before_next(self) -> None:
+        """End the present try, and drop a result that waits: it belongs to an earlier try."""
+        now = self._now
         if now is None:
             return
         if not now.ended and now.result is None:
             self._say("ended", now, "the next try began")
-        if self._waiting is not None:  # it belongs to an earlier try
+        if self._waiting is not None:
             self._settle(self._waiting)
 
     def _match(self, now_s: float) -> None:
@@ -199,13 +194,7 @@ class TryWatch:
         if self._waiting is waiting:
             self._waiting = None
 
-    def _say(
-        self,
-        kind: EventKind,
-        now: _Try,
-        remark: str = "",
-        result: FlightResult | None = None,
-    ) -> None:
+    def _say(self, kind: EventKind, now: _Try, remark: str = "", result: FlightResult | None = None) -> None:
         standing, final = now.standing, now.result is not None
         result = now.result or result
         if result is not None:
@@ -224,10 +213,8 @@ class Judging:
     """Follows the tries of one boot of a vehicle, by its own referee or by the monitor's.
 
     Args:
-        drone_id: system id.
         equipment: with the scenario, if there is one, and a referee for it.
         tell: called with each event of a try.
-        now_s: loop time.
 
     Attributes:
         standing: how the try stands; None without a referee.
@@ -279,7 +266,7 @@ class Judging:
 
         Args:
             boot_unix_us: when the vehicle was switched on, as it reports; None: not yet.
-            now_s: loop time.
+            now_s: time of the loop.
             wall_boot_us: the same by this machine's clock, used if the vehicle never reports it.
         """
         if self._tries is None:

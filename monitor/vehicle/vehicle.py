@@ -35,14 +35,7 @@ JsonMessage = dict[str, Any]
 
 @dataclass(frozen=True, slots=True)
 class VehicleCallbacks:
-    """Receivers of what a vehicle has to send or report; all are called on the loop.
-
-    Attributes:
-        send: puts a message on the link.
-        tell: takes messages for the pages.
-        notice: takes level and one line.
-        tell_try: takes events of tries.
-    """
+    """Called on the loop: `send` with MAVLink, `notice` with level and one line, the others with messages."""
 
     send: Callable[[Message], None]
     tell: Callable[[JsonMessage], None]
@@ -54,10 +47,8 @@ class Vehicle:
     """One drone on the link.
 
     Args:
-        drone_id: MAVLink system id.
         equipment: what the monitor was given.
-        callbacks: receivers of its messages.
-        now_s: loop time.
+        callbacks: receivers of what it sends and reports.
         link_host: the host to which the link is opened; "" if it only listens.
 
     Attributes:
@@ -109,13 +100,7 @@ class Vehicle:
         self._result_crc: int | None = None
 
     def take(self, message: Message, now_s: float, host: str = "") -> None:
-        """Take a message of any component of this system.
-
-        Args:
-            message: as parsed.
-            now_s: loop time.
-            host: IP address of its sender; "" on a serial line.
-        """
+        """Take a message of any component of this system."""
         number, component = message.get_msgId(), message.get_srcComponent()
         if component == AUTOPILOT_COMPONENT_ID:
             self.link.hear(message.get_seq(), now_s)

@@ -31,7 +31,7 @@ def test_the_host_that_the_packets_come_from_may_be_asked_for_a_camera_s_address
         ("http://192.168.1.8/video", "192.168.1.7", "packets come from 192.168.1.7"),
         ("http://127.0.0.1:8100/video", "192.168.1.7", "packets come from 192.168.1.7"),
         ("http://192.168.1.7/video", "127.0.0.1", "packets come from 127.0.0.1"),
-        ("http://192.168.1.7/video", "", "not known where"),
+        ("http://192.168.1.7/video", "", "from an unknown host"),
         ("http://169.254.169.254/latest/meta-data", "10.0.0.1", "packets come from"),
         ("http://0.0.0.0:8100/video", "127.0.0.1", "packets come from"),
         ("http://127.0.0.1:7777/admin?delete=all", "127.0.0.1", "more than a plain path"),
