@@ -80,19 +80,19 @@ class Fleet:
         now_s = asyncio.get_running_loop().time()
         return {"kind": "status", "drones": [vehicle.status(now_s) for vehicle in self._vehicles.values()]}
 
-    def subscribe(self, hear: Callable[[JsonMessage], None]) -> Callable[[], None]:
-        """Receive all messages except pose and status: `hear` is called on the loop and must not block.
+    def subscribe(self, receive: Callable[[JsonMessage], None]) -> Callable[[], None]:
+        """Receive all messages except pose and status: `receive` is called on the loop and must not block.
 
         Returns:
             Ends the subscription.
         """
         key = object()
-        self._watchers[key] = hear
+        self._watchers[key] = receive
         return lambda: self._watchers.pop(key, None) and None
 
-    def on_try(self, hear: Callable[[TryEvent], None]) -> None:
-        """Receive all events of tries; `hear` is called on the loop and must not block."""
-        self._try_watchers.append(hear)
+    def on_try(self, receive: Callable[[TryEvent], None]) -> None:
+        """Receive all events of tries; `receive` is called on the loop and must not block."""
+        self._try_watchers.append(receive)
 
     def drone_ids(self) -> list[int]:
         """System ids of the drones received so far."""
@@ -127,7 +127,7 @@ class Fleet:
 
         Levels are "info", "warning" and "error".
         """
-        self._tell(_notice(drone_id, level, text))
+        self._publish(_notice(drone_id, level, text))
 
     def _take(self, messages: Sequence[Message], host: str = "") -> None:
         """Take messages that were received from a host; never raises."""
@@ -163,26 +163,26 @@ class Fleet:
         return False
 
     def _add(self, system: int, now_s: float) -> Vehicle:
-        def tell_try(event: TryEvent) -> None:
+        def publish_try(event: TryEvent) -> None:
             self._call_all(self._try_watchers, event, f"a try that {event.kind}")
 
         notice = partial(self.notice, system)
-        callbacks = VehicleCallbacks(self._link.send, self._tell, notice, tell_try)
+        callbacks = VehicleCallbacks(self._link.send, self._publish, notice, publish_try)
         vehicle = Vehicle(system, self._equipment, callbacks, now_s, host_of(self._link.url))
         self._vehicles[system] = vehicle
         self._vehicles = dict(sorted(self._vehicles.items()))
         self.notice(system, "info", f"drone {system} is heard")
         return vehicle
 
-    def _tell(self, message: JsonMessage) -> None:
+    def _publish(self, message: JsonMessage) -> None:
         if message["kind"] == "text":
             self._texts.append(message)
         self._call_all(list(self._watchers.values()), message, message["kind"])
 
     def _call_all(self, watchers: Iterable[Callable[[T], None]], message: T, what: str) -> None:
-        for hear in watchers:
+        for receive in watchers:
             try:
-                hear(message)
+                receive(message)
             except Exception:  # the other watchers still get it
                 self._log_fault(f"a watcher failed on {what}")
 
@@ -204,14 +204,14 @@ class Fleet:
             world = next((each for each in worlds if each is not None), self._given_world)
             if world != self._world:
                 self._world = world
-                self._tell(world)
+                self._publish(world)
             await asyncio.sleep(_TICK_S)
 
 
 def _world_of(scenario: Scenario | None) -> JsonMessage:
     """The message "world" of the given scenario while no drone has one of its own."""
-    told = None if scenario is None else scenario.model_dump(mode="json")
-    return {"kind": "world", "scenario": told, "lift_m": 0.0, "source": "telemetry"}
+    shown = None if scenario is None else scenario.model_dump(mode="json")
+    return {"kind": "world", "scenario": shown, "lift_m": 0.0, "source": "telemetry"}
 
 
 def _notice(drone_id: int | None, level: str, text: str) -> JsonMessage:

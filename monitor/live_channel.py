@@ -116,7 +116,7 @@ class LiveChannel:
         if not self._viewers:
             self._has_viewers.clear()
 
-    def tell(self, message: Mapping[str, Any]) -> None:
+    def send(self, message: Mapping[str, Any]) -> None:
         """Send a message to all viewers that requested its kind."""
         kind = message["kind"]
         if any(viewer.takes(kind) for viewer in self._viewers):
@@ -126,7 +126,7 @@ class LiveChannel:
 
     async def run(self) -> None:
         """Send poses and status while there are viewers, until cancelled."""
-        unsubscribe = self._fleet.subscribe(self.tell)
+        unsubscribe = self._fleet.subscribe(self.send)
         try:
             loop = asyncio.get_running_loop()
             due_s, count = loop.time(), 0
@@ -143,7 +143,7 @@ class LiveChannel:
             unsubscribe()
 
     def _update(self, count: int) -> None:
-        self.tell(self._fleet.pose_message())
+        self.send(self._fleet.pose_message())
         if count % STATUS_EVERY == 0:
             message = self._fleet.status_message()
             text = encode(message)

@@ -63,7 +63,7 @@ class _Connection:
         self._websocket = websocket
         self._desk = desk
         self._outbox: asyncio.Queue[JsonMessage] = asyncio.Queue(_MAX_QUEUE)
-        self._browser = Browser(name, may_judge, self._tell)
+        self._browser = Browser(name, may_judge, self._queue)
         self._allowance = Allowance(time.monotonic)
         self._orders: set[asyncio.Task[None]] = set()
         self._overrun = asyncio.Event()
@@ -118,9 +118,9 @@ class _Connection:
             self._reply(order.what, answer.ok, answer.text)
 
     def _reply(self, what: str, ok: bool, text: str) -> None:
-        self._tell({"kind": "reply", "what": what, "ok": ok, "text": text})
+        self._queue({"kind": "reply", "what": what, "ok": ok, "text": text})
 
-    def _tell(self, message: JsonMessage) -> None:
+    def _queue(self, message: JsonMessage) -> None:
         try:
             self._outbox.put_nowait(message)
         except asyncio.QueueFull:
@@ -143,7 +143,7 @@ class _Connection:
 
 
 class PilotDesk:
-    """The seats of all drones and the browsers that are told of them.
+    """The seats of all drones and the browsers that are informed of them.
 
     Args:
         fleet: the drones.
@@ -155,14 +155,14 @@ class PilotDesk:
         self._clock = clock or Clock(time.monotonic)
         self._seats: dict[int, PilotSeat] = {}
         self._browsers: list[Browser] = []
-        self._told: dict[int, tuple[str, Browser | None, bool]] = {}
+        self._announced: dict[int, tuple[str, Browser | None, bool]] = {}
         self._watch: asyncio.Task[None] | None = None
 
     def add(self, browser: Browser) -> None:
         """Add a browser and send it the state of all seats."""
         self._browsers.append(browser)
         for drone_id in self._seats:
-            browser.tell(self._seat_message(drone_id, browser))
+            browser.send(self._seat_message(drone_id, browser))
         if self._watch is None or self._watch.done():
             self._watch = asyncio.get_running_loop().create_task(self._keep_watch(), name="pilot's dead man")
 
@@ -209,12 +209,12 @@ class PilotDesk:
             return
         name = "" if seat.holder is None else seat.holder.name
         now = (name, seat.holder, seat.flying)
-        if self._told.get(drone_id, _NOBODY) == now:
+        if self._announced.get(drone_id, _NOBODY) == now:
             return
-        self._told[drone_id] = now
+        self._announced[drone_id] = now
         self._fleet.set_pilot(drone_id, name)
         for browser in self._browsers:
-            browser.tell(self._seat_message(drone_id, browser))
+            browser.send(self._seat_message(drone_id, browser))
 
     def _seat_message(self, drone_id: int, browser: Browser) -> JsonMessage:
         seat = self._seats[drone_id]

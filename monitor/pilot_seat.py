@@ -55,12 +55,12 @@ class Browser:
     Attributes:
         name: of the person, for other people.
         may_judge: may take the sticks from anyone.
-        tell: sends it a message; does not block.
+        send: sends it a message; does not block.
     """
 
     name: str
     may_judge: bool = False
-    tell: Callable[[JsonMessage], None] = lambda _message: None
+    send: Callable[[JsonMessage], None] = lambda _message: None
 
 
 class Control(Enum):

@@ -90,7 +90,7 @@ class Monitor:
 
 
 class _Files(StaticFiles):
-    """Files that a browser revalidates each time; not so those of libraries that are named by their content."""
+    """Files that a browser revalidates each time, except a library's that are named by their content."""
 
     async def get_response(self, path: str, scope: Scope) -> Response:
         response = await super().get_response(path, scope)

@@ -39,7 +39,7 @@ class LinkQuality:
         self._sequence: int | None = None
         self._seconds: deque[_Second] = deque([_Second(now_s)], maxlen=_SPAN_S)
 
-    def hear(self, sequence: int, now_s: float) -> None:
+    def count(self, sequence: int, now_s: float) -> None:
         """Count a packet with a sequence number of 0 to 255."""
         self.heard_s = now_s
         second = self._seconds[-1]

@@ -33,7 +33,7 @@ class RefereeChannel:
 
     Args:
         api: of the simulator or virtual camera that serves the vehicle's video.
-        hear: called with each answer.
+        take: called with each answer.
         say: called with level and one line for people.
 
     Attributes:
@@ -41,9 +41,9 @@ class RefereeChannel:
         lift_m: how much higher the frames hang than the scenario says.
     """
 
-    def __init__(self, api: SimulatorApi, hear: Callable[[Standing], None], say: Say) -> None:
+    def __init__(self, api: SimulatorApi, take: Callable[[Standing], None], say: Say) -> None:
         self._api = api
-        self._hear = hear
+        self._take = take
         self._say = say
         self._problem = ""
         self._requested: str | None = None  # name of the scenario
@@ -73,7 +73,7 @@ class RefereeChannel:
         self.lift_m = answer.lift_m
         if answer.scenario != self._requested:
             await self._request_scenario(session, answer.scenario)
-        self._hear(answer)
+        self._take(answer)
 
     async def _request_scenario(self, session: aiohttp.ClientSession, name: str) -> None:
         """Get what is flown there; the referee's answers count even if that fails."""

@@ -23,13 +23,13 @@ class Texts:
         warnings: how many the autopilot has sent.
     """
 
-    def __init__(self, drone_id: int, tell: Callable[[JsonMessage], None]) -> None:
+    def __init__(self, drone_id: int, publish: Callable[[JsonMessage], None]) -> None:
         self._id = drone_id
-        self._tell = tell
+        self._publish = publish
         self._assembler = TextAssembler()
         self._newest_warnings: deque[str] = deque(maxlen=_MAX_WARNINGS)
         self._second_s = -1e9
-        self._told = 0
+        self._count = 0
         self._time_us = 0
         self.warnings = 0
 
@@ -37,29 +37,29 @@ class Texts:
         """Take a STATUSTEXT at a vehicle time."""
         self._time_us = time_us
         for text in self._assembler.take(message, message.get_srcComponent(), now_s):
-            self._say(text, now_s)
+            self._pass_on(text, now_s)
 
     def tick(self, now_s: float) -> None:
         """Pass on texts whose end does not arrive."""
         for text in self._assembler.expire(now_s):
-            self._say(text, now_s)
+            self._pass_on(text, now_s)
 
     def since(self, count: int) -> list[str]:
         """Warnings of the autopilot after the first `count` of them, as far as they are kept."""
         new = self.warnings - count
         return list(self._newest_warnings)[-new:] if new > 0 else []
 
-    def _say(self, text: Text, now_s: float) -> None:
+    def _pass_on(self, text: Text, now_s: float) -> None:
         is_autopilot = text.component == mavlink.MAV_COMP_ID_AUTOPILOT1
         if is_autopilot and text.severity <= mavlink.MAV_SEVERITY_WARNING:
             self._newest_warnings.append(text.text)
             self.warnings += 1
         if now_s - self._second_s >= 1.0:
-            self._second_s, self._told = now_s, 0
-        self._told += 1
-        if self._told > _MAX_PER_SECOND:
+            self._second_s, self._count = now_s, 0
+        self._count += 1
+        if self._count > _MAX_PER_SECOND:
             return
-        self._tell(
+        self._publish(
             {
                 "kind": "text",
                 "id": self._id,

@@ -15,7 +15,7 @@ from scenarios.result import FlightResult, RefereeReport, Standing
 from scenarios.truth import TrueState
 from wire.vehicle_telemetry import VehicleTelemetry
 
-_TELL_EVERY_S = 1.0
+_PUBLISH_EVERY_S = 1.0
 _GONE_S = 3.0
 _ALONE_S = 10.0  # after this time without a referee the app's result alone counts
 _SAME_S = 0.1  # difference of two try times of one referee
@@ -59,7 +59,7 @@ class _Try:
     began_us: int | None
     standing: Standing | None
     heard_s: float
-    told_s: float
+    published_s: float
     ended: bool = False
     result: FlightResult | None = None
 
@@ -74,12 +74,12 @@ class _UnclaimedResult:
 
 
 class TryWatch:
-    """Follows the tries of a drone during one boot, which `boot` identifies; `tell` takes the events."""
+    """Follows the tries of a drone during one boot, which `boot` identifies; `publish` takes the events."""
 
-    def __init__(self, drone_id: int, boot: str, tell: Callable[[TryEvent], None], now_s: float) -> None:
+    def __init__(self, drone_id: int, boot: str, publish: Callable[[TryEvent], None], now_s: float) -> None:
         self._id = drone_id
         self._boot = boot
-        self._tell = tell
+        self._publish = publish
         self._began_s = now_s
         self._now: _Try | None = None
         self._waiting: _UnclaimedResult | None = None
@@ -100,18 +100,18 @@ class TryWatch:
             self._end_before_next()
             now = _Try(f"{self._id}-{self._boot}-{began_us}", began_us, standing, now_s, now_s)
             self._now = now
-            self._say("began", now)
+            self._report("began", now)
         now.standing, now.heard_s = standing, now_s
         if now.result is not None:
             return
         if standing.ended:
             if not now.ended:
                 now.ended = True
-                self._say("ended", now)
-        elif now_s - now.told_s >= _TELL_EVERY_S or now.ended:
+                self._report("ended", now)
+        elif now_s - now.published_s >= _PUBLISH_EVERY_S or now.ended:
             now.ended = False
-            now.told_s = now_s
-            self._say("running", now)
+            now.published_s = now_s
+            self._report("running", now)
         self._match(now_s)
 
     def take_result(self, crc: int, result: FlightResult, now_s: float) -> None:
@@ -127,7 +127,7 @@ class TryWatch:
         now = self._now
         if now is not None and not now.ended and now.result is None and now_s - now.heard_s > _GONE_S:
             now.ended = True
-            self._say("ended", now, f"nothing was heard of it for {_GONE_S:g} s")
+            self._report("ended", now, f"nothing was heard of it for {_GONE_S:g} s")
             self._match(now_s)
         alone = now is None or now.began_us is None
         if alone and self._waiting is not None and now_s - self._began_s > _ALONE_S:
@@ -138,7 +138,7 @@ class TryWatch:
         now = self._now
         if now is not None and not now.ended and now.result is None:
             now.ended = True
-            self._say("ended", now, "the drone restarted")
+            self._report("ended", now, "the drone restarted")
 
     def _end_before_next(self) -> None:
         """End the present try, and drop a result that waits: it belongs to an earlier try."""
@@ -146,7 +146,7 @@ class TryWatch:
         if now is None:
             return
         if not now.ended and now.result is None:
-            self._say("ended", now, "the next try began")
+            self._report("ended", now, "the next try began")
         if self._waiting is not None:
             self._settle(self._waiting)
 
@@ -167,7 +167,7 @@ class TryWatch:
         if now.ended and not standing.ended:  # the referee was gone before it saw the end
             tolerance_s = _SIMILAR_S
         elif not standing.ended:  # the app has ended, and the drone still flies
-            fresh = now_s - waiting.received_s < _TELL_EVERY_S
+            fresh = now_s - waiting.received_s < _PUBLISH_EVERY_S
             tolerance_s = _SIMILAR_S if fresh and result.ended != "finished" else -1.0
         if abs(standing.snapshot.try_time_s - result.try_time_s) <= tolerance_s:
             self._finish(now, waiting)
@@ -175,7 +175,7 @@ class TryWatch:
     def _finish(self, now: _Try, waiting: _UnclaimedResult) -> None:
         now.result, now.ended = waiting.result, True
         self._settle(waiting)
-        self._say("ended", now)
+        self._report("ended", now)
 
     def _take_alone(self, waiting: _UnclaimedResult, now_s: float) -> None:
         """Make a try of the app's result, because there is no referee."""
@@ -184,7 +184,7 @@ class TryWatch:
             return
         now = _Try(f"{self._id}-{self._boot}-result-{waiting.crc:08x}", None, None, now_s, now_s)
         self._now = now
-        self._say("began", now, result=waiting.result)
+        self._report("began", now, result=waiting.result)
         self._finish(now, waiting)
 
     def _settle(self, waiting: _UnclaimedResult) -> None:
@@ -194,7 +194,9 @@ class TryWatch:
         if self._waiting is waiting:
             self._waiting = None
 
-    def _say(self, kind: EventKind, now: _Try, remark: str = "", result: FlightResult | None = None) -> None:
+    def _report(
+        self, kind: EventKind, now: _Try, remark: str = "", result: FlightResult | None = None
+    ) -> None:
         standing, final = now.standing, now.result is not None
         result = now.result or result
         if result is not None:
@@ -206,7 +208,7 @@ class TryWatch:
         if remark:
             reason = f"{report.reason}; {remark}".removeprefix("; ")
             report = report.model_copy(update={"reason": reason})
-        self._tell(TryEvent(kind, self._id, now.key, scenario, report, source, final))
+        self._publish(TryEvent(kind, self._id, now.key, scenario, report, source, final))
 
 
 class Judging:
@@ -214,18 +216,18 @@ class Judging:
 
     Args:
         equipment: with the scenario, if there is one, and a referee for it.
-        tell: called with each event of a try.
+        publish: called with each event of a try.
 
     Attributes:
         standing: how the try stands; None without a referee.
     """
 
     def __init__(
-        self, drone_id: int, equipment: Equipment, tell: Callable[[TryEvent], None], now_s: float
+        self, drone_id: int, equipment: Equipment, publish: Callable[[TryEvent], None], now_s: float
     ) -> None:
         self._id = drone_id
         self._equipment = equipment
-        self._tell = tell
+        self._publish = publish
         self._began_s = now_s
         self._on_telemetry: TelemetryReferee | None = None
         self._tries: TryWatch | None = None
@@ -233,7 +235,7 @@ class Judging:
         self._result: tuple[int, FlightResult] | None = None
         self.standing: Standing | None = None
 
-    def hear(self, standing: Standing, now_s: float) -> None:
+    def take_standing(self, standing: Standing, now_s: float) -> None:
         """Take an answer of the vehicle's referee; from now on only this referee counts."""
         self._on_telemetry = None
         self._answered_s = now_s
@@ -274,7 +276,7 @@ class Judging:
                 return
             boot_us = wall_boot_us if boot_unix_us is None else boot_unix_us
             # Clocks that are set by satellites report a slightly different time in each answer.
-            self._tries = TryWatch(self._id, f"{boot_us // 10_000_000}", self._tell, now_s)
+            self._tries = TryWatch(self._id, f"{boot_us // 10_000_000}", self._publish, now_s)
             if self._result is not None:
                 self._tries.take_result(*self._result, now_s)
         if self._on_telemetry is not None:
@@ -309,8 +311,8 @@ class Judging:
 
     def scenario(self, channel: RefereeChannel | None) -> Scenario | None:
         """What is flown: by the vehicle's referee, otherwise by the monitor's equipment."""
-        told = channel.scenario if channel is not None else None
-        return told if told is not None else self._equipment.scenario
+        own = channel.scenario if channel is not None else None
+        return own if own is not None else self._equipment.scenario
 
 
 def figures(
@@ -325,13 +327,13 @@ def figures(
     """
     if standing is None and result is None:
         return None
-    told: JsonMessage = {"next_colour": None, "inside": True, "motors_on": False}
+    shown: JsonMessage = {"next_colour": None, "inside": True, "motors_on": False}
     if standing is not None:
-        told = _of_standing(standing)
+        shown = _of_standing(standing)
     if result is not None:
-        told |= _of_result(result)
-    late = limit_s is not None and told["try_time_s"] >= limit_s
-    return {**told, "limit_s": limit_s, "time_over": late, "final": result is not None}
+        shown |= _of_result(result)
+    late = limit_s is not None and shown["try_time_s"] >= limit_s
+    return {**shown, "limit_s": limit_s, "time_over": late, "final": result is not None}
 
 
 def _of_standing(standing: Standing) -> JsonMessage:

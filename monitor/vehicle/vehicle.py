@@ -38,9 +38,9 @@ class VehicleCallbacks:
     """Called on the loop: `send` with MAVLink, `notice` with level and one line, the others with messages."""
 
     send: Callable[[Message], None]
-    tell: Callable[[JsonMessage], None]
+    publish: Callable[[JsonMessage], None]
     notice: Callable[[str, str], None]
-    tell_try: Callable[[TryEvent], None]
+    publish_try: Callable[[TryEvent], None]
 
 
 class Vehicle:
@@ -78,7 +78,7 @@ class Vehicle:
         self._telemetry = VehicleTelemetry()
         self._channel: RefereeChannel | None = None
         self._channel_task: asyncio.Task[None] | None = None
-        self._texts = Texts(drone_id, callbacks.tell)
+        self._texts = Texts(drone_id, callbacks.publish)
         self._commands = CommandSender(drone_id, callbacks.send)
         scenario, start_pose = equipment.scenario, equipment.start_pose
         self._start_pose = start_pose(scenario) if scenario is not None and start_pose is not None else None
@@ -91,7 +91,7 @@ class Vehicle:
         self._history = History()
         self._history_source = self._placement.source
         self._mission = MissionView(self.id)
-        self._judging = Judging(self.id, self._equipment, self._callbacks.tell_try, now_s)
+        self._judging = Judging(self.id, self._equipment, self._callbacks.publish_try, now_s)
         boot_time = request_message(self.id, mavlink.MAVLINK_MSG_ID_SYSTEM_TIME)
         self._boot_time = RepeatedRequest(boot_time, _MAX_BOOT_TIME_REQUESTS)
         self._rates = RateWatch(self.id, now_s)
@@ -103,7 +103,7 @@ class Vehicle:
         """Take a message of any component of this system."""
         number, component = message.get_msgId(), message.get_srcComponent()
         if component == AUTOPILOT_COMPONENT_ID:
-            self.link.hear(message.get_seq(), now_s)
+            self.link.count(message.get_seq(), now_s)
         if number == mavlink.MAVLINK_MSG_ID_STATUSTEXT:
             self._texts.take(message, self._telemetry.time_us, now_s)
         elif component == AUTOPILOT_COMPONENT_ID:
@@ -232,8 +232,8 @@ class Vehicle:
     def _take_app(self, message: Message, now_s: float) -> None:
         mission = self._mission
         before = mission.state
-        for told in mission.take(message, now_s):
-            self._callbacks.tell(told)
+        for published in mission.take(message, now_s):
+            self._callbacks.publish(published)
         state = mission.state
         if state is not None and state is not before:
             report = self._telemetry.position_near(state.time_us)
@@ -267,7 +267,7 @@ class Vehicle:
         if source != self._history_source:
             self._history_source = source
             self._history.clear()
-            self._callbacks.tell(self._history_message())
+            self._callbacks.publish(self._history_message())
         pose = self.pose(now_s)
         if pose is not None:
             self._history.add(pose)
@@ -297,17 +297,17 @@ class Vehicle:
                 self._callbacks.send(request)
 
     def _open_channel(self, api: SimulatorApi) -> None:
-        def hear(answer: Standing) -> None:
+        def take(answer: Standing) -> None:
             ahead_us = (answer.time_us or 0) - self._telemetry.time_us
             if ahead_us >= _OTHER_BOOT_US:
                 return
             frame = answer.local_frame
             if frame is not None:
                 self._placement.lay_by_frame(frame.origin_arena_m, frame.yaw_rad)
-            self._judging.hear(answer, asyncio.get_running_loop().time())
+            self._judging.take_standing(answer, asyncio.get_running_loop().time())
 
         def say(level: str, text: str) -> None:
             self._callbacks.notice(level, f"drone {self.id}: {text}")
 
-        self._channel = RefereeChannel(api, hear, say)
+        self._channel = RefereeChannel(api, take, say)
         self._channel_task = asyncio.create_task(self._channel.run())

@@ -76,7 +76,7 @@ async def test_a_restart_keeps_judges_logged_in_until_their_session_ends(tmp_pat
 
 
 @pytest.mark.parametrize("content", ["", "[]", '{"cookies": {"judge": {"x": {"name": 1}}}}', "[" * 100_000])
-async def test_a_spoiled_file_of_sessions_is_passed_over_and_replaced(tmp_path, content):
+async def test_an_invalid_file_of_sessions_is_ignored_and_replaced(tmp_path, content):
     path = tmp_path / "contest.db.sessions"
     path.write_text(content)
     access = Access(PASSWORD, all_may_fly=False, cookie="judge", kept=SessionFile(path, "judge"))
@@ -85,7 +85,7 @@ async def test_a_spoiled_file_of_sessions_is_passed_over_and_replaced(tmp_path, 
     assert again.visitor(connection(again, session_id)).may_judge
 
 
-async def test_without_a_folder_to_write_to_judges_still_log_in(tmp_path):
+async def test_judges_can_log_in_when_sessions_cannot_be_written(tmp_path):
     kept = SessionFile(tmp_path / "missing" / "contest.db.sessions", "judge")
     access = Access(PASSWORD, all_may_fly=False, cookie="judge", kept=kept)
     session_id = await access.log_in("Ada", PASSWORD, "10.0.0.1")
@@ -102,11 +102,11 @@ async def test_without_a_folder_to_write_to_judges_still_log_in(tmp_path):
         ("sqlite:///:memory:", None),
     ],
 )
-def test_sessions_lie_beside_the_database(database, path):
+def test_sessions_are_stored_beside_the_database(database, path):
     assert session_path(database) == (None if path is None else Path(path))
 
 
-async def test_who_guesses_is_slowed_down_and_others_are_not():
+async def test_tries_are_limited_for_each_address():
     clock = Clock()
     access = Access(PASSWORD, all_may_fly=False, clock=clock)
     for _ in range(TRIES_A_MINUTE):
@@ -120,7 +120,7 @@ async def test_who_guesses_is_slowed_down_and_others_are_not():
     assert await access.log_in("Eve", PASSWORD, "2001:db8::2")
 
 
-async def test_a_one_time_link_is_good_once_and_a_new_one_is_made():
+async def test_a_one_time_link_is_valid_once_and_is_replaced():
     links = []
     access = Access(None, all_may_fly=True, hear_invitation=links.append)
     with pytest.raises(LoginRefusedError):
@@ -205,7 +205,7 @@ async def test_flying_is_free_on_this_machine_and_needs_a_login_elsewhere(monkey
             assert answer.status == 200
 
 
-async def test_what_is_typed_into_the_form_comes_back_as_text(monkeypatch):
+async def test_the_login_form_escapes_its_input(monkeypatch):
     async with serving(monkeypatch, SAMPLE, password=PASSWORD) as served, browser() as client:
         evil = '"><script>x</script>'
         async with client.post(served.url + "login", data={"name": evil, "secret": "wrong"}) as answer:

@@ -170,7 +170,7 @@ async def test_texts_with_markup_are_shown_as_text(chromium, fake):
     assert complaints == []
 
 
-async def test_the_lit_state_follows_the_mission(chromium, fake):
+async def test_the_highlighted_state_follows_the_mission(chromium, fake):
     page, complaints = await visit(chromium, fake, "/chart")
     lit, around = page.locator("svg .m-active"), page.locator("svg .m-around")
     panel = page.locator(".m-chart")
@@ -191,14 +191,14 @@ async def test_the_lit_state_follows_the_mission(chromium, fake):
     assert complaints == []
 
 
-async def test_a_bad_diagram_is_told_and_the_state_is_still_shown(chromium, fake):
+async def test_an_invalid_diagram_is_reported_and_the_state_is_still_shown(chromium, fake):
     fake.welcome[1] = chart() | {"mermaid": "stateDiagram-v2\n    state {{ --> }\n"}
     page, _ = await visit(chromium, fake, "/chart")
     await expect(page.locator(".m-chart-words")).to_contain_text("cannot be drawn")
     await expect(page.locator(".m-chart")).to_have_attribute("data-state", "red.turning")
 
 
-async def test_a_lost_monitor_is_told_and_found_again(chromium, fake):
+async def test_a_lost_monitor_is_reported_and_reconnected(chromium, fake):
     page, _ = await visit(chromium, fake)
     await expect(figure(page, "try_time_s")).to_have_text("87.4")
     await fake.stop()
@@ -329,7 +329,7 @@ async def test_camera_boxes_and_arena_are_of_one_moment(chromium, fake):
     assert complaints == []
 
 
-async def test_who_comes_late_sees_the_flight_so_far_at_once(chromium, fake):
+async def test_a_late_viewer_sees_the_flight_so_far_at_once(chromium, fake):
     rows = [
         [10 + 0.1 * step, 0.02 * step, 1.0, 1.5, 0.3, 0.2, 0.0, 0.0, 0.0, 0.2, 0.0, 0.0, 0.0, 1, state]
         for step in range(300)

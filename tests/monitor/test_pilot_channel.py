@@ -57,14 +57,14 @@ def closing_of(socket):
     raise AssertionError("it was not closed")
 
 
-def test_who_may_not_fly_is_refused_with_a_reason():
+def test_a_visitor_who_may_not_fly_is_refused_with_a_reason():
     with connected(Visitor("", may_judge=False, may_fly=False)) as (socket, fleet):
         closed = closing_of(socket)
     assert closed.code == 4403 and "log" in closed.reason
     assert fleet.orders == [] and fleet.sent == []
 
 
-def test_an_order_is_answered_and_all_are_told_who_has_the_sticks():
+def test_an_order_is_answered_and_the_seat_is_sent():
     with connected() as (socket, fleet):
         socket.send_json(order("take"))
         seat = socket.receive_json()
@@ -83,7 +83,7 @@ def test_an_order_is_answered_and_all_are_told_who_has_the_sticks():
         assert fleet.orders == ["position", "arm"]
 
 
-def test_a_refused_order_comes_back_in_the_vehicles_words():
+def test_a_refusal_has_the_vehicle_s_reason():
     with connected() as (socket, fleet):
         fleet.refuse["arm"] = "Arming denied: low battery"
         socket.send_json(order("arm"))
@@ -101,7 +101,7 @@ def test_stopping_the_motors_without_confirmation_is_refused():
         assert fleet.orders == ["stop_motors"]
 
 
-def test_a_closed_websocket_has_the_drone_hold():
+def test_the_drone_holds_when_the_websocket_is_closed():
     with connected() as (socket, fleet):
         socket.send_json(order("take"))
         answer_to(socket, "take")
@@ -110,7 +110,7 @@ def test_a_closed_websocket_has_the_drone_hold():
     assert fleet.sent[-1] == (1, NEUTRAL)
 
 
-def test_a_bad_message_closes_the_websocket_with_the_reason_and_has_the_drone_hold():
+def test_a_bad_message_closes_the_websocket_with_the_reason_and_the_drone_holds():
     with connected() as (socket, fleet):
         socket.send_json(order("take"))
         answer_to(socket, "take")
@@ -121,7 +121,7 @@ def test_a_bad_message_closes_the_websocket_with_the_reason_and_has_the_drone_ho
 
 
 @pytest.mark.parametrize("data", [b"\xff\x00", b"{}", b"[" * 999])
-def test_bytes_that_are_no_message_close_it_as_well(data):
+def test_invalid_bytes_close_the_websocket(data):
     with connected() as (socket, _fleet):
         socket.send_bytes(data)
         assert closing_of(socket).code == 4400
@@ -142,7 +142,7 @@ def test_a_flood_closes_the_websocket():
     assert closed.code == 4429 and closed.reason == "too many messages a second"
 
 
-def test_a_fault_within_is_answered_and_not_told_in_detail(caplog):
+def test_an_internal_fault_is_answered_without_details(caplog):
     with connected() as (socket, fleet):
         fleet.do = None
         socket.send_json(order("arm"))
@@ -187,14 +187,14 @@ def test_a_deflection_is_a_number_from_minus_one_to_one(value):
         ('{"kind": "' + "é" * 500 + '"}', "at most 1000"),
     ],
 )
-def test_what_no_page_of_ours_sends_is_refused_in_one_short_line(text, words):
+def test_an_invalid_message_is_refused_in_one_short_line(text, words):
     with pytest.raises(PilotMessageError) as caught:
         read_message(text)
     assert words in str(caught.value)
     assert "\n" not in str(caught.value) and len(str(caught.value)) < 150
 
 
-def test_sixty_messages_a_second_are_taken_and_some_that_were_held_back():
+def test_sixty_messages_a_second_and_a_burst_are_allowed():
     now_s = 0.0
     allowance = Allowance(lambda: now_s)
     assert [allowance.spend() for _ in range(241)] == [True] * 240 + [False]

@@ -92,7 +92,7 @@ async def game():
                 await task
 
 
-async def test_taking_sends_neutral_sticks_before_it_asks_for_position_mode(game):
+async def test_taking_sends_neutral_sticks_before_it_requests_position_mode(game):
     ana = game.browser("Ana")
     task = asyncio.create_task(game.desk.do(ana, Order(1, "take")))
     await game.pass_time(0.3, ana, FORWARD)
@@ -106,7 +106,7 @@ async def test_taking_sends_neutral_sticks_before_it_asks_for_position_mode(game
     assert game.fleet.pilots[1] == "Ana"
 
 
-async def test_sticks_reach_the_drone_only_from_who_has_the_seat(game):
+async def test_only_the_holder_s_sticks_reach_the_drone(game):
     ana, ben = game.browser("Ana"), game.browser("Ben")
     await game.take(ana)
     game.desk.sticks(ana, FORWARD)
@@ -123,7 +123,7 @@ async def test_every_browser_is_told_who_has_the_sticks(game):
     assert theirs == {"kind": "seat", "id": 1, "pilot": "Ana", "yours": False, "flying": True}
 
 
-async def test_a_refusal_comes_back_in_the_vehicles_words_and_frees_the_seat(game):
+async def test_a_refusal_has_the_vehicle_s_reason_and_frees_the_seat(game):
     ana = game.browser("Ana")
     game.fleet.refuse["position"] = "Switching to Position is currently not available: no position"
     answer = await game.order(ana, "take")
@@ -131,7 +131,7 @@ async def test_a_refusal_comes_back_in_the_vehicles_words_and_frees_the_seat(gam
     assert game.seat().holder is None and game.seat().control is Control.NONE
 
 
-async def test_silence_for_half_a_second_centres_the_sticks_and_asks_for_hold(game):
+async def test_silence_for_half_a_second_centres_the_sticks_and_requests_hold(game):
     ana = game.browser("Ana")
     await game.take(ana)
     await game.pass_time(1.0, ana, FORWARD)
@@ -148,7 +148,7 @@ async def test_silence_for_half_a_second_centres_the_sticks_and_asks_for_hold(ga
     assert game.fleet.notices[-1] == (1, "info", "drone 1 holds")
 
 
-async def test_after_silence_late_sticks_do_not_fly(game):
+async def test_sticks_after_silence_are_not_sent(game):
     ana = game.browser("Ana")
     await game.take(ana)
     await game.pass_time(0.6)
@@ -160,7 +160,7 @@ async def test_after_silence_late_sticks_do_not_fly(game):
     assert game.last_sticks() == FORWARD
 
 
-async def test_a_closed_page_has_the_drone_hold_at_once(game):
+async def test_the_drone_holds_at_once_when_the_page_is_closed(game):
     ana = game.browser("Ana")
     await game.take(ana)
     game.desk.sticks(ana, FORWARD)
@@ -171,7 +171,7 @@ async def test_a_closed_page_has_the_drone_hold_at_once(game):
     assert game.fleet.pilots[1] == ""
 
 
-async def test_hold_is_asked_for_until_the_drone_obeys(game):
+async def test_hold_is_requested_until_the_drone_holds(game):
     ana = game.browser("Ana")
     await game.take(ana)
     game.fleet.refuse["hold"] = "drone 1 does not answer"
@@ -183,7 +183,7 @@ async def test_hold_is_asked_for_until_the_drone_obeys(game):
     assert game.seat().control is Control.NONE and game.fleet.orders.count("hold") == 4
 
 
-async def test_a_failsafe_that_flies_the_drone_is_not_disturbed_by_silence(game):
+async def test_silence_does_not_interrupt_a_failsafe(game):
     ana = game.browser("Ana")
     await game.take(ana)
     game.fleet.status[1]["mode"] = "Return"
@@ -192,7 +192,7 @@ async def test_a_failsafe_that_flies_the_drone_is_not_disturbed_by_silence(game)
     assert game.fleet.notices == [(1, "warning", "the pilot's page fell silent; drone 1 goes on by itself")]
 
 
-async def test_a_page_that_closes_while_it_takes_the_sticks_leaves_a_drone_that_holds(game):
+async def test_the_drone_holds_when_the_page_is_closed_while_it_takes_the_sticks(game):
     ana = game.browser("Ana")
     game.fleet.gates["position"] = asyncio.Event()
     task = asyncio.create_task(game.desk.do(ana, Order(1, "take")))
@@ -204,7 +204,7 @@ async def test_a_page_that_closes_while_it_takes_the_sticks_leaves_a_drone_that_
     assert not (await task).ok
 
 
-async def test_giving_back_lets_the_waiting_mission_go_on(game):
+async def test_giving_back_resumes_the_waiting_mission(game):
     ana = game.browser("Ana")
     await game.take(ana)
     game.fleet.status[1]["mission"] = MISSION
@@ -214,7 +214,7 @@ async def test_giving_back_lets_the_waiting_mission_go_on(game):
 
 
 @pytest.mark.parametrize("mission", [None, MISSION | {"paused": False}, MISSION | {"alive": False}])
-async def test_giving_back_without_a_waiting_mission_has_the_drone_hold(game, mission):
+async def test_the_drone_holds_after_giving_back_without_a_waiting_mission(game, mission):
     ana = game.browser("Ana")
     await game.take(ana)
     game.fleet.status[1]["mission"] = mission
@@ -223,7 +223,7 @@ async def test_giving_back_without_a_waiting_mission_has_the_drone_hold(game, mi
     assert game.fleet.orders == ["position", "hold"]
 
 
-async def test_a_mission_that_cannot_go_on_has_the_drone_hold_and_says_why(game):
+async def test_the_drone_holds_if_the_mission_cannot_go_on_and_the_answer_has_the_reason(game):
     ana = game.browser("Ana")
     await game.take(ana)
     game.fleet.status[1]["mission"] = MISSION
@@ -232,7 +232,7 @@ async def test_a_mission_that_cannot_go_on_has_the_drone_hold_and_says_why(game)
     assert answer.text == "the mission frame_challenge cannot go on (no setpoints); drone 1 holds"
 
 
-async def test_a_drone_that_does_not_even_hold_stays_the_pilots(game):
+async def test_the_pilot_keeps_a_drone_that_does_not_hold(game):
     ana = game.browser("Ana")
     await game.take(ana)
     game.fleet.refuse["hold"] = "no answer"
@@ -242,7 +242,7 @@ async def test_a_drone_that_does_not_even_hold_stays_the_pilots(game):
     assert game.last_sticks() == FORWARD
 
 
-async def test_giving_back_and_closing_the_page_does_not_interrupt_the_giving(game):
+async def test_closing_the_page_does_not_interrupt_giving_back(game):
     ana = game.browser("Ana")
     await game.take(ana)
     game.fleet.status[1]["mission"] = MISSION
@@ -285,7 +285,7 @@ async def test_a_taken_seat_is_refused_until_its_holder_was_silent_for_five_seco
     assert game.last_sticks() == NEUTRAL
 
 
-async def test_a_judge_takes_over_at_any_time_and_the_pilot_is_told(game):
+async def test_a_judge_takes_the_sticks_at_any_time_and_the_pilot_is_told(game):
     ana, judge = game.browser("Ana"), game.browser("Judge", may_judge=True)
     await game.take(ana)
     await game.pass_time(0.1, ana, FORWARD)
@@ -306,7 +306,7 @@ async def test_orders_of_others_are_refused_while_somebody_flies(game):
     assert game.fleet.orders == ["position"]
 
 
-async def test_stopping_the_motors_needs_confirmation_and_waits_for_nobody(game):
+async def test_stopping_the_motors_needs_confirmation_and_does_not_wait(game):
     ana = game.browser("Ana")
     answer = await game.order(ana, "stop_motors")
     assert not answer.ok and "confirmed" in answer.text and game.fleet.orders == []
@@ -318,7 +318,7 @@ async def test_stopping_the_motors_needs_confirmation_and_waits_for_nobody(game)
     assert (await waiting).text == "arm: another order came before the answer"
 
 
-async def test_hold_overtakes_an_order_under_way_and_others_wait(game):
+async def test_hold_replaces_the_present_order_and_others_wait(game):
     ana = game.browser("Ana")
     game.fleet.gates["position"] = asyncio.Event()
     taking = asyncio.create_task(game.desk.do(ana, Order(1, "take")))
@@ -330,7 +330,7 @@ async def test_hold_overtakes_an_order_under_way_and_others_wait(game):
     assert game.seat().control is Control.NONE and game.seat().holder is ana
 
 
-async def test_after_hold_the_sticks_fly_only_when_taken_again(game):
+async def test_after_hold_the_sticks_must_be_taken_again(game):
     ana = game.browser("Ana")
     await game.take(ana)
     assert (await game.order(ana, "hold")).ok
@@ -338,7 +338,7 @@ async def test_after_hold_the_sticks_fly_only_when_taken_again(game):
     assert game.last_sticks() == NEUTRAL and game.seat().holder is ana
 
 
-async def test_after_a_take_off_by_button_the_pilot_flies_on(game):
+async def test_after_a_take_off_the_sticks_control_the_drone_again(game):
     ana = game.browser("Ana")
     await game.take(ana)
     assert (await game.order(ana, "take_off")).ok
@@ -351,7 +351,7 @@ async def test_after_a_take_off_by_button_the_pilot_flies_on(game):
     assert game.last_sticks() == FORWARD
 
 
-async def test_a_pilot_who_falls_silent_during_take_off_leaves_it_to_end_by_itself(game):
+async def test_silence_during_take_off_does_not_interrupt_it(game):
     ana = game.browser("Ana")
     await game.take(ana)
     assert (await game.order(ana, "take_off")).ok
@@ -369,7 +369,7 @@ async def test_one_browser_flies_one_drone(game):
     assert (await game.order(ana, "take", number=7)).text == "no drone 7 is heard"
 
 
-async def test_the_seat_of_one_drone_says_nothing_about_the_others(game):
+async def test_the_seats_of_two_drones_are_independent(game):
     ana, ben = game.browser("Ana"), game.browser("Ben")
     await game.take(ana)
     await game.take(ben, number=2, streaming=True)
@@ -378,7 +378,7 @@ async def test_the_seat_of_one_drone_says_nothing_about_the_others(game):
     assert game.last_sticks(2) == FORWARD and game.last_sticks(1) == NEUTRAL
 
 
-async def test_a_fault_in_one_seat_does_not_stop_the_dead_man_of_another(game, caplog):
+async def test_a_fault_in_one_seat_does_not_affect_another(game, caplog):
     ana, ben = game.browser("Ana"), game.browser("Ben")
     await game.take(ana)
     await game.take(ben, number=2)
@@ -405,5 +405,5 @@ async def test_the_watch_runs_by_itself_while_a_browser_is_there():
     desk.remove(ana)
 
 
-def test_people_are_told_apart_by_who_they_are_and_not_by_their_names():
+def test_two_browsers_with_one_name_are_different():
     assert Browser("Ana") != Browser("Ana")

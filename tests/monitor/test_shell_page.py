@@ -63,7 +63,7 @@ async def test_a_page_comes_back_by_itself_when_the_server_does(monkeypatch, chr
             await page.wait_for_selector("main >> text=may judge: False")
 
 
-async def test_a_lost_drone_is_told_in_words(monkeypatch, chromium):
+async def test_a_lost_drone_is_shown_in_words(monkeypatch, chromium):
     async with serving(monkeypatch, SAMPLE) as served, phone(chromium) as page:
         await page.goto(served.url)
         await page.wait_for_function(LINK_IS, arg="live")

@@ -99,7 +99,7 @@ async def next_number(answer):
     return int(line.partition(b":")[2])
 
 
-async def test_many_watch_over_one_connection_which_ends_with_them(monkeypatch):
+async def test_many_viewers_share_one_connection_that_ends_with_the_last(monkeypatch):
     async with camera() as source, serving(monkeypatch) as served, browser() as client:
         served.fleet.video = source.url
         answers = [await client.get(served.url + "video/1") for _ in range(3)]
@@ -115,7 +115,7 @@ async def test_many_watch_over_one_connection_which_ends_with_them(monkeypatch):
         await reached(lambda: source.now == 0 or source.show())
 
 
-async def test_one_image_is_had_alone(monkeypatch):
+async def test_a_single_image_is_served(monkeypatch):
     async with camera() as source, serving(monkeypatch) as served, browser() as client:
         served.fleet.video = source.url
         source.number = 7
@@ -130,7 +130,7 @@ EVIL = b"<script>alert(1)</script>"
 
 
 @pytest.mark.parametrize("head", ["", f"Content-Length: {len(EVIL)}\r\n"])
-async def test_what_is_no_jpeg_is_not_passed_on(monkeypatch, head):
+async def test_only_jpegs_are_forwarded(monkeypatch, head):
     async with camera() as source, serving(monkeypatch) as served, browser() as client:
         served.fleet.video = source.url
         source.first = part(1, EVIL, head)
@@ -155,7 +155,7 @@ async def next_frame(answer):
         return time_us, await answer.content.readexactly(length)
 
 
-async def test_frames_carry_their_time_and_who_comes_late_gets_the_last_one_at_once(monkeypatch):
+async def test_frames_have_their_time_and_a_late_viewer_gets_the_last_one_at_once(monkeypatch):
     async with camera() as source, serving(monkeypatch) as served, browser() as client:
         served.fleet.video = source.url
         source.number = 7
@@ -172,7 +172,7 @@ async def test_frames_carry_their_time_and_who_comes_late_gets_the_last_one_at_o
             assert jpeg == JPEG
 
 
-async def test_a_drone_that_was_away_is_seen_again(monkeypatch):
+async def test_the_connection_is_made_again_after_a_failure(monkeypatch):
     monkeypatch.setattr("monitor.video_proxy._RETRY_S", 0.05)
     async with camera() as source, serving(monkeypatch) as served, browser() as client:
         served.fleet.video = source.url
@@ -195,7 +195,7 @@ async def test_a_drone_that_was_away_is_seen_again(monkeypatch):
         ("1", "5600", 404, "only MJPEG over http"),
     ],
 )
-async def test_video_that_cannot_be_had_is_told_in_words(monkeypatch, path, video, status, words):
+async def test_the_reason_is_told_when_there_is_no_video(monkeypatch, path, video, status, words):
     async with serving(monkeypatch) as served, browser() as client:
         served.fleet.video = video
         async with client.get(served.url + f"video/{path}") as answer:

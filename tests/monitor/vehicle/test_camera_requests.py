@@ -71,7 +71,7 @@ def free_port():
         ("127.0.0.1", "127.0.0.1", "video", True, {"/referee.json"}),  # and the redirection is not followed
     ],
 )
-async def test_only_a_camera_s_own_address_is_asked(address, service_address, place, confirmed, paths):
+async def test_only_a_camera_s_own_url_is_fetched(address, service_address, place, confirmed, paths):
     async with service(service_address) as (port, asked):
         hosts = (f"{service_address}:{port}",) if confirmed else ()
         link_port = free_port()

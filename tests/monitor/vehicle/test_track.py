@@ -19,7 +19,7 @@ def standing(x, y, z, yaw_ned_rad):
     return telemetry
 
 
-def test_the_start_gives_turn_and_shift():
+def test_the_start_gives_rotation_and_translation():
     placement = Placement()
     placement.lay_by_start((2.0, -1.0, 0.5, pi / 2), standing(10.0, 20.0, -3.0, 0.3))
     assert placement.alignment.position((10.0, 20.0, -3.0)) == pytest.approx((2.0, -1.0, 0.5))
@@ -31,7 +31,7 @@ def test_the_start_gives_turn_and_shift():
     assert (w, z) == pytest.approx((cos(pi / 4), sin(pi / 4)))
 
 
-def test_the_frame_of_a_referee_counts_before_all():
+def test_the_referee_s_frame_has_priority():
     placement = Placement()
     placement.lay_by_frame((1.0, 2.0, 3.0), pi / 2)
     assert placement.alignment.position((1.0, 0.0, 0.0)) == pytest.approx((1.0, 3.0, 3.0))
@@ -41,7 +41,7 @@ def test_the_frame_of_a_referee_counts_before_all():
     assert placement.alignment.position((0.0, 0.0, 0.0)) == pytest.approx((1.0, 2.0, 3.0))
 
 
-def test_of_the_apps_pairs_the_stillest_counts():
+def test_the_app_s_pair_with_the_lowest_speed_counts():
     placement = Placement()
     placement.lay_by_app((1.0, 0.0, 0.0, 0.0), PositionReport(0, (0.0, 0.0, 0.0), (1.0, 0.0, 0.0), 0.0))
     assert placement.alignment.position((0.0, 0.0, 0.0)) == pytest.approx((1.0, 0.0, 0.0))
@@ -51,14 +51,14 @@ def test_of_the_apps_pairs_the_stillest_counts():
 
 
 @pytest.mark.parametrize("bad", [float("nan"), float("inf")])
-def test_what_is_no_number_is_not_believed(bad):
+def test_poses_that_are_not_finite_are_ignored(bad):
     placement = Placement()
     placement.lay_by_frame((bad, 0.0, 0.0), 0.0)
     placement.lay_by_app((0.0, 0.0, 0.0, bad), PositionReport(0, (0.0, 0.0, 0.0), (0.0, 0.0, 0.0), 0.0))
     assert placement.source is Source.GUESS
 
 
-def test_one_that_is_carried_lays_nothing():
+def test_a_moving_drone_is_not_placed_by_its_start():
     telemetry = standing(0.0, 0.0, 0.0, 0.0)
     telemetry.take(mavlink.MAVLink_local_position_ned_message(20, 0, 0, 0, 0.5, 0, 0), 0.0)
     placement = Placement()
@@ -80,7 +80,7 @@ def pose(t, x=0.0, on=True, state=3, yaw=0.5):
     }
 
 
-def test_a_sample_has_all_that_the_plots_show():
+def test_a_sample_has_all_columns():
     kept = History()
     kept.add(pose(5.0, x=-1.5))
     kept.add(pose(5.0, x=9.0))  # nothing new came
@@ -104,7 +104,7 @@ def test_a_flight_begins_with_the_motors():
     assert [row[0] for row in kept.rows()] == [6.0]
 
 
-def test_the_past_is_bounded_and_the_whole_trail_stays(monkeypatch):
+def test_the_number_of_samples_is_bounded_and_the_whole_trail_stays(monkeypatch):
     monkeypatch.setattr(track, "MAX_OLDER", 50)
     kept = History()
     for step in range(20_000):
