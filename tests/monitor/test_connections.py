@@ -1,4 +1,4 @@
-"""Clients that mean harm: unfinished requests, too many connections, forged addresses. Real sockets."""
+"""Malicious clients: unfinished requests, too many connections, forged addresses. Real sockets."""
 
 import asyncio
 import contextlib
@@ -26,7 +26,7 @@ async def connected(served, head="", address="127.0.0.1"):
 
 
 async def answer_of(served, request, address="127.0.0.1"):
-    """Status and all else that comes until the server closes; status 0 if nothing does."""
+    """Status and all data until the server closes; status 0 without any."""
     reader, writer = await connected(served, request, address)
     async with asyncio.timeout(15):
         try:
@@ -171,7 +171,7 @@ async def test_a_client_that_does_not_read_is_disconnected(monkeypatch):
 
 
 def read_all(client):
-    """All that comes until the connection ends, however it does."""
+    """All data until the connection ends."""
     data = bytearray()
     with contextlib.suppress(ConnectionResetError):
         while part := client.recv(1 << 16):
@@ -239,7 +239,7 @@ async def test_a_proxy_s_connections_are_not_counted_but_its_clients_requests_ar
     ("proxies", "head", "status"),
     [
         ((), "", 200),
-        ((), "X-Forwarded-For: 127.0.0.1\r\n", 403),  # a proxy is there of which nobody told
+        ((), "X-Forwarded-For: 127.0.0.1\r\n", 403),  # a proxy that was not configured
         ((), "Forwarded: for=127.0.0.1\r\n", 403),
         (("127.0.0.1",), "X-Forwarded-For: 127.0.0.1\r\n", 403),
         (("127.0.0.1",), "X-Forwarded-For: 10.0.0.7\r\n", 403),

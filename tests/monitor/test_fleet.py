@@ -30,14 +30,14 @@ def error_m(drone, pose):
 
 
 def turn_rad(drone, pose):
-    """Angle between the attitude told and the true one."""
+    """Angle between the attitude sent and the true one."""
     truth = nearest(drone, pose).attitude_arena
     dot = abs(sum(told * true for told, true in zip(pose["q"], truth, strict=True)))
     return 2 * (1 - min(1.0, dot)) ** 0.5 * 2**0.5
 
 
 async def fly_a_little(watched, link, seconds=8.0):
-    """Take off, turn and move; poses on the way."""
+    """Take off, turn and move; returns the poses."""
     await watched.until_ready(link)
     with link.lock:
         autopilot = link.drones[0].simulation.autopilot

@@ -1,4 +1,4 @@
-"""Whatever comes over the link, the fleet goes on and tells finite JSON."""
+"""The fleet survives any messages and sends finite JSON."""
 
 import asyncio
 import json

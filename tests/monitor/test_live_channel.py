@@ -89,7 +89,7 @@ async def test_ten_viewers_get_every_pose_at_once(monkeypatch):
         serving(monkeypatch) as served,
         browser() as client,
         client.ws_connect(served.url + "ws/live"),
-    ):  # reads nothing and holds up nobody
+    ):  # reads nothing, and must not delay the others
         watching = [watch(client, served.url + "ws/live", 1.5) for _ in range(10)]
         seen = await asyncio.gather(*watching)
     for poses in seen:

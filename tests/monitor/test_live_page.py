@@ -1,4 +1,4 @@
-"""The live page and the statechart's, in a real browser, told by a test what flies."""
+"""The live page and the statechart's, in a real browser, with messages of the test."""
 
 import asyncio
 import re
@@ -307,7 +307,7 @@ WATCH_MOMENTS = """() => {
 
 
 async def test_camera_boxes_and_arena_are_of_one_moment(chromium, fake):
-    """What the app finds in an image comes 0.2 s after the image, and the drone has moved on by then."""
+    """Detections are sent 0.2 s after their image, when the drone has moved."""
     fake.welcome[2] = {"kind": "status", "drones": [status(video=True)]}
     page, complaints = await visit(chromium, fake)
     await fake.until_filmed()
@@ -370,7 +370,7 @@ async def test_after_a_flight_its_result_and_last_image_stay(chromium, fake):
 
 
 async def test_a_restarted_monitor_does_not_say_that_a_flight_has_not_begun(chromium, fake):
-    """The names of a mission's states come some seconds after its state."""
+    """The names of a mission's states are received some seconds after its state."""
     unnamed = status(state="")
     unnamed["mission"] |= {"name": ""}
     fake.welcome = [world(), {"kind": "status", "drones": [unnamed]}]

@@ -1,4 +1,4 @@
-"""The WebSocket of the sticks: who is let in, what is said, and what has it closed."""
+"""The WebSocket of the sticks: who is accepted, what is sent, and what closes it."""
 
 import asyncio
 import json

@@ -1,4 +1,4 @@
-"""The seat: who has the sticks, and what becomes of a drone whose pilot falls silent."""
+"""The seat: who has the sticks, and what is done when the pilot falls silent."""
 
 import asyncio
 from contextlib import suppress
@@ -263,7 +263,7 @@ async def test_neutral_sticks_go_on_until_the_drone_is_disarmed(game):
     await game.pass_time(3.0)
     assert game.last_sticks() == NEUTRAL
     game.fleet.status[1]["armed"] = False
-    game.fleet.status[1]["link"]["state"] = "lost"  # what is not heard is not believed
+    game.fleet.status[1]["link"]["state"] = "lost"  # so its old status does not count
     await game.pass_time(0.2)
     assert game.last_sticks() == NEUTRAL
     game.fleet.status[1]["link"]["state"] = "live"

@@ -1,4 +1,4 @@
-"""The replay's page in a real browser: one clock for all, two flights side by side, links that hold."""
+"""The replay's page in a real browser: one clock for all, two flights side by side, links to a view."""
 
 import contextlib
 import re
@@ -19,7 +19,7 @@ LAPTOP, PHONE = {"width": 1366, "height": 768}, {"width": 390, "height": 844}
 
 @contextlib.asynccontextmanager
 async def opened(monkeypatch, chromium, library, path, viewport=LAPTOP):
-    """A page of the replay; it must not complain."""
+    """A page of the replay; it must log no errors."""
     async with serving_runs(monkeypatch, library) as served:
         page = await chromium.new_page(viewport=viewport)
         page.set_default_timeout(PATIENCE_MS)

@@ -14,7 +14,7 @@ PHONE = {"width": 390, "height": 800}
 
 @contextlib.asynccontextmanager
 async def phone(chromium):
-    """A page that notes what it asks for and complains of."""
+    """A page that records its requests and errors."""
     page = await chromium.new_page(viewport=PHONE)
     page.complaints, page.hosts = [], set()
     page.on("console", lambda m: page.complaints.append(m.text) if m.type in ("error", "warning") else None)

@@ -30,13 +30,13 @@ LINK = "http://192.168.178.123:8080/login?token=" + "aB3_-xYz" * 5 + "abc"
 
 @pytest.fixture
 def networks(monkeypatch):
-    """A machine with a cable, a wireless network that leads elsewhere, and what no phone reaches."""
+    """A machine with a wired network, the wireless default route, and interfaces that no phone reaches."""
     monkeypatch.setattr(urls.ifaddr, "get_adapters", lambda: ADAPTERS)
     monkeypatch.setattr(urls, "_default_address", lambda: "192.168.1.5")
 
 
 def read_code(image):
-    """What a phone reads in a picture; "" if it finds no code. OpenCV's other detector misses some."""
+    """The text of a QR code in an image; "" without one. OpenCV's other detector misses some."""
     return cv2.QRCodeDetectorAruco().detectAndDecode(image)[0]
 
 

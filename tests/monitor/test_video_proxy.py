@@ -165,7 +165,7 @@ async def test_frames_have_their_time_and_a_late_viewer_gets_the_last_one_at_onc
             assert await next_frame(answer) == (8, JPEG)
         await reached(lambda: source.now == 0 or source.show())
         last = source.number
-        source.hold = True  # the flight is over: nothing new comes
+        source.hold = True  # the flight is over: no new images
         async with client.get(served.url + "video/1/frames") as answer:
             time_us, jpeg = await next_frame(answer)
             assert 8 <= time_us <= last

@@ -15,7 +15,7 @@ from wire.dialect import mavlink
 
 @asynccontextmanager
 async def service(address):
-    """A web server of this machine; yields its port and the paths it was asked for."""
+    """A web server of this machine; yields its port and the requested paths."""
     asked = []
 
     async def answer(request):
@@ -34,7 +34,7 @@ async def service(address):
 
 
 class FakeDrone:
-    """Says from an address that it is a drone with a camera whose video is somewhere."""
+    """A drone at an address, with a camera that sends the URL of its video."""
 
     def __init__(self, address, port, url):
         self._socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)

@@ -1,4 +1,4 @@
-"""Orders: carried out by a real autopilot, and refusals told with its own reason."""
+"""Orders, carried out by a real autopilot or refused with its reason."""
 
 import asyncio
 

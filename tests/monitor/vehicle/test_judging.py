@@ -57,7 +57,7 @@ async def test_the_drone_s_referee_is_used_until_the_end():
 
 
 async def result_follows(watched, link):
-    """The app says what its result.json holds, through the drone's own links."""
+    """The app sends the content of its result.json through the drone's links."""
     content = {
         **link.drones[0].referee_answer()["report"],
         "scenario": SCENARIO.name,

@@ -1,4 +1,4 @@
-"""What an app tells, made into messages for the pages."""
+"""TUNNEL messages of an app become messages for the pages."""
 
 from math import inf, nan
 

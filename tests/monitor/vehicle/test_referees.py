@@ -1,4 +1,4 @@
-"""The referee over HTTP: what it says is checked, and its absence costs little."""
+"""The referee over HTTP: its answers are checked, and its absence costs little."""
 
 import asyncio
 from contextlib import asynccontextmanager

@@ -1,4 +1,4 @@
-"""Tries: which is which, when they end, and which result belongs to which."""
+"""Tries: when they begin and end, and which result belongs to which."""
 
 from dataclasses import replace
 
