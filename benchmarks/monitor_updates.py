@@ -118,7 +118,7 @@ def add_websocket(web):
 
     def tick(t):
         now["t"] = t
-        channel.tell(pose(t))
+        channel.send(pose(t))
 
     assert encode(pose(1.0))
     return tick

@@ -1,4 +1,4 @@
-"""Addresses of visitors: who counts as one, and which proxies are believed."""
+"""Addresses of visitors, and limits of how many connections one address may have."""
 
 from __future__ import annotations
 
@@ -9,10 +9,9 @@ from starlette.types import Scope
 
 
 def visitor_key(address: str) -> str:
-    """Return what stands for an address where visitors are counted.
+    """The key by which visitors are counted: an IPv4 address, or an IPv6 network of 64 bits.
 
-    An IPv6 address is one of 2**64 of its owner, so its network counts; an IPv4 address written as IPv6
-    counts as IPv4.
+    An IPv6 address is one of 2**64 of its owner; an IPv4 address written as IPv6 counts as IPv4.
     """
     try:
         parsed = ip_address(address)
@@ -26,7 +25,7 @@ def visitor_key(address: str) -> str:
 
 
 def client_address(scope: Scope) -> str:
-    """The address a request or WebSocket comes from; "" if the server does not know it."""
+    """The address a request or WebSocket comes from; "" if it is not known."""
     client = scope.get("client")
     return str(client[0]) if client else ""
 
@@ -41,12 +40,7 @@ def is_address_or_network(text: str) -> bool:
 
 
 class Places:
-    """A number of places of which one address can have only a part.
-
-    Args:
-        total: how many there are.
-        per_address: how many of them one address may have.
-    """
+    """A limited number of places, of which one address may take at most `per_address`."""
 
     def __init__(self, total: int, per_address: int) -> None:
         self._total = total
@@ -55,7 +49,7 @@ class Places:
         self._count = 0
 
     def problem(self, address: str) -> str:
-        """Say in one line why an address cannot have a place now; "" if it can."""
+        """Why an address cannot have a place now, in one line; "" if it can."""
         if self._count >= self._total:
             return f"{self._total} are connected; no more can"
         if self._taken[visitor_key(address)] >= self._per_address:
@@ -63,7 +57,7 @@ class Places:
         return ""
 
     def take(self, address: str) -> str:
-        """Take a place. Returns "" or, if there is none, one line that says why."""
+        """Take a place. Returns "" or, if there is none, one line with the reason."""
         problem = self.problem(address)
         if not problem:
             self._taken[visitor_key(address)] += 1
@@ -71,7 +65,7 @@ class Places:
         return problem
 
     def give_back(self, address: str) -> None:
-        """Give back a place that was taken for this address."""
+        """Release a place that was taken for this address."""
         key = visitor_key(address)
         self._taken[key] -= 1
         self._count -= 1
@@ -79,5 +73,5 @@ class Places:
             del self._taken[key]
 
     def __len__(self) -> int:
-        """How many are taken."""
+        """The number of places taken."""
         return self._count

@@ -1,7 +1,7 @@
 """Deadlines and limits of connections, below HTTP: uvicorn has none for a request that is not finished.
 
-Each connection has a `Gate` between the socket and uvicorn's protocol. It closes connections whose request
-does not come or whose client does not take what it asked for, and refuses those that are too many.
+Each connection has a `Gate` between the socket and uvicorn's protocol. It closes connections whose request is
+not received or whose client does not read the answer, and refuses those that are too many.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ from uvicorn.server import ServerState
 from monitor.addresses import Places
 from monitor.settings import ConnectionLimits
 
-_OTHER_FILES = 200  # descriptors that are kept for links, databases, recordings and libraries
+_OTHER_FILES = 200  # file descriptors reserved for links, databases, recordings and libraries
 
 Peer = tuple[str, int]
 
@@ -28,8 +28,8 @@ class Connections:
     """All connections of a server.
 
     Args:
-        limits: how many and how long.
-        is_proxy: whether an address is that of a trusted proxy, whose connections are many people's.
+        limits: their number and deadlines.
+        is_proxy: whether an address is that of a trusted proxy; its connections are not counted.
     """
 
     def __init__(self, limits: ConnectionLimits, is_proxy: Callable[[str], bool]) -> None:
@@ -43,19 +43,19 @@ class Connections:
         self._gates: dict[Peer, Gate] = {}
 
     def enter(self, peer: Peer, gate: Gate) -> str:
-        """Let a connection in. Returns "" or, if it is refused, one line that says why."""
+        """Add a connection. Returns "" or, if it is refused, one line with the reason."""
         problem = "" if self._is_proxy(peer[0]) else self._places.take(peer[0])
         if not problem:
             self._gates[peer] = gate
         return problem
 
     def leave(self, peer: Peer) -> None:
-        """Forget a connection that was let in."""
+        """Remove a connection; ignored if it was refused."""
         if self._gates.pop(peer, None) is not None and not self._is_proxy(peer[0]):
             self._places.give_back(peer[0])
 
     def watch(self, app: ASGIApp) -> ASGIApp:
-        """Return the application with its requests reported to their gates; must be the outermost layer."""
+        """The application, with its requests reported to their gates; must be the outermost layer."""
 
         async def watched(scope: Scope, receive: Receive, send: Send) -> None:
             peer = scope.get("client")
@@ -73,12 +73,7 @@ class Connections:
 
 
 class Gate(asyncio.Protocol):
-    """Stands between a connection and the server's protocol, which it replaces when that hands over.
-
-    Args:
-        connections: all of them.
-        config: of uvicorn, as are the others.
-    """
+    """Passes data between a connection and the server's protocol; the other arguments are uvicorn's."""
 
     def __init__(
         self,
@@ -95,16 +90,16 @@ class Gate(asyncio.Protocol):
         make: Any = AutoHTTPProtocol
         self._inner: asyncio.Protocol = make(config, server_state, app_state, _loop)
         self._transport: asyncio.Transport | None = None
-        self._peer: Peer | None = None  # None: not let in
+        self._peer: Peer | None = None  # None: refused
         self._requests = 0
         self._head_bytes = 0
-        self._timers: dict[str, asyncio.TimerHandle] = {}  # by what is waited for
+        self._timers: dict[str, asyncio.TimerHandle] = {}  # by what has a deadline
 
     def connection_made(self, transport: asyncio.BaseTransport) -> None:
-        """Let it in or refuse it."""
+        """Accept or refuse the connection."""
         self._transport = cast(asyncio.Transport, transport)
         peername = transport.get_extra_info("peername")
-        if not peername:  # it has gone already
+        if not peername:  # closed already
             self._transport.abort()
             return
         peer = (str(peername[0]), int(peername[1]))
@@ -117,7 +112,7 @@ class Gate(asyncio.Protocol):
         self._inner.connection_made(cast(asyncio.BaseTransport, _Watched(self._transport, self)))
 
     def data_received(self, data: bytes) -> None:
-        """Pass on what came, as far as it may be a request."""
+        """Pass data on, unless the head of the request is too long."""
         if self._peer is None or self._transport is None or self._transport.is_closing():
             return
         if not self._requests:
@@ -131,62 +126,62 @@ class Gate(asyncio.Protocol):
         self._inner.data_received(data)
 
     def eof_received(self) -> bool | None:
-        """The client will send nothing more."""
+        """Pass on that the client will send nothing more."""
         return self._inner.eof_received() if self._peer is not None else None
 
     def pause_writing(self) -> None:
-        """The client does not take what it asked for; it has some time to do so."""
-        self._expect("reading", self._limits.stalled_s, self._abort)
+        """Set a deadline, because the client does not read."""
+        self._start_timer("reading", self._limits.stalled_s, self._abort)
         if self._peer is not None:
             self._inner.pause_writing()
 
     def resume_writing(self) -> None:
-        """It does again."""
-        self._has_come("reading")
+        """Remove the deadline: the client reads again."""
+        self._stop_timer("reading")
         if self._peer is not None:
             self._inner.resume_writing()
 
     def connection_lost(self, exc: Exception | None) -> None:
-        """Forget it."""
-        for awaited in list(self._timers):
-            self._has_come(awaited)
+        """Remove the connection."""
+        for name in list(self._timers):
+            self._stop_timer(name)
         if self._peer is not None:
             self._connections.leave(self._peer)
             self._inner.connection_lost(exc)
 
     def request_begins(self) -> None:
-        """The head of a request is complete."""
+        """Count a request whose head is complete."""
         self._requests += 1
         self._head_bytes = 0
-        self._has_come("head")
+        self._stop_timer("head")
 
     def request_ends(self) -> None:
-        """A request or WebSocket has been answered to its end.
+        """Count a request or WebSocket as answered, and set a deadline for the next.
 
-        The first bytes of the next may have come before this: so a deadline runs at any time.
+        The first bytes of the next one may have been received before this, so a deadline is always needed.
         """
         self._requests -= 1
         if not self._requests and "end" not in self._timers:
             self._wait_for_head(self._limits.keep_alive_s)
 
     def hand_over(self, protocol: asyncio.Protocol) -> None:
-        """The server's protocol has another go on, as it does for a WebSocket."""
+        """Use another protocol from now on, as the server does for a WebSocket."""
         self._inner = protocol
 
     def closing(self) -> None:
-        """The connection is being closed, once all has been sent; that too has a deadline."""
+        """Set a deadline for sending the rest: the connection is being closed."""
         if "end" not in self._timers:
-            self._expect("end", self._limits.close_s, self._abort)
+            self._start_timer("end", self._limits.close_s, self._abort)
 
     def _wait_for_head(self, seconds: float) -> None:
-        self._expect("head", seconds, self._head_is_late)
+        self._start_timer("head", seconds, self._head_is_late)
 
-    def _expect(self, awaited: str, seconds: float, late: Callable[[], None]) -> None:
-        self._has_come(awaited)
-        self._timers[awaited] = self._loop.call_later(seconds, late)
+    def _start_timer(self, name: str, seconds: float, late: Callable[[], None]) -> None:
+        self._stop_timer(name)
+        self._timers[name] = self._loop.call_later(seconds, late)
 
-    def _has_come(self, awaited: str) -> None:
-        timer = self._timers.pop(awaited, None)
+    def _stop_timer(self, name: str) -> None:
+        timer = self._timers.pop(name, None)
         if timer is not None:
             timer.cancel()
 
@@ -213,13 +208,13 @@ class Gate(asyncio.Protocol):
 
 
 class _Watched:
-    """A connection's transport as the server's protocol has it: handing over and closing reach the gate."""
+    """The transport that the server's protocol gets: reports a new protocol and closing to the gate."""
 
     def __init__(self, transport: asyncio.Transport, gate: Gate) -> None:
         self._transport = transport
         self._gate = gate
 
-    def __getattr__(self, name: str) -> Any:  # noqa: ANN401 - whatever a transport has
+    def __getattr__(self, name: str) -> Any:  # noqa: ANN401 - any attribute of a transport
         return getattr(self._transport, name)
 
     def set_protocol(self, protocol: asyncio.Protocol) -> None:

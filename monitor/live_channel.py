@@ -1,4 +1,4 @@
-"""`/ws/live`: what the drones do, written once and sent to all who watch; nobody gets a backlog."""
+"""`/ws/live`: the state of the drones, encoded once for all viewers; a slow viewer gets no backlog."""
 
 from __future__ import annotations
 
@@ -20,23 +20,23 @@ if TYPE_CHECKING:
 
 POSE_HZ = 20
 STATUS_EVERY = 4  # poses
-STATUS_AT_LEAST_EVERY = 40  # poses; so a browser knows that the link is not dead
-MOST_VIEWERS = 200
-MOST_VIEWERS_PER_ADDRESS = 60  # a page has two; a class may share one address
-MOST_PENDING = 200
+STATUS_AT_LEAST_EVERY = 40  # poses; shows a browser that the connection is alive
+MAX_VIEWERS = 200
+MAX_VIEWERS_PER_ADDRESS = 60  # a page has two; a class may share one address
+MAX_PENDING = 200
 TOO_SLOW_CODE = 1013  # "try again later"
-# Of these only the newest counts: one that was not sent yet is replaced.
+# Kinds of which only the newest counts: one that was not sent yet is replaced.
 _REPLACED = ("pose", "status", "detections")
 _POSE_DECIMALS = 4  # a tenth of a millimetre; in a quaternion 0.2 mrad
 _log = logging.getLogger(__name__)
 
 
 class Viewer:
-    """What one browser is still to be sent.
+    """The messages that one browser is still to be sent.
 
     Args:
-        kinds: of messages it wants; empty: all.
-        address: where it is.
+        kinds: of messages it requested; empty: all.
+        address: of the browser.
     """
 
     def __init__(self, kinds: Iterable[str] = (), address: str = "") -> None:
@@ -47,24 +47,24 @@ class Viewer:
         self._arrived = asyncio.Event()
         self.too_slow = False
 
-    def wants(self, kind: str) -> bool:
-        """Whether it asked for messages of a kind."""
+    def takes(self, kind: str) -> bool:
+        """Whether it requested messages of a kind."""
         return not self._kinds or kind in self._kinds
 
     def put(self, kind: str, drone_id: object, text: str) -> None:
-        """Queue a message; never waits."""
-        if not self.wants(kind):
+        """Queue a message."""
+        if not self.takes(kind):
             return
         if kind in _REPLACED:
             self._newest[kind, drone_id] = text
-        elif len(self._events) < MOST_PENDING:
+        elif len(self._events) < MAX_PENDING:
             self._events.append(text)
         else:
             self.too_slow = True
         self._arrived.set()
 
     async def next(self) -> str | None:
-        """Wait for the next message, events first; None when it is too slow to go on."""
+        """Wait for the next message, events first; None when too many events wait."""
         while not (self._events or self._newest or self.too_slow):
             self._arrived.clear()
             await self._arrived.wait()
@@ -76,33 +76,29 @@ class Viewer:
 
 
 class LiveChannel:
-    """All viewers, and the task that keeps them up to date.
-
-    Args:
-        fleet: what is shown.
-    """
+    """All viewers of a fleet, and the task that sends them its state."""
 
     def __init__(self, fleet: Fleet) -> None:
         self._fleet = fleet
         self._viewers: set[Viewer] = set()
-        self._places = Places(MOST_VIEWERS, MOST_VIEWERS_PER_ADDRESS)
-        self._somebody = asyncio.Event()
+        self._places = Places(MAX_VIEWERS, MAX_VIEWERS_PER_ADDRESS)
+        self._has_viewers = asyncio.Event()
         self._last_status = ""
         self._histories: dict[int, tuple[tuple[int, float | None], str]] = {}
 
     def enter(self, viewer: Viewer) -> bool:
-        """Let a viewer watch, beginning with the welcome; False if there is no place for it."""
+        """Add a viewer and queue the welcome for it; False if there is no place for it."""
         if self._places.take(viewer.address):
             return False
         for message in self._fleet.welcome():
-            if viewer.wants(message["kind"]):
+            if viewer.takes(message["kind"]):
                 viewer.put(message["kind"], message.get("id"), self._encode_welcome(message))
         self._viewers.add(viewer)
-        self._somebody.set()
+        self._has_viewers.set()
         return True
 
     def _encode_welcome(self, message: Mapping[str, Any]) -> str:
-        """Write a message; a history is long, so those who come within a tenth of a second share it."""
+        """Encode a message; a history is long, so viewers share it until a sample is added."""
         if message["kind"] != "history":
             return encode(message)
         rows = message["poses"]
@@ -114,41 +110,40 @@ class LiveChannel:
         return known[1]
 
     def leave(self, viewer: Viewer) -> None:
-        """Forget a viewer that entered."""
+        """Remove a viewer that entered."""
         self._viewers.remove(viewer)
         self._places.give_back(viewer.address)
         if not self._viewers:
-            self._somebody.clear()
+            self._has_viewers.clear()
 
-    def tell(self, message: Mapping[str, Any]) -> None:
-        """Send a message to all who want its kind."""
+    def send(self, message: Mapping[str, Any]) -> None:
+        """Send a message to all viewers that requested its kind."""
         kind = message["kind"]
-        if any(viewer.wants(kind) for viewer in self._viewers):
+        if any(viewer.takes(kind) for viewer in self._viewers):
             text = encode(message)
             for viewer in self._viewers:
                 viewer.put(kind, message.get("id"), text)
 
     async def run(self) -> None:
-        """Send poses and status while somebody watches, until cancelled."""
-        unsubscribe = self._fleet.subscribe(self.tell)
+        """Send poses and status while there are viewers, until cancelled."""
+        unsubscribe = self._fleet.subscribe(self.send)
         try:
             loop = asyncio.get_running_loop()
             due_s, count = loop.time(), 0
             while True:
-                await self._somebody.wait()
+                await self._has_viewers.wait()
                 try:
                     self._update(count)
-                except Exception:  # a fault in one message must not end the others
+                except Exception:  # the next message may be all right
                     _log.exception("the live channel skips an update")
                 count += 1
-                # Skips what it cannot keep up with instead of hurrying after it.
-                due_s = max(due_s + 1 / POSE_HZ, loop.time())
+                due_s = max(due_s + 1 / POSE_HZ, loop.time())  # after a delay it does not catch up
                 await asyncio.sleep(due_s - loop.time())
         finally:
             unsubscribe()
 
     def _update(self, count: int) -> None:
-        self.tell(self._fleet.pose_message())
+        self.send(self._fleet.pose_message())
         if count % STATUS_EVERY == 0:
             message = self._fleet.status_message()
             text = encode(message)
@@ -159,7 +154,7 @@ class LiveChannel:
 
 
 def register(monitor: Monitor) -> None:
-    """Add `/ws/live`. A page that does not want everything says so: `/ws/live?kinds=status,notice`."""
+    """Add `/ws/live`; `/ws/live?kinds=status,notice` sends only these kinds."""
     channel = LiveChannel(monitor.fleet)
     monitor.jobs.append(channel.run)
 
@@ -172,7 +167,7 @@ def register(monitor: Monitor) -> None:
             return
         sending = asyncio.create_task(_send(websocket, viewer))
         try:
-            while True:  # ends when the browser goes; what it sends is ignored
+            while True:  # until the browser disconnects; what it sends is ignored
                 await websocket.receive()
                 if websocket.client_state.name == "DISCONNECTED":
                     break
@@ -189,9 +184,9 @@ async def _send(websocket: WebSocket, viewer: Viewer) -> None:
             await websocket.send_text(text)
         await websocket.close(TOO_SLOW_CODE, "too slow")
     except (WebSocketDisconnect, RuntimeError, OSError):
-        pass  # it has gone
+        pass  # disconnected
 
 
 def encode(message: Mapping[str, Any]) -> str:
-    """Write a message as JSON; numbers that are not finite become null, poses lose needless digits."""
+    """A message as JSON: numbers that are not finite become null, those of poses are rounded."""
     return finite_json.encode(message, decimals=_POSE_DECIMALS if message["kind"] == "pose" else None)

@@ -1,4 +1,4 @@
-"""What the monitor is given by whoever starts it; it opens no link and knows no referee of its own."""
+"""What the monitor is given at its start; it opens no link and contains no referee."""
 
 from __future__ import annotations
 
@@ -9,93 +9,57 @@ from typing import Any, Protocol
 from errors import UserError
 from scenarios.models import Scenario, TrueState
 from scenarios.result import RefereeReport, RefereeSnapshot
-
-Message = Any  # pymavlink's classes are made by a generator and carry no types
-
-
-class Link(Protocol):
-    """A MAVLink link, read and written from one thread.
-
-    Attributes:
-        url: as given.
-        host: in numbers, from which came what was received last; "" over a wire.
-    """
-
-    url: str
-
-    @property
-    def host(self) -> str:
-        """See above."""
-        ...
-
-    def receive(self, timeout_s: float) -> list[Message]:
-        """Wait for messages of any system; empty if none came in time. Raises `LinkError`."""
-        ...
-
-    def send(self, message: Message) -> None:
-        """Send to the message's `target_system` or, if it has none or 0, to everybody heard so far."""
-
-    def close(self) -> None:
-        """Let go."""
+from wire.transports.vehicle_link import VehicleLink
 
 
 class Referee(Protocol):
-    """Judges a flight by the states it is shown (`scenarios.referee.Referee` is one)."""
+    """Judges a flight by its states; `scenarios.referee.Referee` is one."""
 
     def update(self, state: TrueState) -> None:
-        """Look at the next state."""
+        """Take the next state."""
 
     def snapshot(self) -> RefereeSnapshot:
         """How the try stands now."""
         ...
 
     def report(self, mission_state: str = "", ended: str | None = None) -> RefereeReport:
-        """Judge what was seen so far."""
+        """Judge the states so far."""
         ...
 
 
 @dataclass(frozen=True, slots=True)
 class RunInfo:
-    """A run folder, for a list.
+    """A run folder, for a list."""
 
-    Attributes:
-        name: of the folder; names the run everywhere.
-        scenario: its name.
-        mission: its name; "" if unknown.
-        verdict: of the referee; "" if the flight was not judged.
-        total_time_s: with penalties; None if not judged.
-        started: ISO 8601; "" if unknown.
-    """
-
-    name: str
+    name: str  # of the folder; identifies the run everywhere
     scenario: str
-    mission: str
-    verdict: str
-    total_time_s: float | None
-    started: str
+    mission: str  # "" if unknown
+    verdict: str  # of the referee; "" if the flight was not judged
+    total_time_s: float | None  # with penalties; None if not judged
+    started: str  # ISO 8601; "" if unknown
 
 
 class RunLibrary(Protocol):
-    """The flights that can be shown again. Call it in a thread; reading a run may take seconds."""
+    """Recorded flights. Call it in a thread; reading a run may take seconds."""
 
     def runs(self) -> Sequence[RunInfo]:
         """All runs, newest first."""
         ...
 
     def recording(self, name: str) -> Mapping[str, Any]:
-        """A run as `docs/monitor-channels.md` says, read if it was not. Raises `RunError` with one line."""
+        """A run as in `docs/monitor-channels.md`, read if necessary. Raises `RunError` with one line."""
         ...
 
     def kept(self, name: str) -> Mapping[str, Any] | None:
-        """A run that needs no reading; None if it does. Raises `RunError` if there is no such run."""
+        """A run that was read before; None if it was not. Raises `RunError` if there is no such run."""
         ...
 
     def image(self, name: str, index: int) -> bytes:
-        """A JPEG of its camera. Raises `RunNotReadError` if the run is to be read first, else `RunError`."""
+        """A JPEG of its camera. Raises `RunNotReadError` if the run has to be read first, else `RunError`."""
         ...
 
     def close(self) -> None:
-        """Break off what is being read, and read nothing more."""
+        """Stop reading, and read nothing more."""
 
 
 class RunError(UserError):
@@ -103,27 +67,27 @@ class RunError(UserError):
 
 
 class RunNotReadError(RunError):
-    """A run of which nothing can be had before it has been read."""
+    """A run that has to be read before its images can be had."""
 
 
 @dataclass(frozen=True, slots=True)
 class Equipment:
-    """All that the monitor is given.
+    """What the monitor is given.
 
     Attributes:
         open_link: opens the link to the drones; called again when it failed. Raises `LinkError`.
-        make_referee: for a drone that brings none, following its telemetry.
-        scenario: what is flown, if the one who starts the monitor said so.
+        make_referee: for a drone without one of its own; follows its telemetry.
+        scenario: what is flown, if that was specified when the monitor was started.
         list_scenarios: names that can be drawn.
         load_scenario: one of them; raises `ScenarioError`.
-        runs: flights to show again; None if there is no such folder.
+        runs: recorded flights; None if there is no such folder.
         start_pose: where a scenario's drone stands at first: its centre (m) and yaw (rad), arena axes; None:
-            a drone that brings no referee cannot be judged.
+            a drone without a referee of its own cannot be judged.
         camera_hosts: HOST or HOST:PORT from which video and referee may be fetched although a drone's packets
             come from elsewhere.
     """
 
-    open_link: Callable[[], Link]
+    open_link: Callable[[], VehicleLink]
     make_referee: Callable[[Scenario], Referee]
     scenario: Scenario | None
     list_scenarios: Callable[[], Sequence[str]]

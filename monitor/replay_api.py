@@ -1,4 +1,4 @@
-"""Recorded flights over HTTP: `/api/runs`, a run, its images."""
+"""Recorded flights over HTTP: `/api/runs`, a run, its result, its images."""
 
 from __future__ import annotations
 
@@ -15,41 +15,65 @@ from starlette.requests import Request
 from starlette.responses import PlainTextResponse, Response
 
 from monitor.ports import RunError, RunLibrary, RunNotReadError
-from monitor.reading_queue import BusyError, ReadingQueue
 
 if TYPE_CHECKING:
     from monitor.server import Monitor
 
-_KEPT_ANSWERS = 4
-_QUICK = 5  # of gzip: the best costs ten times as long for a tenth less
-_LONGEST_INDEX = 9
+MAX_READING = 2  # runs that are read at the same time
+MAX_WAITING = 2
+_MAX_PACKED = 4
+_GZIP_LEVEL = 5  # level 9 takes ten times as long for a tenth less
+_MAX_INDEX_DIGITS = 9
 _NO_RUNS = "there is no folder of runs; start the monitor with --runs FOLDER"
+
+
+class BusyError(RunError):
+    """Too many runs wait to be read."""
 
 
 def register(monitor: Monitor) -> None:
     """Add the addresses of recorded flights."""
     answers = _Answers(monitor.equipment.runs)
-    monitor.jobs.append(answers.close_at_end)
+    monitor.at_end(answers.close)
+    monitor.web.add_api_route("/api/runs", answers.listing)
+    monitor.web.add_api_route("/api/runs/{name}", answers.run)
+    monitor.web.add_api_route("/api/runs/{name}/result.json", answers.result)
+    monitor.web.add_api_route("/api/runs/{name}/image/{number}.jpg", answers.image)
 
-    @monitor.web.get("/api/runs")
-    async def runs(request: Request) -> Response:
-        return await answers.listing(request)
 
-    @monitor.web.get("/api/runs/{name}")
-    async def run(request: Request, name: str) -> Response:
-        return await answers.run(request, name)
+class _ReadingQueue:
+    """Reads two runs at a time, so that a long one does not delay the others; requests for a run share it."""
 
-    @monitor.web.get("/api/runs/{name}/result.json")
-    async def result(request: Request, name: str) -> Response:
-        return await answers.result(request, name)
+    def __init__(self, library: RunLibrary) -> None:
+        self._library = library
+        self._tasks: dict[str, asyncio.Task[Mapping[str, Any]]] = {}
+        self._places = asyncio.Semaphore(MAX_READING)
 
-    @monitor.web.get("/api/runs/{name}/image/{number}.jpg")
-    async def image(name: str, number: str) -> Response:
-        return await answers.image(name, number)
+    async def recording(self, name: str) -> Mapping[str, Any]:
+        """One run, at once if it was read before. Raises `BusyError` if the queue is full, and `RunError`."""
+        known = await asyncio.to_thread(self._library.kept, name)
+        if known is not None:
+            return known
+        task = self._tasks.get(name)
+        if task is None:
+            if len(self._tasks) >= MAX_READING + MAX_WAITING:
+                raise BusyError(f"{len(self._tasks)} flights are being read; try again in a minute")
+            task = self._tasks[name] = asyncio.create_task(self._read(name))
+            task.add_done_callback(lambda done: self._remove(name, done))
+        return await asyncio.shield(task)  # others may wait for it when this request is cancelled
+
+    async def _read(self, name: str) -> Mapping[str, Any]:
+        async with self._places:
+            return await asyncio.to_thread(self._library.recording, name)
+
+    def _remove(self, name: str, done: asyncio.Task[Mapping[str, Any]]) -> None:
+        del self._tasks[name]
+        if not done.cancelled():
+            done.exception()  # marks it as retrieved: the requests that waited may be gone
 
 
 class _Answers:
-    """Answers from a library; what was answered is kept packed, so that many viewers cost little.
+    """Answers from a library; the newest answers are kept compressed, so that many viewers cost little.
 
     Args:
         library: the runs; None if there are none.
@@ -57,16 +81,13 @@ class _Answers:
 
     def __init__(self, library: RunLibrary | None) -> None:
         self._library = library
-        self._queue = None if library is None else ReadingQueue(library)
+        self._queue = None if library is None else _ReadingQueue(library)
         self._packed: OrderedDict[str, tuple[object, bytes, str]] = OrderedDict()
 
-    async def close_at_end(self) -> None:
-        """Wait until cancelled, then have the library break off what it reads."""
-        try:
-            await asyncio.Event().wait()
-        finally:
-            if self._library is not None:
-                self._library.close()
+    def close(self) -> None:
+        """Stop what the library is reading."""
+        if self._library is not None:
+            self._library.close()
 
     async def listing(self, request: Request) -> Response:
         """All runs, newest first; none if there is no library."""
@@ -80,44 +101,42 @@ class _Answers:
         try:
             recording = await self._recording(name)
         except RunError as error:
-            return _sorry(error)
+            return _refusal(error)
         # The library gives the same object for the same run until that changes.
         known = self._packed.get(name)
         if known is None or known[0] is not recording:
             body, tag = await asyncio.to_thread(_pack, recording)
-            known = (recording, body, tag)
-            self._packed[name] = known
+            known = self._packed[name] = (recording, body, tag)
         self._packed.move_to_end(name)
-        while len(self._packed) > _KEPT_ANSWERS:
+        while len(self._packed) > _MAX_PACKED:
             self._packed.popitem(last=False)
         return _answer(request, known[1], known[2])
 
-    async def _recording(self, name: str) -> Mapping[str, Any]:
-        """One run from the library. Raises `RunError`."""
-        if self._queue is None:
-            raise RunError(_NO_RUNS)
-        return await self._queue.recording(name)
-
     async def result(self, request: Request, name: str) -> Response:
-        """What stands in a run's `result.json`."""
+        """A run's `result.json`."""
         try:
             recording = await self._recording(name)
         except RunError as error:
-            return _sorry(error)
+            return _refusal(error)
         if recording["result"] is None:
-            return _sorry(RunError(f"run '{name}': was not judged, so it has no result"))
+            return _refusal(RunError(f"run '{name}': was not judged, so it has no result"))
         return _answer(request, *_pack(recording["result"]))
 
     async def image(self, name: str, number: str) -> Response:
         """An image of a run's camera."""
-        if not (number.isascii() and number.isdigit() and len(number) <= _LONGEST_INDEX):
-            return _sorry(RunError(f"image '{number[:40]}': must be a whole number"))
+        if not (number.isascii() and number.isdigit() and len(number) <= _MAX_INDEX_DIGITS):
+            return _refusal(RunError(f"image '{number[:40]}': must be a whole number"))
         try:
             data = await self._image(name, int(number))
         except RunError as error:
-            return _sorry(error)
+            return _refusal(error)
         # A run that is still being flown may get other images under the same numbers.
         return Response(data, media_type="image/jpeg", headers={"Cache-Control": "private, max-age=60"})
+
+    async def _recording(self, name: str) -> Mapping[str, Any]:
+        if self._queue is None:
+            raise RunError(_NO_RUNS)
+        return await self._queue.recording(name)
 
     async def _image(self, name: str, index: int) -> bytes:
         if self._library is None:
@@ -130,9 +149,9 @@ class _Answers:
 
 
 def _pack(content: object) -> tuple[bytes, str]:
-    """JSON in gzip, and a name for just this content."""
+    """Compressed JSON, and its ETag."""
     text = json.dumps(content, allow_nan=False, separators=(",", ":")).encode()
-    return gzip.compress(text, _QUICK, mtime=0), f'"{hashlib.sha256(text).hexdigest()[:24]}"'
+    return gzip.compress(text, _GZIP_LEVEL, mtime=0), f'"{hashlib.sha256(text).hexdigest()[:24]}"'
 
 
 def _answer(request: Request, body: bytes, tag: str) -> Response:
@@ -145,7 +164,7 @@ def _answer(request: Request, body: bytes, tag: str) -> Response:
     return Response(gzip.decompress(body), media_type="application/json", headers=headers)
 
 
-def _sorry(error: RunError) -> Response:
+def _refusal(error: RunError) -> Response:
     if isinstance(error, BusyError):
         return PlainTextResponse(f"{error}\n", 503, {"Retry-After": "60"})
     return PlainTextResponse(f"{error}\n", 404)

@@ -1,15 +1,15 @@
-"""Runs the monitor: drones, pages and the live channel, served until cancelled."""
+"""Runs the monitor: its listening socket, its server and its jobs, until cancelled."""
 
 from __future__ import annotations
 
 import asyncio
 import socket
 from collections.abc import Callable
+from importlib import import_module
 from typing import TYPE_CHECKING
 
-from monitor.qr_code import terminal_code
 from monitor.settings import BACKLOG, MonitorError, MonitorSettings
-from monitor.urls import is_for_others, url_of, urls_for_people
+from monitor.urls import is_for_others, terminal_code, url_of, urls_for_people
 
 if TYPE_CHECKING:
     import uvicorn
@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from monitor.server import Job
 
 
-_MAX_UNSENT_BYTES = 1 << 16  # that the kernel takes for a slow viewer, beyond what is on its way
+_MAX_UNSENT_BYTES = 1 << 16  # that the kernel buffers for a slow viewer
 
 
 async def serve(equipment: Equipment, settings: MonitorSettings, say: Callable[[str], None]) -> None:
@@ -27,14 +27,14 @@ async def serve(equipment: Equipment, settings: MonitorSettings, say: Callable[[
     Args:
         equipment: the link to the drones and what else the monitor needs.
         settings: where it listens and stores.
-        say: takes lines for people: the address, and judges' links.
+        say: takes lines for people: URLs, and judges' links.
 
     Raises:
         MonitorError: a setting cannot be used, or the port is taken.
     """
     settings.check()
     with _listen(settings.bind, settings.port) as listener:
-        # Importing the libraries takes more than a second; other tasks of this loop run meanwhile.
+        # Importing the libraries takes more than a second, so other tasks of this loop run meanwhile.
         await asyncio.to_thread(_import_server)
         from monitor.server import assemble, make_server  # noqa: PLC0415 - see above
 
@@ -55,7 +55,7 @@ async def serve(equipment: Equipment, settings: MonitorSettings, say: Callable[[
             if not reachable:
                 say("this machine is in no network: phones cannot open it yet")
             if qr_codes:
-                say(f"phones that look on read it here, or at {urls[0]}join\n{terminal_code(urls[0])}")
+                say(f"viewers' phones read it here, or at {urls[0]}join\n{terminal_code(urls[0])}")
             monitor.access.invite()
 
         monitor = assemble(equipment, settings, (host, port), invite)
@@ -64,15 +64,7 @@ async def serve(equipment: Equipment, settings: MonitorSettings, say: Callable[[
 
 
 def _listen(bind: str, port: int) -> socket.socket:
-    """Open the listening socket, before anything slow is done: so a taken port is reported at once.
-
-    Args:
-        bind: address or name of an interface.
-        port: TCP port; 0 lets the system choose.
-
-    Raises:
-        MonitorError: it is taken, or the address is not ours.
-    """
+    """Open the listening socket. Raises `MonitorError` if the port is taken or the address is not ours."""
     try:
         family, kind, protocol, _, address = socket.getaddrinfo(
             bind, port, type=socket.SOCK_STREAM, flags=socket.AI_PASSIVE
@@ -84,9 +76,8 @@ def _listen(bind: str, port: int) -> socket.socket:
             "give an address of this machine, such as 127.0.0.1 or 0.0.0.0"
         ) from error
     try:
-        listener.setsockopt(
-            socket.SOL_SOCKET, socket.SO_REUSEADDR, 1
-        )  # a killed monitor's port is free at once
+        # So a killed monitor's port is free at once.
+        listener.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
         if hasattr(socket, "TCP_NOTSENT_LOWAT"):
             listener.setsockopt(socket.IPPROTO_TCP, socket.TCP_NOTSENT_LOWAT, _MAX_UNSENT_BYTES)
         listener.bind(address)
@@ -102,13 +93,14 @@ def _listen(bind: str, port: int) -> socket.socket:
 
 
 def _import_server() -> None:
-    from monitor.server import import_modules  # noqa: PLC0415 - see `serve`
+    from monitor.server import MODULES  # noqa: PLC0415 - see `serve`
 
-    import_modules()
+    for name in MODULES:
+        import_module(name)
 
 
 async def _run(server: uvicorn.Server, listener: socket.socket, jobs: list[Job]) -> None:
-    """Run the server and what belongs to it until cancelled or one of them fails."""
+    """Run server and jobs until cancelled or one of them ends."""
     serving = asyncio.create_task(server.serve([listener]))
     running = [asyncio.create_task(job()) for job in jobs]
     try:

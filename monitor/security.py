@@ -1,4 +1,4 @@
-"""What is let in: only pages of our own, asked for by a name of our own, with bodies of a sane size."""
+"""Which requests are accepted: from the monitor's own pages, to its own host names, with limited bodies."""
 
 from __future__ import annotations
 
@@ -15,8 +15,8 @@ from monitor.settings import ConnectionLimits
 from wire.transports.urls import is_loopback
 
 _FORWARDED = ("x-forwarded-for", "x-real-ip", "forwarded")
-_MERELY_READING = ("GET", "HEAD", "OPTIONS")
-# NiceGUI compiles templates in the browser and begins its pages by inline scripts.
+_SAFE_METHODS = ("GET", "HEAD", "OPTIONS")
+# NiceGUI compiles templates in the browser and starts its pages by inline scripts.
 CONTENT_POLICY = "; ".join(
     (
         "default-src 'self'",
@@ -43,13 +43,13 @@ _HEADERS = {
 
 
 class Guard:
-    """ASGI middleware before everything else.
+    """ASGI middleware before all other.
 
     Args:
-        app: what is guarded.
-        local_only: only programs of this machine reach the server, and no proxy passes on requests of others;
-            then other names in the Host header are a foreign page's trick (DNS rebinding).
-        limits: of bodies, and of requests under way from one address.
+        app: the application.
+        local_only: only programs of this machine reach the server, and no proxy forwards requests of others;
+            then another name in the Host header is an attack by a foreign page (DNS rebinding).
+        limits: of bodies, and of simultaneous requests from one address.
     """
 
     def __init__(self, app: ASGIApp, *, local_only: bool, limits: ConnectionLimits) -> None:
@@ -59,7 +59,7 @@ class Guard:
         self._places = Places(limits.total, limits.per_address)
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
-        """Let a request or WebSocket pass, or refuse it."""
+        """Pass a request or WebSocket on, or refuse it."""
         if scope["type"] not in ("http", "websocket"):
             await self._app(scope, receive, send)
             return
@@ -74,33 +74,28 @@ class Guard:
             await _refuse(scope, receive, send, 429, problem)
             return
         try:
-            await self._pass(scope, headers, receive, send)
+            if scope["type"] == "websocket":
+                await self._app(scope, receive, send)
+            elif problem := self._body_problem(scope, headers):
+                await _refuse(scope, receive, send, 413, problem)
+            else:
+                await self._app(scope, _Body(receive, self._limits), _with_headers(send))
         finally:
             self._places.give_back(address)
 
-    async def _pass(self, scope: Scope, headers: Headers, receive: Receive, send: Send) -> None:
-        if scope["type"] == "websocket":
-            await self._app(scope, receive, send)
-            return
-        problem = self._body_problem(scope, headers)
-        if problem:
-            await _refuse(scope, receive, send, 413, problem)
-            return
-        await self._app(scope, _Body(receive, self._limits), _with_headers(send))
-
     def _body_problem(self, scope: Scope, headers: Headers) -> str:
-        """Say from the head alone why a body is not taken; "" if it may come."""
+        """Why a body is refused by the head of its request; "" if it is not."""
         announced = headers.get("content-length", "0")
         if announced == "0" and "transfer-encoding" not in headers:
             return ""
-        if scope["method"] in _MERELY_READING:
+        if scope["method"] in _SAFE_METHODS:
             return f"{scope['method']} takes no body"
         if not announced.isdecimal() or len(announced) > 18 or int(announced) > self._limits.body_bytes:
             return _too_large(self._limits)
         return ""
 
     def _problem(self, scope: Scope, headers: Headers) -> str | None:
-        """Say why a request is not for us; None if it is."""
+        """Why a request is refused; None if it is not."""
         host = headers.get("host", "")
         if len(headers.getlist("host")) != 1 or not _is_host(host):
             return "the Host header names no host"
@@ -109,9 +104,9 @@ class Guard:
         if self._local_only and any(name in headers for name in _FORWARDED):
             return "a proxy passed this on: start the monitor with --trusted-proxy and the proxy's address"
         origin = headers.get("origin")
-        if origin is not None and not _same_place(origin, host):
+        if origin is not None and not _same_host(origin, host):
             return "pages of other sites may not use the monitor"
-        acts = scope["type"] == "websocket" or scope["method"] not in _MERELY_READING
+        acts = scope["type"] == "websocket" or scope["method"] not in _SAFE_METHODS
         if acts and headers.get("sec-fetch-site", "same-origin") not in ("same-origin", "none"):
             return "pages of other sites may not use the monitor"
         return None
@@ -129,17 +124,17 @@ def _is_local(host: str) -> bool:
     return is_loopback(urlsplit(f"//{host}").hostname or "")
 
 
-def _same_place(origin: str, host: str) -> bool:
-    """Whether an Origin header names the host that was asked; "null" does not."""
-    scheme, separator, place = origin.partition("://")
-    return bool(separator) and scheme in ("http", "https") and place.lower() == host.lower()
+def _same_host(origin: str, host: str) -> bool:
+    """Whether an Origin header names the host of the request; "null" does not."""
+    scheme, _, authority = origin.partition("://")
+    return scheme in ("http", "https") and authority.lower() == host.lower()
 
 
 class _Body:
-    """A request's `receive` that takes a body of a certain length, within a certain time.
+    """A request's `receive` with limits of length and time of the body.
 
     Raises:
-        HTTPException: 413 or 408; the application that asked for the body answers with it.
+        HTTPException: 413 or 408, where the application reads the body.
     """
 
     def __init__(self, receive: Receive, limits: ConnectionLimits) -> None:
@@ -151,7 +146,7 @@ class _Body:
 
     async def __call__(self) -> Message:
         if self._complete:
-            return await self._receive()  # waits for the client to go
+            return await self._receive()  # waits for the client to disconnect
         loop = asyncio.get_running_loop()
         if self._due_s is None:
             self._due_s = loop.time() + self._limits.body_s
@@ -183,12 +178,12 @@ def _with_headers(send: Send) -> Send:
     return send_with_headers
 
 
-async def _refuse(scope: Scope, receive: Receive, send: Send, status: int, words: str) -> None:
-    """Answer with one line; a WebSocket that is not accepted is answered by status 403."""
+async def _refuse(scope: Scope, receive: Receive, send: Send, status: int, text: str) -> None:
+    """Answer with one line; for a WebSocket the server answers with status 403."""
     if scope["type"] == "websocket":
         await receive()
-        await send({"type": "websocket.close", "code": 4403, "reason": words})
+        await send({"type": "websocket.close", "code": 4403, "reason": text})
         return
     # The body, if there is one, is not read; so nothing more can be read from this connection.
     headers = {**_HEADERS, "Connection": "close"}
-    await PlainTextResponse(f"{words}\n", status, headers)(scope, receive, send)
+    await PlainTextResponse(f"{text}\n", status, headers)(scope, receive, send)

@@ -1,7 +1,8 @@
-"""The monitor's web application: guard, files, the modules' own routes, and NiceGUI behind them."""
+"""The monitor's web application: request checks, files, the routes of `MODULES`, and NiceGUI."""
 
 from __future__ import annotations
 
+import asyncio
 import contextlib
 import logging
 import re
@@ -23,33 +24,25 @@ from starlette.staticfiles import StaticFiles
 from starlette.types import ASGIApp, Scope
 from uvicorn.middleware.proxy_headers import ProxyHeadersMiddleware
 
-from monitor.access import Access
+from monitor.access import Access, SessionFile, session_path
 from monitor.connections import Connections, Gate
 from monitor.fleet import Fleet
 from monitor.ports import Equipment
 from monitor.security import Guard
-from monitor.sessions import SessionFile, session_path
 from monitor.settings import BACKLOG, MonitorSettings
 
 Job = Callable[[], Coroutine[Any, Any, None]]
 
-# Each has `register(monitor)`. One line a module.
+# Each has `register(monitor)`.
 MODULES = (
     "monitor.live_channel",
     "monitor.video_proxy",
-    "monitor.pages.login",
-    "monitor.pages.live",
-    "monitor.pages.chart",
-    "monitor.pilot",
-    "monitor.pages.pilot",
+    "monitor.pilot_channel",
     "monitor.replay_api",
-    "monitor.pages.replay",
     "monitor.competition.api",
     "monitor.competition.stage",
-    "monitor.pages.competition",
-    "monitor.pages.judge",
-    "monitor.pages.ranking",
-    "monitor.pages.stage",
+    "monitor.pages.login",
+    "monitor.pages.table",
     "monitor.pages.join",
 )
 
@@ -64,16 +57,16 @@ _MAX_MESSAGE_BYTES = 1 << 17  # of a WebSocket; pages send some hundred bytes
 
 @dataclass
 class Monitor:
-    """What every page is handed.
+    """What each module's `register` gets.
 
     Attributes:
         settings: as started.
         equipment: what the monitor was given.
         fleet: the drones.
-        access: who may do what.
+        access: log-ins and permissions.
         place: IP address and TCP port that it listens on.
-        web: where HTTP routes and WebSockets are added.
-        jobs: run from start to end of the monitor; a `register` appends to them.
+        web: for HTTP routes and WebSockets.
+        jobs: run from start to end of the monitor; `register` may append to them.
     """
 
     settings: MonitorSettings
@@ -84,32 +77,34 @@ class Monitor:
     web: FastAPI
     jobs: list[Job] = field(default_factory=list)
 
+    def at_end(self, close: Callable[[], None]) -> None:
+        """Call a function when the monitor ends."""
+
+        async def wait() -> None:
+            try:
+                await asyncio.Event().wait()
+            finally:
+                close()
+
+        self.jobs.append(wait)
+
 
 class _Files(StaticFiles):
-    """Files that a browser asks after each time, and gets again only if they changed."""
+    """Files that a browser revalidates each time, except a library's that are named by their content."""
 
     async def get_response(self, path: str, scope: Scope) -> Response:
         response = await super().get_response(path, scope)
-        response.headers["Cache-Control"] = "no-cache"
-        return response
-
-
-class _Library(StaticFiles):
-    """A bundle of NiceGUI's: parts named by their content are kept for good."""
-
-    async def get_response(self, path: str, scope: Scope) -> Response:
-        response = await super().get_response(path, scope)
-        forever = _HASHED.search(path) is not None
-        response.headers["Cache-Control"] = "public, max-age=31536000, immutable" if forever else "no-cache"
+        is_hashed = self.directory != _STATIC and _HASHED.search(path) is not None
+        response.headers["Cache-Control"] = "public, max-age=31536000, immutable" if is_hashed else "no-cache"
         return response
 
 
 class _Server(uvicorn.Server):
-    """Leaves signals to the command line, and reports when it listens."""
+    """Leaves signals to the command line, and calls `started` when it listens."""
 
     def __init__(self, config: uvicorn.Config, started: Callable[[], None]) -> None:
         super().__init__(config)
-        self._tell_started = started
+        self._call_started = started
 
     @contextlib.contextmanager
     def capture_signals(self) -> Iterator[None]:
@@ -117,29 +112,16 @@ class _Server(uvicorn.Server):
 
     async def startup(self, sockets: list[socket.socket] | None = None) -> None:
         await super().startup(sockets)
-        self._tell_started()
-
-
-def import_modules() -> None:
-    """Import all that `assemble` needs, which takes more than a second."""
-    for name in MODULES:
-        import_module(name)
+        self._call_started()
 
 
 def assemble(
     equipment: Equipment, settings: MonitorSettings, place: tuple[str, int], invite: Callable[[str], None]
 ) -> Monitor:
-    """Make the monitor; nothing runs yet.
-
-    Args:
-        equipment: the link to the drones and what else the monitor needs.
-        settings: as started.
-        place: address and port it listens on.
-        invite: told the secret of each one-time link for judges.
-    """
+    """Make the monitor, to listen on `place`; `invite` is called with the secret of each one-time link."""
     local_only = ip_address(place[0]).is_loopback and not settings.trusted_proxies
-    cookie = f"framerunner-judge-{place[1]}"  # browsers keep one jar for all ports
-    # Nobody comes back to a port that the system chose.
+    cookie = f"framerunner-judge-{place[1]}"  # browsers share cookies between ports
+    # A port that the system chose is another one after a restart.
     path = session_path(settings.database) if settings.port != 0 else None
     access = Access(
         settings.password,
@@ -159,13 +141,7 @@ def assemble(
 
 
 def make_server(web: ASGIApp, settings: MonitorSettings, started: Callable[[], None]) -> uvicorn.Server:
-    """Return the server of a web application.
-
-    Args:
-        web: the application.
-        settings: as started.
-        started: called once it listens.
-    """
+    """The server of a web application; `started` is called when it listens."""
     proxies = [ip_network(each) for each in settings.trusted_proxies]
 
     def is_proxy(address: str) -> bool:
@@ -182,11 +158,11 @@ def make_server(web: ASGIApp, settings: MonitorSettings, started: Callable[[], N
         access_log=False,
         server_header=False,
         proxy_headers=False,
-        backlog=BACKLOG,  # asyncio accepts so many before any of them can be refused
+        backlog=BACKLOG,  # asyncio accepts so many before it can refuse one
         timeout_keep_alive=settings.limits.keep_alive_s,
         timeout_graceful_shutdown=_END_S,
         ws_max_size=_MAX_MESSAGE_BYTES,
-        ws_per_message_deflate=False,  # would compress the same pose once for each viewer
+        ws_per_message_deflate=False,  # it would compress the same pose for each viewer again
     )
     return _Server(config, started)
 
@@ -195,22 +171,22 @@ def _add_static_files(web: FastAPI) -> None:
     """Serve the monitor's own files and the libraries that come with NiceGUI."""
     web.mount("/static", _Files(directory=_STATIC))
     for name, element in _LIBRARIES.items():
-        web.mount(f"/lib/{name}", _Library(directory=_ELEMENTS / element / "dist"))
+        web.mount(f"/lib/{name}", _Files(directory=_ELEMENTS / element / "dist"))
 
 
 def _add_nicegui(web: FastAPI) -> None:
-    """Mount NiceGUI's pages behind everything else. Its application is global: reset it."""
+    """Mount NiceGUI's pages after all other routes. Its application is global, so it is reset first."""
     core.app.middleware_stack = None
     core.app.user_middleware.clear()
     core.app._shutdown_handlers.clear()
-    Client.instances.clear()  # pages opened before reload
-    logging.getLogger("nicegui").setLevel(logging.ERROR)  # it warns of every address that is not there
+    Client.instances.clear()  # of pages that were opened before; browsers load them again
+    logging.getLogger("nicegui").setLevel(logging.ERROR)  # it warns of every address that does not exist
     ui.run_with(
         web,
         title="framerunner",
         dark=None,
         language="en-US",
         reconnect_timeout=_RECONNECT_S,
-        gzip_middleware_factory=None,  # costs more time than it saves in the networks this is made for
+        gzip_middleware_factory=None,  # takes more time than it saves in a local network
         show_welcome_message=False,
     )

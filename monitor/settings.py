@@ -1,4 +1,4 @@
-"""How the monitor is started, and the error that says it cannot be."""
+"""Settings of the monitor, and the error for those that cannot be used."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from errors import UserError
 from monitor.addresses import is_address_or_network
 
 SHORTEST_PASSWORD = 8
-BACKLOG = 100  # connections accepted at once; must leave room below the limit of open files
+BACKLOG = 100  # connections accepted at the same time; must be well below the limit of open files
 
 
 class MonitorError(UserError):
@@ -17,29 +17,17 @@ class MonitorError(UserError):
 
 @dataclass(frozen=True, slots=True)
 class ConnectionLimits:
-    """How much of the server its clients may have.
+    """Limits of the server's clients."""
 
-    Attributes:
-        head_s: from the connection, or the first byte of its next request, to the end of the request's head.
-        keep_alive_s: from the end of a request to the end of the next one's head.
-        body_s: from the head to the end of the body.
-        stalled_s: how long a client may take nothing of what waits for it.
-        close_s: from closing a connection to its end.
-        head_bytes: length of a request's head.
-        body_bytes: length of a request's body.
-        total: connections.
-        per_address: connections from one address, and requests under way from one address behind a proxy.
-    """
-
-    head_s: float = 10.0
-    keep_alive_s: int = 30
-    body_s: float = 20.0
-    stalled_s: float = 30.0
-    close_s: float = 5.0
+    head_s: float = 10.0  # from the connection, or the first byte of a later request, to the end of its head
+    keep_alive_s: int = 30  # from the end of a request to the end of the next one's head
+    body_s: float = 20.0  # from the head to the end of the body
+    stalled_s: float = 30.0  # how long a client may leave data unread
+    close_s: float = 5.0  # from closing a connection to its end
     head_bytes: int = 65_536
     body_bytes: int = 65_536
-    total: int = 1000
-    per_address: int = 250
+    total: int = 1000  # connections
+    per_address: int = 250  # connections from an address; simultaneous requests from one behind a proxy
 
 
 @dataclass(frozen=True, slots=True)
@@ -50,10 +38,10 @@ class MonitorSettings:
         bind: address or name of the interface to listen on.
         port: TCP port; 0 lets the system choose one.
         database: SQLAlchemy URL of the competition's tables.
-        password: with which judges log in; None: they are given one-time links.
-        trusted_proxies: addresses or networks whose X-Forwarded-For and X-Forwarded-Proto are believed.
+        password: with which judges log in; None: they get one-time links.
+        trusted_proxies: addresses or networks whose X-Forwarded-For and X-Forwarded-Proto are used.
         limits: of connections.
-        qr_codes: say addresses as QR codes too; for a terminal that shows them.
+        qr_codes: print addresses as QR codes too.
     """
 
     bind: str = "127.0.0.1"
@@ -65,11 +53,7 @@ class MonitorSettings:
     qr_codes: bool = False
 
     def check(self) -> None:
-        """See that it can be meant so.
-
-        Raises:
-            MonitorError: a value is out of its range.
-        """
+        """Raise `MonitorError` if a value is out of its range."""
         if not self.bind.strip():
             raise MonitorError("monitor: --bind is empty; give an address such as 127.0.0.1 or 0.0.0.0")
         if not 0 <= self.port <= 65535:

@@ -1,28 +1,34 @@
-"""The addresses under which people open the monitor, from this machine and from their phones."""
+"""URLs under which people open the monitor, from this machine and from their phones, and QR codes of them."""
 
 from __future__ import annotations
 
+import io
 import socket
 from collections.abc import Iterable
 from ipaddress import IPv4Address, IPv6Address, ip_address
 from urllib.parse import urlsplit
 
 import ifaddr
+import segno
 
 from wire.transports.urls import is_loopback
 
 # Networks within this machine, of containers and virtual machines: no phone is in them.
 _VIRTUAL = ("docker", "br-", "veth", "virbr", "lxc", "lxdbr", "cni", "podman", "vmnet", "vboxnet")
 _ELSEWHERE = ("192.0.2.1", 9)  # TEST-NET-1 of RFC 5737; nothing is sent there
+_QUIET_ZONE = 4  # modules of white around a code that the standard (ISO/IEC 18004) requires
+# Not in the colours of the terminal: not every phone reads an inverted code.
+_WHITE_ON_BLACK = "\x1b[97;40m"
+_PLAIN = "\x1b[0m"
 
 
 def url_of(host: str, port: int) -> str:
-    """The address of the monitor's first page."""
+    """URL of the monitor's first page."""
     return f"http://[{host}]:{port}/" if ":" in host else f"http://{host}:{port}/"
 
 
 def urls_for_people(host: str, port: int) -> list[str]:
-    """The addresses that open the monitor, the best first.
+    """The URLs that open the monitor, the best first.
 
     Args:
         host: IP address that it listens on; an unspecified one (0.0.0.0, ::) stands for all networks.
@@ -33,20 +39,32 @@ def urls_for_people(host: str, port: int) -> list[str]:
     """
     if not ip_address(host).is_unspecified:
         return [url_of(host, port)]
-    found = network_addresses(ifaddr.get_adapters(), _first_choice())
+    found = network_addresses(ifaddr.get_adapters(), _default_address())
     usable = [each for each in found if ":" not in each or ":" in host]
     return [url_of(each, port) for each in usable]
 
 
-def network_addresses(adapters: Iterable[ifaddr.Adapter], first_choice: str) -> list[str]:
-    """This machine's addresses in the networks it is in.
+def urls_for_visitor(host: str, port: int, requested: str) -> list[str]:
+    """As `urls_for_people`, but first the scheme and host of a visitor's request, unless it is loopback."""
+    urls = urls_for_people(host, port)
+    parts = urlsplit(requested)
+    theirs = f"{parts.scheme}://{parts.netloc}/"
+    if is_loopback(parts.hostname or "localhost"):
+        return urls
+    return [theirs, *(url for url in urls if url != theirs)]
+
+
+def is_for_others(host: str) -> bool:
+    """Whether another machine can open the monitor that listens on this IP address."""
+    return not ip_address(host).is_loopback
+
+
+def network_addresses(adapters: Iterable[ifaddr.Adapter], first: str) -> list[str]:
+    """This machine's addresses that other machines can reach: IPv4 before IPv6.
 
     Args:
         adapters: its network interfaces.
-        first_choice: address of the interface that leads elsewhere; "" if none does.
-
-    Returns:
-        IPv4 first, among them `first_choice`; without those that only this machine or its containers reach.
+        first: the address that is listed first, if it is there.
     """
     found: list[IPv4Address | IPv6Address] = []
     for adapter in adapters:
@@ -55,36 +73,28 @@ def network_addresses(adapters: Iterable[ifaddr.Adapter], first_choice: str) -> 
         texts = (each.ip if isinstance(each.ip, str) else each.ip[0] for each in adapter.ips)
         found += [ip_address(text.partition("%")[0]) for text in texts]
     usable = [each for each in found if not (each.is_loopback or each.is_link_local)]
-    usable.sort(key=lambda each: (each.version, str(each) != first_choice))
+    usable.sort(key=lambda each: (each.version, str(each) != first))
     return [str(each) for each in usable]
 
 
-def is_for_others(host: str) -> bool:
-    """Whether another machine can open the monitor that listens on this IP address."""
-    return not ip_address(host).is_loopback
-
-
-def urls_for_visitor(host: str, port: int, asked: str) -> list[str]:
-    """As `urls_for_people`, with the name first by which somebody already opened the monitor.
-
-    Args:
-        host: as above.
-        port: as above.
-        asked: URL of that visitor's request.
-    """
-    urls = urls_for_people(host, port)
-    parts = urlsplit(asked)
-    theirs = f"{parts.scheme}://{parts.netloc}/"
-    if is_loopback(parts.hostname or "localhost"):
-        return urls
-    return [theirs, *(url for url in urls if url != theirs)]
-
-
-def _first_choice() -> str:
-    """The address from which this machine would speak to the world; "" without a way there."""
+def _default_address() -> str:
+    """The address of the interface with the default route; "" without one."""
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
         try:
             probe.connect(_ELSEWHERE)
         except OSError:
             return ""
         return str(probe.getsockname()[0])
+
+
+def terminal_code(text: str) -> str:
+    """A QR code as lines of half blocks, for a terminal with UTF-8 and colours."""
+    lines = io.StringIO()
+    segno.make_qr(text, error="l").terminal(lines, border=2, compact=True)
+    return "\n".join(f"{_WHITE_ON_BLACK}{line}{_PLAIN}" for line in lines.getvalue().splitlines() if line)
+
+
+def svg_code(text: str) -> str:
+    """A QR code as an SVG image, black on white, that fills its container."""
+    code = segno.make_qr(text, error="m")
+    return str(code.svg_inline(border=_QUIET_ZONE, dark="#000", light="#fff", omitsize=True))

@@ -23,15 +23,11 @@ LOCKS = sorted((ROOT / "locks").glob("*.txt"))
 INSTALLED_LOCKS = [path for path in LOCKS if path.name != "mavproxy-without.txt"]
 # Exceptions from the limits of 20, each with its reason. Take out what is no longer needed; the tests say so.
 LARGE_FOLDERS = {
-    "monitor": "the server, its channels and the pilot's seat",
     "sitl": "world, camera, links and the program that runs them",
 }
 LARGE_CLASSES = {
     "firmware_py/missions/executor.py MissionExecutor": "a method for each kind of mission item",
     "framerunner/flying/lockstep_drone.py LockstepDrone": "implements the port `Drone`",
-    "monitor/fleet.py Fleet": "a method for each kind of message from a vehicle",
-    "monitor/pilot_seat.py PilotSeat": "a method for each order of a pilot",
-    "monitor/vehicle/vehicle.py Vehicle": "a method for each kind of message from a vehicle",
     "offboard/mavsdk_drone.py MavsdkDrone": "implements the port `Drone`",
 }
 HASHED = re.compile(r"\S+==[^\n]* \\\n( {4}--hash=sha256:[0-9a-f]{64}( \\)?\n)+( {4}#.*\n?)*\Z")

@@ -21,7 +21,7 @@ from monitor.competition.rules import TryScore, read_report
 from monitor.competition.store import Store
 from monitor.competition.validation import RefusedError, shown
 from monitor.competition.views import Board, RunningView
-from monitor.tries import TryEvent
+from monitor.vehicle.tries import TryEvent
 from scenarios.models import COLOURS
 
 if TYPE_CHECKING:

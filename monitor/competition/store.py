@@ -21,7 +21,7 @@ from monitor.competition.database import Database
 from monitor.competition.rules import Correction, Rule, correct, read_report
 from monitor.competition.validation import RefusedError, free_text, from_wire, name_key, shown, team_name
 from monitor.competition.views import Board, TryDetail
-from monitor.tries import TryEvent
+from monitor.vehicle.tries import TryEvent
 from scenarios.result import RefereeReport
 
 MAX_TEAMS = 500

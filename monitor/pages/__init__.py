@@ -1,1 +1,1 @@
-"""The pages of the monitor, one module each, and the frame they share."""
+"""The monitor's pages: those that JavaScript draws (`table`), log-in, `/join`, and the frame of all."""

@@ -1,4 +1,4 @@
-"""The page `/join`: addresses that a phone in the same network opens, as text and as QR codes."""
+"""`/join`: addresses that a phone in the same network opens, as text and as QR codes."""
 
 from __future__ import annotations
 
@@ -6,17 +6,15 @@ from html import escape
 from typing import TYPE_CHECKING
 
 from fastapi import Request
-from fastapi.responses import HTMLResponse, Response
+from fastapi.responses import Response
 
-from monitor.pages.competition import STYLE
-from monitor.pages.shell import HEAD, header_html
-from monitor.qr_code import svg_code
-from monitor.urls import is_for_others, urls_for_visitor
+from monitor.pages.shell import html_page, style_links
+from monitor.urls import is_for_others, svg_code, urls_for_visitor
 
 if TYPE_CHECKING:
     from monitor.server import Monitor
 
-_MOST_OTHERS = 3
+_MAX_OTHERS = 3
 _LOCAL_ONLY = (
     "<p>This monitor can be opened on this machine only. To let phones in, stop it and start it with "
     "<code>--bind 0.0.0.0</code>.</p>"
@@ -26,27 +24,18 @@ _NO_NETWORK = "<p>This machine is in no network. Connect it to one, then load th
 
 def register(monitor: Monitor) -> None:
     """Add the page, and its first code as an image at `/join.svg`."""
+    for_others = is_for_others(monitor.place[0])
 
     def urls(request: Request) -> list[str]:
-        if not is_for_others(monitor.place[0]):
-            return []
-        return urls_for_visitor(*monitor.place, str(request.url))
+        return urls_for_visitor(*monitor.place, str(request.url)) if for_others else []
 
     @monitor.web.get("/join")
     async def join(request: Request) -> Response:
-        visitor = monitor.access.visitor(request)
         found = urls(request)
-        nothing = _NO_NETWORK if is_for_others(monitor.place[0]) else _LOCAL_ONLY
-        content = _codes(found) if found else nothing
-        return HTMLResponse(
-            '<!doctype html><html lang="en"><head><meta charset="utf-8">'
-            "<title>On a phone – framerunner</title>"
-            '<meta name="viewport" content="width=device-width, initial-scale=1">'
-            f"{HEAD}{STYLE}</head><body>{header_html(visitor, '/join')}"
-            '<main class="page join" id="main" tabindex="-1">'
-            f"<h1>Open it on a phone</h1>{content}</main></body></html>",
-            headers={"Cache-Control": "no-store"},
-        )
+        codes = _codes(found) if found else _NO_NETWORK if for_others else _LOCAL_ONLY
+        content = f"<h1>Open it on a phone</h1>{codes}"
+        visitor, head = monitor.access.visitor(request), style_links("competition")
+        return html_page(visitor, "/join", "On a phone", content, head=head, classes="join")
 
     @monitor.web.get("/join.svg")
     async def code(request: Request) -> Response:
@@ -59,7 +48,7 @@ def register(monitor: Monitor) -> None:
 
 
 def _codes(urls: list[str]) -> str:
-    first, *others = urls[: 1 + _MOST_OTHERS]
+    first, *others = urls[: 1 + _MAX_OTHERS]
     more = ""
     if others:  # closed: a phone that sees two codes reads either
         shown = (f"<details><summary>{escape(url)}</summary>{_code(url)}</details>" for url in others)

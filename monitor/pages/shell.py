@@ -1,4 +1,4 @@
-"""The frame of all pages: name, navigation, how the link is, who is logged in."""
+"""The frame of all pages: name, navigation, state of the link, who is logged in."""
 
 from __future__ import annotations
 
@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING
 
 from nicegui import ui
 from starlette.requests import Request
+from starlette.responses import HTMLResponse
 
 if TYPE_CHECKING:
     from monitor.access import Visitor
@@ -34,21 +35,22 @@ HEAD = (
 
 @contextmanager
 def shell(monitor: Monitor, request: Request, title: str, here: str) -> Iterator[Visitor]:
-    """Put the frame around a page; what is made inside the `with` is its content, within `<main>`.
+    """Put the frame around a NiceGUI page; elements made inside the `with` stand within its `<main>`.
 
     Args:
         monitor: the running monitor.
-        request: of the page.
-        title: of the page, for the browser's tab.
-        here: path of the page, which is marked in the navigation.
+        request: the page's request.
+        title: for the browser's tab.
+        here: path that is marked in the navigation; "": no header and navigation, for a projector.
 
     Yields:
-        Who is looking.
+        The visitor who opened the page.
     """
     visitor = monitor.access.visitor(request)
     ui.page_title(f"{title} – framerunner")
     ui.add_head_html(HEAD)
-    ui.add_body_html(header_html(visitor, here))
+    if here:
+        ui.add_body_html(header_html(visitor, here))
     main = ui.element("main").classes("page")
     main.props["id"] = "main"
     main.props["tabindex"] = "-1"  # the skip link moves the focus here
@@ -56,50 +58,59 @@ def shell(monitor: Monitor, request: Request, title: str, here: str) -> Iterator
         yield visitor
 
 
-@contextmanager
-def bare(title: str) -> Iterator[None]:
-    """Put a page without header and navigation around what is made inside the `with`, for a projector.
+def html_page(
+    visitor: Visitor, here: str, title: str, content: str, *, head: str = "", classes: str, status: int = 200
+) -> HTMLResponse:
+    """A page with the same frame, but without NiceGUI and its own JavaScript; browsers do not store it.
 
     Args:
-        title: of the page, for the browser's tab.
+        visitor: who opened the page.
+        here: path that is marked in the navigation.
+        title: for the browser's tab.
+        content: HTML within `<main>`.
+        head: further HTML for the head.
+        classes: CSS classes of `<main>`.
+        status: HTTP status.
     """
-    ui.page_title(f"{title} – framerunner")
-    ui.add_head_html(HEAD)
-    main = ui.element("main").classes("page")
-    main.props["id"] = "main"
-    with main:
-        yield
-
-
-def use_module(path: str, **data: object) -> None:
-    """Have a page's own JavaScript run once the page stands.
-
-    The module is loaded as `<script type="module">` after the page's elements were made. For NAME.js its data
-    stands as JSON in the element "data-NAME"; `pageData(import.meta.url)` of `start.js` reads it.
-
-    Args:
-        path: of the module, below `/static/`.
-        data: what it is to know; what `json.dumps` takes.
-    """
-    path = path.removeprefix("/static/")
-    ui.add_body_html(
-        f'<script type="application/json" id="data-{escape(PurePosixPath(path).stem)}" '
-        f'data-module="/static/{escape(path)}">{json_block(data)}</script>'
+    return HTMLResponse(
+        f'<!doctype html><html lang="en"><head><meta charset="utf-8"><title>{title} – framerunner</title>'
+        '<meta name="viewport" content="width=device-width, initial-scale=1">'
+        f"{HEAD}{head}</head><body>{header_html(visitor, here)}"
+        f'<main class="page {classes}" id="main" tabindex="-1">{content}</main></body></html>',
+        status_code=status,
+        headers={"Cache-Control": "no-store"},
     )
 
 
-def json_block(data: object) -> str:
-    """Write JSON that can stand in a `<script>`: nothing in it can end the element or begin a comment.
+def style_links(*names: str) -> str:
+    """HTML for the head that applies style sheets below `/static/`."""
+    return "".join(f'<link rel="stylesheet" href="/static/{name}.css">' for name in names)
 
-    Raises:
-        ValueError: a number is not finite.
+
+def use_module(path: str, **data: object) -> None:
+    """Run a page's own JavaScript module after the page's elements were made.
+
+    For NAME.js the data stands as JSON in the element "data-NAME"; `pageData(import.meta.url)` of `start.js`
+    reads it.
+
+    Args:
+        path: of the module, below `/static/`.
+        data: for the module; values that `json.dumps` takes.
     """
+    ui.add_body_html(
+        f'<script type="application/json" id="data-{escape(PurePosixPath(path).stem)}" '
+        f'data-module="/static/{escape(path)}">{_json_block(data)}</script>'
+    )
+
+
+def _json_block(data: object) -> str:
+    """JSON that can stand in a `<script>`: nothing in it can end the element or begin a comment."""
     text = json.dumps(data, ensure_ascii=True, allow_nan=False)
     return text.replace("<", "\\u003c").replace(">", "\\u003e").replace("&", "\\u0026")
 
 
 def header_html(visitor: Visitor, here: str) -> str:
-    """Return the header, which stands before anything of NiceGUI's and shows without it."""
+    """The header, which stands before NiceGUI's elements and is shown without them."""
     links = "".join(
         f'<li><a href="{path}"{" aria-current=page" if path == here else ""}>{name}</a></li>'
         for name, path in _PAGES

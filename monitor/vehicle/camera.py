@@ -1,4 +1,4 @@
-"""Where a vehicle's video is: asked of its camera, and believed only so far as is safe."""
+"""Where a vehicle's video is: requested from its camera, and used only if that is safe."""
 
 from __future__ import annotations
 
@@ -7,70 +7,55 @@ from collections.abc import Collection
 from ipaddress import IPv4Address, IPv6Address, ip_address
 from urllib.parse import SplitResult, urlsplit
 
-from monitor.ports import Message
-from wire.dialect import mavlink
+from monitor.vehicle.link_quality import RepeatedRequest
+from wire.dialect import Message, mavlink
 from wire.simulator_api import VIDEO_PATH
 from wire.status_text import plain
 from wire.transports.urls import LinkError, parse_url
 from wire.vehicles import request_message
 
 CAMERAS = range(mavlink.MAV_COMP_ID_CAMERA, mavlink.MAV_COMP_ID_CAMERA6 + 1)
-_ASK_EVERY_S = 2.0
-_ASKS = 8
+_MAX_REQUESTS = 8
 _PATH = re.compile(r"(?:/[\w-][\w.-]{0,60}){0,5}/?", re.ASCII)
 _WEB_PORTS = (80, 443)
-_FIRST_FREE_PORT = 1024  # those below belong to other services
-# What the simulator and the virtual camera serve on this machine: one port an instance.
+_FIRST_FREE_PORT = 1024  # lower ones belong to other services
+# Of the simulator and the virtual camera on this machine: one port for each instance.
 _OWN_PORTS = range(8100, 8110)
 
 
 class CameraWatch:
-    """Asks a vehicle's camera once, and again until it answers.
+    """Requests the URL of a vehicle's video until its camera answers.
 
     Args:
-        drone_id: the vehicle's system id.
-        link_host: the host to which the link goes; "" if it only listens.
-        confirmed: HOST or HOST:PORT that the operator allows besides.
+        link_host: the host to which the link is opened; "" if it only listens.
+        confirmed: HOST or HOST:PORT that the operator allows.
 
     Attributes:
-        url: of the MJPEG video; None: none that may be asked for.
-        problem: why an address was refused, for a notice; "" if none was.
+        url: of the MJPEG video; None: none that may be fetched.
+        problem: why a URL was refused, for a notice; "" if none was.
     """
 
     def __init__(self, drone_id: int, link_host: str = "", confirmed: Collection[str] = ()) -> None:
         self._id = drone_id
         self._link_host = link_host
         self._confirmed = confirmed
-        self._component: int | None = None
-        self._asked_s = -1e9
-        self._asks = 0
+        self._request: RepeatedRequest | None = None
         self._answered = False
         self.url: str | None = None
         self.problem = ""
 
     def see(self, component: int) -> None:
-        """Note that a component sent its heartbeat."""
-        if component in CAMERAS and self._component is None:
-            self._component = component
+        """Take a component's heartbeat; the first camera counts."""
+        if component in CAMERAS and self._request is None:
+            number = mavlink.MAVLINK_MSG_ID_VIDEO_STREAM_INFORMATION
+            self._request = RepeatedRequest(request_message(self._id, number, component), _MAX_REQUESTS)
 
-    def question(self, now_s: float) -> Message | None:
-        """What is to be asked now; None: nothing."""
-        if self._component is None or self._answered or self._asks >= _ASKS:
-            return None
-        if now_s - self._asked_s < _ASK_EVERY_S:
-            return None
-        self._asked_s = now_s
-        self._asks += 1
-        wanted = mavlink.MAVLINK_MSG_ID_VIDEO_STREAM_INFORMATION
-        return request_message(self._id, wanted, self._component)
+    def request(self, now_s: float) -> Message | None:
+        """The request to send now; None: none."""
+        return None if self._request is None or self._answered else self._request.due(now_s)
 
     def take(self, message: Message, host: str) -> None:
-        """Take VIDEO_STREAM_INFORMATION; the first stream that can be shown counts.
-
-        Args:
-            message: as parsed.
-            host: in numbers, from which it came; "" if over a wire.
-        """
+        """Take VIDEO_STREAM_INFORMATION from a host; the first stream that can be shown counts."""
         self._answered = True
         url = plain(bytes(message._uri_raw), 200)
         if self.url is not None or not url.startswith(("http:", "https:")):
@@ -78,7 +63,7 @@ class CameraWatch:
         problem = refusal(url, host, self._link_host, self._confirmed)
         if problem:
             self.problem = (
-                f"the video at {url} is not asked for: {problem}; if it is right, start the monitor with "
+                f"the video at {url} is not fetched: {problem}; if it is right, start the monitor with "
                 "--camera-host HOST or HOST:PORT"
             )
         else:
@@ -86,17 +71,17 @@ class CameraWatch:
 
 
 def refusal(url: str, host: str, link_host: str = "", confirmed: Collection[str] = ()) -> str:
-    """Why an address that a vehicle told must not be asked for; "" if it may.
+    """Why a URL that a vehicle sent must not be fetched; "" if it may.
 
-    A vehicle could name any address and have this machine ask there. So: HTTP, no user name, and what the
-    operator confirmed or else the host that said so, with nothing that a camera does not need. On this
-    machine, where packets of a distant vehicle may be passed on and other services trust who is local, only
-    the simulator's and virtual camera's own addresses.
+    A vehicle could send any URL and make this machine request it. So it must be HTTP without a user name, at
+    a host that the operator confirmed or from which the URL came, without parts that a camera does not need.
+    On this machine, where packets of a remote vehicle may be forwarded and other services trust local
+    clients, only the URLs of the simulator and the virtual camera are allowed.
 
     Args:
-        url: as told.
-        host: in numbers, from which it was told; "" if over a wire.
-        link_host: the host to which the link goes, as the operator wrote it; "" if it only listens.
+        url: as sent.
+        host: IP address of the sender; "" on a serial line.
+        link_host: the host to which the link is opened, as the operator wrote it; "" if it only listens.
         confirmed: HOST or HOST:PORT that the operator allows.
     """
     try:
@@ -105,7 +90,7 @@ def refusal(url: str, host: str, link_host: str = "", confirmed: Collection[str]
     except ValueError:
         return "it is no address"
     problems = {
-        "only http and https are spoken": parts.scheme not in ("http", "https"),
+        "only http and https are supported": parts.scheme not in ("http", "https"),
         "it holds a user name": "@" in parts.netloc,
         "port 0 is none": port == 0,
         "it names no host": not name,
@@ -113,11 +98,10 @@ def refusal(url: str, host: str, link_host: str = "", confirmed: Collection[str]
     problem = next((text for text, there in problems.items() if there), "")
     if problem or {name, f"{name}:{port}"} & {each.lower() for each in confirmed}:
         return problem
-    return _unneeded(parts) or _other_host(name, host, link_host) or _trusting(parts)
+    return _more_than_needed(parts) or _other_host(name, host, link_host) or _other_service(parts)
 
 
-def _unneeded(parts: SplitResult) -> str:
-    """What an address holds that a camera does not need; "" if nothing."""
+def _more_than_needed(parts: SplitResult) -> str:
     if parts.query or parts.fragment or not _PATH.fullmatch(parts.path):
         return "it holds more than a plain path"
     port = parts.port or _WEB_PORTS[0]
@@ -133,15 +117,11 @@ def _other_host(name: str, host: str, link_host: str) -> str:
         return "its host must be given in numbers"
     if host and address == _plain_address(host):
         return ""
-    return (
-        f"the drone's packets come from {host}"
-        if host
-        else "nobody knows where the drone's packets come from"
-    )
+    return f"the drone's packets come from {host or 'an unknown host'}"
 
 
-def _trusting(parts: SplitResult) -> str:
-    """Why an address of this very machine must not be asked for; "" if it may, or is not of this machine."""
+def _other_service(parts: SplitResult) -> str:
+    """Why a URL of this machine must not be fetched; "" if it may, or is of another machine."""
     try:
         is_own = parts.hostname == "localhost" or _plain_address(parts.hostname or "").is_loopback
     except ValueError:
@@ -149,18 +129,18 @@ def _trusting(parts: SplitResult) -> str:
     if not is_own or (parts.port in _OWN_PORTS and parts.path == VIDEO_PATH):
         return ""
     first, last = _OWN_PORTS[0], _OWN_PORTS[-1]
-    return f"on this machine only {VIDEO_PATH} at ports {first} to {last} is asked for"
+    return f"on this machine only {VIDEO_PATH} at ports {first} to {last} is fetched"
 
 
 def _plain_address(text: str) -> IPv4Address | IPv6Address:
-    """An address; an IPv4 one that is written as IPv6 is that IPv4 one. Raises `ValueError`."""
+    """An IP address; IPv4 written as IPv6 becomes IPv4. Raises `ValueError`."""
     address = ip_address(text.partition("%")[0])
     mapped = address.ipv4_mapped if isinstance(address, IPv6Address) else None
     return address if mapped is None else mapped
 
 
 def host_of(link_url: str) -> str:
-    """The host to which a link goes; "" if it listens, or goes over a wire."""
+    """The host to which a link is opened; "" if it listens or is a serial line."""
     try:
         url = parse_url(link_url)
     except LinkError:

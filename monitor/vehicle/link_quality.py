@@ -1,4 +1,4 @@
-"""How well a vehicle is heard, and what it is asked to send: seldom, and never for less than it sends."""
+"""How well a vehicle is received, and requests for messages that it does not send often enough."""
 
 from __future__ import annotations
 
@@ -6,18 +6,18 @@ from collections import deque
 from dataclasses import dataclass
 
 from wire.dialect import Message, mavlink
-from wire.vehicles import request_message, request_rate
+from wire.vehicles import request_rate
 
 _SPAN_S = 10
-_LATE = 200  # a sequence number that jumps farther belongs to a packet that was overtaken
+_MAX_MISSING = 200  # a higher number of missing packets means that one was overtaken
 
 STALE_S = 1.0
 LOST_S = 3.0
-_BOOT_TIME_EVERY_S = 2.0
-_MAX_REQUESTS = 5
+_REPEAT_S = 2.0
+_MAX_RATE_REQUESTS = 5
 _RATE_SPAN_S = 3.0  # over which rates are measured
 _ENOUGH_HZ = 15.0
-_WANTED_HZ = 25.0
+_REQUESTED_HZ = 25.0
 
 
 @dataclass(slots=True)
@@ -31,7 +31,7 @@ class LinkQuality:
     """Age, rate and losses of the autopilot's packets over the last ten seconds.
 
     Attributes:
-        heard_s: when the last one came, loop time.
+        heard_s: when the last one was received, loop time.
     """
 
     def __init__(self, now_s: float) -> None:
@@ -39,13 +39,8 @@ class LinkQuality:
         self._sequence: int | None = None
         self._seconds: deque[_Second] = deque([_Second(now_s)], maxlen=_SPAN_S)
 
-    def hear(self, sequence: int, now_s: float) -> None:
-        """Count a packet.
-
-        Args:
-            sequence: of the packet, 0 to 255.
-            now_s: loop time.
-        """
+    def count(self, sequence: int, now_s: float) -> None:
+        """Count a packet with a sequence number of 0 to 255."""
         self.heard_s = now_s
         second = self._seconds[-1]
         if now_s - second.began_s >= 1.0:
@@ -54,14 +49,14 @@ class LinkQuality:
         second.heard += 1
         if self._sequence is not None:
             missing = (sequence - self._sequence - 1) & 0xFF
-            if missing > _LATE:
-                second.lost -= 1  # counted as missing before, and here it is
+            if missing > _MAX_MISSING:
+                second.lost -= 1  # it was counted as lost before
                 return
             second.lost += missing
         self._sequence = sequence
 
     def forget_sequence(self) -> None:
-        """The vehicle has restarted, and its numbers begin at zero again."""
+        """Accept any next sequence number: the vehicle has restarted."""
         self._sequence = None
 
     def age_s(self, now_s: float) -> float:
@@ -69,12 +64,12 @@ class LinkQuality:
         return max(0.0, now_s - self.heard_s)
 
     def state(self, now_s: float) -> str:
-        """Whether it is "live", "stale" or "lost"."""
+        """One of "live", "stale" and "lost"."""
         age_s = self.age_s(now_s)
         return "live" if age_s < STALE_S else "stale" if age_s < LOST_S else "lost"
 
     def as_dict(self, now_s: float) -> dict[str, object]:
-        """The link as the status tells it."""
+        """The field `link` of the message "status"."""
         recent = [second for second in self._seconds if now_s - second.began_s < _SPAN_S]
         heard = sum(second.heard for second in recent)
         lost = max(0, sum(second.lost for second in recent))
@@ -87,32 +82,25 @@ class LinkQuality:
         }
 
 
-class BootTimeRequest:
-    """Asks when the vehicle was switched on, until it has told."""
+class RepeatedRequest:
+    """A request that is sent every two seconds while it is not answered, `count` times at most."""
 
-    def __init__(self, system_id: int) -> None:
-        self._id = system_id
-        self._asked_s = -1e9
-        self._requests = 0
+    def __init__(self, message: Message, count: int) -> None:
+        self._message = message
+        self._left = count
+        self._sent_s = -1e9
 
-    def request(self, boot_unix_us: int | None, now_s: float) -> Message | None:
-        """What is to be asked now.
-
-        Args:
-            boot_unix_us: what is known; None: nothing.
-            now_s: loop time.
-        """
-        if boot_unix_us is not None or self._requests >= _MAX_REQUESTS:
+    def due(self, now_s: float) -> Message | None:
+        """The message, if it is to be sent now."""
+        if not self._left or now_s - self._sent_s < _REPEAT_S:
             return None
-        if now_s - self._asked_s < _BOOT_TIME_EVERY_S:
-            return None
-        self._asked_s = now_s
-        self._requests += 1
-        return request_message(self._id, mavlink.MAVLINK_MSG_ID_SYSTEM_TIME)
+        self._sent_s = now_s
+        self._left -= 1
+        return self._message
 
 
 class RateWatch:
-    """Asks for more attitude and position where they come too slowly for a picture."""
+    """Requests more attitudes and positions where they are too slow for a smooth display."""
 
     def __init__(self, system_id: int, now_s: float) -> None:
         self._id = system_id
@@ -121,23 +109,18 @@ class RateWatch:
         self._requests = 0
 
     def requests(self, counts: tuple[int, int], now_s: float) -> list[Message]:
-        """What is to be asked now.
-
-        Args:
-            counts: attitudes and positions so far.
-            now_s: loop time.
-        """
+        """The messages to send now, by the numbers of attitudes and positions so far."""
         span_s = now_s - self._since_s
         if span_s < _RATE_SPAN_S:
             return []
         rates_hz = [(now - then) / span_s for now, then in zip(counts, self._counts, strict=True)]
         self._since_s, self._counts = now_s, counts
-        if not any(counts) or min(rates_hz) >= _ENOUGH_HZ or self._requests >= _MAX_REQUESTS:
+        if not any(counts) or min(rates_hz) >= _ENOUGH_HZ or self._requests >= _MAX_RATE_REQUESTS:
             return []
         self._requests += 1
-        wanted = (mavlink.MAVLINK_MSG_ID_ATTITUDE_QUATERNION, mavlink.MAVLINK_MSG_ID_LOCAL_POSITION_NED)
+        numbers = (mavlink.MAVLINK_MSG_ID_ATTITUDE_QUATERNION, mavlink.MAVLINK_MSG_ID_LOCAL_POSITION_NED)
         return [
-            request_rate(self._id, number, _WANTED_HZ)
-            for number, rate_hz in zip(wanted, rates_hz, strict=True)
+            request_rate(self._id, number, _REQUESTED_HZ)
+            for number, rate_hz in zip(numbers, rates_hz, strict=True)
             if rate_hz < _ENOUGH_HZ
         ]

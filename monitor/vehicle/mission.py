@@ -1,4 +1,4 @@
-"""What the app that flies a vehicle tells of its mission, made into messages for the pages."""
+"""The mission of the app that flies a vehicle, from its TUNNEL messages to messages for the pages."""
 
 from __future__ import annotations
 
@@ -7,8 +7,8 @@ from typing import Annotated, Any
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
-from monitor.ports import Message
 from scenarios.result import FlightResult, first_error
+from wire.dialect import Message
 from wire.finite_json import finite
 from wire.mission_codec import DocumentAssembler, PayloadError, decode_detections, decode_state
 from wire.mission_messages import (
@@ -23,9 +23,8 @@ from wire.mission_messages import (
 )
 from wire.status_text import plain
 
-ALIVE_S = 2.0
+_ALIVE_S = 2.0
 _TRANSITIONS = 10
-_COLOURS = ("red", "green", "blue")
 
 JsonMessage = dict[str, Any]
 Name = Annotated[str, Field(max_length=200)]
@@ -36,19 +35,15 @@ class _Lenient(BaseModel):
 
 
 class MissionDocument(_Lenient):
-    """The MISSION document."""
+    """The fields of the MISSION document that the pages use."""
 
     name: Name = ""
-    description: str = ""
-    scenario: Name = ""
     states: list[Name] = Field([], max_length=2000)
     mermaid: str = ""
     source: str = ""
 
 
-class TransitionTold(_Lenient):
-    """A transition in the HISTORY document."""
-
+class _Transition(_Lenient):
     source: Name = Field("", alias="from")
     target: Name = Field("", alias="to")
     time_us: int = Field(0, ge=0, le=2**63)
@@ -58,47 +53,44 @@ class TransitionTold(_Lenient):
 
 
 class _History(_Lenient):
-    transitions: list[TransitionTold] = Field([], max_length=100)
+    """The HISTORY document."""
+
+    transitions: list[_Transition] = Field([], max_length=100)
 
 
 class MissionView:
-    """Follows one app.
+    """The mission state of one app.
 
     Attributes:
-        state: the last one told; None before.
-        document: of the mission flown; None before.
-        result: the CRC of the RESULT document and what makes sense in it; None before.
-        problem: the last payload that made no sense, for a notice; "" if none.
-        problem_told: the notice was given.
+        state: the newest; None before the first.
+        result: CRC and valid content of the RESULT document; None before it was received.
+        problem: of the newest payload that could not be read, for a notice; "" if there was none.
+        problem_told: the notice was sent.
     """
 
     def __init__(self, drone_id: int) -> None:
         self._id = drone_id
         self._assembler = DocumentAssembler()
+        self._document: MissionDocument | None = None
         self._document_crc = 0
         self._heard_s = -1e9
         self._history: JsonMessage | None = None
-        self._seen: JsonMessage | None = None
+        self._detected: JsonMessage | None = None
         self.state: MissionState | None = None
-        self.document: MissionDocument | None = None
         self.result: tuple[int, FlightResult] | None = None
         self.problem = ""
         self.problem_told = False
 
     def take(self, message: Message, now_s: float) -> list[JsonMessage]:
-        """Take a TUNNEL message.
-
-        Returns:
-            What the pages are to be told: "detections", "chart" or "transitions".
-        """
+        """Take a TUNNEL message. Returns messages "detections", "chart" or "transitions" for the pages."""
         payload = bytes(message.payload[: message.payload_length])
         try:
             if message.payload_type == STATE_TYPE:
                 self.state = decode_state(payload)
                 self._heard_s = now_s
             elif message.payload_type == DETECTIONS_TYPE:
-                self._seen = self._detections(payload)
-                return [self._seen]
+                self._detected = self._detections(payload)
+                return [self._detected]
             elif message.payload_type == DOCUMENT_TYPE:
                 document = self._assembler.take(payload)
                 return [] if document is None else self._read(document)
@@ -107,29 +99,24 @@ class MissionView:
         return []
 
     def alive(self, now_s: float) -> bool:
-        """Whether the app was heard lately."""
-        return now_s - self._heard_s < ALIVE_S
+        """Whether a state was received in the last two seconds."""
+        return now_s - self._heard_s < _ALIVE_S
 
     def state_index(self, now_s: float) -> int:
-        """The present state in the chart's list; -1: none, or nobody says."""
+        """Index of the present state in the chart's list; -1: none, or the app is not alive."""
         state = self.state
         return state.state_index if state is not None and self.alive(now_s) else -1
 
     def command(self, now_s: float) -> list[float] | None:
-        """What the app commands: forward, left, up (m/s), yaw rate to the left (rad/s); None if nothing."""
+        """The app's command: forward, left, up (m/s), yaw rate to the left (rad/s); None without one."""
         state = self.state
         if state is None or not state.flying or state.paused or not self.alive(now_s):
             return None
         return [round(value, 4) for value in state.command] if isfinite(sum(state.command)) else None
 
     def as_dict(self, time_us: int, now_s: float) -> JsonMessage | None:
-        """The mission as the status tells it.
-
-        Args:
-            time_us: vehicle time now.
-            now_s: loop time.
-        """
-        state, document = self.state, self.document
+        """The field `mission` of the message "status" at a vehicle time; None before the first state."""
+        state, document = self.state, self._document
         if state is None:
             return None
         alive = self.alive(now_s)
@@ -146,75 +133,66 @@ class MissionView:
         }
 
     def standing(self) -> list[JsonMessage]:
-        """What a new watcher is told: the chart, the last transitions, and what the last image showed."""
-        told = (self._chart(), self._history, self._seen)
-        return [message for message in told if message is not None]
+        """What a new watcher is sent: the chart, the last transitions and the last detections."""
+        messages = (self._chart(), self._history, self._detected)
+        return [message for message in messages if message is not None]
 
     def _state_name(self, state: MissionState) -> str:
-        document = self.document
-        fits = document is not None and self._document_crc == state.mission_crc
-        if document is None or not fits or not 0 <= state.state_index < len(document.states):
+        document = self._document
+        if document is None or self._document_crc != state.mission_crc:
+            return ""
+        if not 0 <= state.state_index < len(document.states):
             return ""
         return plain(document.states[state.state_index])
 
     def _read(self, document: Document) -> list[JsonMessage]:
         try:
             if document.kind is DocumentKind.MISSION:
-                self.document = MissionDocument.model_validate(document.content)
+                self._document = MissionDocument.model_validate(document.content)
                 self._document_crc = document.crc
                 chart = self._chart()
                 return [] if chart is None else [chart]
             if document.kind is DocumentKind.HISTORY:
-                told = _History.model_validate(document.content).transitions
-                self._history = self._transitions(told[-_TRANSITIONS:])
+                transitions = _History.model_validate(document.content).transitions
+                self._history = self._transitions(transitions[-_TRANSITIONS:])
                 return [self._history]
         except ValidationError as error:
             self.problem = f"{document.kind.name.lower()} document: {first_error(error)}"
             return []
         result = FlightResult.from_outside(dict(document.content))
         if result is None:
-            self.problem = "result document: no verdict is told"
+            self.problem = "result document: it has no verdict"
         else:
             self.result = (document.crc, result)
         return []
 
     def _chart(self) -> JsonMessage | None:
-        document = self.document
-        if document is None:
-            return None
-        return {
-            "kind": "chart",
-            "id": self._id,
-            "name": document.name,
-            "mermaid": document.mermaid,
-            "states": document.states,
-            "source": document.source,
-        }
+        document = self._document
+        return None if document is None else {"kind": "chart", "id": self._id, **document.model_dump()}
 
-    def _transitions(self, told: list[TransitionTold]) -> JsonMessage:
+    def _transitions(self, transitions: list[_Transition]) -> JsonMessage:
         listed = [
             {
                 "time_s": round(each.time_us * 1e-6, 3),
                 "from": each.source,
                 "to": each.target,
                 "when": each.when,
-                "values": [[name, value] for name, value in each.values],
+                "values": each.values,
                 "seconds": each.seconds,
             }
-            for each in reversed(told)
+            for each in reversed(transitions)
         ]
         return {"kind": "transitions", "id": self._id, "list": finite(listed)}
 
     def _detections(self, payload: bytes) -> JsonMessage:
-        seen = decode_detections(payload)
-        boxes = zip(_COLOURS, (seen.red, seen.green, seen.blue), strict=True)
+        found = decode_detections(payload)
         return {
             "kind": "detections",
             "id": self._id,
-            "t": None if seen.time_us is None else round(seen.time_us * 1e-6, 3),
-            "width": seen.width_px,
-            "height": seen.height_px,
-            "boxes": {colour: _box(box) for colour, box in boxes},
+            "t": None if found.time_us is None else round(found.time_us * 1e-6, 3),
+            "width": found.width_px,
+            "height": found.height_px,
+            "boxes": {"red": _box(found.red), "green": _box(found.green), "blue": _box(found.blue)},
         }
 
 

@@ -1,4 +1,4 @@
-"""A browser for the tests of pages: started once by each worker, with windows of each test's own."""
+"""A browser for the tests of pages: started once by each worker, with separate windows for each test."""
 
 import pytest_asyncio
 

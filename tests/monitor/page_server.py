@@ -1,4 +1,4 @@
-"""A monitor's pages without a monitor: files, a page's frame, and a live channel that a test speaks on."""
+"""A monitor's pages without a monitor: files, a page's frame, and a live channel that a test writes."""
 
 from __future__ import annotations
 
@@ -15,8 +15,7 @@ from aiohttp import WSMsgType, web
 
 import monitor
 from monitor.access import Visitor
-from monitor.pages import live, stage
-from monitor.pages.shell import HEAD, header_html
+from monitor.pages.shell import HEAD, header_html, style_links
 
 STATIC = Path(monitor.__file__).parent / "static"
 ELEMENTS = Path(nicegui.__file__).parent / "elements"
@@ -31,7 +30,7 @@ NO_CONTEST = {
 
 
 class FakeMonitor:
-    """Serves pages; says to all who watch what it is told to say.
+    """Serves pages, and sends messages to all viewers.
 
     Attributes:
         welcome: messages each new watcher gets first.
@@ -53,7 +52,7 @@ class FakeMonitor:
         self._runner: web.AppRunner | None = None
 
     async def start(self):
-        """Listen; a second time at the same place as before."""
+        """Listen; a second time at the same port as before."""
         app = web.Application()
         self._ended.clear()
         for path in PAGES:
@@ -73,14 +72,14 @@ class FakeMonitor:
         self.url = f"http://127.0.0.1:{self._port}"
 
     async def stop(self):
-        """Stop as a killed monitor does: all connections end."""
+        """Stop like a killed monitor: all connections end."""
         for watcher in [*self._watchers, *self._contest_watchers]:
             await watcher.close()
         self._ended.set()
         await self._runner.cleanup()
 
     async def say(self, kind, **fields):
-        """Tell all who watch."""
+        """Send a message to all viewers."""
         text = json.dumps({"kind": kind, **fields})
         for watcher in list(self._watchers):
             await watcher.send_str(text)
@@ -94,7 +93,7 @@ class FakeMonitor:
         name, module = PAGES[request.path]
         is_bare = name == "stage"
         header = "" if is_bare else header_html(Visitor("", may_judge=False, may_fly=False), request.path)
-        style = stage.STYLE if is_bare else live.STYLE
+        style = style_links("monitor", "stage") if is_bare else style_links("monitor")
         return web.Response(
             content_type="text/html",
             text=f'<!doctype html><html lang="en"><head><meta name="viewport" content="width=device-width">'
@@ -125,7 +124,7 @@ class FakeMonitor:
         return watcher
 
     async def show(self, jpeg, time_s):
-        """Send an image of the camera to all who watch it."""
+        """Send an image of the camera to all viewers."""
         time_us = -1 if time_s is None else round(time_s * 1e6)
         for camera in self._cameras:
             await camera.write(struct.pack("<qI", time_us, len(jpeg)) + jpeg)
@@ -136,7 +135,7 @@ class FakeMonitor:
             await self._filmed.wait()
 
     async def change_contest(self, **stage):
-        """Have the contest be another."""
+        """Change the contest."""
         self.stage |= stage
         for watcher in list(self._contest_watchers):
             await watcher.send_str(json.dumps({"kind": "changed", "version": 1, "problem": ""}))

@@ -1,4 +1,4 @@
-"""Drones for the pilot's tests that do at once what they are told."""
+"""Fake drones for the pilot's tests."""
 
 import asyncio
 
@@ -15,7 +15,7 @@ MISSION = {
 
 
 class FakeFleet:
-    """Two drones that do at once what they are told, unless the test says otherwise; for `Fleet`.
+    """In place of `Fleet`: two drones that carry out orders at once, unless the test sets something else.
 
     Attributes:
         status: of each, by number; may be changed.

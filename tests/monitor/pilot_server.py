@@ -9,7 +9,7 @@ from monitor.settings import MonitorSettings
 
 @asynccontextmanager
 async def served(equipment, folder):
-    """Serve a monitor; its address."""
+    """Serve a monitor; yields its URL."""
     started = asyncio.get_running_loop().create_future()
 
     def say(line):

@@ -1,4 +1,4 @@
-"""A library of made-up runs, as quick as tests want it."""
+"""A library of artificial runs."""
 
 import contextlib
 import dataclasses
@@ -28,7 +28,7 @@ END_S = 40.0
 
 
 def a_run(name="first", end_s=END_S, **changes):
-    """Ten seconds in each state, going around in a circle, red crossed at 12 s and green at 25 s."""
+    """Ten seconds in each state, flying a circle, red crossed at 12 s and green at 25 s."""
     times = [round(-1.0 + 0.05 * tick, 3) for tick in range(round((end_s + 1.0) / 0.05) + 1)]
     poses = [
         {
@@ -135,5 +135,5 @@ async def serving_runs(monkeypatch, library):
     """The monitor with the replay's modules and a library; yields a `Served`."""
     plain = serving_module.equipment()
     monkeypatch.setattr(serving_module, "equipment", lambda: dataclasses.replace(plain, runs=library))
-    async with serving(monkeypatch, "monitor.replay_api", "monitor.pages.replay") as served:
+    async with serving(monkeypatch, "monitor.replay_api", "monitor.pages.table") as served:
         yield served

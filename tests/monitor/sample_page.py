@@ -1,4 +1,4 @@
-"""A page as the monitor's own are: within the frame, with a module and data that try to break out."""
+"""A page in the monitor's frame, with a module and with data that contains markup."""
 
 from fastapi import Request
 from nicegui import ui

@@ -1,4 +1,4 @@
-"""The real web server on a free port of this process, before a fleet that only says what a test wants."""
+"""The real web server on a free port of this process, with a fleet that a test controls."""
 
 import asyncio
 import contextlib
@@ -12,7 +12,7 @@ from monitor.settings import MonitorSettings
 
 
 class StubFleet:
-    """Drone 1 goes on by a tick with each pose."""
+    """One drone whose time advances by a tick with each pose."""
 
     def __init__(self, equipment=None):
         self.ticks = 0
@@ -106,7 +106,7 @@ async def serving(monkeypatch, *modules, bind="127.0.0.1", port=0, password=None
 
 
 def equipment():
-    """Nothing that a test of the server uses."""
+    """Equipment that must not be used."""
 
     def nothing(*_):
         raise AssertionError("not used here")
@@ -116,6 +116,6 @@ def equipment():
 
 @contextlib.asynccontextmanager
 async def browser():
-    """A client with a jar for cookies, also for addresses that are numbers."""
+    """A client that keeps cookies, also of IP addresses."""
     async with aiohttp.ClientSession(cookie_jar=aiohttp.CookieJar(unsafe=True)) as session:
         yield session

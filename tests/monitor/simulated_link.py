@@ -23,7 +23,7 @@ from firmware_py.mavlink.node import MavlinkNode, NodeOptions
 from firmware_py.mavlink.rates import GROUND, ONBOARD
 from framerunner.flying.plan import FlightPlan
 from geometry.axes import flip_vector
-from monitor.ports import Equipment, Message
+from monitor.ports import Equipment
 from scenarios.loader import list_scenarios, load_scenario
 from scenarios.models import Scenario, TrueState
 from sitl.camera_feed import CameraFeed
@@ -31,7 +31,7 @@ from sitl.simulation import Simulation
 from sitl.video import VideoServer
 from sitl.world import CONTROL_PERIOD_US
 from tests.node_input import deliver
-from wire.dialect import mavlink
+from wire.dialect import Message, mavlink
 from wire.mission_messages import COMPONENT_ID
 from wire.transports.urls import LinkError
 
@@ -83,7 +83,7 @@ class SimulatedDrone:
         self.boots += 1
 
     def tick(self) -> list[bytes]:
-        """Advance by one control period; what it says to ground stations."""
+        """Advance by one control period; returns its output to ground stations."""
         simulation = self.simulation
         if self.each_tick is not None:
             self.each_tick(simulation)
@@ -100,7 +100,7 @@ class SimulatedDrone:
         return self.output()
 
     def output(self) -> list[bytes]:
-        """What it wants to say to ground stations."""
+        """Its output to ground stations."""
         return [data for name, data in self.node.take_output() if name == GROUND.name]
 
     def hear_app(self, message: Message) -> None:
@@ -109,7 +109,7 @@ class SimulatedDrone:
         self._app.seq = (self._app.seq + 1) % 256
 
     def referee_answer(self) -> dict[str, object]:
-        """What the simulator's `/referee.json` tells."""
+        """The content of the simulator's `/referee.json`."""
         simulation = self.simulation
         referee, origin_ned_m = simulation.referee, simulation.autopilot.estimator.origin_ned_m
         return {
@@ -124,7 +124,7 @@ class SimulatedDrone:
 
 
 class SimulatedLink:
-    """`monitor.ports.Link` to drones in this process; system ids count from 1.
+    """In place of a `VehicleLink`: to drones in this process; system ids count from 1.
 
     Attributes:
         drones: by place, 0 for system 1.
@@ -173,7 +173,7 @@ class SimulatedLink:
         return self
 
     def receive(self, timeout_s: float) -> list[Message]:
-        """Let some time go by; what was said meanwhile."""
+        """Let some time pass; returns the messages sent meanwhile."""
         messages: list[Message] = []
         with self._asked:
             if self._problem is not None:
@@ -190,17 +190,17 @@ class SimulatedLink:
         return messages
 
     def send(self, message: Message) -> None:
-        """To the drones; heard at the next `receive`."""
+        """Send to the drones; received at the next `receive`."""
         with self.lock:
             self.sent.append(message)
             self._waiting.append(message.pack(self._listener))
             self._listener.seq = (self._listener.seq + 1) % 256
 
     def close(self) -> None:
-        """Nothing to let go of."""
+        """Nothing to close."""
 
     def advance(self, seconds: float) -> None:
-        """Let time go by and wait until all that was said has been taken up by the listener.
+        """Let time pass and wait until the listener has taken all messages.
 
         Blocks, so call it as `await asyncio.to_thread(link.advance, 1.0)`.
         """
@@ -211,7 +211,7 @@ class SimulatedLink:
             self._asked.wait()  # the listener is back, so it has passed on what it had
 
     def fail(self, problem: str | None) -> None:
-        """Break the link, or mend it with None."""
+        """Break the link, or repair it with None."""
         with self.lock:
             self._problem = problem
             self._last_s = None
@@ -255,7 +255,7 @@ class SimulatedLink:
 async def served_link(
     *scenarios: Scenario, speed: float = inf, pictures: bool = False
 ) -> AsyncIterator[SimulatedLink]:
-    """A link whose drones bring video and referee over HTTP, on ports of their own."""
+    """A link whose drones serve video and referee over HTTP, on separate ports."""
     async with AsyncExitStack() as stack:
         servers = [VideoServer(port=0) for _ in scenarios]
         for server in servers:

@@ -3,8 +3,16 @@ from pathlib import Path
 import pytest
 from starlette.requests import HTTPConnection
 
-from monitor.access import LONGEST_NAME, SESSION_S, TRIES_A_MINUTE, Access, LoginRefusedError, Visitor
-from monitor.sessions import SessionFile, session_path
+from monitor.access import (
+    MAX_NAME_LENGTH,
+    SESSION_S,
+    TRIES_A_MINUTE,
+    Access,
+    LoginRefusedError,
+    SessionFile,
+    Visitor,
+    session_path,
+)
 from tests.monitor.serving import browser, serving
 
 SAMPLE = "tests.monitor.sample_page"
@@ -43,7 +51,7 @@ async def test_a_restart_keeps_judges_logged_in_until_their_session_ends(tmp_pat
     wall.now_s = 1e9
 
     def start(password=PASSWORD, cookie="judge-8080"):
-        # The clock of each start begins anew, as a machine's does; Unix time goes on.
+        # The clock starts at 0 each time, as a machine's does; Unix time goes on.
         kept = SessionFile(path, cookie, wall)
         return Access(password, all_may_fly=False, clock=Clock(), cookie=cookie, kept=kept)
 
@@ -68,7 +76,7 @@ async def test_a_restart_keeps_judges_logged_in_until_their_session_ends(tmp_pat
 
 
 @pytest.mark.parametrize("content", ["", "[]", '{"cookies": {"judge": {"x": {"name": 1}}}}', "[" * 100_000])
-async def test_a_spoiled_file_of_sessions_is_passed_over_and_replaced(tmp_path, content):
+async def test_an_invalid_file_of_sessions_is_ignored_and_replaced(tmp_path, content):
     path = tmp_path / "contest.db.sessions"
     path.write_text(content)
     access = Access(PASSWORD, all_may_fly=False, cookie="judge", kept=SessionFile(path, "judge"))
@@ -77,7 +85,7 @@ async def test_a_spoiled_file_of_sessions_is_passed_over_and_replaced(tmp_path, 
     assert again.visitor(connection(again, session_id)).may_judge
 
 
-async def test_without_a_folder_to_write_to_judges_still_log_in(tmp_path):
+async def test_judges_can_log_in_when_sessions_cannot_be_written(tmp_path):
     kept = SessionFile(tmp_path / "missing" / "contest.db.sessions", "judge")
     access = Access(PASSWORD, all_may_fly=False, cookie="judge", kept=kept)
     session_id = await access.log_in("Ada", PASSWORD, "10.0.0.1")
@@ -94,11 +102,11 @@ async def test_without_a_folder_to_write_to_judges_still_log_in(tmp_path):
         ("sqlite:///:memory:", None),
     ],
 )
-def test_sessions_lie_beside_the_database(database, path):
+def test_sessions_are_stored_beside_the_database(database, path):
     assert session_path(database) == (None if path is None else Path(path))
 
 
-async def test_who_guesses_is_slowed_down_and_others_are_not():
+async def test_tries_are_limited_for_each_address():
     clock = Clock()
     access = Access(PASSWORD, all_may_fly=False, clock=clock)
     for _ in range(TRIES_A_MINUTE):
@@ -112,7 +120,7 @@ async def test_who_guesses_is_slowed_down_and_others_are_not():
     assert await access.log_in("Eve", PASSWORD, "2001:db8::2")
 
 
-async def test_a_one_time_link_is_good_once_and_a_new_one_is_made():
+async def test_a_one_time_link_is_valid_once_and_is_replaced():
     links = []
     access = Access(None, all_may_fly=True, hear_invitation=links.append)
     with pytest.raises(LoginRefusedError):
@@ -126,7 +134,7 @@ async def test_a_one_time_link_is_good_once_and_a_new_one_is_made():
     assert min(len(link) for link in links) >= 43  # 256 bits
 
 
-@pytest.mark.parametrize("name", ["", "  ", "x" * (LONGEST_NAME + 1), "a\nb", "a\u202eb", "a\x00b"])
+@pytest.mark.parametrize("name", ["", "  ", "x" * (MAX_NAME_LENGTH + 1), "a\nb", "a\u202eb", "a\x00b"])
 async def test_a_name_that_cannot_be_read_is_refused(name):
     access = Access(PASSWORD, all_may_fly=True)
     with pytest.raises(LoginRefusedError) as refused:
@@ -197,7 +205,7 @@ async def test_flying_is_free_on_this_machine_and_needs_a_login_elsewhere(monkey
             assert answer.status == 200
 
 
-async def test_what_is_typed_into_the_form_comes_back_as_text(monkeypatch):
+async def test_the_login_form_escapes_its_input(monkeypatch):
     async with serving(monkeypatch, SAMPLE, password=PASSWORD) as served, browser() as client:
         evil = '"><script>x</script>'
         async with client.post(served.url + "login", data={"name": evil, "secret": "wrong"}) as answer:

@@ -1,4 +1,4 @@
-"""Clients that mean harm: unfinished requests, too many connections, forged addresses. Real sockets."""
+"""Malicious clients: unfinished requests, too many connections, forged addresses. Real sockets."""
 
 import asyncio
 import contextlib
@@ -26,7 +26,7 @@ async def connected(served, head="", address="127.0.0.1"):
 
 
 async def answer_of(served, request, address="127.0.0.1"):
-    """Status and all else that comes until the server closes; status 0 if nothing does."""
+    """Status and all data until the server closes; status 0 without any."""
     reader, writer = await connected(served, request, address)
     async with asyncio.timeout(15):
         try:
@@ -54,7 +54,7 @@ def test_an_address_has_only_its_share_of_the_places():
 
 
 @pytest.mark.parametrize("head", ["", "GET / HTTP/1.1\r\nHost: 127.0.0.1\r\n", "GET /a"])
-async def test_a_head_that_does_not_end_is_cut_off_and_more_bytes_do_not_help(monkeypatch, head):
+async def test_a_head_that_does_not_end_is_closed_although_bytes_are_sent(monkeypatch, head):
     async with serving(monkeypatch, limits=ConnectionLimits(head_s=0.5)) as served:
         reader, writer = await connected(served, head)
         data = b""
@@ -96,7 +96,7 @@ async def test_an_endless_head_is_refused(monkeypatch):
         assert (await answer_of(served, get()))[0] == 200
 
 
-async def test_a_body_that_does_not_come_is_given_up(monkeypatch):
+async def test_a_body_that_is_not_sent_times_out(monkeypatch):
     async with serving(monkeypatch, limits=ConnectionLimits(body_s=0.5)) as served:
         head = f"POST /login HTTP/1.1\r\nHost: 127.0.0.1\r\n{BODY}Content-Length: 100\r\n\r\nname="
         status, text = await answer_of(served, head)
@@ -138,7 +138,7 @@ async def test_one_address_cannot_take_all_connections(monkeypatch):
 
 
 async def test_one_address_cannot_take_all_places_of_viewers(monkeypatch):
-    for limit in ("live_channel.MOST_VIEWERS_PER_ADDRESS", "competition.api.MAX_WATCHERS_PER_ADDRESS"):
+    for limit in ("live_channel.MAX_VIEWERS_PER_ADDRESS", "competition.api.MAX_WATCHERS_PER_ADDRESS"):
         monkeypatch.setattr(f"monitor.{limit}", 2)
     async with serving(monkeypatch, "monitor.competition.api") as served, browser() as client:
         elsewhere = aiohttp.TCPConnector(local_addr=(OTHER, 0))
@@ -156,7 +156,7 @@ async def test_one_address_cannot_take_all_places_of_viewers(monkeypatch):
                 await viewers[0].close()
 
 
-async def test_who_takes_nothing_of_what_was_asked_for_is_let_go(monkeypatch):
+async def test_a_client_that_does_not_read_is_disconnected(monkeypatch):
     async with serving(monkeypatch, limits=ConnectionLimits(stalled_s=0.5)) as served:
         client = socket.socket()
         client.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 4096)
@@ -171,7 +171,7 @@ async def test_who_takes_nothing_of_what_was_asked_for_is_let_go(monkeypatch):
 
 
 def read_all(client):
-    """All that comes until the connection ends, however it does."""
+    """All data until the connection ends."""
     data = bytearray()
     with contextlib.suppress(ConnectionResetError):
         while part := client.recv(1 << 16):
@@ -188,7 +188,7 @@ async def logged_in(served, head):
     return next(line for line in answer.lower().split("\r\n") if line.startswith("set-cookie"))
 
 
-async def test_the_cookie_is_secure_under_tls_of_which_only_a_trusted_proxy_tells(monkeypatch):
+async def test_the_cookie_is_secure_if_a_trusted_proxy_reports_tls(monkeypatch):
     said = "X-Forwarded-For: 10.0.0.7\r\nX-Forwarded-Proto: https\r\n"
     for proxies, secure in (((), False), (("127.0.0.1",), True), (("10.0.0.0/8",), False)):
         async with serving(monkeypatch, bind="0.0.0.0", password=PASSWORD, trusted_proxies=proxies) as served:
@@ -239,14 +239,14 @@ async def test_a_proxy_s_connections_are_not_counted_but_its_clients_requests_ar
     ("proxies", "head", "status"),
     [
         ((), "", 200),
-        ((), "X-Forwarded-For: 127.0.0.1\r\n", 403),  # a proxy is there of which nobody told
+        ((), "X-Forwarded-For: 127.0.0.1\r\n", 403),  # a proxy that was not configured
         ((), "Forwarded: for=127.0.0.1\r\n", 403),
         (("127.0.0.1",), "X-Forwarded-For: 127.0.0.1\r\n", 403),
         (("127.0.0.1",), "X-Forwarded-For: 10.0.0.7\r\n", 403),
         (("127.0.0.1",), "", 403),
     ],
 )
-async def test_nobody_is_local_by_what_a_header_says(monkeypatch, proxies, head, status):
+async def test_a_header_makes_no_client_local(monkeypatch, proxies, head, status):
     async with serving(monkeypatch, SAMPLE, trusted_proxies=proxies) as served:
         request = f"POST /pilots-only HTTP/1.1\r\nHost: 127.0.0.1\r\nConnection: close\r\n{head}\r\n"
         assert (await answer_of(served, request))[0] == status

@@ -7,7 +7,7 @@ from math import hypot
 
 import pytest
 
-from monitor.sticks import Sticks
+from monitor.vehicle.commands import Sticks
 from scenarios.loader import load_scenario
 from tests.monitor.simulated_link import SimulatedLink, all_finite, equipment, served_link
 from tests.monitor.watching import watching
@@ -30,14 +30,14 @@ def error_m(drone, pose):
 
 
 def turn_rad(drone, pose):
-    """Angle between the attitude told and the true one."""
+    """Angle between the attitude sent and the true one."""
     truth = nearest(drone, pose).attitude_arena
     dot = abs(sum(told * true for told, true in zip(pose["q"], truth, strict=True)))
     return 2 * (1 - min(1.0, dot)) ** 0.5 * 2**0.5
 
 
 async def fly_a_little(watched, link, seconds=8.0):
-    """Take off, turn and move; poses on the way."""
+    """Take off, turn and move; returns the poses."""
     await watched.until_ready(link)
     with link.lock:
         autopilot = link.drones[0].simulation.autopilot
@@ -54,7 +54,7 @@ async def fly_a_little(watched, link, seconds=8.0):
     return poses
 
 
-async def test_poses_are_the_truth_where_a_scenario_was_given(link):
+async def test_poses_are_true_with_a_given_scenario(link):
     async with watching(equipment(link, SCENARIO)) as watched:
         await watched.until(lambda: watched.pose() and watched.pose()["p"][2] > 0.5)  # its place is known
         poses = await fly_a_little(watched, link)
@@ -64,7 +64,7 @@ async def test_poses_are_the_truth_where_a_scenario_was_given(link):
     assert all(all_finite(pose) for pose, _, _ in poses)
 
 
-async def test_poses_are_the_truth_where_the_drone_brings_its_referee():
+async def test_poses_are_true_with_the_drone_s_own_referee():
     async with served_link(SCENARIO) as link, watching(equipment(link)) as watched:
         await watched.until(lambda: watched.status() and watched.status()["figures"])
         poses = await fly_a_little(watched, link)
@@ -73,7 +73,7 @@ async def test_poses_are_the_truth_where_the_drone_brings_its_referee():
     assert max(error for _, error, _ in poses) < 0.01
 
 
-async def test_without_any_word_of_the_arena_north_is_x(link):
+async def test_north_is_x_without_any_source_of_placement(link):
     async with watching(equipment(link)) as watched:
         await watched.until_ready(link)
         with link.lock:
@@ -91,7 +91,7 @@ async def test_without_any_word_of_the_arena_north_is_x(link):
         }
 
 
-async def test_the_status_tells_all_that_the_page_shows(link):
+async def test_the_status_has_all_fields_of_the_page(link):
     async with watching(equipment(link, SCENARIO)) as watched:
         await watched.until_ready(link)
         await asyncio.to_thread(link.advance, 2.0)
@@ -119,7 +119,7 @@ async def test_the_status_tells_all_that_the_page_shows(link):
         assert watched.status()["pilot"] == "Ada"
 
 
-async def test_two_drones_are_told_apart():
+async def test_two_drones_are_kept_apart():
     scenarios = (SCENARIO, load_scenario("test-case-2"))
     link = SimulatedLink(*scenarios)
     async with watching(equipment(link)) as watched:
@@ -133,16 +133,16 @@ async def test_two_drones_are_told_apart():
     assert watched.notices()[:2] == ["drone 1 is heard", "drone 2 is heard"]
 
 
-async def test_a_restart_is_noticed_and_all_begins_anew(link):
+async def test_a_restart_is_reported_and_resets_all(link):
     async with watching(equipment(link, SCENARIO)) as watched:
         await fly_a_little(watched, link)
         link.restart()
-        await watched.until(lambda: "drone 1 has started anew" in watched.notices())
+        await watched.until(lambda: "drone 1 has restarted" in watched.notices())
         await watched.until_ready(link)
         with link.lock:
             assert error_m(link.drones[0], watched.pose()) < 0.01
         assert not watched.status()["armed"]
-    assert watched.notices().count("drone 1 has started anew") == 1
+    assert watched.notices().count("drone 1 has restarted") == 1
 
 
 async def test_a_silent_drone_is_stale_then_lost_then_back():
@@ -160,7 +160,7 @@ async def test_a_silent_drone_is_stale_then_lost_then_back():
     assert watched.notices().count("drone 1: link lost") == 1
 
 
-async def test_a_drone_that_falls_silent_after_its_flight_is_no_lost_link():
+async def test_silence_after_a_flight_is_no_lost_link():
     link = SimulatedLink(SCENARIO)
     async with watching(equipment(link)) as watched:
         await watched.until_ready(link)
@@ -175,7 +175,7 @@ async def test_a_drone_that_falls_silent_after_its_flight_is_no_lost_link():
     assert "drone 1: link lost" not in watched.notices()
 
 
-async def test_who_comes_late_is_told_where_the_drone_has_been(link):
+async def test_a_late_watcher_gets_the_history(link):
     async with watching(equipment(link, SCENARIO)) as watched:
         await fly_a_little(watched, link)
         kinds = [message["kind"] for message in watched.fleet.welcome()]
@@ -203,7 +203,7 @@ async def test_a_link_that_fails_is_opened_again(link):
         await watched.until(lambda: watched.pose()["t"] > before)
 
 
-async def test_sticks_are_streamed_until_let_go(link):
+async def test_sticks_are_streamed_until_none_is_set(link):
     async with watching(equipment(link)) as watched:
         await watched.until(watched.pose)
         sent = lambda: [each for each in link.sent if each.get_type() == "MANUAL_CONTROL"]  # noqa: E731
@@ -222,7 +222,7 @@ async def test_sticks_are_streamed_until_let_go(link):
         assert len(sent()) == count
 
 
-async def test_the_monitor_says_who_it_is_once_a_second_and_asks_little(link):
+async def test_the_monitor_sends_a_heartbeat_a_second_and_few_requests(link):
     loop = asyncio.get_running_loop()
     async with watching(equipment(link)) as watched:
         began_s = loop.time()

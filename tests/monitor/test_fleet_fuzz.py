@@ -1,4 +1,4 @@
-"""Whatever comes over the link, the fleet goes on and tells finite JSON."""
+"""The fleet survives any messages and sends finite JSON."""
 
 import asyncio
 import json
@@ -62,7 +62,7 @@ def parsed(data):
 
 
 @pytest.mark.parametrize("seed", range(4))
-async def test_any_messages_in_any_order_are_survived(seed):
+async def test_no_sequence_of_messages_causes_a_fault(seed):
     chance = random.Random(seed)
     scenario = load_scenario("test-case-1") if seed % 2 else None
     fleet = Fleet(equipment(SimulatedLink(), scenario))
@@ -89,7 +89,7 @@ async def test_any_messages_in_any_order_are_survived(seed):
         vehicle.close()
 
 
-async def test_more_drones_than_can_be_shown_are_told_once():
+async def test_too_many_drones_are_reported_once():
     fleet = Fleet(equipment(SimulatedLink()))
     told = []
     fleet.subscribe(told.append)
@@ -101,7 +101,7 @@ async def test_more_drones_than_can_be_shown_are_told_once():
     assert texts.count("more than 16 drones; the others are not shown") == 1
 
 
-async def test_ground_stations_cameras_and_companions_are_no_drones():
+async def test_ground_stations_cameras_and_companions_are_not_drones():
     fleet = Fleet(equipment(SimulatedLink()))
     for kind, autopilot, system, component in (
         (6, 8, 255, 190),
@@ -118,7 +118,7 @@ async def test_ground_stations_cameras_and_companions_are_no_drones():
     assert fleet.drone_ids() == []
 
 
-async def test_a_watcher_that_fails_does_not_end_the_others():
+async def test_a_watcher_that_fails_does_not_affect_the_others():
     fleet = Fleet(equipment(SimulatedLink()))
     told = []
 
@@ -135,7 +135,7 @@ async def test_a_watcher_that_fails_does_not_end_the_others():
     assert fleet.faults == 2
 
 
-async def test_a_drone_that_shouts_does_not_flood_the_pages():
+async def test_texts_of_a_drone_are_limited_to_twenty_a_second():
     fleet = Fleet(equipment(SimulatedLink()))
     told = []
     fleet.subscribe(told.append)

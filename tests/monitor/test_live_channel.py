@@ -4,7 +4,7 @@ import math
 
 import pytest
 
-from monitor.live_channel import MOST_PENDING, LiveChannel, Viewer, encode
+from monitor.live_channel import MAX_PENDING, LiveChannel, Viewer, encode
 from tests.monitor.serving import StubFleet, browser, serving
 
 
@@ -19,7 +19,7 @@ def pending(viewer):
     return len(viewer._events) + len(viewer._newest)
 
 
-def test_numbers_are_short_and_finite():
+def test_numbers_are_rounded_and_finite():
     text = encode({"kind": "pose", "drones": [{"p": [0.123456789, math.nan, -math.inf], "s": 3}]})
     assert json.loads(text) == {"kind": "pose", "drones": [{"p": [0.1235, None, None], "s": 3}]}
     figures = {"kind": "status", "total_time_s": 43.123456789, "limit": math.inf}
@@ -30,8 +30,8 @@ async def test_the_welcome_comes_first_and_events_before_poses():
     fleet = StubFleet()
     channel, viewer = LiveChannel(fleet), Viewer()
     channel.enter(viewer)
-    channel.tell(fleet.pose_message())
-    channel.tell({"kind": "text", "id": 1, "text": "hello"})
+    channel.send(fleet.pose_message())
+    channel.send({"kind": "text", "id": 1, "text": "hello"})
     assert await kinds(viewer) == ["world", "text", "status", "pose"]
 
 
@@ -40,24 +40,24 @@ async def test_only_the_newest_pose_waits_and_each_drone_has_its_own_detections(
     channel, viewer = LiveChannel(fleet), Viewer(["pose", "detections"])
     channel.enter(viewer)
     for _ in range(100):
-        channel.tell(fleet.pose_message())
+        channel.send(fleet.pose_message())
         for drone_id in (1, 2):
-            channel.tell({"kind": "detections", "id": drone_id})
+            channel.send({"kind": "detections", "id": drone_id})
     assert pending(viewer) == 3
     assert json.loads(await viewer.next())["drones"][0]["t"] == 100.0
 
 
-async def test_who_lets_events_pile_up_is_dropped():
+async def test_a_viewer_with_too_many_waiting_events_is_dropped():
     channel, slow, other = LiveChannel(StubFleet()), Viewer(["text"]), Viewer(["text"])
     channel.enter(slow)
     channel.enter(other)
-    for number in range(MOST_PENDING + 1):
-        channel.tell({"kind": "text", "id": 1, "text": str(number)})
+    for number in range(MAX_PENDING + 1):
+        channel.send({"kind": "text", "id": 1, "text": str(number)})
         assert json.loads(await other.next())["text"] == str(number)
     assert await slow.next() is None
 
 
-async def test_nothing_is_made_while_nobody_watches(monkeypatch):
+async def test_no_poses_are_made_without_viewers(monkeypatch):
     async with serving(monkeypatch) as served, browser() as client:
         assert served.fleet.ticks == 0
         async with client.ws_connect(served.url + "ws/live") as live:
@@ -89,7 +89,7 @@ async def test_ten_viewers_get_every_pose_at_once(monkeypatch):
         serving(monkeypatch) as served,
         browser() as client,
         client.ws_connect(served.url + "ws/live"),
-    ):  # reads nothing and holds up nobody
+    ):  # reads nothing, and must not delay the others
         watching = [watch(client, served.url + "ws/live", 1.5) for _ in range(10)]
         seen = await asyncio.gather(*watching)
     for poses in seen:
@@ -98,7 +98,7 @@ async def test_ten_viewers_get_every_pose_at_once(monkeypatch):
         assert numbers == list(range(int(numbers[0]), int(numbers[0]) + len(numbers)))
 
 
-async def test_a_page_may_ask_for_some_kinds_only(monkeypatch):
+async def test_a_page_may_request_some_kinds_only(monkeypatch):
     async with serving(monkeypatch) as served, browser() as client:
         async with client.ws_connect(served.url + "ws/live?kinds=status,text") as live:
             assert (await live.receive_json())["kind"] == "status"
@@ -109,8 +109,8 @@ async def test_a_page_may_ask_for_some_kinds_only(monkeypatch):
         assert message["text"] == "hello"
 
 
-async def test_too_many_viewers_are_turned_away(monkeypatch):
-    monkeypatch.setattr("monitor.live_channel.MOST_VIEWERS", 1)
+async def test_too_many_viewers_are_refused(monkeypatch):
+    monkeypatch.setattr("monitor.live_channel.MAX_VIEWERS", 1)
     async with (
         serving(monkeypatch) as served,
         browser() as client,
@@ -122,7 +122,7 @@ async def test_too_many_viewers_are_turned_away(monkeypatch):
             assert second.close_code == 1013
 
 
-async def test_a_fault_in_one_message_does_not_end_the_others(monkeypatch):
+async def test_a_fault_in_one_message_does_not_stop_the_next(monkeypatch):
     async with serving(monkeypatch) as served, browser() as client:
         make = served.fleet.pose_message
 
@@ -139,7 +139,7 @@ async def test_a_fault_in_one_message_does_not_end_the_others(monkeypatch):
 
 
 @pytest.mark.parametrize("text", ["hello", "x" * 100_000])
-async def test_what_a_browser_says_is_ignored(monkeypatch, text):
+async def test_messages_of_a_browser_are_ignored(monkeypatch, text):
     async with (
         serving(monkeypatch) as served,
         browser() as client,
@@ -151,7 +151,7 @@ async def test_what_a_browser_says_is_ignored(monkeypatch, text):
                 pass
 
 
-async def test_who_comes_late_is_sent_the_flight_so_far_and_the_next_one_what_was_added():
+async def test_a_late_viewer_gets_the_history_and_the_next_one_its_new_samples():
     fleet, welcome = StubFleet(), {"kind": "history", "id": 1, "poses": [[0.1, 1.0, None]]}
     fleet.welcome = lambda: [welcome]
     channel = LiveChannel(fleet)

@@ -1,4 +1,4 @@
-"""The live page and the statechart's, in a real browser, told by a test what flies."""
+"""The live page and the statechart's, in a real browser, with messages of the test."""
 
 import asyncio
 import re
@@ -170,7 +170,7 @@ async def test_texts_with_markup_are_shown_as_text(chromium, fake):
     assert complaints == []
 
 
-async def test_the_lit_state_follows_the_mission(chromium, fake):
+async def test_the_highlighted_state_follows_the_mission(chromium, fake):
     page, complaints = await visit(chromium, fake, "/chart")
     lit, around = page.locator("svg .m-active"), page.locator("svg .m-around")
     panel = page.locator(".m-chart")
@@ -191,14 +191,14 @@ async def test_the_lit_state_follows_the_mission(chromium, fake):
     assert complaints == []
 
 
-async def test_a_bad_diagram_is_told_and_the_state_is_still_shown(chromium, fake):
+async def test_an_invalid_diagram_is_reported_and_the_state_is_still_shown(chromium, fake):
     fake.welcome[1] = chart() | {"mermaid": "stateDiagram-v2\n    state {{ --> }\n"}
     page, _ = await visit(chromium, fake, "/chart")
     await expect(page.locator(".m-chart-words")).to_contain_text("cannot be drawn")
     await expect(page.locator(".m-chart")).to_have_attribute("data-state", "red.turning")
 
 
-async def test_a_lost_monitor_is_told_and_found_again(chromium, fake):
+async def test_a_lost_monitor_is_reported_and_reconnected(chromium, fake):
     page, _ = await visit(chromium, fake)
     await expect(figure(page, "try_time_s")).to_have_text("87.4")
     await fake.stop()
@@ -307,7 +307,7 @@ WATCH_MOMENTS = """() => {
 
 
 async def test_camera_boxes_and_arena_are_of_one_moment(chromium, fake):
-    """What the app finds in an image comes 0.2 s after the image, and the drone has moved on by then."""
+    """Detections are sent 0.2 s after their image, when the drone has moved."""
     fake.welcome[2] = {"kind": "status", "drones": [status(video=True)]}
     page, complaints = await visit(chromium, fake)
     await fake.until_filmed()
@@ -329,7 +329,7 @@ async def test_camera_boxes_and_arena_are_of_one_moment(chromium, fake):
     assert complaints == []
 
 
-async def test_who_comes_late_sees_the_flight_so_far_at_once(chromium, fake):
+async def test_a_late_viewer_sees_the_flight_so_far_at_once(chromium, fake):
     rows = [
         [10 + 0.1 * step, 0.02 * step, 1.0, 1.5, 0.3, 0.2, 0.0, 0.0, 0.0, 0.2, 0.0, 0.0, 0.0, 1, state]
         for step in range(300)
@@ -370,7 +370,7 @@ async def test_after_a_flight_its_result_and_last_image_stay(chromium, fake):
 
 
 async def test_a_restarted_monitor_does_not_say_that_a_flight_has_not_begun(chromium, fake):
-    """The names of a mission's states come some seconds after its state."""
+    """The names of a mission's states are received some seconds after its state."""
     unnamed = status(state="")
     unnamed["mission"] |= {"name": ""}
     fake.welcome = [world(), {"kind": "status", "drones": [unnamed]}]

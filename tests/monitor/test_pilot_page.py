@@ -10,7 +10,7 @@ from monitor import pilot_seat
 from monitor.access import Access, Visitor
 from monitor.pilot_seat import NEUTRAL
 from monitor.ports import Equipment
-from monitor.sticks import Sticks
+from monitor.vehicle.commands import Sticks
 from tests.chromium import Complaints
 from tests.monitor.pilot_fakes import MISSION, FakeFleet
 from tests.monitor.pilot_server import served
@@ -105,7 +105,7 @@ async def monitor(monkeypatch, tmp_path, chromium):
 
     monkeypatch.setattr("monitor.server.Fleet", make_fleet)
     monkeypatch.setattr(pilot_seat, "SILENT_S", 20.0)  # a busy machine is not a page that fell silent
-    monkeypatch.setattr(pilot_seat, "FORSAKEN_S", 60.0)
+    monkeypatch.setattr(pilot_seat, "ABANDONED_S", 60.0)
     async with served(EQUIPMENT, tmp_path) as url:
 
         async def open_window(viewport=None, touch=False):
@@ -119,7 +119,7 @@ async def monitor(monkeypatch, tmp_path, chromium):
         yield open_window
 
 
-async def test_each_key_leads_one_stick_to_the_top_speed_and_back(monitor):
+async def test_each_key_moves_one_stick_to_the_top_speed_and_back(monitor):
     pilot = await monitor()
     await pilot.take()
     for key, expected in KEYS.items():
@@ -191,7 +191,7 @@ async def test_two_fingers_hold_two_sticks_which_spring_back(monitor):
 
 
 @pytest.mark.parametrize("viewport", [PHONE, {"width": 844, "height": 390}, {"width": 1366, "height": 768}])
-async def test_all_that_is_needed_to_fly_is_in_sight_at_once(monitor, viewport):
+async def test_all_controls_are_visible_without_scrolling(monitor, viewport):
     pilot = await monitor(viewport)
     await pilot.take()
     await pilot.page.wait_for_function("document.scrollingElement.scrollWidth <= innerWidth")
@@ -213,7 +213,7 @@ async def test_without_focus_the_sticks_are_centred_at_once(monitor):
     assert {sticks for _, sticks in pilot.fleet.sent[count:]} == {NEUTRAL}  # the key counts no more
 
 
-async def test_a_hidden_page_has_the_drone_hold(monitor):
+async def test_the_drone_holds_when_the_page_is_hidden(monitor):
     pilot = await monitor()
     await pilot.take()
     await pilot.page.evaluate(
@@ -258,7 +258,7 @@ async def test_escape_gives_back_to_the_mission_that_waits(monitor):
     )
 
 
-async def test_stopping_the_motors_asks_first(monitor):
+async def test_stopping_the_motors_requires_confirmation(monitor):
     pilot = await monitor()
     await pilot.page.get_by_role("button", name="Stop motors").click()
     question = pilot.page.get_by_role("dialog")
@@ -299,7 +299,7 @@ async def test_a_second_window_sees_who_flies_and_may_not(monitor):
     assert first.fleet.orders == ["position"]
 
 
-async def test_a_closed_window_has_the_drone_hold_and_the_others_are_told(monitor):
+async def test_the_drone_holds_when_the_window_is_closed_and_the_others_are_told(monitor):
     first, second = await monitor(), await monitor()
     await first.take()
     await first.page.close()
@@ -327,7 +327,7 @@ async def test_a_visitor_who_may_not_fly_is_told_to_log_in(monitor, monkeypatch)
     assert pilot.fleet.orders == []
 
 
-async def test_texts_of_drones_and_names_are_no_markup(monitor):
+async def test_texts_of_drones_and_names_are_escaped(monitor):
     pilot = await monitor()
     evil = "<img src=x onerror=alert(1)>"
     pilot.fleet.status[1]["mission"] = MISSION | {"paused": False, "state": evil}

@@ -1,14 +1,13 @@
-"""The seat: who has the sticks, and what becomes of a drone whose pilot falls silent."""
+"""The seat: who has the sticks, and what is done when the pilot falls silent."""
 
 import asyncio
 from contextlib import suppress
 
 import pytest
 
-from monitor.pilot_desk import Browser, PilotDesk
-from monitor.pilot_messages import Order
-from monitor.pilot_seat import NEUTRAL, Clock, Hands, Person
-from monitor.sticks import Sticks
+from monitor.pilot_channel import PilotDesk
+from monitor.pilot_seat import NEUTRAL, Browser, Clock, Control, Order
+from monitor.vehicle.commands import Sticks
 from tests.monitor.pilot_fakes import MISSION, FakeFleet
 
 FORWARD = Sticks(0.5, 0.0, 0.0, 0.0)
@@ -93,7 +92,7 @@ async def game():
                 await task
 
 
-async def test_taking_sends_neutral_sticks_before_it_asks_for_position_mode(game):
+async def test_taking_sends_neutral_sticks_before_it_requests_position_mode(game):
     ana = game.browser("Ana")
     task = asyncio.create_task(game.desk.do(ana, Order(1, "take")))
     await game.pass_time(0.3, ana, FORWARD)
@@ -103,11 +102,11 @@ async def test_taking_sends_neutral_sticks_before_it_asks_for_position_mode(game
     answer = await task
     assert answer.ok and "drone 1" in answer.text
     assert game.fleet.orders == ["position"]
-    assert game.seat().hands is Hands.ON
+    assert game.seat().control is Control.ACTIVE
     assert game.fleet.pilots[1] == "Ana"
 
 
-async def test_sticks_reach_the_drone_only_from_who_has_the_seat(game):
+async def test_only_the_holder_s_sticks_reach_the_drone(game):
     ana, ben = game.browser("Ana"), game.browser("Ben")
     await game.take(ana)
     game.desk.sticks(ana, FORWARD)
@@ -124,15 +123,15 @@ async def test_every_browser_is_told_who_has_the_sticks(game):
     assert theirs == {"kind": "seat", "id": 1, "pilot": "Ana", "yours": False, "flying": True}
 
 
-async def test_a_refusal_comes_back_in_the_vehicles_words_and_frees_the_seat(game):
+async def test_a_refusal_has_the_vehicle_s_reason_and_frees_the_seat(game):
     ana = game.browser("Ana")
     game.fleet.refuse["position"] = "Switching to Position is currently not available: no position"
     answer = await game.order(ana, "take")
     assert not answer.ok and answer.text == game.fleet.refuse["position"]
-    assert game.seat().person is None and game.seat().hands is Hands.OFF
+    assert game.seat().holder is None and game.seat().control is Control.NONE
 
 
-async def test_silence_for_half_a_second_centres_the_sticks_and_asks_for_hold(game):
+async def test_silence_for_half_a_second_centres_the_sticks_and_requests_hold(game):
     ana = game.browser("Ana")
     await game.take(ana)
     await game.pass_time(1.0, ana, FORWARD)
@@ -149,7 +148,7 @@ async def test_silence_for_half_a_second_centres_the_sticks_and_asks_for_hold(ga
     assert game.fleet.notices[-1] == (1, "info", "drone 1 holds")
 
 
-async def test_after_silence_late_sticks_do_not_fly(game):
+async def test_sticks_after_silence_are_not_sent(game):
     ana = game.browser("Ana")
     await game.take(ana)
     await game.pass_time(0.6)
@@ -161,18 +160,18 @@ async def test_after_silence_late_sticks_do_not_fly(game):
     assert game.last_sticks() == FORWARD
 
 
-async def test_a_closed_page_has_the_drone_hold_at_once(game):
+async def test_the_drone_holds_at_once_when_the_page_is_closed(game):
     ana = game.browser("Ana")
     await game.take(ana)
     game.desk.sticks(ana, FORWARD)
-    game.desk.go(ana)
+    game.desk.remove(ana)
     assert game.last_sticks() == NEUTRAL
     await game.settle()
     assert game.fleet.orders[-1] == "hold"
     assert game.fleet.pilots[1] == ""
 
 
-async def test_hold_is_asked_for_until_the_drone_obeys(game):
+async def test_hold_is_requested_until_the_drone_holds(game):
     ana = game.browser("Ana")
     await game.take(ana)
     game.fleet.refuse["hold"] = "drone 1 does not answer"
@@ -181,10 +180,10 @@ async def test_hold_is_asked_for_until_the_drone_obeys(game):
     assert (1, "error", "drone 1 does not hold: drone 1 does not answer") in game.fleet.notices
     del game.fleet.refuse["hold"]
     await game.pass_time(1.1)
-    assert game.seat().hands is Hands.OFF and game.fleet.orders.count("hold") == 4
+    assert game.seat().control is Control.NONE and game.fleet.orders.count("hold") == 4
 
 
-async def test_a_failsafe_that_flies_the_drone_is_not_disturbed_by_silence(game):
+async def test_silence_does_not_interrupt_a_failsafe(game):
     ana = game.browser("Ana")
     await game.take(ana)
     game.fleet.status[1]["mode"] = "Return"
@@ -193,29 +192,29 @@ async def test_a_failsafe_that_flies_the_drone_is_not_disturbed_by_silence(game)
     assert game.fleet.notices == [(1, "warning", "the pilot's page fell silent; drone 1 goes on by itself")]
 
 
-async def test_a_page_that_closes_while_it_takes_the_sticks_leaves_a_drone_that_holds(game):
+async def test_the_drone_holds_when_the_page_is_closed_while_it_takes_the_sticks(game):
     ana = game.browser("Ana")
     game.fleet.gates["position"] = asyncio.Event()
     task = asyncio.create_task(game.desk.do(ana, Order(1, "take")))
     await game.pass_time(0.5, ana)
     assert game.fleet.orders == ["position"]
-    game.desk.go(ana)
+    game.desk.remove(ana)
     await game.settle()
-    assert game.fleet.orders == ["position", "hold"] and game.seat().person is None
+    assert game.fleet.orders == ["position", "hold"] and game.seat().holder is None
     assert not (await task).ok
 
 
-async def test_giving_back_lets_the_waiting_mission_go_on(game):
+async def test_giving_back_resumes_the_waiting_mission(game):
     ana = game.browser("Ana")
     await game.take(ana)
     game.fleet.status[1]["mission"] = MISSION
     answer = await game.order(ana, "give")
     assert answer.ok and answer.text == "the mission frame_challenge goes on"
-    assert game.fleet.orders == ["position", "offboard"] and game.seat().person is None
+    assert game.fleet.orders == ["position", "offboard"] and game.seat().holder is None
 
 
 @pytest.mark.parametrize("mission", [None, MISSION | {"paused": False}, MISSION | {"alive": False}])
-async def test_giving_back_without_a_waiting_mission_has_the_drone_hold(game, mission):
+async def test_the_drone_holds_after_giving_back_without_a_waiting_mission(game, mission):
     ana = game.browser("Ana")
     await game.take(ana)
     game.fleet.status[1]["mission"] = mission
@@ -224,7 +223,7 @@ async def test_giving_back_without_a_waiting_mission_has_the_drone_hold(game, mi
     assert game.fleet.orders == ["position", "hold"]
 
 
-async def test_a_mission_that_cannot_go_on_has_the_drone_hold_and_says_why(game):
+async def test_the_drone_holds_if_the_mission_cannot_go_on_and_the_answer_has_the_reason(game):
     ana = game.browser("Ana")
     await game.take(ana)
     game.fleet.status[1]["mission"] = MISSION
@@ -233,7 +232,7 @@ async def test_a_mission_that_cannot_go_on_has_the_drone_hold_and_says_why(game)
     assert answer.text == "the mission frame_challenge cannot go on (no setpoints); drone 1 holds"
 
 
-async def test_a_drone_that_does_not_even_hold_stays_the_pilots(game):
+async def test_the_pilot_keeps_a_drone_that_does_not_hold(game):
     ana = game.browser("Ana")
     await game.take(ana)
     game.fleet.refuse["hold"] = "no answer"
@@ -243,18 +242,18 @@ async def test_a_drone_that_does_not_even_hold_stays_the_pilots(game):
     assert game.last_sticks() == FORWARD
 
 
-async def test_giving_back_and_closing_the_page_does_not_interrupt_the_giving(game):
+async def test_closing_the_page_does_not_interrupt_giving_back(game):
     ana = game.browser("Ana")
     await game.take(ana)
     game.fleet.status[1]["mission"] = MISSION
     game.fleet.gates["offboard"] = asyncio.Event()
     task = asyncio.create_task(game.desk.do(ana, Order(1, "give")))
     await game.settle()
-    game.desk.go(ana)
+    game.desk.remove(ana)
     game.fleet.gates["offboard"].set()
     assert (await task).ok
     await game.pass_time(1.0)
-    assert game.fleet.orders == ["position", "offboard"] and game.seat().hands is Hands.OFF
+    assert game.fleet.orders == ["position", "offboard"] and game.seat().control is Control.NONE
 
 
 async def test_neutral_sticks_go_on_until_the_drone_is_disarmed(game):
@@ -264,7 +263,7 @@ async def test_neutral_sticks_go_on_until_the_drone_is_disarmed(game):
     await game.pass_time(3.0)
     assert game.last_sticks() == NEUTRAL
     game.fleet.status[1]["armed"] = False
-    game.fleet.status[1]["link"]["state"] = "lost"  # what is not heard is not believed
+    game.fleet.status[1]["link"]["state"] = "lost"  # so its old status does not count
     await game.pass_time(0.2)
     assert game.last_sticks() == NEUTRAL
     game.fleet.status[1]["link"]["state"] = "live"
@@ -281,17 +280,17 @@ async def test_a_taken_seat_is_refused_until_its_holder_was_silent_for_five_seco
     assert not (await game.order(ben, "take")).ok
     await game.pass_time(0.3)
     await game.take(ben)
-    assert game.seat().person is ben
+    assert game.seat().holder is ben
     game.desk.sticks(ana, FORWARD)
     assert game.last_sticks() == NEUTRAL
 
 
-async def test_a_judge_takes_over_at_any_time_and_the_pilot_is_told(game):
+async def test_a_judge_takes_the_sticks_at_any_time_and_the_pilot_is_told(game):
     ana, judge = game.browser("Ana"), game.browser("Judge", may_judge=True)
     await game.take(ana)
     await game.pass_time(0.1, ana, FORWARD)
     await game.take(judge)
-    assert game.seat().person is judge and game.last_sticks() == NEUTRAL
+    assert game.seat().holder is judge and game.last_sticks() == NEUTRAL
     assert not game.told["Ana"][-1]["yours"]
     assert (1, "warning", "Judge took the sticks of drone 1 from Ana") in game.fleet.notices
 
@@ -307,7 +306,7 @@ async def test_orders_of_others_are_refused_while_somebody_flies(game):
     assert game.fleet.orders == ["position"]
 
 
-async def test_stopping_the_motors_needs_confirmation_and_waits_for_nobody(game):
+async def test_stopping_the_motors_needs_confirmation_and_does_not_wait(game):
     ana = game.browser("Ana")
     answer = await game.order(ana, "stop_motors")
     assert not answer.ok and "confirmed" in answer.text and game.fleet.orders == []
@@ -319,7 +318,7 @@ async def test_stopping_the_motors_needs_confirmation_and_waits_for_nobody(game)
     assert (await waiting).text == "arm: another order came before the answer"
 
 
-async def test_hold_overtakes_an_order_under_way_and_others_wait(game):
+async def test_hold_replaces_the_present_order_and_others_wait(game):
     ana = game.browser("Ana")
     game.fleet.gates["position"] = asyncio.Event()
     taking = asyncio.create_task(game.desk.do(ana, Order(1, "take")))
@@ -328,18 +327,18 @@ async def test_hold_overtakes_an_order_under_way_and_others_wait(game):
     assert not answer.ok and answer.text == "drone 1 has not answered to take yet"
     assert (await game.order(ana, "hold")).ok
     assert not (await taking).ok
-    assert game.seat().hands is Hands.OFF and game.seat().person is ana
+    assert game.seat().control is Control.NONE and game.seat().holder is ana
 
 
-async def test_after_hold_the_sticks_fly_only_when_taken_again(game):
+async def test_after_hold_the_sticks_must_be_taken_again(game):
     ana = game.browser("Ana")
     await game.take(ana)
     assert (await game.order(ana, "hold")).ok
     await game.pass_time(0.1, ana, FORWARD)
-    assert game.last_sticks() == NEUTRAL and game.seat().person is ana
+    assert game.last_sticks() == NEUTRAL and game.seat().holder is ana
 
 
-async def test_after_a_take_off_by_button_the_pilot_flies_on(game):
+async def test_after_a_take_off_the_sticks_control_the_drone_again(game):
     ana = game.browser("Ana")
     await game.take(ana)
     assert (await game.order(ana, "take_off")).ok
@@ -352,7 +351,7 @@ async def test_after_a_take_off_by_button_the_pilot_flies_on(game):
     assert game.last_sticks() == FORWARD
 
 
-async def test_a_pilot_who_falls_silent_during_take_off_leaves_it_to_end_by_itself(game):
+async def test_silence_during_take_off_does_not_interrupt_it(game):
     ana = game.browser("Ana")
     await game.take(ana)
     assert (await game.order(ana, "take_off")).ok
@@ -370,7 +369,7 @@ async def test_one_browser_flies_one_drone(game):
     assert (await game.order(ana, "take", number=7)).text == "no drone 7 is heard"
 
 
-async def test_the_seat_of_one_drone_says_nothing_about_the_others(game):
+async def test_the_seats_of_two_drones_are_independent(game):
     ana, ben = game.browser("Ana"), game.browser("Ben")
     await game.take(ana)
     await game.take(ben, number=2, streaming=True)
@@ -379,21 +378,21 @@ async def test_the_seat_of_one_drone_says_nothing_about_the_others(game):
     assert game.last_sticks(2) == FORWARD and game.last_sticks(1) == NEUTRAL
 
 
-async def test_a_fault_in_one_seat_does_not_stop_the_dead_man_of_another(game, caplog):
+async def test_a_fault_in_one_seat_does_not_affect_another(game, caplog):
     ana, ben = game.browser("Ana"), game.browser("Ben")
     await game.take(ana)
     await game.take(ben, number=2)
     game.seat(1).tick = lambda: 1 / 0
     await game.pass_time(0.6)
-    assert game.seat(2).hands is Hands.OFF and game.fleet.orders[-1] == "hold"
-    assert "looking after its pilot failed" in caplog.text
+    assert game.seat(2).control is Control.NONE and game.fleet.orders[-1] == "hold"
+    assert "the update of its seat failed" in caplog.text
 
 
 async def test_the_watch_runs_by_itself_while_a_browser_is_there():
     fleet, told = FakeFleet(), []
     desk = PilotDesk(fleet)
     ana = Browser("Ana", False, told.append)
-    desk.come(ana)
+    desk.add(ana)
     loop = asyncio.get_running_loop()
     task = asyncio.create_task(desk.do(ana, Order(1, "take")))
     while not task.done():
@@ -403,8 +402,8 @@ async def test_the_watch_runs_by_itself_while_a_browser_is_there():
     async with asyncio.timeout(5.0):
         await fleet.held.wait()
     assert loop.time() - silent_since_s > 0.4
-    desk.go(ana)
+    desk.remove(ana)
 
 
-def test_people_are_told_apart_by_who_they_are_and_not_by_their_names():
-    assert Person("Ana") != Person("Ana")
+def test_two_browsers_with_one_name_are_different():
+    assert Browser("Ana") != Browser("Ana")

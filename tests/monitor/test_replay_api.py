@@ -1,4 +1,4 @@
-"""Recorded flights over HTTP: whole, packed, asked for once; 404 with one line for the rest."""
+"""Recorded flights over HTTP: whole, compressed, read once; 404 with one line for others."""
 
 import asyncio
 import gzip
@@ -32,7 +32,7 @@ async def test_the_list_and_a_run_are_json(monkeypatch):
             assert await answer.json() == a_run()["result"]
 
 
-async def test_it_is_packed_for_those_who_can_unpack_it(monkeypatch):
+async def test_answers_are_compressed_for_clients_that_accept_it(monkeypatch):
     async with serving_runs(monkeypatch, Library(a_run())) as served, browser() as client:
         sizes = {}
         for coding in ("gzip", "identity"):
@@ -44,7 +44,7 @@ async def test_it_is_packed_for_those_who_can_unpack_it(monkeypatch):
         assert sizes["gzip"] < sizes["identity"] / 3
 
 
-async def test_what_a_browser_has_already_is_not_sent_again(monkeypatch):
+async def test_an_unchanged_answer_is_not_sent_again(monkeypatch):
     library = Library(a_run())
     packed = []
     compress = gzip.compress
@@ -84,7 +84,7 @@ async def test_images_are_jpegs(monkeypatch):
         ("unjudged/result.json", "run 'unjudged': was not judged"),
     ],
 )
-async def test_what_is_not_there_is_told_in_one_line(monkeypatch, path, words):
+async def test_a_missing_run_is_reported_in_one_line(monkeypatch, path, words):
     library = Library(a_run(), a_run("unjudged", result=None))
     async with serving_runs(monkeypatch, library) as served, browser() as client:
         answer = await client.get(f"{served.url}api/runs/{path}")
@@ -95,7 +95,7 @@ async def test_what_is_not_there_is_told_in_one_line(monkeypatch, path, words):
         assert answer.headers["Content-Type"].startswith("text/plain")
 
 
-async def test_a_name_cannot_climb_out_of_its_place(monkeypatch):
+async def test_a_name_cannot_leave_the_folder(monkeypatch):
     library = Library(a_run())
     async with serving_runs(monkeypatch, library) as served, browser() as client:
         for path in ("..%2f..%2fetc", "%2e%2e", "first%00", "%2fetc%2fpasswd"):
@@ -115,7 +115,7 @@ async def test_without_a_library_there_is_an_empty_list_and_a_hint(monkeypatch):
 
 
 class SlowLibrary(Library):
-    """Reads nothing before it is told to."""
+    """Reads nothing before the test allows it."""
 
     def __init__(self, *runs):
         super().__init__(*runs)
@@ -134,7 +134,7 @@ class SlowLibrary(Library):
             return super().recording(name)
 
 
-async def test_two_are_read_at_once_two_wait_and_more_are_refused_in_words(monkeypatch):
+async def test_two_runs_are_read_two_wait_and_more_are_refused(monkeypatch):
     names = [f"run-{number}" for number in range(5)]
     library = SlowLibrary(*(a_run(name, end_s=2.0) for name in names))
     async with serving_runs(monkeypatch, library) as served, browser() as client:
@@ -157,5 +157,5 @@ async def test_two_are_read_at_once_two_wait_and_more_are_refused_in_words(monke
             assert {each[0] for each in await asyncio.gather(*asked)} == {200}
             assert (await status(names[4]))[0] == 200
     assert library.most_at_once == 2
-    assert sorted(library.read) == names  # each once, though three asked for it
+    assert sorted(library.read) == names  # each once, for three requests
     assert library.closed

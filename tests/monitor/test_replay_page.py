@@ -1,4 +1,4 @@
-"""The replay's page in a real browser: one clock for all, two flights side by side, links that hold."""
+"""The replay's page in a real browser: one clock for all, two flights side by side, links to a view."""
 
 import contextlib
 import re
@@ -19,7 +19,7 @@ LAPTOP, PHONE = {"width": 1366, "height": 768}, {"width": 390, "height": 844}
 
 @contextlib.asynccontextmanager
 async def opened(monkeypatch, chromium, library, path, viewport=LAPTOP):
-    """A page of the replay; it must not complain."""
+    """A page of the replay; it must log no errors."""
     async with serving_runs(monkeypatch, library) as served:
         page = await chromium.new_page(viewport=viewport)
         page.set_default_timeout(PATIENCE_MS)
@@ -122,7 +122,7 @@ async def test_it_plays_pauses_steps_and_ends_by_keyboard(monkeypatch, chromium)
         await expect(bar).to_have_attribute("data-playing", "false")
 
 
-async def test_crossings_are_marks_that_lead_there(monkeypatch, chromium):
+async def test_crossings_are_marks_that_jump_to_their_time(monkeypatch, chromium):
     async with opened(monkeypatch, chromium, Library(a_run()), "replay?a=first") as page:
         marks = page.locator(".r-marks button")
         await expect(marks).to_have_count(2)
@@ -157,7 +157,7 @@ async def test_two_flights_side_by_side_have_one_clock(monkeypatch, chromium):
         await expect(page.locator(".r-marks [data-row='1']")).to_have_count(2)
 
 
-async def test_on_a_phone_they_stand_below_one_another_and_nothing_sticks_out(monkeypatch, chromium):
+async def test_on_a_phone_two_flights_are_stacked_and_fit(monkeypatch, chromium):
     library = Library(a_run(), a_run("a-very-long-name-of-a-run-" * 4))
     path = f"replay?a=first&b={'a-very-long-name-of-a-run-' * 4}"
     async with opened(monkeypatch, chromium, library, path, PHONE) as page:
@@ -170,7 +170,7 @@ async def test_on_a_phone_they_stand_below_one_another_and_nothing_sticks_out(mo
         assert min(play["width"], play["height"]) >= 36
 
 
-async def test_the_address_is_a_link_to_what_is_seen(monkeypatch, chromium):
+async def test_the_address_is_a_link_to_the_present_view(monkeypatch, chromium):
     async with opened(monkeypatch, chromium, Library(a_run()), "replay?a=first") as page:
         await seek(page, 21.5)
         await page.wait_for_function("location.search === '?a=first&t=21.5'")
@@ -179,7 +179,7 @@ async def test_the_address_is_a_link_to_what_is_seen(monkeypatch, chromium):
         await expect(page.locator(".r-time")).to_have_text("21.5 s")
 
 
-async def test_the_list_is_searched_and_leads_to_one_and_to_two(monkeypatch, chromium):
+async def test_the_list_is_searched_and_opens_one_or_two_flights(monkeypatch, chromium):
     runs = [a_run(), a_run("second")]
     bad = RunInfo("bad", "", "", "unreadable", None, "")
     library = Library(*runs, infos=[info_of(run) for run in runs] + [bad])
@@ -228,7 +228,7 @@ async def test_a_flight_without_result_images_and_chart(monkeypatch, chromium):
         await expect(figure(page, "verdict")).to_have_text("nobody judges")
 
 
-async def test_a_run_that_is_not_there_is_told_and_the_other_is_shown(monkeypatch, chromium):
+async def test_a_missing_run_is_reported_and_the_other_is_shown(monkeypatch, chromium):
     async with opened(monkeypatch, chromium, Library(a_run()), "replay?a=gone&b=first") as page:
         await expect(page.locator(".m-line")).to_have_text("run 'gone': there is no such run")
         await expect(page.locator(".r-side h2")).to_have_text("first")

@@ -28,7 +28,7 @@ async def test_a_page_has_frame_data_and_headers(monkeypatch):
     assert json.loads(data) == {"text": EVIL}
 
 
-async def test_all_that_a_page_names_is_here(monkeypatch):
+async def test_all_addresses_in_a_page_are_served_locally(monkeypatch):
     """The page works offline: every address in it is one of ours and is answered."""
     async with serving(monkeypatch, SAMPLE) as served, browser() as client:
         text = await (await client.get(served.url)).text()
@@ -48,7 +48,7 @@ async def test_all_that_a_page_names_is_here(monkeypatch):
                 assert answer.status == 200, address
 
 
-async def test_files_are_asked_after_and_libraries_are_served(monkeypatch):
+async def test_files_are_revalidated_and_libraries_are_served(monkeypatch):
     async with serving(monkeypatch) as served, browser() as client:
         async with client.get(served.url + "static/shell.css") as answer:
             assert answer.headers["Cache-Control"] == "no-cache"
@@ -88,7 +88,7 @@ async def test_foreign_names_and_pages_are_refused(monkeypatch):
                 assert refused.value.status == 403, (path, headers)
 
 
-async def test_our_own_names_are_taken(monkeypatch):
+async def test_own_host_names_are_accepted(monkeypatch):
     async with serving(monkeypatch, SAMPLE) as served, browser() as client:
         for host in (f"localhost:{served.port}", "[::1]:8080", "127.0.0.1"):
             headers = {"Host": host, "Origin": f"http://{host}"}
@@ -98,7 +98,7 @@ async def test_our_own_names_are_taken(monkeypatch):
                 assert (await live.receive_json())["kind"] == "world"
 
 
-async def test_another_machine_may_call_us_any_name(monkeypatch):
+async def test_any_host_name_is_accepted_from_another_machine(monkeypatch):
     async with serving(monkeypatch, SAMPLE, bind="0.0.0.0") as served, browser() as client:
         url = f"http://127.0.0.1:{served.port}/"
         async with client.get(url, headers={"Host": "laptop.local:8080"}) as answer:
@@ -135,7 +135,7 @@ async def test_bodies_are_limited_whether_announced_or_not(monkeypatch):
         writer.close()
 
 
-async def test_a_taken_port_is_told_in_one_line(monkeypatch):
+async def test_a_taken_port_is_reported_in_one_line(monkeypatch):
     with socket.create_server(("127.0.0.1", 0)) as taken:
         port = taken.getsockname()[1]
         with pytest.raises(MonitorError) as refused:
@@ -158,19 +158,19 @@ async def test_a_taken_port_is_told_in_one_line(monkeypatch):
         ),
     ],
 )
-def test_settings_that_cannot_be_are_refused(settings, words):
+def test_invalid_settings_are_refused(settings, words):
     with pytest.raises(MonitorError, match=words):
         settings.check()
     assert "short" not in repr(settings)
 
 
-async def test_an_address_that_is_not_ours_is_told_in_one_line(monkeypatch):
+async def test_an_unknown_bind_address_is_reported_in_one_line(monkeypatch):
     with pytest.raises(MonitorError, match=r"--bind no\.such\.host\.invalid: .*give an address"):
         async with serving(monkeypatch, bind="no.such.host.invalid"):
             pass
 
 
-async def test_it_ends_soon_though_somebody_watches_and_its_port_is_free_again(monkeypatch):
+async def test_it_ends_soon_despite_viewers_and_frees_its_port(monkeypatch):
     async with serving(monkeypatch, SAMPLE) as served, browser() as client:
         port = served.port
         live = await client.ws_connect(served.url + "ws/live")

@@ -14,7 +14,7 @@ PHONE = {"width": 390, "height": 800}
 
 @contextlib.asynccontextmanager
 async def phone(chromium):
-    """A page that notes what it asks for and complains of."""
+    """A page that records its requests and errors."""
     page = await chromium.new_page(viewport=PHONE)
     page.complaints, page.hosts = [], set()
     page.on("console", lambda m: page.complaints.append(m.text) if m.type in ("error", "warning") else None)
@@ -63,7 +63,7 @@ async def test_a_page_comes_back_by_itself_when_the_server_does(monkeypatch, chr
             await page.wait_for_selector("main >> text=may judge: False")
 
 
-async def test_a_lost_drone_is_told_in_words(monkeypatch, chromium):
+async def test_a_lost_drone_is_shown_in_words(monkeypatch, chromium):
     async with serving(monkeypatch, SAMPLE) as served, phone(chromium) as page:
         await page.goto(served.url)
         await page.wait_for_function(LINK_IS, arg="live")

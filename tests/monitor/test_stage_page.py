@@ -1,4 +1,4 @@
-"""The page for the audience, in a real browser: it finds by itself what there is to show."""
+"""The page for the audience, in a real browser: it follows the contest by itself."""
 
 import pytest
 from playwright.async_api import expect

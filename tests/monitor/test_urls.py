@@ -8,8 +8,14 @@ import pytest
 from ifaddr import IP, Adapter
 
 from monitor import urls
-from monitor.qr_code import terminal_code
-from monitor.urls import is_for_others, network_addresses, url_of, urls_for_people, urls_for_visitor
+from monitor.urls import (
+    is_for_others,
+    network_addresses,
+    terminal_code,
+    url_of,
+    urls_for_people,
+    urls_for_visitor,
+)
 from tests.monitor.serving import browser, serving
 
 ADAPTERS = (
@@ -24,13 +30,13 @@ LINK = "http://192.168.178.123:8080/login?token=" + "aB3_-xYz" * 5 + "abc"
 
 @pytest.fixture
 def networks(monkeypatch):
-    """A machine with a cable, a wireless network that leads elsewhere, and what no phone reaches."""
+    """A machine with a wired network, the wireless default route, and interfaces that no phone reaches."""
     monkeypatch.setattr(urls.ifaddr, "get_adapters", lambda: ADAPTERS)
-    monkeypatch.setattr(urls, "_first_choice", lambda: "192.168.1.5")
+    monkeypatch.setattr(urls, "_default_address", lambda: "192.168.1.5")
 
 
 def read_code(image):
-    """What a phone reads in a picture; "" if it finds no code. OpenCV's other detector misses some."""
+    """The text of a QR code in an image; "" without one. OpenCV's other detector misses some."""
     return cv2.QRCodeDetectorAruco().detectAndDecode(image)[0]
 
 
@@ -45,13 +51,13 @@ def picture(text):
     return np.kron(np.array(rows, np.uint8) * 255, np.ones((8, 8), np.uint8))
 
 
-def test_what_phones_reach_is_told_and_nothing_else(networks):
+def test_only_addresses_that_phones_reach_are_listed(networks):
     assert urls_for_people("0.0.0.0", 8080) == ["http://192.168.1.5:8080/", "http://10.0.0.3:8080/"]
     assert urls_for_people("::", 80)[2:] == ["http://[2001:db8::5]:80/"]
     assert network_addresses(ADAPTERS[:2], "") == []
 
 
-def test_one_address_is_told_as_it_is():
+def test_a_single_bind_address_is_listed():
     assert urls_for_people("127.0.0.1", 8080) == ["http://127.0.0.1:8080/"]
     assert urls_for_people("::1", 80) == [url_of("::1", 80)] == ["http://[::1]:80/"]
     assert [is_for_others(host) for host in ("127.0.0.1", "::1", "0.0.0.0", "192.168.1.5")] == [
@@ -59,7 +65,7 @@ def test_one_address_is_told_as_it_is():
     ]  # fmt: skip
 
 
-def test_a_name_by_which_somebody_came_is_told_first(networks):
+def test_the_host_name_of_the_request_is_listed_first(networks):
     told = urls_for_people("0.0.0.0", 8080)
     for own in ("http://localhost:8080/join", "http://127.0.0.1:8080/join", told[0] + "join"):
         assert urls_for_visitor("0.0.0.0", 8080, own) == told
@@ -80,7 +86,7 @@ def test_a_phone_reads_the_code_in_a_terminal(text):
 
 
 @pytest.mark.parametrize(("bind", "qr_codes"), [("0.0.0.0", True), ("0.0.0.0", False), ("127.0.0.1", True)])
-async def test_the_monitor_says_where_phones_find_it(monkeypatch, networks, bind, qr_codes):
+async def test_the_monitor_prints_its_addresses_for_phones(monkeypatch, networks, bind, qr_codes):
     async with serving(monkeypatch, bind=bind, qr_codes=qr_codes) as served:
         said = "\n".join(served.lines)
         host = "192.168.1.5" if bind == "0.0.0.0" else "127.0.0.1"
@@ -94,7 +100,7 @@ async def test_the_monitor_says_where_phones_find_it(monkeypatch, networks, bind
         assert read == (wanted if qr_codes and bind == "0.0.0.0" else [])
 
 
-async def test_a_machine_without_a_network_is_told_its_own_address(monkeypatch):
+async def test_without_a_network_the_loopback_address_is_printed(monkeypatch):
     monkeypatch.setattr(urls.ifaddr, "get_adapters", lambda: ADAPTERS[:1])
     async with serving(monkeypatch, "monitor.pages.join", bind="0.0.0.0") as served, browser() as client:
         assert served.lines[0] == f"monitor: http://127.0.0.1:{served.port}/"

@@ -5,7 +5,7 @@ import struct
 import pytest
 from aiohttp import web
 
-from monitor.video_proxy import MAX_IMAGE_BYTES, can_be_passed_on
+from monitor.video_proxy import MAX_IMAGE_BYTES, can_be_forwarded
 from tests.monitor.serving import browser, serving
 
 JPEG = b"\xff\xd8\xff\xe0 an image \xff\xd9"
@@ -16,8 +16,8 @@ def part(number, body=JPEG, head=""):
     return text.encode() + body + b"\r\n"
 
 
-def test_only_http_is_passed_on():
-    assert can_be_passed_on("http://127.0.0.1:8100/video")
+def test_only_http_is_forwarded():
+    assert can_be_forwarded("http://127.0.0.1:8100/video")
     for url in (
         None,
         "",
@@ -28,7 +28,7 @@ def test_only_http_is_passed_on():
         "http://[",
         "http://",
     ):
-        assert not can_be_passed_on(url)
+        assert not can_be_forwarded(url)
 
 
 class Camera:
@@ -99,7 +99,7 @@ async def next_number(answer):
     return int(line.partition(b":")[2])
 
 
-async def test_many_watch_over_one_connection_which_ends_with_them(monkeypatch):
+async def test_many_viewers_share_one_connection_that_ends_with_the_last(monkeypatch):
     async with camera() as source, serving(monkeypatch) as served, browser() as client:
         served.fleet.video = source.url
         answers = [await client.get(served.url + "video/1") for _ in range(3)]
@@ -115,7 +115,7 @@ async def test_many_watch_over_one_connection_which_ends_with_them(monkeypatch):
         await reached(lambda: source.now == 0 or source.show())
 
 
-async def test_one_image_is_had_alone(monkeypatch):
+async def test_a_single_image_is_served(monkeypatch):
     async with camera() as source, serving(monkeypatch) as served, browser() as client:
         served.fleet.video = source.url
         source.number = 7
@@ -130,7 +130,7 @@ EVIL = b"<script>alert(1)</script>"
 
 
 @pytest.mark.parametrize("head", ["", f"Content-Length: {len(EVIL)}\r\n"])
-async def test_what_is_no_jpeg_is_not_passed_on(monkeypatch, head):
+async def test_only_jpegs_are_forwarded(monkeypatch, head):
     async with camera() as source, serving(monkeypatch) as served, browser() as client:
         served.fleet.video = source.url
         source.first = part(1, EVIL, head)
@@ -155,7 +155,7 @@ async def next_frame(answer):
         return time_us, await answer.content.readexactly(length)
 
 
-async def test_frames_carry_their_time_and_who_comes_late_gets_the_last_one_at_once(monkeypatch):
+async def test_frames_have_their_time_and_a_late_viewer_gets_the_last_one_at_once(monkeypatch):
     async with camera() as source, serving(monkeypatch) as served, browser() as client:
         served.fleet.video = source.url
         source.number = 7
@@ -165,14 +165,14 @@ async def test_frames_carry_their_time_and_who_comes_late_gets_the_last_one_at_o
             assert await next_frame(answer) == (8, JPEG)
         await reached(lambda: source.now == 0 or source.show())
         last = source.number
-        source.hold = True  # the flight is over: nothing new comes
+        source.hold = True  # the flight is over: no new images
         async with client.get(served.url + "video/1/frames") as answer:
             time_us, jpeg = await next_frame(answer)
             assert 8 <= time_us <= last
             assert jpeg == JPEG
 
 
-async def test_a_drone_that_was_away_is_seen_again(monkeypatch):
+async def test_the_connection_is_made_again_after_a_failure(monkeypatch):
     monkeypatch.setattr("monitor.video_proxy._RETRY_S", 0.05)
     async with camera() as source, serving(monkeypatch) as served, browser() as client:
         served.fleet.video = source.url
@@ -190,12 +190,12 @@ async def test_a_drone_that_was_away_is_seen_again(monkeypatch):
     ("path", "video", "status", "words"),
     [
         ("2", None, 404, "no drone 2"),
-        ("1", None, 404, "tells of no video"),
+        ("1", None, 404, "has no video"),
         ("1", "rtsp://10.0.0.1/live", 404, "is rtsp; only MJPEG over http"),
         ("1", "5600", 404, "only MJPEG over http"),
     ],
 )
-async def test_video_that_cannot_be_had_is_told_in_words(monkeypatch, path, video, status, words):
+async def test_the_reason_is_told_when_there_is_no_video(monkeypatch, path, video, status, words):
     async with serving(monkeypatch) as served, browser() as client:
         served.fleet.video = video
         async with client.get(served.url + f"video/{path}") as answer:

@@ -1,4 +1,4 @@
-"""A fleet that runs beside a test, and waits for what it shall show."""
+"""A fleet that runs beside a test, and waiting for its state."""
 
 from __future__ import annotations
 
@@ -6,11 +6,11 @@ import asyncio
 from contextlib import asynccontextmanager
 
 from monitor.fleet import Fleet
-from monitor.tries import TryEvent
+from monitor.vehicle.tries import TryEvent
 
 
 class Watched:
-    """A running fleet and all it said.
+    """A running fleet and its messages.
 
     Attributes:
         heard: messages to watchers, but for pose and status.
@@ -39,7 +39,7 @@ class Watched:
         return next((each for each in drones if each["id"] == drone_id), None)
 
     async def until(self, condition, limit_s=20.0):
-        """Wait for a condition; what it returned."""
+        """Wait for a condition; returns its value."""
         loop = asyncio.get_running_loop()
         end_s = loop.time() + limit_s
         while not (found := condition()):
@@ -48,7 +48,7 @@ class Watched:
         return found
 
     async def until_ready(self, link, drone_id=1):
-        """Wait until a drone can be armed, and shows where it is and how it is."""
+        """Wait until a drone can be armed, and its pose and status are known."""
         return await self.until(
             lambda: (
                 link.drones[drone_id - 1].simulation.autopilot.status.ready

@@ -8,7 +8,7 @@ import aiohttp
 
 from monitor import run, server
 from monitor.settings import MonitorSettings
-from monitor.tries import TryEvent
+from monitor.vehicle.tries import TryEvent
 from scenarios.models import Frame, Scenario
 from scenarios.result import RefereeReport
 
@@ -16,7 +16,7 @@ PASSWORD = "only for these tests"
 COLOURS = ("red", "green", "blue")
 MODULES = (
     "monitor.competition.api",
-    *(f"monitor.pages.{name}" for name in ("login", "competition", "judge", "ranking", "join")),
+    *(f"monitor.pages.{name}" for name in ("login", "table", "join")),
 )
 
 

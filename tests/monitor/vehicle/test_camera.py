@@ -1,4 +1,4 @@
-"""Where video may be asked for, when the drone names the address."""
+"""From where video may be fetched when the drone sends the URL."""
 
 import pytest
 from pymavlink.dialects.v20 import common as mavlink
@@ -18,7 +18,7 @@ from monitor.vehicle.camera import CameraWatch, host_of, refusal
         ("http://8.8.8.8/video", "8.8.8.8"),
     ],
 )
-def test_the_host_that_the_packets_come_from_may_be_asked_for_a_camera_s_address(url, host):
+def test_video_may_be_fetched_from_the_sender_of_the_packets(url, host):
     if ":81/" in url:
         assert "port 81 is of another service" in refusal(url, host)
         url = url.replace(":81/", ":8081/")
@@ -31,7 +31,7 @@ def test_the_host_that_the_packets_come_from_may_be_asked_for_a_camera_s_address
         ("http://192.168.1.8/video", "192.168.1.7", "packets come from 192.168.1.7"),
         ("http://127.0.0.1:8100/video", "192.168.1.7", "packets come from 192.168.1.7"),
         ("http://192.168.1.7/video", "127.0.0.1", "packets come from 127.0.0.1"),
-        ("http://192.168.1.7/video", "", "nobody knows where"),
+        ("http://192.168.1.7/video", "", "from an unknown host"),
         ("http://169.254.169.254/latest/meta-data", "10.0.0.1", "packets come from"),
         ("http://0.0.0.0:8100/video", "127.0.0.1", "packets come from"),
         ("http://127.0.0.1:7777/admin?delete=all", "127.0.0.1", "more than a plain path"),
@@ -56,11 +56,11 @@ def test_the_host_that_the_packets_come_from_may_be_asked_for_a_camera_s_address
         ("http:///video", "127.0.0.1", "names no host"),
     ],
 )
-def test_all_else_is_refused_in_words(url, host, words):
+def test_other_urls_are_refused_with_a_reason(url, host, words):
     assert words in refusal(url, host)
 
 
-def test_the_host_that_the_link_goes_to_may_be_asked():
+def test_video_may_be_fetched_from_the_host_of_the_link():
     assert host_of("tcpout://drone.example:5760") == "drone.example"
     assert host_of("udpin://0.0.0.0:14550") == ""
     assert host_of("serial:///dev/ttyUSB0:57600") == ""
@@ -70,7 +70,7 @@ def test_the_host_that_the_link_goes_to_may_be_asked():
 
 
 @pytest.mark.parametrize("confirmed", ["192.168.1.7", "192.168.1.7:81"])
-def test_what_the_operator_confirmed_may_be_asked(confirmed):
+def test_video_may_be_fetched_from_confirmed_hosts(confirmed):
     assert refusal("http://192.168.1.7:81/stream?size=1", "127.0.0.1", "", (confirmed,)) == ""
     assert refusal("http://192.168.1.8:81/stream", "127.0.0.1", "", (confirmed,))
     assert refusal("ftp://192.168.1.7:81/stream", "127.0.0.1", "", (confirmed,))
@@ -82,31 +82,31 @@ def told(uri, number=1):
     )
 
 
-def test_a_camera_is_asked_until_it_answers_and_its_first_http_stream_counts():
+def test_the_request_is_repeated_until_the_camera_answers_and_its_first_http_stream_counts():
     watch = CameraWatch(1)
-    assert watch.question(0.0) is None
+    assert watch.request(0.0) is None
     watch.see(100)
-    asked = watch.question(0.0)
+    asked = watch.request(0.0)
     assert (asked.target_system, asked.target_component) == (1, 100)
     assert (asked.command, asked.param1) == (512, 269)
-    assert watch.question(1.0) is None
-    assert watch.question(2.5) is not None
+    assert watch.request(1.0) is None
+    assert watch.request(2.5) is not None
     watch.take(told(b"5600"), "127.0.0.1")
     watch.take(told(b"http://127.0.0.1:8100/video", 2), "127.0.0.1")
     watch.take(told(b"http://127.0.0.1:8101/video", 3), "127.0.0.1")
     assert watch.url == "http://127.0.0.1:8100/video"
-    assert watch.question(99.0) is None
+    assert watch.request(99.0) is None
 
 
-def test_a_camera_that_never_answers_is_left_alone():
+def test_a_camera_that_does_not_answer_gets_eight_requests():
     watch = CameraWatch(1)
     watch.see(100)
-    assert sum(watch.question(3.0 * count) is not None for count in range(50)) == 8
+    assert sum(watch.request(3.0 * count) is not None for count in range(50)) == 8
 
 
-def test_a_refused_address_is_told():
+def test_a_refused_url_is_reported():
     watch = CameraWatch(1)
     watch.take(told(b"http://8.8.8.8/video"), "127.0.0.1")
     assert watch.url is None
-    assert "http://8.8.8.8/video is not asked for" in watch.problem
+    assert "http://8.8.8.8/video is not fetched" in watch.problem
     assert "--camera-host" in watch.problem

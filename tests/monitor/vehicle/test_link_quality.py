@@ -2,13 +2,15 @@
 
 import pytest
 
-from monitor.vehicle.link_quality import BootTimeRequest, LinkQuality, RateWatch
+from monitor.vehicle.link_quality import LinkQuality, RateWatch, RepeatedRequest
+from wire.dialect import mavlink
+from wire.vehicles import request_message
 
 
 def heard(sequences, rate_hz=50.0):
     traffic = LinkQuality(0.0)
     for count, sequence in enumerate(sequences):
-        traffic.hear(sequence % 256, count / rate_hz)
+        traffic.count(sequence % 256, count / rate_hz)
     return traffic
 
 
@@ -22,7 +24,7 @@ def test_missing_numbers_are_losses_over_the_last_ten_seconds():
     assert told["rate_hz"] == pytest.approx(50.0, abs=1.0)
 
 
-def test_a_packet_that_was_overtaken_is_no_loss():
+def test_a_packet_out_of_order_is_no_loss():
     order = [number for pair in range(0, 200, 2) for number in (pair + 1, pair)]
     assert heard(order).as_dict(4.0)["loss_percent"] <= 1.0
 
@@ -30,12 +32,12 @@ def test_a_packet_that_was_overtaken_is_no_loss():
 def test_old_losses_are_forgotten():
     traffic = heard([0, 100])
     for count in range(600):
-        traffic.hear((101 + count) % 256, 1.0 + count / 50)
+        traffic.count((101 + count) % 256, 1.0 + count / 50)
     assert traffic.as_dict(13.0)["loss_percent"] == 0.0
 
 
 @pytest.mark.parametrize(("age_s", "state"), [(0.5, "live"), (1.5, "stale"), (2.9, "stale"), (3.1, "lost")])
-def test_age_makes_the_state(age_s, state):
+def test_the_state_follows_from_the_age(age_s, state):
     told = heard([0]).as_dict(age_s)
     assert (told["state"], told["age_s"]) == (state, round(age_s, 1))
 
@@ -50,13 +52,13 @@ def wanted(messages):
 
 
 @pytest.mark.parametrize("rate_hz", [15.0, 25.0, 50.0, 100.0])
-def test_enough_is_left_as_it_is(rate_hz):
+def test_sufficient_rates_are_not_changed(rate_hz):
     watch = RateWatch(1, 0.0)
     for second in range(1, 30):
         assert watch.requests((round(second * rate_hz), round(second * rate_hz)), float(second)) == []
 
 
-def test_only_what_is_slow_is_asked_for_and_not_for_ever():
+def test_only_slow_messages_are_requested_and_five_times_at_most():
     watch = RateWatch(3, 0.0)
     assert watch.requests((10, 1), 1.0) == []
     assert wanted(watch.requests((60, 4), 3.0)) == [(3, 511, 32, 40_000)]
@@ -65,19 +67,15 @@ def test_only_what_is_slow_is_asked_for_and_not_for_ever():
     assert [len(each) for each in asked] == [2] * 4 + [0] * 25
 
 
-def test_a_drone_that_says_nothing_yet_is_not_asked():
+def test_nothing_is_requested_before_the_first_message():
     watch = RateWatch(1, 0.0)
     assert watch.requests((0, 0), 10.0) == []
 
 
-def test_the_boot_time_is_asked_for_until_it_is_known():
-    boot = BootTimeRequest(1)
-    assert wanted([boot.request(None, 0.0)]) == [(1, 512, 2, 0)]
-    assert boot.request(None, 1.0) is None
-    assert boot.request(None, 2.0) is not None
-    assert boot.request(1_700_000_000_000_000, 100.0) is None
-
-
-def test_a_drone_without_a_date_is_left_alone():
-    boot = BootTimeRequest(1)
-    assert sum(boot.request(None, 3.0 * count) is not None for count in range(40)) == 5
+def test_a_request_is_repeated_every_two_seconds_a_few_times():
+    message = request_message(1, mavlink.MAVLINK_MSG_ID_SYSTEM_TIME)
+    request = RepeatedRequest(message, 5)
+    assert request.due(0.0) is message
+    assert request.due(1.0) is None
+    assert request.due(2.0) is message
+    assert sum(request.due(3.0 * count) is not None for count in range(2, 40)) == 3

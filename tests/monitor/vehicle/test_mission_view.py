@@ -1,4 +1,4 @@
-"""What an app tells, made into messages for the pages."""
+"""TUNNEL messages of an app become messages for the pages."""
 
 from math import inf, nan
 
@@ -84,7 +84,7 @@ def test_after_two_seconds_of_silence_the_app_is_not_alive(view):
     "told",
     [state(paused=True), state(flying=False), state(command=(nan, 0, 0, 0)), state(command=(inf,) * 4)],
 )
-def test_there_is_no_command_while_the_app_does_not_lead(view, told):
+def test_there_is_no_command_while_the_app_does_not_fly(view, told):
     view.take(told, 10.0)
     assert view.command(10.1) is None
 
@@ -96,7 +96,7 @@ def test_a_state_of_another_mission_has_no_name(view):
     assert view.as_dict(0, 10.0)["state"] == ""
 
 
-def test_transitions_are_told_newest_first(view):
+def test_transitions_are_listed_newest_first(view):
     taken = [
         {
             "from": f"s{number}",
@@ -123,7 +123,7 @@ def test_transitions_are_told_newest_first(view):
     assert [message["kind"] for message in view.standing()] == ["chart", "transitions"]
 
 
-def test_detections_say_what_is_not_seen_and_what_is_not_known(view):
+def test_detections_distinguish_not_seen_and_not_known(view):
     seen = MissionDetections(1_500_000, 320, 240, red=(10.0, -10.0, 20.0, -20.0, 1.25, inf))
     (told,) = view.take(tunnel(DETECTIONS_TYPE, encode_detections(seen)), 10.0)
     assert told == {
@@ -153,7 +153,7 @@ def test_a_result_is_kept_with_its_crc(view):
         (0x8F13, b"\x01\x02"),
     ],
 )
-def test_nonsense_is_passed_over(view, kind, payload):
+def test_invalid_payloads_are_ignored(view, kind, payload):
     assert view.take(tunnel(kind, payload), 10.0) == []
     assert view.as_dict(9_500_000, 10.1)["state"] == "red.cross"
 
@@ -167,13 +167,13 @@ def test_nonsense_is_passed_over(view, kind, payload):
         {"transitions": [{"values": [["a", {"b": 1}]]}]},
     ],
 )
-def test_a_history_of_another_form_is_told_once(view, content):
+def test_an_invalid_history_is_reported(view, content):
     _, pieces = documents(DocumentKind.HISTORY, content)
     assert [message for piece in pieces for message in view.take(piece, 10.0)] == []
     assert view.problem.startswith("history document: transitions")
 
 
-def test_numbers_are_finite_whatever_the_app_says(view):
+def test_numbers_that_are_not_finite_are_left_out(view):
     told = {"verdict": "clean", "a": [{"b": inf}], "total_time_s": nan, "seconds_in_state": {"c": inf}}
     _, pieces = documents(DocumentKind.RESULT, told)
     for piece in pieces:
@@ -181,9 +181,9 @@ def test_numbers_are_finite_whatever_the_app_says(view):
     assert view.result[1].as_json() == {"verdict": "clean"}
 
 
-def test_a_result_without_a_verdict_is_told_to_be_none(view):
+def test_a_result_without_a_verdict_is_refused(view):
     _, pieces = documents(DocumentKind.RESULT, {"try_time_s": 40.5})
     for piece in pieces:
         view.take(piece, 10.0)
     assert view.result is None
-    assert view.problem == "result document: no verdict is told"
+    assert view.problem == "result document: it has no verdict"

@@ -4,7 +4,7 @@ import pytest
 
 from firmware_py.status import FlightMode
 from framerunner.flying.plan import FlightPlan
-from monitor.vehicle.placement import Source
+from monitor.vehicle.track import Source
 from scenarios.loader import load_scenario
 from scenarios.models import TrueState
 from tests.monitor.simulated_link import SimulatedLink, equipment, served_link
@@ -37,7 +37,7 @@ def ended(watched):
     return [event for event in watched.tries if event.kind == "ended"]
 
 
-async def test_the_drones_referee_is_followed_to_the_end():
+async def test_the_drone_s_referee_is_used_until_the_end():
     async with served_link(SCENARIO, speed=8.0) as link, watching(equipment(link)) as watched:
         Hop(link.drones[0])
         await watched.until(lambda: ended(watched), 30.0)
@@ -57,7 +57,7 @@ async def test_the_drones_referee_is_followed_to_the_end():
 
 
 async def result_follows(watched, link):
-    """The app says what its result.json holds, through the drone's own links."""
+    """The app sends the content of its result.json through the drone's links."""
     content = {
         **link.drones[0].referee_answer()["report"],
         "scenario": SCENARIO.name,
@@ -125,7 +125,7 @@ async def test_time_is_over_at_the_scenarios_limit():
         assert figures["verdict"] == "timed out"
 
 
-async def test_the_apps_own_pose_lays_the_arena_where_nothing_else_does():
+async def test_the_app_s_pose_places_the_drone_without_another_source():
     link = SimulatedLink(SCENARIO)
     async with watching(equipment(link)) as watched:
         await watched.until_ready(link)

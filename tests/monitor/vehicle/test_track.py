@@ -1,10 +1,12 @@
-"""Local axes laid into the arena: by the referee, by the start, by the app."""
+"""Where a vehicle is in the arena: by the referee, by the start, by the app; and where it was."""
 
+from itertools import pairwise
 from math import cos, pi, sin
 
 import pytest
 
-from monitor.vehicle.placement import Placement, Source
+from monitor.vehicle import track
+from monitor.vehicle.track import History, Placement, Source
 from wire.dialect import mavlink
 from wire.vehicle_telemetry import PositionReport, VehicleTelemetry
 
@@ -17,7 +19,7 @@ def standing(x, y, z, yaw_ned_rad):
     return telemetry
 
 
-def test_the_start_gives_turn_and_shift():
+def test_the_start_gives_rotation_and_translation():
     placement = Placement()
     placement.lay_by_start((2.0, -1.0, 0.5, pi / 2), standing(10.0, 20.0, -3.0, 0.3))
     assert placement.alignment.position((10.0, 20.0, -3.0)) == pytest.approx((2.0, -1.0, 0.5))
@@ -29,7 +31,7 @@ def test_the_start_gives_turn_and_shift():
     assert (w, z) == pytest.approx((cos(pi / 4), sin(pi / 4)))
 
 
-def test_the_frame_of_a_referee_counts_before_all():
+def test_the_referee_s_frame_has_priority():
     placement = Placement()
     placement.lay_by_frame((1.0, 2.0, 3.0), pi / 2)
     assert placement.alignment.position((1.0, 0.0, 0.0)) == pytest.approx((1.0, 3.0, 3.0))
@@ -39,7 +41,7 @@ def test_the_frame_of_a_referee_counts_before_all():
     assert placement.alignment.position((0.0, 0.0, 0.0)) == pytest.approx((1.0, 2.0, 3.0))
 
 
-def test_of_the_apps_pairs_the_stillest_counts():
+def test_the_app_s_pair_with_the_lowest_speed_counts():
     placement = Placement()
     placement.lay_by_app((1.0, 0.0, 0.0, 0.0), PositionReport(0, (0.0, 0.0, 0.0), (1.0, 0.0, 0.0), 0.0))
     assert placement.alignment.position((0.0, 0.0, 0.0)) == pytest.approx((1.0, 0.0, 0.0))
@@ -49,16 +51,76 @@ def test_of_the_apps_pairs_the_stillest_counts():
 
 
 @pytest.mark.parametrize("bad", [float("nan"), float("inf")])
-def test_what_is_no_number_is_not_believed(bad):
+def test_poses_that_are_not_finite_are_ignored(bad):
     placement = Placement()
     placement.lay_by_frame((bad, 0.0, 0.0), 0.0)
     placement.lay_by_app((0.0, 0.0, 0.0, bad), PositionReport(0, (0.0, 0.0, 0.0), (0.0, 0.0, 0.0), 0.0))
     assert placement.source is Source.GUESS
 
 
-def test_one_that_is_carried_lays_nothing():
+def test_a_moving_drone_is_not_placed_by_its_start():
     telemetry = standing(0.0, 0.0, 0.0, 0.0)
     telemetry.take(mavlink.MAVLink_local_position_ned_message(20, 0, 0, 0, 0.5, 0, 0), 0.0)
     placement = Placement()
     placement.lay_by_start((1.0, 1.0, 1.0, 0.0), telemetry)
     assert placement.source is Source.GUESS
+
+
+def pose(t, x=0.0, on=True, state=3, yaw=0.5):
+    q = [cos(yaw / 2), 0.0, 0.0, sin(yaw / 2)]
+    return {
+        "t": t,
+        "p": [x, 1.0, 2.0],
+        "q": q,
+        "v": [0.1, 0.2, 0.3],
+        "r": 0.4,
+        "c": None,
+        "on": on,
+        "s": state,
+    }
+
+
+def test_a_sample_has_all_columns():
+    kept = History()
+    kept.add(pose(5.0, x=-1.5))
+    kept.add(pose(5.0, x=9.0))  # nothing new came
+    kept.add({**pose(5.1), "c": [1.0, 2.0, 3.0, 4.0]})
+    none = [None] * 4
+    assert kept.rows() == [
+        [5.0, -1.5, 1.0, 2.0, 0.5, 0.1, 0.2, 0.3, 0.4, *none, 1, 3],
+        [5.1, 0.0, 1.0, 2.0, 0.5, 0.1, 0.2, 0.3, 0.4, 1.0, 2.0, 3.0, 4.0, 1, 3],
+    ]
+
+
+def test_a_flight_begins_with_the_motors():
+    kept = History()
+    for t in (1.0, 2.0):
+        kept.add(pose(t, on=False))
+    for t in (3.0, 4.0):
+        kept.add(pose(t))
+    kept.add(pose(5.0, on=False))
+    assert [row[0] for row in kept.rows()] == [3.0, 4.0, 5.0]
+    kept.add(pose(6.0))
+    assert [row[0] for row in kept.rows()] == [6.0]
+
+
+def test_the_number_of_samples_is_bounded_and_the_whole_trail_stays(monkeypatch):
+    monkeypatch.setattr(track, "MAX_OLDER", 50)
+    kept = History()
+    for step in range(20_000):
+        kept.add(pose(0.1 * step, x=0.02 * step))
+    rows = kept.rows()
+    recent = [row for row in rows if row[0] >= rows[-1][0] - track.RECENT_S]
+    assert len(recent) == pytest.approx(600, abs=2)
+    assert len(rows) <= 50 + len(recent)
+    assert rows[0][0] == 0.0
+    gaps = [after[1] - before[1] for before, after in pairwise(rows)]
+    assert max(gaps) < 40.0
+
+
+def test_where_it_hovers_only_a_change_of_state_is_kept():
+    kept = History()
+    for step in range(3000):
+        kept.add(pose(0.1 * step, state=step // 1000))
+    older = [row for row in kept.rows() if row[0] < 0.1 * 2999 - track.RECENT_S]
+    assert [(row[0], row[14]) for row in older] == [(0.0, 0), (100.0, 1), (200.0, 2)]

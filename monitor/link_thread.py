@@ -1,4 +1,4 @@
-"""The thread that reads and writes the link, and opens it again when it fails."""
+"""The thread that reads and writes the link to the drones, and opens it again when it fails."""
 
 from __future__ import annotations
 
@@ -10,27 +10,26 @@ from collections.abc import Callable, Sequence
 from itertools import groupby
 from operator import itemgetter
 
-from monitor.ports import Link, Message
+from wire.dialect import Message
 from wire.transports.urls import LinkError
+from wire.transports.vehicle_link import VehicleLink
 
-_WAIT_S = 0.02  # what is to be sent waits at most this long while nothing comes in
+_WAIT_S = 0.02  # longest delay of a message to send while nothing is received
 _FIRST_PAUSE_S, _MAX_PAUSE_S = 0.5, 5.0
-_MAX_RECEIVED = 5000  # waiting for a loop that is busy; the oldest go first
+_MAX_RECEIVED = 5000  # waiting for a loop that is busy; the oldest are dropped
 _MAX_TO_SEND = 256
 _END_S = 2.0
 
 Say = Callable[[str, str], None]
 
 
-class Listener:
-    """Carries messages between a link and the loop.
-
-    All but the thread itself belongs to the loop.
+class LinkThread:
+    """Carries messages between a link and the loop; all methods belong to the loop.
 
     Args:
         open_link: opens it; raises `LinkError`.
-        take: called on the loop with what came, and the host it came from; "" over a wire.
-        say: called on the loop with level and one line for people.
+        take: called with received messages and the host they came from, "" on a serial line.
+        say: called with level and one line for people.
 
     Attributes:
         problem: what is wrong with the link now; "" if nothing is.
@@ -38,7 +37,7 @@ class Listener:
     """
 
     def __init__(
-        self, open_link: Callable[[], Link], take: Callable[[Sequence[Message], str], None], say: Say
+        self, open_link: Callable[[], VehicleLink], take: Callable[[Sequence[Message], str], None], say: Say
     ) -> None:
         self._open_link = open_link
         self._take = take
@@ -52,15 +51,15 @@ class Listener:
         self.url = ""
 
     async def run(self) -> None:
-        """Listen until cancelled.
+        """Read and write until cancelled.
 
         Raises:
-            RuntimeError: the thread ended by a fault of its own.
+            Exception: the thread ended with a fault.
         """
         loop = asyncio.get_running_loop()
         self._halt.clear()
         ended: asyncio.Future[None] = loop.create_future()
-        thread = threading.Thread(target=self._listen, args=(loop, ended), name="monitor's link", daemon=True)
+        thread = threading.Thread(target=self._run, args=(loop, ended), name="monitor's link", daemon=True)
         thread.start()
         try:
             await asyncio.shield(ended)
@@ -69,11 +68,11 @@ class Listener:
             await asyncio.to_thread(thread.join, _END_S)
 
     def send(self, message: Message) -> None:
-        """Have a message sent; lost without a word while there is no link."""
+        """Send a message; it is lost without an error while there is no link."""
         self._to_send.append(message)
 
-    def _listen(self, loop: asyncio.AbstractEventLoop, ended: asyncio.Future[None]) -> None:
-        """The thread: open, read, open again."""
+    def _run(self, loop: asyncio.AbstractEventLoop, ended: asyncio.Future[None]) -> None:
+        """In the thread: open, read, open again."""
         pause_s = _FIRST_PAUSE_S
         try:
             while not self._halt.is_set():
@@ -84,16 +83,14 @@ class Listener:
                     self._carry(loop, link)
                 except LinkError as error:
                     self._to_send.clear()
-                    loop.call_soon_threadsafe(self._fail, str(error), time.monotonic())
+                    loop.call_soon_threadsafe(self._failed, str(error), time.monotonic())
                     self._halt.wait(pause_s)
                     pause_s = min(2 * pause_s, _MAX_PAUSE_S)
-        except RuntimeError as error:  # the loop is closed: nobody listens any more
-            if not loop.is_closed():
-                loop.call_soon_threadsafe(_end, ended, error)
         except Exception as error:
-            loop.call_soon_threadsafe(_end, ended, error)
+            if not loop.is_closed():  # a closed loop is itself the cause
+                loop.call_soon_threadsafe(_end, ended, error)
 
-    def _carry(self, loop: asyncio.AbstractEventLoop, link: Link) -> None:
+    def _carry(self, loop: asyncio.AbstractEventLoop, link: VehicleLink) -> None:
         try:
             while not self._halt.is_set():
                 while self._to_send:
@@ -120,7 +117,7 @@ class Listener:
             self._say("info", f"the link {url} is back after {time.monotonic() - self._failed_s:.0f} s")
         self._failed_s, self.problem = None, ""
 
-    def _fail(self, problem: str, now_s: float) -> None:
+    def _failed(self, problem: str, now_s: float) -> None:
         if problem != self.problem:
             self._say("error", f"{problem}; trying again")
         self.problem = problem

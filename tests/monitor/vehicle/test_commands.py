@@ -1,12 +1,11 @@
-"""Orders: carried out by a real autopilot, and refusals told with its own reason."""
+"""Orders, carried out by a real autopilot or refused with its reason."""
 
 import asyncio
 
 import pytest
 
 from firmware_py.status import FlightMode
-from monitor.sticks import Sticks
-from monitor.vehicle.orders import CommandDesk
+from monitor.vehicle.commands import CommandSender, Sticks
 from scenarios.loader import load_scenario
 from tests.monitor.simulated_link import SimulatedLink, equipment
 from tests.monitor.watching import watching
@@ -29,7 +28,7 @@ async def in_the_air(watched):
     await watched.until(lambda: watched.status()["landed"] is False)
 
 
-async def test_arm_and_disarm_are_shown_by_telemetry(flown):
+async def test_arm_and_disarm_are_confirmed_by_telemetry(flown):
     watched, link = flown
     assert await watched.fleet.do(1, "arm") == (True, "the motors are on")
     assert link.drones[0].simulation.autopilot.status.armed
@@ -53,7 +52,7 @@ async def test_a_flight_by_orders(flown):
     assert watched.status()["landed"]
 
 
-async def test_the_sticks_lead_in_position_mode(flown):
+async def test_the_sticks_control_the_drone_in_position_mode(flown):
     watched, _link = flown
     await in_the_air(watched)
     watched.fleet.sticks(1, Sticks(0.0, 0.0, 0.0, 0.0))
@@ -76,7 +75,7 @@ async def test_offboard_without_an_app_is_refused_with_the_reason(flown):
     assert reason in [message["text"] for message in watched.of_kind("text")]
 
 
-async def test_stopping_the_motors_in_the_air_is_asked_with_force(flown):
+async def test_stopping_the_motors_in_the_air_is_forced(flown):
     watched, link = flown
     await in_the_air(watched)
     await watched.fleet.do(1, "stop_motors")  # whether it may is the vehicle's choice
@@ -84,7 +83,7 @@ async def test_stopping_the_motors_in_the_air_is_asked_with_force(flown):
     assert (sent[-1].param1, sent[-1].param2) == (0.0, 21196.0)
 
 
-async def test_two_at_once_get_each_their_own_answer(flown):
+async def test_simultaneous_orders_get_their_own_answers(flown):
     watched, link = flown
     await in_the_air(watched)
     answers = await asyncio.gather(
@@ -95,7 +94,7 @@ async def test_two_at_once_get_each_their_own_answer(flown):
     assert link.drones[0].simulation.autopilot.status.mode is FlightMode.HOLD
 
 
-async def test_a_drone_that_does_not_answer_is_asked_three_times():
+async def test_a_command_without_an_answer_is_sent_three_times():
     link = SimulatedLink(load_scenario("empty"))
     async with watching(equipment(link)) as watched:
         await watched.until_ready(link)
@@ -105,7 +104,7 @@ async def test_a_drone_that_does_not_answer_is_asked_three_times():
     assert sent == [0, 1, 2]
 
 
-async def test_what_is_no_order_is_told(flown):
+async def test_an_unknown_order_is_refused(flown):
     watched, _link = flown
     assert await watched.fleet.do(7, "arm") == (False, "no drone 7 is heard")
     ok, text = await watched.fleet.do(1, "dance")
@@ -116,29 +115,29 @@ def ack(number, result, target=250):
     return mavlink.MAVLink_command_ack_message(number, result, 0, 0, target, 190)
 
 
-async def test_in_progress_waits_longer_and_others_answers_are_not_ours():
+async def test_in_progress_extends_the_wait_and_answers_to_others_are_ignored():
     sent = []
-    desk = CommandDesk(1, sent.append)
-    asked = asyncio.create_task(desk.ask(22))
+    sender = CommandSender(1, sent.append)
+    asked = asyncio.create_task(sender.request(22))
     await asyncio.sleep(0)
-    desk.take(ack(22, 0, target=255))  # of another ground station
-    desk.take(ack(400, 0))
-    desk.take(ack(22, 5))  # in progress
+    sender.take(ack(22, 0, target=255))  # of another ground station
+    sender.take(ack(400, 0))
+    sender.take(ack(22, 5))  # in progress
     await asyncio.sleep(0.8)
     assert not asked.done()
     assert len(sent) == 1
-    desk.take(ack(22, 2))
+    sender.take(ack(22, 2))
     assert await asked == 2
 
 
-async def test_stopping_does_not_wait_for_its_turn():
+async def test_an_urgent_command_does_not_wait():
     sent = []
-    desk = CommandDesk(1, sent.append)
-    arming = asyncio.create_task(desk.ask(400, 1.0))
+    sender = CommandSender(1, sent.append)
+    arming = asyncio.create_task(sender.request(400, 1.0))
     await asyncio.sleep(0)
-    stopping = asyncio.create_task(desk.ask(400, 0.0, 21196.0, urgent=True))
+    stopping = asyncio.create_task(sender.request(400, 0.0, 21196.0, urgent=True))
     await asyncio.sleep(0)
     assert [(m.param1, m.param2) for m in sent] == [(1.0, 0.0), (0.0, 21196.0)]
-    desk.take(ack(400, 0))
+    sender.take(ack(400, 0))
     assert await stopping == 0
     assert await arming is None

@@ -1,11 +1,10 @@
-"""Tries: which is which, when they end, and which result belongs to which."""
+"""Tries: when they begin and end, and which result belongs to which."""
 
 from dataclasses import replace
 
 import pytest
 
-from monitor.tries import TryWatch
-from monitor.vehicle.judging import figures
+from monitor.vehicle.tries import TryWatch, figures
 from scenarios.result import FlightResult, RefereeReport, RefereeSnapshot, Standing
 
 FLYING = RefereeSnapshot(5_000_000, 10.0, 0.0, ("red",), "green", 0, True, True, False, False)
@@ -53,7 +52,7 @@ def test_a_try_begins_runs_every_second_and_ends(watch, events):
     assert (last.scenario, last.source, last.report) == ("s", "truth", CLEAN)
 
 
-def test_one_that_never_left_the_ground_ends_too(watch, events):
+def test_a_try_without_a_take_off_ends(watch, events):
     watch.see(standing(), 1.0)
     watch.see(standing(motors_on=False, settled=True), 2.0)
     assert kinds(events)[-1] == ("ended", False)
@@ -70,7 +69,7 @@ def test_the_apps_result_makes_it_final_once(watch, events):
     assert events[-1].report == result() == watch.result
 
 
-def test_a_result_that_comes_before_the_referee_says_so_waits(watch, events):
+def test_a_result_before_the_referee_s_end_waits(watch, events):
     watch.see(standing(try_time_s=39.9), 1.0)
     watch.take_result(7, result(), 1.1)
     assert kinds(events) == [("began", False)]
@@ -89,7 +88,7 @@ def test_the_result_of_an_earlier_try_is_not_counted_again(watch, events):
     assert watch.result is None
 
 
-def test_an_earlier_result_that_was_never_claimed_is_not_either(watch, events):
+def test_an_earlier_unclaimed_result_is_not_counted_either(watch, events):
     watch.see(landed(40.0), 1.0)
     watch.take_result(7, result(55.0), 1.2)  # of which try? none that was seen
     watch.see(landed(55.0, began_us=90_000_000), 5.0)
@@ -98,7 +97,7 @@ def test_an_earlier_result_that_was_never_claimed_is_not_either(watch, events):
     assert watch.result is None
 
 
-def test_a_monitor_that_starts_late_takes_no_replay_for_the_new_try(watch, events):
+def test_a_repeated_result_is_not_taken_for_the_try_that_is_flown(watch, events):
     watch.take_result(7, result(40.0), 0.5)
     watch.see(standing(try_time_s=12.0), 1.0)
     watch.see(standing(try_time_s=40.0), 29.0)  # the time fits by chance, but it is still flown
@@ -107,13 +106,13 @@ def test_a_monitor_that_starts_late_takes_no_replay_for_the_new_try(watch, event
     assert kinds(events)[-1] == ("ended", False)
 
 
-def test_another_scenarios_result_is_not_ours(watch):
+def test_a_result_of_another_scenario_is_not_taken(watch):
     watch.see(landed(), 1.0)
     watch.take_result(7, result(scenario="other"), 1.2)
     assert watch.result is None
 
 
-def test_an_app_that_breaks_off_ends_the_try_in_the_air(watch, events):
+def test_an_aborted_app_ends_the_try_in_the_air(watch, events):
     watch.see(standing(try_time_s=20.0), 1.0)
     watch.take_result(7, result(20.1, ended="aborted", verdict="aborted"), 1.1)
     assert kinds(events)[-1] == ("ended", True)
@@ -128,7 +127,7 @@ def test_two_referees_may_differ_by_their_heartbeats(watch):
     assert watch.result is not None
 
 
-def test_a_referee_that_vanishes_ends_the_try_and_one_that_returns_goes_on(watch, events):
+def test_a_try_ends_when_its_referee_is_gone_and_goes_on_when_it_returns(watch, events):
     watch.see(standing(), 1.0)
     watch.tick(3.9)
     assert kinds(events) == [("began", False)]
@@ -142,7 +141,7 @@ def test_a_referee_that_vanishes_ends_the_try_and_one_that_returns_goes_on(watch
     assert len({event.key for event in events}) == 1
 
 
-def test_a_result_after_the_referee_vanished_is_taken(watch):
+def test_a_result_is_taken_after_the_referee_is_gone(watch):
     watch.see(standing(try_time_s=39.8), 1.0)
     watch.take_result(7, result(40.0), 1.1)
     assert watch.result is None
@@ -150,7 +149,7 @@ def test_a_result_after_the_referee_vanished_is_taken(watch):
     assert watch.result == result(40.0)
 
 
-def test_the_next_try_ends_one_that_was_left(watch, events):
+def test_the_next_try_ends_the_one_before(watch, events):
     watch.see(standing(), 1.0)
     watch.see(standing(began_us=90_000_000), 1.2)
     assert kinds(events) == [("began", False), ("ended", False), ("began", False)]
@@ -160,10 +159,10 @@ def test_the_next_try_ends_one_that_was_left(watch, events):
 def test_a_restart_ends_it(watch, events):
     watch.see(standing(), 1.0)
     watch.close()
-    assert events[-1].report.reason.endswith("the drone started anew")
+    assert events[-1].report.reason.endswith("the drone restarted")
 
 
-def test_where_nobody_else_judges_the_apps_word_stands(watch, events):
+def test_without_a_referee_the_app_s_result_counts(watch, events):
     watch.take_result(7, result(), 2.0)
     watch.tick(9.0)
     assert events == []
@@ -176,7 +175,7 @@ def test_where_nobody_else_judges_the_apps_word_stands(watch, events):
 
 
 @pytest.mark.parametrize("time_s", [0.0, None, "40", True, float("nan")])
-def test_a_result_without_a_try_is_none(watch, events, time_s):
+def test_a_result_without_a_try_time_is_ignored(watch, events, time_s):
     watch.take_result(7, result(time_s), 2.0)
     watch.tick(20.0)
     assert events == []
@@ -230,5 +229,5 @@ def test_final_figures_are_those_of_the_result():
     assert figures(None, app, None)["total_time_s"] == 41.75
 
 
-def test_without_anybody_who_says_so_there_are_none():
+def test_there_are_no_figures_without_a_source():
     assert figures(None, None, 180.0) is None

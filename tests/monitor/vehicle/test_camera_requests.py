@@ -1,4 +1,4 @@
-"""Where the monitor asks when a drone names an address: real datagrams, and a real server that counts."""
+"""From where the monitor fetches when a drone sends a URL: real datagrams, and a real server that counts."""
 
 import asyncio
 import socket
@@ -15,7 +15,7 @@ from wire.dialect import mavlink
 
 @asynccontextmanager
 async def service(address):
-    """A web server of this machine; yields its port and the paths it was asked for."""
+    """A web server of this machine; yields its port and the requested paths."""
     asked = []
 
     async def answer(request):
@@ -34,7 +34,7 @@ async def service(address):
 
 
 class FakeDrone:
-    """Says from an address that it is a drone with a camera whose video is somewhere."""
+    """A drone at an address, with a camera that sends the URL of its video."""
 
     def __init__(self, address, port, url):
         self._socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
@@ -71,7 +71,7 @@ def free_port():
         ("127.0.0.1", "127.0.0.1", "video", True, {"/referee.json"}),  # and the redirection is not followed
     ],
 )
-async def test_only_a_camera_s_own_address_is_asked(address, service_address, place, confirmed, paths):
+async def test_only_a_camera_s_own_url_is_fetched(address, service_address, place, confirmed, paths):
     async with service(service_address) as (port, asked):
         hosts = (f"{service_address}:{port}",) if confirmed else ()
         link_port = free_port()
@@ -83,9 +83,7 @@ async def test_only_a_camera_s_own_address_is_asked(address, service_address, pl
                 def told():
                     drone.speak()
                     return (
-                        asked
-                        if confirmed
-                        else [each for each in watched.notices() if "not asked for" in each]
+                        asked if confirmed else [each for each in watched.notices() if "not fetched" in each]
                     )
 
                 await watched.until(told)
