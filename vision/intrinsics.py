@@ -1,4 +1,4 @@
-"""The pinhole model: how a camera's angle of view becomes focal length and camera matrix."""
+"""The pinhole model: focal length and camera matrix from the angle of view."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ import numpy.typing as npt
 
 
 def focal_length_px(width_px: int, horizontal_fov_rad: float) -> float:
-    """Return the focal length of an ideal pinhole camera, in pixels.
+    """Focal length of an ideal pinhole camera, pixels.
 
     Args:
         width_px: width of the image.
@@ -19,10 +19,10 @@ def focal_length_px(width_px: int, horizontal_fov_rad: float) -> float:
 
 
 def camera_matrix(width_px: int, height_px: int, horizontal_fov_rad: float) -> npt.NDArray[np.float64]:
-    """Return OpenCV's camera matrix of an ideal pinhole camera with square pixels.
+    """OpenCV's camera matrix of an ideal pinhole camera with square pixels.
 
     OpenCV counts pixels from 0 and puts whole numbers on pixel *centres*, so the middle of an image of w
-    columns lies at (w - 1) / 2.
+    columns is (w - 1) / 2.
 
     Returns:
         [[f, 0, cx], [0, f, cy], [0, 0, 1]], shape (3, 3), pixels.

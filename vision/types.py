@@ -1,12 +1,17 @@
-"""What vision gives to the navigator."""
+"""Images, camera sources and detections."""
 
 from __future__ import annotations
 
+from collections.abc import AsyncIterator
 from dataclasses import dataclass, field
 from math import inf
+from typing import Protocol, Self
+from urllib.parse import urlsplit
 
 import numpy as np
 import numpy.typing as npt
+
+from errors import UserError
 
 Image = npt.NDArray[np.uint8]
 
@@ -45,7 +50,7 @@ class Detections:
     """What one image showed.
 
     Attributes:
-        time_us: vehicle time of the image, microseconds; None where the source does not tell.
+        time_us: vehicle time of the image, microseconds; None if the source does not send it.
     """
 
     red: Detection = NOT_SEEN
@@ -60,7 +65,7 @@ class CameraFrame:
 
     Attributes:
         image: BGR, shape (height, width, 3), uint8.
-        time_us: vehicle time of its exposure, microseconds; None where the source does not tell.
+        time_us: vehicle time of its exposure, microseconds; None if the source does not send it.
         received_s: monotonic wall time of its arrival, seconds.
         jpeg: the compressed image as received, if it was; for recording without compressing again.
     """
@@ -69,3 +74,44 @@ class CameraFrame:
     time_us: int | None
     received_s: float
     jpeg: bytes | None = field(default=None, repr=False)
+
+
+class CameraError(UserError):
+    """A camera cannot be opened or has failed; the message is one line that names it."""
+
+
+class CameraSource(Protocol):
+    """A camera: `async with source: async for frame in source.frames()`.
+
+    A live source gives the latest image, however long the consumer took. `__aenter__` and `frames` raise
+    `CameraError` if the camera cannot be opened or fails.
+
+    Attributes:
+        bad_frames: images skipped so far because they could not be decoded.
+    """
+
+    bad_frames: int
+
+    async def __aenter__(self) -> Self:
+        """Open the camera."""
+        ...
+
+    async def __aexit__(self, *exc_info: object) -> None:
+        """Close it."""
+
+    def frames(self) -> AsyncIterator[CameraFrame]:
+        """Images in order of arrival."""
+        ...
+
+
+def shown_url(url: str) -> str:
+    """A URL for messages: without its password, on one line, at most 120 characters."""
+    text = url
+    try:
+        parts = urlsplit(url)
+        if parts.password is not None:
+            text = url.replace(f":{parts.password}@", ":***@", 1)
+    except ValueError:
+        pass  # not a URL; shown as it is
+    text = text.encode("unicode_escape").decode("ascii")
+    return text if len(text) <= 120 else text[:117] + "..."
