@@ -165,12 +165,12 @@ def _drone(
     drone = MavsdkDrone(vehicle.drone_url, start_arena=plan.start_pose, hang_report=hang_report, box=plan.box)
     drone.record_to(records.folder.tlog)
     stack.callback(lambda: warn(drone.recording_problem))
-    drone.tell_through(companion)
+    drone.use_companion(companion)
     if vehicle.sitl is not None:
-        drone.wait_with(vehicle.sitl.clock, vehicle.sitl.system_id)
+        drone.use_clock(vehicle.sitl.clock, vehicle.sitl.system_id)
     if vehicle.shared_with is not None:
         drone.share_with(vehicle.shared_with)
-    stack.push_async_callback(drone.let_go)  # not before the result has been told, over its link
+    stack.push_async_callback(drone.disconnect)  # not before the result has been told, over its link
     return drone
 
 

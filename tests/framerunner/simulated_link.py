@@ -24,9 +24,8 @@ from firmware_py.status import CommandResult, FlightMode, LandedState
 from framerunner.flying.plan import FlightPlan
 from offboard.app import MissionEnd, Moment, fly_mission
 from offboard.keep_in_box import Box, flight_box
-from offboard.link.setpoints import SetpointStream
-from offboard.link.telemetry import TelemetryFeed
-from offboard.link.ticks import TickSource
+from offboard.link.commands import SetpointStream
+from offboard.link.telemetry import TelemetryFeed, TickSource
 from offboard.mavsdk_drone import MavsdkDrone
 from offboard.mission import Mission
 from scenarios.models import Scenario
