@@ -1,15 +1,14 @@
-"""From YAML nodes to a `MissionFile`: structure, keys and names. Expressions are checked later."""
+"""From YAML nodes to a `MissionFile`: structure, keys and names. `check` checks expressions."""
 
 from __future__ import annotations
 
 import ast
 import re
-from difflib import get_close_matches
 from pathlib import Path
 
-from offboard.chart.problems import Place, ProblemList, cut
-from offboard.chart.source import ListNode, MapNode, Node, Scalar, parse
+from offboard.chart.problems import Place, ProblemList, cut, did_you_mean
 from offboard.chart.spec import Action, MissionFile, State, Transition
+from offboard.chart.yaml_nodes import ListNode, MapNode, Node, Scalar, parse_yaml
 
 _MISSION_KEYS = ("name", "description", "extends", "initial", "variables", "templates", "states")
 _STATE_KEYS = (
@@ -39,12 +38,12 @@ def read_mission_file(text: str, path: Path) -> MissionFile:
 
     Args:
         text: its content.
-        path: where it stands; its name is used in problems.
+        path: its file; problems have its name.
 
     Raises:
         MissionError: with every problem of its structure.
     """
-    root = parse(text, path.name, _MISSION_KEYS)
+    root = parse_yaml(text, path.name, _MISSION_KEYS)
     problems = ProblemList()
     mission = _Reader(problems).mission(root, path)
     problems.raise_if_any()
@@ -52,7 +51,7 @@ def read_mission_file(text: str, path: Path) -> MissionFile:
 
 
 class _Reader:
-    """Turns nodes into data and notes what does not fit."""
+    """Converts nodes to data and collects problems."""
 
     def __init__(self, problems: ProblemList) -> None:
         self._problems = problems
@@ -128,7 +127,7 @@ class _Reader:
                 continue
             if incomplete is not None and set(node.keys) == {"to"}:
                 text = "take the '-' before 'to' away, and put 'to' under the 'when' above it"
-                self._problems.take_back(incomplete)
+                self._problems.remove(incomplete)
                 self._problems.add(node.place, text)
                 incomplete = None
                 continue
@@ -204,7 +203,7 @@ class _Reader:
         return value
 
     def _mission_name(self, root: MapNode, path: Path) -> str:
-        """What the file says, or the file's own name written as a mission's."""
+        """The name in the file or, without one, the file's own name in the form of a mission's."""
         name = self._text(root, "name")
         if not name:
             words = re.sub(r"[^a-z0-9_-]+", "-", path.stem.lower()).strip("-_")
@@ -216,7 +215,7 @@ class _Reader:
         return name
 
     def _named(self, parent: MapNode, key: str) -> dict[str, Node]:
-        """States or templates by name; none if what belongs into one of them stands beside them."""
+        """States or templates by name; none if a key of one of them is not indented."""
         children = self._children(parent, key)
         names = list(children)
         for number, (name, node) in enumerate(children.items()):
@@ -286,21 +285,17 @@ class _Reader:
         return not unknown
 
     def _unknown_key(self, node: MapNode, key: str, allowed: tuple[str, ...], what: str) -> None:
-        near = get_close_matches(key.lower(), allowed, 1)
-        near = near or [word for word in (_SYNONYMS.get(key.lower(), ""),) if word in allowed]
-        mend = f"did you mean '{near[0]}'?" if near else f"it has {', '.join(allowed)}"
-        if not near and allowed == _MISSION_KEYS and isinstance(node.items[key], MapNode):
-            mend = "if it is a state, indent it to stand under 'states:'"
+        synonym = _SYNONYMS.get(key.lower(), "")
+        advice = f"did you mean '{synonym}'?" if synonym in allowed else ""
+        advice = did_you_mean(key.lower(), allowed, advice)
+        if not advice and allowed == _MISSION_KEYS and isinstance(node.items[key], MapNode):
+            advice = "if it is a state, indent it to stand under 'states:'"
         elif key in _TRANSITION_KEYS:
-            mend = f"write it into a list under 'transitions:', such as '- {key}: ...'"
-        elif key in _only_of_missions(allowed):
-            mend = "it belongs to the mission; write it at the beginning of a line"
-        self._problems.add(node.keys[key], f"{what} has no '{cut(key, 30)}'; {mend}")
-
-
-def _only_of_missions(allowed: tuple[str, ...]) -> tuple[str, ...]:
-    """Keys that only the mission itself has."""
-    return tuple(key for key in _MISSION_KEYS if key not in allowed and key not in _STATE_KEYS)
+            advice = f"write it into a list under 'transitions:', such as '- {key}: ...'"
+        elif key in _MISSION_KEYS and key not in (*allowed, *_STATE_KEYS):
+            advice = "it belongs to the mission; write it at the beginning of a line"
+        advice = advice or f"it has {', '.join(allowed)}"
+        self._problems.add(node.keys[key], f"{what} has no '{cut(key, 30)}'; {advice}")
 
 
 def _value_place(node: MapNode, key: str) -> Place:

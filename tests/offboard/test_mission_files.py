@@ -127,7 +127,7 @@ BAD_CHARTS = [
     (
         "    final: true",
         "    final: true\n    resume: up",
-        "m.yaml:17:13: state 'done' is final; nothing is left to go on with, take 'resume' away",
+        "m.yaml:17:13: state 'done' is final; there is nothing to continue, remove 'resume'",
     ),
     ("        to: done", "        to: done\n        resume: up", "a transition has no 'resume'"),
     ("name: little", "resume: up", "a mission has no 'resume'"),

@@ -159,10 +159,10 @@ def test_a_file_that_cannot_be_read_is_refused(tmp_path):
 
 BAD_STARTS = [
     ("def __init__(self, variables):\n    pass", "must begin with 'super().__init__(variables)'"),
-    ("def __init__(self):\n    super().__init__()", "my_pilot.py: MyPilot cannot be made: TypeError: "),
+    ("def __init__(self):\n    super().__init__()", "my_pilot.py: MyPilot cannot be created: TypeError: "),
     (
         "def __init__(self, variables):\n    super().__init__(variables)\n    self.memory.total += 1",
-        "my_pilot.py:30: MyPilot cannot be made: AttributeError: ",
+        "my_pilot.py:30: MyPilot cannot be created: AttributeError: ",
     ),
 ]
 
