@@ -15,7 +15,7 @@ from offboard.drone import DroneState, VelocityCommand
 from offboard.engine import TransitionTaken
 from offboard.mission import load_mission, mermaid
 from scenarios.result import FlightResult
-from tests.offboard.fakes import START_1, TEST_CASE_1, GeometricEyes, KinematicDrone
+from tests.offboard.fakes import START_1, TEST_CASE_1, GeometricPerception, KinematicDrone
 from vision.types import CameraFrame, Detection, Detections
 from wire.mission_codec import DocumentAssembler
 from wire.mission_messages import DocumentKind
@@ -231,8 +231,8 @@ async def test_a_whole_flight_is_told_in_order():
         seen.append((moment.state.time_us, moment.mission_state))
         teller.see(moment)
 
-    eyes = GeometricEyes(drone, TEST_CASE_1)
-    outcome = await fly_mission(drone, None, MISSION, observer=observe, eyes=eyes)
+    perception = GeometricPerception(drone, TEST_CASE_1)
+    outcome = await fly_mission(drone, perception, MISSION, observer=observe)
     assert outcome.ended == "finished"
     changes = [now for now, before in zip(seen, [(0, ""), *seen], strict=False) if now[1] != before[1]]
     assert listener.texts == [f"mission: {state}" for _, state in changes]
