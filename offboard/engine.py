@@ -16,7 +16,7 @@ from math import isfinite
 from statemachine import StateChart
 
 from errors import UserError
-from offboard.chart.expressions import Evaluate, compile_value, names_in
+from offboard.chart.expressions import compile_value, names_in
 from offboard.chart.native import RESUME, TICK
 from offboard.chart.spec import Action, Leaf, Transition
 from offboard.drone import VelocityCommand
@@ -65,7 +65,7 @@ class _FastState:
 
     def __init__(self, leaf: Leaf, finish: bool) -> None:
         self.leaf = leaf
-        self.guards = tuple(_guard(transition.when) for transition in leaf.transitions)
+        self.guards = tuple(compile_value(transition.when or "True") for transition in leaf.transitions)
         self.during = tuple(_act(action) for action in leaf.during)
         self.finish = finish
 
@@ -240,10 +240,6 @@ def _values(when: str, pilot: Pilot) -> tuple[tuple[str, object], ...]:
             continue
         found.append((name, value))
     return tuple(found)
-
-
-def _guard(when: str) -> Evaluate:
-    return compile_value(when) if when else lambda pilot: True
 
 
 def _act(action: Action) -> Act:

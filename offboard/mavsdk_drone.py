@@ -133,11 +133,7 @@ class MavsdkDrone:
         return self._ticks.late
 
     async def connect(self) -> None:
-        """Find the vehicle and subscribe to its telemetry.
-
-        Raises:
-            DroneError: port in use, device missing, no vehicle within the limit.
-        """
+        """Find the vehicle and subscribe to its telemetry."""
         advice = "give another address" if self._system_id is None else "choose another --instance"
         try:
             check_free(self._url, advice)
@@ -146,13 +142,7 @@ class MavsdkDrone:
         log_subscribe(_log)
         # As a ground station: PX4 sends the reasons of its refusals (STATUSTEXT) only to ground stations.
         self._mavsdk = Mavsdk(Configuration.create_with_component_type(ComponentType.GROUND_STATION))
-        await self._add_recorder()
-        await self._add_companion()
-        try:
-            for url in (*self._shared_with, self._url.text):
-                await self._mavsdk.add_any_connection(url, ForwardingOption.ON)
-        except MavsdkError as error:
-            raise DroneError(f"cannot open {self._url.text}: {error}") from None
+        await self._open_connections(self._mavsdk)
         system: Any = await self._mavsdk.first_autopilot(self._connect_limit_s)
         if system is None:
             raise DroneError(
@@ -173,12 +163,27 @@ class MavsdkDrone:
         self._telemetry = TelemetryAsync(system)
         self._feed.subscribe(_synchronous(self._telemetry), _synchronous(MavlinkDirectAsync(system)))
 
-    async def ready(self) -> None:
-        """Wait until the vehicle can be armed; then determine the axes.
+    async def _open_connections(self, mavsdk: Mavsdk) -> None:
+        """To recorder, companion, ground stations and vehicle; MAVSDK forwards between them."""
+        if self._tlog_path is not None:
+            try:
+                self._recorder = TlogRecorder(self._tlog_path)
+                await mavsdk.add_any_connection(await self._recorder.listen(), ForwardingOption.ON)
+            except (OSError, MavsdkError) as error:
+                raise DroneError(f"cannot record to {self._tlog_path}: {error}") from None
+        if self._companion is not None:
+            try:
+                await mavsdk.add_any_connection(self._companion.listen(), ForwardingOption.ON)
+            except (OSError, MavsdkError) as error:  # the mission can be flown without
+                logger.warning("the mission cannot be reported: %s", error)
+        try:
+            for url in (*self._shared_with, self._url.text):
+                await mavsdk.add_any_connection(url, ForwardingOption.ON)
+        except MavsdkError as error:
+            raise DroneError(f"cannot open {self._url.text}: {error}") from None
 
-        Raises:
-            DroneError: with what is missing; or the vehicle is armed already.
-        """
+    async def ready(self) -> None:
+        """Wait until the vehicle can be armed; then determine the axes."""
         try:
             await self._wait_for_checks()
         except TimeoutError:
@@ -209,12 +214,7 @@ class MavsdkDrone:
         await self._until(lambda: not self._feed.missing(), self._ready_limit_s)
 
     async def ticks(self) -> AsyncIterator[DroneState]:
-        """States at 20 Hz of vehicle time; ticks that were not waited for are skipped.
-
-        Raises:
-            DroneError: link lost, values not finite, app hung; and, while no pilot has it: another mode,
-                disarmed by others.
-        """
+        """States at 20 Hz of vehicle time; ticks that were not waited for are skipped."""
         while True:
             command = self._sent if self._commanding and not self._pilot_has_it else None
             received = await self._ticks.next(STAND_STILL_S, command)
@@ -290,8 +290,7 @@ class MavsdkDrone:
             return
         if self._feed.mode == "OFFBOARD":
             await self._leave_offboard()
-            mode = self._feed.mode
-            if mode != "HOLD" and mode not in PILOT_MODES:
+            if (mode := self._feed.mode) != "HOLD" and mode not in PILOT_MODES:
                 raise DroneError(f"the vehicle is in {mode} instead{self._feed.recent_texts()}")
         else:
             await asyncio.to_thread(self._stream.end)
@@ -411,18 +410,16 @@ class MavsdkDrone:
 
     def _check_state(self, state: DroneState) -> None:
         values = (state.x, state.y, state.z, state.yaw, *state.velocity_arena_m_s)
-        if not all(isfinite(value) for value in values):
+        if not all(map(isfinite, values)):
             raise DroneError("the vehicle's position, velocity or heading is not finite")
         if not self._commanding or self._pilot_has_it:
             return
         if not state.armed:
             raise DroneError(f"the vehicle was disarmed by others{self._feed.recent_texts()}")
-        if state.offboard:
-            return
-        if state.mode not in PILOT_MODES:
+        if not state.offboard and state.mode not in PILOT_MODES:
             texts = self._feed.recent_texts()
             raise DroneError(f"the pilot or a failsafe took over: mode {state.mode}{texts}")
-        self._pilot_has_it = True
+        self._pilot_has_it = not state.offboard
 
     async def _request(self, what: str, request: Awaitable[object]) -> None:
         try:
@@ -456,32 +453,12 @@ class MavsdkDrone:
                     raise TimeoutError
                 await self._ticks.next(0.05)
 
-    async def _add_recorder(self) -> None:
-        if self._tlog_path is None or self._mavsdk is None:
-            return
-        try:
-            self._recorder = TlogRecorder(self._tlog_path)
-            url = await self._recorder.listen()
-            await self._mavsdk.add_any_connection(url, ForwardingOption.ON)
-        except (OSError, MavsdkError) as error:
-            raise DroneError(f"cannot record to {self._tlog_path}: {error}") from None
-
-    async def _add_companion(self) -> None:
-        if self._companion is None or self._mavsdk is None:
-            return
-        try:
-            await self._mavsdk.add_any_connection(self._companion.listen(), ForwardingOption.ON)
-        except (OSError, MavsdkError) as error:  # the mission can be flown without
-            logger.warning("the mission cannot be reported: %s", error)
-
     def _stop_from_watchdog(self) -> None:
-        """On the watchdog's thread: end the native stream and request hold.
+        """On the watchdog's thread: end the native stream and, in offboard, request hold.
 
-        If others have the vehicle, hold is not requested, but the stream ends permanently: the vehicle must
-        not be given back to an app that hangs. An error is ignored, because without setpoints the vehicle's
-        failsafe acts.
+        A vehicle that a pilot has must not be given back to a hung app, so the stream ends permanently.
         """
-        with contextlib.suppress(Exception):
+        with contextlib.suppress(Exception):  # without setpoints the vehicle's failsafe acts
             if self._feed.mode == "OFFBOARD":
                 self._stream.request_hold_blocking()
             else:

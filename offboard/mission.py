@@ -73,11 +73,7 @@ class Mission:
         return frozenset(leaf_id for leaf_id in self.leaves if is_finish(states, leaf_id))
 
     def new_pilot(self) -> Pilot:
-        """A pilot with the mission's own variables.
-
-        Raises:
-            MissionError: the contestant's class cannot be made.
-        """
+        """A pilot with the mission's own variables; `MissionError` if a contestant's class fails."""
         variables = dict(self.spec.variables)
         if isinstance(self.pilot, PilotFile):
             return self.pilot.new_pilot(variables)
@@ -103,7 +99,7 @@ def load_mission(name_or_path: str | Path, pilot: PilotFile | type[Pilot] | None
     path = _find(str(name_or_path), Path.cwd(), Place(str(name_or_path)))
     written = read_mission_file(_read_text(path), path)
     problems = ProblemList()
-    spec = expand(merge_extended(written, _open_base), problems)
+    spec = expand(merge_extended(written, _read_base), problems)
     check(spec, pilot.pilot_class() if isinstance(pilot, PilotFile) else pilot, problems)
     problems.raise_if_any()
     mission = Mission(spec.name, spec.description, path, spec, pilot, native_yaml(spec))
@@ -112,7 +108,7 @@ def load_mission(name_or_path: str | Path, pilot: PilotFile | type[Pilot] | None
     return mission
 
 
-def _open_base(mission: MissionFile) -> MissionFile:
+def _read_base(mission: MissionFile) -> MissionFile:
     path = _find(mission.extends, mission.path.parent, mission.place)
     return read_mission_file(_read_text(path), path)
 
@@ -190,13 +186,7 @@ def _draw(state: State, indent: str, lines: list[str]) -> None:
 
 @dataclass(frozen=True, slots=True)
 class NewMission:
-    """The files of a new mission.
-
-    Attributes:
-        mission: the mission file.
-        pilot: the Python file that belongs to it, if there is one.
-        texts: the content of each.
-    """
+    """The files of a new mission, and the text of each."""
 
     mission: Path
     pilot: Path | None
@@ -210,13 +200,7 @@ class NewMission:
 
 
 def new_mission(name: str, folder: Path, *, python: bool = False) -> NewMission:
-    """Compose a first mission with comments; nothing is written.
-
-    Args:
-        name: of the mission, small letters, digits and _.
-        folder: of its files.
-        python: with a Python file.
-    """
+    """Compose a first mission with comments, with or without a Python file; nothing is written."""
     from jinja2 import Environment, FileSystemLoader, StrictUndefined  # noqa: PLC0415 - slow to import
 
     templates = Environment(

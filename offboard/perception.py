@@ -69,11 +69,7 @@ class CameraPerception:
         self._task: asyncio.Task[None] | None = None
 
     async def open(self) -> None:
-        """Wait for the first image.
-
-        Raises:
-            CameraLostError: there was none.
-        """
+        """Wait for the first image; raises `CameraLostError` if there is none."""
         self._task = asyncio.create_task(self._watch(), name="camera")
         with contextlib.suppress(TimeoutError):
             await asyncio.wait_for(self._arrived.wait(), FIRST_IMAGE_S)
@@ -81,11 +77,7 @@ class CameraPerception:
             raise CameraLostError(self._ended or f"the camera gave no image within {FIRST_IMAGE_S:g} s")
 
     def latest(self, time_us: int) -> Detections:
-        """What the latest image showed, at this vehicle time.
-
-        Raises:
-            CameraLostError: the camera ended, failed, or its last image is older than a second.
-        """
+        """What the latest image showed; `CameraLostError` if the camera ended or failed, or it is too old."""
         if self._images != self._images_used:
             self._images_used = self._images
             self._used_us = time_us if self._image_us is None else self._image_us
@@ -100,8 +92,7 @@ class CameraPerception:
     async def seen(self, image_us: int, limit_s: float) -> bool:
         """Wait until the image exposed at a vehicle time, or a later one, has been processed.
 
-        Returns:
-            False if it was not within `limit_s` of wall time, or the camera has failed.
+        False if it was not within `limit_s` of wall time, or the camera has failed.
         """
         with contextlib.suppress(TimeoutError):
             async with asyncio.timeout(limit_s):

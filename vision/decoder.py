@@ -28,11 +28,7 @@ class ImageDecoder:
         self._worker = WorkerProcess()
 
     async def decode_jpeg(self, data: bytes) -> Image:
-        """Decode a JPEG to BGR.
-
-        Raises:
-            ImageError: not one that a camera sends, damaged, or it takes too long.
-        """
+        """Decode a JPEG to BGR; raises `ImageError` if no camera sends it, or it takes too long."""
         if not jpeg_structure(data, self._size_px).is_quick:
             return await self.decode_file(data)
         try:
@@ -44,11 +40,7 @@ class ImageDecoder:
         return image
 
     async def decode_file(self, data: bytes) -> Image:
-        """Decode an image of any format that OpenCV can read.
-
-        Raises:
-            ImageError: not an image, too large, or it takes too long.
-        """
+        """Decode an image of any format that OpenCV can read; raises `ImageError`."""
         try:
             await self._worker.start()
             async with asyncio.timeout(DECODE_LIMIT_S):

@@ -40,11 +40,7 @@ class Latest(Generic[T]):
         self._changed.set()
 
     async def get(self) -> T:
-        """Take the item; wait for one if there is none.
-
-        Raises:
-            CameraError: given to `end`, after the last item was taken.
-        """
+        """Take the item; wait for one if there is none. After the last one, raises the error of `end`."""
         while self._item is None:
             if self._error is not None:
                 raise self._error
@@ -78,11 +74,7 @@ class HttpSource:
         self._last_refused = ""
 
     async def __aenter__(self) -> Self:
-        """Connect.
-
-        Raises:
-            CameraError: there is no answer, or it is not MJPEG.
-        """
+        """Connect; raises `CameraError` if there is no answer, or it is not MJPEG."""
         limits = aiohttp.ClientTimeout(total=None, connect=self._timeout_s, sock_connect=self._timeout_s)
         self._session = aiohttp.ClientSession(timeout=limits, auto_decompress=False)
         try:
@@ -105,11 +97,7 @@ class HttpSource:
             await self._session.close()
 
     async def frames(self) -> AsyncIterator[CameraFrame]:
-        """Always the latest image.
-
-        Raises:
-            CameraError: the stream ended or cannot be read, or no image arrived in time.
-        """
+        """Always the latest image; raises `CameraError` when the stream fails or no image arrives in time."""
         loop = asyncio.get_running_loop()
         deadline_s = loop.time() + self._timeout_s
         while True:
@@ -117,9 +105,11 @@ class HttpSource:
                 async with asyncio.timeout_at(deadline_s):
                     part, received_s = await self._latest.get()
             except TimeoutError:
-                raise CameraError(
-                    f"{self._name}: no image for {self._timeout_s:g} s{self._skipped()}"
-                ) from None
+                problem = f"{self._name}: no image for {self._timeout_s:g} s"
+                if self.bad_frames:
+                    last = f"the last one is {self._last_refused}"
+                    problem += f" ({self.bad_frames} images were skipped; {last})"
+                raise CameraError(problem) from None
             try:
                 image = await self._decoder.decode_jpeg(part.data)
             except ImageError as error:
@@ -144,11 +134,6 @@ class HttpSource:
             raise CameraError(f"{self._name}: not a valid URL") from error
         except (aiohttp.ClientError, OSError, ValueError) as error:
             raise CameraError(f"{self._name}: {_first_line(error)}") from error
-
-    def _skipped(self) -> str:
-        if not self.bad_frames:
-            return ""
-        return f" ({self.bad_frames} images were skipped; the last one is {self._last_refused})"
 
     def _reader(self, response: aiohttp.ClientResponse) -> MjpegReader:
         if response.status != 200:

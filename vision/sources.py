@@ -85,11 +85,7 @@ class CaptureSource:
         self._worker = WorkerProcess()
 
     async def __aenter__(self) -> Self:
-        """Open the camera.
-
-        Raises:
-            CameraError: it cannot be opened, or not in time.
-        """
+        """Open the camera; raises `CameraError` if that fails, also after `timeout_s`."""
         settings = f"{round(self._timeout_s * 1000)} {self._url}".encode()
         try:
             async with asyncio.timeout(self._timeout_s):
@@ -106,11 +102,7 @@ class CaptureSource:
         self._worker.end()
 
     async def frames(self) -> AsyncIterator[CameraFrame]:
-        """Always the latest image; its vehicle time is unknown.
-
-        Raises:
-            CameraError: the stream ended, or no image arrived in time.
-        """
+        """Always the latest image; its vehicle time is unknown. Raises `CameraError`."""
         loop = asyncio.get_running_loop()
         deadline_s = loop.time() + self._timeout_s
         while True:
@@ -158,11 +150,7 @@ class FolderSource:
         self._decoder = ImageDecoder()
 
     async def __aenter__(self) -> Self:
-        """List the folder.
-
-        Raises:
-            CameraError: it cannot be read or holds no images.
-        """
+        """List the folder; raises `CameraError` if it cannot be read or holds no images."""
         try:
             entries = sorted(self._folder.iterdir())
         except OSError as error:

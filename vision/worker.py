@@ -94,20 +94,13 @@ class WorkerProcess:
         return None if self._process is None else self._process.pid
 
     async def start(self) -> None:
-        """Start the process, if there is none, and wait until it is ready.
-
-        Raises:
-            WorkerEndedError: it cannot be started, or not in time.
-        """
+        """Start the process, if there is none, and wait until it is ready. Raises `WorkerEndedError`."""
         if self._process is not None:
             return
-        try:
+        with self._ended_by_errors("does not start"):
             self._spawn()
             async with asyncio.timeout(_START_LIMIT_S):
                 await self._answer()
-        except (OSError, TimeoutError) as error:
-            self.end()
-            raise WorkerEndedError(f"the process that decodes images does not start: {error}") from error
 
     async def request(self, kind: Request, data: bytes = b"") -> Answer:
         """Send one request and wait for its answer. Cancelling the wait ends the process.
@@ -117,16 +110,10 @@ class WorkerProcess:
         """
         await self.start()
         assert self._link is not None
-        try:
+        with self._ended_by_errors("has ended"):
             head = REQUEST.pack(kind, len(data))
             await asyncio.get_running_loop().sock_sendall(self._link, head + data)
             return await self._answer()
-        except OSError as error:
-            self.end()
-            raise WorkerEndedError("the process that decodes images has ended") from error
-        except BaseException:  # also a cancelled wait: its answer would be taken for the next request's
-            self.end()
-            raise
 
     def end(self) -> None:
         """Kill the process."""
@@ -142,21 +129,28 @@ class WorkerProcess:
             # The system needs a moment to take back its memory; the event loop does not wait for that.
             threading.Thread(target=process.wait, daemon=True).start()
 
+    @contextlib.contextmanager
+    def _ended_by_errors(self, problem: str) -> Iterator[None]:
+        """End the process after any error, also a cancelled wait: the next request would get its answer."""
+        try:
+            yield
+        except BaseException as error:
+            self.end()
+            if isinstance(error, OSError):
+                raise WorkerEndedError(f"the process that decodes images {problem}: {error}") from error
+            raise
+
     async def _answer(self) -> Answer:
         """Wait for the next answer."""
         assert self._link is not None
-        loop = asyncio.get_running_loop()
         answer = bytearray()
-        try:
-            while len(answer) < ANSWER.size:
-                chunk = await loop.sock_recv(self._link, ANSWER.size - len(answer))
-                if not chunk:
-                    raise ConnectionResetError("it has ended")
-                answer += chunk
-            return self._checked(bytes(answer))
-        except BaseException:
-            self.end()
-            raise
+        while len(answer) < ANSWER.size:
+            size = ANSWER.size - len(answer)
+            chunk = await asyncio.get_running_loop().sock_recv(self._link, size)
+            if not chunk:
+                raise ConnectionResetError("connection closed")
+            answer += chunk
+        return self._checked(bytes(answer))
 
     def _spawn(self) -> None:
         ours, theirs = socket.socketpair()
@@ -215,7 +209,7 @@ class _Capture:
         self._changed = threading.Condition()
 
     def start(self) -> bool:
-        """Start reading; False if it could not be opened."""
+        """Start to read; False if it could not be opened."""
         if not self._capture.isOpened():
             return False
         threading.Thread(target=self._read, daemon=True).start()
@@ -321,7 +315,7 @@ def _serve(link: socket.socket, memory: mmap.mmap) -> None:
 
 
 def main() -> None:
-    """Run the process on the descriptors that the parent passed."""
+    """Serve on the descriptors that the parent passed."""
     with contextlib.suppress(ValueError, OSError):  # not every system has these limits
         resource.setrlimit(resource.RLIMIT_AS, (MEMORY_LIMIT_BYTES, MEMORY_LIMIT_BYTES))
         resource.setrlimit(resource.RLIMIT_CORE, (0, 0))

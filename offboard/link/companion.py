@@ -103,17 +103,15 @@ class Companion:
             self._state = encode_state(state)
         except PayloadError as error:
             logger.warning("not sent: %s", error)
-            return
-        self._send_state()
+        else:
+            self._send_state()
 
     def send_detections(self, detections: MissionDetections) -> None:
         """Send what an image showed."""
         try:
-            payload = encode_detections(detections)
+            self._send_tunnel(DETECTIONS_TYPE, encode_detections(detections))
         except PayloadError as error:
             logger.warning("not sent: %s", error)
-            return
-        self._send_tunnel(DETECTIONS_TYPE, payload)
 
     def send_document(self, kind: DocumentKind, pieces: list[bytes]) -> None:
         """Send a document of `split_document` at the next beats, then repeat it in turn with the others."""
@@ -123,16 +121,15 @@ class Companion:
     def send_text(self, text: str) -> None:
         """Send a STATUSTEXT of severity INFO, in several messages if it is too long for one."""
         data = text.encode("utf-8", "replace")[: _MAX_TEXT_CHUNKS * _TEXT_BYTES]
+        severity = mavlink.MAV_SEVERITY_INFO
         if len(data) <= _TEXT_BYTES:
-            self._send(mavlink.MAVLink_statustext_message(mavlink.MAV_SEVERITY_INFO, data))
+            self._send(mavlink.MAVLink_statustext_message(severity, data))
             return
         self._text_id = self._text_id % 0xFFFF + 1
         # The last one must end with a zero, so there is one more if the text fills them exactly.
         for number in range(len(data) // _TEXT_BYTES + 1):
             chunk = data[number * _TEXT_BYTES : (number + 1) * _TEXT_BYTES]
-            self._send(
-                mavlink.MAVLink_statustext_message(mavlink.MAV_SEVERITY_INFO, chunk, self._text_id, number)
-            )
+            self._send(mavlink.MAVLink_statustext_message(severity, chunk, self._text_id, number))
 
     def beat(self) -> None:
         """Send what is due between ticks: heartbeat, pieces of documents, the last state again."""

@@ -62,19 +62,13 @@ class TelemetryFeed:
         clock: monotonic wall time, seconds.
 
     Attributes:
-        sample: of the last tick.
+        sample: of the last tick; time, yaw, position and velocity here are the latest, as in `Sample`.
         tick_number: of the last tick, counted from the vehicle's boot.
-        time_us: vehicle time of the latest attitude, microseconds since its boot.
-        yaw_ned_rad: heading, clockwise from north.
-        position_ned_m: local position, shape (3,).
-        velocity_ned_m_s: shape (3,).
-        position_us: time of position and velocity, microseconds since boot.
         armed: from the last heartbeat; None before the first.
         mode: name of the flight mode, such as "OFFBOARD".
         landed: from EXTENDED_SYS_STATE.
         health: MAVSDK's health, None before the first.
-        attitudes: how many were received.
-        positions: how many were received.
+        attitudes, positions: how many were received.
     """
 
     def __init__(self, clock: Callable[[], float] = time.monotonic) -> None:
@@ -102,12 +96,7 @@ class TelemetryFeed:
         self._new_tick = asyncio.Event()
 
     def subscribe(self, plugin: Any, direct: Any) -> None:  # noqa: ANN401 - MAVSDK is untyped
-        """Receive a vehicle's telemetry.
-
-        Args:
-            plugin: MAVSDK's telemetry plugin (the synchronous one).
-            direct: its `mavlink_direct` plugin (the synchronous one).
-        """
+        """Subscribe to MAVSDK's synchronous plugins `telemetry` and `mavlink_direct`."""
         self._loop = asyncio.get_running_loop()
         plugin.subscribe_attitude_euler(self._on_attitude)
         direct.subscribe_message("LOCAL_POSITION_NED", self._on_position)
@@ -118,10 +107,9 @@ class TelemetryFeed:
         plugin.subscribe_status_text(self._on_text)
 
     async def next_tick(self, timeout_s: float) -> bool:
-        """Wait for the next tick; ticks that were not waited for are skipped.
+        """Wait for the next tick; False if there was none within `timeout_s` of wall time.
 
-        Returns:
-            False if there was none within `timeout_s` of wall time.
+        Ticks that were not waited for are skipped.
         """
         try:
             # Not wait_for: before Python 3.12 it loses a cancellation that arrives together with the tick,
@@ -134,11 +122,7 @@ class TelemetryFeed:
         return True
 
     async def tick(self, number: int, timeout_s: float) -> bool:
-        """Wait until the tick of this number, or a later one, has been received.
-
-        Returns:
-            False if it was not within `timeout_s` of wall time.
-        """
+        """Wait for the tick of this number, or a later one; False after `timeout_s` of wall time."""
         with contextlib.suppress(TimeoutError):
             async with asyncio.timeout(timeout_s):
                 while self.tick_number < number:
@@ -237,11 +221,9 @@ def _number(value: float | None) -> float:
 
 
 async def request_rates(feed: TelemetryFeed, plugin: Any) -> None:  # noqa: ANN401
-    """Request 50 Hz of attitude and position if the vehicle sends less; a refusal is no error.
+    """Request 50 Hz of attitude and position, from MAVSDK's asyncio plugin, if the vehicle sends less.
 
-    Args:
-        feed: subscribed to the vehicle.
-        plugin: MAVSDK's telemetry plugin (the asyncio one).
+    A refusal is no error.
     """
     start_us, attitudes, positions = feed.time_us, feed.attitudes, feed.positions
     await asyncio.sleep(0.5)
@@ -302,14 +284,11 @@ class TickSource:
             self.waits = True
 
     async def next(self, timeout_s: float, command: VelocityCommand | None = None) -> bool:
-        """Wait for the next tick; the feed's `sample` belongs to it then.
+        """Wait for the next tick; the feed's `sample` belongs to it then. False if there was none.
 
         Args:
             timeout_s: wall time to wait if vehicle time does not wait.
             command: see `VehicleClock.advance`; with one, ticks skipped are counted as late.
-
-        Returns:
-            False if there was none.
         """
         clock = self._clock
         if clock is None or not self.waits:

@@ -12,7 +12,7 @@ are sent unchanged, to the last bit.
 from __future__ import annotations
 
 from collections import deque
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from math import cos, exp, hypot, pi, remainder, sin
 
 from geometry.vectors import Vec3
@@ -37,6 +37,7 @@ _MAX_STEP_S = 0.2  # after a longer gap the model starts again at the vehicle
 LAG_WINDOW = 8  # ticks over which a change of speed is measured
 INITIAL_LAG_S = 0.3
 MAX_LAG_S = 0.7
+MIN_CHANGES = (0.1, 0.1, 0.08, 0.15)  # of speed in x, y, z (m/s) and yaw (rad/s) by which lag is measured
 _INITIAL_WEIGHT = 8.0  # of the initial lag, in changes of the minimum size
 
 
@@ -104,20 +105,6 @@ class _Model:
     recent_speed_m_s: float = 0.0
 
 
-@dataclass(slots=True)
-class _Lags:
-    """The vehicle's lags: over the ground (x and y), in height, in yaw."""
-
-    x: LagEstimate = field(default_factory=lambda: LagEstimate(0.1))
-    y: LagEstimate = field(default_factory=lambda: LagEstimate(0.1))
-    up: LagEstimate = field(default_factory=lambda: LagEstimate(0.08))
-    yaw: LagEstimate = field(default_factory=lambda: LagEstimate(0.15))
-
-    def interrupt(self) -> None:
-        for lag in (self.x, self.y, self.up, self.yaw):
-            lag.interrupt()
-
-
 class CommandTracker:
     """Adds to velocity commands what makes the vehicle follow the model.
 
@@ -126,16 +113,14 @@ class CommandTracker:
     """
 
     def __init__(self) -> None:
-        self.active = False
-        self._model: _Model | None = None
-        self._lags = _Lags()
         self._commanded = self._sent = VelocityCommand()
+        self.reset()
 
     def reset(self) -> None:
         """Start again at the next state, without correction."""
-        self._model = None
-        self._lags = _Lags()
         self.active = False
+        self._model: _Model | None = None
+        self._lags = tuple(map(LagEstimate, MIN_CHANGES))
 
     def correct(self, command: VelocityCommand, state: DroneState) -> VelocityCommand:
         """The command to send, from the mission's command and the vehicle's state now; once a tick."""
@@ -144,7 +129,8 @@ class CommandTracker:
         step_s = 0.0 if model is None else (state.time_us - model.time_us) * 1e-6
         if model is None or not 0.0 <= step_s <= _MAX_STEP_S:
             self._model = _Model(state.time_us, (state.x, state.y, state.z), state.yaw)
-            self._lags.interrupt()
+            for lag in self._lags:
+                lag.interrupt()
             return command
         if step_s > 0.0:
             _advance(model, commanded, state, step_s)
@@ -153,17 +139,14 @@ class CommandTracker:
         if offset_m > MIN_OFFSET_M or abs(model.offset_rad) > MIN_OFFSET_RAD:
             self.active = True
         if self.active:
-            self._sent = _corrected(command, model, self._lags, state)
+            self._sent = _corrected(command, model, [lag.lag_s for lag in self._lags], state)
         return self._sent
 
     def _measure_lags(self, sent: VelocityCommand, model: _Model, state: DroneState, step_s: float) -> None:
-        lags = self._lags
-        sent_x, sent_y = _turned(sent.forward_m_s, sent.left_m_s, state.yaw)
-        velocity_x, velocity_y, velocity_z = state.velocity_arena_m_s
-        lags.x.update(sent_x, velocity_x, step_s)
-        lags.y.update(sent_y, velocity_y, step_s)
-        lags.up.update(sent.up_m_s, velocity_z, step_s)
-        lags.yaw.update(sent.yaw_rate_rad_s, model.measured_yaw_rate_rad_s, step_s)
+        commanded = (*_turned(sent.forward_m_s, sent.left_m_s, state.yaw), sent.up_m_s, sent.yaw_rate_rad_s)
+        measured = (*state.velocity_arena_m_s, model.measured_yaw_rate_rad_s)
+        for lag, command, speed in zip(self._lags, commanded, measured, strict=True):
+            lag.update(command, speed, step_s)
 
 
 def _advance(model: _Model, commanded: VelocityCommand, state: DroneState, step_s: float) -> None:
@@ -220,16 +203,19 @@ def _forget_across(
     )
 
 
-def _corrected(command: VelocityCommand, model: _Model, lags: _Lags, state: DroneState) -> VelocityCommand:
+def _corrected(
+    command: VelocityCommand, model: _Model, lags_s: list[float], state: DroneState
+) -> VelocityCommand:
     wanted_x, wanted_y = _turned(command.forward_m_s, command.left_m_s, state.yaw)
-    level_s = max(lags.x.lag_s, lags.y.lag_s)
+    x_s, y_s, up_s, yaw_s = lags_s
+    level_s = max(x_s, y_s)
     add = [
         _velocity_correction(wanted, speed, measured, lag_s) + POSITION_GAIN_PER_S * offset
         for wanted, speed, measured, lag_s, offset in zip(
             (wanted_x, wanted_y, command.up_m_s),
             model.velocity_m_s,
             state.velocity_arena_m_s,
-            (level_s, level_s, lags.up.lag_s),
+            (level_s, level_s, up_s),
             model.offset_m,
             strict=True,
         )
@@ -237,7 +223,7 @@ def _corrected(command: VelocityCommand, model: _Model, lags: _Lags, state: Dron
     size = hypot(*add)
     scale = MAX_CORRECTION_M_S / size if size > MAX_CORRECTION_M_S else 1.0
     rates = (command.yaw_rate_rad_s, model.yaw_rate_rad_s, model.measured_yaw_rate_rad_s)
-    turn = _velocity_correction(*rates, lags.yaw.lag_s) + HEADING_GAIN_PER_S * model.offset_rad
+    turn = _velocity_correction(*rates, yaw_s) + HEADING_GAIN_PER_S * model.offset_rad
     c, s = cos(state.yaw), sin(state.yaw)
     return VelocityCommand(
         command.forward_m_s + scale * (c * add[0] + s * add[1]),
