@@ -67,7 +67,7 @@ class Kinds:
             case ast.Constant(value=value):
                 kind = _kind_of_type(type(value))
             case ast.Name() | ast.Attribute():
-                kind = self._of_name(node)
+                kind = _kind_of_type(self._type_of(node))
             case ast.Tuple():
                 kind = self._of_tuple(node)
             case ast.BoolOp():
@@ -83,10 +83,10 @@ class Kinds:
                 self._require_number(node.left)
                 kind = self._require_number(node.right)
             case ast.Compare():
-                for left, operator, right in zip(
-                    [node.left, *node.comparators], node.ops, node.comparators, strict=False
-                ):
+                left = node.left
+                for operator, right in zip(node.ops, node.comparators, strict=True):
                     self._compare(left, operator, right)
+                    left = right
                 kind = Kind.CONDITION
         return kind
 
@@ -99,15 +99,14 @@ class Kinds:
         if kind is Kind.PLACE and isinstance(node, ast.Tuple):
             raise self._comma(node)
         if kind is Kind.TEXT and isinstance(node, ast.Constant):
-            raise KindError(
-                node, f"{shown} alone is no condition; write the whole comparison: colour == {shown}"
-            )
+            text = f"{shown} alone is no condition; write the whole comparison: colour == {shown}"
+            raise KindError(node, text)
         example = "imu.z > 1" if isinstance(node, ast.Constant) else f"{shown} > 1"
         advice = {
             Kind.NUMBER: f"compare it, such as {example}",
             Kind.TEXT: f"compare it, such as {shown} == 'red'",
             Kind.PLACE: "compare a number, such as distance_to_goal_m < 0.2",
-            Kind.PARTS: f"name one of its parts, such as {self._parts(node)}",
+            Kind.PARTS: self._name_a_part(node),
         }[kind]
         raise KindError(node, f"{shown} is {kind.value}, no condition; {advice}")
 
@@ -121,9 +120,7 @@ class Kinds:
             wanted = Kind.ANY  # a variable may change its kind
         given = self.of(node)
         if given is Kind.PARTS:
-            raise KindError(
-                node, f"{self._shown(node)} is several values; name one, such as {self._parts(node)}"
-            )
+            raise KindError(node, f"{self._shown(node)} is several values; {self._name_a_part(node)}")
         if wanted is not Kind.ANY and given not in (wanted, Kind.ANY):
             raise self._not_assignable(name, wanted, given, node)
         choices = choices_of(target)
@@ -144,13 +141,13 @@ class Kinds:
             Kind.CONDITION: f"{name} = True",
             Kind.TEXT: f"{name} = 'red'",
         }.get(wanted, name)
-        return KindError(
-            node, f"{name} is {wanted.value}, {self._shown(node)} is {given.value}; write {example}"
-        )
+        shown = f"{self._shown(node)} is {given.value}"
+        return KindError(node, f"{name} is {wanted.value}, {shown}; write {example}")
 
-    def _of_name(self, node: ast.expr) -> Kind:
-        path = path_of(node)
-        return Kind.ANY if path[0] == "memory" else _kind_of_type(self._vocabulary.type_of(path))
+    def _type_of(self, node: ast.expr) -> object:
+        """Declared type of a name; `object` if there is none, or if it may change as a variable's does."""
+        path = path_of(node) if isinstance(node, (ast.Name, ast.Attribute)) else ("memory",)
+        return object if path[0] == "memory" else self._vocabulary.type_of(path)
 
     def _of_tuple(self, node: ast.Tuple) -> Kind:
         for part in node.elts:
@@ -168,15 +165,14 @@ class Kinds:
             return Kind.NUMBER
         if isinstance(node, ast.Tuple):
             raise self._comma(node)
-        shown = self._shown(node)
-        advice = {
-            Kind.PARTS: f"name one of its parts, such as {self._parts(node)}",
-            Kind.PLACE: "read distance_to_goal_m, or imu.x",
-            Kind.TEXT: "a number stands without quotes"
-            if isinstance(node, ast.Constant)
-            else "take a number",
-        }.get(kind, "take a number")
-        raise KindError(node, f"{shown} is {kind.value}, not a number; {advice}")
+        advice = "take a number"
+        if kind is Kind.PARTS:
+            advice = self._name_a_part(node)
+        elif kind is Kind.PLACE:
+            advice = "read distance_to_goal_m, or imu.x"
+        elif kind is Kind.TEXT and isinstance(node, ast.Constant):
+            advice = "a number stands without quotes"
+        raise KindError(node, f"{self._shown(node)} is {kind.value}, not a number; {advice}")
 
     def _compare(self, left: ast.expr, operator: ast.cmpop, right: ast.expr) -> None:
         if isinstance(operator, _ORDER):
@@ -186,10 +182,9 @@ class Kinds:
         kinds = self.of(left), self.of(right)
         for node, kind in zip((left, right), kinds, strict=True):
             if kind is Kind.PARTS:
-                advice = f"name one of its parts, such as {self._parts(node)}"
-                raise KindError(node, f"{self._shown(node)} is several values; {advice}")
+                raise KindError(node, f"{self._shown(node)} is several values; {self._name_a_part(node)}")
         for name, constant in ((left, right), (right, left)):
-            choices = () if not isinstance(name, (ast.Name, ast.Attribute)) else self._choices(name)
+            choices = choices_of(self._type_of(name))
             if choices and isinstance(constant, ast.Constant) and constant.value not in choices:
                 listed = ", ".join(map(repr, choices))
                 text = f"{self._shown(name)} is never {self._shown(constant)}; it is one of {listed}"
@@ -200,10 +195,6 @@ class Kinds:
             one, other = self._shown(left), self._shown(right)
             text = f"{one} is {kinds[0].value}, {other} is {kinds[1].value}; they are never equal"
             raise KindError(left, text)
-
-    def _choices(self, node: ast.expr) -> tuple[object, ...]:
-        path = path_of(node)
-        return () if path[0] == "memory" else choices_of(self._vocabulary.type_of(path))
 
     def _comma(self, node: ast.Tuple) -> KindError:
         """The error for a comma where a number is required."""
@@ -223,11 +214,11 @@ class Kinds:
     def _shown(self, node: ast.expr) -> str:
         return cut(ast.get_source_segment(self._text, node) or "this", 40)
 
-    def _parts(self, node: ast.expr) -> str:
-        parts = (
-            self._vocabulary.parts_of(path_of(node)) if isinstance(node, (ast.Name, ast.Attribute)) else []
-        )
-        return f"{self._shown(node)}.{'d' if 'd' in parts else parts[0]}" if parts else "imu.x"
+    def _name_a_part(self, node: ast.expr) -> str:
+        named = isinstance(node, (ast.Name, ast.Attribute))
+        parts = self._vocabulary.parts_of(path_of(node)) if named else []
+        example = f"{self._shown(node)}.{'d' if 'd' in parts else parts[0]}" if parts else "imu.x"
+        return f"name one of its parts, such as {example}"
 
 
 def masked(text: str) -> str:

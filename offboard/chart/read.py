@@ -59,7 +59,6 @@ class _Reader:
     def mission(self, root: MapNode, path: Path) -> MissionFile:
         self._check_keys(root, _MISSION_KEYS, "a mission")
         variables = self._variables(root)
-        templates = self._named(root, "templates")
         return MissionFile(
             place=Place(root.place.file, root.place.line),
             path=path,
@@ -69,18 +68,21 @@ class _Reader:
             initial=self._text(root, "initial"),
             initial_place=_value_place(root, "initial"),
             variables={key: self._constant(key, node) for key, node in variables.items()},
-            templates={
-                key: self._state(key, node, _TEMPLATE_KEYS, root.items["templates"])
-                for key, node in templates.items()
-            },
-            states=self._states(root),
+            templates=self._states(root, "templates", _TEMPLATE_KEYS),
+            states=tuple(self._states(root, "states", _STATE_KEYS).values()),
         )
 
-    def _states(self, parent: MapNode) -> tuple[State, ...]:
-        children = self._named(parent, "states")
-        return tuple(
-            self._state(key, node, _STATE_KEYS, parent.items["states"]) for key, node in children.items()
-        )
+    def _states(self, parent: MapNode, key: str, allowed: tuple[str, ...]) -> dict[str, State]:
+        """States or templates by name; none if a key of one of them is not indented."""
+        children = self._children(parent, key)
+        names = list(children)
+        for number, (name, node) in enumerate(children.items()):
+            if name in _STATE_KEYS and (name == "states" or not isinstance(node, MapNode)):
+                under = f", under '{names[number - 1]}:'" if number else ""
+                place = self._key_place(parent.items[key], name)
+                self._problems.add(place, f"'{name}' stands beside the {key}; indent it more{under}")
+                return {}
+        return {name: self._state(name, node, allowed, parent.items[key]) for name, node in children.items()}
 
     def _state(self, name: str, node: Node, keys: tuple[str, ...], around: Node) -> State:
         place = self._key_place(around, name)
@@ -105,7 +107,7 @@ class _Reader:
             during=self._actions(node, "during"),
             exit=self._actions(node, "exit"),
             transitions=self._transitions(node),
-            states=self._states(node),
+            states=tuple(self._states(node, "states", _STATE_KEYS).values()),
         )
 
     def _resume(self, state: MapNode) -> Transition | None:
@@ -113,9 +115,8 @@ class _Reader:
             return None
         place, to = _value_place(state, "resume"), self._text(state, "resume")
         if not to and isinstance(state.items["resume"], Scalar):
-            self._problems.add(
-                state.keys["resume"], "'resume' is empty; name the state to go on in after a pause"
-            )
+            text = "'resume' is empty; name the state to go on in after a pause"
+            self._problems.add(state.keys["resume"], text)
         return Transition(place, to)
 
     def _transitions(self, state: MapNode) -> tuple[Transition, ...]:
@@ -148,9 +149,7 @@ class _Reader:
         return Transition(_value_place(node, "to"), to, when, when_place)
 
     def _actions(self, state: MapNode, key: str) -> tuple[Action, ...]:
-        return tuple(
-            action for node in self._list(state, key) if (action := self._action(key, node)) is not None
-        )
+        return tuple(filter(None, (self._action(key, node) for node in self._list(state, key))))
 
     def _action(self, key: str, node: Node) -> Action | None:
         if isinstance(node, MapNode) and len(node.items) == 1:
@@ -213,18 +212,6 @@ class _Reader:
             limit = "; at most 80" if len(name) > 80 else ""
             self._problems.add(_value_place(root, "name"), text + limit)
         return name
-
-    def _named(self, parent: MapNode, key: str) -> dict[str, Node]:
-        """States or templates by name; none if a key of one of them is not indented."""
-        children = self._children(parent, key)
-        names = list(children)
-        for number, (name, node) in enumerate(children.items()):
-            if name in _STATE_KEYS and (name == "states" or not isinstance(node, MapNode)):
-                under = f", under '{names[number - 1]}:'" if number else ""
-                place = self._key_place(parent.items[key], name)
-                self._problems.add(place, f"'{name}' stands beside the {key}; indent it more{under}")
-                return {}
-        return children
 
     def _children(self, node: MapNode, key: str) -> dict[str, Node]:
         child = node.items.get(key)
