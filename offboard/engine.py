@@ -106,12 +106,7 @@ class MissionEngine:
         return self._present is not None and self._present.finish
 
     def tick(self, imu: Imu, cam: Detections, time_us: int) -> VelocityCommand:
-        """Run one step of the chart. After a pause this continues the mission.
-
-        Args:
-            imu: where the drone is.
-            cam: what the latest image showed.
-            time_us: vehicle time, microseconds.
+        """Run one step of the chart, at this vehicle time. After a pause this continues the mission.
 
         Returns:
             The velocity to fly from now on, within the limits. `pilot.cmd.on` says whether motors must run.

@@ -53,7 +53,7 @@ def flight_box(scenario: Scenario, lift_m: float = 0.0) -> Box:
     """The box of a scenario: its arena and, on all sides but below, the arena's `margin_m`.
 
     Args:
-        scenario: as declared.
+        scenario: gives arena and start.
         lift_m: added to the heights of floor and ceiling, for a drone that starts without a base.
     """
     arena, start = scenario.arena, scenario.start
@@ -125,8 +125,7 @@ def confine(command: VelocityCommand, state: DroneState, box: Box) -> tuple[Velo
     """Limit a command by the distances to the box's sides.
 
     Returns:
-        The command to fly, and the sides that limited it, such as "x 6.0 m"; the same object and "" if none
-        did.
+        The command to fly, and the sides that limited it, such as "x 6.0 m"; the same object and "" if none.
     """
     c, s = cos(state.yaw), sin(state.yaw)
     wanted = (

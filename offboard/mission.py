@@ -22,12 +22,12 @@ from offboard.chart.spec import (
     leaves,
     merge_extended,
 )
-from offboard.chart.yaml_nodes import MAX_FILE_BYTES
 from offboard.pilot import Pilot
 from offboard.pilot_file import PilotFile
 
 __all__ = ["Mission", "MissionError", "list_missions", "load_mission", "mermaid", "new_mission"]
 
+MAX_FILE_BYTES = 1_000_000
 MISSIONS = Path(__file__).parent / "missions"
 TEMPLATES = Path(__file__).parent / "templates"
 

@@ -45,11 +45,8 @@ class PilotFile:
             MissionError: as `file:line: text`, whatever is wrong with it.
         """
         module = self._execute()
-        defined = [
-            kind
-            for kind in dict.fromkeys(each for each in vars(module).values() if isinstance(each, type))
-            if issubclass(kind, Pilot) and kind.__module__ == module.__name__
-        ]
+        kinds = dict.fromkeys(each for each in vars(module).values() if isinstance(each, type))
+        defined = [k for k in kinds if issubclass(k, Pilot) and k.__module__ == module.__name__]
         defined = [kind for kind in defined if not any(kind in other.__mro__[1:] for other in defined)]
         if not defined:
             raise self._refused("has no subclass of Pilot; write 'class MyPilot(Pilot):' with your methods")
@@ -91,11 +88,7 @@ class PilotFile:
                 raise self._refused(reason, _line_of(member))
 
     def new_pilot(self, variables: dict[str, object]) -> Pilot:
-        """A pilot of a new class, with the mission's variables and their first values.
-
-        Raises:
-            MissionError: the file cannot be used, or its class cannot be instantiated.
-        """
+        """A pilot of a new class, with the mission's variables. Raises `MissionError`."""
         kind = self.pilot_class()
         try:
             pilot = kind(variables)
@@ -132,13 +125,7 @@ def read_pilot(path: str | Path) -> PilotFile:
 
 
 def place_in(pilot: PilotFile, module_name: str, error: BaseException) -> str:
-    """Where in a contestant's file an exception was raised, as "file:line: "; empty if not there.
-
-    Args:
-        pilot: the file.
-        module_name: `__module__` of its class.
-        error: as caught.
-    """
+    """Where in a contestant's file, executed as a module, an error was raised: "file:line: " or empty."""
     line = _last_line_in(error.__traceback__, module_name)
     return f"{Place(pilot.name, line)}: " if line else ""
 

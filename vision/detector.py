@@ -75,14 +75,7 @@ def measure(
 ) -> Detection:
     """The paper's six numbers of a bounding box.
 
-    Args:
-        row_min: top row of the box, counted from 1.
-        row_max: bottom row, inclusive.
-        col_min: left column, counted from 1.
-        col_max: right column, inclusive.
-        width_px: of the image.
-        height_px: of the image.
-        focal_px: focal length.
+    Rows and columns are counted from 1 at the image's upper left corner, inclusive.
     """
     n, s = height_px / 2 - row_min, height_px / 2 - row_max
     e, w = col_max - (width_px / 2 + 1), col_min - (width_px / 2 + 1)

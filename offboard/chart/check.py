@@ -10,13 +10,7 @@ from offboard.pilot import Pilot
 
 
 def check(mission: MissionFile, pilot_class: type[Pilot], problems: ProblemList) -> None:
-    """Check an expanded mission, and its names against a pilot class.
-
-    Args:
-        mission: expanded.
-        pilot_class: `Pilot` or a subclass.
-        problems: takes what is found.
-    """
+    """Check an expanded mission, and its names against a pilot class; `problems` takes what is found."""
     vocabulary = Vocabulary(pilot_class, mission.variables)
     if not mission.states:
         problems.add(mission.place, "has no 'states'; write 'states:' and below it the states, indented")

@@ -10,7 +10,7 @@ from __future__ import annotations
 import ast
 import re
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 
 from statemachine.spec_parser import parse_expr
 
@@ -90,9 +90,8 @@ class ExpressionError(Exception):
 
 def check_guard(text: str, vocabulary: Vocabulary) -> None:
     """Check a condition: form, names, and that it is true or false. Raises `ExpressionError`."""
-    tree = _checked(text, vocabulary)
-    with _kind_errors(text):
-        Kinds(text.strip(), vocabulary).require_condition(tree.body)
+    with _as_expression_errors(text):
+        Kinds(text.strip(), vocabulary).require_condition(_checked(text, vocabulary).body)
 
 
 def check_assignment(location: str, text: str, vocabulary: Vocabulary) -> None:
@@ -106,18 +105,18 @@ def check_assignment(location: str, text: str, vocabulary: Vocabulary) -> None:
         vocabulary.check_assignable(path)
     except UnknownNameError as error:
         raise ExpressionError(str(error), IN_LOCATION) from None
-    tree = _checked(text, vocabulary)
-    with _kind_errors(text):
-        Kinds(text.strip(), vocabulary).require_assignable(path, tree.body)
+    with _as_expression_errors(text):
+        Kinds(text.strip(), vocabulary).require_assignable(path, _checked(text, vocabulary).body)
 
 
 def _checked(text: str, vocabulary: Vocabulary) -> ast.Expression:
     """Check form and names."""
     tree = _parsed(text)
     for node in ast.walk(tree):
-        if isinstance(node, ast.Call) and not node.args and not node.keywords:
-            name = ".".join(path_of(node.func))
-            if name and _is_known(vocabulary, path_of(node.func)):
+        if isinstance(node, ast.Call) and not node.args and not node.keywords and path_of(node.func):
+            with suppress(UnknownNameError):
+                vocabulary.type_of(path_of(node.func))
+                name = ".".join(path_of(node.func))
                 raise ExpressionError(f"write it without parentheses: {name}", _offset(text, node))
         if not isinstance(node, _ALLOWED):
             reason = _REASONS.get(type(node), f"{type(node).__name__} is not possible here")
@@ -133,27 +132,17 @@ def _checked(text: str, vocabulary: Vocabulary) -> ast.Expression:
         parse_expr(text, _name_of_pilot)
     except (ValueError, SyntaxError) as error:
         raise ExpressionError(str(error)) from None
-    except RecursionError:
-        raise ExpressionError("is nested too deep; write it simpler") from None
     return tree
 
 
 @contextmanager
-def _kind_errors(text: str) -> Iterator[None]:
+def _as_expression_errors(text: str) -> Iterator[None]:
     try:
         yield
     except KindError as error:
         raise ExpressionError(str(error), _offset(text, error.node)) from None
     except RecursionError:
         raise ExpressionError("is nested too deep; write it simpler") from None
-
-
-def _is_known(vocabulary: Vocabulary, path: tuple[str, ...]) -> bool:
-    try:
-        vocabulary.type_of(path)
-    except UnknownNameError:
-        return False
-    return True
 
 
 def _around(tree: ast.AST, inner: ast.AST) -> ast.AST:
@@ -205,12 +194,7 @@ def _parsed(text: str) -> ast.Expression:
 
 
 def _syntax_error(text: str, error_at: int) -> ExpressionError:
-    """What is wrong with a text that is no expression.
-
-    Args:
-        text: the expression.
-        error_at: where Python's parser stopped, characters from its beginning.
-    """
+    """What is wrong with a text that is no expression; Python's parser stopped at `error_at`."""
     plain = masked(text)
     for pattern, advice in _MISTAKE_PATTERNS:
         found = pattern.search(plain)

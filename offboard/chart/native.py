@@ -34,11 +34,7 @@ def native_yaml(mission: MissionFile) -> str:
 
 
 def load_chart(mission: MissionFile, text: str) -> type[StateChart]:
-    """Build the chart's class from an untrusted document.
-
-    Raises:
-        MissionError: the library refuses what the checker accepts.
-    """
+    """Build the chart's class; `MissionError` if the library refuses what the checker accepts."""
     try:
         chart: type[StateChart] = load(text, format="yaml", validate=True)
     except (InvalidDefinition, ValueError) as error:

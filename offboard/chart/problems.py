@@ -77,11 +77,7 @@ class ProblemList:
         self._by_place.pop(place, None)
 
     def raise_if_any(self) -> None:
-        """Stop if anything was found.
-
-        Raises:
-            MissionError: with all problems, in order of file, line and column.
-        """
+        """Raise a `MissionError` with all problems, in order of file, line and column."""
         if self.found:
             order = sorted(self._by_place, key=lambda place: (place.file, place.line, place.column))
             lines = [problem(place, self._by_place[place]) for place in order[:MAX_REPORTED]]
@@ -97,13 +93,6 @@ def cut(text: str, max_characters: int = 60) -> str:
 
 
 def did_you_mean(name: str, known: Iterable[str], otherwise: str, owner: str = "") -> str:
-    """What to write instead of an unknown name: the most similar one, if there is one.
-
-    Args:
-        name: as written.
-        known: names that exist.
-        otherwise: the text if none is similar.
-        owner: stands before the similar name, such as "cmd.".
-    """
+    """Suggest the known name that is most similar, after its `owner` such as "cmd."; or `otherwise`."""
     similar = get_close_matches(name, known, 1)
     return f"did you mean '{owner}{similar[0]}'?" if similar else otherwise

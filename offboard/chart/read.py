@@ -34,11 +34,7 @@ _ASSIGNMENT = re.compile(r"\s*([A-Za-z_][\w.]*)\s*=(?!=)\s*(.*)\Z", re.DOTALL)
 
 
 def read_mission_file(text: str, path: Path) -> MissionFile:
-    """Read one mission file, without what it extends.
-
-    Args:
-        text: its content.
-        path: its file; problems have its name.
+    """Read the text of one mission file, without what it extends.
 
     Raises:
         MissionError: with every problem of its structure.

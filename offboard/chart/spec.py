@@ -128,12 +128,7 @@ class Leaf:
 
 
 def leaves(states: tuple[State, ...], outer: tuple[State, ...] = ()) -> list[Leaf]:
-    """All states without states of their own, in document order.
-
-    Args:
-        states: a level of an expanded chart.
-        outer: the superstates around it, innermost first.
-    """
+    """All states without states of their own; `outer` are the superstates around, innermost first."""
     found: list[Leaf] = []
     for state in states:
         if state.states:
@@ -155,10 +150,6 @@ def all_states(states: tuple[State, ...]) -> list[State]:
 def merge_extended(mission: MissionFile, open_base: Callable[[MissionFile], MissionFile]) -> MissionFile:
     """Merge a mission with what it extends: variables, templates and states of the same name are replaced.
 
-    Args:
-        mission: the file as read.
-        open_base: reads the file that a mission extends.
-
     Raises:
         MissionError: missions that extend each other, or a chain that is too long.
     """
@@ -166,9 +157,8 @@ def merge_extended(mission: MissionFile, open_base: Callable[[MissionFile], Miss
     while chain[-1].extends:
         base = open_base(chain[-1])
         if base.path in [known.path for known in chain] or len(chain) > MAX_EXTENDS:
-            raise mission_error(
-                chain[-1].place, f"extends '{chain[-1].extends}': runs in a circle or too deep"
-            )
+            text = f"extends '{chain[-1].extends}': runs in a circle or too deep"
+            raise mission_error(chain[-1].place, text)
         chain.append(base)
     merged = chain.pop()
     while chain:
@@ -192,14 +182,10 @@ def _merge(base: MissionFile, top: MissionFile) -> MissionFile:
 
 
 def expand(mission: MissionFile, problems: ProblemList) -> MissionFile:
-    """Give every state its full id and every transition its full target.
-
-    Args:
-        mission: merged with what it extends.
-        problems: takes unknown templates and targets, and templates that are not used.
+    """Give every state of a merged mission its full id and every transition its full target.
 
     Raises:
-        MissionError: too many states.
+        MissionError: too many states; all else is added to `problems`.
     """
     used: set[str] = set()
     states = tuple(_instance(state, mission.templates, used, problems) for state in mission.states)

@@ -61,11 +61,7 @@ class Vocabulary:
         raise UnknownNameError(f"unknown action '{cut(name)}'; {advice}")
 
     def type_of(self, path: tuple[str, ...]) -> object:
-        """Type of a dotted name such as ("cam", "red", "d"); `object` if none is declared.
-
-        Raises:
-            UnknownNameError: a part of it does not exist.
-        """
+        """Type of a name such as ("cam", "red", "d"), `object` if not declared. Raises `UnknownNameError`."""
         kind: object = self._pilot_class
         for name in path:
             names = self._names_of(kind)

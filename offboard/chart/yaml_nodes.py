@@ -1,7 +1,7 @@
 """YAML text to nodes with their lines, and YAML's syntax errors in words for people who do not know YAML.
 
-No tags, no aliases, bounded in size. YAML's parser reports what it expected, often lines after the fault. The
-text mostly shows what was meant, so the messages are made from the text.
+No tags, no aliases, bounded in depth. YAML's parser reports what it expected, often lines after the fault.
+The text mostly shows what was meant, so the messages are made from the text.
 """
 
 from __future__ import annotations
@@ -13,7 +13,6 @@ import yaml
 
 from offboard.chart.problems import Place, ProblemList, mission_error
 
-MAX_FILE_BYTES = 1_000_000
 MAX_DEPTH = 40
 _KEY = re.compile(r"\s*(?:-\s+)?([\w.]+)\s*:(?:\s|$)")
 _TWO_COLONS = re.compile(r"\s*(?:-\s+)?[\w.]+\s*:\s+[^\s'\"#][^'\"#]*:(?:\s|$)")
@@ -67,11 +66,8 @@ def parse_yaml(text: str, file: str, keys: tuple[str, ...]) -> MapNode:
         keys: that the outermost mapping may have.
 
     Raises:
-        MissionError: bad syntax, an alias, a key written twice, too deep, too large, not a mapping.
+        MissionError: bad syntax, an alias, a key written twice, too deep, not a mapping.
     """
-    if len(text.encode()) > MAX_FILE_BYTES:
-        limit = f"{MAX_FILE_BYTES // 1_000_000} MB"
-        raise mission_error(Place(file), f"is larger than {limit}; a mission is a page or two")
     try:
         _refuse_aliases_and_depth(text, file)
         root = yaml.compose(text, Loader=yaml.SafeLoader)
@@ -136,13 +132,7 @@ def _place(part: yaml.Node | yaml.Event, file: str) -> Place:
 
 
 def _syntax_fault(text: str, error: yaml.YAMLError, top_keys: tuple[str, ...]) -> Fault:
-    """What is wrong with a text that is not YAML.
-
-    Args:
-        text: all of it.
-        error: what PyYAML raised.
-        top_keys: keys that may stand at the beginning of a line.
-    """
+    """What is wrong with a text that is not YAML; `top_keys` may stand at the beginning of a line."""
     lines = text.split("\n")
     mark = getattr(error, "problem_mark", None)
     context = getattr(error, "context_mark", None)

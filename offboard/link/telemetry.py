@@ -243,11 +243,9 @@ class VehicleClock(Protocol):
         ...
 
     async def advance(self, tick_us: int, command: VelocityCommand | None) -> None:
-        """Let time go on to the next tick, and wait until its image has been seen.
+        """Let time run to a tick of the 50 ms grid, and wait until its image has been processed.
 
-        Args:
-            tick_us: where the tick is on the grid of 50 ms.
-            command: was sent last and must arrive first; None: there is none.
+        A command was sent before and must arrive first.
         """
 
     def release(self) -> None:

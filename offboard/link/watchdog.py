@@ -47,10 +47,9 @@ class Watchdog:
     """Watches the event loop on which it is started.
 
     Args:
-        stand_still: called once a hang, on the watchdog's thread, when the loop hangs.
-        stop_commanding: called once, on the watchdog's thread, when the loop still hangs.
+        stand_still: called on the watchdog's thread, once a hang, after `limits.stand_s`.
+        stop_commanding: called on the watchdog's thread, once, after `limits.hang_s`.
         report: a real file for the second guard's stack trace; by default standard error.
-        limits: of a hang.
 
     Attributes:
         tripped_after_s: how long the loop had hung when commanding was ended; 0 if it was not.
