@@ -33,7 +33,7 @@ _ALLOWED = (
 _REASONS = {
     ast.Call: "calls are not possible; name a value of the pilot, or set goal_m and read distance_to_goal_m",
     ast.Subscript: "[...] is not possible; name the part, such as imu.x",
-    ast.List: "[...] is not possible; a place stands in parentheses: (x, y, z)",
+    ast.List: "[...] is not possible; write a place in parentheses: (x, y, z)",
     ast.Pow: "** is not possible; write a product",
     ast.Mod: "% is not possible here",
     ast.BitAnd: "write 'and' instead of '&'",
@@ -64,7 +64,7 @@ _MISTAKES = (
     (r"%", "'{}' is not possible; write 0.3 for 30 %"),
     (r"\b(?:AND|OR|NOT|And|Or|Not)\b", "write '{lower}' in small letters"),
     (r"(?:^|(?<=\s))(?:if|when|while)\b", "leave '{}' out; 'when:' means it already"),
-    (r"\b(?:then|goto|else)\b", "leave '{}' out; the next state stands under 'to:'"),
+    (r"\b(?:then|goto|else)\b", "leave '{}' out; write the next state under 'to:'"),
     (
         r"(?<![\w.])\d[\d.]*\s*(?:ms|s|sec|m|cm|mm|rad|deg|px|°)(?!\w)",
         "write the number without a unit: {number} instead of {}",
@@ -182,7 +182,7 @@ def _name_of_pilot(name: str) -> Evaluate:
 
 def _parsed(text: str) -> ast.Expression:
     if not text.strip():
-        raise ExpressionError("nothing stands here; write an expression (what follows a # is not read)")
+        raise ExpressionError("nothing is written here; write an expression (what follows a # is not read)")
     if len(text) > MAX_EXPRESSION_CHARACTERS:
         raise ExpressionError(f"is longer than {MAX_EXPRESSION_CHARACTERS} characters; split it")
     try:

@@ -171,7 +171,7 @@ class Kinds:
         elif kind is Kind.PLACE:
             advice = "read distance_to_goal_m, or imu.x"
         elif kind is Kind.TEXT and isinstance(node, ast.Constant):
-            advice = "a number stands without quotes"
+            advice = "write a number without quotes"
         raise KindError(node, f"{self._shown(node)} is {kind.value}, not a number; {advice}")
 
     def _compare(self, left: ast.expr, operator: ast.cmpop, right: ast.expr) -> None:

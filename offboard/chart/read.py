@@ -151,7 +151,7 @@ class _Reader:
         if isinstance(node, MapNode) and len(node.items) == 1:
             (name, value), place = next(iter(node.items.items())), next(iter(node.keys.values()))
             if name in _TRANSITION_KEYS:
-                self._problems.add(place, f"'{name}' does not belong here; it stands under 'transitions:'")
+                self._problems.add(place, f"'{name}' does not belong here; write it under 'transitions:'")
                 return None
             if isinstance(value, Scalar) and _SETTING.match(name):
                 self._problems.add(place, f"to set a value write '=': {name} = {cut(value.text, 30)}")
@@ -193,7 +193,7 @@ class _Reader:
                 what = f"{text} is two numbers; write it with a point: {text.replace(',', '.')}"
             elif re.fullmatch(r"[A-Za-z_]\w*", text):
                 word = text.capitalize()
-                what = f"write {word}" if word in ("True", "False") else f"texts stand in quotes: '{text}'"
+                what = f"write {word}" if word in ("True", "False") else f"write a text in quotes: '{text}'"
             self._problems.add(node.place, what)
         return value
 

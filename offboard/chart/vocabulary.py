@@ -127,7 +127,7 @@ class Vocabulary:
         if name.lower() in ("true", "false"):
             return f"write {name.capitalize()}"
         if name.lower() in COLOURS:
-            return f"texts stand in quotes: '{name.lower()}'"
+            return f"write a text in quotes: '{name.lower()}'"
         if name in self._variables:
             return f"write memory.{name}"
         whole = [

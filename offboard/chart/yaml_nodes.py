@@ -120,7 +120,7 @@ def _convert(node: yaml.Node, file: str, problems: ProblemList) -> Node:
             continue
         key = key_node.value
         if key in items:
-            problems.add(key_place, f"'{key}' stands twice (first in line {keys[key].line}); rename one")
+            problems.add(key_place, f"'{key}' is written twice (first in line {keys[key].line}); rename one")
         items[key] = _convert(value_node, file, problems)
         keys[key] = key_place
     return MapNode(place, items, keys)

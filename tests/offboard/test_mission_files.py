@@ -108,7 +108,7 @@ BAD_CHARTS = [
         "initial: landing",
         "m.yaml:2:10: 'initial' of the mission is 'landing'; it has the states up, done",
     ),
-    ("  done:\n", "  up:\n", "m.yaml:13:3: 'up' stands twice (first in line 5); rename one"),
+    ("  done:\n", "  up:\n", "m.yaml:13:3: 'up' is written twice (first in line 5); rename one"),
     ("transitions:", "transition:", "state 'up' has no 'transition'; did you mean 'transitions'?"),
     ("name: little", "nam: little", "a mission has no 'nam'; did you mean 'name'?"),
     ("final: true", "final: maybe", "'final' is true or false, not 'maybe'"),
