@@ -12,8 +12,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 from math import isfinite
-
-from statemachine import StateChart
+from typing import Any
 
 from errors import UserError
 from offboard.chart.expressions import compile_value, names_in
@@ -92,7 +91,7 @@ class MissionEngine:
             leaf_id: _FastState(leaf, leaf_id in mission.finishes) for leaf_id, leaf in mission.leaves.items()
         }
         self._quiet_ticks = quiet_ticks
-        self._chart: StateChart | None = None
+        self._chart: Any = None  # a `StateChart`, from the first tick on
         self._present: _FastState | None = None
         self._started_us = 0
         self._entered_us = 0
@@ -172,7 +171,7 @@ class MissionEngine:
             for act in present.during:
                 act(pilot)
         elif present.during:
-            self._send_tick()
+            self._chart.send(TICK)
 
     def _resume(self, present: _FastState, paused_us: int, time_us: int) -> bool:
         """End a pause; True if the chart went to another state, which ends this tick."""
@@ -181,7 +180,6 @@ class MissionEngine:
         self._entered_us += time_us - paused_us
         if present.leaf.resume is None:
             return False
-        assert self._chart is not None
         source, seconds = self.state, (time_us - self._entered_us) / 1e6
         self.pilot.seconds_in_mission = (time_us - self._started_us) / 1e6
         cmd = self.pilot.cmd
@@ -195,19 +193,14 @@ class MissionEngine:
         """Let the chart take a transition whose guard holds, and record why."""
         source, seconds = self.state, self.pilot.seconds_in_state
         values = _values(transition.when, self.pilot)  # now, because the actions on leaving may change them
-        self._send_tick()
+        self._chart.send(TICK)
         self._settle(time_us)
         arrived = self.state == transition.to or self.state.startswith(f"{transition.to}.")
         when = transition.when if arrived else DONE
         self.transition = TransitionTaken(source, self.state, when, values, time_us, seconds)
 
-    def _send_tick(self) -> None:
-        assert self._chart is not None
-        self._chart.send(TICK)
-
     def _settle(self, time_us: int) -> None:
         """Read the chart's present state."""
-        assert self._chart is not None
         self.state = next(state.id for state in self._chart.configuration if state.id in self._states)
         self._present = self._states[self.state]
         self._entered_us = time_us

@@ -234,10 +234,9 @@ class MavsdkDrone:
         await self._stream_before_offboard()
         self._watchdog.start()
         try:
-            await self._request("offboard mode", self._stream.request_offboard())
-            await self._confirm("offboard mode", lambda: self._feed.mode == "OFFBOARD")
-            await self._request("arming", self._action.arm())
-            await self._confirm("arming", lambda: bool(self._feed.armed))
+            request = self._stream.request_offboard()
+            await self._request("offboard mode", request, lambda: self._feed.mode == "OFFBOARD")
+            await self._request("arming", self._action.arm(), lambda: bool(self._feed.armed))
         except BaseException:
             self._watchdog.stop()
             await self._hold_on_ground()
@@ -260,8 +259,7 @@ class MavsdkDrone:
     async def motors_off(self) -> None:
         """Stop the motors at once (forced disarm), in the air too."""
         self._commanding = False
-        await self._request("stopping the motors", self._action.kill())
-        await self._confirm("stopping the motors", lambda: self._feed.armed is False)
+        await self._request("stopping the motors", self._action.kill(), lambda: self._feed.armed is False)
         self._watchdog.stop()
         with contextlib.suppress(MavsdkError):
             await self._requests.wait(self._stream.request_hold())
@@ -270,8 +268,8 @@ class MavsdkDrone:
         """Let the vehicle land and wait until it has disarmed itself."""
         feed = self._feed
         self._commanding = False
-        await self._request("landing", self._action.land())
-        await self._confirm("landing", lambda: feed.mode == "LAND" or feed.armed is False)
+        request = self._action.land()
+        await self._request("landing", request, lambda: feed.mode == "LAND" or feed.armed is False)
         self._watchdog.stop()
         limit_us = feed.time_us + int(LAND_LIMIT_S * 1e6)
         while feed.armed:
@@ -421,22 +419,26 @@ class MavsdkDrone:
             raise DroneError(f"the pilot or a failsafe took over: mode {state.mode}{texts}")
         self._pilot_has_it = not state.offboard
 
-    async def _request(self, what: str, request: Awaitable[object]) -> None:
+    async def _request(
+        self, what: str, request: Awaitable[object], shown: Callable[[], bool] | None = None
+    ) -> None:
+        """Wait for the answer and, with `shown`, until telemetry shows the effect.
+
+        Acknowledgements are not trusted: PX4 sends two for a mode, the first one always "accepted".
+        """
+        feed = self._feed
         try:
             await self._requests.wait(request)
+            if shown is not None:
+                await self._until(shown, CONFIRM_S)
         except MavsdkError as error:
             result = getattr(getattr(error, "result", None), "name", str(error))
-            raise DroneError(f"{what} was refused: {result}{self._feed.recent_texts()}") from None
-
-    async def _confirm(self, what: str, shown: Callable[[], bool]) -> None:
-        """Acknowledgements are not trusted: PX4 sends two for a mode, the first one always "accepted"."""
-        try:
-            await self._until(shown, CONFIRM_S)
+            raise DroneError(f"{what} was refused: {result}{feed.recent_texts()}") from None
         except TimeoutError:
-            armed = "armed" if self._feed.armed else "disarmed"
+            armed = "armed" if feed.armed else "disarmed"
             raise DroneError(
-                f"{what} was acknowledged, but telemetry still shows mode {self._feed.mode}, {armed} "
-                f"after {CONFIRM_S:g} s{self._feed.recent_texts()}"
+                f"{what} was acknowledged, but telemetry still shows mode {feed.mode}, {armed} "
+                f"after {CONFIRM_S:g} s{feed.recent_texts()}"
             ) from None
 
     async def _becomes(self, condition: Callable[[], bool], limit_s: float) -> bool:

@@ -1,9 +1,9 @@
 """The real app and its MAVSDK adapter over a bad link, in simulated time.
 
 All of the app runs: mission, box, `MavsdkDrone`, its telemetry feed, `CameraPerception` and the detector. In
-place of MAVSDK and UDP there is a link whose two ways lose, swap, double, delay and fall silent, by a seed; at its
-other end are the simulation's autopilot and camera. The event loop's clock is the simulation's: where it
-would wait, the simulation moves on. So a flight needs no real time and repeats exactly.
+place of MAVSDK and UDP there is a link whose two ways lose, swap, double, delay and fall silent, by a seed;
+at its other end are the simulation's autopilot and camera. The event loop's clock is the simulation's: where
+it would wait, the simulation moves on. So a flight needs no real time and repeats exactly.
 """
 
 from __future__ import annotations
