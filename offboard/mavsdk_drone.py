@@ -97,6 +97,7 @@ class MavsdkDrone:
         self._action: Any = None
         self._setpoints: SetpointStream | None = None
         self._telemetry: Any = None
+        self._direct: Any = None  # kept, because MAVSDK ends the subscriptions of a plugin that is deleted
         self._requests = PendingRequests()
         self._tracker = CommandTracker()
         self._latest: DroneState | None = None
@@ -161,7 +162,8 @@ class MavsdkDrone:
         self._action = ActionAsync(system)
         self._setpoints = SetpointStream(OffboardAsync(system))
         self._telemetry = TelemetryAsync(system)
-        self._feed.subscribe(_synchronous(self._telemetry), _synchronous(MavlinkDirectAsync(system)))
+        self._direct = MavlinkDirectAsync(system)
+        self._feed.subscribe(_synchronous(self._telemetry), _synchronous(self._direct))
 
     async def _open_connections(self, mavsdk: Mavsdk) -> None:
         """To recorder, companion, ground stations and vehicle; MAVSDK forwards between them."""
