@@ -36,25 +36,17 @@ class OutsideBoxError(UserError):
 
 @dataclass(frozen=True, slots=True)
 class Box:
-    """Where the drone's centre may be, arena axes.
+    """Where the drone's centre may be, arena axes."""
 
-    Attributes:
-        low_m: minimum x, y, z, shape (3,).
-        high_m: maximum x, y, z, shape (3,).
-        start_m: x, y of take-off and landing, shape (2,).
-    """
-
-    low_m: Vec3
-    high_m: Vec3
-    start_m: tuple[float, float]
+    low_m: Vec3  # minimum x, y, z
+    high_m: Vec3  # maximum x, y, z
+    start_m: tuple[float, float]  # x, y of take-off and landing
 
 
 def flight_box(scenario: Scenario, lift_m: float = 0.0) -> Box:
     """The box of a scenario: its arena and, on all sides but below, the arena's `margin_m`.
 
-    Args:
-        scenario: gives arena and start.
-        lift_m: added to the heights of floor and ceiling, for a drone that starts without a base.
+    `lift_m` is added to the heights of floor and ceiling, for a drone that starts without a base.
     """
     arena, start = scenario.arena, scenario.start
     x_m, y_m = arena.length_x_m / 2 + arena.margin_m, arena.width_y_m / 2 + arena.margin_m
@@ -67,9 +59,6 @@ class KeepInBox:
 
     Towards a side, speed is limited by the distance to it, so that the drone stops before it; beyond a side
     it is brought back. A command that does not lead out is not changed, to the last bit.
-
-    Args:
-        box: where the drone may be.
 
     Attributes:
         remark: how the last command was changed, for people; empty if it was not.

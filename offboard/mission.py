@@ -13,15 +13,7 @@ from offboard.chart.check import check, is_finish
 from offboard.chart.native import load_chart, native_yaml
 from offboard.chart.problems import MissionError, Place, ProblemList, did_you_mean, mission_error
 from offboard.chart.read import read_mission_file
-from offboard.chart.spec import (
-    Leaf,
-    MissionFile,
-    State,
-    all_states,
-    expand,
-    leaves,
-    merge_extended,
-)
+from offboard.chart.spec import Leaf, MissionFile, State, all_states, expand, leaves, merge_extended
 from offboard.pilot import Pilot
 from offboard.pilot_file import PilotFile
 
@@ -37,9 +29,6 @@ class Mission:
     """A checked mission, ready to fly. It can be pickled: another process builds the chart again.
 
     Attributes:
-        name: of the mission.
-        description: one line for people.
-        path: its file.
         spec: the expanded chart.
         pilot: what the mission was checked against: a contestant's file or a class.
         native: the expanded chart as a document of python-statemachine.

@@ -68,16 +68,11 @@ class WorkerEndedError(Exception):
 
 @dataclass(frozen=True, slots=True)
 class Answer:
-    """What the process has answered.
-
-    Attributes:
-        image: BGR, shape (height, width, 3), uint8; None unless `reply` is `Reply.IMAGE`.
-        received_s: monotonic wall time at which a captured image arrived, seconds.
-    """
+    """What the process has answered."""
 
     reply: Reply
-    image: Image | None
-    received_s: float
+    image: Image | None  # BGR, shape (height, width, 3), uint8; None unless `reply` is `Reply.IMAGE`
+    received_s: float  # monotonic wall time at which a captured image arrived, seconds
 
 
 class WorkerProcess:

@@ -13,17 +13,11 @@ MAX_REPORTED = 50
 
 @dataclass(frozen=True, slots=True)
 class Place:
-    """A place in a mission file.
-
-    Attributes:
-        file: its name.
-        line: counted from 1; 0 for the whole file.
-        column: counted from 1; 0 for the whole line.
-    """
+    """A place in a mission file."""
 
     file: str
-    line: int = 0
-    column: int = 0
+    line: int = 0  # counted from 1; 0 for the whole file
+    column: int = 0  # counted from 1; 0 for the whole line
 
     def __str__(self) -> str:
         numbers = (number for number in (self.line, self.column) if number)

@@ -23,19 +23,11 @@ MAX_STATES = 1000
 
 @dataclass(frozen=True, slots=True)
 class Action:
-    """One line of `enter`, `exit` or `during`: a primitive by name, or `location = expression`.
-
-    Attributes:
-        place: where it begins.
-        name: the primitive; empty for an assignment.
-        location: what is assigned to, dotted; empty for a primitive.
-        expression: its new value.
-        expression_place: where that begins.
-    """
+    """One line of `enter`, `exit` or `during`: a primitive by name, or `location = expression`."""
 
     place: Place
-    name: str = ""
-    location: str = ""
+    name: str = ""  # of the primitive; empty for an assignment
+    location: str = ""  # what is assigned to, dotted; empty for a primitive
     expression: str = ""
     expression_place: Place = NOWHERE
 
@@ -45,44 +37,27 @@ class Action:
 
 @dataclass(frozen=True, slots=True)
 class Transition:
-    """One way out of a state.
+    """One way out of a state."""
 
-    Attributes:
-        place: of its target.
-        to: the target as written; after expansion, a full state id.
-        when: the guard; empty for "always".
-        when_place: where the guard begins; without one, where the transition begins.
-    """
-
-    place: Place
-    to: str
-    when: str = ""
-    when_place: Place = NOWHERE
+    place: Place  # of its target
+    to: str  # the target as written; after expansion, a full state id
+    when: str = ""  # the guard; empty for "always"
+    when_place: Place = NOWHERE  # of the guard; without one, of the transition
 
 
 @dataclass(frozen=True, slots=True)
 class State:
-    """A state or, if it has states of its own, a superstate.
+    """A state or, if it has states of its own, a superstate."""
 
-    Attributes:
-        place: of its name.
-        id: name as written; after expansion the full id ("red.turning").
-        initial: the state a superstate starts in.
-        initial_place, then_place: of what they name.
-        then: the target of a superstate when one of its final states is reached.
-        use: the template whose states it takes; empty after expansion.
-        resume: where the mission continues after a pause within this state; None: where it was.
-    """
-
-    place: Place
-    id: str
-    initial: str = ""
+    place: Place  # of its name
+    id: str  # name as written; after expansion the full id ("red.turning")
+    initial: str = ""  # the state a superstate starts in
     initial_place: Place = NOWHERE
     final: bool = False
-    then: str = ""
+    then: str = ""  # the target of a superstate when one of its final states is reached
     then_place: Place = NOWHERE
-    use: str = ""
-    resume: Transition | None = None
+    use: str = ""  # the template whose states it takes; empty after expansion
+    resume: Transition | None = None  # where the mission continues after a pause; None: where it was
     enter: tuple[Action, ...] = ()
     during: tuple[Action, ...] = ()
     exit: tuple[Action, ...] = ()
@@ -113,18 +88,12 @@ class MissionFile:
 
 @dataclass(frozen=True, slots=True)
 class Leaf:
-    """A state without states of its own, with everything that holds while it is active.
-
-    Attributes:
-        transitions: its own first, then those of the superstates around it, in order of priority.
-        during: its own first, then those of the superstates around it.
-        resume: its own or, without one, that of the nearest superstate that has one.
-    """
+    """A state without states of its own, with everything that holds while it is active."""
 
     state: State
-    transitions: tuple[Transition, ...]
-    during: tuple[Action, ...]
-    resume: Transition | None
+    transitions: tuple[Transition, ...]  # its own, then those of the superstates, in order of priority
+    during: tuple[Action, ...]  # its own, then those of the superstates
+    resume: Transition | None  # its own or, without one, that of the nearest superstate that has one
 
 
 def leaves(states: tuple[State, ...], outer: tuple[State, ...] = ()) -> list[Leaf]:

@@ -38,21 +38,13 @@ CHECKS = "pre-arm checks not passed"
 
 @dataclass(frozen=True, slots=True)
 class Sample:
-    """Where the vehicle was when its clock crossed the 50 ms grid, in its local NED axes.
+    """Where the vehicle was when its clock crossed the 50 ms grid, in its local NED axes."""
 
-    Attributes:
-        time_us: of the attitude that crossed, microseconds since boot.
-        yaw_ned_rad: clockwise from north.
-        position_ned_m: latest by then, shape (3,).
-        velocity_ned_m_s: shape (3,).
-        position_us: time of position and velocity, microseconds since boot.
-    """
-
-    time_us: int
-    yaw_ned_rad: float
-    position_ned_m: Vec3
+    time_us: int  # of the attitude that crossed, microseconds since boot
+    yaw_ned_rad: float  # clockwise from north
+    position_ned_m: Vec3  # latest by then
     velocity_ned_m_s: Vec3
-    position_us: int = 0
+    position_us: int = 0  # of position and velocity, microseconds since boot
 
 
 class TelemetryFeed:

@@ -80,29 +80,17 @@ class LagEstimate:
 
 @dataclass(slots=True)
 class _Model:
-    """An ideal drone flown by the same commands, relative to the vehicle.
+    """An ideal drone flown by the same commands, relative to the vehicle; arena axes."""
 
-    Attributes:
-        time_us: vehicle time.
-        position_m: the vehicle's then, arena axes.
-        yaw_rad: the vehicle's heading then.
-        offset_m: from the vehicle to the model, arena axes.
-        velocity_m_s: the model's, arena axes.
-        offset_rad: from the vehicle's heading to the model's.
-        yaw_rate_rad_s: the model's.
-        measured_yaw_rate_rad_s: the vehicle's.
-        recent_speed_m_s: highest commanded speed, decaying.
-    """
-
-    time_us: int
-    position_m: Vec3
-    yaw_rad: float
-    offset_m: Vec3 = (0.0, 0.0, 0.0)
-    velocity_m_s: Vec3 = (0.0, 0.0, 0.0)
-    offset_rad: float = 0.0
-    yaw_rate_rad_s: float = 0.0
-    measured_yaw_rate_rad_s: float = 0.0
-    recent_speed_m_s: float = 0.0
+    time_us: int  # vehicle time
+    position_m: Vec3  # the vehicle's then
+    yaw_rad: float  # the vehicle's then
+    offset_m: Vec3 = (0.0, 0.0, 0.0)  # from the vehicle to the model
+    velocity_m_s: Vec3 = (0.0, 0.0, 0.0)  # the model's
+    offset_rad: float = 0.0  # from the vehicle's heading to the model's
+    yaw_rate_rad_s: float = 0.0  # the model's
+    measured_yaw_rate_rad_s: float = 0.0  # the vehicle's
+    recent_speed_m_s: float = 0.0  # highest commanded speed, decaying
 
 
 class CommandTracker:

@@ -25,17 +25,11 @@ BEAT_S = 0.1
 
 @dataclass(frozen=True, slots=True)
 class HangLimits:
-    """Wall seconds for which the event loop may hang.
+    """Wall seconds for which the event loop may hang."""
 
-    Attributes:
-        stand_s: then the vehicle hovers until the loop runs again.
-        hang_s: then commanding ends.
-        locked_s: then, with the interpreter's lock held, the process ends.
-    """
-
-    stand_s: float = 0.5
-    hang_s: float = 1.0
-    locked_s: float = 2.0
+    stand_s: float = 0.5  # then the vehicle hovers until the loop runs again
+    hang_s: float = 1.0  # then commanding ends
+    locked_s: float = 2.0  # then, with the interpreter's lock held, the process ends
 
 
 LIMITS = HangLimits()
