@@ -28,23 +28,17 @@ class Moment:
     """One tick of a flight, for displays and records.
 
     Attributes:
-        command: as sent.
-        detections: of the latest image.
-        mission_state: such as "red.turning".
-        flight_time_s: vehicle time since motors on; 0 before.
-        transition: the one taken in this tick, if any.
-        paused: a pilot has the sticks; the mission waits.
         remark: in a pause, why the mission did not continue when the pilot last gave the drone back;
             otherwise how the mission's command was changed to keep the drone in its box; empty if it was not.
     """
 
     state: DroneState
-    command: VelocityCommand
-    detections: Detections
-    mission_state: str
-    flight_time_s: float
-    transition: TransitionTaken | None = None
-    paused: bool = False
+    command: VelocityCommand  # as sent
+    detections: Detections  # of the latest image
+    mission_state: str  # such as "red.turning"
+    flight_time_s: float  # vehicle time since motors on; 0 before
+    transition: TransitionTaken | None = None  # the one taken in this tick
+    paused: bool = False  # a pilot has the sticks; the mission waits
     remark: str = ""
 
 
@@ -54,24 +48,15 @@ logger = logging.getLogger(__name__)
 
 @dataclass(frozen=True, slots=True)
 class MissionEnd:
-    """How a flight ended.
-
-    Attributes:
-        reason: why it did not finish; empty if it did.
-        mission_state: the state it was in.
-        flight_time_s: vehicle time from motors on to its end.
-        ticks: how many were flown.
-        pauses: how often a pilot took the drone.
-        kept_in_box_s: vehicle time for which the command was changed to keep the drone in its box.
-    """
+    """How a flight ended."""
 
     ended: Literal["finished", "timed out", "aborted"]
-    reason: str
-    mission_state: str
-    flight_time_s: float
-    ticks: int
-    pauses: int = 0
-    kept_in_box_s: float = 0.0
+    reason: str  # why it did not finish; empty if it did
+    mission_state: str  # the state it was in
+    flight_time_s: float  # vehicle time from motors on to its end
+    ticks: int  # how many were flown
+    pauses: int = 0  # how often a pilot took the drone
+    kept_in_box_s: float = 0.0  # vehicle time for which the command was changed to keep the drone in its box
 
     @property
     def interrupted(self) -> bool:

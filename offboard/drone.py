@@ -17,32 +17,20 @@ class DroneError(UserError):
 class DroneState:
     """The drone's state in arena axes (x forward, y left, z up, yaw counter-clockwise).
 
-    Attributes:
-        time_us: vehicle time, microseconds since its boot.
-        x: position, metres.
-        y: position, metres.
-        z: height above the arena's floor, metres.
-        yaw: heading, radians, -pi..pi.
-        velocity_arena_m_s: shape (3,).
-        armed: motors are on.
-        offboard: the drone follows this app's setpoints. If it does not between `motors_on` and the end of
-            commanding, a pilot has taken it.
-        mode: name of the flight mode, for people.
-        landed: it is on the ground or on the base.
-        position_age_s: how much older the position is than `time_us`, seconds.
+    If `offboard` is false between `motors_on` and the end of commanding, a pilot has taken the drone.
     """
 
-    time_us: int
-    x: float
-    y: float
-    z: float
-    yaw: float
+    time_us: int  # vehicle time, microseconds since its boot
+    x: float  # metres
+    y: float  # metres
+    z: float  # above the arena's floor, metres
+    yaw: float  # radians, -pi..pi
     velocity_arena_m_s: tuple[float, float, float] = (0.0, 0.0, 0.0)
     armed: bool = False
-    offboard: bool = False
-    mode: str = ""
-    landed: bool = True
-    position_age_s: float = 0.0
+    offboard: bool = False  # it follows this app's setpoints
+    mode: str = ""  # name of the flight mode, for people
+    landed: bool = True  # on the ground or on the base
+    position_age_s: float = 0.0  # how much older the position is than `time_us`
 
 
 @dataclass(frozen=True, slots=True)

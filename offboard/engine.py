@@ -39,22 +39,18 @@ class TransitionTaken:
     """A change of state, and why.
 
     Attributes:
-        source: full id of the state (a leaf) that was left.
-        target: full id of the present state; if the transition finished a superstate, the state after it.
         when: the guard that held; "" for a transition without one, "done" if a superstate was finished,
             "resume" after a pause.
         values: each name of the guard that held with its value then, such as ("frame.d", 0.44), in the order
             of the guard; a name that could not be read is left out.
-        time_us: vehicle time, microseconds.
-        seconds_in_source: vehicle time in `source`, without pauses.
     """
 
-    source: str
-    target: str
+    source: str  # full id of the leaf that was left
+    target: str  # full id of the present state; if a superstate was finished, the state after it
     when: str
     values: tuple[tuple[str, object], ...]
-    time_us: int
-    seconds_in_source: float
+    time_us: int  # vehicle time
+    seconds_in_source: float  # vehicle time without pauses
 
 
 class _FastState:

@@ -129,9 +129,10 @@ def confine(command: VelocityCommand, state: DroneState, box: Box) -> tuple[Velo
     sides: list[str] = []
     for axis, brake_s in enumerate((BRAKE_LEVEL_S, BRAKE_LEVEL_S, BRAKE_HEIGHT_S)):
         ahead_m = speed[axis] * reaction_s
-        max_speed = _max_speed(high[axis] - at[axis] - max(0.0, ahead_m), brake_s)
-        min_speed = -_max_speed(at[axis] - low[axis] + min(0.0, ahead_m), brake_s)
-        limited = max(min_speed, min(max_speed, wanted[axis]))
+        # Limits of the speed towards each side; beyond a side the limit is negative, which leads back.
+        to_high = max(-RETURN_M_S, (high[axis] - at[axis] - max(0.0, ahead_m)) / brake_s)
+        to_low = max(-RETURN_M_S, (at[axis] - low[axis] + min(0.0, ahead_m)) / brake_s)
+        limited = max(-to_low, min(to_high, wanted[axis]))
         if limited != wanted[axis]:
             side_m = high[axis] if limited < wanted[axis] else low[axis]
             sides.append(f"{'xyz'[axis]} {side_m:.1f} m")
@@ -140,11 +141,6 @@ def confine(command: VelocityCommand, state: DroneState, box: Box) -> tuple[Velo
         return command, ""
     x, y, up = kept
     return replace(command, forward_m_s=c * x + s * y, left_m_s=c * y - s * x, up_m_s=up), ", ".join(sides)
-
-
-def _max_speed(distance_m: float, brake_s: float) -> float:
-    """The maximum speed towards a side; beyond it a negative one, which leads back."""
-    return max(-RETURN_M_S, distance_m / brake_s)
 
 
 def _sides(box: Box, state: DroneState) -> tuple[Vec3, Vec3]:

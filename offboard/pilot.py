@@ -30,40 +30,24 @@ class PilotError(UserError):
 
 @dataclass(frozen=True, slots=True)
 class Imu:
-    """Where the drone is.
+    """Where the drone is in the arena."""
 
-    Attributes:
-        x: position in the arena, metres.
-        y: position in the arena, metres.
-        z: height above the floor, metres.
-        yaw: heading, radians, counter-clockwise from x.
-    """
-
-    x: float = 0.0
-    y: float = 0.0
-    z: float = 0.0
-    yaw: float = 0.0
+    x: float = 0.0  # metres
+    y: float = 0.0  # metres
+    z: float = 0.0  # height above the floor, metres
+    yaw: float = 0.0  # heading, radians, counter-clockwise from x
 
 
 @dataclass(slots=True)
 class Command:
-    """What the mission commands (the paper's on, velX, velY, velZ, rotZ).
+    """What the mission commands (the paper's on, velX, velY, velZ, rotZ)."""
 
-    Attributes:
-        on: motors on.
-        vel_x: forward, m/s.
-        vel_y: to the left, m/s.
-        vel_z: up, m/s.
-        rot_z: yaw rate to the left, rad/s.
-        land: with `on` false: land by the vehicle's own means instead of stopping the motors at once.
-    """
-
-    on: bool = False
-    vel_x: float = 0.0
-    vel_y: float = 0.0
-    vel_z: float = 0.0
-    rot_z: float = 0.0
-    land: bool = False
+    on: bool = False  # motors on
+    vel_x: float = 0.0  # forward, m/s
+    vel_y: float = 0.0  # to the left, m/s
+    vel_z: float = 0.0  # up, m/s
+    rot_z: float = 0.0  # yaw rate to the left, rad/s
+    land: bool = False  # with `on` false: land by the vehicle's own means, do not stop the motors at once
 
 
 class Memory(SimpleNamespace):
@@ -71,30 +55,17 @@ class Memory(SimpleNamespace):
 
 
 class Pilot:
-    """The paper's interface to missions.
+    """The paper's interface to missions. All times are vehicle time."""
 
-    Attributes:
-        imu: position and heading.
-        cam: what the camera sees: `red`, `green`, `blue`, each with n, s, e, w, d, a.
-        cmd: the command; it stays as it is until changed.
-        colour: of the frame to find: red, green or blue. Assign it, then read `frame`.
-        goal_m: where `fly_to_goal` flies, (x, y, z) in the arena, metres.
-        memory: the mission's own variables.
-        seconds_in_state: vehicle time since the present state was entered.
-        seconds_in_mission: vehicle time since the mission started.
-        seconds_unseen: vehicle time since `frame` was last wholly in view, or since the mission started or
-            continued after a pause.
-    """
-
-    imu: Imu
-    cam: Detections
-    cmd: Command
-    colour: Colour
-    goal_m: Vec3
-    memory: Memory
-    seconds_in_state: float
-    seconds_in_mission: float
-    seconds_unseen: float
+    imu: Imu  # position and heading
+    cam: Detections  # what the camera sees: `red`, `green`, `blue`, each with n, s, e, w, d, a
+    cmd: Command  # it stays as it is until changed
+    colour: Colour  # of the frame to find: red, green or blue; assign it, then read `frame`
+    goal_m: Vec3  # where `fly_to_goal` flies, (x, y, z) in the arena
+    memory: Memory  # the mission's own variables
+    seconds_in_state: float  # since the present state was entered
+    seconds_in_mission: float  # since the mission started
+    seconds_unseen: float  # since `frame` was last wholly in view, or the mission started or continued
 
     def __init__(self, variables: dict[str, object] | None = None) -> None:
         """Start with motors off, and with the first values of the mission's own variables."""

@@ -78,8 +78,7 @@ class HttpSource:
         limits = aiohttp.ClientTimeout(total=None, connect=self._timeout_s, sock_connect=self._timeout_s)
         self._session = aiohttp.ClientSession(timeout=limits, auto_decompress=False)
         try:
-            response = await self._connect(self._session)
-            reader = self._reader(response)
+            response, reader = await self._connect(self._session)
         except BaseException:
             await self._session.close()
             raise
@@ -120,10 +119,14 @@ class HttpSource:
             yield CameraFrame(image, part.time_us, received_s, part.data)
             deadline_s = loop.time() + self._timeout_s
 
-    async def _connect(self, session: aiohttp.ClientSession) -> aiohttp.ClientResponse:
+    async def _connect(self, session: aiohttp.ClientSession) -> tuple[aiohttp.ClientResponse, MjpegReader]:
         try:
             async with asyncio.timeout(self._timeout_s):
-                return await session.get(self._url, max_redirects=3)
+                response = await session.get(self._url, max_redirects=3)
+            if response.status != 200:
+                problem = f"HTTP {response.status} {_first_line(response.reason)}"
+                raise CameraError(f"{self._name}: {problem}")
+            return response, MjpegReader(response.headers.get("Content-Type", ""))
         except TimeoutError as error:
             raise CameraError(f"{self._name}: no answer within {self._timeout_s:g} s") from error
         except aiohttp.ClientConnectorError as error:
@@ -134,12 +137,6 @@ class HttpSource:
             raise CameraError(f"{self._name}: not a valid URL") from error
         except (aiohttp.ClientError, OSError, ValueError) as error:
             raise CameraError(f"{self._name}: {_first_line(error)}") from error
-
-    def _reader(self, response: aiohttp.ClientResponse) -> MjpegReader:
-        if response.status != 200:
-            raise CameraError(f"{self._name}: HTTP {response.status} {_first_line(response.reason)}")
-        try:
-            return MjpegReader(response.headers.get("Content-Type", ""))
         except StreamError as error:
             raise CameraError(f"{self._name}: {error}") from None
 

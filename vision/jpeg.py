@@ -32,19 +32,12 @@ class ImageError(ValueError):
 
 @dataclass(frozen=True, slots=True)
 class JpegStructure:
-    """What the markers of a whole JPEG say.
+    """What the markers of a whole JPEG say."""
 
-    Attributes:
-        size_px: width and height.
-        progressive: coded in passes that refine each other; if not, baseline.
-        scans: how often the decoder visits the whole image.
-        size_bytes: of the compressed image.
-    """
-
-    size_px: tuple[int, int]
-    progressive: bool
-    scans: int
-    size_bytes: int
+    size_px: tuple[int, int]  # width and height
+    progressive: bool  # coded in passes that refine each other; if not, baseline
+    scans: int  # how often the decoder visits the whole image
+    size_bytes: int  # of the compressed image
 
     @property
     def is_quick(self) -> bool:

@@ -18,23 +18,14 @@ Image = npt.NDArray[np.uint8]
 
 @dataclass(frozen=True, slots=True)
 class Detection:
-    """The paper's six numbers of one colour; the defaults mean "not seen".
+    """The paper's six numbers of one colour; the defaults mean "not seen"."""
 
-    Attributes:
-        n: upper edge of its bounding box, pixels above the image centre.
-        s: lower edge, pixels above the centre.
-        e: right edge, pixels right of the centre.
-        w: left edge, pixels right of the centre.
-        d: distance, metres; +inf unless the whole frame is in view.
-        a: unsigned angle between line of sight and the frame's normal, degrees; +inf unless whole.
-    """
-
-    n: float = -inf
-    s: float = inf
-    e: float = -inf
-    w: float = inf
-    d: float = inf
-    a: float = inf
+    n: float = -inf  # upper edge of its bounding box, pixels above the image centre
+    s: float = inf  # lower edge, pixels above the centre
+    e: float = -inf  # right edge, pixels right of the centre
+    w: float = inf  # left edge, pixels right of the centre
+    d: float = inf  # distance, metres; +inf unless the whole frame is in view
+    a: float = inf  # unsigned angle of line of sight to the frame's normal, degrees; +inf unless whole
 
     @property
     def seen(self) -> bool:
@@ -47,33 +38,22 @@ NOT_SEEN = Detection()
 
 @dataclass(frozen=True, slots=True)
 class Detections:
-    """What one image showed.
-
-    Attributes:
-        time_us: vehicle time of the image, microseconds; None if the source does not send it.
-    """
+    """What one image showed."""
 
     red: Detection = NOT_SEEN
     green: Detection = NOT_SEEN
     blue: Detection = NOT_SEEN
-    time_us: int | None = None
+    time_us: int | None = None  # vehicle time of the image; None if the source does not send it
 
 
 @dataclass(frozen=True, slots=True)
 class CameraFrame:
-    """One image of a camera source.
+    """One image of a camera source."""
 
-    Attributes:
-        image: BGR, shape (height, width, 3), uint8.
-        time_us: vehicle time of its exposure, microseconds; None if the source does not send it.
-        received_s: monotonic wall time of its arrival, seconds.
-        jpeg: the compressed image as received, if it was; for recording without compressing again.
-    """
-
-    image: Image
-    time_us: int | None
-    received_s: float
-    jpeg: bytes | None = field(default=None, repr=False)
+    image: Image  # BGR, shape (height, width, 3), uint8
+    time_us: int | None  # vehicle time of its exposure; None if the source does not send it
+    received_s: float  # monotonic wall time of its arrival
+    jpeg: bytes | None = field(default=None, repr=False)  # as received, to record it without encoding
 
 
 class CameraError(UserError):

@@ -46,7 +46,11 @@ class Vocabulary:
             for name, member in inspect.getmembers(pilot_class, inspect.isfunction)
             if not name.startswith("_")
         }
-        self.values = _plain_attributes(pilot_class) | _typed_names(pilot_class)
+        untyped = inspect.getmembers(
+            pilot_class, lambda each: isinstance(each, bool | int | float | str | tuple)
+        )
+        self.values = {name: type(value) for name, value in untyped if not name.startswith("_")}
+        self.values |= _typed_names(pilot_class)
 
     def check_primitive(self, name: str) -> None:
         """Refuse an action that is no method of the pilot. Raises `UnknownNameError`."""
@@ -157,14 +161,6 @@ def path_of(node: ast.AST) -> tuple[str, ...]:
 def choices_of(kind: object) -> tuple[object, ...]:
     """Values that a type allows, if it is a Literal; otherwise none."""
     return get_args(kind) if str(get_origin(kind)).endswith("Literal") else ()
-
-
-def _plain_attributes(pilot_class: type[Pilot]) -> dict[str, object]:
-    """Class attributes without a declared type (`gain = 0.5`), with the type of their value."""
-    members = inspect.getmembers(
-        pilot_class, lambda member: isinstance(member, bool | int | float | str | tuple)
-    )
-    return {name: type(member) for name, member in members if not name.startswith("_")}
 
 
 def _needed_values(pilot_class: type[Pilot], name: str) -> str:

@@ -50,33 +50,23 @@ class Sample:
 class TelemetryFeed:
     """Latest values; written on MAVSDK's thread, read on the loop's. Each field is replaced whole.
 
-    Args:
-        clock: monotonic wall time, seconds.
-
-    Attributes:
-        sample: of the last tick; time, yaw, position and velocity here are the latest, as in `Sample`.
-        tick_number: of the last tick, counted from the vehicle's boot.
-        armed: from the last heartbeat; None before the first.
-        mode: name of the flight mode, such as "OFFBOARD".
-        landed: from EXTENDED_SYS_STATE.
-        health: MAVSDK's health, None before the first.
-        attitudes, positions: how many were received.
+    `clock` is monotonic wall time, seconds. Time, yaw, position and velocity have the units of `Sample`.
     """
 
     def __init__(self, clock: Callable[[], float] = time.monotonic) -> None:
         self._clock = clock
-        self.sample = Sample(0, 0.0, (0.0, 0.0, 0.0), (0.0, 0.0, 0.0))
-        self.tick_number = 0
+        self.sample = Sample(0, 0.0, (0.0, 0.0, 0.0), (0.0, 0.0, 0.0))  # of the last tick
+        self.tick_number = 0  # of the last tick, counted from the vehicle's boot
         self.time_us = 0
         self.yaw_ned_rad = 0.0
         self.position_ned_m: Vec3 = (0.0, 0.0, 0.0)
         self.velocity_ned_m_s: Vec3 = (0.0, 0.0, 0.0)
         self.position_us = 0
-        self.armed: bool | None = None
-        self.mode = ""
-        self.landed = True
-        self.health: Any = None
-        self.attitudes = 0
+        self.armed: bool | None = None  # from the last heartbeat; None before the first
+        self.mode = ""  # name of the flight mode, such as "OFFBOARD"
+        self.landed = True  # from EXTENDED_SYS_STATE
+        self.health: Any = None  # MAVSDK's; None before the first
+        self.attitudes = 0  # how many were received
         self.positions = 0
         self._attitude_received_s = 0.0
         self._position_received_s = 0.0
