@@ -137,8 +137,6 @@ class HttpSource:
             raise CameraError(f"{self._name}: not a valid URL") from error
         except (aiohttp.ClientError, OSError, ValueError) as error:
             raise CameraError(f"{self._name}: {_first_line(error)}") from error
-        except StreamError as error:
-            raise CameraError(f"{self._name}: {error}") from None
 
     async def _read(self, response: aiohttp.ClientResponse, reader: MjpegReader) -> None:
         parts, since_s = 0, time.monotonic()

@@ -46,10 +46,9 @@ class Vocabulary:
             for name, member in inspect.getmembers(pilot_class, inspect.isfunction)
             if not name.startswith("_")
         }
-        untyped = inspect.getmembers(
-            pilot_class, lambda each: isinstance(each, bool | int | float | str | tuple)
-        )
-        self.values = {name: type(value) for name, value in untyped if not name.startswith("_")}
+        plain = (bool, int, float, str, tuple)
+        untyped = inspect.getmembers(pilot_class, lambda member: isinstance(member, plain))
+        self.values: dict[str, object] = {name: type(value) for name, value in untyped if name[0] != "_"}
         self.values |= _typed_names(pilot_class)
 
     def check_primitive(self, name: str) -> None:
