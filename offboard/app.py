@@ -1,4 +1,4 @@
-"""Flies a mission: drone and camera in, an outcome with its reason out. Whatever happens, it ends safely."""
+"""Flies a mission with a drone and a camera, and ends safely whatever happens."""
 
 from __future__ import annotations
 
@@ -11,16 +11,16 @@ from typing import Literal
 
 from offboard.drone import Drone, DroneError, DroneState, VelocityCommand
 from offboard.engine import MissionEngine, MissionRunError, TransitionTaken
-from offboard.eyes import Camera, CameraEyes, CameraLostError, ClosedEyes, Eyes
 from offboard.keep_in_box import Box, KeepInBox, OutsideBoxError
 from offboard.mission import Mission
+from offboard.perception import CameraLostError, Perception
 from offboard.pilot import Imu
 from vision.types import Detections
 
 INTERRUPTED = "interrupted"
 MICROSECONDS = 1_000_000
 STILL = VelocityCommand()
-REST_US = 3 * MICROSECONDS  # time to fall onto the base, and to be seen at rest there
+REST_US = 3 * MICROSECONDS  # time to fall onto the base, and for telemetry to show the drone at rest
 
 
 @dataclass(frozen=True, slots=True)
@@ -28,24 +28,17 @@ class Moment:
     """One tick of a flight, for displays and records.
 
     Attributes:
-        state: of the drone.
-        command: as sent.
-        detections: of the latest image.
-        mission_state: such as "red.turning".
-        flight_time_s: vehicle time since motors on; 0 before.
-        transition: the one taken in this tick, if any.
-        paused: a pilot has the sticks; the mission waits.
-        remark: in a pause, why the mission did not go on when the pilot last gave the drone back; otherwise
-            what keeping the drone in its box made of the mission's command. Empty if nothing.
+        remark: in a pause, why the mission did not continue when the pilot last gave the drone back;
+            otherwise how the mission's command was changed to keep the drone in its box; empty if it was not.
     """
 
     state: DroneState
-    command: VelocityCommand
-    detections: Detections
-    mission_state: str
-    flight_time_s: float
-    transition: TransitionTaken | None = None
-    paused: bool = False
+    command: VelocityCommand  # as sent
+    detections: Detections  # of the latest image
+    mission_state: str  # such as "red.turning"
+    flight_time_s: float  # vehicle time since motors on; 0 before
+    transition: TransitionTaken | None = None  # the one taken in this tick
+    paused: bool = False  # a pilot has the sticks; the mission waits
     remark: str = ""
 
 
@@ -55,85 +48,68 @@ logger = logging.getLogger(__name__)
 
 @dataclass(frozen=True, slots=True)
 class MissionEnd:
-    """How a flight ended.
-
-    Attributes:
-        ended: "finished" if the mission reached its end.
-        reason: why it did not; empty if it did.
-        mission_state: the state it was in.
-        flight_time_s: vehicle time from motors on to its end.
-        ticks: how many were flown.
-        pauses: how often a pilot took the drone.
-        kept_in_box_s: vehicle time for which the command was changed to keep the drone in its box.
-    """
+    """How a flight ended."""
 
     ended: Literal["finished", "timed out", "aborted"]
-    reason: str
-    mission_state: str
-    flight_time_s: float
-    ticks: int
-    pauses: int = 0
-    kept_in_box_s: float = 0.0
+    reason: str  # why it did not finish; empty if it did
+    mission_state: str  # the state it was in
+    flight_time_s: float  # vehicle time from motors on to its end
+    ticks: int  # how many were flown
+    pauses: int = 0  # how often a pilot took the drone
+    kept_in_box_s: float = 0.0  # vehicle time for which the command was changed to keep the drone in its box
 
     @property
     def interrupted(self) -> bool:
-        """Somebody stopped it with Ctrl-C."""
+        """Whether a user stopped it with Ctrl-C."""
         return self.reason.startswith(INTERRUPTED)
 
 
 async def fly_mission(
     drone: Drone,
-    camera: Camera | None,
+    perception: Perception,
     mission: Mission,
     *,
     limit_s: float = 180.0,
     observer: Observer | None = None,
-    eyes: Eyes | None = None,
     box: Box | None = None,
 ) -> MissionEnd:
-    """Connect, fly the mission, let go.
+    """Connect, fly the mission, disconnect.
 
-    If anything goes wrong after the start (drone, camera, mission, time limit, Ctrl-C), commanding stops,
-    hold is asked for, and the outcome says why. A pilot who takes the drone pauses the mission; it goes on
-    when he gives the drone back where that is safe.
+    If anything fails after the start (drone, camera, mission, time limit, Ctrl-C), commanding stops, hold is
+    requested, and the outcome says why. A pilot who takes the drone pauses the mission; it continues when he
+    gives the drone back where that is safe.
 
     Args:
         drone: not yet connected; closed at the end.
-        camera: source of images; None for a mission that does not look.
+        perception: opened and closed here.
         mission: checked.
         limit_s: vehicle time from motors on, seconds.
         observer: called at every tick; must be quick.
-        eyes: instead of `camera`: other means to see, such as those of a lockstep simulation.
-        box: in which the drone is kept, whatever the mission says; None: it is not.
-
-    Returns:
-        How it ended.
+        box: keeps the drone inside, whatever the mission commands; None: no limits.
 
     Raises:
         DroneError: the drone cannot be reached or is not ready.
         CameraLostError: the camera gives no image at the start.
     """
-    if eyes is None:
-        eyes = ClosedEyes() if camera is None else CameraEyes(camera)
     keeper = None if box is None else KeepInBox(box)
-    flight = _Flight(drone, eyes, MissionEngine(mission), limit_s, observer, keeper=keeper)
+    flight = _Flight(drone, perception, MissionEngine(mission), limit_s, observer, keeper=keeper)
     try:
         await drone.connect()
-        await eyes.open()
+        await perception.open()
         await drone.ready()
         return await flight.run()
     finally:
-        await eyes.close()
+        await perception.close()
         await drone.close()
 
 
 class _Flight:
-    """One flight under way."""
+    """One flight in progress."""
 
     def __init__(
         self,
         drone: Drone,
-        eyes: Eyes,
+        perception: Perception,
         engine: MissionEngine,
         limit_s: float,
         observer: Observer | None,
@@ -141,13 +117,13 @@ class _Flight:
         keeper: KeepInBox | None,
     ) -> None:
         self._drone = drone
-        self._eyes = eyes
+        self._perception = perception
         self._engine = engine
         self._limit_us = round(limit_s * MICROSECONDS)
         self._observer = observer
         self._keeper = keeper
         self._flying = False
-        self._motors_asked = False
+        self._motors_requested = False
         self._landed = False
         self._first_us: int | None = None
         self._started_us: int | None = None
@@ -158,7 +134,7 @@ class _Flight:
         self._remark = ""
 
     async def run(self) -> MissionEnd:
-        """Fly to the end, whichever it is."""
+        """Fly until the flight ends, for whatever reason."""
         try:
             timed_out = await self._fly()
         except (DroneError, CameraLostError, MissionRunError, OutsideBoxError) as error:
@@ -166,48 +142,48 @@ class _Flight:
         except asyncio.CancelledError:
             task = asyncio.current_task()
             if task is not None:
-                task.uncancel()  # the outcome tells of it
+                task.uncancel()  # the outcome reports it
             return await self._stop("aborted", INTERRUPTED)
         except BaseException:
             await self._stop("aborted", "unexpected error")
             raise
         if timed_out:
             return await self._stop("timed out", f"not finished within {self._limit_us / MICROSECONDS:g} s")
-        await self._watch_come_to_rest()
+        await self._observe_rest()
         return self._outcome("finished", "")
 
     async def _fly(self) -> bool:
-        """Tick until the mission is finished; True if time was up before."""
+        """Tick until the mission is finished; True if the time limit ended before."""
         ticks = self._drone.ticks()
         try:
             async for state in ticks:
-                if self._time_is_up(state.time_us):
+                if self._is_timed_out(state.time_us):
                     return True
                 await self._tick(state)
                 if self._engine.finished:
-                    await self._come_down()
+                    await self._stop_motors()
                     return False
         finally:
             await _close(ticks)
         raise DroneError("the drone's ticks ended")
 
     async def _tick(self, state: DroneState) -> None:
-        if self._flying and (self._paused or not state.offboard) and await self._stay_paused(state):
+        if self._flying and (self._paused or not state.offboard) and await self._is_paused(state):
             return
-        detections = self._eyes.latest(state.time_us)
+        detections = self._perception.latest(state.time_us)
         imu = Imu(state.x, state.y, state.z, state.yaw)
-        command = self._kept_in(self._engine.tick(imu, detections, state.time_us), state)
-        wanted = self._engine.pilot.cmd.on
-        switches = wanted != self._flying
-        self._motors_asked = self._motors_asked or wanted
-        if switches:  # this takes seconds; those who watch shall know at once why
+        command = self._kept_in_box(self._engine.tick(imu, detections, state.time_us), state)
+        motors_on = self._engine.pilot.cmd.on
+        switches = motors_on != self._flying
+        self._motors_requested = self._motors_requested or motors_on
+        if switches:  # this takes seconds; observers get the reason before
             self._observe(state, command, detections)
-        if wanted and not self._flying:
+        if motors_on and not self._flying:
             await self._drone.motors_on()
             self._flying = True
             self._started_us = None  # counts from the next tick, the first with motors on
-        elif self._flying and not wanted:
-            await self._come_down()
+        elif self._flying and not motors_on:
+            await self._stop_motors()
         if self._flying:
             self._drone.command(command)
         self._ticks += 1
@@ -215,16 +191,16 @@ class _Flight:
             self._observe(state, command, detections)
 
     def _observe(self, state: DroneState, command: VelocityCommand, detections: Detections) -> None:
-        if self._observer is not None:
-            flight_time_s = self._flight_time_s()
-            place, transition = self._engine.state, self._engine.transition
+        if self._observer is None:
+            return
+        engine, flight_time_s, remark = self._engine, self._flight_time_s(), self._remark
+        if not self._paused:
             remark = "" if self._keeper is None else self._keeper.remark
-            self._observer(
-                Moment(state, command, detections, place, flight_time_s, transition, remark=remark)
-            )
+        what = (state, command, detections, engine.state, flight_time_s, engine.transition)
+        self._observer(Moment(*what, self._paused, remark))
 
-    def _kept_in(self, command: VelocityCommand, state: DroneState) -> VelocityCommand:
-        """What of a command may be flown; the first change in a flight is logged."""
+    def _kept_in_box(self, command: VelocityCommand, state: DroneState) -> VelocityCommand:
+        """The command limited to the box; the first change in a flight is logged."""
         keeper = self._keeper
         if keeper is None or not self._flying:
             return command
@@ -234,8 +210,8 @@ class _Flight:
             logger.warning("%s (x %.1f, y %.1f, z %.1f m)", keeper.remark, state.x, state.y, state.z)
         return kept
 
-    async def _stay_paused(self, state: DroneState) -> bool:
-        """Begin, go on with or end a pause; True if the mission waits in this tick."""
+    async def _is_paused(self, state: DroneState) -> bool:
+        """Start, continue or end a pause; True if the mission waits in this tick."""
         if not self._paused:
             self._paused = True
             self._pauses += 1
@@ -249,25 +225,23 @@ class _Flight:
                 else "the motors were stopped in the air while the pilot had the sticks"
             )
         try:
-            detections, blind = self._eyes.latest(state.time_us), ""
-        except CameraLostError as error:  # no harm to a pilot, and it may come back
-            detections, blind = Detections(), str(error)
+            detections, camera_problem = self._perception.latest(state.time_us), ""
+        except CameraLostError as error:  # a pilot can fly without it, and it may return
+            detections, camera_problem = Detections(), str(error)
         if state.offboard:
-            self._remark = _hindrance(state) or blind
+            self._remark = _why_not_continued(state) or camera_problem
             if not self._remark:
                 self._paused = False
-                logger.info("the pilot gave the drone back: the mission goes on")
+                logger.info("the pilot gave the drone back: the mission continues")
                 return False
-            logger.warning("the mission does not go on: %s", self._remark)
+            logger.warning("the mission does not continue: %s", self._remark)
             await self._drone.refuse()
         self._ticks += 1
-        if self._observer is not None:
-            place, flight_time_s = self._engine.state, self._flight_time_s()
-            self._observer(Moment(state, STILL, detections, place, flight_time_s, None, True, self._remark))
+        self._observe(state, STILL, detections)
         return True
 
-    def _time_is_up(self, time_us: int) -> bool:
-        """Whether the limit is over; it counts from motors on, and before that from the first tick."""
+    def _is_timed_out(self, time_us: int) -> bool:
+        """Whether the limit has ended; it counts from motors on, and before that from the first tick."""
         self._now_us = time_us
         if self._first_us is None:
             self._first_us = time_us
@@ -276,8 +250,8 @@ class _Flight:
         since_us = self._first_us if self._started_us is None else self._started_us
         return time_us - since_us > self._limit_us
 
-    async def _come_down(self) -> None:
-        """Motors off or, if the mission says so or ends in the air, land."""
+    async def _stop_motors(self) -> None:
+        """Motors off or, if the mission says so or ends with motors on, land."""
         if not self._flying:
             return
         cmd = self._engine.pilot.cmd
@@ -288,8 +262,8 @@ class _Flight:
         else:
             await self._drone.motors_off()
 
-    async def _watch_come_to_rest(self) -> None:
-        """Go on observing after motors off, for the records and for a referee who lives on telemetry.
+    async def _observe_rest(self) -> None:
+        """Observe for a while after motors off, for the records and for a referee that uses telemetry.
 
         A landing takes many seconds, in which no tick is observed; the time counts from its end.
         """
@@ -302,18 +276,17 @@ class _Flight:
                 if self._observer is not None:
                     since_us = state.time_us if self._started_us is None else self._started_us
                     flight_time_s = (state.time_us - since_us) / MICROSECONDS
-                    blind = Detections()
-                    self._observer(Moment(state, STILL, blind, self._engine.state, flight_time_s))
+                    self._observer(Moment(state, STILL, Detections(), self._engine.state, flight_time_s))
                 if state.time_us >= end_us:
                     break
         except DroneError:
-            return  # the flight is over; a link lost now changes nothing
+            return  # the flight has ended; a link lost now changes nothing
         finally:
             await _close(ticks)
 
     async def _stop(self, ended: Literal["timed out", "aborted"], reason: str) -> MissionEnd:
-        """Stop commanding and ask for hold."""
-        if self._motors_asked:
+        """Stop commanding and request hold."""
+        if self._motors_requested:
             self._flying = False
             try:
                 await self._drone.hold()
@@ -322,16 +295,16 @@ class _Flight:
         return self._outcome(ended, reason)
 
     def _outcome(self, ended: Literal["finished", "timed out", "aborted"], reason: str) -> MissionEnd:
-        place, flight_time_s = self._engine.state, self._flight_time_s()
+        state, flight_time_s = self._engine.state, self._flight_time_s()
         kept_s = 0.0 if self._keeper is None else self._keeper.limited_us / MICROSECONDS
-        return MissionEnd(ended, reason, place, flight_time_s, self._ticks, self._pauses, kept_s)
+        return MissionEnd(ended, reason, state, flight_time_s, self._ticks, self._pauses, kept_s)
 
     def _flight_time_s(self) -> float:
         return 0.0 if self._started_us is None else (self._now_us - self._started_us) / MICROSECONDS
 
 
-def _hindrance(state: DroneState) -> str:
-    """Why the drone's state forbids to fly on after a pause; empty if it does not."""
+def _why_not_continued(state: DroneState) -> str:
+    """Why the drone's state forbids the mission to continue after a pause; empty if it does not."""
     if state.landed:
         return "the drone stands on the ground"
     if not all(map(isfinite, (state.x, state.y, state.z, state.yaw))):

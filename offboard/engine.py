@@ -1,10 +1,10 @@
-"""Runs a mission, tick by tick: what the drone sees in, a velocity command out. No clock, no drone.
+"""Runs a mission tick by tick: position and detections in, a velocity command out. No clock, no drone.
 
-Most ticks change no state. Sending an event through python-statemachine costs some hundred microseconds,
-so the engine first asks the guards of the present state, compiled by the library's own restricted
-evaluator; only if one holds is the chart sent its `tick` (it asks the guards again, in order of priority,
-and does the leaving and entering), otherwise `during` is done here. `quiet_ticks=False` sends every tick
-through the chart; a test shows that both fly alike.
+Most ticks change no state. Sending an event through python-statemachine costs some hundred microseconds, so
+the engine first evaluates the guards of the present state, compiled by the library's own restricted
+evaluator. Only if one holds is `tick` sent to the chart, which evaluates the guards again, in order of
+priority, and leaves and enters states; otherwise `during` is run here. `quiet_ticks=False` sends every tick
+to the chart; a test shows that both fly alike.
 """
 
 from __future__ import annotations
@@ -12,11 +12,10 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 from math import isfinite
-
-from statemachine import StateChart
+from typing import Any
 
 from errors import UserError
-from offboard.chart.expressions import Evaluate, compile_value, names_in
+from offboard.chart.expressions import compile_value, names_in
 from offboard.chart.native import RESUME, TICK
 from offboard.chart.spec import Action, Leaf, Transition
 from offboard.drone import VelocityCommand
@@ -32,7 +31,7 @@ DONE = "done"
 
 
 class MissionRunError(UserError):
-    """The mission cannot go on; the message is one line with the state and the reason."""
+    """The mission cannot continue; the message is one line with the state and the reason."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -40,73 +39,61 @@ class TransitionTaken:
     """A change of state, and why.
 
     Attributes:
-        source: full id of the state (a leaf) that was left.
-        target: full id of the one that is present now. If a superstate was finished on the way, this is
-            where the mission went on.
         when: the guard that held; "" for a transition without one, "done" if a superstate was finished,
-            "resume" if the mission goes on here after a pause.
+            "resume" after a pause.
         values: each name of the guard that held with its value then, such as ("frame.d", 0.44), in the order
             of the guard; a name that could not be read is left out.
-        time_us: vehicle time, microseconds.
-        seconds_in_source: how long it was in `source`, vehicle time without pauses.
     """
 
-    source: str
-    target: str
+    source: str  # full id of the leaf that was left
+    target: str  # full id of the present state; if a superstate was finished, the state after it
     when: str
     values: tuple[tuple[str, object], ...]
-    time_us: int
-    seconds_in_source: float
+    time_us: int  # vehicle time
+    seconds_in_source: float  # vehicle time without pauses
 
 
 class _FastState:
-    """A leaf of the chart with its guards and its `during` compiled."""
+    """A leaf of the chart with compiled guards and `during`."""
 
     __slots__ = ("during", "finish", "guards", "leaf")
 
     def __init__(self, leaf: Leaf, finish: bool) -> None:
         self.leaf = leaf
-        self.guards = tuple(_guard(transition.when) for transition in leaf.transitions)
+        self.guards = tuple(compile_value(transition.when or "True") for transition in leaf.transitions)
         self.during = tuple(_act(action) for action in leaf.during)
         self.finish = finish
 
 
 class MissionEngine:
-    """A mission under way."""
+    """A mission in progress; the first tick enters the initial state.
+
+    Args:
+        mission: what to fly.
+        pilot: by default a new one of the mission's class.
+        quiet_ticks: do not send the chart the ticks that change nothing.
+
+    Attributes:
+        state: full id of the present state, such as "red.turning"; empty before the first tick.
+        transition: the transition taken in the last tick; None if none was.
+    """
 
     def __init__(self, mission: Mission, pilot: Pilot | None = None, *, quiet_ticks: bool = True) -> None:
-        """Prepare; the first tick enters the initial state.
-
-        Args:
-            mission: what to fly.
-            pilot: its eyes and hands; by default a new one of the mission's class.
-            quiet_ticks: spare the chart the ticks that change nothing.
-        """
+        self.state = ""
+        self.transition: TransitionTaken | None = None
         self.mission = mission
         self.pilot = mission.new_pilot() if pilot is None else pilot
         self._states = {
             leaf_id: _FastState(leaf, leaf_id in mission.finishes) for leaf_id, leaf in mission.leaves.items()
         }
         self._quiet_ticks = quiet_ticks
-        self._chart: StateChart | None = None
-        self._id = ""
+        self._chart: Any = None  # a `StateChart`, from the first tick on
         self._present: _FastState | None = None
         self._started_us = 0
         self._entered_us = 0
         self._last_us = 0
         self._seen_us: dict[str, int] = {}
         self._paused_us: int | None = None
-        self._taken: TransitionTaken | None = None
-
-    @property
-    def transition(self) -> TransitionTaken | None:
-        """The transition taken in the last tick; None if none was."""
-        return self._taken
-
-    @property
-    def state(self) -> str:
-        """Full id of the present state, such as "red.turning"; empty before the first tick."""
-        return self._id
 
     @property
     def finished(self) -> bool:
@@ -114,15 +101,10 @@ class MissionEngine:
         return self._present is not None and self._present.finish
 
     def tick(self, imu: Imu, cam: Detections, time_us: int) -> VelocityCommand:
-        """Run one step of the chart. After a pause this goes on with the mission.
-
-        Args:
-            imu: where the drone is.
-            cam: what the latest image showed.
-            time_us: vehicle time, microseconds.
+        """Run one step of the chart, at this vehicle time. After a pause this continues the mission.
 
         Returns:
-            The velocity to fly from now on, within the limits. `pilot.cmd.on` says whether motors shall run.
+            The velocity to fly from now on, within the limits. `pilot.cmd.on` says whether motors must run.
 
         Raises:
             MissionRunError: a value that is not finite, a clock that runs backwards, an error in the chart.
@@ -135,7 +117,7 @@ class MissionEngine:
         pilot = self.pilot
         pilot.imu = imu
         pilot.cam = cam
-        self._taken = None
+        self.transition = None
         try:
             self._count_unseen(time_us)
             if self._present is None:
@@ -149,24 +131,17 @@ class MissionEngine:
             raise self._error(str(error)) from None
         except MissionRunError:
             raise
-        except (
-            Exception,
-            SystemExit,
-        ) as error:  # whatever an expression or a contestant's primitive may raise
+        except (Exception, SystemExit) as error:  # of an expression or a contestant's primitive
             raise self._error(self._place(error) + in_words(error)) from error
 
     def pause(self, time_us: int) -> None:
-        """Let the mission and its clocks stand still from this tick on, until the next call of `tick`.
-
-        Args:
-            time_us: vehicle time of the first tick that is left out, microseconds.
-        """
-        self._taken = None
+        """Pause the mission and its clocks from this vehicle time on, until the next call of `tick`."""
+        self.transition = None
         if self._paused_us is None and self._present is not None:
             self._paused_us = time_us
 
     def _count_unseen(self, time_us: int) -> None:
-        """Note which frames are wholly in view."""
+        """Update the time since the pilot's frame was wholly in view."""
         pilot, seen_us = self.pilot, self._seen_us
         if self._present is None or self._paused_us is not None:
             seen_us.update(dict.fromkeys(COLOURS, time_us))
@@ -192,74 +167,63 @@ class MissionEngine:
             for act in present.during:
                 act(pilot)
         elif present.during:
-            self._send_tick()
+            self._chart.send(TICK)
 
     def _resume(self, present: _FastState, paused_us: int, time_us: int) -> bool:
-        """End a pause; True if the chart was sent elsewhere, so that this tick is done."""
+        """End a pause; True if the chart went to another state, which ends this tick."""
         self._paused_us = None
         self._started_us += time_us - paused_us
         self._entered_us += time_us - paused_us
         if present.leaf.resume is None:
             return False
-        assert self._chart is not None
-        source, seconds = self._id, (time_us - self._entered_us) / 1e6
+        source, seconds = self.state, (time_us - self._entered_us) / 1e6
         self.pilot.seconds_in_mission = (time_us - self._started_us) / 1e6
         cmd = self.pilot.cmd
         cmd.vel_x = cmd.vel_y = cmd.vel_z = cmd.rot_z = 0.0  # those of the state that is left
         self._chart.send(RESUME)
         self._settle(time_us)
-        self._taken = TransitionTaken(source, self._id, RESUME, (), time_us, seconds)
+        self.transition = TransitionTaken(source, self.state, RESUME, (), time_us, seconds)
         return True
 
     def _take(self, transition: Transition, time_us: int) -> None:
-        """Have the chart take a transition whose guard holds, and note why it did."""
-        source, seconds = self._id, self.pilot.seconds_in_state
-        values = _values(transition.when, self.pilot)  # now: what is done on leaving may change them
-        self._send_tick()
-        self._settle(time_us)
-        arrived = self._id == transition.to or self._id.startswith(f"{transition.to}.")
-        when = transition.when if arrived else DONE
-        self._taken = TransitionTaken(source, self._id, when, values, time_us, seconds)
-
-    def _send_tick(self) -> None:
-        assert self._chart is not None
+        """Let the chart take a transition whose guard holds, and record why."""
+        source, seconds = self.state, self.pilot.seconds_in_state
+        values = _values(transition.when, self.pilot)  # now, because the actions on leaving may change them
         self._chart.send(TICK)
+        self._settle(time_us)
+        arrived = self.state == transition.to or self.state.startswith(f"{transition.to}.")
+        when = transition.when if arrived else DONE
+        self.transition = TransitionTaken(source, self.state, when, values, time_us, seconds)
 
     def _settle(self, time_us: int) -> None:
-        """Note which state the chart is in now."""
-        assert self._chart is not None
-        self._id = next(state.id for state in self._chart.configuration if state.id in self._states)
-        self._present = self._states[self._id]
+        """Read the chart's present state."""
+        self.state = next(state.id for state in self._chart.configuration if state.id in self._states)
+        self._present = self._states[self.state]
         self._entered_us = time_us
         self.pilot.seconds_in_state = 0.0
 
     def _place(self, error: BaseException) -> str:
-        """File and line of the contestant's code that an exception came from."""
+        """File and line of the contestant's code that raised an exception."""
         pilot = self.mission.pilot
         return place_in(pilot, type(self.pilot).__module__, error) if isinstance(pilot, PilotFile) else ""
 
     def _error(self, reason: str) -> MissionRunError:
-        return MissionRunError(
-            f"mission '{self.mission.name}', state '{self._id or 'not started'}': {reason}"
-        )
+        state = self.state or "not started"
+        return MissionRunError(f"mission '{self.mission.name}', state '{state}': {reason}")
 
 
 def _values(when: str, pilot: Pilot) -> tuple[tuple[str, object], ...]:
-    """What the names of a guard stand for now."""
+    """The present values of the names of a guard."""
     found = []
     for name in names_in(when):
         value: object = pilot
         try:
             for part in name.split("."):
                 value = getattr(value, part)
-        except (Exception, SystemExit):  # a value which the guard did not get to read; nothing hangs on it
+        except (Exception, SystemExit):  # of a value that the guard itself did not read
             continue
         found.append((name, value))
     return tuple(found)
-
-
-def _guard(when: str) -> Evaluate:
-    return compile_value(when) if when else lambda pilot: True
 
 
 def _act(action: Action) -> Act:

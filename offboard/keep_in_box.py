@@ -1,7 +1,7 @@
-"""Keeps velocity commands from carrying the drone out of a box, whatever a mission asks for.
+"""Limits velocity commands so that the drone stays in a box, whatever a mission commands.
 
-A vehicle's own fence may do nothing: PX4's needs a global position, which a hall does not have. This one
-works on the position that the mission flies by, and no mission can switch it off.
+A vehicle's own fence may do nothing: PX4's needs a global position, which there is none of in a hall. This
+one uses the same position as the mission, and no mission can switch it off.
 """
 
 from __future__ import annotations
@@ -14,27 +14,19 @@ from geometry.vectors import Vec3
 from offboard.drone import DroneState, VelocityCommand
 from scenarios.models import Scenario
 
-FLOOR_M = 0.15
-"""Least height of the drone's centre away from its start."""
-START_RADIUS_M = 1.0
-"""In plan round the start: there the drone takes off and lands, so the floor does not count."""
+FLOOR_M = 0.15  # minimum height of the drone's centre away from its start
+START_RADIUS_M = 1.0  # horizontally; there the drone takes off and lands, so there is no floor
 REACTION_S = 0.6
-"""The place that counts is where the drone will be after this time. A vehicle that follows a velocity within
-0.6 s, as PX4 does with its default gains, over a link that takes 0.4 s, then stops at the side."""
-BRAKE_LEVEL_S = 0.8
-"""The way that is left there, divided by this, is the speed allowed."""
-BRAKE_UPRIGHT_S = 0.5
-"""Likewise for height: frames hang low, so the drone must be allowed near the floor."""
-RETURN_M_S = 0.5
-"""Most speed on the way back."""
-STALE_S = 0.5
-"""A position older than this says no more where the drone is."""
-STRAYED_M = 0.3
-"""How far outside counts as not kept in."""
-NO_RETURN_S = 3.0
-"""Vehicle time outside without coming nearer after which commanding is given up."""
+"""The distance to a side counts from where the drone will be after this time. A vehicle that follows a
+velocity within 0.6 s, as PX4 does with its default gains, over a link that takes 0.4 s, then stops there."""
+BRAKE_LEVEL_S = 0.8  # that distance, divided by this, is the speed allowed
+BRAKE_HEIGHT_S = 0.5  # likewise for height: frames hang low, so the drone must be allowed near the floor
+RETURN_M_S = 0.5  # maximum speed back into the box
+STALE_S = 0.5  # a position older than this is not used
+OUTSIDE_M = 0.3  # how far outside counts as not kept in
+NO_RETURN_S = 3.0  # vehicle time outside without coming nearer after which commanding ends
 _NEARER_M = 0.05
-MAX_STEP_US = 200_000  # between two ticks of one piece of flight
+MAX_STEP_US = 200_000  # counted between two ticks
 STILL = VelocityCommand()
 
 
@@ -44,25 +36,17 @@ class OutsideBoxError(UserError):
 
 @dataclass(frozen=True, slots=True)
 class Box:
-    """Where the drone's centre may be, arena axes.
+    """Where the drone's centre may be, arena axes."""
 
-    Attributes:
-        low_m: least x, y, z, shape (3,).
-        high_m: largest x, y, z, shape (3,).
-        start_m: x, y of take-off and landing, shape (2,).
-    """
-
-    low_m: Vec3
-    high_m: Vec3
-    start_m: tuple[float, float]
+    low_m: Vec3  # minimum x, y, z
+    high_m: Vec3  # maximum x, y, z
+    start_m: tuple[float, float]  # x, y of take-off and landing
 
 
 def flight_box(scenario: Scenario, lift_m: float = 0.0) -> Box:
     """The box of a scenario: its arena and, on all sides but below, the arena's `margin_m`.
 
-    Args:
-        scenario: as declared.
-        lift_m: how much higher the floor is than the scenario says, in the app's numbers, for want of a base.
+    `lift_m` is added to the heights of floor and ceiling, for a drone that starts without a base.
     """
     arena, start = scenario.arena, scenario.start
     x_m, y_m = arena.length_x_m / 2 + arena.margin_m, arena.width_y_m / 2 + arena.margin_m
@@ -73,14 +57,11 @@ def flight_box(scenario: Scenario, lift_m: float = 0.0) -> Box:
 class KeepInBox:
     """Limits commands to one drone, tick by tick. No clock: time is the vehicle's.
 
-    Towards a side, speed is limited by the way that is left, so that the drone stops before it; beyond a side
-    it is brought back. What does not lead out is not changed, to the last bit.
-
-    Args:
-        box: where the drone may be.
+    Towards a side, speed is limited by the distance to it, so that the drone stops before it; beyond a side
+    it is brought back. A command that does not lead out is not changed, to the last bit.
 
     Attributes:
-        remark: what was done to the last command, for people; empty if nothing.
+        remark: how the last command was changed, for people; empty if it was not.
         limited_us: vehicle time for which commands were changed.
     """
 
@@ -93,11 +74,7 @@ class KeepInBox:
         self._outside_m = 0.0
 
     def limit(self, command: VelocityCommand, state: DroneState) -> VelocityCommand:
-        """The command that may be flown now; call it once a tick.
-
-        Args:
-            command: as the mission wants it.
-            state: of the drone now; its position finite.
+        """The command that may be flown now; call it once a tick, with a finite position.
 
         Raises:
             OutsideBoxError: the drone has been outside for seconds and does not come nearer.
@@ -115,7 +92,7 @@ class KeepInBox:
 
     def _check_return(self, state: DroneState) -> None:
         outside_m = outside(self.box, state)
-        if outside_m <= STRAYED_M:
+        if outside_m <= OUTSIDE_M:
             self._outside_m = 0.0
         elif not self._outside_m or outside_m < self._outside_m - _NEARER_M:
             self._outside_m, self._outside_us = outside_m, state.time_us
@@ -134,16 +111,10 @@ def outside(box: Box, state: DroneState) -> float:
 
 
 def confine(command: VelocityCommand, state: DroneState, box: Box) -> tuple[VelocityCommand, str]:
-    """Limit a command by the way that is left to the box's sides.
-
-    Args:
-        command: any.
-        state: where the drone is and how it moves.
-        box: where it may be.
+    """Limit a command by the distances to the box's sides.
 
     Returns:
-        The command to fly, and the sides that limited it, such as "x 6.0 m"; the very same command and ""
-        where none did.
+        The command to fly, and the sides that limited it, such as "x 6.0 m"; the same object and "" if none.
     """
     c, s = cos(state.yaw), sin(state.yaw)
     wanted = (
@@ -156,11 +127,12 @@ def confine(command: VelocityCommand, state: DroneState, box: Box) -> tuple[Velo
     reaction_s = REACTION_S + state.position_age_s
     kept: list[float] = []
     sides: list[str] = []
-    for axis, brake_s in enumerate((BRAKE_LEVEL_S, BRAKE_LEVEL_S, BRAKE_UPRIGHT_S)):
+    for axis, brake_s in enumerate((BRAKE_LEVEL_S, BRAKE_LEVEL_S, BRAKE_HEIGHT_S)):
         ahead_m = speed[axis] * reaction_s
-        most = _allowed(high[axis] - at[axis] - max(0.0, ahead_m), brake_s)
-        least = -_allowed(at[axis] - low[axis] + min(0.0, ahead_m), brake_s)
-        limited = max(least, min(most, wanted[axis]))
+        # Limits of the speed towards each side; beyond a side the limit is negative, which leads back.
+        to_high = max(-RETURN_M_S, (high[axis] - at[axis] - max(0.0, ahead_m)) / brake_s)
+        to_low = max(-RETURN_M_S, (at[axis] - low[axis] + min(0.0, ahead_m)) / brake_s)
+        limited = max(-to_low, min(to_high, wanted[axis]))
         if limited != wanted[axis]:
             side_m = high[axis] if limited < wanted[axis] else low[axis]
             sides.append(f"{'xyz'[axis]} {side_m:.1f} m")
@@ -171,12 +143,7 @@ def confine(command: VelocityCommand, state: DroneState, box: Box) -> tuple[Velo
     return replace(command, forward_m_s=c * x + s * y, left_m_s=c * y - s * x, up_m_s=up), ", ".join(sides)
 
 
-def _allowed(left_m: float, brake_s: float) -> float:
-    """The most speed towards a side; negative beyond it: the way back."""
-    return max(-RETURN_M_S, left_m / brake_s)
-
-
 def _sides(box: Box, state: DroneState) -> tuple[Vec3, Vec3]:
-    """Least and largest x, y, z where the drone is: there is no floor near the start."""
+    """Minimum and maximum x, y, z where the drone is: there is no floor near the start."""
     near = hypot(state.x - box.start_m[0], state.y - box.start_m[1]) < START_RADIUS_M
     return ((*box.low_m[:2], -1e9) if near else box.low_m), box.high_m

@@ -1,4 +1,4 @@
-"""The `Drone` port over MAVSDK: any MAVLink vehicle that speaks PX4's modes, simulated or real."""
+"""The `Drone` port over MAVSDK: any MAVLink vehicle with PX4's modes, simulated or real."""
 
 from __future__ import annotations
 
@@ -21,25 +21,24 @@ from mavsdk.logging import log_subscribe
 from geometry.alignment import Alignment, Pose
 from offboard.drone import DroneError, DroneState, VelocityCommand
 from offboard.keep_in_box import Box, confine
+from offboard.link.commands import PendingRequests, SetpointStream
 from offboard.link.companion import Companion
-from offboard.link.hold import leave_offboard
-from offboard.link.requests import Requests
-from offboard.link.setpoints import SetpointStream
-from offboard.link.telemetry import CHECKS, TelemetryFeed, ask_for_rates
-from offboard.link.ticks import TickSource, VehicleClock
+from offboard.link.telemetry import CHECKS, TelemetryFeed, TickSource, VehicleClock, request_rates
 from offboard.link.tlog import TlogRecorder
 from offboard.link.tracking import CommandTracker
-from offboard.link.watchdog import PATIENT, Watchdog
+from offboard.link.watchdog import PATIENT_LIMITS, Watchdog
 from wire.transports.sockets import check_free
 from wire.transports.urls import LinkError, parse_url
 
-STAND_STILL_S = 0.5  # wall time without a tick after which the last velocity is not flown any longer
+STAND_STILL_S = 0.5  # wall time without a tick after which a velocity of zero is sent
 LINK_LOST_S = 1.0  # wall time without telemetry
-HEARTBEAT_LOST_S = 6.0  # wall time; there is one a second, and of a lossy link three in a row get lost
-CONFIRM_S = 6.0  # until one of the heartbeats, one a second, shows what was asked for
+HEARTBEAT_LOST_S = 6.0  # wall time; there is one a second, and a lossy link may lose three in a row
+CONFIRM_S = 6.0  # until one of the heartbeats, one a second, shows what was requested
+HOLD_ATTEMPTS = 3
+HOLD_SHOWN_S = 1.5  # wall time until a heartbeat, one a second, shows the new mode
 LAND_LIMIT_S = 120.0  # vehicle time
 STREAM_BEFORE_OFFBOARD_S = 0.3  # PX4 enters offboard only with fresh setpoints
-PRESENT_MODE_S = 8.0
+FIRST_MODE_S = 8.0  # wall time for PX4's checks to pass in the mode it starts in
 PILOT_MODES = ("MANUAL", "ALTCTL", "POSCTL", "ACRO", "STABILIZED", "RATTITUDE")
 
 logger = logging.getLogger(__name__)
@@ -48,17 +47,30 @@ logger = logging.getLogger(__name__)
 class MavsdkDrone:
     """A vehicle over MAVLink.
 
-    Axes: the vehicle stands on `start_arena` when it connects; from its telemetry there the way between its
-    local axes and the arena's is fixed once (see `Alignment`), so it must be disarmed then.
+    Axes: the vehicle is on `start_arena` when it connects; its telemetry there gives the transform between
+    its local axes and the arena's (see `Alignment`), so it must be disarmed then.
 
     Time: its clock is the time stamp of its ATTITUDE messages, which may run slower or faster than the
-    wall's. Wall time is used only where the question is whether link and app are alive.
+    wall's. Wall time is used only to find out whether link and app are alive.
 
     Safety: setpoints are sent by MAVSDK's own thread at 20 Hz, so a watchdog guards the app (see
-    `Watchdog`). Whoever takes the vehicle out of offboard keeps it: this class never asks for a mode then,
-    lest it take the sticks from a pilot. While a pilot has it, setpoints that stand still go on, one with
-    each tick, because PX4 lets nobody choose offboard without; they end when the app hangs, and with the
-    link or the flight.
+    `Watchdog`). After a pilot has taken the vehicle out of offboard, this class never requests a mode. While
+    a pilot has it, a velocity of zero is sent with each tick, because PX4 refuses offboard without
+    setpoints; that ends when the app hangs, and with the link or the flight.
+
+    Args:
+        url: udpin://, udpout://, tcpout://, tcpin:// or serial:// (see `parse_url`).
+        start_arena: where the drone is: x, y, z (metres) and yaw (radians), arena axes.
+        connect_limit_s: wall time to find the vehicle.
+        ready_limit_s: wall time until it can be armed.
+        hang_report: a real file for the stack of a hung app; by default standard error.
+        box: commands that were corrected here do not leave it; None: there is none.
+
+    Attributes:
+        recording_problem: why recording ended before the flight; set by `disconnect`.
+
+    Raises:
+        LinkError: bad address; nothing is opened yet.
     """
 
     def __init__(
@@ -71,19 +83,7 @@ class MavsdkDrone:
         hang_report: TextIO | None = None,
         box: Box | None = None,
     ) -> None:
-        """Check the address; nothing is opened yet.
-
-        Args:
-            url: udpin://, udpout://, tcpout://, tcpin:// or serial:// (see `parse_url`).
-            start_arena: where the drone stands: x, y, z (metres) and yaw (radians), arena axes.
-            connect_limit_s: wall time to find the vehicle.
-            ready_limit_s: wall time until it can be armed.
-            hang_report: a real file for the stack of a hung app; by default standard error.
-            box: out of which nothing leads that is added to commands here; None: there is none.
-
-        Raises:
-            LinkError: bad address.
-        """
+        self.recording_problem = ""
         self._url = parse_url(url)
         self._start_arena = Pose(start_arena[:3], start_arena[3])
         self._connect_limit_s = connect_limit_s
@@ -94,144 +94,136 @@ class MavsdkDrone:
         self._system_id: int | None = None
         self._alignment: Alignment | None = None
         self._mavsdk: Mavsdk | None = None
-        self._system: Any = None
         self._action: Any = None
         self._setpoints: SetpointStream | None = None
         self._telemetry: Any = None
-        self._requests = Requests()
-        self._direct: Any = None
+        self._direct: Any = None  # kept, because MAVSDK ends the subscriptions of a plugin that is deleted
+        self._requests = PendingRequests()
         self._tracker = CommandTracker()
         self._latest: DroneState | None = None
         self._commanding = False
         self._pilot_has_it = False
         self._tlog_path: Path | None = None
         self._recorder: TlogRecorder | None = None
-        self.recording_problem = ""  # why recording ended before the flight; known after `let_go`
         self._companion: Companion | None = None
         self._watchdog = Watchdog(self._stand_still, self._stop_from_watchdog, hang_report)
-        self._guests: list[str] = []
+        self._shared_with: list[str] = []
         self._box = box
 
     def record_to(self, path: Path) -> None:
         """Record all MAVLink traffic as a tlog from `connect` to `close`."""
         self._tlog_path = path
 
-    def tell_through(self, companion: Companion) -> None:
-        """Let a companion speak over this link. As it may have more to say, only `let_go` closes it then."""
+    def use_companion(self, companion: Companion) -> None:
+        """Let a companion send over this link, which stays open until `disconnect` then."""
         self._companion = companion
 
     def share_with(self, url: str) -> None:
-        """Let a ground station at this address in on the link: it hears the vehicle and can speak to it."""
-        self._guests.append(url)
+        """Forward between the vehicle and a ground station at this address."""
+        self._shared_with.append(url)
 
-    def wait_with(self, clock: VehicleClock, system_id: int) -> None:
-        """Let the vehicle's time wait for this app from `ready` on.
-
-        Args:
-            clock: of the vehicle.
-            system_id: MAVLink id of the vehicle whose clock it is; no other one is flown.
-        """
-        self._ticks.grant(clock)
+    def use_clock(self, clock: VehicleClock, system_id: int) -> None:
+        """Let the time of the vehicle with this MAVLink id wait for this app from `ready` on."""
+        self._ticks.use_clock(clock)
         self._system_id = system_id
-        self._watchdog.limits = PATIENT
+        self._watchdog.limits = PATIENT_LIMITS
 
     @property
     def late_ticks(self) -> int:
-        """Ticks of the flight that this app was not given in time."""
+        """Ticks of the flight that this app did not get in time."""
         return self._ticks.late
 
     async def connect(self) -> None:
-        """Find the vehicle and listen to it.
-
-        Raises:
-            DroneError: port taken, device missing, no vehicle within the limit.
-        """
+        """Find the vehicle and subscribe to its telemetry."""
         advice = "give another address" if self._system_id is None else "choose another --instance"
         try:
             check_free(self._url, advice)
         except LinkError as error:
             raise DroneError(str(error)) from None
         log_subscribe(_log)
-        # As a ground station: PX4 sends the reasons of its refusals (STATUSTEXT) to no one else.
-        configuration = Configuration.create_with_component_type(ComponentType.GROUND_STATION)
-        self._mavsdk = Mavsdk(configuration)
-        await self._start_recorder()
-        await self._let_companion_in()
-        try:
-            for url in (*self._guests, self._url.text):
-                await self._mavsdk.add_any_connection(url, ForwardingOption.ON)
-        except MavsdkError as error:
-            raise DroneError(f"cannot open {self._url.text}: {error}") from None
-        self._system = await self._mavsdk.first_autopilot(self._connect_limit_s)
-        if self._system is None:
+        # As a ground station: PX4 sends the reasons of its refusals (STATUSTEXT) only to ground stations.
+        self._mavsdk = Mavsdk(Configuration.create_with_component_type(ComponentType.GROUND_STATION))
+        await self._open_connections(self._mavsdk)
+        system: Any = await self._mavsdk.first_autopilot(self._connect_limit_s)
+        if system is None:
             raise DroneError(
-                f"no vehicle was heard on {self._url.text} within {self._connect_limit_s:g} s; "
+                f"no vehicle was found on {self._url.text} within {self._connect_limit_s:g} s; "
                 "is it running and sending to this address?"
             )
-        system_id = await self._system.get_system_id()
+        system_id = await system.get_system_id()
         if self._system_id not in (None, system_id):
             raise DroneError(
                 f"another vehicle (system {system_id}) sends to {self._url.text}; stop it, or choose another "
                 "--instance"
             )
-        for listener in (self._recorder, self._companion):
-            if listener is not None:
-                listener.announce(system_id)
-        self._action = ActionAsync(self._system)
-        self._setpoints = SetpointStream(OffboardAsync(self._system))
-        self._telemetry = TelemetryAsync(self._system)
-        self._direct = MavlinkDirectAsync(self._system)
+        for component in (self._recorder, self._companion):
+            if component is not None:
+                component.announce(system_id)
+        self._action = ActionAsync(system)
+        self._setpoints = SetpointStream(OffboardAsync(system))
+        self._telemetry = TelemetryAsync(system)
+        self._direct = MavlinkDirectAsync(system)
         self._feed.subscribe(_synchronous(self._telemetry), _synchronous(self._direct))
 
-    async def ready(self) -> None:
-        """Wait until the vehicle can be armed; then fix the axes.
+    async def _open_connections(self, mavsdk: Mavsdk) -> None:
+        """To recorder, companion, ground stations and vehicle; MAVSDK forwards between them."""
+        if self._tlog_path is not None:
+            try:
+                self._recorder = TlogRecorder(self._tlog_path)
+                await mavsdk.add_any_connection(await self._recorder.listen(), ForwardingOption.ON)
+            except (OSError, MavsdkError) as error:
+                raise DroneError(f"cannot record to {self._tlog_path}: {error}") from None
+        if self._companion is not None:
+            try:
+                await mavsdk.add_any_connection(self._companion.listen(), ForwardingOption.ON)
+            except (OSError, MavsdkError) as error:  # the mission can be flown without
+                logger.warning("the mission cannot be reported: %s", error)
+        try:
+            for url in (*self._shared_with, self._url.text):
+                await mavsdk.add_any_connection(url, ForwardingOption.ON)
+        except MavsdkError as error:
+            raise DroneError(f"cannot open {self._url.text}: {error}") from None
 
-        Raises:
-            DroneError: with what is missing; or the vehicle is armed already.
-        """
+    async def ready(self) -> None:
+        """Wait until the vehicle can be armed; then determine the axes."""
         try:
             await self._wait_for_checks()
         except TimeoutError:
             missing = ", ".join(self._feed.missing())
-            await self._leave_offboard()
+            await self._hold_on_ground()
             raise DroneError(
                 f"not ready within {self._ready_limit_s:g} s: {missing}{self._feed.recent_texts()}; "
                 f"framerunner doctor --drone {self._url.text} says what is missing"
             ) from None
         if self._feed.armed:
             raise DroneError("the vehicle is armed already; land and disarm it, then put it on its start")
-        await ask_for_rates(self._feed, self._telemetry)
         feed = self._feed
+        await request_rates(feed, self._telemetry)
         self._alignment = Alignment(self._start_arena, Pose(feed.position_ned_m, feed.yaw_ned_rad))
         await self._ticks.begin()
 
     async def _wait_for_checks(self) -> None:
         """Wait until nothing is missing.
 
-        PX4's checks are those of the mode it is in. At first that is hold, which wants a global position:
-        in a hall, without GPS, it never passes, while offboard does. So that is tried when all else is there.
+        PX4's checks are those of the mode it is in. At first that is hold, which requires a global position:
+        in a hall, without GPS, they never pass; offboard's do. So offboard is tried when only they fail.
         """
         with contextlib.suppress(TimeoutError):
-            await self._until(lambda: not self._feed.missing(), min(PRESENT_MODE_S, self._ready_limit_s / 2))
+            await self._until(lambda: not self._feed.missing(), min(FIRST_MODE_S, self._ready_limit_s / 2))
         if self._feed.missing() == [CHECKS] and not self._feed.armed:
             await self._stream_before_offboard()
-            await self._ask("offboard mode", self._stream.ask_for_offboard())
+            await self._request("offboard mode", self._stream.request_offboard())
         await self._until(lambda: not self._feed.missing(), self._ready_limit_s)
 
     async def ticks(self) -> AsyncIterator[DroneState]:
-        """States at 20 Hz of vehicle time; ticks that were not waited for are passed over.
-
-        Raises:
-            DroneError: link lost, values not finite, app hung; and, while no pilot has it: another mode,
-                disarmed by others.
-        """
+        """States at 20 Hz of vehicle time; ticks that were not waited for are skipped."""
         while True:
             command = self._sent if self._commanding and not self._pilot_has_it else None
-            came = await self._ticks.next(STAND_STILL_S, command)
-            if not came and not self._ticks.waits:
+            received = await self._ticks.next(STAND_STILL_S, command)
+            if not received and not self._ticks.waits:
                 self._stand_still()
-                came = await self._ticks.next(LINK_LOST_S - STAND_STILL_S, command)
-            self._check_alive(came)
+                received = await self._ticks.next(LINK_LOST_S - STAND_STILL_S, command)
+            self._check_alive(received)
             state = self._state()
             self._check_state(state)
             self._latest = state
@@ -240,20 +232,16 @@ class MavsdkDrone:
             yield state
 
     async def motors_on(self) -> None:
-        """Enter offboard with zero setpoints, then arm; both count when telemetry shows them.
-
-        Offboard first, while disarmed: so the motors never run in another mode.
-        """
+        """Enter offboard with zero setpoints, then arm: so the motors never run in another mode."""
         await self._stream_before_offboard()
         self._watchdog.start()
         try:
-            await self._ask("offboard mode", self._stream.ask_for_offboard())
-            await self._confirm("offboard mode", lambda: self._feed.mode == "OFFBOARD")
-            await self._ask("arming", self._action.arm())
-            await self._confirm("arming", lambda: bool(self._feed.armed))
+            request = self._stream.request_offboard()
+            await self._request("offboard mode", request, lambda: self._feed.mode == "OFFBOARD")
+            await self._request("arming", self._action.arm(), lambda: bool(self._feed.armed))
         except BaseException:
             self._watchdog.stop()
-            await self._leave_offboard()
+            await self._hold_on_ground()
             raise
         self._tracker.reset()
         self._pilot_has_it = False
@@ -265,66 +253,75 @@ class MavsdkDrone:
             await self._ticks.next(0.05)
             self._send(VelocityCommand())
 
-    async def _leave_offboard(self) -> None:
-        """On the ground, when there will be no flight."""
+    async def _hold_on_ground(self) -> None:
+        """Leave offboard when there will be no flight."""
         with contextlib.suppress(MavsdkError, asyncio.CancelledError):
-            await self._requests.wait(self._stream.ask_for_hold())
+            await self._requests.wait(self._stream.request_hold())
 
     async def motors_off(self) -> None:
         """Stop the motors at once (forced disarm), in the air too."""
         self._commanding = False
-        await self._ask("stopping the motors", self._action.kill())
-        await self._confirm("stopping the motors", lambda: self._feed.armed is False)
+        await self._request("stopping the motors", self._action.kill(), lambda: self._feed.armed is False)
         self._watchdog.stop()
         with contextlib.suppress(MavsdkError):
-            await self._requests.wait(self._stream.ask_for_hold())
+            await self._requests.wait(self._stream.request_hold())
 
     async def land(self) -> None:
         """Let the vehicle land and wait until it has disarmed itself."""
         feed = self._feed
         self._commanding = False
-        await self._ask("landing", self._action.land())
-        await self._confirm("landing", lambda: feed.mode == "LAND" or feed.armed is False)
+        request = self._action.land()
+        await self._request("landing", request, lambda: feed.mode == "LAND" or feed.armed is False)
         self._watchdog.stop()
         limit_us = feed.time_us + int(LAND_LIMIT_S * 1e6)
         while feed.armed:
-            came = await self._ticks.next(LINK_LOST_S)
-            self._check_alive(came)
-            # One heartbeat tells of mode and arming, but MAVSDK passes them on one after the other.
-            if feed.mode != "LAND" and not await self._shows(lambda: not feed.armed, 0.5):
-                raise DroneError(f"landing was broken off: mode {feed.mode}{feed.recent_texts()}")
+            self._check_alive(await self._ticks.next(LINK_LOST_S))
+            # One heartbeat has mode and arming, but MAVSDK passes them on one after the other.
+            if feed.mode != "LAND" and not await self._becomes(lambda: not feed.armed, 0.5):
+                raise DroneError(f"landing was interrupted: mode {feed.mode}{feed.recent_texts()}")
             if feed.time_us > limit_us:
                 raise DroneError(f"still not landed after {LAND_LIMIT_S:g} s{feed.recent_texts()}")
 
     async def hold(self) -> None:
-        """Stop commanding for good and ask for hold, unless another hand has the vehicle already."""
+        """Stop commanding permanently and request hold, unless the vehicle has left offboard already."""
         self._commanding = self._pilot_has_it = False
         self._watchdog.stop()
         if self._setpoints is None:
             return
         if self._feed.mode == "OFFBOARD":
-            await leave_offboard(self._ask_for_hold, self._left_offboard)
-            mode = self._feed.mode
-            if mode != "HOLD" and mode not in PILOT_MODES:
+            await self._leave_offboard()
+            if (mode := self._feed.mode) != "HOLD" and mode not in PILOT_MODES:
                 raise DroneError(f"the vehicle is in {mode} instead{self._feed.recent_texts()}")
         else:
             await asyncio.to_thread(self._stream.end)
 
     async def refuse(self) -> None:
-        """Let the vehicle that was given back hold; go on waiting."""
+        """Let the vehicle that was given back hold, and wait until it is given back again."""
         if self._feed.mode == "OFFBOARD":
-            await leave_offboard(self._ask_for_hold, self._left_offboard)
+            await self._leave_offboard()
 
-    async def _left_offboard(self, limit_s: float) -> bool:
-        return await self._shows(lambda: self._feed.mode != "OFFBOARD", limit_s)
+    async def _leave_offboard(self) -> None:
+        """Request hold until telemetry shows another mode than offboard.
 
-    async def _ask_for_hold(self) -> None:
-        """By other means where the watchdog has ended the stream for good."""
-        stream = self._stream
-        await self._ask("hold", stream.ask_for_hold() if stream.can_ask else self._action.hold())
+        The first request ends the setpoints: a vehicle that receives no request leaves offboard by its own
+        failsafe. The link may lose a request, its answer or the heartbeat that shows its effect.
+        """
+        stream, refusal = self._stream, None
+        for _ in range(HOLD_ATTEMPTS):
+            refusal = None
+            try:  # not through the plugin if the watchdog has ended the stream
+                await self._request("hold", self._action.hold() if stream.ended else stream.request_hold())
+            except DroneError as error:
+                refusal = error
+            if await self._becomes(lambda: self._feed.mode != "OFFBOARD", HOLD_SHOWN_S):
+                return
+        raise refusal or DroneError(
+            f"requested {HOLD_ATTEMPTS} times and acknowledged, but telemetry still shows offboard; "
+            "setpoints have ended, so the vehicle's failsafe for that has to act"
+        )
 
     def command(self, command: VelocityCommand) -> None:
-        """Set the velocity to fly from now on. Without motors on, or with a pilot, it is passed over."""
+        """Set the velocity to fly; ignored without motors on, or while a pilot has the vehicle."""
         latest = self._latest
         if not self._commanding:
             return
@@ -340,19 +337,19 @@ class MavsdkDrone:
         self._send(command)
 
     async def close(self) -> None:
-        """Let go of the vehicle and finish the recording; with a companion only end all commanding."""
+        """End all commanding and, without a companion, disconnect."""
         self._commanding = False
         self._watchdog.stop()
         self._ticks.release()
-        await self._requests.settled()
+        await self._requests.wait_for_all()
         if self._companion is None:
-            await self.let_go()
+            await self.disconnect()
         elif self._setpoints is not None:
-            await asyncio.to_thread(self._setpoints.end)  # whatever became of hold
+            await asyncio.to_thread(self._setpoints.end)  # even if hold failed
 
-    async def let_go(self) -> None:
+    async def disconnect(self) -> None:
         """Close the link and the recording; may be called again."""
-        await self._requests.settled()
+        await self._requests.wait_for_all()
         if self._mavsdk is not None:
             await asyncio.to_thread(self._mavsdk.destroy)
             self._mavsdk = None
@@ -362,7 +359,7 @@ class MavsdkDrone:
             self._recorder = None
 
     def _stand_still(self) -> None:
-        """Send a velocity of zero, as MAVSDK's thread would send the last one on; from any thread."""
+        """Send a velocity of zero, because MAVSDK's thread would repeat the last one; from any thread."""
         if self._commanding and not self._pilot_has_it:
             self._send(VelocityCommand())
 
@@ -394,63 +391,65 @@ class MavsdkDrone:
             position_age_s=max(0.0, (sample.time_us - sample.position_us) * 1e-6),
         )
 
-    def _check_alive(self, tick_came: bool) -> None:
+    def _check_alive(self, tick_received: bool) -> None:
         hung_s = self._watchdog.tripped_after_s
         if hung_s:
-            did = "asked for hold" if self._stream.can_ask else "fell silent"
+            did = "stopped sending" if self._stream.ended else "requested hold"
             raise DroneError(f"this app hung for more than {hung_s:.1f} s; its watchdog {did}")
         if self._ticks.waits:
-            if not tick_came:
+            if not tick_received:
                 raise DroneError("link lost: the simulator runs, but its telemetry does not arrive")
             return
         feed = self._feed
         if (age_s := feed.age_s()) > LINK_LOST_S:
             raise DroneError(f"link lost: no telemetry for {age_s:.1f} s")
-        if not tick_came:
+        if not tick_received:
             raise DroneError("link lost: the vehicle's clock stands still")
         if (heartbeat_age_s := feed.heartbeat_age_s()) > HEARTBEAT_LOST_S:
             raise DroneError(f"link lost: no heartbeat for {heartbeat_age_s:.1f} s")
 
     def _check_state(self, state: DroneState) -> None:
         values = (state.x, state.y, state.z, state.yaw, *state.velocity_arena_m_s)
-        if not all(isfinite(value) for value in values):
+        if not all(map(isfinite, values)):
             raise DroneError("the vehicle's position, velocity or heading is not finite")
         if not self._commanding or self._pilot_has_it:
             return
         if not state.armed:
             raise DroneError(f"the vehicle was disarmed by others{self._feed.recent_texts()}")
-        if state.offboard:
-            return
-        if state.mode not in PILOT_MODES:
+        if not state.offboard and state.mode not in PILOT_MODES:
             texts = self._feed.recent_texts()
             raise DroneError(f"the pilot or a failsafe took over: mode {state.mode}{texts}")
-        self._pilot_has_it = True
+        self._pilot_has_it = not state.offboard
 
-    async def _ask(self, what: str, request: Awaitable[object]) -> None:
+    async def _request(
+        self, what: str, request: Awaitable[object], shown: Callable[[], bool] | None = None
+    ) -> None:
+        """Wait for the answer and, with `shown`, until telemetry shows the effect.
+
+        Acknowledgements are not trusted: PX4 sends two for a mode, the first one always "accepted".
+        """
+        feed = self._feed
         try:
             await self._requests.wait(request)
+            if shown is not None:
+                await self._until(shown, CONFIRM_S)
         except MavsdkError as error:
             result = getattr(getattr(error, "result", None), "name", str(error))
-            raise DroneError(f"{what} was refused: {result}{self._feed.recent_texts()}") from None
-
-    async def _confirm(self, what: str, shown: Callable[[], bool]) -> None:
-        """No acknowledgement is trusted: PX4 sends two for a mode, the first one always "accepted"."""
-        try:
-            await self._until(shown, CONFIRM_S)
+            raise DroneError(f"{what} was refused: {result}{feed.recent_texts()}") from None
         except TimeoutError:
-            armed = "armed" if self._feed.armed else "disarmed"
+            armed = "armed" if feed.armed else "disarmed"
             raise DroneError(
-                f"{what} was acknowledged, but telemetry still shows mode {self._feed.mode}, {armed} "
-                f"after {CONFIRM_S:g} s{self._feed.recent_texts()}"
+                f"{what} was acknowledged, but telemetry still shows mode {feed.mode}, {armed} "
+                f"after {CONFIRM_S:g} s{feed.recent_texts()}"
             ) from None
 
-    async def _shows(self, condition: Callable[[], bool], limit_s: float) -> bool:
+    async def _becomes(self, condition: Callable[[], bool], limit_s: float) -> bool:
         with contextlib.suppress(TimeoutError):
             await self._until(condition, limit_s)
         return condition()
 
     async def _until(self, condition: Callable[[], bool], limit_s: float) -> None:
-        """Wait for a condition; the limit is vehicle time where that waits for the app, else wall time."""
+        """Wait for a condition; the limit is vehicle time if that waits for the app, else wall time."""
         waits, limit_us = self._ticks.waits, self._feed.time_us + round(limit_s * 1e6)
         async with asyncio.timeout(None if waits else limit_s):
             while not condition():
@@ -458,33 +457,14 @@ class MavsdkDrone:
                     raise TimeoutError
                 await self._ticks.next(0.05)
 
-    async def _start_recorder(self) -> None:
-        if self._tlog_path is None or self._mavsdk is None:
-            return
-        try:
-            self._recorder = TlogRecorder(self._tlog_path)
-            url = await self._recorder.listen()
-            await self._mavsdk.add_any_connection(url, ForwardingOption.ON)
-        except (OSError, MavsdkError) as error:
-            raise DroneError(f"cannot record to {self._tlog_path}: {error}") from None
-
-    async def _let_companion_in(self) -> None:
-        if self._companion is None or self._mavsdk is None:
-            return
-        try:
-            await self._mavsdk.add_any_connection(self._companion.listen(), ForwardingOption.ON)
-        except (OSError, MavsdkError) as error:  # the mission can be flown all the same
-            logger.warning("the mission cannot be told of: %s", error)
-
     def _stop_from_watchdog(self) -> None:
-        """On the watchdog's thread: end the native stream, ask for hold; if hold fails, silence is enough.
+        """On the watchdog's thread: end the native stream and, in offboard, request hold.
 
-        Not for hold if others have the vehicle, but the stream ends for good: nobody shall give the vehicle
-        back to an app that hangs.
+        A vehicle that a pilot has must not be given back to a hung app, so the stream ends permanently.
         """
-        with contextlib.suppress(Exception):
+        with contextlib.suppress(Exception):  # without setpoints the vehicle's failsafe acts
             if self._feed.mode == "OFFBOARD":
-                self._stream.ask_for_hold_now()
+                self._stream.request_hold_blocking()
             else:
                 self._stream.end()
 

@@ -1,27 +1,27 @@
-"""Missions: found by name or path, checked, loaded, drawn."""
+"""Missions: found by name or path, checked, loaded, drawn; and the files of a new one."""
 
 from __future__ import annotations
 
+import shlex
 from dataclasses import dataclass, field, fields
-from difflib import get_close_matches
 from functools import cached_property
 from pathlib import Path
 
 from statemachine import StateChart
 
 from offboard.chart.check import check, is_finish
-from offboard.chart.expand import expand, merge_extended
 from offboard.chart.native import load_chart, native_yaml
-from offboard.chart.problems import MissionError, Place, Problem, ProblemList
+from offboard.chart.problems import MissionError, Place, ProblemList, did_you_mean, mission_error
 from offboard.chart.read import read_mission_file
-from offboard.chart.source import MAX_FILE_BYTES
-from offboard.chart.spec import Action, Leaf, MissionFile, State, all_states, leaves
+from offboard.chart.spec import Leaf, MissionFile, State, all_states, expand, leaves, merge_extended
 from offboard.pilot import Pilot
 from offboard.pilot_file import PilotFile
 
-__all__ = ["Mission", "MissionError", "list_missions", "load_mission", "mermaid"]
+__all__ = ["Mission", "MissionError", "list_missions", "load_mission", "mermaid", "new_mission"]
 
+MAX_FILE_BYTES = 1_000_000
 MISSIONS = Path(__file__).parent / "missions"
+TEMPLATES = Path(__file__).parent / "templates"
 
 
 @dataclass(frozen=True)
@@ -29,9 +29,6 @@ class Mission:
     """A checked mission, ready to fly. It can be pickled: another process builds the chart again.
 
     Attributes:
-        name: as its file says.
-        description: one line for people.
-        path: its file.
         spec: the expanded chart.
         pilot: what the mission was checked against: a contestant's file or a class.
         native: the expanded chart as a document of python-statemachine.
@@ -45,7 +42,7 @@ class Mission:
     native: str = field(repr=False)
 
     def __getstate__(self) -> dict[str, object]:
-        """Leave out what is built from the rest; the chart's class could not be pickled."""
+        """Only the fields: the chart's class cannot be pickled."""
         return {part.name: getattr(self, part.name) for part in fields(self)}
 
     @cached_property
@@ -65,11 +62,7 @@ class Mission:
         return frozenset(leaf_id for leaf_id in self.leaves if is_finish(states, leaf_id))
 
     def new_pilot(self) -> Pilot:
-        """A pilot with the mission's own variables.
-
-        Raises:
-            MissionError: the contestant's class cannot be made.
-        """
+        """A pilot with the mission's own variables; `MissionError` if a contestant's class fails."""
         variables = dict(self.spec.variables)
         if isinstance(self.pilot, PilotFile):
             return self.pilot.new_pilot(variables)
@@ -77,7 +70,7 @@ class Mission:
 
 
 def list_missions() -> list[str]:
-    """Names of the missions that come with the package."""
+    """Names of the missions in the package."""
     return sorted(path.stem for path in MISSIONS.glob("*.yaml"))
 
 
@@ -95,43 +88,42 @@ def load_mission(name_or_path: str | Path, pilot: PilotFile | type[Pilot] | None
     path = _find(str(name_or_path), Path.cwd(), Place(str(name_or_path)))
     written = read_mission_file(_read_text(path), path)
     problems = ProblemList()
-    spec = expand(merge_extended(written, _open_base), problems)
+    spec = expand(merge_extended(written, _read_base), problems)
     check(spec, pilot.pilot_class() if isinstance(pilot, PilotFile) else pilot, problems)
     problems.raise_if_any()
     mission = Mission(spec.name, spec.description, path, spec, pilot, native_yaml(spec))
-    mission.new_pilot()  # made once and loaded now, so that what would be refused is refused now
+    mission.new_pilot()  # now, so that an error in the pilot or the chart is raised now
     mission.chart  # noqa: B018
     return mission
 
 
-def _open_base(mission: MissionFile) -> MissionFile:
+def _read_base(mission: MissionFile) -> MissionFile:
     path = _find(mission.extends, mission.path.parent, mission.place)
     return read_mission_file(_read_text(path), path)
 
 
 def _find(name: str, folder: Path, place: Place) -> Path:
-    """A file if it looks like one, else a mission of the package."""
+    """A file if it looks like one, otherwise a mission of the package."""
     if name.endswith((".yaml", ".yml")) or "/" in name:
         path = (folder / name).resolve()
         if path.is_file():
             return path
-        raise MissionError([Problem(place, f"mission file '{name}' does not exist")])
+        raise mission_error(place, f"mission file '{name}' does not exist")
     known = list_missions()
     if name in known:
         return MISSIONS / f"{name}.yaml"
-    near = get_close_matches(name, known, 1)
-    mend = f"did you mean '{near[0]}'?" if near else f"known: {', '.join(known)}; a file ends in .yaml"
-    raise MissionError([Problem(place, f"unknown mission '{name}'; {mend}")])
+    advice = did_you_mean(name, known, f"known: {', '.join(known)}; a file ends in .yaml")
+    raise mission_error(place, f"unknown mission '{name}'; {advice}")
 
 
 def _read_text(path: Path) -> str:
     try:
         if path.stat().st_size > MAX_FILE_BYTES:
-            raise MissionError([Problem(Place(path.name), "is larger than 1 MB; a mission is a page or two")])
+            raise mission_error(Place(path.name), "is larger than 1 MB; a mission is a page or two")
         return path.read_text(encoding="utf-8")
     except (OSError, UnicodeDecodeError) as error:
         reason = getattr(error, "strerror", None) or "is not UTF-8 text"
-        raise MissionError([Problem(Place(path.name), f"cannot be read: {reason}")]) from None
+        raise mission_error(Place(path.name), f"cannot be read: {reason}") from None
 
 
 def mermaid(mission: Mission, active: str | None = None) -> str:
@@ -141,7 +133,7 @@ def mermaid(mission: Mission, active: str | None = None) -> str:
 
     Args:
         mission: what to draw.
-        active: full id of the state to light, such as "red.turning".
+        active: full id of the state to highlight, such as "red.turning".
     """
     lines = ["stateDiagram-v2", f"    [*] --> {mission.spec.initial}"]
     for state in mission.spec.states:
@@ -168,7 +160,7 @@ def _draw(state: State, indent: str, lines: list[str]) -> None:
             lines.append(f"{indent}{state.id} --> [*]")
     for what, actions in (("enter", state.enter), ("during", state.during), ("exit", state.exit)):
         if actions and not state.states:
-            lines.append(f"{indent}{state.id} : {what} / {_label(actions)}")
+            lines.append(f"{indent}{state.id} : {what} / {', '.join(map(str, actions))}")
     several = len(state.transitions) > 1
     for number, transition in enumerate(state.transitions, 1):
         order = f"{number} " if several else ""
@@ -181,5 +173,42 @@ def _draw(state: State, indent: str, lines: list[str]) -> None:
         lines.append(f"{indent}{state.id} --> {state.resume.to} : after a pause")
 
 
-def _label(actions: tuple[Action, ...]) -> str:
-    return ", ".join(str(action) for action in actions)
+@dataclass(frozen=True, slots=True)
+class NewMission:
+    """The files of a new mission, and the text of each."""
+
+    mission: Path
+    pilot: Path | None
+    texts: dict[Path, str]
+
+    @property
+    def arguments(self) -> str:
+        """The files as command-line arguments of a mission."""
+        option = "" if self.pilot is None else f" --pilot {shlex.quote(str(self.pilot))}"
+        return f"{shlex.quote(str(self.mission))}{option}"
+
+
+def new_mission(name: str, folder: Path, *, python: bool = False) -> NewMission:
+    """Compose a first mission with comments, with or without a Python file; nothing is written."""
+    from jinja2 import Environment, FileSystemLoader, StrictUndefined  # noqa: PLC0415 - slow to import
+
+    templates = Environment(
+        loader=FileSystemLoader(TEMPLATES),
+        undefined=StrictUndefined,
+        autoescape=False,
+        keep_trailing_newline=True,
+        trim_blocks=True,
+        lstrip_blocks=True,
+    )
+    mission = folder / f"{name}.yaml"
+    pilot = folder / f"{name}.py" if python else None
+    values = {
+        "name": name,
+        "python": python,
+        "yaml": mission.name,
+        "option": "" if pilot is None else f" --pilot {pilot.name}",
+    }
+    texts = {mission: templates.get_template("mission.yaml.j2").render(values)}
+    if pilot is not None:
+        texts[pilot] = templates.get_template("pilot.py.j2").render(values)
+    return NewMission(mission, pilot, texts)

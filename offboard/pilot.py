@@ -1,4 +1,4 @@
-"""What a mission can see and do: the paper's interface `imu`, `cam`, `cmd`, and named primitives.
+"""What a mission can read and command: the paper's interface `imu`, `cam`, `cmd`, and named primitives.
 
 Everything public in `Pilot` can be used in a mission file: attributes and properties in guards and on the
 right of assignments, `cmd`, `goal_m`, `colour` and `memory` on the left, methods as actions. A subclass may
@@ -20,50 +20,34 @@ from vision.types import Detection, Detections
 
 MAX_VELOCITY_M_S = 1.0
 MAX_YAW_RATE_RAD_S = 1.0
-LOOK_TURN_PX = 80.0  # pixels aside that make 1 rad/s: the paper's gains, for its image of 320 x 240
-LOOK_CLIMB_PX = 120.0  # pixels above that make 1 m/s
+LOOK_TURN_PX = 80.0  # horizontal offset that gives 1 rad/s: the paper's gains, for its image of 320 x 240
+LOOK_CLIMB_PX = 120.0  # vertical offset that gives 1 m/s
 
 
 class PilotError(UserError):
-    """A mission computed something that must not be flown; the message is one line for people."""
+    """A mission computed a command that must not be flown; the message is one line for people."""
 
 
 @dataclass(frozen=True, slots=True)
 class Imu:
-    """Where the drone is.
+    """Where the drone is in the arena."""
 
-    Attributes:
-        x: position in the arena, metres.
-        y: position in the arena, metres.
-        z: height above the floor, metres.
-        yaw: heading, radians, counter-clockwise from x.
-    """
-
-    x: float = 0.0
-    y: float = 0.0
-    z: float = 0.0
-    yaw: float = 0.0
+    x: float = 0.0  # metres
+    y: float = 0.0  # metres
+    z: float = 0.0  # height above the floor, metres
+    yaw: float = 0.0  # heading, radians, counter-clockwise from x
 
 
 @dataclass(slots=True)
 class Command:
-    """What the mission asks of the drone (the paper's on, velX, velY, velZ, rotZ).
+    """What the mission commands (the paper's on, velX, velY, velZ, rotZ)."""
 
-    Attributes:
-        on: motors on.
-        vel_x: forward, m/s.
-        vel_y: to the left, m/s.
-        vel_z: up, m/s.
-        rot_z: yaw rate to the left, rad/s.
-        land: with `on` false: land by the vehicle's own means instead of stopping the motors at once.
-    """
-
-    on: bool = False
-    vel_x: float = 0.0
-    vel_y: float = 0.0
-    vel_z: float = 0.0
-    rot_z: float = 0.0
-    land: bool = False
+    on: bool = False  # motors on
+    vel_x: float = 0.0  # forward, m/s
+    vel_y: float = 0.0  # to the left, m/s
+    vel_z: float = 0.0  # up, m/s
+    rot_z: float = 0.0  # yaw rate to the left, rad/s
+    land: bool = False  # with `on` false: land by the vehicle's own means, do not stop the motors at once
 
 
 class Memory(SimpleNamespace):
@@ -71,37 +55,20 @@ class Memory(SimpleNamespace):
 
 
 class Pilot:
-    """The paper's interface to missions.
+    """The paper's interface to missions. All times are vehicle time."""
 
-    Attributes:
-        imu: position and heading.
-        cam: what the camera sees: `red`, `green`, `blue`, each with n, s, e, w, d, a.
-        cmd: the command; it stays as it is until changed.
-        colour: which frame is looked for: red, green or blue. Assign it, then read `frame`.
-        goal_m: where `fly_to_goal` flies, (x, y, z) in the arena, metres.
-        memory: the mission's own variables.
-        seconds_in_state: vehicle time since the present state was entered.
-        seconds_in_mission: vehicle time since the mission started.
-        seconds_unseen: vehicle time since `frame` was last wholly in view, or since the mission started or
-            went on after a pause.
-    """
-
-    imu: Imu
-    cam: Detections
-    cmd: Command
-    colour: Colour
-    goal_m: Vec3
-    memory: Memory
-    seconds_in_state: float
-    seconds_in_mission: float
-    seconds_unseen: float
+    imu: Imu  # position and heading
+    cam: Detections  # what the camera sees: `red`, `green`, `blue`, each with n, s, e, w, d, a
+    cmd: Command  # it stays as it is until changed
+    colour: Colour  # of the frame to find: red, green or blue; assign it, then read `frame`
+    goal_m: Vec3  # where `fly_to_goal` flies, (x, y, z) in the arena
+    memory: Memory  # the mission's own variables
+    seconds_in_state: float  # since the present state was entered
+    seconds_in_mission: float  # since the mission started
+    seconds_unseen: float  # since `frame` was last wholly in view, or the mission started or continued
 
     def __init__(self, variables: dict[str, object] | None = None) -> None:
-        """Start with motors off.
-
-        Args:
-            variables: the mission's own variables and their first values.
-        """
+        """Start with motors off, and with the first values of the mission's own variables."""
         self.imu = Imu()
         self.cam = Detections()
         self.cmd = Command()
@@ -114,13 +81,13 @@ class Pilot:
 
     @property
     def frame(self) -> Detection:
-        """What the camera sees of the frame that is looked for (`cam` at `colour`)."""
+        """What the camera sees of the frame of this `colour`."""
         detection: Detection = getattr(self.cam, self.colour)
         return detection
 
     @property
     def frame_seen(self) -> bool:
-        """The frame that is looked for is wholly in view: its distance is known."""
+        """The frame of this `colour` is wholly in view: its distance is known."""
         return isfinite(self.frame.d)
 
     @property
@@ -152,7 +119,7 @@ class Pilot:
         cmd.vel_z = scale * up_m_s
 
     def look_to_frame(self) -> None:
-        """Turn and climb to bring the frame to the image's centre; keep on as before while it is lost.
+        """Turn and climb to bring the frame to the image's centre; no change while it is not wholly in view.
 
         The paper's Look2Frame: rot_z = -((e + w) / 2) / 80, vel_z = ((n + s) / 2) / 120.
         """
@@ -168,18 +135,18 @@ class Pilot:
         self.cmd.land = False
 
     def land(self) -> None:
-        """Let the vehicle land by its own means and stop its motors when it stands."""
+        """Let the vehicle land by its own means and stop its motors on the ground."""
         self.hover()
         self.cmd.on = False
         self.cmd.land = True
 
 
 def velocity_command(cmd: Command) -> VelocityCommand:
-    """The command as it may be flown: each rate held within +-1 m/s and +-1 rad/s.
+    """The command as it may be flown: each rate limited to +-1 m/s and +-1 rad/s.
 
-    An infinite rate becomes the limit, as the paper's stabiliser makes of it: its navigator asks for
-    infinite speed ahead when it loses a frame while shifting, and then flies 1 m/s forward. That is a
-    known fault of that navigator, reproduced here, but nothing that is not finite ever leaves this function.
+    An infinite rate becomes the limit, as in the paper's stabiliser: its navigator commands infinite speed
+    ahead when it loses a frame while shifting, and then flies 1 m/s forward. That is a known fault of that
+    navigator, reproduced here.
 
     Raises:
         PilotError: a rate is no number.
@@ -197,7 +164,7 @@ def _limited(name: str, value: float, limit: float) -> float:
         if -limit <= value <= limit:
             return value
     except (TypeError, ValueError):  # None, a text, an array: a subclass may assign anything
-        raise PilotError(f"cmd.{name} is {value!r}, which is no number; mend what sets it") from None
+        raise PilotError(f"cmd.{name} is {value!r}, which is no number; correct what sets it") from None
     if isnan(value):
-        raise PilotError(f"cmd.{name} is not a number; mend the expression that sets it")
+        raise PilotError(f"cmd.{name} is not a number; correct the expression that sets it")
     return limit if value > 0 else -limit

@@ -1,6 +1,6 @@
-"""A contestant's Python file: one subclass of `Pilot` with primitives and values of its own.
+"""A contestant's Python file: one subclass of `Pilot` that adds primitives and values.
 
-It is code and does whatever it says, so it is read only where a person names it; a mission file never can.
+Reading it executes it, so it is read only if a person names it; a mission file cannot.
 """
 
 from __future__ import annotations
@@ -16,48 +16,37 @@ from typing import get_type_hints
 
 from statemachine import StateChart
 
-from offboard.chart.problems import MissionError, Place, Problem
+from offboard.chart.problems import MissionError, Place, mission_error
 from offboard.pilot import Pilot
 
 MAX_FILE_BYTES = 1_000_000
-_ON_ITS_INSTANCES = (
+_INSTANCE_NAMES = (
     "final_states history_values initial_state model prepare_event resume state state_field tick"
 )
-_THE_CHART_S_OWN = frozenset([*dir(StateChart), *_ON_ITS_INSTANCES.split()])
-"""Names that python-statemachine takes for its own before it asks the pilot, or writes to."""
-_CALLED_BY_THE_CHART = re.compile(
-    r"(before|on|after)_(transition|tick|resume|done_.*)|on_(enter|exit|invoke)_.*"
-)
-"""Names that python-statemachine would call of itself whenever a state changes."""
+_CHART_NAMES = frozenset([*dir(StateChart), *_INSTANCE_NAMES.split()])
+"""Names that python-statemachine looks up in the chart before the pilot, or writes to."""
+_CHART_CALLBACKS = re.compile(r"(before|on|after)_(transition|tick|resume|done_.*)|on_(enter|exit|invoke)_.*")
+"""Names that python-statemachine would call at changes of state."""
 
 
 @dataclass(frozen=True, slots=True)
 class PilotFile:
-    """A Python file as text, so that it can be sent to another process.
-
-    Attributes:
-        name: the file's, for messages.
-        text: its content.
-    """
+    """A Python file as text, so that it can be sent to another process."""
 
     name: str
     text: str
 
     def pilot_class(self) -> type[Pilot]:
-        """Execute the text in a module of its own and return the subclass of `Pilot` that it defines.
+        """Execute the text in a new module and return the subclass of `Pilot` that it defines.
 
-        Each call gives a new class in a new module: what one flight leaves behind in variables of the
-        module or the class, the next one does not find.
+        Each call gives a new class in a new module, so that no flight sees variables of another one.
 
         Raises:
             MissionError: as `file:line: text`, whatever is wrong with it.
         """
         module = self._execute()
-        defined = [
-            kind
-            for kind in dict.fromkeys(each for each in vars(module).values() if isinstance(each, type))
-            if issubclass(kind, Pilot) and kind.__module__ == module.__name__
-        ]
+        kinds = dict.fromkeys(each for each in vars(module).values() if isinstance(each, type))
+        defined = [k for k in kinds if issubclass(k, Pilot) and k.__module__ == module.__name__]
         defined = [kind for kind in defined if not any(kind in other.__mro__[1:] for other in defined)]
         if not defined:
             raise self._refused("has no subclass of Pilot; write 'class MyPilot(Pilot):' with your methods")
@@ -68,7 +57,7 @@ class PilotFile:
         return defined[0]
 
     def _execute(self) -> ModuleType:
-        """Run the text as a module; it is known to Python by a name that stands for its content."""
+        """Run the text as a module, named by a hash of its content."""
         try:
             code = compile(self.text, self.name, "exec", dont_inherit=True)
         except (SyntaxError, ValueError) as error:
@@ -77,16 +66,16 @@ class PilotFile:
         digest = sha256(f"{self.name}\n{self.text}".encode()).hexdigest()
         module = ModuleType(f"pilot_file_{digest[:16]}")
         module.__file__ = self.name
-        sys.modules[module.__name__] = module  # where typing and dataclasses look for a class's surroundings
+        sys.modules[module.__name__] = module  # where typing and dataclasses look up a class's module
         try:
             exec(code, vars(module))
         except (Exception, SystemExit) as error:  # it may raise anything
-            line = last_line_in(error.__traceback__, module.__name__)
+            line = _last_line_in(error.__traceback__, module.__name__)
             raise self._refused(f"cannot be imported: {in_words(error)}", line) from None
         return module
 
     def _check(self, kind: type[Pilot]) -> None:
-        """Refuse members that would fail, or be misunderstood, only in flight."""
+        """Refuse members that would fail only in flight."""
         try:
             get_type_hints(kind)
         except Exception as error:  # an annotation may be any expression
@@ -94,39 +83,29 @@ class PilotFile:
         for name, member in inspect.getmembers(kind):
             if name.startswith("_") or getattr(Pilot, name, None) is member:
                 continue
-            reason = _unfit(name, member)
+            reason = _why_unusable(name, member)
             if reason:
                 raise self._refused(reason, _line_of(member))
 
     def new_pilot(self, variables: dict[str, object]) -> Pilot:
-        """A pilot of the file's class, which is made anew.
-
-        Args:
-            variables: the mission's own variables and their first values.
-
-        Raises:
-            MissionError: the file cannot be used, or its class cannot be made.
-        """
+        """A pilot of a new class, with the mission's variables. Raises `MissionError`."""
         kind = self.pilot_class()
         try:
             pilot = kind(variables)
         except (Exception, SystemExit) as error:  # it may raise anything
-            line = last_line_in(error.__traceback__, kind.__module__)
-            raise self._refused(f"{kind.__name__} cannot be made: {in_words(error)}", line) from None
+            line = _last_line_in(error.__traceback__, kind.__module__)
+            raise self._refused(f"{kind.__name__} cannot be created: {in_words(error)}", line) from None
         if not hasattr(pilot, "memory"):
             text = f"{kind.__name__}.__init__ must begin with 'super().__init__(variables)'"
             raise self._refused(text, _line_of(kind.__init__))
         return pilot
 
     def _refused(self, text: str, line: int = 0) -> MissionError:
-        return MissionError([Problem(Place(self.name, line), text)])
+        return mission_error(Place(self.name, line), text)
 
 
 def read_pilot(path: str | Path) -> PilotFile:
-    """Read a contestant's Python file and try whether it can be used.
-
-    Args:
-        path: the file, named by a person: it is executed.
+    """Read a contestant's Python file and execute it once, to find out whether it can be used.
 
     Raises:
         MissionError: it cannot be read, or `PilotFile.pilot_class` refuses it; one line.
@@ -134,42 +113,31 @@ def read_pilot(path: str | Path) -> PilotFile:
     path = Path(path)
     try:
         if path.stat().st_size > MAX_FILE_BYTES:
-            raise _unreadable(path, "is larger than 1 MB; a pilot is a page or two")
+            raise mission_error(Place(str(path)), "is larger than 1 MB; a pilot is a page or two")
         text = path.read_text(encoding="utf-8")
     except UnicodeDecodeError:
-        raise _unreadable(path, "is not UTF-8 text; name the Python file") from None
+        raise mission_error(Place(str(path)), "is not UTF-8 text; name the Python file") from None
     except OSError as error:
-        raise _unreadable(path, f"cannot be read: {error.strerror}") from None
+        raise mission_error(Place(str(path)), f"cannot be read: {error.strerror}") from None
     pilot = PilotFile(path.name, text)
     pilot.pilot_class()
     return pilot
 
 
 def place_in(pilot: PilotFile, module_name: str, error: BaseException) -> str:
-    """Where in a contestant's file an exception came from, as "file:line: "; empty if not from there.
-
-    Args:
-        pilot: the file.
-        module_name: `__module__` of its class.
-        error: as caught.
-    """
-    line = last_line_in(error.__traceback__, module_name)
+    """Where in a contestant's file, executed as a module, an error was raised: "file:line: " or empty."""
+    line = _last_line_in(error.__traceback__, module_name)
     return f"{Place(pilot.name, line)}: " if line else ""
 
 
 def in_words(error: BaseException) -> str:
-    """An exception of other people's code in one line."""
+    """An exception of a contestant's code in one line."""
     text = " ".join(str(error).split())
     return f"{type(error).__name__}: {text}" if text else type(error).__name__
 
 
-def last_line_in(traceback: TracebackType | None, module_name: str) -> int:
-    """Line of the innermost call within a module, 0 if there is none.
-
-    Args:
-        traceback: of the exception.
-        module_name: `__name__` of the module.
-    """
+def _last_line_in(traceback: TracebackType | None, module_name: str) -> int:
+    """Line of the innermost call within a module, 0 if there is none."""
     line = 0
     while traceback is not None:
         if traceback.tb_frame.f_globals.get("__name__") == module_name:
@@ -178,13 +146,9 @@ def last_line_in(traceback: TracebackType | None, module_name: str) -> int:
     return line
 
 
-def _unreadable(path: Path, text: str) -> MissionError:
-    return MissionError([Problem(Place(str(path)), text)])
-
-
-def _unfit(name: str, member: object) -> str:
+def _why_unusable(name: str, member: object) -> str:
     """Why a member of a pilot's class cannot be used by a mission; empty if it can."""
-    if name in _THE_CHART_S_OWN or _CALLED_BY_THE_CHART.fullmatch(name):
+    if name in _CHART_NAMES or _CHART_CALLBACKS.fullmatch(name):
         return f"'{name}' is a name that the statechart uses itself; rename it, such as 'my_{name}'"
     if isinstance(member, property):
         try:

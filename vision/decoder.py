@@ -1,4 +1,4 @@
-"""Images of unknown origin to pixels: looked at first, then decoded where that can do no harm."""
+"""Decodes images of unknown origin: in this process only where that is quick whatever they hold."""
 
 from __future__ import annotations
 
@@ -9,8 +9,7 @@ import numpy as np
 
 from vision.jpeg import ImageError, jpeg_structure
 from vision.types import Image
-from vision.worker_process import WorkerEndedError, WorkerProcess
-from vision.worker_protocol import DECODE_LIMIT_S, Request
+from vision.worker import DECODE_LIMIT_S, Request, WorkerEndedError, WorkerProcess
 
 
 class ImageDecoder:
@@ -29,11 +28,7 @@ class ImageDecoder:
         self._worker = WorkerProcess()
 
     async def decode_jpeg(self, data: bytes) -> Image:
-        """Decode a JPEG to BGR.
-
-        Raises:
-            ImageError: not one that a camera sends, damaged, or it takes too long.
-        """
+        """Decode a JPEG to BGR; raises `ImageError` if no camera sends it, or it takes too long."""
         if not jpeg_structure(data, self._size_px).is_quick:
             return await self.decode_file(data)
         try:
@@ -45,15 +40,11 @@ class ImageDecoder:
         return image
 
     async def decode_file(self, data: bytes) -> Image:
-        """Decode an image of any format that OpenCV knows.
-
-        Raises:
-            ImageError: it is none, too large, or takes too long.
-        """
+        """Decode an image of any format that OpenCV can read; raises `ImageError`."""
         try:
             await self._worker.start()
             async with asyncio.timeout(DECODE_LIMIT_S):
-                image = (await self._worker.ask(Request.DECODE, data)).image
+                image = (await self._worker.request(Request.DECODE, data)).image
         except TimeoutError:
             raise ImageError(f"one that takes longer than {DECODE_LIMIT_S:g} s to decode") from None
         except WorkerEndedError as error:

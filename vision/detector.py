@@ -5,10 +5,10 @@ Navigation Systems", Electronics 2021, 10, 7, and their published implementation
 
 Choices where the sources leave room:
 
-- The colour test for red, |g - b| < 20 and r - g > 50, goes on to green and blue by r -> g -> b -> r.
+- The colour test for red, |g - b| < 20 and r - g > 50, is used for green and blue with r -> g -> b -> r.
 - Distance and angle are given for a frame *wholly* in view, as the paper says: its box touches no border of
   the image. The published code looks at the top and bottom rows only, so that a frame cut off at a side
-  seems narrower than it is and gets far too large an angle.
+  seems narrower than it is and its angle is far too large.
 - A box one pixel high (l = 0) has no measurable size: neither distance nor angle.
 """
 
@@ -51,7 +51,7 @@ def detect(image: Image, time_us: int | None = None, *, focal_px: float | None =
     if image.ndim != 3 or image.shape[2] != 3 or image.dtype != np.uint8 or image.size == 0:
         raise ValueError(f"image: need (height, width, 3) of uint8, got {image.shape} of {image.dtype}")
     height, width = image.shape[:2]
-    # Splitting into planes made beforehand is several times quicker than letting OpenCV make them.
+    # Splitting into allocated planes is several times quicker than letting OpenCV allocate them.
     planes: list[_Plane] = list(np.empty((3, height, width), np.uint8))
     blue, green, red = cv2.split(image, planes)
     focal = width / 2 if focal_px is None else focal_px
@@ -73,16 +73,9 @@ def measure(
     height_px: int = 240,
     focal_px: float = 160.0,
 ) -> Detection:
-    """Turn a bounding box into the paper's six numbers.
+    """The paper's six numbers of a bounding box.
 
-    Args:
-        row_min: top row of the box, counted from 1.
-        row_max: bottom row, inclusive.
-        col_min: left column, counted from 1.
-        col_max: right column, inclusive.
-        width_px: of the image.
-        height_px: of the image.
-        focal_px: focal length.
+    Rows and columns are counted from 1 at the image's upper left corner, inclusive.
     """
     n, s = height_px / 2 - row_min, height_px / 2 - row_max
     e, w = col_max - (width_px / 2 + 1), col_min - (width_px / 2 + 1)
@@ -109,12 +102,5 @@ def _find(shown: _Plane, following: _Plane, other: _Plane, focal_px: float) -> D
     if rows == 0:
         return NOT_SEEN
     height, width = shown.shape
-    return measure(
-        row + 1,
-        row + rows,
-        column + 1,
-        column + columns,
-        width_px=width,
-        height_px=height,
-        focal_px=focal_px,
-    )
+    box = (row + 1, row + rows, column + 1, column + columns)
+    return measure(*box, width_px=width, height_px=height, focal_px=focal_px)

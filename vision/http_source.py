@@ -7,57 +7,78 @@ import os
 import time
 from collections.abc import AsyncIterator
 from contextlib import suppress
-from typing import Self
+from typing import Generic, Self, TypeVar
 
 import aiohttp
 
 from vision.decoder import ImageDecoder
 from vision.jpeg import ImageError
-from vision.latest import CameraError, Latest, first_line, shown
-from vision.types import CameraFrame
+from vision.types import CameraError, CameraFrame, shown_url
 from wire.mjpeg import MjpegReader, Part, StreamError
 
-_FEED_BYTES = 16 * 1024  # of the stream, between which others run
+_FEED_BYTES = 16 * 1024  # of the stream, between which other tasks run
 _MAX_PARTS_PER_S = 1000
+T = TypeVar("T")
+
+
+class Latest(Generic[T]):
+    """Holds the newest item until it is taken; an older one is dropped. For one event loop's thread."""
+
+    def __init__(self) -> None:
+        self._item: T | None = None
+        self._error: CameraError | None = None
+        self._changed = asyncio.Event()
+
+    def put(self, item: T) -> None:
+        """Replace the item."""
+        self._item = item
+        self._changed.set()
+
+    def end(self, error: CameraError) -> None:
+        """No item follows the one held now."""
+        self._error = error
+        self._changed.set()
+
+    async def get(self) -> T:
+        """Take the item; wait for one if there is none. After the last one, raises the error of `end`."""
+        while self._item is None:
+            if self._error is not None:
+                raise self._error
+            self._changed.clear()
+            await self._changed.wait()
+        item, self._item = self._item, None
+        return item
 
 
 class HttpSource:
-    """Reads the stream in a task of its own and decodes only what the consumer asks for."""
+    """Reads the stream in a task and decodes only the images that the consumer takes.
+
+    Args:
+        url: http:// or https://
+        timeout_s: how long to wait for the connection, and for each image.
+        size_px: width and height of its images, others are skipped; None for any.
+
+    Attributes:
+        bad_frames: images skipped so far because they are damaged or not of this camera.
+    """
 
     def __init__(self, url: str, timeout_s: float = 5.0, size_px: tuple[int, int] | None = None) -> None:
-        """Prepare; nothing is opened yet.
-
-        Args:
-            url: http:// or https://
-            timeout_s: how long to wait for the connection, and for each image.
-            size_px: width and height of its images, others are skipped; None for any.
-        """
+        self.bad_frames = 0
         self._url = url
-        self._name = f"camera {shown(url)}"
+        self._name = f"camera {shown_url(url)}"
         self._timeout_s = timeout_s
         self._latest: Latest[tuple[Part, float]] = Latest()
         self._session: aiohttp.ClientSession | None = None
         self._task: asyncio.Task[None] | None = None
         self._decoder = ImageDecoder(size_px)
-        self._bad_frames = 0
         self._last_refused = ""
 
-    @property
-    def bad_frames(self) -> int:
-        """Images skipped so far because they are damaged or not of this camera."""
-        return self._bad_frames
-
     async def __aenter__(self) -> Self:
-        """Connect.
-
-        Raises:
-            CameraError: nobody answers, or the answer is not MJPEG.
-        """
+        """Connect; raises `CameraError` if there is no answer, or it is not MJPEG."""
         limits = aiohttp.ClientTimeout(total=None, connect=self._timeout_s, sock_connect=self._timeout_s)
         self._session = aiohttp.ClientSession(timeout=limits, auto_decompress=False)
         try:
-            response = await self._connect(self._session)
-            reader = self._reader(response)
+            response, reader = await self._connect(self._session)
         except BaseException:
             await self._session.close()
             raise
@@ -75,61 +96,47 @@ class HttpSource:
             await self._session.close()
 
     async def frames(self) -> AsyncIterator[CameraFrame]:
-        """Images as they come, always the latest.
-
-        Raises:
-            CameraError: the stream ended or cannot be read, or no image came in time.
-        """
+        """Always the latest image; raises `CameraError` when the stream fails or no image arrives in time."""
         loop = asyncio.get_running_loop()
         deadline_s = loop.time() + self._timeout_s
         while True:
             try:
                 async with asyncio.timeout_at(deadline_s):
-                    taken = await self._latest.get()
+                    part, received_s = await self._latest.get()
             except TimeoutError:
-                raise CameraError(
-                    f"{self._name}: no image for {self._timeout_s:g} s{self._skipped()}"
-                ) from None
-            if taken is None:
-                return
-            part, received_s = taken
+                problem = f"{self._name}: no image for {self._timeout_s:g} s"
+                if self.bad_frames:
+                    last = f"the last one is {self._last_refused}"
+                    problem += f" ({self.bad_frames} images were skipped; {last})"
+                raise CameraError(problem) from None
             try:
                 image = await self._decoder.decode_jpeg(part.data)
             except ImageError as error:
-                self._bad_frames += 1
+                self.bad_frames += 1
                 self._last_refused = str(error)
-                await asyncio.sleep(0)  # a flood of garbage must not keep others from running
+                await asyncio.sleep(0)  # other tasks run even while every image is refused
                 continue
             yield CameraFrame(image, part.time_us, received_s, part.data)
             deadline_s = loop.time() + self._timeout_s
 
-    async def _connect(self, session: aiohttp.ClientSession) -> aiohttp.ClientResponse:
+    async def _connect(self, session: aiohttp.ClientSession) -> tuple[aiohttp.ClientResponse, MjpegReader]:
         try:
             async with asyncio.timeout(self._timeout_s):
-                return await session.get(self._url, max_redirects=3)
+                response = await session.get(self._url, max_redirects=3)
+            if response.status != 200:
+                problem = f"HTTP {response.status} {_first_line(response.reason)}"
+                raise CameraError(f"{self._name}: {problem}")
+            return response, MjpegReader(response.headers.get("Content-Type", ""))
         except TimeoutError as error:
             raise CameraError(f"{self._name}: no answer within {self._timeout_s:g} s") from error
         except aiohttp.ClientConnectorError as error:
             number = error.errno or 0
-            reason = os.strerror(number) if number > 0 else first_line(error.strerror)
+            reason = os.strerror(number) if number > 0 else _first_line(error.strerror)
             raise CameraError(f"{self._name}: cannot connect: {reason.lower()}") from error
         except aiohttp.InvalidURL as error:
             raise CameraError(f"{self._name}: not a valid URL") from error
         except (aiohttp.ClientError, OSError, ValueError) as error:
-            raise CameraError(f"{self._name}: {first_line(error)}") from error
-
-    def _skipped(self) -> str:
-        if not self._bad_frames:
-            return ""
-        return f" ({self._bad_frames} images were skipped; the last one is {self._last_refused})"
-
-    def _reader(self, response: aiohttp.ClientResponse) -> MjpegReader:
-        if response.status != 200:
-            raise CameraError(f"{self._name}: HTTP {response.status} {first_line(response.reason)}")
-        try:
-            return MjpegReader(response.headers.get("Content-Type", ""))
-        except StreamError as error:
-            raise CameraError(f"{self._name}: {error}") from None
+            raise CameraError(f"{self._name}: {_first_line(error)}") from error
 
     async def _read(self, response: aiohttp.ClientResponse, reader: MjpegReader) -> None:
         parts, since_s = 0, time.monotonic()
@@ -148,4 +155,10 @@ class HttpSource:
                     await asyncio.sleep(0)
             self._latest.end(CameraError(f"{self._name}: the stream ended"))
         except (StreamError, aiohttp.ClientError, OSError) as error:
-            self._latest.end(CameraError(f"{self._name}: the stream broke: {first_line(error)}"))
+            self._latest.end(CameraError(f"{self._name}: the stream failed: {_first_line(error)}"))
+
+
+def _first_line(error: object) -> str:
+    """The first line of an error's text, or its type if it has none."""
+    lines = str(error).strip().splitlines()
+    return lines[0][:200] if lines else type(error).__name__

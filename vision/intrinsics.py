@@ -1,4 +1,4 @@
-"""The pinhole model: how a camera's angle of view becomes focal length and camera matrix."""
+"""The pinhole model: OpenCV's camera matrix from the angle of view."""
 
 from __future__ import annotations
 
@@ -8,26 +8,12 @@ import numpy as np
 import numpy.typing as npt
 
 
-def focal_length_px(width_px: int, horizontal_fov_rad: float) -> float:
-    """Return the focal length of an ideal pinhole camera, in pixels.
-
-    Args:
-        width_px: width of the image.
-        horizontal_fov_rad: angle between its left and right border, 0..pi.
-    """
-    return width_px / 2 / tan(horizontal_fov_rad / 2)
-
-
 def camera_matrix(width_px: int, height_px: int, horizontal_fov_rad: float) -> npt.NDArray[np.float64]:
-    """Return OpenCV's camera matrix of an ideal pinhole camera with square pixels.
+    """Camera matrix of an ideal pinhole camera: [[f, 0, cx], [0, f, cy], [0, 0, 1]], pixels.
 
     OpenCV counts pixels from 0 and puts whole numbers on pixel *centres*, so the middle of an image of w
-    columns lies at (w - 1) / 2.
-
-    Returns:
-        [[f, 0, cx], [0, f, cy], [0, 0, 1]], shape (3, 3), pixels.
+    columns is (w - 1) / 2.
     """
-    focal_px = focal_length_px(width_px, horizontal_fov_rad)
-    return np.array(
-        [[focal_px, 0.0, (width_px - 1) / 2], [0.0, focal_px, (height_px - 1) / 2], [0.0, 0.0, 1.0]]
-    )
+    focal_px = width_px / 2 / tan(horizontal_fov_rad / 2)
+    cx, cy = (width_px - 1) / 2, (height_px - 1) / 2
+    return np.array([[focal_px, 0.0, cx], [0.0, focal_px, cy], [0.0, 0.0, 1.0]])

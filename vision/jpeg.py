@@ -1,9 +1,8 @@
-"""What a JPEG claims to be, from its markers alone: the cheap look before an image is decoded.
+"""Reads a JPEG's markers and refuses what no camera sends, before anything is decoded.
 
 A few bytes can claim an image of gigabytes, and a progressive JPEG of 99 kB can hold thousands of scans, each
-of which visits every block of the image. The time that decoding takes is bounded by the numbers of pixels,
-scans and bytes, so they are read, and refused where no camera sends them, before anything is decoded.
-Source of the format: ITU-T T.81, annex B.
+of which visits every block of the image. The numbers of pixels, scans and bytes bound the time that decoding
+takes. Source of the format: ITU-T T.81, annex B.
 """
 
 from __future__ import annotations
@@ -28,24 +27,17 @@ _END_OF_SCAN = re.compile(rb"\xff[^\x00\xd0-\xd7\xff]")
 
 
 class ImageError(ValueError):
-    """Not an image that a camera sends; the message is one line that goes on after "the image is"."""
+    """Not an image that a camera sends; the message completes "the image is ..."."""
 
 
 @dataclass(frozen=True, slots=True)
 class JpegStructure:
-    """What the markers of a whole JPEG say.
+    """What the markers of a whole JPEG say."""
 
-    Attributes:
-        size_px: width and height.
-        progressive: coded in passes that refine each other; if not, baseline.
-        scans: how often the decoder goes through the image.
-        size_bytes: of the compressed image.
-    """
-
-    size_px: tuple[int, int]
-    progressive: bool
-    scans: int
-    size_bytes: int
+    size_px: tuple[int, int]  # width and height
+    progressive: bool  # coded in passes that refine each other; if not, baseline
+    scans: int  # how often the decoder visits the whole image
+    size_bytes: int  # of the compressed image
 
     @property
     def is_quick(self) -> bool:
@@ -55,11 +47,11 @@ class JpegStructure:
 
 
 def jpeg_structure(data: bytes, size_px: tuple[int, int] | None = None) -> JpegStructure:
-    """Go through a JPEG's markers; nothing is decoded.
+    """Read a JPEG's markers; nothing is decoded.
 
     Args:
-        data: as received; what follows the end of the image does not count.
-        size_px: width and height that the camera has, if that is known.
+        data: as received; what follows the end of the image is ignored.
+        size_px: width and height of the camera's images, if known.
 
     Raises:
         ImageError: cut off, larger than `MAX_PIXELS` or not of that size, neither baseline nor progressive of
@@ -88,9 +80,9 @@ def jpeg_structure(data: bytes, size_px: tuple[int, int] | None = None) -> JpegS
         at += length
         if marker == _START_OF_SCAN:
             scans += 1
-            most = MAX_PROGRESSIVE_SCANS if frame is not None and frame[1] else MAX_BASELINE_SCANS
-            if scans > most:
-                raise ImageError(f"of more than {most} scans")
+            limit = MAX_PROGRESSIVE_SCANS if frame is not None and frame[1] else MAX_BASELINE_SCANS
+            if scans > limit:
+                raise ImageError(f"of more than {limit} scans")
             found = _END_OF_SCAN.search(data, at)
             if found is None:
                 raise ImageError("cut off")

@@ -1,17 +1,26 @@
-"""Where images come from: `open_source` finds the camera source that fits a URL, a path or a device."""
+"""Camera sources: `open_source` chooses the one for a URL, a path or a device.
+
+MJPEG over HTTP has a module of its own, `vision.http_source`.
+"""
 
 from __future__ import annotations
 
+import asyncio
 import re
+import time
+from collections.abc import AsyncIterator
 from pathlib import Path
+from typing import Self
 from urllib.parse import urlsplit
 
-from vision.capture_source import CaptureSource
-from vision.folder_source import FolderSource
-from vision.latest import CameraError, CameraSource, shown
+from vision.decoder import ImageDecoder
+from vision.jpeg import JPEG_START, ImageError
+from vision.types import CameraError, CameraFrame, CameraSource, shown_url
+from vision.worker import Answer, Reply, Request, WorkerEndedError, WorkerProcess
 
-__all__ = ["CameraError", "CameraSource", "open_source"]
-
+IMAGE_SUFFIXES = (".png", ".jpg", ".jpeg", ".bmp")
+MAX_FILE_BYTES = 64 * 1024 * 1024
+_TIME = re.compile(r"(\d{1,18})us$")
 _VIDEO_FILE = re.compile(r"\.(mp4|mkv|avi|mov|webm|ts|m3u8|mpd|sdp)$", re.IGNORECASE)
 
 
@@ -36,7 +45,7 @@ def open_source(
         try:
             parts = urlsplit(text)
         except ValueError as error:
-            raise CameraError(f"camera {shown(text)}: not a valid URL") from error
+            raise CameraError(f"camera {shown_url(text)}: not a valid URL") from error
         if parts.scheme.lower() in ("http", "https") and not _VIDEO_FILE.search(parts.path):
             from vision.http_source import HttpSource  # noqa: PLC0415 - its library is slow to import
 
@@ -50,5 +59,133 @@ def open_source(
     except (OSError, ValueError):  # such as a zero byte in the name
         found = False
     if not found:
-        raise CameraError(f"camera '{shown(text)}': no such file, folder, device or URL")
+        raise CameraError(f"camera '{shown_url(text)}': no such file, folder, device or URL")
     return CaptureSource(text, timeout_s)
+
+
+class CaptureSource:
+    """Whatever OpenCV opens: RTSP, UDP, video devices, files; read in a process that can be ended.
+
+    Only the latest image is kept. A file is played at its own speed, and its end is a normal end; the end of
+    a live stream is an error.
+
+    Args:
+        url: URL, path or number of a device.
+        timeout_s: how long to wait for it to open, and for each image.
+
+    Attributes:
+        bad_frames: images skipped so far because they are too large; OpenCV does not report which it skips.
+    """
+
+    def __init__(self, url: str | int, timeout_s: float = 5.0) -> None:
+        self.bad_frames = 0
+        self._url = url
+        self._name = f"camera {shown_url(str(url))}"
+        self._timeout_s = timeout_s
+        self._worker = WorkerProcess()
+
+    async def __aenter__(self) -> Self:
+        """Open the camera; raises `CameraError` if that fails, also after `timeout_s`."""
+        settings = f"{round(self._timeout_s * 1000)} {self._url}".encode()
+        try:
+            async with asyncio.timeout(self._timeout_s):
+                answer = await self._request(Request.OPEN, settings)
+        except TimeoutError:
+            raise CameraError(f"{self._name}: did not open within {self._timeout_s:g} s") from None
+        if answer.reply is not Reply.OPENED:
+            self._worker.end()
+            raise CameraError(f"{self._name}: cannot be opened; is it there, and is it video?")
+        return self
+
+    async def __aexit__(self, *exc_info: object) -> None:
+        """Close it."""
+        self._worker.end()
+
+    async def frames(self) -> AsyncIterator[CameraFrame]:
+        """Always the latest image; its vehicle time is unknown. Raises `CameraError`."""
+        loop = asyncio.get_running_loop()
+        deadline_s = loop.time() + self._timeout_s
+        while True:
+            try:
+                async with asyncio.timeout_at(deadline_s):
+                    answer = await self._request(Request.NEXT)
+            except TimeoutError:
+                raise CameraError(f"{self._name}: no image for {self._timeout_s:g} s") from None
+            if answer.reply is Reply.END_OF_FILE:
+                return
+            if answer.reply is Reply.END_OF_STREAM:
+                raise CameraError(f"{self._name}: the stream ended")
+            if answer.image is None:
+                self.bad_frames += 1
+                continue
+            yield CameraFrame(answer.image, None, answer.received_s)
+            deadline_s = loop.time() + self._timeout_s
+
+    async def _request(self, kind: Request, data: bytes = b"") -> Answer:
+        try:
+            return await self._worker.request(kind, data)
+        except WorkerEndedError:
+            raise CameraError(f"{self._name}: OpenCV crashed or ran out of memory on it") from None
+
+
+class FolderSource:
+    """Every image of a folder once, in the order of the names, for tests and replays.
+
+    A name that ends in digits and "us" gives the vehicle time: `0000123000us.png` is 0.123 s.
+
+    Args:
+        folder: holds the images.
+        rate_hz: images a second; by default as fast as they are taken.
+
+    Attributes:
+        bad_frames: files skipped so far because they could not be decoded.
+    """
+
+    def __init__(self, folder: Path, rate_hz: float | None = None) -> None:
+        self.bad_frames = 0
+        self._folder = folder
+        self._name = f"camera {shown_url(str(folder))}"
+        self._period_s = 1.0 / rate_hz if rate_hz else 0.0
+        self._paths: list[Path] = []
+        self._decoder = ImageDecoder()
+
+    async def __aenter__(self) -> Self:
+        """List the folder; raises `CameraError` if it cannot be read or holds no images."""
+        try:
+            entries = sorted(self._folder.iterdir())
+        except OSError as error:
+            raise CameraError(f"{self._name}: {(error.strerror or 'cannot be read').lower()}") from error
+        self._paths = [path for path in entries if path.suffix.lower() in IMAGE_SUFFIXES]
+        if not self._paths:
+            raise CameraError(f"{self._name}: no images in this folder ({', '.join(IMAGE_SUFFIXES)})")
+        return self
+
+    async def __aexit__(self, *exc_info: object) -> None:
+        """End the decoder's process."""
+        self._decoder.close()
+
+    async def frames(self) -> AsyncIterator[CameraFrame]:
+        """Every image once; what cannot be decoded is skipped and counted."""
+        for path in self._paths:
+            data = _read(path)
+            is_jpeg = data.startswith(JPEG_START)
+            decode = self._decoder.decode_jpeg if is_jpeg else self._decoder.decode_file
+            try:
+                image = await decode(data)
+            except ImageError:
+                self.bad_frames += 1
+                continue
+            found = _TIME.search(path.stem)
+            time_us = int(found.group(1)) if found else None
+            yield CameraFrame(image, time_us, time.monotonic(), data if is_jpeg else None)
+            await asyncio.sleep(self._period_s)
+
+
+def _read(path: Path) -> bytes:
+    """The content of a file; nothing if it cannot be read or is too large."""
+    try:
+        if not path.is_file() or path.stat().st_size > MAX_FILE_BYTES:
+            return b""
+        return path.read_bytes()
+    except OSError:
+        return b""

@@ -1,35 +1,31 @@
-"""What vision gives to the navigator."""
+"""Images, camera sources and detections."""
 
 from __future__ import annotations
 
+from collections.abc import AsyncIterator
 from dataclasses import dataclass, field
 from math import inf
+from typing import Protocol, Self
+from urllib.parse import urlsplit
 
 import numpy as np
 import numpy.typing as npt
+
+from errors import UserError
 
 Image = npt.NDArray[np.uint8]
 
 
 @dataclass(frozen=True, slots=True)
 class Detection:
-    """The paper's six numbers of one colour; the defaults mean "not seen".
+    """The paper's six numbers of one colour; the defaults mean "not seen"."""
 
-    Attributes:
-        n: upper edge of its bounding box, pixels above the image centre.
-        s: lower edge, pixels above the centre.
-        e: right edge, pixels right of the centre.
-        w: left edge, pixels right of the centre.
-        d: distance, metres; +inf unless the whole frame is in view.
-        a: unsigned angle between line of sight and the frame's normal, degrees; +inf unless whole.
-    """
-
-    n: float = -inf
-    s: float = inf
-    e: float = -inf
-    w: float = inf
-    d: float = inf
-    a: float = inf
+    n: float = -inf  # upper edge of its bounding box, pixels above the image centre
+    s: float = inf  # lower edge, pixels above the centre
+    e: float = -inf  # right edge, pixels right of the centre
+    w: float = inf  # left edge, pixels right of the centre
+    d: float = inf  # distance, metres; +inf unless the whole frame is in view
+    a: float = inf  # unsigned angle of line of sight to the frame's normal, degrees; +inf unless whole
 
     @property
     def seen(self) -> bool:
@@ -42,30 +38,60 @@ NOT_SEEN = Detection()
 
 @dataclass(frozen=True, slots=True)
 class Detections:
-    """What one image showed.
-
-    Attributes:
-        time_us: vehicle time of the image, microseconds; None where the source does not tell.
-    """
+    """What one image showed."""
 
     red: Detection = NOT_SEEN
     green: Detection = NOT_SEEN
     blue: Detection = NOT_SEEN
-    time_us: int | None = None
+    time_us: int | None = None  # vehicle time of the image; None if the source does not send it
 
 
 @dataclass(frozen=True, slots=True)
 class CameraFrame:
-    """One image of a camera source.
+    """One image of a camera source."""
+
+    image: Image  # BGR, shape (height, width, 3), uint8
+    time_us: int | None  # vehicle time of its exposure; None if the source does not send it
+    received_s: float  # monotonic wall time of its arrival
+    jpeg: bytes | None = field(default=None, repr=False)  # as received, to record it without encoding
+
+
+class CameraError(UserError):
+    """A camera cannot be opened or has failed; the message is one line that names it."""
+
+
+class CameraSource(Protocol):
+    """A camera: `async with source: async for frame in source.frames()`.
+
+    A live source gives the latest image, however long the consumer took. `__aenter__` and `frames` raise
+    `CameraError` if the camera cannot be opened or fails.
 
     Attributes:
-        image: BGR, shape (height, width, 3), uint8.
-        time_us: vehicle time of its exposure, microseconds; None where the source does not tell.
-        received_s: monotonic wall time of its arrival, seconds.
-        jpeg: the compressed image as received, if it was; for recording without compressing again.
+        bad_frames: images skipped so far because they could not be decoded.
     """
 
-    image: Image
-    time_us: int | None
-    received_s: float
-    jpeg: bytes | None = field(default=None, repr=False)
+    bad_frames: int
+
+    async def __aenter__(self) -> Self:
+        """Open the camera."""
+        ...
+
+    async def __aexit__(self, *exc_info: object) -> None:
+        """Close it."""
+
+    def frames(self) -> AsyncIterator[CameraFrame]:
+        """Images in order of arrival."""
+        ...
+
+
+def shown_url(url: str) -> str:
+    """A URL for messages: without its password, on one line, at most 120 characters."""
+    text = url
+    try:
+        parts = urlsplit(url)
+        if parts.password is not None:
+            text = url.replace(f":{parts.password}@", ":***@", 1)
+    except ValueError:
+        pass  # not a URL; shown as it is
+    text = text.encode("unicode_escape").decode("ascii")
+    return text if len(text) <= 120 else text[:117] + "..."

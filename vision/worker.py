@@ -1,35 +1,198 @@
-"""The process in which images of unknown origin are decoded: `python -m vision.worker SOCKET MEMORY`.
+"""The process in which images of unknown origin are decoded: how it is started, and what it does.
 
-It is started by `vision.worker_process`, which can end it at any moment; when its parent is gone it ends by
-itself. SOCKET and MEMORY are inherited file descriptors. Requests come by the socket; each is answered by one
-`ANSWER`, and an image by its pixels at the beginning of the shared memory.
+OpenCV and its codecs are native code. A hostile image can make them hang, crash or take all memory, and a
+thread in them cannot be stopped; a process can. `WorkerProcess` starts
+`python -m vision.worker SOCKET MEMORY` with two inherited file descriptors. Requests are sent over the
+socket; each is answered by one `ANSWER`, and an image by its pixels at the beginning of the shared memory.
+When its parent has ended, the process ends too.
 """
 
 from __future__ import annotations
 
+import asyncio
 import contextlib
 import mmap
 import os
 import resource
 import signal
 import socket
+import struct
+import subprocess
 import sys
+import tempfile
 import threading
 import time
 from collections.abc import Iterator
+from dataclasses import dataclass
+from enum import IntEnum
+from typing import BinaryIO, cast
 
 import cv2
 import numpy as np
 
 from vision.types import Image
-from vision.worker_protocol import ANSWER, DECODE_LIMIT_S, MAX_IMAGE_BYTES, REQUEST, Reply, Request
 
+MAX_IMAGE_BYTES = 3 * 4096 * 4096
 MEMORY_LIMIT_BYTES = 4 << 30
-_LOOK_S = 1.0
+DECODE_LIMIT_S = 0.5
+"""Longest time for one image: thirty times what a baseline JPEG of 1920 x 1080 pixels takes."""
+_START_LIMIT_S = 10.0
+_PARENT_CHECK_S = 1.0
+REQUEST = struct.Struct("<BI")  # kind, and the number of bytes that follow
+ANSWER = struct.Struct("<BIId")  # kind, width and height (pixels), monotonic time of arrival (seconds)
+
+
+class Request(IntEnum):
+    """What the process is to do."""
+
+    DECODE = 1  # an image file follows
+    OPEN = 2  # time limit in milliseconds, a space and the URL follow; a number is a device
+    NEXT = 3  # the next image of what was opened
+
+
+class Reply(IntEnum):
+    """What an answer means."""
+
+    IMAGE = 1
+    NO_IMAGE = 2  # it cannot be decoded, or is too large
+    READY = 3  # sent once, without a request, when the process can work
+    OPENED = 4
+    NOT_OPENED = 5
+    END_OF_FILE = 6
+    END_OF_STREAM = 7
+
+
+class WorkerEndedError(Exception):
+    """The process has crashed, run out of memory or time, or sent an invalid answer."""
+
+
+@dataclass(frozen=True, slots=True)
+class Answer:
+    """What the process has answered."""
+
+    reply: Reply
+    image: Image | None  # BGR, shape (height, width, 3), uint8; None unless `reply` is `Reply.IMAGE`
+    received_s: float  # monotonic wall time at which a captured image arrived, seconds
+
+
+class WorkerProcess:
+    """The process as its parent sees it. There is none before `start` and after `end`."""
+
+    def __init__(self) -> None:
+        self._process: subprocess.Popen[bytes] | None = None
+        self._link: socket.socket | None = None
+        self._memory: mmap.mmap | None = None
+
+    @property
+    def pid(self) -> int | None:
+        """Process id, while there is a process."""
+        return None if self._process is None else self._process.pid
+
+    async def start(self) -> None:
+        """Start the process, if there is none, and wait until it is ready. Raises `WorkerEndedError`."""
+        if self._process is not None:
+            return
+        with self._ended_by_errors("does not start"):
+            self._spawn()
+            async with asyncio.timeout(_START_LIMIT_S):
+                await self._answer()
+
+    async def request(self, kind: Request, data: bytes = b"") -> Answer:
+        """Send one request and wait for its answer. Cancelling the wait ends the process.
+
+        Raises:
+            WorkerEndedError: the process has ended, or was ended because its answer was invalid.
+        """
+        await self.start()
+        assert self._link is not None
+        with self._ended_by_errors("has ended"):
+            head = REQUEST.pack(kind, len(data))
+            await asyncio.get_running_loop().sock_sendall(self._link, head + data)
+            return await self._answer()
+
+    def end(self) -> None:
+        """Kill the process."""
+        process, self._process = self._process, None
+        if self._link is not None:
+            self._link.close()
+            self._link = None
+        if self._memory is not None:
+            self._memory.close()
+            self._memory = None
+        if process is not None:
+            process.kill()
+            # The system needs a moment to take back its memory; the event loop does not wait for that.
+            threading.Thread(target=process.wait, daemon=True).start()
+
+    @contextlib.contextmanager
+    def _ended_by_errors(self, problem: str) -> Iterator[None]:
+        """End the process after any error, also a cancelled wait: the next request would get its answer."""
+        try:
+            yield
+        except BaseException as error:
+            self.end()
+            if isinstance(error, OSError):
+                raise WorkerEndedError(f"the process that decodes images {problem}: {error}") from error
+            raise
+
+    async def _answer(self) -> Answer:
+        """Wait for the next answer."""
+        assert self._link is not None
+        answer = bytearray()
+        while len(answer) < ANSWER.size:
+            size = ANSWER.size - len(answer)
+            chunk = await asyncio.get_running_loop().sock_recv(self._link, size)
+            if not chunk:
+                raise ConnectionResetError("connection closed")
+            answer += chunk
+        return self._checked(bytes(answer))
+
+    def _spawn(self) -> None:
+        ours, theirs = socket.socketpair()
+        ours.setblocking(False)
+        with theirs, _shared_file() as file:
+            descriptors = (theirs.fileno(), file.fileno())
+            self._process = subprocess.Popen(
+                [sys.executable, "-m", "vision.worker", *map(str, descriptors)],
+                stdin=subprocess.DEVNULL,
+                stdout=subprocess.DEVNULL,
+                stderr=subprocess.DEVNULL,  # an image can make a decoder print anything
+                pass_fds=descriptors,
+                start_new_session=True,  # a Ctrl-C in the terminal is handled by the flight
+                env={**os.environ, "OPENCV_IO_MAX_IMAGE_PIXELS": str(MAX_IMAGE_BYTES // 3)},
+            )
+            self._link = ours
+            self._memory = mmap.mmap(file.fileno(), MAX_IMAGE_BYTES, prot=mmap.PROT_READ)
+
+    def _checked(self, answer: bytes) -> Answer:
+        """Check an answer: an image may have taken control of the process."""
+        assert self._memory is not None
+        kind, width, height, received_s = ANSWER.unpack(answer)
+        size_fits = 0 < width * height * 3 <= MAX_IMAGE_BYTES
+        if kind not in tuple(Reply) or (kind == Reply.IMAGE and not size_fits):
+            raise WorkerEndedError("the process that decodes images sent an invalid answer")
+        image: Image | None = None
+        if kind == Reply.IMAGE:
+            shared = np.frombuffer(self._memory, np.uint8, width * height * 3)
+            image = shared.reshape(height, width, 3).copy()
+        return Answer(Reply(kind), image, received_s)
+
+
+def _shared_file() -> BinaryIO:
+    """A file of `MAX_IMAGE_BYTES` without a name; only pages that are written take memory."""
+    if hasattr(os, "memfd_create"):
+        file: BinaryIO = os.fdopen(os.memfd_create("framerunner-image"), "r+b")
+    else:
+        file = cast(BinaryIO, tempfile.TemporaryFile(prefix="framerunner-"))  # noqa: SIM115 - the caller closes it
+    file.truncate(MAX_IMAGE_BYTES)
+    return file
+
+
+# From here on: what runs in the process.
 
 
 class _Capture:
-    """What OpenCV opens, read on a thread of its own, for it blocks; only the latest image is kept."""
+    """What OpenCV opens, read on a thread because it blocks; only the latest image is kept."""
 
     def __init__(self, url: str, limit_ms: int) -> None:
         self._parent = os.getppid()
@@ -41,7 +204,7 @@ class _Capture:
         self._changed = threading.Condition()
 
     def start(self) -> bool:
-        """Begin to read; False if it could not be opened."""
+        """Start to read; False if it could not be opened."""
         if not self._capture.isOpened():
             return False
         threading.Thread(target=self._read, daemon=True).start()
@@ -50,8 +213,10 @@ class _Capture:
     def next(self) -> tuple[Reply, Image | None, float]:
         """Wait for an image that has not been taken yet, or the end."""
         with self._changed:
-            while not self._changed.wait_for(lambda: self._latest is not None or self._ended, _LOOK_S):
-                if os.getppid() != self._parent:  # it was killed, and the stream may be silent for ever
+            while not self._changed.wait_for(
+                lambda: self._latest is not None or self._ended, _PARENT_CHECK_S
+            ):
+                if os.getppid() != self._parent:  # it was killed, and the stream may stay silent
                     os._exit(0)
             taken, self._latest = self._latest, None
         if taken is None:
@@ -87,7 +252,7 @@ def _opened(url: str, limit_ms: int) -> cv2.VideoCapture:
 
 
 def _decoded(data: bytes) -> Image | None:
-    """Decode an image; None if it is none."""
+    """Decode an image; None if it cannot be decoded."""
     try:
         with _limited(2 * DECODE_LIMIT_S):
             image = cv2.imdecode(np.frombuffer(data, np.uint8), cv2.IMREAD_COLOR)
@@ -98,7 +263,7 @@ def _decoded(data: bytes) -> Image | None:
 
 @contextlib.contextmanager
 def _limited(limit_s: float) -> Iterator[None]:
-    """End the process if the work takes longer, also in the middle of native code; the parent may be gone."""
+    """End the process if the work takes longer, even inside native code; the parent may have ended."""
     signal.setitimer(signal.ITIMER_REAL, limit_s)
     try:
         yield
@@ -107,7 +272,7 @@ def _limited(limit_s: float) -> Iterator[None]:
 
 
 def _received(link: socket.socket, length: int) -> bytes:
-    """Receive so many bytes; if the parent is gone, so is this process."""
+    """Receive this number of bytes; end the process if the parent has closed the socket."""
     data = bytearray()
     while len(data) < length:
         chunk = link.recv(min(1 << 20, length - len(data)))
@@ -117,15 +282,10 @@ def _received(link: socket.socket, length: int) -> bytes:
     return bytes(data)
 
 
-def serve(link: socket.socket, memory: mmap.mmap) -> None:
-    """Answer requests until the parent is gone.
-
-    Args:
-        link: to the parent.
-        memory: shared with the parent, `MAX_IMAGE_BYTES` long.
-    """
+def _serve(link: socket.socket, memory: mmap.mmap) -> None:
+    """Answer requests until the parent has ended."""
     capture: _Capture | None = None
-    shown = np.frombuffer(memory, np.uint8)
+    pixels = np.frombuffer(memory, np.uint8)
     link.sendall(ANSWER.pack(Reply.READY, 0, 0, 0.0))
     while True:
         kind, length = REQUEST.unpack(_received(link, REQUEST.size))
@@ -145,20 +305,20 @@ def serve(link: socket.socket, memory: mmap.mmap) -> None:
             reply = Reply.IMAGE if fits else Reply.NO_IMAGE
             if fits:
                 height, width = image.shape[:2]
-                shown[: image.size] = image.reshape(-1)
+                pixels[: image.size] = image.reshape(-1)
         link.sendall(ANSWER.pack(reply, width, height, received_s))
 
 
 def main() -> None:
-    """Serve on the descriptors that the parent left open."""
+    """Serve on the descriptors that the parent passed."""
     with contextlib.suppress(ValueError, OSError):  # not every system has these limits
         resource.setrlimit(resource.RLIMIT_AS, (MEMORY_LIMIT_BYTES, MEMORY_LIMIT_BYTES))
         resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
     cv2.setNumThreads(1)
     link = socket.socket(fileno=int(sys.argv[1]))
     try:
-        serve(link, mmap.mmap(int(sys.argv[2]), MAX_IMAGE_BYTES))
-    except OSError:  # the parent is gone
+        _serve(link, mmap.mmap(int(sys.argv[2]), MAX_IMAGE_BYTES))
+    except OSError:  # the parent has ended
         os._exit(0)
 
 

@@ -9,8 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 from cyclopts import App, Parameter
 
 if TYPE_CHECKING:
-    from offboard.mission import Mission
-    from offboard.starter import Starter
+    from offboard.mission import Mission, NewMission
 
 app = App(name="mission", help="List, show, check and begin missions.")
 
@@ -89,12 +88,12 @@ def new(
         framerunner mission new my_mission --python --out missions
     """
     from framerunner.errors import SettingError
-    from offboard.starter import starter
+    from offboard.mission import new_mission
 
     if not _NAME.fullmatch(name):
         mend = "use small letters, digits and _, a letter first, such as 'my_mission'"
         raise SettingError(f"NAME '{name}': {mend}")
-    files = starter(name, out, python=python)
+    files = new_mission(name, out, python=python)
     _write(files)
     print(f"written: {', '.join(map(str, files.texts))}")
     print()
@@ -113,7 +112,7 @@ def _load(mission: str | Path, pilot: Path | None) -> Mission:
     return load_mission(mission, None if pilot is None else read_pilot(pilot))
 
 
-def _write(files: Starter) -> None:
+def _write(files: NewMission) -> None:
     """Write all files or, if one of them is there already, none."""
     from framerunner.errors import SettingError
 

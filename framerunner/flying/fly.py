@@ -16,7 +16,7 @@ from framerunner.flying.plan import FlightPlan
 from framerunner.runs.track import Track, TrackRecorder
 from offboard.app import MissionEnd, Moment, Observer, fly_mission
 from offboard.drone import Drone
-from offboard.eyes import Eyes
+from offboard.perception import Perception
 from scenarios.result import FlightResult
 
 Run = Callable[[Coroutine[Any, Any, MissionEnd]], Awaitable[MissionEnd]]
@@ -40,7 +40,7 @@ class Flown:
 async def fly(
     plan: FlightPlan,
     drone: Drone,
-    eyes: Eyes,
+    eyes: Perception,
     judge: Judge,
     observers: Sequence[Observer] = (),
     *,
@@ -71,9 +71,7 @@ async def fly(
         for see in watching:
             see(moment)
 
-    flight = fly_mission(
-        drone, None, mission, limit_s=plan.limit_s, observer=observe, eyes=eyes, box=plan.box
-    )
+    flight = fly_mission(drone, eyes, mission, limit_s=plan.limit_s, observer=observe, box=plan.box)
     outcome = await (flight if run is None else run(flight))
     report = await judge.report(
         outcome.mission_state, None if outcome.ended == "finished" else outcome.reason

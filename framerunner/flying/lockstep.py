@@ -15,7 +15,7 @@ from framerunner.flying.fly import Flown, fly
 from framerunner.flying.lockstep_drone import LockstepDrone, TruthObserver
 from framerunner.flying.plan import FlightPlan
 from offboard.app import Moment, Observer
-from offboard.eyes import CAMERA_DEAD_S, CameraLostError
+from offboard.perception import CAMERA_DEAD_S, CameraLostError
 from scenarios.models import Scenario, TrueState
 from scenarios.result import RefereeReport, RefereeSnapshot
 from sitl.camera_feed import CameraFeed

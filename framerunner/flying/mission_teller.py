@@ -63,7 +63,7 @@ class MissionTeller:
         self._detections: Detections | None = None
         self._broken = False
         still = (0.0, 0.0, 0.0, 0.0)
-        companion.tell_state(MissionState(self._crc, -1, 0, 0, 0, False, False, False, still, start_arena))
+        companion.send_state(MissionState(self._crc, -1, 0, 0, 0, False, False, False, still, start_arena))
 
     def see_frame(self, frame: CameraFrame) -> None:
         """Note how large the images are."""
@@ -83,7 +83,7 @@ class MissionTeller:
     async def tell_result(self, result: FlightResult) -> None:
         """Tell how the flight was judged, at once and twice, and wait 0.3 s until that has gone out."""
         if self._tell_document(DocumentKind.RESULT, result.as_json()) is not None:
-            await self._companion.farewell(DocumentKind.RESULT)
+            await self._companion.send_finally(DocumentKind.RESULT)
 
     def _see(self, moment: Moment) -> None:
         time_us = moment.state.time_us
@@ -102,12 +102,12 @@ class MissionTeller:
         self._ticks += 1
         if moment.mission_state != self._mission_state:
             self._mission_state = moment.mission_state
-            self._companion.say(f"{TEXT_PREFIX}{moment.mission_state}")
+            self._companion.send_text(f"{TEXT_PREFIX}{moment.mission_state}")
         self._tell_detections(moment)
 
     def _tell_state(self, moment: Moment, flying: bool) -> None:
         state, command = moment.state, moment.command
-        self._companion.tell_state(
+        self._companion.send_state(
             MissionState(
                 mission_crc=self._crc,
                 state_index=self._numbers.get(moment.mission_state, -1),
@@ -137,7 +137,7 @@ class MissionTeller:
             return  # nobody looks any more
         width, height = self._image_size_px
         red, green, blue = _box(seen.red), _box(seen.green), _box(seen.blue)
-        self._companion.tell_detections(MissionDetections(seen.time_us, width, height, red, green, blue))
+        self._companion.send_detections(MissionDetections(seen.time_us, width, height, red, green, blue))
 
     def _tell_mission(self, mission: Mission, source: str, scenario: str) -> int:
         """Tell what is flown, without what makes it too large; its CRC."""
@@ -162,7 +162,7 @@ class MissionTeller:
         except PayloadError as error:
             logger.warning("not told: %s", error)
             return None
-        self._companion.tell_document(kind, pieces)
+        self._companion.send_document(kind, pieces)
         return crc
 
 

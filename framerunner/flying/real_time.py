@@ -20,9 +20,9 @@ from wire.simulator_api import SimulatorApi
 if TYPE_CHECKING:  # what is heavy is imported when a flight begins
     from framerunner.flying.mission_teller import MissionTeller
     from framerunner.flying.simulator_process import SimulatorClock, SitlProcess
-    from offboard.eyes import CameraEyes
     from offboard.link.companion import Companion
     from offboard.mavsdk_drone import MavsdkDrone
+    from offboard.perception import CameraPerception
 
 SLOW_FACTOR = 0.95  # of the wanted speed; below, vehicle time had to wait
 
@@ -88,8 +88,8 @@ async def fly_in_real_time(
     from framerunner.flying.display import FlightDisplay
     from framerunner.flying.judges import choose_judge
     from framerunner.flying.mission_teller import MissionTeller
-    from offboard.eyes import CameraEyes
     from offboard.link.companion import Companion
+    from offboard.perception import CameraPerception
 
     async with AsyncExitStack() as stack:
         session = await stack.enter_async_context(aiohttp.ClientSession())
@@ -102,7 +102,7 @@ async def fly_in_real_time(
         teller = MissionTeller(companion, plan.chart, source, plan.scenario.name, plan.start_pose)
         drone = _drone(plan, vehicle, records, stack, companion)
         camera = await _camera(plan, vehicle, records, stack, teller)
-        eyes = CameraEyes(camera)
+        eyes = CameraPerception(camera)
         timing = FlightTiming(drone, eyes, None if vehicle.sitl is None else vehicle.sitl.clock)
         title = f"{plan.scenario.name}: {plan.chart.name}"
         display = FlightDisplay(title, plan.limit_s, records.recorder, judge)
@@ -165,12 +165,12 @@ def _drone(
     drone = MavsdkDrone(vehicle.drone_url, start_arena=plan.start_pose, hang_report=hang_report, box=plan.box)
     drone.record_to(records.folder.tlog)
     stack.callback(lambda: warn(drone.recording_problem))
-    drone.tell_through(companion)
+    drone.use_companion(companion)
     if vehicle.sitl is not None:
-        drone.wait_with(vehicle.sitl.clock, vehicle.sitl.system_id)
+        drone.use_clock(vehicle.sitl.clock, vehicle.sitl.system_id)
     if vehicle.shared_with is not None:
         drone.share_with(vehicle.shared_with)
-    stack.push_async_callback(drone.let_go)  # not before the result has been told, over its link
+    stack.push_async_callback(drone.disconnect)  # not before the result has been told, over its link
     return drone
 
 
@@ -203,7 +203,7 @@ class FlightTiming:
         clock: of a simulator whose time waits for this program; None: vehicle time does not wait.
     """
 
-    def __init__(self, drone: MavsdkDrone, eyes: CameraEyes, clock: SimulatorClock | None) -> None:
+    def __init__(self, drone: MavsdkDrone, eyes: CameraPerception, clock: SimulatorClock | None) -> None:
         self._drone = drone
         self._eyes = eyes
         self._clock = clock

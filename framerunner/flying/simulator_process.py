@@ -15,7 +15,7 @@ from framerunner.errors import SettingError
 from framerunner.flying.child_process import ChildProcess
 from framerunner.flying.lockstep_drone import TELEMETRY_DELAY_US, sent_yaw_rate, single
 from offboard.drone import DroneError, VelocityCommand
-from offboard.eyes import CameraEyes
+from offboard.perception import CameraPerception
 from sitl.server_settings import VIDEO_PORT
 from sitl.time_grants import FREE_US, Grant, Held, Velocity
 from sitl.world import CONTROL_PERIOD_US
@@ -98,9 +98,9 @@ class SimulatorClock:
         self._channel = channel
         self._reader: asyncio.StreamReader | None = None
         self._writer: asyncio.StreamWriter | None = None
-        self._eyes: CameraEyes | None = None
+        self._eyes: CameraPerception | None = None
 
-    def look_through(self, eyes: CameraEyes) -> None:
+    def look_through(self, eyes: CameraPerception) -> None:
         """Wait at each tick until these have seen the image that was sent last."""
         self._eyes = eyes
 

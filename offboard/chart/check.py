@@ -1,38 +1,30 @@
-"""What must hold of an expanded chart: names, expressions, initial states, ways in and ways out."""
+"""Checks an expanded chart: names, expressions, initial states, and that each state is reached and left."""
 
 from __future__ import annotations
 
-from difflib import get_close_matches
-
 from offboard.chart.expressions import IN_LOCATION, ExpressionError, check_assignment, check_guard
-from offboard.chart.problems import Place, ProblemList, cut
+from offboard.chart.problems import Place, ProblemList, cut, did_you_mean
 from offboard.chart.spec import Action, Leaf, MissionFile, State, Transition, all_states, leaves
 from offboard.chart.vocabulary import UnknownNameError, Vocabulary
 from offboard.pilot import Pilot
 
 
 def check(mission: MissionFile, pilot_class: type[Pilot], problems: ProblemList) -> None:
-    """Check an expanded mission against the pilot.
-
-    Args:
-        mission: expanded.
-        pilot_class: what the mission's names are compared with.
-        problems: takes what is found, each by line.
-    """
+    """Check an expanded mission, and its names against a pilot class; `problems` takes what is found."""
     vocabulary = Vocabulary(pilot_class, mission.variables)
     if not mission.states:
         problems.add(mission.place, "has no 'states'; write 'states:' and below it the states, indented")
         return
-    is_whole = not problems.found
+    expanded_without_problems = not problems.found
     for state in all_states(mission.states):
-        _check_words(state, vocabulary, problems)
-    if not is_whole:
-        return  # what follows would tell of the same fault again
+        _check_names(state, vocabulary, problems)
+    if not expanded_without_problems:
+        return  # what follows would report the same faults again
     _check_initial(mission.place, "the mission", mission, problems)
     for state in all_states(mission.states):
         _check_shape(state, problems)
     if not problems.found:
-        _check_ways(mission, problems)
+        _check_paths(mission, problems)
 
 
 def _check_initial(place: Place, what: str, around: MissionFile | State, problems: ProblemList) -> None:
@@ -40,9 +32,8 @@ def _check_initial(place: Place, what: str, around: MissionFile | State, problem
     if not initial:
         problems.add(place, f"{what} has no 'initial'; name the state it starts in, such as '{names[0]}'")
     elif initial not in names:
-        near = get_close_matches(initial, names, 1)
-        mend = f"did you mean '{near[0]}'?" if near else f"it has the states {cut(', '.join(names), 100)}"
-        problems.add(around.initial_place, f"'initial' of {what} is '{cut(initial, 40)}'; {mend}")
+        advice = did_you_mean(initial, names, f"it has the states {cut(', '.join(names), 100)}")
+        problems.add(around.initial_place, f"'initial' of {what} is '{cut(initial, 40)}'; {advice}")
 
 
 def _check_shape(state: State, problems: ProblemList) -> None:
@@ -59,7 +50,7 @@ def _check_shape(state: State, problems: ProblemList) -> None:
     if state.then or state.initial:
         problems.add(place, f"state '{state.id}' has 'then' or 'initial' but no states of its own")
     if state.final and state.resume:
-        text = f"state '{state.id}' is final; nothing is left to go on with, take 'resume' away"
+        text = f"state '{state.id}' is final; there is nothing to continue, remove 'resume'"
         problems.add(state.resume.place, text)
     if state.final and (state.transitions or state.during):
         problems.add(place, f"state '{state.id}' is final; nothing happens after its 'enter'")
@@ -67,7 +58,7 @@ def _check_shape(state: State, problems: ProblemList) -> None:
 
 
 def _check_transitions(state: State, problems: ProblemList) -> None:
-    """None that can never be taken, for one above it always goes first."""
+    """No transition is hidden by one above it."""
     seen: dict[str, Transition] = {}
     for transition in state.transitions:
         if "" in seen:
@@ -82,7 +73,7 @@ def _check_transitions(state: State, problems: ProblemList) -> None:
         seen.setdefault(guard, transition)
 
 
-def _check_words(state: State, vocabulary: Vocabulary, problems: ProblemList) -> None:
+def _check_names(state: State, vocabulary: Vocabulary, problems: ProblemList) -> None:
     for transition in state.transitions:
         if transition.when:
             try:
@@ -108,41 +99,41 @@ def _check_action(action: Action, vocabulary: Vocabulary, problems: ProblemList)
         problems.add(place, f"'{cut(str(action))}': {error}")
 
 
-def _check_ways(mission: MissionFile, problems: ProblemList) -> None:
-    """Every state can be entered and has a way out; from each a final one can be reached without a pause."""
+def _check_paths(mission: MissionFile, problems: ProblemList) -> None:
+    """Every state can be entered and left; from each a final one can be reached without a pause."""
     states = {state.id: state for state in all_states(mission.states)}
     by_leaf = {leaf.state.id: leaf for leaf in leaves(mission.states)}
     start = [_entry(states, mission.initial)]
-    ways = _ways(states, by_leaf, pauses=False)
-    unpaused = _reached(start, ways)
+    successors = _successors(states, by_leaf, pauses=False)
+    unpaused = _reached(start, successors)
     back: dict[str, list[str]] = {}
-    for leaf_id, targets in ways.items():
+    for leaf_id, targets in successors.items():
         for target in targets:
             back.setdefault(target, []).append(leaf_id)
     ending = _reached([leaf_id for leaf_id in by_leaf if is_finish(states, leaf_id)], back)
     stuck = [leaf_id for leaf_id in by_leaf if leaf_id in unpaused and leaf_id not in ending]
-    ends = [leaf_id for leaf_id in stuck if not set(ways[leaf_id]) - {leaf_id}]
+    ends = [leaf_id for leaf_id in stuck if not set(successors[leaf_id]) - {leaf_id}]
     for leaf_id in ends:
         text = f"state '{leaf_id}' has no way out; add 'transitions:', or 'final: true' if it is the end"
         problems.add(states[leaf_id].place, text)
     if ends:
-        return  # that a state is not reached or the end is not may follow from it
+        return  # that other states are not reached may follow from it
     if stuck:
         text = f"never finishes: no way from state '{stuck[0]}' to a final state"
-        mend = "lead a transition there, or mark one with 'final: true'"
-        problems.add(states[stuck[0]].place, f"{text}; {mend}")
+        advice = "add a transition to one, or mark a state with 'final: true'"
+        problems.add(states[stuck[0]].place, f"{text}; {advice}")
         return
-    entered = _reached(start, _ways(states, by_leaf, pauses=True))
+    entered = _reached(start, _successors(states, by_leaf, pauses=True))
     for state_id in _never_entered(mission.states, entered):
         if _entry(states, state_id) in entered:
-            continue  # it follows one that was told of
-        entered |= _reached([_entry(states, state_id)], ways)
+            continue  # it follows one that was reported
+        entered |= _reached([_entry(states, state_id)], successors)
         place = states[state_id].place
-        problems.add(place, f"state '{state_id}' is never reached; lead a transition to it or take it away")
+        problems.add(place, f"state '{state_id}' is never reached; add a transition to it, or remove it")
 
 
 def _never_entered(around: tuple[State, ...], entered: set[str]) -> list[str]:
-    """States of which nothing is entered; of those within each other the outermost."""
+    """States of which no leaf is entered; a superstate instead of its states."""
     found = []
     for state in around:
         own = [leaf.state.id for leaf in leaves((state,))]
@@ -153,8 +144,8 @@ def _never_entered(around: tuple[State, ...], entered: set[str]) -> list[str]:
     return found
 
 
-def _ways(states: dict[str, State], by_leaf: dict[str, Leaf], *, pauses: bool) -> dict[str, list[str]]:
-    """Of each leaf those that can follow it, by transitions and, if wanted, after pauses."""
+def _successors(states: dict[str, State], by_leaf: dict[str, Leaf], *, pauses: bool) -> dict[str, list[str]]:
+    """For each leaf those that can follow it, by transitions and, with `pauses`, after a pause."""
     found = {}
     for leaf_id, leaf in by_leaf.items():
         targets = [transition.to for transition in leaf.transitions]
@@ -167,25 +158,20 @@ def _ways(states: dict[str, State], by_leaf: dict[str, Leaf], *, pauses: bool) -
     return found
 
 
-def _reached(start: list[str], ways: dict[str, list[str]]) -> set[str]:
-    """What can be reached from some leaves, they included."""
+def _reached(start: list[str], successors: dict[str, list[str]]) -> set[str]:
+    """Leaves that can be reached from some, including these."""
     seen: set[str] = set()
     pending = list(start)
     while pending:
         current = pending.pop()
         if current not in seen:
             seen.add(current)
-            pending += ways.get(current, [])
+            pending += successors.get(current, [])
     return seen
 
 
 def is_finish(states: dict[str, State], leaf_id: str) -> bool:
-    """Whether the mission is over in this state: it is final and nothing follows its superstate.
-
-    Args:
-        states: all states of the expanded chart by full id.
-        leaf_id: one of them.
-    """
+    """Whether the mission is over in this leaf: it is final and its superstate has no `then`."""
     outer = states.get(leaf_id.rpartition(".")[0])
     return states[leaf_id].final and (outer is None or not outer.then)
 

@@ -1,20 +1,20 @@
-"""Guards and values: which expressions are allowed, and their fast form.
+"""Guards and values: which expressions are allowed, and their compiled form.
 
 Allowed are numbers, texts, names, dotted names, comparison, and/or/not, + - * / and tuples. Calls,
 subscripts, lambdas and everything else are refused here with a reason, and a second time by
-python-statemachine's restricted evaluator, which also does the evaluating.
+python-statemachine's restricted evaluator, which also evaluates them.
 """
 
 from __future__ import annotations
 
 import ast
+import re
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 
 from statemachine.spec_parser import parse_expr
 
-from offboard.chart.hints import hint_for_syntax
-from offboard.chart.kinds import KindError, Kinds
+from offboard.chart.kinds import KindError, Kinds, masked
 from offboard.chart.vocabulary import UnknownNameError, Vocabulary, path_of
 from offboard.pilot import Pilot
 
@@ -33,7 +33,7 @@ _ALLOWED = (
 _REASONS = {
     ast.Call: "calls are not possible; name a value of the pilot, or set goal_m and read distance_to_goal_m",
     ast.Subscript: "[...] is not possible; name the part, such as imu.x",
-    ast.List: "[...] is not possible; a place stands in parentheses: (x, y, z)",
+    ast.List: "[...] is not possible; write a place in parentheses: (x, y, z)",
     ast.Pow: "** is not possible; write a product",
     ast.Mod: "% is not possible here",
     ast.BitAnd: "write 'and' instead of '&'",
@@ -47,12 +47,40 @@ _REASONS = {
     ast.NamedExpr: ":= is not possible; assign under 'enter' or 'during'",
 }
 
+_MISTAKES = (
+    (r"&&|&", "write 'and' instead of '{}'"),
+    (r"\|\||\|", "write 'or' instead of '{}'"),
+    (r"!(?!=)", "write 'not' instead of '{}'"),
+    (r"<>|≠|=!", "write '!=' instead of '{}'"),
+    (r"=<|≤", "write '<=' instead of '{}'"),
+    (r"=>|≥", "write '>=' instead of '{}'"),
+    (r"===", "write '==' instead of '{}'"),
+    (r"(?<![<>=!:+\-*/])=(?!=)", "'=' sets a value; to compare write '=='"),
+    (r":=|\+=|-=|\*=|/=", "'{}' is not possible here; a guard only compares"),
+    (r"[‘’“”„‚«»´`]", "write a straight quotation mark ' instead of {}"),
+    (r"[×·]", "write '*' instead of '{}'"),
+    (r"[−–—]", "write '-' instead of '{}'"),
+    (r"÷", "write '/' instead of '{}'"),
+    (r"%", "'{}' is not possible; write 0.3 for 30 %"),
+    (r"\b(?:AND|OR|NOT|And|Or|Not)\b", "write '{lower}' in small letters"),
+    (r"(?:^|(?<=\s))(?:if|when|while)\b", "leave '{}' out; 'when:' means it already"),
+    (r"\b(?:then|goto|else)\b", "leave '{}' out; write the next state under 'to:'"),
+    (
+        r"(?<![\w.])\d[\d.]*\s*(?:ms|s|sec|m|cm|mm|rad|deg|px|°)(?!\w)",
+        "write the number without a unit: {number} instead of {}",
+    ),
+    (r"\b(?:and|or)\s*(?:<=?|>=?|==|!=)", "name the value again after '{first}': a < 2 and a > 1"),
+    (r"\b(?:and|or|not)\s*$", "something must follow '{}'"),
+    (r"(?:<=?|>=?|==|!=|[-+*/])\s*$", "a value must follow '{}'"),
+)
+_MISTAKE_PATTERNS = tuple((re.compile(pattern), text) for pattern, text in _MISTAKES)
+
 
 class ExpressionError(Exception):
-    """An expression that is not allowed, names something unknown or mixes what does not fit, in one line.
+    """An expression that is not allowed, has unknown names or mixes kinds; the message is one line.
 
     Attributes:
-        offset: how many characters into the expression the fault stands.
+        offset: of the fault, characters from the beginning of the expression.
     """
 
     def __init__(self, text: str, offset: int = 0) -> None:
@@ -61,39 +89,34 @@ class ExpressionError(Exception):
 
 
 def check_guard(text: str, vocabulary: Vocabulary) -> None:
-    """Check a condition: form, names, and that it gives true or false.
-
-    Raises:
-        ExpressionError: with the reason.
-    """
-    tree = _checked(text, vocabulary)
-    with _kind_errors(text):
-        Kinds(text.strip(), vocabulary).want_condition(tree.body)
+    """Check a condition: form, names, and that it is true or false. Raises `ExpressionError`."""
+    with _as_expression_errors(text):
+        Kinds(text.strip(), vocabulary).require_condition(_checked(text, vocabulary).body)
 
 
 def check_assignment(location: str, text: str, vocabulary: Vocabulary) -> None:
     """Check both sides of `location = expression`.
 
     Raises:
-        ExpressionError: with the reason; the offset counts in the expression, below 0 in the location.
+        ExpressionError: with the reason; its offset is `IN_LOCATION` if the location is wrong.
     """
     path = tuple(location.split("."))
     try:
         vocabulary.check_assignable(path)
     except UnknownNameError as error:
         raise ExpressionError(str(error), IN_LOCATION) from None
-    tree = _checked(text, vocabulary)
-    with _kind_errors(text):
-        Kinds(text.strip(), vocabulary).want_for(path, tree.body)
+    with _as_expression_errors(text):
+        Kinds(text.strip(), vocabulary).require_assignable(path, _checked(text, vocabulary).body)
 
 
 def _checked(text: str, vocabulary: Vocabulary) -> ast.Expression:
     """Check form and names."""
     tree = _parsed(text)
     for node in ast.walk(tree):
-        if isinstance(node, ast.Call) and not node.args and not node.keywords:
-            name = ".".join(path_of(node.func))
-            if name and _is_known(vocabulary, path_of(node.func)):
+        if isinstance(node, ast.Call) and not node.args and not node.keywords and path_of(node.func):
+            with suppress(UnknownNameError):
+                vocabulary.type_of(path_of(node.func))
+                name = ".".join(path_of(node.func))
                 raise ExpressionError(f"write it without parentheses: {name}", _offset(text, node))
         if not isinstance(node, _ALLOWED):
             reason = _REASONS.get(type(node), f"{type(node).__name__} is not possible here")
@@ -109,13 +132,11 @@ def _checked(text: str, vocabulary: Vocabulary) -> ast.Expression:
         parse_expr(text, _name_of_pilot)
     except (ValueError, SyntaxError) as error:
         raise ExpressionError(str(error)) from None
-    except RecursionError:
-        raise ExpressionError("is nested too deep; write it simpler") from None
     return tree
 
 
 @contextmanager
-def _kind_errors(text: str) -> Iterator[None]:
+def _as_expression_errors(text: str) -> Iterator[None]:
     try:
         yield
     except KindError as error:
@@ -124,16 +145,8 @@ def _kind_errors(text: str) -> Iterator[None]:
         raise ExpressionError("is nested too deep; write it simpler") from None
 
 
-def _is_known(vocabulary: Vocabulary, path: tuple[str, ...]) -> bool:
-    try:
-        vocabulary.type_of(path)
-    except UnknownNameError:
-        return False
-    return True
-
-
 def _around(tree: ast.AST, inner: ast.AST) -> ast.AST:
-    """The node itself, or the one around it that has a place in the text."""
+    """The node, or the one around it that has a position in the text."""
     if hasattr(inner, "col_offset"):
         return inner
     return next((node for node in ast.walk(tree) if inner in ast.iter_child_nodes(node)), tree)
@@ -153,12 +166,9 @@ def compile_value(text: str) -> Evaluate:
 
 
 def names_in(text: str) -> tuple[str, ...]:
-    """The dotted names of a checked expression, each once, in the order in which they stand there."""
-    return tuple(dict.fromkeys(".".join(path) for path in reversed(_paths(text)))) if text else ()
-
-
-def _paths(text: str) -> list[tuple[str, ...]]:
-    return [path_of(node) for node in _name_nodes(_parsed(text))]
+    """The dotted names of a checked expression, each once, in their order; none of an empty one."""
+    nodes = reversed(_name_nodes(_parsed(text))) if text else ()
+    return tuple(dict.fromkeys(".".join(path_of(node)) for node in nodes))
 
 
 def _name_of_pilot(name: str) -> Evaluate:
@@ -172,16 +182,44 @@ def _name_of_pilot(name: str) -> Evaluate:
 
 def _parsed(text: str) -> ast.Expression:
     if not text.strip():
-        raise ExpressionError("nothing stands here; write an expression (what follows a # is not read)")
+        raise ExpressionError("nothing is written here; write an expression (what follows a # is not read)")
     if len(text) > MAX_EXPRESSION_CHARACTERS:
         raise ExpressionError(f"is longer than {MAX_EXPRESSION_CHARACTERS} characters; split it")
     try:
         return ast.parse(text.strip(), mode="eval")
     except SyntaxError as error:
-        at, mend = hint_for_syntax(text, (error.offset or 1) - 1)
-        raise ExpressionError(mend, at) from None
+        raise _syntax_error(text, (error.offset or 1) - 1) from None
     except (ValueError, RecursionError, MemoryError):
         raise ExpressionError("cannot be understood: too deep") from None
+
+
+def _syntax_error(text: str, error_at: int) -> ExpressionError:
+    """What is wrong with a text that is no expression; Python's parser stopped at `error_at`."""
+    plain = masked(text)
+    for pattern, advice in _MISTAKE_PATTERNS:
+        found = pattern.search(plain)
+        if found:
+            sign = found.group().strip()
+            first, number = (re.match(pattern, sign) for pattern in (r"\w+", r"[\d.]+"))
+            words = {
+                "lower": sign.lower(),
+                "first": first.group() if first else sign,
+                "number": number.group() if number else sign,
+            }
+            return ExpressionError(advice.format(sign, **words), found.start())
+    if plain.count("'") % 2 or plain.count('"') % 2:
+        at = max(plain.rfind("'"), plain.rfind('"'))
+        return ExpressionError(f"a text begins here and is never closed; write {plain[at]} after it", at)
+    opened, closed = plain.count("("), plain.count(")")
+    if opened > closed:
+        return ExpressionError("a ')' is missing", plain.find("("))
+    if closed > opened:
+        return ExpressionError("a '(' is missing", plain.rfind(")"))
+    at = min(max(error_at, 0), len(text) - 1)
+    rest = text[at:].strip()
+    return ExpressionError(
+        f"cannot be understood from '{rest[:30]}' on; write a comparison such as imu.z > 1", at
+    )
 
 
 def _name_nodes(tree: ast.AST) -> list[ast.expr]:

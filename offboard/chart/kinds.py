@@ -1,15 +1,15 @@
-"""What an expression gives: a condition, a number, a text or a place, and what does not go together."""
+"""The kind of an expression's value (condition, number, text, place), and which kinds do not fit together."""
 
 from __future__ import annotations
 
 import ast
+import re
 from collections.abc import Mapping
 from dataclasses import is_dataclass
 from enum import Enum
 from typing import get_args, get_origin
 
 from geometry.vectors import Vec3
-from offboard.chart.hints import decimal_comma
 from offboard.chart.problems import cut
 from offboard.chart.vocabulary import Vocabulary, choices_of, path_of
 from offboard.pilot import MAX_VELOCITY_M_S, MAX_YAW_RATE_RAD_S
@@ -21,6 +21,8 @@ LIMITS: Mapping[tuple[str, ...], tuple[float, str]] = {
     ("cmd", "rot_z"): (MAX_YAW_RATE_RAD_S, "rad/s"),
 }
 _ORDER = (ast.Lt, ast.LtE, ast.Gt, ast.GtE)
+_QUOTED = re.compile(r"'[^']*'|\"[^\"]*\"")
+_DECIMAL_COMMA = re.compile(r"(?<![\w.])(\d+),(\d+)(?![\w.])")
 
 
 class Kind(Enum):
@@ -35,10 +37,10 @@ class Kind(Enum):
 
 
 class KindError(Exception):
-    """Values that do not go together, in one line.
+    """Values that do not fit together; the message is one line.
 
     Attributes:
-        node: the part of the expression that is meant.
+        node: the part of the expression with the fault.
     """
 
     def __init__(self, node: ast.AST, text: str) -> None:
@@ -47,58 +49,49 @@ class KindError(Exception):
 
 
 class Kinds:
-    """Finds kinds in one expression."""
+    """Finds the kinds in one expression.
+
+    Args:
+        text: the expression as written.
+        vocabulary: contains all its names.
+    """
 
     def __init__(self, text: str, vocabulary: Vocabulary) -> None:
-        """Prepare.
-
-        Args:
-            text: the expression as written.
-            vocabulary: its names, all known.
-        """
         self._text = text
         self._vocabulary = vocabulary
 
     def of(self, node: ast.expr) -> Kind:
-        """What a part of the expression gives.
-
-        Raises:
-            KindError: it can give nothing sensible.
-        """
+        """The kind of a part of the expression. Raises `KindError` if its parts do not fit together."""
         kind = Kind.ANY
         match node:
             case ast.Constant(value=value):
                 kind = _kind_of_type(type(value))
             case ast.Name() | ast.Attribute():
-                kind = self._of_name(node)
+                kind = _kind_of_type(self._type_of(node))
             case ast.Tuple():
                 kind = self._of_tuple(node)
             case ast.BoolOp():
                 for part in node.values:
-                    self.want_condition(part)
+                    self.require_condition(part)
                 kind = Kind.CONDITION
             case ast.UnaryOp(op=ast.Not()):
-                self.want_condition(node.operand)
+                self.require_condition(node.operand)
                 kind = Kind.CONDITION
             case ast.UnaryOp():
-                kind = self._want_number(node.operand)
+                kind = self._require_number(node.operand)
             case ast.BinOp():
-                self._want_number(node.left)
-                kind = self._want_number(node.right)
+                self._require_number(node.left)
+                kind = self._require_number(node.right)
             case ast.Compare():
-                for left, operator, right in zip(
-                    [node.left, *node.comparators], node.ops, node.comparators, strict=False
-                ):
+                left = node.left
+                for operator, right in zip(node.ops, node.comparators, strict=True):
                     self._compare(left, operator, right)
+                    left = right
                 kind = Kind.CONDITION
         return kind
 
-    def want_condition(self, node: ast.expr) -> None:
-        """Refuse what is not true or false.
-
-        Raises:
-            KindError: with what to write.
-        """
+    def require_condition(self, node: ast.expr) -> None:
+        """Refuse what is not true or false. Raises `KindError`."""
         kind = self.of(node)
         if kind in (Kind.CONDITION, Kind.ANY):
             return
@@ -106,28 +99,19 @@ class Kinds:
         if kind is Kind.PLACE and isinstance(node, ast.Tuple):
             raise self._comma(node)
         if kind is Kind.TEXT and isinstance(node, ast.Constant):
-            raise KindError(
-                node, f"{shown} alone is no condition; write the whole comparison: colour == {shown}"
-            )
+            text = f"{shown} alone is no condition; write the whole comparison: colour == {shown}"
+            raise KindError(node, text)
         example = "imu.z > 1" if isinstance(node, ast.Constant) else f"{shown} > 1"
-        mend = {
+        advice = {
             Kind.NUMBER: f"compare it, such as {example}",
             Kind.TEXT: f"compare it, such as {shown} == 'red'",
             Kind.PLACE: "compare a number, such as distance_to_goal_m < 0.2",
-            Kind.PARTS: f"name one of its parts, such as {self._parts(node)}",
+            Kind.PARTS: self._name_a_part(node),
         }[kind]
-        raise KindError(node, f"{shown} is {kind.value}, no condition; {mend}")
+        raise KindError(node, f"{shown} is {kind.value}, no condition; {advice}")
 
-    def want_for(self, path: tuple[str, ...], node: ast.expr) -> None:
-        """Refuse a value that cannot be assigned to a name.
-
-        Args:
-            path: the name, in parts.
-            node: the value.
-
-        Raises:
-            KindError: with what to write.
-        """
+    def require_assignable(self, path: tuple[str, ...], node: ast.expr) -> None:
+        """Refuse a value that cannot be assigned to a dotted name. Raises `KindError`."""
         target = self._vocabulary.type_of(path)
         name, wanted = ".".join(path), _kind_of_type(target)
         if isinstance(node, ast.Tuple) and wanted is Kind.PLACE and len(node.elts) != 3:
@@ -136,9 +120,7 @@ class Kinds:
             wanted = Kind.ANY  # a variable may change its kind
         given = self.of(node)
         if given is Kind.PARTS:
-            raise KindError(
-                node, f"{self._shown(node)} is several values; name one, such as {self._parts(node)}"
-            )
+            raise KindError(node, f"{self._shown(node)} is several values; {self._name_a_part(node)}")
         if wanted is not Kind.ANY and given not in (wanted, Kind.ANY):
             raise self._not_assignable(name, wanted, given, node)
         choices = choices_of(target)
@@ -159,13 +141,13 @@ class Kinds:
             Kind.CONDITION: f"{name} = True",
             Kind.TEXT: f"{name} = 'red'",
         }.get(wanted, name)
-        return KindError(
-            node, f"{name} is {wanted.value}, {self._shown(node)} is {given.value}; write {example}"
-        )
+        shown = f"{self._shown(node)} is {given.value}"
+        return KindError(node, f"{name} is {wanted.value}, {shown}; write {example}")
 
-    def _of_name(self, node: ast.expr) -> Kind:
-        path = path_of(node)
-        return Kind.ANY if path[0] == "memory" else _kind_of_type(self._vocabulary.type_of(path))
+    def _type_of(self, node: ast.expr) -> object:
+        """Declared type of a name; `object` if there is none, or if it may change as a variable's does."""
+        path = path_of(node) if isinstance(node, (ast.Name, ast.Attribute)) else ("memory",)
+        return object if path[0] == "memory" else self._vocabulary.type_of(path)
 
     def _of_tuple(self, node: ast.Tuple) -> Kind:
         for part in node.elts:
@@ -177,34 +159,32 @@ class Kinds:
             raise self._comma(node)
         return Kind.PLACE
 
-    def _want_number(self, node: ast.expr) -> Kind:
+    def _require_number(self, node: ast.expr) -> Kind:
         kind = self.of(node)
         if kind in (Kind.NUMBER, Kind.ANY):
             return Kind.NUMBER
         if isinstance(node, ast.Tuple):
             raise self._comma(node)
-        shown = self._shown(node)
-        mend = {
-            Kind.PARTS: f"name one of its parts, such as {self._parts(node)}",
-            Kind.PLACE: "read distance_to_goal_m, or imu.x",
-            Kind.TEXT: "a number stands without quotes"
-            if isinstance(node, ast.Constant)
-            else "take a number",
-        }.get(kind, "take a number")
-        raise KindError(node, f"{shown} is {kind.value}, not a number; {mend}")
+        advice = "take a number"
+        if kind is Kind.PARTS:
+            advice = self._name_a_part(node)
+        elif kind is Kind.PLACE:
+            advice = "read distance_to_goal_m, or imu.x"
+        elif kind is Kind.TEXT and isinstance(node, ast.Constant):
+            advice = "write a number without quotes"
+        raise KindError(node, f"{self._shown(node)} is {kind.value}, not a number; {advice}")
 
     def _compare(self, left: ast.expr, operator: ast.cmpop, right: ast.expr) -> None:
         if isinstance(operator, _ORDER):
-            self._want_number(left)
-            self._want_number(right)
+            self._require_number(left)
+            self._require_number(right)
             return
         kinds = self.of(left), self.of(right)
         for node, kind in zip((left, right), kinds, strict=True):
             if kind is Kind.PARTS:
-                mend = f"name one of its parts, such as {self._parts(node)}"
-                raise KindError(node, f"{self._shown(node)} is several values; {mend}")
+                raise KindError(node, f"{self._shown(node)} is several values; {self._name_a_part(node)}")
         for name, constant in ((left, right), (right, left)):
-            choices = () if not isinstance(name, (ast.Name, ast.Attribute)) else self._choices(name)
+            choices = choices_of(self._type_of(name))
             if choices and isinstance(constant, ast.Constant) and constant.value not in choices:
                 listed = ", ".join(map(repr, choices))
                 text = f"{self._shown(name)} is never {self._shown(constant)}; it is one of {listed}"
@@ -216,12 +196,8 @@ class Kinds:
             text = f"{one} is {kinds[0].value}, {other} is {kinds[1].value}; they are never equal"
             raise KindError(left, text)
 
-    def _choices(self, node: ast.expr) -> tuple[object, ...]:
-        path = path_of(node)
-        return () if path[0] == "memory" else choices_of(self._vocabulary.type_of(path))
-
     def _comma(self, node: ast.Tuple) -> KindError:
-        """A comma where a number is wanted."""
+        """The error for a comma where a number is required."""
         hint = decimal_comma(self._text)
         if hint is not None:
             return KindError(node, hint[1])
@@ -238,15 +214,29 @@ class Kinds:
     def _shown(self, node: ast.expr) -> str:
         return cut(ast.get_source_segment(self._text, node) or "this", 40)
 
-    def _parts(self, node: ast.expr) -> str:
-        parts = (
-            self._vocabulary.parts_of(path_of(node)) if isinstance(node, (ast.Name, ast.Attribute)) else []
-        )
-        return f"{self._shown(node)}.{'d' if 'd' in parts else parts[0]}" if parts else "imu.x"
+    def _name_a_part(self, node: ast.expr) -> str:
+        named = isinstance(node, (ast.Name, ast.Attribute))
+        parts = self._vocabulary.parts_of(path_of(node)) if named else []
+        example = f"{self._shown(node)}.{'d' if 'd' in parts else parts[0]}" if parts else "imu.x"
+        return f"name one of its parts, such as {example}"
+
+
+def masked(text: str) -> str:
+    """An expression with `_` for every character of its quoted texts."""
+    return _QUOTED.sub(lambda found: "_" * len(found.group()), text)
+
+
+def decimal_comma(text: str) -> tuple[int, str] | None:
+    """Where a number is written with a comma, and how to write it; None if there is none."""
+    found = _DECIMAL_COMMA.search(masked(text))
+    if found is None:
+        return None
+    whole, part = found.groups()
+    return found.start(), f"write decimals with a point: {whole}.{part} instead of {whole},{part}"
 
 
 def _kind_of_type(kind: object) -> Kind:
-    """What values of a declared type are; anything, if that is not certain."""
+    """The kind of a declared type; ANY if that is not certain."""
     if kind is bool:
         return Kind.CONDITION
     if kind in (int, float):

@@ -1,12 +1,12 @@
-"""The expanded chart in python-statemachine's own words, loaded by its secure loader.
+"""The expanded chart as a document of python-statemachine, loaded by its secure loader.
 
-Four things of the library shape this translation (3.2.2, tried):
-- of one list of actions it runs the assignments first, whatever their order; a primitive that stands before
-  an assignment is therefore written as a condition with no consequence, which is called in its place;
-- a superstate is offered an event only if the state within took none, so `during` as a last transition of
-  the inner state would hide the outer ones; hence each leaf carries the transitions around it;
-- an "internal" transition of an inner state to itself does its `enter` again; one without a target does not,
-  so `during` is written as that;
+Four properties of the library (3.2.2, tested) determine the document:
+- in one list of actions it runs the assignments first, whatever their order; a primitive before an assignment
+  is therefore written as a condition without a consequence, which is called in the right order;
+- a superstate gets an event only if the inner state took none, so `during` as a last transition of the inner
+  state would hide the outer ones; hence each leaf has the transitions of the superstates around it;
+- an "internal" transition of a state to itself runs its `enter` again; one without a target does not, so
+  `during` is written as that;
 - an error in a guard is taken as "false" and an event; here it is raised.
 """
 
@@ -19,7 +19,7 @@ from statemachine import StateChart
 from statemachine.exceptions import InvalidDefinition
 from statemachine.io import load
 
-from offboard.chart.problems import MissionError, Problem
+from offboard.chart.problems import mission_error
 from offboard.chart.spec import Action, Leaf, MissionFile, State, leaves
 
 TICK = "tick"
@@ -27,27 +27,18 @@ RESUME = "resume"
 
 
 def native_yaml(mission: MissionFile) -> str:
-    """The expanded mission as a native document of python-statemachine.
-
-    Args:
-        mission: expanded and checked.
-    """
+    """A mission that is expanded and checked, as a document of python-statemachine."""
     by_leaf = {leaf.state.id: leaf for leaf in leaves(mission.states)}
     states = {s.id: _state(s, s.name == mission.initial, by_leaf) for s in mission.states}
-    document = {"name": mission.name, "states": states}
-    return yaml.safe_dump(document, sort_keys=False, width=110)
+    return yaml.safe_dump({"name": mission.name, "states": states}, sort_keys=False, width=110)
 
 
 def load_chart(mission: MissionFile, text: str) -> type[StateChart]:
-    """Build the chart's class, never trusting the document.
-
-    Raises:
-        MissionError: the library refuses what the checker let pass.
-    """
+    """Build the chart's class; `MissionError` if the library refuses what the checker accepts."""
     try:
         chart: type[StateChart] = load(text, format="yaml", validate=True)
     except (InvalidDefinition, ValueError) as error:
-        raise MissionError([Problem(mission.place, " ".join(str(error).split()))]) from None
+        raise mission_error(mission.place, " ".join(str(error).split())) from None
     chart.catch_errors_as_events = False
     return chart
 
@@ -77,8 +68,7 @@ def _transitions(leaf: Leaf) -> list[dict[str, Any]]:
         guard = {"cond": transition.when} if transition.when else {}
         found.append({"event": TICK, "target": transition.to, **guard})
     if leaf.during:
-        during = _actions(leaf.during)
-        found.append({"event": TICK, "on": during})  # without a target nothing is left or entered
+        found.append({"event": TICK, "on": _actions(leaf.during)})  # without a target no state is left
     if leaf.resume:
         found.append({"event": RESUME, "target": leaf.resume.to})
     return found

@@ -1,15 +1,14 @@
-"""From YAML nodes to a `MissionFile`: structure, keys and names. Expressions are checked later."""
+"""From YAML nodes to a `MissionFile`: structure, keys and names. `check` checks expressions."""
 
 from __future__ import annotations
 
 import ast
 import re
-from difflib import get_close_matches
 from pathlib import Path
 
-from offboard.chart.problems import Place, ProblemList, cut
-from offboard.chart.source import ListNode, MapNode, Node, Scalar, parse
+from offboard.chart.problems import Place, ProblemList, cut, did_you_mean
 from offboard.chart.spec import Action, MissionFile, State, Transition
+from offboard.chart.yaml_nodes import ListNode, MapNode, Node, Scalar, parse_yaml
 
 _MISSION_KEYS = ("name", "description", "extends", "initial", "variables", "templates", "states")
 _STATE_KEYS = (
@@ -35,16 +34,12 @@ _ASSIGNMENT = re.compile(r"\s*([A-Za-z_][\w.]*)\s*=(?!=)\s*(.*)\Z", re.DOTALL)
 
 
 def read_mission_file(text: str, path: Path) -> MissionFile:
-    """Read one mission file, without what it extends.
-
-    Args:
-        text: its content.
-        path: where it stands; its name is used in problems.
+    """Read the text of one mission file, without what it extends.
 
     Raises:
         MissionError: with every problem of its structure.
     """
-    root = parse(text, path.name, _MISSION_KEYS)
+    root = parse_yaml(text, path.name, _MISSION_KEYS)
     problems = ProblemList()
     mission = _Reader(problems).mission(root, path)
     problems.raise_if_any()
@@ -52,7 +47,7 @@ def read_mission_file(text: str, path: Path) -> MissionFile:
 
 
 class _Reader:
-    """Turns nodes into data and notes what does not fit."""
+    """Converts nodes to data and collects problems."""
 
     def __init__(self, problems: ProblemList) -> None:
         self._problems = problems
@@ -60,7 +55,6 @@ class _Reader:
     def mission(self, root: MapNode, path: Path) -> MissionFile:
         self._check_keys(root, _MISSION_KEYS, "a mission")
         variables = self._variables(root)
-        templates = self._named(root, "templates")
         return MissionFile(
             place=Place(root.place.file, root.place.line),
             path=path,
@@ -70,18 +64,21 @@ class _Reader:
             initial=self._text(root, "initial"),
             initial_place=_value_place(root, "initial"),
             variables={key: self._constant(key, node) for key, node in variables.items()},
-            templates={
-                key: self._state(key, node, _TEMPLATE_KEYS, root.items["templates"])
-                for key, node in templates.items()
-            },
-            states=self._states(root),
+            templates=self._states(root, "templates", _TEMPLATE_KEYS),
+            states=tuple(self._states(root, "states", _STATE_KEYS).values()),
         )
 
-    def _states(self, parent: MapNode) -> tuple[State, ...]:
-        children = self._named(parent, "states")
-        return tuple(
-            self._state(key, node, _STATE_KEYS, parent.items["states"]) for key, node in children.items()
-        )
+    def _states(self, parent: MapNode, key: str, allowed: tuple[str, ...]) -> dict[str, State]:
+        """States or templates by name; none if a key of one of them is not indented."""
+        children = self._children(parent, key)
+        names = list(children)
+        for number, (name, node) in enumerate(children.items()):
+            if name in _STATE_KEYS and (name == "states" or not isinstance(node, MapNode)):
+                under = f", under '{names[number - 1]}:'" if number else ""
+                place = self._key_place(parent.items[key], name)
+                self._problems.add(place, f"'{name}' stands beside the {key}; indent it more{under}")
+                return {}
+        return {name: self._state(name, node, allowed, parent.items[key]) for name, node in children.items()}
 
     def _state(self, name: str, node: Node, keys: tuple[str, ...], around: Node) -> State:
         place = self._key_place(around, name)
@@ -106,7 +103,7 @@ class _Reader:
             during=self._actions(node, "during"),
             exit=self._actions(node, "exit"),
             transitions=self._transitions(node),
-            states=self._states(node),
+            states=tuple(self._states(node, "states", _STATE_KEYS).values()),
         )
 
     def _resume(self, state: MapNode) -> Transition | None:
@@ -114,9 +111,8 @@ class _Reader:
             return None
         place, to = _value_place(state, "resume"), self._text(state, "resume")
         if not to and isinstance(state.items["resume"], Scalar):
-            self._problems.add(
-                state.keys["resume"], "'resume' is empty; name the state to go on in after a pause"
-            )
+            text = "'resume' is empty; name the state to go on in after a pause"
+            self._problems.add(state.keys["resume"], text)
         return Transition(place, to)
 
     def _transitions(self, state: MapNode) -> tuple[Transition, ...]:
@@ -128,7 +124,7 @@ class _Reader:
                 continue
             if incomplete is not None and set(node.keys) == {"to"}:
                 text = "take the '-' before 'to' away, and put 'to' under the 'when' above it"
-                self._problems.take_back(incomplete)
+                self._problems.remove(incomplete)
                 self._problems.add(node.place, text)
                 incomplete = None
                 continue
@@ -149,15 +145,13 @@ class _Reader:
         return Transition(_value_place(node, "to"), to, when, when_place)
 
     def _actions(self, state: MapNode, key: str) -> tuple[Action, ...]:
-        return tuple(
-            action for node in self._list(state, key) if (action := self._action(key, node)) is not None
-        )
+        return tuple(filter(None, (self._action(key, node) for node in self._list(state, key))))
 
     def _action(self, key: str, node: Node) -> Action | None:
         if isinstance(node, MapNode) and len(node.items) == 1:
             (name, value), place = next(iter(node.items.items())), next(iter(node.keys.values()))
             if name in _TRANSITION_KEYS:
-                self._problems.add(place, f"'{name}' does not belong here; it stands under 'transitions:'")
+                self._problems.add(place, f"'{name}' does not belong here; write it under 'transitions:'")
                 return None
             if isinstance(value, Scalar) and _SETTING.match(name):
                 self._problems.add(place, f"to set a value write '=': {name} = {cut(value.text, 30)}")
@@ -199,12 +193,12 @@ class _Reader:
                 what = f"{text} is two numbers; write it with a point: {text.replace(',', '.')}"
             elif re.fullmatch(r"[A-Za-z_]\w*", text):
                 word = text.capitalize()
-                what = f"write {word}" if word in ("True", "False") else f"texts stand in quotes: '{text}'"
+                what = f"write {word}" if word in ("True", "False") else f"write a text in quotes: '{text}'"
             self._problems.add(node.place, what)
         return value
 
     def _mission_name(self, root: MapNode, path: Path) -> str:
-        """What the file says, or the file's own name written as a mission's."""
+        """The name in the file or, without one, the file's own name in the form of a mission's."""
         name = self._text(root, "name")
         if not name:
             words = re.sub(r"[^a-z0-9_-]+", "-", path.stem.lower()).strip("-_")
@@ -214,18 +208,6 @@ class _Reader:
             limit = "; at most 80" if len(name) > 80 else ""
             self._problems.add(_value_place(root, "name"), text + limit)
         return name
-
-    def _named(self, parent: MapNode, key: str) -> dict[str, Node]:
-        """States or templates by name; none if what belongs into one of them stands beside them."""
-        children = self._children(parent, key)
-        names = list(children)
-        for number, (name, node) in enumerate(children.items()):
-            if name in _STATE_KEYS and (name == "states" or not isinstance(node, MapNode)):
-                under = f", under '{names[number - 1]}:'" if number else ""
-                place = self._key_place(parent.items[key], name)
-                self._problems.add(place, f"'{name}' stands beside the {key}; indent it more{under}")
-                return {}
-        return children
 
     def _children(self, node: MapNode, key: str) -> dict[str, Node]:
         child = node.items.get(key)
@@ -286,21 +268,17 @@ class _Reader:
         return not unknown
 
     def _unknown_key(self, node: MapNode, key: str, allowed: tuple[str, ...], what: str) -> None:
-        near = get_close_matches(key.lower(), allowed, 1)
-        near = near or [word for word in (_SYNONYMS.get(key.lower(), ""),) if word in allowed]
-        mend = f"did you mean '{near[0]}'?" if near else f"it has {', '.join(allowed)}"
-        if not near and allowed == _MISSION_KEYS and isinstance(node.items[key], MapNode):
-            mend = "if it is a state, indent it to stand under 'states:'"
+        synonym = _SYNONYMS.get(key.lower(), "")
+        advice = f"did you mean '{synonym}'?" if synonym in allowed else ""
+        advice = did_you_mean(key.lower(), allowed, advice)
+        if not advice and allowed == _MISSION_KEYS and isinstance(node.items[key], MapNode):
+            advice = "if it is a state, indent it to stand under 'states:'"
         elif key in _TRANSITION_KEYS:
-            mend = f"write it into a list under 'transitions:', such as '- {key}: ...'"
-        elif key in _only_of_missions(allowed):
-            mend = "it belongs to the mission; write it at the beginning of a line"
-        self._problems.add(node.keys[key], f"{what} has no '{cut(key, 30)}'; {mend}")
-
-
-def _only_of_missions(allowed: tuple[str, ...]) -> tuple[str, ...]:
-    """Keys that only the mission itself has."""
-    return tuple(key for key in _MISSION_KEYS if key not in allowed and key not in _STATE_KEYS)
+            advice = f"write it into a list under 'transitions:', such as '- {key}: ...'"
+        elif key in _MISSION_KEYS and key not in (*allowed, *_STATE_KEYS):
+            advice = "it belongs to the mission; write it at the beginning of a line"
+        advice = advice or f"it has {', '.join(allowed)}"
+        self._problems.add(node.keys[key], f"{what} has no '{cut(key, 30)}'; {advice}")
 
 
 def _value_place(node: MapNode, key: str) -> Place:

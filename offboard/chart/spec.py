@@ -1,28 +1,33 @@
-"""A mission as data: what its file says, and, after expansion, the chart that is flown."""
+"""A mission as data: what its file says, and its expansion to the chart that is checked, flown and drawn.
+
+Expansion merges what a mission extends, replaces templates by states and names by full ids:
+
+    red: {use: cross_frame, then: green}
+
+becomes the superstate `red` with the states of the template `cross_frame` as `red.go_to_center`,
+`red.turning`, ... A target is looked up within the state, beside it, in the superstates around
+it, then as a full id.
+"""
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from collections.abc import Callable
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
-from offboard.chart.problems import NOWHERE, Place
+from offboard.chart.problems import NOWHERE, Place, ProblemList, cut, did_you_mean, mission_error
+
+MAX_EXTENDS = 5
+MAX_STATES = 1000
 
 
 @dataclass(frozen=True, slots=True)
 class Action:
-    """One line of `enter`, `exit` or `during`: a primitive by name, or `location = expression`.
-
-    Attributes:
-        place: where it begins.
-        name: the primitive; empty for an assignment.
-        location: what is assigned to, dotted; empty for a primitive.
-        expression: its new value.
-        expression_place: where that begins.
-    """
+    """One line of `enter`, `exit` or `during`: a primitive by name, or `location = expression`."""
 
     place: Place
-    name: str = ""
-    location: str = ""
+    name: str = ""  # of the primitive; empty for an assignment
+    location: str = ""  # what is assigned to, dotted; empty for a primitive
     expression: str = ""
     expression_place: Place = NOWHERE
 
@@ -32,44 +37,27 @@ class Action:
 
 @dataclass(frozen=True, slots=True)
 class Transition:
-    """One way out of a state.
+    """One way out of a state."""
 
-    Attributes:
-        place: of its target.
-        to: the target as written; after expansion, a full state id.
-        when: the guard; empty for "always".
-        when_place: where the guard begins; without one, where the transition begins.
-    """
-
-    place: Place
-    to: str
-    when: str = ""
-    when_place: Place = NOWHERE
+    place: Place  # of its target
+    to: str  # the target as written; after expansion, a full state id
+    when: str = ""  # the guard; empty for "always"
+    when_place: Place = NOWHERE  # of the guard; without one, of the transition
 
 
 @dataclass(frozen=True, slots=True)
 class State:
-    """A state or, if it has states of its own, a superstate.
+    """A state or, if it has states of its own, a superstate."""
 
-    Attributes:
-        place: of its name.
-        id: name as written; after expansion the full id ("red.turning").
-        initial: the state a superstate starts in.
-        initial_place, then_place: of what they name.
-        then: where a superstate goes on when one of its final states is reached.
-        use: the template whose states it takes; empty after expansion.
-        resume: where the mission goes on after a pause within this state; None: where it was.
-    """
-
-    place: Place
-    id: str
-    initial: str = ""
+    place: Place  # of its name
+    id: str  # name as written; after expansion the full id ("red.turning")
+    initial: str = ""  # the state a superstate starts in
     initial_place: Place = NOWHERE
     final: bool = False
-    then: str = ""
+    then: str = ""  # the target of a superstate when one of its final states is reached
     then_place: Place = NOWHERE
-    use: str = ""
-    resume: Transition | None = None
+    use: str = ""  # the template whose states it takes; empty after expansion
+    resume: Transition | None = None  # where the mission continues after a pause; None: where it was
     enter: tuple[Action, ...] = ()
     during: tuple[Action, ...] = ()
     exit: tuple[Action, ...] = ()
@@ -100,27 +88,16 @@ class MissionFile:
 
 @dataclass(frozen=True, slots=True)
 class Leaf:
-    """A state without states of its own, with everything that holds while it is active.
-
-    Attributes:
-        transitions: its own first, then those of the superstates around it, in order of priority.
-        during: its own first, then those of the superstates around it.
-        resume: its own or, without one, that of the nearest superstate that has one.
-    """
+    """A state without states of its own, with everything that holds while it is active."""
 
     state: State
-    transitions: tuple[Transition, ...]
-    during: tuple[Action, ...]
-    resume: Transition | None
+    transitions: tuple[Transition, ...]  # its own, then those of the superstates, in order of priority
+    during: tuple[Action, ...]  # its own, then those of the superstates
+    resume: Transition | None  # its own or, without one, that of the nearest superstate that has one
 
 
 def leaves(states: tuple[State, ...], outer: tuple[State, ...] = ()) -> list[Leaf]:
-    """All states without states of their own, in document order.
-
-    Args:
-        states: a level of an expanded chart.
-        outer: the superstates around it, innermost first.
-    """
+    """All states without states of their own; `outer` are the superstates around, innermost first."""
     found: list[Leaf] = []
     for state in states:
         if state.states:
@@ -137,3 +114,124 @@ def leaves(states: tuple[State, ...], outer: tuple[State, ...] = ()) -> list[Lea
 def all_states(states: tuple[State, ...]) -> list[State]:
     """All states of a chart, superstates before their own, in document order."""
     return [found for state in states for found in (state, *all_states(state.states))]
+
+
+def merge_extended(mission: MissionFile, open_base: Callable[[MissionFile], MissionFile]) -> MissionFile:
+    """Merge a mission with what it extends: variables, templates and states of the same name are replaced.
+
+    Raises:
+        MissionError: missions that extend each other, or a chain that is too long.
+    """
+    chain = [mission]
+    while chain[-1].extends:
+        base = open_base(chain[-1])
+        if base.path in [known.path for known in chain] or len(chain) > MAX_EXTENDS:
+            text = f"extends '{chain[-1].extends}': runs in a circle or too deep"
+            raise mission_error(chain[-1].place, text)
+        chain.append(base)
+    merged = chain.pop()
+    while chain:
+        merged = _merge(merged, chain.pop())
+    return merged
+
+
+def _merge(base: MissionFile, top: MissionFile) -> MissionFile:
+    replaced = {state.id: state for state in top.states}
+    kept = tuple(replaced.pop(state.id, state) for state in base.states)
+    return replace(
+        top,
+        extends="",
+        initial=top.initial or base.initial,
+        initial_place=top.initial_place if top.initial else base.initial_place,
+        description=top.description or base.description,
+        variables={**base.variables, **top.variables},
+        templates={**base.templates, **top.templates},
+        states=kept + tuple(replaced.values()),
+    )
+
+
+def expand(mission: MissionFile, problems: ProblemList) -> MissionFile:
+    """Give every state of a merged mission its full id and every transition its full target.
+
+    Raises:
+        MissionError: too many states; all else is added to `problems`.
+    """
+    used: set[str] = set()
+    states = tuple(_instance(state, mission.templates, used, problems) for state in mission.states)
+    for name in sorted(set(mission.templates) - used):
+        problems.add(mission.templates[name].place, f"template '{name}' is not used; remove it or 'use' it")
+    states = tuple(_with_ids(state, "") for state in states)
+    known = all_states(states)
+    if len(known) > MAX_STATES:
+        raise mission_error(mission.place, f"has {len(known)} states; {MAX_STATES} are the limit")
+    ids = {state.id for state in known}
+    return replace(mission, states=tuple(_resolved(state, ids, problems) for state in states), templates={})
+
+
+def _instance(state: State, templates: dict[str, State], used: set[str], problems: ProblemList) -> State:
+    """The state with the states and actions of its template."""
+    inner = tuple(_instance(child, templates, used, problems) for child in state.states)
+    state = replace(state, states=inner)
+    if not state.use:
+        return state
+    template = templates.get(state.use)
+    if template is None:
+        known = ", ".join(templates) or "none"
+        text = f"state '{state.id}' uses the unknown template '{state.use}'; known: {known}"
+        problems.add(state.place, text)
+        return replace(state, use="")
+    used.add(state.use)
+    for child in all_states(template.states):
+        if child.use:
+            problems.add(child.place, f"state '{child.id}': 'use' is not possible within a template")
+    if state.states or state.initial:
+        problems.add(state.place, f"state '{state.id}' has 'use' and states of its own; choose one")
+    return replace(
+        state,
+        use="",
+        initial=template.initial,
+        initial_place=template.initial_place,
+        resume=state.resume or template.resume,
+        states=template.states,
+        enter=state.enter + template.enter,
+        during=state.during + template.during,
+        exit=state.exit + template.exit,
+        transitions=state.transitions + template.transitions,
+    )
+
+
+def _with_ids(state: State, outer: str) -> State:
+    full = f"{outer}.{state.id}" if outer else state.id
+    return replace(state, id=full, states=tuple(_with_ids(child, full) for child in state.states))
+
+
+def _resolved(state: State, ids: set[str], problems: ProblemList) -> State:
+    def target(name: str, place: Place, what: str) -> str:
+        found = _look_up(name, state.id, ids)
+        if found:
+            return found
+        beside = [known for known in sorted(ids) if known.rpartition(".")[0] == state.id.rpartition(".")[0]]
+        names = sorted({known.rpartition(".")[2] for known in ids} | ids)
+        advice = did_you_mean(name.lower(), names, f"there are {cut(', '.join(beside), 100)}")
+        problems.add(place, f"{what} '{cut(name, 40)}' of state '{state.id}' is not a state; {advice}")
+        return name
+
+    resume = state.resume
+    return replace(
+        state,
+        resume=resume and replace(resume, to=target(resume.to, resume.place, "'resume'")),
+        then=target(state.then, state.then_place, "'then'") if state.then else "",
+        transitions=tuple(replace(t, to=target(t.to, t.place, "target")) for t in state.transitions),
+        states=tuple(_resolved(child, ids, problems) for child in state.states),
+    )
+
+
+def _look_up(name: str, source: str, ids: set[str]) -> str:
+    """Full id of a target as seen from a state: within it, beside it, then outwards; empty if unknown."""
+    outer = source
+    while outer:
+        candidate = f"{outer}.{name}"
+        if candidate in ids:
+            return candidate
+        outer = outer.rpartition(".")[0]
+    return name if name in ids else ""

@@ -1,4 +1,4 @@
-"""The names a mission may use, read off the Pilot class: attributes, properties, methods, and their types."""
+"""The names a mission may use: attributes, properties and methods of the Pilot class, and their types."""
 
 from __future__ import annotations
 
@@ -6,32 +6,39 @@ import ast
 import inspect
 import re
 from collections.abc import Mapping
-from difflib import get_close_matches
 from typing import get_args, get_origin, get_type_hints
 
-from offboard.chart.hints import hint_for_action
-from offboard.chart.problems import cut
+from offboard.chart.problems import cut, did_you_mean
 from offboard.pilot import Memory, Pilot
 from scenarios.models import COLOURS
 
 WRITABLE = ("cmd", "colour", "goal_m", "memory")
-"""What of the pilot a mission may assign to; all else is the world's or the engine's."""
+"""What a mission may assign to; all else of the pilot is set by the engine."""
+_MISTAKES_IN_ACTIONS = (
+    (":=", "to set a value write '=' instead of ':='"),
+    ("==", "'==' compares; to set a value write one '='"),
+    (r"^[a-z][\w.]*\s*:", "to set a value write '=' instead of ':'"),
+    (r"[,;]|\band\b|\s-\s", "one action a line; begin each line with '- '"),
+)
 
 
 class UnknownNameError(Exception):
-    """A name that does not exist, with what does, in one line."""
+    """A name that does not exist or cannot be used so; the message says in one line what to write."""
 
 
 class Vocabulary:
-    """Names and types reachable from a pilot."""
+    """Names and types reachable from a pilot.
+
+    Args:
+        pilot_class: `Pilot` or a subclass with more primitives.
+        variables: the mission's own variables.
+
+    Attributes:
+        primitives: docstrings of the methods by name.
+        values: types of the attributes and properties by name.
+    """
 
     def __init__(self, pilot_class: type[Pilot], variables: Mapping[str, object]) -> None:
-        """Read a pilot class.
-
-        Args:
-            pilot_class: `Pilot` or a subclass with more primitives.
-            variables: the mission's own variables.
-        """
         self._pilot_class = pilot_class
         self._variables = variables
         self.primitives = {
@@ -39,14 +46,13 @@ class Vocabulary:
             for name, member in inspect.getmembers(pilot_class, inspect.isfunction)
             if not name.startswith("_")
         }
-        self.values = _plain_attributes(pilot_class) | _typed_names(pilot_class)
+        plain = (bool, int, float, str, tuple)
+        untyped = inspect.getmembers(pilot_class, lambda member: isinstance(member, plain))
+        self.values: dict[str, object] = {name: type(value) for name, value in untyped if name[0] != "_"}
+        self.values |= _typed_names(pilot_class)
 
     def check_primitive(self, name: str) -> None:
-        """Refuse an action that is no method of the pilot.
-
-        Raises:
-            UnknownNameError: with the nearest name or all of them.
-        """
+        """Refuse an action that is no method of the pilot. Raises `UnknownNameError`."""
         if name in self.primitives:
             needed = _needed_values(self._pilot_class, name)
             if needed:
@@ -54,15 +60,11 @@ class Vocabulary:
             return
         if name in self.values:
             raise UnknownNameError(f"'{name}' is a value, not an action; write 'location = expression'")
-        mend = hint_for_action(name, tuple(self.primitives)) or self._mend(name, list(self.primitives))
-        raise UnknownNameError(f"unknown action '{cut(name)}'; {mend}")
+        advice = self._mistake_in(name) or self._similar(name, list(self.primitives))
+        raise UnknownNameError(f"unknown action '{cut(name)}'; {advice}")
 
     def type_of(self, path: tuple[str, ...]) -> object:
-        """Type at the end of a dotted path such as ("cam", "red", "d"); `object` where nothing is declared.
-
-        Raises:
-            UnknownNameError: with what the class before the unknown part has.
-        """
+        """Type of a name such as ("cam", "red", "d"), `object` if not declared. Raises `UnknownNameError`."""
         kind: object = self._pilot_class
         for name in path:
             names = self._names_of(kind)
@@ -72,19 +74,11 @@ class Vocabulary:
         return kind
 
     def parts_of(self, path: tuple[str, ...]) -> list[str]:
-        """Names of what a value consists of; none of a plain value.
-
-        Raises:
-            UnknownNameError: it does not exist.
-        """
+        """Names of a value's parts; none of a plain value. Raises `UnknownNameError`."""
         return list(self._names_of(self.type_of(path)))
 
     def check_assignable(self, path: tuple[str, ...]) -> None:
-        """Refuse an assignment to what the mission does not own.
-
-        Raises:
-            UnknownNameError: unknown, or known but not the mission's to set.
-        """
+        """Refuse an assignment to a name that is unknown or can only be read. Raises `UnknownNameError`."""
         name = ".".join(path)
         if path[0] == "goal_m" and len(path) > 1:
             raise UnknownNameError("goal_m is set as a whole: goal_m = (x, y, z)")
@@ -107,25 +101,36 @@ class Vocabulary:
         if kind is self._pilot_class:
             if name in self.primitives:
                 return f"'{name}' is an action, not a value"
-            return f"unknown name '{cut(name)}'; {self._likely(name) or self._mend(name, names)}"
+            return f"unknown name '{cut(name)}'; {self._likely(name) or self._similar(name, names)}"
         if kind is Memory:
-            listed = " ".join(names) or "none"
-            near = get_close_matches(name, names, 1)
-            mend = f"did you mean 'memory.{near[0]}'?" if near else f"declared under 'variables': {listed}"
-            return f"no variable '{cut(name)}'; {mend}"
+            declared = f"declared under 'variables': {' '.join(names) or 'none'}"
+            return f"no variable '{cut(name)}'; {did_you_mean(name, names, declared, 'memory.')}"
         shown = ".".join(owner)
-        if not names:
-            return f"'{shown}' has no '{name}'; it is a plain value"
-        near = get_close_matches(name.lower(), names, 1)
-        mend = f"did you mean '{shown}.{near[0]}'?" if near else f"it has {' '.join(names)}"
-        return f"'{shown}' has no '{name}'; {mend}"
+        advice = "it is a plain value"
+        if names:
+            advice = did_you_mean(name.lower(), names, f"it has {' '.join(names)}", f"{shown}.")
+        return f"'{shown}' has no '{name}'; {advice}"
+
+    def _mistake_in(self, action: str) -> str:
+        """What to write instead of an action that does not exist; empty if that cannot be seen."""
+        changed = re.match(r"([a-z][\w.]*)\s*([-+*/])=\s*(.+)", action)
+        if changed:
+            name, sign, value = changed.groups()
+            return f"write it in full: {name} = {name} {sign} {value}"
+        called = re.match(r"(\w+)\s*\((.*)\)?\s*$", action)
+        if called and called.group(1) in self.primitives:
+            if not called.group(2).strip(" )"):
+                return f"write it without parentheses: {called.group(1)}"
+            before = "; set goal_m in a line before it" if called.group(1) == "fly_to_goal" else ""
+            return f"'{called.group(1)}' takes no values{before}"
+        return next((advice for pattern, advice in _MISTAKES_IN_ACTIONS if re.search(pattern, action)), "")
 
     def _likely(self, name: str) -> str:
-        """What is meant by an unknown name that is another language's, a colour's or only a part of one."""
+        """What to write instead of an unknown name of another language, of a colour or without its owner."""
         if name.lower() in ("true", "false"):
             return f"write {name.capitalize()}"
         if name.lower() in COLOURS:
-            return f"texts stand in quotes: '{name.lower()}'"
+            return f"write a text in quotes: '{name.lower()}'"
         if name in self._variables:
             return f"write memory.{name}"
         whole = [
@@ -135,17 +140,14 @@ class Vocabulary:
         ]
         return f"did you mean {' or '.join(map(repr, whole))}?" if whole else ""
 
-    def _mend(self, name: str, names: list[str]) -> str:
-        plain = re.sub(r"[^a-z0-9]+", "_", name.lower())
-        near = get_close_matches(plain, names, 1) or get_close_matches(name, names, 1)
-        if near:
-            return f"did you mean '{near[0]}'?"
+    def _similar(self, name: str, names: list[str]) -> str:
         adds = "; what a Python file adds needs --pilot FILE.py" if self._pilot_class is Pilot else ""
-        return f"there are {' '.join(names)}{adds}"
+        otherwise = did_you_mean(name, names, f"there are {' '.join(names)}{adds}")
+        return did_you_mean(re.sub(r"[^a-z0-9]+", "_", name.lower()), names, otherwise)
 
 
 def path_of(node: ast.AST) -> tuple[str, ...]:
-    """The parts of a dotted name; of what is none, the parts behind its last dot."""
+    """The parts of a dotted name; of another expression, the parts after its last dot."""
     parts: list[str] = []
     while isinstance(node, ast.Attribute):
         parts.append(node.attr)
@@ -156,20 +158,12 @@ def path_of(node: ast.AST) -> tuple[str, ...]:
 
 
 def choices_of(kind: object) -> tuple[object, ...]:
-    """Values a type allows, if it is a Literal; else none."""
+    """Values that a type allows, if it is a Literal; otherwise none."""
     return get_args(kind) if str(get_origin(kind)).endswith("Literal") else ()
 
 
-def _plain_attributes(pilot_class: type[Pilot]) -> dict[str, object]:
-    """Class attributes that a contestant wrote without a type (`gain = 0.5`), with the type they have."""
-    members = inspect.getmembers(
-        pilot_class, lambda member: isinstance(member, bool | int | float | str | tuple)
-    )
-    return {name: type(member) for name, member in members if not name.startswith("_")}
-
-
 def _needed_values(pilot_class: type[Pilot], name: str) -> str:
-    """Names of the parameters that a method cannot do without, but for `self`."""
+    """Names of the parameters that a method requires, without `self`."""
     is_static = isinstance(inspect.getattr_static(pilot_class, name), staticmethod)
     parameters = list(inspect.signature(getattr(pilot_class, name)).parameters.values())
     kinds = (inspect.Parameter.VAR_POSITIONAL, inspect.Parameter.VAR_KEYWORD)

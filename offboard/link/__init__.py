@@ -1,1 +1,1 @@
-"""The parts of the MAVLink adapter: addresses, telemetry, axes, watchdog, recording."""
+"""The parts of the MAVLink adapter: telemetry, commands, tracking, watchdog, companion, recording."""

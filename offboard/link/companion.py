@@ -1,10 +1,10 @@
-"""What the app tells over MAVLink, as a component of the vehicle's system: onboard computer, component 191.
+"""Reports the mission over MAVLink, as a component of the vehicle's system: onboard computer, component 191.
 
-MAVSDK speaks as a ground station and forwards between its connections, so the companion has a local one of
-its own: what it sends there goes on to the vehicle, which passes it on to the links of ground stations.
+MAVSDK is a ground station and forwards between its connections, so the companion has a local connection of
+its own: what it sends there is forwarded to the vehicle, which forwards it to the links of ground stations.
 
-MAVSDK counts every heartbeat of the vehicle's system as a sign of life. So that the companion's never hide
-that the autopilot's have ended, each is sent only upon one of the autopilot's.
+MAVSDK takes every heartbeat of the vehicle's system as a sign that the vehicle is there. So that the
+companion's never hide that the autopilot's have ended, it sends one only after each of the autopilot's.
 """
 
 from __future__ import annotations
@@ -31,29 +31,30 @@ from wire.mission_messages import (
 )
 from wire.vehicles import companion_heartbeat
 
-BEAT_S = 0.05  # wall time; what is not told at a tick is told at a beat
+BEAT_S = 0.05  # wall time between two calls of `beat`
 PIECES_A_BEAT = 2  # of new documents: 6 kB/s at most, so that a slow link has room for setpoints
-REPEAT_BEATS = 10  # between two pieces of the round of all documents
-SILENT_S = 0.25  # wall time; a state is repeated while no tick brings another
-FAREWELL_GAP_S = 0.15
+REPEAT_BEATS = 10  # between two pieces of the repeated documents
+SILENT_S = 0.25  # wall time without a new state after which the last one is repeated
+FINAL_GAP_S = 0.15
 _TEXT_BYTES = 50  # of one STATUSTEXT
-_MOST_CHUNKS = 4
+_MAX_TEXT_CHUNKS = 4
 _TUNNEL_BYTES = 128
-_PACKETS_A_BEAT = 1000
+_MAX_PACKETS_A_BEAT = 1000
 _MAVLINK_2 = 0xFD  # the first byte of a packet
 
 logger = logging.getLogger(__name__)
 
 
 class Companion:
-    """Sends without ever waiting. What cannot be sent is lost: to be heard must not matter to the flight.
+    """Sends without waiting. What cannot be sent is dropped: reporting must not disturb the flight.
+
+    Documents and a state may be given before anything is open.
 
     Attributes:
         sent: packets handed to MAVSDK.
     """
 
     def __init__(self) -> None:
-        """Nothing is opened yet; documents and a state may be told already."""
         self.sent = 0
         self._port: socket.socket | None = None
         self._peer: Any = None
@@ -61,21 +62,18 @@ class Companion:
         self._autopilot = b""  # its system and component id
         self._task: asyncio.Task[None] | None = None
         self._documents: dict[DocumentKind, list[bytes]] = {}
-        self._fresh: dict[DocumentKind, deque[bytes]] = {}
-        self._turn = 0
+        self._unsent: dict[DocumentKind, deque[bytes]] = {}
+        self._next_repeated = 0
         self._beats = 0
         self._state = b""
         self._state_s = -inf
         self._text_id = 0
 
     def listen(self) -> str:
-        """Open a local UDP port.
-
-        Returns:
-            The URL for MAVSDK to forward to.
+        """Open a local UDP port; returns the URL for MAVSDK to forward to.
 
         Raises:
-            OSError: there is none.
+            OSError: no port can be opened.
         """
         self._port = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
         self._port.setblocking(False)
@@ -83,14 +81,14 @@ class Companion:
         return f"udpout://127.0.0.1:{self._port.getsockname()[1]}"
 
     def announce(self, system_id: int) -> None:
-        """Speak as a component of this vehicle from now on (within a running event loop)."""
+        """Send as a component of this vehicle from now on (within a running event loop)."""
         self._sender = mavlink.MAVLink(None, srcSystem=system_id, srcComponent=COMPONENT_ID)
         self._autopilot = bytes((system_id, AUTOPILOT_COMPONENT_ID))
         if self._task is None:
-            self._task = asyncio.create_task(self._beat_on(), name="companion")
+            self._task = asyncio.create_task(self._keep_beating(), name="companion")
 
     async def close(self) -> None:
-        """Fall silent."""
+        """Stop sending and close the port."""
         if self._task is not None:
             self._task.cancel()
             await asyncio.gather(self._task, return_exceptions=True)
@@ -99,53 +97,50 @@ class Companion:
             self._port.close()
             self._port = None
 
-    def tell_state(self, state: MissionState) -> None:
-        """Send where the mission is; it is repeated at the beats while nothing newer is told."""
+    def send_state(self, state: MissionState) -> None:
+        """Send the mission's state; `beat` repeats it until there is a newer one."""
         try:
             self._state = encode_state(state)
         except PayloadError as error:
-            logger.warning("not told: %s", error)
-            return
-        self._send_state()
+            logger.warning("not sent: %s", error)
+        else:
+            self._send_state()
 
-    def tell_detections(self, detections: MissionDetections) -> None:
+    def send_detections(self, detections: MissionDetections) -> None:
         """Send what an image showed."""
         try:
-            payload = encode_detections(detections)
+            self._send_tunnel(DETECTIONS_TYPE, encode_detections(detections))
         except PayloadError as error:
-            logger.warning("not told: %s", error)
-            return
-        self._send_tunnel(DETECTIONS_TYPE, payload)
+            logger.warning("not sent: %s", error)
 
-    def tell_document(self, kind: DocumentKind, pieces: list[bytes]) -> None:
-        """Send a document of `split_document` at the next beats, then again and again in the round of all."""
+    def send_document(self, kind: DocumentKind, pieces: list[bytes]) -> None:
+        """Send a document of `split_document` at the next beats, then repeat it in turn with the others."""
         self._documents[kind] = pieces
-        self._fresh[kind] = deque(pieces)
+        self._unsent[kind] = deque(pieces)
 
-    def say(self, text: str) -> None:
-        """Send a text for people, severity INFO; one that is too long for one message goes in several."""
-        words = text.encode("utf-8", "replace")[: _MOST_CHUNKS * _TEXT_BYTES]
-        if len(words) <= _TEXT_BYTES:
-            self._send(mavlink.MAVLink_statustext_message(mavlink.MAV_SEVERITY_INFO, words))
+    def send_text(self, text: str) -> None:
+        """Send a STATUSTEXT of severity INFO, in several messages if it is too long for one."""
+        data = text.encode("utf-8", "replace")[: _MAX_TEXT_CHUNKS * _TEXT_BYTES]
+        severity = mavlink.MAV_SEVERITY_INFO
+        if len(data) <= _TEXT_BYTES:
+            self._send(mavlink.MAVLink_statustext_message(severity, data))
             return
         self._text_id = self._text_id % 0xFFFF + 1
         # The last one must end with a zero, so there is one more if the text fills them exactly.
-        for number in range(len(words) // _TEXT_BYTES + 1):
-            chunk = words[number * _TEXT_BYTES : (number + 1) * _TEXT_BYTES]
-            self._send(
-                mavlink.MAVLink_statustext_message(mavlink.MAV_SEVERITY_INFO, chunk, self._text_id, number)
-            )
+        for number in range(len(data) // _TEXT_BYTES + 1):
+            chunk = data[number * _TEXT_BYTES : (number + 1) * _TEXT_BYTES]
+            self._send(mavlink.MAVLink_statustext_message(severity, chunk, self._text_id, number))
 
     def beat(self) -> None:
-        """Send what is due besides the ticks: heartbeat, pieces of documents, a state that has grown old."""
-        if self._hear_autopilot():
+        """Send what is due between ticks: heartbeat, pieces of documents, the last state again."""
+        if self._autopilot_heartbeat_received():
             self._send(companion_heartbeat())
         if self._peer is None:
             return
         if self._state and time.monotonic() - self._state_s > SILENT_S:
             self._send_state()
         for _ in range(PIECES_A_BEAT):
-            piece = self._next_fresh()
+            piece = self._next_unsent()
             if piece is None:
                 break
             self._send_tunnel(DOCUMENT_TYPE, piece)
@@ -153,33 +148,33 @@ class Companion:
             self._repeat_piece()
         self._beats += 1
 
-    async def farewell(self, kind: DocumentKind) -> None:
-        """Send all of a document twice and let it arrive: the link is about to be closed. Takes 0.3 s."""
+    async def send_finally(self, kind: DocumentKind) -> None:
+        """Send all of a document twice, before the link is closed. Takes 0.3 s."""
         for _ in range(2):
             for piece in self._documents.get(kind, ()):
                 self._send_tunnel(DOCUMENT_TYPE, piece)
-            await asyncio.sleep(FAREWELL_GAP_S)
+            await asyncio.sleep(FINAL_GAP_S)
 
-    async def _beat_on(self) -> None:
+    async def _keep_beating(self) -> None:
         while True:
             try:
                 self.beat()
-            except Exception as error:  # the flight goes on whatever happens here
-                logger.warning("nothing is told of the mission any more: %r", error)
+            except Exception as error:  # the flight continues whatever happens here
+                logger.warning("the mission is not reported any more: %r", error)
                 return
             await asyncio.sleep(BEAT_S)
 
-    def _hear_autopilot(self) -> bool:
-        """Take all that MAVSDK forwarded; whether a heartbeat of the vehicle's autopilot was among it."""
-        heard = False
+    def _autopilot_heartbeat_received(self) -> bool:
+        """Read all that MAVSDK forwarded; whether it contained a heartbeat of the vehicle's autopilot."""
+        found = False
         if self._port is None:
             return False
         with contextlib.suppress(OSError):  # there is no more
-            for _ in range(_PACKETS_A_BEAT):
+            for _ in range(_MAX_PACKETS_A_BEAT):
                 data, peer = self._port.recvfrom(512)
                 self._peer = self._peer or peer
-                heard = heard or self._is_heartbeat(data)
-        return heard
+                found = found or self._is_heartbeat(data)
+        return found
 
     def _is_heartbeat(self, data: bytes) -> bool:
         if len(data) < 10:
@@ -187,18 +182,18 @@ class Companion:
         source, message_id = (data[5:7], data[7:10]) if data[0] == _MAVLINK_2 else (data[3:5], data[5:6])
         return source == self._autopilot and not any(message_id)
 
-    def _next_fresh(self) -> bytes | None:
+    def _next_unsent(self) -> bytes | None:
         """A piece not sent yet: of the newest kinds first, as the mission's own document is the longest."""
         for kind in reversed(DocumentKind):
-            if self._fresh.get(kind):
-                return self._fresh[kind].popleft()
+            if self._unsent.get(kind):
+                return self._unsent[kind].popleft()
         return None
 
     def _repeat_piece(self) -> None:
         pieces = [piece for kind in sorted(self._documents) for piece in self._documents[kind]]
         if pieces:
-            self._send_tunnel(DOCUMENT_TYPE, pieces[self._turn % len(pieces)])
-            self._turn += 1
+            self._send_tunnel(DOCUMENT_TYPE, pieces[self._next_repeated % len(pieces)])
+            self._next_repeated += 1
 
     def _send_state(self) -> None:
         self._state_s = time.monotonic()

@@ -1,11 +1,11 @@
-"""The vehicle's latest telemetry and its 20 Hz ticks, without queues.
+"""The vehicle's latest telemetry, and its ticks: 20 a second of vehicle time.
 
-MAVSDK's asyncio streams put every sample into an unbounded queue, so a slow reader reads the past. Here the
+MAVSDK's asyncio streams put every sample into an unbounded queue, so a slow reader reads old values. Here the
 plugin's callbacks, on MAVSDK's own thread, keep the latest sample and its age; the event loop is woken only
-twenty times a second of vehicle time, when the time stamp of the attitude crosses the 50 ms grid.
+when the time stamp of the attitude crosses the 50 ms grid.
 
-Links swap and delay: an attitude or a position older than the one before is dropped. MAVSDK's telemetry
-plugin gives positions without their time stamps, so they come by its `mavlink_direct`, as JSON.
+Links swap and delay packets: an attitude or a position older than the one before is dropped. MAVSDK's
+telemetry plugin gives positions without their time stamps, so they are read as JSON from `mavlink_direct`.
 """
 
 from __future__ import annotations
@@ -18,15 +18,18 @@ from collections import deque
 from collections.abc import Callable
 from dataclasses import dataclass
 from math import nan, radians
-from typing import Any
+from typing import Any, Protocol
 
 from mavsdk.asyncio import MavsdkError
 
 from geometry.vectors import Vec3
+from offboard.drone import VelocityCommand
 from wire.mission_messages import TEXT_PREFIX
 from wire.vehicle_telemetry import MessageOrder
 
 TICK_US = 50_000
+TICK_LOST_S = 0.5  # wall time; a tick whose telemetry has not arrived by then was lost on the link
+_MAX_LOST_IN_A_ROW = 10
 TEXTS_KEPT = 8
 TEXT_AGE_S = 8.0
 WANTED_RATE_HZ = 50.0
@@ -35,75 +38,47 @@ CHECKS = "pre-arm checks not passed"
 
 @dataclass(frozen=True, slots=True)
 class Sample:
-    """Where the vehicle was when its clock crossed the 50 ms grid, in its local NED axes.
+    """Where the vehicle was when its clock crossed the 50 ms grid, in its local NED axes."""
 
-    Attributes:
-        time_us: of the attitude that crossed, microseconds since boot.
-        yaw_ned_rad: clockwise from north.
-        position_ned_m: latest by then, shape (3,).
-        velocity_ned_m_s: shape (3,).
-        position_us: when that was so, microseconds since boot.
-    """
-
-    time_us: int
-    yaw_ned_rad: float
-    position_ned_m: Vec3
+    time_us: int  # of the attitude that crossed, microseconds since boot
+    yaw_ned_rad: float  # clockwise from north
+    position_ned_m: Vec3  # latest by then
     velocity_ned_m_s: Vec3
-    position_us: int = 0
+    position_us: int = 0  # of position and velocity, microseconds since boot
 
 
 class TelemetryFeed:
     """Latest values; written on MAVSDK's thread, read on the loop's. Each field is replaced whole.
 
-    Args:
-        clock: monotonic wall time, seconds.
-
-    Attributes:
-        sample: of the last tick.
-        time_us: vehicle time of the latest attitude, microseconds since its boot.
-        yaw_ned_rad: heading, clockwise from north.
-        position_ned_m: local position, shape (3,).
-        velocity_ned_m_s: shape (3,).
-        position_us: when that was so, microseconds since boot.
-        armed: as the last heartbeat says; None before the first.
-        mode: flight mode in words, such as "OFFBOARD".
-        landed: as EXTENDED_SYS_STATE says.
-        health: MAVSDK's health, None before the first.
-        attitudes: how many came.
-        positions: how many came.
+    `clock` is monotonic wall time, seconds. Time, yaw, position and velocity have the units of `Sample`.
     """
 
     def __init__(self, clock: Callable[[], float] = time.monotonic) -> None:
         self._clock = clock
-        self.sample = Sample(0, 0.0, (0.0, 0.0, 0.0), (0.0, 0.0, 0.0))
+        self.sample = Sample(0, 0.0, (0.0, 0.0, 0.0), (0.0, 0.0, 0.0))  # of the last tick
+        self.tick_number = 0  # of the last tick, counted from the vehicle's boot
         self.time_us = 0
         self.yaw_ned_rad = 0.0
         self.position_ned_m: Vec3 = (0.0, 0.0, 0.0)
         self.velocity_ned_m_s: Vec3 = (0.0, 0.0, 0.0)
         self.position_us = 0
-        self.armed: bool | None = None
-        self.mode = ""
-        self.landed = True
-        self.health: Any = None
-        self.attitudes = 0
+        self.armed: bool | None = None  # from the last heartbeat; None before the first
+        self.mode = ""  # name of the flight mode, such as "OFFBOARD"
+        self.landed = True  # from EXTENDED_SYS_STATE
+        self.health: Any = None  # MAVSDK's; None before the first
+        self.attitudes = 0  # how many were received
         self.positions = 0
-        self.attitude_received_s = 0.0
-        self.position_received_s = 0.0
-        self.heartbeat_received_s = 0.0
+        self._attitude_received_s = 0.0
+        self._position_received_s = 0.0
+        self._heartbeat_received_s = 0.0
         self._texts: deque[tuple[float, str]] = deque(maxlen=TEXTS_KEPT)
         self._attitude_order = MessageOrder()
         self._position_order = MessageOrder()
-        self._tick = 0
         self._loop: asyncio.AbstractEventLoop | None = None
         self._new_tick = asyncio.Event()
 
     def subscribe(self, plugin: Any, direct: Any) -> None:  # noqa: ANN401 - MAVSDK is untyped
-        """Listen to a vehicle.
-
-        Args:
-            plugin: MAVSDK's telemetry plugin (the synchronous one).
-            direct: its `mavlink_direct` plugin (the synchronous one).
-        """
+        """Subscribe to MAVSDK's synchronous plugins `telemetry` and `mavlink_direct`."""
         self._loop = asyncio.get_running_loop()
         plugin.subscribe_attitude_euler(self._on_attitude)
         direct.subscribe_message("LOCAL_POSITION_NED", self._on_position)
@@ -114,16 +89,13 @@ class TelemetryFeed:
         plugin.subscribe_status_text(self._on_text)
 
     async def next_tick(self, timeout_s: float) -> bool:
-        """Wait for the next crossing of the 50 ms grid of vehicle time.
+        """Wait for the next tick; False if there was none within `timeout_s` of wall time.
 
-        Crossings that nobody waited for are passed over; `sample` is the last one's.
-
-        Returns:
-            False if none came within `timeout_s` of wall time.
+        Ticks that were not waited for are skipped.
         """
         try:
-            # Not wait_for: before Python 3.12 it loses a cancellation that comes together with the tick, and
-            # then whoever waits in a loop under a time limit waits for ever.
+            # Not wait_for: before Python 3.12 it loses a cancellation that arrives together with the tick,
+            # and then a loop under a time limit never ends.
             async with asyncio.timeout(timeout_s):
                 await self._new_tick.wait()
         except TimeoutError:
@@ -132,11 +104,7 @@ class TelemetryFeed:
         return True
 
     async def tick(self, number: int, timeout_s: float) -> bool:
-        """Wait until the crossing of a given number, counted from the vehicle's boot, has been seen.
-
-        Returns:
-            False if it was not within `timeout_s` of wall time.
-        """
+        """Wait for the tick of this number, or a later one; False after `timeout_s` of wall time."""
         with contextlib.suppress(TimeoutError):
             async with asyncio.timeout(timeout_s):
                 while self.tick_number < number:
@@ -144,27 +112,22 @@ class TelemetryFeed:
                     await self._new_tick.wait()
         return self.tick_number >= number
 
-    @property
-    def tick_number(self) -> int:
-        """Number of the last crossing, counted from the vehicle's boot."""
-        return self._tick
-
     def age_s(self) -> float:
-        """Wall time since the older of attitude and position came, seconds."""
-        return self._clock() - min(self.attitude_received_s, self.position_received_s)
+        """Wall time since the older of attitude and position was received, seconds."""
+        return self._clock() - min(self._attitude_received_s, self._position_received_s)
 
     def heartbeat_age_s(self) -> float:
-        """Wall time since the last heartbeat came, which tells of mode and arming, seconds."""
-        return self._clock() - self.heartbeat_received_s
+        """Wall time since the last heartbeat was received, seconds."""
+        return self._clock() - self._heartbeat_received_s
 
     def recent_texts(self) -> str:
-        """What the vehicle said lately, for the end of an error message; empty if nothing."""
+        """The vehicle's recent status texts, for the end of an error message; empty if there are none."""
         since = self._clock() - TEXT_AGE_S
         texts = list(dict.fromkeys(text for at, text in list(self._texts) if at >= since))
         return f"; the vehicle says: {' | '.join(texts)}" if texts else ""
 
     def missing(self) -> list[str]:
-        """What the vehicle has not told yet, or what keeps it from being armed; empty if it is ready."""
+        """What has not been received yet, or what prevents arming; empty if the vehicle is ready."""
         health = self.health
         missing = []
         if not self.attitudes:
@@ -185,30 +148,30 @@ class TelemetryFeed:
             return
         self.yaw_ned_rad = radians(euler.yaw_deg)
         self.time_us = time_us
-        self.attitude_received_s = self._clock()
+        self._attitude_received_s = self._clock()
         self.attitudes += 1
         tick = time_us // TICK_US
-        if tick != self._tick:
-            self._tick = tick
+        if tick != self.tick_number:
+            self.tick_number = tick
             self.sample = Sample(
                 time_us, self.yaw_ned_rad, self.position_ned_m, self.velocity_ned_m_s, self.position_us
             )
             self._wake()
 
     def _on_position(self, message: Any, _user: object) -> None:  # noqa: ANN401
-        told = json.loads(message.fields_json)
-        position_us = told["time_boot_ms"] * 1000
+        fields = json.loads(message.fields_json)
+        position_us = fields["time_boot_ms"] * 1000
         if not self._position_order.is_next(position_us):
             return
-        self.position_ned_m = (_number(told["x"]), _number(told["y"]), _number(told["z"]))
-        self.velocity_ned_m_s = (_number(told["vx"]), _number(told["vy"]), _number(told["vz"]))
+        self.position_ned_m = (_number(fields["x"]), _number(fields["y"]), _number(fields["z"]))
+        self.velocity_ned_m_s = (_number(fields["vx"]), _number(fields["vy"]), _number(fields["vz"]))
         self.position_us = position_us
-        self.position_received_s = self._clock()
+        self._position_received_s = self._clock()
         self.positions += 1
 
     def _on_armed(self, armed: bool, _user: object) -> None:
         self.armed = bool(armed)
-        self.heartbeat_received_s = self._clock()  # MAVSDK tells of it with each heartbeat
+        self._heartbeat_received_s = self._clock()  # MAVSDK calls this with each heartbeat
 
     def _on_mode(self, mode: Any, _user: object) -> None:  # noqa: ANN401
         self.mode = getattr(mode, "name", str(mode))
@@ -220,9 +183,9 @@ class TelemetryFeed:
         self.health = health
 
     def _on_text(self, text: Any, _user: object) -> None:  # noqa: ANN401
-        words = text.text.strip()
-        if not words.startswith(TEXT_PREFIX):  # MAVSDK hands over what this app's own companion says, too
-            self._texts.append((self._clock(), words))
+        stripped = text.text.strip()
+        if not stripped.startswith(TEXT_PREFIX):  # MAVSDK also passes the texts of this app's companion
+            self._texts.append((self._clock(), stripped))
 
     def _wake(self) -> None:
         loop = self._loop
@@ -235,16 +198,14 @@ class TelemetryFeed:
 
 
 def _number(value: float | None) -> float:
-    """JSON has no word for what is not finite; MAVSDK writes null."""
+    """JSON cannot express values that are not finite; MAVSDK writes null."""
     return nan if value is None else value
 
 
-async def ask_for_rates(feed: TelemetryFeed, plugin: Any) -> None:  # noqa: ANN401
-    """Ask for 50 Hz of attitude and position where the vehicle sends less; a refusal is no error.
+async def request_rates(feed: TelemetryFeed, plugin: Any) -> None:  # noqa: ANN401
+    """Request 50 Hz of attitude and position, from MAVSDK's asyncio plugin, if the vehicle sends less.
 
-    Args:
-        feed: listens to the vehicle.
-        plugin: MAVSDK's telemetry plugin (the asyncio one).
+    A refusal is no error.
     """
     start_us, attitudes, positions = feed.time_us, feed.attitudes, feed.positions
     await asyncio.sleep(0.5)
@@ -254,3 +215,82 @@ async def ask_for_rates(feed: TelemetryFeed, plugin: Any) -> None:  # noqa: ANN4
             await plugin.set_rate_attitude_euler(WANTED_RATE_HZ)
         if (feed.positions - positions) / span_s < 0.9 * WANTED_RATE_HZ:
             await plugin.set_rate_position_velocity_ned(WANTED_RATE_HZ)
+
+
+class VehicleClock(Protocol):
+    """The time of a vehicle that can wait. Its coroutines raise `DroneError` when the vehicle is gone."""
+
+    async def stop(self) -> int:
+        """Stop time; returns the time of the last telemetry, microseconds."""
+        ...
+
+    async def advance(self, tick_us: int, command: VelocityCommand | None) -> None:
+        """Let time run to a tick of the 50 ms grid, and wait until its image has been processed.
+
+        A command was sent before and must arrive first.
+        """
+
+    def release(self) -> None:
+        """Let time run freely from now on."""
+
+
+class TickSource:
+    """Waits for ticks.
+
+    A real vehicle's time never waits: an app that is late skips ticks. The time of a simulator that this
+    program has started can wait: then the app gets every tick and its image, on a busy machine too.
+
+    Attributes:
+        late: ticks that were skipped, or lost on the link, in flight.
+        waits: vehicle time waits for the app now.
+    """
+
+    def __init__(self, feed: TelemetryFeed) -> None:
+        self.late = 0
+        self.waits = False
+        self._feed = feed
+        self._clock: VehicleClock | None = None
+        self._number = 0
+        self._last_in_flight: int | None = None
+
+    def use_clock(self, clock: VehicleClock) -> None:
+        """Let vehicle time wait for the app, from `begin` to `release`."""
+        self._clock = clock
+
+    async def begin(self) -> None:
+        """Let vehicle time wait from now on, if it can."""
+        if self._clock is not None:
+            self._number = await self._clock.stop() // TICK_US
+            self.waits = True
+
+    async def next(self, timeout_s: float, command: VelocityCommand | None = None) -> bool:
+        """Wait for the next tick; the feed's `sample` belongs to it then. False if there was none.
+
+        Args:
+            timeout_s: wall time to wait if vehicle time does not wait.
+            command: see `VehicleClock.advance`; with one, ticks skipped are counted as late.
+        """
+        clock = self._clock
+        if clock is None or not self.waits:
+            return await self._next_free(timeout_s, in_flight=command is not None)
+        for _ in range(_MAX_LOST_IN_A_ROW):
+            self._number += 1
+            await clock.advance(self._number * TICK_US, command)
+            if await self._feed.tick(self._number, TICK_LOST_S):
+                return True
+            self.late += 1
+        return False
+
+    def release(self) -> None:
+        """Let vehicle time run freely."""
+        if self._clock is not None and self.waits:
+            self._clock.release()
+        self.waits = False
+
+    async def _next_free(self, timeout_s: float, *, in_flight: bool) -> bool:
+        received = await self._feed.next_tick(timeout_s)
+        number = self._feed.tick_number
+        if self._last_in_flight is not None and in_flight:
+            self.late += max(0, number - self._last_in_flight - 1)
+        self._last_in_flight = number if in_flight else None
+        return received

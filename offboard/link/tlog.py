@@ -1,9 +1,9 @@
 """Recording of all MAVLink traffic as a tlog: each packet after its time, 8 bytes, big-endian microseconds.
 
-MAVSDK forwards between its connections what it receives. A connection to the recorder therefore gets all
-that the vehicle says. What MAVSDK sends to the vehicle goes only to connections on which that system has
-been heard; so the recorder says once that it is the vehicle's logger component, and gets those as well.
-Acknowledgements addressed to MAVSDK itself are the one thing that is not forwarded.
+MAVSDK forwards between its connections what it receives, so a connection to the recorder gets all that the
+vehicle sends. What MAVSDK sends to the vehicle is sent only on connections from which that system has been
+received; so the recorder announces itself once as the vehicle's logger component. Only acknowledgements
+addressed to MAVSDK itself are not forwarded.
 """
 
 from __future__ import annotations
@@ -25,12 +25,9 @@ RECEIVE_BUFFER_BYTES = 4 << 20
 
 
 class TlogRecorder(asyncio.DatagramProtocol):
-    """A local UDP port whose packets are written to a file, unbuffered: what was received is kept.
+    """A local UDP port whose packets are written to a file, unbuffered, so that a crash loses none.
 
-    A disk that is full ends the recording, after the last packet that fits.
-
-    Args:
-        path: the file.
+    A full disk ends the recording, after the last packet that fits.
 
     Attributes:
         packets: how many were written.
@@ -42,18 +39,14 @@ class TlogRecorder(asyncio.DatagramProtocol):
 
     def __init__(self, path: Path) -> None:
         self.problem = ""
+        self.packets = 0
         self._file: BinaryIO = path.open("wb", buffering=0)
         self._transport: asyncio.DatagramTransport | None = None
         self._peer: tuple[str, int] | None = None
         self._system_id = 0
-        self.packets = 0
 
     async def listen(self) -> str:
-        """Open the port.
-
-        Returns:
-            The URL for MAVSDK to forward to.
-        """
+        """Open the port; returns the URL for MAVSDK to forward to."""
         port = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
         port.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, RECEIVE_BUFFER_BYTES)
         port.setblocking(False)
@@ -62,10 +55,10 @@ class TlogRecorder(asyncio.DatagramProtocol):
         return f"udpout://127.0.0.1:{port.getsockname()[1]}"
 
     def announce(self, system_id: int) -> None:
-        """Say that this is a component of the vehicle, so that what is sent to the vehicle comes here too."""
+        """Send that this is a component of the vehicle, to receive also what is sent to the vehicle."""
         self._system_id = system_id
         if self._peer is not None:
-            self._send_announcement()
+            self._send_heartbeat()
 
     def close(self) -> None:
         """Close port and file."""
@@ -83,7 +76,7 @@ class TlogRecorder(asyncio.DatagramProtocol):
         if self._peer is None:
             self._peer = addr
             if self._system_id:
-                self._send_announcement()
+                self._send_heartbeat()
         if not self.problem and not self._file.closed:
             self._write(struct.pack(">Q", time.time_ns() // 1000) + data)
 
@@ -100,7 +93,7 @@ class TlogRecorder(asyncio.DatagramProtocol):
             with contextlib.suppress(OSError):
                 self._file.truncate(whole)
 
-    def _send_announcement(self) -> None:
+    def _send_heartbeat(self) -> None:
         sender = mavlink.MAVLink(None, srcSystem=self._system_id, srcComponent=LOGGER_COMPONENT)
         heartbeat = sender.heartbeat_encode(
             mavlink.MAV_TYPE_LOG, mavlink.MAV_AUTOPILOT_INVALID, 0, 0, mavlink.MAV_STATE_ACTIVE

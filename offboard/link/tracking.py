@@ -1,163 +1,170 @@
-"""Makes a vehicle move as the project's own would, whatever its own velocity control lets slip.
+"""Corrects velocity commands so that a vehicle with poor velocity control moves as the simulated drone would.
 
-A mission flies by velocities: 0.3 m/s for four seconds are 1.2 m through a frame, and none are a stand. The
-simulated drone of this project does just that. An ordinary one lags by half a second and more, stays behind
-against drag, and drifts in height while it is told to stand, as PX4 does under velocity setpoints. So here a
-model of a drone that obeys is flown by the same commands, and the vehicle is made to follow the model: by the
-model's acceleration, as far ahead as the vehicle was seen to lag, and by what it is off the model's speed and
-place. That begins once the vehicle has been off by so much that it cannot be one that obeys: until then, and
-for one that obeys for ever, commands are sent to the last bit as the mission wants them.
+A mission flies by velocities: 0.3 m/s for four seconds are 1.2 m through a frame, and zero is a hover. The
+simulated drone follows that closely. A real one lags by half a second and more, stays slower than commanded
+against drag, and drifts in height while it hovers, as PX4 does under velocity setpoints. So a model of an
+ideal drone is flown by the same commands, and the vehicle is made to follow the model: by the model's
+acceleration, sent ahead by the lag that was measured, and by the vehicle's offset from the model's velocity
+and position. Correction starts once the vehicle is farther off than an ideal one ever is; until then commands
+are sent unchanged, to the last bit.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from collections import deque
+from dataclasses import dataclass
 from math import cos, exp, hypot, pi, remainder, sin
 
 from geometry.vectors import Vec3
 from offboard.drone import DroneState, VelocityCommand
-from offboard.link.lag import LagEstimate
 
-LAG_S = 0.15  # of the model, as of the simulated drone
-MEMORY_S = 0.5  # in telling whether a vehicle obeys, a command counts for so long after it has changed
-FORGET_S = 1.0  # what is off beside the way is given up so quickly: the mission sees it, and steers anew
-HELP_FROM_M = 0.14  # off the model by more in a stand, it needs help; the simulated drone: 0.04
-HELP_FROM_S = 0.3  # so much more for each metre a second of late
-HELP_FROM_RAD = 0.2  # likewise for its heading; the simulated drone: 0.13
-LEASH_M = 0.5  # how far the place may be from the vehicle
-LEASH_RAD = 0.5
-STAND_M_S = 0.05  # a slower command is a stand, which has no sides
-PULL_PER_S = 0.8
-TURN_PER_S = 1.0
-BANDWIDTH_PER_S = 3.0  # a vehicle slower than that is made as quick by feeding back its speed
-MOST_M_S = 0.7
-MOST_RAD_S = 1.0
-_LONGEST_STEP_S = 0.2  # after a longer gap the vehicle is taken from where it is
+MODEL_LAG_S = 0.15  # as of the simulated drone
+SPEED_MEMORY_S = 0.5  # decay of the commanded speed by which the threshold is raised
+FORGET_S = 1.0  # decay of the offset across the command: the mission sees it, and steers again from there
+MIN_OFFSET_M = 0.14  # of the model in hover, before commands are corrected; the simulated drone: 0.04
+MIN_OFFSET_S = 0.3  # added to that for each m/s commanded
+MIN_OFFSET_RAD = 0.2  # likewise for its heading; the simulated drone: 0.13
+MAX_OFFSET_M = 0.5  # of the model from the vehicle
+MAX_OFFSET_RAD = 0.5
+HOVER_M_S = 0.05  # a slower command is a hover, which has no direction
+POSITION_GAIN_PER_S = 0.8
+HEADING_GAIN_PER_S = 1.0
+BANDWIDTH_PER_S = 3.0  # a slower vehicle is made as quick by feedback of its velocity
+MAX_CORRECTION_M_S = 0.7
+MAX_CORRECTION_RAD_S = 1.0
+_MAX_STEP_S = 0.2  # after a longer gap the model starts again at the vehicle
+
+LAG_WINDOW = 8  # ticks over which a change of speed is measured
+INITIAL_LAG_S = 0.3
+MAX_LAG_S = 0.7
+MIN_CHANGES = (0.1, 0.1, 0.08, 0.15)  # of speed in x, y, z (m/s) and yaw (rad/s) by which lag is measured
+_INITIAL_WEIGHT = 8.0  # of the initial lag, in changes of the minimum size
+
+
+class LagEstimate:
+    """Least squares for T in T dv/dt = commanded - v, both sides integrated over a window of ticks.
+
+    Args:
+        min_change: a smaller change of speed over a window is ignored, because it may be noise.
+    """
+
+    __slots__ = ("_integral", "_min_change", "_past", "_products", "_squares")
+
+    def __init__(self, min_change: float) -> None:
+        self._min_change = min_change
+        self._squares = _INITIAL_WEIGHT * min_change * min_change
+        self._products = INITIAL_LAG_S * self._squares
+        self._integral = 0.0
+        self._past: deque[tuple[float, float]] = deque(maxlen=LAG_WINDOW)
+
+    def update(self, commanded: float, speed: float, step_s: float) -> None:
+        """Add one step: the speed commanded since the last one, and the speed now."""
+        self._integral += (commanded - speed) * step_s
+        if len(self._past) == LAG_WINDOW:
+            integral, before = self._past[0]
+            change = speed - before
+            if abs(change) > self._min_change:
+                self._squares += change * change
+                self._products += change * (self._integral - integral)
+        self._past.append((self._integral, speed))
+
+    def interrupt(self) -> None:
+        """Keep the estimate, but measure no change across a gap."""
+        self._past.clear()
+
+    @property
+    def lag_s(self) -> float:
+        """The estimate, 0 to MAX_LAG_S."""
+        return min(max(self._products / self._squares, 0.0), MAX_LAG_S)
 
 
 @dataclass(slots=True)
 class _Model:
-    """A drone that obeys, flown by the same commands.
+    """An ideal drone flown by the same commands, relative to the vehicle; arena axes."""
 
-    Attributes:
-        time_us: vehicle time.
-        at_m: the vehicle's place then, arena axes.
-        yaw_rad: the vehicle's heading then.
-        off_m: from the vehicle to the model, arena axes.
-        velocity_m_s: the model's, arena axes.
-        off_rad: from the vehicle's heading to the model's.
-        turn_rad_s: the model's yaw rate.
-        turned_rad_s: the vehicle's.
-        speed_m_s: commanded of late, at most.
-    """
-
-    time_us: int
-    at_m: Vec3
-    yaw_rad: float
-    off_m: Vec3 = (0.0, 0.0, 0.0)
-    velocity_m_s: Vec3 = (0.0, 0.0, 0.0)
-    off_rad: float = 0.0
-    turn_rad_s: float = 0.0
-    turned_rad_s: float = 0.0
-    speed_m_s: float = 0.0
-
-
-@dataclass(slots=True)
-class _Lags:
-    """How late the vehicle is: over the ground (x and y), upwards, in turning."""
-
-    x: LagEstimate = field(default_factory=lambda: LagEstimate(0.1))
-    y: LagEstimate = field(default_factory=lambda: LagEstimate(0.1))
-    up: LagEstimate = field(default_factory=lambda: LagEstimate(0.08))
-    turn: LagEstimate = field(default_factory=lambda: LagEstimate(0.15))
-
-    def interrupt(self) -> None:
-        """What comes next does not follow what came before."""
-        for lag in (self.x, self.y, self.up, self.turn):
-            lag.interrupt()
+    time_us: int  # vehicle time
+    position_m: Vec3  # the vehicle's then
+    yaw_rad: float  # the vehicle's then
+    offset_m: Vec3 = (0.0, 0.0, 0.0)  # from the vehicle to the model
+    velocity_m_s: Vec3 = (0.0, 0.0, 0.0)  # the model's
+    offset_rad: float = 0.0  # from the vehicle's heading to the model's
+    yaw_rate_rad_s: float = 0.0  # the model's
+    measured_yaw_rate_rad_s: float = 0.0  # the vehicle's
+    recent_speed_m_s: float = 0.0  # highest commanded speed, decaying
 
 
 class CommandTracker:
     """Adds to velocity commands what makes the vehicle follow the model.
 
     Attributes:
-        helps: the vehicle has shown that it needs it.
+        active: the vehicle has been off the model by so much that its commands are corrected.
     """
 
     def __init__(self) -> None:
-        self.helps = False
-        self._model: _Model | None = None
-        self._lags = _Lags()
-        self._flown = self._sent = VelocityCommand()
+        self._commanded = self._sent = VelocityCommand()
+        self.reset()
 
     def reset(self) -> None:
-        """Begin anew at the next state, with a vehicle that obeys."""
-        self._model = None
-        self._lags = _Lags()
-        self.helps = False
+        """Start again at the next state, without correction."""
+        self.active = False
+        self._model: _Model | None = None
+        self._lags = tuple(map(LagEstimate, MIN_CHANGES))
 
     def correct(self, command: VelocityCommand, state: DroneState) -> VelocityCommand:
-        """The command to send.
-
-        Args:
-            command: as the mission wants it from now on.
-            state: of the vehicle now; once a tick.
-        """
-        model, flown, sent = self._model, self._flown, self._sent
-        self._flown = self._sent = command
+        """The command to send, from the mission's command and the vehicle's state now; once a tick."""
+        model, commanded, sent = self._model, self._commanded, self._sent
+        self._commanded = self._sent = command
         step_s = 0.0 if model is None else (state.time_us - model.time_us) * 1e-6
-        if model is None or not 0.0 <= step_s <= _LONGEST_STEP_S:
+        if model is None or not 0.0 <= step_s <= _MAX_STEP_S:
             self._model = _Model(state.time_us, (state.x, state.y, state.z), state.yaw)
-            self._lags.interrupt()
+            for lag in self._lags:
+                lag.interrupt()
             return command
         if step_s > 0.0:
-            _advance(model, flown, state, step_s)
-            self._learn(sent, model, state, step_s)
-        off_m = hypot(*model.off_m) - HELP_FROM_S * model.speed_m_s
-        if off_m > HELP_FROM_M or abs(model.off_rad) > HELP_FROM_RAD:
-            self.helps = True
-        if self.helps:
-            self._sent = _following(command, model, self._lags, state)
+            _advance(model, commanded, state, step_s)
+            self._measure_lags(sent, model, state, step_s)
+        offset_m = hypot(*model.offset_m) - MIN_OFFSET_S * model.recent_speed_m_s
+        if offset_m > MIN_OFFSET_M or abs(model.offset_rad) > MIN_OFFSET_RAD:
+            self.active = True
+        if self.active:
+            self._sent = _corrected(command, model, [lag.lag_s for lag in self._lags], state)
         return self._sent
 
-    def _learn(self, sent: VelocityCommand, model: _Model, state: DroneState, step_s: float) -> None:
-        lags = self._lags
-        sent_x, sent_y = _turned(sent.forward_m_s, sent.left_m_s, state.yaw)
-        velocity_x, velocity_y, velocity_z = state.velocity_arena_m_s
-        lags.x.see(sent_x, velocity_x, step_s)
-        lags.y.see(sent_y, velocity_y, step_s)
-        lags.up.see(sent.up_m_s, velocity_z, step_s)
-        lags.turn.see(sent.yaw_rate_rad_s, model.turned_rad_s, step_s)
+    def _measure_lags(self, sent: VelocityCommand, model: _Model, state: DroneState, step_s: float) -> None:
+        commanded = (*_turned(sent.forward_m_s, sent.left_m_s, state.yaw), sent.up_m_s, sent.yaw_rate_rad_s)
+        measured = (*state.velocity_arena_m_s, model.measured_yaw_rate_rad_s)
+        for lag, command, speed in zip(self._lags, commanded, measured, strict=True):
+            lag.update(command, speed, step_s)
 
 
-def _advance(model: _Model, flown: VelocityCommand, state: DroneState, step_s: float) -> None:
-    """Fly the model by the command of the last step, but not farther from the vehicle than the leash."""
-    speed_m_s = hypot(flown.forward_m_s, flown.left_m_s, flown.up_m_s)
-    model.speed_m_s = max(speed_m_s, exp(-step_s / MEMORY_S) * model.speed_m_s)
-    wanted_x, wanted_y = _turned(flown.forward_m_s, flown.left_m_s, state.yaw)
-    x_m, velocity_x = _gone(model.velocity_m_s[0], wanted_x, step_s)
-    y_m, velocity_y = _gone(model.velocity_m_s[1], wanted_y, step_s)
-    z_m, velocity_z = _gone(model.velocity_m_s[2], flown.up_m_s, step_s)
+def _advance(model: _Model, commanded: VelocityCommand, state: DroneState, step_s: float) -> None:
+    """Fly the model by the command of the last step, at most MAX_OFFSET_M away from the vehicle."""
+    speed_m_s = hypot(commanded.forward_m_s, commanded.left_m_s, commanded.up_m_s)
+    model.recent_speed_m_s = max(speed_m_s, exp(-step_s / SPEED_MEMORY_S) * model.recent_speed_m_s)
+    wanted_x, wanted_y = _turned(commanded.forward_m_s, commanded.left_m_s, state.yaw)
+    x_m, velocity_x = _lag_step(model.velocity_m_s[0], wanted_x, step_s)
+    y_m, velocity_y = _lag_step(model.velocity_m_s[1], wanted_y, step_s)
+    z_m, velocity_z = _lag_step(model.velocity_m_s[2], commanded.up_m_s, step_s)
     model.velocity_m_s = (velocity_x, velocity_y, velocity_z)
-    (off_x, off_y, off_z), (at_x, at_y, at_z) = model.off_m, model.at_m
+    (off_x, off_y, off_z), (at_x, at_y, at_z) = model.offset_m, model.position_m
     x, y, z = off_x + at_x - state.x + x_m, off_y + at_y - state.y + y_m, off_z + at_z - state.z + z_m
     distance_m = hypot(x, y, z)
-    scale = LEASH_M / distance_m if distance_m > LEASH_M else 1.0
-    way = (flown.forward_m_s, flown.left_m_s)
-    x, y = _forget_beside((scale * x, scale * y), way, state.yaw, exp(-step_s / FORGET_S))
-    model.off_m, model.at_m = (x, y, scale * z), (state.x, state.y, state.z)
-    turn_rad, model.turn_rad_s = _gone(model.turn_rad_s, flown.yaw_rate_rad_s, step_s)
+    scale = MAX_OFFSET_M / distance_m if distance_m > MAX_OFFSET_M else 1.0
+    direction = (commanded.forward_m_s, commanded.left_m_s)
+    x, y = _forget_across((scale * x, scale * y), direction, state.yaw, exp(-step_s / FORGET_S))
+    model.offset_m, model.position_m = (x, y, scale * z), (state.x, state.y, state.z)
+    turn_rad, model.yaw_rate_rad_s = _lag_step(model.yaw_rate_rad_s, commanded.yaw_rate_rad_s, step_s)
     turned_rad = remainder(state.yaw - model.yaw_rad, 2 * pi)
-    model.turned_rad_s = turned_rad / step_s
-    model.off_rad = max(-LEASH_RAD, min(LEASH_RAD, model.off_rad + turn_rad - turned_rad))
+    model.measured_yaw_rate_rad_s = turned_rad / step_s
+    model.offset_rad = max(-MAX_OFFSET_RAD, min(MAX_OFFSET_RAD, model.offset_rad + turn_rad - turned_rad))
     model.yaw_rad = state.yaw
     model.time_us = state.time_us
 
 
-def _gone(speed: float, wanted: float, step_s: float) -> tuple[float, float]:
-    """Way and speed after a step of a first-order lag of LAG_S, exactly."""
-    kept = exp(-step_s / LAG_S)
-    return wanted * step_s + (speed - wanted) * LAG_S * (1.0 - kept), wanted + kept * (speed - wanted)
+def _lag_step(speed: float, wanted: float, step_s: float) -> tuple[float, float]:
+    """Distance and speed after a step of a first-order lag of MODEL_LAG_S, exact."""
+    kept = exp(-step_s / MODEL_LAG_S)
+    return wanted * step_s + (speed - wanted) * MODEL_LAG_S * (1.0 - kept), wanted + kept * (speed - wanted)
 
 
 def _turned(forward: float, left: float, yaw_rad: float) -> tuple[float, float]:
@@ -165,57 +172,59 @@ def _turned(forward: float, left: float, yaw_rad: float) -> tuple[float, float]:
     return c * forward - s * left, s * forward + c * left
 
 
-def _forget_beside(
-    off_m: tuple[float, float], flown_m_s: tuple[float, float], yaw_rad: float, kept: float
+def _forget_across(
+    offset_m: tuple[float, float], commanded_m_s: tuple[float, float], yaw_rad: float, kept: float
 ) -> tuple[float, float]:
-    """Keep all of what is off along the command and a share of what is off beside it; all in a stand.
+    """Keep the offset along the command and a share of the offset across it; all of it in a hover.
 
-    A mission that steers by sight has seen where it is and aims from there. A vehicle pushed back to the
-    old way meanwhile would come past its aim on the other side.
+    A mission that steers by the camera has seen where it is and aims from there. A vehicle pushed back to its
+    old line meanwhile would pass the aim on the other side.
     """
-    speed_m_s = hypot(*flown_m_s)
-    if speed_m_s < STAND_M_S:
-        return off_m
-    along_x, along_y = _turned(flown_m_s[0] / speed_m_s, flown_m_s[1] / speed_m_s, yaw_rad)
-    along_m = off_m[0] * along_x + off_m[1] * along_y
+    speed_m_s = hypot(*commanded_m_s)
+    if speed_m_s < HOVER_M_S:
+        return offset_m
+    along_x, along_y = _turned(commanded_m_s[0] / speed_m_s, commanded_m_s[1] / speed_m_s, yaw_rad)
+    along_m = offset_m[0] * along_x + offset_m[1] * along_y
     return (
-        along_m * along_x + kept * (off_m[0] - along_m * along_x),
-        along_m * along_y + kept * (off_m[1] - along_m * along_y),
+        along_m * along_x + kept * (offset_m[0] - along_m * along_x),
+        along_m * along_y + kept * (offset_m[1] - along_m * along_y),
     )
 
 
-def _following(command: VelocityCommand, model: _Model, lags: _Lags, state: DroneState) -> VelocityCommand:
+def _corrected(
+    command: VelocityCommand, model: _Model, lags_s: list[float], state: DroneState
+) -> VelocityCommand:
     wanted_x, wanted_y = _turned(command.forward_m_s, command.left_m_s, state.yaw)
-    wanted = (wanted_x, wanted_y, command.up_m_s)
-    level_s = max(lags.x.lag_s, lags.y.lag_s)
+    x_s, y_s, up_s, yaw_s = lags_s
+    level_s = max(x_s, y_s)
     add = [
-        _help(want, speed, measured, lag_s) + PULL_PER_S * off
-        for want, speed, measured, lag_s, off in zip(
-            wanted,
+        _velocity_correction(wanted, speed, measured, lag_s) + POSITION_GAIN_PER_S * offset
+        for wanted, speed, measured, lag_s, offset in zip(
+            (wanted_x, wanted_y, command.up_m_s),
             model.velocity_m_s,
             state.velocity_arena_m_s,
-            (level_s, level_s, lags.up.lag_s),
-            model.off_m,
+            (level_s, level_s, up_s),
+            model.offset_m,
             strict=True,
         )
     ]
     size = hypot(*add)
-    scale = MOST_M_S / size if size > MOST_M_S else 1.0
-    turn = _help(command.yaw_rate_rad_s, model.turn_rad_s, model.turned_rad_s, lags.turn.lag_s)
-    turn = max(-MOST_RAD_S, min(MOST_RAD_S, turn + TURN_PER_S * model.off_rad))
+    scale = MAX_CORRECTION_M_S / size if size > MAX_CORRECTION_M_S else 1.0
+    rates = (command.yaw_rate_rad_s, model.yaw_rate_rad_s, model.measured_yaw_rate_rad_s)
+    turn = _velocity_correction(*rates, yaw_s) + HEADING_GAIN_PER_S * model.offset_rad
     c, s = cos(state.yaw), sin(state.yaw)
     return VelocityCommand(
         command.forward_m_s + scale * (c * add[0] + s * add[1]),
         command.left_m_s + scale * (c * add[1] - s * add[0]),
         command.up_m_s + scale * add[2],
-        command.yaw_rate_rad_s + turn,
+        command.yaw_rate_rad_s + max(-MAX_CORRECTION_RAD_S, min(MAX_CORRECTION_RAD_S, turn)),
     )
 
 
-def _help(wanted: float, speed: float, measured: float, lag_s: float) -> float:
-    """What to add to a wanted speed, so that a vehicle of this lag has the model's speed.
+def _velocity_correction(wanted: float, speed: float, measured: float, lag_s: float) -> float:
+    """What to add to a wanted speed so that a vehicle of this lag has the model's speed.
 
     One of first order, lag_s dv/dt = sent - v, has it when speed + lag_s dspeed/dt is sent.
     """
-    ahead = (lag_s / LAG_S - 1.0) * (wanted - speed)
+    ahead = (lag_s / MODEL_LAG_S - 1.0) * (wanted - speed)
     return ahead + max(0.0, BANDWIDTH_PER_S * lag_s - 1.0) * (speed - measured)

@@ -1,11 +1,11 @@
 """Two guards against a hung app, whose native MAVLink thread would go on sending the last setpoint.
 
-1. A thread: if the event loop has not turned for half a second, it sends a velocity of zero, and the flight
-   goes on when the loop turns again; after a second it stops the setpoints and asks for hold.
+1. A thread: if the event loop has not run for half a second, it sends a velocity of zero, and the flight
+   continues when the loop runs again; after a second it ends the setpoints and requests hold.
 2. A timer that needs no interpreter (`faulthandler`): a hang that holds the GIL stops that thread, too; then
-   the process is ended, and with the setpoints gone the vehicle's own offboard-loss failsafe acts.
+   the process is ended, and without setpoints the vehicle's own offboard-loss failsafe acts.
 
-Both run only while the drone is being commanded. The loop shows that it turns by a task of its own.
+Both run only while the drone is being commanded. A task shows that the loop runs.
 """
 
 from __future__ import annotations
@@ -25,26 +25,29 @@ BEAT_S = 0.1
 
 @dataclass(frozen=True, slots=True)
 class HangLimits:
-    """Wall seconds for which the event loop may stand still.
+    """Wall seconds for which the event loop may hang."""
 
-    Attributes:
-        stand_s: then the vehicle stands until the loop turns again.
-        hang_s: then commanding ends.
-        locked_s: then, with the interpreter's lock held, the process ends.
-    """
-
-    stand_s: float = 0.5
-    hang_s: float = 1.0
-    locked_s: float = 2.0
+    stand_s: float = 0.5  # then the vehicle hovers until the loop runs again
+    hang_s: float = 1.0  # then commanding ends
+    locked_s: float = 2.0  # then, with the interpreter's lock held, the process ends
 
 
 LIMITS = HangLimits()
-PATIENT = HangLimits(10.0, 20.0, 60.0)
-"""For a vehicle whose time waits for the app: it flies nothing meanwhile."""
+PATIENT_LIMITS = HangLimits(10.0, 20.0, 60.0)
+"""For a vehicle whose time waits for the app: it does not move meanwhile."""
 
 
 class Watchdog:
-    """Watches the event loop it is started on."""
+    """Watches the event loop on which it is started.
+
+    Args:
+        stand_still: called on the watchdog's thread, once a hang, after `limits.stand_s`.
+        stop_commanding: called on the watchdog's thread, once, after `limits.hang_s`.
+        report: a real file for the second guard's stack trace; by default standard error.
+
+    Attributes:
+        tripped_after_s: how long the loop had hung when commanding was ended; 0 if it was not.
+    """
 
     def __init__(
         self,
@@ -53,29 +56,15 @@ class Watchdog:
         report: TextIO | None = None,
         limits: HangLimits = LIMITS,
     ) -> None:
-        """Prepare.
-
-        Args:
-            stand_still: called on the watchdog's thread, once a hang, when the loop hangs.
-            stop_commanding: called once, on the watchdog's thread, when the loop goes on hanging.
-            report: where the second guard writes where the app hung; by default standard error. It needs a
-                real file.
-            limits: of a hang.
-        """
         self.limits = limits
+        self.tripped_after_s = 0.0
         self._stand_still = stand_still
         self._stop_commanding = stop_commanding
         self._report = report
         self._beat_s = 0.0
-        self._tripped_after_s = 0.0
         self._stop = threading.Event()
         self._thread: threading.Thread | None = None
         self._task: asyncio.Task[None] | None = None
-
-    @property
-    def tripped_after_s(self) -> float:
-        """How long the loop had hung when the watchdog acted; 0 if it never did."""
-        return self._tripped_after_s
 
     def start(self) -> None:
         """Watch from now on. Call on the event loop."""
@@ -83,12 +72,12 @@ class Watchdog:
             return
         self._stop.clear()
         self._beat()
-        self._task = asyncio.create_task(self._beating(), name="watchdog beat")
+        self._task = asyncio.create_task(self._keep_beating(), name="watchdog beat")
         self._thread = threading.Thread(target=self._watch, name="watchdog", daemon=True)
         self._thread.start()
 
     def stop(self) -> None:
-        """Watch no more."""
+        """Stop watching."""
         self._stop.set()
         if self._task is not None:
             self._task.cancel()
@@ -97,8 +86,8 @@ class Watchdog:
             faulthandler.cancel_dump_traceback_later()
             self._thread = None
 
-    async def _beating(self) -> None:
-        while not self._tripped_after_s:
+    async def _keep_beating(self) -> None:
+        while not self.tripped_after_s:
             self._beat()
             await asyncio.sleep(BEAT_S)
 
@@ -109,14 +98,14 @@ class Watchdog:
             faulthandler.dump_traceback_later(self.limits.locked_s, exit=True, file=file)
 
     def _watch(self) -> None:
-        stood_since_s = 0.0
+        stopped_at_beat_s = 0.0
         while not self._stop.wait(BEAT_S):
             hung_s = time.monotonic() - self._beat_s
-            if hung_s > self.limits.stand_s and stood_since_s != self._beat_s:
-                stood_since_s = self._beat_s
+            if hung_s > self.limits.stand_s and stopped_at_beat_s != self._beat_s:
+                stopped_at_beat_s = self._beat_s
                 self._stand_still()
             if hung_s > self.limits.hang_s:
-                self._tripped_after_s = hung_s
+                self.tripped_after_s = hung_s
                 faulthandler.cancel_dump_traceback_later()  # this thread runs, so the GIL is free
                 self._stop_commanding()
                 return

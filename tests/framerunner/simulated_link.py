@@ -1,9 +1,9 @@
 """The real app and its MAVSDK adapter over a bad link, in simulated time.
 
-All of the app runs: mission, box, `MavsdkDrone`, its telemetry feed, `CameraEyes` and the detector. In place
-of MAVSDK and UDP there is a link whose two ways lose, swap, double, delay and fall silent, by a seed; at its
-other end are the simulation's autopilot and camera. The event loop's clock is the simulation's: where it
-would wait, the simulation moves on. So a flight needs no real time and repeats exactly.
+All of the app runs: mission, box, `MavsdkDrone`, its telemetry feed, `CameraPerception` and the detector. In
+place of MAVSDK and UDP there is a link whose two ways lose, swap, double, delay and fall silent, by a seed;
+at its other end are the simulation's autopilot and camera. The event loop's clock is the simulation's: where
+it would wait, the simulation moves on. So a flight needs no real time and repeats exactly.
 """
 
 from __future__ import annotations
@@ -24,11 +24,11 @@ from firmware_py.status import CommandResult, FlightMode, LandedState
 from framerunner.flying.plan import FlightPlan
 from offboard.app import MissionEnd, Moment, fly_mission
 from offboard.keep_in_box import Box, flight_box
-from offboard.link.setpoints import SetpointStream
-from offboard.link.telemetry import TelemetryFeed
-from offboard.link.ticks import TickSource
+from offboard.link.commands import SetpointStream
+from offboard.link.telemetry import TelemetryFeed, TickSource
 from offboard.mavsdk_drone import MavsdkDrone
 from offboard.mission import Mission
+from offboard.perception import CameraPerception
 from scenarios.models import Scenario, TrueState
 from sitl.camera_feed import CameraFeed
 from sitl.simulation import Simulation
@@ -371,9 +371,9 @@ def fly_over(
     async def fly() -> MissionEnd:
         kept_in = box if boxed else None
         drone = LinkedDrone(vehicle, scenario, kept_in)
-        camera = _Camera(vehicle)
+        perception = CameraPerception(_Camera(vehicle))
         return await fly_mission(
-            drone, camera, mission, limit_s=scenario.try_limit_s, observer=moments.append, box=kept_in
+            drone, perception, mission, limit_s=scenario.try_limit_s, observer=moments.append, box=kept_in
         )
 
     with asyncio.Runner(loop_factory=lambda: SimulatedTimeLoop(vehicle)) as runner:

@@ -12,10 +12,9 @@ from framerunner.cli import run
 from framerunner.flying.lockstep import fly_lockstep
 from framerunner.flying.plan import FlightPlan
 from offboard.chart.vocabulary import Vocabulary
-from offboard.mission import load_mission
+from offboard.mission import TEMPLATES, load_mission, new_mission
 from offboard.pilot import Pilot
 from offboard.pilot_file import read_pilot
-from offboard.starter import TEMPLATES, starter
 from scenarios.loader import load_scenario
 
 ROOT = Path(__file__).parents[2]
@@ -82,7 +81,7 @@ def test_what_it_prints_can_be_pasted(capsys, python):
 
 @pytest.mark.parametrize("python", [False, True])
 def test_it_explains_every_word_it_uses_and_is_neatly_laid_out(python):
-    files = starter("mine", Path(), python=python)
+    files = new_mission("mine", Path(), python=python)
     text = files.texts[files.mission]
     head, _, chart = text.partition("\nname: mine\n")
     words = set(re.findall(r"- ([a-z_]+)(?= #|$)", chart, re.MULTILINE))

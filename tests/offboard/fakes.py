@@ -149,7 +149,20 @@ class KinematicDrone:
         self.yaw = remainder(self.yaw + turn * dt_s, 2 * pi)
 
 
-class GeometricEyes:
+class NoCamera:
+    """For missions without a camera: nothing is ever seen."""
+
+    async def open(self) -> None:
+        pass
+
+    def latest(self, time_us: int) -> Detections:
+        return Detections()
+
+    async def close(self) -> None:
+        pass
+
+
+class GeometricPerception:
     """What a camera of 320 x 240 sees of frames that do not hide one another, at 10 Hz."""
 
     def __init__(self, drone: KinematicDrone, targets: dict[str, Target], latency_ticks: int = 0) -> None:

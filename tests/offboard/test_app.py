@@ -10,10 +10,10 @@ import pytest
 
 from offboard.app import fly_mission
 from offboard.drone import DroneError
-from offboard.eyes import CameraEyes, CameraLostError
 from offboard.mission import load_mission
+from offboard.perception import CameraLostError, CameraPerception
 from offboard.pilot import Pilot
-from tests.offboard.fakes import START_1, TEST_CASE_1, GeometricEyes, KinematicDrone
+from tests.offboard.fakes import START_1, TEST_CASE_1, GeometricPerception, KinematicDrone, NoCamera
 from vision.types import CameraFrame, Detections
 
 MISSION = load_mission("frame_challenge")
@@ -21,7 +21,7 @@ MISSION = load_mission("frame_challenge")
 
 def starting():
     drone = KinematicDrone(*START_1)
-    return drone, GeometricEyes(drone, TEST_CASE_1)
+    return drone, GeometricPerception(drone, TEST_CASE_1)
 
 
 @pytest.mark.parametrize(
@@ -34,9 +34,9 @@ def starting():
     ],
 )
 async def test_a_drone_error_stops_commanding_and_asks_for_hold(reason):
-    drone, eyes = starting()
+    drone, perception = starting()
     drone.faults[200] = DroneError(reason)
-    outcome = await fly_mission(drone, None, MISSION, eyes=eyes)
+    outcome = await fly_mission(drone, perception, MISSION)
     assert (outcome.ended, outcome.reason) == ("aborted", reason)
     assert outcome.mission_state == "red.frame_visible"
     assert drone.calls == ["connect", "ready", "motors_on", "hold", "close"]
@@ -44,43 +44,43 @@ async def test_a_drone_error_stops_commanding_and_asks_for_hold(reason):
 
 
 async def test_a_hold_that_fails_is_told_as_well():
-    drone, eyes = starting()
+    drone, perception = starting()
     drone.faults[50] = DroneError("link lost")
     drone.hold_error = DroneError("no answer")
-    outcome = await fly_mission(drone, None, MISSION, eyes=eyes)
+    outcome = await fly_mission(drone, perception, MISSION)
     assert outcome.reason == "link lost; hold: no answer"
     assert drone.calls[-1] == "close"
 
 
 async def test_no_hold_is_asked_of_a_drone_that_never_started():
-    drone, eyes = starting()
+    drone, perception = starting()
     drone.faults[1] = DroneError("link lost")
-    outcome = await fly_mission(drone, None, MISSION, eyes=eyes)
+    outcome = await fly_mission(drone, perception, MISSION)
     assert outcome.ended == "aborted"
     assert drone.calls == ["connect", "ready", "close"]
 
 
 @pytest.mark.parametrize("step", ["connect", "ready"])
 async def test_an_error_before_the_flight_is_raised_and_all_is_closed(step, monkeypatch):
-    drone, eyes = starting()
+    drone, perception = starting()
 
     async def fail():
         raise DroneError("no vehicle")
 
     monkeypatch.setattr(drone, step, fail)
     with pytest.raises(DroneError, match="no vehicle"):
-        await fly_mission(drone, None, MISSION, eyes=eyes)
+        await fly_mission(drone, perception, MISSION)
     assert drone.calls[-1] == "close"
 
 
 async def test_motors_on_refused_is_an_outcome_and_holds(monkeypatch):
-    drone, eyes = starting()
+    drone, perception = starting()
 
     async def refuse():
         raise DroneError("arming was refused: COMMAND_DENIED")
 
     monkeypatch.setattr(drone, "motors_on", refuse)
-    outcome = await fly_mission(drone, None, MISSION, eyes=eyes)
+    outcome = await fly_mission(drone, perception, MISSION)
     assert "COMMAND_DENIED" in outcome.reason
     assert drone.calls[-2:] == ["hold", "close"]
     assert drone.commands == []
@@ -93,8 +93,8 @@ class Breaking(Pilot):
 
 
 async def test_an_error_in_a_mission_aborts_with_its_state():
-    drone, eyes = starting()
-    outcome = await fly_mission(drone, None, load_mission("frame_challenge", Breaking), eyes=eyes)
+    drone, perception = starting()
+    outcome = await fly_mission(drone, perception, load_mission("frame_challenge", Breaking))
     assert outcome.ended == "aborted"
     assert "state 'take_off.set_base': RuntimeError: broken wing" in outcome.reason
     assert "hold" in drone.calls
@@ -107,19 +107,19 @@ async def test_a_position_that_is_not_a_number_aborts():
         if moment.flight_time_s > 1:
             drone.x = float("nan")
 
-    outcome = await fly_mission(drone, None, MISSION, observer=spoil)
+    outcome = await fly_mission(drone, NoCamera(), MISSION, observer=spoil)
     assert "not finite" in outcome.reason
     assert drone.calls[-2:] == ["hold", "close"]
 
 
 async def test_ctrl_c_holds_and_is_told():
-    drone, eyes = starting()
+    drone, perception = starting()
 
     def stop(moment):
         if moment.flight_time_s > 5:
             task.cancel()
 
-    task = asyncio.create_task(fly_mission(yielding(drone), None, MISSION, eyes=eyes, observer=stop))
+    task = asyncio.create_task(fly_mission(yielding(drone), perception, MISSION, observer=stop))
     outcome = await task
     assert outcome.interrupted
     assert outcome.ended == "aborted"
@@ -128,15 +128,15 @@ async def test_ctrl_c_holds_and_is_told():
 
 
 async def test_an_observer_s_fault_still_holds_and_is_raised():
-    drone, eyes = starting()
+    drone, perception = starting()
     with pytest.raises(KeyError):
-        await fly_mission(drone, None, MISSION, eyes=eyes, observer=lambda m: {}["display"])
+        await fly_mission(drone, perception, MISSION, observer=lambda m: {}["display"])
     assert drone.calls[-2:] == ["hold", "close"]
 
 
 async def test_the_limit_counts_vehicle_time_from_motors_on():
-    drone, eyes = starting()
-    outcome = await fly_mission(drone, None, MISSION, eyes=eyes, limit_s=2.0)
+    drone, perception = starting()
+    outcome = await fly_mission(drone, perception, MISSION, limit_s=2.0)
     assert (outcome.ended, outcome.mission_state) == ("timed out", "take_off.set_base")
     assert outcome.flight_time_s == pytest.approx(2.05)
 
@@ -158,10 +158,10 @@ async def test_a_mission_that_ends_in_the_air_lands(tmp_path):
                 final: true
             """)
     )
-    drone, eyes = starting()
+    drone, perception = starting()
     moments = []
     drone.landing_us = 12_000_000
-    outcome = await fly_mission(drone, None, load_mission(str(path)), eyes=eyes, observer=moments.append)
+    outcome = await fly_mission(drone, perception, load_mission(str(path)), observer=moments.append)
     assert outcome.ended == "finished"
     assert drone.calls == ["connect", "ready", "motors_on", "land", "close"]
     landed_us = [
@@ -211,7 +211,7 @@ def yielding(drone):
 )
 async def test_a_dead_camera_ends_the_flight(then, reason, timed):
     drone = yielding(KinematicDrone(*START_1))
-    outcome = await fly_mission(drone, Film(drone, 40, then, timed), MISSION)
+    outcome = await fly_mission(drone, CameraPerception(Film(drone, 40, then, timed)), MISSION)
     assert outcome.ended == "aborted"
     assert outcome.reason.startswith(reason)
     assert drone.calls[-2:] == ["hold", "close"]
@@ -221,15 +221,17 @@ async def test_a_dead_camera_ends_the_flight(then, reason, timed):
 async def test_a_camera_without_a_first_image_is_an_error_before_the_flight():
     drone = KinematicDrone(*START_1)
     with pytest.raises(CameraLostError, match="connection reset"):
-        await fly_mission(drone, Film(drone, 0, "fail"), MISSION)
+        await fly_mission(drone, CameraPerception(Film(drone, 0, "fail")), MISSION)
     assert drone.calls == ["connect", "close"]
 
 
 async def test_old_images_from_a_buffer_count_as_old():
     drone = KinematicDrone(*START_1)
-    eyes = CameraEyes(Film(drone, 1, "silence"), lambda image, time_us: Detections(time_us=time_us))
-    await eyes.open()
-    assert eyes.latest(drone.time_us + 1_000_000).time_us == drone.time_us
+    perception = CameraPerception(
+        Film(drone, 1, "silence"), lambda image, time_us: Detections(time_us=time_us)
+    )
+    await perception.open()
+    assert perception.latest(drone.time_us + 1_000_000).time_us == drone.time_us
     with pytest.raises(CameraLostError, match=r"no image for 1\.1 s"):
-        eyes.latest(drone.time_us + 1_100_000)
-    await eyes.close()
+        perception.latest(drone.time_us + 1_100_000)
+    await perception.close()

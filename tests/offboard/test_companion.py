@@ -1,4 +1,4 @@
-"""The component by which the app tells of its mission: what it sends, when, and that it never does harm."""
+"""The component by which the app reports its mission: what it sends, when, and that it does no harm."""
 
 from __future__ import annotations
 
@@ -71,7 +71,7 @@ def silent():
 
 @pytest.fixture
 async def pair(silent):
-    """A companion that knows its vehicle; its beats are the test's to give."""
+    """A companion that was given its vehicle; the test calls its beats."""
     companion, forwarder = silent
     companion.announce(SYSTEM)
     forwarder.forward(mavlink.MAVLink_attitude_message(0, 0, 0, 0, 0, 0, 0))
@@ -81,12 +81,12 @@ async def pair(silent):
     await companion.close()
 
 
-async def test_it_speaks_as_a_component_of_the_vehicle_to_everybody(pair):
+async def test_it_sends_to_all_as_a_component_of_the_vehicle(pair):
     companion, forwarder = pair
     seen = MissionDetections(4_900_000, 320, 240, (1.0, -1.0, 2.0, -2.0, 0.5, 10.0))
-    companion.tell_state(STATE)
-    companion.tell_detections(seen)
-    companion.say("mission: red.turning")
+    companion.send_state(STATE)
+    companion.send_detections(seen)
+    companion.send_text("mission: red.turning")
     messages = forwarder.received()
     assert {(message.get_srcSystem(), message.get_srcComponent()) for message in messages} == {(SYSTEM, 191)}
     assert [message.get_seq() for message in messages] == [0, 1, 2]
@@ -102,7 +102,7 @@ async def test_it_speaks_as_a_component_of_the_vehicle_to_everybody(pair):
 
 @pytest.mark.parametrize("version", [1, 2])
 async def test_each_heartbeat_answers_one_of_the_autopilot_s(pair, version):
-    """MAVSDK takes any heartbeat of the system for a sign of life: ours must not outlive the vehicle's."""
+    """MAVSDK takes any heartbeat of the system for the vehicle's: ours must end with the vehicle's."""
     companion, forwarder = pair
     for _ in range(100):
         companion.beat()
@@ -125,8 +125,8 @@ async def test_a_document_is_sent_at_once_then_again_and_again_two_pieces_a_seco
     mission = split_document(DocumentKind.MISSION, {"source": "".join(map(str, range(900)))})[1]
     history = split_document(DocumentKind.HISTORY, {"transitions": []})[1]
     assert len(mission) > 5 and len(history) == 1
-    companion.tell_document(DocumentKind.MISSION, mission)
-    companion.tell_document(DocumentKind.HISTORY, history)
+    companion.send_document(DocumentKind.MISSION, mission)
+    companion.send_document(DocumentKind.HISTORY, history)
     companion.beat()
     sent = payloads(forwarder.received(), 0x8F12)
     assert sent == [*history, *mission[: module.PIECES_A_BEAT - 1]]  # the long one waits for the others
@@ -147,10 +147,10 @@ async def test_of_a_document_only_the_newest_version_is_sent(pair):
     companion, forwarder = pair
     old = split_document(DocumentKind.HISTORY, {"transitions": ["".join(map(str, range(900)))]})[1]
     new = split_document(DocumentKind.HISTORY, {"transitions": [1]})[1]
-    companion.tell_document(DocumentKind.HISTORY, old)
+    companion.send_document(DocumentKind.HISTORY, old)
     companion.beat()
     forwarder.received()
-    companion.tell_document(DocumentKind.HISTORY, new)
+    companion.send_document(DocumentKind.HISTORY, new)
     for _ in range(50):
         companion.beat()
     assert set(payloads(forwarder.received(), 0x8F12)) == set(new)
@@ -160,7 +160,7 @@ async def test_a_state_is_repeated_while_no_tick_brings_another(pair, monkeypatc
     companion, forwarder = pair
     now_s = 100.0
     monkeypatch.setattr(module.time, "monotonic", lambda: now_s)
-    companion.tell_state(STATE)
+    companion.send_state(STATE)
     companion.beat()
     now_s += module.SILENT_S / 2
     companion.beat()
@@ -173,24 +173,24 @@ async def test_a_state_is_repeated_while_no_tick_brings_another(pair, monkeypatc
     ]
 
 
-async def test_the_last_words_are_said_twice(pair, monkeypatch):
+async def test_the_final_document_is_sent_twice(pair, monkeypatch):
     companion, forwarder = pair
-    monkeypatch.setattr(module, "FAREWELL_GAP_S", 0.0)
+    monkeypatch.setattr(module, "FINAL_GAP_S", 0.0)
     pieces = split_document(DocumentKind.RESULT, {"reason": "".join(map(str, range(200)))})[1]
     assert len(pieces) > 1
-    companion.tell_document(DocumentKind.RESULT, pieces)
-    await companion.farewell(DocumentKind.RESULT)
+    companion.send_document(DocumentKind.RESULT, pieces)
+    await companion.send_finally(DocumentKind.RESULT)
     said = payloads(forwarder.received(), 0x8F12)
     assert all(said.count(piece) >= 2 for piece in pieces)
-    assert 2 * module.FAREWELL_GAP_S <= 0.5
+    assert 2 * module.FINAL_GAP_S <= 0.5
 
 
 @pytest.mark.parametrize("length", [50, 51, 100, 130, 200, 500])
-async def test_a_long_text_goes_in_pieces_that_can_be_joined(pair, length):
+async def test_a_long_text_is_sent_in_pieces_that_can_be_joined(pair, length):
     companion, forwarder = pair
     text = "".join(chr(97 + number % 26) for number in range(length))
-    companion.say(text)
-    companion.say("short")
+    companion.send_text(text)
+    companion.send_text("short")
     *chunks, short = forwarder.received()
     assert "".join(chunk.text for chunk in chunks) == text[:200]
     assert [chunk.chunk_seq for chunk in chunks] == list(range(len(chunks)))
@@ -200,34 +200,34 @@ async def test_a_long_text_goes_in_pieces_that_can_be_joined(pair, length):
     assert (short.text, short.id) == ("short", 0)
 
 
-async def test_what_no_field_holds_is_not_told(pair, caplog):
+async def test_what_fits_in_no_field_is_not_sent(pair, caplog):
     companion, forwarder = pair
     far = (1e300, 0.0, 0.0, 0.0)
-    companion.tell_state(MissionState(7, 4, 2, 0, 0, True, False, False, far, far))
-    companion.tell_detections(MissionDetections(0, -1, 240))
+    companion.send_state(MissionState(7, 4, 2, 0, 0, True, False, False, far, far))
+    companion.send_detections(MissionDetections(0, -1, 240))
     assert forwarder.received() == []
     assert [record.message.partition(": a value")[0] for record in caplog.records] == [
-        "not told: state",
-        "not told: detections",
+        "not sent: state",
+        "not sent: detections",
     ]
 
 
-async def test_nothing_is_sent_and_nothing_raised_while_nobody_listens(silent):
+async def test_nothing_is_sent_or_raised_while_nothing_is_connected(silent):
     companion, forwarder = silent
-    companion.tell_state(STATE)
-    companion.say("too early")
+    companion.send_state(STATE)
+    companion.send_text("too early")
     companion.announce(SYSTEM)
-    companion.tell_state(STATE)
+    companion.send_state(STATE)
     companion.beat()
     assert (companion.sent, forwarder.received()) == (0, [])
     await companion.close()
-    companion.tell_state(STATE)
+    companion.send_state(STATE)
     companion.beat()
     await companion.close()
     assert companion.sent == 0
 
 
-async def test_a_socket_that_fails_is_no_matter(pair):
+async def test_a_socket_that_fails_does_no_harm(pair):
     companion, forwarder = pair
 
     class Broken:
@@ -242,12 +242,12 @@ async def test_a_socket_that_fails_is_no_matter(pair):
 
     companion._port.close()
     companion._port = Broken()
-    companion.tell_state(STATE)
+    companion.send_state(STATE)
     companion.beat()
     assert (companion.sent, forwarder.received()) == (0, [])
 
 
-async def test_an_error_at_a_beat_ends_the_telling_not_the_loop(silent, caplog):
+async def test_an_error_at_a_beat_ends_the_reports_and_not_the_loop(silent, caplog):
     companion, _ = silent
     failed = asyncio.Event()
 
@@ -260,11 +260,11 @@ async def test_an_error_at_a_beat_ends_the_telling_not_the_loop(silent, caplog):
     await failed.wait()
     await companion.close()
     assert [record.message for record in caplog.records] == [
-        "nothing is told of the mission any more: RuntimeError('a fault of ours')"
+        "the mission is not reported any more: RuntimeError('a fault of ours')"
     ]
 
 
-def test_what_the_companion_says_is_not_taken_for_the_vehicle_s_words():
+def test_the_companion_s_texts_are_not_taken_for_the_vehicle_s():
     feed = TelemetryFeed()
     for words in ("mission: red.turning", "Preflight Fail: no heading"):
         feed._on_text(type("Text", (), {"text": words}), None)

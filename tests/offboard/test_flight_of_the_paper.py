@@ -10,15 +10,15 @@ from offboard.app import Moment, fly_mission
 from offboard.engine import MissionEngine
 from offboard.mission import load_mission
 from offboard.pilot import Imu
-from tests.offboard.fakes import START_1, TEST_CASE_1, GeometricEyes, KinematicDrone, Target, crossings
+from tests.offboard.fakes import START_1, TEST_CASE_1, GeometricPerception, KinematicDrone, Target, crossings
 from vision.types import Detections
 
 
 async def fly(mission, targets=TEST_CASE_1, limit_s=180.0):
     drone = KinematicDrone(*START_1)
     moments: list[Moment] = []
-    eyes = GeometricEyes(drone, targets)
-    flight = fly_mission(drone, None, mission, limit_s=limit_s, observer=moments.append, eyes=eyes)
+    perception = GeometricPerception(drone, targets)
+    flight = fly_mission(drone, perception, mission, limit_s=limit_s, observer=moments.append)
     outcome = await flight
     return drone, moments, outcome
 
@@ -44,15 +44,15 @@ async def test_soft_landing_lets_the_vehicle_land():
 @pytest.mark.parametrize("lag_s", [0.2, 0.7, 0.9])
 async def test_careful_crossing_takes_late_vehicles_through_the_middle(lag_s):
     drone = KinematicDrone(*START_1, lag_s=lag_s)
-    eyes = GeometricEyes(drone, TEST_CASE_1)
-    outcome = await fly_mission(drone, None, load_mission("careful_crossing"), eyes=eyes)
+    perception = GeometricPerception(drone, TEST_CASE_1)
+    outcome = await fly_mission(drone, perception, load_mission("careful_crossing"))
     assert (outcome.ended, outcome.mission_state) == ("finished", "landing.touch_down")
     for target in TEST_CASE_1.values():
         assert min(crossings(drone.path, target)) < 0.05
     assert drone.calls[-2:] == ["land", "close"]
 
 
-class GoingBlind(GeometricEyes):
+class GoingBlind(GeometricPerception):
     """Sees nothing any more from some tick on."""
 
     blind = False
@@ -65,15 +65,15 @@ class GoingBlind(GeometricEyes):
 @pytest.mark.parametrize("state", ["red.frame_visible", "red.shift_left", "red.shift_right"])
 async def test_a_frame_lost_from_view_is_not_climbed_after(mission, state):
     drone = KinematicDrone(*START_1)
-    eyes, moments = GoingBlind(drone, TEST_CASE_1), []
+    perception, moments = GoingBlind(drone, TEST_CASE_1), []
 
     def observe(moment):
-        if moment.mission_state == state and not eyes.blind:
-            eyes.blind, drone.rates[2] = True, 0.3
-        if eyes.blind:
+        if moment.mission_state == state and not perception.blind:
+            perception.blind, drone.rates[2] = True, 0.3
+        if perception.blind:
             moments.append(moment)
 
-    await fly_mission(drone, None, load_mission(mission), limit_s=60.0, observer=observe, eyes=eyes)
+    await fly_mission(drone, perception, load_mission(mission), limit_s=60.0, observer=observe)
     after = [each for each in moments if each.flight_time_s - moments[0].flight_time_s > 2.0]
     assert {each.mission_state for each in after} <= {"red.lost", "red.go_to_center", "red.turning"}
     search_m = 2.0

@@ -14,7 +14,7 @@ from offboard.drone import DroneState, VelocityCommand
 from offboard.keep_in_box import Box, KeepInBox, OutsideBoxError, confine, flight_box, outside
 from offboard.mavsdk_drone import MavsdkDrone
 from scenarios.loader import load_scenario
-from tests.offboard.fakes import KinematicDrone, runaway
+from tests.offboard.fakes import KinematicDrone, NoCamera, runaway
 
 BOX = flight_box(load_scenario("test-case-1"))
 START = (-3.0, -3.0)
@@ -129,7 +129,7 @@ async def test_a_mission_that_runs_away_is_kept_in_and_told_of(tmp_path, velocit
     mission = runaway(tmp_path, velocity)
     drone, moments = KinematicDrone(0.0, 0.0, 0.5), []
     box = Box(BOX.low_m, BOX.high_m, (-4.0, -4.0))
-    outcome = await fly_mission(drone, None, mission, limit_s=30.0, observer=moments.append, box=box)
+    outcome = await fly_mission(drone, NoCamera(), mission, limit_s=30.0, observer=moments.append, box=box)
     assert (outcome.ended, drone.calls[-2:]) == ("timed out", ["hold", "close"])
     assert outcome.kept_in_box_s > 5.0
     assert moments[-1].remark.startswith("kept in the box: ")
@@ -142,7 +142,7 @@ async def test_a_drone_carried_off_ends_in_hold(tmp_path):
     drone = KinematicDrone(0.0, 0.0, 0.5)
     drone.x = 8.0  # and does not fly back, however it is told to
     drone.command = drone.commands.append
-    outcome = await fly_mission(drone, None, mission, limit_s=30.0, box=BOX)
+    outcome = await fly_mission(drone, NoCamera(), mission, limit_s=30.0, box=BOX)
     assert outcome.ended == "aborted"
     assert "2.0 m outside its box and does not come back" in outcome.reason
     assert drone.calls[-2:] == ["hold", "close"]

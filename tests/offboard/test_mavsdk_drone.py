@@ -212,7 +212,7 @@ async def test_an_app_that_hangs_while_a_pilot_has_it_leaves_no_stream_and_asks_
         time.sleep(1.5)  # noqa: ASYNC251 - this is what hanging is
         assert not fresh_setpoints(vehicle, 0.2)
         error = await until_error(ticks)
-        assert error.startswith("this app hung") and error.endswith("its watchdog fell silent")
+        assert error.startswith("this app hung") and error.endswith("its watchdog stopped sending")
         vehicle.mode = (6, 0)  # somebody gives it back to an app that has given up
         await drone._until(lambda: drone._feed.mode == "OFFBOARD", 3.0)
         await drone.hold()
@@ -272,7 +272,7 @@ async def test_a_silent_link_stands_still_before_it_is_lost(vehicle):
 
 
 async def test_hold_is_asked_for_again_when_the_request_is_lost(vehicle, monkeypatch):
-    monkeypatch.setattr("offboard.link.hold.SHOWN_S", 0.7)
+    monkeypatch.setattr("offboard.mavsdk_drone.HOLD_SHOWN_S", 0.7)
     async with connected(vehicle) as drone:
         await drone.motors_on()
         vehicle.setpoint_loss_s = math.inf
@@ -377,7 +377,7 @@ async def test_an_armed_vehicle_is_not_taken(vehicle):
 
 async def test_no_vehicle_is_one_clear_line():
     drone = MavsdkDrone(f"udpin://127.0.0.1:{free_port()}", connect_limit_s=0.3)
-    with pytest.raises(DroneError, match=r"no vehicle was heard on udpin://127.*within 0\.3 s"):
+    with pytest.raises(DroneError, match=r"no vehicle was found on udpin://127.*within 0\.3 s"):
         await drone.connect()
     await drone.close()
 

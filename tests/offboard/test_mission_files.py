@@ -108,7 +108,7 @@ BAD_CHARTS = [
         "initial: landing",
         "m.yaml:2:10: 'initial' of the mission is 'landing'; it has the states up, done",
     ),
-    ("  done:\n", "  up:\n", "m.yaml:13:3: 'up' stands twice (first in line 5); rename one"),
+    ("  done:\n", "  up:\n", "m.yaml:13:3: 'up' is written twice (first in line 5); rename one"),
     ("transitions:", "transition:", "state 'up' has no 'transition'; did you mean 'transitions'?"),
     ("name: little", "nam: little", "a mission has no 'nam'; did you mean 'name'?"),
     ("final: true", "final: maybe", "'final' is true or false, not 'maybe'"),
@@ -127,7 +127,7 @@ BAD_CHARTS = [
     (
         "    final: true",
         "    final: true\n    resume: up",
-        "m.yaml:17:13: state 'done' is final; nothing is left to go on with, take 'resume' away",
+        "m.yaml:17:13: state 'done' is final; there is nothing to continue, remove 'resume'",
     ),
     ("        to: done", "        to: done\n        resume: up", "a transition has no 'resume'"),
     ("name: little", "resume: up", "a mission has no 'resume'"),

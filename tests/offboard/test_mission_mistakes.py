@@ -124,7 +124,7 @@ LEGS = dedent("""\
         (
             "initial: a",
             "initial: c",
-            "13:3: state 'a' is never reached; lead a transition to it",
+            "13:3: state 'a' is never reached; add a transition to it",
         ),
     ],
 )

@@ -10,9 +10,9 @@ import pytest
 
 from offboard.app import MissionEnd, Moment, fly_mission
 from offboard.drone import DroneError, VelocityCommand
-from offboard.eyes import CameraLostError
 from offboard.mission import Mission, load_mission
-from tests.offboard.fakes import START_1, TEST_CASE_1, GeometricEyes, KinematicDrone, crossings
+from offboard.perception import CameraLostError
+from tests.offboard.fakes import START_1, TEST_CASE_1, GeometricPerception, KinematicDrone, crossings
 
 MISSION = load_mission("frame_challenge")
 POSCTL = "POSCTL"
@@ -20,11 +20,11 @@ PLACES = ["take_off.set_base", "blue.go_to_center", "red.crossing", "green.going
 
 
 class Flight:
-    """A flight under the eyes of a pilot who acts at its moments."""
+    """A flight and a pilot who acts at some of its ticks."""
 
     def __init__(self, mission: Mission = MISSION, limit_s: float = 180.0) -> None:
         self.drone = KinematicDrone(*START_1)
-        self.eyes = GeometricEyes(self.drone, TEST_CASE_1)
+        self.perception = GeometricPerception(self.drone, TEST_CASE_1)
         self.mission = mission
         self.limit_s = limit_s
         self.moments: list[Moment] = []
@@ -67,7 +67,7 @@ class Flight:
 
     async def fly(self) -> MissionEnd:
         return await fly_mission(
-            self.drone, None, self.mission, limit_s=self.limit_s, observer=self._see, eyes=self.eyes
+            self.drone, self.perception, self.mission, limit_s=self.limit_s, observer=self._see
         )
 
     def _see(self, moment: Moment) -> None:
@@ -252,10 +252,10 @@ async def test_what_no_pilot_did_still_ends_the_flight():
 
 
 class Blinking:
-    """Eyes that lose the camera for a time."""
+    """Detections of a camera that is lost for a time."""
 
-    def __init__(self, eyes: GeometricEyes) -> None:
-        self.eyes = eyes
+    def __init__(self, perception: GeometricPerception) -> None:
+        self.perception = perception
         self.dead = False
 
     async def open(self) -> None:
@@ -267,16 +267,16 @@ class Blinking:
     def latest(self, time_us):
         if self.dead:
             raise CameraLostError("the camera is dead: no image for 1.1 s")
-        return self.eyes.latest(time_us)
+        return self.perception.latest(time_us)
 
 
 async def test_with_a_dead_camera_it_is_not_taken_back_until_the_camera_lives():
     flight = Flight().take("blue.turning")
-    flight.eyes = eyes = Blinking(flight.eyes)
-    flight.after_paused(1.0, lambda: setattr(eyes, "dead", True)).give(2.0)
+    flight.perception = perception = Blinking(flight.perception)
+    flight.after_paused(1.0, lambda: setattr(perception, "dead", True)).give(2.0)
     flight.when(
         lambda moment: moment.remark != "" and moment.state.mode == "HOLD",
-        lambda: setattr(eyes, "dead", False),
+        lambda: setattr(perception, "dead", False),
     )
     outcome = await flight.give(1.0).fly()
     assert outcome.ended == "finished"
@@ -298,7 +298,7 @@ async def test_on_the_ground_it_is_not_taken_back_and_each_time_that_is_said(cap
     assert outcome.ended == "timed out"
     assert flight.drone.calls.count("refuse") == 2
     assert [record.getMessage() for record in caplog.records if record.levelname == "WARNING"] == [
-        "the mission does not go on: the drone stands on the ground"
+        "the mission does not continue: the drone stands on the ground"
     ] * 2
     assert len(flight.drone.commands) == outcome.ticks - len(flight.paused)
 

@@ -6,9 +6,8 @@ from types import SimpleNamespace
 import pytest
 
 from offboard.drone import VelocityCommand
-from offboard.link import ticks
-from offboard.link.telemetry import TelemetryFeed
-from offboard.link.ticks import TickSource
+from offboard.link import telemetry
+from offboard.link.telemetry import TelemetryFeed, TickSource
 
 COMMAND = VelocityCommand(forward_m_s=0.5)
 
@@ -52,7 +51,7 @@ async def feed():
 
 async def test_time_that_waits_gives_every_tick_however_late_it_is_asked_for(feed):
     clock, source = Clock(feed), TickSource(feed)
-    source.grant(clock)
+    source.use_clock(clock)
     await source.begin()
     for number in (21, 22, 23):
         await asyncio.sleep(0.06)
@@ -65,9 +64,9 @@ async def test_time_that_waits_gives_every_tick_however_late_it_is_asked_for(fee
 
 
 async def test_a_tick_lost_on_the_link_is_counted_and_the_next_one_is_given(feed, monkeypatch):
-    monkeypatch.setattr(ticks, "LOST_S", 0.02)
+    monkeypatch.setattr(telemetry, "TICK_LOST_S", 0.02)
     source = TickSource(feed)
-    source.grant(Clock(feed, lost=(22, 23)))
+    source.use_clock(Clock(feed, lost=(22, 23)))
     await source.begin()
     assert await source.next(1.0) and await source.next(1.0)
     assert feed.sample.time_us == 24 * 50_000
@@ -75,9 +74,9 @@ async def test_a_tick_lost_on_the_link_is_counted_and_the_next_one_is_given(feed
 
 
 async def test_telemetry_that_never_comes_ends_the_waiting(feed, monkeypatch):
-    monkeypatch.setattr(ticks, "LOST_S", 0.001)
+    monkeypatch.setattr(telemetry, "TICK_LOST_S", 0.001)
     source = TickSource(feed)
-    source.grant(Clock(feed, lost=range(100)))
+    source.use_clock(Clock(feed, lost=range(100)))
     await source.begin()
     assert not await source.next(1.0)
 
@@ -101,3 +100,18 @@ async def test_time_that_does_not_wait_passes_ticks_over_and_counts_them_in_flig
         late.append(source.late)
     assert late == [0, 0, 0, 0, 2]
     assert not await source.next(0.01, COMMAND)
+
+
+async def test_a_cancellation_together_with_a_tick_is_not_lost():
+    """Otherwise a wait under a time limit never ends when its end and a tick coincide."""
+    for turns in range(4):
+        feed = TelemetryFeed()
+        waiting = asyncio.create_task(feed.next_tick(5.0))
+        await asyncio.sleep(0)
+        await asyncio.sleep(0)
+        feed._new_tick.set()
+        for _ in range(turns):
+            await asyncio.sleep(0)
+        cancelled = waiting.cancel()
+        await asyncio.wait({waiting})
+        assert waiting.cancelled() == cancelled

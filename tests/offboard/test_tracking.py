@@ -1,28 +1,37 @@
-"""A vehicle that lags, stays behind or drifts goes where its commands lead; one that obeys is left alone."""
+"""A vehicle that lags, is too slow or drifts is corrected; an ideal one gets its commands unchanged."""
 
-from math import cos, hypot, pi, remainder, sin
+from math import cos, exp, hypot, pi, remainder, sin
 
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from offboard.drone import DroneState, VelocityCommand
-from offboard.link.tracking import HELP_FROM_M, LEASH_M, MOST_M_S, MOST_RAD_S, CommandTracker
+from offboard.link.tracking import (
+    INITIAL_LAG_S,
+    MAX_CORRECTION_M_S,
+    MAX_CORRECTION_RAD_S,
+    MAX_LAG_S,
+    MAX_OFFSET_M,
+    MIN_OFFSET_M,
+    CommandTracker,
+    LagEstimate,
+)
 
 STEP_S = 0.05
 
 
 class Vehicle:
-    """Reaches a share of what it is told with a lag, and is carried off by a drift."""
+    """Reaches a share of the commanded velocity with a lag, and drifts."""
 
     def __init__(self, *, lag_s=0.25, share=1.0, drift=(0.0, 0.0, 0.0), yaw=0.4):
         self.lag_s, self.share, self.drift = lag_s, share, drift
-        self.time_us, self.place, self.yaw = 0, [0.0, 0.0, 1.0], yaw
+        self.time_us, self.position, self.yaw = 0, [0.0, 0.0, 1.0], yaw
         self.velocity, self.rate = [0.0, 0.0, 0.0], 0.0
 
     @property
     def state(self):
-        return DroneState(self.time_us, *self.place, self.yaw, tuple(self.velocity), True, True)
+        return DroneState(self.time_us, *self.position, self.yaw, tuple(self.velocity), True, True)
 
     def fly(self, command):
         for _ in range(10):
@@ -33,14 +42,14 @@ class Vehicle:
             gain = min(1.0, step_s / self.lag_s) if self.lag_s else 1.0
             for axis in range(3):
                 self.velocity[axis] += gain * (self.share * wanted[axis] - self.velocity[axis])
-                self.place[axis] += (self.velocity[axis] + self.drift[axis]) * step_s
+                self.position[axis] += (self.velocity[axis] + self.drift[axis]) * step_s
             self.rate += gain * (command.yaw_rate_rad_s - self.rate)
             self.yaw = remainder(self.yaw + self.rate * step_s, 2 * pi)
         self.time_us += round(STEP_S * 1e6)
 
 
 def fly(vehicle, commands, tracker=None):
-    """Fly each command for its seconds; what was sent."""
+    """Fly each command for its seconds; returns each command with what was sent."""
     tracker = tracker or CommandTracker()
     sent = []
     for command, seconds in commands:
@@ -50,25 +59,25 @@ def fly(vehicle, commands, tracker=None):
     return sent
 
 
-STAND = VelocityCommand()
+HOVER = VelocityCommand()
 AHEAD = VelocityCommand(forward_m_s=0.3)
 
 
 @pytest.mark.parametrize("lag_s", [0.0, 0.15, 0.3])
-def test_a_vehicle_that_obeys_gets_its_commands_unchanged(lag_s):
+def test_an_ideal_vehicle_gets_its_commands_unchanged(lag_s):
     commands = [
         (VelocityCommand(up_m_s=0.5), 3.0),
         (VelocityCommand(forward_m_s=1.0), 4.0),
-        (STAND, 3.0),
+        (HOVER, 3.0),
         (VelocityCommand(left_m_s=-0.1, yaw_rate_rad_s=0.2), 3.0),
         (VelocityCommand(yaw_rate_rad_s=1.0), 5.0),
-        (STAND, 2.0),
+        (HOVER, 2.0),
     ]
     sent = fly(Vehicle(lag_s=lag_s), commands)
     assert all(got is wanted for wanted, got in sent)
 
 
-def test_a_vehicle_that_stays_behind_still_goes_the_whole_way():
+def test_a_vehicle_that_is_too_slow_still_flies_the_whole_distance():
     """As PX4 under velocity setpoints: it flies half of 0.3 m/s for the first seconds."""
     slow = {"lag_s": 0.8, "share": 0.6, "yaw": 0.0}
     alone, helped = Vehicle(**slow), Vehicle(**slow)
@@ -76,20 +85,20 @@ def test_a_vehicle_that_stays_behind_still_goes_the_whole_way():
         alone.fly(AHEAD)
     tracker = CommandTracker()
     fly(helped, [(AHEAD, 4.0)], tracker)
-    assert tracker.helps
-    assert alone.place[0] < 0.65
-    assert helped.place[0] > 0.85
-    fly(helped, [(STAND, 4.0)], tracker)
-    assert helped.place[0] == pytest.approx(1.2, abs=0.1)
+    assert tracker.active
+    assert alone.position[0] < 0.65
+    assert helped.position[0] > 0.85
+    fly(helped, [(HOVER, 4.0)], tracker)
+    assert helped.position[0] == pytest.approx(1.2, abs=0.1)
 
 
 @pytest.mark.parametrize("lag_s", [0.6, 0.7])
-def test_a_late_vehicle_answers_quickly_once_it_is_known(lag_s):
-    """Its lag is learned from its own answers, and sent ahead of."""
+def test_a_vehicle_with_lag_follows_quickly_once_the_lag_is_measured(lag_s):
+    """Its lag is measured and compensated."""
     alone, helped, tracker = Vehicle(lag_s=lag_s, yaw=0.0), Vehicle(lag_s=lag_s, yaw=0.0), CommandTracker()
     turn = VelocityCommand(yaw_rate_rad_s=0.5)
-    fly(helped, [(VelocityCommand(forward_m_s=1.0), 2.0), (STAND, 2.0), (turn, 2.0), (STAND, 2.0)], tracker)
-    assert tracker.helps
+    fly(helped, [(VelocityCommand(forward_m_s=1.0), 2.0), (HOVER, 2.0), (turn, 2.0), (HOVER, 2.0)], tracker)
+    assert tracker.active
     alone.yaw = helped.yaw
     wanted = VelocityCommand(forward_m_s=0.3, yaw_rate_rad_s=0.3)
     fly(helped, [(wanted, 0.4)], tracker)
@@ -105,44 +114,44 @@ def test_a_late_vehicle_answers_quickly_once_it_is_known(lag_s):
 @settings(max_examples=30)
 def test_a_drifting_vehicle_is_held(drift):
     vehicle = Vehicle(lag_s=0.8, drift=drift)
-    fly(vehicle, [(STAND, 20.0)])
-    off_m = hypot(vehicle.place[0], vehicle.place[1], vehicle.place[2] - 1.0)
-    assert off_m < HELP_FROM_M + 0.02 + hypot(*drift)
+    fly(vehicle, [(HOVER, 20.0)])
+    off_m = hypot(vehicle.position[0], vehicle.position[1], vehicle.position[2] - 1.0)
+    assert off_m < MIN_OFFSET_M + 0.02 + hypot(*drift)
     if hypot(*drift) > 0.05:
         assert hypot(*(v + d for v, d in zip(vehicle.velocity, drift, strict=True))) < 0.02
 
 
 @given(st.floats(-pi, pi), st.lists(st.tuples(*[st.floats(-1, 1)] * 4), min_size=1, max_size=8))
 @settings(max_examples=50)
-def test_the_help_is_bounded_and_finite(yaw, wishes):
+def test_the_correction_is_bounded_and_finite(yaw, commands):
     vehicle = Vehicle(lag_s=1.0, share=0.5, drift=(0.3, -0.3, 0.2), yaw=yaw)
-    for wanted, got in fly(vehicle, [(VelocityCommand(*wish), 1.0) for wish in wishes]):
+    for wanted, got in fly(vehicle, [(VelocityCommand(*each), 1.0) for each in commands]):
         added = (
             got.forward_m_s - wanted.forward_m_s,
             got.left_m_s - wanted.left_m_s,
             got.up_m_s - wanted.up_m_s,
         )
-        assert hypot(*added) <= MOST_M_S + 1e-9
-        assert abs(got.yaw_rate_rad_s - wanted.yaw_rate_rad_s) <= MOST_RAD_S + 1e-9
+        assert hypot(*added) <= MAX_CORRECTION_M_S + 1e-9
+        assert abs(got.yaw_rate_rad_s - wanted.yaw_rate_rad_s) <= MAX_CORRECTION_RAD_S + 1e-9
 
 
-def test_a_vehicle_held_down_does_not_wind_the_place_up():
+def test_a_vehicle_held_down_does_not_wind_the_offset_up():
     """On the ground, while PX4 spools up: afterwards it does not shoot past the goal."""
     tracker, vehicle = CommandTracker(), Vehicle(lag_s=0.0, share=0.0)
     fly(vehicle, [(VelocityCommand(up_m_s=0.5), 5.0)], tracker)
     vehicle.share, vehicle.lag_s = 1.0, 0.3
-    fly(vehicle, [(STAND, 8.0)], tracker)
-    assert 1.0 < vehicle.place[2] <= 1.0 + LEASH_M + 0.05
+    fly(vehicle, [(HOVER, 8.0)], tracker)
+    assert 1.0 < vehicle.position[2] <= 1.0 + MAX_OFFSET_M + 0.05
 
 
-def test_after_a_gap_the_vehicle_is_taken_from_where_it_is():
+def test_after_a_gap_the_model_starts_again_at_the_vehicle():
     tracker, vehicle = CommandTracker(), Vehicle()
-    fly(vehicle, [(STAND, 1.0)], tracker)
-    vehicle.place[0] += 0.4
+    fly(vehicle, [(HOVER, 1.0)], tracker)
+    vehicle.position[0] += 0.4
     vehicle.time_us += 1_000_000
-    assert tracker.correct(STAND, vehicle.state) == STAND
-    vehicle.fly(STAND)
-    assert tracker.correct(STAND, vehicle.state) == STAND
+    assert tracker.correct(HOVER, vehicle.state) == HOVER
+    vehicle.fly(HOVER)
+    assert tracker.correct(HOVER, vehicle.state) == HOVER
 
 
 def test_without_time_nothing_moves():
@@ -151,17 +160,53 @@ def test_without_time_nothing_moves():
         assert tracker.correct(AHEAD, vehicle.state) == AHEAD
 
 
-def test_what_is_off_beside_the_way_is_forgotten_and_along_it_is_not():
-    """The mission steers by sight: pushed back to the old way, the vehicle would come past its aim."""
+def test_the_offset_across_the_command_is_forgotten_and_along_it_is_not():
+    """The mission steers by the camera: pushed back to its old line, the vehicle would miss its aim."""
     tracker, vehicle = CommandTracker(), Vehicle(yaw=0.0)
-    fly(vehicle, [(STAND, 1.0)], tracker)
-    vehicle.place[0] -= 0.3
-    vehicle.place[1] += 0.3
+    fly(vehicle, [(HOVER, 1.0)], tracker)
+    vehicle.position[0] -= 0.3
+    vehicle.position[1] += 0.3
     sent = [tracker.correct(AHEAD, vehicle.state)]
     for _ in range(80):
         vehicle.time_us += 50_000
-        vehicle.place[0] += AHEAD.forward_m_s * STEP_S  # goes on, parallel to the way
+        vehicle.position[0] += AHEAD.forward_m_s * STEP_S  # continues, parallel to the command
         sent.append(tracker.correct(AHEAD, vehicle.state))
     assert sent[0].left_m_s < -0.1
     assert sent[-1].left_m_s == pytest.approx(0.0, abs=0.02)
     assert sent[-1].forward_m_s > AHEAD.forward_m_s + 0.1
+
+
+def watch(estimate, lag_s, commanded, seconds=20.0):
+    """Show an estimate a vehicle of first order, commanded by `commanded(time)`."""
+    speed = 0.0
+    for tick in range(round(seconds / STEP_S)):
+        wanted = commanded(tick * STEP_S)
+        speed = wanted + exp(-STEP_S / lag_s) * (speed - wanted)
+        estimate.update(wanted, speed, STEP_S)
+    return estimate.lag_s
+
+
+def steps(time_s):
+    return 0.5 if time_s % 4.0 < 2.0 else -0.2
+
+
+@pytest.mark.parametrize("lag_s", [0.1, 0.2, 0.4, 0.6])
+@pytest.mark.parametrize("commanded", [steps, lambda time_s: 0.4 * sin(2.0 * time_s)])
+def test_the_lag_is_measured(lag_s, commanded):
+    assert watch(LagEstimate(0.1), lag_s, commanded) == pytest.approx(lag_s, abs=0.05)
+
+
+def test_the_lag_is_the_initial_one_before_a_change_and_noise_is_no_change():
+    estimate = LagEstimate(0.1)
+    assert estimate.lag_s == INITIAL_LAG_S
+    for tick in range(200):
+        estimate.update(0.3, 0.04 * (-1) ** tick, STEP_S)
+    assert estimate.lag_s == INITIAL_LAG_S
+
+
+def test_the_lag_is_bounded():
+    assert watch(LagEstimate(0.1), 2.0, lambda _: 1.0) == MAX_LAG_S
+    ahead = LagEstimate(0.1)
+    for tick in range(100):
+        ahead.update(0.0, 0.02 * tick, STEP_S)  # speeds up without a command
+    assert ahead.lag_s == 0.0

@@ -13,6 +13,7 @@ from pymavlink import mavutil
 from offboard.app import fly_mission
 from offboard.mavsdk_drone import MavsdkDrone
 from offboard.mission import load_mission
+from tests.offboard.fakes import NoCamera
 from tests.realtime.conftest import Peer
 
 mavlink = mavutil.mavlink
@@ -115,7 +116,7 @@ async def test_a_pilot_takes_the_drone_flies_it_aside_and_gives_it_back(sim, ins
         await asyncio.to_thread(station.wait, "LOCAL_POSITION_NED")
         pilot = asyncio.create_task(asyncio.to_thread(take_and_give_back, station, moments, landed))
         drone = MavsdkDrone(f"udpin://127.0.0.1:{14540 + instance}")
-        outcome = await fly_mission(drone, None, load_mission(str(path)), observer=moments.append)
+        outcome = await fly_mission(drone, NoCamera(), load_mission(str(path)), observer=moments.append)
         landed.set()
         await pilot
     finally:

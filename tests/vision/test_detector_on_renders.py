@@ -9,12 +9,12 @@ from geometry.vectors import Quaternion, Vec3
 from scenarios.models import Base, Frame, Scenario
 from sitl.camera import Camera
 from vision.detector import detect
-from vision.intrinsics import camera_matrix, focal_length_px
+from vision.intrinsics import camera_matrix
 from vision.types import Detection
 
 FRAME = Frame(colour="green", x_m=0, y_m=0, z_m=1.5, yaw_rad=0.4)
 SCENARIO = Scenario(name="one", frames=(FRAME,), base=Base(x_m=4.5, y_m=4.5))
-FOCAL_PX = focal_length_px(320, 1.57)
+FOCAL_PX = camera_matrix(320, 240, 1.57)[0, 0]
 
 
 def look(distance: float, turn: float = 0.0, up: float = 0.0) -> tuple[Vec3, Quaternion]:

@@ -13,12 +13,9 @@ import numpy as np
 import pytest
 from aiohttp import web
 
-from vision.capture_source import CaptureSource
-from vision.folder_source import FolderSource
-from vision.http_source import HttpSource
-from vision.latest import Latest, shown
-from vision.sources import CameraError, open_source
-from vision.types import CameraFrame, Image
+from vision.http_source import HttpSource, Latest
+from vision.sources import CaptureSource, FolderSource, open_source
+from vision.types import CameraError, CameraFrame, Image, shown_url
 
 MULTIPART = {"Content-Type": "multipart/x-mixed-replace; boundary=cut"}
 Write = Callable[[bytes], Awaitable[None]]
@@ -421,9 +418,9 @@ def test_open_source_says_what_it_cannot_find(text: str) -> None:
 
 
 def test_a_password_is_never_shown() -> None:
-    assert shown("rtsp://me:secret@host/x") == "rtsp://me:***@host/x"
-    assert shown("http://host/\r\nevil") == "http://host/\\r\\nevil"
-    assert shown("http://[broken") == "http://[broken"
+    assert shown_url("rtsp://me:secret@host/x") == "rtsp://me:***@host/x"
+    assert shown_url("http://host/\r\nevil") == "http://host/\\r\\nevil"
+    assert shown_url("http://[broken") == "http://[broken"
 
 
 async def test_latest_keeps_one_item_and_ends() -> None:

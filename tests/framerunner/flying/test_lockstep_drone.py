@@ -10,7 +10,7 @@ from firmware_py.status import CommandResult, FlightMode
 from framerunner.flying.lockstep import LockstepEyes
 from framerunner.flying.lockstep_drone import TICK_US, LockstepDrone
 from offboard.drone import DroneError, VelocityCommand
-from offboard.eyes import CameraLostError
+from offboard.perception import CameraLostError
 from scenarios.loader import load_scenario
 from sitl.simulation import Simulation
 

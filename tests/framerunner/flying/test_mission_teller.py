@@ -15,7 +15,7 @@ from offboard.drone import DroneState, VelocityCommand
 from offboard.engine import TransitionTaken
 from offboard.mission import load_mission, mermaid
 from scenarios.result import FlightResult
-from tests.offboard.fakes import START_1, TEST_CASE_1, GeometricEyes, KinematicDrone
+from tests.offboard.fakes import START_1, TEST_CASE_1, GeometricPerception, KinematicDrone
 from vision.types import CameraFrame, Detection, Detections
 from wire.mission_codec import DocumentAssembler
 from wire.mission_messages import DocumentKind
@@ -31,22 +31,22 @@ class Listener:
     def __init__(self):
         self.states, self.detections, self.texts, self.documents, self.farewells = [], [], [], [], []
 
-    def tell_state(self, state):
+    def send_state(self, state):
         self.states.append(state)
 
-    def tell_detections(self, detections):
+    def send_detections(self, detections):
         self.detections.append(detections)
 
-    def say(self, text):
+    def send_text(self, text):
         self.texts.append(text)
 
-    def tell_document(self, kind, pieces):
+    def send_document(self, kind, pieces):
         assembler = DocumentAssembler()
         (document,) = [document for piece in pieces if (document := assembler.take(piece))]
         assert document.kind == kind
         self.documents.append(document)
 
-    async def farewell(self, kind):
+    async def send_finally(self, kind):
         self.farewells.append(kind)
 
     def contents(self, kind):
@@ -211,7 +211,7 @@ async def test_a_result_that_cannot_be_told_is_passed_over(caplog):
 
 def test_a_fault_in_telling_does_not_reach_the_flight(caplog):
     listener, teller = make_teller()
-    listener.say = lambda text: 1 / 0
+    listener.send_text = lambda text: 1 / 0
     told = len(listener.states)
     with caplog.at_level(logging.WARNING):
         for tick in range(5):
@@ -231,8 +231,8 @@ async def test_a_whole_flight_is_told_in_order():
         seen.append((moment.state.time_us, moment.mission_state))
         teller.see(moment)
 
-    eyes = GeometricEyes(drone, TEST_CASE_1)
-    outcome = await fly_mission(drone, None, MISSION, observer=observe, eyes=eyes)
+    perception = GeometricPerception(drone, TEST_CASE_1)
+    outcome = await fly_mission(drone, perception, MISSION, observer=observe)
     assert outcome.ended == "finished"
     changes = [now for now, before in zip(seen, [(0, ""), *seen], strict=False) if now[1] != before[1]]
     assert listener.texts == [f"mission: {state}" for _, state in changes]

@@ -1,4 +1,4 @@
-"""The process that decodes images of unknown origin: it can be ended, and it goes with its parent."""
+"""The process that decodes images of unknown origin: it can be ended, and it ends with its parent."""
 
 import asyncio
 import contextlib
@@ -14,8 +14,7 @@ import pytest
 from tests.vision.hostile_images import progressive_of_many_scans
 from vision.decoder import ImageDecoder
 from vision.jpeg import ImageError
-from vision.worker_process import WorkerEndedError, WorkerProcess
-from vision.worker_protocol import Reply, Request
+from vision.worker import Reply, Request, WorkerEndedError, WorkerProcess
 
 IMAGE = np.arange(30 * 40 * 3, dtype=np.uint8).reshape(30, 40, 3)
 PNG = bytes(cv2.imencode(".png", IMAGE)[1])
@@ -39,9 +38,9 @@ async def test_images_come_back_in_order() -> None:
     worker = WorkerProcess()
     try:
         for _ in range(3):
-            answer = await worker.ask(Request.DECODE, PNG)
+            answer = await worker.request(Request.DECODE, PNG)
             assert np.array_equal(answer.image, IMAGE)
-            assert (await worker.ask(Request.DECODE, b"garbage")).reply is Reply.NO_IMAGE
+            assert (await worker.request(Request.DECODE, b"garbage")).reply is Reply.NO_IMAGE
     finally:
         worker.end()
 
@@ -76,8 +75,8 @@ async def test_a_process_that_dies_is_replaced() -> None:
         await worker.start()
         os.kill(worker.pid, signal.SIGKILL)
         with pytest.raises(WorkerEndedError):
-            await worker.ask(Request.DECODE, PNG)
-        assert np.array_equal((await worker.ask(Request.DECODE, PNG)).image, IMAGE)
+            await worker.request(Request.DECODE, PNG)
+        assert np.array_equal((await worker.request(Request.DECODE, PNG)).image, IMAGE)
     finally:
         worker.end()
 
@@ -97,13 +96,12 @@ async def test_closing_ends_a_process_at_work() -> None:
 
 PARENT = """
 import asyncio, sys
-from vision.worker_process import WorkerProcess
-from vision.worker_protocol import Request
+from vision.worker import Request, WorkerProcess
 async def main():
     worker = WorkerProcess()
     await worker.start()
     print(worker.pid, flush=True)
-    await worker.ask(Request.DECODE, sys.stdin.buffer.read())
+    await worker.request(Request.DECODE, sys.stdin.buffer.read())
 asyncio.run(main())
 """
 
