@@ -16,7 +16,7 @@ from monitor.tries import TryEvent
 from monitor.vehicle.camera import host_of
 from monitor.vehicle.orders import OWN_SYSTEM
 from monitor.vehicle.vehicle import Vehicle, VehicleCallbacks
-from wire.vehicles import ground_station_heartbeat, is_vehicle
+from wire.dialect import ground_station_heartbeat, is_vehicle
 
 _TICK_S = 0.1
 _BEAT_S = 1.0

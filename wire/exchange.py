@@ -1,14 +1,100 @@
-"""One MAVLink system on its links: what comes in and is believed, what is forwarded, what is sent."""
+"""One MAVLink system on its links: it receives, authenticates, forwards and sends packets.
+
+Forwarding is PX4's, as its SITL has it on both links: a packet to everyone is forwarded to all other links
+where a component was heard, one to a system or component to the links where that was heard. What is for this
+vehicle alone is not forwarded. Different from PX4: a packet is not forwarded to a link on which its sender
+was heard too, so that a router on two links makes no endless loop, and a component that is silent for a
+minute is forgotten.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 
 from wire.dialect import AUTOPILOT_COMPONENT_ID, BROADCAST, Message, mavlink
-from wire.forwarding import Router
 from wire.framing import Packet, source_of
 from wire.link import Link, LinkProfile
 from wire.signing import Signing
+
+_FORGOTTEN_US = 60_000_000
+_CAPACITY = 64  # components in all; beyond, the one silent for longest is forgotten
+_REFRESH_US = 1_000_000
+_NEVER_FORWARDED = (
+    mavlink.MAVLINK_MSG_ID_SETUP_SIGNING,  # it carries the key
+    mavlink.MAVLINK_MSG_ID_RADIO_STATUS,  # about its own link
+)
+
+Component = tuple[int, int]  # system id, component id
+
+
+class Router:
+    """Remembers which component was heard on which link.
+
+    Args:
+        is_own: whether a system id and component id are this vehicle's own.
+    """
+
+    def __init__(self, is_own: Callable[[int, int], bool]) -> None:
+        self._is_own = is_own
+        self._heard_us: dict[tuple[str, Component], int] = {}
+
+    def hear(self, link: str, source: Component, time_us: int) -> None:
+        """Note that a component was heard on a link."""
+        key = (link, source)
+        heard_us = self._heard_us.get(key)
+        if heard_us is not None and time_us - heard_us < _REFRESH_US:
+            return
+        if heard_us is None:
+            self._make_room(time_us)
+        self._heard_us[key] = time_us
+
+    def forget_link(self, link: str) -> None:
+        """Forget all components of a link that was removed."""
+        self._heard_us = {key: heard for key, heard in self._heard_us.items() if key[0] != link}
+
+    def destinations(self, link: str, source: Component, message: Message, time_us: int) -> list[str]:
+        """The links to which a packet is forwarded.
+
+        Args:
+            link: on which it was received.
+            source: its sender.
+            message: its content; an unknown message has no known target, so it is for everyone.
+            time_us: vehicle time.
+        """
+        if len(self._heard_us) < 2 or message.get_msgId() in _NEVER_FORWARDED:
+            return []
+        target = (
+            getattr(message, "target_system", BROADCAST),
+            getattr(message, "target_component", BROADCAST),
+        )
+        if self._is_own(*target):
+            return []
+        with_target: dict[str, None] = {}  # in the order in which they were heard
+        with_sender = {link}
+        for (name, component), heard_us in self._heard_us.items():
+            if time_us - heard_us > _FORGOTTEN_US:
+                continue
+            if component == source:
+                with_sender.add(name)
+            elif _is_target(component, target):
+                with_target[name] = None
+        return [name for name in with_target if name not in with_sender]
+
+    def _make_room(self, time_us: int) -> None:
+        heard = self._heard_us
+        if len(heard) < _CAPACITY:
+            return
+        for key in [key for key, heard_us in heard.items() if time_us - heard_us > _FORGOTTEN_US]:
+            del heard[key]
+        if len(heard) >= _CAPACITY:
+            del heard[min(heard, key=heard.__getitem__)]
+
+
+def _is_target(component: Component, target: Component) -> bool:
+    system_id, component_id = target
+    if system_id == BROADCAST:
+        return True
+    return component[0] == system_id and component_id in (BROADCAST, component[1])
 
 
 class Exchange:
@@ -21,25 +107,11 @@ class Exchange:
         boot_unix_us: see below.
 
     Attributes:
-        links: by name; they come and go, so keep a `Link`, or look a name up each time and expect it gone.
-        system_id: of this system.
+        links: by name; they are added and removed, so a name may be missing later.
         time_us: vehicle time of the last update.
-        boot_unix_us: time of boot, microseconds since 1970; 0: not known. Whoever learns it sets it.
-        signing: of all links.
-        refused_packets: sound packets that were not believed for want of a signature.
+        boot_unix_us: time of boot, microseconds since 1970; 0: not known. A service that receives it sets it.
+        refused_packets: valid packets that were refused because their signature is wrong or missing.
     """
-
-    __slots__ = (
-        "_component_ids",
-        "_link_number",
-        "_router",
-        "boot_unix_us",
-        "links",
-        "refused_packets",
-        "signing",
-        "system_id",
-        "time_us",
-    )
 
     def __init__(
         self,
@@ -64,29 +136,25 @@ class Exchange:
         return self.boot_unix_us + self.time_us if self.boot_unix_us else 0
 
     def add_link(self, profile: LinkProfile) -> None:
-        """Speak on one more link, from the next update on.
-
-        Args:
-            profile: with a name that no other link has.
-        """
+        """Use one more link, with a name that no other link has, from the next update on."""
         self.links[profile.name] = Link(profile, self.signing, self._link_number)
         self._link_number = (self._link_number + 1) % 256
 
     def remove_link(self, name: str) -> None:
-        """Speak no more on a link; what somebody still sends there is lost."""
+        """Stop using a link; what is still sent there is lost."""
         link = self.links.pop(name, None)
         if link is not None:
             link.open = False
             self._router.forget_link(name)
 
     def advance(self, time_us: int) -> None:
-        """Set vehicle time, microseconds since boot; it never goes back."""
+        """Set vehicle time, microseconds since boot; it never decreases."""
         self.time_us = time_us
         if self.signing.active:
             self.signing.advance(time_us)
 
     def receive(self, link: Link, max_steps: int) -> Iterator[Message]:
-        """Messages that came in on a link and are believed, each forwarded where it is also meant to go.
+        """The messages received and accepted on a link; each is also forwarded to its other targets.
 
         Args:
             link: whose reader has the bytes.
@@ -96,20 +164,20 @@ class Exchange:
         for message in link.reader.read(max_steps):
             packet = message.get_msgbuf()
             sender = source_of(packet)
-            if self._is_own(*sender):  # our own packet has come back, or somebody uses our ids
+            if self._is_own(*sender):  # our own packet in a loop, or another sender with our ids
                 continue
             if not self.signing.accepts(packet, trusted=link.profile.trusted):
                 self.refused_packets += 1
                 continue
             sequence = packet[2 if packet[0] == mavlink.PROTOCOL_MARKER_V1 else 4]
-            link.traffic.hear(sender, sequence, len(packet))
+            link.traffic.receive(sender, sequence, len(packet))
             self._router.hear(name, sender, self.time_us)
             for other in self._router.destinations(name, sender, message, self.time_us):
                 self.links[other].forward(packet)
             yield message
 
     def take_output(self) -> list[tuple[str, bytes]]:
-        """What is to be sent, as (link name, datagram); a datagram holds one or more whole packets."""
+        """The datagrams to send, each with its link's name; a datagram has one or more whole packets."""
         return [(name, data) for name, link in self.links.items() for data in link.take()]
 
     def packet(self, message: Message, component_id: int = AUTOPILOT_COMPONENT_ID) -> Packet:
@@ -133,8 +201,8 @@ class Exchange:
 
         Args:
             message: with target_system and target_component.
-            or_everyone: whether target system 0 counts too; PX4 takes that for few messages only.
-            component_id: which component asks.
+            or_everyone: whether target system 0 counts too, as PX4 has it for few messages.
+            component_id: of which component.
         """
         system_fits = message.target_system == self.system_id or (
             or_everyone and message.target_system == BROADCAST

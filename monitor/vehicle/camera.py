@@ -8,11 +8,10 @@ from ipaddress import IPv4Address, IPv6Address, ip_address
 from urllib.parse import SplitResult, urlsplit
 
 from monitor.ports import Message
-from wire.dialect import mavlink
+from wire.dialect import mavlink, request_message
 from wire.simulator_api import VIDEO_PATH
 from wire.status_text import plain
 from wire.transports.urls import LinkError, parse_url
-from wire.vehicles import request_message
 
 CAMERAS = range(mavlink.MAV_COMP_ID_CAMERA, mavlink.MAV_COMP_ID_CAMERA6 + 1)
 _ASK_EVERY_S = 2.0

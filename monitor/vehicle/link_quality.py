@@ -5,11 +5,10 @@ from __future__ import annotations
 from collections import deque
 from dataclasses import dataclass
 
-from wire.dialect import Message, mavlink
-from wire.vehicles import request_message, request_rate
+from wire.dialect import Message, mavlink, request_message, request_rate
+from wire.framing import missing_before
 
 _SPAN_S = 10
-_LATE = 200  # a sequence number that jumps farther belongs to a packet that was overtaken
 
 STALE_S = 1.0
 LOST_S = 3.0
@@ -53,11 +52,10 @@ class LinkQuality:
             self._seconds.append(second)
         second.heard += 1
         if self._sequence is not None:
-            missing = (sequence - self._sequence - 1) & 0xFF
-            if missing > _LATE:
-                second.lost -= 1  # counted as missing before, and here it is
+            missing = missing_before(sequence, self._sequence)
+            second.lost += missing  # -1: counted as missing before, and received now
+            if missing < 0:
                 return
-            second.lost += missing
         self._sequence = sequence
 
     def forget_sequence(self) -> None:

@@ -10,10 +10,9 @@ from math import nan
 from typing import Protocol
 
 from wire import px4_modes
-from wire.dialect import Message, mavlink
+from wire.dialect import Message, command_long, mavlink
 from wire.px4_modes import Px4Mode
 from wire.vehicle_telemetry import VehicleTelemetry
-from wire.vehicles import command_long
 
 OWN_SYSTEM = 250
 _ANSWER_S = 0.5

@@ -9,7 +9,7 @@ from typing import Any
 from monitor.ports import Message
 from monitor.vehicle.orders import is_warning
 from wire.dialect import mavlink
-from wire.mission_messages import COMPONENT_ID as APP
+from wire.mission_tunnel import COMPONENT_ID as APP
 from wire.status_text import Text, TextAssembler
 
 _KEPT = 16

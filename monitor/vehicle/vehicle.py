@@ -24,7 +24,7 @@ from monitor.vehicle.speech import Speech
 from scenarios.models import Scenario
 from scenarios.result import Standing
 from wire.dialect import AUTOPILOT_COMPONENT_ID, mavlink
-from wire.mission_messages import COMPONENT_ID as APP
+from wire.mission_tunnel import COMPONENT_ID as APP
 from wire.simulator_api import SimulatorApi
 from wire.vehicle_telemetry import VehicleTelemetry
 

@@ -8,9 +8,9 @@ import threading
 import pytest
 from pymavlink.dialects.v20 import common as mavlink
 
+from wire.dialect import companion_heartbeat, is_vehicle, request_message
 from wire.transports.urls import LinkError
 from wire.transports.vehicle_link import VehicleLink
-from wire.vehicles import companion_heartbeat, is_vehicle, request_message
 
 
 def free_port(kind=socket.SOCK_DGRAM):

@@ -20,7 +20,8 @@ from firmware_py.mavlink.camera.model import (
     CountingSink,
     VideoStream,
 )
-from firmware_py.mavlink.service import Command, Service, SevenParams
+from firmware_py.mavlink.service import Command, Service
+from firmware_py.missions.flight import SevenParams
 from firmware_py.status import CommandResult
 from geometry.vectors import Vec3
 from wire.dialect import Message, mavlink

@@ -6,10 +6,9 @@ from math import nan
 
 from firmware_py.autopilot import Autopilot
 from firmware_py.mavlink.camera.model import CameraModel, PictureSpace, VideoEncoding, VideoStream
-from firmware_py.mavlink.scaling import boot_ms, degrees_e7, millimetres
-from firmware_py.mavlink.telemetry.identity import OWN_VERSION
+from firmware_py.mavlink.telemetry.connection import OWN_VERSION
 from firmware_py.status import FlightMode
-from wire.dialect import Message, mavlink
+from wire.dialect import Message, boot_ms, degrees_e7, mavlink, millimetres
 from wire.exchange import Exchange
 
 _FLAGS = mavlink.CAMERA_CAP_FLAGS_CAPTURE_IMAGE

@@ -7,7 +7,7 @@ from enum import Enum
 from math import tan
 from typing import Protocol
 
-from firmware_py.mavlink.service import SevenParams
+from firmware_py.missions.flight import SevenParams
 from firmware_py.status import CommandResult
 
 CAMERA_COMPONENT_ID = 100  # MAV_COMP_ID_CAMERA

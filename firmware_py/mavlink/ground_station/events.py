@@ -25,11 +25,10 @@ from firmware_py.mavlink.ground_station.event_definitions import (
     Part,
     event_of,
 )
-from firmware_py.mavlink.scaling import boot_ms
 from firmware_py.mavlink.service import Command, Service
 from firmware_py.status import CommandResult, FlightMode
 from firmware_py.types import StatusText
-from wire.dialect import Message, mavlink
+from wire.dialect import Message, boot_ms, mavlink
 from wire.exchange import Exchange
 from wire.link import Link
 
@@ -159,7 +158,7 @@ class EventService(Service):
         self.handlers = {mavlink.MAVLINK_MSG_ID_REQUEST_EVENT: self._resend}
         self.commands = {mavlink.MAV_CMD_RUN_PREARM_CHECKS: self._run_checks}
 
-    def tell(self, text: StatusText) -> bool:
+    def send_text(self, text: StatusText) -> bool:
         """Send the event that says the same as a text, if there is one.
 
         Returns:

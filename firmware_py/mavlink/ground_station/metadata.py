@@ -22,10 +22,9 @@ from firmware_py.mavlink.ground_station.event_definitions import (
     enums,
     navigation_mode_groups,
 )
-from firmware_py.mavlink.scaling import boot_ms
 from firmware_py.mavlink.service import Service
 from firmware_py.parameters import DECLARATIONS, Parameter, Parameters
-from wire.dialect import Message, mavlink
+from wire.dialect import Message, boot_ms, mavlink
 from wire.exchange import Exchange
 
 FOLDER = "etc/extras"

@@ -9,10 +9,9 @@ from __future__ import annotations
 from math import atan2, degrees, hypot
 
 from firmware_py.autopilot import Autopilot
-from firmware_py.mavlink.scaling import degrees_e7, whole
 from firmware_py.mavlink.service import Service
 from firmware_py.status import LandedState, VehicleStatus
-from wire.dialect import BROADCAST, Message, mavlink
+from wire.dialect import BROADCAST, Message, degrees_e7, mavlink, whole
 from wire.exchange import Exchange
 
 _NO_IDENTITY = [0] * 20

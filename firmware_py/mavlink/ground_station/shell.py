@@ -15,7 +15,7 @@ from math import degrees
 
 from firmware_py.autopilot import Autopilot
 from firmware_py.mavlink.service import Service
-from firmware_py.mavlink.telemetry.identity import FOLLOWED_PX4_VERSION, OWN_VERSION
+from firmware_py.mavlink.telemetry.connection import FOLLOWED_PX4_VERSION, OWN_VERSION
 from firmware_py.parameters import ParameterError
 from wire.dialect import BROADCAST, Message, mavlink
 from wire.exchange import Exchange

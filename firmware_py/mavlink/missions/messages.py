@@ -11,7 +11,6 @@ from dataclasses import dataclass
 from math import isfinite, isinf, isnan, nan
 from struct import pack
 
-from firmware_py.mavlink.scaling import whole
 from firmware_py.missions.geofence import MIN_VERTICES, vertex_count
 from firmware_py.missions.items import (
     CIRCLES,
@@ -27,7 +26,7 @@ from firmware_py.missions.items import (
     MissionItem,
     PlanType,
 )
-from wire.dialect import Message, mavlink
+from wire.dialect import Message, mavlink, whole
 
 _NOT_GIVEN = 0x7FFF_FFFF  # x or y of MISSION_ITEM_INT
 _REGIONS = frozenset({Do.NAV_ROI, Do.SET_ROI})

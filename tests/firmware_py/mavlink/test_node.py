@@ -2,8 +2,8 @@
 
 import pytest
 
-from firmware_py.mavlink.rates import GROUND, ONBOARD
 from firmware_py.mavlink.service import merged
+from firmware_py.mavlink.telemetry.streams import GROUND, ONBOARD
 from tests.node_input import deliver
 from wire.dialect import mavlink
 

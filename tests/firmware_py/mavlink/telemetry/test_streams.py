@@ -4,13 +4,13 @@ from math import cos, inf, nan, pi, sin
 import pytest
 
 from firmware_py.mavlink.node import MavlinkNode
-from firmware_py.mavlink.rates import GROUND, ONBOARD
 from firmware_py.mavlink.telemetry.sensing import (
     EARTH_FIELD_NED_GAUSS,
     earth_field_frd_gauss,
     pressure_hpa,
     temperature_k,
 )
+from firmware_py.mavlink.telemetry.streams import GROUND, ONBOARD
 from firmware_py.setpoints import AttitudeSetpoint, TrajectorySetpoint
 from firmware_py.status import FlightMode, LandedState, VehicleStatus
 from firmware_py.types import (
@@ -302,3 +302,11 @@ def test_every_source_names_its_own_message(autopilot, peer):
     }
     assert len(made) > 35
     assert all(message_id == made_id for message_id, made_id in made.items())
+
+
+@pytest.mark.parametrize(("system", "heard"), [(1, True), (2, False)])
+def test_the_origin_can_be_told(autopilot, peer, system, heard):
+    peer.send(mavlink.MAVLink_set_gps_global_origin_message(system, 473977420, 85455940, 488000))
+    assert bool(autopilot.calls) == heard
+    if heard:
+        assert autopilot.calls[0][1].altitude_m == 488.0

@@ -1,6 +1,6 @@
 import pytest
 
-from wire.schedule import Schedule
+from wire.link import Schedule
 
 
 def counted(schedule, seconds, step_us=4000):

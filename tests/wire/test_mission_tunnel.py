@@ -10,11 +10,15 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from wire.mission_codec import (
+from wire.mission_tunnel import (
     MAX_DOCUMENT_BYTES,
     MAX_PIECES,
     PIECE_BYTES,
+    UNSEEN,
     DocumentAssembler,
+    DocumentKind,
+    MissionDetections,
+    MissionState,
     PayloadError,
     decode_detections,
     decode_state,
@@ -22,7 +26,6 @@ from wire.mission_codec import (
     encode_state,
     split_document,
 )
-from wire.mission_messages import UNSEEN, DocumentKind, MissionDetections, MissionState
 
 MISSION, HISTORY, RESULT = DocumentKind
 TUNNEL_BYTES = 128
@@ -179,8 +182,8 @@ def test_a_newer_document_drops_the_half_received_one():
 @pytest.mark.parametrize(
     ("content", "words"),
     [
-        ({"text": "x" * MAX_DOCUMENT_BYTES}, f"1000011 bytes; at most {MAX_DOCUMENT_BYTES}"),
-        (incompressible(60_000), f"pieces; at most {MAX_PIECES}"),
+        ({"text": "x" * MAX_DOCUMENT_BYTES}, f"1000011 bytes; the limit is {MAX_DOCUMENT_BYTES}"),
+        (incompressible(60_000), f"pieces; the limit is {MAX_PIECES}"),
         ({"value": object()}, "cannot be written as JSON"),
     ],
 )
@@ -195,7 +198,7 @@ def test_what_cannot_be_told_is_refused_in_one_line(content, words):
     ("payload", "words"),
     [
         (b"", "piece of a document: 0 bytes"),
-        (piece(b"x", version=2), "version 2; this program knows 1"),
+        (piece(b"x", version=2), "version 2; this program reads 1"),
         (piece(b"x", kind=9), "kind 9 is not known"),
         (piece(b"x", index=1), "index 1 of 1"),
         (piece(b"x", index=0, count=0), "index 0 of 0"),
@@ -242,7 +245,7 @@ def test_a_damaged_document_is_received_when_it_is_repeated():
 
 @pytest.mark.parametrize("decode", [decode_state, decode_detections])
 def test_another_version_or_length_is_refused(decode):
-    with pytest.raises(PayloadError, match="version 2; this program knows 1, update the older one"):
+    with pytest.raises(PayloadError, match="version 2; this program reads 1, update the older one"):
         decode(bytes([2]) * 90)
     for payload in (b"", b"\1", bytes([1]) * 57, bytes([1]) * 86):
         with pytest.raises(PayloadError, match=r"bytes; .* expected"):

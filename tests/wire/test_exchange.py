@@ -3,8 +3,7 @@
 import pytest
 
 from wire.dialect import mavlink
-from wire.exchange import Exchange
-from wire.forwarding import _CAPACITY, Router
+from wire.exchange import _CAPACITY, Exchange, Router
 from wire.link import LinkProfile
 
 OTHERS = (245, 191)
