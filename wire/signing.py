@@ -1,10 +1,10 @@
-"""MAVLink 2 signing: who has the key may speak, and nobody can say again what was said.
+"""MAVLink 2 signing: packets without the key's signature are refused, and so are replayed ones.
 
 https://mavlink.io/en/guide/message_signing.html: the signature is the first 48 bits of the SHA-256 over key,
-packet, link id and a timestamp, which must grow from packet to packet of a (system, component, link id).
-PX4 v1.17 cannot sign; the rules for unsigned packets are those of newer ones: with a key they are refused,
-except on links that cannot be reached from outside (there USB, here loopback), so that companion apps that
-cannot sign, such as MAVSDK's, go on working beside a signed radio.
+packet, link id and a timestamp, which must increase from packet to packet of a (system, component, link id).
+PX4 v1.17 cannot sign; the rules for unsigned packets are those of later versions: with a key they are
+refused, except on links that cannot be reached from outside (there USB, here loopback), so that companion
+apps that cannot sign, such as MAVSDK's, work beside a signed radio.
 """
 
 from __future__ import annotations
@@ -25,20 +25,13 @@ _ALWAYS = (mavlink.MAVLINK_MSG_ID_RADIO_STATUS,)  # radios cannot sign
 
 
 class SigningKey:
-    """A secret of 32 bytes that never shows itself in a text.
+    """A secret of 32 bytes that is hidden when the object is printed.
 
-    Attributes:
-        secret: the bytes.
+    Raises:
+        ValueError: it does not have 32 bytes, or they are all zero, which means "no signing".
     """
 
-    __slots__ = ("secret",)
-
     def __init__(self, secret: bytes) -> None:
-        """Keep a secret.
-
-        Raises:
-            ValueError: it has not 32 bytes, or they are all zero, which means "no signing".
-        """
         if len(secret) != KEY_BYTES or not any(secret):
             raise ValueError("a signing key has 32 bytes, not all zero")
         self.secret = secret
@@ -48,10 +41,10 @@ class SigningKey:
 
     @classmethod
     def from_text(cls, text: str) -> SigningKey:
-        """Read a key: 64 hexadecimal digits, or a passphrase, of which the SHA-256 is taken as usual.
+        """The key of 64 hexadecimal digits, or of a passphrase, which is its SHA-256.
 
         Raises:
-            ValueError: the text is empty or stands for no key.
+            ValueError: the text is empty or no key.
         """
         text = text.strip()
         if not text:
@@ -66,23 +59,19 @@ class SigningKey:
 
 
 class Signing:
-    """The signing of one vehicle: its key, its clock and whom it heard.
+    """The signing of one vehicle: its key, its clock and the latest timestamps of its peers.
+
+    Args:
+        key: None: sign nothing and accept all packets, until SETUP_SIGNING contains one.
+        boot_unix_us: time of boot, microseconds since 1970.
 
     Attributes:
         active: whether there is a key.
     """
 
-    __slots__ = ("_boot_us", "_key", "_streams", "_timestamp", "active")
-
     def __init__(self, key: SigningKey | None, boot_unix_us: int) -> None:
-        """Begin.
-
-        Args:
-            key: None: sign nothing and believe everybody, until SETUP_SIGNING brings one.
-            boot_unix_us: time of boot in microseconds since 1970.
-        """
         self._boot_us = boot_unix_us - _EPOCH_UNIX_US
-        self._streams: dict[tuple[int, int, int], int] = {}
+        self._streams: dict[tuple[int, int, int], int] = {}  # timestamp by system, component and link id
         self._timestamp = 0
         self._key = b""
         self.active = False
@@ -90,46 +79,36 @@ class Signing:
         self.advance(0)
 
     def set_key(self, key: SigningKey | None, timestamp: int = 0) -> None:
-        """Change the key.
-
-        Args:
-            key: None ends signing.
-            timestamp: at least which to go on from.
-        """
+        """Change the key, None ends signing; the next timestamp is above `timestamp`."""
         self._key = b"" if key is None else key.secret
         self._timestamp = max(self._timestamp, timestamp)
         self._streams.clear()
         self.active = key is not None
 
     def advance(self, time_us: int) -> None:
-        """Tell the vehicle's time; the timestamp never goes back."""
+        """Set vehicle time; the timestamp never decreases."""
         self._timestamp = max(self._timestamp, (self._boot_us + time_us) // 10)
 
     def block(self, packet: bytes, link_id: int) -> bytes:
-        """The 13 bytes that make a packet a signed one.
+        """The 13 bytes to append to a signed packet.
 
         Args:
             packet: header, with the flag for "signed", to checksum.
-            link_id: of the link it goes to, 0 to 255.
+            link_id: of the link on which it is sent, 0 to 255.
         """
         self._timestamp = min(self._timestamp + 1, _MAX_TIMESTAMP)
         stamp = bytes((link_id,)) + self._timestamp.to_bytes(6, "little")
         return stamp + sha256(self._key + packet + stamp).digest()[:_SIGNATURE_BYTES]
 
     def accepts(self, packet: bytes | bytearray, *, trusted: bool) -> bool:
-        """Whether to believe a packet that came in.
-
-        Args:
-            packet: all of it.
-            trusted: whether its link cannot be reached from outside.
-        """
+        """Whether to accept a received packet; `trusted`: its link cannot be reached from outside."""
         if not self.active or message_id_of(packet) in _ALWAYS:
             return True
         if packet[0] != mavlink.PROTOCOL_MARKER_V2 or not packet[2] & mavlink.MAVLINK_IFLAG_SIGNED:
             return trusted
-        return self._is_sound(packet)
+        return self._is_valid(packet)
 
-    def _is_sound(self, packet: bytes | bytearray) -> bool:
+    def _is_valid(self, packet: bytes | bytearray) -> bool:
         signed = len(packet) - _SIGNATURE_BYTES
         if sha256(self._key + packet[:signed]).digest()[:_SIGNATURE_BYTES] != packet[signed:]:
             return False
@@ -146,7 +125,7 @@ class Signing:
         return True
 
     def set_up(self, message: Message) -> bool:
-        """Take the key of SETUP_SIGNING, zeros end signing; False if its timestamp leaves no future."""
+        """Take the key of SETUP_SIGNING, zeros end signing; False if its timestamp is too high."""
         secret = bytes(message.secret_key)
         if message.initial_timestamp > _MAX_TIMESTAMP // 2:
             return False

@@ -1,7 +1,7 @@
-"""The camera: a component of its own beside the autopilot (https://mavlink.io/en/services/camera.html).
+"""The camera, a component beside the autopilot (https://mavlink.io/en/services/camera.html).
 
-It takes pictures and tells where its video is. It does not record, zoom, focus or track, and says so. Its
-video always runs, so it cannot be stopped.
+It takes pictures and sends the addresses of its video. It refuses to record, zoom, focus or track. Its video
+always runs and cannot be stopped.
 """
 
 from __future__ import annotations
@@ -27,13 +27,13 @@ from geometry.vectors import Vec3
 from wire.dialect import Message, mavlink
 from wire.exchange import Exchange
 
-_REMEMBERED = 1000  # pictures that can be told again
+_REMEMBERED = 1000  # pictures whose messages can be requested again
 _MAX_INTERVAL_S = 86400.0
 _MAX_COUNT = 1_000_000
 _HEARTBEAT_US = 1_000_000
 
 _REQUESTS: dict[int, tuple[int, int]] = {
-    # Older than REQUEST_MESSAGE: the message, and which of their parameters holds its index (0: none).
+    # Older than REQUEST_MESSAGE: the message, and which of their parameters is its index (0: none).
     mavlink.MAV_CMD_REQUEST_CAMERA_INFORMATION: (mavlink.MAVLINK_MSG_ID_CAMERA_INFORMATION, 0),
     mavlink.MAV_CMD_REQUEST_CAMERA_SETTINGS: (mavlink.MAVLINK_MSG_ID_CAMERA_SETTINGS, 0),
     mavlink.MAV_CMD_REQUEST_STORAGE_INFORMATION: (mavlink.MAVLINK_MSG_ID_STORAGE_INFORMATION, 1),
@@ -45,11 +45,11 @@ _REQUESTS: dict[int, tuple[int, int]] = {
 
 
 class Captures:
-    """Takes pictures when they are due and tells everybody.
+    """Takes pictures when they are due and broadcasts a message for each.
 
     Attributes:
         count: pictures taken since boot.
-        interval_s: of the series under way; 0: none.
+        interval_s: of the present series; 0: none.
     """
 
     def __init__(
@@ -57,9 +57,9 @@ class Captures:
     ) -> None:
         self._autopilot = autopilot
         self._exchange = exchange
-        self._shortest_s = 1.0 / camera.rate_hz
+        self._min_interval_s = 1.0 / camera.rate_hz
         self._sink = sink
-        self._told: OrderedDict[int, Message] = OrderedDict()
+        self._sent: OrderedDict[int, Message] = OrderedDict()
         self._left = 0.0
         self._due_us = 0
         self._spacing_m = 0.0
@@ -68,26 +68,26 @@ class Captures:
         self.interval_s = 0.0
 
     def start(self, interval_s: float, count: int) -> CommandResult:
-        """Take pictures from now on, instead of a series under way.
+        """Take pictures from now on, instead of the present series.
 
         Args:
-            interval_s: between them, in vehicle time; not less than the camera needs.
-            count: how many; 0: until stopped.
+            interval_s: between them, in vehicle time; the camera's minimum replaces a smaller one.
+            count: of pictures; 0: until stopped.
 
         Returns:
-            ACCEPTED; FAILED if the one picture could not be taken; DENIED for a time or count that is none.
+            ACCEPTED; FAILED if a single picture could not be taken; DENIED for an invalid interval or count.
         """
         if not (0.0 <= interval_s <= _MAX_INTERVAL_S and 0 <= count <= _MAX_COUNT):
             return CommandResult.DENIED
         if count == 1:
             return CommandResult.ACCEPTED if self._take() else CommandResult.FAILED
-        self.interval_s = max(interval_s, self._shortest_s)
+        self.interval_s = max(interval_s, self._min_interval_s)
         self._left = count or inf
         self._due_us = self._exchange.time_us
         return CommandResult.ACCEPTED
 
     def every(self, spacing_m: float) -> CommandResult:
-        """Take a picture each time the vehicle has gone so far; 0: no more."""
+        """Take a picture each time the vehicle has moved by a distance; 0: no more."""
         if not 0.0 <= spacing_m < inf:
             return CommandResult.DENIED
         self._spacing_m = spacing_m
@@ -99,9 +99,9 @@ class Captures:
         self.interval_s = 0.0
         self._spacing_m = 0.0
 
-    def told(self, index: int) -> Message | None:
-        """What was told of a picture; None if that is forgotten, or there is none."""
-        return self._told.get(index)
+    def sent(self, index: int) -> Message | None:
+        """The message of a picture; None if it is too old, or there is no such picture."""
+        return self._sent.get(index)
 
     def update(self) -> None:
         """Take what is due."""
@@ -127,9 +127,9 @@ class Captures:
         message = messages.image_captured(self._autopilot, exchange, index, url)
         if url is not None:
             self.count += 1
-            self._told[index] = message
-            if len(self._told) > _REMEMBERED:
-                self._told.popitem(last=False)
+            self._sent[index] = message
+            if len(self._sent) > _REMEMBERED:
+                self._sent.popitem(last=False)
         exchange.broadcast(message, CAMERA_COMPONENT_ID)
         return url is not None
 
@@ -138,9 +138,9 @@ class CameraComponent(Service):
     """Answers for the camera, sends its heartbeat and takes its pictures.
 
     Args:
-        camera: which.
-        video: its streams, the one to be preferred first.
-        sink: who takes and keeps pictures; by default they are only counted.
+        camera: what it is.
+        video: its streams, the preferred one first.
+        sink: takes and keeps pictures; by default they are only counted.
     """
 
     component_id = CAMERA_COMPONENT_ID
@@ -194,7 +194,7 @@ class CameraComponent(Service):
         self._captures.update()
 
     def run(self, command: int, params: SevenParams) -> CommandResult:
-        """Do what a MAV_CMD to the camera says, from a mission for one; UNSUPPORTED if it is none of ours."""
+        """Execute a MAV_CMD to the camera, such as a mission's; UNSUPPORTED if it is not the camera's."""
         work = self._work.get(command)
         return CommandResult.UNSUPPORTED if work is None else work(params)
 
@@ -203,7 +203,7 @@ class CameraComponent(Service):
         return command in self.commands and command != mavlink.MAV_CMD_REQUEST_MESSAGE
 
     def _start_once(self, command: Command) -> CommandResult:
-        """IMAGE_START_CAPTURE; the same single picture, which its number tells, is not taken again."""
+        """IMAGE_START_CAPTURE; a repeated command for one picture, by its number, takes no other."""
         _, _, count, number = command.params
         if command.repeated and count == 1.0 and self._last_single == (*command.sender, number):
             return CommandResult.ACCEPTED
@@ -241,23 +241,23 @@ class CameraComponent(Service):
                 space = self._sink.space()
                 message = messages.capture_status(captures.interval_s, captures.count, space, time_us)
             case mavlink.MAVLINK_MSG_ID_CAMERA_IMAGE_CAPTURED:
-                message = captures.told(index)
+                message = captures.sent(index)
             case _:
                 return self._of_streams(message_id, index)
         return [] if message is None else [message]
 
     def _of_streams(self, message_id: int, index: int) -> list[Message]:
-        """What is asked about a stream, numbered from 1, or about all, 0."""
+        """The messages of a stream, numbered from 1, or of all, 0."""
         streams = self._video
-        wanted = [(n, stream) for n, stream in enumerate(streams, start=1) if index in (0, n)]
-        told = [messages.stream_information(stream, n, len(streams)) for n, stream in wanted]
+        requested = [(n, stream) for n, stream in enumerate(streams, start=1) if index in (0, n)]
+        information = [messages.stream_information(stream, n, len(streams)) for n, stream in requested]
         if message_id == mavlink.MAVLINK_MSG_ID_VIDEO_STREAM_INFORMATION:
-            return told
+            return information
         if message_id != mavlink.MAVLINK_MSG_ID_VIDEO_STREAM_STATUS:
             return []
-        # MAVSDK 4.1 asks for nothing but the status, yet shows the last information that it hears: so that
-        # comes too, the preferred stream's last.
-        return [*reversed(told), *(messages.stream_status(stream, n) for n, stream in wanted)]
+        # MAVSDK 4.1 requests only the status, yet shows the last information that it receives: so that is
+        # sent too, the preferred stream's last.
+        return [*reversed(information), *(messages.stream_status(stream, n) for n, stream in requested)]
 
     def _start_images(self, params: SevenParams) -> CommandResult:
         interval_s = 0.0 if isnan(params[1]) else params[1]
@@ -286,9 +286,9 @@ class CameraComponent(Service):
         return CommandResult.ACCEPTED if image else CommandResult.DENIED
 
     def _start_streaming(self, params: SevenParams) -> CommandResult:
-        """It runs already, if it is there: stream 0 means all."""
-        there = isnan(params[0]) or 0 <= params[0] <= len(self._video)
-        return CommandResult.ACCEPTED if there and self._video else CommandResult.DENIED
+        """An existing stream runs already; stream 0 means all."""
+        exists = isnan(params[0]) or 0 <= params[0] <= len(self._video)
+        return CommandResult.ACCEPTED if exists and self._video else CommandResult.DENIED
 
 
 def _run(work: Callable[[SevenParams], CommandResult], command: Command) -> CommandResult:
@@ -300,5 +300,5 @@ def _cannot(_params: SevenParams) -> CommandResult:
 
 
 def _whole_count(number: float) -> int:
-    """A count as commands carry it; -1 for what is none."""
+    """A count of a command; -1 if it is invalid."""
     return int(number) if isfinite(number) and 0.0 <= number <= _MAX_COUNT else -1

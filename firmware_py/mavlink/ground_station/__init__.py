@@ -1,1 +1,1 @@
-"""What only ground stations use and no flight needs: files (FTP), logs, events, metadata, remote id, a shell."""
+"""What only ground stations use and no flight needs: files, logs, events, metadata, remote id, a shell."""
