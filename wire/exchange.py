@@ -28,11 +28,7 @@ Component = tuple[int, int]  # system id, component id
 
 
 class Router:
-    """Remembers which component was heard on which link.
-
-    Args:
-        is_own: whether a system id and component id are this vehicle's own.
-    """
+    """Remembers which component was heard on which link."""
 
     def __init__(self, is_own: Callable[[int, int], bool]) -> None:
         self._is_own = is_own
@@ -53,14 +49,7 @@ class Router:
         self._heard_us = {key: heard for key, heard in self._heard_us.items() if key[0] != link}
 
     def destinations(self, link: str, source: Component, message: Message, time_us: int) -> list[str]:
-        """The links to which a packet is forwarded.
-
-        Args:
-            link: on which it was received.
-            source: its sender.
-            message: its content; an unknown message has no known target, so it is for everyone.
-            time_us: vehicle time.
-        """
+        """The links to which a packet is forwarded; an unknown message has no target, so it is for everyone."""
         if len(self._heard_us) < 2 or message.get_msgId() in _NEVER_FORWARDED:
             return []
         target = (
@@ -104,7 +93,6 @@ class Exchange:
         system_id: of this system.
         component_ids: of its components that are not elsewhere on the links.
         signing: of all links; by default nothing is signed.
-        boot_unix_us: see below.
 
     Attributes:
         links: by name; they are added and removed, so a name may be missing later.
@@ -154,12 +142,7 @@ class Exchange:
             self.signing.advance(time_us)
 
     def receive(self, link: Link, max_steps: int) -> Iterator[Message]:
-        """The messages received and accepted on a link; each is also forwarded to its other targets.
-
-        Args:
-            link: whose reader has the bytes.
-            max_steps: bounds the work, see `PacketReader.read`.
-        """
+        """Messages accepted on a link, in a number of its reader's steps; each is forwarded too, if it has other targets."""
         name = link.profile.name
         for message in link.reader.read(max_steps):
             packet = message.get_msgbuf()
@@ -197,13 +180,7 @@ class Exchange:
     def is_for_us(
         self, message: Message, *, or_everyone: bool = False, component_id: int = AUTOPILOT_COMPONENT_ID
     ) -> bool:
-        """Whether a message names one of our components as its target.
-
-        Args:
-            message: with target_system and target_component.
-            or_everyone: whether target system 0 counts too, as PX4 has it for few messages.
-            component_id: of which component.
-        """
+        """Whether a message's target is our component or, `or_everyone`, system 0, as PX4 has it for few."""
         system_fits = message.target_system == self.system_id or (
             or_everyone and message.target_system == BROADCAST
         )

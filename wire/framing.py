@@ -9,7 +9,6 @@ from struct import Struct
 from sys import maxsize
 
 import numpy as np
-import numpy.typing as npt
 
 from wire.dialect import Message, mavlink
 
@@ -29,15 +28,8 @@ _KNOWN_IDS = np.zeros(1 << 16, dtype=np.bool_)  # all of the dialect's are below
 _KNOWN_IDS[list(CRC_EXTRA)] = True
 
 
-def _payloads_v1() -> npt.NDArray[np.bool_]:
-    """By payload length and message id: whether a message of MAVLink 1 can have that length."""
-    max_bytes = np.full(_ID_COUNT_V1, -1)
-    max_bytes[list(_PAYLOAD_BYTES_V1)] = list(_PAYLOAD_BYTES_V1.values())
-    lengths = np.arange(256)
-    return lengths[:, np.newaxis] <= max_bytes
-
-
-_PAYLOADS_V1 = _payloads_v1()
+_MAX_PAYLOAD_BYTES_V1 = np.full(_ID_COUNT_V1, -1)  # by message id; -1: unknown
+_MAX_PAYLOAD_BYTES_V1[list(_PAYLOAD_BYTES_V1)] = list(_PAYLOAD_BYTES_V1.values())
 
 
 def packet_length(data: bytes | bytearray, start: int) -> int | None:
@@ -62,11 +54,7 @@ def packet_length(data: bytes | bytearray, start: int) -> int | None:
 
 
 def possible_starts(window: bytes | bytearray) -> list[int]:
-    """Where headers of known messages may begin, found without computing any checksum.
-
-    Args:
-        window: only starts with `HEADER_BYTES_V2` bytes of it after them are found.
-    """
+    """Where headers of known messages may begin; the last `HEADER_BYTES_V2` - 1 bytes are not searched."""
     count = len(window) - HEADER_BYTES_V2 + 1
     if count <= 0:
         return []
@@ -74,7 +62,7 @@ def possible_starts(window: bytes | bytearray) -> list[int]:
     first = data[:count]
     starts_v1 = np.flatnonzero(first == MARKER_V1)
     if starts_v1.size:
-        starts_v1 = starts_v1[_PAYLOADS_V1[data[starts_v1 + 1], data[starts_v1 + 5]]]
+        starts_v1 = starts_v1[data[starts_v1 + 1] <= _MAX_PAYLOAD_BYTES_V1[data[starts_v1 + 5]]]
     starts_v2 = np.flatnonzero((first == MARKER_V2) & (data[2 : count + 2] <= SIGNED))
     if starts_v2.size:
         low = data[starts_v2 + 7] | data[starts_v2 + 8].astype(np.uint16) << 8
@@ -102,8 +90,7 @@ class PacketReader:
     Attributes:
         behind: the last `read` used up its steps; more can be read without more bytes.
         skipped_bytes: number of bytes that were no part of a message.
-        dropped_bytes: number of bytes that were not taken, because 64 KiB already waited to be read.
-        overflows: how often some were not taken.
+        overflows: how often bytes were dropped, because 64 KiB already waited to be read.
         checksums: number of checksums computed.
     """
 
@@ -115,7 +102,6 @@ class PacketReader:
         self._decoder = mavlink.MAVLink(None)
         self.behind = False
         self.skipped_bytes = 0
-        self.dropped_bytes = 0
         self.overflows = 0
         self.checksums = 0
 
@@ -128,20 +114,20 @@ class PacketReader:
             messages += self.read()
         return messages
 
-    def add(self, data: bytes) -> None:
-        """Take bytes to be read later; those for which there is no room are dropped and counted."""
+    def add(self, data: bytes) -> int:
+        """Take bytes to be read later; the number of bytes dropped, because 64 KiB already waited."""
         buffer = self._buffer
-        room = _CAPACITY_BYTES - len(buffer)
-        if len(data) > room:
-            self.dropped_bytes += len(data) - room
+        dropped_bytes = max(0, len(data) - (_CAPACITY_BYTES - len(buffer)))
+        if dropped_bytes:
             self.overflows += 1
-            data = data[:room]
+            data = data[:-dropped_bytes]
         if not buffer:
             self._aligned = True
         elif self._is_sound(data, 0, packet_length(data, 0) or 0):
             # An incomplete packet before a whole one will never be completed.
             self._boundary = len(buffer)
         buffer += data
+        return dropped_bytes
 
     def read(self, max_steps: int = maxsize) -> list[Message]:
         """Return the next messages that are complete, after some steps at most."""
@@ -220,7 +206,7 @@ class PacketReader:
             return False
         is_v1 = data[start] == MARKER_V1
         header = HEADER_BYTES_V1 if is_v1 else HEADER_BYTES_V2
-        extra = CRC_EXTRA.get(_message_id(data, start))
+        extra = CRC_EXTRA.get(message_id_of(data, start))
         if extra is None:
             return False
         self.checksums += 1
@@ -234,7 +220,7 @@ class PacketReader:
         It must follow another packet directly, with another packet or nothing after it and none within it.
         """
         buffer, after = self._buffer, start + length
-        if not (self._aligned and start == self._position) or _message_id(buffer, start) in CRC_EXTRA:
+        if not (self._aligned and start == self._position) or message_id_of(buffer, start) in CRC_EXTRA:
             return False
         if after < len(buffer) and buffer[after] not in MARKERS:
             return False
@@ -278,12 +264,7 @@ class Packet:
         self.is_heartbeat = message.get_msgId() == mavlink.MAVLINK_MSG_ID_HEARTBEAT
 
     def numbered(self, sequence: int, *, signed: bool = False) -> bytes:
-        """The packet with a sequence number, 0 to 255, and its checksum.
-
-        Args:
-            sequence: 0 to 255.
-            signed: set the flag for "signed"; the caller adds the signature.
-        """
+        """The packet with a sequence number, 0 to 255; if `signed`, the caller appends the signature."""
         packet = self._template
         packet[2] = SIGNED if signed else 0
         packet[4] = sequence
@@ -298,26 +279,14 @@ def source_of(packet: bytes | bytearray) -> tuple[int, int]:
     return (packet[3], packet[4]) if packet[0] == MARKER_V1 else (packet[5], packet[6])
 
 
-def message_id_of(packet: bytes | bytearray) -> int:
-    """Message id of a whole packet."""
-    return _message_id(packet, 0)
-
-
-def missing_before(sequence: int, last: int) -> int:
-    """How many packets of a sender are missing between the last one and this one.
-
-    Args:
-        sequence: number of this packet, 0 to 255.
-        last: the highest number so far, modulo 256.
-
-    Returns:
-        0 to 200; -1 for a packet that is late or received twice.
-    """
-    missing = (sequence - last - 1) % 256
-    return missing if missing <= _MAX_GAP else -1
-
-
-def _message_id(data: bytes | bytearray, start: int) -> int:
+def message_id_of(data: bytes | bytearray, start: int = 0) -> int:
+    """Message id of a packet that begins at `start`."""
     if data[start] == MARKER_V1:
         return data[start + 5]
     return int.from_bytes(data[start + 7 : start + 10], "little")
+
+
+def missing_before(sequence: int, last: int) -> int:
+    """How many packets of a sender are missing after the last one; -1: this one is late or doubled."""
+    missing = (sequence - last - 1) % 256
+    return missing if missing <= _MAX_GAP else -1

@@ -23,19 +23,12 @@ _REQUESTED_PHASE_US = 16_000
 
 @dataclass(frozen=True, slots=True)
 class LinkProfile:
-    """A kind of link.
+    """A kind of link."""
 
-    Attributes:
-        name: of the link; unique within a system.
-        rates_hz: message id to rate, in vehicle time.
-        bytes_s: capacity of the link; PX4's MAV_0_RATE.
-        trusted: it cannot be reached from outside, so a drone with a signing key accepts unsigned packets.
-    """
-
-    name: str
-    rates_hz: Mapping[int, float]
-    bytes_s: float = inf
-    trusted: bool = True
+    name: str  # of the link; unique within a system
+    rates_hz: Mapping[int, float]  # by message id, in vehicle time
+    bytes_s: float = inf  # capacity; PX4's MAV_0_RATE
+    trusted: bool = True  # it cannot be reached from outside: unsigned packets are accepted in spite of a key
 
 
 @dataclass(slots=True)
@@ -142,7 +135,7 @@ class Schedule:
         Args:
             message_id: of the stream.
             interval_us: 0: its default, negative: off.
-            time_us: vehicle time now.
+            time_us: present vehicle time.
         """
         if interval_us == 0:
             interval_us = self._defaults_us.get(message_id, -1)
@@ -157,12 +150,7 @@ class Schedule:
 
 
 class Budget:
-    """The capacity of a slow link: stretches the streams to fit, and reports when too much waits.
-
-    Attributes:
-        bytes_s: capacity of the link.
-        stretch: factor of the streams' requested intervals, 1 to 20.
-    """
+    """A slow link's capacity: `stretch`, 1 to 20, is the factor of intervals with which the streams fit."""
 
     def __init__(self, bytes_s: float, rates_hz: Mapping[int, float]) -> None:
         self.bytes_s = bytes_s
@@ -198,7 +186,7 @@ class Budget:
         return min(max(1.0, needed_bytes_s / self.bytes_s), _MAX_STRETCH)
 
 
-@dataclass(slots=True)
+@dataclass(slots=True, eq=False)
 class Link:
     """One link at run time."""
 

@@ -1,6 +1,7 @@
 """How an app reports its mission over MAVLink: TUNNEL payloads with state, detections and documents.
 
-Numbers are little-endian. A document is compressed JSON, sent in pieces.
+Numbers are little-endian. A document is compressed JSON, sent in pieces. The functions take a payload cut to
+its `payload_length`.
 """
 
 from __future__ import annotations
@@ -42,46 +43,28 @@ class PayloadError(ValueError):
 
 @dataclass(frozen=True, slots=True)
 class MissionState:
-    """The state of a mission, sent ten times a second and at every change.
+    """The state of a mission, sent ten times a second and at every change."""
 
-    Attributes:
-        mission_crc: of the MISSION document with the list of states that `state_index` refers to.
-        state_index: of the present state; -1 before the first.
-        transitions: number of transitions so far, modulo 65536.
-        time_us: vehicle time, microseconds.
-        entered_us: vehicle time at which the present state was entered.
-        flying: the app commands the drone.
-        paused: a pilot has the sticks; the mission waits.
-        finished: the mission has ended.
-        command: forward, left, up (m/s) and yaw rate to the left (rad/s), as sent.
-        pose_arena: x, y, z (m) and yaw (rad) in arena axes, as the app estimates them.
-    """
-
-    mission_crc: int
-    state_index: int
-    transitions: int
-    time_us: int
-    entered_us: int
-    flying: bool
-    paused: bool
-    finished: bool
-    command: tuple[float, float, float, float]
-    pose_arena: tuple[float, float, float, float]
+    mission_crc: int  # of the MISSION document with the list of states
+    state_index: int  # of the present state in that list; -1 before the first
+    transitions: int  # number of transitions so far, modulo 65536
+    time_us: int  # vehicle time
+    entered_us: int  # vehicle time at which the present state was entered
+    flying: bool  # the app commands the drone
+    paused: bool  # a pilot has the sticks; the mission waits
+    finished: bool  # the mission has ended
+    command: tuple[
+        float, float, float, float
+    ]  # forward, left, up (m/s), yaw rate to the left (rad/s), as sent
+    pose_arena: tuple[float, float, float, float]  # x, y, z (m), yaw (rad) in arena axes, as estimated
 
 
 @dataclass(frozen=True, slots=True)
 class MissionDetections:
-    """What the app detected in one image.
+    """What the app detected in one image: a box of each colour, as in `vision.types.Detection`."""
 
-    Attributes:
-        time_us: vehicle time of the image, microseconds; None where its source has none.
-        width_px: of the image.
-        height_px: of the image.
-        red: n, s, e, w, d, a as in `vision.types.Detection`; `green` and `blue` likewise.
-    """
-
-    time_us: int | None
-    width_px: int
+    time_us: int | None  # vehicle time of the image; None where its source has none
+    width_px: int  # of the image
     height_px: int
     red: Box = UNSEEN
     green: Box = UNSEEN
@@ -131,9 +114,6 @@ def encode_state(state: MissionState) -> bytes:
 def decode_state(payload: bytes) -> MissionState:
     """Read a state; numbers may be infinite or NaN.
 
-    Args:
-        payload: the TUNNEL's payload, cut to its `payload_length`.
-
     Raises:
         PayloadError: wrong length or version.
     """
@@ -172,9 +152,6 @@ def encode_detections(detections: MissionDetections) -> bytes:
 
 def decode_detections(payload: bytes) -> MissionDetections:
     """Read one image's detections; numbers may be infinite or NaN.
-
-    Args:
-        payload: the TUNNEL's payload, cut to its `payload_length`.
 
     Raises:
         PayloadError: wrong length or version.
@@ -232,9 +209,6 @@ class DocumentAssembler:
 
     def take(self, payload: bytes) -> Document | None:
         """Take a piece.
-
-        Args:
-            payload: the TUNNEL's payload, cut to its `payload_length`.
 
         Returns:
             The document if this was its last missing piece. A repeated document is returned again only after

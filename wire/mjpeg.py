@@ -38,13 +38,9 @@ class Part:
 
 
 def write_part(jpeg: bytes, time_us: int | None) -> bytes:
-    """One image of a stream, with the boundary after it, so that a browser shows it at once.
+    """One image of a stream and its vehicle time, with the boundary after it: so a browser shows it at once.
 
     The response has `STREAM_HEADERS`, and `STREAM_START` before the first part.
-
-    Args:
-        jpeg: the image.
-        time_us: vehicle time of its exposure, microseconds; None if unknown.
     """
     stamp = "" if time_us is None else f"X-Time-Us: {time_us}\r\n"
     head = f"Content-Type: image/jpeg\r\nContent-Length: {len(jpeg)}\r\n{stamp}\r\n"
@@ -52,11 +48,7 @@ def write_part(jpeg: bytes, time_us: int | None) -> bytes:
 
 
 class MjpegReader:
-    """Splits a multipart stream into its parts.
-
-    Args:
-        content_type: of the response.
-        max_part_bytes: a larger part ends the stream.
+    """Splits a multipart stream into its parts, by the response's Content-Type.
 
     Raises:
         StreamError: it is another kind of response, or has no boundary.

@@ -61,12 +61,8 @@ class SigningKey:
 class Signing:
     """The signing of one vehicle: its key, its clock and the latest timestamps of its peers.
 
-    Args:
-        key: None: sign nothing and accept all packets, until SETUP_SIGNING contains one.
-        boot_unix_us: time of boot, microseconds since 1970.
-
-    Attributes:
-        active: whether there is a key.
+    Without a key it is not active: it signs nothing and accepts all packets, until SETUP_SIGNING contains
+    one.
     """
 
     def __init__(self, key: SigningKey | None, boot_unix_us: int) -> None:
@@ -90,12 +86,7 @@ class Signing:
         self._timestamp = max(self._timestamp, (self._boot_us + time_us) // 10)
 
     def block(self, packet: bytes, link_id: int) -> bytes:
-        """The 13 bytes to append to a signed packet.
-
-        Args:
-            packet: header, with the flag for "signed", to checksum.
-            link_id: of the link on which it is sent, 0 to 255.
-        """
+        """The 13 bytes to append to a packet with the flag for "signed", sent on a link from 0 to 255."""
         self._timestamp = min(self._timestamp + 1, _MAX_TIMESTAMP)
         stamp = bytes((link_id,)) + self._timestamp.to_bytes(6, "little")
         return stamp + sha256(self._key + packet + stamp).digest()[:_SIGNATURE_BYTES]

@@ -90,29 +90,11 @@ class VehiclePose:
 
 
 class VehicleTelemetry:
-    """The present state of a vehicle as it reports it, and the last seconds of its motion.
-
-    Attributes:
-        restarts: how often the vehicle's clock restarted at zero.
-        attitudes: number of reports of attitude, of all boots.
-        positions: number of reports of position, of all boots.
-        time_us: newest vehicle time received, microseconds since boot; 0 before the first report.
-        attitude_heard_s: when the newest attitude was received, by the receiver's clock.
-        position_heard_s: when the newest position was received.
-        boot_unix_us: time of boot, microseconds since 1970; None: not known.
-        armed: of the last heartbeat.
-        is_px4: its modes are PX4's.
-        mode: flight mode; None before the first heartbeat, and if it is not one of PX4's.
-        mode_name: title of the flight mode; "" before the first heartbeat.
-        custom_mode: HEARTBEAT.custom_mode.
-        landed: it is on the ground; None: not known.
-        battery_percent: remaining charge; None: not known.
-        voltage_v: of the battery; None: not known.
-    """
+    """The present state of a vehicle as it reports it (None: not known), and its last seconds of motion."""
 
     def __init__(self) -> None:
-        self.restarts = 0
-        self.attitudes = self.positions = 0
+        self.restarts = 0  # how often the vehicle's clock restarted at zero
+        self.attitudes = self.positions = 0  # numbers of reports, of all boots
         self._forget()
         self._takers: dict[int, Callable[[Message, float], bool]] = {
             mavlink.MAVLINK_MSG_ID_HEARTBEAT: self._take_heartbeat,
@@ -129,28 +111,24 @@ class VehicleTelemetry:
         """Set the state of a vehicle that has sent nothing since its boot."""
         self._attitudes: _Track[AttitudeReport] = _Track()
         self._positions: _Track[PositionReport] = _Track()
-        self.time_us = 0
-        self.attitude_heard_s = self.position_heard_s = -1e9
-        self.boot_unix_us: int | None = None
+        self.time_us = 0  # newest vehicle time received
+        self.attitude_heard_s = self.position_heard_s = -1e9  # receiver's time of the newest report
+        self.boot_unix_us: int | None = None  # time of boot, microseconds since 1970
         self.armed = False
-        self.is_px4 = False
-        self.mode: Px4Mode | None = None
-        self.mode_name = ""
-        self.custom_mode = 0
-        self.landed: bool | None = None
-        self.battery_percent: int | None = None
-        self.voltage_v: float | None = None
+        self.is_px4 = False  # its modes are PX4's
+        self.mode: Px4Mode | None = None  # None too if it is not one of PX4's
+        self.mode_name = ""  # title of the mode; "" before the first heartbeat
+        self.custom_mode = 0  # HEARTBEAT.custom_mode
+        self.landed: bool | None = None  # it is on the ground
+        self.battery_percent: int | None = None  # remaining charge
+        self.voltage_v: float | None = None  # of the battery
         self._has_battery_status = False
 
     def take(self, message: Message, now_s: float = 0.0) -> bool:
-        """Take a message of the vehicle's autopilot; other kinds of messages are ignored.
-
-        Args:
-            message: as parsed.
-            now_s: the receiver's clock, seconds.
+        """Take a message of the vehicle's autopilot, with the receiver's time.
 
         Returns:
-            Whether it is the newest of its kind; False if it is late, implausible or ignored.
+            Whether it is the newest of its kind; False if it is late, implausible or not read here.
         """
         taker = self._takers.get(message.get_msgId())
         return taker is not None and taker(message, now_s)

@@ -39,34 +39,20 @@ from wire.signing import Signing, SigningKey
 
 @dataclass(frozen=True, slots=True)
 class NodeOptions:
-    """What a vehicle offers over MAVLink beside its autopilot.
+    """What a vehicle offers over MAVLink beside its autopilot; None: it does not have that."""
 
-    Attributes:
-        system_id: MAVLink system id, 1 to 250; written to MAV_SYS_ID.
-        boot_unix_us: time of boot, microseconds since 1970; 0: not known.
-        signing_key: signs all packets; None: none is signed.
-        video: the camera's streams, the preferred one first.
-        storage: the vehicle's files and logs; None: it keeps none.
-        firmware_files: read-only files, content by path, for `mftp://` addresses; by default the metadata of
-            this vehicle's parameters and events.
-        shell: whether SERIAL_CONTROL is answered.
-        log_text: called with vehicle time and each status text.
-        camera: on the vehicle, a component beside the autopilot; None: there is none.
-        captures: takes and keeps its pictures; by default they are only counted.
-        failures: breaks parts on purpose; None: nothing can be broken.
-    """
-
-    system_id: int = 1
-    boot_unix_us: int = 0
-    signing_key: SigningKey | None = None
-    video: Sequence[VideoStream] = ()
-    storage: Storage | None = None
+    system_id: int = 1  # 1 to 250; written to MAV_SYS_ID
+    boot_unix_us: int = 0  # time of boot, microseconds since 1970; 0: not known
+    signing_key: SigningKey | None = None  # signs all packets
+    video: Sequence[VideoStream] = ()  # the camera's streams, the preferred one first
+    storage: Storage | None = None  # of the vehicle's files and logs
+    # Read-only files, content by path, for `mftp://` addresses; by default the component metadata.
     firmware_files: Mapping[str, bytes] | None = None
-    shell: bool = False
-    log_text: Callable[[int, StatusText], None] | None = None
+    shell: bool = False  # whether SERIAL_CONTROL is answered
+    log_text: Callable[[int, StatusText], None] | None = None  # called with vehicle time and each text
     camera: CameraModel | None = None
-    captures: CaptureSink | None = None
-    failures: FailureSink | None = None
+    captures: CaptureSink | None = None  # takes and keeps pictures; by default they are only counted
+    failures: FailureSink | None = None  # breaks parts on purpose
 
 
 def _services(autopilot: Autopilot, exchange: Exchange, options: NodeOptions) -> tuple[Service, ...]:
@@ -184,13 +170,9 @@ class MavlinkNode:
         self._exchange.remove_link(name)
 
     def add_input(self, link: str, data: bytes) -> int:
-        """Keep bytes received on a link for `process_input`; how many of them are lost for lack of room."""
+        """Keep bytes received on a link for `process_input`; the number of bytes dropped for lack of room."""
         source = self._exchange.links.get(link)
-        if source is None:
-            return 0
-        dropped_bytes = source.reader.dropped_bytes
-        source.reader.add(data)
-        return source.reader.dropped_bytes - dropped_bytes
+        return 0 if source is None else source.reader.add(data)
 
     def process_input(self, link: str, max_steps: int) -> bool:
         """Read some of the bytes that `add_input` kept and handle their messages. It never raises.

@@ -126,7 +126,7 @@ class ParameterService(_ParameterProtocol):
             return
         version = parameters.version
         try:
-            parameters.set(name, _from_float(parameters.declaration(name), message.param_value))
+            parameters.set(name, _decoded(parameters.declaration(name), pack("<f", message.param_value)))
         except ParameterError as error:
             self._report_refusal(error)
         if parameters.version == version:  # nothing changed, so nothing was sent yet
@@ -140,7 +140,7 @@ class ParameterService(_ParameterProtocol):
             return self._hash_message()
         parameters = self._parameters
         declared = parameters.declarations[index]
-        value = _to_float(declared, parameters.value(declared.name))
+        (value,) = unpack("<f", _encoded(declared, parameters.value(declared.name)))
         return mavlink.MAVLink_param_value_message(
             declared.name.encode(), value, _TYPES[declared.kind], len(parameters), index
         )
@@ -197,40 +197,29 @@ class ExtendedParameterService(_ParameterProtocol):
             result = mavlink.PARAM_ACK_VALUE_UNSUPPORTED
         else:
             try:
-                parameters.set(name, _from_bytes(declared, message._param_value_raw))
+                parameters.set(name, _decoded(declared, message._param_value_raw))
             except ParameterError as error:
                 result = mavlink.PARAM_ACK_VALUE_UNSUPPORTED
                 self._report_refusal(error)
-        kept = _to_bytes(declared, parameters.value(name))
+        kept = _encoded(declared, parameters.value(name)).ljust(_EXTENDED_BYTES, b"\0")
         answer = mavlink.MAVLink_param_ext_ack_message(name.encode(), kept, _TYPES[declared.kind], result)
         self._exchange.send(link, answer)
 
     def _value_message(self, index: int) -> Message:
         parameters = self._parameters
         declared = parameters.declarations[index]
-        value = _to_bytes(declared, parameters.value(declared.name))
+        value = _encoded(declared, parameters.value(declared.name)).ljust(_EXTENDED_BYTES, b"\0")
         return mavlink.MAVLink_param_ext_value_message(
             declared.name.encode(), value, _TYPES[declared.kind], len(parameters), index
         )
 
 
-def _to_float(declared: Parameter, value: float) -> float:
-    """A value as PARAM_VALUE contains it."""
-    return value if declared.kind == "float" else float(unpack("<f", pack("<i", int(value)))[0])
+def _encoded(declared: Parameter, value: float) -> bytes:
+    """A value as four bytes: a float, or an integer."""
+    return pack("<f", value) if declared.kind == "float" else pack("<i", int(value))
 
 
-def _from_float(declared: Parameter, value: float) -> float:
-    """A value of PARAM_SET."""
-    return value if declared.kind == "float" else float(unpack("<i", pack("<f", value))[0])
-
-
-def _to_bytes(declared: Parameter, value: float) -> bytes:
-    """A value as PARAM_EXT_VALUE contains it."""
-    four = pack("<f", value) if declared.kind == "float" else pack("<i", int(value))
-    return four.ljust(_EXTENDED_BYTES, b"\0")
-
-
-def _from_bytes(declared: Parameter, data: bytes) -> float:
-    """A value of PARAM_EXT_SET; zeros at the end may be missing."""
+def _decoded(declared: Parameter, data: bytes) -> float:
+    """The value of the first four bytes; zeros at the end may be missing."""
     layout = "<f" if declared.kind == "float" else "<i"
     return float(unpack(layout, data[:4].ljust(4, b"\0"))[0])

@@ -22,29 +22,17 @@ Entry = TypeVar("Entry")
 
 @dataclass(frozen=True, slots=True)
 class Command:
-    """A COMMAND_LONG or COMMAND_INT; NaN means "not given".
+    """A COMMAND_LONG or COMMAND_INT; NaN means "not given"."""
 
-    Attributes:
-        link: on which it was received.
-        params: params 1 to 4.
-        latitude_deg: param 5 or x.
-        longitude_deg: param 6 or y.
-        altitude_m: param 7 or z; above mean sea level unless the frame says above home.
-        frame: MAV_FRAME of COMMAND_INT.
-        params_567: params 5 to 7 as received, for commands in which they are no position.
-        sender: system and component id.
-        repeated: it says that it is sent again, because no acknowledgement was received.
-    """
-
-    link: Link
-    params: tuple[float, float, float, float]
-    latitude_deg: float = nan
-    longitude_deg: float = nan
-    altitude_m: float = nan
+    link: Link  # on which it was received
+    params: tuple[float, float, float, float]  # 1 to 4
+    latitude_deg: float = nan  # param 5 or x
+    longitude_deg: float = nan  # param 6 or y
+    altitude_m: float = nan  # param 7 or z; above mean sea level or, with a relative frame, above home
     frame: int = mavlink.MAV_FRAME_GLOBAL
-    params_567: tuple[float, float, float] = (nan, nan, nan)
-    sender: tuple[int, int] = (BROADCAST, BROADCAST)
-    repeated: bool = False
+    params_567: tuple[float, float, float] = (nan, nan, nan)  # as received; not always a position
+    sender: tuple[int, int] = (BROADCAST, BROADCAST)  # system and component id
+    repeated: bool = False  # it was sent before, and no acknowledgement was received
 
     @classmethod
     def from_long(cls, link: Link, message: Message) -> Command:

@@ -148,10 +148,8 @@ def test_sound_packets_amid_noise_are_all_heard(noise):
 
 def test_what_finds_no_room_is_dropped_and_counted():
     reader = PacketReader()
-    reader.add(packed() * 100)
-    reader.add(bytes(100_000))
-    reader.add(bytes(10))
-    assert reader.dropped_bytes == 100 * len(packed()) + 100_000 + 10 - 65536
+    dropped = [reader.add(data) for data in (packed() * 100, bytes(100_000), bytes(10))]
+    assert dropped == [0, 100 * len(packed()) + 100_000 - 65536, 10]
     assert reader.overflows == 2
     assert len(reader.read()) == 100
     assert len(reader.feed(packed())) == 1

@@ -45,7 +45,7 @@ def test_memory_is_bounded_whatever_comes():
         for number in range(1, 400)
         for text in take(assembler, said(b"x" * 50, number=number, place=number % 256))
     ]
-    assert len(assembler._open) <= 4
+    assert len(assembler._incomplete) <= 4
     assert max(map(len, texts)) <= 500
 
 

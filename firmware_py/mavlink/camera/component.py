@@ -17,7 +17,6 @@ from firmware_py.mavlink.camera.model import (
     CAMERA_COMPONENT_ID,
     CameraModel,
     CaptureSink,
-    CountingSink,
     VideoStream,
 )
 from firmware_py.mavlink.service import Command, Service
@@ -53,7 +52,7 @@ class Captures:
     """
 
     def __init__(
-        self, autopilot: Autopilot, exchange: Exchange, camera: CameraModel, sink: CaptureSink
+        self, autopilot: Autopilot, exchange: Exchange, camera: CameraModel, sink: CaptureSink | None
     ) -> None:
         self._autopilot = autopilot
         self._exchange = exchange
@@ -123,7 +122,7 @@ class Captures:
 
     def _take(self) -> bool:
         exchange, index = self._exchange, self.count
-        url = self._sink.capture(exchange.time_us, index)
+        url = "" if self._sink is None else self._sink.capture(exchange.time_us, index)
         message = messages.image_captured(self._autopilot, exchange, index, url)
         if url is not None:
             self.count += 1
@@ -137,10 +136,7 @@ class Captures:
 class CameraComponent(Service):
     """Answers for the camera, sends its heartbeat and takes its pictures.
 
-    Args:
-        camera: what it is.
-        video: its streams, the preferred one first.
-        sink: takes and keeps pictures; by default they are only counted.
+    The first video stream is the preferred one; without a sink pictures are only counted.
     """
 
     component_id = CAMERA_COMPONENT_ID
@@ -157,8 +153,8 @@ class CameraComponent(Service):
         self._exchange = exchange
         self._camera = camera
         self._video = video
-        self._sink: CaptureSink = sink if sink is not None else CountingSink()
-        self._captures = Captures(autopilot, exchange, camera, self._sink)
+        self._sink = sink
+        self._captures = Captures(autopilot, exchange, camera, sink)
         self._heartbeat_due_us = 0
         self._last_single: tuple[int, int, float] | None = None
         self._work: dict[int, Callable[[SevenParams], CommandResult]] = {
@@ -229,6 +225,7 @@ class CameraComponent(Service):
 
     def _requested(self, message_id: int, index: int) -> list[Message]:
         time_us, captures = self._exchange.time_us, self._captures
+        space = None if self._sink is None else self._sink.space()
         match message_id:
             case mavlink.MAVLINK_MSG_ID_CAMERA_INFORMATION:
                 streams = bool(self._video)
@@ -236,9 +233,8 @@ class CameraComponent(Service):
             case mavlink.MAVLINK_MSG_ID_CAMERA_SETTINGS:
                 message = messages.settings(time_us)
             case mavlink.MAVLINK_MSG_ID_STORAGE_INFORMATION if index <= 1:
-                message = messages.storage_information(self._sink.space(), time_us)
+                message = messages.storage_information(space, time_us)
             case mavlink.MAVLINK_MSG_ID_CAMERA_CAPTURE_STATUS:
-                space = self._sink.space()
                 message = messages.capture_status(captures.interval_s, captures.count, space, time_us)
             case mavlink.MAVLINK_MSG_ID_CAMERA_IMAGE_CAPTURED:
                 message = captures.sent(index)

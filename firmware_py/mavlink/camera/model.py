@@ -92,18 +92,6 @@ class CaptureSink(Protocol):
         """The storage; None if pictures are not kept."""
 
 
-class CountingSink:
-    """Keeps no pictures; they are only counted."""
-
-    def capture(self, time_us: int, index: int) -> str | None:
-        """An empty URL: the picture is not kept."""
-        return ""
-
-    def space(self) -> PictureSpace | None:
-        """None: there is no storage."""
-        return None
-
-
 class CameraControl(Protocol):
     """The camera, as a mission uses it."""
 

@@ -60,13 +60,7 @@ class ExtraFiles(Mapping[str, bytes]):
 def extras(parameters: Parameters | None = None) -> dict[str, bytes]:
     """All files by their path, with a vehicle's default parameters or, without it, the declared ones."""
     declared = DECLARATIONS if parameters is None else parameters.declarations
-    defaults = {each.name: each.default for each in DECLARATIONS}
-    own = tuple(
-        (each.name, each.default)
-        for each in declared
-        if each.default != defaults.get(each.name, each.default)
-    )
-    return dict(_files(own))
+    return dict(_files(tuple((each.name, each.default) for each in declared)))
 
 
 def file_crc(content: bytes) -> int:
@@ -75,8 +69,8 @@ def file_crc(content: bytes) -> int:
 
 
 @lru_cache(maxsize=4)
-def _files(own_defaults: tuple[tuple[str, float], ...]) -> tuple[tuple[str, bytes], ...]:
-    declarations = Parameters(defaults=dict(own_defaults)).declarations
+def _files(defaults: tuple[tuple[str, float], ...]) -> tuple[tuple[str, bytes], ...]:
+    declarations = Parameters(defaults=dict(defaults)).declarations
     files = {
         PARAMETERS_FILE: _compressed(parameters_json(declarations)),
         EVENTS_FILE: _compressed(events_json()),

@@ -32,11 +32,7 @@ _WITHOUT_EFFECT = frozenset(  # every mission of MAVSDK contains them, and there
 
 
 class MissionExecution(Service):
-    """Checks missions when they change, starts them, reports their progress and passes on their commands.
-
-    Args:
-        camera: that the mission may command; None: there is none.
-    """
+    """Checks missions when they change, starts them, reports their progress and passes on their commands."""
 
     def __init__(self, autopilot: Autopilot, exchange: Exchange, camera: CameraControl | None) -> None:
         self._autopilot = autopilot

@@ -129,13 +129,7 @@ def _as_int(value: float, scale: float) -> int:
 
 
 class ExtendedMessage(mavlink.MAVLink_message):  # type: ignore[misc]  # pymavlink has no types
-    """A message with an extension field that the dialect lacks.
-
-    Args:
-        known: the dialect's message.
-        layout: of all fields, for `struct`.
-        fields: in the order of the wire.
-    """
+    """A message with an extension field that the dialect lacks; its fields are in the order of the wire."""
 
     def __init__(self, known: Message, layout: str, *fields: int) -> None:
         mavlink.MAVLink_message.__init__(self, known.id, known.msgname)

@@ -34,8 +34,6 @@ _MISSION_PLANNER = 190  # MAV_COMP_ID_MISSIONPLANNER, which PX4 accepts as its o
 _CRITICAL = mavlink.MAV_SEVERITY_CRITICAL
 _MAX_DOWNLOADS = 32
 
-_DownloadKey = tuple[str, int, int, PlanType]
-
 
 @dataclass(frozen=True, slots=True)
 class _Partner:
@@ -43,9 +41,6 @@ class _Partner:
 
     link: Link
     address: tuple[int, int]  # system and component id
-
-    def is_same(self, other: _Partner) -> bool:
-        return self.link is other.link and self.address == other.address
 
 
 @dataclass(slots=True)
@@ -92,7 +87,8 @@ class MissionService(Service):
         self._store = autopilot.missions
         self._upload: _Upload | None = None
         self._outcome: _Outcome | None = None
-        self._downloads: dict[_DownloadKey, tuple[Plan, int]] = {}  # with the time of the last request
+        # With the time of the last request.
+        self._downloads: dict[tuple[_Partner, PlanType], tuple[Plan, int]] = {}
         self.handlers = {
             message_id: partial(self._receive, work)
             for message_id, work in {
@@ -138,7 +134,7 @@ class MissionService(Service):
         upload, now_us = self._upload, self._exchange.time_us
         if plan_type is None:
             self._answer(partner, mavlink.MAV_MISSION_UNSUPPORTED, message.mission_type)
-        elif upload is not None and not upload.partner.is_same(partner):
+        elif upload is not None and upload.partner != partner:
             self._say("WPM: IGN MISSION_COUNT: Busy with another upload")
             self._answer(partner, mavlink.MAV_MISSION_ERROR, plan_type)
         elif upload is not None and _repeats(upload, plan_type, message.count, now_us):
@@ -172,7 +168,7 @@ class MissionService(Service):
         if upload is None:
             self._say("IGN MISSION_ITEM: No transfer")
             self._answer(partner, mavlink.MAV_MISSION_ERROR, message.mission_type)
-        elif not upload.partner.is_same(partner):
+        elif upload.partner != partner:
             self._say("REJ. MIS ITEM: partner id mismatch")
         elif message.mission_type != upload.plan_type:
             self._answer(partner, mavlink.MAV_MISSION_ERROR, message.mission_type)
@@ -216,12 +212,12 @@ class MissionService(Service):
     def _repeat_outcome(self, partner: _Partner, message: Message) -> bool:
         """Whether an item is the one that ended the last upload; then its acknowledgement was lost."""
         outcome = self._outcome
-        if outcome is None or not outcome.partner.is_same(partner):
+        if outcome is None or outcome.partner != partner:
             return False
         if (message.mission_type, message.seq) != (outcome.plan_type, outcome.last_seq):
             return False
         upload = self._upload
-        if upload is not None and upload.partner.is_same(partner) and upload.plan_type is outcome.plan_type:
+        if upload is not None and upload.partner == partner and upload.plan_type is outcome.plan_type:
             return False  # it belongs to the present upload
         self._answer(partner, outcome.result, outcome.plan_type, outcome.opaque_id)
         return True
@@ -231,8 +227,8 @@ class MissionService(Service):
         upload = self._upload
         plan_type = _PLAN_TYPES.get(message.mission_type)
         if plan_type is not None:
-            self._downloads.pop(_key(partner, plan_type), None)
-        if upload is None or not upload.partner.is_same(partner) or plan_type is not upload.plan_type:
+            self._downloads.pop((partner, plan_type), None)
+        if upload is None or upload.partner != partner or plan_type is not upload.plan_type:
             return
         if message.type == mavlink.MAV_MISSION_OPERATION_CANCELLED:
             self._upload = None
@@ -248,7 +244,7 @@ class MissionService(Service):
             self._answer(partner, mavlink.MAV_MISSION_UNSUPPORTED, message.mission_type)
             return
         plan = self._store.plan(plan_type)
-        self._downloads[_key(partner, plan_type)] = (plan, self._exchange.time_us)
+        self._downloads[(partner, plan_type)] = (plan, self._exchange.time_us)
         if len(self._downloads) > _MAX_DOWNLOADS:
             self._downloads.pop(next(iter(self._downloads)))
         count = mission_count(partner.address, len(plan.items), plan_type, plan.opaque_id)
@@ -259,7 +255,7 @@ class MissionService(Service):
         if plan_type is None:
             self._answer(partner, mavlink.MAV_MISSION_UNSUPPORTED, message.mission_type)
             return
-        key = _key(partner, plan_type)
+        key = (partner, plan_type)
         plan, _ = self._downloads.get(key, (self._store.plan(plan_type), 0))
         if message.seq >= len(plan.items):
             self._say(f"WPM: REJ. CMD: Req. WP was unexpected: {message.seq} of {len(plan.items)}")
@@ -293,7 +289,7 @@ class MissionService(Service):
             cleared = () if plan_type is None else (plan_type,)
         if not cleared:
             result = mavlink.MAV_MISSION_UNSUPPORTED
-        elif upload is not None and not upload.partner.is_same(partner):
+        elif upload is not None and upload.partner != partner:
             self._say("WPM: IGN CLEAR CMD: Busy")
             result, cleared = mavlink.MAV_MISSION_ERROR, ()
         else:
@@ -320,10 +316,6 @@ class MissionService(Service):
 
     def _say(self, text: str) -> None:
         self._autopilot.say(_CRITICAL, text)
-
-
-def _key(partner: _Partner, plan_type: PlanType) -> _DownloadKey:
-    return (partner.link.profile.name, *partner.address, plan_type)
 
 
 def _repeats(upload: _Upload, plan_type: PlanType, count: int, now_us: int) -> bool:

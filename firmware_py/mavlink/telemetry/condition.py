@@ -171,12 +171,7 @@ def esc_status(autopilot: Autopilot) -> Message:
 
 
 def esc_info(autopilot: Autopilot, time_us: int) -> Message:
-    """ESC_INFO of the first four motors: all present, no faults, temperatures unknown.
-
-    Args:
-        autopilot: with the motors.
-        time_us: vehicle time; the message's counter follows from it.
-    """
+    """ESC_INFO of the first four motors: all present, no faults; its counter follows from vehicle time."""
     motors = len(autopilot.airframe.rotors)
     return mavlink.MAVLink_esc_info_message(
         0,

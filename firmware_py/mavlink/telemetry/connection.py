@@ -53,11 +53,6 @@ def packed_version(version: tuple[int, int, int]) -> int:
     return major << 24 | minor << 16 | patch << 8 | _RELEASE
 
 
-def _base_mode(status: VehicleStatus) -> int:
-    """HEARTBEAT.base_mode as PX4 sets it: 29 disarmed and 157 armed in auto modes, 17 and 145 in offboard."""
-    return int(_CUSTOM | status.mode.value.flags | (_ARMED if status.armed else 0))
-
-
 def _system_status(status: VehicleStatus) -> int:
     """HEARTBEAT.system_status (MAV_STATE)."""
     if status.armed and status.mode is FlightMode.TERMINATION:
@@ -94,13 +89,11 @@ def _protocol_version() -> Message:
 
 def _available_modes(index: int) -> list[Message]:
     """AVAILABLE_MODES of the mode with an index from 1; 0: of all; none for an index beyond."""
-    if index == 0:
-        return [_available_mode(number) for number in range(1, len(_LISTED_MODES) + 1)]
-    return [_available_mode(index)] if 0 < index <= len(_LISTED_MODES) else []
+    modes = enumerate(_LISTED_MODES, start=1)
+    return [_available_mode(number, mode) for number, mode in modes if index in (0, number)]
 
 
-def _available_mode(number: int) -> Message:
-    mode = _LISTED_MODES[number - 1]
+def _available_mode(number: int, mode: FlightMode) -> Message:
     # MAVLink requires a standard mode to have no name.
     name = "" if mode.value.standard else _PX4_NAMES.get(mode, mode.value.title)
     properties = 0 if mode in _BASIC_MODES else mavlink.MAV_MODE_PROPERTY_ADVANCED
@@ -142,14 +135,12 @@ class ConnectionService(Service):
         }
 
     def _heartbeat(self) -> Message:
-        status = self._autopilot.status
+        status, mode = self._autopilot.status, self._autopilot.status.mode
+        # As in PX4: 29 disarmed and 157 armed in auto modes, 17 and 145 in offboard.
+        base_mode = _CUSTOM | mode.value.flags | (_ARMED if status.armed else 0)
+        kind = (mavlink.MAV_TYPE_QUADROTOR, mavlink.MAV_AUTOPILOT_PX4)
         return mavlink.MAVLink_heartbeat_message(
-            mavlink.MAV_TYPE_QUADROTOR,
-            mavlink.MAV_AUTOPILOT_PX4,
-            _base_mode(status),
-            status.mode.custom_mode,
-            _system_status(status),
-            3,
+            *kind, base_mode, mode.custom_mode, _system_status(status), 3
         )
 
     def _receive_heartbeat(self, link: Link, message: Message) -> None:

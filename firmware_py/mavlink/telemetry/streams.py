@@ -95,12 +95,7 @@ class AutopilotTelemetry(Service):
 
 
 class StreamService(Service):
-    """Sends the streams that are due on each link, and requested messages.
-
-    Args:
-        sources: of all services, by message id.
-        replies: of all services, by message id.
-    """
+    """Sends the streams that are due on each link, and requested messages, of all services."""
 
     def __init__(
         self, exchange: Exchange, sources: Mapping[int, Source], replies: Mapping[int, Reply]
