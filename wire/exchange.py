@@ -28,29 +28,29 @@ Component = tuple[int, int]  # system id, component id
 
 
 class Router:
-    """Remembers which component was heard on which link."""
+    """Remembers from which component packets were received on which link."""
 
     def __init__(self, is_own: Callable[[int, int], bool]) -> None:
         self._is_own = is_own
-        self._heard_us: dict[tuple[str, Component], int] = {}
+        self._received_us: dict[tuple[str, Component], int] = {}
 
-    def hear(self, link: str, source: Component, time_us: int) -> None:
-        """Note that a component was heard on a link."""
+    def note(self, link: str, source: Component, time_us: int) -> None:
+        """Note a packet received from a component on a link."""
         key = (link, source)
-        heard_us = self._heard_us.get(key)
-        if heard_us is not None and time_us - heard_us < _REFRESH_US:
+        received_us = self._received_us.get(key)
+        if received_us is not None and time_us - received_us < _REFRESH_US:
             return
-        if heard_us is None:
+        if received_us is None:
             self._make_room(time_us)
-        self._heard_us[key] = time_us
+        self._received_us[key] = time_us
 
     def forget_link(self, link: str) -> None:
         """Forget all components of a link that was removed."""
-        self._heard_us = {key: heard for key, heard in self._heard_us.items() if key[0] != link}
+        self._received_us = {key: time_us for key, time_us in self._received_us.items() if key[0] != link}
 
     def destinations(self, link: str, source: Component, message: Message, time_us: int) -> list[str]:
-        """The links to which a packet is forwarded; an unknown message has no target, so it is for everyone."""
-        if len(self._heard_us) < 2 or message.get_msgId() in _NEVER_FORWARDED:
+        """The links to which a packet is forwarded; an unknown message has no target: it is for everyone."""
+        if len(self._received_us) < 2 or message.get_msgId() in _NEVER_FORWARDED:
             return []
         target = (
             getattr(message, "target_system", BROADCAST),
@@ -58,10 +58,10 @@ class Router:
         )
         if self._is_own(*target):
             return []
-        with_target: dict[str, None] = {}  # in the order in which they were heard
+        with_target: dict[str, None] = {}  # in the order of their first packets
         with_sender = {link}
-        for (name, component), heard_us in self._heard_us.items():
-            if time_us - heard_us > _FORGOTTEN_US:
+        for (name, component), received_us in self._received_us.items():
+            if time_us - received_us > _FORGOTTEN_US:
                 continue
             if component == source:
                 with_sender.add(name)
@@ -70,13 +70,13 @@ class Router:
         return [name for name in with_target if name not in with_sender]
 
     def _make_room(self, time_us: int) -> None:
-        heard = self._heard_us
-        if len(heard) < _CAPACITY:
+        received_us = self._received_us
+        if len(received_us) < _CAPACITY:
             return
-        for key in [key for key, heard_us in heard.items() if time_us - heard_us > _FORGOTTEN_US]:
-            del heard[key]
-        if len(heard) >= _CAPACITY:
-            del heard[min(heard, key=heard.__getitem__)]
+        for key in [key for key, then_us in received_us.items() if time_us - then_us > _FORGOTTEN_US]:
+            del received_us[key]
+        if len(received_us) >= _CAPACITY:
+            del received_us[min(received_us, key=received_us.__getitem__)]
 
 
 def _is_target(component: Component, target: Component) -> bool:
@@ -142,7 +142,7 @@ class Exchange:
             self.signing.advance(time_us)
 
     def receive(self, link: Link, max_steps: int) -> Iterator[Message]:
-        """Messages accepted on a link, in a number of its reader's steps; each is forwarded too, if it has other targets."""
+        """Read in at most some steps, forward, and yield the messages accepted on a link."""
         name = link.profile.name
         for message in link.reader.read(max_steps):
             packet = message.get_msgbuf()
@@ -154,7 +154,7 @@ class Exchange:
                 continue
             sequence = packet[2 if packet[0] == mavlink.PROTOCOL_MARKER_V1 else 4]
             link.traffic.receive(sender, sequence, len(packet))
-            self._router.hear(name, sender, self.time_us)
+            self._router.note(name, sender, self.time_us)
             for other in self._router.destinations(name, sender, message, self.time_us):
                 self.links[other].forward(packet)
             yield message

@@ -156,11 +156,6 @@ class MavlinkNode:
             service.update for service in self.services if type(service).update is not Service.update
         )
 
-    @property
-    def refused_packets(self) -> int:
-        """How many valid packets were refused because their signature is wrong or missing."""
-        return self._exchange.refused_packets
-
     def add_link(self, profile: LinkProfile) -> None:
         """Use one more link, with a name that no other has, from the next update on."""
         self._exchange.add_link(profile)
@@ -197,19 +192,15 @@ class MavlinkNode:
         target = getattr(message, "target_component", BROADCAST)
         for component_id, handlers in self._handlers.items():
             handler = handlers.get(message_id)
-            if handler is None:
+            is_target = component_id == AUTOPILOT_COMPONENT_ID or target in (component_id, BROADCAST)
+            if handler is None or not is_target:
                 continue
-            if component_id == AUTOPILOT_COMPONENT_ID or target in (component_id, BROADCAST):
-                self._handle(handler, link, message)
-
-    def _handle(self, handler: Handler, link: Link, message: Message) -> None:
-        try:
-            handler(link, message)
-        except Exception as error:  # a packet must never end a flight
-            self.failed_messages += 1
-            self._autopilot.say(
-                mavlink.MAV_SEVERITY_ERROR, f"Internal error on {message.get_type()}: {error!r}"
-            )
+            try:
+                handler(link, message)
+            except Exception as error:  # a packet must never end a flight
+                self.failed_messages += 1
+                text = f"Internal error on {message.get_type()}: {error!r}"
+                self._autopilot.say(mavlink.MAV_SEVERITY_ERROR, text)
 
     def update(self, time_us: int) -> None:
         """Send what is due at a vehicle time, microseconds since boot, which never decreases."""

@@ -90,7 +90,7 @@ def incompressible(count):
 
 
 @given(states)
-def test_a_state_comes_back(state):
+def test_a_state_is_decoded_as_encoded(state):
     payload = encode_state(state)
     assert len(payload) <= TUNNEL_BYTES
     assert decode_state(payload) == state
@@ -103,7 +103,7 @@ def test_detections_come_back(seen):
     assert decode_detections(payload) == seen
 
 
-def test_what_was_not_seen_comes_back_as_that():
+def test_an_unseen_box_is_decoded_as_unseen():
     back = decode_detections(encode_detections(MissionDetections(None, 320, 240)))
     assert (back.red, back.time_us) == (UNSEEN, None)
 
@@ -133,7 +133,7 @@ def test_a_value_without_room_is_refused(change):
 
 
 @given(kinds, objects)
-def test_a_document_comes_back_once(kind, content):
+def test_a_document_is_returned_once(kind, content):
     crc, pieces = split_document(kind, content)
     assert all(len(payload) <= PIECE_BYTES + 8 for payload in pieces)
     assembler = DocumentAssembler()
@@ -187,7 +187,7 @@ def test_a_newer_document_drops_the_half_received_one():
         ({"value": object()}, "cannot be written as JSON"),
     ],
 )
-def test_what_cannot_be_told_is_refused_in_one_line(content, words):
+def test_an_invalid_document_is_refused_in_one_line(content, words):
     with pytest.raises(PayloadError, match=words) as caught:
         split_document(RESULT, content)
     assert "\n" not in str(caught.value)

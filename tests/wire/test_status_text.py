@@ -38,7 +38,7 @@ def test_texts_of_two_components_are_not_mixed():
     assert take(assembler, said(b"b", number=7, place=1), component=191) == ["…b"]
 
 
-def test_memory_is_bounded_whatever_comes():
+def test_memory_is_bounded():
     assembler = TextAssembler()
     texts = [
         text

@@ -40,15 +40,18 @@ _COMPRESSION = [{"id": lzma.FILTER_LZMA2, "preset": 6, "dict_size": 1 << 18}]  #
 
 
 class ExtraFiles(Mapping[str, bytes]):
-    """All files by their path on the vehicle, such as `etc/extras/parameters.json.xz`; made when read."""
+    """All files by their path on the vehicle, such as `etc/extras/parameters.json.xz`; made when first read.
+
+    Args:
+        parameters: of the vehicle, for its defaults; by default those that are declared.
+    """
 
     def __init__(self, parameters: Parameters | None = None) -> None:
         self._parameters = parameters
 
     def __getitem__(self, path: str) -> bytes:
-        if path not in FILES:
-            raise KeyError(path)
-        return extras(self._parameters)[path]
+        declared = DECLARATIONS if self._parameters is None else self._parameters.declarations
+        return _files(tuple((each.name, each.default) for each in declared))[path]
 
     def __iter__(self) -> Iterator[str]:
         return iter(FILES)
@@ -57,19 +60,13 @@ class ExtraFiles(Mapping[str, bytes]):
         return len(FILES)
 
 
-def extras(parameters: Parameters | None = None) -> dict[str, bytes]:
-    """All files by their path, with a vehicle's default parameters or, without it, the declared ones."""
-    declared = DECLARATIONS if parameters is None else parameters.declarations
-    return dict(_files(tuple((each.name, each.default) for each in declared)))
-
-
 def file_crc(content: bytes) -> int:
     """MAVLink's CRC-32 of a file: zlib's without its first and last inversion."""
     return crc32(content, 0xFFFFFFFF) ^ 0xFFFFFFFF
 
 
 @lru_cache(maxsize=4)
-def _files(defaults: tuple[tuple[str, float], ...]) -> tuple[tuple[str, bytes], ...]:
+def _files(defaults: tuple[tuple[str, float], ...]) -> dict[str, bytes]:
     declarations = Parameters(defaults=dict(defaults)).declarations
     files = {
         PARAMETERS_FILE: _compressed(parameters_json(declarations)),
@@ -83,7 +80,7 @@ def _files(defaults: tuple[tuple[str, float], ...]) -> tuple[tuple[str, bytes], 
             for number, path in ((_TYPE_PARAMETER, PARAMETERS_FILE), (_TYPE_EVENTS, EVENTS_FILE))
         ],
     }
-    return ((GENERAL_FILE, _compressed(general)), *files.items())
+    return {GENERAL_FILE: _compressed(general), **files}
 
 
 def _compressed(content: object) -> bytes:
@@ -177,5 +174,5 @@ class MetadataService(Service):
 
     def _general_file(self) -> tuple[int, int, bytes]:
         """Time, checksum and address, which both messages contain."""
-        crc = file_crc(extras(self._autopilot.parameters)[GENERAL_FILE])
+        crc = file_crc(ExtraFiles(self._autopilot.parameters)[GENERAL_FILE])
         return boot_ms(self._exchange.time_us), crc, f"mftp://{GENERAL_FILE}".encode()

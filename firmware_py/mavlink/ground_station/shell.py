@@ -49,24 +49,24 @@ class Console:
         self._autopilot = autopilot
         self._system_id = system_id
         self._commands: dict[str, Callable[[list[str]], str]] = {
-            "help": lambda _words: _HELP,
+            "help": lambda _arguments: _HELP,
             "ver": self._versions,
             "status": self._status,
             "commander": self._commander,
             "param": self._parameters,
-            "reboot": lambda _words: "reboot: start the simulator again instead\n",
+            "reboot": lambda _arguments: "reboot: start the simulator again instead\n",
         }
 
-    def answer(self, words: list[str]) -> str:
-        """The answer to the words of a line, ending with a newline unless it is empty."""
-        if not words:
+    def answer(self, arguments: list[str]) -> str:
+        """The answer to a command and its arguments, ending with a newline unless it is empty."""
+        if not arguments:
             return ""
-        command = self._commands.get(words[0])
+        command = self._commands.get(arguments[0])
         if command is None:
-            return f"{words[0]}: command not found; try help\n"
-        return command(words[1:])
+            return f"{arguments[0]}: command not found; try help\n"
+        return command(arguments[1:])
 
-    def _versions(self, _words: list[str]) -> str:
+    def _versions(self, _arguments: list[str]) -> str:
         own, followed = (".".join(map(str, version)) for version in (OWN_VERSION, FOLLOWED_PX4_VERSION))
         return (
             f"HW arch: simulated {self._autopilot.airframe.name}\n"
@@ -74,7 +74,7 @@ class Console:
             f"System id: {self._system_id}\n"
         )
 
-    def _status(self, _words: list[str]) -> str:
+    def _status(self, _arguments: list[str]) -> str:
         state, place = self._autopilot.state, self._autopilot.global_position()
         north_m, east_m, down_m = state.position_ned_m
         speeds = " ".join(f"{speed:.2f}" for speed in state.velocity_ned_m_s)
@@ -92,8 +92,8 @@ class Console:
             f"battery: {battery.voltage_v:.2f} V, {battery.remaining * 100:.0f} %\n"
         )
 
-    def _commander(self, words: list[str]) -> str:
-        if words != ["status"]:
+    def _commander(self, arguments: list[str]) -> str:
+        if arguments != ["status"]:
             return "usage: commander status\n"
         status = self._autopilot.status
         return (
@@ -104,8 +104,8 @@ class Console:
             f"landed: {status.landed_state.name.lower()}\n"
         )
 
-    def _parameters(self, words: list[str]) -> str:
-        match words:
+    def _parameters(self, arguments: list[str]) -> str:
+        match arguments:
             case ["show"]:
                 return self._show("*")
             case ["show", pattern]:

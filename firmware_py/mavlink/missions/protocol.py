@@ -50,8 +50,8 @@ class _Upload:
     partner: _Partner
     plan_type: PlanType
     count: int  # of all items
-    heard_us: int  # when the partner was heard last
-    requested_us: int  # when an item was requested last
+    received_us: int  # vehicle time of the partner's last message
+    requested_us: int  # vehicle time of the last request for an item
     as_int: bool = True  # request MISSION_ITEM_INT
     items: list[MissionItem] = field(default_factory=list)  # received so far
     current: int | None = None  # the item marked as current
@@ -87,7 +87,7 @@ class MissionService(Service):
         self._store = autopilot.missions
         self._upload: _Upload | None = None
         self._outcome: _Outcome | None = None
-        # With the time of the last request.
+        # The plan that is read, and the time of the last request.
         self._downloads: dict[tuple[_Partner, PlanType], tuple[Plan, int]] = {}
         self.handlers = {
             message_id: partial(self._receive, work)
@@ -110,7 +110,7 @@ class MissionService(Service):
         """Repeat a request that was not answered, and end transfers whose other side is silent."""
         now_us, upload = self._exchange.time_us, self._upload
         if upload is not None:
-            if now_us - upload.heard_us > _TIMEOUT_US:
+            if now_us - upload.received_us > _TIMEOUT_US:
                 self._say("Operation timeout")
                 self._end(upload, mavlink.MAV_MISSION_OPERATION_CANCELLED)
             elif now_us - upload.requested_us > _RETRY_US:
@@ -173,7 +173,7 @@ class MissionService(Service):
         elif message.mission_type != upload.plan_type:
             self._answer(partner, mavlink.MAV_MISSION_ERROR, message.mission_type)
         else:
-            upload.heard_us = self._exchange.time_us
+            upload.received_us = self._exchange.time_us
             if message.seq == upload.next_seq:
                 self._take(upload, message)
 
@@ -321,4 +321,4 @@ class MissionService(Service):
 def _repeats(upload: _Upload, plan_type: PlanType, count: int, now_us: int) -> bool:
     """Whether MISSION_COUNT was received twice; after a pause it is a client that restarts its upload."""
     same = (plan_type, count) == (upload.plan_type, upload.count)
-    return same and now_us - upload.heard_us <= _RETRY_US
+    return same and now_us - upload.received_us <= _RETRY_US

@@ -65,20 +65,11 @@ def _system_status(status: VehicleStatus) -> int:
 
 
 def _autopilot_version(system_id: int) -> Message:
-    no_hash = [0] * 8
-    return mavlink.MAVLink_autopilot_version_message(
-        _CAPABILITIES,
-        packed_version(FOLLOWED_PX4_VERSION),
-        packed_version(OWN_VERSION),
-        0,
-        0,
-        no_hash,
-        no_hash,
-        no_hash,
-        0,
-        0,
-        _UID_PREFIX << 32 | system_id,
-    )
+    # Of flight software and middleware; operating system and board have none.
+    versions = (packed_version(FOLLOWED_PX4_VERSION), packed_version(OWN_VERSION), 0, 0)
+    no_hashes = [[0] * 8] * 3
+    uid = _UID_PREFIX << 32 | system_id
+    return mavlink.MAVLink_autopilot_version_message(_CAPABILITIES, *versions, *no_hashes, 0, 0, uid)
 
 
 def _protocol_version() -> Message:

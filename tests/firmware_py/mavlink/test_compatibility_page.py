@@ -51,7 +51,7 @@ def test_every_command_is_on_the_page(node):
     assert CAMERA_COMPONENT_ID == 100
 
 
-def test_every_row_says_what_it_is():
+def test_every_row_has_its_kind():
     rows = [line for line in PAGE.splitlines() if line.startswith("| ") and not line.startswith("|---")]
     kinds = [row.split("|")[2].strip() for row in rows]
     assert set(kinds) == {"same", "different", "not there", ""}

@@ -205,7 +205,7 @@ def test_random_bytes_are_no_messages(autopilot, make_peer, pieces):
     assert peer.node.failed_messages == 0
 
 
-def test_a_fault_inside_is_counted_and_said_and_ends_nothing(autopilot, peer):
+def test_an_internal_error_is_counted_and_reported_and_ends_nothing(autopilot, peer):
     def broken():
         raise RuntimeError("worn out")
 

@@ -69,7 +69,7 @@ def test_other_devices_replies_and_other_vehicles_are_left_alone(peer):
     assert typed(peer, "", flags=0) == ""  # goodbye
 
 
-def test_mavsdk_asks_for_no_answer_and_wants_one(peer):
+def test_mavsdk_is_answered_though_it_sets_no_flag(peer):
     assert "compatible with PX4" in typed(peer, "ver all\n", flags=0)
 
 
