@@ -16,7 +16,7 @@ MARKER_V1 = int(mavlink.PROTOCOL_MARKER_V1)
 MARKER_V2 = int(mavlink.PROTOCOL_MARKER_V2)
 MARKERS = (MARKER_V1, MARKER_V2)
 SIGNED = int(mavlink.MAVLINK_IFLAG_SIGNED)
-SIGNATURE_BYTES = 13
+SIGNATURE_BYTES = 13  # link id 1, timestamp 6, hash 6
 CHECKSUM_BYTES = 2
 HEADER_BYTES_V1 = int(mavlink.HEADER_LEN_V1)
 HEADER_BYTES_V2 = int(mavlink.HEADER_LEN_V2)
@@ -26,10 +26,14 @@ _ID_COUNT_V1 = 256
 _PAYLOAD_BYTES_V1 = {n: kind.unpacker.size for n, kind in mavlink.mavlink_map.items() if n < _ID_COUNT_V1}
 _KNOWN_IDS = np.zeros(1 << 16, dtype=np.bool_)  # all of the dialect's are below 2^16
 _KNOWN_IDS[list(CRC_EXTRA)] = True
-
-
 _MAX_PAYLOAD_BYTES_V1 = np.full(_ID_COUNT_V1, -1)  # by message id; -1: unknown
 _MAX_PAYLOAD_BYTES_V1[list(_PAYLOAD_BYTES_V1)] = list(_PAYLOAD_BYTES_V1.values())
+
+_HEADER = Struct("<BBBBBBBHB")
+_CAPACITY_BYTES = 1 << 16  # the largest datagram fits
+_WINDOW_BYTES = 2048  # of noise, searched in one step
+_MAX_TRIES = 64  # of headers found in it, in one step
+_MAX_GAP = 200  # a sequence number that is farther ahead belongs to a packet that was overtaken
 
 
 def packet_length(data: bytes | bytearray, start: int) -> int | None:
@@ -68,13 +72,6 @@ def possible_starts(window: bytes | bytearray) -> list[int]:
         low = data[starts_v2 + 7] | data[starts_v2 + 8].astype(np.uint16) << 8
         starts_v2 = starts_v2[(data[starts_v2 + 9] == 0) & _KNOWN_IDS[low]]
     return sorted([*starts_v1.tolist(), *starts_v2.tolist()])
-
-
-_HEADER = Struct("<BBBBBBBHB")
-_CAPACITY_BYTES = 1 << 16  # the largest datagram fits
-_WINDOW_BYTES = 2048  # of noise, searched in one step
-_MAX_TRIES = 64  # of headers found in it, in one step
-_MAX_GAP = 200  # a sequence number that is farther ahead belongs to a packet that was overtaken
 
 
 class PacketReader:

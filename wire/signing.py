@@ -12,11 +12,10 @@ from __future__ import annotations
 from hashlib import sha256
 
 from wire.dialect import Message, mavlink
-from wire.framing import message_id_of, source_of
+from wire.framing import SIGNATURE_BYTES, message_id_of, source_of
 
 KEY_BYTES = 32
-_SIGNATURE_BYTES = 6
-_BLOCK_BYTES = 13  # link id 1, timestamp 6, signature 6
+_HASH_BYTES = 6
 _EPOCH_UNIX_US = 1_420_070_400_000_000  # timestamps count 10 us from 2015-01-01
 _MINUTE = 6_000_000  # of timestamps; a new stream may be that late
 _MAX_TIMESTAMP = (1 << 48) - 1
@@ -89,7 +88,7 @@ class Signing:
         """The 13 bytes to append to a packet with the flag for "signed", sent on a link from 0 to 255."""
         self._timestamp = min(self._timestamp + 1, _MAX_TIMESTAMP)
         stamp = bytes((link_id,)) + self._timestamp.to_bytes(6, "little")
-        return stamp + sha256(self._key + packet + stamp).digest()[:_SIGNATURE_BYTES]
+        return stamp + sha256(self._key + packet + stamp).digest()[:_HASH_BYTES]
 
     def accepts(self, packet: bytes | bytearray, *, trusted: bool) -> bool:
         """Whether to accept a received packet; `trusted`: its link cannot be reached from outside."""
@@ -100,10 +99,10 @@ class Signing:
         return self._is_valid(packet)
 
     def _is_valid(self, packet: bytes | bytearray) -> bool:
-        signed = len(packet) - _SIGNATURE_BYTES
-        if sha256(self._key + packet[:signed]).digest()[:_SIGNATURE_BYTES] != packet[signed:]:
+        signed = len(packet) - _HASH_BYTES
+        if sha256(self._key + packet[:signed]).digest()[:_HASH_BYTES] != packet[signed:]:
             return False
-        stamp = len(packet) - _BLOCK_BYTES
+        stamp = len(packet) - SIGNATURE_BYTES
         stream = (*source_of(packet), packet[stamp])
         timestamp = int.from_bytes(packet[stamp + 1 : signed], "little")
         last = self._streams.get(stream)

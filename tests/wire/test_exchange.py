@@ -40,7 +40,7 @@ class Party:
 
 @pytest.fixture
 def party():
-    """The app on the onboard link and a ground station on the ground link, both heard."""
+    """The app on the onboard link and a ground station on the ground link; both have sent a heartbeat."""
     party = Party()
     party.heartbeat(OTHERS, "onboard")
     party.heartbeat(STATION, "ground")
@@ -133,5 +133,5 @@ def test_the_table_is_bounded_and_drops_the_longest_silent_first():
     router.note("a", (2, 1), 0)
     for number in range(10 * _CAPACITY):
         router.note("b", (3 + number % 200, number // 200), 1 + number)
-    assert len(router._heard_us) == _CAPACITY
+    assert len(router._received_us) == _CAPACITY
     assert router.destinations("b", (9, 9), heartbeat, 1000) == []

@@ -1,4 +1,4 @@
-"""What a mission tells survives as bytes, and bytes of any kind do no harm."""
+"""A mission's reports are decoded as encoded, and invalid bytes are refused."""
 
 import json
 import struct
@@ -71,7 +71,7 @@ STATE = MissionState(7, 3, 2, 10, 5, True, False, False, (0.0,) * 4, (0.0,) * 4)
 
 
 def joined(assembler, pieces):
-    """What an assembler makes of pieces, without those that complete nothing."""
+    """The documents that an assembler makes of pieces."""
     return [document for piece in pieces if (document := assembler.take(piece)) is not None]
 
 
@@ -81,7 +81,7 @@ def piece(packed, kind=MISSION, crc=None, index=0, count=1, version=1):
 
 
 def incompressible(count):
-    """An object whose JSON hardly shrinks."""
+    """An object whose JSON cannot be compressed well."""
     state, letters = 1, []
     for _ in range(count):
         state = state * 6364136223846793005 % 2**64 + 1442695040888963407 & 2**64 - 1

@@ -1,4 +1,4 @@
-"""Where a simulator's API is."""
+"""The addresses of a simulator's API."""
 
 import pytest
 

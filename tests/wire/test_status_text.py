@@ -1,4 +1,4 @@
-"""STATUSTEXT as real drones send it, and as none should."""
+"""STATUSTEXT: texts of real drones, and invalid ones."""
 
 from pymavlink.dialects.v20 import common as mavlink
 

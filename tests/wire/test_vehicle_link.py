@@ -1,4 +1,4 @@
-"""The link of tools that listen: each kind of address, and faults in one line."""
+"""The link of receiving programs: each kind of address, and errors of one line."""
 
 import os
 import pty

@@ -1,4 +1,4 @@
-"""A vehicle as its messages tell it: where it was between and beyond its reports, and its state."""
+"""A vehicle's state from its messages: poses between and beyond its reports, and its flags."""
 
 from math import cos, hypot, pi, sin
 
@@ -49,7 +49,7 @@ def test_there_is_no_pose_before_both_kinds_are_received():
 
 @given(speed=speeds, yaw_rate=st.floats(-2, 2), at=st.floats(0.1, 0.9), offset_us=st.integers(0, 30_000))
 def test_even_motion_is_filled_in_exactly(speed, yaw_rate, at, offset_us):
-    """Attitude at 50 Hz, position at 30 Hz, on clocks that do not meet."""
+    """Attitude at 50 Hz, position at 30 Hz, at different times."""
     telemetry = VehicleTelemetry()
     for time_us in range(0, 1_200_000, 1000):
         if time_us % 20_000 == 0:

@@ -165,17 +165,17 @@ class CameraComponent(Service):
             mavlink.MAV_CMD_SET_CAMERA_MODE: self._set_mode,
             mavlink.MAV_CMD_IMAGE_START_CAPTURE: self._start_images,
             mavlink.MAV_CMD_IMAGE_STOP_CAPTURE: self._stop_images,
-            mavlink.MAV_CMD_VIDEO_START_CAPTURE: _cannot,
-            mavlink.MAV_CMD_VIDEO_STOP_CAPTURE: _cannot,
+            mavlink.MAV_CMD_VIDEO_START_CAPTURE: _unsupported,
+            mavlink.MAV_CMD_VIDEO_STOP_CAPTURE: _unsupported,
             mavlink.MAV_CMD_VIDEO_START_STREAMING: self._start_streaming,
-            mavlink.MAV_CMD_VIDEO_STOP_STREAMING: _cannot,
-            mavlink.MAV_CMD_STORAGE_FORMAT: _cannot,
-            mavlink.MAV_CMD_SET_CAMERA_ZOOM: _cannot,
-            mavlink.MAV_CMD_SET_CAMERA_FOCUS: _cannot,
+            mavlink.MAV_CMD_VIDEO_STOP_STREAMING: _unsupported,
+            mavlink.MAV_CMD_STORAGE_FORMAT: _unsupported,
+            mavlink.MAV_CMD_SET_CAMERA_ZOOM: _unsupported,
+            mavlink.MAV_CMD_SET_CAMERA_FOCUS: _unsupported,
         }
         self.commands = {
             **{number: partial(_run, work) for number, work in self._work.items()},
-            **{number: partial(self._answer, *asked) for number, asked in _REQUESTS.items()},
+            **{number: partial(self._answer, *request) for number, request in _REQUESTS.items()},
             mavlink.MAV_CMD_IMAGE_START_CAPTURE: self._start_once,
             mavlink.MAV_CMD_REQUEST_MESSAGE: self._request_message,
         }
@@ -212,9 +212,9 @@ class CameraComponent(Service):
         message_id = command.params[0]
         return self._send(command, int(message_id) if isfinite(message_id) else -1, command.params[1])
 
-    def _answer(self, message_id: int, place: int, command: Command) -> CommandResult:
-        """A request that is older than REQUEST_MESSAGE."""
-        return self._send(command, message_id, command.all_params[place - 1] if place else 0.0)
+    def _answer(self, message_id: int, index_param: int, command: Command) -> CommandResult:
+        """Answer a request that is older than REQUEST_MESSAGE."""
+        return self._send(command, message_id, command.all_params[index_param - 1] if index_param else 0.0)
 
     def _send(self, command: Command, message_id: int, argument: float) -> CommandResult:
         index = int(argument) if isfinite(argument) and 0 <= argument < 1 << 31 else 0
@@ -291,7 +291,7 @@ def _run(work: Callable[[SevenParams], CommandResult], command: Command) -> Comm
     return work(command.all_params)
 
 
-def _cannot(_params: SevenParams) -> CommandResult:
+def _unsupported(_params: SevenParams) -> CommandResult:
     return CommandResult.UNSUPPORTED
 
 

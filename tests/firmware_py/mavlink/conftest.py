@@ -21,7 +21,7 @@ HOME = GeodeticPoint(47.397742, 8.545594, 489.0)
 
 @dataclass
 class FakeAutopilot:
-    """Records what it is asked for and answers `result`."""
+    """Records the calls of its methods and returns `result`."""
 
     airframe: Airframe
     parameters: Parameters = field(default_factory=Parameters)
@@ -108,7 +108,7 @@ class FakeAutopilot:
 
 
 class Peer:
-    """A client on both links: sends messages to a node and reads what it answers, streams left out."""
+    """A client on both links: sends messages to a node and reads its answers without streams."""
 
     def __init__(self, autopilot, *, system=245, component=191, links=(ONBOARD, GROUND), node_options=None):
         self.autopilot = autopilot

@@ -1,4 +1,4 @@
-"""docs/px4-compatibility.md names all that is there."""
+"""docs/px4-compatibility.md lists all messages and commands."""
 
 import re
 from pathlib import Path

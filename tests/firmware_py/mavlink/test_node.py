@@ -1,4 +1,4 @@
-"""Links of a node that come and go."""
+"""Links that are added to a node and removed."""
 
 import pytest
 

@@ -1,4 +1,4 @@
-"""A serial line carries little: streams are stretched to fit, heartbeats and answers come through."""
+"""A slow serial line: streams are stretched to fit, heartbeats and answers are sent."""
 
 from dataclasses import replace
 

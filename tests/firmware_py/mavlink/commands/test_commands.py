@@ -314,7 +314,7 @@ def test_a_region_of_interest_and_home_are_places(autopilot, peer):
 
 
 def test_altitudes_of_circles_and_home_count_from_the_sea_whatever_the_frame(autopilot, peer):
-    """MAVSDK names a relative frame for both and means it so; PX4 looks at no frame."""
+    """MAVSDK sends a relative frame with an absolute altitude for both; PX4 ignores the frame."""
     place = (round(PLACE.latitude_deg * 1e7), round(PLACE.longitude_deg * 1e7), PLACE.altitude_m)
     peer.ask(peer.int(34, 20.0, 3.0, 0, nan, *place, frame=mavlink.MAV_FRAME_GLOBAL_RELATIVE_ALT))
     peer.ask(peer.int(179, 0, 0, 0, 0, *place, frame=mavlink.MAV_FRAME_GLOBAL_RELATIVE_ALT))

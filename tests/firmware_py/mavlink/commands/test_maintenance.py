@@ -74,7 +74,7 @@ def test_the_command_reaches_who_breaks(autopilot, make_peer):
 
 
 class Vehicle:
-    """Has parameters and listens."""
+    """Has parameters and keeps its texts."""
 
     def __init__(self):
         self.parameters = Parameters()

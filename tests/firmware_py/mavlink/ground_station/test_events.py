@@ -211,7 +211,7 @@ def test_a_request_for_dropped_events_is_answered_with_the_oldest_kept(autopilot
 
 
 def test_all_events_arrive_over_a_bad_link(autopilot, peer, make_lossy_peer):
-    """A receiver as libevents has it: it asks for the next one whenever a later one comes or is announced."""
+    """As libevents: the receiver requests the next event when a later one is received or announced."""
     client, got, latest = make_lossy_peer(peer, seed=3, loss=0.2), [], 65527
 
     def take(messages):

@@ -113,7 +113,7 @@ def test_a_slow_link_is_not_flooded(make_link):
 
 
 def download(lossy, number, size):
-    """As MAVSDK: in chunks of 512 packets, what is missing after half a second is asked for again."""
+    """As MAVSDK: in chunks of 512 packets; missing ones are requested again after half a second."""
     content, missing = bytearray(size), set(range(0, size, 90))
     for _ in range(200):
         if not missing:

@@ -1,4 +1,4 @@
-"""The shell over SERIAL_CONTROL: silent unless switched on, and about the vehicle only."""
+"""The shell over SERIAL_CONTROL: silent unless enabled, and about the vehicle only."""
 
 import pytest
 from hypothesis import HealthCheck, given, settings

@@ -11,7 +11,7 @@ CAMERA = {"camera": CameraModel(320, 240, radians(90.0), 10.0)}
 
 
 def order(autopilot, peer, command, *params):
-    """Have the mission command something, and let the node pass it on."""
+    """Issue a command of the mission, and let the node pass it on."""
     issued = [IssuedCommand(command, (*params, *[0.0] * (7 - len(params))))]
     autopilot.take_issued_commands = lambda: [issued.pop()] if issued else []
     return peer.advance(0.01)

@@ -1,4 +1,4 @@
-"""The mission protocol at the table: what is sent, what comes back, what is kept."""
+"""The mission protocol without a flight: requests, answers, stored plans."""
 
 from math import isnan, nan
 from struct import unpack_from
@@ -92,7 +92,7 @@ def told(autopilot):
 
 @pytest.fixture
 def quiet(autopilot, make_peer):
-    """A peer that leaves texts with the autopilot."""
+    """A peer whose node leaves the autopilot's texts to the test."""
     peer = make_peer(autopilot)
     autopilot.take_texts = list
     return peer

@@ -87,7 +87,7 @@ def test_health_bits_that_mavsdk_waits_for(autopilot, peer):
 
 
 def test_sys_status_has_px4s_bits_on_the_ground_and_in_the_air(autopilot, peer):
-    """As a PX4 v1.17 simulation without a remote control was seen to say."""
+    """As measured from a PX4 v1.17 simulation without a remote control."""
     status = latest(peer, "SYS_STATUS")
     assert status.onboard_control_sensors_present == 0x0200402F
     assert status.onboard_control_sensors_enabled == 0x0201402F
