@@ -33,7 +33,6 @@ _HEADER = Struct("<BBBBBBBHB")
 _CAPACITY_BYTES = 1 << 16  # the largest datagram fits
 _WINDOW_BYTES = 2048  # of noise, searched in one step
 _MAX_TRIES = 64  # of headers found in it, in one step
-_MAX_GAP = 200  # a sequence number that is farther ahead belongs to a packet that was overtaken
 
 
 def packet_length(data: bytes | bytearray, start: int) -> int | None:
@@ -283,7 +282,7 @@ def message_id_of(data: bytes | bytearray, start: int = 0) -> int:
     return int.from_bytes(data[start + 7 : start + 10], "little")
 
 
-def missing_before(sequence: int, last: int) -> int:
-    """How many packets of a sender are missing after the last one; -1: this one is late or doubled."""
+def missing_before(sequence: int, last: int, max_missing: int = 127) -> int:
+    """How many packets of a sender are missing after its last one; -1: this one is late or doubled."""
     missing = (sequence - last - 1) % 256
-    return missing if missing <= _MAX_GAP else -1
+    return missing if missing <= max_missing else -1

@@ -9,6 +9,7 @@ from wire.dialect import Message, mavlink, request_message, request_rate
 from wire.framing import missing_before
 
 _SPAN_S = 10
+_MAX_MISSING = 200  # a sequence number that is farther ahead belongs to a packet that was overtaken
 
 STALE_S = 1.0
 LOST_S = 3.0
@@ -52,7 +53,7 @@ class LinkQuality:
             self._seconds.append(second)
         second.heard += 1
         if self._sequence is not None:
-            missing = missing_before(sequence, self._sequence)
+            missing = missing_before(sequence, self._sequence, _MAX_MISSING)
             second.lost += missing  # -1: counted as missing before, and received now
             if missing < 0:
                 return
