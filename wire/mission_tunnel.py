@@ -189,7 +189,7 @@ def split_document(kind: DocumentKind, content: Mapping[str, Any]) -> tuple[int,
 
 
 @dataclass(slots=True)
-class _Incomplete:
+class _IncompleteDocument:
     """A document of which pieces are missing."""
 
     crc: int
@@ -204,7 +204,7 @@ class DocumentAssembler:
     """
 
     def __init__(self) -> None:
-        self._incomplete: dict[DocumentKind, _Incomplete] = {}
+        self._incomplete: dict[DocumentKind, _IncompleteDocument] = {}
         self._complete: dict[DocumentKind, int] = {}  # CRC of the latest
 
     def take(self, payload: bytes) -> Document | None:
@@ -229,7 +229,7 @@ class DocumentAssembler:
             return None
         incomplete = self._incomplete.get(kind)
         if incomplete is None or incomplete.crc != crc or incomplete.count != count:
-            incomplete = self._incomplete[kind] = _Incomplete(crc, count)
+            incomplete = self._incomplete[kind] = _IncompleteDocument(crc, count)
         incomplete.parts[index] = payload[_PIECE.size :]
         if len(incomplete.parts) < count:
             return None

@@ -23,7 +23,7 @@ class Text:
 
 
 @dataclass(slots=True)
-class _Incomplete:
+class _IncompleteText:
     severity: int
     pieces: dict[int, bytes]
     since_s: float
@@ -33,7 +33,7 @@ class TextAssembler:
     """Joins long texts, which are sent in pieces of 50 bytes with one id."""
 
     def __init__(self) -> None:
-        self._incomplete: dict[tuple[int, int], _Incomplete] = {}
+        self._incomplete: dict[tuple[int, int], _IncompleteText] = {}
 
     def take(self, message: Message, component: int, now_s: float) -> list[Text]:
         """Take a STATUSTEXT; return the texts that are complete or given up."""
@@ -44,7 +44,7 @@ class TextAssembler:
         done = self.expire(now_s)
         if key not in self._incomplete and len(self._incomplete) >= _MAX_INCOMPLETE:
             done += self._joined(next(iter(self._incomplete)))
-        parts = self._incomplete.setdefault(key, _Incomplete(message.severity, {}, now_s))
+        parts = self._incomplete.setdefault(key, _IncompleteText(message.severity, {}, now_s))
         if message.chunk_seq < _MAX_PIECES:
             parts.pieces[message.chunk_seq] = raw
         if len(raw.split(b"\0", 1)[0]) < _PIECE_BYTES or message.chunk_seq >= _MAX_PIECES - 1:
