@@ -1,18 +1,34 @@
-"""JSON without NaN and infinities, which it cannot represent."""
+"""JSON without NaN and infinities, which it cannot represent: they become null."""
 
 from __future__ import annotations
 
+import json
 from collections.abc import Mapping
 from math import isfinite
 from typing import Any
 
 
-def finite(value: Any) -> Any:  # noqa: ANN401 - anything that JSON can represent
-    """A copy with None for numbers that are not finite, lists for tuples and text for keys."""
+def finite(value: Any, decimals: int | None = None) -> Any:  # noqa: ANN401 - anything that JSON can represent
+    """A copy with None for numbers that are not finite, lists for tuples and text for keys.
+
+    Args:
+        value: anything that JSON can represent; other objects are kept.
+        decimals: to which numbers are rounded; None: they are not.
+    """
     if isinstance(value, float):
-        return value if isfinite(value) else None
+        kept = value if isfinite(value) else None
+        return kept if kept is None or decimals is None else round(kept, decimals)
     if isinstance(value, (list, tuple)):
-        return [finite(item) for item in value]
+        return [finite(item, decimals) for item in value]
     if isinstance(value, Mapping):
-        return {str(key): finite(item) for key, item in value.items()}
+        return {str(key): finite(item, decimals) for key, item in value.items()}
     return value
+
+
+def encode(value: Any, decimals: int | None = None) -> str:  # noqa: ANN401 - as above
+    """Compact JSON of what `finite` returns.
+
+    Raises:
+        TypeError: it contains an object that JSON cannot represent.
+    """
+    return json.dumps(finite(value, decimals), separators=(",", ":"), allow_nan=False)
