@@ -52,11 +52,9 @@ class Router:
         """The links to which a packet is forwarded; an unknown message has no target: it is for everyone."""
         if len(self._received_us) < 2 or message.get_msgId() in _NEVER_FORWARDED:
             return []
-        target = (
-            getattr(message, "target_system", BROADCAST),
-            getattr(message, "target_component", BROADCAST),
-        )
-        if self._is_own(*target):
+        system_id = getattr(message, "target_system", BROADCAST)
+        component_id = getattr(message, "target_component", BROADCAST)
+        if self._is_own(system_id, component_id):
             return []
         with_target: dict[str, None] = {}  # in the order of their first packets
         with_sender = {link}
@@ -65,7 +63,9 @@ class Router:
                 continue
             if component == source:
                 with_sender.add(name)
-            elif _is_target(component, target):
+            elif system_id == BROADCAST or (
+                system_id == component[0] and component_id in (BROADCAST, component[1])
+            ):
                 with_target[name] = None
         return [name for name in with_target if name not in with_sender]
 
@@ -77,13 +77,6 @@ class Router:
             del received_us[key]
         if len(received_us) >= _CAPACITY:
             del received_us[min(received_us, key=received_us.__getitem__)]
-
-
-def _is_target(component: Component, target: Component) -> bool:
-    system_id, component_id = target
-    if system_id == BROADCAST:
-        return True
-    return component[0] == system_id and component_id in (BROADCAST, component[1])
 
 
 class Exchange:

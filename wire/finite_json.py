@@ -18,6 +18,8 @@ def finite(value: Any, decimals: int | None = None) -> Any:  # noqa: ANN401 - an
     if isinstance(value, float):
         kept = value if isfinite(value) else None
         return kept if kept is None or decimals is None else round(kept, decimals)
+    if value is None or isinstance(value, (str, int)):
+        return value
     if isinstance(value, (list, tuple)):
         return [finite(item, decimals) for item in value]
     if isinstance(value, Mapping):

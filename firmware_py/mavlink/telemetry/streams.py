@@ -167,9 +167,7 @@ class StreamService(Service):
         message_id, interval_us = _message_id(command.params[0]), command.params[1]
         if message_id is None or message_id not in self._streamable:
             return CommandResult.FAILED
-        if message_id == mavlink.MAVLINK_MSG_ID_HEARTBEAT:
-            return CommandResult.FAILED
-        if not isfinite(interval_us):
+        if message_id == mavlink.MAVLINK_MSG_ID_HEARTBEAT or not isfinite(interval_us):
             return CommandResult.FAILED
         kept_us = -1 if interval_us < 0 else min(round(interval_us), _MAX_INTERVAL_US)
         command.link.schedule.set_interval(message_id, kept_us, self._exchange.time_us)
