@@ -113,7 +113,7 @@ class Heard:
     """Counts the sound packets of each sender, by system id."""
 
     packets: ClassVar[Counter[int]] = Counter()
-    count = Traffic.hear
+    count = Traffic.receive
 
     @staticmethod
     def hear(traffic: Traffic, sender: tuple[int, int], sequence: int, size: int) -> None:
@@ -249,7 +249,7 @@ def main() -> int:
     """Flood each link with everything and show what came of it."""
     options = read_options()
     server.Pacer = TimedPacer  # type: ignore[misc]
-    Traffic.hear = Heard.hear  # type: ignore[method-assign]
+    Traffic.receive = Heard.hear  # type: ignore[method-assign]
     table = Table(title=f"a link flooded with up to {options.rate:g} MB/s for {options.seconds:g} s")
     for column in COLUMNS:
         table.add_column(column, justify="left" if column in ("link", "bytes") else "right")

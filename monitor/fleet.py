@@ -16,8 +16,7 @@ from monitor.vehicle.commands import OWN_SYSTEM, Answer, Sticks
 from monitor.vehicle.tries import TryEvent
 from monitor.vehicle.vehicle import Vehicle, VehicleCallbacks
 from scenarios.models import Scenario
-from wire.dialect import Message
-from wire.vehicles import ground_station_heartbeat, is_vehicle
+from wire.dialect import Message, ground_station_heartbeat, is_vehicle
 
 _TICK_S = 0.1
 _HEARTBEAT_S = 1.0

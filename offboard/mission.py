@@ -7,10 +7,11 @@ from dataclasses import dataclass, field, fields
 from functools import cached_property
 from pathlib import Path
 
+import yaml
 from statemachine import StateChart
 
 from offboard.chart.check import check, is_finish
-from offboard.chart.native import load_chart, native_yaml
+from offboard.chart.native import load_chart, native_document
 from offboard.chart.problems import MissionError, Place, ProblemList, did_you_mean, mission_error
 from offboard.chart.read import read_mission_file
 from offboard.chart.spec import Leaf, MissionFile, State, all_states, expand, leaves, merge_extended
@@ -31,7 +32,6 @@ class Mission:
     Attributes:
         spec: the expanded chart.
         pilot: what the mission was checked against: a contestant's file or a class.
-        native: the expanded chart as a document of python-statemachine.
     """
 
     name: str
@@ -39,7 +39,6 @@ class Mission:
     path: Path
     spec: MissionFile = field(repr=False)
     pilot: PilotFile | type[Pilot] = field(repr=False)
-    native: str = field(repr=False)
 
     def __getstate__(self) -> dict[str, object]:
         """Only the fields: the chart's class cannot be pickled."""
@@ -48,7 +47,12 @@ class Mission:
     @cached_property
     def chart(self) -> type[StateChart]:
         """The class whose instances run the chart."""
-        return load_chart(self.spec, self.native)
+        return load_chart(self.spec)
+
+    @property
+    def native(self) -> str:
+        """The expanded chart as a YAML document of python-statemachine: equal if missions fly alike."""
+        return yaml.safe_dump(native_document(self.spec), sort_keys=False, width=110)
 
     @cached_property
     def leaves(self) -> dict[str, Leaf]:
@@ -91,7 +95,7 @@ def load_mission(name_or_path: str | Path, pilot: PilotFile | type[Pilot] | None
     spec = expand(merge_extended(written, _read_base), problems)
     check(spec, pilot.pilot_class() if isinstance(pilot, PilotFile) else pilot, problems)
     problems.raise_if_any()
-    mission = Mission(spec.name, spec.description, path, spec, pilot, native_yaml(spec))
+    mission = Mission(spec.name, spec.description, path, spec, pilot)
     mission.new_pilot()  # now, so that an error in the pilot or the chart is raised now
     mission.chart  # noqa: B018
     return mission

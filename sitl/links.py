@@ -12,7 +12,7 @@ from abc import ABC, abstractmethod
 from collections.abc import Awaitable, Callable
 from dataclasses import dataclass
 
-from wire.headers import MARKERS
+from wire.framing import MARKERS
 from wire.transports.sockets import (
     Address,
     Stream,

@@ -1,1 +1,1 @@
-"""What crosses a link, as bytes and back: MAVLink, what an app tells of its mission, video over HTTP."""
+"""What crosses a link, as bytes and back: MAVLink, an app's reports of its mission, video over HTTP."""

@@ -1,23 +1,33 @@
-"""Packets: out of a stream of bytes that may hold anything, and onto several links at once."""
+"""Packets of MAVLink 1 and 2: read from any stream of bytes, and packed once for several links.
+
+The header fields are those of https://mavlink.io/en/guide/serialization.html.
+"""
 
 from __future__ import annotations
 
 from struct import Struct
 from sys import maxsize
 
+import numpy as np
+
 from wire.dialect import Message, mavlink
-from wire.headers import (
-    CHECKSUM_BYTES,
-    CRC_EXTRA,
-    HEADER_BYTES_V1,
-    HEADER_BYTES_V2,
-    MARKER_V1,
-    MARKER_V2,
-    MARKERS,
-    SIGNED,
-    packet_length,
-    possible_starts,
-)
+
+MARKER_V1 = int(mavlink.PROTOCOL_MARKER_V1)
+MARKER_V2 = int(mavlink.PROTOCOL_MARKER_V2)
+MARKERS = (MARKER_V1, MARKER_V2)
+SIGNED = int(mavlink.MAVLINK_IFLAG_SIGNED)
+SIGNATURE_BYTES = 13  # link id 1, timestamp 6, hash 6
+CHECKSUM_BYTES = 2
+HEADER_BYTES_V1 = int(mavlink.HEADER_LEN_V1)
+HEADER_BYTES_V2 = int(mavlink.HEADER_LEN_V2)
+CRC_EXTRA: dict[int, int] = {number: kind.crc_extra for number, kind in mavlink.mavlink_map.items()}
+
+_ID_COUNT_V1 = 256
+_PAYLOAD_BYTES_V1 = {n: kind.unpacker.size for n, kind in mavlink.mavlink_map.items() if n < _ID_COUNT_V1}
+_KNOWN_IDS = np.zeros(1 << 16, dtype=np.bool_)  # all of the dialect's are below 2^16
+_KNOWN_IDS[list(CRC_EXTRA)] = True
+_MAX_PAYLOAD_BYTES_V1 = np.full(_ID_COUNT_V1, -1)  # by message id; -1: unknown
+_MAX_PAYLOAD_BYTES_V1[list(_PAYLOAD_BYTES_V1)] = list(_PAYLOAD_BYTES_V1.values())
 
 _HEADER = Struct("<BBBBBBBHB")
 _CAPACITY_BYTES = 1 << 16  # the largest datagram fits
@@ -25,11 +35,49 @@ _WINDOW_BYTES = 2048  # of noise, searched in one step
 _MAX_TRIES = 64  # of headers found in it, in one step
 
 
-class PacketReader:
-    """Takes bytes of one link and gives whole messages, MAVLink 1 and 2. Never raises, whatever the bytes.
+def packet_length(data: bytes | bytearray, start: int) -> int | None:
+    """Length in bytes of the packet whose header begins at `start`.
 
-    pymavlink's own loop throws away as many bytes as a broken header names, and with them good packets that
-    follow; this one loses nothing but the noise itself. Where no packet follows the last one, it searches for
+    Returns:
+        None while the header is not complete; 0 if no packet can begin so.
+    """
+    available = len(data) - start
+    if available < 3:
+        return None
+    if data[start] == MARKER_V1:
+        known = available >= HEADER_BYTES_V1 and _PAYLOAD_BYTES_V1.get(data[start + 5])
+        if known and data[start + 1] > known:
+            return 0
+        return HEADER_BYTES_V1 + data[start + 1] + CHECKSUM_BYTES
+    flags = data[start + 2]
+    if data[start] != MARKER_V2 or flags & ~SIGNED:
+        return 0  # the packet has an unknown flag and must be dropped
+    signature = SIGNATURE_BYTES if flags else 0
+    return HEADER_BYTES_V2 + data[start + 1] + CHECKSUM_BYTES + signature
+
+
+def possible_starts(window: bytes | bytearray) -> list[int]:
+    """Where headers of known messages may begin; the last `HEADER_BYTES_V2` - 1 bytes are not searched."""
+    count = len(window) - HEADER_BYTES_V2 + 1
+    if count <= 0:
+        return []
+    data = np.frombuffer(bytes(window), dtype=np.uint8)
+    first = data[:count]
+    starts_v1 = np.flatnonzero(first == MARKER_V1)
+    if starts_v1.size:
+        starts_v1 = starts_v1[data[starts_v1 + 1] <= _MAX_PAYLOAD_BYTES_V1[data[starts_v1 + 5]]]
+    starts_v2 = np.flatnonzero((first == MARKER_V2) & (data[2 : count + 2] <= SIGNED))
+    if starts_v2.size:
+        low = data[starts_v2 + 7] | data[starts_v2 + 8].astype(np.uint16) << 8
+        starts_v2 = starts_v2[(data[starts_v2 + 9] == 0) & _KNOWN_IDS[low]]
+    return sorted([*starts_v1.tolist(), *starts_v2.tolist()])
+
+
+class PacketReader:
+    """Reads whole messages from the bytes of one link, MAVLink 1 and 2. Never raises, whatever the bytes.
+
+    pymavlink's own loop drops as many bytes as a broken header states, and with them valid packets that
+    follow; this one drops only the noise itself. Where no packet follows the last one, it searches for
     the header of a known message, and computes a checksum only there.
 
     Reading is done in steps, so that its caller can bound the work: a step is one message, or noise: at
@@ -37,39 +85,24 @@ class PacketReader:
 
     Attributes:
         behind: the last `read` used up its steps; more can be read without more bytes.
-        skipped_bytes: how many bytes were no part of a message.
-        dropped_bytes: how many bytes were not taken, because 64 KiB already waited to be read.
-        overflows: how often some were not taken.
-        checksums: how many were computed.
+        skipped_bytes: number of bytes that were no part of a message.
+        overflows: how often bytes were dropped, because 64 KiB already waited to be read.
+        checksums: number of checksums computed.
     """
-
-    __slots__ = (
-        "_aligned",
-        "_boundary",
-        "_buffer",
-        "_decoder",
-        "_place",
-        "behind",
-        "checksums",
-        "dropped_bytes",
-        "overflows",
-        "skipped_bytes",
-    )
 
     def __init__(self) -> None:
         self._buffer = bytearray()
-        self._place = 0  # what stands before it has been read
-        self._aligned = True  # a packet ended, or bytes began to come, at this place
+        self._position = 0  # all before it has been read
+        self._aligned = True  # a packet ended, or the stream began, at this position
         self._boundary = 0  # the newest bytes begin there, with a whole packet
         self._decoder = mavlink.MAVLink(None)
         self.behind = False
         self.skipped_bytes = 0
-        self.dropped_bytes = 0
         self.overflows = 0
         self.checksums = 0
 
     def feed(self, data: bytes) -> list[Message]:
-        """Take bytes and give the messages that are now complete; the rest waits for more."""
+        """Take bytes and return the messages that are now complete; the rest waits for more."""
         messages: list[Message] = []
         piece = _CAPACITY_BYTES // 2
         for first in range(0, len(data), piece):
@@ -77,79 +110,75 @@ class PacketReader:
             messages += self.read()
         return messages
 
-    def add(self, data: bytes) -> None:
-        """Take bytes to be read later; those that find no room are lost, and counted."""
+    def add(self, data: bytes) -> int:
+        """Take bytes to be read later; the number of bytes dropped, because 64 KiB already waited."""
         buffer = self._buffer
-        room = _CAPACITY_BYTES - len(buffer)
-        if len(data) > room:
-            self.dropped_bytes += len(data) - room
+        dropped_bytes = max(0, len(data) - (_CAPACITY_BYTES - len(buffer)))
+        if dropped_bytes:
             self.overflows += 1
-            data = data[:room]
+            data = data[:-dropped_bytes]
         if not buffer:
             self._aligned = True
         elif self._is_sound(data, 0, packet_length(data, 0) or 0):
-            # What waits before a whole packet will never be completed.
+            # An incomplete packet before a whole one will never be completed.
             self._boundary = len(buffer)
         buffer += data
+        return dropped_bytes
 
-    def read(self, most_steps: int = maxsize) -> list[Message]:
-        """Give the next messages that are complete.
-
-        Args:
-            most_steps: after how many steps to stop.
-        """
+    def read(self, max_steps: int = maxsize) -> list[Message]:
+        """Return the next messages that are complete, after some steps at most."""
         messages: list[Message] = []
         steps = 0
-        while steps < most_steps and self._step(messages):
+        while steps < max_steps and self._step(messages):
             steps += 1
-        self.behind = steps == most_steps
-        del self._buffer[: self._place]
-        self._boundary = max(0, self._boundary - self._place)
-        self._place = 0
+        self.behind = steps == max_steps
+        del self._buffer[: self._position]
+        self._boundary = max(0, self._boundary - self._position)
+        self._position = 0
         return messages
 
     def _step(self, messages: list[Message]) -> bool:
-        """Read one message or pass over some noise; False: nothing can be done before more bytes come."""
-        buffer, place = self._buffer, self._place
-        if place >= len(buffer):
+        """Read one message or skip some noise; False: nothing can be done without more bytes."""
+        buffer, position = self._buffer, self._position
+        if position >= len(buffer):
             return False
-        if self._aligned or place == self._boundary:
-            length = self._try(place, messages)
+        if self._aligned or position == self._boundary:
+            length = self._try(position, messages)
             if length is None:
                 return False
             if length:
-                self._place += length
+                self._position += length
                 self._aligned = True
                 return True
             self._aligned = False
-            place += 1
-        end = min(place + _WINDOW_BYTES, len(buffer))
-        window = buffer[place : end + HEADER_BYTES_V2 - 1]
-        starts = [place + start for start in possible_starts(window)]
+            position += 1
+        end = min(position + _WINDOW_BYTES, len(buffer))
+        window = buffer[position : end + HEADER_BYTES_V2 - 1]
+        starts = [position + start for start in possible_starts(window)]
         if end + HEADER_BYTES_V2 > len(buffer):  # the last bytes may be the beginning of a header
             end = len(buffer)
-            tail = range(max(place, end - HEADER_BYTES_V2 + 1), end)
+            tail = range(max(position, end - HEADER_BYTES_V2 + 1), end)
             starts += [start for start in tail if buffer[start] in MARKERS]
         if len(starts) > _MAX_TRIES:
             end = starts[_MAX_TRIES]
         for start in starts[:_MAX_TRIES]:
             length = self._try(start, messages)
             if length != 0:
-                self._pass_over(start)
+                self._skip_to(start)
                 if length is None:
                     return False
-                self._place += length
+                self._position += length
                 self._aligned = True
                 return True
-        self._pass_over(end)
+        self._skip_to(end)
         return True
 
-    def _pass_over(self, end: int) -> None:
-        self.skipped_bytes += end - self._place
-        self._place = end
+    def _skip_to(self, end: int) -> None:
+        self.skipped_bytes += end - self._position
+        self._position = end
 
     def _try(self, start: int, messages: list[Message]) -> int | None:
-        """Add the message that begins at a place; its length, 0 if there is none, None if more must come."""
+        """Append the message at a position; its length, 0 if there is none, None if more bytes are needed."""
         buffer = self._buffer
         length = packet_length(buffer, start)
         if length == 0:
@@ -168,12 +197,12 @@ class PacketReader:
         return length
 
     def _is_sound(self, data: bytes | bytearray, start: int, length: int) -> bool:
-        """Whether a whole packet of a known message is there and has the right checksum."""
+        """Whether a whole packet of a known message begins there, with the right checksum."""
         if length == 0 or start + length > len(data):
             return False
         is_v1 = data[start] == MARKER_V1
         header = HEADER_BYTES_V1 if is_v1 else HEADER_BYTES_V2
-        extra = CRC_EXTRA.get(_message_id(data, start))
+        extra = CRC_EXTRA.get(message_id_of(data, start))
         if extra is None:
             return False
         self.checksums += 1
@@ -182,12 +211,12 @@ class PacketReader:
         return data[end] == crc & 0xFF and data[end + 1] == crc >> 8
 
     def _is_unknown(self, start: int, length: int) -> bool:
-        """Whether to believe a packet of an unknown message, whose checksum cannot be tested.
+        """Whether to accept a packet of an unknown message, whose checksum cannot be tested.
 
-        It must stand right after another packet, with another packet or nothing after it and none within it.
+        It must follow another packet directly, with another packet or nothing after it and none within it.
         """
         buffer, after = self._buffer, start + length
-        if not (self._aligned and start == self._place) or _message_id(buffer, start) in CRC_EXTRA:
+        if not (self._aligned and start == self._position) or message_id_of(buffer, start) in CRC_EXTRA:
             return False
         if after < len(buffer) and buffer[after] not in MARKERS:
             return False
@@ -197,7 +226,7 @@ class PacketReader:
 
 
 def _payload_only(_packer: Message, _crc_extra: int, payload: bytes, force_mavlink1: bool = False) -> bytes:
-    """In place of a message's own framing: only its fields, as they are on the wire."""
+    """Replaces a message's own framing: only its fields, as they are on the wire."""
     del force_mavlink1
     return payload
 
@@ -208,13 +237,13 @@ class Packet:
     Attributes:
         component_id: of its sender; each counts its own packets.
         length: bytes without a signature.
-        is_heartbeat: the one message that a slow link never leaves out.
+        is_heartbeat: the one message that is never left out on a slow link.
     """
 
     __slots__ = ("_crc_extra", "_template", "component_id", "is_heartbeat", "length")
 
     def __init__(self, message: Message, system_id: int, component_id: int) -> None:
-        # pymavlink's own way makes two objects and two checksums more, of which none would be used.
+        # pymavlink's own packing makes two more objects and two more checksums, which are not needed.
         message._pack = _payload_only
         payload = message.pack(None).rstrip(b"\0") or b"\0"
         del message._pack
@@ -231,12 +260,7 @@ class Packet:
         self.is_heartbeat = message.get_msgId() == mavlink.MAVLINK_MSG_ID_HEARTBEAT
 
     def numbered(self, sequence: int, *, signed: bool = False) -> bytes:
-        """The packet with a sequence number, 0 to 255, and the checksum that goes with it.
-
-        Args:
-            sequence: 0 to 255.
-            signed: set the flag for "signed"; the caller adds the signature.
-        """
+        """The packet with a sequence number, 0 to 255; if `signed`, the caller appends the signature."""
         packet = self._template
         packet[2] = SIGNED if signed else 0
         packet[4] = sequence
@@ -247,16 +271,18 @@ class Packet:
 
 
 def source_of(packet: bytes | bytearray) -> tuple[int, int]:
-    """System id and component id of a whole packet's sender, also of one whose message is unknown."""
+    """System id and component id of a whole packet's sender; the message may be unknown."""
     return (packet[3], packet[4]) if packet[0] == MARKER_V1 else (packet[5], packet[6])
 
 
-def message_id_of(packet: bytes | bytearray) -> int:
-    """Message id of a whole packet."""
-    return _message_id(packet, 0)
-
-
-def _message_id(data: bytes | bytearray, start: int) -> int:
+def message_id_of(data: bytes | bytearray, start: int = 0) -> int:
+    """Message id of a packet that begins at `start`."""
     if data[start] == MARKER_V1:
         return data[start + 5]
     return int.from_bytes(data[start + 7 : start + 10], "little")
+
+
+def missing_before(sequence: int, last: int, max_missing: int = 127) -> int:
+    """How many packets of a sender are missing after its last one; -1: this one is late or doubled."""
+    missing = (sequence - last - 1) % 256
+    return missing if missing <= max_missing else -1

@@ -1,7 +1,7 @@
-"""MJPEG over HTTP, JPEG images as parts of one multipart response: read and written, without sockets.
+"""MJPEG over HTTP, JPEG images as parts of one multipart response: reader and writer, without sockets.
 
-Cameras are careless with boundaries and lengths, and a stream from a network is not to be trusted:
-`MjpegReader` accepts what is common, holds no more than one part, and says what it cannot accept.
+Many cameras send wrong boundaries and lengths, and a stream from a network is not to be trusted:
+`MjpegReader` accepts common faults, keeps no more than one part, and reports what it cannot accept.
 """
 
 from __future__ import annotations
@@ -26,30 +26,21 @@ _STREAM_TYPE = re.compile(
 
 
 class StreamError(ValueError):
-    """The stream cannot be read any further; the message is one line."""
+    """The stream cannot be read further; the message is one line."""
 
 
 @dataclass(frozen=True, slots=True)
 class Part:
-    """One part of the stream.
+    """One part of the stream."""
 
-    Attributes:
-        data: its body, as received; a JPEG if the camera is sound.
-        time_us: the header `X-Time-Us`, if there is a sound one: vehicle time of exposure, microseconds.
-    """
-
-    data: bytes
-    time_us: int | None
+    data: bytes  # its body as received, normally a JPEG
+    time_us: int | None  # vehicle time of exposure, the header `X-Time-Us`; None: missing or invalid
 
 
 def write_part(jpeg: bytes, time_us: int | None) -> bytes:
-    """One image of a stream, with the boundary after it: so a browser shows it at once.
+    """One image of a stream and its vehicle time, with the boundary after it: so a browser shows it at once.
 
-    The response has `STREAM_HEADERS`; `STREAM_START` comes before the first part.
-
-    Args:
-        jpeg: the image.
-        time_us: vehicle time of its exposure, microseconds; None if unknown.
+    The response has `STREAM_HEADERS`, and `STREAM_START` before the first part.
     """
     stamp = "" if time_us is None else f"X-Time-Us: {time_us}\r\n"
     head = f"Content-Type: image/jpeg\r\nContent-Length: {len(jpeg)}\r\n{stamp}\r\n"
@@ -57,14 +48,10 @@ def write_part(jpeg: bytes, time_us: int | None) -> bytes:
 
 
 class MjpegReader:
-    """Cuts a multipart stream into its parts.
-
-    Args:
-        content_type: of the response.
-        max_part_bytes: a part that is larger ends the stream.
+    """Splits a multipart stream into its parts, by the response's Content-Type.
 
     Raises:
-        StreamError: it is another kind of response, or names no boundary.
+        StreamError: it is another kind of response, or has no boundary.
     """
 
     def __init__(self, content_type: str, max_part_bytes: int = MAX_PART_BYTES) -> None:
@@ -78,7 +65,7 @@ class MjpegReader:
         self._delimiter = b"--" + boundary.encode("utf-8", "replace")
         self._max = max_part_bytes
         self._buffer = bytearray()
-        self._searched = 0  # so far, the buffer holds no delimiter
+        self._searched = 0  # up to here, the buffer has no delimiter
         self._head: tuple[int | None, int | None] | None = None  # length and time of the part being read
 
     def feed(self, data: bytes) -> list[Part]:
@@ -99,7 +86,7 @@ class MjpegReader:
                 parts.append(part)
 
     def _read_head(self) -> bool:
-        """Go past the next delimiter and its headers; False if there is not enough yet."""
+        """Skip the next delimiter and read its headers; False if they are incomplete."""
         buffer = self._buffer
         at = buffer.find(self._delimiter)
         if at < 0:  # noise between parts is dropped
@@ -120,7 +107,7 @@ class MjpegReader:
         return True
 
     def _read_body(self) -> Part | None:
-        """Return the part whose headers were read; None if it is not complete yet."""
+        """Return the part whose headers were read; None if it is incomplete."""
         assert self._head is not None
         length, time_us = self._head
         buffer = self._buffer
@@ -140,7 +127,7 @@ class MjpegReader:
 
 
 def _number(head: bytes, name: bytes) -> int | None:
-    """Return a header's value if it is a whole number of sensible length."""
+    """A header's value if it is an integer of up to 18 digits."""
     found = re.search(
         rb"^[ \t]*" + name + rb"[ \t]*:[ \t]*(\d{1,18})[ \t]*\r?$", head, re.IGNORECASE | re.MULTILINE
     )

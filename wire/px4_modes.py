@@ -1,7 +1,7 @@
 """PX4's flight modes: one table of their numbers, names and flags.
 
-Numbers: `px4_custom_mode.h` and `vehicle_status.msg` of PX4; flags: `get_px4_custom_mode` and
-`get_mavlink_navigation_mode` there.
+Numbers: `px4_custom_mode.h` and `vehicle_status.msg` of PX4; flags: its `get_px4_custom_mode` and
+`get_mavlink_navigation_mode`.
 """
 
 from __future__ import annotations
@@ -17,27 +17,16 @@ _AUTO = mavlink.MAV_MODE_FLAG_AUTO_ENABLED | mavlink.MAV_MODE_FLAG_GUIDED_ENABLE
 
 @dataclass(frozen=True, slots=True)
 class Px4Mode:
-    """A flight mode.
+    """A flight mode."""
 
-    Attributes:
-        main: main mode of HEARTBEAT.custom_mode.
-        sub: sub mode.
-        title: name that ground stations show.
-        words: name inside a sentence.
-        px4_name: short name that PX4's tools and pymavlink use; "UNKNOWN" where they have none.
-        navigation_state: PX4's number of the mode inside, as logs and events have it; -1: none.
-        flags: of HEARTBEAT.base_mode, without armed and custom mode.
-        standard: MAV_STANDARD_MODE; 0: none.
-    """
-
-    main: int
-    sub: int
-    title: str
-    words: str
-    px4_name: str = "UNKNOWN"
-    navigation_state: int = -1
-    flags: int = _AUTO
-    standard: int = 0
+    main: int  # main mode of HEARTBEAT.custom_mode
+    sub: int  # sub mode
+    title: str  # name that ground stations show
+    words: str  # name inside a sentence
+    px4_name: str = "UNKNOWN"  # short name in PX4's tools and pymavlink
+    navigation_state: int = -1  # PX4's internal number, as in logs and events; -1: none
+    flags: int = _AUTO  # of HEARTBEAT.base_mode, without armed and custom mode
+    standard: int = 0  # MAV_STANDARD_MODE; 0: none
 
     @property
     def custom_mode(self) -> int:
@@ -98,7 +87,7 @@ def mode_title(heartbeat: Message) -> str:
 
 
 def _mode_or_main(custom_mode: int) -> Px4Mode | None:
-    """The mode; a sub mode that is not known counts as its main mode's first one, but in the auto modes."""
+    """The mode; an unknown sub mode counts as its main mode's first one, except in the auto modes."""
     main, sub = numbers_of(custom_mode)
     return _BY_NUMBERS.get((main, sub if main == _AUTO_MAIN or (main, sub) in _BY_NUMBERS else 0))
 

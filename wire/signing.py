@@ -1,10 +1,10 @@
-"""MAVLink 2 signing: who has the key may speak, and nobody can say again what was said.
+"""MAVLink 2 signing: packets without the key's signature are refused, and so are replayed ones.
 
 https://mavlink.io/en/guide/message_signing.html: the signature is the first 48 bits of the SHA-256 over key,
-packet, link id and a timestamp, which must grow from packet to packet of a (system, component, link id).
-PX4 v1.17 cannot sign; the rules for unsigned packets are those of newer ones: with a key they are refused,
-except on links that cannot be reached from outside (there USB, here loopback), so that companion apps that
-cannot sign, such as MAVSDK's, go on working beside a signed radio.
+packet, link id and a timestamp, which must increase from packet to packet of a (system, component, link id).
+PX4 v1.17 cannot sign; the rules for unsigned packets are those of later versions: with a key they are
+refused, except on links that cannot be reached from outside (there USB, here loopback), so that companion
+apps that cannot sign, such as MAVSDK's, work beside a signed radio.
 """
 
 from __future__ import annotations
@@ -12,11 +12,10 @@ from __future__ import annotations
 from hashlib import sha256
 
 from wire.dialect import Message, mavlink
-from wire.framing import message_id_of, source_of
+from wire.framing import SIGNATURE_BYTES, message_id_of, source_of
 
 KEY_BYTES = 32
-_SIGNATURE_BYTES = 6
-_BLOCK_BYTES = 13  # link id 1, timestamp 6, signature 6
+_HASH_BYTES = 6
 _EPOCH_UNIX_US = 1_420_070_400_000_000  # timestamps count 10 us from 2015-01-01
 _MINUTE = 6_000_000  # of timestamps; a new stream may be that late
 _MAX_TIMESTAMP = (1 << 48) - 1
@@ -25,20 +24,13 @@ _ALWAYS = (mavlink.MAVLINK_MSG_ID_RADIO_STATUS,)  # radios cannot sign
 
 
 class SigningKey:
-    """A secret of 32 bytes that never shows itself in a text.
+    """A secret of 32 bytes that is hidden when the object is printed.
 
-    Attributes:
-        secret: the bytes.
+    Raises:
+        ValueError: it does not have 32 bytes, or they are all zero, which means "no signing".
     """
 
-    __slots__ = ("secret",)
-
     def __init__(self, secret: bytes) -> None:
-        """Keep a secret.
-
-        Raises:
-            ValueError: it has not 32 bytes, or they are all zero, which means "no signing".
-        """
         if len(secret) != KEY_BYTES or not any(secret):
             raise ValueError("a signing key has 32 bytes, not all zero")
         self.secret = secret
@@ -48,10 +40,10 @@ class SigningKey:
 
     @classmethod
     def from_text(cls, text: str) -> SigningKey:
-        """Read a key: 64 hexadecimal digits, or a passphrase, of which the SHA-256 is taken as usual.
+        """The key of 64 hexadecimal digits, or of a passphrase, which is its SHA-256.
 
         Raises:
-            ValueError: the text is empty or stands for no key.
+            ValueError: the text is empty or no key.
         """
         text = text.strip()
         if not text:
@@ -66,23 +58,15 @@ class SigningKey:
 
 
 class Signing:
-    """The signing of one vehicle: its key, its clock and whom it heard.
+    """The signing of one vehicle: its key, its clock and the latest timestamps of its peers.
 
-    Attributes:
-        active: whether there is a key.
+    Without a key it is not active: it signs nothing and accepts all packets, until SETUP_SIGNING contains
+    one.
     """
 
-    __slots__ = ("_boot_us", "_key", "_streams", "_timestamp", "active")
-
     def __init__(self, key: SigningKey | None, boot_unix_us: int) -> None:
-        """Begin.
-
-        Args:
-            key: None: sign nothing and believe everybody, until SETUP_SIGNING brings one.
-            boot_unix_us: time of boot in microseconds since 1970.
-        """
         self._boot_us = boot_unix_us - _EPOCH_UNIX_US
-        self._streams: dict[tuple[int, int, int], int] = {}
+        self._streams: dict[tuple[int, int, int], int] = {}  # timestamp by system, component and link id
         self._timestamp = 0
         self._key = b""
         self.active = False
@@ -90,50 +74,35 @@ class Signing:
         self.advance(0)
 
     def set_key(self, key: SigningKey | None, timestamp: int = 0) -> None:
-        """Change the key.
-
-        Args:
-            key: None ends signing.
-            timestamp: at least which to go on from.
-        """
+        """Change the key, None ends signing; the next timestamp is above `timestamp`."""
         self._key = b"" if key is None else key.secret
         self._timestamp = max(self._timestamp, timestamp)
         self._streams.clear()
         self.active = key is not None
 
     def advance(self, time_us: int) -> None:
-        """Tell the vehicle's time; the timestamp never goes back."""
+        """Set vehicle time; the timestamp never decreases."""
         self._timestamp = max(self._timestamp, (self._boot_us + time_us) // 10)
 
     def block(self, packet: bytes, link_id: int) -> bytes:
-        """The 13 bytes that make a packet a signed one.
-
-        Args:
-            packet: header, with the flag for "signed", to checksum.
-            link_id: of the link it goes to, 0 to 255.
-        """
+        """The 13 bytes to append to a packet with the flag for "signed", sent on a link from 0 to 255."""
         self._timestamp = min(self._timestamp + 1, _MAX_TIMESTAMP)
         stamp = bytes((link_id,)) + self._timestamp.to_bytes(6, "little")
-        return stamp + sha256(self._key + packet + stamp).digest()[:_SIGNATURE_BYTES]
+        return stamp + sha256(self._key + packet + stamp).digest()[:_HASH_BYTES]
 
     def accepts(self, packet: bytes | bytearray, *, trusted: bool) -> bool:
-        """Whether to believe a packet that came in.
-
-        Args:
-            packet: all of it.
-            trusted: whether its link cannot be reached from outside.
-        """
+        """Whether to accept a received packet; `trusted`: its link cannot be reached from outside."""
         if not self.active or message_id_of(packet) in _ALWAYS:
             return True
         if packet[0] != mavlink.PROTOCOL_MARKER_V2 or not packet[2] & mavlink.MAVLINK_IFLAG_SIGNED:
             return trusted
-        return self._is_sound(packet)
+        return self._is_valid(packet)
 
-    def _is_sound(self, packet: bytes | bytearray) -> bool:
-        signed = len(packet) - _SIGNATURE_BYTES
-        if sha256(self._key + packet[:signed]).digest()[:_SIGNATURE_BYTES] != packet[signed:]:
+    def _is_valid(self, packet: bytes | bytearray) -> bool:
+        signed = len(packet) - _HASH_BYTES
+        if sha256(self._key + packet[:signed]).digest()[:_HASH_BYTES] != packet[signed:]:
             return False
-        stamp = len(packet) - _BLOCK_BYTES
+        stamp = len(packet) - SIGNATURE_BYTES
         stream = (*source_of(packet), packet[stamp])
         timestamp = int.from_bytes(packet[stamp + 1 : signed], "little")
         last = self._streams.get(stream)
@@ -146,7 +115,7 @@ class Signing:
         return True
 
     def set_up(self, message: Message) -> bool:
-        """Take the key of SETUP_SIGNING, zeros end signing; False if its timestamp leaves no future."""
+        """Take the key of SETUP_SIGNING, zeros end signing; False if its timestamp is too high."""
         secret = bytes(message.secret_key)
         if message.initial_timestamp > _MAX_TIMESTAMP // 2:
             return False

@@ -1,7 +1,6 @@
-"""A simulator's HTTP API: its one URL and what is served below it.
+"""A simulator's HTTP API: its base URL and the paths below it.
 
-The simulator and the virtual camera serve it (`docs/monitor-channels.md`). Whoever knows only the address of
-a camera finds the API by `SimulatorApi.of_video`; there is no other rule.
+The simulator and the virtual camera serve it (`docs/monitor-channels.md`).
 """
 
 from __future__ import annotations
@@ -16,20 +15,16 @@ SCENARIO_PATH = "/scenario.json"
 
 @dataclass(frozen=True, slots=True)
 class SimulatorApi:
-    """Where a simulator's API is.
+    """The address of a simulator's API."""
 
-    Attributes:
-        url: scheme, host and port, such as "http://127.0.0.1:8100"; no slash at the end.
-    """
-
-    url: str
+    url: str  # scheme, host and port, such as "http://127.0.0.1:8100"; no slash at the end
 
     @classmethod
     def at(cls, url: str) -> SimulatorApi:
-        """The API at a URL that somebody has written down.
+        """The API at a URL given by a user.
 
         Raises:
-            ValueError: it is none; the message is one line for people.
+            ValueError: it is not such a URL; the message is one line for people.
         """
         api = cls.of_video(url)
         if api is None or urlsplit(url).path not in ("", "/"):
@@ -40,10 +35,10 @@ class SimulatorApi:
 
     @classmethod
     def of_video(cls, video_url: str) -> SimulatorApi | None:
-        """The API that a video may belong to: that of the same scheme, host and port. Nothing is asked.
+        """The API that a video may belong to: with the same scheme, host and port; nothing is requested.
 
         Returns:
-            None for a video that does not come over HTTP: a device, a file, RTSP.
+            None for a video that is not sent over HTTP: a device, a file, RTSP.
         """
         try:
             parts = urlsplit(video_url)
@@ -54,15 +49,15 @@ class SimulatorApi:
 
     @property
     def video_url(self) -> str:
-        """Of the camera's images, as MJPEG."""
+        """URL of the camera's images, as MJPEG."""
         return self.url + VIDEO_PATH
 
     @property
     def referee_url(self) -> str:
-        """Of the referee's view of the try, as JSON."""
+        """URL of the standing of the try, as JSON."""
         return self.url + REFEREE_PATH
 
     @property
     def scenario_url(self) -> str:
-        """Of what is flown, as JSON."""
+        """URL of the scenario, as JSON."""
         return self.url + SCENARIO_PATH

@@ -1,8 +1,8 @@
-"""What a vehicle's autopilot tells of itself, read from parsed MAVLink messages.
+"""The state of a vehicle, read from its autopilot's parsed MAVLink messages.
 
-Each report carries the vehicle time at which it was true. Links swap, double and delay messages: a late
-report finds its place among the others and changes nothing that is newer; a clock that goes back by more than
-`RESTART_US` is that of a vehicle that has restarted, and all that was known of it is forgotten.
+Each report has the vehicle time at which it was true. Links swap, double and delay messages: a late report is
+inserted among the others and changes nothing newer; a clock that goes back by more than `RESTART_US` means
+that the vehicle has restarted, and its earlier reports are dropped.
 """
 
 from __future__ import annotations
@@ -12,7 +12,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from math import fsum, hypot, remainder, tau
 from operator import attrgetter
-from typing import Generic, NamedTuple, Protocol, TypeVar
+from typing import Generic, NamedTuple, TypeVar
 
 from geometry.rotations import (
     interpolated,
@@ -27,10 +27,10 @@ from wire.dialect import Message, mavlink
 from wire.px4_modes import Px4Mode, mode_of, mode_title
 
 RESTART_US = 3_000_000
-SPAN_US = RESTART_US  # of reports that are kept at least
-AHEAD_US = 60_000  # as far as a pose is carried on beyond the last report
-GAP_US = 300_000  # between two reports farther apart nothing is interpolated
-NEAR_US = 100_000  # a position counts for so long before the first and after the last report
+SPAN_US = RESTART_US  # minimum span of the reports that are kept
+AHEAD_US = 60_000  # maximum extrapolation of a pose beyond the last report
+GAP_US = 300_000  # maximum distance of reports between which poses are interpolated
+NEAR_US = 100_000  # a position is valid for this time before the first and after the last report
 _MAX_PLAUSIBLE = 1e6  # metres, metres a second or radians a second
 _MIN_NORM, _MAX_NORM = 0.5, 2.0  # of a quaternion that can be an attitude
 _UNKNOWN_MV = 0xFFFF
@@ -40,17 +40,11 @@ _YEAR_2001_US = 978_307_200_000_000
 class MessageOrder:
     """The order of messages of one kind from one vehicle, by their time stamps."""
 
-    __slots__ = ("_newest_us",)
-
     def __init__(self) -> None:
         self._newest_us = 0
 
     def is_next(self, time_us: int) -> bool:
-        """Whether a message is not older than those before, or the first one after a restart.
-
-        Args:
-            time_us: its time stamp, microseconds since the vehicle's boot.
-        """
+        """Whether a message, by its vehicle time, is not older than those before, or is a boot's first."""
         if self._newest_us - RESTART_US <= time_us < self._newest_us:
             return False
         self._newest_us = time_us
@@ -58,19 +52,12 @@ class MessageOrder:
 
 
 class AttitudeReport(NamedTuple):
-    """What ATTITUDE or ATTITUDE_QUATERNION says.
+    """An ATTITUDE or ATTITUDE_QUATERNION message."""
 
-    Attributes:
-        time_us: vehicle time, microseconds since boot.
-        attitude_ned: unit quaternion (w, x, y, z), body FRD to NED.
-        rate_frd_rad_s: angular rate, body axes, shape (3,).
-        by_angles: it came as ATTITUDE, whose angles are less accurate.
-    """
-
-    time_us: int
-    attitude_ned: Quaternion
+    time_us: int  # vehicle time
+    attitude_ned: Quaternion  # unit quaternion (w, x, y, z), body FRD to NED
     rate_frd_rad_s: Vec3 = (0.0, 0.0, 0.0)
-    by_angles: bool = False
+    by_angles: bool = False  # it is an ATTITUDE, whose angles are less accurate
 
     @property
     def yaw_ned_rad(self) -> float:
@@ -84,62 +71,30 @@ class AttitudeReport(NamedTuple):
 
 
 class PositionReport(NamedTuple):
-    """What LOCAL_POSITION_NED says.
+    """A LOCAL_POSITION_NED message."""
 
-    Attributes:
-        time_us: vehicle time, microseconds since boot.
-        position_ned_m: local, shape (3,).
-        velocity_ned_m_s: shape (3,).
-        yaw_ned_rad: the heading known when it came, clockwise from north; 0 before the first attitude.
-    """
-
-    time_us: int
+    time_us: int  # vehicle time
     position_ned_m: Vec3
     velocity_ned_m_s: Vec3
-    yaw_ned_rad: float = 0.0
+    yaw_ned_rad: float = 0.0  # of the latest attitude then, clockwise from north; 0 before the first
 
 
 @dataclass(frozen=True, slots=True)
 class VehiclePose:
-    """Where the vehicle was at one instant.
+    """Where the vehicle was at one instant, in its local frame."""
 
-    Attributes:
-        time_us: vehicle time, microseconds since boot.
-        position_ned_m: local, shape (3,).
-        velocity_ned_m_s: shape (3,).
-        attitude_ned: unit quaternion (w, x, y, z), body FRD to NED.
-    """
-
-    time_us: int
+    time_us: int  # vehicle time
     position_ned_m: Vec3
     velocity_ned_m_s: Vec3
-    attitude_ned: Quaternion
+    attitude_ned: Quaternion  # unit quaternion (w, x, y, z), body FRD to NED
 
 
 class VehicleTelemetry:
-    """The present state of a vehicle as it tells it, and the last seconds of its motion.
-
-    Attributes:
-        restarts: how often the vehicle's clock began again at zero.
-        attitudes: reports of attitude so far, of all boots.
-        positions: reports of position so far, of all boots.
-        time_us: newest vehicle time heard, microseconds since boot; 0 before the first report.
-        attitude_heard_s: when the newest attitude came, by the receiver's clock.
-        position_heard_s: when the newest position came.
-        boot_unix_us: when the vehicle was switched on, microseconds since 1970; None: not told yet.
-        armed: the motors may turn, as the last heartbeat says.
-        is_px4: its modes are PX4's.
-        mode: flight mode; None before the first heartbeat, and if it is not one of PX4's.
-        mode_name: of the flight mode, for people; "" before the first heartbeat.
-        custom_mode: HEARTBEAT.custom_mode.
-        landed: it stands on the ground; None: not known.
-        battery_percent: charge left; None: not known.
-        voltage_v: of the battery; None: not known.
-    """
+    """The present state of a vehicle as it reports it (None: not known), and its last seconds of motion."""
 
     def __init__(self) -> None:
-        self.restarts = 0
-        self.attitudes = self.positions = 0
+        self.restarts = 0  # how often the vehicle's clock restarted at zero
+        self.attitudes = self.positions = 0  # numbers of reports, of all boots
         self._forget()
         self._takers: dict[int, Callable[[Message, float], bool]] = {
             mavlink.MAVLINK_MSG_ID_HEARTBEAT: self._take_heartbeat,
@@ -153,31 +108,27 @@ class VehicleTelemetry:
         }
 
     def _forget(self) -> None:
-        """Know nothing of this boot."""
+        """Set the state of a vehicle that has sent nothing since its boot."""
         self._attitudes: _Track[AttitudeReport] = _Track()
         self._positions: _Track[PositionReport] = _Track()
-        self.time_us = 0
-        self.attitude_heard_s = self.position_heard_s = -1e9
-        self.boot_unix_us: int | None = None
+        self.time_us = 0  # newest vehicle time received
+        self.attitude_heard_s = self.position_heard_s = -1e9  # receiver's time of the newest report
+        self.boot_unix_us: int | None = None  # time of boot, microseconds since 1970
         self.armed = False
-        self.is_px4 = False
-        self.mode: Px4Mode | None = None
-        self.mode_name = ""
-        self.custom_mode = 0
-        self.landed: bool | None = None
-        self.battery_percent: int | None = None
-        self.voltage_v: float | None = None
+        self.is_px4 = False  # its modes are PX4's
+        self.mode: Px4Mode | None = None  # None too if it is not one of PX4's
+        self.mode_name = ""  # title of the mode; "" before the first heartbeat
+        self.custom_mode = 0  # HEARTBEAT.custom_mode
+        self.landed: bool | None = None  # it is on the ground
+        self.battery_percent: int | None = None  # remaining charge
+        self.voltage_v: float | None = None  # of the battery
         self._has_battery_status = False
 
     def take(self, message: Message, now_s: float = 0.0) -> bool:
-        """Take a message of the vehicle's autopilot; those of other kinds are passed over.
-
-        Args:
-            message: as parsed.
-            now_s: the receiver's clock, seconds.
+        """Take a message of the vehicle's autopilot, with the receiver's time.
 
         Returns:
-            Whether it told the newest of its kind; False if it is late, makes no sense or is not read here.
+            Whether it is the newest of its kind; False if it is late, implausible or not read here.
         """
         taker = self._takers.get(message.get_msgId())
         return taker is not None and taker(message, now_s)
@@ -194,26 +145,20 @@ class VehicleTelemetry:
 
     @property
     def covered_us(self) -> int | None:
-        """Up to here attitude and position are both reported; None while one has not come."""
+        """Vehicle time up to which attitude and position are both reported; None while one is missing."""
         attitude, position = self.attitude, self.position
         return None if attitude is None or position is None else min(attitude.time_us, position.time_us)
 
     @property
     def stands_disarmed(self) -> bool:
-        """Known to stand on the ground with its motors off."""
+        """Known to be on the ground with its motors off."""
         return bool(self.mode_name) and not self.armed and self.landed is True
 
     def pose(self, time_us: int) -> VehiclePose | None:
-        """Where the vehicle was.
+        """The pose at a vehicle time; None outside the reports or in a gap of them.
 
-        Between two reports the position goes straight and the attitude turns evenly; beyond the last one
-        both are carried on with velocity and body rates, for `AHEAD_US` at most.
-
-        Args:
-            time_us: vehicle time, microseconds.
-
-        Returns:
-            The pose; None outside the reports or in a gap of them.
+        Between two reports it is interpolated (position linearly, attitude with a constant rate); beyond the
+        last one it is extrapolated with velocity and body rates, by `AHEAD_US` at most.
         """
         attitudes, positions = self._attitudes.around(time_us), self._positions.around(time_us)
         if attitudes is None or positions is None:
@@ -222,7 +167,7 @@ class VehicleTelemetry:
         return VehiclePose(time_us, position_m, velocity_m_s, _attitude(*attitudes, time_us))
 
     def position_near(self, time_us: int) -> PositionReport | None:
-        """Position and heading at a time, straight between two reports; None where none is near."""
+        """Position and heading at a vehicle time, interpolated linearly; None where no report is near."""
         index, reports = self._positions.index(time_us), self._positions.reports
         before = reports[index - 1] if index else None
         after = reports[index] if index < len(reports) else None
@@ -252,7 +197,7 @@ class VehicleTelemetry:
 
     def _take_angles(self, message: Message, now_s: float) -> bool:
         angles = (message.roll, message.pitch, message.yaw)
-        if not abs(sum(angles)) < _MAX_PLAUSIBLE:  # nor is it with a NaN
+        if not abs(sum(angles)) < _MAX_PLAUSIBLE:  # or NaN
             return False
         return self._take_attitude(message, quaternion_from_euler(*angles), now_s, by_angles=True)
 
@@ -262,7 +207,7 @@ class VehicleTelemetry:
         rates = (message.rollspeed, message.pitchspeed, message.yawspeed)
         w, x, y, z = attitude
         norm = hypot(w, x, y, z)
-        if not (_MIN_NORM < norm < _MAX_NORM and _size(rates) < _MAX_PLAUSIBLE):  # nor is it with a NaN
+        if not (_MIN_NORM < norm < _MAX_NORM and _size(rates) < _MAX_PLAUSIBLE):  # or NaN
             return False
         time_us = message.time_boot_ms * 1000
         self._follow_clock(time_us)
@@ -278,7 +223,7 @@ class VehicleTelemetry:
 
     def _take_position(self, message: Message, now_s: float) -> bool:
         position, velocity = (message.x, message.y, message.z), (message.vx, message.vy, message.vz)
-        if not _size(position) + _size(velocity) < _MAX_PLAUSIBLE:  # nor is it with a NaN
+        if not _size(position) + _size(velocity) < _MAX_PLAUSIBLE:  # or NaN
             return False
         time_us = message.time_boot_ms * 1000
         self._follow_clock(time_us)
@@ -316,7 +261,7 @@ class VehicleTelemetry:
         return True
 
     def _take_system_status(self, message: Message, _now_s: float) -> bool:
-        """Take SYS_STATUS, which says of the battery what BATTERY_STATUS says better."""
+        """Take the battery's state of SYS_STATUS, unless the more accurate BATTERY_STATUS was received."""
         if self._has_battery_status:
             return False
         known = message.voltage_battery != _UNKNOWN_MV
@@ -325,7 +270,7 @@ class VehicleTelemetry:
         return True
 
     def _take_system_time(self, message: Message, _now_s: float) -> bool:
-        """Take SYSTEM_TIME; the first one that knows the date counts."""
+        """Take SYSTEM_TIME; the first one with a date counts."""
         boot_us = message.time_unix_usec - message.time_boot_ms * 1000
         if self.boot_unix_us is not None or boot_us <= _YEAR_2001_US:
             return False
@@ -333,19 +278,12 @@ class VehicleTelemetry:
         return True
 
 
-class _Timed(Protocol):
-    @property
-    def time_us(self) -> int: ...
-
-
-T = TypeVar("T", bound=_Timed)
+T = TypeVar("T", AttitudeReport, PositionReport)
 _time = attrgetter("time_us")
 
 
 class _Track(Generic[T]):
-    """Reports in order of their own time, whatever the order they came in."""
-
-    __slots__ = ("reports",)
+    """Reports in order of their vehicle time, received in any order."""
 
     def __init__(self) -> None:
         self.reports: list[T] = []
@@ -355,7 +293,7 @@ class _Track(Generic[T]):
         return self.reports[-1] if self.reports else None
 
     def add(self, report: T) -> bool:
-        """Put a report in its place; whether none is newer. One of the newest's time replaces it."""
+        """Insert a report; whether none is newer. One with the newest's time replaces that."""
         reports, time_us = self.reports, report.time_us
         if reports and reports[-1].time_us > time_us:
             index = self.index(time_us)
@@ -366,16 +304,16 @@ class _Track(Generic[T]):
             reports[-1] = report
         else:
             reports.append(report)
-            if reports[0].time_us < time_us - 2 * SPAN_US:  # seldom, so that it costs nothing
+            if reports[0].time_us < time_us - 2 * SPAN_US:  # rarely, as deletion is slow
                 del reports[: self.index(time_us - SPAN_US)]
         return True
 
     def index(self, time_us: int) -> int:
-        """How many reports are of a time or older."""
+        """Number of reports up to a time."""
         return bisect_right(self.reports, time_us, key=_time)
 
     def around(self, time_us: int) -> tuple[T, T | None] | None:
-        """The report at or before a time and the next one; None if it is older than all, or beyond reach."""
+        """The reports before and after a time; None before the first, in a gap, or too far ahead."""
         index = self.index(time_us)
         if index == 0:
             return None
@@ -413,5 +351,5 @@ def _size(vector: Vec3) -> float:
     return abs(vector[0]) + abs(vector[1]) + abs(vector[2])
 
 
-def _percent(told: int) -> int | None:
-    return told if 0 <= told <= 100 else None
+def _percent(remaining: int) -> int | None:
+    return remaining if 0 <= remaining <= 100 else None

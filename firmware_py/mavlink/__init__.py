@@ -1,1 +1,1 @@
-"""MAVLink as PX4 speaks it, in services. Bytes in, bytes out, time given; no clock, no socket."""
+"""PX4's MAVLink in services: bytes in, bytes out, with the time as an argument; no clock, no socket."""

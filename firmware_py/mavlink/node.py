@@ -1,4 +1,4 @@
-"""The node: one vehicle's MAVLink, from bytes to services and from telemetry to bytes."""
+"""The MAVLink node of one vehicle: received bytes to services, and their messages to bytes."""
 
 from __future__ import annotations
 
@@ -11,28 +11,24 @@ from firmware_py.mavlink.camera.model import CAMERA_COMPONENT_ID, CameraModel, C
 from firmware_py.mavlink.commands.flight import FlightCommands
 from firmware_py.mavlink.commands.maintenance import FailureSink, MaintenanceCommands
 from firmware_py.mavlink.commands.protocol import CommandService
-from firmware_py.mavlink.ground_station.calibration import CalibrationService
 from firmware_py.mavlink.ground_station.events import EventService
 from firmware_py.mavlink.ground_station.file_transfer import FileTransferService
 from firmware_py.mavlink.ground_station.log_transfer import LogTransferService
 from firmware_py.mavlink.ground_station.metadata import ExtraFiles, MetadataService
 from firmware_py.mavlink.ground_station.remote_id import RemoteIdService
 from firmware_py.mavlink.ground_station.shell import ShellService
+from firmware_py.mavlink.manual_control import ManualControlService
 from firmware_py.mavlink.missions.execution import MissionExecution
 from firmware_py.mavlink.missions.protocol import MissionService
-from firmware_py.mavlink.parameters.extended import ExtendedParameterService
-from firmware_py.mavlink.parameters.protocol import ParameterService
+from firmware_py.mavlink.offboard import OffboardService
+from firmware_py.mavlink.parameters import ExtendedParameterService, ParameterService
 from firmware_py.mavlink.service import Handler, Service, merged
-from firmware_py.mavlink.setpoints.manual_control import ManualControlService
-from firmware_py.mavlink.setpoints.offboard import OffboardService
-from firmware_py.mavlink.telemetry.condition import ConditionTelemetry
+from firmware_py.mavlink.telemetry.condition import CONDITION, esc_info
 from firmware_py.mavlink.telemetry.connection import ConnectionService
-from firmware_py.mavlink.telemetry.identity import IdentityService
-from firmware_py.mavlink.telemetry.motion import MotionTelemetry
-from firmware_py.mavlink.telemetry.places import PlaceService
-from firmware_py.mavlink.telemetry.sensing import SensorTelemetry
+from firmware_py.mavlink.telemetry.motion import MOTION, HomeAndOriginService
+from firmware_py.mavlink.telemetry.sensing import SENSORS
 from firmware_py.mavlink.telemetry.status_texts import StatusTextService
-from firmware_py.mavlink.telemetry.streams import StreamService
+from firmware_py.mavlink.telemetry.streams import AutopilotSource, AutopilotTelemetry, StreamService
 from firmware_py.storage import Storage
 from firmware_py.types import StatusText
 from wire.dialect import AUTOPILOT_COMPONENT_ID, BROADCAST, Message, mavlink
@@ -43,34 +39,20 @@ from wire.signing import Signing, SigningKey
 
 @dataclass(frozen=True, slots=True)
 class NodeOptions:
-    """What a vehicle has and offers over MAVLink beside its autopilot.
+    """What a vehicle offers over MAVLink beside its autopilot; None: it does not have that."""
 
-    Attributes:
-        system_id: MAVLink system id, 1 to 250; written to MAV_SYS_ID.
-        boot_unix_us: time of boot, microseconds since 1970; 0: not known.
-        signing_key: with which all is signed; None: nothing is.
-        video: the camera's streams, the one to be preferred first.
-        storage: the vehicle's files and logs; None: it keeps none.
-        firmware_files: path to content of files that can only be read, for `mftp://` addresses; by default
-            those that explain this vehicle's parameters and events.
-        shell: whether SERIAL_CONTROL is answered.
-        log_text: called with vehicle time and all that is said to people.
-        camera: on the vehicle, a component of its own; None: there is none.
-        captures: takes and keeps its pictures; by default they are only counted.
-        failures: breaks parts on purpose; None: nothing can be broken.
-    """
-
-    system_id: int = 1
-    boot_unix_us: int = 0
-    signing_key: SigningKey | None = None
-    video: Sequence[VideoStream] = ()
-    storage: Storage | None = None
+    system_id: int = 1  # 1 to 250; written to MAV_SYS_ID
+    boot_unix_us: int = 0  # time of boot, microseconds since 1970; 0: not known
+    signing_key: SigningKey | None = None  # signs all packets
+    video: Sequence[VideoStream] = ()  # the camera's streams, the preferred one first
+    storage: Storage | None = None  # of the vehicle's files and logs
+    # Read-only files, content by path, for `mftp://` addresses; by default the component metadata.
     firmware_files: Mapping[str, bytes] | None = None
-    shell: bool = False
-    log_text: Callable[[int, StatusText], None] | None = None
+    shell: bool = False  # whether SERIAL_CONTROL is answered
+    log_text: Callable[[int, StatusText], None] | None = None  # called with vehicle time and each text
     camera: CameraModel | None = None
-    captures: CaptureSink | None = None
-    failures: FailureSink | None = None
+    captures: CaptureSink | None = None  # takes and keeps pictures; by default they are only counted
+    failures: FailureSink | None = None  # breaks parts on purpose
 
 
 def _services(autopilot: Autopilot, exchange: Exchange, options: NodeOptions) -> tuple[Service, ...]:
@@ -85,9 +67,15 @@ def _services(autopilot: Autopilot, exchange: Exchange, options: NodeOptions) ->
         files = ExtraFiles(autopilot.parameters)
     events = EventService(autopilot, exchange)
     mission = MissionExecution(autopilot, exchange, camera)
+    state_messages: dict[int, AutopilotSource] = {
+        **MOTION,
+        **SENSORS,
+        **CONDITION,
+        mavlink.MAVLINK_MSG_ID_ESC_INFO: lambda autopilot: esc_info(autopilot, exchange.time_us),
+    }
     services: tuple[Service, ...] = (
-        PlaceService(autopilot, exchange),
-        StatusTextService(autopilot, exchange, events.tell, options.log_text),
+        HomeAndOriginService(autopilot, exchange),
+        StatusTextService(autopilot, exchange, events.send_text, options.log_text),
         events,
         ParameterService(autopilot, exchange),
         ExtendedParameterService(autopilot, exchange),
@@ -97,17 +85,13 @@ def _services(autopilot: Autopilot, exchange: Exchange, options: NodeOptions) ->
         mission,
         *((ShellService(autopilot, exchange),) if options.shell else ()),
         *((camera,) if camera is not None else ()),
-        # The others only answer.
+        # The others have no `update`.
         ConnectionService(autopilot, exchange),
-        IdentityService(exchange),
-        MotionTelemetry(autopilot),
-        SensorTelemetry(autopilot),
-        ConditionTelemetry(autopilot, exchange),
+        AutopilotTelemetry(autopilot, state_messages),
         OffboardService(autopilot, exchange),
         ManualControlService(autopilot, exchange),
         FlightCommands(autopilot),
         MaintenanceCommands(autopilot, options.failures),
-        CalibrationService(autopilot),
         MetadataService(autopilot, exchange),
         RemoteIdService(autopilot, exchange),
     )
@@ -130,19 +114,19 @@ def _services(autopilot: Autopilot, exchange: Exchange, options: NodeOptions) ->
 
 
 class MavlinkNode:
-    """Speaks MAVLink for an autopilot on some links. Streams from the first update, heard or not, as PX4.
+    """Connects an autopilot to MAVLink links. As PX4, it streams from the first update, heard or not.
 
     Args:
-        autopilot: for whom to speak.
+        autopilot: of the vehicle.
         links: with different names.
-        options: what else there is.
+        options: what else the vehicle offers.
 
     Raises:
         ParameterError: the system id is out of range.
 
     Attributes:
-        services: all that are offered, in the order of their updates.
-        failed_messages: messages whose handling failed inside; it should stay 0, and the texts say why not.
+        services: in the order of their updates.
+        failed_messages: messages whose handler raised an exception; a status text reports each.
     """
 
     def __init__(
@@ -172,41 +156,28 @@ class MavlinkNode:
             service.update for service in self.services if type(service).update is not Service.update
         )
 
-    @property
-    def refused_packets(self) -> int:
-        """How many sound packets were not believed for want of a signature."""
-        return self._exchange.refused_packets
-
     def add_link(self, profile: LinkProfile) -> None:
-        """Speak on one more link, with a name that no other has, from the next update on."""
+        """Use one more link, with a name that no other has, from the next update on."""
         self._exchange.add_link(profile)
 
     def remove_link(self, name: str) -> None:
-        """Speak no more on a link; what a service still sends there is lost."""
+        """Stop using a link; what a service still sends there is lost."""
         self._exchange.remove_link(name)
 
     def add_input(self, link: str, data: bytes) -> int:
-        """Keep bytes that came in for `process_input`; how many found no room and are lost.
-
-        Args:
-            link: name of the link's profile.
-            data: any piece of the stream.
-        """
+        """Keep bytes received on a link for `process_input`; the number of bytes dropped for lack of room."""
         source = self._exchange.links.get(link)
-        if source is None:
-            return 0
-        dropped_bytes = source.reader.dropped_bytes
-        source.reader.add(data)
-        return source.reader.dropped_bytes - dropped_bytes
+        return 0 if source is None else source.reader.add(data)
 
     def process_input(self, link: str, max_steps: int) -> bool:
-        """Read some of what `add_input` kept and act on it; whether some is left that can be read now.
-
-        It never raises, whatever the bytes are.
+        """Read some of the bytes that `add_input` kept and handle their messages. It never raises.
 
         Args:
             link: name of the link's profile.
             max_steps: bounds the work: a step is one message or some noise, see `PacketReader`.
+
+        Returns:
+            Whether more can be read now.
         """
         source = self._exchange.links.get(link)
         if source is None:
@@ -216,35 +187,27 @@ class MavlinkNode:
         return source.reader.behind
 
     def _dispatch(self, link: Link, message: Message) -> None:
-        """Call the handlers: the autopilot's always, as PX4 checks few targets; others' if they are meant."""
+        """Call the handlers: the autopilot's always, as PX4 checks few targets; others' as targets only."""
         message_id = message.get_msgId()
         target = getattr(message, "target_component", BROADCAST)
         for component_id, handlers in self._handlers.items():
             handler = handlers.get(message_id)
-            if handler is None:
+            is_target = component_id == AUTOPILOT_COMPONENT_ID or target in (component_id, BROADCAST)
+            if handler is None or not is_target:
                 continue
-            if component_id == AUTOPILOT_COMPONENT_ID or target in (component_id, BROADCAST):
-                self._handle(handler, link, message)
-
-    def _handle(self, handler: Handler, link: Link, message: Message) -> None:
-        try:
-            handler(link, message)
-        except Exception as error:  # the last boundary: a packet must never end a flight
-            self.failed_messages += 1
-            self._autopilot.say(
-                mavlink.MAV_SEVERITY_ERROR, f"Internal error on {message.get_type()}: {error!r}"
-            )
+            try:
+                handler(link, message)
+            except Exception as error:  # a packet must never end a flight
+                self.failed_messages += 1
+                text = f"Internal error on {message.get_type()}: {error!r}"
+                self._autopilot.say(mavlink.MAV_SEVERITY_ERROR, text)
 
     def update(self, time_us: int) -> None:
-        """Send what is due.
-
-        Args:
-            time_us: vehicle time, microseconds since boot; never goes back.
-        """
+        """Send what is due at a vehicle time, microseconds since boot, which never decreases."""
         self._exchange.advance(time_us)
         for update in self._updates:
             update()
 
     def take_output(self) -> list[tuple[str, bytes]]:
-        """What is to be sent, as (link name, datagram); a datagram holds one or more whole packets."""
+        """The datagrams to send, each with its link's name; a datagram has one or more whole packets."""
         return self._exchange.take_output()

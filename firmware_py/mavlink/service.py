@@ -1,4 +1,4 @@
-"""The one shape of all MAVLink services, and what their tables hold."""
+"""The one shape of all MAVLink services, and the entries of their tables."""
 
 from __future__ import annotations
 
@@ -8,6 +8,7 @@ from math import isfinite, nan
 from types import MappingProxyType
 from typing import Any, TypeVar
 
+from firmware_py.missions.flight import SevenParams
 from firmware_py.status import CommandResult
 from firmware_py.types import GeodeticPoint
 from wire.dialect import AUTOPILOT_COMPONENT_ID, BROADCAST, Message, mavlink
@@ -15,36 +16,23 @@ from wire.link import Link
 
 _NOT_GIVEN = 0x7FFFFFFF  # of x and y in COMMAND_INT
 _RELATIVE_FRAMES = (mavlink.MAV_FRAME_GLOBAL_RELATIVE_ALT, mavlink.MAV_FRAME_GLOBAL_RELATIVE_ALT_INT)
-SevenParams = tuple[float, float, float, float, float, float, float]
 _EMPTY: Mapping[int, Any] = MappingProxyType({})
 Entry = TypeVar("Entry")
 
 
 @dataclass(frozen=True, slots=True)
 class Command:
-    """What COMMAND_LONG and COMMAND_INT say; NaN means "not given".
+    """A COMMAND_LONG or COMMAND_INT; NaN means "not given"."""
 
-    Attributes:
-        link: it came by.
-        params: params 1 to 4.
-        latitude_deg: param 5 or x.
-        longitude_deg: param 6 or y.
-        altitude_m: param 7 or z; above mean sea level unless the frame says above home.
-        frame: MAV_FRAME of COMMAND_INT.
-        params_567: params 5 to 7 as they came, for commands in which they are no place.
-        sender: system and component id.
-        repeated: it says that it is sent again, for want of an acknowledgement.
-    """
-
-    link: Link
-    params: tuple[float, float, float, float]
-    latitude_deg: float = nan
-    longitude_deg: float = nan
-    altitude_m: float = nan
+    link: Link  # on which it was received
+    params: tuple[float, float, float, float]  # 1 to 4
+    latitude_deg: float = nan  # param 5 or x
+    longitude_deg: float = nan  # param 6 or y
+    altitude_m: float = nan  # param 7 or z; above mean sea level or, with a relative frame, above home
     frame: int = mavlink.MAV_FRAME_GLOBAL
-    params_567: tuple[float, float, float] = (nan, nan, nan)
-    sender: tuple[int, int] = (BROADCAST, BROADCAST)
-    repeated: bool = False
+    params_567: tuple[float, float, float] = (nan, nan, nan)  # as received; not always a position
+    sender: tuple[int, int] = (BROADCAST, BROADCAST)  # system and component id
+    repeated: bool = False  # it was sent before, and no acknowledgement was received
 
     @classmethod
     def from_long(cls, link: Link, message: Message) -> Command:
@@ -71,7 +59,7 @@ class Command:
 
     @property
     def all_params(self) -> SevenParams:
-        """Params 1 to 7 as they came."""
+        """Params 1 to 7 as received."""
         return (*self.params, *self.params_567)
 
     @property
@@ -80,38 +68,38 @@ class Command:
         return isfinite(self.latitude_deg) and isfinite(self.longitude_deg)
 
     def altitude_amsl_m(self, home: GeodeticPoint | None) -> float:
-        """The altitude above mean sea level; NaN when it is not given or counts from a home not known."""
+        """The altitude above mean sea level; NaN when it is not given, or is relative to an unknown home."""
         if self.frame not in _RELATIVE_FRAMES:
             return self.altitude_m
         return nan if home is None else self.altitude_m + home.altitude_m
 
 
 Handler = Callable[[Link, Message], None]
-"""Takes a message that came by a link."""
+"""Takes a message received on a link."""
 
 CommandHandler = Callable[[Command], CommandResult | None]
-"""Does a command; None: it is not acknowledged."""
+"""Executes a command; None: it is not acknowledged."""
 
 Source = Callable[[], Message | None]
-"""Makes a message as it is now; None: there is nothing to tell yet."""
+"""Makes a message as it is now; None: it has no content yet."""
 
 Reply = Callable[[Link, int], list[Message]]
-"""Makes what REQUEST_MESSAGE asks for on a link, with an index as its second parameter; empty: denied."""
+"""Makes what REQUEST_MESSAGE requests on a link, with an index as its second parameter; empty: denied."""
 
 
 class Service:
     """One MAVLink service of one of the vehicle's components.
 
-    A service sets the tables that it has in its constructor, and overrides `update` if it sends something
-    that nobody asked for. No two services of a component have an entry for the same id. Most are
-    given `autopilot`, for which they speak, and `exchange`, the vehicle's links and time.
+    A service sets its tables in its constructor, and overrides `update` if it sends messages unrequested. No
+    two services of a component have an entry for the same id. Most are given `autopilot` and `exchange`, the
+    vehicle's links and time.
 
     Attributes:
-        component_id: whose service it is.
+        component_id: of the component.
         handlers: by message id.
-        commands: by MAV_CMD; they are acknowledged with what the handler returns.
-        sources: by message id; what can be streamed and requested.
-        replies: by message id; what can only be requested.
+        commands: by MAV_CMD; they are acknowledged with the handler's result.
+        sources: by message id; messages that can be streamed and requested.
+        replies: by message id; messages that can only be requested.
     """
 
     component_id: int = AUTOPILOT_COMPONENT_ID
@@ -125,7 +113,7 @@ class Service:
 
 
 def merged(tables: Iterable[Mapping[int, Entry]]) -> dict[int, Entry]:
-    """One table of all.
+    """All tables in one.
 
     Raises:
         ValueError: two of them have an entry for the same id.

@@ -10,7 +10,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 from firmware_py.autopilot import Autopilot
-from firmware_py.mavlink.telemetry.identity import FOLLOWED_PX4_VERSION, OWN_VERSION, packed_version
+from firmware_py.mavlink.telemetry.connection import FOLLOWED_PX4_VERSION, OWN_VERSION, packed_version
 from firmware_py.storage import Path, Storage
 from firmware_py.types import StatusText
 from firmware_py.ulog import messages

@@ -7,13 +7,12 @@ from collections import deque
 from dataclasses import dataclass, field
 from math import dist
 
-from wire.dialect import AUTOPILOT_COMPONENT_ID, Message, mavlink
+from wire.dialect import AUTOPILOT_COMPONENT_ID, Message, is_vehicle, mavlink
+from wire.framing import missing_before
 from wire.status_text import TextAssembler
 from wire.vehicle_telemetry import VehicleTelemetry
-from wire.vehicles import is_vehicle
 
 TEXTS_KEPT = 12
-_HALF_TURN = 128
 # Bits of PX4's navigation states. An offboard flight by velocity needs what a take-off needs: attitude,
 # height and local position. Offboard's own bit is never set while nobody sends setpoints.
 TAKEOFF_MODE = 1 << 17
@@ -99,9 +98,9 @@ class StreamCounter:
         if self._last is None:
             self.passed, self._last = 1, sequence
             return
-        ahead = (sequence - self._last) % 256
-        if 0 < ahead < _HALF_TURN:
-            self.passed += ahead
+        missing = missing_before(sequence, self._last)
+        if missing >= 0:
+            self.passed += missing + 1
             self._last = sequence
 
     @property

@@ -9,9 +9,16 @@ import time
 from collections.abc import Callable, Iterator
 
 from framerunner.doctor.record import Record
-from wire.dialect import AUTOPILOT_COMPONENT_ID, Message, mavlink
+from wire.dialect import (
+    AUTOPILOT_COMPONENT_ID,
+    Message,
+    command_long,
+    companion_heartbeat,
+    ground_station_heartbeat,
+    mavlink,
+    request_message,
+)
 from wire.transports.vehicle_link import VehicleLink
-from wire.vehicles import command_long, companion_heartbeat, ground_station_heartbeat, request_message
 
 SYSTEM_ID = 247
 COMPONENT_ID = 190

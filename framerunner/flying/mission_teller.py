@@ -13,13 +13,14 @@ from offboard.link.companion import Companion
 from offboard.mission import Mission, mermaid
 from scenarios.result import FlightResult
 from vision.types import CameraFrame, Detection, Detections
-from wire.mission_codec import PayloadError, split_document
-from wire.mission_messages import (
+from wire.mission_tunnel import (
     TEXT_PREFIX,
     Box,
     DocumentKind,
     MissionDetections,
     MissionState,
+    PayloadError,
+    split_document,
 )
 
 STATE_TICKS = 2  # 10 Hz of vehicle time

@@ -19,10 +19,9 @@ from scenarios.models import Scenario
 from scenarios.result import FlightResult
 from vision.jpeg import MAX_PIXELS
 from vision.types import Detections
-from wire.dialect import Message, mavlink
+from wire.dialect import Message, is_vehicle, mavlink
 from wire.px4_modes import OFFBOARD, px4_name
 from wire.vehicle_telemetry import PositionReport, VehicleTelemetry
-from wire.vehicles import is_vehicle
 
 TICK_US = 50_000
 _MAX_TICKS = 576_000  # eight hours: a log that holds more is damaged

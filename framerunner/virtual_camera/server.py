@@ -10,11 +10,17 @@ from collections.abc import Callable, Mapping
 
 from framerunner.virtual_camera.painter import VirtualCamera
 from sitl.video import VideoServer
-from wire.dialect import AUTOPILOT_COMPONENT_ID, Message, mavlink
+from wire.dialect import (
+    AUTOPILOT_COMPONENT_ID,
+    Message,
+    companion_heartbeat,
+    is_vehicle,
+    mavlink,
+    request_rate,
+)
 from wire.simulator_api import REFEREE_PATH, SCENARIO_PATH
 from wire.transports.urls import LinkError
 from wire.transports.vehicle_link import VehicleLink
-from wire.vehicles import companion_heartbeat, is_vehicle, request_rate
 
 STALE_S = 0.5  # wall time without attitude or position, after which no image is served
 SYSTEM_ID = 246  # MAVSDK has 245, ground stations 255

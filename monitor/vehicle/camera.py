@@ -8,11 +8,10 @@ from ipaddress import IPv4Address, IPv6Address, ip_address
 from urllib.parse import SplitResult, urlsplit
 
 from monitor.vehicle.link_quality import RepeatedRequest
-from wire.dialect import Message, mavlink
+from wire.dialect import Message, mavlink, request_message
 from wire.simulator_api import VIDEO_PATH
 from wire.status_text import plain
 from wire.transports.urls import LinkError, parse_url
-from wire.vehicles import request_message
 
 CAMERAS = range(mavlink.MAV_COMP_ID_CAMERA, mavlink.MAV_COMP_ID_CAMERA6 + 1)
 _MAX_REQUESTS = 8

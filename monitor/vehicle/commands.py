@@ -12,10 +12,9 @@ from typing import NamedTuple
 
 from monitor.vehicle.texts import Texts
 from wire import px4_modes
-from wire.dialect import Message, mavlink
+from wire.dialect import Message, command_long, mavlink
 from wire.px4_modes import Px4Mode
 from wire.vehicle_telemetry import VehicleTelemetry
-from wire.vehicles import command_long
 
 OWN_SYSTEM = 250
 STICKS_HZ = 25.0

@@ -5,11 +5,11 @@ from __future__ import annotations
 from collections import deque
 from dataclasses import dataclass
 
-from wire.dialect import Message, mavlink
-from wire.vehicles import request_rate
+from wire.dialect import Message, mavlink, request_rate
+from wire.framing import missing_before
 
 _SPAN_S = 10
-_MAX_MISSING = 200  # a higher number of missing packets means that one was overtaken
+_MAX_MISSING = 200  # a sequence number that is farther ahead belongs to a packet that was overtaken
 
 STALE_S = 1.0
 LOST_S = 3.0
@@ -48,11 +48,10 @@ class LinkQuality:
             self._seconds.append(second)
         second.heard += 1
         if self._sequence is not None:
-            missing = (sequence - self._sequence - 1) & 0xFF
-            if missing > _MAX_MISSING:
-                second.lost -= 1  # it was counted as lost before
+            missing = missing_before(sequence, self._sequence, _MAX_MISSING)
+            second.lost += missing  # -1: counted as missing before, and received now
+            if missing < 0:
                 return
-            second.lost += missing
         self._sequence = sequence
 
     def forget_sequence(self) -> None:

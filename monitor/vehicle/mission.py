@@ -10,16 +10,19 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError
 from scenarios.result import FlightResult, first_error
 from wire.dialect import Message
 from wire.finite_json import finite
-from wire.mission_codec import DocumentAssembler, PayloadError, decode_detections, decode_state
-from wire.mission_messages import (
+from wire.mission_tunnel import (
     DETECTIONS_TYPE,
     DOCUMENT_TYPE,
     STATE_TYPE,
     UNSEEN,
     Box,
     Document,
+    DocumentAssembler,
     DocumentKind,
     MissionState,
+    PayloadError,
+    decode_detections,
+    decode_state,
 )
 from wire.status_text import plain
 

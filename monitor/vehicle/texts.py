@@ -7,7 +7,7 @@ from collections.abc import Callable
 from typing import Any
 
 from wire.dialect import Message, mavlink
-from wire.mission_messages import COMPONENT_ID as APP
+from wire.mission_tunnel import COMPONENT_ID as APP
 from wire.status_text import Text, TextAssembler
 
 _MAX_WARNINGS = 16

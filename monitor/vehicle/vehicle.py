@@ -20,11 +20,10 @@ from monitor.vehicle.track import History, Placement
 from monitor.vehicle.tries import Judging, TryEvent
 from scenarios.models import Scenario
 from scenarios.result import Standing
-from wire.dialect import AUTOPILOT_COMPONENT_ID, Message, mavlink
-from wire.mission_messages import COMPONENT_ID as APP
+from wire.dialect import AUTOPILOT_COMPONENT_ID, Message, mavlink, request_message
+from wire.mission_tunnel import COMPONENT_ID as APP
 from wire.simulator_api import SimulatorApi
 from wire.vehicle_telemetry import VehicleTelemetry
-from wire.vehicles import request_message
 
 _FRESH_S = 1.0
 _MAX_BOOT_TIME_REQUESTS = 5

@@ -18,9 +18,8 @@ from collections import deque
 from math import inf
 from typing import Any
 
-from wire.dialect import AUTOPILOT_COMPONENT_ID, mavlink
-from wire.mission_codec import PayloadError, encode_detections, encode_state
-from wire.mission_messages import (
+from wire.dialect import AUTOPILOT_COMPONENT_ID, companion_heartbeat, mavlink
+from wire.mission_tunnel import (
     COMPONENT_ID,
     DETECTIONS_TYPE,
     DOCUMENT_TYPE,
@@ -28,8 +27,10 @@ from wire.mission_messages import (
     DocumentKind,
     MissionDetections,
     MissionState,
+    PayloadError,
+    encode_detections,
+    encode_state,
 )
-from wire.vehicles import companion_heartbeat
 
 BEAT_S = 0.05  # wall time between two calls of `beat`
 PIECES_A_BEAT = 2  # of new documents: 6 kB/s at most, so that a slow link has room for setpoints

@@ -24,7 +24,7 @@ from mavsdk.asyncio import MavsdkError
 
 from geometry.vectors import Vec3
 from offboard.drone import VelocityCommand
-from wire.mission_messages import TEXT_PREFIX
+from wire.mission_tunnel import TEXT_PREFIX
 from wire.vehicle_telemetry import MessageOrder
 
 TICK_US = 50_000

@@ -20,7 +20,7 @@ from math import inf, isfinite
 
 from firmware_py.mavlink.camera.model import CameraModel, VideoEncoding, VideoStream
 from firmware_py.mavlink.node import MavlinkNode, NodeOptions
-from firmware_py.mavlink.rates import GROUND, ONBOARD
+from firmware_py.mavlink.telemetry.streams import GROUND, ONBOARD
 from framerunner.flying.plan import FlightPlan
 from geometry.axes import flip_vector
 from monitor.ports import Equipment
@@ -32,7 +32,7 @@ from sitl.video import VideoServer
 from sitl.world import CONTROL_PERIOD_US
 from tests.node_input import deliver
 from wire.dialect import Message, mavlink
-from wire.mission_messages import COMPONENT_ID
+from wire.mission_tunnel import COMPONENT_ID
 from wire.transports.urls import LinkError
 
 _BURST_TICKS = 5  # 20 ms of simulated time at once

@@ -11,8 +11,15 @@ from pymavlink.dialects.v20 import common as mavlink
 from offboard.link import companion as module
 from offboard.link.companion import Companion
 from offboard.link.telemetry import TelemetryFeed
-from wire.mission_codec import DocumentAssembler, decode_detections, decode_state, split_document
-from wire.mission_messages import DocumentKind, MissionDetections, MissionState
+from wire.mission_tunnel import (
+    DocumentAssembler,
+    DocumentKind,
+    MissionDetections,
+    MissionState,
+    decode_detections,
+    decode_state,
+    split_document,
+)
 
 SYSTEM = 3
 STATE = MissionState(

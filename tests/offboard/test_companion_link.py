@@ -12,7 +12,7 @@ from offboard.mavsdk_drone import MavsdkDrone
 from tests.offboard.conftest import free_port
 from tests.offboard.udp_vehicle import UdpVehicle
 from tests.processes import wait_until
-from wire.mission_messages import MissionState
+from wire.mission_tunnel import MissionState
 
 pytestmark = pytest.mark.realtime
 

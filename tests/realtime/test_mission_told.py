@@ -11,8 +11,7 @@ from pymavlink import mavutil
 
 from offboard.mission import load_mission, mermaid
 from tests.processes import bound, free_instance, program
-from wire.mission_codec import DocumentAssembler, decode_detections, decode_state
-from wire.mission_messages import DocumentKind
+from wire.mission_tunnel import DocumentAssembler, DocumentKind, decode_detections, decode_state
 
 mavlink = mavutil.mavlink
 pytestmark = [pytest.mark.realtime, pytest.mark.alone]

@@ -5,7 +5,7 @@ import pytest
 from firmware_py.airframe import load_airframe
 from firmware_py.autopilot import Autopilot
 from firmware_py.mavlink.node import MavlinkNode
-from firmware_py.mavlink.rates import GROUND, ONBOARD
+from firmware_py.mavlink.telemetry.streams import GROUND, ONBOARD
 from firmware_py.types import GeodeticPoint
 from sitl.link_hub import LinkInput
 from wire.dialect import mavlink
@@ -45,7 +45,7 @@ class Inlet:
         return most_s
 
     def heard(self, link):
-        return self.node._exchange.links[link].traffic.messages_heard
+        return self.node._exchange.links[link].traffic.messages_received
 
 
 @pytest.fixture

@@ -15,7 +15,7 @@ values = st.recursive(
 
 
 @given(values)
-def test_whatever_is_written_can_be_read_and_is_finite(value):
+def test_encoded_values_can_be_read_and_are_finite(value):
     again = json.loads(encode(value), parse_constant=lambda _: pytest.fail("no JSON"))
     assert again == finite(value)
 
@@ -26,5 +26,5 @@ def test_a_number_is_kept_or_null(value):
 
 
 def test_numbers_are_rounded_where_asked():
-    told = {"t": 1.23456, "q": [0.00004, nan, -inf, 7]}
-    assert encode(told, decimals=4) == '{"t":1.2346,"q":[0.0,null,null,7]}'
+    value = {"t": 1.23456, "q": [0.00004, nan, -inf, 7]}
+    assert encode(value, decimals=4) == '{"t":1.2346,"q":[0.0,null,null,7]}'

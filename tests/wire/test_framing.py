@@ -38,7 +38,7 @@ def test_noise_before_a_packet_costs_only_itself(noise):
     assert reader.skipped_bytes == len(noise)
 
 
-def test_a_packet_shut_in_by_a_false_start_comes_out_with_the_next():
+def test_a_packet_after_a_false_start_is_read_with_the_next():
     reader = PacketReader()
     assert reader.feed(b"\xfd\xff\x00" + packed()) == []  # the false header announces 267 bytes
     assert len(reader.feed(packed())) == 2
@@ -57,7 +57,7 @@ def test_a_message_of_unknown_id_is_passed_over_whole():
     assert [message.get_type() for message in messages] == [f"UNKNOWN_{0x332211}", "PING"]
 
 
-def test_a_message_of_unknown_id_is_not_believed_amid_noise():
+def test_a_message_of_unknown_id_is_not_accepted_amid_noise():
     unknown = bytearray(packed())
     unknown[7:10] = b"\x11\x22\x33"
     messages = PacketReader().feed(b"noise" + bytes(unknown) + packed())
@@ -127,7 +127,7 @@ def test_what_one_step_may_cost_is_bounded(noise):
 
 
 @pytest.mark.parametrize("noise", [b"\xfe", b"\xfd", b"\xfd\xff\x00", FALSE_HEADERS, b"\x00", None])
-def test_sound_packets_amid_noise_are_all_heard(noise):
+def test_valid_packets_amid_noise_are_all_read(noise):
     rng = random.Random(3)
     stream = b""
     for count in range(200):
@@ -146,12 +146,10 @@ def test_sound_packets_amid_noise_are_all_heard(noise):
     assert sum(message.get_type() == "PING" for message in heard) == 200
 
 
-def test_what_finds_no_room_is_dropped_and_counted():
+def test_bytes_without_room_are_dropped_and_counted():
     reader = PacketReader()
-    reader.add(packed() * 100)
-    reader.add(bytes(100_000))
-    reader.add(bytes(10))
-    assert reader.dropped_bytes == 100 * len(packed()) + 100_000 + 10 - 65536
+    dropped = [reader.add(data) for data in (packed() * 100, bytes(100_000), bytes(10))]
+    assert dropped == [0, 100 * len(packed()) + 100_000 - 65536, 10]
     assert reader.overflows == 2
     assert len(reader.read()) == 100
     assert len(reader.feed(packed())) == 1

@@ -1,4 +1,4 @@
-"""MJPEG: what cameras send, and what they should not."""
+"""MJPEG: streams of real cameras, and invalid ones."""
 
 import pytest
 from hypothesis import given

@@ -26,13 +26,13 @@ def test_short_names_are_pymavlinks(main):
 
 
 @pytest.mark.parametrize("mode", MODES)
-def test_flags_are_pymavlinks_where_it_knows_them(mode):
+def test_flags_are_pymavlinks_where_it_has_them(mode):
     known = mavutil.px4_map.get(mode.px4_name)
     if known is not None and known[1:] == (mode.main, mode.sub) and mode is not OFFBOARD:
         assert mode.flags | mavlink.MAV_MODE_FLAG_CUSTOM_MODE_ENABLED == known[0]
 
 
-def test_what_is_no_mode_of_px4s_is_told_by_its_numbers():
+def test_an_unknown_mode_is_named_by_its_numbers():
     assert mode_of(0x6304_0000) is None
     assert mode_title(heartbeat(0x6304_0000)) == "mode 4.99"
     assert mode_title(heartbeat(5, autopilot=3)) == "mode 5"

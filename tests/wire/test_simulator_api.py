@@ -1,4 +1,4 @@
-"""Where a simulator's API is."""
+"""The addresses of a simulator's API."""
 
 import pytest
 
@@ -34,6 +34,6 @@ def test_its_documents_lie_below_it():
 
 
 @pytest.mark.parametrize("url", ["10.0.0.2:8100", "udpin://0.0.0.0:14540", "http://10.0.0.2:8100/video", ""])
-def test_what_is_no_such_url_is_refused_in_words(url):
+def test_another_url_is_refused_with_a_message(url):
     with pytest.raises(ValueError, match="write http://HOST:PORT"):
         SimulatorApi.at(url)

@@ -1,4 +1,4 @@
-"""STATUSTEXT as real drones send it, and as none should."""
+"""STATUSTEXT: texts of real drones, and invalid ones."""
 
 from pymavlink.dialects.v20 import common as mavlink
 
@@ -38,14 +38,14 @@ def test_texts_of_two_components_are_not_mixed():
     assert take(assembler, said(b"b", number=7, place=1), component=191) == ["…b"]
 
 
-def test_memory_is_bounded_whatever_comes():
+def test_memory_is_bounded():
     assembler = TextAssembler()
     texts = [
         text
         for number in range(1, 400)
         for text in take(assembler, said(b"x" * 50, number=number, place=number % 256))
     ]
-    assert len(assembler._open) <= 4
+    assert len(assembler._incomplete) <= 4
     assert max(map(len, texts)) <= 500
 
 

@@ -50,7 +50,7 @@ def test_bad_addresses_are_named(text):
     assert "\n" not in str(caught.value)
 
 
-def test_a_program_says_what_it_accepts():
+def test_a_program_has_rules_for_what_it_accepts():
     rules = UrlRules("--at {}", "tcpin://a:1", takes_options=True, listens_on_names=True)
     url = parse_url("tcpin://localhost:1?a=b&c=", rules)
     assert url == LinkUrl("tcpin://localhost:1?a=b&c=", "tcpin", "localhost", 1, (("a", "b"), ("c", "")))
@@ -76,7 +76,7 @@ def test_loopback(host, own):
     assert is_loopback(host) is own
 
 
-def test_a_missing_serial_device_is_told():
+def test_a_missing_serial_device_is_reported():
     with pytest.raises(LinkError, match=r"/dev/ttyNONE9 cannot be opened .*; is it plugged in"):
         check_free(parse_url("serial:///dev/ttyNONE9:57600"), "")
 

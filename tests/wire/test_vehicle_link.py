@@ -1,4 +1,4 @@
-"""The link of tools that listen: each kind of address, and faults in one line."""
+"""The link of receiving programs: each kind of address, and errors of one line."""
 
 import os
 import pty
@@ -8,9 +8,9 @@ import threading
 import pytest
 from pymavlink.dialects.v20 import common as mavlink
 
+from wire.dialect import companion_heartbeat, is_vehicle, request_message
 from wire.transports.urls import LinkError
 from wire.transports.vehicle_link import VehicleLink
-from wire.vehicles import companion_heartbeat, is_vehicle, request_message
 
 
 def free_port(kind=socket.SOCK_DGRAM):
@@ -65,7 +65,7 @@ def test_of_several_vehicles_on_one_port_each_gets_what_is_for_it():
         link.close()
 
 
-def test_listening_on_udp_hears_and_answers_the_last_speaker():
+def test_a_listening_udp_link_answers_the_latest_sender():
     port = free_port()
     link = open_link(f"udpin://127.0.0.1:{port}")
     vehicle = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
@@ -84,7 +84,7 @@ def test_listening_on_udp_hears_and_answers_the_last_speaker():
         link.close()
 
 
-def test_speaking_first_over_udp():
+def test_sending_first_over_udp():
     vehicle = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
     vehicle.bind(("127.0.0.1", 0))
     link = open_link(f"udpout://127.0.0.1:{vehicle.getsockname()[1]}")
@@ -187,7 +187,7 @@ def test_an_address_that_cannot_be_had_is_one_clear_line(url, words):
     assert "\n" not in str(refused.value)
 
 
-def test_nobody_at_the_tcp_port_and_a_taken_udp_port_are_one_clear_line():
+def test_a_closed_tcp_port_and_a_taken_udp_port_are_one_clear_line():
     with pytest.raises(LinkError, match="refused"):
         open_link(f"tcpout://127.0.0.1:{free_port(socket.SOCK_STREAM)}")
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as other:

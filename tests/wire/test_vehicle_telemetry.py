@@ -1,4 +1,4 @@
-"""A vehicle as its messages tell it: where it was between and beyond its reports, and its state."""
+"""A vehicle's state from its messages: poses between and beyond its reports, and its flags."""
 
 from math import cos, hypot, pi, sin
 
@@ -36,7 +36,7 @@ def turned_apart(a, b):
     return abs(sum(p * q for p, q in zip(a, b, strict=True)))
 
 
-def test_nothing_is_known_before_both_kinds_have_come():
+def test_there_is_no_pose_before_both_kinds_are_received():
     telemetry = VehicleTelemetry()
     telemetry.take(attitude(20_000))
     assert telemetry.covered_us is None
@@ -49,7 +49,7 @@ def test_nothing_is_known_before_both_kinds_have_come():
 
 @given(speed=speeds, yaw_rate=st.floats(-2, 2), at=st.floats(0.1, 0.9), offset_us=st.integers(0, 30_000))
 def test_even_motion_is_filled_in_exactly(speed, yaw_rate, at, offset_us):
-    """Attitude at 50 Hz, position at 30 Hz, on clocks that do not meet."""
+    """Attitude at 50 Hz, position at 30 Hz, at different times."""
     telemetry = VehicleTelemetry()
     for time_us in range(0, 1_200_000, 1000):
         if time_us % 20_000 == 0:
@@ -65,7 +65,7 @@ def test_even_motion_is_filled_in_exactly(speed, yaw_rate, at, offset_us):
 
 
 @given(roll=angles, yaw=angles, turn=st.floats(-1.0, 1.0), flipped=st.booleans(), share=st.floats(0, 1))
-def test_attitudes_are_filled_in_the_short_way_and_stay_of_unit_length(roll, yaw, turn, flipped, share):
+def test_attitudes_are_interpolated_the_short_way_with_unit_length(roll, yaw, turn, flipped, share):
     """A quaternion and its negative are one attitude; reports may change between them."""
     first = quaternion_from_euler(roll, 0.2, yaw)
     second = multiply(first, (cos(turn / 2), 0.0, sin(turn / 2), 0.0))
@@ -92,7 +92,7 @@ def test_the_last_reports_are_carried_on_a_little(speed, rate, ahead_us):
     assert telemetry.pose(1_000_000 + AHEAD_US + 1) is None
 
 
-def test_nothing_is_made_up_across_a_hole():
+def test_nothing_is_interpolated_across_a_gap():
     telemetry = VehicleTelemetry()
     for time_us in (0, 100_000, 100_000 + GAP_US + 1000):
         telemetry.take(attitude(time_us))
@@ -123,7 +123,7 @@ def test_reports_that_are_not_finite_are_passed_over(bad):
     assert (telemetry.time_us, telemetry.attitude, telemetry.position) == (0, None, None)
 
 
-def test_a_clock_that_goes_back_begins_a_new_history():
+def test_a_clock_that_goes_back_starts_a_new_track():
     telemetry = VehicleTelemetry()
     for time_us in (60_000_000, 4_000_000, 4_020_000):
         telemetry.take(attitude(time_us))
@@ -183,7 +183,7 @@ def test_of_two_attitudes_of_one_instant_the_quaternion_counts():
 
 
 @given(st.floats(-0.5, 0.5), st.floats(-0.5, 0.5), st.floats(-3, 3))
-def test_turning_about_the_vertical_is_told_whatever_the_tilt(roll, pitch, rate):
+def test_the_turn_rate_is_about_the_vertical_whatever_the_tilt(roll, pitch, rate):
     body = (-sin(pitch) * rate, sin(roll) * cos(pitch) * rate, cos(roll) * cos(pitch) * rate)
     telemetry = VehicleTelemetry()
     telemetry.take(quaternion(0, quaternion_from_euler(roll, pitch, 1.0), body))
@@ -198,7 +198,7 @@ def landed(state):
     return mavlink.MAVLink_extended_sys_state_message(0, state)
 
 
-def test_a_heartbeat_tells_of_arming_and_mode():
+def test_a_heartbeat_has_arming_and_mode():
     telemetry = VehicleTelemetry()
     assert (telemetry.armed, telemetry.mode, telemetry.mode_name) == (False, None, "")
     telemetry.take(heartbeat(29 | 128))
@@ -209,7 +209,7 @@ def test_a_heartbeat_tells_of_arming_and_mode():
     assert telemetry.mode_name == f"mode {OFFBOARD.custom_mode}"
 
 
-def test_it_stands_disarmed_only_when_both_are_told():
+def test_it_stands_disarmed_only_when_both_are_known():
     telemetry = VehicleTelemetry()
     telemetry.take(landed(1))
     assert telemetry.landed and not telemetry.stands_disarmed

@@ -1,8 +1,8 @@
 """UDP, TCP and serial lines as transports of bytes that never block.
 
-A thread waits for them with `select.poll`, an asyncio loop with `add_reader`; both by `fileno`, which may be
-another one after each `read`. `read` gives b"" when there is nothing now and raises `OSError` when the link
-has gone. What cannot be sent is lost in whole writes without an error, as on a radio. Functions that open
+A thread waits for them with `select.poll`, an asyncio loop with `add_reader`; both by `fileno`, which may
+change with each `read`. `read` returns b"" when nothing was received and raises `OSError` when the link is
+closed. A write that cannot be sent is dropped as a whole without an error, as on a radio. Functions that open
 something raise `LinkError`: one line with what cannot be opened, why, and what to do.
 """
 
@@ -22,22 +22,18 @@ from wire.transports.urls import LinkError, LinkUrl
 
 Address = tuple[str, int]
 
-MAX_UNSENT_BYTES = 1 << 18  # of a stream; whoever reads slower loses packets
+MAX_UNSENT_BYTES = 1 << 18  # of a stream; a slower reader loses packets
 _CONNECT_S = 5.0
 _READ_BYTES = 1 << 16
 
 
 class UdpSocket:
-    """A UDP socket, bound or connected.
-
-    Attributes:
-        peer: who sent what was read last; None before.
-    """
+    """A UDP socket, bound or connected."""
 
     def __init__(self, opened: socket.socket) -> None:
         opened.setblocking(False)
         self._socket = opened
-        self.peer: Address | None = None
+        self.peer: Address | None = None  # sender of the datagram that was read last
 
     def fileno(self) -> int:
         """The descriptor to wait for."""
@@ -47,12 +43,12 @@ class UdpSocket:
         """The next datagram."""
         try:
             data, self.peer = self._socket.recvfrom(_READ_BYTES)
-        except (BlockingIOError, ConnectionRefusedError):  # refused: nobody listens there yet
+        except (BlockingIOError, ConnectionRefusedError):  # refused: nothing listens there yet
             return b""
         return data
 
     def write(self, data: bytes, to: Address | None = None) -> None:
-        """Send a datagram to the peer it is connected to, or to another."""
+        """Send a datagram to the peer that it is connected to, or to another address."""
         with suppress(OSError):
             if to is None:
                 self._socket.send(data)
@@ -60,7 +56,7 @@ class UdpSocket:
                 self._socket.sendto(data, to)
 
     def close(self) -> None:
-        """Let go of the port."""
+        """Close the port."""
         self._socket.close()
 
 
@@ -89,7 +85,7 @@ class Stream:
         return self._descriptor
 
     def read(self) -> bytes:
-        """The next bytes; sends on what waits, too."""
+        """The next bytes; unsent bytes are sent first."""
         if self._unsent:
             self.flush()
         try:
@@ -97,7 +93,7 @@ class Stream:
         except BlockingIOError:
             return b""
         if not data:
-            why = "the serial line has gone" if self.peer is None else "the other side closed the connection"
+            why = "the serial line is gone" if self.peer is None else "the other side closed the connection"
             raise ConnectionResetError(errno.ECONNRESET, why)
         return data
 
@@ -108,25 +104,25 @@ class Stream:
             self.flush()
 
     def has_unsent(self) -> bool:
-        """Whether bytes wait until the other end takes more."""
+        """Whether bytes wait to be sent."""
         return bool(self._unsent)
 
     def flush(self) -> None:
-        """Send what waits, as far as the other end takes it."""
+        """Send the waiting bytes, as many as the other end takes."""
         try:
             del self._unsent[: os.write(self._descriptor, self._unsent)]
         except BlockingIOError:
             return
         except OSError:
-            self._unsent.clear()  # that it is gone shows in `read`
+            self._unsent.clear()  # `read` raises the error
 
     def close(self) -> None:
-        """Let go of the connection or device."""
+        """Close the connection or device."""
         os.close(self._descriptor)
 
 
 class OneClient:
-    """A TCP server that takes one client after the other, and loses what is sent while there is none."""
+    """A TCP server that takes one client after the other, and drops writes while there is none."""
 
     def __init__(self, listener: socket.socket) -> None:
         self._listener = listener
@@ -134,11 +130,11 @@ class OneClient:
         self.peer: Address | None = None
 
     def fileno(self) -> int:
-        """The descriptor to wait for: of the client or, without one, for the next."""
+        """The descriptor to wait for: the client's or, without one, the listener's."""
         return (self._client or self._listener).fileno()
 
     def read(self) -> bytes:
-        """The client's next bytes; lets the next client in when that has gone."""
+        """The client's next bytes; accepts the next client when that has closed the connection."""
         try:
             if self._client is not None:
                 return self._client.read()
@@ -158,14 +154,14 @@ class OneClient:
             self._client.write(data)
 
     def close(self) -> None:
-        """Let go of client and port."""
+        """Close client and port."""
         if self._client is not None:
             self._client.close()
         self._listener.close()
 
 
 def bind_udp(place: Address, advice: str) -> UdpSocket:
-    """A UDP socket that listens; `advice` says what people can do when the port is taken."""
+    """A UDP socket that listens; `advice` is what to do when the port is taken."""
     with _explained(f"UDP {_name(place)} cannot be opened", advice):
         family, address = _local(place, socket.SOCK_DGRAM)
         opened = socket.socket(family, socket.SOCK_DGRAM)
@@ -178,7 +174,7 @@ def bind_udp(place: Address, advice: str) -> UdpSocket:
 
 
 def connect_udp(place: Address) -> UdpSocket:
-    """A UDP socket that sends to one address and hears only what comes from there."""
+    """A UDP socket that sends to one address and receives only from there."""
     address = resolved_ipv4(place)
     opened = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
     with _explained(f"UDP {_name(place)} cannot be sent to", "check host and network"):
@@ -191,7 +187,7 @@ def connect_udp(place: Address) -> UdpSocket:
 
 
 def resolved_ipv4(place: Address, what: str = "UDP") -> Address:
-    """Look up where UDP goes, once: with a name, `sendto` would look it up, blocking, for every packet."""
+    """Look up the address of a name once: `sendto` would look it up, blocking, for every packet."""
     with _explained(f"{what} {_name(place)} cannot be sent to", "give a host's name or an IPv4 address"):
         found = socket.getaddrinfo(*place, family=socket.AF_INET, type=socket.SOCK_DGRAM)
     return cast(Address, found[0][4])
@@ -246,10 +242,10 @@ def open_drone(url: LinkUrl) -> UdpSocket | Stream | OneClient:
 
 
 def check_free(url: LinkUrl, advice: str) -> None:
-    """See that a drone's port or device can be had before MAVSDK is told to open it.
+    """Check that a drone's port or device is free before MAVSDK opens it.
 
-    MAVSDK binds a UDP port that another program holds without complaint, and the last binder gets all
-    packets; so the port is bound here first, exclusively, and let go. `advice` is for a port that is taken.
+    MAVSDK binds a UDP port that another program has bound without an error, and the last one receives all
+    packets; so the port is bound here first, exclusively, and closed. `advice` is for a port that is taken.
     """
     if url.scheme == "udpin":
         bind_udp(url.place, _advice(url, advice)).close()
@@ -275,12 +271,12 @@ def _name(place: Address) -> str:
 
 @contextmanager
 def _explained(problem: str, advice: str) -> Iterator[None]:
-    """Make one line of a failure: what the problem is, why, and what to do."""
+    """Raise an operating system's error as one line: the problem, its cause, and what to do."""
     try:
         yield
     except (OSError, UnicodeError) as error:
         reason: object = error
-        if isinstance(error, OSError):  # some texts of Python's own repeat the address
+        if isinstance(error, OSError):  # some texts of Python repeat the address
             number = error.errno or 0
             reason = os.strerror(number) if number > 0 else error.strerror or error
         raise LinkError(f"{problem} ({reason}); {advice}") from None

@@ -1,12 +1,12 @@
 """URLs of MAVLink links, checked before anything is opened.
 
-    udpin://HOST:PORT       listens there and sends to whoever sent something
+    udpin://HOST:PORT       listens there and sends to the latest sender
     udpout://HOST:PORT      sends there first, from a port that the system chooses
     tcpin://HOST:PORT       a TCP server
     tcpout://HOST:PORT      a TCP client
     serial:///dev/tty:BAUD  a serial line
 
-All programs read this grammar; what only some of them accept is said by their `UrlRules`.
+All programs read this grammar; their `UrlRules` state what only some of them accept.
 """
 
 from __future__ import annotations
@@ -29,21 +29,13 @@ class LinkError(UserError):
 
 @dataclass(frozen=True, slots=True)
 class UrlRules:
-    """What a program accepts.
+    """What a program accepts, and its words for error messages."""
 
-    Attributes:
-        subject: names field and value in messages; `{}` stands for the value.
-        examples: of good URLs.
-        takes_options: NAME=VALUE may follow after a `?`.
-        listens_on_names: udpin and tcpin take a host's name, not only an IP address.
-        devices: how a serial device may begin.
-    """
-
-    subject: str
-    examples: str
-    takes_options: bool = False
-    listens_on_names: bool = False
-    devices: tuple[str, ...] = ("/",)
+    subject: str  # field and value in error messages; `{}` is replaced by the value
+    examples: str  # of valid URLs
+    takes_options: bool = False  # NAME=VALUE may follow after a `?`
+    listens_on_names: bool = False  # udpin and tcpin take a host's name, not only an IP address
+    devices: tuple[str, ...] = ("/",)  # prefixes of serial devices
 
 
 # MAVSDK reads these too: it listens on IP addresses only, and on Windows a serial device is COM3.
@@ -56,21 +48,13 @@ DRONE = UrlRules(
 
 @dataclass(frozen=True, slots=True)
 class LinkUrl:
-    """A checked URL.
+    """A checked URL."""
 
-    Attributes:
-        text: as people wrote it, without spaces around it.
-        scheme: one of `SCHEMES`.
-        address: host, or path of a device.
-        number: port, or baud rate.
-        options: names and values after the `?`; the caller checks them.
-    """
-
-    text: str
-    scheme: str
-    address: str
-    number: int
-    options: tuple[tuple[str, str], ...] = ()
+    text: str  # as given, without spaces around it
+    scheme: str  # one of `SCHEMES`
+    address: str  # host, or path of a device
+    number: int  # port, or baud rate
+    options: tuple[tuple[str, str], ...] = ()  # names and values after the `?`; the caller checks them
 
     @property
     def place(self) -> tuple[str, int]:
@@ -105,7 +89,7 @@ def host_and_port(text: str, default_port: int) -> tuple[str, int]:
     """Split HOST or HOST:PORT.
 
     Raises:
-        LinkError: the port is no port.
+        LinkError: the port is invalid.
     """
     host, colon, port = text.rpartition(":")
     if not colon:
@@ -116,7 +100,7 @@ def host_and_port(text: str, default_port: int) -> tuple[str, int]:
 
 
 def is_loopback(host: str) -> bool:
-    """Whether a host is this machine's own address, which nobody outside can reach or hear."""
+    """Whether a host is this machine's loopback address, which cannot be reached from outside."""
     return host == "localhost" or (_is_ip(host) and ipaddress.ip_address(host).is_loopback)
 
 

@@ -1,7 +1,7 @@
-"""A MAVLink link to a vehicle for programs that listen more than they speak, such as monitor and doctor.
+"""A MAVLink link to a vehicle for programs that mostly receive, such as monitor and doctor.
 
-`fly` commands through MAVSDK. A program that measures a link must see every packet with its sequence number,
-and must send nothing of its own accord, so it reads the link itself.
+`fly` commands through MAVSDK. A program that measures a link must see every packet with its sequence number
+and send nothing unrequested, so it reads the link itself.
 """
 
 from __future__ import annotations
@@ -22,17 +22,14 @@ class VehicleLink:
         system_id: own MAVLink system id; no vehicle should have it.
         component_id: own component id.
 
-    Attributes:
-        url: as given.
-
     Raises:
-        LinkError: bad address, port taken, nobody answers, no such device.
+        LinkError: bad address, port taken, no connection, no such device.
     """
 
     def __init__(self, url: str, *, system_id: int, component_id: int) -> None:
         parsed = parse_url(url)
         self._transport = open_drone(parsed)
-        # Several vehicles may send to a UDP port; elsewhere all are behind the same other end.
+        # Several vehicles may send to a UDP port; other transports have one peer for all.
         self._udp_port = self._transport if parsed.scheme == "udpin" else None
         self._peers: dict[int, Address] = {}  # by system id
         self.url = parsed.text
@@ -40,10 +37,7 @@ class VehicleLink:
         self._reader = PacketReader()
 
     def receive(self, timeout_s: float) -> list[Message]:
-        """Wait for messages; what cannot be understood is passed over.
-
-        Args:
-            timeout_s: wall time to wait at most.
+        """Wait for messages, for a maximum of wall time; bytes that are no message are skipped.
 
         Raises:
             LinkError: the link has failed.
@@ -63,7 +57,7 @@ class VehicleLink:
         return messages
 
     def send(self, message: Message) -> None:
-        """Send a message to the system it is for, or to all; lost if nobody is there yet."""
+        """Send a message to its target system, or to all; lost before anything was received."""
         data = message.pack(self._codec)
         self._codec.seq = (self._codec.seq + 1) % 256
         if not isinstance(self._udp_port, UdpSocket):
@@ -75,10 +69,10 @@ class VehicleLink:
 
     @property
     def host(self) -> str:
-        """IP address of whoever sent what was received last; "" before, and on a serial line."""
+        """IP address of the latest sender; "" before the first, and on a serial line."""
         peer = self._transport.peer
         return "" if peer is None else peer[0]
 
     def close(self) -> None:
-        """Let go of the port or device."""
+        """Close the port or device."""
         self._transport.close()

@@ -1,1 +1,1 @@
-"""The camera, a component of its own."""
+"""The camera, a component beside the autopilot."""

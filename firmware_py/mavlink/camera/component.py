@@ -1,7 +1,7 @@
-"""The camera: a component of its own beside the autopilot (https://mavlink.io/en/services/camera.html).
+"""The camera, a component beside the autopilot (https://mavlink.io/en/services/camera.html).
 
-It takes pictures and tells where its video is. It does not record, zoom, focus or track, and says so. Its
-video always runs, so it cannot be stopped.
+It takes pictures and sends the addresses of its video. It refuses to record, zoom, focus or track. Its video
+always runs and cannot be stopped.
 """
 
 from __future__ import annotations
@@ -17,22 +17,22 @@ from firmware_py.mavlink.camera.model import (
     CAMERA_COMPONENT_ID,
     CameraModel,
     CaptureSink,
-    CountingSink,
     VideoStream,
 )
-from firmware_py.mavlink.service import Command, Service, SevenParams
+from firmware_py.mavlink.service import Command, Service
+from firmware_py.missions.flight import SevenParams
 from firmware_py.status import CommandResult
 from geometry.vectors import Vec3
 from wire.dialect import Message, mavlink
 from wire.exchange import Exchange
 
-_REMEMBERED = 1000  # pictures that can be told again
+_REMEMBERED = 1000  # pictures whose messages can be requested again
 _MAX_INTERVAL_S = 86400.0
 _MAX_COUNT = 1_000_000
 _HEARTBEAT_US = 1_000_000
 
 _REQUESTS: dict[int, tuple[int, int]] = {
-    # Older than REQUEST_MESSAGE: the message, and which of their parameters holds its index (0: none).
+    # Older than REQUEST_MESSAGE: the message, and which of their parameters is its index (0: none).
     mavlink.MAV_CMD_REQUEST_CAMERA_INFORMATION: (mavlink.MAVLINK_MSG_ID_CAMERA_INFORMATION, 0),
     mavlink.MAV_CMD_REQUEST_CAMERA_SETTINGS: (mavlink.MAVLINK_MSG_ID_CAMERA_SETTINGS, 0),
     mavlink.MAV_CMD_REQUEST_STORAGE_INFORMATION: (mavlink.MAVLINK_MSG_ID_STORAGE_INFORMATION, 1),
@@ -44,21 +44,21 @@ _REQUESTS: dict[int, tuple[int, int]] = {
 
 
 class Captures:
-    """Takes pictures when they are due and tells everybody.
+    """Takes pictures when they are due and broadcasts a message for each.
 
     Attributes:
         count: pictures taken since boot.
-        interval_s: of the series under way; 0: none.
+        interval_s: of the present series; 0: none.
     """
 
     def __init__(
-        self, autopilot: Autopilot, exchange: Exchange, camera: CameraModel, sink: CaptureSink
+        self, autopilot: Autopilot, exchange: Exchange, camera: CameraModel, sink: CaptureSink | None
     ) -> None:
         self._autopilot = autopilot
         self._exchange = exchange
-        self._shortest_s = 1.0 / camera.rate_hz
+        self._min_interval_s = 1.0 / camera.rate_hz
         self._sink = sink
-        self._told: OrderedDict[int, Message] = OrderedDict()
+        self._sent: OrderedDict[int, Message] = OrderedDict()
         self._left = 0.0
         self._due_us = 0
         self._spacing_m = 0.0
@@ -67,26 +67,26 @@ class Captures:
         self.interval_s = 0.0
 
     def start(self, interval_s: float, count: int) -> CommandResult:
-        """Take pictures from now on, instead of a series under way.
+        """Take pictures from now on, instead of the present series.
 
         Args:
-            interval_s: between them, in vehicle time; not less than the camera needs.
-            count: how many; 0: until stopped.
+            interval_s: between them, in vehicle time; the camera's minimum replaces a smaller one.
+            count: of pictures; 0: until stopped.
 
         Returns:
-            ACCEPTED; FAILED if the one picture could not be taken; DENIED for a time or count that is none.
+            ACCEPTED; FAILED if a single picture could not be taken; DENIED for an invalid interval or count.
         """
         if not (0.0 <= interval_s <= _MAX_INTERVAL_S and 0 <= count <= _MAX_COUNT):
             return CommandResult.DENIED
         if count == 1:
             return CommandResult.ACCEPTED if self._take() else CommandResult.FAILED
-        self.interval_s = max(interval_s, self._shortest_s)
+        self.interval_s = max(interval_s, self._min_interval_s)
         self._left = count or inf
         self._due_us = self._exchange.time_us
         return CommandResult.ACCEPTED
 
     def every(self, spacing_m: float) -> CommandResult:
-        """Take a picture each time the vehicle has gone so far; 0: no more."""
+        """Take a picture each time the vehicle has moved by a distance; 0: no more."""
         if not 0.0 <= spacing_m < inf:
             return CommandResult.DENIED
         self._spacing_m = spacing_m
@@ -98,9 +98,9 @@ class Captures:
         self.interval_s = 0.0
         self._spacing_m = 0.0
 
-    def told(self, index: int) -> Message | None:
-        """What was told of a picture; None if that is forgotten, or there is none."""
-        return self._told.get(index)
+    def sent(self, index: int) -> Message | None:
+        """The message of a picture; None if it is too old, or there is no such picture."""
+        return self._sent.get(index)
 
     def update(self) -> None:
         """Take what is due."""
@@ -122,13 +122,13 @@ class Captures:
 
     def _take(self) -> bool:
         exchange, index = self._exchange, self.count
-        url = self._sink.capture(exchange.time_us, index)
+        url = "" if self._sink is None else self._sink.capture(exchange.time_us, index)
         message = messages.image_captured(self._autopilot, exchange, index, url)
         if url is not None:
             self.count += 1
-            self._told[index] = message
-            if len(self._told) > _REMEMBERED:
-                self._told.popitem(last=False)
+            self._sent[index] = message
+            if len(self._sent) > _REMEMBERED:
+                self._sent.popitem(last=False)
         exchange.broadcast(message, CAMERA_COMPONENT_ID)
         return url is not None
 
@@ -136,10 +136,7 @@ class Captures:
 class CameraComponent(Service):
     """Answers for the camera, sends its heartbeat and takes its pictures.
 
-    Args:
-        camera: which.
-        video: its streams, the one to be preferred first.
-        sink: who takes and keeps pictures; by default they are only counted.
+    The first video stream is the preferred one; without a sink pictures are only counted.
     """
 
     component_id = CAMERA_COMPONENT_ID
@@ -156,8 +153,8 @@ class CameraComponent(Service):
         self._exchange = exchange
         self._camera = camera
         self._video = video
-        self._sink: CaptureSink = sink if sink is not None else CountingSink()
-        self._captures = Captures(autopilot, exchange, camera, self._sink)
+        self._sink = sink
+        self._captures = Captures(autopilot, exchange, camera, sink)
         self._heartbeat_due_us = 0
         self._last_single: tuple[int, int, float] | None = None
         self._work: dict[int, Callable[[SevenParams], CommandResult]] = {
@@ -168,17 +165,17 @@ class CameraComponent(Service):
             mavlink.MAV_CMD_SET_CAMERA_MODE: self._set_mode,
             mavlink.MAV_CMD_IMAGE_START_CAPTURE: self._start_images,
             mavlink.MAV_CMD_IMAGE_STOP_CAPTURE: self._stop_images,
-            mavlink.MAV_CMD_VIDEO_START_CAPTURE: _cannot,
-            mavlink.MAV_CMD_VIDEO_STOP_CAPTURE: _cannot,
+            mavlink.MAV_CMD_VIDEO_START_CAPTURE: _unsupported,
+            mavlink.MAV_CMD_VIDEO_STOP_CAPTURE: _unsupported,
             mavlink.MAV_CMD_VIDEO_START_STREAMING: self._start_streaming,
-            mavlink.MAV_CMD_VIDEO_STOP_STREAMING: _cannot,
-            mavlink.MAV_CMD_STORAGE_FORMAT: _cannot,
-            mavlink.MAV_CMD_SET_CAMERA_ZOOM: _cannot,
-            mavlink.MAV_CMD_SET_CAMERA_FOCUS: _cannot,
+            mavlink.MAV_CMD_VIDEO_STOP_STREAMING: _unsupported,
+            mavlink.MAV_CMD_STORAGE_FORMAT: _unsupported,
+            mavlink.MAV_CMD_SET_CAMERA_ZOOM: _unsupported,
+            mavlink.MAV_CMD_SET_CAMERA_FOCUS: _unsupported,
         }
         self.commands = {
             **{number: partial(_run, work) for number, work in self._work.items()},
-            **{number: partial(self._answer, *asked) for number, asked in _REQUESTS.items()},
+            **{number: partial(self._answer, *request) for number, request in _REQUESTS.items()},
             mavlink.MAV_CMD_IMAGE_START_CAPTURE: self._start_once,
             mavlink.MAV_CMD_REQUEST_MESSAGE: self._request_message,
         }
@@ -193,7 +190,7 @@ class CameraComponent(Service):
         self._captures.update()
 
     def run(self, command: int, params: SevenParams) -> CommandResult:
-        """Do what a MAV_CMD to the camera says, from a mission for one; UNSUPPORTED if it is none of ours."""
+        """Execute a MAV_CMD to the camera, such as a mission's; UNSUPPORTED if it is not the camera's."""
         work = self._work.get(command)
         return CommandResult.UNSUPPORTED if work is None else work(params)
 
@@ -202,7 +199,7 @@ class CameraComponent(Service):
         return command in self.commands and command != mavlink.MAV_CMD_REQUEST_MESSAGE
 
     def _start_once(self, command: Command) -> CommandResult:
-        """IMAGE_START_CAPTURE; the same single picture, which its number tells, is not taken again."""
+        """IMAGE_START_CAPTURE; a repeated command for one picture, by its number, takes no other."""
         _, _, count, number = command.params
         if command.repeated and count == 1.0 and self._last_single == (*command.sender, number):
             return CommandResult.ACCEPTED
@@ -215,9 +212,9 @@ class CameraComponent(Service):
         message_id = command.params[0]
         return self._send(command, int(message_id) if isfinite(message_id) else -1, command.params[1])
 
-    def _answer(self, message_id: int, place: int, command: Command) -> CommandResult:
-        """A request that is older than REQUEST_MESSAGE."""
-        return self._send(command, message_id, command.all_params[place - 1] if place else 0.0)
+    def _answer(self, message_id: int, index_param: int, command: Command) -> CommandResult:
+        """Answer a request that is older than REQUEST_MESSAGE."""
+        return self._send(command, message_id, command.all_params[index_param - 1] if index_param else 0.0)
 
     def _send(self, command: Command, message_id: int, argument: float) -> CommandResult:
         index = int(argument) if isfinite(argument) and 0 <= argument < 1 << 31 else 0
@@ -228,6 +225,7 @@ class CameraComponent(Service):
 
     def _requested(self, message_id: int, index: int) -> list[Message]:
         time_us, captures = self._exchange.time_us, self._captures
+        space = None if self._sink is None else self._sink.space()
         match message_id:
             case mavlink.MAVLINK_MSG_ID_CAMERA_INFORMATION:
                 streams = bool(self._video)
@@ -235,28 +233,27 @@ class CameraComponent(Service):
             case mavlink.MAVLINK_MSG_ID_CAMERA_SETTINGS:
                 message = messages.settings(time_us)
             case mavlink.MAVLINK_MSG_ID_STORAGE_INFORMATION if index <= 1:
-                message = messages.storage_information(self._sink.space(), time_us)
+                message = messages.storage_information(space, time_us)
             case mavlink.MAVLINK_MSG_ID_CAMERA_CAPTURE_STATUS:
-                space = self._sink.space()
                 message = messages.capture_status(captures.interval_s, captures.count, space, time_us)
             case mavlink.MAVLINK_MSG_ID_CAMERA_IMAGE_CAPTURED:
-                message = captures.told(index)
+                message = captures.sent(index)
             case _:
                 return self._of_streams(message_id, index)
         return [] if message is None else [message]
 
     def _of_streams(self, message_id: int, index: int) -> list[Message]:
-        """What is asked about a stream, numbered from 1, or about all, 0."""
+        """The messages of a stream, numbered from 1, or of all, 0."""
         streams = self._video
-        wanted = [(n, stream) for n, stream in enumerate(streams, start=1) if index in (0, n)]
-        told = [messages.stream_information(stream, n, len(streams)) for n, stream in wanted]
+        requested = [(n, stream) for n, stream in enumerate(streams, start=1) if index in (0, n)]
+        information = [messages.stream_information(stream, n, len(streams)) for n, stream in requested]
         if message_id == mavlink.MAVLINK_MSG_ID_VIDEO_STREAM_INFORMATION:
-            return told
+            return information
         if message_id != mavlink.MAVLINK_MSG_ID_VIDEO_STREAM_STATUS:
             return []
-        # MAVSDK 4.1 asks for nothing but the status, yet shows the last information that it hears: so that
-        # comes too, the preferred stream's last.
-        return [*reversed(told), *(messages.stream_status(stream, n) for n, stream in wanted)]
+        # MAVSDK 4.1 requests only the status, yet shows the last information that it receives: so that is
+        # sent too, the preferred stream's last.
+        return [*reversed(information), *(messages.stream_status(stream, n) for n, stream in requested)]
 
     def _start_images(self, params: SevenParams) -> CommandResult:
         interval_s = 0.0 if isnan(params[1]) else params[1]
@@ -285,19 +282,19 @@ class CameraComponent(Service):
         return CommandResult.ACCEPTED if image else CommandResult.DENIED
 
     def _start_streaming(self, params: SevenParams) -> CommandResult:
-        """It runs already, if it is there: stream 0 means all."""
-        there = isnan(params[0]) or 0 <= params[0] <= len(self._video)
-        return CommandResult.ACCEPTED if there and self._video else CommandResult.DENIED
+        """An existing stream runs already; stream 0 means all."""
+        exists = isnan(params[0]) or 0 <= params[0] <= len(self._video)
+        return CommandResult.ACCEPTED if exists and self._video else CommandResult.DENIED
 
 
 def _run(work: Callable[[SevenParams], CommandResult], command: Command) -> CommandResult:
     return work(command.all_params)
 
 
-def _cannot(_params: SevenParams) -> CommandResult:
+def _unsupported(_params: SevenParams) -> CommandResult:
     return CommandResult.UNSUPPORTED
 
 
 def _whole_count(number: float) -> int:
-    """A count as commands carry it; -1 for what is none."""
+    """A count of a command; -1 if it is invalid."""
     return int(number) if isfinite(number) and 0.0 <= number <= _MAX_COUNT else -1

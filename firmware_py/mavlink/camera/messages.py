@@ -6,10 +6,9 @@ from math import nan
 
 from firmware_py.autopilot import Autopilot
 from firmware_py.mavlink.camera.model import CameraModel, PictureSpace, VideoEncoding, VideoStream
-from firmware_py.mavlink.scaling import boot_ms, degrees_e7, millimetres
-from firmware_py.mavlink.telemetry.identity import OWN_VERSION
+from firmware_py.mavlink.telemetry.connection import OWN_VERSION
 from firmware_py.status import FlightMode
-from wire.dialect import Message, mavlink
+from wire.dialect import Message, boot_ms, degrees_e7, mavlink, millimetres
 from wire.exchange import Exchange
 
 _FLAGS = mavlink.CAMERA_CAP_FLAGS_CAPTURE_IMAGE
@@ -24,13 +23,10 @@ _URI_BYTES, _NAME_BYTES, _LABEL_BYTES, _FILE_BYTES = 160, 32, 32, 205
 
 
 def heartbeat(mode: FlightMode) -> Message:
-    """HEARTBEAT of a camera, which is no autopilot.
+    """HEARTBEAT of a camera, with the vehicle's mode.
 
-    It tells the vehicle's mode too: MAVSDK's follow-me takes any component's heartbeat for the vehicle's,
-    and would end following with each one that tells none.
-
-    Args:
-        mode: the vehicle's.
+    MAVSDK's follow-me takes any component's heartbeat for the vehicle's, and would end with one without a
+    mode.
     """
     return mavlink.MAVLink_heartbeat_message(
         mavlink.MAV_TYPE_CAMERA,
@@ -43,13 +39,7 @@ def heartbeat(mode: FlightMode) -> Message:
 
 
 def information(camera: CameraModel, *, streams: bool, time_us: int) -> Message:
-    """CAMERA_INFORMATION.
-
-    Args:
-        camera: which.
-        streams: whether there is video to be watched.
-        time_us: vehicle time.
-    """
+    """CAMERA_INFORMATION; `streams`: whether there is video."""
     major, minor, patch = OWN_VERSION
     flags = _FLAGS | (mavlink.CAMERA_CAP_FLAGS_HAS_VIDEO_STREAM if streams else 0)
     return mavlink.MAVLink_camera_information_message(
@@ -86,7 +76,7 @@ def storage_information(space: PictureSpace | None, time_us: int) -> Message:
         mavlink.STORAGE_STATUS_READY,
         space.total_mib,
         space.used_mib,
-        max(0.0, space.total_mib - space.used_mib),
+        space.free_mib,
         0.0,
         0.0,
         mavlink.STORAGE_TYPE_OTHER,
@@ -96,23 +86,16 @@ def storage_information(space: PictureSpace | None, time_us: int) -> Message:
 
 
 def capture_status(interval_s: float, count: int, space: PictureSpace | None, time_us: int) -> Message:
-    """CAMERA_CAPTURE_STATUS; it never records.
-
-    Args:
-        interval_s: between the pictures of the series under way; 0: there is none.
-        count: of pictures taken since boot.
-        space: for pictures.
-        time_us: vehicle time.
-    """
-    available_mib = max(0.0, space.total_mib - space.used_mib) if space else 0.0
+    """CAMERA_CAPTURE_STATUS: the present series' interval (0: none), pictures since boot, free storage."""
     image_status = _INTERVAL_SET if interval_s > 0.0 else 0
+    free_mib = space.free_mib if space else 0.0
     return mavlink.MAVLink_camera_capture_status_message(
-        boot_ms(time_us), image_status, 0, interval_s, 0, available_mib, count
+        boot_ms(time_us), image_status, 0, interval_s, 0, free_mib, count
     )
 
 
 def image_captured(autopilot: Autopilot, exchange: Exchange, index: int, url: str | None) -> Message:
-    """CAMERA_IMAGE_CAPTURED: a picture taken now, where, and its URL; None: it could not be taken."""
+    """CAMERA_IMAGE_CAPTURED: a picture taken now and here, and its URL; None: it could not be taken."""
     place, home = autopilot.global_position(), autopilot.status.home
     altitude_m = place.altitude_m if place else 0.0
     return mavlink.MAVLink_camera_image_captured_message(
@@ -137,13 +120,7 @@ def stream_information(stream: VideoStream, number: int, count: int) -> Message:
         number,
         count,
         kind,
-        _RUNNING,
-        stream.rate_hz,
-        stream.width_px,
-        stream.height_px,
-        0,
-        0,
-        round(stream.field_of_view_deg),
+        *_stream_fields(stream),
         stream.encoding.value.encode()[:_NAME_BYTES],
         stream.uri.encode()[:_URI_BYTES],
         encoding,
@@ -152,16 +129,13 @@ def stream_information(stream: VideoStream, number: int, count: int) -> Message:
 
 def stream_status(stream: VideoStream, number: int) -> Message:
     """VIDEO_STREAM_STATUS of one stream: it always runs."""
-    return mavlink.MAVLink_video_stream_status_message(
-        number,
-        _RUNNING,
-        stream.rate_hz,
-        stream.width_px,
-        stream.height_px,
-        0,
-        0,
-        round(stream.field_of_view_deg),
-    )
+    return mavlink.MAVLink_video_stream_status_message(number, *_stream_fields(stream))
+
+
+def _stream_fields(stream: VideoStream) -> tuple[float, ...]:
+    """The fields that both messages contain: flags, rate, size, bit rate, rotation, field of view."""
+    field_of_view_deg = round(stream.field_of_view_deg)
+    return (_RUNNING, stream.rate_hz, stream.width_px, stream.height_px, 0, 0, field_of_view_deg)
 
 
 def _padded(text: str, length: int) -> bytes:

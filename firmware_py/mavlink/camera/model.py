@@ -1,4 +1,4 @@
-"""What a camera component needs to know: its camera, its video streams, and who keeps its pictures."""
+"""What a camera component needs: its camera, its video streams, and the storage of its pictures."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from enum import Enum
 from math import tan
 from typing import Protocol
 
-from firmware_py.mavlink.service import SevenParams
+from firmware_py.missions.flight import SevenParams
 from firmware_py.status import CommandResult
 
 CAMERA_COMPONENT_ID = 100  # MAV_COMP_ID_CAMERA
@@ -16,23 +16,14 @@ _SENSOR_WIDTH_MM = 6.17  # nominal, of a 1/2.3 inch sensor: a pinhole has an ang
 
 @dataclass(frozen=True, slots=True)
 class CameraModel:
-    """A camera fixed to the vehicle, looking along its x axis.
-
-    Attributes:
-        width_px: columns of an image.
-        height_px: rows of an image.
-        horizontal_fov_rad: angle of view over the width.
-        rate_hz: images a second; pictures cannot follow each other faster.
-        vendor: who made it, at most 32 bytes.
-        name: of the model, at most 32 bytes.
-    """
+    """A camera fixed to the vehicle, looking along its x axis."""
 
     width_px: int
     height_px: int
     horizontal_fov_rad: float
-    rate_hz: float
-    vendor: str = "framerunner"
-    name: str = "pinhole"
+    rate_hz: float  # of images; pictures cannot be taken faster
+    vendor: str = "framerunner"  # at most 32 bytes
+    name: str = "pinhole"  # of the model, at most 32 bytes
 
     @property
     def sensor_size_mm(self) -> tuple[float, float]:
@@ -46,7 +37,7 @@ class CameraModel:
 
 
 class VideoEncoding(Enum):
-    """How the images travel."""
+    """How the images are sent."""
 
     MJPEG_HTTP = "MJPEG over HTTP"
     H264_RTP = "H.264 in RTP over UDP"
@@ -57,21 +48,16 @@ class VideoStream:
     """One stream of the camera.
 
     Attributes:
-        uri: where a watcher finds it: `http://host:port/video`; of RTP, which is sent unasked, the UDP port
-            to listen on as text ("5600"), which is what VIDEO_STREAM_INFORMATION wants there.
-        encoding: how the images travel.
-        width_px: of an image.
-        height_px: of an image.
-        rate_hz: images a second.
-        field_of_view_deg: horizontal.
+        uri: its address: `http://host:port/video`; of RTP, which is sent unrequested, the UDP port to listen
+            on as text ("5600"), as VIDEO_STREAM_INFORMATION requires.
     """
 
     uri: str
     encoding: VideoEncoding
     width_px: int
     height_px: int
-    rate_hz: float
-    field_of_view_deg: float
+    rate_hz: float  # of images
+    field_of_view_deg: float  # horizontal
 
 
 @dataclass(frozen=True, slots=True)
@@ -80,6 +66,11 @@ class PictureSpace:
 
     total_mib: float
     used_mib: float
+
+    @property
+    def free_mib(self) -> float:
+        """What is left of it."""
+        return max(0.0, self.total_mib - self.used_mib)
 
 
 class CaptureSink(Protocol):
@@ -93,28 +84,16 @@ class CaptureSink(Protocol):
             index: counts pictures from 0.
 
         Returns:
-            Where it can be fetched, a URL of at most 205 bytes; empty if it is not kept; None if none could
-            be taken.
+            A URL to download it, of at most 205 bytes; empty if it is not kept; None if it could not be
+            taken.
         """
 
     def space(self) -> PictureSpace | None:
-        """How much room there is; None if pictures are not kept."""
-
-
-class CountingSink:
-    """Keeps no pictures; they are only counted."""
-
-    def capture(self, time_us: int, index: int) -> str | None:
-        """Take nothing."""
-        return ""
-
-    def space(self) -> PictureSpace | None:
-        """Nowhere."""
-        return None
+        """The storage; None if pictures are not kept."""
 
 
 class CameraControl(Protocol):
-    """What a mission can do with the camera."""
+    """The camera, as a mission uses it."""
 
     def run(self, command: int, params: SevenParams) -> CommandResult:
-        """Do what a MAV_CMD to the camera says; UNSUPPORTED if it is not the camera's."""
+        """Execute a MAV_CMD; UNSUPPORTED if it is not the camera's."""

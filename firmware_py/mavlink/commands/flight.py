@@ -1,4 +1,4 @@
-"""Commands that fly: arming, modes, take-off, places, circles, home, region of interest, termination."""
+"""Commands for flight: arming, modes, take-off, positions, orbits, home, region of interest, termination."""
 
 from __future__ import annotations
 
@@ -21,40 +21,40 @@ _MIN_ORBIT_M = 1.0
 
 
 class FlightCommands(Service):
-    """Passes them to the autopilot."""
+    """Passes these commands to the autopilot."""
 
     def __init__(self, autopilot: Autopilot) -> None:
         self._autopilot = autopilot
         self.commands = {
-            mavlink.MAV_CMD_NAV_RETURN_TO_LAUNCH: self._return,
-            mavlink.MAV_CMD_NAV_LAND: self._land,
+            mavlink.MAV_CMD_NAV_RETURN_TO_LAUNCH: lambda _command: autopilot.set_mode(FlightMode.RETURN),
+            mavlink.MAV_CMD_NAV_LAND: lambda _command: autopilot.land(),
             mavlink.MAV_CMD_NAV_TAKEOFF: self._takeoff,
             mavlink.MAV_CMD_DO_ORBIT: self._orbit,
-            mavlink.MAV_CMD_NAV_ROI: self._look_mode,
+            mavlink.MAV_CMD_NAV_ROI: self._set_roi,
             mavlink.MAV_CMD_DO_SET_MODE: self._set_mode,
             mavlink.MAV_CMD_DO_CHANGE_SPEED: self._change_speed,
             mavlink.MAV_CMD_DO_SET_HOME: self._set_home,
             mavlink.MAV_CMD_DO_FLIGHTTERMINATION: self._terminate,
             mavlink.MAV_CMD_DO_REPOSITION: self._reposition,
-            mavlink.MAV_CMD_DO_SET_ROI_LOCATION: self._look_at,
-            mavlink.MAV_CMD_DO_SET_ROI_NONE: self._look_ahead,
-            mavlink.MAV_CMD_DO_SET_ROI: self._look_mode,
+            mavlink.MAV_CMD_DO_SET_ROI_LOCATION: self._set_roi_location,
+            mavlink.MAV_CMD_DO_SET_ROI_NONE: lambda _command: autopilot.look_at(None),
+            mavlink.MAV_CMD_DO_SET_ROI: self._set_roi,
             mavlink.MAV_CMD_DO_SET_STANDARD_MODE: self._set_standard_mode,
             mavlink.MAV_CMD_COMPONENT_ARM_DISARM: self._arm_disarm,
             mavlink.MAV_CMD_DO_SET_GLOBAL_ORIGIN: self._set_origin,
         }
 
     def _arm_disarm(self, command: Command) -> CommandResult | None:
-        autopilot, wanted = self._autopilot, command.params[0]
-        if isnan(wanted):
-            return CommandResult.ACCEPTED  # PX4's odd answer: nothing happens
-        action = floor(wanted + 0.5) if isfinite(wanted) else -1
+        autopilot, requested = self._autopilot, command.params[0]
+        if isnan(requested):
+            return CommandResult.ACCEPTED  # as PX4, which does nothing
+        action = floor(requested + 0.5) if isfinite(requested) else -1
         force = command.params[1] == FORCE_MAGIC
         if action == 1:
             return autopilot.arm(force=force)
         if action == 0:
             return autopilot.disarm(force=force)
-        autopilot.say(_CRITICAL, f"Unsupported ARM_DISARM param: {wanted:g}")
+        autopilot.say(_CRITICAL, f"Unsupported ARM_DISARM param: {requested:g}")
         return None  # PX4 does not acknowledge this either
 
     def _takeoff(self, command: Command) -> CommandResult:
@@ -62,14 +62,8 @@ class FlightCommands(Service):
             return CommandResult.DENIED
         return self._autopilot.takeoff(command.altitude_amsl_m(self._autopilot.status.home))
 
-    def _land(self, _command: Command) -> CommandResult:
-        return self._autopilot.land()
-
-    def _return(self, _command: Command) -> CommandResult:
-        return self._autopilot.set_mode(FlightMode.RETURN)
-
     def _set_mode(self, command: Command) -> CommandResult:
-        """DO_SET_MODE: only PX4's custom modes are understood; what is no mode here is refused in words."""
+        """DO_SET_MODE: only PX4's custom modes are accepted; an unknown mode is refused with a text."""
         base_mode, main, sub, _ = command.params
         if not isfinite(base_mode) or not int(base_mode) & mavlink.MAV_MODE_FLAG_CUSTOM_MODE_ENABLED:
             self._autopilot.say(_WARNING, "Mode change refused: only PX4 custom modes are understood")
@@ -82,15 +76,15 @@ class FlightCommands(Service):
         return self._autopilot.set_mode(mode)
 
     def _set_standard_mode(self, command: Command) -> CommandResult:
-        wanted = command.params[0]
-        mode = _STANDARD_MODES.get(_small(wanted))
+        number = command.params[0]
+        mode = _STANDARD_MODES.get(_small(number))
         if mode is None:
-            self._autopilot.say(_WARNING, f"Mode change refused: no standard mode {wanted:g} here")
+            self._autopilot.say(_WARNING, f"Mode change refused: no standard mode {number:g} here")
             return CommandResult.TEMPORARILY_REJECTED
         return self._autopilot.set_mode(mode)
 
     def _reposition(self, command: Command) -> CommandResult:
-        """DO_REPOSITION: param 2 must be 1, as in PX4; what is left open stays as it is."""
+        """DO_REPOSITION: param 2 must be 1, as in PX4; params that are not given stay as they are."""
         speed_m_s, flags, _, yaw_rad = command.params
         if flags != 1.0:
             return CommandResult.UNSUPPORTED
@@ -104,7 +98,7 @@ class FlightCommands(Service):
         )
 
     def _orbit(self, command: Command) -> CommandResult:
-        """DO_ORBIT: a negative radius turns counter-clockwise; what is left open is as PX4 has it."""
+        """DO_ORBIT: a negative radius means counter-clockwise; params not given have PX4's defaults."""
         autopilot = self._autopilot
         radius_m, speed_m_s, yaw, _ = command.params
         centre = self._place(command, command.altitude_m)
@@ -122,7 +116,7 @@ class FlightCommands(Service):
         behaviour = OrbitYaw(int(yaw) if known else autopilot.parameters.integer("MC_ORBIT_YAW_MOD"))
         here = autopilot.state.position_ned_m
         north_m, east_m, down_m = (
-            place if isnan(wanted) else wanted for wanted, place in zip(centre, here, strict=True)
+            present if isnan(given) else given for given, present in zip(centre, here, strict=True)
         )
         return autopilot.orbit(
             Orbit((north_m, east_m, down_m), abs(radius_m), copysign(1.0, radius_m) * speed_m_s, behaviour)
@@ -146,21 +140,20 @@ class FlightCommands(Service):
             GeodeticPoint(command.latitude_deg, command.longitude_deg, command.altitude_m)
         )
 
-    def _look_at(self, command: Command) -> CommandResult:
+    def _set_roi_location(self, command: Command) -> CommandResult:
         place = self._place(command, command.altitude_m)
         if place is None or any(map(isnan, place)):
             return CommandResult.DENIED
         return self._autopilot.look_at(place)
 
-    def _look_ahead(self, _command: Command) -> CommandResult:
-        return self._autopilot.look_at(None)
-
-    def _look_mode(self, command: Command) -> CommandResult:
-        """The older DO_SET_ROI: param 1 is the mode, of which none and a place can be had."""
+    def _set_roi(self, command: Command) -> CommandResult:
+        """The older DO_SET_ROI: param 1 is the mode, of which NONE and LOCATION are supported."""
         mode = command.params[0]
         if mode == mavlink.MAV_ROI_NONE:
-            return self._look_ahead(command)
-        return self._look_at(command) if mode == mavlink.MAV_ROI_LOCATION else CommandResult.UNSUPPORTED
+            return self._autopilot.look_at(None)
+        if mode == mavlink.MAV_ROI_LOCATION:
+            return self._set_roi_location(command)
+        return CommandResult.UNSUPPORTED
 
     def _terminate(self, command: Command) -> CommandResult:
         if not command.params[0] > 0.5 or not self._autopilot.status.armed:
@@ -168,13 +161,13 @@ class FlightCommands(Service):
         return self._autopilot.terminate()
 
     def _place(self, command: Command, altitude_m: float) -> Vec3 | None:
-        """A command's place, NED metres with NaN for what is not given; None if it is no place on Earth.
+        """A command's position, NED metres with NaN where not given; None if it is not on Earth.
 
         Args:
             command: with latitude and longitude.
-            altitude_m: above mean sea level. PX4 takes all commands so, whatever the frame. MAVSDK relies
-                on it for circles and home: it names a relative frame and means an absolute altitude. Where no
-                peer does so, take-off and places to fly to, the frame counts.
+            altitude_m: above mean sea level. PX4 ignores the frame of all commands. MAVSDK relies on it for
+                orbits and home: it sends a relative frame with an absolute altitude. Take-off and reposition,
+                for which no peer does so, respect the frame.
         """
         autopilot = self._autopilot
         here = autopilot.global_position()
@@ -200,5 +193,5 @@ class FlightCommands(Service):
 
 
 def _small(number: float) -> int:
-    """A mode number; what cannot be one is 0, which is no mode."""
+    """A mode number; 0, which is no mode, if it is invalid."""
     return int(number) if isfinite(number) and 0 <= number <= 255 else 0

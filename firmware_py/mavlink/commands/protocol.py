@@ -1,15 +1,12 @@
-"""COMMAND_LONG and COMMAND_INT: one table from command to handler, one true COMMAND_ACK each.
+"""COMMAND_LONG and COMMAND_INT: one table from command to handler, and one COMMAND_ACK with the result.
 
-Differences from PX4, on purpose:
-
-* DO_SET_MODE gets one acknowledgement, the true one (PX4 sends an early ACCEPTED before it). A mode that does
-  not exist here is TEMPORARILY_REJECTED with the reason as text, also where PX4 accepts and does nothing.
-* Every unknown command is UNSUPPORTED; PX4 is silent to a few (gimbal and camera).
+Different from PX4: DO_SET_MODE has no early ACCEPTED, and every unknown command is UNSUPPORTED.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
+from functools import partial
 from math import nan
 
 from firmware_py.mavlink.service import Command, CommandHandler, Handler, Service
@@ -25,12 +22,12 @@ _TO_EVERYONE = (
 
 
 class CommandService(Service):
-    """Takes one component's commands to their handlers and acknowledges them.
+    """Passes one component's commands to their handlers and acknowledges them.
 
     Args:
-        component_id: whose commands.
-        table: of all the component's services, by MAV_CMD.
-        takes_broadcast: whether a command to all components is this one's to answer.
+        component_id: of the component.
+        table: of all its services, by MAV_CMD.
+        takes_broadcast: whether this component answers a command to all components.
     """
 
     def __init__(
@@ -45,27 +42,21 @@ class CommandService(Service):
         self._table = table
         self._takes_broadcast = takes_broadcast
         handlers: dict[int, Handler] = {
-            mavlink.MAVLINK_MSG_ID_COMMAND_LONG: self._receive_long,
-            mavlink.MAVLINK_MSG_ID_COMMAND_INT: self._receive_int,
+            mavlink.MAVLINK_MSG_ID_COMMAND_LONG: partial(self._receive, Command.from_long),
+            mavlink.MAVLINK_MSG_ID_COMMAND_INT: partial(self._receive, Command.from_int),
         }
         if mavlink.MAV_CMD_DO_SET_MODE in table:
             handlers[mavlink.MAVLINK_MSG_ID_SET_MODE] = self._receive_set_mode
         self.handlers = handlers
 
-    def _receive_long(self, link: Link, message: Message) -> None:
-        self._receive(message, Command.from_long(link, message))
-
-    def _receive_int(self, link: Link, message: Message) -> None:
-        self._receive(message, Command.from_int(link, message))
-
-    def _receive(self, message: Message, command: Command) -> None:
-        """Run a command; one with a wrong target is ignored."""
+    def _receive(self, read: Callable[[Link, Message], Command], link: Link, message: Message) -> None:
+        """Execute a command, unless it is for another target."""
         number = message.command
         or_everyone = number in _TO_EVERYONE and number in self._table
         if not self._exchange.is_for_us(message, or_everyone=or_everyone, component_id=self.component_id):
             return
         if message.target_component != BROADCAST or self._takes_broadcast(number):
-            self._run(number, command)
+            self._run(number, read(link, message))
 
     def _receive_set_mode(self, link: Link, message: Message) -> None:
         """The legacy SET_MODE, which QGroundControl uses; acknowledged as DO_SET_MODE, as PX4 does."""

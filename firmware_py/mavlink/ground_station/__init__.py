@@ -1,4 +1,1 @@
-"""What only makes ground stations complete; no flight needs it.
-
-Files (FTP), logs, events, metadata, remote id, a shell, calibration.
-"""
+"""What only ground stations use and no flight needs: files, logs, events, metadata, remote id, a shell."""

@@ -1,9 +1,9 @@
-"""Which events there are: what MAVLink's events service tells by a number and a few arguments.
+"""The events of MAVLink's events service: each has a number, a message and a few arguments.
 
 A receiver looks the number up in `all_events.json`, in the format of libevents
-(https://mavlink.io/en/services/events.html). What the commander says becomes events by itself: each of its
-texts is one; a text with a figure in it is matched by a pattern; what neither says stays a text only. Names
-and bits of the enumerations are PX4's, as ground stations expect them of a health report.
+(https://mavlink.io/en/services/events.html). Each text of the commander is an event; a text with a number in
+it is matched by a pattern; other texts have no event. Names and bits of the enumerations are PX4's, as ground
+stations expect them of a health report.
 """
 
 from __future__ import annotations
@@ -18,12 +18,10 @@ from typing import Literal
 from firmware_py.commander_table import TABLE, Event
 from firmware_py.status import NAVIGATION_STATES, CommandResult, FlightMode
 
-COMPONENT = 1
-"""The upper eight bits of every id: the autopilot."""
+COMPONENT = 1  # the upper eight bits of every id: the autopilot
 NAMESPACE = "framerunner"
 ARGUMENT_BYTES = 40
-PROTOCOL_LEVEL = 8
-"""A log level beyond MAV_SEVERITY: for programs, not shown to people."""
+PROTOCOL_LEVEL = 8  # a log level beyond MAV_SEVERITY: for programs, not shown to people
 
 _FNV_OFFSET, _FNV_PRIME = 0x811C9DC5, 0x01000193
 _FORMATS = {
@@ -42,27 +40,17 @@ Group = Literal["default", "arming_check", "health"]
 
 @dataclass(frozen=True, slots=True)
 class EventKind:
-    """A sort of event.
+    """A kind of event."""
 
-    Attributes:
-        name: unique; the number is derived from it, so it must not change.
-        message: one line for people; {1} is the first argument, {1:.1m} one with a decimal and a unit.
-        group: `arming_check` and `health` are those of the health report.
-        arguments: (type, name) of each.
-        summary: it begins or ends a health report.
-        description: whole sentences.
-    """
-
-    name: str
-    message: str
-    group: Group = "default"
-    arguments: tuple[tuple[str, str], ...] = ()
-    summary: bool = False
-    description: str = ""
+    name: str  # unique; the id is derived from it, so it must not change
+    message: str  # one line; {1} is the first argument, {1:.1m} one with a decimal and a unit
+    group: Group = "default"  # `arming_check` and `health` are those of the health report
+    arguments: tuple[tuple[str, str], ...] = ()  # (type, name) of each
+    summary: bool = False  # it begins or ends a health report
 
     @property
     def sub_id(self) -> int:
-        """The lower 24 bits of the id: those of the name's 32 bit FNV-1a hash, as PX4 takes them."""
+        """The lower 24 bits of the id: those of the name's 32 bit FNV-1a hash, as in PX4."""
         value = _FNV_OFFSET
         for byte in self.name.encode():
             value = (value ^ byte) * _FNV_PRIME & 0xFFFFFFFF
@@ -70,42 +58,20 @@ class EventKind:
 
     @property
     def id(self) -> int:
-        """What EVENT carries."""
+        """EVENT's id."""
         return COMPONENT << 24 | self.sub_id
 
     def packed(self, *values: float) -> bytes:
-        """The arguments as EVENT carries them, padded to 40 bytes."""
-        layout = "<" + "".join(_FORMATS[kind] for kind, _ in self.arguments)
-        whole = (value if kind == "float" else int(value) for (kind, _), value in self._paired(values))
-        return pack(layout, *whole).ljust(ARGUMENT_BYTES, b"\0")
-
-    def _paired(self, values: tuple[float, ...]) -> list[tuple[tuple[str, str], float]]:
-        return list(zip(self.arguments, values, strict=True))
-
-
-@dataclass(frozen=True, slots=True)
-class Occurrence:
-    """One event that happened.
-
-    Attributes:
-        kind: what it is.
-        severity: MAV_SEVERITY, or `PROTOCOL_LEVEL`.
-        values: of the arguments.
-    """
-
-    kind: EventKind
-    severity: int
-    values: tuple[float, ...] = ()
-
-    @property
-    def log_levels(self) -> int:
-        """For people in the lower four bits, for logs in the upper ones."""
-        return self.severity << 4 | self.severity
+        """EVENT's arguments: the values, padded to 40 bytes."""
+        kinds = [kind for kind, _ in self.arguments]
+        numbers = (
+            value if kind == "float" else int(value) for kind, value in zip(kinds, values, strict=True)
+        )
+        layout = "<" + "".join(_FORMATS[kind] for kind in kinds)
+        return pack(layout, *numbers).ljust(ARGUMENT_BYTES, b"\0")
 
 
-MODE_GROUPS = NAVIGATION_STATES
-"""Each mode is a group of its own, as in PX4."""
-
+MODE_GROUPS = NAVIGATION_STATES  # each mode is its own group, as in PX4
 ALL_MODES = sum(1 << group for group in MODE_GROUPS.values())
 
 _GROUP_NAMES: dict[FlightMode, str] = {
@@ -135,11 +101,6 @@ class Part(IntFlag):
     MAGNETOMETER = 1 << 27
     ACCEL = 1 << 28
     GYRO = 1 << 29
-
-    @property
-    def index(self) -> int:
-        """Place of the bit."""
-        return int(self).bit_length() - 1
 
 
 _PART_LABELS: dict[Part, str] = {
@@ -254,56 +215,44 @@ def _slug(text: str) -> str:
     return re.sub(r"[^a-z0-9]+", "_", text.lower()).strip("_")
 
 
-def _escaped(text: str) -> str:
-    return re.sub(r"([\\<{])", r"\\\1", text)
+def _message(text: str) -> str:
+    return re.sub(r"([\\<{])", r"\\\1", text)[:_MAX_MESSAGE]
 
 
-def _texts() -> dict[str, EventKind]:
-    said = [row.text for row in TABLE if row.text]
-    return {
-        text: EventKind(f"says_{_slug(text)}", _escaped(text)[:_MAX_MESSAGE]) for text in (*said, *_PLAIN)
-    }
-
-
-def _checks() -> dict[str, EventKind]:
-    reasons = [
-        row.text
-        for row in TABLE
-        if row.event is Event.ARM and row.text and row.result is not CommandResult.ACCEPTED
-    ]
-    return {
-        text: EventKind(f"check_{_slug(text)}", _reason(text), "arming_check", _CHECK_ARGUMENTS)
-        for text in reasons
-    }
-
-
-def _reason(refusal: str) -> str:
-    """A refusal without the words that each begins with, as reports show it below a heading."""
+def _check(refusal: str) -> EventKind:
+    """The event of a refusal, without its first words, as reports show it below a heading."""
     reason = refusal.removeprefix(_REFUSAL)
-    return _escaped(reason[:1].upper() + reason[1:])[:_MAX_MESSAGE]
+    message = _message(reason[:1].upper() + reason[1:])
+    return EventKind(f"check_{_slug(refusal)}", message, "arming_check", _CHECK_ARGUMENTS)
 
 
-TEXTS: dict[str, EventKind] = _texts()
-"""Events by the text that says the same."""
-
-CHECKS: dict[str, EventKind] = _checks()
-"""Events of the arming report, by the text that refuses to arm."""
+# Events by their texts.
+TEXTS: dict[str, EventKind] = {
+    text: EventKind(f"says_{_slug(text)}", _message(text))
+    for text in (*(row.text for row in TABLE if row.text), *_PLAIN)
+}
+# Events of the arming report, by the text that refuses to arm.
+CHECKS: dict[str, EventKind] = {
+    row.text: _check(row.text)
+    for row in TABLE
+    if row.event is Event.ARM and row.text and row.result is not CommandResult.ACCEPTED
+}
 
 
 def event_of(text: str) -> tuple[EventKind, tuple[float, ...]] | None:
-    """The event that says the same as a text, with its arguments; None when there is none."""
+    """The event of a text, with its arguments; None when there is none."""
     kind = TEXTS.get(text)
     if kind is not None:
         return kind, ()
     for pattern, kind in _PATTERNS:
         found = pattern.fullmatch(text)
         if found is not None:
-            return kind, tuple(float(figure) for figure in found.groups())
+            return kind, tuple(float(number) for number in found.groups())
     return None
 
 
 def all_kinds() -> Iterator[EventKind]:
-    """Every sort of event there is."""
+    """Every kind of event."""
     yield from (MODE_CHANGED, ARMING_SUMMARY, HEALTH_SUMMARY, OTHER_CHECK)
     yield from (kind for _, kind in _PATTERNS)
     yield from TEXTS.values()

@@ -1,8 +1,8 @@
-"""The events service: EVENT with its sequence, and what was missed again on request.
+"""The events service: EVENT with its sequence number, and missed events on request.
 
-As PX4: sequences begin at 65525, so that they soon wrap; CURRENT_EVENT_SEQUENCE comes every three seconds;
-the last twenty events can be asked for again. RUN_PREARM_CHECKS sends the health report again, which MAVSDK
-and QGroundControl ask for when they connect.
+As PX4: sequence numbers begin at 65525, so that they soon wrap; CURRENT_EVENT_SEQUENCE is sent every three
+seconds; the last twenty events can be requested. RUN_PREARM_CHECKS sends the health report, which MAVSDK and
+QGroundControl request when they connect.
 """
 
 from __future__ import annotations
@@ -21,24 +21,21 @@ from firmware_py.mavlink.ground_station.event_definitions import (
     OTHER_CHECK,
     PROTOCOL_LEVEL,
     EventKind,
-    Occurrence,
     Part,
     event_of,
 )
-from firmware_py.mavlink.scaling import boot_ms
 from firmware_py.mavlink.service import Command, Service
 from firmware_py.status import CommandResult, FlightMode
 from firmware_py.types import StatusText
-from wire.dialect import Message, mavlink
+from wire.dialect import Message, boot_ms, mavlink
 from wire.exchange import Exchange
 from wire.link import Link
 
 _FIRST_SEQUENCE = 65525
 _KEPT = 20
 _SEQUENCE_PERIOD_US = 3_000_000
-_HEALTH_PERIOD_US = 100_000  # between looks
-_REPORT_GAP_US = 2_000_000  # between reports that nobody asked for
-_LEAST_SEVERE = mavlink.MAV_SEVERITY_DEBUG
+_HEALTH_PERIOD_US = 100_000  # between assessments
+_REPORT_GAP_US = 2_000_000  # between unrequested reports
 _UNARMABLE = sum(
     1 << MODE_GROUPS[mode]
     for mode in (
@@ -53,7 +50,7 @@ _ALWAYS_THERE = Part.GYRO | Part.ACCEL | Part.MAGNETOMETER | Part.ABSOLUTE_PRESS
 _PLACED = Part.GPS | Part.LOCAL_POSITION_ESTIMATE | Part.GLOBAL_POSITION_ESTIMATE
 _LOW_BATTERY = 2  # MAV_BATTERY_CHARGE_STATE_LOW
 
-# What a reason is about, by a word in it, and whether it hinders the chosen mode only.
+# The part that a reason is about, by a word in it, and whether it prevents the chosen mode only.
 _SUBJECTS: tuple[tuple[str, Part, bool], ...] = (
     ("battery", Part.BATTERY, False),
     ("ground station", Part.COMMUNICATION_LINKS, False),
@@ -71,13 +68,7 @@ _SUBJECTS: tuple[tuple[str, Part, bool], ...] = (
 
 @dataclass(frozen=True, slots=True)
 class Check:
-    """What hinders arming.
-
-    Attributes:
-        kind: the event that says so.
-        part: what it is about.
-        modes: groups of modes that it hinders, as bits.
-    """
+    """What prevents arming: its event, the part it is about, and the groups of modes it prevents, as bits."""
 
     kind: EventKind
     part: Part
@@ -86,41 +77,16 @@ class Check:
 
 @dataclass(frozen=True, slots=True)
 class HealthReport:
-    """A report; equal ones need not be sent twice.
-
-    Attributes:
-        present: parts there are.
-        failing: of these, those that do not work.
-        warning: those to be looked after.
-        check: what hinders arming.
-    """
+    """Parts that are present, failing or near it, and what prevents arming."""
 
     present: Part
     failing: Part
     warning: Part
     check: Check | None
 
-    def events(self) -> list[Occurrence]:
-        """The events of the report, in their order: summary, checks, summary."""
-        check = self.check
-        hindered = _UNARMABLE | (check.modes if check else 0)
-        error = check.part if check else Part(0)
-        events = [
-            Occurrence(
-                ARMING_SUMMARY,
-                PROTOCOL_LEVEL,
-                (0, error, self.warning, ALL_MODES & ~hindered, ALL_MODES),
-            )
-        ]
-        if check is not None:
-            events.append(Occurrence(check.kind, mavlink.MAV_SEVERITY_ERROR, (check.modes, check.part.index)))
-        health = (0, self.present, self.failing, self.warning)
-        events.append(Occurrence(HEALTH_SUMMARY, PROTOCOL_LEVEL, health))
-        return events
-
 
 def assess(autopilot: Autopilot) -> HealthReport:
-    """The report as it is now."""
+    """The present report."""
     status = autopilot.status
     present, failing = _ALWAYS_THERE, Part(0)
     if status.origin is not None:
@@ -143,7 +109,7 @@ def _check(reason: str, intended: FlightMode) -> Check:
 
 
 class EventService(Service):
-    """Tells events, on all links."""
+    """Sends events, on all links."""
 
     def __init__(self, autopilot: Autopilot, exchange: Exchange) -> None:
         self._autopilot = autopilot
@@ -152,37 +118,33 @@ class EventService(Service):
         self._sequence_due_us = 0
         self._recent: deque[tuple[int, Message]] = deque(maxlen=_KEPT)
         self._mode = autopilot.status.mode
-        self._asked = False
+        self._report_requested = False
         self._health_due_us = 0
         self._report: HealthReport | None = None
         self._report_us = -_REPORT_GAP_US
         self.handlers = {mavlink.MAVLINK_MSG_ID_REQUEST_EVENT: self._resend}
         self.commands = {mavlink.MAV_CMD_RUN_PREARM_CHECKS: self._run_checks}
 
-    def tell(self, text: StatusText) -> bool:
-        """Send the event that says the same as a text, if there is one.
-
-        Returns:
-            Whether there is; the text then ends with a tab, so that who reads events leaves it out.
-        """
+    def send_text(self, text: StatusText) -> bool:
+        """Send the event of a text, if there is one; whether there is."""
         found = event_of(text.text)
         if found is None:
             return False
         kind, values = found
-        self.send(Occurrence(kind, min(max(text.severity, 0), _LEAST_SEVERE), values))
+        self._send(kind, min(max(text.severity, 0), mavlink.MAV_SEVERITY_DEBUG), *values)
         return True
 
-    def send(self, occurrence: Occurrence) -> None:
-        """Send an event and keep it for those who miss it."""
+    def _send(self, kind: EventKind, severity: int, *values: float) -> None:
+        """Send an event and keep it for receivers that miss it; severity may be `PROTOCOL_LEVEL`."""
         self._sequence = self._sequence + 1 & 0xFFFF
         message = mavlink.MAVLink_event_message(
             0,
             0,
-            occurrence.kind.id,
+            kind.id,
             boot_ms(self._exchange.time_us),
             self._sequence,
-            occurrence.log_levels,
-            list(occurrence.kind.packed(*occurrence.values)),
+            severity << 4 | severity,  # for logs and for people
+            list(kind.packed(*values)),
         )
         self._recent.append((self._sequence, message))
         self._exchange.broadcast(message)
@@ -193,7 +155,7 @@ class EventService(Service):
         mode = self._autopilot.status.mode
         if mode is not self._mode:
             self._mode = mode
-            self.send(Occurrence(MODE_CHANGED, mavlink.MAV_SEVERITY_INFO, (MODE_GROUPS[mode],)))
+            self._send(MODE_CHANGED, mavlink.MAV_SEVERITY_INFO, MODE_GROUPS[mode])
         if now_us >= self._sequence_due_us:
             self._sequence_due_us = now_us + _SEQUENCE_PERIOD_US
             flags = 0 if self._recent else mavlink.MAV_EVENT_CURRENT_SEQUENCE_FLAGS_RESET
@@ -201,36 +163,43 @@ class EventService(Service):
             self._exchange.broadcast(message)
         if now_us >= self._health_due_us:
             self._health_due_us = now_us + _HEALTH_PERIOD_US
-            self._report_health(now_us)
+            if self._report_requested or now_us - self._report_us >= _REPORT_GAP_US:
+                report = assess(self._autopilot)
+                if self._report_requested or report != self._report:
+                    self._report_requested, self._report, self._report_us = False, report, now_us
+                    self._send_report(report)
 
-    def _report_health(self, now_us: int) -> None:
-        if not self._asked and now_us - self._report_us < _REPORT_GAP_US:
-            return
-        report = assess(self._autopilot)
-        if report == self._report and not self._asked:
-            return
-        self._asked, self._report, self._report_us = False, report, now_us
-        for occurrence in report.events():
-            self.send(occurrence)
+    def _send_report(self, report: HealthReport) -> None:
+        """Send the events of a report, in their order: summary, check, summary."""
+        check, prevented, error = report.check, _UNARMABLE, Part(0)
+        if check is not None:
+            prevented, error = prevented | check.modes, check.part
+        self._send(
+            ARMING_SUMMARY, PROTOCOL_LEVEL, 0, error, report.warning, ALL_MODES & ~prevented, ALL_MODES
+        )
+        if check is not None:
+            bit_number = int(check.part).bit_length() - 1
+            self._send(check.kind, mavlink.MAV_SEVERITY_ERROR, check.modes, bit_number)
+        self._send(HEALTH_SUMMARY, PROTOCOL_LEVEL, 0, report.present, report.failing, report.warning)
 
     def _run_checks(self, _command: Command) -> CommandResult:
         """RUN_PREARM_CHECKS: they run all the time; the report is sent again."""
-        self._asked = True
+        self._report_requested = True
         self._health_due_us = 0
         armed = self._autopilot.status.armed
         return CommandResult.TEMPORARILY_REJECTED if armed else CommandResult.ACCEPTED
 
     def _resend(self, link: Link, message: Message) -> None:
-        """REQUEST_EVENT: what is still there, and one RESPONSE_EVENT_ERROR for what is not."""
+        """REQUEST_EVENT: send the kept events, and one RESPONSE_EVENT_ERROR if others were requested."""
         if not self._exchange.is_for_us(message):
             return
         first, last = message.first_sequence, message.last_sequence
         span = last - first & 0xFFFF
         kept = [(sequence - first & 0xFFFF, event) for sequence, event in self._recent]
-        wanted = [(distance, event) for distance, event in kept if distance <= span]
-        if not wanted or wanted[0][0] > 0:
+        requested = [(distance, event) for distance, event in kept if distance <= span]
+        if not requested or requested[0][0] > 0:
             self._exchange.send(link, self._unavailable(message, first))
-        for _, event in wanted:
+        for _, event in requested:
             self._exchange.send(link, event)
 
     def _unavailable(self, request: Message, sequence: int) -> Message:

@@ -1,21 +1,21 @@
-"""MAVLink FTP without the files: payloads with their opcodes and errors, and who has which files open."""
+"""MAVLink FTP without the files: payloads with their opcodes and errors, and each client's open files."""
 
 from __future__ import annotations
 
 import errno
 from dataclasses import dataclass, field
-from enum import IntEnum
 from struct import Struct
 
 from firmware_py.storage import Path
+from wire.dialect import mavlink
 
 PAYLOAD_BYTES = 251
 DATA_BYTES = 239  # of one payload, after the header
-# sequence, session, opcode, size, opcode asked for, burst complete, padding, offset
+# sequence, session, opcode, size, opcode of the request, burst complete, padding, offset
 _HEADER = Struct("<HBBBBBBI")
-_SESSIONS = 4  # open files of one client; PX4 has one a link
-_CLIENTS = 16
-_IDLE_US = 10_000_000  # PX4 closes a session unused so long
+_MAX_SESSIONS = 4  # open files of one client; PX4 has one a link
+_MAX_CLIENTS = 16
+_IDLE_US = 10_000_000  # as PX4: an unused session is closed
 _TAKEOVER_US = 1_000_000
 _TWIN_US = 2_000_000
 _LATE_US = 1_000_000
@@ -23,97 +23,45 @@ _LATE_US = 1_000_000
 ClientKey = tuple[str, int, int]  # link, system, component
 
 
-class Opcode(IntEnum):
-    """What a client asks for; ACK and NAK are answers."""
-
-    NONE = 0
-    TERMINATE_SESSION = 1
-    RESET_SESSIONS = 2
-    LIST_DIRECTORY = 3
-    OPEN_FILE_RO = 4
-    READ_FILE = 5
-    CREATE_FILE = 6
-    WRITE_FILE = 7
-    REMOVE_FILE = 8
-    CREATE_DIRECTORY = 9
-    REMOVE_DIRECTORY = 10
-    OPEN_FILE_WO = 11
-    TRUNCATE_FILE = 12
-    RENAME = 13
-    CALC_FILE_CRC32 = 14
-    BURST_READ_FILE = 15
-    ACK = 128
-    NAK = 129
-
-
-class FtpError(IntEnum):
-    """Why not: the first byte of a NAK's data."""
-
-    FAIL = 1
-    FAIL_ERRNO = 2
-    INVALID_DATA_SIZE = 3
-    INVALID_SESSION = 4
-    NO_SESSIONS_AVAILABLE = 5
-    EOF = 6
-    UNKNOWN_COMMAND = 7
-    FILE_EXISTS = 8
-    FILE_PROTECTED = 9
-    FILE_NOT_FOUND = 10
-
-
 class RefusalError(Exception):
-    """A request that gets a NAK.
+    """A request that gets a NAK with an error, a MAV_FTP_ERR."""
 
-    Attributes:
-        error: why.
-    """
-
-    def __init__(self, error: FtpError) -> None:
-        super().__init__(error.name)
+    def __init__(self, error: int) -> None:
+        super().__init__(error)
         self.error = error
 
 
 _ERRORS = {
-    errno.ENOENT: FtpError.FILE_NOT_FOUND,
-    errno.EEXIST: FtpError.FILE_EXISTS,
-    errno.EACCES: FtpError.FILE_PROTECTED,
-    errno.EPERM: FtpError.FILE_PROTECTED,
-    errno.EROFS: FtpError.FILE_PROTECTED,
-    errno.ELOOP: FtpError.FILE_PROTECTED,
+    errno.ENOENT: mavlink.MAV_FTP_ERR_FILENOTFOUND,
+    errno.EEXIST: mavlink.MAV_FTP_ERR_FILEEXISTS,
+    errno.EACCES: mavlink.MAV_FTP_ERR_FILEPROTECTED,
+    errno.EPERM: mavlink.MAV_FTP_ERR_FILEPROTECTED,
+    errno.EROFS: mavlink.MAV_FTP_ERR_FILEPROTECTED,
+    errno.ELOOP: mavlink.MAV_FTP_ERR_FILEPROTECTED,
 }
 
 
-def reason(error: RefusalError | OSError) -> bytes:
-    """A NAK's data; an error of storage without a code of its own goes with its number, as PX4 does it."""
+def nak_data(error: RefusalError | OSError) -> bytes:
+    """A NAK's data; an error of storage without a code in FTP is sent as its errno, as PX4 does it."""
     if isinstance(error, RefusalError):
         return bytes((error.error,))
     number = error.errno or errno.EIO
     if number in _ERRORS:
         return bytes((_ERRORS[number],))
-    return bytes((FtpError.FAIL_ERRNO, number & 0xFF))
+    return bytes((mavlink.MAV_FTP_ERR_FAILERRNO, number & 0xFF))
 
 
 @dataclass(frozen=True, slots=True)
 class Request:
-    """A client's request.
+    """A client's request."""
 
-    Attributes:
-        sequence: the answer carries the next one.
-        session: which of the client's open files.
-        opcode: what for; it need not be a known one.
-        size: of the data, as the client says; at most 239 when it is sound.
-        offset: into a file or listing, or a length.
-        data: 239 bytes at most, `size` of them meant.
-        raw: header and data, to know it again.
-    """
-
-    sequence: int
-    session: int
-    opcode: int
-    size: int
-    offset: int
-    data: bytes
-    raw: bytes
+    sequence: int  # the answer has the next one
+    session: int  # number of one of the client's open files
+    opcode: int  # may be an unknown one
+    size: int  # of the data, as the client states it; at most 239 when it is valid
+    offset: int  # in a file or listing, or a length
+    data: bytes  # 239 bytes at most
+    raw: bytes  # header and data; the same request has the same
 
     @property
     def strings(self) -> list[bytes]:
@@ -136,116 +84,74 @@ def parse(payload: bytes) -> Request:
 
 @dataclass(frozen=True, slots=True)
 class Answer:
-    """What is answered to a request.
+    """The answer to a request."""
 
-    Attributes:
-        data: at most 239 bytes.
-        ack: else a NAK, and the data says why.
-        session: the one meant or just opened.
-        offset: of the data; in most answers the request's.
-        burst_complete: the last packet of a burst, and the file goes on.
-    """
-
-    data: bytes = b""
-    ack: bool = True
-    session: int = 0
-    offset: int = 0
-    burst_complete: bool = False
+    data: bytes = b""  # at most 239 bytes
+    ack: bool = True  # else a NAK, with `nak_data`
+    session: int = 0  # of the request, or just opened
+    offset: int = 0  # of the data; in most answers the request's
+    burst_complete: bool = False  # the last packet of a burst that did not reach the file's end
 
     def payload(self, sequence: int, opcode: int) -> bytes:
         """The 251 bytes of a payload that answers `opcode`."""
-        kind = Opcode.ACK if self.ack else Opcode.NAK
+        kind = mavlink.MAV_FTP_OPCODE_ACK if self.ack else mavlink.MAV_FTP_OPCODE_NAK
+        size = len(self.data)
         header = _HEADER.pack(
-            sequence & 0xFFFF,
-            self.session,
-            kind,
-            len(self.data),
-            opcode,
-            self.burst_complete,
-            0,
-            self.offset,
+            sequence & 0xFFFF, self.session, kind, size, opcode, self.burst_complete, 0, self.offset
         )
         return (header + self.data).ljust(PAYLOAD_BYTES, b"\0")
 
 
 @dataclass(slots=True)
 class Burst:
-    """A burst under way.
+    """A burst being sent; sequence and offset are the next packet's."""
 
-    Attributes:
-        request: header and data of the request that started it.
-        sequence: of the next packet.
-        offset: of the next packet.
-        sent: bytes sent since the request.
-    """
-
-    request: bytes
+    request: bytes  # `Request.raw`
     sequence: int
     offset: int
-    sent: int = 0
+    sent_bytes: int = 0
 
 
 @dataclass(slots=True)
 class Session:
-    """An open file.
-
-    Attributes:
-        path: of the file.
-        size: when it was opened.
-        writable: opened for writing, else for reading.
-        opening: header and data of the request that opened it.
-        opened_us: vehicle time of that.
-        used_us: vehicle time of the last use.
-        burst: under way, if any.
-        closing: asked to be closed, perhaps by an old request that came late: it can be read, or replaced.
-    """
+    """An open file."""
 
     path: Path
-    size: int
-    writable: bool
-    opening: bytes
+    size: int  # when it was opened
+    writable: bool  # opened for writing, else for reading
+    opening: bytes  # `Request.raw` of the request that opened it
     opened_us: int
     used_us: int
     burst: Burst | None = None
-    closing: bool = False
+    closing: bool = False  # closed by a request that may be an old, late one: it can be read, or replaced
 
 
 @dataclass(slots=True)
 class Client:
-    """One client.
-
-    Attributes:
-        key: link, system and component it speaks from.
-        sessions: open files by number; numbers are the client's own.
-        used_us: vehicle time of its last request.
-        last_request: header and data of the last request if it changed something, else empty.
-        last_reply: payload of the answer to it.
-        last_closing: header and data of the last request that closed a session.
-        closed_us: vehicle time of that.
-    """
+    """One client."""
 
     key: ClientKey
-    sessions: dict[int, Session] = field(default_factory=dict)
-    used_us: int = 0
-    last_request: bytes = b""
-    last_reply: bytes = b""
-    last_closing: bytes = b""
+    sessions: dict[int, Session] = field(default_factory=dict)  # by number; numbers are the client's own
+    used_us: int = 0  # vehicle time of the last request
+    last_request: bytes = b""  # `Request.raw` of the last request if it changed something, else empty
+    last_reply: bytes = b""  # payload of the answer to it
+    last_closing: bytes = b""  # `Request.raw` of the last request that closed a session
     closed_us: int = 0
 
     def session(self, number: int, time_us: int) -> Session:
-        """An open file that is now used.
+        """An open file, which is now used.
 
         Raises:
-            RefusalError: INVALID_SESSION.
+            RefusalError: INVALIDSESSION.
         """
         session = self.sessions.get(number)
         if session is None:
-            raise RefusalError(FtpError.INVALID_SESSION)
+            raise RefusalError(mavlink.MAV_FTP_ERR_INVALIDSESSION)
         session.used_us = time_us
         return session
 
     def twin(self, number: int, opening: bytes, time_us: int) -> Session | None:
-        """A session that the very same request opened a moment ago: the request came twice."""
+        """A session that the same request opened a moment ago: the request was received twice."""
         session = self.sessions.get(number)
         if session is None or session.closing or session.opening != opening:
             return None
@@ -254,9 +160,9 @@ class Client:
     def close(self, numbers: list[int], request: bytes, time_us: int) -> None:
         """Close sessions.
 
-        The same request a moment later may be the first one that took a detour, while the client has opened
-        the next file by that number; or MAVSDK, which counts from 0 for each file, and means it. So it leaves
-        the session to be read or replaced.
+        The same request a moment later may be a late copy of the first, while the client has opened the next
+        file with that number; or it is meant, as MAVSDK counts from 0 for each file. So it only marks the
+        session, which can still be read or replaced.
         """
         late = request == self.last_closing and time_us - self.closed_us <= _LATE_US
         self.last_closing, self.closed_us = request, time_us
@@ -266,42 +172,42 @@ class Client:
             else:
                 del self.sessions[number]
 
-    def make_room(self, number: int, time_us: int) -> None:
-        """Have a session number free.
+    def free(self, number: int, time_us: int) -> None:
+        """Make a session number free.
 
-        MAVSDK uses number 0 whatever a vehicle answers, pymavlink counts up: so the number asked for is the
-        number opened. One that a client has left open is taken over once it rests.
+        MAVSDK uses number 0 whatever a vehicle answers, pymavlink counts up: so the requested number is the
+        one that is opened. A session that a client has left open is taken over once it is unused.
 
         Raises:
-            RefusalError: NO_SESSIONS_AVAILABLE.
+            RefusalError: NOSESSIONSAVAILABLE.
         """
         session = self.sessions.get(number)
         if session is not None:
             if not session.closing and time_us - session.used_us < _TAKEOVER_US:
-                raise RefusalError(FtpError.NO_SESSIONS_AVAILABLE)
+                raise RefusalError(mavlink.MAV_FTP_ERR_NOSESSIONSAVAILABLE)
             del self.sessions[number]
-        if len(self.sessions) >= _SESSIONS:
-            raise RefusalError(FtpError.NO_SESSIONS_AVAILABLE)
+        if len(self.sessions) >= _MAX_SESSIONS:
+            raise RefusalError(mavlink.MAV_FTP_ERR_NOSESSIONSAVAILABLE)
 
 
 class Clients:
-    """All clients, few enough whatever comes over the links."""
+    """All clients, in a bounded number."""
 
     def __init__(self) -> None:
         self._clients: dict[ClientKey, Client] = {}
 
     def client(self, key: ClientKey, time_us: int) -> Client:
-        """The client with that key, known or new; the one longest silent makes room."""
+        """The client with that key, known or new; a new one replaces the one silent for longest."""
         client = self._clients.get(key)
         if client is None:
-            if len(self._clients) >= _CLIENTS:
+            if len(self._clients) >= _MAX_CLIENTS:
                 del self._clients[min(self._clients.values(), key=lambda each: each.used_us).key]
             client = self._clients[key] = Client(key)
         client.used_us = time_us
         return client
 
     def bursting(self) -> list[tuple[Client, int, Session]]:
-        """Clients and their sessions with a burst under way."""
+        """Clients and their sessions whose burst is being sent."""
         return [
             (client, number, session)
             for client in self._clients.values()
@@ -310,13 +216,11 @@ class Clients:
         ]
 
     def close_idle(self, time_us: int) -> None:
-        """Forget sessions and clients that rest."""
+        """Forget unused sessions and clients."""
         for key, client in list(self._clients.items()):
-            client.sessions = {
-                number: session
-                for number, session in client.sessions.items()
-                if time_us - session.used_us <= _IDLE_US
-            }
+            for number, session in list(client.sessions.items()):
+                if time_us - session.used_us > _IDLE_US:
+                    del client.sessions[number]
             if not client.sessions and time_us - client.used_us > _IDLE_US:
                 del self._clients[key]
 

@@ -1,11 +1,11 @@
-"""MAVLink FTP: lists, reads and writes a vehicle's files, as PX4 answers.
+"""MAVLink FTP: lists, reads and writes a vehicle's files.
 
-As PX4: the opcodes and errors; system 0 is answered; a request that changed something and comes again gets
-the same answer and changes nothing again; a burst pauses after 35 kB until the client asks on; what is unused
-for ten seconds is closed. `@PARAM/param.pck`, which MAVProxy asks for first, is a file not found.
+As PX4: the opcodes and errors; system 0 is answered; a repeated request that changed something gets the same
+answer and changes nothing again; a burst pauses after 35 kB until the client requests more; a session that is
+unused for ten seconds is closed. `@PARAM/param.pck`, which MAVProxy requests first, is a file not found.
 
 Different: sessions belong to clients, not to links, and a client may have four (PX4: one a link); the
-firmware's files (`etc`) cannot be written; what is written has a quota.
+firmware's files (`etc`) are read-only; written files have a quota.
 """
 
 from __future__ import annotations
@@ -22,13 +22,11 @@ from firmware_py.mavlink.ground_station.file_sessions import (
     Burst,
     Client,
     Clients,
-    FtpError,
-    Opcode,
     RefusalError,
     Request,
     Session,
+    nak_data,
     parse,
-    reason,
 )
 from firmware_py.mavlink.service import Service
 from firmware_py.storage import Entry, Path, Storage, parse_path, refuse, sound_name
@@ -37,20 +35,20 @@ from wire.exchange import Exchange
 from wire.link import Link
 
 _BURST_PACKETS = 8  # a link and update: some 480 kB/s at 250 updates a second
-_BURST_BYTES = 35_000  # PX4's figure
-_CRC_BYTES = 1 << 20  # at once; the rest of a large file in the next updates
-_CHECKSUMS = 8  # under way at a time
+_BURST_BYTES = 35_000  # as PX4
+_CRC_BYTES = 1 << 20  # an update
+_MAX_CHECKSUMS = 8  # at a time
 _CHANGING = frozenset(
     {
-        Opcode.TERMINATE_SESSION,
-        Opcode.OPEN_FILE_RO,
-        Opcode.CREATE_FILE,
-        Opcode.OPEN_FILE_WO,
-        Opcode.WRITE_FILE,
-        Opcode.REMOVE_FILE,
-        Opcode.CREATE_DIRECTORY,
-        Opcode.REMOVE_DIRECTORY,
-        Opcode.RENAME,
+        mavlink.MAV_FTP_OPCODE_TERMINATESESSION,
+        mavlink.MAV_FTP_OPCODE_OPENFILERO,
+        mavlink.MAV_FTP_OPCODE_CREATEFILE,
+        mavlink.MAV_FTP_OPCODE_OPENFILEWO,
+        mavlink.MAV_FTP_OPCODE_WRITEFILE,
+        mavlink.MAV_FTP_OPCODE_REMOVEFILE,
+        mavlink.MAV_FTP_OPCODE_CREATEDIRECTORY,
+        mavlink.MAV_FTP_OPCODE_REMOVEDIRECTORY,
+        mavlink.MAV_FTP_OPCODE_RENAME,
     }
 )
 
@@ -59,9 +57,9 @@ class FileTree:
     """Storage and the firmware's own files as one tree. Its methods raise OSError as `Storage` does.
 
     Args:
-        storage: what clients may change; None: nothing can be kept.
-        firmware_files: path to content, such as `etc/extras/parameters.json.xz`. Their top folders belong to
-            the firmware whole. Content is asked for when a client wants it.
+        storage: files that clients may change; None: there are none.
+        firmware_files: read-only files, content by path, such as `etc/extras/parameters.json.xz`. Nothing
+            else can be in their top folders. Content is looked up only when a client reads it.
     """
 
     def __init__(self, storage: Storage | None, firmware_files: Mapping[str, bytes]) -> None:
@@ -72,7 +70,7 @@ class FileTree:
         self._tops = {path[0] for path in self._firmware}
 
     def entry(self, path: Path) -> Entry:
-        """What is there."""
+        """The file or folder at a path."""
         if not self._is_firmware(path):
             return self._need_storage(path).entry(path)
         if path in self._firmware:
@@ -82,19 +80,17 @@ class FileTree:
         raise refuse(errno.ENOENT, path)
 
     def entries(self, path: Path) -> list[Entry]:
-        """What a folder holds, by name."""
+        """The content of a folder, sorted by name."""
         if self._is_firmware(path):
             if path in self._firmware:
                 raise refuse(errno.ENOTDIR, path)
             self.entry(path)
             return self._firmware_entries(path)
-        kept = [] if self._storage is None and not path else self._need_storage(path).entries(path)
+        stored = [] if self._storage is None and not path else self._need_storage(path).entries(path)
         if path:
-            return kept
-        own = self._firmware_entries(())
-        return sorted(
-            [each for each in kept if each.name not in self._tops] + own, key=lambda each: each.name
-        )
+            return stored
+        both = [each for each in stored if each.name not in self._tops] + self._firmware_entries(())
+        return sorted(both, key=lambda each: each.name)
 
     def read(self, path: Path, offset: int, count: int) -> bytes:
         """At most `count` bytes of a file."""
@@ -108,18 +104,18 @@ class FileTree:
         """The storage, for a path that a client may change.
 
         Raises:
-            OSError: EACCES, the path is the firmware's or the root, or nothing can be kept.
+            OSError: EACCES, the path is the firmware's or the root, or there is no storage.
         """
         if not path or self._is_firmware(path) or self._storage is None:
             raise refuse(errno.EACCES, path)
         return self._storage
 
     def listing(self, path: Path, first: int) -> bytes:
-        """A page of a listing, as ListDirectory sends it: zero-terminated `Dname`, `Fname<tab>size` or `S`.
+        """A page of a folder's listing: zero-terminated `Dname`, `Fname<tab>size` or `S` for each entry.
 
         Args:
-            path: of a folder.
-            first: how many entries to leave out.
+            path: of the folder.
+            first: index of the page's first entry.
 
         Returns:
             As many as fit into one answer; empty: there are no more.
@@ -156,7 +152,7 @@ def _line(entry: Entry) -> bytes:
 
 @dataclass(slots=True)
 class _Checksum:
-    """A CRC-32 under way; it is answered when the whole file is read."""
+    """A CRC-32 being computed; it is answered when the whole file is read."""
 
     client: Client
     request: Request
@@ -167,30 +163,26 @@ class _Checksum:
 
 
 class FileOperations:
-    """Does what requests ask for at once. Its methods raise RefusalError and OSError, which become NAKs.
-
-    Args:
-        tree: of files.
-    """
+    """Executes requests that are answered at once; RefusalError and OSError of its methods become NAKs."""
 
     def __init__(self, tree: FileTree, exchange: Exchange) -> None:
         self._tree = tree
         self._exchange = exchange
         self.table: dict[int, Callable[[Client, Request], Answer]] = {
-            Opcode.NONE: self._nothing,
-            Opcode.TERMINATE_SESSION: self._terminate,
-            Opcode.RESET_SESSIONS: self._reset,
-            Opcode.LIST_DIRECTORY: self._list,
-            Opcode.OPEN_FILE_RO: self._open,
-            Opcode.READ_FILE: self._read,
-            Opcode.CREATE_FILE: self._open,
-            Opcode.WRITE_FILE: self._write,
-            Opcode.REMOVE_FILE: self._change,
-            Opcode.CREATE_DIRECTORY: self._change,
-            Opcode.REMOVE_DIRECTORY: self._change,
-            Opcode.OPEN_FILE_WO: self._open,
-            Opcode.TRUNCATE_FILE: self._change,
-            Opcode.RENAME: self._rename,
+            mavlink.MAV_FTP_OPCODE_NONE: self._nothing,
+            mavlink.MAV_FTP_OPCODE_TERMINATESESSION: self._terminate,
+            mavlink.MAV_FTP_OPCODE_RESETSESSION: self._reset,
+            mavlink.MAV_FTP_OPCODE_LISTDIRECTORY: self._list,
+            mavlink.MAV_FTP_OPCODE_OPENFILERO: self._open,
+            mavlink.MAV_FTP_OPCODE_READFILE: self._read,
+            mavlink.MAV_FTP_OPCODE_CREATEFILE: self._open,
+            mavlink.MAV_FTP_OPCODE_WRITEFILE: self._write,
+            mavlink.MAV_FTP_OPCODE_REMOVEFILE: self._change,
+            mavlink.MAV_FTP_OPCODE_CREATEDIRECTORY: self._change,
+            mavlink.MAV_FTP_OPCODE_REMOVEDIRECTORY: self._change,
+            mavlink.MAV_FTP_OPCODE_OPENFILEWO: self._open,
+            mavlink.MAV_FTP_OPCODE_TRUNCATEFILE: self._change,
+            mavlink.MAV_FTP_OPCODE_RENAME: self._rename,
         }
 
     def reading(self, client: Client, request: Request) -> Session:
@@ -215,7 +207,7 @@ class FileOperations:
     def _list(self, _client: Client, request: Request) -> Answer:
         page = self._tree.listing(parse_path(request.path), request.offset)
         if not page:
-            raise RefusalError(FtpError.EOF)
+            raise RefusalError(mavlink.MAV_FTP_ERR_EOF)
         return Answer(page, session=request.session, offset=request.offset)
 
     def _open(self, client: Client, request: Request) -> Answer:
@@ -223,34 +215,34 @@ class FileOperations:
         twin = client.twin(number, request.raw, time_us)
         if twin is not None:
             return Answer(pack("<I", twin.size), session=number)
-        client.make_room(number, time_us)
-        path, writable = parse_path(request.path), request.opcode != Opcode.OPEN_FILE_RO
+        client.free(number, time_us)
+        path, writable = parse_path(request.path), request.opcode != mavlink.MAV_FTP_OPCODE_OPENFILERO
         size = self._prepare(path, request.opcode)
         client.sessions[number] = Session(path, size, writable, request.raw, time_us, time_us)
         return Answer(pack("<I", size & 0xFFFFFFFF), session=number)
 
     def _prepare(self, path: Path, opcode: int) -> int:
-        """Have a file as it is to be opened; its size before, as PX4 tells it."""
+        """Check or create a file to be opened; its size before that, as PX4 reports it."""
         try:
             entry = self._tree.entry(path)
             if entry.is_folder:
                 raise refuse(errno.EISDIR, path)
             size = entry.size
         except FileNotFoundError:
-            if opcode == Opcode.OPEN_FILE_RO:
+            if opcode == mavlink.MAV_FTP_OPCODE_OPENFILERO:
                 raise
             self._tree.writable(path).create(path)
             return 0
-        if opcode != Opcode.OPEN_FILE_RO:
+        if opcode != mavlink.MAV_FTP_OPCODE_OPENFILERO:
             storage = self._tree.writable(path)
-            if opcode == Opcode.CREATE_FILE:
+            if opcode == mavlink.MAV_FTP_OPCODE_CREATEFILE:
                 storage.truncate(path, 0)
         return size
 
     def _read(self, client: Client, request: Request) -> Answer:
         session = self.reading(client, request)
         if request.offset >= session.size:
-            raise RefusalError(FtpError.EOF)
+            raise RefusalError(mavlink.MAV_FTP_ERR_EOF)
         data = self._tree.read(session.path, request.offset, request.size)
         return Answer(data, session=request.session, offset=request.offset)
 
@@ -265,13 +257,13 @@ class FileOperations:
         path, offset = parse_path(request.path), 0
         storage = self._tree.writable(path)
         match request.opcode:
-            case Opcode.REMOVE_FILE:
+            case mavlink.MAV_FTP_OPCODE_REMOVEFILE:
                 storage.remove(path)
-            case Opcode.CREATE_DIRECTORY:
+            case mavlink.MAV_FTP_OPCODE_CREATEDIRECTORY:
                 storage.make_folder(path)
-            case Opcode.REMOVE_DIRECTORY:
+            case mavlink.MAV_FTP_OPCODE_REMOVEDIRECTORY:
                 storage.remove_folder(path)
-            case Opcode.TRUNCATE_FILE:
+            case mavlink.MAV_FTP_OPCODE_TRUNCATEFILE:
                 offset = request.offset
                 storage.truncate(path, offset)
         return Answer(session=request.session, offset=offset)
@@ -287,12 +279,7 @@ class FileOperations:
 
 
 class FileTransferService(Service):
-    """Serves files.
-
-    Args:
-        storage: what clients may change; None: there are only the firmware's files.
-        firmware_files: path to content, such as `etc/extras/parameters.json.xz`, for `mftp://` addresses.
-    """
+    """Serves the files of a `FileTree`."""
 
     def __init__(
         self, exchange: Exchange, storage: Storage | None, firmware_files: Mapping[str, bytes]
@@ -302,20 +289,20 @@ class FileTransferService(Service):
         self._operations = FileOperations(self._tree, exchange)
         self._work: dict[int, Callable[[Client, Request], Answer | None]] = {
             **self._operations.table,
-            Opcode.CALC_FILE_CRC32: self._checksum,
-            Opcode.BURST_READ_FILE: self._burst,
+            mavlink.MAV_FTP_OPCODE_CALCFILECRC: self._checksum,
+            mavlink.MAV_FTP_OPCODE_BURSTREADFILE: self._burst,
         }
         self._clients = Clients()
         self._checksums: list[_Checksum] = []
         self._idle_due_us = 0
-        self.handlers = {mavlink.MAVLINK_MSG_ID_FILE_TRANSFER_PROTOCOL: self._hear}
+        self.handlers = {mavlink.MAVLINK_MSG_ID_FILE_TRANSFER_PROTOCOL: self._receive}
 
     def update(self) -> None:
-        """Go on with bursts and checksums, and close what is unused."""
+        """Continue bursts and checksums, and close what is unused."""
         if not self._clients:
             return
         if self._checksums:
-            self._go_on(self._checksums[0])
+            self._continue_checksum(self._checksums[0])
         room = dict.fromkeys(self._exchange.links, _BURST_PACKETS)
         for client, number, session in self._clients.bursting():
             self._send_burst(client, number, session, room)
@@ -323,11 +310,11 @@ class FileTransferService(Service):
             self._idle_due_us = self._exchange.time_us + 1_000_000
             self._clients.close_idle(self._exchange.time_us)
 
-    def _hear(self, link: Link, message: Message) -> None:
+    def _receive(self, link: Link, message: Message) -> None:
         if not self._exchange.is_for_us(message, or_everyone=True):
             return
         request = parse(bytes(message.payload))
-        if request.opcode in (Opcode.ACK, Opcode.NAK):
+        if request.opcode in (mavlink.MAV_FTP_OPCODE_ACK, mavlink.MAV_FTP_OPCODE_NAK):
             return  # an answer, not a request
         key = (link.profile.name, message.get_srcSystem(), message.get_srcComponent())
         client = self._clients.client(key, self._exchange.time_us)
@@ -339,21 +326,22 @@ class FileTransferService(Service):
             self._reply(client, request, answer)
 
     def _answer(self, client: Client, request: Request) -> Answer | None:
-        """Do what is asked; None: the answer comes later."""
+        """Execute a request; None: it is answered later."""
         try:
             if request.size > DATA_BYTES:
-                raise RefusalError(FtpError.INVALID_DATA_SIZE)
+                raise RefusalError(mavlink.MAV_FTP_ERR_INVALIDDATASIZE)
             work = self._work.get(request.opcode)
             if work is None:
-                raise RefusalError(FtpError.UNKNOWN_COMMAND)
+                raise RefusalError(mavlink.MAV_FTP_ERR_UNKNOWNCOMMAND)
             return work(client, request)
         except (RefusalError, OSError) as error:
-            return Answer(reason(error), ack=False, session=request.session, offset=request.offset)
+            return Answer(nak_data(error), ack=False, session=request.session, offset=request.offset)
 
     def _reply(self, client: Client, request: Request, answer: Answer) -> None:
         payload = answer.payload(request.sequence + 1, request.opcode)
-        again = request.opcode in _CHANGING and answer.data != bytes((FtpError.NO_SESSIONS_AVAILABLE,))
-        client.last_request, client.last_reply = (request.raw, payload) if again else (b"", b"")
+        no_session = bytes((mavlink.MAV_FTP_ERR_NOSESSIONSAVAILABLE,))
+        keep = request.opcode in _CHANGING and answer.data != no_session
+        client.last_request, client.last_reply = (request.raw, payload) if keep else (b"", b"")
         self._send(client, payload)
 
     def _send(self, client: Client, payload: bytes) -> None:
@@ -369,20 +357,20 @@ class FileTransferService(Service):
         if entry.is_folder:
             raise refuse(errno.EISDIR, path)
         if any(each.client is client for each in self._checksums):
-            return None  # asked again while it is worked out
-        if len(self._checksums) >= _CHECKSUMS:
-            raise RefusalError(FtpError.NO_SESSIONS_AVAILABLE)
+            return None  # a repeated request while it is computed
+        if len(self._checksums) >= _MAX_CHECKSUMS:
+            raise RefusalError(mavlink.MAV_FTP_ERR_NOSESSIONSAVAILABLE)
         self._checksums.append(_Checksum(client, request, path, entry.size))
-        self._go_on(self._checksums[-1])
+        self._continue_checksum(self._checksums[-1])
         return None
 
-    def _go_on(self, checksum: _Checksum) -> None:
-        """Read on, and answer at the end."""
+    def _continue_checksum(self, checksum: _Checksum) -> None:
+        """Read the next part of the file; answer at its end."""
         count = min(_CRC_BYTES, checksum.size - checksum.offset)
         try:
             data = self._tree.read(checksum.path, checksum.offset, count)
         except OSError as error:
-            answer = Answer(reason(error), ack=False, session=checksum.request.session)
+            answer = Answer(nak_data(error), ack=False, session=checksum.request.session)
         else:
             checksum.crc = crc32(data, checksum.crc)
             checksum.offset += len(data)
@@ -394,7 +382,7 @@ class FileTransferService(Service):
 
     def _burst(self, client: Client, request: Request) -> None:
         session = self._operations.reading(client, request)
-        if session.burst is None or session.burst.request != request.raw:  # else it came twice
+        if session.burst is None or session.burst.request != request.raw:  # else it was received twice
             session.burst = Burst(request.raw, request.sequence + 1, request.offset)
 
     def _send_burst(self, client: Client, number: int, session: Session, room: dict[str, int]) -> None:
@@ -409,23 +397,23 @@ class FileTransferService(Service):
             session.used_us = client.used_us = self._exchange.time_us
 
     def _burst_packet(self, burst: Burst, number: int, session: Session) -> bytes:
-        """The next packet; the burst is over after the last of the file, an error, or 35 kB."""
+        """The next packet; the burst ends after the end of the file, an error, or 35 kB."""
         sequence, offset = burst.sequence, burst.offset
         try:
             if offset >= session.size:
-                raise RefusalError(FtpError.EOF)
+                raise RefusalError(mavlink.MAV_FTP_ERR_EOF)
             data = self._tree.read(session.path, offset, DATA_BYTES)
             if not data:
-                raise RefusalError(FtpError.EOF)  # it became shorter
+                raise RefusalError(mavlink.MAV_FTP_ERR_EOF)  # the file has become shorter
         except (RefusalError, OSError) as error:
             session.burst = None
-            answer = Answer(reason(error), ack=False, session=number, offset=offset)
-            return answer.payload(sequence, Opcode.BURST_READ_FILE)
+            answer = Answer(nak_data(error), ack=False, session=number, offset=offset)
+            return answer.payload(sequence, mavlink.MAV_FTP_OPCODE_BURSTREADFILE)
         burst.sequence += 1
         burst.offset += len(data)
-        burst.sent += len(data)
-        complete = burst.sent > _BURST_BYTES
+        burst.sent_bytes += len(data)
+        complete = burst.sent_bytes > _BURST_BYTES
         if complete:
             session.burst = None
         answer = Answer(data, session=number, offset=offset, burst_complete=complete)
-        return answer.payload(sequence, Opcode.BURST_READ_FILE)
+        return answer.payload(sequence, mavlink.MAV_FTP_OPCODE_BURSTREADFILE)

@@ -1,9 +1,9 @@
 """Log download: LOG_REQUEST_LIST, LOG_REQUEST_DATA, LOG_REQUEST_END and LOG_ERASE, as PX4 answers them.
 
-Logs are the files in the folders of `log/`, numbered from 0 in the order of their names. The numbers hold
-until the list is asked for again. Different from PX4: without any log one LOG_ENTRY says so (PX4 is silent,
-and clients wait for their time-out), data can be asked for before the list, a list ends where it was asked
-to, and what is meant for another vehicle is left to it.
+Logs are the files in the folders of `log/`, numbered from 0 in the order of their names, until the list is
+requested again. Different from PX4: without any log one LOG_ENTRY reports that (PX4 is silent, and clients
+wait for their time-out), data can be requested before the list, a list ends with the requested number, and
+requests to another vehicle are ignored.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ from wire.link import Link
 
 LOG_FOLDER: Path = ("log",)
 _CHUNK = 90
-_PACKETS = 8  # a link and update: 180 kB/s at 250 updates a second
+_PACKETS = 8  # per link and update: 180 kB/s at 250 updates a second
 _LAST = 0xFFFF
 _MAX_LOGS = 1000
 
@@ -34,37 +34,24 @@ class _Log:
 
 @dataclass(slots=True)
 class _Transfer:
-    """What one link is owed.
+    """What is to be sent on one link."""
 
-    Attributes:
-        asked: first and last number of a list that was asked for.
-        entries: LOG_ENTRY messages to be sent.
-        log: whose data is sent.
-        number: of that log.
-        offset: of the next data.
-        end: where to stop.
-    """
-
-    asked: tuple[int, int] | None = None
-    entries: deque[Message] = field(default_factory=deque)
-    log: _Log | None = None
-    number: int = 0
-    offset: int = 0
-    end: int = 0
+    requested: tuple[int, int] | None = None  # first and last number of a list
+    entries: deque[Message] = field(default_factory=deque)  # LOG_ENTRY
+    log: _Log | None = None  # whose data is sent
+    number: int = 0  # of that log
+    offset: int = 0  # of the next data
+    end: int = 0  # of the data
 
 
 class LogTransferService(Service):
-    """Lists and sends the logs.
-
-    Args:
-        storage: where the logs are; None: there are none.
-    """
+    """Lists and sends the logs in `storage`; None: there are none."""
 
     def __init__(self, exchange: Exchange, storage: Storage | None) -> None:
         self._exchange = exchange
         self._storage = storage
         self._logs: list[_Log] | None = None
-        self._transfers: dict[str, _Transfer] = {}  # by link; what nothing is owed on is left out
+        self._transfers: dict[str, _Transfer] = {}  # unfinished ones, by link
         self.handlers = {
             mavlink.MAVLINK_MSG_ID_LOG_REQUEST_LIST: self._list,
             mavlink.MAVLINK_MSG_ID_LOG_REQUEST_DATA: self._data,
@@ -80,10 +67,10 @@ class LogTransferService(Service):
                 del self._transfers[name]
 
     def _continue(self, link: Link, transfer: _Transfer) -> bool:
-        """Send a few packets; whether more are owed."""
-        if transfer.asked is not None:
-            self._make_list(transfer, *transfer.asked)
-            transfer.asked = None
+        """Send a few packets; whether the transfer is unfinished."""
+        if transfer.requested is not None:
+            self._make_list(transfer, *transfer.requested)
+            transfer.requested = None
         for _ in range(_PACKETS):
             if link.congested:
                 break
@@ -114,15 +101,15 @@ class LogTransferService(Service):
         if not self._exchange.is_for_us(message, or_everyone=True):
             return
         transfer = self._transfers.setdefault(link.profile.name, _Transfer())
-        transfer.asked, transfer.log = (message.start, message.end), None
+        transfer.requested, transfer.log = (message.start, message.end), None
 
     def _make_list(self, transfer: _Transfer, first: int, end: int) -> None:
-        """At the next update, not at once: a flight that has just ended is then written down."""
+        """Make the list at the next update, when the log of a flight that has just ended is complete."""
         self._logs = logs = self._find()
         transfer.entries.clear()
         if not logs:
             transfer.entries.append(mavlink.MAVLink_log_entry_message(0, 0, 0, 0, 0))
-        last = len(logs) if end == _LAST else end  # PX4's way to fill last_log_num
+        last = len(logs) if end == _LAST else end  # as PX4 fills last_log_num
         for number in range(first, min(end, len(logs) - 1) + 1):
             log = logs[number]
             transfer.entries.append(
@@ -151,7 +138,7 @@ class LogTransferService(Service):
             self._transfers.pop(link.profile.name, None)
 
     def _erase(self, _link: Link, message: Message) -> None:
-        """Remove all logs; one that is being written is started again (`UlogRecorder`)."""
+        """Remove all logs; one that is being written is restarted (`UlogRecorder`)."""
         if not self._exchange.is_for_us(message) or self._storage is None:
             return
         self._transfers.clear()

@@ -1,8 +1,8 @@
-"""The files that explain this vehicle to ground stations: parameters and events with names, units and words.
+"""Component metadata: files with the names, units and texts of parameters and events for ground stations.
 
 The formats are MAVLink's (https://mavlink.io/en/services/component_information.html), in the versions that
-PX4 writes and ground stations read. They are made from the declarations when first asked for, which takes
-some hundredths of a second. COMPONENT_METADATA and the older COMPONENT_INFORMATION say where they are.
+PX4 writes and ground stations read. They are made from the declarations at the first request, which takes
+some hundredths of a second. COMPONENT_METADATA and the older COMPONENT_INFORMATION contain their addresses.
 """
 
 from __future__ import annotations
@@ -22,11 +22,11 @@ from firmware_py.mavlink.ground_station.event_definitions import (
     enums,
     navigation_mode_groups,
 )
-from firmware_py.mavlink.scaling import boot_ms
 from firmware_py.mavlink.service import Service
 from firmware_py.parameters import DECLARATIONS, Parameter, Parameters
-from wire.dialect import Message, mavlink
+from wire.dialect import Message, boot_ms, mavlink
 from wire.exchange import Exchange
+from wire.link import Link
 
 FOLDER = "etc/extras"
 GENERAL_FILE = f"{FOLDER}/component_general.json.xz"
@@ -36,23 +36,22 @@ FILES = (GENERAL_FILE, PARAMETERS_FILE, EVENTS_FILE)
 
 _TYPE_PARAMETER, _TYPE_EVENTS = 1, 4  # COMP_METADATA_TYPE
 _VENDOR = "framerunner"
-_COMPRESSION = [{"id": lzma.FILTER_LZMA2, "preset": 6, "dict_size": 1 << 18}]  # small to unpack
+_COMPRESSION = [{"id": lzma.FILTER_LZMA2, "preset": 6, "dict_size": 1 << 18}]  # unpacked in little memory
 
 
 class ExtraFiles(Mapping[str, bytes]):
-    """All files by their path on the vehicle, such as `etc/extras/parameters.json.xz`; made when read.
+    """All files by their path on the vehicle, such as `etc/extras/parameters.json.xz`; made when first read.
 
     Args:
-        parameters: of the vehicle, for its own defaults; without them, those that are declared.
+        parameters: of the vehicle, for its defaults; by default those that are declared.
     """
 
     def __init__(self, parameters: Parameters | None = None) -> None:
         self._parameters = parameters
 
     def __getitem__(self, path: str) -> bytes:
-        if path not in FILES:
-            raise KeyError(path)
-        return extras(self._parameters)[path]
+        declared = DECLARATIONS if self._parameters is None else self._parameters.declarations
+        return _files(tuple((each.name, each.default) for each in declared))[path]
 
     def __iter__(self) -> Iterator[str]:
         return iter(FILES)
@@ -61,54 +60,32 @@ class ExtraFiles(Mapping[str, bytes]):
         return len(FILES)
 
 
-def extras(parameters: Parameters | None = None) -> dict[str, bytes]:
-    """The same as a dictionary, made now."""
-    declared = DECLARATIONS if parameters is None else parameters.declarations
-    defaults = {each.name: each.default for each in DECLARATIONS}
-    own = tuple(
-        (each.name, each.default)
-        for each in declared
-        if each.default != defaults.get(each.name, each.default)
-    )
-    return dict(_files(own))
-
-
 def file_crc(content: bytes) -> int:
-    """MAVLink's CRC-32 of a file: as zlib's, but without its first and last inversion."""
+    """MAVLink's CRC-32 of a file: zlib's without its first and last inversion."""
     return crc32(content, 0xFFFFFFFF) ^ 0xFFFFFFFF
 
 
 @lru_cache(maxsize=4)
-def _files(own_defaults: tuple[tuple[str, float], ...]) -> tuple[tuple[str, bytes], ...]:
-    declarations = Parameters(defaults=dict(own_defaults)).declarations
+def _files(defaults: tuple[tuple[str, float], ...]) -> dict[str, bytes]:
+    declarations = Parameters(defaults=dict(defaults)).declarations
     files = {
         PARAMETERS_FILE: _compressed(parameters_json(declarations)),
         EVENTS_FILE: _compressed(events_json()),
     }
-    general = general_json({_TYPE_PARAMETER: PARAMETERS_FILE, _TYPE_EVENTS: EVENTS_FILE}, files)
-    return ((GENERAL_FILE, _compressed(general)), *files.items())
+    general = {
+        "version": 1,
+        "vendorName": _VENDOR,
+        "metadataTypes": [
+            {"type": number, "uri": f"mftp://{path}", "fileCrc": file_crc(files[path])}
+            for number, path in ((_TYPE_PARAMETER, PARAMETERS_FILE), (_TYPE_EVENTS, EVENTS_FILE))
+        ],
+    }
+    return {GENERAL_FILE: _compressed(general), **files}
 
 
 def _compressed(content: object) -> bytes:
     text = json.dumps(content, ensure_ascii=False, separators=(",", ":"), sort_keys=True)
     return lzma.compress(text.encode(), lzma.FORMAT_XZ, lzma.CHECK_CRC32, filters=_COMPRESSION)
-
-
-def general_json(types: dict[int, str], files: dict[str, bytes]) -> dict[str, object]:
-    """`component_general.json`: which files there are.
-
-    Args:
-        types: path by COMP_METADATA_TYPE.
-        files: content by path.
-    """
-    return {
-        "version": 1,
-        "vendorName": _VENDOR,
-        "metadataTypes": [
-            {"type": number, "uri": f"mftp://{path}", "fileCrc": file_crc(files[path])}
-            for number, path in types.items()
-        ],
-    }
 
 
 def parameters_json(declarations: tuple[Parameter, ...]) -> dict[str, object]:
@@ -171,8 +148,6 @@ def events_json() -> dict[str, object]:
 
 def _event(kind: EventKind) -> dict[str, object]:
     described: dict[str, object] = {"name": kind.name, "message": kind.message}
-    if kind.description:
-        described["description"] = kind.description
     if kind.summary:
         described["type"] = "summary"
     if kind.arguments:
@@ -181,23 +156,23 @@ def _event(kind: EventKind) -> dict[str, object]:
 
 
 class MetadataService(Service):
-    """Says where the files are."""
+    """Sends the address of the general file, which has the addresses of the others."""
 
     def __init__(self, autopilot: Autopilot, exchange: Exchange) -> None:
         self._autopilot = autopilot
         self._exchange = exchange
         self.replies = {
-            mavlink.MAVLINK_MSG_ID_COMPONENT_METADATA: lambda _, __: [self._component_metadata()],
-            mavlink.MAVLINK_MSG_ID_COMPONENT_INFORMATION: lambda _, __: [self._component_information()],
+            mavlink.MAVLINK_MSG_ID_COMPONENT_METADATA: self._component_metadata,
+            mavlink.MAVLINK_MSG_ID_COMPONENT_INFORMATION: self._component_information,
         }
 
-    def _component_metadata(self) -> Message:
-        return mavlink.MAVLink_component_metadata_message(*self._general_file())
+    def _component_metadata(self, _link: Link, _index: int) -> list[Message]:
+        return [mavlink.MAVLink_component_metadata_message(*self._general_file())]
 
-    def _component_information(self) -> Message:
-        return mavlink.MAVLink_component_information_message(*self._general_file(), 0, b"")
+    def _component_information(self, _link: Link, _index: int) -> list[Message]:
+        return [mavlink.MAVLink_component_information_message(*self._general_file(), 0, b"")]
 
     def _general_file(self) -> tuple[int, int, bytes]:
-        """Time, checksum and address, as both messages have them."""
-        crc = file_crc(extras(self._autopilot.parameters)[GENERAL_FILE])
+        """Time, checksum and address, which both messages contain."""
+        crc = file_crc(ExtraFiles(self._autopilot.parameters)[GENERAL_FILE])
         return boot_ms(self._exchange.time_us), crc, f"mftp://{GENERAL_FILE}".encode()

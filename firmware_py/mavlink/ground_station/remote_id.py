@@ -1,7 +1,7 @@
-"""OPEN_DRONE_ID_LOCATION and _SYSTEM: where the vehicle and its operator are, for others.
+"""Remote identification, OPEN_DRONE_ID_LOCATION and _SYSTEM: the positions of the vehicle and its operator.
 
-As in PX4, the operator is taken to stand where the vehicle was armed, and no identity is told, because nobody
-has registered this vehicle.
+As in PX4, the operator's position is where the vehicle was armed; the vehicle is not registered, so there is
+no identity.
 """
 
 from __future__ import annotations
@@ -9,22 +9,21 @@ from __future__ import annotations
 from math import atan2, degrees, hypot
 
 from firmware_py.autopilot import Autopilot
-from firmware_py.mavlink.scaling import degrees_e7, whole
 from firmware_py.mavlink.service import Service
 from firmware_py.status import LandedState, VehicleStatus
-from wire.dialect import BROADCAST, Message, mavlink
+from wire.dialect import BROADCAST, Message, degrees_e7, mavlink, whole
 from wire.exchange import Exchange
 
 _NO_IDENTITY = [0] * 20
 _UNKNOWN_M = -1000.0
-_MAX_CM_S, _MAX_VERTICAL_CM_S = 25425, 6200  # of the standard; what is faster is told as this
+_MAX_CM_S, _MAX_VERTICAL_CM_S = 25425, 6200  # of the standard; higher speeds are sent as these
 _TIME_UNKNOWN = 65535.0
 _HOUR_S = 3600.0
 _EPOCH_2019_S = 1_546_300_800
 
 
 class RemoteIdService(Service):
-    """Tells others where the vehicle and its operator are."""
+    """Streams both messages."""
 
     def __init__(self, autopilot: Autopilot, exchange: Exchange) -> None:
         self._autopilot = autopilot
@@ -35,7 +34,7 @@ class RemoteIdService(Service):
         }
 
     def _location(self) -> Message | None:
-        """OPEN_DRONE_ID_LOCATION, once there is a position; accuracies as GPS_RAW_INT claims them."""
+        """OPEN_DRONE_ID_LOCATION, once there is a position; with the accuracies of GPS_RAW_INT."""
         autopilot = self._autopilot
         state, status, place = autopilot.state, autopilot.status, autopilot.global_position()
         if place is None:

@@ -1,8 +1,8 @@
-"""SERIAL_CONTROL: a shell on the vehicle, as PX4's on device 10. Only where somebody switched it on.
+"""SERIAL_CONTROL: a shell on the vehicle, as PX4's on device 10; off unless it is enabled.
 
-It knows a few commands of its own, about the vehicle only: nothing of the computer that it runs on can be
-reached. Lines are echoed and followed by a prompt, as nsh does. Different from PX4: what comes without the
-flag that asks for an answer is answered too, because MAVSDK 4.1 never sets it.
+It has a few commands, about the vehicle only: nothing of the computer that it runs on can be reached. Lines
+are echoed and followed by a prompt, as in nsh. Different from PX4: input without the flag that requests an
+answer is answered too, because MAVSDK 4.1 never sets it.
 """
 
 from __future__ import annotations
@@ -15,72 +15,66 @@ from math import degrees
 
 from firmware_py.autopilot import Autopilot
 from firmware_py.mavlink.service import Service
-from firmware_py.mavlink.telemetry.identity import FOLLOWED_PX4_VERSION, OWN_VERSION
+from firmware_py.mavlink.telemetry.connection import FOLLOWED_PX4_VERSION, OWN_VERSION
 from firmware_py.parameters import ParameterError
 from wire.dialect import BROADCAST, Message, mavlink
 from wire.exchange import Exchange
 from wire.link import Link
 
 _PROMPT = b"nsh> "
-_PIECE = 70
-_PIECES = 4  # a link and update
+_PIECE_BYTES = 70
+_PIECES = 4  # per link and update
 _MAX_LINE = 200
 _MAX_WAITING = 64  # lines
-_SHELLS = 8
+_MAX_SHELLS = 8
 _PAYLOAD_START = 10  # of a MAVLink 2 packet
-_TARGET_PLACE = 79  # in the payload: an extension that pymavlink does not know
+_TARGET_OFFSET = 79  # in the payload: an extension that pymavlink lacks
 _HELP = """\
-help                     what can be asked
+help                     this list
 ver all                  versions
 status                   where the vehicle is and how it moves
 commander status         arming, mode, failsafe
 param show [PATTERN]     parameters, such as param show 'MPC_*'
 param set NAME VALUE     change a parameter
 """
+_SHELL = mavlink.SERIAL_CONTROL_DEV_SHELL
 _REPLY = mavlink.SERIAL_CONTROL_FLAG_REPLY
 _RESPOND = mavlink.SERIAL_CONTROL_FLAG_RESPOND
 
 
 class Console:
-    """What the shell knows: words in, text out. Nothing here reaches further than the vehicle.
-
-    Args:
-        system_id: of the vehicle.
-    """
+    """The commands of the shell, as text; they concern the vehicle only."""
 
     def __init__(self, autopilot: Autopilot, system_id: int) -> None:
         self._autopilot = autopilot
         self._system_id = system_id
         self._commands: dict[str, Callable[[list[str]], str]] = {
-            "help": self._help,
+            "help": lambda _arguments: _HELP,
             "ver": self._versions,
             "status": self._status,
             "commander": self._commander,
             "param": self._parameters,
-            "reboot": self._reboot,
+            "reboot": lambda _arguments: "reboot: start the simulator again instead\n",
         }
 
-    def answer(self, words: list[str]) -> str:
-        """The answer to the words of a line, ending with a newline unless it is empty."""
-        if not words:
+    def answer(self, arguments: list[str]) -> str:
+        """The answer to a command and its arguments, ending with a newline unless it is empty."""
+        if not arguments:
             return ""
-        command = self._commands.get(words[0])
+        command = self._commands.get(arguments[0])
         if command is None:
-            return f"{words[0]}: command not found; try help\n"
-        return command(words[1:])
+            return f"{arguments[0]}: command not found; try help\n"
+        return command(arguments[1:])
 
-    def _help(self, _words: list[str]) -> str:
-        return _HELP
-
-    def _versions(self, _words: list[str]) -> str:
+    def _versions(self, _arguments: list[str]) -> str:
         own, followed = (".".join(map(str, version)) for version in (OWN_VERSION, FOLLOWED_PX4_VERSION))
         return (
             f"HW arch: simulated {self._autopilot.airframe.name}\n"
-            f"FW version: framerunner {own}, speaks as PX4 {followed}\n"
+            f"FW version: framerunner {own}, compatible with PX4 {followed}\n"
             f"System id: {self._system_id}\n"
         )
 
-    def _status(self, _words: list[str]) -> str:
+    def _status(self, _arguments: list[str]) -> str:
         state, place = self._autopilot.state, self._autopilot.global_position()
         north_m, east_m, down_m = state.position_ned_m
         speeds = " ".join(f"{speed:.2f}" for speed in state.velocity_ned_m_s)
@@ -98,8 +92,8 @@ class Console:
             f"battery: {battery.voltage_v:.2f} V, {battery.remaining * 100:.0f} %\n"
         )
 
-    def _commander(self, words: list[str]) -> str:
-        if words != ["status"]:
+    def _commander(self, arguments: list[str]) -> str:
+        if arguments != ["status"]:
             return "usage: commander status\n"
         status = self._autopilot.status
         return (
@@ -110,8 +104,8 @@ class Console:
             f"landed: {status.landed_state.name.lower()}\n"
         )
 
-    def _parameters(self, words: list[str]) -> str:
-        match words:
+    def _parameters(self, arguments: list[str]) -> str:
+        match arguments:
             case ["show"]:
                 return self._show("*")
             case ["show", pattern]:
@@ -140,38 +134,28 @@ class Console:
             return f"{name}: {text} is not a number\n"
         return f"{name}: {parameters.value(name):g}\n"
 
-    def _reboot(self, _words: list[str]) -> str:
-        return "reboot: start the simulator again instead\n"
-
 
 @dataclass(slots=True)
 class _Shell:
-    """One user's shell.
-
-    Attributes:
-        link: by which they speak.
-        line: what was typed so far.
-        lines: typed, to be answered.
-        output: to be sent.
-    """
+    """One user's shell."""
 
     link: str
-    line: bytearray = field(default_factory=bytearray)
-    lines: deque[bytes] = field(default_factory=lambda: deque(maxlen=_MAX_WAITING))
-    output: bytearray = field(default_factory=lambda: bytearray(_PROMPT))
+    line: bytearray = field(default_factory=bytearray)  # typed so far
+    lines: deque[bytes] = field(default_factory=lambda: deque(maxlen=_MAX_WAITING))  # to be answered
+    output: bytearray = field(default_factory=lambda: bytearray(_PROMPT))  # to be sent
 
 
 class ShellService(Service):
-    """Answers what is typed."""
+    """Runs a shell for each sender."""
 
     def __init__(self, autopilot: Autopilot, exchange: Exchange) -> None:
         self._console = Console(autopilot, exchange.system_id)
         self._exchange = exchange
         self._shells: dict[tuple[str, int, int], _Shell] = {}
-        self.handlers = {mavlink.MAVLINK_MSG_ID_SERIAL_CONTROL: self._hear}
+        self.handlers = {mavlink.MAVLINK_MSG_ID_SERIAL_CONTROL: self._receive}
 
     def update(self) -> None:
-        """Answer one line of each shell, and send what there is to send."""
+        """Answer one line of each shell, and send its output."""
         for key, shell in list(self._shells.items()):
             link = self._exchange.links.get(shell.link)
             if link is None:
@@ -188,28 +172,22 @@ class ShellService(Service):
         for _ in range(_PIECES):
             if not shell.output or link.congested:
                 return
-            piece = bytes(shell.output[:_PIECE])
-            del shell.output[:_PIECE]
-            message = mavlink.MAVLink_serial_control_message(
-                mavlink.SERIAL_CONTROL_DEV_SHELL,
-                _REPLY,
-                0,
-                0,
-                len(piece),
-                piece.ljust(_PIECE, b"\0"),
-            )
+            piece = bytes(shell.output[:_PIECE_BYTES])
+            del shell.output[:_PIECE_BYTES]
+            data = piece.ljust(_PIECE_BYTES, b"\0")
+            message = mavlink.MAVLink_serial_control_message(_SHELL, _REPLY, 0, 0, len(piece), data)
             self._exchange.send(link, message)
 
-    def _hear(self, link: Link, message: Message) -> None:
-        meant = _target_system(message) in (BROADCAST, self._exchange.system_id)
-        if not meant or message.device != mavlink.SERIAL_CONTROL_DEV_SHELL or message.flags & _REPLY:
+    def _receive(self, link: Link, message: Message) -> None:
+        is_target = _target_system(message) in (BROADCAST, self._exchange.system_id)
+        if not is_target or message.device != _SHELL or message.flags & _REPLY:
             return
         key = (link.profile.name, message.get_srcSystem(), message.get_srcComponent())
-        if not message.flags & _RESPOND and not message.count:  # nobody reads any longer
+        if not message.flags & _RESPOND and not message.count:  # the sender closes its shell
             self._shells.pop(key, None)
             return
         if key not in self._shells:
-            if len(self._shells) >= _SHELLS:
+            if len(self._shells) >= _MAX_SHELLS:
                 del self._shells[next(iter(self._shells))]
             self._shells[key] = _Shell(link.profile.name)
         self._type(self._shells[key], bytes(message.data)[: message.count])
@@ -229,6 +207,6 @@ class ShellService(Service):
 
 def _target_system(message: Message) -> int:
     packet = bytes(message.get_msgbuf())
-    if packet[0] != mavlink.PROTOCOL_MARKER_V2 or packet[1] <= _TARGET_PLACE:
+    if packet[0] != mavlink.PROTOCOL_MARKER_V2 or packet[1] <= _TARGET_OFFSET:
         return BROADCAST
-    return packet[_PAYLOAD_START + _TARGET_PLACE]
+    return packet[_PAYLOAD_START + _TARGET_OFFSET]

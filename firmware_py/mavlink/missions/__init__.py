@@ -1,1 +1,1 @@
-"""The mission protocol, and what a mission in flight tells and commands."""
+"""The mission protocol, and the reports and commands of a mission in flight."""

@@ -1,4 +1,4 @@
-"""A mission in flight: whether it can be flown, where it is, what it has reached, what it commands."""
+"""A mission in flight: its check, its current and reached items, and the commands in it."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ _REPEATS, _REPEAT_US = 10, 1_000_000  # of MISSION_ITEM_REACHED, as PX4
 _NO_TOTAL = 0xFFFF
 _ACTIVE, _SUSPENDED = 1, 2
 _ACTIVE_MODES = frozenset({FlightMode.MISSION, FlightMode.TAKEOFF, FlightMode.LAND})
-_WITHOUT_EFFECT = frozenset(  # every mission of MAVSDK has them, and there is no gimbal
+_WITHOUT_EFFECT = frozenset(  # every mission of MAVSDK contains them, and there is no gimbal
     {
         mavlink.MAV_CMD_DO_MOUNT_CONFIGURE,
         mavlink.MAV_CMD_DO_MOUNT_CONTROL,
@@ -32,11 +32,7 @@ _WITHOUT_EFFECT = frozenset(  # every mission of MAVSDK has them, and there is n
 
 
 class MissionExecution(Service):
-    """Checks missions when they change, starts them, tells where they are and passes on their commands.
-
-    Args:
-        camera: that the mission may command; None: there is none.
-    """
+    """Checks missions when they change, starts them, reports their progress and passes on their commands."""
 
     def __init__(self, autopilot: Autopilot, exchange: Exchange, camera: CameraControl | None) -> None:
         self._autopilot = autopilot
@@ -57,7 +53,7 @@ class MissionExecution(Service):
         self.sources = {mavlink.MAVLINK_MSG_ID_MISSION_CURRENT: self._mission_current}
 
     def check(self) -> None:
-        """Find out whether the mission can be flown, if that, the fence or home has changed."""
+        """Check whether the mission can be flown, if the mission, the fence or home has changed."""
         autopilot = self._autopilot
         store, home_known = autopilot.missions, autopilot.status.home is not None
         state = (store.mission.version, store.fence.version, home_known)
@@ -77,31 +73,30 @@ class MissionExecution(Service):
             self._reached = None
 
     def update(self) -> None:
-        """Broadcast what is new, and what was reached ten times more; pass on what the mission commands."""
+        """Broadcast a new current item, and reached ones eleven times; pass on the mission's commands."""
         store, exchange = self._autopilot.missions, self._exchange
         self.check()
         if store.current != self._current_sent and store.mission.items:
-            self.tell_current()
+            self.broadcast_current()
         for seq in store.take_reached():
             self._reached, self._repeats_left = seq, _REPEATS
-            self._tell_reached(seq)
+            self._broadcast_reached(seq)
         if self._reached is not None and self._repeats_left and exchange.time_us >= self._repeat_due_us:
             self._repeats_left -= 1
-            self._tell_reached(self._reached)
+            self._broadcast_reached(self._reached)
         for issued in self._autopilot.take_issued_commands():
             self._pass_on(issued)
 
-    def tell_current(self) -> None:
+    def broadcast_current(self) -> None:
         """Broadcast MISSION_CURRENT."""
         self._current_sent = self._autopilot.missions.current
         self._exchange.broadcast(self._mission_current())
 
-    def _tell_reached(self, seq: int) -> None:
+    def _broadcast_reached(self, seq: int) -> None:
         self._repeat_due_us = self._exchange.time_us + _REPEAT_US
         self._exchange.broadcast(mavlink.MAVLink_mission_item_reached_message(seq))
 
     def _update_view(self, autopilot: Autopilot) -> None:
-        """Bring the view of the vehicle up to date."""
         view, status = self._view, autopilot.status
         if status.origin is not self._origin:
             self._origin = status.origin
@@ -124,8 +119,8 @@ class MissionExecution(Service):
     def _start(self, command: Command) -> CommandResult:
         """MISSION_START: switch to mission mode and arm.
 
-        Param 1 is the item to begin with; -1, or not given: where the mission is. Param 2, the last item,
-        counts for nothing, as in PX4. TEMPORARILY_REJECTED: the mode or arming is refused.
+        Param 1 is the first item; -1, or not given: the current one. Param 2, the last item, is ignored, as
+        in PX4. TEMPORARILY_REJECTED: the mode or arming is refused.
         """
         autopilot = self._autopilot
         store, first = autopilot.missions, command.params[0]
@@ -147,7 +142,7 @@ class MissionExecution(Service):
         return result if result is CommandResult.ACCEPTED else CommandResult.TEMPORARILY_REJECTED
 
     def _set_current(self, command: Command) -> CommandResult:
-        """DO_SET_MISSION_CURRENT, which PX4 does not know: param 1 is the item to fly next."""
+        """DO_SET_MISSION_CURRENT, which PX4 does not have: param 1 is the item to fly next."""
         autopilot, seq = self._autopilot, command.params[0]
         if isfinite(seq) and autopilot.missions.select(int(seq)):
             return CommandResult.ACCEPTED
@@ -156,13 +151,13 @@ class MissionExecution(Service):
         return CommandResult.DENIED
 
     def _pass_on(self, issued: IssuedCommand) -> None:
-        """Have a command of the mission done, and say if it could not be."""
-        result = self._do(issued)
+        """Execute a command of the mission, and report if that failed."""
+        result = self._execute(issued)
         if result is not CommandResult.ACCEPTED:
             text = f"Mission command {issued.command} not done: {result.name.lower().replace('_', ' ')}"
             self._autopilot.say(mavlink.MAV_SEVERITY_WARNING, text)
 
-    def _do(self, issued: IssuedCommand) -> CommandResult:
+    def _execute(self, issued: IssuedCommand) -> CommandResult:
         autopilot = self._autopilot
         if issued.command in _WITHOUT_EFFECT:
             return CommandResult.ACCEPTED

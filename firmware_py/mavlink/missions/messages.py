@@ -1,7 +1,7 @@
-"""Mission messages: items to and from MISSION_ITEM and MISSION_ITEM_INT, and what carries a plan's opaque id.
+"""Mission messages: items to and from MISSION_ITEM and MISSION_ITEM_INT, and a plan's opaque id.
 
-What can be uploaded is what PX4 takes. The opaque ids are extensions that pymavlink's dialects do not know
-yet; receivers that do not know them either read the rest.
+The items that can be uploaded are PX4's. The opaque ids are extensions that pymavlink's dialects lack;
+receivers that lack them too ignore them.
 """
 
 from __future__ import annotations
@@ -11,7 +11,6 @@ from dataclasses import dataclass
 from math import isfinite, isinf, isnan, nan
 from struct import pack
 
-from firmware_py.mavlink.scaling import whole
 from firmware_py.missions.geofence import MIN_VERTICES, vertex_count
 from firmware_py.missions.items import (
     CIRCLES,
@@ -27,12 +26,12 @@ from firmware_py.missions.items import (
     MissionItem,
     PlanType,
 )
-from wire.dialect import Message, mavlink
+from wire.dialect import Message, mavlink, whole
 
 _NOT_GIVEN = 0x7FFF_FFFF  # x or y of MISSION_ITEM_INT
 _REGIONS = frozenset({Do.NAV_ROI, Do.SET_ROI})
 _REGION_PLACES = (ROI_NONE, ROI_LOCATION)
-_REGION_WAYS = (ROI_NONE, ROI_WPNEXT, ROI_WPINDEX)
+_REGION_WAYPOINTS = (ROI_NONE, ROI_WPNEXT, ROI_WPINDEX)
 _FENCE = POLYGONS | CIRCLES | {Do.FENCE_RETURN_POINT}
 _WITH_PLACE: dict[PlanType, frozenset[int]] = {
     PlanType.MISSION: frozenset(PLACES | _REGIONS | {Do.SET_ROI_LOCATION, Do.CONDITION_GATE, Do.ARM_DISARM}),
@@ -43,7 +42,7 @@ _WITHOUT_PLACE = (
     frozenset(Do) - _WITH_PLACE[PlanType.MISSION] - _FENCE - {Do.RALLY_POINT} | {Do.ARM_DISARM} | _REGIONS
 )
 _OF_OTHER_PLANS = frozenset(_FENCE | {Do.RALLY_POINT})
-_SHORT_FRAMES = {
+_SHORT_FRAMES: dict[int, int] = {
     Frame.GLOBAL_INT: Frame.GLOBAL,
     Frame.GLOBAL_RELATIVE_ALT_INT: Frame.GLOBAL_RELATIVE_ALT,
 }
@@ -52,14 +51,9 @@ _INT_FRAMES = {short: long for long, short in _SHORT_FRAMES.items()}
 
 @dataclass(frozen=True, slots=True)
 class Refusal:
-    """An item that cannot be taken.
+    """An item that cannot be taken."""
 
-    Attributes:
-        result: MAV_MISSION_RESULT.
-        reason: for people.
-    """
-
-    result: int
+    result: int  # MAV_MISSION_RESULT
     reason: str
 
 
@@ -87,7 +81,7 @@ def read_item(message: Message, plan_type: PlanType) -> MissionItem | Refusal:
 
 
 def _faults(item: MissionItem) -> Iterator[Refusal]:
-    """What is wrong with the numbers of an item."""
+    """The faults in the numbers of an item."""
     first, second = item.params[0], item.params[1]
     with_place = item.frame in GLOBAL_FRAMES
     if with_place and not _is_angle(item.x, 90.0, optional=item.has_place):
@@ -96,7 +90,7 @@ def _faults(item: MissionItem) -> Iterator[Refusal]:
         yield Refusal(mavlink.MAV_MISSION_INVALID_PARAM6_Y, f"longitude {item.y:g} is no place")
     if with_place and isinf(item.z):
         yield Refusal(mavlink.MAV_MISSION_INVALID_PARAM7, f"altitude {item.z:g} cannot be flown")
-    if item.command in _REGIONS and first not in (_REGION_PLACES if with_place else _REGION_WAYS):
+    if item.command in _REGIONS and first not in (_REGION_PLACES if with_place else _REGION_WAYPOINTS):
         yield Refusal(mavlink.MAV_MISSION_INVALID_PARAM1, f"region mode {first:g} is not supported")
     if item.command == Do.JUMP and not isfinite(first):
         yield Refusal(mavlink.MAV_MISSION_INVALID_PARAM1, f"index {first:g} to jump to is none")
@@ -108,8 +102,8 @@ def _faults(item: MissionItem) -> Iterator[Refusal]:
         yield Refusal(mavlink.MAV_MISSION_ERROR, f"a polygon needs {MIN_VERTICES} vertices")
 
 
-def _is_angle(angle_deg: float, largest_deg: float, *, optional: bool) -> bool:
-    return optional if isnan(angle_deg) else abs(angle_deg) <= largest_deg
+def _is_angle(angle_deg: float, max_deg: float, *, optional: bool) -> bool:
+    return optional if isnan(angle_deg) else abs(angle_deg) <= max_deg
 
 
 def item_message(
@@ -118,24 +112,15 @@ def item_message(
     """The item as MISSION_ITEM_INT or MISSION_ITEM, in that message's own frame, as PX4 sends it."""
     build = mavlink.MAVLink_mission_item_int_message if as_int else mavlink.MAVLink_mission_item_message
     frames = _INT_FRAMES if as_int else _SHORT_FRAMES
-    frame = next((long for short, long in frames.items() if short == item.frame), item.frame)
+    frame = frames.get(item.frame, item.frame)
     x: float = item.x
     y: float = item.y
     if as_int:
         scale = 1.0 if item.frame == Frame.MISSION else 1e7
         x, y = _as_int(item.x, scale), _as_int(item.y, scale)
+    flags = (int(current), int(item.autocontinue))
     return build(
-        *target,
-        item.seq,
-        int(frame),
-        item.command,
-        int(current),
-        int(item.autocontinue),
-        *item.params,
-        x,
-        y,
-        item.z,
-        int(plan_type),
+        *target, item.seq, int(frame), item.command, *flags, *item.params, x, y, item.z, int(plan_type)
     )
 
 
@@ -144,13 +129,7 @@ def _as_int(value: float, scale: float) -> int:
 
 
 class ExtendedMessage(mavlink.MAVLink_message):  # type: ignore[misc]  # pymavlink has no types
-    """A message with an extension field that the dialect does not know yet.
-
-    Args:
-        known: the dialect's message.
-        layout: of all fields, for `struct`.
-        fields: in the order of the wire.
-    """
+    """A message with an extension field that the dialect lacks; its fields are in the order of the wire."""
 
     def __init__(self, known: Message, layout: str, *fields: int) -> None:
         mavlink.MAVLink_message.__init__(self, known.id, known.msgname)
@@ -163,19 +142,18 @@ class ExtendedMessage(mavlink.MAVLink_message):  # type: ignore[misc]  # pymavli
 
 
 def mission_count(target: tuple[int, int], count: int, mission_type: int, opaque_id: int) -> Message:
-    """MISSION_COUNT with the id of the plan, or 0."""
+    """MISSION_COUNT with the opaque id of the plan, or 0."""
     known = mavlink.MAVLink_mission_count_message
     return ExtendedMessage(known, "<HBBBI", count, *target, mission_type, opaque_id)
 
 
 def mission_ack(target: tuple[int, int], result: int, mission_type: int, opaque_id: int) -> Message:
-    """MISSION_ACK with the id of the new plan, or 0."""
-    return ExtendedMessage(
-        mavlink.MAVLink_mission_ack_message, "<BBBBI", *target, result, mission_type, opaque_id
-    )
+    """MISSION_ACK with the opaque id of the new plan, or 0."""
+    known = mavlink.MAVLink_mission_ack_message
+    return ExtendedMessage(known, "<BBBBI", *target, result, mission_type, opaque_id)
 
 
 def mission_current(seq: int, total: int, state: int, mode: int, opaque_ids: tuple[int, int, int]) -> Message:
-    """MISSION_CURRENT: item, number of items, MISSION_STATE, 1 active or 2 not, ids of the three plans."""
+    """MISSION_CURRENT: item, number of items, MISSION_STATE, 1 active or 2 not, opaque ids of three plans."""
     known = mavlink.MAVLink_mission_current_message
     return ExtendedMessage(known, "<HHBBIII", seq, total, state, mode, *opaque_ids)

@@ -1,12 +1,12 @@
-"""The mission protocol: plans up and down, for missions, fences and rally points.
+"""The mission protocol: upload and download of missions, fences and rally points.
 
-It answers as PX4 does. Differences, all for links that lose, double or swap packets, or for plain speech:
+It answers as PX4 does. Differences, all for links that lose, double or swap packets, or for clear answers:
 
-* Items may be read in any order and without the list first; PX4 breaks off at a request out of turn.
-* An upload that is given up is ended by an acknowledgement (OPERATION_CANCELLED); PX4 says so as text only.
-* The acknowledgement of a refused upload is repeated when the refused item comes again.
-* Partial lists and unknown types of plan are answered UNSUPPORTED; PX4 is silent to the first.
-* Places that are nowhere on Earth and circles without a radius are refused.
+* Items may be requested in any order and without the list first; PX4 ends the download then.
+* An upload that times out is ended by an acknowledgement (OPERATION_CANCELLED); PX4 only sends a text.
+* The acknowledgement of a refused upload is repeated when the refused item is received again.
+* Partial lists and unknown types of plan are answered UNSUPPORTED; PX4 does not answer the first.
+* Positions that are not on Earth and circles without a radius are refused.
 """
 
 from __future__ import annotations
@@ -26,93 +26,55 @@ from wire.dialect import Message, mavlink
 from wire.exchange import Exchange
 from wire.link import Link
 
-_RETRY_US = 250_000  # an item is asked for again
-_GIVE_UP_US = 5_000_000  # nothing was heard from the other side
+_RETRY_US = 250_000  # until an item is requested again
+_TIMEOUT_US = 5_000_000  # of the other side
 _MAX_ITEMS = {PlanType.MISSION: 10_000, PlanType.FENCE: 64, PlanType.RALLY: 32}  # PX4's SITL has the same
 _PLAN_TYPES = {int(plan_type): plan_type for plan_type in PlanType}
-_MISSION_PLANNER = 190  # MAV_COMP_ID_MISSIONPLANNER, which PX4 takes for itself here
+_MISSION_PLANNER = 190  # MAV_COMP_ID_MISSIONPLANNER, which PX4 accepts as its own id here
 _CRITICAL = mavlink.MAV_SEVERITY_CRITICAL
 _MAX_DOWNLOADS = 32
 
-_DownloadKey = tuple[str, int, int, PlanType]
-
 
 @dataclass(frozen=True, slots=True)
-class Partner:
-    """Who uploads or downloads.
-
-    Attributes:
-        link: by which.
-        system: id.
-        component: id.
-    """
+class _Partner:
+    """The other side of an upload or download."""
 
     link: Link
-    system: int
-    component: int
-
-    @property
-    def address(self) -> tuple[int, int]:
-        """System and component, as messages name their target."""
-        return self.system, self.component
-
-    def is_same(self, other: Partner) -> bool:
-        """Whether both are one."""
-        return self.link is other.link and self.address == other.address
+    address: tuple[int, int]  # system and component id
 
 
 @dataclass(slots=True)
-class Upload:
-    """A plan that comes in, item by item.
+class _Upload:
+    """A plan that is received item by item."""
 
-    Attributes:
-        partner: who sends.
-        plan_type: of what.
-        count: how many items there will be.
-        heard_us: when the partner was heard last.
-        asked_us: when an item was asked for last.
-        as_int: ask for MISSION_ITEM_INT.
-        items: what has come.
-        current: the item marked as current.
-    """
-
-    partner: Partner
+    partner: _Partner
     plan_type: PlanType
-    count: int
-    heard_us: int
-    asked_us: int
-    as_int: bool = True
-    items: list[MissionItem] = field(default_factory=list)
-    current: int | None = None
+    count: int  # of all items
+    received_us: int  # vehicle time of the partner's last message
+    requested_us: int  # vehicle time of the last request for an item
+    as_int: bool = True  # request MISSION_ITEM_INT
+    items: list[MissionItem] = field(default_factory=list)  # received so far
+    current: int | None = None  # the item marked as current
 
     @property
-    def wanted(self) -> int:
-        """The item to come next."""
+    def next_seq(self) -> int:
+        """The next item to receive."""
         return len(self.items)
 
     @property
     def complete(self) -> bool:
-        """Whether all have come."""
         return len(self.items) == self.count
 
 
 @dataclass(frozen=True, slots=True)
-class Outcome:
-    """How an upload ended, to be said again when its last item comes again.
+class _Outcome:
+    """How an upload ended; repeated when its last item is received again."""
 
-    Attributes:
-        partner: who sent.
-        plan_type: of what.
-        last_seq: the item that ended it.
-        result: MAV_MISSION_RESULT.
-        opaque_id: of the new plan.
-    """
-
-    partner: Partner
+    partner: _Partner
     plan_type: PlanType
-    last_seq: int
-    result: int
-    opaque_id: int
+    last_seq: int  # the item that ended it
+    result: int  # MAV_MISSION_RESULT
+    opaque_id: int  # of the new plan
 
 
 class MissionService(Service):
@@ -123,9 +85,10 @@ class MissionService(Service):
         self._exchange = exchange
         self._execution = execution
         self._store = autopilot.missions
-        self._upload: Upload | None = None
-        self._outcome: Outcome | None = None
-        self._downloads: dict[_DownloadKey, tuple[Plan, int]] = {}  # what is read, and when it was last
+        self._upload: _Upload | None = None
+        self._outcome: _Outcome | None = None
+        # The plan that is read, and the time of the last request.
+        self._downloads: dict[tuple[_Partner, PlanType], tuple[Plan, int]] = {}
         self.handlers = {
             message_id: partial(self._receive, work)
             for message_id, work in {
@@ -144,38 +107,38 @@ class MissionService(Service):
         }
 
     def update(self) -> None:
-        """Ask again for what has not come, give up on who is silent."""
+        """Repeat a request that was not answered, and end transfers whose other side is silent."""
         now_us, upload = self._exchange.time_us, self._upload
         if upload is not None:
-            if now_us - upload.heard_us > _GIVE_UP_US:
-                self._autopilot.say(_CRITICAL, "Operation timeout")
+            if now_us - upload.received_us > _TIMEOUT_US:
+                self._say("Operation timeout")
                 self._end(upload, mavlink.MAV_MISSION_OPERATION_CANCELLED)
-            elif now_us - upload.asked_us > _RETRY_US:
-                self._ask(upload)
+            elif now_us - upload.requested_us > _RETRY_US:
+                self._request_next(upload)
         if self._downloads:
             self._forget_downloads(now_us)
 
-    def _receive(self, work: Callable[[Partner, Message], None], link: Link, message: Message) -> None:
-        """Act on a message that is for us."""
+    def _receive(self, work: Callable[[_Partner, Message], None], link: Link, message: Message) -> None:
+        """Handle a message that is for us."""
         if message.target_component == _MISSION_PLANNER:
             for_us = message.target_system == self._exchange.system_id
         else:
             for_us = self._exchange.is_for_us(message)
         if for_us:
-            work(Partner(link, message.get_srcSystem(), message.get_srcComponent()), message)
+            work(_Partner(link, (message.get_srcSystem(), message.get_srcComponent())), message)
 
     # Uploads
 
-    def _count(self, partner: Partner, message: Message) -> None:
+    def _count(self, partner: _Partner, message: Message) -> None:
         plan_type = _PLAN_TYPES.get(message.mission_type)
         upload, now_us = self._upload, self._exchange.time_us
         if plan_type is None:
             self._answer(partner, mavlink.MAV_MISSION_UNSUPPORTED, message.mission_type)
-        elif upload is not None and not upload.partner.is_same(partner):
+        elif upload is not None and upload.partner != partner:
             self._say("WPM: IGN MISSION_COUNT: Busy with another upload")
             self._answer(partner, mavlink.MAV_MISSION_ERROR, plan_type)
         elif upload is not None and _repeats(upload, plan_type, message.count, now_us):
-            self._ask(upload)
+            self._request_next(upload)
         elif message.count > _MAX_ITEMS[plan_type]:
             self._upload = None
             self._say(f"Too many items: {message.count}, there is room for {_MAX_ITEMS[plan_type]}")
@@ -185,39 +148,37 @@ class MissionService(Service):
             self._clear(plan_type)
             self._answer(partner, mavlink.MAV_MISSION_ACCEPTED, plan_type)
         else:
-            self._upload = Upload(partner, plan_type, message.count, now_us, now_us)
-            self._ask(self._upload)
+            self._upload = _Upload(partner, plan_type, message.count, now_us, now_us)
+            self._request_next(self._upload)
 
-    def _ask(self, upload: Upload) -> None:
-        """Ask for the item that is wanted next."""
-        upload.asked_us = self._exchange.time_us
-        build = (
-            mavlink.MAVLink_mission_request_int_message
-            if upload.as_int
-            else mavlink.MAVLink_mission_request_message
-        )
-        self._exchange.send(
-            upload.partner.link, build(*upload.partner.address, upload.wanted, int(upload.plan_type))
-        )
+    def _request_next(self, upload: _Upload) -> None:
+        """Request the next item."""
+        upload.requested_us = self._exchange.time_us
+        fields = (*upload.partner.address, upload.next_seq, int(upload.plan_type))
+        if upload.as_int:
+            request = mavlink.MAVLink_mission_request_int_message(*fields)
+        else:
+            request = mavlink.MAVLink_mission_request_message(*fields)
+        self._exchange.send(upload.partner.link, request)
 
-    def _item(self, partner: Partner, message: Message) -> None:
+    def _item(self, partner: _Partner, message: Message) -> None:
         upload = self._upload
         if self._repeat_outcome(partner, message):
             return
         if upload is None:
             self._say("IGN MISSION_ITEM: No transfer")
             self._answer(partner, mavlink.MAV_MISSION_ERROR, message.mission_type)
-        elif not upload.partner.is_same(partner):
+        elif upload.partner != partner:
             self._say("REJ. MIS ITEM: partner id mismatch")
         elif message.mission_type != upload.plan_type:
             self._answer(partner, mavlink.MAV_MISSION_ERROR, message.mission_type)
         else:
-            upload.heard_us = self._exchange.time_us
-            if message.seq == upload.wanted:
+            upload.received_us = self._exchange.time_us
+            if message.seq == upload.next_seq:
                 self._take(upload, message)
 
-    def _take(self, upload: Upload, message: Message) -> None:
-        """The wanted item has come."""
+    def _take(self, upload: _Upload, message: Message) -> None:
+        """Take the requested item."""
         item = read_item(message, upload.plan_type)
         if isinstance(item, Refusal):
             self._say(f"IGN MISSION_ITEM: Invalid item {message.seq + 1}: {item.reason}")
@@ -229,10 +190,10 @@ class MissionService(Service):
         if upload.complete:
             self._finish(upload)
         else:
-            self._ask(upload)
+            self._request_next(upload)
 
-    def _finish(self, upload: Upload) -> None:
-        """All items have come: the new plan replaces the old one, or nothing changes."""
+    def _finish(self, upload: _Upload) -> None:
+        """Replace the old plan by the complete upload, if it is valid."""
         fault = fence_fault(upload.items) if upload.plan_type is PlanType.FENCE else None
         if fault is not None:
             self._say(fault)
@@ -242,59 +203,59 @@ class MissionService(Service):
         self._end(upload, mavlink.MAV_MISSION_ACCEPTED, opaque_id)
         self._execution.check()
 
-    def _end(self, upload: Upload, result: int, opaque_id: int = 0) -> None:
-        last_seq = upload.wanted - 1 if upload.complete else upload.wanted
+    def _end(self, upload: _Upload, result: int, opaque_id: int = 0) -> None:
+        last_seq = upload.next_seq - 1 if upload.complete else upload.next_seq
         self._upload = None
-        self._outcome = Outcome(upload.partner, upload.plan_type, last_seq, result, opaque_id)
+        self._outcome = _Outcome(upload.partner, upload.plan_type, last_seq, result, opaque_id)
         self._answer(upload.partner, result, upload.plan_type, opaque_id)
 
-    def _repeat_outcome(self, partner: Partner, message: Message) -> bool:
-        """Whether an item is the one that ended the last upload; then its acknowledgement got lost."""
+    def _repeat_outcome(self, partner: _Partner, message: Message) -> bool:
+        """Whether an item is the one that ended the last upload; then its acknowledgement was lost."""
         outcome = self._outcome
-        if outcome is None or not outcome.partner.is_same(partner):
+        if outcome is None or outcome.partner != partner:
             return False
         if (message.mission_type, message.seq) != (outcome.plan_type, outcome.last_seq):
             return False
         upload = self._upload
-        if upload is not None and upload.partner.is_same(partner) and upload.plan_type is outcome.plan_type:
-            return False  # it belongs to the upload that goes on
+        if upload is not None and upload.partner == partner and upload.plan_type is outcome.plan_type:
+            return False  # it belongs to the present upload
         self._answer(partner, outcome.result, outcome.plan_type, outcome.opaque_id)
         return True
 
-    def _ack(self, partner: Partner, message: Message) -> None:
-        """The other side cancels, or wants to be asked in the other form; or it has read all."""
+    def _ack(self, partner: _Partner, message: Message) -> None:
+        """The other side cancels an upload, requires the other form of requests, or ends a download."""
         upload = self._upload
         plan_type = _PLAN_TYPES.get(message.mission_type)
         if plan_type is not None:
-            self._downloads.pop(_key(partner, plan_type), None)
-        if upload is None or not upload.partner.is_same(partner) or plan_type is not upload.plan_type:
+            self._downloads.pop((partner, plan_type), None)
+        if upload is None or upload.partner != partner or plan_type is not upload.plan_type:
             return
         if message.type == mavlink.MAV_MISSION_OPERATION_CANCELLED:
             self._upload = None
         elif message.type == mavlink.MAV_MISSION_UNSUPPORTED:
             upload.as_int = not upload.as_int
-            self._ask(upload)
+            self._request_next(upload)
 
     # Downloads
 
-    def _request_list(self, partner: Partner, message: Message) -> None:
+    def _request_list(self, partner: _Partner, message: Message) -> None:
         plan_type = _PLAN_TYPES.get(message.mission_type)
         if plan_type is None:
             self._answer(partner, mavlink.MAV_MISSION_UNSUPPORTED, message.mission_type)
             return
         plan = self._store.plan(plan_type)
-        self._downloads[_key(partner, plan_type)] = (plan, self._exchange.time_us)
+        self._downloads[(partner, plan_type)] = (plan, self._exchange.time_us)
         if len(self._downloads) > _MAX_DOWNLOADS:
             self._downloads.pop(next(iter(self._downloads)))
         count = mission_count(partner.address, len(plan.items), plan_type, plan.opaque_id)
         self._exchange.send(partner.link, count)
 
-    def _request(self, partner: Partner, message: Message) -> None:
+    def _request(self, partner: _Partner, message: Message) -> None:
         plan_type = _PLAN_TYPES.get(message.mission_type)
         if plan_type is None:
             self._answer(partner, mavlink.MAV_MISSION_UNSUPPORTED, message.mission_type)
             return
-        key = _key(partner, plan_type)
+        key = (partner, plan_type)
         plan, _ = self._downloads.get(key, (self._store.plan(plan_type), 0))
         if message.seq >= len(plan.items):
             self._say(f"WPM: REJ. CMD: Req. WP was unexpected: {message.seq} of {len(plan.items)}")
@@ -310,15 +271,15 @@ class MissionService(Service):
         self._exchange.send(partner.link, answer)
 
     def _forget_downloads(self, now_us: int) -> None:
-        for key in [key for key, (_, used_us) in self._downloads.items() if now_us - used_us > _GIVE_UP_US]:
+        for key in [key for key, (_, used_us) in self._downloads.items() if now_us - used_us > _TIMEOUT_US]:
             del self._downloads[key]
 
-    def _partial_list(self, partner: Partner, message: Message) -> None:
+    def _partial_list(self, partner: _Partner, message: Message) -> None:
         self._answer(partner, mavlink.MAV_MISSION_UNSUPPORTED, message.mission_type)
 
-    # The rest
+    # Other requests
 
-    def _clear_all(self, partner: Partner, message: Message) -> None:
+    def _clear_all(self, partner: _Partner, message: Message) -> None:
         upload = self._upload
         result = mavlink.MAV_MISSION_ACCEPTED
         if message.mission_type == mavlink.MAV_MISSION_TYPE_ALL:
@@ -328,7 +289,7 @@ class MissionService(Service):
             cleared = () if plan_type is None else (plan_type,)
         if not cleared:
             result = mavlink.MAV_MISSION_UNSUPPORTED
-        elif upload is not None and not upload.partner.is_same(partner):
+        elif upload is not None and upload.partner != partner:
             self._say("WPM: IGN CLEAR CMD: Busy")
             result, cleared = mavlink.MAV_MISSION_ERROR, ()
         else:
@@ -341,27 +302,23 @@ class MissionService(Service):
         self._store.clear(plan_type)
         self._execution.check()
 
-    def _set_current(self, partner: Partner, message: Message) -> None:
+    def _set_current(self, _partner: _Partner, message: Message) -> None:
         if self._upload is not None:
             self._say("WPM: IGN WP CURR CMD: Busy")
         elif self._store.select(message.seq):
-            self._execution.tell_current()
+            self._execution.broadcast_current()
         else:
             count = len(self._store.mission.items)
             self._say(f"WPM: WP CURR CMD: Not in list: {message.seq} of {count}")
 
-    def _answer(self, partner: Partner, result: int, mission_type: int, opaque_id: int = 0) -> None:
+    def _answer(self, partner: _Partner, result: int, mission_type: int, opaque_id: int = 0) -> None:
         self._exchange.send(partner.link, mission_ack(partner.address, result, mission_type, opaque_id))
 
     def _say(self, text: str) -> None:
         self._autopilot.say(_CRITICAL, text)
 
 
-def _key(partner: Partner, plan_type: PlanType) -> _DownloadKey:
-    return (partner.link.profile.name, partner.system, partner.component, plan_type)
-
-
-def _repeats(upload: Upload, plan_type: PlanType, count: int, now_us: int) -> bool:
-    """Whether MISSION_COUNT came twice; the same after a silence is a client that starts again."""
+def _repeats(upload: _Upload, plan_type: PlanType, count: int, now_us: int) -> bool:
+    """Whether MISSION_COUNT was received twice; after a pause it is a client that restarts its upload."""
     same = (plan_type, count) == (upload.plan_type, upload.count)
-    return same and now_us - upload.heard_us <= _RETRY_US
+    return same and now_us - upload.received_us <= _RETRY_US

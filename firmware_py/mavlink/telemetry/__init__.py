@@ -1,1 +1,1 @@
-"""Telemetry: what is streamed, and on which requests."""
+"""Telemetry: streamed and requested messages."""

@@ -1,21 +1,18 @@
-"""Telemetry of the vehicle's condition: health, landed or not, battery, mode, flight times, motors.
+"""Telemetry of the vehicle's condition: health, landed state, battery, mode, flight times, motors.
 
 Differences from PX4: innovation ratios and vibration are 0, because the state is exact, and so is the load,
-because the autopilot reads no clock. Motor speeds are those that were asked for; nothing measures them.
+because the autopilot reads no clock. Motor speeds are the commanded ones; they are not measured.
 """
 
 from __future__ import annotations
 
-from functools import partial
 from math import ceil, isfinite
 
 from firmware_py.autopilot import Autopilot
-from firmware_py.mavlink.scaling import boot_ms, whole
-from firmware_py.mavlink.service import Service
+from firmware_py.mavlink.telemetry.streams import AutopilotSource
 from firmware_py.status import LandedState
 from firmware_py.types import MotorSpeeds
-from wire.dialect import Message, mavlink
-from wire.exchange import Exchange
+from wire.dialect import Message, boot_ms, mavlink, whole
 
 _POSITION = mavlink.MAV_SYS_STATUS_SENSOR_GPS | mavlink.MAV_SYS_STATUS_SENSOR_XY_POSITION_CONTROL
 _PRESENT = (
@@ -26,7 +23,7 @@ _PRESENT = (
     | mavlink.MAV_SYS_STATUS_SENSOR_BATTERY
     | _POSITION
 )
-# PX4 calls healthy what nothing is wrong with, there or not; but a remote control it misses.
+# PX4 reports a part without faults as healthy even if it is absent, except for a remote control.
 _HEALTHY = (
     _PRESENT
     | mavlink.MAV_SYS_STATUS_SENSOR_DIFFERENTIAL_PRESSURE
@@ -46,7 +43,7 @@ _RPM = 60.0 / 6.283185307179586  # of 1 rad/s
 
 
 def sys_status(autopilot: Autopilot) -> Message:
-    """SYS_STATUS: the health bits that clients wait for, and the battery in short."""
+    """SYS_STATUS: the health bits that clients wait for, voltage, current and remaining charge."""
     status, battery = autopilot.status, autopilot.battery
     missing = 0 if status.origin is not None else _POSITION
     present = _PRESENT & ~missing
@@ -65,14 +62,7 @@ def sys_status(autopilot: Autopilot) -> Message:
         whole(battery.voltage_v * 1e3, 16, signed=False),
         whole(battery.current_a * 100, 16),
         min(100, whole(ceil(battery.remaining * 100) if isfinite(battery.remaining) else -1, 8)),
-        0,
-        0,
-        0,
-        0,
-        0,
-        0,
-        0,
-        0,
+        *[0] * 8,
         mavlink.MAV_SYS_STATUS_RECOVERY_SYSTEM,
     )
 
@@ -85,7 +75,7 @@ def extended_sys_state(autopilot: Autopilot) -> Message:
 
 
 def battery_status(autopilot: Autopilot) -> Message:
-    """BATTERY_STATUS: one pack, whose whole voltage stands where the first cell's would, as PX4 tells it."""
+    """BATTERY_STATUS: one pack, with its whole voltage as the first cell's, as PX4 sends it."""
     battery = autopilot.battery
     return mavlink.MAVLink_battery_status_message(
         0,
@@ -103,17 +93,15 @@ def battery_status(autopilot: Autopilot) -> Message:
 
 
 def current_mode(autopilot: Autopilot) -> Message:
-    """CURRENT_MODE: the mode flown and the one asked for."""
-    status = autopilot.status
+    """CURRENT_MODE: the present mode and the requested one."""
+    status, mode = autopilot.status, autopilot.status.mode
     return mavlink.MAVLink_current_mode_message(
-        status.mode.value.standard,
-        status.mode.custom_mode,
-        status.intended_mode.custom_mode,
+        mode.value.standard, mode.custom_mode, status.intended_mode.custom_mode
     )
 
 
 def estimator_status(autopilot: Autopilot) -> Message:
-    """ESTIMATOR_STATUS: the flags PX4 shows, 895 in flight and 959 standing."""
+    """ESTIMATOR_STATUS: PX4's flags, 895 in flight and 959 on the ground."""
     status = autopilot.status
     flags = mavlink.ESTIMATOR_ATTITUDE
     if status.origin is not None:
@@ -130,9 +118,7 @@ def estimator_status(autopilot: Autopilot) -> Message:
         flags |= mavlink.ESTIMATOR_CONST_POS_MODE
     elif status.origin is not None:
         flags |= mavlink.ESTIMATOR_POS_VERT_AGL
-    return mavlink.MAVLink_estimator_status_message(
-        autopilot.state.time_us, flags, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
-    )
+    return mavlink.MAVLink_estimator_status_message(autopilot.state.time_us, flags, *[0.0] * 8)
 
 
 def vibration(autopilot: Autopilot) -> Message:
@@ -141,7 +127,7 @@ def vibration(autopilot: Autopilot) -> Message:
 
 
 def flight_information(autopilot: Autopilot) -> Message:
-    """FLIGHT_INFORMATION: since when it is armed and in the air, in vehicle time as PX4; 0: it is not."""
+    """FLIGHT_INFORMATION: when it was armed and took off, in vehicle time as in PX4; 0: it is not."""
     status, flight = autopilot.status, autopilot.flight
     flying = status.armed and flight.takeoff_us > flight.landed_us
     return mavlink.MAVLink_flight_information_message(
@@ -154,7 +140,7 @@ def flight_information(autopilot: Autopilot) -> Message:
 
 
 def servo_output_raw(autopilot: Autopilot) -> Message:
-    """SERVO_OUTPUT_RAW: motor speeds as pulses, 900 µs disarmed, 1000 to 2000 µs from rest to full speed."""
+    """SERVO_OUTPUT_RAW: motor speeds as pulses, 900 µs disarmed, 1000 to 2000 µs from 0 to full speed."""
     pulses = _pulses(autopilot)
     return mavlink.MAVLink_servo_output_raw_message(
         autopilot.state.time_us & 0xFFFFFFFF, 0, *pulses, *[0] * (_SERVOS - len(pulses))
@@ -170,7 +156,7 @@ def actuator_output_status(autopilot: Autopilot) -> Message:
 
 
 def esc_status(autopilot: Autopilot) -> Message:
-    """ESC_STATUS of the first four motors; each is said to draw its share of the current."""
+    """ESC_STATUS of the first four motors; each is reported to draw its share of the current."""
     speeds = _speeds(autopilot)
     motors = len(speeds)
     current_a = autopilot.battery.current_a / max(1, len(autopilot.airframe.rotors))
@@ -185,7 +171,7 @@ def esc_status(autopilot: Autopilot) -> Message:
 
 
 def esc_info(autopilot: Autopilot, time_us: int) -> Message:
-    """ESC_INFO of the first four motors: all there, nothing wrong, temperatures unknown."""
+    """ESC_INFO of the first four motors: all present, no faults; its counter follows from vehicle time."""
     motors = len(autopilot.airframe.rotors)
     return mavlink.MAVLink_esc_info_message(
         0,
@@ -213,26 +199,15 @@ def _pulses(autopilot: Autopilot) -> list[int]:
     return [whole(_PWM_LOW_US + scale * speed, 16, signed=False) for speed in speeds_rad_s]
 
 
-class ConditionTelemetry(Service):
-    """Streams what the functions of this module make."""
-
-    def __init__(self, autopilot: Autopilot, exchange: Exchange) -> None:
-        of_autopilot = {
-            message_id: partial(make, autopilot)
-            for message_id, make in {
-                mavlink.MAVLINK_MSG_ID_ACTUATOR_OUTPUT_STATUS: actuator_output_status,
-                mavlink.MAVLINK_MSG_ID_BATTERY_STATUS: battery_status,
-                mavlink.MAVLINK_MSG_ID_CURRENT_MODE: current_mode,
-                mavlink.MAVLINK_MSG_ID_ESC_STATUS: esc_status,
-                mavlink.MAVLINK_MSG_ID_ESTIMATOR_STATUS: estimator_status,
-                mavlink.MAVLINK_MSG_ID_EXTENDED_SYS_STATE: extended_sys_state,
-                mavlink.MAVLINK_MSG_ID_FLIGHT_INFORMATION: flight_information,
-                mavlink.MAVLINK_MSG_ID_SERVO_OUTPUT_RAW: servo_output_raw,
-                mavlink.MAVLINK_MSG_ID_SYS_STATUS: sys_status,
-                mavlink.MAVLINK_MSG_ID_VIBRATION: vibration,
-            }.items()
-        }
-        self.sources = {
-            **of_autopilot,
-            mavlink.MAVLINK_MSG_ID_ESC_INFO: lambda: esc_info(autopilot, exchange.time_us),
-        }
+CONDITION: dict[int, AutopilotSource] = {
+    mavlink.MAVLINK_MSG_ID_ACTUATOR_OUTPUT_STATUS: actuator_output_status,
+    mavlink.MAVLINK_MSG_ID_BATTERY_STATUS: battery_status,
+    mavlink.MAVLINK_MSG_ID_CURRENT_MODE: current_mode,
+    mavlink.MAVLINK_MSG_ID_ESC_STATUS: esc_status,
+    mavlink.MAVLINK_MSG_ID_ESTIMATOR_STATUS: estimator_status,
+    mavlink.MAVLINK_MSG_ID_EXTENDED_SYS_STATE: extended_sys_state,
+    mavlink.MAVLINK_MSG_ID_FLIGHT_INFORMATION: flight_information,
+    mavlink.MAVLINK_MSG_ID_SERVO_OUTPUT_RAW: servo_output_raw,
+    mavlink.MAVLINK_MSG_ID_SYS_STATUS: sys_status,
+    mavlink.MAVLINK_MSG_ID_VIBRATION: vibration,
+}

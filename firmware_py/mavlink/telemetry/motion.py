@@ -1,18 +1,20 @@
-"""Telemetry of motion: attitude, positions, velocities, and what of them is being followed."""
+"""Telemetry of motion: attitude, position, velocity, their setpoints, home and the local frame's origin."""
 
 from __future__ import annotations
 
-from functools import partial
 from math import degrees, hypot, isfinite, isnan, nan
 
 from firmware_py.autopilot import Autopilot
 from firmware_py.geodesy import LocalProjection
-from firmware_py.mavlink.scaling import boot_ms, degrees_e7, millimetres, whole
 from firmware_py.mavlink.service import Service
+from firmware_py.mavlink.telemetry.streams import AutopilotSource
 from firmware_py.setpoints import AttitudeSetpoint, BodyRateSetpoint, TrajectorySetpoint
 from firmware_py.status import FlightMode
+from firmware_py.types import GeodeticPoint
 from geometry.vectors import NAN3, Quaternion
-from wire.dialect import Message, mavlink
+from wire.dialect import Message, boot_ms, degrees_e7, mavlink, millimetres, whole
+from wire.exchange import Exchange
+from wire.link import Link
 
 _COVARIANCE_UNKNOWN = [nan] + [0.0] * 20
 _MILLI_G = 1000.0 / 9.80665  # of 1 m/s²
@@ -33,7 +35,7 @@ _RATES_IGNORED = (
     | mavlink.ATTITUDE_TARGET_TYPEMASK_BODY_PITCH_RATE_IGNORE
     | mavlink.ATTITUDE_TARGET_TYPEMASK_BODY_YAW_RATE_IGNORE
 )
-_NOT_TOLD = -1
+_NO_ESTIMATE = -1
 
 
 def attitude(autopilot: Autopilot) -> Message:
@@ -53,7 +55,7 @@ def attitude_quaternion(autopilot: Autopilot) -> Message:
 
 
 def local_position_ned(autopilot: Autopilot) -> Message | None:
-    """LOCAL_POSITION_NED, once a position is known."""
+    """LOCAL_POSITION_NED; None before a position is known."""
     state = autopilot.state
     if autopilot.status.origin is None:
         return None
@@ -63,7 +65,7 @@ def local_position_ned(autopilot: Autopilot) -> Message | None:
 
 
 def global_position_int(autopilot: Autopilot) -> Message | None:
-    """GLOBAL_POSITION_INT, once a position is known."""
+    """GLOBAL_POSITION_INT; None before a position is known."""
     state, home, place = autopilot.state, autopilot.status.home, autopilot.global_position()
     if place is None:
         return None
@@ -83,7 +85,7 @@ def global_position_int(autopilot: Autopilot) -> Message | None:
 
 
 def vfr_hud(autopilot: Autopilot) -> Message | None:
-    """VFR_HUD; airspeed NaN as PX4 has it without such a sensor."""
+    """VFR_HUD; airspeed is NaN, as in PX4 without such a sensor."""
     state, place = autopilot.state, autopilot.global_position()
     if place is None:
         return None
@@ -115,7 +117,7 @@ def altitude(autopilot: Autopilot) -> Message | None:
 
 
 def odometry(autopilot: Autopilot) -> Message | None:
-    """ODOMETRY; velocity in the local frame, as PX4's."""
+    """ODOMETRY; velocity in the local frame, as in PX4."""
     state = autopilot.state
     if autopilot.status.origin is None:
         return None
@@ -136,7 +138,7 @@ def odometry(autopilot: Autopilot) -> Message | None:
 
 
 def hil_state_quaternion(autopilot: Autopilot) -> Message | None:
-    """HIL_STATE_QUATERNION, the true state; the same as the estimate, whose sensors are exact."""
+    """HIL_STATE_QUATERNION: the true state, which is the estimate, as the sensors are exact."""
     state, place = autopilot.state, autopilot.global_position()
     if place is None:
         return None
@@ -155,7 +157,7 @@ def hil_state_quaternion(autopilot: Autopilot) -> Message | None:
 
 
 def position_target_local_ned(autopilot: Autopilot) -> Message:
-    """POSITION_TARGET_LOCAL_NED: what is followed now. A component not controlled is NaN and masked out."""
+    """POSITION_TARGET_LOCAL_NED: the present setpoint; an uncontrolled component is NaN and masked out."""
     followed = autopilot.status.setpoint.trajectory
     return mavlink.MAVLink_position_target_local_ned_message(
         boot_ms(autopilot.state.time_us),
@@ -170,7 +172,7 @@ def position_target_local_ned(autopilot: Autopilot) -> Message:
 
 
 def position_target_global_int(autopilot: Autopilot) -> Message | None:
-    """POSITION_TARGET_GLOBAL_INT, while armed in a mode that flies to a place, as PX4."""
+    """POSITION_TARGET_GLOBAL_INT, while armed in a mode that flies to a position, as in PX4."""
     status = autopilot.status
     followed, origin = status.setpoint.trajectory, status.origin
     north_m, east_m, down_m = followed.position_ned_m
@@ -194,9 +196,9 @@ def position_target_global_int(autopilot: Autopilot) -> Message | None:
 
 
 def attitude_target(autopilot: Autopilot) -> Message:
-    """ATTITUDE_TARGET: attitude and rates if somebody asks for them, else masked; the thrust always.
+    """ATTITUDE_TARGET: attitude and rates where a setpoint contains them, else masked; the thrust always.
 
-    A stabiliser that goes from velocity straight to motors has no attitude it aims at, so none is made up.
+    The stabiliser computes motor speeds from a velocity directly, so there is no other attitude setpoint.
     """
     followed = autopilot.status.setpoint
     mask = 0
@@ -215,7 +217,7 @@ def attitude_target(autopilot: Autopilot) -> Message:
 
 
 def time_estimate_to_target(autopilot: Autopilot) -> Message | None:
-    """TIME_ESTIMATE_TO_TARGET: seconds that a return would take; -1 for what PX4 does not tell either.
+    """TIME_ESTIMATE_TO_TARGET: seconds that a return would take; -1 where PX4 has no value either.
 
     Climb to RTL_RETURN_ALT, cruise home, descend, wait RTL_LAND_DELAY, land: distances over the speeds of
     the parameters, without acceleration and without PX4's reserve.
@@ -238,7 +240,7 @@ def time_estimate_to_target(autopilot: Autopilot) -> Message | None:
         + slow_from_m / value("MPC_LAND_SPEED")
     )
     return mavlink.MAVLink_time_estimate_to_target_message(
-        whole(seconds, 32), _NOT_TOLD, _NOT_TOLD, _NOT_TOLD, _NOT_TOLD
+        whole(seconds, 32), _NO_ESTIMATE, _NO_ESTIMATE, _NO_ESTIMATE, _NO_ESTIMATE
     )
 
 
@@ -253,24 +255,79 @@ def _mask(followed: TrajectorySetpoint) -> int:
     return mask
 
 
-class MotionTelemetry(Service):
-    """Streams what the functions of this module make."""
+MOTION: dict[int, AutopilotSource] = {
+    mavlink.MAVLINK_MSG_ID_ALTITUDE: altitude,
+    mavlink.MAVLINK_MSG_ID_ATTITUDE: attitude,
+    mavlink.MAVLINK_MSG_ID_ATTITUDE_QUATERNION: attitude_quaternion,
+    mavlink.MAVLINK_MSG_ID_ATTITUDE_TARGET: attitude_target,
+    mavlink.MAVLINK_MSG_ID_GLOBAL_POSITION_INT: global_position_int,
+    mavlink.MAVLINK_MSG_ID_HIL_STATE_QUATERNION: hil_state_quaternion,
+    mavlink.MAVLINK_MSG_ID_LOCAL_POSITION_NED: local_position_ned,
+    mavlink.MAVLINK_MSG_ID_ODOMETRY: odometry,
+    mavlink.MAVLINK_MSG_ID_POSITION_TARGET_GLOBAL_INT: position_target_global_int,
+    mavlink.MAVLINK_MSG_ID_POSITION_TARGET_LOCAL_NED: position_target_local_ned,
+    mavlink.MAVLINK_MSG_ID_TIME_ESTIMATE_TO_TARGET: time_estimate_to_target,
+    mavlink.MAVLINK_MSG_ID_VFR_HUD: vfr_hud,
+}
 
-    def __init__(self, autopilot: Autopilot) -> None:
+
+class HomeAndOriginService(Service):
+    """HOME_POSITION, GPS_GLOBAL_ORIGIN and SET_GPS_GLOBAL_ORIGIN."""
+
+    def __init__(self, autopilot: Autopilot, exchange: Exchange) -> None:
+        self._autopilot = autopilot
+        self._exchange = exchange
+        self._sent_origin: GeodeticPoint | None = None
+        self._sent_home: GeodeticPoint | None = None
+        self.handlers = {mavlink.MAVLINK_MSG_ID_SET_GPS_GLOBAL_ORIGIN: self._set_origin}
         self.sources = {
-            message_id: partial(make, autopilot)
-            for message_id, make in {
-                mavlink.MAVLINK_MSG_ID_ALTITUDE: altitude,
-                mavlink.MAVLINK_MSG_ID_ATTITUDE: attitude,
-                mavlink.MAVLINK_MSG_ID_ATTITUDE_QUATERNION: attitude_quaternion,
-                mavlink.MAVLINK_MSG_ID_ATTITUDE_TARGET: attitude_target,
-                mavlink.MAVLINK_MSG_ID_GLOBAL_POSITION_INT: global_position_int,
-                mavlink.MAVLINK_MSG_ID_HIL_STATE_QUATERNION: hil_state_quaternion,
-                mavlink.MAVLINK_MSG_ID_LOCAL_POSITION_NED: local_position_ned,
-                mavlink.MAVLINK_MSG_ID_ODOMETRY: odometry,
-                mavlink.MAVLINK_MSG_ID_POSITION_TARGET_GLOBAL_INT: position_target_global_int,
-                mavlink.MAVLINK_MSG_ID_POSITION_TARGET_LOCAL_NED: position_target_local_ned,
-                mavlink.MAVLINK_MSG_ID_TIME_ESTIMATE_TO_TARGET: time_estimate_to_target,
-                mavlink.MAVLINK_MSG_ID_VFR_HUD: vfr_hud,
-            }.items()
+            mavlink.MAVLINK_MSG_ID_GPS_GLOBAL_ORIGIN: self._gps_global_origin,
+            mavlink.MAVLINK_MSG_ID_HOME_POSITION: self._home_position,
         }
+
+    def update(self) -> None:
+        """Broadcast what has changed, without waiting for its stream's next turn."""
+        status = self._autopilot.status
+        if status.origin is not self._sent_origin:
+            self._sent_origin = status.origin
+            self._broadcast(self._gps_global_origin())
+        if status.home is not self._sent_home:
+            self._sent_home = status.home
+            self._broadcast(self._home_position())
+
+    def _broadcast(self, message: Message | None) -> None:
+        if message is not None:
+            self._exchange.broadcast(message)
+
+    def _home_position(self) -> Message | None:
+        status = self._autopilot.status
+        if status.home is None:
+            return None
+        return mavlink.MAVLink_home_position_message(
+            degrees_e7(status.home.latitude_deg),
+            degrees_e7(status.home.longitude_deg),
+            millimetres(status.home.altitude_m),
+            *status.home_ned_m,
+            (1.0, 0.0, 0.0, 0.0),
+            0.0,
+            0.0,
+            0.0,
+            self._autopilot.state.time_us,
+        )
+
+    def _gps_global_origin(self) -> Message | None:
+        origin = self._autopilot.status.origin
+        if origin is None:
+            return None
+        return mavlink.MAVLink_gps_global_origin_message(
+            degrees_e7(origin.latitude_deg),
+            degrees_e7(origin.longitude_deg),
+            millimetres(origin.altitude_m),
+            self._autopilot.state.time_us,
+        )
+
+    def _set_origin(self, _link: Link, message: Message) -> None:
+        if message.target_system == self._exchange.system_id:
+            self._autopilot.set_origin(
+                GeodeticPoint(message.latitude / 1e7, message.longitude / 1e7, message.altitude / 1e3)
+            )

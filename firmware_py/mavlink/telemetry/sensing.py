@@ -1,16 +1,14 @@
-"""Telemetry of sensors. There are no noisy sensors yet: pressure and magnetic field follow from the state."""
+"""Telemetry of sensors, which are exact: pressure and magnetic field are computed from the state."""
 
 from __future__ import annotations
 
-from functools import partial
 from math import atan2, degrees, hypot
 
 from firmware_py.autopilot import Autopilot
-from firmware_py.mavlink.scaling import boot_ms, degrees_e7, millimetres, whole
-from firmware_py.mavlink.service import Service
+from firmware_py.mavlink.telemetry.streams import AutopilotSource
 from geometry.rotations import rotation, to_body
 from geometry.vectors import Quaternion, Vec3
-from wire.dialect import Message, mavlink
+from wire.dialect import Message, boot_ms, degrees_e7, mavlink, millimetres, whole
 
 # North, east, down at PX4's simulated home (Zurich), gauss; World Magnetic Model 2025, two digits.
 EARTH_FIELD_NED_GAUSS: Vec3 = (0.22, 0.013, 0.43)
@@ -74,7 +72,7 @@ def scaled_imu(autopilot: Autopilot) -> Message:
 def distance_sensor(autopilot: Autopilot) -> Message | None:
     """DISTANCE_SENSOR: the range along body down to flat ground at the height where the vehicle booted.
 
-    PX4's own physics makes it from the state too. Beyond its range, or turned away, it says 0, as PX4.
+    PX4's simulation computes it from the state too. Out of range, or pointing up, it is 0, as in PX4.
     """
     state = autopilot.state
     if autopilot.status.origin is None:
@@ -97,12 +95,10 @@ def distance_sensor(autopilot: Autopilot) -> Message | None:
 
 
 def gnss_integrity(autopilot: Autopilot) -> Message | None:
-    """GNSS_INTEGRITY: nothing watches for jamming or spoofing, and it says so."""
+    """GNSS_INTEGRITY: jamming and spoofing are not monitored."""
     if autopilot.status.origin is None:
         return None
-    return mavlink.MAVLink_gnss_integrity_message(
-        0, 0, 0, 0, 0, 0, _UNKNOWN_16, _UNKNOWN_16, _UNKNOWN_8, _UNKNOWN_8, _UNKNOWN_8, _UNKNOWN_8
-    )
+    return mavlink.MAVLink_gnss_integrity_message(*[0] * 6, *[_UNKNOWN_16] * 2, *[_UNKNOWN_8] * 4)
 
 
 def scaled_pressure(autopilot: Autopilot) -> Message | None:
@@ -119,11 +115,11 @@ def scaled_pressure(autopilot: Autopilot) -> Message | None:
 
 
 def gps_raw_int(autopilot: Autopilot) -> Message:
-    """GPS_RAW_INT: a 3D fix with PX4's simulated figures, or no fix yet."""
+    """GPS_RAW_INT: a 3D fix with the values of PX4's simulation, or no fix yet."""
     state, place = autopilot.state, autopilot.global_position()
     if place is None:
         return mavlink.MAVLink_gps_raw_int_message(
-            state.time_us, mavlink.GPS_FIX_TYPE_NO_FIX, 0, 0, 0, 0xFFFF, 0xFFFF, 0xFFFF, 0xFFFF, 0
+            state.time_us, mavlink.GPS_FIX_TYPE_NO_FIX, 0, 0, 0, *[_UNKNOWN_16] * 4, 0
         )
     north_m_s, east_m_s, _ = state.velocity_ned_m_s
     altitude_mm = millimetres(place.altitude_m)
@@ -145,18 +141,11 @@ def gps_raw_int(autopilot: Autopilot) -> Message:
     )
 
 
-class SensorTelemetry(Service):
-    """Streams what the functions of this module make."""
-
-    def __init__(self, autopilot: Autopilot) -> None:
-        self.sources = {
-            message_id: partial(make, autopilot)
-            for message_id, make in {
-                mavlink.MAVLINK_MSG_ID_DISTANCE_SENSOR: distance_sensor,
-                mavlink.MAVLINK_MSG_ID_GNSS_INTEGRITY: gnss_integrity,
-                mavlink.MAVLINK_MSG_ID_GPS_RAW_INT: gps_raw_int,
-                mavlink.MAVLINK_MSG_ID_HIGHRES_IMU: highres_imu,
-                mavlink.MAVLINK_MSG_ID_SCALED_IMU: scaled_imu,
-                mavlink.MAVLINK_MSG_ID_SCALED_PRESSURE: scaled_pressure,
-            }.items()
-        }
+SENSORS: dict[int, AutopilotSource] = {
+    mavlink.MAVLINK_MSG_ID_DISTANCE_SENSOR: distance_sensor,
+    mavlink.MAVLINK_MSG_ID_GNSS_INTEGRITY: gnss_integrity,
+    mavlink.MAVLINK_MSG_ID_GPS_RAW_INT: gps_raw_int,
+    mavlink.MAVLINK_MSG_ID_HIGHRES_IMU: highres_imu,
+    mavlink.MAVLINK_MSG_ID_SCALED_IMU: scaled_imu,
+    mavlink.MAVLINK_MSG_ID_SCALED_PRESSURE: scaled_pressure,
+}

@@ -1,7 +1,7 @@
-"""STATUSTEXT: what the autopilot says, to the links where a ground station was heard, as PX4.
+"""STATUSTEXT: the autopilot's texts, to the links where a ground station was heard, as PX4.
 
-Texts said before that wait for it, the latest few and five seconds long. Longer ones go in pieces of 50. As
-in PX4, a text that is sent as an event too ends with a tab, so that who reads events leaves it out.
+Earlier texts wait for one: the latest few, for five seconds. Long texts are sent in pieces of 50 bytes. As in
+PX4, a text that is also sent as an event ends with a tab, so that receivers of events can leave it out.
 """
 
 from __future__ import annotations
@@ -21,23 +21,23 @@ _STALE_US = 5_000_000
 
 
 class StatusTextService(Service):
-    """Brings the autopilot's texts to people.
+    """Sends the autopilot's texts.
 
     Args:
-        announce: tells a text as an event, if there is one that says the same, and answers whether.
-        log: called with vehicle time and each text, heard by anybody or not.
+        send_event: sends a text's event, if there is one, and returns whether.
+        log: called with vehicle time and each text, whether it is received or not.
     """
 
     def __init__(
         self,
         autopilot: Autopilot,
         exchange: Exchange,
-        announce: Callable[[StatusText], bool],
+        send_event: Callable[[StatusText], bool],
         log: Callable[[int, StatusText], None] | None = None,
     ) -> None:
         self._autopilot = autopilot
         self._exchange = exchange
-        self._announce = announce
+        self._send_event = send_event
         self._log = log
         self._last_id = 0
         self._waiting: dict[str, deque[tuple[int, list[Message]]]] = {}
@@ -48,7 +48,7 @@ class StatusTextService(Service):
         for said in self._autopilot.take_texts():
             if self._log is not None:
                 self._log(exchange.time_us, said)
-            text = StatusText(said.severity, f"{said.text}\t") if self._announce(said) else said
+            text = StatusText(said.severity, f"{said.text}\t") if self._send_event(said) else said
             pieces = self._pieces(text)
             for name in exchange.links:
                 waiting = self._waiting.setdefault(name, deque(maxlen=_KEPT))
@@ -70,7 +70,7 @@ class StatusTextService(Service):
         if len(data) <= _PIECE:
             return [mavlink.MAVLink_statustext_message(severity, data, 0, 0)]
         self._last_id = self._last_id % 0xFFFF + 1
-        # One that fills its last piece needs an empty one after it, or the receiver waits for more.
+        # A text that fills its last piece needs an empty one after it, or the receiver waits for more.
         starts = range(0, len(data) + 1, _PIECE)
         return [
             mavlink.MAVLink_statustext_message(severity, data[start : start + _PIECE], self._last_id, place)

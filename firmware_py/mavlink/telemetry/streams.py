@@ -1,20 +1,77 @@
-"""Streams and requests: what goes out on each link by its schedule, and REQUEST_MESSAGE and its relatives.
+"""Streams and requests: PX4 v1.17's rates, what is due on each link, REQUEST_MESSAGE and its relatives.
 
-PX4 has streams that say nothing without a device that is not there. Their intervals can be set here too, with
-PX4's answer and PX4's silence. Difference from PX4: CURRENT_MODE, which PX4 denies on request, is sent.
+PX4 has streams that are silent without a device that is missing here. Their intervals can be set here too,
+with PX4's answer and PX4's silence. Difference from PX4: CURRENT_MODE, which PX4 denies on request, is sent.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
+from functools import partial
 from math import isfinite, nan
+from types import MappingProxyType
 
+from firmware_py.autopilot import Autopilot
 from firmware_py.mavlink.service import Command, CommandHandler, Reply, Service, Source
 from firmware_py.status import CommandResult
 from wire.dialect import Message, mavlink
 from wire.exchange import Exchange
 from wire.framing import Packet
-from wire.link import Link
+from wire.link import Link, LinkProfile
+
+# Hz on the onboard link (UDP 14540), the ground station link (UDP 14550) and a radio; 0: not streamed.
+_RATES_HZ: dict[str, tuple[float, float, float]] = {
+    "HEARTBEAT": (1, 1, 1),
+    "ALTITUDE": (10, 1, 1),
+    "ATTITUDE": (100, 50, 15),
+    "ATTITUDE_QUATERNION": (50, 50, 10),
+    "ATTITUDE_TARGET": (10, 50, 2),
+    "BATTERY_STATUS": (0.5, 0.5, 0.5),
+    "CURRENT_MODE": (0.5, 0.5, 0.5),
+    "DISTANCE_SENSOR": (10, 0.5, 0.5),
+    "ESTIMATOR_STATUS": (1, 0.5, 0.5),
+    "EXTENDED_SYS_STATE": (5, 1, 1),
+    "GLOBAL_POSITION_INT": (50, 50, 5),
+    "GNSS_INTEGRITY": (1, 1, 1),
+    "GPS_RAW_INT": (8, 5, 5),
+    "HIGHRES_IMU": (50, 0, 0),
+    "HOME_POSITION": (0.5, 0.5, 0.5),
+    "LINK_NODE_STATUS": (1, 1, 1),
+    "LOCAL_POSITION_NED": (30, 50, 1),
+    "MISSION_CURRENT": (1, 1, 1),
+    "ODOMETRY": (30, 0, 0),
+    "OPEN_DRONE_ID_LOCATION": (1, 1, 1),
+    "OPEN_DRONE_ID_SYSTEM": (1, 1, 1),
+    "PING": (1, 0.1, 0.1),
+    "POSITION_TARGET_GLOBAL_INT": (10, 1, 1),
+    "POSITION_TARGET_LOCAL_NED": (10, 50, 1.5),
+    "RC_CHANNELS": (20, 20, 5),
+    "SCALED_PRESSURE": (1, 1, 1),
+    "SERVO_OUTPUT_RAW": (10, 50, 1),
+    "SYSTEM_TIME": (1, 0, 0),
+    "SYS_STATUS": (5, 1, 1),
+    "TIMESYNC": (10, 0, 0),
+    "TIME_ESTIMATE_TO_TARGET": (0.5, 0.5, 0.5),
+    "VFR_HUD": (10, 4, 4),
+    "VIBRATION": (0.5, 0.1, 0.1),
+}
+
+
+def _profile(name: str, column: int) -> LinkProfile:
+    rates_hz = {
+        int(getattr(mavlink, f"MAVLINK_MSG_ID_{message}")): rates[column]
+        for message, rates in _RATES_HZ.items()
+        if rates[column]
+    }
+    return LinkProfile(name, MappingProxyType(rates_hz))
+
+
+ONBOARD = _profile("onboard", 0)
+GROUND = _profile("ground", 1)
+NORMAL = _profile("normal", 2)  # PX4's name for what it sends on a telemetry radio
+
+AutopilotSource = Callable[[Autopilot], Message | None]
+"""Makes a message from the autopilot's state; None: it has no content yet."""
 
 _MAX_MESSAGE_ID = 0xFFFFFF
 _MAX_INTERVAL_US = 0x7FFFFFFF
@@ -30,13 +87,15 @@ _SILENT = """
 """
 
 
-class StreamService(Service):
-    """Sends what is due on each link and what is asked for.
+class AutopilotTelemetry(Service):
+    """Offers the messages that functions make from the autopilot's state."""
 
-    Args:
-        sources: of all services, by message id.
-        replies: of all services, by message id.
-    """
+    def __init__(self, autopilot: Autopilot, sources: Mapping[int, AutopilotSource]) -> None:
+        self.sources = {message_id: partial(make, autopilot) for message_id, make in sources.items()}
+
+
+class StreamService(Service):
+    """Sends the streams that are due on each link, and requested messages, of all services."""
 
     def __init__(
         self, exchange: Exchange, sources: Mapping[int, Source], replies: Mapping[int, Reply]
@@ -46,21 +105,20 @@ class StreamService(Service):
         self._replies = replies
         silent = (getattr(mavlink, f"MAVLINK_MSG_ID_{name}") for name in _SILENT.split())
         self._streamable = frozenset({*sources, _LINK_NODE_STATUS, *silent})
+        older_requests = {
+            mavlink.MAV_CMD_GET_HOME_POSITION: mavlink.MAVLINK_MSG_ID_HOME_POSITION,
+            mavlink.MAV_CMD_REQUEST_PROTOCOL_VERSION: mavlink.MAVLINK_MSG_ID_PROTOCOL_VERSION,
+            mavlink.MAV_CMD_REQUEST_AUTOPILOT_CAPABILITIES: mavlink.MAVLINK_MSG_ID_AUTOPILOT_VERSION,
+        }
         self.commands = {
-            mavlink.MAV_CMD_GET_HOME_POSITION: self._requester(mavlink.MAVLINK_MSG_ID_HOME_POSITION),
             mavlink.MAV_CMD_GET_MESSAGE_INTERVAL: self._get_interval,
             mavlink.MAV_CMD_SET_MESSAGE_INTERVAL: self._set_interval,
             mavlink.MAV_CMD_REQUEST_MESSAGE: lambda command: self._request(command.link, *command.params[:2]),
-            mavlink.MAV_CMD_REQUEST_PROTOCOL_VERSION: self._requester(
-                mavlink.MAVLINK_MSG_ID_PROTOCOL_VERSION
-            ),
-            mavlink.MAV_CMD_REQUEST_AUTOPILOT_CAPABILITIES: self._requester(
-                mavlink.MAVLINK_MSG_ID_AUTOPILOT_VERSION
-            ),
+            **{number: self._requester(message_id) for number, message_id in older_requests.items()},
         }
 
     def update(self) -> None:
-        """Send what is due on each link; what goes to several is made once."""
+        """Send what is due on each link; a message for several links is made once."""
         exchange = self._exchange
         time_us = exchange.time_us
         packets: dict[int, Packet | None] = {}
@@ -73,21 +131,17 @@ class StreamService(Service):
                 if packet is not None:
                     link.send_stream(packet)
 
-    def _can_stream(self, message_id: int) -> bool:
-        """Whether the interval of that message can be set."""
-        return message_id in self._streamable
-
     def _message(self, message_id: int, link: Link) -> Message | None:
-        """The message as it is now; None when it does not exist or has nothing to tell yet."""
+        """The message as it is now; None when it does not exist or has no content yet."""
         source = self._sources.get(message_id)
         if source is not None:
             return source()
         return link.node_status(self._exchange.time_us) if message_id == _LINK_NODE_STATUS else None
 
     def _request(self, link: Link, message_id: float, argument: float = nan) -> CommandResult:
-        """Send a message on a link; anything that is no message of ours is denied."""
-        wanted = _message_id(message_id)
-        messages = [] if wanted is None else self._requested(link, wanted, _message_id(argument) or 0)
+        """Send a message on a link; any number that is no message of ours is denied."""
+        requested = _message_id(message_id)
+        messages = [] if requested is None else self._requested(link, requested, _message_id(argument) or 0)
         for message in messages:
             self._exchange.send(link, message)
         return CommandResult.ACCEPTED if messages else CommandResult.DENIED
@@ -102,26 +156,26 @@ class StreamService(Service):
         return [] if message is None else [message]
 
     def _requester(self, message_id: int) -> CommandHandler:
-        """The handler of a command that is older than REQUEST_MESSAGE and asks for one message."""
+        """The handler of a command that is older than REQUEST_MESSAGE and requests one message."""
         return lambda command: self._request(command.link, message_id)
 
     def _get_interval(self, command: Command) -> CommandResult:
         return self._request(command.link, mavlink.MAVLINK_MSG_ID_MESSAGE_INTERVAL, command.params[0])
 
     def _set_interval(self, command: Command) -> CommandResult:
-        """0: default, -1: off. HEARTBEAT and what is unknown fail, as in PX4."""
-        wanted, interval_us = _message_id(command.params[0]), command.params[1]
-        if wanted is None or not self._can_stream(wanted) or wanted == mavlink.MAVLINK_MSG_ID_HEARTBEAT:
+        """0: default, -1: off. HEARTBEAT and unknown messages fail, as in PX4."""
+        message_id, interval_us = _message_id(command.params[0]), command.params[1]
+        if message_id is None or message_id not in self._streamable:
             return CommandResult.FAILED
-        if not isfinite(interval_us):
+        if message_id == mavlink.MAVLINK_MSG_ID_HEARTBEAT or not isfinite(interval_us):
             return CommandResult.FAILED
         kept_us = -1 if interval_us < 0 else min(round(interval_us), _MAX_INTERVAL_US)
-        command.link.schedule.set_interval(wanted, kept_us, self._exchange.time_us)
+        command.link.schedule.set_interval(message_id, kept_us, self._exchange.time_us)
         return CommandResult.ACCEPTED
 
     def _interval(self, link: Link, message_id: int) -> Message:
         """MESSAGE_INTERVAL: 0 for a message that does not exist, -1 for one that is off."""
-        interval_us = link.schedule.interval_us(message_id) if self._can_stream(message_id) else 0
+        interval_us = link.schedule.interval_us(message_id) if message_id in self._streamable else 0
         return mavlink.MAVLink_message_interval_message(message_id & 0xFFFF, interval_us)
 
 

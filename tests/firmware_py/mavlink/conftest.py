@@ -6,7 +6,7 @@ import pytest
 from firmware_py.airframe import Airframe, load_airframe
 from firmware_py.geodesy import LocalProjection, is_on_earth
 from firmware_py.mavlink.node import MavlinkNode, NodeOptions
-from firmware_py.mavlink.rates import GROUND, ONBOARD
+from firmware_py.mavlink.telemetry.streams import GROUND, ONBOARD
 from firmware_py.missions.store import MissionStore
 from firmware_py.parameters import Parameters
 from firmware_py.status import CommandResult, FlightMode, VehicleStatus
@@ -21,7 +21,7 @@ HOME = GeodeticPoint(47.397742, 8.545594, 489.0)
 
 @dataclass
 class FakeAutopilot:
-    """Records what it is asked for and answers `result`."""
+    """Records the calls of its methods and returns `result`."""
 
     airframe: Airframe
     parameters: Parameters = field(default_factory=Parameters)
@@ -108,7 +108,7 @@ class FakeAutopilot:
 
 
 class Peer:
-    """A client on both links: sends messages to a node and reads what it answers, streams left out."""
+    """A client on both links: sends messages to a node and reads its answers without streams."""
 
     def __init__(self, autopilot, *, system=245, component=191, links=(ONBOARD, GROUND), node_options=None):
         self.autopilot = autopilot

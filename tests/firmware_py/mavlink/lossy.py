@@ -1,4 +1,4 @@
-"""A bad link for tests: datagrams get lost, come twice and overtake each other, the same way every time."""
+"""A bad link for tests: it loses, doubles and swaps datagrams, the same ones every time."""
 
 import random
 
@@ -93,7 +93,7 @@ class LossyPeer:
 
 
 def _packets(datagram):
-    """The packets of a datagram of the node, so that each one may get lost alone."""
+    """The packets of one of the node's datagrams, so that each one can be lost alone."""
     packets, place = [], 0
     while place < len(datagram):
         length = 12 + datagram[place + 1] + (13 if datagram[place + 2] & 1 else 0)

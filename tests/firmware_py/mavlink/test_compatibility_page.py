@@ -1,4 +1,4 @@
-"""docs/px4-compatibility.md names all that is there."""
+"""docs/px4-compatibility.md lists all messages and commands."""
 
 import re
 from pathlib import Path
@@ -7,7 +7,7 @@ import pytest
 
 from firmware_py.mavlink.camera.model import CAMERA_COMPONENT_ID, CameraModel
 from firmware_py.mavlink.node import MavlinkNode, NodeOptions
-from firmware_py.mavlink.rates import GROUND, ONBOARD
+from firmware_py.mavlink.telemetry.streams import GROUND, ONBOARD
 from wire.dialect import AUTOPILOT_COMPONENT_ID, mavlink
 
 PAGE = (Path(__file__).parents[3] / "docs" / "px4-compatibility.md").read_text(encoding="utf-8")
@@ -51,7 +51,7 @@ def test_every_command_is_on_the_page(node):
     assert CAMERA_COMPONENT_ID == 100
 
 
-def test_every_row_says_what_it_is():
+def test_every_row_has_its_kind():
     rows = [line for line in PAGE.splitlines() if line.startswith("| ") and not line.startswith("|---")]
     kinds = [row.split("|")[2].strip() for row in rows]
     assert set(kinds) == {"same", "different", "not there", ""}

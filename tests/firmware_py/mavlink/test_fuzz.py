@@ -1,4 +1,4 @@
-"""Packets that are sound on the wire and senseless in content, at the real autopilot."""
+"""Valid packets with random content, handled by the real autopilot."""
 
 import random
 from math import isfinite
@@ -117,7 +117,7 @@ NAMES = [b"MIS_TAKEOFF_ALT", b"COM_OBL_RC_ACT", b"_HASH_CHECK", b"", b"\xff" * 1
 
 
 def content(kind, field, type_name, array_length):
-    """What to put into one field: often right where rightness leads deeper, awkward elsewhere."""
+    """Values of one field: often valid ones where these reach more code, extreme ones elsewhere."""
     if field == "command":
         return st.sampled_from(COMMANDS)
     if field in ("target_system", "target_component"):
@@ -205,7 +205,7 @@ def test_random_bytes_are_no_messages(autopilot, make_peer, pieces):
     assert peer.node.failed_messages == 0
 
 
-def test_a_fault_inside_is_counted_and_said_and_ends_nothing(autopilot, peer):
+def test_an_internal_error_is_counted_and_reported_and_ends_nothing(autopilot, peer):
     def broken():
         raise RuntimeError("worn out")
 

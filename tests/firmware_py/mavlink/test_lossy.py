@@ -1,4 +1,4 @@
-"""The bad link of the tests is as bad as it says, and always in the same way."""
+"""The bad link of the tests loses and swaps as many datagrams as configured, reproducibly."""
 
 from itertools import pairwise
 

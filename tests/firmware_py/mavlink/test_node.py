@@ -1,9 +1,9 @@
-"""Links of a node that come and go."""
+"""Links that are added to a node and removed."""
 
 import pytest
 
-from firmware_py.mavlink.rates import GROUND, ONBOARD
 from firmware_py.mavlink.service import merged
+from firmware_py.mavlink.telemetry.streams import GROUND, ONBOARD
 from tests.node_input import deliver
 from wire.dialect import mavlink
 
@@ -28,7 +28,7 @@ def test_a_list_of_parameters_for_who_has_left_ends(peer):
     assert peer.node.failed_messages == 0
 
 
-def test_bytes_of_a_link_that_is_gone_are_dropped(peer):
+def test_bytes_of_a_removed_link_are_dropped(peer):
     peer.node.remove_link("onboard")
     deliver(peer.node, "onboard", b"late")
     assert {link for link, _ in peer.advance(0.5)} == {"ground"}

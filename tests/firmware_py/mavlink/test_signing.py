@@ -5,7 +5,7 @@ from hashlib import sha256
 
 import pytest
 
-from firmware_py.mavlink.rates import GROUND, ONBOARD
+from firmware_py.mavlink.telemetry.streams import GROUND, ONBOARD
 from tests.node_input import deliver
 from wire.dialect import mavlink
 from wire.signing import Signing, SigningKey
@@ -76,12 +76,12 @@ def test_pymavlink_with_another_key_believes_nothing(signed_peer):
 def test_who_has_the_key_is_answered(signed_peer):
     give_key(signed_peer.packer)
     assert asked(signed_peer, "radio")
-    assert signed_peer.node.refused_packets == 0
+    assert signed_peer.node._exchange.refused_packets == 0
 
 
-def test_who_has_none_is_heard_on_loopback_only(signed_peer):
+def test_unsigned_packets_are_accepted_on_loopback_only(signed_peer):
     assert asked(signed_peer, "radio") == []
-    assert signed_peer.node.refused_packets == 1
+    assert signed_peer.node._exchange.refused_packets == 1
     assert asked(signed_peer, "onboard")
 
 
@@ -91,7 +91,7 @@ def test_a_wrong_signature_is_refused_everywhere(signed_peer, link):
     assert asked(signed_peer, link) == []
 
 
-def test_nothing_is_heard_twice(signed_peer):
+def test_a_signed_packet_is_accepted_once(signed_peer):
     give_key(signed_peer.packer)
     packet = signed_peer.long(mavlink.MAV_CMD_REQUEST_MESSAGE, 148).pack(signed_peer.packer)
     deliver(signed_peer.node, "radio", packet)
@@ -116,7 +116,7 @@ def test_a_new_stream_may_be_a_minute_late(signed_peer, late_s, heard):
 def test_a_radio_need_not_sign(signed_peer):
     message = mavlink.MAVLink_radio_status_message(100, 100, 50, 10, 10, 0, 0)
     signed_peer.send(message, "radio")
-    assert signed_peer.node.refused_packets == 0
+    assert signed_peer.node._exchange.refused_packets == 0
 
 
 def test_mavlink_1_cannot_be_signed(signed_peer):
@@ -133,7 +133,7 @@ def test_a_changed_packet_is_refused(signed_peer):
         broken[place] ^= 1
         deliver(signed_peer.node, "radio", bytes(broken))
     assert signed_peer.take() == []
-    assert signed_peer.node.refused_packets == 3
+    assert signed_peer.node._exchange.refused_packets == 3
 
 
 def setup_message(secret, *, timestamp=TICKS, target=(1, 1)):
@@ -152,7 +152,7 @@ def test_setup_signing_turns_it_on_and_off(autopilot, make_peer):
     assert asked(peer, "radio")
 
 
-def test_setup_signing_is_not_taken_over_the_air_and_goes_nowhere(autopilot, make_peer):
+def test_setup_signing_is_not_accepted_on_radios_and_not_forwarded(autopilot, make_peer):
     peer = make_peer(autopilot, links=(ONBOARD, RADIO))
     peer.meet_ground_station("onboard")
     peer.meet_ground_station("radio")

@@ -1,10 +1,10 @@
-"""A serial line carries little: streams are stretched to fit, heartbeats and answers come through."""
+"""A slow serial line: streams are stretched to fit, heartbeats and answers are sent."""
 
 from dataclasses import replace
 
 import pytest
 
-from firmware_py.mavlink.rates import NORMAL, ONBOARD
+from firmware_py.mavlink.telemetry.streams import NORMAL, ONBOARD
 from wire.dialect import mavlink
 
 BYTES_S = 2880.0  # half of 57600 baud
@@ -37,7 +37,7 @@ def test_all_streams_slow_down_alike(serial_peer):
     assert received.count("ATTITUDE") == pytest.approx(2 * received.count("ATTITUDE_QUATERNION"), rel=0.15)
 
 
-def test_what_was_asked_for_fits_too(serial_peer):
+def test_requested_streams_fit_too(serial_peer):
     serial_peer.send(serial_peer.long(mavlink.MAV_CMD_SET_MESSAGE_INTERVAL, 30, 1000), "serial")
     serial_peer.advance(5.0)
     assert size(serial_peer.advance(10.0)) / 10.0 < 1.1 * BYTES_S

@@ -17,8 +17,7 @@ from offboard.mission import load_mission, mermaid
 from scenarios.result import FlightResult
 from tests.offboard.fakes import START_1, TEST_CASE_1, GeometricPerception, KinematicDrone
 from vision.types import CameraFrame, Detection, Detections
-from wire.mission_codec import DocumentAssembler
-from wire.mission_messages import DocumentKind
+from wire.mission_tunnel import DocumentAssembler, DocumentKind
 
 MISSION = load_mission("frame_challenge")
 LEAVES = list(MISSION.leaves)
@@ -91,7 +90,7 @@ def test_a_mission_that_is_too_large_is_told_without_its_text(caplog):
     listener, _ = make_teller("".join(map(chr, noise)))
     (content,) = listener.contents(DocumentKind.MISSION)
     assert (content["source"], content["mermaid"], content["states"]) == ("", mermaid(MISSION), LEAVES)
-    assert "pieces; at most 255 can be told" in caplog.text
+    assert "pieces; the limit is 255" in caplog.text
 
 
 def test_the_state_is_told_every_second_tick_and_at_once_when_it_changes():

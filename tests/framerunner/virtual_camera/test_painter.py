@@ -8,7 +8,7 @@ import pytest
 from pymavlink.dialects.v20 import common as mavlink
 
 from firmware_py.mavlink.node import MavlinkNode
-from firmware_py.mavlink.rates import GROUND
+from firmware_py.mavlink.telemetry.streams import GROUND
 from framerunner.flying.plan import FlightPlan
 from framerunner.virtual_camera.painter import VirtualCamera
 from geometry.alignment import Pose

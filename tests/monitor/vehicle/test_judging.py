@@ -11,8 +11,14 @@ from tests.monitor.simulated_link import SimulatedLink, equipment, served_link
 from tests.monitor.vehicle.test_mission_view import tunnel
 from tests.monitor.watching import watching
 from wire.dialect import mavlink
-from wire.mission_codec import encode_state, split_document
-from wire.mission_messages import DOCUMENT_TYPE, STATE_TYPE, DocumentKind, MissionState
+from wire.mission_tunnel import (
+    DOCUMENT_TYPE,
+    STATE_TYPE,
+    DocumentKind,
+    MissionState,
+    encode_state,
+    split_document,
+)
 
 SCENARIO = load_scenario("test-case-1")
 

@@ -3,8 +3,7 @@
 import pytest
 
 from monitor.vehicle.link_quality import LinkQuality, RateWatch, RepeatedRequest
-from wire.dialect import mavlink
-from wire.vehicles import request_message
+from wire.dialect import mavlink, request_message
 
 
 def heard(sequences, rate_hz=50.0):

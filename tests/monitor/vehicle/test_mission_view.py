@@ -7,14 +7,16 @@ from pymavlink.dialects.v20 import common as mavlink
 
 from monitor.vehicle.mission import MissionView
 from scenarios.result import FlightResult
-from wire.mission_codec import encode_detections, encode_state, split_document
-from wire.mission_messages import (
+from wire.mission_tunnel import (
     DETECTIONS_TYPE,
     DOCUMENT_TYPE,
     STATE_TYPE,
     DocumentKind,
     MissionDetections,
     MissionState,
+    encode_detections,
+    encode_state,
+    split_document,
 )
 
 CHART = {

@@ -67,13 +67,13 @@ def test_its_heartbeat_is_a_cameras_once_a_second_on_every_link(viewer):
         assert [(m.get_type(), m.type, m.autopilot) for m in beats] == [("HEARTBEAT", 30, 8)] * 3
 
 
-def test_its_heartbeat_tells_the_vehicles_mode_for_mavsdk_follows_no_target_else(viewer, autopilot):
+def test_its_heartbeat_has_the_vehicles_mode_as_mavsdks_follow_me_requires(viewer, autopilot):
     autopilot.status.mode = FlightMode.FOLLOW
     (_, beat), *_ = [came for came in viewer.advance(1.5) if came[1].get_srcComponent() == 100]
     assert (beat.base_mode & 1, beat.custom_mode) == (1, FlightMode.FOLLOW.custom_mode)
 
 
-def test_without_a_camera_nobody_answers_there(peer):
+def test_without_a_camera_its_component_does_not_answer(peer):
     assert peer.ask(peer.long(REQUEST, 259, target=CAMERA)) == []
     assert {m.get_srcComponent() for _, m in peer.advance(2.0)} == {1}
     assert acks(peer.ask(peer.long(START, 0, 0, 1, target=ALL))) == [(1, START, UNSUPPORTED)]
@@ -101,7 +101,7 @@ def test_information_describes_the_lens(viewer, question):
         (270, 2505, "VIDEO_STREAM_STATUS"),
     ],
 )
-def test_every_message_can_be_asked_for_in_the_new_and_the_old_way(viewer, message_id, elder, name):
+def test_every_message_can_be_requested_by_the_new_and_the_old_command(viewer, message_id, elder, name):
     for question in (viewer.long(REQUEST, message_id, target=CAMERA), viewer.int(elder, 1, target=CAMERA)):
         answers = viewer.ask(question)
         assert answers[-1].get_type() == "COMMAND_ACK"
@@ -109,7 +109,7 @@ def test_every_message_can_be_asked_for_in_the_new_and_the_old_way(viewer, messa
         assert named(answers, name)
 
 
-def test_streams_tell_where_they_are(viewer):
+def test_streams_have_their_addresses(viewer):
     answers = named(viewer.ask(viewer.long(REQUEST, 269, 0, target=CAMERA)), "VIDEO_STREAM_INFORMATION")
     assert [(m.stream_id, m.count, m.uri, m.type, m.encoding) for m in answers] == [
         (1, 2, "5600", mavlink.VIDEO_STREAM_TYPE_RTPUDP, mavlink.VIDEO_STREAM_ENCODING_H264),
@@ -145,7 +145,7 @@ def test_what_it_does_not_know_is_denied(viewer, message_id):
 
 
 @pytest.mark.parametrize("target", [CAMERA, ALL])
-def test_a_picture_is_told_with_place_and_attitude(viewer, autopilot, album, target):
+def test_a_picture_is_reported_with_position_and_attitude(viewer, autopilot, album, target):
     autopilot.state = VehicleState(attitude=(0.8, 0.0, 0.0, 0.6))
     autopilot.place = GeodeticPoint(47.4, 8.5, 492.0)
     answers = viewer.ask(viewer.long(START, 0, 0, 1, 1, target=target))
@@ -208,7 +208,7 @@ def test_pictures_cannot_follow_faster_than_the_cameras_rate(viewer):
     assert len(pictures(viewer.advance(1.0))) == 11
 
 
-def test_a_picture_each_time_it_has_gone_so_far(viewer, autopilot, album):
+def test_a_picture_is_taken_after_each_distance(viewer, autopilot, album):
     assert acks(viewer.ask(viewer.long(206, 1.0, target=CAMERA))) == [(100, 206, ACCEPTED)]
     for step in range(26):
         autopilot.state.position_ned_m = (step * 0.1, 0.0, 0.0)
@@ -220,7 +220,7 @@ def test_a_picture_each_time_it_has_gone_so_far(viewer, autopilot, album):
     assert len(album.taken) == 3
 
 
-def test_a_picture_that_fails_is_told_as_failed(viewer, album):
+def test_a_picture_that_fails_is_reported_as_failed(viewer, album):
     album.broken = True
     answers = viewer.ask(viewer.long(START, 0, 0, 1, target=CAMERA))
     assert acks(answers) == [(100, START, FAILED)]

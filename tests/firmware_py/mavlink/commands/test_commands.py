@@ -103,7 +103,7 @@ def test_the_one_ack_is_the_autopilots_answer(autopilot, peer, command, params, 
     assert acks(peer.ask(peer.long(command, *params))) == [(command, result)]
 
 
-def test_the_ack_goes_to_who_asked_on_its_link_only(peer):
+def test_the_ack_is_sent_to_the_sender_on_its_link_only(peer):
     peer.send(peer.long(LAND), "ground")
     ((link, ack),) = peer.take()
     assert (link, ack.target_system, ack.target_component) == ("ground", 245, 191)
@@ -154,7 +154,7 @@ def test_takeoff_above_home_in_a_relative_frame(autopilot, peer):
         (262, [3], "Mode change refused: no standard mode 3 here"),
     ],
 )
-def test_a_refusal_is_said_in_words(autopilot, peer, command, params, text):
+def test_a_refusal_has_a_text(autopilot, peer, command, params, text):
     peer.ask(peer.long(command, *params))
     assert [said.text for said in autopilot.texts] == [text]
 
@@ -230,7 +230,7 @@ def test_available_modes_have_a_standard_mode_or_a_name(peer):
     assert modes[FlightMode.TERMINATION.custom_mode].properties & 2  # not to be chosen by a person
 
 
-def test_intervals_belong_to_the_link_that_asked(peer):
+def test_intervals_belong_to_the_link_of_the_request(peer):
     attitude = mavlink.MAVLINK_MSG_ID_ATTITUDE
     peer.ask(peer.long(SET_INTERVAL, attitude, -1))
     names = [(link, message.get_type()) for link, message in peer.advance(1.0)]
@@ -241,7 +241,7 @@ def test_intervals_belong_to_the_link_that_asked(peer):
 @pytest.mark.parametrize(
     ("message_id", "interval_us"), [(30, 10_000), (105, 20_000), (245, 200_000), (264, -1), (9999, 0)]
 )
-def test_message_interval_is_told(peer, message_id, interval_us):
+def test_message_interval_is_sent(peer, message_id, interval_us):
     for question in (peer.long(GET_INTERVAL, message_id), peer.long(REQUEST, 244, message_id)):
         told = peer.ask(question)[0]
         assert (told.get_type(), told.message_id, told.interval_us) == (
@@ -314,7 +314,7 @@ def test_a_region_of_interest_and_home_are_places(autopilot, peer):
 
 
 def test_altitudes_of_circles_and_home_count_from_the_sea_whatever_the_frame(autopilot, peer):
-    """MAVSDK names a relative frame for both and means it so; PX4 looks at no frame."""
+    """MAVSDK sends a relative frame with an absolute altitude for both; PX4 ignores the frame."""
     place = (round(PLACE.latitude_deg * 1e7), round(PLACE.longitude_deg * 1e7), PLACE.altitude_m)
     peer.ask(peer.int(34, 20.0, 3.0, 0, nan, *place, frame=mavlink.MAV_FRAME_GLOBAL_RELATIVE_ALT))
     peer.ask(peer.int(179, 0, 0, 0, 0, *place, frame=mavlink.MAV_FRAME_GLOBAL_RELATIVE_ALT))
@@ -336,7 +336,7 @@ def test_reboot_actuator_test_and_checks_are_refused_while_armed(autopilot, peer
     assert autopilot.texts == []
 
 
-def test_calibration_is_told_in_the_words_that_stations_follow(autopilot, peer):
+def test_calibration_sends_the_texts_that_stations_follow(autopilot, peer):
     peer.ask(peer.long(241, 0, 0, 0, 0, 1))
     said = [text.text for text in autopilot.texts]
     assert said[0] == "[cal] calibration started: 2 accel"

@@ -59,7 +59,7 @@ def test_what_cannot_be_done_is_unsupported(autopilot, breaker, numbers):
     assert breaker.injected == []
 
 
-def test_without_somebody_to_break_it_nothing_can_be_broken(autopilot):
+def test_without_a_failure_sink_nothing_can_be_broken(autopilot):
     autopilot.parameters.set("SYS_FAILURE_EN", 1)
     assert inject_failure(autopilot, None, 101, 1, 1) is UNSUPPORTED
 
@@ -74,7 +74,7 @@ def test_the_command_reaches_who_breaks(autopilot, make_peer):
 
 
 class Vehicle:
-    """Has parameters and listens."""
+    """Has parameters and keeps its texts."""
 
     def __init__(self):
         self.parameters = Parameters()

@@ -12,9 +12,9 @@ from firmware_py.mavlink.ground_station.event_definitions import (
     all_kinds,
     event_of,
 )
-from firmware_py.mavlink.ground_station.metadata import EVENTS_FILE, extras
+from firmware_py.mavlink.ground_station.metadata import EVENTS_FILE, ExtraFiles
 from firmware_py.mavlink.node import MavlinkNode
-from firmware_py.mavlink.rates import GROUND, ONBOARD
+from firmware_py.mavlink.telemetry.streams import GROUND, ONBOARD
 from firmware_py.status import FlightMode
 from wire.dialect import mavlink
 from wire.framing import PacketReader
@@ -27,7 +27,7 @@ FORMATS = {"uint8_t": "B", "uint16_t": "H", "uint32_t": "I", "float": "f"}
 @pytest.fixture(scope="module")
 def described():
     """Event id to (group, event), and the enumerations, as a ground station reads them from the file."""
-    component = json.loads(lzma.decompress(extras()[EVENTS_FILE]))["components"]["1"]
+    component = json.loads(lzma.decompress(ExtraFiles()[EVENTS_FILE]))["components"]["1"]
     events = {
         1 << 24 | int(number): (name, event)
         for name, group in component["event_groups"].items()
@@ -77,14 +77,14 @@ def test_the_first_events_are_a_health_report_numbered_on(autopilot, described):
         assert (told.sequence, told.flags) == (65525, 1)
 
 
-def test_the_sequence_is_told_every_three_seconds_and_reset_only_at_first(peer):
+def test_the_sequence_is_sent_every_three_seconds_and_reset_only_at_first(peer):
     told = [m for on, m in peer.advance(9.1) if on == "ground" and m.get_type() == "CURRENT_EVENT_SEQUENCE"]
     assert len(told) == 3
     assert {m.flags for m in told} == {0}
     assert {m.sequence for m in told} == {65527}
 
 
-def test_a_text_is_told_as_event_too_and_then_ends_with_a_tab(autopilot, peer, described):
+def test_a_text_with_an_event_ends_with_a_tab(autopilot, peer, described):
     peer.meet_ground_station()
     peer.advance(0.1)
     autopilot.say(INFO, "Landing detected")
@@ -106,7 +106,7 @@ def test_figures_travel_as_arguments(autopilot, peer, described):
     assert values(event, described) == (2.5,)
 
 
-def test_whatever_the_commander_says_is_an_event():
+def test_every_text_of_the_commander_is_an_event():
     from firmware_py.commander_table import TABLE
 
     for row in TABLE:
@@ -114,7 +114,7 @@ def test_whatever_the_commander_says_is_an_event():
     assert event_of("") is None
 
 
-def test_a_change_of_mode_is_told(autopilot, peer, described):
+def test_a_change_of_mode_is_an_event(autopilot, peer, described):
     peer.advance(0.1)
     autopilot.status.mode = FlightMode.OFFBOARD
     (event,) = events(peer.advance(0.05))
@@ -188,14 +188,14 @@ def test_reports_come_when_something_changed_or_on_request_only(autopilot, peer)
     assert len(events(peer.advance(2.0))) == 3
 
 
-def test_what_was_missed_comes_again(peer):
+def test_missed_events_are_sent_again(peer):
     peer.advance(0.2)
     again = peer.ask(request(65526, 65527))
     assert [m.sequence for m in again] == [65526, 65527]
     assert peer.ask(request(65527, 65527, target=(2, 1))) == []
 
 
-def test_what_is_gone_is_answered_with_the_oldest_that_is_left(autopilot, peer):
+def test_a_request_for_dropped_events_is_answered_with_the_oldest_kept(autopilot, peer):
     peer.advance(0.2)
     for _ in range(30):
         autopilot.say(INFO, "Landing detected")
@@ -210,8 +210,8 @@ def test_what_is_gone_is_answered_with_the_oldest_that_is_left(autopilot, peer):
     assert unknown.get_type() == "RESPONSE_EVENT_ERROR"
 
 
-def test_nothing_is_left_out_over_a_bad_link(autopilot, peer, make_lossy_peer):
-    """A receiver as libevents has it: it asks for the next one whenever a later one comes or is announced."""
+def test_all_events_arrive_over_a_bad_link(autopilot, peer, make_lossy_peer):
+    """As libevents: the receiver requests the next event when a later one is received or announced."""
     client, got, latest = make_lossy_peer(peer, seed=3, loss=0.2), [], 65527
 
     def take(messages):

@@ -67,7 +67,7 @@ def test_write_read_burst_crc_and_list(client):
     assert client.retries == 0
 
 
-def test_a_listing_of_many_goes_page_by_page(client, storage):
+def test_a_long_listing_has_pages(client, storage):
     storage.make_folder(("many",))
     for number in range(200):
         storage.create(("many", f"file-{number:03}.txt"))
@@ -125,7 +125,7 @@ def test_rename_truncate_open_for_writing_and_remove(client):
     assert client.list("/") == ["Detc"]
 
 
-def test_a_request_that_comes_again_gets_the_same_answer_and_does_nothing_again(quiet_link, storage):
+def test_a_repeated_request_gets_the_same_answer_and_changes_nothing(quiet_link, storage):
     storage.create(("a",))
     remove = request(9, ftp.REMOVE, b"/a\0")
     first, second = (Reply(quiet_link.ask(remove)[0].payload) for _ in range(2))
@@ -134,7 +134,7 @@ def test_a_request_that_comes_again_gets_the_same_answer_and_does_nothing_again(
     assert (third.opcode, third.data[0]) == (ftp.NAK, ftp.NOT_FOUND)
 
 
-def test_an_opening_that_comes_late_again_does_not_empty_the_file(quiet_link, storage):
+def test_a_late_copy_of_an_opening_does_not_empty_the_file(quiet_link, storage):
     create = request(0, ftp.CREATE, b"/a\0")
     quiet_link.ask(create)
     quiet_link.ask(request(1, ftp.WRITE, b"kept"))
@@ -142,7 +142,7 @@ def test_an_opening_that_comes_late_again_does_not_empty_the_file(quiet_link, st
     assert storage.read(("a",), 0, 10) == b"kept"
 
 
-def test_a_closing_that_comes_late_again_does_not_close_the_next_file(quiet_link, storage):
+def test_a_late_copy_of_a_closing_does_not_close_the_next_file(quiet_link, storage):
     for name in "ab":
         storage.create((name,))
         storage.write((name,), 0, name.encode())
@@ -182,7 +182,7 @@ def test_a_session_left_open_is_closed_and_the_number_used_again(client):
     assert code_of(client.ask, ftp.READ, size=3) == ftp.INVALID_SESSION
 
 
-def test_a_burst_pauses_after_35_kb_and_tells_the_end(quiet_link, storage):
+def test_a_burst_pauses_after_35_kb_and_reports_the_end(quiet_link, storage):
     storage.create(("a",))
     storage.write(("a",), 0, bytes(40_000))
     quiet_link.ask(request(0, ftp.OPEN, b"/a\0"))

@@ -68,7 +68,7 @@ def test_a_part_of_the_list_and_none_at_all(make_link):
     assert entry.num_logs == 0
 
 
-def test_data_come_as_asked_for_and_end_with_the_file(make_link):
+def test_data_are_sent_as_requested_and_end_with_the_file(make_link):
     peer = make_link(logs())
     peer.send(ask_data(0, 90, 200))
     data = [message for _, message in peer.advance(0.1)]
@@ -113,7 +113,7 @@ def test_a_slow_link_is_not_flooded(make_link):
 
 
 def download(lossy, number, size):
-    """As MAVSDK: in chunks of 512 packets, what is missing after half a second is asked for again."""
+    """As MAVSDK: in chunks of 512 packets; missing ones are requested again after half a second."""
     content, missing = bytearray(size), set(range(0, size, 90))
     for _ in range(200):
         if not missing:

@@ -13,7 +13,6 @@ from firmware_py.mavlink.ground_station.metadata import (
     GENERAL_FILE,
     PARAMETERS_FILE,
     ExtraFiles,
-    extras,
     file_crc,
 )
 from firmware_py.parameters import DECLARATIONS, Parameters
@@ -40,7 +39,7 @@ PARAMETER_KEYS = {
 
 
 def content(path, parameters=None):
-    return json.loads(lzma.decompress(extras(parameters)[path]))
+    return json.loads(lzma.decompress(ExtraFiles(parameters)[path]))
 
 
 def test_the_general_file_names_the_others_with_their_checksums():
@@ -48,8 +47,8 @@ def test_the_general_file_names_the_others_with_their_checksums():
     assert set(general) == {"version", "vendorName", "metadataTypes"}
     assert general["version"] == 1
     assert general["metadataTypes"] == [
-        {"type": 1, "uri": f"mftp://{PARAMETERS_FILE}", "fileCrc": file_crc(extras()[PARAMETERS_FILE])},
-        {"type": 4, "uri": f"mftp://{EVENTS_FILE}", "fileCrc": file_crc(extras()[EVENTS_FILE])},
+        {"type": 1, "uri": f"mftp://{PARAMETERS_FILE}", "fileCrc": file_crc(ExtraFiles()[PARAMETERS_FILE])},
+        {"type": 4, "uri": f"mftp://{EVENTS_FILE}", "fileCrc": file_crc(ExtraFiles()[EVENTS_FILE])},
     ]
 
 
@@ -134,7 +133,7 @@ def test_enumerations_keep_to_the_schema(component):
             assert not enum.get("is_bitfield") or int(value).bit_count() == 1
 
 
-def test_a_health_report_can_be_told_from_the_rest(component):
+def test_a_health_report_can_be_distinguished(component):
     # What libevents looks for: one summary at the beginning, one at the end, two arguments in between.
     for group, arguments in (("arming_check", 5), ("health", 4)):
         summaries = [
@@ -149,10 +148,10 @@ def test_a_health_report_can_be_told_from_the_rest(component):
 
 
 def test_files_are_the_same_bytes_each_time_and_made_when_read():
-    assert set(extras()) == set(FILES) == set(ExtraFiles())
+    assert set(ExtraFiles()) == set(FILES)
     again = ExtraFiles(Parameters())
     assert len(again) == len(FILES)
-    assert {path: again[path] for path in again} == extras()
+    assert {path: again[path] for path in again} == ExtraFiles()
     with pytest.raises(KeyError):
         again["etc/passwd"]
 
@@ -161,9 +160,9 @@ def test_files_are_the_same_bytes_each_time_and_made_when_read():
     ("message_id", "uri", "crc"),
     [(397, "uri", "file_crc"), (395, "general_metadata_uri", "general_metadata_file_crc")],
 )
-def test_clients_are_told_where_the_files_are(autopilot, peer, message_id, uri, crc):
+def test_clients_receive_the_addresses_of_the_files(autopilot, peer, message_id, uri, crc):
     answers = peer.ask(peer.long(512, message_id))
     (told,) = [each for each in answers if each.get_msgId() == message_id]
     assert getattr(told, uri) == f"mftp://{GENERAL_FILE}"
-    assert getattr(told, crc) == file_crc(extras(autopilot.parameters)[GENERAL_FILE])
+    assert getattr(told, crc) == file_crc(ExtraFiles(autopilot.parameters)[GENERAL_FILE])
     assert [each.result for each in answers if each.get_type() == "COMMAND_ACK"] == [0]

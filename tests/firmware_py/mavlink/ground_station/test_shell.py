@@ -1,4 +1,4 @@
-"""The shell over SERIAL_CONTROL: silent unless switched on, and about the vehicle only."""
+"""The shell over SERIAL_CONTROL: silent unless enabled, and about the vehicle only."""
 
 import pytest
 from hypothesis import HealthCheck, given, settings
@@ -37,7 +37,7 @@ def test_it_prompts_echoes_and_answers(peer):
     assert typed(peer, "\n") == "nsh> \r\nnsh> "
     answer = typed(peer, "ver all\n")
     assert answer.startswith("ver all\r\n")
-    assert "speaks as PX4 1.17.0" in answer
+    assert "compatible with PX4 1.17.0" in answer
     assert answer.endswith("nsh> ")
     assert "param show" in typed(peer, "help\n")
     assert "Disarmed" in typed(peer, "commander status\n")
@@ -59,7 +59,7 @@ def test_parameters_are_shown_and_set_within_their_range(peer, autopilot):
 
 def test_a_line_may_come_in_pieces_and_be_corrected(peer):
     typed(peer, "ve")
-    assert "speaks as PX4" in typed(peer, "x\x7fr all\r\n")
+    assert "compatible with PX4" in typed(peer, "x\x7fr all\r\n")
 
 
 def test_other_devices_replies_and_other_vehicles_are_left_alone(peer):
@@ -69,8 +69,8 @@ def test_other_devices_replies_and_other_vehicles_are_left_alone(peer):
     assert typed(peer, "", flags=0) == ""  # goodbye
 
 
-def test_mavsdk_asks_for_no_answer_and_wants_one(peer):
-    assert "speaks as PX4" in typed(peer, "ver all\n", flags=0)
+def test_mavsdk_is_answered_though_it_sets_no_flag(peer):
+    assert "compatible with PX4" in typed(peer, "ver all\n", flags=0)
 
 
 LINES = st.one_of(st.binary(max_size=70), st.sampled_from([b"param set", b"param show ["]))

@@ -11,13 +11,13 @@ CAMERA = {"camera": CameraModel(320, 240, radians(90.0), 10.0)}
 
 
 def order(autopilot, peer, command, *params):
-    """Have the mission command something, and let the node pass it on."""
+    """Issue a command of the mission, and let the node pass it on."""
     issued = [IssuedCommand(command, (*params, *[0.0] * (7 - len(params))))]
     autopilot.take_issued_commands = lambda: [issued.pop()] if issued else []
     return peer.advance(0.01)
 
 
-def test_pictures_are_the_cameras(autopilot, make_peer):
+def test_a_missions_picture_is_taken_by_the_camera(autopilot, make_peer):
     received = order(autopilot, make_peer(autopilot, node_options=CAMERA), START, 0.0, 0.0, 1.0, 1.0)
     assert [m.image_index for on, m in received if m.get_type() == "CAMERA_IMAGE_CAPTURED"] == [0, 0]
     assert autopilot.texts == []
@@ -44,7 +44,7 @@ def test_home_is_here_or_there(autopilot, peer, params, place):
     ("command", "params", "why"),
     [(START, (0.0, 0.0, 1.0), "unsupported"), (SET_HOME, (0.0, 0, 0, 0, nan, 8.0, 500.0), "denied")],
 )
-def test_what_cannot_be_done_is_said(autopilot, make_peer, command, params, why):
+def test_a_command_that_fails_is_reported(autopilot, make_peer, command, params, why):
     peer = make_peer(autopilot)
     peer.meet_ground_station()
     received = order(autopilot, peer, command, *params)

@@ -1,4 +1,4 @@
-"""Mission messages with senseless content: nothing raises, and a plan is whole or as before."""
+"""Mission messages with random content: nothing raises, and a plan is complete or unchanged."""
 
 from math import isfinite
 
@@ -149,7 +149,7 @@ def test_an_upload_is_whole_or_nothing_and_what_is_taken_can_be_flown(airframe, 
 
 
 def fly(autopilot):
-    """Whatever was taken is flown, kept in and returned to without a fault, even if it is not valid."""
+    """Accepted plans cause no error in flight, even if they are not valid."""
     store = autopilot.missions
     store.valid = bool(store.mission.items)
     view = View(projection=LocalProjection(HOME), home_ned_m=(0.0, 0.0, 0.0))

@@ -1,4 +1,4 @@
-"""The mission protocol at the table: what is sent, what comes back, what is kept."""
+"""The mission protocol without a flight: requests, answers, stored plans."""
 
 from math import isnan, nan
 from struct import unpack_from
@@ -92,14 +92,14 @@ def told(autopilot):
 
 @pytest.fixture
 def quiet(autopilot, make_peer):
-    """A peer that leaves texts with the autopilot."""
+    """A peer whose node leaves the autopilot's texts to the test."""
     peer = make_peer(autopilot)
     autopilot.take_texts = list
     return peer
 
 
 @pytest.mark.parametrize("plan", list(PlanType))
-def test_nothing_is_there_at_first(peer, plan):
+def test_plans_are_empty_at_first(peer, plan):
     (count,) = peer.ask(mavlink.MAVLink_mission_request_list_message(1, 1, plan))
     assert (count.get_type(), count.count, count.mission_type) == ("MISSION_COUNT", 0, plan)
     assert (count.target_system, count.target_component) == (245, 191)
@@ -113,7 +113,7 @@ def test_nothing_is_there_at_first(peer, plan):
         (RALLY, waypoints(2, plan=2, command=5100)),
     ],
 )
-def test_an_upload_is_asked_for_item_by_item_and_read_back_the_same(peer, autopilot, plan, items):
+def test_an_upload_is_requested_item_by_item_and_read_back_the_same(peer, autopilot, plan, items):
     answers = upload(peer, items, plan=plan)
     assert [answer.get_type() for answer in answers] == ["MISSION_REQUEST_INT"] * len(items) + ["MISSION_ACK"]
     assert [answer.seq for answer in answers[:-1]] == list(range(len(items)))
@@ -283,7 +283,7 @@ def test_the_planner_s_component_id_counts_as_ours(peer):
     assert len(peer.ask(mavlink.MAVLink_mission_request_list_message(1, 190, 0))) == 1
 
 
-def test_an_item_that_does_not_come_is_asked_for_again_and_in_the_end_given_up(quiet, autopilot, told):
+def test_a_missing_item_is_requested_again_until_a_timeout(quiet, autopilot, told):
     peer = quiet
     peer.ask(count_of(waypoints(3)))
     peer.ask(waypoints(1)[0])
@@ -313,7 +313,7 @@ def test_doubles_and_items_out_of_turn_change_nothing(peer, autopilot):
     assert [stored.seq for stored in autopilot.missions.mission.items] == [0, 1, 2]
 
 
-def test_a_client_that_begins_anew_begins_at_the_first_item(peer):
+def test_a_client_that_restarts_begins_at_the_first_item(peer):
     items = waypoints(3)
     peer.ask(count_of(items))
     peer.ask(items[0])
@@ -334,7 +334,7 @@ def test_the_sender_cancels(peer, autopilot):
     assert autopilot.missions.mission.items == ()
 
 
-def test_a_second_uploader_is_told_to_wait_and_disturbs_nothing(quiet, autopilot):
+def test_a_second_uploader_is_refused_and_disturbs_nothing(quiet, autopilot):
     peer = quiet
     items = waypoints(2)
     peer.ask(count_of(items))
@@ -450,7 +450,7 @@ def test_mission_states(quiet, autopilot):
     assert current_of(peer)[:4] == (1, 3, mavlink.MISSION_STATE_COMPLETE, 2)
 
 
-def test_set_current_is_told_at_once_on_all_links(quiet, autopilot, told):
+def test_set_current_is_broadcast_at_once_on_all_links(quiet, autopilot, told):
     upload(quiet, waypoints(3))
     quiet.send(mavlink.MAVLink_mission_set_current_message(1, 1, 2))
     assert [(link, m.seq) for link, m in quiet.take() if m.get_type() == "MISSION_CURRENT"] == [
@@ -463,7 +463,7 @@ def test_set_current_is_told_at_once_on_all_links(quiet, autopilot, told):
     assert told()[-1] == "WPM: WP CURR CMD: Not in list: 3 of 3"
 
 
-def test_what_is_reached_is_told_at_once_and_ten_times_more(quiet, autopilot):
+def test_a_reached_item_is_broadcast_at_once_and_ten_times_more(quiet, autopilot):
     upload(quiet, waypoints(3))
     quiet.advance(0.1)
     autopilot.missions.report_reached(0)

@@ -21,7 +21,7 @@ def test_ping_is_answered_to_its_sender_but_an_answer_is_not(peer):
     assert peer.ask(mavlink.MAVLink_ping_message(12, 34, 1, 1)) == []
 
 
-def test_the_date_is_learnt_from_whoever_knows_it_later(peer):
+def test_a_later_date_is_taken_over(peer):
     def date():
         return [m for _, m in peer.advance(1.0) if m.get_type() == "SYSTEM_TIME"][-1]
 

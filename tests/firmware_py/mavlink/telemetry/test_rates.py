@@ -1,4 +1,4 @@
-"""What is streamed, and how often, against what a PX4 v1.17 was seen to send."""
+"""The streams and their rates, compared with those measured from PX4 v1.17."""
 
 from collections import Counter
 

@@ -8,7 +8,7 @@ def texts(received, link="ground"):
     return [m for on, m in received if on == link and m.get_type() == "STATUSTEXT"]
 
 
-def test_texts_go_only_where_a_ground_station_was_heard(autopilot, peer):
+def test_texts_are_sent_only_where_a_ground_station_was_heard(autopilot, peer):
     peer.meet_ground_station("ground")
     peer.send(
         mavlink.MAVLink_heartbeat_message(mavlink.MAV_TYPE_ONBOARD_CONTROLLER, 8, 0, 0, 4, 3), "onboard"

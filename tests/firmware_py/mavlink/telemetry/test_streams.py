@@ -4,13 +4,13 @@ from math import cos, inf, nan, pi, sin
 import pytest
 
 from firmware_py.mavlink.node import MavlinkNode
-from firmware_py.mavlink.rates import GROUND, ONBOARD
 from firmware_py.mavlink.telemetry.sensing import (
     EARTH_FIELD_NED_GAUSS,
     earth_field_frd_gauss,
     pressure_hpa,
     temperature_k,
 )
+from firmware_py.mavlink.telemetry.streams import GROUND, ONBOARD
 from firmware_py.setpoints import AttitudeSetpoint, TrajectorySetpoint
 from firmware_py.status import FlightMode, LandedState, VehicleStatus
 from firmware_py.types import (
@@ -68,7 +68,7 @@ def test_datagrams_hold_whole_packets_below_the_mtu(peer):
         (VehicleStatus(armed=True, mode=FlightMode.LAND, failsafe=True), 157, 0x06040000, 5),
     ],
 )
-def test_heartbeat_says_what_px4_says(autopilot, peer, status, base_mode, custom_mode, state):
+def test_the_heartbeat_is_px4s(autopilot, peer, status, base_mode, custom_mode, state):
     autopilot.status = status
     beat = latest(peer, "HEARTBEAT")
     assert (beat.type, beat.autopilot) == (2, 12)
@@ -87,7 +87,7 @@ def test_health_bits_that_mavsdk_waits_for(autopilot, peer):
 
 
 def test_sys_status_has_px4s_bits_on_the_ground_and_in_the_air(autopilot, peer):
-    """As a PX4 v1.17 simulation without a remote control was seen to say."""
+    """As measured from a PX4 v1.17 simulation without a remote control."""
     status = latest(peer, "SYS_STATUS")
     assert status.onboard_control_sensors_present == 0x0200402F
     assert status.onboard_control_sensors_enabled == 0x0201402F
@@ -98,7 +98,7 @@ def test_sys_status_has_px4s_bits_on_the_ground_and_in_the_air(autopilot, peer):
     assert status.onboard_control_sensors_health == 0x1320C83F
 
 
-def test_the_battery_is_told_in_full_and_in_short(autopilot, peer):
+def test_the_battery_is_in_both_messages(autopilot, peer):
     autopilot.battery.voltage_v, autopilot.battery.current_a = 15.25, 12.5
     autopilot.battery.used_mah, autopilot.battery.remaining = 840.0, 0.554
     short, full = latest(peer, "SYS_STATUS"), latest(peer, "BATTERY_STATUS")
@@ -161,7 +161,7 @@ def test_the_range_to_the_ground_is_along_the_body(autopilot, peer):
     assert latest(peer, "DISTANCE_SENSOR").current_distance == 0
 
 
-def test_the_way_home_takes_its_time(autopilot, peer):
+def test_a_return_takes_distances_over_speeds(autopilot, peer):
     parameters = autopilot.parameters
     for name, value in (("RTL_RETURN_ALT", 30), ("RTL_DESCEND_ALT", 10), ("RTL_LAND_DELAY", 0)):
         parameters.set(name, value)
@@ -170,7 +170,7 @@ def test_the_way_home_takes_its_time(autopilot, peer):
     assert latest(peer, "TIME_ESTIMATE_TO_TARGET").safe_return == pytest.approx(seconds, abs=1)
 
 
-def test_remote_identification_tells_place_speed_and_emergency(autopilot, peer):
+def test_remote_identification_has_position_speed_and_emergency(autopilot, peer):
     autopilot.state = VehicleState(velocity_ned_m_s=(0.0, 3.0, -1.0))
     told = latest(peer, "OPEN_DRONE_ID_LOCATION")
     assert (told.status, told.direction, told.speed_horizontal, told.speed_vertical) == (1, 9000, 300, 100)
@@ -182,7 +182,7 @@ def test_remote_identification_tells_place_speed_and_emergency(autopilot, peer):
     assert latest(peer, "OPEN_DRONE_ID_SYSTEM").operator_latitude == 473977420
 
 
-def test_motors_are_told_in_three_more_ways(autopilot, peer, airframe):
+def test_motors_are_in_three_more_messages(autopilot, peer, airframe):
     speed = airframe.motor.max_speed_rad_s / 2
     autopilot.output, autopilot.status.armed = MotorOutput((speed,) * 4), True
     autopilot.battery.current_a = 20.0
@@ -195,7 +195,7 @@ def test_motors_are_told_in_three_more_ways(autopilot, peer, airframe):
     assert (info.count, info.info) == (4, 15)
 
 
-def test_nothing_is_claimed_before_a_position_is_known(autopilot, peer):
+def test_no_position_is_sent_before_one_is_known(autopilot, peer):
     autopilot.status, autopilot.place = VehicleStatus(), None
     names = {message.get_type() for _, message in peer.advance(2.5)}
     assert not names & {"GLOBAL_POSITION_INT", "LOCAL_POSITION_NED", "HOME_POSITION", "ODOMETRY", "VFR_HUD"}
@@ -265,14 +265,14 @@ def test_a_state_that_is_not_finite_ends_nothing(autopilot, peer):
 
 
 @pytest.mark.parametrize(("place", "name"), [("origin", "GPS_GLOBAL_ORIGIN"), ("home", "HOME_POSITION")])
-def test_origin_and_home_are_told_when_they_change(autopilot, peer, place, name):
+def test_origin_and_home_are_sent_when_they_change(autopilot, peer, place, name):
     setattr(autopilot.status, place, GeodeticPoint(10.0, 20.0, 30.0))
     told = [(on, m) for on, m in peer.advance(0.1) if m.get_type() == name]
     assert [on for on, _ in told] == ["onboard", "ground"]
     assert told[0][1].latitude == 100000000
 
 
-def test_date_only_when_told(autopilot, peer, make_peer):
+def test_the_date_is_zero_until_it_is_set(autopilot, peer, make_peer):
     assert latest(peer, "SYSTEM_TIME").time_unix_usec == 0
     told = make_peer(autopilot, node_options={"boot_unix_us": 1_700_000_000_000_000})
     date = latest(told, "SYSTEM_TIME")
@@ -302,3 +302,11 @@ def test_every_source_names_its_own_message(autopilot, peer):
     }
     assert len(made) > 35
     assert all(message_id == made_id for message_id, made_id in made.items())
+
+
+@pytest.mark.parametrize(("system", "heard"), [(1, True), (2, False)])
+def test_the_origin_can_be_set(autopilot, peer, system, heard):
+    peer.send(mavlink.MAVLink_set_gps_global_origin_message(system, 473977420, 85455940, 488000))
+    assert bool(autopilot.calls) == heard
+    if heard:
+        assert autopilot.calls[0][1].altitude_m == 488.0

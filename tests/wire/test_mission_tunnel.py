@@ -1,4 +1,4 @@
-"""What a mission tells survives as bytes, and bytes of any kind do no harm."""
+"""A mission's reports are decoded as encoded, and invalid bytes are refused."""
 
 import json
 import struct
@@ -10,11 +10,15 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from wire.mission_codec import (
+from wire.mission_tunnel import (
     MAX_DOCUMENT_BYTES,
     MAX_PIECES,
     PIECE_BYTES,
+    UNSEEN,
     DocumentAssembler,
+    DocumentKind,
+    MissionDetections,
+    MissionState,
     PayloadError,
     decode_detections,
     decode_state,
@@ -22,7 +26,6 @@ from wire.mission_codec import (
     encode_state,
     split_document,
 )
-from wire.mission_messages import UNSEEN, DocumentKind, MissionDetections, MissionState
 
 MISSION, HISTORY, RESULT = DocumentKind
 TUNNEL_BYTES = 128
@@ -68,7 +71,7 @@ STATE = MissionState(7, 3, 2, 10, 5, True, False, False, (0.0,) * 4, (0.0,) * 4)
 
 
 def joined(assembler, pieces):
-    """What an assembler makes of pieces, without those that complete nothing."""
+    """The documents that an assembler makes of pieces."""
     return [document for piece in pieces if (document := assembler.take(piece)) is not None]
 
 
@@ -78,7 +81,7 @@ def piece(packed, kind=MISSION, crc=None, index=0, count=1, version=1):
 
 
 def incompressible(count):
-    """An object whose JSON hardly shrinks."""
+    """An object whose JSON cannot be compressed well."""
     state, letters = 1, []
     for _ in range(count):
         state = state * 6364136223846793005 % 2**64 + 1442695040888963407 & 2**64 - 1
@@ -87,7 +90,7 @@ def incompressible(count):
 
 
 @given(states)
-def test_a_state_comes_back(state):
+def test_a_state_is_decoded_as_encoded(state):
     payload = encode_state(state)
     assert len(payload) <= TUNNEL_BYTES
     assert decode_state(payload) == state
@@ -100,7 +103,7 @@ def test_detections_come_back(seen):
     assert decode_detections(payload) == seen
 
 
-def test_what_was_not_seen_comes_back_as_that():
+def test_an_unseen_box_is_decoded_as_unseen():
     back = decode_detections(encode_detections(MissionDetections(None, 320, 240)))
     assert (back.red, back.time_us) == (UNSEEN, None)
 
@@ -130,7 +133,7 @@ def test_a_value_without_room_is_refused(change):
 
 
 @given(kinds, objects)
-def test_a_document_comes_back_once(kind, content):
+def test_a_document_is_returned_once(kind, content):
     crc, pieces = split_document(kind, content)
     assert all(len(payload) <= PIECE_BYTES + 8 for payload in pieces)
     assembler = DocumentAssembler()
@@ -179,12 +182,12 @@ def test_a_newer_document_drops_the_half_received_one():
 @pytest.mark.parametrize(
     ("content", "words"),
     [
-        ({"text": "x" * MAX_DOCUMENT_BYTES}, f"1000011 bytes; at most {MAX_DOCUMENT_BYTES}"),
-        (incompressible(60_000), f"pieces; at most {MAX_PIECES}"),
+        ({"text": "x" * MAX_DOCUMENT_BYTES}, f"1000011 bytes; the limit is {MAX_DOCUMENT_BYTES}"),
+        (incompressible(60_000), f"pieces; the limit is {MAX_PIECES}"),
         ({"value": object()}, "cannot be written as JSON"),
     ],
 )
-def test_what_cannot_be_told_is_refused_in_one_line(content, words):
+def test_an_invalid_document_is_refused_in_one_line(content, words):
     with pytest.raises(PayloadError, match=words) as caught:
         split_document(RESULT, content)
     assert "\n" not in str(caught.value)
@@ -195,7 +198,7 @@ def test_what_cannot_be_told_is_refused_in_one_line(content, words):
     ("payload", "words"),
     [
         (b"", "piece of a document: 0 bytes"),
-        (piece(b"x", version=2), "version 2; this program knows 1"),
+        (piece(b"x", version=2), "version 2; this program reads 1"),
         (piece(b"x", kind=9), "kind 9 is not known"),
         (piece(b"x", index=1), "index 1 of 1"),
         (piece(b"x", index=0, count=0), "index 0 of 0"),
@@ -242,7 +245,7 @@ def test_a_damaged_document_is_received_when_it_is_repeated():
 
 @pytest.mark.parametrize("decode", [decode_state, decode_detections])
 def test_another_version_or_length_is_refused(decode):
-    with pytest.raises(PayloadError, match="version 2; this program knows 1, update the older one"):
+    with pytest.raises(PayloadError, match="version 2; this program reads 1, update the older one"):
         decode(bytes([2]) * 90)
     for payload in (b"", b"\1", bytes([1]) * 57, bytes([1]) * 86):
         with pytest.raises(PayloadError, match=r"bytes; .* expected"):

@@ -1,6 +1,6 @@
 import pytest
 
-from wire.schedule import Schedule
+from wire.link import Schedule
 
 
 def counted(schedule, seconds, step_us=4000):
@@ -43,7 +43,7 @@ def test_intervals_change_turn_off_and_return_to_default():
 
 
 @pytest.mark.parametrize("requested_us", [0, 4_000, 12_000, 16_000, 123_456_000])
-def test_a_requested_stream_is_on_the_same_grid_whenever_it_was_asked_for(requested_us):
+def test_a_requested_stream_is_on_the_same_grid_whenever_it_was_requested(requested_us):
     schedule = Schedule({})
     schedule.set_interval(7, 20_000, requested_us)
     sent = [t for t in range(requested_us, requested_us + 400_000, 4_000) if schedule.due(t)]

@@ -41,7 +41,7 @@ def test_targets(autopilot, peer, to, taken):
         (target(frame=99), "SET_POSITION_TARGET_LOCAL_NED coordinate frame 99 unsupported"),
     ],
 )
-def test_a_refused_one_is_no_setpoint_and_is_said_once_a_second(autopilot, peer, message, text):
+def test_a_refusal_is_no_setpoint_and_is_reported_once_a_second(autopilot, peer, message, text):
     for _ in range(60):  # three seconds at 20 Hz
         peer.send(message)
         peer.time_us += 50_000

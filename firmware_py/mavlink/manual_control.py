@@ -1,12 +1,11 @@
-"""A pilot's sticks: MANUAL_CONTROL, RC_CHANNELS_OVERRIDE, and RC_CHANNELS, which tells the latter again."""
+"""A pilot's sticks: MANUAL_CONTROL, RC_CHANNELS_OVERRIDE, and RC_CHANNELS with the latter's channels."""
 
 from __future__ import annotations
 
 from firmware_py.autopilot import Autopilot
-from firmware_py.mavlink.scaling import boot_ms
 from firmware_py.mavlink.service import Service
 from firmware_py.types import ManualInput
-from wire.dialect import BROADCAST, Message, mavlink
+from wire.dialect import BROADCAST, Message, boot_ms, mavlink
 from wire.exchange import Exchange
 from wire.link import Link
 
@@ -21,13 +20,13 @@ _STALE_US = 500_000  # COM_RC_LOSS_T's default
 
 
 class ManualControlService(Service):
-    """Takes sticks to the autopilot; tells a remote control's channels, and nothing without one, as PX4."""
+    """Passes sticks to the autopilot; streams a remote control's channels, if there is one, as PX4."""
 
     def __init__(self, autopilot: Autopilot, exchange: Exchange) -> None:
         self._autopilot = autopilot
         self._exchange = exchange
         self._pulses_us: list[int] = []  # of the channels that are given, from the first on
-        self._channels_heard_us = -_STALE_US
+        self._channels_received_us = -_STALE_US
         self.handlers = {
             mavlink.MAVLINK_MSG_ID_MANUAL_CONTROL: self._manual_control,
             mavlink.MAVLINK_MSG_ID_RC_CHANNELS_OVERRIDE: self._channels_override,
@@ -36,7 +35,7 @@ class ManualControlService(Service):
 
     def _manual_control(self, _link: Link, message: Message) -> None:
         """Sticks of a joystick. A value out of range is a stick that is not moved, as in PX4."""
-        if not self._is_ours(message.target) or self._mode() in (_RC_ONLY, _DISABLED):
+        if not self._is_target(message.target) or self._mode() in (_RC_ONLY, _DISABLED):
             return
         self._autopilot.manual_input(
             ManualInput(
@@ -50,7 +49,7 @@ class ManualControlService(Service):
 
     def _channels_override(self, _link: Link, message: Message) -> None:
         """Channels of a remote control: 1 to 4 are roll, pitch, throttle, yaw (RC_MAP_*'s order here)."""
-        if not self._is_ours(message.target_system):
+        if not self._is_target(message.target_system):
             return
         pulses = [getattr(message, f"chan{number}_raw") for number in range(1, _CHANNELS + 1)]
         sticks = pulses[:4]
@@ -63,22 +62,19 @@ class ManualControlService(Service):
         count = max((place for place, pulse in enumerate(pulses, 1) if pulse not in _NOT_GIVEN), default=0)
         if count:
             self._pulses_us = pulses[:count]
-            self._channels_heard_us = self._exchange.time_us
+            self._channels_received_us = self._exchange.time_us
 
     def _rc_channels(self) -> Message | None:
-        if self._exchange.time_us - self._channels_heard_us >= _STALE_US:
+        if self._exchange.time_us - self._channels_received_us >= _STALE_US:
             return None
         count = len(self._pulses_us)
+        unused = [0xFFFF] * (_CHANNELS - count)
         return mavlink.MAVLink_rc_channels_message(
-            boot_ms(self._channels_heard_us),
-            count,
-            *self._pulses_us,
-            *[0xFFFF] * (_CHANNELS - count),
-            _UNKNOWN_RSSI,
+            boot_ms(self._channels_received_us), count, *self._pulses_us, *unused, _UNKNOWN_RSSI
         )
 
-    def _is_ours(self, target: int) -> bool:
-        return target in (BROADCAST, self._exchange.system_id)
+    def _is_target(self, system_id: int) -> bool:
+        return system_id in (BROADCAST, self._exchange.system_id)
 
     def _mode(self) -> int:
         return self._autopilot.parameters.integer("COM_RC_IN_MODE")

@@ -98,7 +98,7 @@ def test_silence_as_px4(autopilot, peer, question):
     assert autopilot.parameters.version == 0
 
 
-def test_a_change_is_kept_and_told_on_all_links(autopilot, peer):
+def test_a_change_is_kept_and_broadcast(autopilot, peer):
     peer.send(set_(TAKEOFF_ALTITUDE, 1.5))
     received = peer.take()
     assert autopilot.parameters.value("MIS_TAKEOFF_ALT") == 1.5
@@ -136,12 +136,12 @@ def test_what_cannot_be_is_answered_with_what_is_kept_and_a_reason(autopilot, pe
     assert said.text.startswith(f"Parameter refused: {name.decode()}: ")
 
 
-def test_a_change_by_the_vehicle_itself_is_told_too(autopilot, peer):
+def test_a_change_by_the_vehicle_is_broadcast_too(autopilot, peer):
     autopilot.parameters.set("COM_OF_LOSS_T", 0.5)
     assert [m.param_value for m in values(peer.take(), "ground")] == [0.5]
 
 
-def test_a_refusal_repeated_is_said_once_but_answered_each_time(autopilot, peer):
+def test_a_repeated_refusal_is_reported_once_but_answered_each_time(autopilot, peer):
     bad = set_(TAKEOFF_ALTITUDE, -1.0)
     assert [len(peer.ask(bad)) for _ in range(6)] == [1] * 6
     assert [said.severity for said in autopilot.texts] == [4]
@@ -217,14 +217,14 @@ def test_what_needs_nothing_done_is_accepted(autopilot, storage, action):
     assert autopilot.parameters.changed() == {"MIS_TAKEOFF_ALT": 7.0}
 
 
-def test_saving_asks_who_keeps_them(autopilot, storage):
+def test_saving_calls_the_storage(autopilot, storage):
     asked = []
     autopilot.parameters.on_save(lambda: asked.append(True))
     assert storage(1.0) == [CommandResult.ACCEPTED]
     assert asked == [True]
 
 
-def test_saving_without_a_file_fails_in_words(autopilot, storage):
+def test_saving_without_a_file_fails_with_a_text(autopilot, storage):
     assert storage(1.0) == [CommandResult.FAILED]
     (said,) = autopilot.texts
     assert said.text == "Parameters are not saved: start it with --parameters FILE"

@@ -1,7 +1,7 @@
-"""Offboard setpoints: positions, velocities, accelerations, attitudes, rates, motors; and a target to follow.
+"""Offboard setpoints (position, velocity, acceleration, attitude, rates, motors) and a target to follow.
 
-The rules are in `firmware_py.offboard_requests`. Differences from PX4: the same refusal is said once a
-second at most, not with every packet; SET_ACTUATOR_CONTROL_TARGET, which PX4 1.17 no longer knows, is flown.
+The rules are in `firmware_py.offboard_requests`. Differences from PX4: the same refusal is reported once a
+second at most, not with every packet; SET_ACTUATOR_CONTROL_TARGET, which PX4 1.17 has removed, is flown.
 """
 
 from __future__ import annotations
@@ -25,14 +25,14 @@ from wire.dialect import Message, mavlink
 from wire.exchange import Exchange
 from wire.link import Link
 
-_SAY_AGAIN_US = 1_000_000
+_REPEAT_TEXT_US = 1_000_000
 _ALTITUDES = {
     mavlink.MAV_FRAME_GLOBAL: False,
     mavlink.MAV_FRAME_GLOBAL_INT: False,
     mavlink.MAV_FRAME_GLOBAL_RELATIVE_ALT: True,
     mavlink.MAV_FRAME_GLOBAL_RELATIVE_ALT_INT: True,
 }
-_PLACE = TargetMask.X | TargetMask.Y | TargetMask.Z
+_POSITION = TargetMask.X | TargetMask.Y | TargetMask.Z
 _NO_ATTITUDE = mavlink.ATTITUDE_TARGET_TYPEMASK_ATTITUDE_IGNORE
 _NO_RATES = (
     mavlink.ATTITUDE_TARGET_TYPEMASK_BODY_ROLL_RATE_IGNORE
@@ -45,12 +45,12 @@ _HAS_VELOCITY = 1 << 1  # est_capabilities of FOLLOW_TARGET
 
 
 class OffboardService(Service):
-    """Takes setpoints to the autopilot, refusals to people."""
+    """Passes setpoints to the autopilot and reports refusals as texts."""
 
     def __init__(self, autopilot: Autopilot, exchange: Exchange) -> None:
         self._autopilot = autopilot
         self._exchange = exchange
-        self._said_us: dict[str, int] = {}  # one key for each frame number and some more: bounded
+        self._refused_us: dict[str, int] = {}  # by text: one for each frame number and some more
         self.handlers = {
             mavlink.MAVLINK_MSG_ID_SET_POSITION_TARGET_LOCAL_NED: self._local,
             mavlink.MAVLINK_MSG_ID_SET_POSITION_TARGET_GLOBAL_INT: self._global,
@@ -65,7 +65,7 @@ class OffboardService(Service):
             self._take(self._from_target(message, message.coordinate_frame, position))
 
     def _global(self, _link: Link, message: Message) -> None:
-        """As the local one, with the place on Earth; all of it or none, as in PX4."""
+        """As `_local`, with latitude, longitude and altitude; all of them or none, as in PX4."""
         if not self._exchange.is_for_us(message, or_everyone=True):
             return
         relative = _ALTITUDES.get(message.coordinate_frame)
@@ -75,9 +75,9 @@ class OffboardService(Service):
             self._take(SetpointRefusal(text))
             return
         position: Vec3 | None = NAN3
-        if not message.type_mask & _PLACE:
-            position = self._place(message, relative=relative)
-        if position is not None:  # without a home no height above it: no setpoint, as in PX4
+        if not message.type_mask & _POSITION:
+            position = self._local_position(message, relative=relative)
+        if position is not None:  # PX4 takes no setpoint relative to an unknown home either
             self._take(self._from_target(message, mavlink.MAV_FRAME_LOCAL_NED, position))
 
     def _attitude(self, _link: Link, message: Message) -> None:
@@ -112,9 +112,9 @@ class OffboardService(Service):
         if isinstance(request, Setpoint):
             self._autopilot.accept_setpoint(request)
             return
-        said_us = self._said_us.get(request.text)
-        if said_us is None or self._exchange.time_us - said_us >= _SAY_AGAIN_US:
-            self._said_us[request.text] = self._exchange.time_us
+        refused_us = self._refused_us.get(request.text)
+        if refused_us is None or self._exchange.time_us - refused_us >= _REPEAT_TEXT_US:
+            self._refused_us[request.text] = self._exchange.time_us
             self._autopilot.say(mavlink.MAV_SEVERITY_CRITICAL, request.text)
 
     def _from_target(self, message: Message, frame: int, position_m: Vec3) -> Setpoint | SetpointRefusal:
@@ -129,8 +129,8 @@ class OffboardService(Service):
         )
         return setpoint_from_target(target, self._autopilot.state, self._exchange.time_us)
 
-    def _place(self, message: Message, *, relative: bool) -> Vec3 | None:
-        """The place of a global target in the local frame; None when it cannot be known."""
+    def _local_position(self, message: Message, *, relative: bool) -> Vec3 | None:
+        """The position of a global target in the local frame; None when it is not known."""
         home = self._autopilot.status.home
         altitude_m = message.alt
         if relative:
@@ -144,11 +144,13 @@ class OffboardService(Service):
         )
 
     def _follow_target(self, _link: Link, message: Message) -> None:
-        """A report of the target; one that is no place on Earth, or not finite, is dropped."""
-        point = GeodeticPoint(message.lat / 1e7, message.lon / 1e7, message.alt)
-        place = self._autopilot.local_position(point)
-        if place is None:
+        """The target's position; one that is not on Earth, or not finite, is dropped."""
+        position = self._autopilot.local_position(
+            GeodeticPoint(message.lat / 1e7, message.lon / 1e7, message.alt)
+        )
+        if position is None:
             return
         north_m_s, east_m_s, down_m_s = (float(component) for component in message.vel)
         moves = message.est_capabilities & _HAS_VELOCITY and isfinite(north_m_s + east_m_s + down_m_s)
-        self._autopilot.follow_target(place, (north_m_s, east_m_s, down_m_s) if moves else (0.0, 0.0, 0.0))
+        velocity = (north_m_s, east_m_s, down_m_s) if moves else (0.0, 0.0, 0.0)
+        self._autopilot.follow_target(position, velocity)

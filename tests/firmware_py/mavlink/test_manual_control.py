@@ -51,7 +51,7 @@ def test_a_channel_that_is_not_given_is_no_pilot(autopilot, peer, pulse):
     ("mode", "joystick_heard", "channels_heard"),
     [(0, False, True), (1, True, False), (2, True, True), (3, True, True), (4, False, False)],
 )
-def test_a_parameter_says_which_sticks_count(autopilot, peer, mode, joystick_heard, channels_heard):
+def test_a_parameter_selects_the_source_of_sticks(autopilot, peer, mode, joystick_heard, channels_heard):
     autopilot.parameters.set("COM_RC_IN_MODE", mode)
     peer.send(joystick())
     assert bool(autopilot.calls) == joystick_heard
@@ -60,7 +60,7 @@ def test_a_parameter_says_which_sticks_count(autopilot, peer, mode, joystick_hea
     assert bool(autopilot.calls) == channels_heard
 
 
-def test_channels_of_a_remote_control_are_told_while_they_come(peer):
+def test_channels_of_a_remote_control_are_streamed_while_they_are_received(peer):
     peer.send(channels(1500, 1600, 1100, 1400, 2000))
     told = [m for on, m in peer.advance(0.4) if on == "ground" and m.get_type() == "RC_CHANNELS"]
     assert len(told) >= 7
@@ -77,6 +77,6 @@ def test_channels_of_a_remote_control_are_told_while_they_come(peer):
 @pytest.mark.parametrize(
     "message", [channels(*[1500] * 8, target=2), channels(*[0] * 8), channels(*[65535] * 8)]
 )
-def test_channels_of_others_or_released_are_not_told(peer, message):
+def test_channels_of_others_or_released_are_not_streamed(peer, message):
     peer.send(message)
     assert "RC_CHANNELS" not in {m.get_type() for _, m in peer.advance(0.5)}

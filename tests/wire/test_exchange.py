@@ -1,10 +1,9 @@
-"""What comes in on one link goes on to another."""
+"""Packets received on one link are forwarded to another."""
 
 import pytest
 
 from wire.dialect import mavlink
-from wire.exchange import Exchange
-from wire.forwarding import _CAPACITY, Router
+from wire.exchange import _CAPACITY, Exchange, Router
 from wire.link import LinkProfile
 
 OTHERS = (245, 191)
@@ -12,7 +11,7 @@ STATION = (255, 190)
 
 
 class Party:
-    """Several clients of one system, each with its own ids and link; knows what bytes came to each link."""
+    """Several clients of one system, each with its own ids and link; keeps the bytes sent on each link."""
 
     def __init__(self):
         self.exchange = Exchange(1)
@@ -41,7 +40,7 @@ class Party:
 
 @pytest.fixture
 def party():
-    """The app on the onboard link and a ground station on the ground link, both heard."""
+    """The app on the onboard link and a ground station on the ground link; both have sent a heartbeat."""
     party = Party()
     party.heartbeat(OTHERS, "onboard")
     party.heartbeat(STATION, "ground")
@@ -60,12 +59,12 @@ def test_heartbeats_of_each_appear_on_the_other_link_unchanged(party):
     assert data in party.arrived("ground")
 
 
-def test_nothing_goes_back_where_it_came_from(party):
+def test_nothing_is_forwarded_back(party):
     data = party.heartbeat(STATION, "ground")
     assert data not in party.arrived("ground")
 
 
-def test_nothing_goes_where_nobody_was_heard():
+def test_nothing_is_forwarded_where_no_component_was_heard():
     party = Party()
     data = party.heartbeat(STATION, "ground")
     assert data not in party.arrived("onboard")
@@ -75,12 +74,12 @@ def test_nothing_goes_where_nobody_was_heard():
     ("target", "goes"),
     [(OTHERS, True), ((245, 0), True), ((245, 55), False), ((7, 1), False), ((1, 1), False), ((0, 0), True)],
 )
-def test_a_message_with_a_target_goes_where_that_was_heard(party, target, goes):
+def test_a_message_with_a_target_is_forwarded_where_that_was_heard(party, target, goes):
     data = party.send(STATION, "ground", long_to(*target))
     assert (data in party.arrived("onboard")) is goes
 
 
-def test_an_unknown_message_goes_on_as_it_is(party):
+def test_an_unknown_message_is_forwarded_unchanged(party):
     packer = mavlink.MAVLink(None, *STATION)
     data = bytearray(mavlink.MAVLink_heartbeat_message(6, 8, 0, 0, 4, 3).pack(packer))
     data[7:10] = (59_999).to_bytes(3, "little")
@@ -88,14 +87,14 @@ def test_an_unknown_message_goes_on_as_it_is(party):
     assert bytes(data) in party.arrived("onboard")
 
 
-def test_mavlink_1_goes_on_as_it_is(party):
+def test_mavlink_1_is_forwarded_unchanged(party):
     message = mavlink.MAVLink_heartbeat_message(6, 8, 0, 0, 4, 3)
     data = party.send(STATION, "ground", message, force_mavlink1=True)
     assert data[0] == 0xFE
     assert data in party.arrived("onboard")
 
 
-def test_a_malformed_packet_goes_nowhere(party):
+def test_a_malformed_packet_is_not_forwarded(party):
     packer = mavlink.MAVLink(None, *STATION)
     data = bytearray(mavlink.MAVLink_heartbeat_message(6, 8, 0, 0, 4, 3).pack(packer))
     data[-1] ^= 0xFF
@@ -104,7 +103,7 @@ def test_a_malformed_packet_goes_nowhere(party):
     assert party.arrived("onboard") == b""
 
 
-def test_what_claims_to_be_from_us_goes_nowhere(party):
+def test_a_packet_with_our_ids_is_not_forwarded(party):
     data = party.heartbeat((1, 1), "ground")
     assert data not in party.arrived("onboard")
 
@@ -122,17 +121,17 @@ def test_the_silent_are_forgotten(party):
     assert data not in party.arrived("onboard")
 
 
-def test_a_link_that_is_gone_gets_nothing(party):
+def test_a_removed_link_gets_nothing(party):
     party.exchange.remove_link("onboard")
     party.heartbeat(STATION, "ground")
     assert party.arrived("onboard") == b""
 
 
-def test_the_table_is_bounded_and_the_longest_silent_goes_first():
+def test_the_table_is_bounded_and_drops_the_longest_silent_first():
     router = Router(lambda system, component: False)
     heartbeat = mavlink.MAVLink_heartbeat_message(6, 8, 0, 0, 4, 3)
-    router.hear("a", (2, 1), 0)
+    router.note("a", (2, 1), 0)
     for number in range(10 * _CAPACITY):
-        router.hear("b", (3 + number % 200, number // 200), 1 + number)
-    assert len(router._heard_us) == _CAPACITY
+        router.note("b", (3 + number % 200, number // 200), 1 + number)
+    assert len(router._received_us) == _CAPACITY
     assert router.destinations("b", (9, 9), heartbeat, 1000) == []

@@ -59,7 +59,7 @@ def test_silence(autopilot, peer, question):
     assert autopilot.parameters.version == 0
 
 
-def test_a_set_is_acknowledged_and_told_to_all(autopilot, peer):
+def test_a_set_is_acknowledged_and_broadcast(autopilot, peer):
     peer.send(set_(b"COM_OBL_RC_ACT", 4, INT32))
     received = peer.take()
     (answer,) = [m for _, m in received if m.get_type() == "PARAM_EXT_ACK"]
@@ -76,7 +76,7 @@ def test_a_set_is_acknowledged_and_told_to_all(autopilot, peer):
         (set_(b"SYS_AUTOSTART", 10040, INT32), 4001),
     ],
 )
-def test_what_cannot_be_is_answered_with_what_is_kept(autopilot, peer, question, kept):
+def test_an_invalid_value_is_answered_with_the_kept_one(autopilot, peer, question, kept):
     (answer,) = peer.ask(question)
     assert answer.param_result == UNSUPPORTED
     assert value_of(answer) == kept

@@ -1,1 +1,0 @@
-"""What the drone is to fly now: offboard setpoints and a pilot's sticks."""
