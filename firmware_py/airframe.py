@@ -15,7 +15,6 @@ import yaml
 from pydantic import BaseModel, ConfigDict, Field, StringConstraints, ValidationError, model_validator
 
 from errors import UserError
-from firmware_py.control.weights import Weights
 from geometry.vectors import Vec3
 
 GRAVITY_M_S2 = 9.80665
@@ -80,7 +79,7 @@ class Battery(_Part):
 
 
 class Limits(_Part):
-    """What the stabiliser never asks for more of."""
+    """Limits of the stabiliser's commands."""
 
     tilt_rad: float = Field(0.52, gt=0, lt=1.3)
     roll_pitch_rate_rad_s: float = Field(4.0, gt=0)
@@ -88,6 +87,28 @@ class Limits(_Part):
     speed_horizontal_m_s: float = Field(2.0, gt=0)
     speed_up_m_s: float = Field(1.5, gt=0)
     speed_down_m_s: float = Field(1.0, gt=0)
+
+
+class Weights(_Part):
+    """Tuning of the regulator (Bryson's rule: each weight is 1 / value^2) and of its disturbance observer.
+
+    Weights of torque and thrust are in units of angular and linear acceleration, so the same numbers suit
+    airframes of any size.
+    """
+
+    tilt_rad: float = Field(0.6, gt=0)
+    roll_pitch_rate_rad_s: float = Field(4.0, gt=0)
+    yaw_rate_rad_s: float = Field(0.5, gt=0)
+    velocity_horizontal_m_s: float = Field(0.6, gt=0)
+    velocity_vertical_m_s: float = Field(0.3, gt=0)
+    integral_horizontal_m: float = Field(0.3, gt=0, description="only of the level law")
+    integral_vertical_m: float = Field(0.1, gt=0, description="only of the level law")
+    integral_yaw_rad: float = Field(0.1, gt=0, description="only of the level law")
+    acceleration_vertical_m_s2: float = Field(3.0, gt=0)
+    acceleration_roll_pitch_rad_s2: float = Field(60.0, gt=0)
+    acceleration_yaw_rad_s2: float = Field(6.0, gt=0)
+    observer_force_rad_s: float = Field(2.0, gt=0, description="bandwidth for unknown forces")
+    observer_moment_rad_s: float = Field(4.0, gt=0, description="bandwidth for unknown moments")
 
 
 class Airframe(_Part):
@@ -102,7 +123,7 @@ class Airframe(_Part):
     contact: Contact = Contact()
     limits: Limits = Limits()
     battery: Battery = Battery()
-    stabiliser: Weights = Field(Weights(), description="what its design weighs how much")
+    stabiliser: Weights = Field(Weights(), description="of its design")
     parameters: dict[ParameterName, int | float] = Field(
         default_factory=dict, description="the autopilot's parameters that this airframe starts with"
     )

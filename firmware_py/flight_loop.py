@@ -368,7 +368,7 @@ class FlightLoop:
         self._battery.configure(airframe, parameters)
         if self._stabiliser is not None:
             value, limits = parameters.value, self._stabiliser.limits
-            limits.tilt_rad = radians(value("MPC_TILTMAX_AIR"))
+            limits.limit_tilt(radians(value("MPC_TILTMAX_AIR")))
             limits.rate_rad_s = radians(min(value("MC_ROLLRATE_MAX"), value("MC_PITCHRATE_MAX")))
             limits.min_thrust, limits.max_thrust = value("MPC_THR_MIN"), value("MPC_THR_MAX")
         self._lift_off.configure(parameters)

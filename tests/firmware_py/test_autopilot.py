@@ -9,8 +9,7 @@ from hypothesis import strategies as st
 
 from firmware_py.airframe import load_airframe
 from firmware_py.autopilot import Autopilot
-from firmware_py.commands import VelocityCommand
-from firmware_py.control.limits import FlightLimits
+from firmware_py.commands import FlightLimits, VelocityCommand
 from firmware_py.parameters import Parameters
 from firmware_py.setpoints import TrajectorySetpoint
 from firmware_py.status import CommandResult, FlightMode, LandedState

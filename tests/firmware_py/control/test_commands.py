@@ -63,7 +63,7 @@ def test_tilt_and_yaw_rate_are_held_with_the_vertical_velocity(hover):
 
 def test_a_tilt_asked_for_directly_may_exceed_the_limit_of_velocity_flight():
     hover = Hover(load_airframe("x500"))
-    hover.stabiliser.limits.tilt_rad = radians(20)
+    hover.stabiliser.limits.limit_tilt(radians(20))
     last = hover.fly(1.0, AttitudeCommand(radians(40), 0.0, 0.0, 0.7))[-1]
     assert last.state.roll_rad == pytest.approx(radians(40), abs=0.02)
 

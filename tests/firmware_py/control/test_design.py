@@ -5,8 +5,15 @@ import numpy as np
 import pytest
 
 from firmware_py.airframe import GRAVITY_M_S2, load_airframe
-from firmware_py.control.design import cost_matrices, design, design_bandwidths
-from firmware_py.control.linear_model import allocation, discretise, hover_model, with_integrals
+from firmware_py.control.design import (
+    cost_matrices,
+    design,
+    design_bandwidths,
+    discretise,
+    hover_model,
+    with_integrals,
+)
+from firmware_py.control.mixer import allocation
 
 PERIOD_S = 0.004
 
@@ -18,7 +25,7 @@ def airframe():
 
 def test_gains_agree_with_python_control(airframe):
     a, b = with_integrals(discretise(hover_model(airframe), PERIOD_S), PERIOD_S)
-    q, r = cost_matrices(airframe, airframe.stabiliser)
+    q, r = cost_matrices(airframe)
     expected, _, poles = control.dlqr(a, b, q, r)
     gains = design(airframe, PERIOD_S)
     np.testing.assert_allclose(np.hstack([gains.kx, gains.ki]), expected, rtol=1e-6, atol=1e-9)
@@ -141,7 +148,7 @@ def any_airframe(request):
 
 def test_bandwidths_are_python_controls_regulator_without_integrals(any_airframe):
     model = discretise(hover_model(any_airframe), PERIOD_S)
-    q, r = cost_matrices(any_airframe, any_airframe.stabiliser)
+    q, r = cost_matrices(any_airframe)
     k, _, poles = control.dlqr(model.a, model.b, q[:8, :8], r)
     loops = design_bandwidths(any_airframe, PERIOD_S)
     i_roll, i_pitch, i_yaw = any_airframe.inertia_kg_m2

@@ -6,8 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from firmware_py.airframe import load_airframe
-from firmware_py.control.linear_model import allocation
-from firmware_py.control.mixer import Mixer
+from firmware_py.control.mixer import Mixer, allocation
 
 AIRFRAME = load_airframe("abejorro")
 MIXER = Mixer(AIRFRAME)
