@@ -280,7 +280,7 @@ def braking_speed(distance_m: float, limits: SpeedLimits) -> float:
     Near the target it is proportional, farther away it follows v^2 = 2 a s; where the slopes meet it changes
     over, so that the deceleration never exceeds a.
     """
-    gain, max_m_s2 = limits.position_gain, _BRAKING_SHARE * limits.pace.level_m_s2
+    gain, max_m_s2 = limits.position_gain, _BRAKING_SHARE * limits.acceleration.level_m_s2
     if distance_m * gain * gain <= max_m_s2:
         return gain * distance_m
     return sqrt(2.0 * max_m_s2 * distance_m - (max_m_s2 / gain) ** 2)
