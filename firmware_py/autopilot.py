@@ -4,13 +4,13 @@ from __future__ import annotations
 
 from math import isinf, isnan, nan
 
-from firmware_py.commander_table import BY_HAND, MODE_EVENT, WARNING, Event, State
+from firmware_py.commander_table import BY_HAND, MODE_EVENT, Event, State
 from firmware_py.flight_loop import FlightLoop
 from firmware_py.guidance.orbit import Orbit
 from firmware_py.missions.flight import IssuedCommand
 from firmware_py.setpoints import Setpoint
 from firmware_py.status import CommandResult, FlightMode
-from firmware_py.types import GeodeticPoint, ManualInput
+from firmware_py.types import WARNING, GeodeticPoint, ManualInput
 from geometry.vectors import Vec3
 
 _AUTO_BIT, _OFFBOARD_BIT = 1, 2  # of COM_RC_OVERRIDE
@@ -73,7 +73,7 @@ class Autopilot(FlightLoop):
         """
         breach = self._navigator.breach_at(target_ned_m) if not any(map(isnan, target_ned_m)) else None
         if breach is not None:
-            self.say(WARNING, f"Reposition denied: {breach.text}")
+            self.say(WARNING, f"Reposition denied: {breach}")
             return CommandResult.DENIED
         result = self._handle(Event.SET_HOLD)
         nowhere = self._land_detector.landed and all(map(isnan, target_ned_m))

@@ -12,8 +12,8 @@ from enum import Enum
 from firmware_py import commander_guards as when
 from firmware_py.commander_guards import MANUAL_MODES, Cause, Guard, Reaction, Situation
 from firmware_py.status import CommandResult, FlightMode
+from firmware_py.types import CRITICAL, INFO, WARNING
 
-CRITICAL, WARNING, INFO = 2, 4, 6  # MAV_SEVERITY
 _MANY = 8  # states of a row that the diagram draws as one
 
 

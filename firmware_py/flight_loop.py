@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 from firmware_py.airframe import Airframe
 from firmware_py.battery import BatteryMonitor
 from firmware_py.commander import NOT_CHECKED, Commander, Observation, SlowChecks
-from firmware_py.commander_table import INFO, WARNING, Event, Row, State
+from firmware_py.commander_table import Event, Row, State
 from firmware_py.commands import ControlCommand
 from firmware_py.estimator import Estimator
 from firmware_py.geodesy import GeoReference
@@ -26,6 +26,8 @@ from firmware_py.offboard_requests import SetpointQueue
 from firmware_py.parameters import Parameters
 from firmware_py.status import CommandResult, LandedState, VehicleStatus
 from firmware_py.types import (
+    INFO,
+    WARNING,
     FlightRecord,
     GeodeticPoint,
     MotorOutput,
@@ -350,7 +352,7 @@ class FlightLoop:
         battery.update(self._now_us, sensors.battery_voltage_v, sensors.battery_current_a)
         breach = navigator.breach() if self.status.armed else None
         if breach is not None and not self._checks.fence_breached:
-            self.say(WARNING, breach.text)
+            self.say(WARNING, breach)
         self._texts.extend(navigator.take_texts())
         return SlowChecks(
             battery.state.warning,

@@ -127,9 +127,13 @@ class GeodeticPoint:
     altitude_m: float
 
 
+CRITICAL, WARNING, INFO = 2, 4, 6
+"""MAV_SEVERITY of a `StatusText`."""
+
+
 @dataclass(frozen=True, slots=True)
 class StatusText:
-    """A message to people; severity is MAV_SEVERITY (3 error, 4 warning, 6 info)."""
+    """A message to people, with MAV_SEVERITY."""
 
     severity: int
     text: str

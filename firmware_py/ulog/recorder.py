@@ -12,12 +12,11 @@ from dataclasses import dataclass
 from firmware_py.autopilot import Autopilot
 from firmware_py.mavlink.telemetry.identity import FOLLOWED_PX4_VERSION, OWN_VERSION, packed_version
 from firmware_py.storage import Path, Storage
-from firmware_py.types import StatusText
+from firmware_py.types import WARNING, StatusText
 from firmware_py.ulog import messages
 from firmware_py.ulog.topics import LOGGED, STATUS_TOPIC, Logged, Sample
 
 _FLUSH_US = 1_000_000
-_WARNING = 4
 _LOG_FOLDER: Path = ("log",)
 _GPS_DATA_FORMAT = 2  # vehicle_gps_position in degrees: Flight Review asks
 
@@ -180,7 +179,7 @@ class UlogRecorder:
             self._size = 0
             self._buffer = bytearray(self._definitions(autopilot, autopilot.state.time_us))
         except OSError as error:
-            autopilot.say(_WARNING, f"Logging stopped: {error.strerror or error}")
+            autopilot.say(WARNING, f"Logging stopped: {error.strerror or error}")
             self.path = None
             self._paused = True
 
