@@ -11,6 +11,7 @@ from math import atan2, hypot, inf, isnan, nan, pi, remainder, sqrt, tau
 
 from firmware_py.guidance.limits import VELOCITY_GAIN, AccelerationLimits, SpeedLimits, clamp
 from firmware_py.types import VehicleState
+from geometry.rotations import rotation, to_world
 from geometry.vectors import NAN3, ZERO3, Vec3
 
 _STANDING_M_S = 0.02  # below it, the vehicle is at rest
@@ -44,14 +45,7 @@ class Reference:
         if hypot(*state.velocity_ned_m_s) < _STANDING_M_S:
             self.velocity_ned_m_s = self.acceleration_ned_m_s2 = ZERO3
             return
-        w, x, y, z = state.attitude
-        forward, right, down = state.specific_force_frd_m_s2
-        north_m_s2 = (
-            (1 - 2 * (y * y + z * z)) * forward + 2 * (x * y - w * z) * right + 2 * (x * z + w * y) * down
-        )
-        east_m_s2 = (
-            2 * (x * y + w * z) * forward + (1 - 2 * (x * x + z * z)) * right + 2 * (y * z - w * x) * down
-        )
+        north_m_s2, east_m_s2, _ = to_world(rotation(state.attitude), *state.specific_force_frd_m_s2)
         size_m_s2 = hypot(north_m_s2, east_m_s2)
         share = limits.level_m_s2 / size_m_s2 if size_m_s2 > limits.level_m_s2 else 1.0
         self.acceleration_ned_m_s2 = (share * north_m_s2, share * east_m_s2, 0.0)

@@ -29,8 +29,8 @@ OK, NO = CommandResult.ACCEPTED, CommandResult.TEMPORARILY_REJECTED
 
 FLYING = Situation(
     now_us=NOW,
-    unsound_us=0,
-    sound_us=NOW,
+    unusable_us=0,
+    usable_us=NOW,
     position_us=NOW,
     manual_us=NOW,
     has_mission=True,
@@ -58,7 +58,7 @@ CHOICES = (
 
 def _flights():
     """Combinations of what makes a flight well or ill, the vehicle's own side."""
-    for unsound_us, sound_us, upright_us, airborne_us, flown in product(
+    for unusable_us, usable_us, upright_us, airborne_us, flown in product(
         (LONG_AGO, NOW - 100_000),
         (NOW, LONG_AGO),
         (NOW, NOW - 4000, LONG_AGO),
@@ -67,8 +67,8 @@ def _flights():
     ):
         for entered_us, armed_us, reached in product((NOW, LONG_AGO), (NOW, LONG_AGO), (False, True)):
             yield {
-                "unsound_us": unsound_us,
-                "sound_us": sound_us,
+                "unusable_us": unusable_us,
+                "usable_us": usable_us,
                 "upright_us": upright_us,
                 "airborne_us": airborne_us,
                 "landed": airborne_us < NOW,
@@ -101,7 +101,7 @@ def situations():
         for flight in _flights()
         for intended in (FlightMode.OFFBOARD, FlightMode.LAND)
     ]
-    ordinary = {"now_us": NOW, "sound_us": NOW, "upright_us": NOW, "armed_us": NOW, "entered_us": LONG_AGO}
+    ordinary = {"now_us": NOW, "usable_us": NOW, "upright_us": NOW, "armed_us": NOW, "entered_us": LONG_AGO}
     found += [
         Situation(
             **ordinary, landed=landed, flown=True, **around, choices=choices, cause=cause, follow_up=then
@@ -370,8 +370,8 @@ def test_offboard_is_entered_only_with_setpoints(state):
 @pytest.mark.parametrize(
     ("state", "change", "target", "text"),
     [
-        (State.HOLD, {"sound_us": NOW - 300_001}, State.DISARMED, "Sensors lost: motors stopped"),
-        (State.HOLD, {"sound_us": NOW - 300_000}, None, ""),
+        (State.HOLD, {"usable_us": NOW - 300_001}, State.DISARMED, "Sensors lost: motors stopped"),
+        (State.HOLD, {"usable_us": NOW - 300_000}, None, ""),
         (
             State.LAND,
             {"upright_us": NOW - 300_001},
@@ -432,7 +432,7 @@ def test_what_a_tick_does(state, change, target, text):
 @pytest.mark.parametrize(
     ("change", "text"),
     [
-        ({"unsound_us": NOW - 700_000}, "Arming denied: Resolve system health failures first"),
+        ({"unusable_us": NOW - 700_000}, "Arming denied: Resolve system health failures first"),
         ({"upright_us": NOW - 4000}, "Arming denied: vehicle is tipped over"),
         ({"position_us": LONG_AGO}, "Arming denied: no position estimate"),
         ({"battery_arms": False}, "Arming denied: low battery"),
@@ -510,14 +510,14 @@ def _until(commander, now_us, condition, limit_s=30, **conditions):
 def test_a_lost_ground_station_holds_and_then_returns_with_px4s_timing():
     commander, now_us = _flying_commander()
     commander.configure(Parameters({"NAV_DLL_ACT": 2}))
-    commander.ground_station_heard()
+    commander.note_ground_station()
     held_s = _until(commander, now_us, lambda: commander.state is State.FAILSAFE_HOLD)
     assert held_s == pytest.approx(12.28, abs=0.06)
     assert commander.failsafe
     now_us += round(held_s * 1e6)
     returned_s = _until(commander, now_us, lambda: commander.state is State.FAILSAFE_RETURN)
     assert returned_s == pytest.approx(5.0, abs=0.02)
-    commander.ground_station_heard()  # it does not come back by itself
+    commander.note_ground_station()  # it does not come back by itself
     _ticks(commander, now_us + 5_100_000, 100, landed=False)
     assert commander.state is State.FAILSAFE_RETURN
 
@@ -525,12 +525,12 @@ def test_a_lost_ground_station_holds_and_then_returns_with_px4s_timing():
 def test_a_failsafe_that_was_overruled_comes_again_only_after_it_was_over():
     commander, now_us = _flying_commander()
     commander.configure(Parameters({"NAV_DLL_ACT": 2, "COM_DL_LOSS_T": 5}))
-    commander.ground_station_heard()
+    commander.note_ground_station()
     _until(commander, now_us, lambda: commander.state is State.FAILSAFE_HOLD)
     commander.handle(Event.SET_HOLD)
     now_us = _ticks(commander, commander.situation.now_us + 4000, 500, landed=False)
     assert commander.state is State.HOLD
-    commander.ground_station_heard()
+    commander.note_ground_station()
     _until(commander, now_us, lambda: commander.state is State.FAILSAFE_HOLD)
 
 
@@ -547,7 +547,7 @@ def test_an_emptying_battery_warns_returns_and_lands(level, state):
 
 def test_sticks_that_stop_in_a_manual_mode_hold_and_then_return():
     commander, now_us = _flying_commander()
-    commander.sticks_came()
+    commander.note_manual_input()
     commander.handle(Event.SET_POSITION)
     lost_s = _until(commander, now_us, lambda: commander.state is State.FAILSAFE_HOLD)
     assert lost_s == pytest.approx(0.5, abs=0.05)
@@ -565,7 +565,7 @@ def test_nobody_misses_sticks_that_were_never_there():
 
 def test_a_lost_position_descends():
     commander, now_us = _flying_commander()
-    lost_s = _until(commander, now_us, lambda: commander.state is State.FAILSAFE_DESCEND, placed=False)
+    lost_s = _until(commander, now_us, lambda: commander.state is State.FAILSAFE_DESCEND, has_position=False)
     assert lost_s == pytest.approx(1.0, abs=0.05)
 
 
@@ -580,7 +580,7 @@ def test_a_broken_fence_holds():
 
 
 def _ticks(commander, start_us, count, **conditions):
-    seen = Observation(0, sound=True, placed=True, upright=True, landed=True, target_reached=False)
+    seen = Observation(0, usable=True, has_position=True, upright=True, landed=True, target_reached=False)
     for tick in range(count):
         commander.tick(seen._replace(now_us=start_us + 4000 * tick, **conditions))
     return start_us + 4000 * count
@@ -590,25 +590,25 @@ def test_ready_comes_with_settled_sensors_whenever_they_start():
     for first_us in (0, 3_000_000):
         commander = Commander()
         now_us = _ticks(commander, first_us, 200)
-        assert not commander.ready
+        assert commander.refusal
         _ticks(commander, now_us, 1)
-        assert commander.ready
+        assert not commander.refusal
 
 
 def test_one_bad_sample_starts_the_wait_again():
     commander = Commander()
     now_us = _ticks(commander, 0, 300)
-    assert commander.ready
-    now_us = _ticks(commander, now_us, 1, sound=False)
-    assert not commander.ready
+    assert not commander.refusal
+    now_us = _ticks(commander, now_us, 1, usable=False)
+    assert commander.refusal
     _ticks(commander, now_us, 201)
-    assert commander.ready
+    assert not commander.refusal
 
 
 def test_a_setpoint_from_the_future_does_not_stay_fresh_for_ever():
     commander = Commander()
     now_us = _ticks(commander, 0, 300)
-    commander.setpoint_came(10**12)
+    commander.note_setpoint(10**12)
     assert not when.setpoint_lost(commander.situation)
     _ticks(commander, now_us, 300)
     assert when.setpoint_lost(commander.situation)
