@@ -57,7 +57,7 @@ CHOICES = (
 
 
 def _flights():
-    """Combinations of what makes a flight well or ill, the vehicle's own side."""
+    """Combinations of the vehicle's own conditions."""
     for unusable_us, usable_us, upright_us, airborne_us, flown in product(
         (LONG_AGO, NOW - 100_000),
         (NOW, LONG_AGO),
@@ -80,7 +80,7 @@ def _flights():
 
 
 def _circumstances():
-    """Combinations of what comes from outside."""
+    """Combinations of inputs from outside."""
     for setpoint_us, position_us, manual_us, has_mission, intended in product(
         (NOW, NEVER_US), (NOW, LONG_AGO), (NOW, NEVER_US), (False, True), FlightMode
     ):
@@ -94,7 +94,7 @@ def _circumstances():
 
 
 def situations():
-    """Every flight with an ordinary day around it, and an ordinary flight with everything around it."""
+    """All vehicle conditions with normal inputs, and a normal flight with all inputs."""
     outside = {"setpoint_us": NOW, "position_us": NOW, "manual_us": NOW, "has_mission": True}
     found = [
         Situation(now_us=NOW, **flight, **outside, intended=intended)
@@ -210,7 +210,7 @@ def test_commands_in_flight(state, event, cell):
 
 @pytest.mark.parametrize("mode", MODES)
 @pytest.mark.parametrize("state", State)
-def test_every_mode_can_be_asked_for_in_every_state(state, mode):
+def test_every_mode_can_be_requested_in_every_state(state, mode):
     row = first_match(RULES[state, MODE_EVENT[mode]], FLYING)
     assert row is not None
     if state is State.TERMINATED:
@@ -239,18 +239,18 @@ def test_a_mode_that_cannot_be_flown_is_refused_in_flight(state, mode):
 
 
 @pytest.mark.parametrize("state", State)
-def test_nothing_happens_by_itself_when_all_is_well(state):
+def test_nothing_changes_without_a_cause(state):
     assert first_match(RULES[state, Event.TICK], replace(FLYING)) is None
 
 
 @pytest.mark.parametrize("state", sorted(ARMED - {State.TERMINATED}, key=lambda state: state.value))
-def test_offboard_resumes_from_wherever_its_loss_led(state):
+def test_offboard_resumes_from_every_state_after_the_loss_of_setpoints(state):
     row = first_match(RULES[state, Event.TICK], replace(FLYING, cause=Cause.SETPOINTS))
     assert row is not None
     assert row.target is State.OFFBOARD
 
 
-def test_nothing_resumes_once_the_flight_is_terminated():
+def test_nothing_resumes_after_termination():
     assert first_match(RULES[State.TERMINATED, Event.TICK], replace(FLYING, cause=Cause.SETPOINTS)) is None
 
 
@@ -305,7 +305,7 @@ def test_a_failsafe_never_leads_back_to_a_milder_one(state, event):
         (Reaction.STABILIZED, State.STABILIZED),
     ],
 )
-def test_lost_setpoints_leave_it_to_the_pilot_if_there_is_one(reaction, state):
+def test_lost_setpoints_give_control_to_a_pilot_with_sticks(reaction, state):
     choices = Choices({Cause.SETPOINTS: reaction}, without_sticks=Reaction.LAND)
     row = first_match(RULES[State.OFFBOARD, Event.SETPOINTS_LOST], replace(FLYING, choices=choices))
     assert row is not None
@@ -331,7 +331,7 @@ def test_only_arming_arms_and_only_when_checks_pass():
 
 
 @pytest.mark.parametrize("state", sorted(ARMED, key=lambda state: state.value))
-def test_in_the_air_only_force_or_a_hopeless_failure_stops_the_motors(state):
+def test_in_the_air_only_force_or_a_hard_failure_stops_the_motors(state):
     stopping = [event for event in Event if any(row.target is State.DISARMED for row in RULES[state, event])]
     in_the_air = [now for now in SITUATIONS if not now.landed]
     for event, now in product(stopping, in_the_air):
@@ -346,7 +346,7 @@ def test_in_the_air_only_force_or_a_hopeless_failure_stops_the_motors(state):
 
 
 @pytest.mark.parametrize("state", sorted(ARMED - {State.TERMINATED}, key=lambda state: state.value))
-def test_failsafes_stand_before_all_else(state):
+def test_failsafes_come_first(state):
     for now in SITUATIONS:
         row = first_match(RULES[state, Event.TICK], now)
         if when.sensors_lost(now):
@@ -484,7 +484,7 @@ def test_parameters_set_times_and_choices():
     assert choices.arm_needs_ground_station
 
 
-def test_defaults_return_home_when_setpoints_stop_and_nobody_holds_sticks():
+def test_defaults_return_home_when_setpoints_stop_without_manual_control():
     commander = Commander()
     commander.configure(Parameters())
     assert commander.situation.choices.reaction(Cause.SETPOINTS) is Reaction.RETURN
@@ -522,7 +522,7 @@ def test_a_lost_ground_station_holds_and_then_returns_with_px4s_timing():
     assert commander.state is State.FAILSAFE_RETURN
 
 
-def test_a_failsafe_that_was_overruled_comes_again_only_after_it_was_over():
+def test_a_failsafe_that_was_overridden_acts_again_only_after_its_cause_has_ended():
     commander, now_us = _flying_commander()
     commander.configure(Parameters({"NAV_DLL_ACT": 2, "COM_DL_LOSS_T": 5}))
     commander.note_ground_station()
@@ -537,7 +537,7 @@ def test_a_failsafe_that_was_overruled_comes_again_only_after_it_was_over():
 @pytest.mark.parametrize(
     ("level", "state"), [(2, State.HOLD), (3, State.FAILSAFE_RETURN), (4, State.FAILSAFE_LAND)]
 )
-def test_an_emptying_battery_warns_returns_and_lands(level, state):
+def test_a_discharging_battery_warns_returns_and_lands(level, state):
     commander, now_us = _flying_commander()
     for warning in range(1, level + 1):
         commander.situation.battery_warning = warning
@@ -557,7 +557,7 @@ def test_sticks_that_stop_in_a_manual_mode_hold_and_then_return():
     )
 
 
-def test_nobody_misses_sticks_that_were_never_there():
+def test_sticks_that_were_missing_at_arming_are_not_lost():
     commander, now_us = _flying_commander()
     _ticks(commander, now_us, 1000, landed=False)
     assert commander.state is State.HOLD
@@ -569,7 +569,7 @@ def test_a_lost_position_descends():
     assert lost_s == pytest.approx(1.0, abs=0.05)
 
 
-def test_a_broken_fence_holds():
+def test_a_geofence_breach_holds():
     commander, now_us = _flying_commander()
     commander.situation.fence_breached = True
     _until(commander, now_us, lambda: commander.state is State.FAILSAFE_HOLD, limit_s=0.1)
@@ -586,7 +586,7 @@ def _ticks(commander, start_us, count, **conditions):
     return start_us + 4000 * count
 
 
-def test_ready_comes_with_settled_sensors_whenever_they_start():
+def test_ready_after_usable_samples_for_the_settling_time():
     for first_us in (0, 3_000_000):
         commander = Commander()
         now_us = _ticks(commander, first_us, 200)
@@ -595,7 +595,7 @@ def test_ready_comes_with_settled_sensors_whenever_they_start():
         assert not commander.refusal
 
 
-def test_one_bad_sample_starts_the_wait_again():
+def test_one_unusable_sample_restarts_the_settling_time():
     commander = Commander()
     now_us = _ticks(commander, 0, 300)
     assert not commander.refusal
@@ -614,7 +614,7 @@ def test_a_setpoint_from_the_future_does_not_stay_fresh_for_ever():
     assert when.setpoint_lost(commander.situation)
 
 
-def test_the_diagram_shows_every_state_and_every_way_out_of_offboard():
+def test_the_diagram_shows_every_state_and_every_transition_from_offboard():
     diagram = mermaid()
     assert diagram.startswith("stateDiagram-v2\n")
     for state in State:

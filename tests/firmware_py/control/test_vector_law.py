@@ -65,7 +65,7 @@ def test_to_twelve_metres_a_second_and_back(hover, field, velocity):
     assert radians(43) < max(sample.tilt_rad for sample in faster) < radians(46)
 
 
-def test_diagonal_climb_gives_the_vertical_its_due(hover):
+def test_a_diagonal_climb_keeps_the_vertical_velocity(hover):
     samples = hover.fly(4.0, VelocityCommand((8.0, 4.0, -3.0)))
     assert rise_s(samples, "down_m_s", -3.0) < 0.8
     assert samples[-1].forward_m_s == pytest.approx(8.0, abs=0.05)
@@ -73,7 +73,7 @@ def test_diagonal_climb_gives_the_vertical_its_due(hover):
     assert samples[-1].down_m_s == pytest.approx(-3.0, abs=0.02)
 
 
-def test_a_velocity_in_the_world_is_kept_while_the_nose_turns(hover):
+def test_a_velocity_in_ned_is_kept_while_yawing(hover):
     def eastwards(yaw_rate_rad_s):
         return lambda state: VelocityCommand(
             (12 * sin(state.yaw_rad), 12 * cos(state.yaw_rad), 0.0), yaw_rate_rad_s
@@ -88,7 +88,7 @@ def test_a_velocity_in_the_world_is_kept_while_the_nose_turns(hover):
 
 
 @pytest.mark.parametrize(("speed", "turn_deg_s"), [(5.0, 60.0), (10.0, -30.0)])
-def test_a_velocity_in_turning_axes_turns_with_them(hover, speed, turn_deg_s):
+def test_a_velocity_in_level_axes_turns_with_them(hover, speed, turn_deg_s):
     hover.fly(3.0, VelocityCommand((speed, 0.0, 0.0)))
     turning = hover.fly(5.0, VelocityCommand((speed, 0.0, 0.0), radians(turn_deg_s)))
     assert max(abs(sample.right_m_s) for sample in turning) < 0.9
@@ -96,18 +96,18 @@ def test_a_velocity_in_turning_axes_turns_with_them(hover, speed, turn_deg_s):
     assert turning[-1].right_m_s == pytest.approx(0.0, abs=0.02)
 
 
-def test_an_unknown_force_and_moment_are_learnt_and_then_forgotten(hover):
+def test_an_unknown_force_and_moment_are_learnt_and_unlearnt(hover):
     hover.dynamics.push((4.0, -2.0, -3.0), (0.05, 0.1, 0.02))
     pushed = hover.fly(5.0, VelocityCommand())
     assert hypot(*pushed[-1].state.velocity_ned_m_s) < 0.02
-    assert pushed[-1].tilt_rad > radians(10)  # it leans against the force
+    assert pushed[-1].tilt_rad > radians(10)  # tilted against the force
     hover.dynamics.push((0.0, 0.0, 0.0), (0.0, 0.0, 0.0))
     freed = hover.fly(5.0, VelocityCommand())
     assert hypot(*freed[-1].state.velocity_ned_m_s) < 0.02
     assert freed[-1].tilt_rad < radians(0.5)
 
 
-def test_a_speed_out_of_reach_winds_nothing_up(hover):
+def test_an_unreachable_speed_winds_nothing_up(hover):
     hover.stabiliser.limits.limit_tilt(radians(10))
     cruise = hover.fly(8.0, VelocityCommand((20.0, 0.0, 0.0)))
     assert max(sample.tilt_rad for sample in cruise) < radians(11)
@@ -146,7 +146,7 @@ def learn(observer, push, seconds, *, known=0.0, velocity=0.0):
     return velocity
 
 
-def test_learns_a_constant_push_with_a_double_pole():
+def test_learns_a_constant_disturbance_with_a_double_pole():
     observer = DisturbanceObserver(2.0, PERIOD_S, 10.0)
     learn(observer, 3.0, 1.0)
     expected = 3.0 * (1 - exp(-2.0) * (1 + 2.0))
@@ -155,25 +155,25 @@ def test_learns_a_constant_push_with_a_double_pole():
     assert observer.d[2] == 0.0
 
 
-def test_what_is_known_is_not_learnt():
+def test_an_expected_acceleration_is_not_learnt():
     observer = DisturbanceObserver(2.0, PERIOD_S, 10.0)
     learn(observer, 0.0, 2.0, known=5.0)
     assert observer.d == pytest.approx((0.0, 0.0, 0.0), abs=1e-9)
 
 
-def test_starts_at_any_velocity_without_a_kick():
+def test_starts_at_any_velocity_without_a_jump():
     observer = DisturbanceObserver(2.0, PERIOD_S, 10.0)
     learn(observer, 0.0, 0.1, velocity=12.0)
     assert observer.d == pytest.approx((0.0, 0.0, 0.0), abs=1e-9)
 
 
-def test_keeps_to_its_limit():
+def test_the_estimate_is_limited():
     observer = DisturbanceObserver(2.0, PERIOD_S, 1.0)
     learn(observer, 8.0, 3.0)
     assert observer.d == (1.0, -1.0, 0.0)
 
 
-def test_held_it_learns_nothing_and_forgets_nothing():
+def test_while_held_it_learns_and_forgets_nothing():
     observer = DisturbanceObserver(2.0, PERIOD_S, 10.0)
     velocity = learn(observer, 3.0, 3.0)
     before = observer.d
