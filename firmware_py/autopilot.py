@@ -95,7 +95,7 @@ class Autopilot(FlightLoop):
         return CommandResult.ACCEPTED
 
     def look_at(self, point_ned_m: Vec3 | None) -> CommandResult:
-        """Turn to a place, shape (3,), on the way to targets and in hold; None: no longer."""
+        """Turn to a place, shape (3,), while flying to targets and in hold; None: no longer."""
         self._guidance.look_at(point_ned_m)
         return CommandResult.ACCEPTED
 

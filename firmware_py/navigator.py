@@ -1,4 +1,4 @@
-"""The navigator: gives the legs of the stored mission, checks the fence, and chooses where a return goes."""
+"""The navigator: flies the stored mission by legs, checks the fence, and chooses a return's destination."""
 
 from __future__ import annotations
 
@@ -80,7 +80,7 @@ class Navigator:
         return _breach_text(self._fence.breach_at(position_ned_m, self._view))
 
     def return_place(self) -> Vec3 | None:
-        """Where a return goes from here, NED metres; None before home is known."""
+        """A return's destination from here, NED metres; None before home is known."""
         return return_place(self._view, self._store, self._parameters)
 
     def take_texts(self) -> list[StatusText]:
@@ -104,7 +104,7 @@ def _breach_text(breach: str | None) -> str | None:
 
 
 def return_place(view: View, store: MissionStore, parameters: Parameters) -> Vec3 | None:
-    """Where RTL_TYPE sends the vehicle from here, by PX4's rules, NED metres; None before home is known.
+    """A return's destination by RTL_TYPE and PX4's rules, NED metres; None before home is known.
 
     Heights such as RTL_RETURN_ALT count from there. The types that follow the mission's own path (2 and 4)
     are flown straight: to its landing if it has one, else home.

@@ -46,7 +46,7 @@ class ModeContext:
         trajectory: of automatic modes.
         sticks: a pilot's newest input.
         home_ned_m: heights of return, landing and following count from it, shape (3,).
-        region_ned_m: a place to look at on the way to targets and in hold, shape (3,); None: none.
+        region_ned_m: a place to look at while flying to targets and in hold, shape (3,); None: none.
     """
 
     limits: SpeedLimits

@@ -157,7 +157,7 @@ class Guidance:
         self._follow.follower.report(time_us, position_ned_m, velocity_ned_m_s)
 
     def look_at(self, region_ned_m: Vec3 | None) -> None:
-        """Turn to a place, shape (3,), on the way to targets and in hold; None: no longer."""
+        """Turn to a place, shape (3,), while flying to targets and in hold; None: no longer."""
         self._context.region_ned_m = region_ned_m
 
     def change_speed(self, speed_m_s: float) -> None:

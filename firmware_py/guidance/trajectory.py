@@ -1,6 +1,6 @@
 """Smooth trajectories: a reference point with limited acceleration and jerk, which the vehicle follows.
 
-A mode only gives the velocity that it wants next, or a target. The point's acceleration goes to the
+A mode only gives the next velocity, or a target. The point's acceleration goes to the
 stabiliser as feed-forward and its position corrects the remaining error, so nothing overshoots.
 """
 
@@ -67,7 +67,7 @@ class Reference:
             wanted_ned_m_s: shape (3,).
             limits: of its motion.
             period_s: of control.
-            level_bound: keep a horizontal position of its own; else the vehicle's.
+            level_bound: integrate the horizontal position; else take the vehicle's.
             height_bound: the same for the height.
         """
         (north_m, east_m, down_m), here = self.position_ned_m, state.position_ned_m

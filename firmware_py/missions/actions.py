@@ -94,7 +94,7 @@ class MissionActions:
         self._repeating = False
 
     def perform(self, item: MissionItem, view: View) -> None:
-        """Do what an item says; one that only orders the mission, such as a jump, does nothing."""
+        """Perform an item; one that only controls the order of items, such as a jump, does nothing."""
         command = item.command
         if command in _REGIONS:
             self.region.change(item, view)

@@ -61,7 +61,7 @@ class UlogRecorder:
         self._groups = _by_rate()
         self._due_us = 0
         self._flush_us = 0
-        self._heard: Autopilot | None = None
+        self._recorded: Autopilot | None = None
         self._nav: tuple[object, ...] = ()
 
     def update(self, autopilot: Autopilot) -> None:
@@ -98,14 +98,14 @@ class UlogRecorder:
         if self.path is not None:
             self._buffer += messages.logged_text(time_us, said.severity, said.text)
 
-    def _hear_parameter(self, name: str, value: float) -> None:
-        if self.path is not None and self._heard is not None:
-            self._buffer += messages.parameter(self._heard.parameters.declaration(name), value)
+    def _log_parameter(self, name: str, value: float) -> None:
+        if self.path is not None and self._recorded is not None:
+            self._buffer += messages.parameter(self._recorded.parameters.declaration(name), value)
 
     def _begin(self, autopilot: Autopilot) -> None:
-        if self._heard is None:
-            self._heard = autopilot
-            autopilot.parameters.on_change(self._hear_parameter)
+        if self._recorded is None:
+            self._recorded = autopilot
+            autopilot.parameters.on_change(self._log_parameter)
         time_us = autopilot.state.time_us
         self.path = self._name_log(time_us)
         self._size = 0
