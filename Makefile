@@ -71,7 +71,7 @@ bench: $(VENV)/installed ## time our flight, alone and beside MuJoCo and PyFlyt;
 	$(BIN)/python -m benchmarks $(BENCH)
 
 .PHONY: parameters
-parameters: $(VENV)/installed-dev ## write docs/parameters.md anew from the declarations
+parameters: $(VENV)/installed-dev ## write docs/parameters.md from the declarations
 	$(BIN)/python -m firmware_py.parameters.reference > docs/parameters.md
 
 .PHONY: messages

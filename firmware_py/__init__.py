@@ -1,1 +1,1 @@
-"""The autopilot: sensors in, motor speeds out, MAVLink bytes both ways. No clock, no socket."""
+"""The autopilot: from sensors and MAVLink bytes to motor speeds and MAVLink bytes. No clock, no socket."""

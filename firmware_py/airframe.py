@@ -1,7 +1,7 @@
-"""The airframe: every number of a multicopter, declared once.
+"""The airframe: all numbers of a multicopter, declared once.
 
-The stabiliser designs itself from these numbers and the simulator makes its JSBSim model from them, so a
-new drone is a new YAML file in `firmware_py/airframes/`.
+The stabiliser's gains and the simulator's JSBSim model are computed from them, so a new drone is a new YAML
+file in `firmware_py/airframes/`.
 """
 
 from __future__ import annotations
@@ -15,13 +15,12 @@ import yaml
 from pydantic import BaseModel, ConfigDict, Field, StringConstraints, ValidationError, model_validator
 
 from errors import UserError
-from firmware_py.control.weights import Weights
 from geometry.vectors import Vec3
 
 GRAVITY_M_S2 = 9.80665
 
 ParameterName = Annotated[str, StringConstraints(pattern=r"^[A-Z][A-Z0-9_]{0,15}$")]
-"""A parameter's name as PX4 and MAVLink have them: 16 characters at most."""
+"""A parameter's name, by the limits of PX4 and MAVLink."""
 
 
 class AirframeError(UserError):
@@ -33,10 +32,10 @@ class _Part(BaseModel):
 
 
 class Rotor(_Part):
-    """One rotor: where it is and which way it turns."""
+    """One rotor: its position and direction of rotation."""
 
     position_frd_m: Vec3 = Field(description="hub relative to the centre of mass: forward, right, down")
-    spin: Literal["cw", "ccw"] = Field(description="seen from above; its drag turns the body the other way")
+    spin: Literal["cw", "ccw"] = Field(description="seen from above; the drag torque on the body is opposite")
 
     @property
     def yaw_sign(self) -> float:
@@ -45,7 +44,7 @@ class Rotor(_Part):
 
 
 class Motor(_Part):
-    """What every motor with its propeller does."""
+    """Properties of every motor with its propeller."""
 
     thrust_n_s2: float = Field(gt=0, description="thrust per squared rotor speed, N/(rad/s)^2")
     torque_nm_s2: float = Field(gt=0, description="drag torque per squared rotor speed, N m/(rad/s)^2")
@@ -62,7 +61,7 @@ class Drag(_Part):
 
 
 class Contact(_Part):
-    """How the body touches things: a spring and a damper with friction at each touching point."""
+    """Contact with ground and solids: a spring and a damper with friction at each contact point."""
 
     stiffness_n_m: float = Field(300.0, gt=0)
     damping_n_s_m: float = Field(6.0, ge=0)
@@ -70,17 +69,17 @@ class Contact(_Part):
 
 
 class Battery(_Part):
-    """What feeds the motors."""
+    """The battery."""
 
     cells: int = Field(4, ge=1, le=16, description="in series")
     capacity_mah: float = Field(5000.0, gt=0)
     resistance_ohm: float = Field(0.02, ge=0, description="of the whole battery with its leads")
     efficiency: float = Field(0.75, gt=0, le=1, description="mechanical over electrical power of the motors")
-    electronics_a: float = Field(0.5, ge=0, description="drawn by all but the motors")
+    electronics_a: float = Field(0.5, ge=0, description="current of everything except the motors")
 
 
 class Limits(_Part):
-    """What the stabiliser never asks for more of."""
+    """Limits of the stabiliser's commands."""
 
     tilt_rad: float = Field(0.52, gt=0, lt=1.3)
     roll_pitch_rate_rad_s: float = Field(4.0, gt=0)
@@ -88,6 +87,28 @@ class Limits(_Part):
     speed_horizontal_m_s: float = Field(2.0, gt=0)
     speed_up_m_s: float = Field(1.5, gt=0)
     speed_down_m_s: float = Field(1.0, gt=0)
+
+
+class Weights(_Part):
+    """Tuning of the regulator (Bryson's rule: each weight is 1 / value^2) and of its disturbance observer.
+
+    Weights of torque and thrust are in units of angular and linear acceleration, so the same numbers suit
+    airframes of any size.
+    """
+
+    tilt_rad: float = Field(0.6, gt=0)
+    roll_pitch_rate_rad_s: float = Field(4.0, gt=0)
+    yaw_rate_rad_s: float = Field(0.5, gt=0)
+    velocity_horizontal_m_s: float = Field(0.6, gt=0)
+    velocity_vertical_m_s: float = Field(0.3, gt=0)
+    integral_horizontal_m: float = Field(0.3, gt=0, description="only of the level law")
+    integral_vertical_m: float = Field(0.1, gt=0, description="only of the level law")
+    integral_yaw_rad: float = Field(0.1, gt=0, description="only of the level law")
+    acceleration_vertical_m_s2: float = Field(3.0, gt=0)
+    acceleration_roll_pitch_rad_s2: float = Field(60.0, gt=0)
+    acceleration_yaw_rad_s2: float = Field(6.0, gt=0)
+    observer_force_rad_s: float = Field(2.0, gt=0, description="bandwidth for unknown forces")
+    observer_moment_rad_s: float = Field(4.0, gt=0, description="bandwidth for unknown moments")
 
 
 class Airframe(_Part):
@@ -102,16 +123,16 @@ class Airframe(_Part):
     contact: Contact = Contact()
     limits: Limits = Limits()
     battery: Battery = Battery()
-    stabiliser: Weights = Field(Weights(), description="what its design weighs how much")
+    stabiliser: Weights = Field(Weights(), description="of its design")
     parameters: dict[ParameterName, int | float] = Field(
-        default_factory=dict, description="the autopilot's parameters that this airframe starts with"
+        default_factory=dict, description="defaults of the autopilot's parameters for this airframe"
     )
     envelope_m: Vec3 = Field(description="length, width, height of the box around it, centred on the mass")
 
     @model_validator(mode="after")
     def _can_fly(self) -> Self:
         if self.hover_speed_rad_s >= self.motor.max_speed_rad_s:
-            raise ValueError("motor.max_speed_rad_s: the rotors cannot carry the mass; raise it")
+            raise ValueError("motor.max_speed_rad_s: the rotors cannot carry the mass; increase it")
         if abs(sum(rotor.yaw_sign for rotor in self.rotors)) > 0:
             raise ValueError("rotors: as many must spin cw as ccw, or yaw cannot be balanced")
         return self
@@ -123,12 +144,12 @@ class Airframe(_Part):
 
     @property
     def full_thrust_n(self) -> float:
-        """Thrust of all rotors at their greatest speed."""
+        """Thrust of all rotors at maximum speed."""
         return len(self.rotors) * self.motor.thrust_n_s2 * self.motor.max_speed_rad_s**2
 
     @cached_property
     def hover_speed_rad_s(self) -> float:
-        """Rotor speed at which thrust carries the weight."""
+        """Rotor speed at which the thrust equals the weight."""
         return float((self.weight_n / (len(self.rotors) * self.motor.thrust_n_s2)) ** 0.5)
 
 

@@ -1,40 +1,40 @@
-"""The autopilot as ground stations, apps and pilots see it: the flight loop, and commands to it."""
+"""The autopilot: the flight loop, and the commands of ground stations, apps and pilots to it."""
 
 from __future__ import annotations
 
 from math import isinf, isnan, nan
 
-from firmware_py.commander_table import BY_HAND, MODE_EVENT, WARNING, Event, State
+from firmware_py.commander_table import BY_HAND, MODE_EVENT, Event, State
 from firmware_py.flight_loop import FlightLoop
 from firmware_py.guidance.orbit import Orbit
 from firmware_py.missions.flight import IssuedCommand
 from firmware_py.setpoints import Setpoint
 from firmware_py.status import CommandResult, FlightMode
-from firmware_py.types import GeodeticPoint, ManualInput
+from firmware_py.types import WARNING, GeodeticPoint, ManualInput
 from geometry.vectors import Vec3
 
 _AUTO_BIT, _OFFBOARD_BIT = 1, 2  # of COM_RC_OVERRIDE
 
 
 class Autopilot(FlightLoop):
-    """A whole autopilot for one vehicle: `FlightLoop`, and a method for each thing asked of it."""
+    """The autopilot of one vehicle: `FlightLoop`, and a method for each command."""
 
     def arm(self, *, force: bool = False) -> CommandResult:
-        """Arm, or say in a status text why not. As in PX4, forcing from outside skips no check."""
+        """Arm, or report in a status text why not. As in PX4, a forced command skips no check."""
         del force
         self.prepare()
         return self._handle(Event.ARM)
 
     def disarm(self, *, force: bool = False) -> CommandResult:
-        """Disarm: on the ground, or anywhere at once if forced."""
+        """Disarm: on the ground, or if forced also in the air."""
         return self._handle(Event.FORCE_DISARM if force else Event.DISARM)
 
     def terminate(self) -> CommandResult:
-        """Stop the motors for good, wherever it is; always ACCEPTED."""
+        """Stop the motors until disarmed, also in the air; always ACCEPTED."""
         return self._handle(Event.TERMINATE)
 
     def set_mode(self, mode: FlightMode) -> CommandResult:
-        """Change the mode: disarmed always; armed, to one that can be flown; else a text says why."""
+        """Change the mode; while armed only to one that can be flown, else a status text reports why not."""
         return self._handle(
             MODE_EVENT[mode],
             takeoff_altitude_m=nan if mode is FlightMode.TAKEOFF else None,
@@ -42,11 +42,11 @@ class Autopilot(FlightLoop):
         )
 
     def takeoff(self, altitude_amsl_m: float = nan) -> CommandResult:
-        """Take off and hold; if disarmed, as soon as it is armed.
+        """Take off and hold; if disarmed, after arming.
 
         Args:
-            altitude_amsl_m: metres above mean sea level; NaN: MIS_TAKEOFF_ALT above home. One below the
-                vehicle means to stay at its height.
+            altitude_amsl_m: metres above mean sea level; NaN: MIS_TAKEOFF_ALT above home. The vehicle does
+                not descend to a lower one.
 
         Returns:
             ACCEPTED; DENIED for an infinite altitude.
@@ -57,15 +57,15 @@ class Autopilot(FlightLoop):
         return self._handle(Event.SET_TAKEOFF, takeoff_altitude_m=altitude_amsl_m)
 
     def land(self) -> CommandResult:
-        """Land where it is; always ACCEPTED."""
+        """Land here; always ACCEPTED."""
         return self._handle(Event.SET_LAND)
 
     def reposition(self, target_ned_m: Vec3, yaw_rad: float = nan, speed_m_s: float = nan) -> CommandResult:
         """Fly to a place and hold there.
 
         Args:
-            target_ned_m: in the local frame, shape (3,); NaN components: where it holds, or has braked.
-            yaw_rad: where to look; NaN: along the way.
+            target_ned_m: in the local frame, shape (3,); in NaN components the vehicle brakes and stays.
+            yaw_rad: NaN: by MPC_YAW_MODE.
             speed_m_s: horizontal; NaN: MPC_XY_CRUISE.
 
         Returns:
@@ -73,34 +73,34 @@ class Autopilot(FlightLoop):
         """
         breach = self._navigator.breach_at(target_ned_m) if not any(map(isnan, target_ned_m)) else None
         if breach is not None:
-            self.say(WARNING, f"Reposition denied: {breach.text}")
+            self.say(WARNING, f"Reposition denied: {breach}")
             return CommandResult.DENIED
         result = self._handle(Event.SET_HOLD)
-        nowhere = self._land_detector.landed and all(map(isnan, target_ned_m))
-        if result is CommandResult.ACCEPTED and self.status.armed and not nowhere:
-            self._guidance.fly_to(self.state, target_ned_m, yaw_rad, speed_m_s)  # also from the ground
+        stays_on_ground = self._land_detector.landed and all(map(isnan, target_ned_m))
+        if result is CommandResult.ACCEPTED and self.status.armed and not stays_on_ground:
+            self._guidance.fly_to(self.state, target_ned_m, yaw_rad, speed_m_s)
         return result
 
     def orbit(self, orbit: Orbit) -> CommandResult:
-        """Circle around a point, if that can be flown now."""
+        """Fly an orbit, if that is possible now."""
         return self._handle(Event.SET_ORBIT, orbit=orbit)
 
     def orbit_here(self) -> Orbit:
-        """The circle that is flown when no other was asked for: PX4's, 1 m around where it is."""
+        """The default orbit, PX4's: a radius of 1 m around the present position."""
         return Orbit(self.state.position_ned_m)
 
     def change_speed(self, speed_m_s: float) -> CommandResult:
-        """Fly the present journey at another horizontal speed; NaN: MPC_XY_CRUISE again."""
+        """Fly to the present target at another horizontal speed; NaN: MPC_XY_CRUISE."""
         self._guidance.change_speed(speed_m_s)
         return CommandResult.ACCEPTED
 
     def look_at(self, point_ned_m: Vec3 | None) -> CommandResult:
-        """On journeys and in hold, turn the nose to a place, shape (3,); None: no more."""
+        """Turn to a place, shape (3,), while flying to targets and in hold; None: no longer."""
         self._guidance.look_at(point_ned_m)
         return CommandResult.ACCEPTED
 
     def set_home(self, point: GeodeticPoint | None) -> CommandResult:
-        """Set home to a place on Earth, or (None) to where the vehicle is."""
+        """Set home to a place on Earth; None: to the present position."""
         geo = self._geo
         if geo.projection is None:
             self.say(WARNING, "Set home denied: no position estimate")
@@ -114,28 +114,27 @@ class Autopilot(FlightLoop):
         return CommandResult.ACCEPTED
 
     def set_origin(self, point: GeodeticPoint) -> CommandResult:
-        """Say where on Earth the local frame's origin is."""
+        """Set where on Earth the local frame's origin is."""
         if not self._geo.move_origin(point):
             return CommandResult.DENIED
         self._publish_places()
         return CommandResult.ACCEPTED
 
     def accept_setpoint(self, setpoint: Setpoint) -> None:
-        """Take an offboard setpoint; it is flown in OFFBOARD and lets OFFBOARD be entered.
+        """Take an offboard setpoint; it is flown in OFFBOARD, which cannot be entered without one.
 
-        One that says nothing that can be flown counts as none received; a status text says so, once until a
-        usable one comes.
+        An unusable one is ignored; a status text reports the first since a usable one.
         """
         if setpoint.is_usable:
             self.setpoints.put(setpoint, self._now_us)
-            self._commander.setpoint_came(setpoint.time_us)
+            self._commander.note_setpoint(setpoint.time_us)
         elif self.setpoints.refuse():
             self.say(WARNING, "Offboard setpoint ignored: nothing in it can be flown")
 
     def manual_input(self, sticks: ManualInput) -> None:
-        """Take a pilot's sticks; moved in a mode that flies itself, they take over (COM_RC_OVERRIDE)."""
+        """Take manual control input; in automatic modes, moved sticks take over (COM_RC_OVERRIDE)."""
         self._guidance.take_sticks(sticks)
-        self._commander.sticks_came()
+        self._commander.note_manual_input()
         state = self._commander.state
         if self._motors_stopped or state in BY_HAND or self._land_detector.landed:
             return
@@ -147,14 +146,14 @@ class Autopilot(FlightLoop):
 
     def ground_station_heard(self) -> None:
         """Note a ground station's heartbeat."""
-        self._commander.ground_station_heard()
+        self._commander.note_ground_station()
 
     def follow_target(self, position_ned_m: Vec3, velocity_ned_m_s: Vec3) -> None:
         """Take a report of the target to follow, in the local frame."""
         self._guidance.report_target(self._now_us, position_ned_m, velocity_ned_m_s)
 
     def global_position(self) -> GeodeticPoint | None:
-        """Where on Earth it believes to be; None before the first usable sample."""
+        """The estimated position on Earth; None before the first usable sample."""
         return self._geo.to_geodetic(self.state.position_ned_m)
 
     def local_position(self, point: GeodeticPoint) -> Vec3 | None:
@@ -162,5 +161,5 @@ class Autopilot(FlightLoop):
         return self._geo.to_local(point)
 
     def take_issued_commands(self) -> list[IssuedCommand]:
-        """What the mission commands others, such as the camera, since the last call."""
+        """The mission's commands to others, such as the camera, since the last call."""
         return self._navigator.take_issued()

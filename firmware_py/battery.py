@@ -1,4 +1,4 @@
-"""What the autopilot makes of the battery's voltage and current: charge left, and how worried to be."""
+"""The battery monitor: remaining charge and warnings from voltage and current."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ _SUPPLY_UNCHECKED = 894_281  # of CBRK_SUPPLY_CHK
 
 @dataclass(frozen=True, slots=True)
 class BatterySettings:
-    """Cells, their voltages at rest, capacity, resistance, and the shares of charge that warn."""
+    """Cells, their voltages without load, capacity, resistance, and the shares of charge that warn."""
 
     cells: int
     charged_v: float
@@ -28,7 +28,7 @@ class BatterySettings:
 
 
 def battery_settings(airframe: Airframe, parameters: Parameters) -> BatterySettings:
-    """What the BAT_ parameters say; what they leave open is the airframe's."""
+    """The BAT_ parameters; the airframe's values where they give none."""
     value, own = parameters.value, airframe.battery
     cells = parameters.integer("BAT1_N_CELLS") or own.cells
     capacity_mah, cell_ohm = value("BAT1_CAPACITY"), value("BAT1_R_INTERNAL")
@@ -45,10 +45,10 @@ def battery_settings(airframe: Airframe, parameters: Parameters) -> BatterySetti
 
 
 class BatteryMonitor:
-    """Counts what is drawn, and estimates the charge left by the voltage at rest, as PX4's does.
+    """Integrates the current, and estimates the remaining charge by the voltage without load, as PX4's.
 
     Attributes:
-        state: what is known, updated in place.
+        state: updated in place.
     """
 
     __slots__ = ("_min_charge_to_arm", "_settings", "_started", "_time_us", "state")
@@ -60,7 +60,7 @@ class BatteryMonitor:
         self.configure(airframe, parameters)
 
     def configure(self, airframe: Airframe, parameters: Parameters) -> None:
-        """Take over changed parameters."""
+        """Apply changed parameters."""
         self._settings = battery_settings(airframe, parameters)
         if parameters.integer("CBRK_SUPPLY_CHK") == _SUPPLY_UNCHECKED:
             self._min_charge_to_arm = 0.0
@@ -69,12 +69,12 @@ class BatteryMonitor:
             self._min_charge_to_arm = chosen if chosen >= 0.0 else self._settings.critical
 
     @property
-    def arms(self) -> bool:
-        """Whether there is charge enough to arm."""
+    def can_arm(self) -> bool:
+        """Whether the charge is enough to arm."""
         return self.state.remaining >= self._min_charge_to_arm
 
     def update(self, time_us: int, voltage_v: float, current_a: float) -> None:
-        """Take a measurement: the voltage at the terminals, and the current drawn."""
+        """Take a measurement of the terminal voltage and the current."""
         state, settings = self.state, self._settings
         period_s = (time_us - self._time_us) / 1e6 if self._started else 0.0
         self._started, self._time_us = True, time_us
@@ -94,7 +94,7 @@ def warning(remaining: float, settings: BatterySettings) -> int:
 
 
 def _share(voltage_v: float, settings: BatterySettings) -> float:
-    """Share of the full charge that belongs to a voltage at rest."""
+    """Share of the full charge at a voltage without load."""
     cell_v = voltage_v / max(settings.cells, 1)
     span_v = max(settings.charged_v - settings.empty_v, 1e-3)
     return min(max((cell_v - settings.empty_v) / span_v, 0.0), 1.0)

@@ -1,4 +1,4 @@
-"""The commander: arming, modes and failsafes. Its behaviour is the table in `firmware_py.commander_table`."""
+"""The commander: arming, modes and failsafes, by the table in `firmware_py.commander_table`."""
 
 from __future__ import annotations
 
@@ -12,8 +12,8 @@ from firmware_py.commander_guards import (
     Reaction,
     Situation,
     Timeouts,
+    next_cause,
     setpoint_lost,
-    trouble,
 )
 from firmware_py.commander_table import (
     CAUSE_EVENT,
@@ -29,7 +29,7 @@ from firmware_py.guidance.orbit import Orbit
 from firmware_py.parameters import Parameters
 from firmware_py.status import CommandResult, FlightMode
 
-_CHECK_PERIOD_US = 40_000  # of what is not urgent
+_CHECK_PERIOD_US = 40_000  # of causes that are not urgent
 
 _LINK_LOSS = (  # NAV_DLL_ACT and NAV_RCL_ACT
     Reaction.NOTHING,
@@ -66,7 +66,7 @@ _FENCE = (  # GF_ACTION
 )
 _BATTERY_CRITICAL = {0: Reaction.WARN, 2: Reaction.LAND, 3: Reaction.RETURN}  # COM_LOW_BAT_ACT
 _BATTERY_EMERGENCY = {0: Reaction.WARN, 2: Reaction.LAND, 3: Reaction.LAND}
-_EXCEPT = (  # the bits of COM_RCL_EXCEPT and COM_DLL_EXCEPT
+_EXCEPTIONS = (  # the bits of COM_RCL_EXCEPT and COM_DLL_EXCEPT
     frozenset({FlightMode.MISSION}),
     frozenset({FlightMode.HOLD, FlightMode.TAKEOFF}),
     frozenset({FlightMode.OFFBOARD}),
@@ -77,7 +77,7 @@ _TERMINATION_OFF = 121_212
 
 @dataclass(frozen=True, slots=True)
 class SlowChecks:
-    """What is checked ten times a second; see `Situation`."""
+    """Conditions that are checked ten times a second; see `Situation`."""
 
     battery_warning: int = 1
     battery_arms: bool = True
@@ -90,21 +90,21 @@ NOT_CHECKED = SlowChecks()
 
 
 class Observation(NamedTuple):
-    """The vehicle in one control tick, as the commander is told of it; it never changes.
+    """The vehicle in one control tick; immutable.
 
     Attributes:
         now_us: vehicle time.
-        sound: this tick's sample could be used.
-        placed: the horizontal position is known.
-        upright: its attitude is one to fly in.
-        landed: it stands on something.
-        target_reached: the take-off is at its height.
+        usable: this tick's sample is usable.
+        has_position: the horizontal position is measured.
+        upright: the attitude is within the limits of the failure detector.
+        landed: on the ground.
+        target_reached: a take-off has reached its height.
         checks: the last slow checks; the same object until the next.
     """
 
     now_us: int
-    sound: bool
-    placed: bool
+    usable: bool
+    has_position: bool
     upright: bool
     landed: bool
     target_reached: bool
@@ -112,11 +112,11 @@ class Observation(NamedTuple):
 
 
 class Commander:
-    """Remembers the state and what is known of the vehicle; the table decides.
+    """Keeps the state and the situation; the table decides.
 
     Attributes:
-        state: where in the table it is.
-        situation: what guards look at.
+        state: of the table.
+        situation: judged by the guards.
         takeoff_altitude_m: of the next take-off, above mean sea level; NaN: MIS_TAKEOFF_ALT above home.
         orbit: the circle to fly.
     """
@@ -144,7 +144,7 @@ class Commander:
 
     @property
     def mode(self) -> FlightMode:
-        """The mode flown; disarmed, the one last asked for."""
+        """The mode that is flown; disarmed: the intended one."""
         return FLOWN_MODE.get(self.state, self.situation.intended)
 
     @property
@@ -153,33 +153,28 @@ class Commander:
         return self.situation.cause is not None or self.state is State.TERMINATED
 
     @property
-    def ready(self) -> bool:
-        """Whether it could be armed now."""
-        return not self.refusal
-
-    @property
     def refusal(self) -> str:
-        """Why it could not be armed now; empty if it could."""
+        """Why the vehicle cannot be armed now; empty if it can."""
         row = first_match(RULES[State.DISARMED, Event.ARM], self.situation)
         return "" if row is None or row.result is CommandResult.ACCEPTED else row.text
 
     def tick(self, seen: Observation) -> Row | None:
-        """Take note of the vehicle and apply the table once.
+        """Update the situation and apply the table once.
 
         Returns:
-            The rule that fired; None when nothing happens.
+            The row that matched; None when nothing happens.
         """
-        now_us, sound, placed, upright, landed, target_reached, checks = seen
+        now_us, usable, has_position, upright, landed, target_reached, checks = seen
         now = self.situation
         if not self._started:
             self._start(now_us)
         now.now_us = now_us
-        if sound:
-            now.sound_us = now_us
-            if placed:
+        if usable:
+            now.usable_us = now_us
+            if has_position:
                 now.position_us = now_us
         else:
-            now.unsound_us = now_us
+            now.unusable_us = now_us
         if upright:
             now.upright_us = now_us
         now.landed = landed
@@ -204,7 +199,7 @@ class Commander:
 
     def _start(self, now_us: int) -> None:
         self._started, now = True, self.situation
-        now.unsound_us = now.sound_us = now.position_us = now.upright_us = now_us
+        now.unusable_us = now.usable_us = now.position_us = now.upright_us = now_us
 
     def _take_checks(self, checks: SlowChecks) -> None:
         self._checks, now = checks, self.situation
@@ -214,9 +209,8 @@ class Commander:
         now.fence_breached = checks.fence_breached
 
     def _check(self, now_us: int) -> Row | None:
-        """Look for what is not urgent."""
         self._check_us = now_us + _CHECK_PERIOD_US
-        cause = None if self.state is State.DISARMED else trouble(self.situation)
+        cause = None if self.state is State.DISARMED else next_cause(self.situation)
         return None if cause is None else self._react(cause)
 
     def _react(self, cause: Cause) -> Row | None:
@@ -224,7 +218,7 @@ class Commander:
         return first_match(RULES[self.state, CAUSE_EVENT[cause]], self.situation)
 
     def handle(self, event: Event) -> Row:
-        """Take a command, between ticks; the rule that fired holds the answer."""
+        """Take a command, between ticks; the row that matched has the answer."""
         row = first_match(RULES[self.state, event], self.situation)
         if row is None:  # the table has an answer to every command; a test sweeps it
             raise LookupError(f"commander: no rule for {event.value} in {self.state.value}")
@@ -232,32 +226,32 @@ class Commander:
         return row
 
     def remember(self, takeoff_altitude_m: float | None, orbit: Orbit | None) -> None:
-        """Take what a command asks for; None: as before."""
+        """Keep the arguments of a command; None: unchanged."""
         if takeoff_altitude_m is not None:
             self.takeoff_altitude_m = takeoff_altitude_m
         if orbit is not None:
             self.orbit = orbit
 
-    def mission_known(self, *, valid: bool) -> None:
-        """Note whether there is a mission that can be flown; an upload may have come this moment."""
+    def note_mission(self, *, valid: bool) -> None:
+        """Note whether there is a mission that can be flown, between two slow checks."""
         self.situation.has_mission = valid
 
-    def setpoint_came(self, time_us: int) -> None:
-        """Note a usable offboard setpoint; a time ahead of the vehicle's counts as now."""
+    def note_setpoint(self, time_us: int) -> None:
+        """Note a usable offboard setpoint; a time in the future counts as now."""
         self.situation.setpoint_us = min(time_us, self.situation.now_us)
 
-    def ground_station_heard(self) -> None:
+    def note_ground_station(self) -> None:
         """Note a ground station's heartbeat."""
         self.situation.ground_station_us = self.situation.now_us
 
-    def sticks_came(self) -> None:
-        """Note a pilot's input."""
+    def note_manual_input(self) -> None:
+        """Note manual control input."""
         now = self.situation
         now.manual_us = now.now_us
         now.manual_missed = False
 
     def configure(self, parameters: Parameters) -> None:
-        """Take over times and choices from the parameters."""
+        """Apply times and choices of the parameters."""
         value, whole = parameters.value, parameters.integer
         self.situation.timeouts = Timeouts(
             setpoint_loss_us=_microseconds(value("COM_OF_LOSS_T")),
@@ -270,10 +264,10 @@ class Commander:
             flight_us=_wait(value("COM_FLT_TIME_MAX")),
         )
         self.situation.choices = Choices(
-            reactions=_chosen(parameters),
+            reactions=_reactions(parameters),
             arm_needs_ground_station=whole("NAV_DLL_ACT") > 0,
-            manual_ignored_in=_excepted(whole("COM_RCL_EXCEPT")),
-            ground_station_ignored_in=_excepted(whole("COM_DLL_EXCEPT")) | {FlightMode.LAND},
+            manual_ignored_in=_modes_of(whole("COM_RCL_EXCEPT")),
+            ground_station_ignored_in=_modes_of(whole("COM_DLL_EXCEPT")) | {FlightMode.LAND},
             mission_after_takeoff=whole("COM_TAKEOFF_ACT") == 1,
             tumbling_ends=whole("CBRK_FLIGHTTERM") != _TERMINATION_OFF,
             manual_disabled=whole("COM_RC_IN_MODE") == _MANUAL_DISABLED,
@@ -293,7 +287,7 @@ class Commander:
             now.battery_at_arming = now.battery_warning
             now.handled.clear()
         if row.event is not Event.TICK or row.target not in _LATER_STEPS:
-            now.cause = row.cause  # a hold that becomes a landing keeps its cause
+            now.cause = row.cause  # a landing that follows a hold keeps its cause
         now.follow_up = row.follow_up
         self.state = row.target
         self._tick_rules = TICK_RULES[self.state]
@@ -303,8 +297,8 @@ class Commander:
 _LATER_STEPS = frozenset({State.FAILSAFE_RETURN, State.FAILSAFE_LAND})
 
 
-def _chosen(parameters: Parameters) -> dict[Cause, Reaction]:
-    """What parameters choose for each cause; what needs sticks that are absent falls back as in PX4."""
+def _reactions(parameters: Parameters) -> dict[Cause, Reaction]:
+    """The parameters' reaction to each cause."""
     whole = parameters.integer
     battery = whole("COM_LOW_BAT_ACT")
     return {
@@ -319,9 +313,9 @@ def _chosen(parameters: Parameters) -> dict[Cause, Reaction]:
     }
 
 
-def _excepted(bits: int) -> frozenset[FlightMode]:
-    """The modes that COM_RCL_EXCEPT and COM_DLL_EXCEPT name."""
-    return frozenset().union(*(modes for bit, modes in enumerate(_EXCEPT) if bits >> bit & 1))
+def _modes_of(bits: int) -> frozenset[FlightMode]:
+    """The modes of COM_RCL_EXCEPT or COM_DLL_EXCEPT."""
+    return frozenset().union(*(modes for bit, modes in enumerate(_EXCEPTIONS) if bits >> bit & 1))
 
 
 def _microseconds(seconds: float) -> int:

@@ -1,4 +1,4 @@
-"""What the commander looks at, and the conditions ("guards") its table is made of."""
+"""The situation that the commander judges, and the conditions ("guards") of its table."""
 
 from __future__ import annotations
 
@@ -9,17 +9,17 @@ from enum import Enum
 from firmware_py.status import FlightMode
 
 NEVER_US = -(10**15)
-"""The last time of what never happened."""
+"""The time of what has never happened."""
 
-_SETTLE_US = 800_000  # sensors must be sound this long before arming
+_SETTLE_US = 800_000  # samples must be usable this long before arming
 _SENSORS_LOST_US = 300_000
 _POSITION_LOST_US = 1_000_000  # PX4: COM_POS_FS_DELAY, 1 s
-_HEARTBEAT_US = 2_280_000  # so much later than COM_DL_LOSS_T after a last heartbeat does PX4 1.17 act
+_HEARTBEAT_US = 2_280_000  # PX4 1.17 acts so much later than COM_DL_LOSS_T after the last heartbeat
 _BATTERY_LOW, _BATTERY_CRITICAL, _BATTERY_EMERGENCY = 2, 3, 4  # MAV_BATTERY_CHARGE_STATE
 
 
 class Reaction(Enum):
-    """What a failsafe does, from mild to severe."""
+    """What a failsafe does, in order of severity."""
 
     NOTHING = "nothing"
     WARN = "warn"
@@ -34,7 +34,7 @@ class Reaction(Enum):
 
 
 STICK_REACTIONS = frozenset({Reaction.STABILIZED, Reaction.ALTITUDE, Reaction.POSITION})
-"""Reactions that leave the vehicle to a pilot's sticks."""
+"""Reactions after which a pilot flies by the sticks."""
 
 
 class Cause(Enum):
@@ -53,7 +53,7 @@ class Cause(Enum):
 
 @dataclass(slots=True)
 class Timeouts:
-    """The times that parameters set, microseconds; None means never."""
+    """Times of the parameters, microseconds; None: never."""
 
     setpoint_loss_us: int = 1_000_000
     failsafe_hold_us: int = 5_000_000
@@ -67,17 +67,17 @@ class Timeouts:
 
 @dataclass(slots=True)
 class Choices:
-    """What parameters choose.
+    """Choices of the parameters.
 
     Attributes:
-        reactions: to each cause; one that is missing means nothing.
-        arm_needs_ground_station: no arming unless a ground station is heard.
-        manual_ignored_in: modes in which the loss of manual control is of no interest.
+        reactions: to each cause; NOTHING to a missing one.
+        arm_needs_ground_station: no arming without a ground station.
+        manual_ignored_in: modes in which the loss of manual control input is ignored.
         manual_disabled: there is no manual control at all.
-        ground_station_ignored_in: modes in which the loss of the ground station is of no interest.
-        mission_after_takeoff: a take-off goes on with the mission if there is one.
+        ground_station_ignored_in: modes in which the loss of the ground station is ignored.
+        mission_after_takeoff: the mission follows a take-off, if there is one.
         tumbling_ends: a failed attitude ends the flight.
-        without_sticks: instead of a reaction that leaves the vehicle to sticks, when none come.
+        without_sticks: replaces a reaction that needs the sticks when there is no manual control input.
     """
 
     reactions: dict[Cause, Reaction] = field(default_factory=dict)
@@ -90,47 +90,47 @@ class Choices:
     without_sticks: Reaction = Reaction.RETURN
 
     def reaction(self, cause: Cause) -> Reaction:
-        """What is done about a cause when no sticks come."""
+        """The reaction to a cause without manual control input."""
         chosen = self.reactions.get(cause, Reaction.NOTHING)
         return self.without_sticks if chosen in STICK_REACTIONS else chosen
 
 
 @dataclass(slots=True)
 class Situation:
-    """What guards look at. Times are vehicle times in microseconds.
+    """What guards judge. Times are vehicle times in microseconds.
 
     Attributes:
         now_us: now.
-        unsound_us: when the last sample was missed or unusable.
-        sound_us: when the last usable sample came.
-        position_us: when the horizontal position was last known.
-        upright_us: when its attitude was last one to fly in.
-        airborne_us: when it last was in the air.
-        landed: it stands on something.
-        flown: it has been in the air since arming.
-        target_reached: the take-off is at its height.
-        setpoint_us: when the last usable offboard setpoint came.
-        ground_station_us: when a ground station was last heard.
-        manual_us: when the last sticks came.
-        manual_missed: sticks were absent at arming, so nobody waits for them.
+        unusable_us: last missing or unusable sample.
+        usable_us: last usable sample.
+        position_us: last sample with a horizontal position.
+        upright_us: last attitude within the limits of the failure detector.
+        airborne_us: last time in the air.
+        landed: on the ground.
+        flown: in the air at any time since arming.
+        target_reached: a take-off has reached its height.
+        setpoint_us: last usable offboard setpoint.
+        ground_station_us: last heartbeat of a ground station.
+        manual_us: last manual control input.
+        manual_missed: there was no manual control input at arming, so its absence is no loss.
         battery_warning: MAV_BATTERY_CHARGE_STATE, 1 ok to 4 emergency.
-        battery_arms: there is charge enough to arm.
-        battery_at_arming: the warning when it was armed; only what is worse counts.
-        fence_breached: it is outside the geofence.
+        battery_arms: the charge is enough to arm.
+        battery_at_arming: the warning at arming; only a worse one counts.
+        fence_breached: outside the geofence.
         has_mission: there is a mission that can be flown.
         entered_us: when the present state was entered.
-        armed_us: when it was armed.
-        intended: the mode last asked for.
-        cause: why a failsafe is in charge; None: it is not.
-        follow_up: what a failsafe's hold turns into.
-        handled: causes that were reacted to and still hold.
-        timeouts: what parameters say.
-        choices: what parameters say.
+        armed_us: when the vehicle was armed.
+        intended: the mode last requested.
+        cause: of the active failsafe; None: none is active.
+        follow_up: the reaction that follows a failsafe's hold.
+        handled: causes that were reacted to and still exist.
+        timeouts: of the parameters.
+        choices: of the parameters.
     """
 
     now_us: int = 0
-    unsound_us: int = 0
-    sound_us: int = 0
+    unusable_us: int = 0
+    usable_us: int = 0
     position_us: int = 0
     upright_us: int = 0
     airborne_us: int = NEVER_US
@@ -160,44 +160,44 @@ Guard = Callable[[Situation], bool]
 
 
 def unsettled(now: Situation) -> bool:
-    """Sensors have not been sound for long enough."""
-    return now.now_us - now.unsound_us < _SETTLE_US
+    """Samples have not been usable for long enough."""
+    return now.now_us - now.unusable_us < _SETTLE_US
 
 
 def tipped_over(now: Situation) -> bool:
-    """It lies on its side."""
+    """The attitude is beyond the limits of the failure detector."""
     return now.upright_us < now.now_us
 
 
 def sensors_lost(now: Situation) -> bool:
-    """No usable sample for too long to fly on the last one."""
-    return now.now_us - now.sound_us > _SENSORS_LOST_US
+    """No usable sample for too long."""
+    return now.now_us - now.usable_us > _SENSORS_LOST_US
 
 
 def tumbled(now: Situation) -> bool:
-    """Its attitude is beyond recovery."""
+    """The attitude has failed for the time set."""
     return now.choices.tumbling_ends and now.now_us - now.upright_us > now.timeouts.tumble_us
 
 
 def position_lost(now: Situation) -> bool:
-    """The horizontal position is not known."""
+    """No horizontal position for too long."""
     return now.now_us - now.position_us > _POSITION_LOST_US
 
 
 def landed_after_flight(now: Situation) -> bool:
-    """It has flown and stands for the time set."""
+    """On the ground after a flight, for the time set."""
     wait_us = now.timeouts.disarm_landed_us
     return now.landed and now.flown and wait_us is not None and now.now_us - now.airborne_us >= wait_us
 
 
 def landing_done(now: Situation) -> bool:
-    """It was told to land where it stands already, and the time set is over."""
+    """On the ground in a landing mode, for the time set."""
     wait_us = now.timeouts.disarm_landed_us
     return now.landed and wait_us is not None and now.now_us - max(now.airborne_us, now.entered_us) >= wait_us
 
 
 def never_flown(now: Situation) -> bool:
-    """It was armed and did not take off within the time set."""
+    """Armed, and not in the air within the time set."""
     wait_us = now.timeouts.disarm_preflight_us
     return not now.flown and wait_us is not None and now.now_us - now.armed_us >= wait_us
 
@@ -208,7 +208,7 @@ def setpoint_lost(now: Situation) -> bool:
 
 
 def offboard_back(now: Situation) -> bool:
-    """Setpoints come again after their loss."""
+    """Setpoints are received again after their loss."""
     return now.cause is Cause.SETPOINTS and not setpoint_lost(now)
 
 
@@ -218,12 +218,12 @@ def ground_station_lost(now: Situation) -> bool:
 
 
 def ground_station_absent(now: Situation) -> bool:
-    """A ground station must be there to arm, and is not."""
+    """Arming needs a ground station, and there is none."""
     return now.choices.arm_needs_ground_station and ground_station_lost(now)
 
 
 def manual_lost(now: Situation) -> bool:
-    """No sticks for the time set."""
+    """No manual control input for the time set."""
     return now.now_us - now.manual_us > now.timeouts.manual_us
 
 
@@ -233,22 +233,22 @@ def manual_present(now: Situation) -> bool:
 
 
 def battery_too_low(now: Situation) -> bool:
-    """The battery is too low to take off with."""
+    """The charge is too low to arm."""
     return not now.battery_arms
 
 
 def hold_over(now: Situation) -> bool:
-    """The failsafe has held for its time."""
+    """A failsafe has held for its time."""
     return now.now_us - now.entered_us >= now.timeouts.failsafe_hold_us
 
 
 def hold_over_on_ground(now: Situation) -> bool:
-    """The same, standing."""
+    """The same, on the ground."""
     return now.landed and now.follow_up is not Reaction.NOTHING and hold_over(now)
 
 
 def hold_over_then(reaction: Reaction) -> Guard:
-    """A guard: the failsafe has held for its time, and this comes next."""
+    """A guard: a failsafe has held for its time, and this reaction follows."""
 
     def guard(now: Situation) -> bool:
         return now.follow_up is reaction and hold_over(now)
@@ -258,7 +258,7 @@ def hold_over_then(reaction: Reaction) -> Guard:
 
 
 def reacts(cause: Cause, reaction: Reaction) -> Guard:
-    """A guard: parameters choose this reaction to that cause."""
+    """A guard: the parameters choose this reaction to a cause."""
 
     def guard(now: Situation) -> bool:
         return now.choices.reaction(cause) is reaction
@@ -268,7 +268,7 @@ def reacts(cause: Cause, reaction: Reaction) -> Guard:
 
 
 def reacts_with_sticks(cause: Cause, reaction: Reaction) -> Guard:
-    """The same for a reaction that leaves the vehicle to a pilot's sticks: they must be there."""
+    """The same for a reaction that needs manual control input, which is received."""
 
     def guard(now: Situation) -> bool:
         return now.choices.reactions.get(cause, Reaction.NOTHING) is reaction and not manual_lost(now)
@@ -278,17 +278,17 @@ def reacts_with_sticks(cause: Cause, reaction: Reaction) -> Guard:
 
 
 def target_reached(now: Situation) -> bool:
-    """The take-off is at its height."""
+    """The take-off has reached its height."""
     return now.target_reached
 
 
 def target_reached_with_mission(now: Situation) -> bool:
-    """The same, and a mission is to follow."""
+    """The same, and a mission follows."""
     return now.target_reached and now.choices.mission_after_takeoff and now.has_mission
 
 
 def landed(now: Situation) -> bool:
-    """It stands on something."""
+    """On the ground."""
     return now.landed
 
 
@@ -298,7 +298,7 @@ def no_mission(now: Situation) -> bool:
 
 
 def intends(mode: FlightMode) -> Guard:
-    """A guard: this mode was chosen."""
+    """A guard: this mode is intended."""
 
     def guard(now: Situation) -> bool:
         return now.intended is mode
@@ -308,27 +308,27 @@ def intends(mode: FlightMode) -> Guard:
 
 
 def intends_unarmable(now: Situation) -> bool:
-    """The mode chosen is one that cannot be armed in."""
+    """The intended mode cannot be armed in."""
     return now.intended in UNARMABLE
 
 
-def intends_offboard_unfed(now: Situation) -> bool:
-    """The mode chosen is offboard, and no setpoints come."""
+def intends_offboard_without_setpoints(now: Situation) -> bool:
+    """The intended mode is offboard, and no setpoints are received."""
     return now.intended is FlightMode.OFFBOARD and setpoint_lost(now)
 
 
-def intends_manual_unmanned(now: Situation) -> bool:
-    """The mode chosen is flown by hand, and no sticks come."""
+def intends_manual_without_input(now: Situation) -> bool:
+    """The intended mode is manual, and there is no manual control input."""
     return now.intended in MANUAL_MODES and manual_lost(now)
 
 
-def intends_mission_without(now: Situation) -> bool:
-    """The mode chosen is mission, and there is none."""
+def intends_missing_mission(now: Situation) -> bool:
+    """The intended mode is mission, and there is no valid one."""
     return now.intended is FlightMode.MISSION and not now.has_mission
 
 
-def needs_position_in_vain(now: Situation) -> bool:
-    """The mode chosen needs a position, and there is none."""
+def position_missing(now: Situation) -> bool:
+    """The intended mode needs a position, and there is none."""
     return now.intended not in POSITIONLESS and position_lost(now)
 
 
@@ -341,10 +341,10 @@ MANUAL_MODES = frozenset(
         FlightMode.STABILIZED,
     }
 )
-"""Modes flown by hand."""
+"""Modes flown by the sticks."""
 
 POSITIONLESS = MANUAL_MODES - {FlightMode.POSITION}
-"""Modes that can be flown without knowing where one is."""
+"""Modes that need no position."""
 
 UNARMABLE = frozenset(
     {
@@ -355,13 +355,13 @@ UNARMABLE = frozenset(
         FlightMode.TERMINATION,
     }
 )
-"""Modes that cannot be armed in, as in PX4."""
+"""Modes in which the vehicle cannot be armed, as in PX4."""
 
 
-def trouble(now: Situation) -> Cause | None:
-    """The first cause, severe ones first, that holds and was not reacted to yet; forgets what is over."""
+def next_cause(now: Situation) -> Cause | None:
+    """The most severe cause that exists and was not reacted to yet; removes causes that are over."""
     handled = now.handled
-    for cause, holds in _TROUBLES:
+    for cause, holds in _CAUSES:
         if holds(now):
             if cause not in handled:
                 return cause
@@ -377,13 +377,13 @@ def _battery_at(level: int) -> Guard:
     return guard
 
 
-def _ground_station_went(now: Situation) -> bool:
+def _ground_station_gone(now: Situation) -> bool:
     if now.intended in now.choices.ground_station_ignored_in:
         return False
     return now.ground_station_us > NEVER_US and ground_station_lost(now)
 
 
-def _manual_went(now: Situation) -> bool:
+def _manual_gone(now: Situation) -> bool:
     if now.choices.manual_disabled or now.manual_us == NEVER_US or not manual_lost(now):
         return False
     if now.intended in MANUAL_MODES:
@@ -400,13 +400,13 @@ def _fence_breached(now: Situation) -> bool:
     return now.fence_breached
 
 
-_TROUBLES: tuple[tuple[Cause, Guard], ...] = (
+_CAUSES: tuple[tuple[Cause, Guard], ...] = (
     (Cause.POSITION, position_lost),
     (Cause.BATTERY_EMERGENCY, _battery_at(_BATTERY_EMERGENCY)),
     (Cause.BATTERY_CRITICAL, _battery_at(_BATTERY_CRITICAL)),
     (Cause.FENCE, _fence_breached),
-    (Cause.MANUAL, _manual_went),
-    (Cause.GROUND_STATION, _ground_station_went),
+    (Cause.MANUAL, _manual_gone),
+    (Cause.GROUND_STATION, _ground_station_gone),
     (Cause.FLIGHT_TIME, _flight_time_over),
     (Cause.BATTERY_LOW, _battery_at(_BATTERY_LOW)),
 )

@@ -1,7 +1,7 @@
 """The commander's state machine as a table: what each event does in each state.
 
-Rows are tried from the top and the first that fits counts, so failsafes stand first. Nothing here keeps
-state or acts; `firmware_py.commander` does. Texts and results are PX4's wherever PX4 has the same case.
+Rows are tried from the top and the first match counts, so failsafes come first. Nothing here keeps state
+or acts; `firmware_py.commander` does. Texts and results are PX4's wherever PX4 has the same case.
 """
 
 from __future__ import annotations
@@ -12,13 +12,13 @@ from enum import Enum
 from firmware_py import commander_guards as when
 from firmware_py.commander_guards import MANUAL_MODES, Cause, Guard, Reaction, Situation
 from firmware_py.status import CommandResult, FlightMode
+from firmware_py.types import CRITICAL, INFO, WARNING
 
-CRITICAL, WARNING, INFO = 2, 4, 6  # MAV_SEVERITY
-_MANY = 8  # states of a row that the diagram draws as one
+_MANY = 8  # a row with more states is drawn as one in the diagram
 
 
 class State(Enum):
-    """Armed or not, the mode flown, and whether a failsafe chose it."""
+    """Disarmed, or the mode that is flown, and whether a failsafe chose it."""
 
     DISARMED = "disarmed"
     MANUAL = "manual"
@@ -37,12 +37,12 @@ class State(Enum):
     FAILSAFE_HOLD = "failsafe_hold"
     FAILSAFE_RETURN = "failsafe_return"
     FAILSAFE_LAND = "failsafe_land"
-    FAILSAFE_DESCEND = "failsafe_descend"  # down without a position
-    TERMINATED = "terminated"  # motors stopped, wherever it is
+    FAILSAFE_DESCEND = "failsafe_descend"  # without a position
+    TERMINATED = "terminated"  # motors stopped, also in the air
 
 
 class Event(Enum):
-    """What may happen. Conditions of the vehicle that need no reaction of choice are guards on TICK."""
+    """Commands, ends of modes and causes of failsafes; all other conditions are guards on TICK."""
 
     TICK = "tick"
     ARM = "arm"
@@ -102,7 +102,7 @@ MODE_EVENT: dict[FlightMode, Event] = {
     mode: Event.TERMINATE if mode is FlightMode.TERMINATION else Event(f"set_{mode.name.lower()}")
     for mode in FlightMode
 }
-"""The event that asks for each mode."""
+"""The event that requests each mode."""
 
 CAUSE_EVENT: dict[Cause, Event] = {
     Cause.SETPOINTS: Event.SETPOINTS_LOST,
@@ -115,7 +115,7 @@ CAUSE_EVENT: dict[Cause, Event] = {
     Cause.POSITION: Event.POSITION_LOST,
     Cause.FLIGHT_TIME: Event.FLIGHT_TIME_OVER,
 }
-"""The event by which each cause of a failsafe is told."""
+"""The event of each cause of a failsafe."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -123,16 +123,16 @@ class Row:
     """One rule. Entering DISARMED stops the motors; leaving it sets home.
 
     Attributes:
-        states: where it holds.
-        event: what happens.
-        guard: what must be true as well; None: always.
-        target: the next state; None: stay, and the mode flown goes on undisturbed.
-        intends: what becomes the mode asked for; None: as before.
+        states: in which it applies.
+        event: to which it applies.
+        guard: condition; None: always.
+        target: the next state; None: stay, and the mode continues unchanged.
+        intends: the new intended mode; None: unchanged.
         result: the answer to a command.
         severity: MAV_SEVERITY of the text.
-        text: what people are told; empty: nothing.
-        cause: why the target is entered, for a failsafe; None: nobody's failsafe.
-        follow_up: what the failsafe's hold turns into.
+        text: for people; empty: none.
+        cause: of a failsafe; None: the target is entered for another reason.
+        follow_up: the reaction that follows the failsafe's hold.
     """
 
     states: frozenset[State]
@@ -178,7 +178,7 @@ _DOWNWARD = _at(State.LAND, State.FAILSAFE_LAND, State.FAILSAFE_DESCEND)
 _HOMEWARD = _at(State.RETURN, State.FAILSAFE_RETURN)
 _LANDING = _DOWNWARD | _HOMEWARD
 BY_HAND = _at(State.MANUAL, State.STABILIZED, State.ACRO, State.ALTITUDE, State.POSITION)
-"""States flown by a pilot's sticks."""
+"""States flown by the sticks."""
 _BLIND = _at(State.MANUAL, State.STABILIZED, State.ACRO, State.ALTITUDE)  # no position needed
 
 _HARD_FAILURES = (
@@ -198,7 +198,7 @@ _STEPS = {
     Reaction.TERMINATE: (State.TERMINATED, _FLYING),
     Reaction.DISARM: (State.DISARMED, _FLYING),
 }
-"""Where a reaction leads, and from where: never back from what is more severe."""
+"""The target of each reaction, and the states from which it is entered: none that are more severe."""
 
 _STICKS = {
     Reaction.STABILIZED: State.STABILIZED,
@@ -208,7 +208,7 @@ _STICKS = {
 
 _DOING = {Reaction.RETURN: "returning home", Reaction.LAND: "landing"}
 _DELAYED = (Cause.GROUND_STATION, Cause.MANUAL)
-"""Causes that may pass: PX4 holds for COM_FAIL_ACT_T before it acts."""
+"""Causes that may end: PX4 holds for COM_FAIL_ACT_T before it acts."""
 
 
 def _hold_ends(reaction: Reaction) -> Row:
@@ -225,7 +225,7 @@ def _hold_ends(reaction: Reaction) -> Row:
 
 
 def _reactions(cause: Cause, *, from_sticks: bool = False) -> tuple[Row, ...]:
-    """The rows for one cause: what was chosen, from the states in which that is a step further."""
+    """The rows of one cause: each reaction, in the states in which it is more severe."""
     event, rows = CAUSE_EVENT[cause], []
     alarm = f"Failsafe activated: {cause.value}"
     if from_sticks:
@@ -244,7 +244,7 @@ def _reactions(cause: Cause, *, from_sticks: bool = False) -> tuple[Row, ...]:
     for reaction, (target, states) in _STEPS.items():
         delayed = cause in _DELAYED and reaction in {Reaction.RETURN, Reaction.LAND}
         if cause is Cause.SETPOINTS and reaction is Reaction.HOLD:
-            follow_up = Reaction.LAND  # nobody leads it any more; see docs/px4-compatibility.md
+            follow_up = Reaction.LAND  # the app is gone; see docs/px4-compatibility.md
         else:
             follow_up = reaction if delayed else Reaction.NOTHING
         rows.append(
@@ -342,13 +342,13 @@ _DISARMED_TEXT = "Disarmed by external command"
 _ARMING = (
     _refuse(_OFF, Event.ARM, when.unsettled, _DENIED + "Resolve system health failures first"),
     _refuse(_OFF, Event.ARM, when.tipped_over, _DENIED + "vehicle is tipped over"),
-    _refuse(_OFF, Event.ARM, when.needs_position_in_vain, _DENIED + "no position estimate"),
+    _refuse(_OFF, Event.ARM, when.position_missing, _DENIED + "no position estimate"),
     _refuse(_OFF, Event.ARM, when.battery_too_low, _DENIED + "low battery"),
     _refuse(_OFF, Event.ARM, when.ground_station_absent, _DENIED + "no connection to the ground station"),
     _refuse(_OFF, Event.ARM, when.intends_unarmable, _DENIED + "not in this mode"),
-    _refuse(_OFF, Event.ARM, when.intends_offboard_unfed, _DENIED + "no offboard setpoints"),
-    _refuse(_OFF, Event.ARM, when.intends_manual_unmanned, _DENIED + "no manual control input"),
-    _refuse(_OFF, Event.ARM, when.intends_mission_without, _DENIED + "no valid mission"),
+    _refuse(_OFF, Event.ARM, when.intends_offboard_without_setpoints, _DENIED + "no offboard setpoints"),
+    _refuse(_OFF, Event.ARM, when.intends_manual_without_input, _DENIED + "no manual control input"),
+    _refuse(_OFF, Event.ARM, when.intends_missing_mission, _DENIED + "no valid mission"),
     *(
         Row(_OFF, Event.ARM, when.intends(mode), state, text=_ARMED_TEXT)
         for state, mode in FLOWN_MODE.items()
@@ -372,7 +372,7 @@ def _unavailable(mode: FlightMode) -> str:
     return f"Switching to {mode.name.capitalize()} is currently not available"
 
 
-_TERMINATED_FOR_GOOD = tuple(
+_AFTER_TERMINATION = tuple(
     _refuse(_at(State.TERMINATED), event, None, "Mode change refused: flight terminated")
     for mode, event in MODE_EVENT.items()
     if mode is not FlightMode.TERMINATION
@@ -409,7 +409,7 @@ _SETS = tuple(
 )
 
 _MODES = (
-    *_TERMINATED_FOR_GOOD,
+    *_AFTER_TERMINATION,
     *_NEEDS_STICKS,
     *_NEEDS_POSITION,
     _refuse(
@@ -424,7 +424,7 @@ _MODES = (
 )
 
 TABLE: tuple[Row, ...] = _FAILSAFES + _PROGRESS + _ARMING + _MODES
-"""All rules, in order."""
+"""All rows, in order."""
 
 RULES: dict[tuple[State, Event], tuple[Row, ...]] = {
     (state, event): tuple(row for row in TABLE if state in row.states and row.event is event)
@@ -437,11 +437,11 @@ TICK_RULES: dict[State, tuple[tuple[Guard, Row], ...]] = {
     state: tuple((row.guard, row) for row in RULES[state, Event.TICK] if row.guard is not None)
     for state in State
 }
-"""The rules of a tick with their guards, which all of them have; this is looked through in every tick."""
+"""The rows of a tick with their guards, which they all have; evaluated in every tick."""
 
 
 def first_match(rows: tuple[Row, ...], now: Situation) -> Row | None:
-    """The first row whose guard is true; None if there is none (a tick on which nothing happens)."""
+    """The first row whose guard is true; None: nothing happens in this tick."""
     for row in rows:
         if row.guard is None or row.guard(now):
             return row
@@ -449,7 +449,7 @@ def first_match(rows: tuple[Row, ...], now: Situation) -> Row | None:
 
 
 def mermaid() -> str:
-    """The table as a Mermaid state diagram; refusals and what changes nothing are left out."""
+    """The table as a Mermaid state diagram, without rows that change no state."""
     lines = ["stateDiagram-v2", '    state "any armed state" as armed', "    [*] --> disarmed"]
     for row in TABLE:
         if row.target is None:

@@ -1,25 +1,56 @@
-"""What guidance can tell the stabiliser: the kinds of command, from a velocity down to the motors' outputs.
+"""What guidance gives the stabiliser: commands, from a velocity down to motor outputs, and limits.
 
 Vectors are of shape (3,): level axes are forward, right, down and turn with the yaw; body axes are FRD. A yaw
-rate is clockwise seen from above; a thrust is collective along body up, as a share of the greatest, 0..1.
+rate is clockwise seen from above; a thrust is collective along body up, as a share of full thrust, 0..1.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from math import inf, tan
 from typing import ClassVar
 
 from geometry.vectors import ZERO3, Vec3
 
-_DESCENT_SHARE = 0.7  # less than this share of the thrust that carries the weight means to go down
+_DESCENT_SHARE = 0.7  # of hover thrust: less means a descent
+
+
+class FlightLimits:
+    """Limits within which the stabiliser follows commands; they may change in flight.
+
+    Args:
+        airframe_tilt_rad: maximum for `limit_tilt`.
+
+    Attributes:
+        rate_rad_s: of roll and pitch together, where the vector law turns to an attitude.
+        min_thrust: where the height is controlled, as a share of full thrust.
+        max_thrust: the same.
+        tilt_squared: square of the tilt limit, for small angles.
+        tilt_tangent: its tangent, horizontal thrust per vertical thrust.
+    """
+
+    __slots__ = ("_max_tilt_rad", "max_thrust", "min_thrust", "rate_rad_s", "tilt_squared", "tilt_tangent")
+
+    def __init__(self, airframe_tilt_rad: float) -> None:
+        self._max_tilt_rad = airframe_tilt_rad
+        self.limit_tilt(airframe_tilt_rad)
+        self.rate_rad_s = inf
+        self.min_thrust = 0.0
+        self.max_thrust = 1.0
+
+    def limit_tilt(self, tilt_rad: float) -> None:
+        """Limit the tilt for velocities and accelerations; the airframe's limit holds as well."""
+        tilt_rad = max(0.0, min(tilt_rad, self._max_tilt_rad))
+        self.tilt_squared = tilt_rad**2
+        self.tilt_tangent = tan(tilt_rad)
 
 
 class ControlCommand:
-    """What a stabiliser can be told.
+    """A command to the stabiliser.
 
     Attributes:
-        is_for_motors: the motors get it unchanged, on the ground as in the air.
+        is_for_motors: passed on to the motors unchanged, on the ground as in the air.
         controls_climb: it holds a vertical velocity.
     """
 
@@ -28,30 +59,30 @@ class ControlCommand:
     controls_climb: ClassVar[bool] = False
 
     def vertical_intent(self, hover_thrust: float) -> float:
-        """The vertical velocity it asks for in m/s; else only the sign counts. Below zero is up.
+        """The commanded vertical velocity, m/s down; without one, only its sign means anything.
 
         Args:
-            hover_thrust: what carries the weight, as a share of the greatest thrust.
+            hover_thrust: as a share of full thrust.
         """
         raise NotImplementedError
 
     def with_limited_climb(self, limit: Callable[[float], float]) -> ControlCommand:
-        """The same with another climb, if it climbs by a velocity.
+        """The same with a limited climb, if the command is a velocity.
 
         Args:
-            limit: from the vertical velocity asked for, below zero, to the one allowed, m/s.
+            limit: from the commanded vertical velocity, below zero, to the one allowed, m/s down.
         """
         del limit
         return self
 
     def straight_up(self) -> ControlCommand:
-        """What of it may be followed while the ground still touches: nothing sideways, no turn."""
+        """The part that may be followed while on the ground: no horizontal motion, no turn."""
         return self
 
 
 @dataclass(slots=True)
 class VelocityCommand(ControlCommand):
-    """A velocity with an acceleration as feed-forward, and a yaw rate."""
+    """A velocity, an acceleration as feed-forward, and a yaw rate."""
 
     velocity_level_m_s: Vec3 = ZERO3
     yaw_rate_rad_s: float = 0.0
@@ -59,11 +90,11 @@ class VelocityCommand(ControlCommand):
     controls_climb: ClassVar[bool] = True
 
     def vertical_intent(self, hover_thrust: float) -> float:
-        """The velocity downwards, m/s."""
+        """Its vertical velocity."""
         return self.velocity_level_m_s[2]
 
     def with_limited_climb(self, limit: Callable[[float], float]) -> ControlCommand:
-        """The same with another climb and without feed-forward."""
+        """The same with a limited climb and without feed-forward."""
         forward_m_s, right_m_s, down_m_s = self.velocity_level_m_s
         if down_m_s >= 0.0:
             return self
@@ -76,13 +107,13 @@ class VelocityCommand(ControlCommand):
 
 @dataclass(slots=True)
 class AccelerationCommand(ControlCommand):
-    """An acceleration (zeros hover) and a yaw rate; the velocity is left to whoever commands it."""
+    """An acceleration (zeros: hover) and a yaw rate; the velocity is not controlled."""
 
     acceleration_level_m_s2: Vec3
     yaw_rate_rad_s: float = 0.0
 
     def vertical_intent(self, hover_thrust: float) -> float:
-        """The sign of the acceleration downwards."""
+        """Its vertical acceleration."""
         return self.acceleration_level_m_s2[2]
 
     def straight_up(self) -> ControlCommand:
@@ -101,11 +132,11 @@ class TiltCommand(ControlCommand):
     controls_climb: ClassVar[bool] = True
 
     def vertical_intent(self, hover_thrust: float) -> float:
-        """The velocity downwards, m/s."""
+        """Its vertical velocity."""
         return self.down_m_s
 
     def with_limited_climb(self, limit: Callable[[float], float]) -> ControlCommand:
-        """The same with another climb."""
+        """The same with a limited climb."""
         if self.down_m_s >= 0.0:
             return self
         return TiltCommand(self.roll_rad, self.pitch_rad, self.yaw_rate_rad_s, limit(self.down_m_s))
@@ -125,7 +156,7 @@ class AttitudeCommand(ControlCommand):
     thrust: float
 
     def vertical_intent(self, hover_thrust: float) -> float:
-        """The sign: up unless the thrust is clearly less than the weight."""
+        """Up unless the thrust is clearly less than the weight."""
         return _DESCENT_SHARE * hover_thrust - self.thrust
 
     def straight_up(self) -> ControlCommand:
@@ -135,27 +166,27 @@ class AttitudeCommand(ControlCommand):
 
 @dataclass(slots=True)
 class BodyRateCommand(ControlCommand):
-    """Roll, pitch and yaw rate, and a thrust."""
+    """Body rates and a thrust."""
 
     rate_frd_rad_s: Vec3
     thrust: float
 
     def vertical_intent(self, hover_thrust: float) -> float:
-        """The sign: up unless the thrust is clearly less than the weight."""
+        """Up unless the thrust is clearly less than the weight."""
         return _DESCENT_SHARE * hover_thrust - self.thrust
 
     def straight_up(self) -> ControlCommand:
-        """Its thrust, without turning."""
+        """Its thrust, without rotation."""
         return BodyRateCommand(ZERO3, self.thrust)
 
 
 @dataclass(slots=True)
 class MotorCommand(ControlCommand):
-    """Outputs of the motors, passed through: 0..1 of a rotor's full thrust, in the airframe's order."""
+    """Motor outputs, passed through: 0..1 of a rotor's full thrust, in the airframe's order."""
 
     outputs: tuple[float, ...]
     is_for_motors: ClassVar[bool] = True
 
     def vertical_intent(self, hover_thrust: float) -> float:
-        """The sign: up as soon as a motor turns."""
+        """Up as soon as a motor turns."""
         return -1.0 if max(self.outputs, default=0.0) > 0.0 else 1.0

@@ -1,4 +1,4 @@
-"""Sensors to vehicle state. For ideal sensors it passes values through; it refuses samples it cannot use."""
+"""The vehicle state from ideal sensors: samples are checked and given in the local frame."""
 
 from __future__ import annotations
 
@@ -6,44 +6,44 @@ from dataclasses import replace
 from math import isfinite, isnan
 
 from firmware_py.types import Sensors, VehicleState
-from geometry.rotations import euler_from_quaternion
+from geometry.rotations import euler_from_quaternion, rotation, to_world
 from geometry.vectors import Vec3
 
-_LONGEST_S = 0.1  # between samples that can be counted on
+_MAX_GAP_S = 0.1  # between samples, for dead reckoning
 _NORM_TOLERANCE = 0.05  # of the attitude quaternion's squared length; more than rounding, so it is a fault
 
 
 class Estimator:
-    """Keeps the vehicle state, with positions relative to the first usable sample (PX4's local frame).
+    """Estimates the vehicle state; positions are relative to the first usable sample (PX4's local frame).
 
     Attributes:
         state: the estimate, updated in place; it keeps its last value while samples are unusable.
         origin_ned_m: the local frame's origin in the sensors' frame, shape (3,); None before a first sample.
-        placed: whether the last sample told the horizontal position; else it is counted on from the last.
+        has_position: whether the last sample had a horizontal position; else it is dead reckoning.
     """
 
-    __slots__ = ("origin_ned_m", "placed", "state")
+    __slots__ = ("has_position", "origin_ned_m", "state")
 
     def __init__(self) -> None:
         self.state = VehicleState()
         self.origin_ned_m: Vec3 | None = None
-        self.placed = False
+        self.has_position = False
 
     def update(self, sensors: Sensors) -> bool:
         """Take one sample.
 
         Returns:
-            Whether it was usable: all values finite, the attitude a unit quaternion and newer than the last.
+            Whether it was usable: finite, the attitude a unit quaternion, and newer than the last.
         """
         state = self.state
         origin = self.origin_ned_m
-        if not _is_sound(sensors):
-            sensors = self._without_place(sensors)
-            if not _is_sound(sensors):
+        if not _is_usable(sensors):
+            sensors = self._without_position(sensors)
+            if not _is_usable(sensors):
                 return False
-            self.placed = False
+            self.has_position = False
         else:
-            self.placed = True
+            self.has_position = True
         if origin is not None and sensors.time_us <= state.time_us:
             return False
         position = sensors.position_ned_m
@@ -58,21 +58,18 @@ class Estimator:
         state.specific_force_frd_m_s2 = sensors.specific_force_frd_m_s2
         return True
 
-    def _without_place(self, sensors: Sensors) -> Sensors:
-        """A sample without satellites, horizontal position and velocity NaN, made whole by dead reckoning.
+    def _without_position(self, sensors: Sensors) -> Sensors:
+        """Complete a sample without horizontal position and velocity (NaN) by dead reckoning.
 
         The accelerometer is integrated from the last state: v += (R f + g) dt, p += v dt. It drifts, but the
-        commander needs it for a second only.
+        commander uses it for a second only.
         """
         origin, state = self.origin_ned_m, self.state
         lost = (*sensors.position_ned_m[:2], *sensors.velocity_ned_m_s[:2])
         period_s = (sensors.time_us - state.time_us) / 1e6
-        if origin is None or not all(map(isnan, lost)) or not 0.0 < period_s < _LONGEST_S:
+        if origin is None or not all(map(isnan, lost)) or not 0.0 < period_s < _MAX_GAP_S:
             return sensors
-        w, x, y, z = sensors.attitude
-        fx, fy, fz = sensors.specific_force_frd_m_s2
-        north_m_s2 = (1 - 2 * (y * y + z * z)) * fx + 2 * (x * y - w * z) * fy + 2 * (x * z + w * y) * fz
-        east_m_s2 = 2 * (x * y + w * z) * fx + (1 - 2 * (x * x + z * z)) * fy + 2 * (y * z - w * x) * fz
+        north_m_s2, east_m_s2, _ = to_world(rotation(sensors.attitude), *sensors.specific_force_frd_m_s2)
         north_m_s = state.velocity_ned_m_s[0] + north_m_s2 * period_s
         east_m_s = state.velocity_ned_m_s[1] + east_m_s2 * period_s
         return replace(
@@ -86,7 +83,7 @@ class Estimator:
         )
 
 
-def _is_sound(sensors: Sensors) -> bool:
+def _is_usable(sensors: Sensors) -> bool:
     px, py, pz = sensors.position_ned_m
     vx, vy, vz = sensors.velocity_ned_m_s
     w, x, y, z = sensors.attitude

@@ -1,6 +1,6 @@
 """One control tick of the autopilot: estimate, observe, decide, guide, actuate.
 
-It reads no clock and opens nothing: time is what the sensors say, and who calls it decides how fast.
+It reads no clock: its time is that of the sensors' samples.
 """
 
 from __future__ import annotations
@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 from firmware_py.airframe import Airframe
 from firmware_py.battery import BatteryMonitor
 from firmware_py.commander import NOT_CHECKED, Commander, Observation, SlowChecks
-from firmware_py.commander_table import INFO, WARNING, Event, Row, State
+from firmware_py.commander_table import Event, Row, State
 from firmware_py.commands import ControlCommand
 from firmware_py.estimator import Estimator
 from firmware_py.geodesy import GeoReference
@@ -26,6 +26,8 @@ from firmware_py.offboard_requests import SetpointQueue
 from firmware_py.parameters import Parameters
 from firmware_py.status import CommandResult, LandedState, VehicleStatus
 from firmware_py.types import (
+    INFO,
+    WARNING,
     FlightRecord,
     GeodeticPoint,
     MotorOutput,
@@ -40,7 +42,7 @@ if TYPE_CHECKING:
 
 _MAX_TEXTS = 100
 _CHECK_PERIOD_US = 100_000
-_READY_PERIOD_US = 100_000  # once armed, whether it could be armed again is of little interest
+_READY_PERIOD_US = 100_000  # of the pre-arm checks while armed
 
 _STAYS_ON_GROUND = frozenset(
     {
@@ -53,7 +55,7 @@ _STAYS_ON_GROUND = frozenset(
         State.FAILSAFE_RETURN,
     }
 )
-"""States that leave the ground only if their mode departs for a place above."""
+"""States that leave the ground only if their mode flies to a place above."""
 
 _AIRBORNE_STATES = {
     State.TAKEOFF: LandedState.TAKEOFF,
@@ -66,24 +68,24 @@ _LEG_ENDS = {LegKind.RETURN: Event.MISSION_RETURNS, LegKind.DONE: Event.MISSION_
 
 
 class FlightLoop:
-    """Joins estimator, commander, guidance and stabiliser. Of decisions only the commander keeps a memory.
+    """Combines estimator, commander, guidance and stabiliser. Only the commander remembers decisions.
 
     Args:
-        airframe: what it flies.
-        origin: where on Earth the sensors' positions count from.
-        parameters: shared with the MAVLink services; the airframe's defaults if not given.
+        airframe: what flies.
+        origin: where on Earth the sensors' positions are measured from.
+        parameters: shared with the MAVLink services; by default the airframe's defaults.
         control_period_s: time between calls of `step`.
-        stabiliser: another one than the airframe's own design, for tests.
+        stabiliser: replaces the airframe's own, for tests.
 
     Attributes:
-        airframe: what it flies.
-        parameters: what a ground station may change; changes act at the next tick.
-        estimator: knows the local frame's origin.
+        airframe: what flies.
+        parameters: a change takes effect at the next tick.
+        estimator: has the local frame's origin.
         state: the estimate of the vehicle, updated in place.
-        status: arming, mode, home and so on, updated in place.
-        output: what the last step sent to the motors.
-        battery: what is known of the battery.
-        flight: times of the flight now or last.
+        status: arming, mode, home and others, updated in place.
+        output: of the last step.
+        battery: its state, updated in place.
+        flight: times of the present or last flight.
         missions: mission, fence and rally points.
         setpoints: of an offboard controller, as received.
     """
@@ -118,7 +120,7 @@ class FlightLoop:
         self._land_detector = LandDetector((airframe.hover_speed_rad_s / airframe.motor.max_speed_rad_s) ** 2)
         self._texts: deque[StatusText] = deque(maxlen=_MAX_TEXTS)
         self._period_us = round(control_period_s * 1e6)
-        self._now_us = 0  # goes on while samples are unusable
+        self._now_us = 0  # advances also while samples are unusable
         self._checks = NOT_CHECKED
         self._checks_due_us = self._ready_due_us = 0
         self._motors_stopped = True
@@ -128,39 +130,39 @@ class FlightLoop:
         self._configure()
 
     def prepare(self) -> None:
-        """Design the stabiliser, if that has not been done; arming does it at the latest.
+        """Design the stabiliser, if that has not been done; arming calls it.
 
-        It takes some tenths of a second, most of them to import SciPy, so a program in real time does it
-        before its clock runs, and after it has sent its first heartbeat.
+        It takes some tenths of a second, mostly for the import of SciPy, so a program in real time calls it
+        before its clock runs, after the first heartbeat.
         """
         if self._stabiliser is None:
             from firmware_py.control.stabiliser import Stabiliser
 
             self._stabiliser = Stabiliser(self.airframe, self._period_us / 1e6)
-            self._parameters_version = -1  # it gets its limits with the next tick
+            self._parameters_version = -1  # sets its limits at the next tick
 
     def step(self, sensors: Sensors) -> MotorSpeeds:
         """Fly one control tick.
 
         Args:
-            sensors: this tick's sample. An unusable one (not finite, not newer than the last) is bridged
-                with the last motor speeds; soon after, the commander gives up.
+            sensors: this tick's sample. For an unusable one (not finite, not newer than the last) the last
+                motor speeds are repeated; after 0.3 s without a usable one the commander stops the motors.
 
         Returns:
             Rotor speeds in rad/s, in the airframe's order; zeros while disarmed.
         """
         if self.parameters.version != self._parameters_version:
             self._configure()
-        sound = self.estimator.update(sensors)
-        seen = self._observe(sensors, sound)
+        usable = self.estimator.update(sensors)
+        seen = self._observe(sensors, usable)
         commander = self._commander
-        row = commander.tick(seen)  # it decides
+        row = commander.tick(seen)
         if row is not None:
             self._follow(row)
         if commander.state is State.MISSION:
             self._advance_mission()
         self._refresh_status()
-        if sound and not self._motors_stopped:
+        if usable and not self._motors_stopped:
             command = self._guidance.step(self.state)
             self.output = self._actuate(command, seen.landed)
         return self.output.speeds_rad_s
@@ -175,7 +177,7 @@ class FlightLoop:
             takeoff_altitude_m: of the next take-off, above mean sea level; NaN: MIS_TAKEOFF_ALT above home.
             orbit: the circle to fly.
         """
-        self._commander.mission_known(valid=self.missions.valid)
+        self._commander.note_mission(valid=self.missions.valid)
         self._commander.remember(takeoff_altitude_m, orbit)
         row = self._commander.handle(event)
         self._follow(row)
@@ -183,25 +185,24 @@ class FlightLoop:
         return row.result
 
     def say(self, severity: int, text: str) -> None:
-        """Leave a line for people, with MAV_SEVERITY; the oldest go first when nobody takes them."""
+        """Add a status text with MAV_SEVERITY; of texts that are not taken the oldest are dropped."""
         self._texts.append(StatusText(severity, text))
 
     def take_texts(self) -> list[StatusText]:
-        """All messages since the last call, oldest first."""
+        """All status texts since the last call, oldest first."""
         texts = list(self._texts)
         self._texts.clear()
         return texts
 
     def _publish_places(self) -> None:
-        """Tell status and guidance where origin and home are."""
+        """Update origin and home in status and guidance."""
         status, geo = self.status, self._geo
         status.origin, status.home, status.home_ned_m = geo.origin, geo.home, geo.home_ned_m
         self._guidance.set_home(geo.home_ned_m)
 
-    def _observe(self, sensors: Sensors, sound: bool) -> Observation:
-        """What the commander is to know of this tick."""
+    def _observe(self, sensors: Sensors, usable: bool) -> Observation:
         state, detector, now_us = self.state, self._land_detector, self._now_us
-        if not sound:
+        if not usable:
             self._now_us = now_us = now_us + self._period_us
         else:
             if state.time_us > now_us:
@@ -225,8 +226,8 @@ class FlightLoop:
         _, x, y, _ = state.attitude
         return Observation(
             now_us,
-            sound,
-            self.estimator.placed,
+            usable,
+            self.estimator.has_position,
             1.0 - 2.0 * (x * x + y * y) > self._upright_cosine,
             detector.landed,
             self._guidance.mode.target_reached,
@@ -234,7 +235,7 @@ class FlightLoop:
         )
 
     def _actuate(self, command: ControlCommand, landed: bool) -> MotorOutput:
-        """Motors for a command, with the ground between if it stands."""
+        """Motor output for a command, in the air or on the ground."""
         stabiliser = self._stabiliser
         if stabiliser is None:
             raise RuntimeError("the stabiliser is not designed yet; call prepare()")
@@ -251,7 +252,7 @@ class FlightLoop:
         )
 
     def _follow(self, row: Row) -> None:
-        """Do what a rule that fired entails."""
+        """Apply a row that matched."""
         if row.text:
             self.say(row.severity, row.text)
         if row.target is None:
@@ -279,7 +280,7 @@ class FlightLoop:
         self.flight.number += 1
 
     def _enter(self, target: State, before: State, event: Event) -> None:
-        """Fly the mode of a state entered; one without motors changes no guidance."""
+        """Start the mode of a state; a state without motors changes no mode."""
         if before is State.MISSION:
             self._navigator.leave_mission()
         if self._motors_stopped:
@@ -287,7 +288,7 @@ class FlightLoop:
             return
         on_ground = self.status.landed_state is LandedState.ON_GROUND
         if target is State.FAILSAFE_HOLD and before is State.TAKEOFF and on_ground:
-            return  # as PX4: a take-off that has begun goes on to its height and holds there
+            return  # as PX4: a take-off that has begun continues to its height and holds there
         reached = before is State.TAKEOFF and event is Event.TICK
         self._guidance.enter(
             target,
@@ -300,7 +301,7 @@ class FlightLoop:
             self._navigator.enter_mission()
 
     def _target_of(self, target: State) -> Vec3:
-        """Where a take-off or a return goes, NED metres; NaN for other states."""
+        """The target of a take-off or a return, NED metres; NaN for other states."""
         if target in (State.RETURN, State.FAILSAFE_RETURN):
             return self._navigator.return_place() or self._geo.home_ned_m
         here = self._geo.to_geodetic(self.state.position_ned_m)
@@ -317,7 +318,7 @@ class FlightLoop:
         return (nan, nan, self.state.position_ned_m[2] - climb_m)
 
     def _advance_mission(self) -> None:
-        """Fly the mission's next leg, and tell the commander when it ends."""
+        """Fly the mission's next leg, and report its end to the commander."""
         self._navigator.observe(self.state, self._geo, landed=self._land_detector.landed)
         leg = self._navigator.next_leg()
         if leg is None:
@@ -343,24 +344,24 @@ class FlightLoop:
             self.say(INFO, "Landing detected" if landed else "Takeoff detected")
 
     def _check(self, sensors: Sensors) -> SlowChecks:
-        """Look at battery, fence and mission."""
+        """Check battery, fence and mission."""
         self._checks_due_us = self._now_us + _CHECK_PERIOD_US
         battery, navigator = self._battery, self._navigator
         navigator.observe(self.state, self._geo, landed=self._land_detector.landed)
         battery.update(self._now_us, sensors.battery_voltage_v, sensors.battery_current_a)
         breach = navigator.breach() if self.status.armed else None
         if breach is not None and not self._checks.fence_breached:
-            self.say(WARNING, breach.text)
+            self.say(WARNING, breach)
         self._texts.extend(navigator.take_texts())
         return SlowChecks(
             battery.state.warning,
-            battery.arms,
+            battery.can_arm,
             self.missions.valid,
             breach is not None,
         )
 
     def _configure(self) -> None:
-        """Take over the parameters; looked up by name only when one has changed."""
+        """Apply the parameters, when one has changed."""
         parameters, airframe = self.parameters, self.airframe
         self._parameters_version = parameters.version
         self._commander.configure(parameters)
@@ -368,7 +369,7 @@ class FlightLoop:
         self._battery.configure(airframe, parameters)
         if self._stabiliser is not None:
             value, limits = parameters.value, self._stabiliser.limits
-            limits.tilt_rad = radians(value("MPC_TILTMAX_AIR"))
+            limits.limit_tilt(radians(value("MPC_TILTMAX_AIR")))
             limits.rate_rad_s = radians(min(value("MC_ROLLRATE_MAX"), value("MC_PITCHRATE_MAX")))
             limits.min_thrust, limits.max_thrust = value("MPC_THR_MIN"), value("MPC_THR_MAX")
         self._lift_off.configure(parameters)
@@ -391,8 +392,8 @@ class FlightLoop:
         if status.armed and self._now_us < self._ready_due_us:
             return
         self._ready_due_us = self._now_us + _READY_PERIOD_US
-        ready = commander.ready
-        status.not_ready = "" if ready else commander.refusal
+        status.not_ready = commander.refusal
+        ready = not status.not_ready
         if ready and not status.ready and not status.armed:
             self.say(INFO, "Ready for takeoff!")
         status.ready = ready

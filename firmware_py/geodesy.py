@@ -1,7 +1,7 @@
 """Between the local NED frame and latitude, longitude, altitude.
 
-Azimuthal equidistant projection on a sphere, as PX4's `MapProjection` does it, so that both agree about
-where a local position is on the map. Source: Snyder, "Map Projections - A Working Manual", USGS PP 1395,
+Azimuthal equidistant projection on a sphere, as PX4's `MapProjection`, so that both give the same
+coordinates. Source: Snyder, "Map Projections - A Working Manual", USGS PP 1395,
 equations 20-14, 20-15, 22-4, 22-5 and 25-2.
 """
 
@@ -17,7 +17,7 @@ _LATITUDE_DEG, _LONGITUDE_DEG, _ALTITUDE_M = 90.0, 180.0, 100_000.0
 
 
 class LocalProjection:
-    """A local NED frame on Earth; distances and bearings from its origin are true."""
+    """A local NED frame on Earth; distances and bearings from its origin are exact."""
 
     __slots__ = ("_cos_latitude", "_latitude_rad", "_sin_latitude", "origin")
 
@@ -64,7 +64,7 @@ class LocalProjection:
         sin_angle = hypot(north, east)
         if sin_angle == 0.0:
             return (0.0, 0.0, down_m)
-        # atan2 and not acos: near the origin the cosine alone has lost all its digits.
+        # atan2 and not acos: near the origin the cosine alone has no precision.
         cos_angle = self._sin_latitude * sin_latitude + self._cos_latitude * cos_latitude * cos(turn_rad)
         scale_m = EARTH_RADIUS_M * atan2(sin_angle, cos_angle) / sin_angle
         return (north * scale_m, east * scale_m, down_m)
@@ -74,7 +74,7 @@ class GeoReference:
     """Where on Earth the local frame and home are.
 
     Args:
-        sensor_origin: where on Earth the sensors' positions count from.
+        sensor_origin: where on Earth the sensors' positions are measured from.
 
     Attributes:
         projection: of the local frame; None before its origin is known.
@@ -96,11 +96,11 @@ class GeoReference:
         return None if self.projection is None else self.projection.origin
 
     def fix_origin(self, origin_ned_m: Vec3) -> None:
-        """Take the local frame's origin, given in the sensors' frame."""
+        """Set the local frame's origin, given in the sensors' frame, shape (3,)."""
         self.projection = LocalProjection(self._sensor_projection.to_geodetic(origin_ned_m))
 
     def move_origin(self, point: GeodeticPoint) -> bool:
-        """Say where on Earth the local frame's origin is; False before there is one."""
+        """Set where on Earth the local frame's origin is; False before there is one, or if not on Earth."""
         if self.projection is None or not is_on_earth(point):
             return False
         self.projection = LocalProjection(point)
@@ -108,11 +108,11 @@ class GeoReference:
         return True
 
     def set_home_at(self, position_ned_m: Vec3) -> None:
-        """Home is a place in the local frame."""
+        """Set home to a place in the local frame, shape (3,)."""
         self.home, self.home_ned_m = self.to_geodetic(position_ned_m), position_ned_m
 
     def set_home(self, point: GeodeticPoint) -> bool:
-        """Home is a place on Earth; False if that cannot be."""
+        """Set home to a place on Earth; False before the origin is known or for no place on Earth."""
         local = self.to_local(point)
         if local is None:
             return False
@@ -131,7 +131,7 @@ class GeoReference:
 
 
 def is_on_earth(point: GeodeticPoint) -> bool:
-    """Whether the numbers can be a place: finite and in range."""
+    """Whether the coordinates are finite and in range."""
     return (
         isfinite(point.latitude_deg + point.longitude_deg + point.altitude_m)
         and abs(point.latitude_deg) <= _LATITUDE_DEG

@@ -1,8 +1,8 @@
-"""Between ground and air: whether the vehicle stands on something, and how the motors take it off the ground.
+"""Contact with the ground: detection of take-off and landing, and the motors' output before and at lift-off.
 
-Without a range finder the ground shows itself by what the vehicle does not do: told to descend, with
-little thrust, it stays where it is. The same signs as PX4's multicopter land detector, with shorter
-times because the vehicle is light and its state clean.
+Without a range finder the ground is detected by motion: with a descent commanded and little thrust, the
+vehicle does not move. The conditions are those of PX4's multicopter land detector, with shorter times
+because the vehicle is light and its state without noise.
 """
 
 from __future__ import annotations
@@ -18,34 +18,34 @@ from firmware_py.types import MotorOutput, VehicleState
 if TYPE_CHECKING:
     from firmware_py.control.stabiliser import Stabiliser  # it imports SciPy
 
-_FALL_US = 100_000  # unasked motion longer than this is not standing
-_MOVING_M_S = 0.3  # while it stands
+_FALL_US = 100_000  # longer vertical motion without lift-off means that the vehicle is in the air
+_MOVING_M_S = 0.3  # on the ground
 _DESCENT_COMMAND_M_S = 0.05
 _DESCENT_SHARE = 0.3  # less than this share of the commanded descent is "not descending"
 _LOW_THRUST_SHARE = 0.9  # of hover; slow descent in the air needs nearly all of it
 _LIFTED_SPEED_M_S = 0.1
 _LIFTED_HEIGHT_M = 0.03
-_MIN_CLIMB_SHARE = 0.02  # of the climb wanted, whatever the ramp says, once it works to leave the ground
-_LIFT_M_S = 0.04  # asked to climb faster than this, it leaves the ground
-_LIFT_HELD_TICKS = 125  # half a second: integrals rest while the contact still carries the weight
+_MIN_CLIMB_SHARE = 0.02  # of the commanded climb, also where the ramp allows less
+_LIFT_M_S = 0.04  # a commanded climb above this starts a lift-off
+_LIFT_HELD_TICKS = 125  # half a second in which integrals are held: the ground may carry the weight
 
 
 class LandDetector:
-    """Follows the vehicle from ground to air and back.
+    """Detects take-off and landing.
 
     Attributes:
-        landed: whether it stands on something.
-        trigger_us: the signs of ground must hold this long (LNDMC_TRIG_TIME).
-        vertical_m_s: standing means less (LNDMC_Z_VEL_MAX).
-        level_m_s: standing means less (LNDMC_XY_VEL_MAX).
-        turning_rad_s: of roll and pitch; standing means less (LNDMC_ROT_MAX).
+        landed: whether the vehicle is on the ground.
+        trigger_us: the conditions must hold this long (LNDMC_TRIG_TIME).
+        vertical_m_s: maximum vertical speed on the ground (LNDMC_Z_VEL_MAX).
+        level_m_s: maximum horizontal speed (LNDMC_XY_VEL_MAX).
+        turning_rad_s: maximum rate of roll and pitch (LNDMC_ROT_MAX).
     """
 
     __slots__ = (
+        "_ground_down_m",
         "_hover_throttle",
+        "_last_not_ground_us",
         "_last_still_us",
-        "_last_unlike_us",
-        "_stand_down_m",
         "landed",
         "level_m_s",
         "trigger_us",
@@ -57,19 +57,19 @@ class LandDetector:
         """Start on the ground.
 
         Args:
-            hover_throttle: mean squared share of rotor speed that carries the weight, 0..1.
+            hover_throttle: mean of (rotor speed / maximum)^2 at hover, 0..1.
         """
         self.landed = True
         self.trigger_us = 300_000
         self.vertical_m_s = self.level_m_s = _MOVING_M_S
         self.turning_rad_s = inf
         self._hover_throttle = hover_throttle
-        self._stand_down_m = 0.0
+        self._ground_down_m = 0.0
         self._last_still_us = 0
-        self._last_unlike_us = 0
+        self._last_not_ground_us = 0
 
     def configure(self, parameters: Parameters) -> None:
-        """Take over changed parameters."""
+        """Apply changed parameters."""
         value = parameters.value
         self.trigger_us = round(value("LNDMC_TRIG_TIME") * 1e6)
         self.vertical_m_s = value("LNDMC_Z_VEL_MAX")
@@ -79,19 +79,19 @@ class LandDetector:
     def update(
         self, state: VehicleState, *, armed: bool, lifting: bool, command_down_m_s: float, throttle: float
     ) -> bool:
-        """Take one tick, and say whether the vehicle stands on something.
+        """Take one tick; return whether the vehicle is on the ground.
 
         Args:
-            state: the vehicle now.
+            state: of the vehicle now.
             armed: motors may turn.
-            lifting: the motors work to leave the ground.
-            command_down_m_s: vertical speed now asked of the stabiliser, positive down.
-            throttle: mean squared share of rotor speed, 0..1.
+            lifting: a lift-off has begun.
+            command_down_m_s: commanded vertical velocity, positive down.
+            throttle: mean of (rotor speed / maximum)^2, 0..1.
         """
         if self.landed:
             self._watch_for_air(state, lifting)
         elif armed and command_down_m_s <= _DESCENT_COMMAND_M_S:
-            self._last_unlike_us = state.time_us
+            self._last_not_ground_us = state.time_us
         else:
             self._watch_for_ground(state, armed, command_down_m_s, throttle)
         return self.landed
@@ -100,23 +100,23 @@ class LandDetector:
         down_m = state.position_ned_m[2]
         climb_m_s = -state.velocity_ned_m_s[2]
         if not lifting:
-            self._stand_down_m = down_m
+            self._ground_down_m = down_m
             if abs(climb_m_s) < _MOVING_M_S:
                 self._last_still_us = state.time_us
             left = state.time_us - self._last_still_us > _FALL_US
         else:
             self._last_still_us = state.time_us
-            left = climb_m_s > _LIFTED_SPEED_M_S or self._stand_down_m - down_m > _LIFTED_HEIGHT_M
+            left = climb_m_s > _LIFTED_SPEED_M_S or self._ground_down_m - down_m > _LIFTED_HEIGHT_M
         if left:
             self.landed = False
-            self._last_unlike_us = state.time_us
+            self._last_not_ground_us = state.time_us
 
     def _watch_for_ground(
         self, state: VehicleState, armed: bool, command_down_m_s: float, throttle: float
     ) -> None:
         north_m_s, east_m_s, down_m_s = state.velocity_ned_m_s
         roll_rad_s, pitch_rad_s, _ = state.angular_rate_frd_rad_s
-        like_ground = (
+        is_ground = (
             abs(down_m_s) < self.vertical_m_s
             and hypot(north_m_s, east_m_s) < self.level_m_s
             and hypot(roll_rad_s, pitch_rad_s) < self.turning_rad_s
@@ -128,21 +128,21 @@ class LandDetector:
                 )
             )
         )
-        if not like_ground:
-            self._last_unlike_us = state.time_us
-        elif state.time_us - self._last_unlike_us > self.trigger_us:
+        if not is_ground:
+            self._last_not_ground_us = state.time_us
+        elif state.time_us - self._last_not_ground_us > self.trigger_us:
             self.landed = True
-            self._stand_down_m = state.position_ned_m[2]
+            self._ground_down_m = state.position_ned_m[2]
             self._last_still_us = state.time_us
 
 
 class LiftOff:
-    """Stands between guidance and stabiliser while the vehicle is on the ground, and just after.
+    """Limits commands on the ground and at lift-off, and passes them on to the stabiliser.
 
     Attributes:
-        ticks: for how many ticks the motors have been working to leave the ground; 0: they idle.
+        ticks: since the lift-off began; 0: the motors idle.
         spool_up_us: motors idle this long after arming (COM_SPOOLUP_TIME).
-        ramp_us: the climb allowed grows this long from when it is wanted (MPC_TKO_RAMP_T).
+        ramp_us: duration of the climb ramp since a climb is commanded (MPC_TKO_RAMP_T).
     """
 
     __slots__ = ("_armed_us", "_climb_ramp", "_ramp_start_us", "_wanted", "ramp_us", "spool_up_us", "ticks")
@@ -153,26 +153,26 @@ class LiftOff:
         self.ramp_us = 0
         self._climb_ramp = ClimbRamp(0.0, 0.0)
         self._armed_us = 0
-        self._wanted = False  # to lift
+        self._wanted = False  # a lift-off
         self._ramp_start_us = -(10**15)
 
     def configure(self, parameters: Parameters) -> None:
-        """Take over changed parameters."""
+        """Apply changed parameters."""
         self.spool_up_us = round(parameters.value("COM_SPOOLUP_TIME") * 1e6)
         self.ramp_us = round(parameters.value("MPC_TKO_RAMP_T") * 1e6)
 
     def arm(self, time_us: int) -> None:
-        """The motors may turn from now on."""
+        """Begin after arming."""
         self.ticks = 0
         self._wanted = False
         self._armed_us = time_us
 
     def rest(self) -> None:
-        """The motors stand."""
+        """The motors are stopped."""
         self.ticks = 0
 
     def fly(self, stabiliser: Stabiliser, state: VehicleState, command: ControlCommand) -> MotorOutput:
-        """Motors for a command in the air."""
+        """Motor output for a command in the air."""
         self.ticks = 0
         self._wanted = False
         if state.time_us - self._ramp_start_us < self.ramp_us:
@@ -189,15 +189,15 @@ class LiftOff:
         may_lift: bool,
         climb_ramp: ClimbRamp,
     ) -> MotorOutput:
-        """Motors for a command on the ground.
+        """Motor output for a command on the ground.
 
         Args:
-            stabiliser: that flies.
-            state: the vehicle now.
+            stabiliser: of the airframe.
+            state: of the vehicle now.
             command: of guidance.
-            down_m_s: what it means vertically; below zero: up.
-            may_lift: the mode flown is one that takes off.
-            climb_ramp: of the mode flown.
+            down_m_s: its vertical velocity; below zero: up.
+            may_lift: the mode may leave the ground.
+            climb_ramp: of the mode.
         """
         self._climb_ramp = climb_ramp
         ramped = command.controls_climb and self.ramp_us > 0
@@ -211,7 +211,7 @@ class LiftOff:
         return stabiliser.step(state, command.straight_up(), grounded=self.ticks <= _LIFT_HELD_TICKS)
 
     def _lifts(self, time_us: int, down_m_s: float, *, may_lift: bool, ramped: bool) -> bool:
-        """Whether the motors work to leave the ground: it is wanted, and the ramp allows a climb."""
+        """Whether to lift off: a climb is commanded, and the ramp allows it."""
         if time_us - self._armed_us < self.spool_up_us or not may_lift or down_m_s > -_LIFT_M_S:
             self._wanted = False
             return False
@@ -221,13 +221,12 @@ class LiftOff:
         return self.ticks > 0 or not ramped or self._ramp(down_m_s, time_us) < 0.0
 
     def _ramp(self, down_m_s: float, time_us: int) -> float:
-        """The vertical velocity allowed on the way to one wanted, below zero: up."""
+        """The vertical velocity that the ramp allows for a commanded one, below zero: up."""
         ramp = self._climb_ramp
         share = min((time_us - self._ramp_start_us) / self.ramp_us, 1.0)
         return max(down_m_s, -ramp.from_m_s - share * (ramp.to_m_s - ramp.from_m_s))
 
     def _ramped(self, command: ControlCommand, time_us: int) -> ControlCommand:
-        """Less climb in the first moments."""
         return command.with_limited_climb(
             lambda down_m_s: min(self._ramp(down_m_s, time_us), _MIN_CLIMB_SHARE * down_m_s)
         )

@@ -1,37 +1,38 @@
-"""The navigator: gives the legs of the stored mission, checks the fence, and knows where a return goes."""
+"""The navigator: flies the stored mission by legs, checks the fence, and chooses a return's destination."""
 
 from __future__ import annotations
 
+from math import hypot, inf, isfinite
+
 from firmware_py.geodesy import GeoReference
-from firmware_py.missions import rally
 from firmware_py.missions.executor import MissionExecutor
 from firmware_py.missions.flight import IssuedCommand, Leg, View
-from firmware_py.missions.geofence import Breach, Geofence
+from firmware_py.missions.geofence import Geofence
+from firmware_py.missions.items import Do
 from firmware_py.missions.store import MissionStore
 from firmware_py.parameters import Parameters
 from firmware_py.types import StatusText, VehicleState
 from geometry.vectors import Vec3
 
 _MAX_ISSUED = 100
+_NEARER_M = 2.0  # another place must be nearer than the best so far by this
+_OF_HOME_M = 10.0  # a rally point this near to home counts as home
+_HOME_OR_RALLY, _NOT_HOME, _MISSION_PATH, _NEAREST, _FEWEST_ITEMS = range(5)  # RTL_TYPE
 
 
 class Navigator:
-    """Joins mission, fence and rally points.
+    """Combines mission, fence and rally points.
 
     Args:
-        store: mission, fence and rally points.
+        store: of all three.
         parameters: MIS_, NAV_, GF_ and RTL_.
-
-    Attributes:
-        store: see above.
-        view: the vehicle as missions see it.
     """
 
-    __slots__ = ("_executor", "_fence", "_issued", "_leg", "_parameters", "store", "view")
+    __slots__ = ("_executor", "_fence", "_issued", "_leg", "_parameters", "_store", "_view")
 
     def __init__(self, store: MissionStore, parameters: Parameters) -> None:
-        self.store = store
-        self.view = View()
+        self._store = store
+        self._view = View()
         self._parameters = parameters
         self._executor = MissionExecutor(store, parameters)
         self._fence = Geofence(store, parameters)
@@ -39,8 +40,8 @@ class Navigator:
         self._issued: list[IssuedCommand] = []
 
     def observe(self, state: VehicleState, geo: GeoReference, *, landed: bool) -> None:
-        """Bring the view up to date."""
-        view = self.view
+        """Update the view of the vehicle."""
+        view = self._view
         view.time_us = state.time_us
         view.position_ned_m = state.position_ned_m
         view.velocity_ned_m_s = state.velocity_ned_m_s
@@ -50,12 +51,12 @@ class Navigator:
         view.home_ned_m = geo.home_ned_m if geo.home is not None else None
 
     def enter_mission(self) -> None:
-        """Begin the mission, or go on with it."""
+        """Begin or continue the mission."""
         self._leg = None
-        self._executor.enter(self.view)
+        self._executor.enter(self._view)
 
     def leave_mission(self) -> None:
-        """Another mode is flown now."""
+        """Mission mode has ended."""
         self._executor.leave()
 
     def disarmed(self) -> None:
@@ -63,28 +64,27 @@ class Navigator:
         self._executor.disarmed()
 
     def next_leg(self) -> Leg | None:
-        """Take the mission one tick further; the leg to fly from now on, None: as before."""
-        leg = self._executor.step(self.view)
+        """The mission's leg from this tick on; None: unchanged."""
+        leg = self._executor.step(self._view)
         if leg is self._leg:
             return None
         self._leg = leg
         return leg
 
-    def breach(self) -> Breach | None:
-        """What part of the fence is broken now; None: none."""
-        return self._fence.check(self.view)
+    def breach(self) -> str | None:
+        """How the vehicle breaches the fence now, for people; None: it does not."""
+        return _breach_text(self._fence.check(self._view))
 
-    def breach_at(self, position_ned_m: Vec3) -> Breach | None:
-        """What part of the fence a place is behind; None: none."""
-        return self._fence.breach_at(position_ned_m, self.view)
+    def breach_at(self, position_ned_m: Vec3) -> str | None:
+        """How a place breaches the fence, for people; None: it does not."""
+        return _breach_text(self._fence.breach_at(position_ned_m, self._view))
 
     def return_place(self) -> Vec3 | None:
-        """Where a return goes from here, NED metres; None before home is known."""
-        found = rally.destination(self.view, self.store, self._parameters)
-        return None if found is None else found.position_ned_m
+        """A return's destination from here, NED metres; None before home is known."""
+        return return_place(self._view, self._store, self._parameters)
 
     def take_texts(self) -> list[StatusText]:
-        """What people are to be told since the last call; commands to others are kept for `take_issued`."""
+        """Texts for people since the last call; commands to others are kept for `take_issued`."""
         texts = []
         for event in self._executor.take_events():
             if isinstance(event, StatusText):
@@ -97,3 +97,39 @@ class Navigator:
         """Commands to others since the last call."""
         taken, self._issued = self._issued, []
         return taken
+
+
+def _breach_text(breach: str | None) -> str | None:
+    return None if breach is None else f"Geofence violation: {breach}"
+
+
+def return_place(view: View, store: MissionStore, parameters: Parameters) -> Vec3 | None:
+    """A return's destination by RTL_TYPE and PX4's rules, NED metres; None before home is known.
+
+    Heights such as RTL_RETURN_ALT count from there. The types that follow the mission's own path (2 and 4)
+    are flown straight: to its landing if it has one, else home.
+    """
+    home_ned_m = view.home_ned_m
+    if home_ned_m is None:
+        return None
+    rtl_type = parameters.integer("RTL_TYPE")
+    follows_mission = rtl_type in (_MISSION_PATH, _FEWEST_ITEMS)
+    best_ned_m, min_m = home_ned_m, _distance_m(view.position_ned_m, home_ned_m)
+    if rtl_type == _NOT_HOME or follows_mission:
+        min_m = inf
+    places = []
+    if rtl_type != _HOME_OR_RALLY and store.valid:
+        landings = (view.place_of(item) for item in store.mission.items if item.command == Do.LAND)
+        places += [*landings][:1]
+    if not follows_mission:
+        rally_points = (view.place_of(item) for item in store.rally.items if item.command == Do.RALLY_POINT)
+        places += [place for place in rally_points if _distance_m(home_ned_m, place) > _OF_HOME_M]
+    for place_ned_m in places:
+        distance_m = _distance_m(view.position_ned_m, place_ned_m)
+        if distance_m + _NEARER_M < min_m and all(map(isfinite, place_ned_m)):
+            best_ned_m, min_m = place_ned_m, distance_m
+    return best_ned_m
+
+
+def _distance_m(one_ned_m: Vec3, other_ned_m: Vec3) -> float:
+    return hypot(one_ned_m[0] - other_ned_m[0], one_ned_m[1] - other_ned_m[1])

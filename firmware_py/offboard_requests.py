@@ -1,13 +1,14 @@
-"""What an offboard controller asks for: PX4's rules from a message to a `Setpoint`, and when it is flown.
+"""An offboard controller's requests: PX4's rules from a message to a `Setpoint`, and when it is flown.
 
-Pure functions, shared by the MAVLink service and by an adapter that flies in the same process.
+Shared by the MAVLink service and by an adapter that flies in the same process.
 
-Two rules of PX4 seen from outside: a request with nothing finite in it is refused and counts as no setpoint;
-a request that leaves an axis open, or gives only one of the horizontal pair, is taken but braked, because its
-position controller cannot fly it. So one NaN or infinity among three velocities stops the vehicle in the air.
+Two rules of PX4: a request without any finite component is refused and counts as no setpoint; a request that
+does not control an axis, or gives only one of the horizontal pair, is accepted but the vehicle brakes,
+because its position controller cannot fly it. So one NaN or infinity among three velocities stops the
+vehicle in the air.
 
-One difference: PX4 turns a body velocity into the world once, at reception. Here it goes on to turn with the
-vehicle, as the paper's drone does, so a setpoint that is sent again changes nothing.
+One difference: PX4 transforms a body velocity to NED once, at reception. Here it continues to turn with the
+vehicle, as the paper's drone does, so sending a setpoint again changes nothing.
 """
 
 from __future__ import annotations
@@ -27,6 +28,7 @@ from firmware_py.setpoints import (
     TrajectorySetpoint,
 )
 from firmware_py.types import VehicleState
+from geometry.rotations import rotation, to_world
 from geometry.vectors import NAN3, ZERO3, Quaternion, Vec3
 from wire.dialect import mavlink
 
@@ -38,13 +40,13 @@ _MAX_RATE_RAD_S = 30.0
 
 @dataclass(frozen=True, slots=True)
 class SetpointRefusal:
-    """A request that is no setpoint; the text is for people, in PX4's words."""
+    """A request that is not a setpoint, with PX4's text for people."""
 
     text: str
 
 
 class TargetMask(IntEnum):
-    """POSITION_TARGET_TYPEMASK: a set bit takes the component out."""
+    """POSITION_TARGET_TYPEMASK: a set bit means that the component is ignored."""
 
     X = 1
     Y = 2
@@ -76,11 +78,11 @@ class LocalTarget:
 def setpoint_from_target(
     target: LocalTarget, state: VehicleState, time_us: int
 ) -> Setpoint | SetpointRefusal:
-    """Turn a target message into a setpoint.
+    """The setpoint of a target message.
 
     Args:
-        target: the message.
-        state: the vehicle now; its yaw and attitude turn body targets into the world.
+        target: the message's fields.
+        state: of the vehicle now; its yaw and attitude transform body targets to NED.
         time_us: vehicle time of reception.
     """
     mask = target.type_mask
@@ -95,7 +97,8 @@ def setpoint_from_target(
             body_velocity = target.velocity_m_s
             velocity = _level_to_ned(target.velocity_m_s, state.yaw_rad)
         if not mask & (TargetMask.AX | TargetMask.AY | TargetMask.AZ):
-            acceleration = _body_to_ned(target.acceleration_m_s2, state.attitude)
+            north, east, down = to_world(rotation(state.attitude), *target.acceleration_m_s2)
+            acceleration = (_finite(north), _finite(east), _finite(down))
     else:
         return SetpointRefusal(f"{_LOCAL} coordinate frame {target.frame} unsupported")
     if mask & TargetMask.FORCE and _any_finite(acceleration):
@@ -117,10 +120,10 @@ def setpoint_from_attitude(
     """The setpoint for an attitude or for body rates, with a thrust.
 
     Args:
-        attitude: unit quaternion (w, x, y, z), body FRD to world NED; None: not asked for.
-        rate_frd_rad_s: body rates, shape (3,); None: not asked for. Flown only without an attitude.
-        yaw_rate_rad_s: clockwise, beside an attitude.
-        thrust: 0..1 of the greatest.
+        attitude: quaternion (w, x, y, z), body FRD to world NED, normalised here; None: not given.
+        rate_frd_rad_s: body rates, shape (3,), used only without an attitude; None: not given.
+        yaw_rate_rad_s: clockwise, added to an attitude's yaw control.
+        thrust: share of full thrust, 0..1.
         time_us: vehicle time now.
     """
     if not isfinite(thrust):
@@ -141,12 +144,12 @@ def setpoint_from_attitude(
 def setpoint_from_controls(
     airframe: Airframe, torque_frd: Vec3, thrust: float, time_us: int
 ) -> Setpoint | SetpointRefusal:
-    """The setpoint for normalised torques and thrust, mixed straight to the motors.
+    """The setpoint for normalised torques and thrust, mixed directly to the motors.
 
-    Each rotor gets the thrust plus its lever's share of roll and pitch and its spin's of yaw.
+    Each rotor gets the thrust, plus roll and pitch by its lever arms and yaw by its direction of rotation.
 
     Args:
-        airframe: where the rotors are.
+        airframe: with the rotors' positions.
         torque_frd: roll, pitch, yaw, each -1..1; shape (3,).
         thrust: 0..1.
         time_us: vehicle time now.
@@ -171,7 +174,7 @@ def setpoint_from_body_velocity(
 ) -> Setpoint | SetpointRefusal:
     """The setpoint for a velocity in level axes (forward, right, down) and a clockwise yaw rate.
 
-    The same as `setpoint_from_target` with BODY_NED and mask 0x5C7, without the packet.
+    The same as `setpoint_from_target` with BODY_NED and mask 0x5C7.
     """
     velocity_ned_m_s = _level_to_ned(velocity_level_m_s, state.yaw_rad)
     yaw_rate_rad_s = _finite(yaw_rate_rad_s)
@@ -184,8 +187,7 @@ def setpoint_from_body_velocity(
 class SetpointQueue:
     """Holds the newest setpoint until it is flown: from the next multiple of 10 ms on.
 
-    So a few milliseconds that a packet takes more or less change nothing, nor does one that is sent again,
-    and a flight over a network repeats as well as one without.
+    So a few milliseconds of delay change nothing, and flights over a network are repeatable, too.
 
     Attributes:
         waiting: the newest setpoint that is not flown yet.
@@ -201,18 +203,18 @@ class SetpointQueue:
         self._refused = False
 
     def put(self, setpoint: Setpoint, now_us: int) -> None:
-        """Replace what waits."""
+        """Take a setpoint; it replaces the waiting one."""
         self.waiting = self.newest = setpoint
         self._slot = now_us // _GRID_US
         self._refused = False
 
     def refuse(self) -> bool:
-        """Note that one cannot be flown; whether it is the first since one that can."""
+        """Note an unusable setpoint; return whether it is the first since a usable one."""
         first, self._refused = not self._refused, True
         return first
 
     def newest_velocity(self) -> tuple[float, float, float, float] | None:
-        """The newest setpoint as forward, right, down (m/s) and yaw rate (rad/s, clockwise; NaN: open).
+        """The newest setpoint as forward, right, down (m/s) and yaw rate (rad/s, clockwise; NaN: not given).
 
         None if it is of another kind, and before the first.
         """
@@ -222,17 +224,17 @@ class SetpointQueue:
         return (*newest.velocity_level_m_s, newest.yaw_rate_rad_s)
 
     def is_due(self, now_us: int) -> bool:
-        """Whether what waits is to be flown from now on."""
+        """Whether the waiting setpoint is to be flown from now on."""
         return self.waiting is not None and now_us // _GRID_US != self._slot
 
     def take(self) -> Setpoint | None:
-        """What waits, due or not; it waits no more."""
+        """Remove and return the waiting setpoint, due or not."""
         waiting, self.waiting = self.waiting, None
         return waiting
 
 
 def _checked(wanted: TrajectorySetpoint, body_velocity: Vec3 | None) -> Setpoint | SetpointRefusal:
-    """Refuse it without anything to follow, brake where an axis is open or the horizontal pair is half."""
+    """Refuse a setpoint without any component; brake if an axis or one of the horizontal pair is missing."""
     groups = (wanted.position_ned_m, wanted.velocity_ned_m_s, wanted.acceleration_ned_m_s2)
     if not any(_any_finite(group) for group in groups):
         return SetpointRefusal(f"{_LOCAL} invalid")
@@ -278,15 +280,3 @@ def _level_to_ned(vector: Vec3, yaw_rad: float) -> Vec3:
     forward, right, down = vector
     c, s = cos(yaw_rad), sin(yaw_rad)
     return (_finite(c * forward - s * right), _finite(s * forward + c * right), _finite(down))
-
-
-def _body_to_ned(vector: Vec3, attitude: Quaternion) -> Vec3:
-    """Rotate by the unit quaternion (w, x, y, z): v' = v + 2w (q × v) + 2 q × (q × v)."""
-    w, qx, qy, qz = attitude
-    x, y, z = vector
-    tx, ty, tz = 2 * (qy * z - qz * y), 2 * (qz * x - qx * z), 2 * (qx * y - qy * x)
-    return (
-        _finite(x + w * tx + qy * tz - qz * ty),
-        _finite(y + w * ty + qz * tx - qx * tz),
-        _finite(z + w * tz + qx * ty - qy * tx),
-    )

@@ -1,6 +1,6 @@
-"""What can be followed: setpoints as types, how each is made safe to follow, and the command it becomes.
+"""Setpoints: types for all that modes and offboard controllers can give, and the command of each.
 
-A NaN in a component of a vector means "not controlled" (PX4's convention).
+A NaN component means "not controlled" (PX4's convention).
 """
 
 from __future__ import annotations
@@ -29,15 +29,15 @@ from firmware_py.types import VehicleState
 from geometry.rotations import euler_from_quaternion
 from geometry.vectors import NAN3, ZERO3, Quaternion, Vec3
 
-_MAX = 1e6  # metres or m/s asked for are cut to this, which keeps all arithmetic finite
+_MAX = 1e6  # limit of metres and m/s, which keeps all arithmetic finite
 _MAX_ACCELERATION_M_S2 = 50.0
 _NORM_TOLERANCE = 0.1
-_BRAKING_SHARE = 0.6  # of the acceleration allowed, for slowing down before a place: the vehicle lags behind
+_BRAKING_SHARE = 0.6  # of the acceleration limit, for braking before a place: the vehicle lags
 
 
 @dataclass(frozen=True, slots=True)
 class Setpoint(ABC):
-    """What a mode follows, or an offboard controller asks for.
+    """What a mode follows, or an offboard controller requests.
 
     Attributes:
         time_us: vehicle time of reception, microseconds.
@@ -48,19 +48,19 @@ class Setpoint(ABC):
     @property
     @abstractmethod
     def is_usable(self) -> bool:
-        """Whether it says anything that can be flown."""
+        """Whether it can be flown."""
 
     def bounded(self, limits: SpeedLimits) -> Setpoint:
-        """The same made safe to follow: finite or open, and within limits.
+        """The same with components that are finite, or not controlled, and within limits.
 
-        A yaw rate is passed on as asked for, which is what PX4 echoes; it is limited when flown.
+        A yaw rate is only limited when flown; telemetry shows it as requested, as PX4's does.
         """
         del limits
         return self
 
     @abstractmethod
     def command(self, state: VehicleState, limits: SpeedLimits) -> ControlCommand:
-        """What the stabiliser has to follow in this tick; for a setpoint that is `bounded`."""
+        """The command of this tick; for a setpoint that is `bounded`."""
 
     def constant_command(self, limits: SpeedLimits) -> ControlCommand | None:
         """The command, if it is the same in every tick."""
@@ -69,7 +69,7 @@ class Setpoint(ABC):
 
     @property
     def trajectory(self) -> TrajectorySetpoint:
-        """What telemetry says of place and velocity: here a velocity of zero."""
+        """The setpoint in telemetry: by default a velocity of zero."""
         return TrajectorySetpoint(self.time_us, velocity_ned_m_s=ZERO3)
 
 
@@ -79,8 +79,8 @@ class TrajectorySetpoint(Setpoint):
 
     Attributes:
         position_ned_m: shape (3,).
-        velocity_ned_m_s: alone or as feed-forward beside a position, shape (3,).
-        acceleration_ned_m_s2: flown if there is neither of the others, shape (3,).
+        velocity_ned_m_s: alone, or as feed-forward of a position, shape (3,).
+        acceleration_ned_m_s2: flown without position and velocity, shape (3,).
         yaw_rad: clockwise from north.
         yaw_rate_rad_s: clockwise.
     """
@@ -100,8 +100,8 @@ class TrajectorySetpoint(Setpoint):
     def bounded(self, limits: SpeedLimits) -> TrajectorySetpoint:
         """An infinite component counts as not controlled, and a velocity that is not controlled is zero.
 
-        So the vehicle brakes and hovers on that axis, as PX4's does. An acceleration alone keeps the velocity
-        open.
+        So the vehicle brakes and hovers on that axis, as PX4's does. An acceleration alone leaves the
+        velocity uncontrolled.
         """
         yaw_rad, yaw_rate_rad_s = _finite(self.yaw_rad), _finite(self.yaw_rate_rad_s)
         acceleration_only = all(map(isnan, self.position_ned_m + self.velocity_ned_m_s)) and self.is_usable
@@ -122,7 +122,7 @@ class TrajectorySetpoint(Setpoint):
         )
 
     def command(self, state: VehicleState, limits: SpeedLimits) -> ControlCommand:
-        """The velocity towards the place, or the velocity, or the acceleration."""
+        """The velocity towards the place, the velocity, or the acceleration."""
         if isnan(self.velocity_ned_m_s[0]):
             return AccelerationCommand(
                 level(state, self.acceleration_ned_m_s2),
@@ -142,7 +142,7 @@ class TrajectorySetpoint(Setpoint):
         return self
 
     def _approach(self, state: VehicleState, limits: SpeedLimits) -> Vec3:
-        """Velocity NED to a place: proportional near by, and never faster than it can brake."""
+        """Velocity NED to a place: proportional to the distance, and not faster than it can brake."""
         north_m, east_m, down_m = self.position_ned_m
         distance_m = hypot(north_m - state.position_ned_m[0], east_m - state.position_ned_m[1])
         north_m_s, east_m_s, down_m_s = velocity_towards(
@@ -163,8 +163,8 @@ class BodyVelocitySetpoint(Setpoint):
         velocity_level_m_s: forward, right, down; shape (3,), finite.
         yaw_rad: clockwise from north.
         yaw_rate_rad_s: clockwise.
-        velocity_ned_m_s: what the velocity was at reception, for telemetry, shape (3,).
-        acceleration_ned_m_s2: asked for beside it, for telemetry; not flown; shape (3,).
+        velocity_ned_m_s: the velocity at reception, for telemetry, shape (3,).
+        acceleration_ned_m_s2: requested with it, for telemetry; not flown; shape (3,).
     """
 
     velocity_level_m_s: Vec3
@@ -175,12 +175,12 @@ class BodyVelocitySetpoint(Setpoint):
 
     @property
     def is_usable(self) -> bool:
-        """Whether all of the velocity is finite."""
+        """Whether the velocity is finite."""
         forward, right, down = self.velocity_level_m_s
         return isfinite(forward + right + down)
 
     def bounded(self, limits: SpeedLimits) -> BodyVelocitySetpoint:
-        """Cut to the limits."""
+        """The same within the limits."""
         north_m_s2, east_m_s2, down_m_s2 = self.acceleration_ned_m_s2
         return BodyVelocitySetpoint(
             self.time_us,
@@ -192,19 +192,19 @@ class BodyVelocitySetpoint(Setpoint):
         )
 
     def command(self, state: VehicleState, limits: SpeedLimits) -> ControlCommand:
-        """The velocity as it is."""
+        """The velocity, with the yaw rate towards its yaw."""
         turn_rad_s = yaw_rate(state.yaw_rad, self.yaw_rad, self.yaw_rate_rad_s, limits)
         return VelocityCommand(self.velocity_level_m_s, turn_rad_s)
 
     def constant_command(self, limits: SpeedLimits) -> ControlCommand | None:
-        """The command, unless a yaw is to be turned to."""
+        """The command, unless a yaw is given."""
         if not isnan(self.yaw_rad):
             return None
         return VelocityCommand(self.velocity_level_m_s, yaw_rate(0.0, nan, self.yaw_rate_rad_s, limits))
 
     @property
     def trajectory(self) -> TrajectorySetpoint:
-        """The velocity as it was at reception."""
+        """The velocity in NED at reception."""
         return TrajectorySetpoint(
             self.time_us,
             NAN3,
@@ -217,7 +217,7 @@ class BodyVelocitySetpoint(Setpoint):
 
 @dataclass(frozen=True, slots=True)
 class AttitudeSetpoint(Setpoint):
-    """An attitude (body FRD to world NED), a thrust, 0..1 of the greatest, and a yaw rate beside them."""
+    """An attitude (body FRD to world NED), a thrust as a share of full thrust, and an added yaw rate."""
 
     attitude: Quaternion
     thrust: float
@@ -230,7 +230,7 @@ class AttitudeSetpoint(Setpoint):
         return isfinite(self.thrust) and abs(square - 1.0) < _NORM_TOLERANCE  # false for NaN too
 
     def command(self, state: VehicleState, limits: SpeedLimits) -> ControlCommand:
-        """Its tilt, and a turn to its yaw."""
+        """Its tilt, and the yaw rate towards its yaw."""
         roll_rad, pitch_rad, yaw_rad = euler_from_quaternion(self.attitude)
         turn_rad_s = yaw_rate(state.yaw_rad, yaw_rad, self.yaw_rate_rad_s, limits)
         return AttitudeCommand(roll_rad, pitch_rad, turn_rad_s, self.thrust)
@@ -243,7 +243,7 @@ class AttitudeSetpoint(Setpoint):
 
 @dataclass(frozen=True, slots=True)
 class BodyRateSetpoint(Setpoint):
-    """Body rates, shape (3,), and a thrust, 0..1 of the greatest."""
+    """Body rates, shape (3,), and a thrust as a share of full thrust."""
 
     rate_frd_rad_s: Vec3
     thrust: float
@@ -254,33 +254,33 @@ class BodyRateSetpoint(Setpoint):
         return isfinite(self.thrust)
 
     def command(self, state: VehicleState, limits: SpeedLimits) -> ControlCommand:
-        """The same."""
+        """The command with the same values."""
         return BodyRateCommand(self.rate_frd_rad_s, self.thrust)
 
 
 @dataclass(frozen=True, slots=True)
 class MotorSetpoint(Setpoint):
-    """Outputs of the motors themselves, 0..1 of a rotor's full thrust, in the airframe's order."""
+    """Motor outputs, 0..1 of a rotor's full thrust, in the airframe's order."""
 
     outputs: tuple[float, ...]
 
     @property
     def is_usable(self) -> bool:
-        """Whether there are outputs, all finite."""
+        """Whether there are outputs and all are finite."""
         return bool(self.outputs) and all(map(isfinite, self.outputs))
 
     def command(self, state: VehicleState, limits: SpeedLimits) -> ControlCommand:
-        """The same."""
+        """The command with the same values."""
         return MotorCommand(self.outputs)
 
 
 def braking_speed(distance_m: float, limits: SpeedLimits) -> float:
-    """The speed from which one can stop in a distance.
+    """The speed from which the vehicle can stop within a distance.
 
-    Near the target it is proportional, farther away it follows v^2 = 2 a s; where the slopes meet it changes
-    over, so that the deceleration never exceeds a.
+    Near the target it is proportional to the distance, farther away it follows v^2 = 2 a s; it changes where
+    the slopes are equal, so that the deceleration never exceeds a.
     """
-    gain, max_m_s2 = limits.position_gain, _BRAKING_SHARE * limits.pace.level_m_s2
+    gain, max_m_s2 = limits.position_gain, _BRAKING_SHARE * limits.acceleration.level_m_s2
     if distance_m * gain * gain <= max_m_s2:
         return gain * distance_m
     return sqrt(2.0 * max_m_s2 * distance_m - (max_m_s2 / gain) ** 2)

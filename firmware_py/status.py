@@ -39,7 +39,7 @@ NAVIGATION_STATES: dict[FlightMode, int] = {
     mode: mode.value.navigation_state
     for mode in sorted(FlightMode, key=lambda mode: mode.value.navigation_state)
 }
-"""PX4's number of each mode inside (its navigation state), as logs and events have it, in PX4's order."""
+"""PX4's navigation state of each mode, as in logs and events, in PX4's order."""
 
 
 class LandedState(IntEnum):
@@ -63,20 +63,20 @@ class CommandResult(IntEnum):
 
 @dataclass(slots=True)
 class VehicleStatus:
-    """What the commander says of the vehicle.
+    """The status of the vehicle.
 
     Attributes:
         armed: motors may turn.
-        mode: the mode flown now (a failsafe may have chosen it).
-        intended_mode: the mode last asked for by a person or an app.
+        mode: the mode that is flown; a failsafe may have chosen it.
+        intended_mode: the mode last requested by a person or an app.
         landed_state: for EXTENDED_SYS_STATE.
-        failsafe: a failsafe is in charge (system status CRITICAL).
+        failsafe: a failsafe is active (system status CRITICAL).
         ready: pre-arm checks of the intended mode pass (system status STANDBY).
-        not_ready: why not, in the words that would refuse to arm it; empty when it is ready.
-        home: where it was armed (first: where it booted); None before the first position.
+        not_ready: why not, as the text of a refused arming; empty when it is ready.
+        home: the position at arming (before: at boot); None before the first position.
         home_ned_m: the same in the local frame, shape (3,).
         origin: the local frame's origin on Earth; None before the first position.
-        setpoint: what is followed now.
+        setpoint: followed now.
     """
 
     armed: bool = False

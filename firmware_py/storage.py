@@ -1,7 +1,7 @@
-"""Where a vehicle keeps its files: what the services need of it, and how paths are told.
+"""The interface to a vehicle's file storage, and the paths in it.
 
-Files are kept elsewhere (`sitl/storage.py` has a folder and a memory). A path is a tuple of names that was
-checked once, so no keeper of files ever parses a text that came over a link.
+`sitl/storage.py` implements it in memory, `sitl/storage_folder.py` in a folder. A path is a tuple of names
+that was checked once, so no implementation parses text from a link.
 """
 
 from __future__ import annotations
@@ -12,9 +12,9 @@ from typing import Protocol
 
 Path = tuple[str, ...]
 
-_LONGEST_NAME = 120  # bytes; a listing must hold one name in 239 bytes
-_DEEPEST = 8
-_ALIAS: Path = ("fs", "microsd")  # where PX4's boards have what its simulation has at the root
+_MAX_NAME = 120  # bytes; a listing must hold one name in 239 bytes
+_MAX_DEPTH = 8
+_ALIAS: Path = ("fs", "microsd")  # the root on PX4's boards
 _FORBIDDEN = frozenset(chr(code) for code in (*range(32), 127)) | {"\\", "/"}
 
 
@@ -26,7 +26,7 @@ class Entry:
         name: the last name of its path.
         size: in bytes; 0 for a folder.
         is_folder: a folder, else a file.
-        modified_unix_s: seconds since 1970 of the last change; 0: not known.
+        modified_unix_s: last change in seconds since 1970; 0: not known.
     """
 
     name: str
@@ -36,18 +36,18 @@ class Entry:
 
 
 class Storage(Protocol):
-    """Keeps files. The empty path is its root.
+    """File storage. The empty path is its root.
 
     Every method may raise OSError with an `errno`: ENOENT, EEXIST, EISDIR, ENOTDIR, ENOTEMPTY, EACCES, and
-    ENOSPC or EFBIG where a limit is reached. Nothing has changed then.
+    ENOSPC or EFBIG where a limit is reached. Nothing is changed then.
     """
 
     def entry(self, path: Path) -> Entry:
-        """What is there."""
+        """The file or folder at a path."""
         ...
 
     def entries(self, path: Path) -> list[Entry]:
-        """What a folder holds, by name."""
+        """The contents of a folder, sorted by name."""
         ...
 
     def read(self, path: Path, offset: int, count: int) -> bytes:
@@ -55,15 +55,15 @@ class Storage(Protocol):
         ...
 
     def write(self, path: Path, offset: int, data: bytes) -> None:
-        """Write into a file that is there; a gap is filled with zeros."""
+        """Write into an existing file; a gap is filled with zeros."""
         ...
 
     def create(self, path: Path) -> None:
-        """Make an empty file, or empty the one that is there."""
+        """Make an empty file, or empty an existing one."""
         ...
 
     def truncate(self, path: Path, size: int) -> None:
-        """Make a file that long, with zeros where it grows."""
+        """Set the size of a file; it grows by zeros."""
         ...
 
     def remove(self, path: Path) -> None:
@@ -71,7 +71,7 @@ class Storage(Protocol):
         ...
 
     def make_folder(self, path: Path) -> None:
-        """Make a folder in one that is there."""
+        """Make a folder in an existing one."""
         ...
 
     def remove_folder(self, path: Path) -> None:
@@ -79,7 +79,7 @@ class Storage(Protocol):
         ...
 
     def rename(self, old: Path, new: Path) -> None:
-        """Give a file or folder another path; a file at the new path is replaced."""
+        """Move a file or folder; a file at the new path is replaced."""
         ...
 
 
@@ -89,29 +89,29 @@ def refuse(code: int, path: Path) -> OSError:
 
 
 def parse_path(text: bytes) -> Path:
-    """The names of a path as it comes over a link; it begins at the root, with a slash or without.
+    """The path of a text from a link; it begins at the root, with or without a slash.
 
     Args:
         text: bytes without the final zero.
 
     Raises:
-        OSError: EACCES for a path that could lead out of the root or cannot be told in a listing: `..`,
-            control characters, backslashes, bytes that are no UTF-8, a name or path too long.
+        OSError: EACCES for a path that could lead out of the root or cannot be shown in a listing: `..`,
+            control characters, backslashes, bytes that are not UTF-8, a name or path too long.
     """
     try:
         names = text.decode().split("/")
     except UnicodeDecodeError:
         raise refuse(errno.EACCES, ()) from None
     path = tuple(name for name in names if name not in ("", "."))
-    if len(path) > _DEEPEST or not all(sound_name(name) for name in path):
+    if len(path) > _MAX_DEPTH or not all(sound_name(name) for name in path):
         raise refuse(errno.EACCES, ())
     return path[2:] if path[:2] == _ALIAS else path
 
 
 def sound_name(name: str) -> bool:
-    """Whether a name can be kept and listed."""
+    """Whether a name can be stored and listed."""
     try:
         length = len(name.encode())
-    except UnicodeEncodeError:  # bytes on a disk that are no UTF-8
+    except UnicodeEncodeError:  # bytes on a disk that are not UTF-8
         return False
-    return 0 < length <= _LONGEST_NAME and name != ".." and _FORBIDDEN.isdisjoint(name)
+    return 0 < length <= _MAX_NAME and name != ".." and _FORBIDDEN.isdisjoint(name)

@@ -1,4 +1,4 @@
-"""The data that goes into and out of the autopilot. World NED, body FRD, SI units, radians."""
+"""Inputs and outputs of the autopilot. World NED, body FRD, SI units, radians."""
 
 from __future__ import annotations
 
@@ -19,9 +19,9 @@ class Sensors:
         velocity_ned_m_s: shape (3,).
         attitude: unit quaternion (w, x, y, z), body FRD to world NED.
         angular_rate_frd_rad_s: shape (3,).
-        specific_force_frd_m_s2: what an accelerometer reads, shape (3,); at rest (0, 0, -g).
+        specific_force_frd_m_s2: as an accelerometer measures it, shape (3,); at rest (0, 0, -g).
         battery_voltage_v: at the battery's terminals.
-        battery_current_a: drawn from it.
+        battery_current_a: drawn from the battery.
     """
 
     time_us: int
@@ -36,7 +36,7 @@ class Sensors:
 
 @dataclass(slots=True)
 class VehicleState:
-    """What the autopilot believes about the vehicle.
+    """The estimate of the vehicle's state.
 
     Attributes:
         time_us: time of the sample, microseconds since boot.
@@ -63,14 +63,14 @@ class VehicleState:
 
 @dataclass(frozen=True, slots=True)
 class ManualInput:
-    """A person's sticks, from MANUAL_CONTROL or RC channels.
+    """A pilot's sticks, from MANUAL_CONTROL or RC channels.
 
     Attributes:
         time_us: vehicle time of reception.
-        forward: the right stick's up, -1..1 (pitch: nose down).
-        right: the right stick's right, -1..1 (roll).
-        up: the left stick's up, -1..1; -1 is no thrust.
-        yaw: the left stick's right, -1..1 (clockwise).
+        forward: right stick upwards, -1..1 (pitch: nose down).
+        right: right stick to the right, -1..1 (roll).
+        up: left stick upwards, -1..1; -1 is no thrust.
+        yaw: left stick to the right, -1..1 (clockwise).
     """
 
     time_us: int
@@ -82,13 +82,13 @@ class ManualInput:
 
 @dataclass(slots=True)
 class BatteryState:
-    """What is known of the battery.
+    """The state of the battery.
 
     Attributes:
         voltage_v: at its terminals.
         current_a: drawn now.
-        used_mah: since it was full.
-        remaining: share of the charge left, 0..1.
+        used_mah: since boot.
+        remaining: share of the full charge, 0..1.
         cells: in series.
         warning: MAV_BATTERY_CHARGE_STATE: 1 ok, 2 low, 3 critical, 4 emergency.
     """
@@ -103,12 +103,12 @@ class BatteryState:
 
 @dataclass(slots=True)
 class FlightRecord:
-    """Times of the flight now or last, vehicle time in microseconds; 0: not yet.
+    """Times of the present or last flight, vehicle time in microseconds; 0: not yet.
 
     Attributes:
-        armed_us: when it was armed.
-        takeoff_us: when it left the ground.
-        landed_us: when it stood again.
+        armed_us: of arming.
+        takeoff_us: of take-off.
+        landed_us: of landing.
         number: counts armings from 1; 0 before the first.
     """
 
@@ -127,9 +127,13 @@ class GeodeticPoint:
     altitude_m: float
 
 
+CRITICAL, WARNING, INFO = 2, 4, 6
+"""MAV_SEVERITY of a `StatusText`."""
+
+
 @dataclass(frozen=True, slots=True)
 class StatusText:
-    """A message to people; severity is MAV_SEVERITY (3 error, 4 warning, 6 info)."""
+    """A message to people, with MAV_SEVERITY."""
 
     severity: int
     text: str
@@ -137,14 +141,14 @@ class StatusText:
 
 @dataclass(slots=True)
 class MotorOutput:
-    """What the last step sent to the motors.
+    """Output of one step to the motors.
 
     Attributes:
         speeds_rad_s: one per rotor, in the airframe's order.
         throttle: mean of (speed / maximum)^2, 0..1.
-        thrust_high: less thrust than asked for.
-        thrust_low: more thrust than asked for.
-        yaw_cut: less yaw moment than asked for.
+        thrust_high: the commanded thrust was too high and is reduced.
+        thrust_low: the commanded thrust was too low and is raised.
+        yaw_cut: the yaw moment is reduced.
     """
 
     speeds_rad_s: MotorSpeeds = (0.0, 0.0, 0.0, 0.0)

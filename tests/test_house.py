@@ -26,7 +26,6 @@ LARGE_FOLDERS = {
     "sitl": "world, camera, links and the program that runs them",
 }
 LARGE_CLASSES = {
-    "firmware_py/missions/executor.py MissionExecutor": "a method for each kind of mission item",
     "framerunner/flying/lockstep_drone.py LockstepDrone": "implements the port `Drone`",
     "offboard/mavsdk_drone.py MavsdkDrone": "implements the port `Drone`",
 }

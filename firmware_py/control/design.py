@@ -1,4 +1,10 @@
-"""Designs the stabiliser: discrete linear-quadratic regulators, with integral action or as nested loops."""
+"""Design of the stabiliser: linear-quadratic regulators on the multicopter's linear model at hover.
+
+States x = [roll, pitch, p, q, r, v_forward, v_right, v_down] (level axes that turn with the yaw), inputs
+u = [thrust beyond weight N, roll moment, pitch moment, yaw moment N m] in body FRD, outputs
+y = [v_forward, v_right, v_down, r]. Quadratic drag vanishes at hover. Source of the equations: Newton-Euler
+at small angles, as in Casado & Bermúdez, Electronics 2021, 10, 7, section 3, in FRD instead of FLU axes.
+"""
 
 from __future__ import annotations
 
@@ -6,31 +12,75 @@ from dataclasses import dataclass
 
 import numpy as np
 import numpy.typing as npt
-from scipy.linalg import solve_discrete_are
+from scipy.linalg import expm, solve_discrete_are
 
 from firmware_py.airframe import GRAVITY_M_S2, Airframe
-from firmware_py.control.linear_model import Array, discretise, hover_model, with_integrals
-from firmware_py.control.weights import Weights
+
+Array = npt.NDArray[np.float64]
 
 
 @dataclass(frozen=True, slots=True)
-class Gains:
-    """u = -Kx x - Ki sum((y - r) dt), with the shapes of the linear model.
+class LinearModel:
+    """x' = A x + B u, y = C x (continuous), or x+ = A x + B u (discrete).
 
     Attributes:
-        kx: shape (4, 8).
-        ki: shape (4, 4).
-        poles: eigenvalues of the closed loop per sample, shape (12,), all inside the unit circle.
+        a: shape (8, 8).
+        b: shape (8, 4).
+        c: shape (4, 8).
     """
 
-    kx: Array
-    ki: Array
-    poles: npt.NDArray[np.complex128]
+    a: Array
+    b: Array
+    c: Array
 
 
-def cost_matrices(airframe: Airframe, weights: Weights) -> tuple[Array, Array]:
-    """Return Q of shape (12, 12) and R of shape (4, 4) of the quadratic cost."""
-    w = weights
+def hover_model(airframe: Airframe) -> LinearModel:
+    """Return the continuous model of an airframe at hover."""
+    i_roll, i_pitch, i_yaw = airframe.inertia_kg_m2
+    a = np.zeros((8, 8))
+    a[0, 2] = a[1, 3] = 1.0
+    a[5, 1] = -GRAVITY_M_S2  # nose up slows down
+    a[6, 0] = GRAVITY_M_S2  # right side down accelerates right
+    b = np.zeros((8, 4))
+    b[2, 1], b[3, 2], b[4, 3] = 1 / i_roll, 1 / i_pitch, 1 / i_yaw
+    b[7, 0] = -1 / airframe.mass_kg
+    c = np.zeros((4, 8))
+    c[0, 5] = c[1, 6] = c[2, 7] = c[3, 4] = 1.0
+    return LinearModel(a, b, c)
+
+
+def discretise(model: LinearModel, period_s: float) -> LinearModel:
+    """Return the exact model at sampling instants, for inputs held constant between them.
+
+    The block exponential of Van Loan, "Computing integrals involving the matrix exponential", 1978.
+    """
+    states, inputs = model.b.shape
+    block = np.zeros((states + inputs, states + inputs))
+    block[:states, :states], block[:states, states:] = model.a, model.b
+    power = expm(block * period_s)
+    return LinearModel(power[:states, :states], power[:states, states:], model.c)
+
+
+def with_integrals(model: LinearModel, period_s: float) -> tuple[Array, Array]:
+    """Augment a discrete model (n states, m outputs) with the integrals of its outputs.
+
+    Returns:
+        A of shape (n + m, n + m) and B of shape (n + m, inputs) for [x, sum of y * period].
+    """
+    states, inputs = model.b.shape
+    outputs = model.c.shape[0]
+    a = np.zeros((states + outputs, states + outputs))
+    a[:states, :states] = model.a
+    a[states:, :states] = model.c * period_s
+    a[states:, states:] = np.eye(outputs)
+    b = np.zeros((states + outputs, inputs))
+    b[:states] = model.b
+    return a, b
+
+
+def cost_matrices(airframe: Airframe) -> tuple[Array, Array]:
+    """Return Q of shape (12, 12) and R of shape (4, 4) of the quadratic cost, from the airframe's weights."""
+    w = airframe.stabiliser
     states = [
         w.tilt_rad,
         w.tilt_rad,
@@ -55,28 +105,36 @@ def cost_matrices(airframe: Airframe, weights: Weights) -> tuple[Array, Array]:
     return np.diag([1 / value**2 for value in states]), np.diag([1 / value**2 for value in inputs])
 
 
-def design(airframe: Airframe, period_s: float, weights: Weights | None = None) -> Gains:
-    """Solve the discrete algebraic Riccati equation for an airframe.
+@dataclass(frozen=True, slots=True)
+class Gains:
+    """u = -Kx x - Ki sum((y - r) dt), with the shapes of the linear model.
 
-    K = (R + B'PB)^-1 B'PA (e.g. Anderson & Moore, "Optimal Control", 1990, section 3.3).
-
-    Args:
-        airframe: its mass and inertia make the model.
-        period_s: control period.
-        weights: what to weigh how much; by default what the airframe declares.
+    Attributes:
+        kx: shape (4, 8).
+        ki: shape (4, 4).
+        poles: eigenvalues of the closed loop per sample, shape (12,), all inside the unit circle.
     """
+
+    kx: Array
+    ki: Array
+    poles: npt.NDArray[np.complex128]
+
+
+def design(airframe: Airframe, period_s: float) -> Gains:
+    """Design the regulator with integrals of all outputs for an airframe and a control period."""
     a, b = with_integrals(discretise(hover_model(airframe), period_s), period_s)
-    q, r = cost_matrices(airframe, weights or airframe.stabiliser)
+    q, r = cost_matrices(airframe)
     k = _regulator(a, b, q, r)
     return Gains(k[:, :8], k[:, 8:], np.linalg.eigvals(a - b @ k).astype(np.complex128))
 
 
 @dataclass(frozen=True, slots=True)
 class Bandwidths:
-    """A regulator without integrals, u = -K x, read as loops within loops, each with its bandwidth in 1/s.
+    """A regulator without integrals, u = -K x, as nested loops, each with its bandwidth in 1/s.
 
-    The velocity error times its bandwidth is the acceleration wanted; that makes an angle; the angle's error
-    times its bandwidth is the body rate wanted; its error times its bandwidth is the angular acceleration.
+    The velocity error times its bandwidth is the desired acceleration, which gives a desired angle; the
+    angle's error times its bandwidth is the desired body rate; its error times its bandwidth is the desired
+    angular acceleration.
 
     Attributes:
         velocity_level: forward, right, down; shape (3,).
@@ -91,19 +149,14 @@ class Bandwidths:
     poles: npt.NDArray[np.complex128]
 
 
-def design_bandwidths(airframe: Airframe, period_s: float, weights: Weights | None = None) -> Bandwidths:
-    """Design the nested loops of an airframe, as `design` does but with no integrals.
+def design_bandwidths(airframe: Airframe, period_s: float) -> Bandwidths:
+    """Design the nested loops of an airframe, as `design` does but without integrals.
 
-    Unknown forces and moments are then an observer's task, which by the separation principle moves no pole
-    of this design.
-
-    Args:
-        airframe: its mass and inertia make the model.
-        period_s: control period.
-        weights: what to weigh how much; by default what the airframe declares.
+    Unknown forces and moments are left to an observer, which by the separation principle moves no pole of
+    this design.
     """
     model = discretise(hover_model(airframe), period_s)
-    q, r = cost_matrices(airframe, weights or airframe.stabiliser)
+    q, r = cost_matrices(airframe)
     k = _regulator(model.a, model.b, q[:8, :8], r)
     i_roll, i_pitch, i_yaw = airframe.inertia_kg_m2
     return Bandwidths(
@@ -119,6 +172,10 @@ def design_bandwidths(airframe: Airframe, period_s: float, weights: Weights | No
 
 
 def _regulator(a: Array, b: Array, q: Array, r: Array) -> Array:
+    """K = (R + B'PB)^-1 B'PA, with P of the discrete algebraic Riccati equation.
+
+    Source: Anderson & Moore, "Optimal Control", 1990, section 3.3.
+    """
     p = solve_discrete_are(a, b, q, r)
     gains: Array = np.linalg.solve(r + b.T @ p @ b, b.T @ p @ a).astype(np.float64)
     return gains

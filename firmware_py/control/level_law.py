@@ -1,14 +1,14 @@
 """The level law: follows a velocity in level axes and a yaw rate, for airframes that tilt little.
 
 The regulator's law u = -Kx x - Ki xi is written as nested loops, which changes nothing while no limit is
-touched: the velocity part, divided by the gain on the angle, is the angle it asks for; the angle part,
-divided by the gain on the rate, is the rate it asks for. So tilt and rates can be limited where they have a
-meaning. The reference enters the proportional part with a weight (set-point weighting, Åström & Hägglund,
-"Advanced PID Control", 2006, section 3.4), which quickens the response without moving a pole. Drag, which the
-hover model leaves out, is cancelled from the airframe's numbers at the velocity flown (feedback
-linearisation), so that stopping from speed behaves as starting does and the integrals need not learn it.
+reached: the velocity part divided by the gain of the angle is the desired angle; the angle part divided by
+the gain of the rate is the desired rate. So tilt and rates can be limited. The reference enters the
+proportional part with a weight (set-point weighting, Åström & Hägglund, "Advanced PID Control", 2006,
+section 3.4), which quickens the response without moving a pole. Drag, which the hover model leaves out, is
+cancelled from the airframe's numbers at the current velocity (feedback linearisation), so that braking
+behaves as accelerating does and the integrals need not compensate it.
 
-Angles are taken for their sines, which is good to about 35 degrees; beyond it flies `vector_law`.
+Angles are used for their sines, which is accurate up to about 35 degrees; beyond that `vector_law` is used.
 """
 
 from __future__ import annotations
@@ -16,45 +16,31 @@ from __future__ import annotations
 from math import cos, sin, sqrt
 
 from firmware_py.airframe import GRAVITY_M_S2, Airframe
-from firmware_py.commands import VelocityCommand
+from firmware_py.commands import FlightLimits, VelocityCommand
 from firmware_py.control.design import design
-from firmware_py.control.limits import FlightLimits
 from firmware_py.control.mixer import Mixer
-from firmware_py.control.weights import Weights
 from firmware_py.types import MotorOutput, VehicleState
-from geometry.vectors import Vec3
+from geometry.vectors import ZERO3
 
-_NOTHING: Vec3 = (0.0, 0.0, 0.0)
 _MIN_COSINE = 0.5  # thrust is raised for tilt up to 60 degrees
+# How much of a reference acts at once, 0..1.
+_WEIGHT_HORIZONTAL = 0.5
+_WEIGHT_VERTICAL = 0.8
+_WEIGHT_YAW = 0.8
 
 
 class LevelLaw:
-    """Holds the integrators; everything else is the gains of `design`.
+    """The gains of `design`, and the integrals.
 
     Args:
-        airframe: the numbers to design from.
+        airframe: what flies.
         period_s: time between calls of `step`.
-        weights: of the regulator; by default what the airframe declares.
-        limits: what may change in flight.
+        limits: may change in flight.
         mixer: of that airframe.
-        horizontal_reference_weight: how much of a horizontal reference acts at once (0..1).
-        vertical_reference_weight: the same for the vertical.
-        yaw_reference_weight: the same for the yaw rate.
     """
 
-    def __init__(
-        self,
-        airframe: Airframe,
-        period_s: float,
-        weights: Weights | None,
-        limits: FlightLimits,
-        mixer: Mixer,
-        *,
-        horizontal_reference_weight: float = 0.5,
-        vertical_reference_weight: float = 0.8,
-        yaw_reference_weight: float = 0.8,
-    ) -> None:
-        gains = design(airframe, period_s, weights)
+    def __init__(self, airframe: Airframe, period_s: float, limits: FlightLimits, mixer: Mixer) -> None:
+        gains = design(airframe, period_s)
         kx, ki = gains.kx, gains.ki
         self._period_s = period_s
         self._limits = limits
@@ -63,52 +49,49 @@ class LevelLaw:
         self._weight_n = airframe.weight_n
         forward, right, down = airframe.drag.force_n_s2_m2
         self._drag_share = (forward / self._weight_n, right / self._weight_n, down / self._weight_n)
-        self._b_vertical = vertical_reference_weight
-        self._b_yaw = yaw_reference_weight
-        # Roll about forward answers v_right, pitch about right answers v_forward (nose down: forward).
+        # Roll about forward controls v_right, pitch about right controls v_forward (nose down: forward).
         limit_rad_s = airframe.limits.roll_pitch_rate_rad_s
         roll = (float(kx[1, 0]), float(kx[1, 2]), float(kx[1, 6]), float(ki[1, 1]))
         pitch = (float(kx[2, 1]), float(kx[2, 3]), float(kx[2, 5]), float(ki[2, 0]))
-        self._roll = _Tilt(roll, horizontal_reference_weight, limit_rad_s)
-        self._pitch = _Tilt(pitch, horizontal_reference_weight, limit_rad_s)
+        self._roll = _Tilt(roll, limit_rad_s)
+        self._pitch = _Tilt(pitch, limit_rad_s)
         self._k_down, self._ki_down = float(kx[0, 7]), float(ki[0, 2])
         self._k_yaw, self._ki_yaw = float(kx[3, 4]), float(ki[3, 3])
         self._xi_down = 0.0
         self._xi_yaw = 0.0
 
     def reset(self) -> None:
-        """Forget all integrals: at arming and on the ground."""
+        """Set all integrals to zero: at arming and on the ground."""
         self._roll.xi = self._pitch.xi = self._xi_down = self._xi_yaw = 0.0
 
     def enter(self, state: VehicleState) -> None:
-        """Take over in flight, with what was learnt before leaving and at rest at the velocity now."""
+        """Take over in flight, with the integrals kept by `leave` and in equilibrium at the velocity now."""
         self._shift(state, 1.0)
 
     def leave(self, state: VehicleState) -> None:
-        """Give over in flight: keep of the integrals what was learnt."""
+        """Hand over in flight: keep only what the integrals have learnt of disturbances."""
         self._shift(state, -1.0)
 
     def _shift(self, state: VehicleState, sign: float) -> None:
-        """Add to the integrals what they are at a steady velocity without anything learnt, or take it off.
+        """Add or subtract the integrals' values at a steady velocity without disturbance.
 
-        There they make up for the part of the reference that does not act at once:
-        0 = k (v - b v) + ki xi.
+        There they replace the part of the reference that does not act at once: 0 = k (v - b v) + ki xi.
         """
         north, east, down = state.velocity_ned_m_s
         cos_yaw, sin_yaw = cos(state.yaw_rad), sin(state.yaw_rad)
-        self._roll.xi += sign * self._roll.rest(cos_yaw * east - sin_yaw * north)
-        self._pitch.xi += sign * self._pitch.rest(cos_yaw * north + sin_yaw * east)
-        self._xi_down -= sign * self._k_down * (1.0 - self._b_vertical) * down / self._ki_down
+        self._roll.xi += sign * self._roll.steady(cos_yaw * east - sin_yaw * north)
+        self._pitch.xi += sign * self._pitch.steady(cos_yaw * north + sin_yaw * east)
+        self._xi_down -= sign * self._k_down * (1.0 - _WEIGHT_VERTICAL) * down / self._ki_down
         r = state.angular_rate_frd_rad_s[2]
-        self._xi_yaw -= sign * self._k_yaw * (1.0 - self._b_yaw) * r / self._ki_yaw
+        self._xi_yaw -= sign * self._k_yaw * (1.0 - _WEIGHT_YAW) * r / self._ki_yaw
 
     def step(self, state: VehicleState, command: VelocityCommand, grounded: bool) -> MotorOutput:
         """Return the motor commands for one control period.
 
         Args:
-            state: the vehicle now.
+            state: of the vehicle now.
             command: what to follow.
-            grounded: it still stands on something; integrals are held so that they do not wind up.
+            grounded: the vehicle still touches the ground; integrals are held so that they do not wind up.
         """
         north, east, down = state.velocity_ned_m_s
         cos_yaw, sin_yaw = cos(state.yaw_rad), sin(state.yaw_rad)
@@ -117,7 +100,7 @@ class LevelLaw:
         p, q, r = state.angular_rate_frd_rad_s
         period_s = 0.0 if grounded else self._period_s
 
-        # The level axes turn with the yaw: to keep a velocity in them takes the centripetal tilt.
+        # The level axes turn with the yaw: a constant velocity in them needs a centripetal tilt.
         turn = r / GRAVITY_M_S2
         drag_forward, drag_right, drag_down = self._drag_share
         roll_axis, pitch_axis = self._roll, self._pitch
@@ -126,7 +109,7 @@ class LevelLaw:
         pitch = pitch_axis.angle(forward, want_forward, period_s)
         pitch += turn * right - drag_forward * forward * abs(forward)
         below = 0.0
-        if command.acceleration_level_m_s2 != _NOTHING:
+        if command.acceleration_level_m_s2 != ZERO3:
             ahead, aside, below = command.acceleration_level_m_s2
             roll += aside / GRAVITY_M_S2
             pitch -= ahead / GRAVITY_M_S2
@@ -146,14 +129,14 @@ class LevelLaw:
         self._xi_down += error_down * period_s
         self._xi_yaw += error_yaw * period_s
         lift_n = self._weight_n * (1.0 - drag_down * down * abs(down))
-        lift_n -= self._k_down * (down - self._b_vertical * want_down) + self._ki_down * self._xi_down
+        lift_n -= self._k_down * (down - _WEIGHT_VERTICAL * want_down) + self._ki_down * self._xi_down
         lift_n -= self._mass_kg * below
         cosine = cos(roll_rad) * cos(pitch_rad)
         thrust_n = lift_n / (cosine if cosine > _MIN_COSINE else _MIN_COSINE) if lift_n > 0.0 else 0.0
-        yaw_nm = -self._k_yaw * (r - self._b_yaw * want_yaw) - self._ki_yaw * self._xi_yaw
+        yaw_nm = -self._k_yaw * (r - _WEIGHT_YAW * want_yaw) - self._ki_yaw * self._xi_yaw
 
         output = self._mixer.mix(thrust_n, roll_nm, pitch_nm, yaw_nm)
-        # Anti-windup: an integral does not grow in the direction the motors cannot follow.
+        # Anti-windup: an integral does not grow in a direction that the motors cannot follow.
         if (output.thrust_high and error_down > 0) or (output.thrust_low and error_down < 0):
             self._xi_down -= error_down * period_s
         if output.yaw_cut and (error_yaw < 0) == (yaw_nm > 0):
@@ -166,38 +149,34 @@ class _Tilt:
 
     Args:
         gains: of the angle, the rate, the velocity and its integral, as in u = -K x.
-        weight: how much of the reference acts at once (0..1).
-        rate_limit_rad_s: of the rate asked for.
+        rate_limit_rad_s: of the desired rate.
     """
 
-    __slots__ = ("_k_angle", "_k_rate", "_k_velocity", "_ki", "_limit_nm", "_weight", "xi")
+    __slots__ = ("_k_angle", "_k_rate", "_k_velocity", "_ki", "_limit_nm", "xi")
 
-    def __init__(
-        self, gains: tuple[float, float, float, float], weight: float, rate_limit_rad_s: float
-    ) -> None:
+    def __init__(self, gains: tuple[float, float, float, float], rate_limit_rad_s: float) -> None:
         self._k_angle, self._k_rate, k_velocity, ki = gains
         self._k_velocity = k_velocity / self._k_angle
         self._ki = ki / self._k_angle
-        self._weight = weight
-        self._limit_nm = self._k_rate * rate_limit_rad_s  # the moment that a rate at its limit asks for
+        self._limit_nm = self._k_rate * rate_limit_rad_s  # the moment for a rate at its limit
         self.xi = 0.0
 
-    def rest(self, velocity: float) -> float:
-        """The integral with which this velocity, if wanted, asks for no angle."""
-        return -self._k_velocity * (1.0 - self._weight) * velocity / self._ki
+    def steady(self, velocity: float) -> float:
+        """The integral at which this velocity, if commanded, needs no angle."""
+        return -self._k_velocity * (1.0 - _WEIGHT_HORIZONTAL) * velocity / self._ki
 
     def angle(self, velocity: float, wanted: float, period_s: float) -> float:
-        """Integrate the error and return the angle asked for, rad."""
+        """Integrate the error and return the desired angle, rad."""
         self.xi = xi = self.xi + (velocity - wanted) * period_s
-        return -self._k_velocity * (velocity - self._weight * wanted) - self._ki * xi
+        return -self._k_velocity * (velocity - _WEIGHT_HORIZONTAL * wanted) - self._ki * xi
 
     def hold(self, error: float, period_s: float) -> None:
-        """Take the last step of the integral back, unless it leads out of the limit."""
+        """Undo the last step of the integral, unless it leads back below the limit."""
         if (self._ki * self.xi > 0) == (self._ki * error > 0):
             self.xi -= error * period_s
 
     def moment(self, error_rad: float, rate: float) -> float:
-        """Return the moment that turns the body by an angle, N m."""
+        """Return the moment that reduces an angle's error, N m."""
         wanted_nm = self._k_angle * error_rad
         limit_nm = self._limit_nm
         if wanted_nm > limit_nm:

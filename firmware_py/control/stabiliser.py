@@ -1,7 +1,6 @@
-"""The stabiliser: follows any of the commands, from a velocity down to motor outputs.
+"""The stabiliser: follows any command, from a velocity down to motor outputs, on any airframe.
 
-It designs itself from the airframe's numbers. What the laws under it do is told in `level_law` (velocities of
-airframes that tilt little) and `vector_law` (all else).
+`level_law` flies velocities on airframes that tilt little, `vector_law` everything else.
 """
 
 from __future__ import annotations
@@ -9,39 +8,35 @@ from __future__ import annotations
 from math import radians
 
 from firmware_py.airframe import Airframe
-from firmware_py.commands import ControlCommand, VelocityCommand
+from firmware_py.commands import ControlCommand, FlightLimits, VelocityCommand
 from firmware_py.control.level_law import LevelLaw
-from firmware_py.control.limits import FlightLimits
 from firmware_py.control.mixer import Mixer
 from firmware_py.control.vector_law import VectorLaw
-from firmware_py.control.weights import Weights
 from firmware_py.types import MotorOutput, VehicleState
 
-LEVEL_LAW_TILT_RAD = radians(35.0)
-"""An airframe that never tilts farther follows velocities by the level law."""
+_LEVEL_LAW_TILT_RAD = radians(35.0)  # airframes that never tilt farther follow velocities by the level law
 
 
 class Stabiliser:
     """One airframe's control law; keeps what it has learnt when the kind of command changes.
 
     Args:
-        airframe: the numbers to design from.
+        airframe: what flies; the gains are designed from its numbers.
         period_s: time between calls of `step`.
-        weights: of the design; by default what the airframe declares.
 
     Attributes:
-        limits: `limits.tilt_rad` may be set in flight, to less than the airframe's own limit.
+        limits: may be set in flight.
     """
 
-    def __init__(self, airframe: Airframe, period_s: float, weights: Weights | None = None) -> None:
+    def __init__(self, airframe: Airframe, period_s: float) -> None:
         mixer = Mixer(airframe)
         self.limits = FlightLimits(airframe.limits.tilt_rad)
         self._idle = MotorOutput(mixer.mix(0.0, 0.0, 0.0, 0.0).speeds_rad_s)
-        self._vector = VectorLaw(airframe, period_s, weights, self.limits, mixer)
+        self._vector = VectorLaw(airframe, period_s, self.limits, mixer)
         self._velocity_law: LevelLaw | VectorLaw = self._vector
-        if airframe.limits.tilt_rad <= LEVEL_LAW_TILT_RAD:
-            self._velocity_law = LevelLaw(airframe, period_s, weights, self.limits, mixer)
-        self._law = self._velocity_law  # which flies now
+        if airframe.limits.tilt_rad <= _LEVEL_LAW_TILT_RAD:
+            self._velocity_law = LevelLaw(airframe, period_s, self.limits, mixer)
+        self._law = self._velocity_law  # in use now
 
     def reset(self) -> None:
         """Forget all that was learnt: at arming and on the ground."""
@@ -50,16 +45,16 @@ class Stabiliser:
             self._law.reset()
 
     def idle(self) -> MotorOutput:
-        """Return motors turning slowly, as an armed drone's do on the ground."""
+        """Return slowly turning motors, as an armed drone has on the ground."""
         return self._idle
 
     def step(self, state: VehicleState, command: ControlCommand, *, grounded: bool = False) -> MotorOutput:
         """Return the motor commands for one control period.
 
         Args:
-            state: the vehicle now.
+            state: of the vehicle now.
             command: what to follow.
-            grounded: it still stands on something; what is learnt in flight is held.
+            grounded: the vehicle still touches the ground; what is learnt in flight is held.
         """
         if type(command) is VelocityCommand:
             if self._law is not self._velocity_law:

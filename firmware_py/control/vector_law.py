@@ -1,9 +1,9 @@
-"""The vector law: points the thrust where the acceleration wants it, at any tilt.
+"""The vector law: turns the thrust vector to the desired acceleration, at any tilt.
 
-The regulator's nested loops (`design_bandwidths`) with the true geometry between them: a velocity error asks
-for an acceleration; with gravity, the drag declared and the force learnt it makes the thrust vector, limited
-in tilt with the vertical part kept first (as PX4's position control does); the body's down axis turns there
-by the shortest way; body rates follow. So it is the linear design near hover and right far from it.
+The regulator's nested loops (`design_bandwidths`) with exact geometry between them: a velocity error gives a
+desired acceleration; with gravity, the declared drag and the learnt force it gives the thrust vector, limited
+in tilt with priority for its vertical part (as in PX4's position control); the body's down axis turns there
+by the shortest rotation; body rates follow. So it equals the linear design near hover.
 """
 
 from __future__ import annotations
@@ -16,47 +16,101 @@ from firmware_py.commands import (
     AttitudeCommand,
     BodyRateCommand,
     ControlCommand,
+    FlightLimits,
     MotorCommand,
     TiltCommand,
     VelocityCommand,
 )
 from firmware_py.control.design import design_bandwidths
-from firmware_py.control.limits import FlightLimits
 from firmware_py.control.mixer import Mixer
-from firmware_py.control.observer import DisturbanceObserver
-from firmware_py.control.weights import Weights
 from firmware_py.types import MotorOutput, VehicleState
 from geometry.rotations import Rotation, rotation, tilt_error, to_body, to_world
 from geometry.vectors import Vec3
 
-_MIN_COSINE = 0.5  # thrust is raised for tilt up to 60 degrees, and fades from there to none on its side
-_MIN_LIFT = 0.2  # of the weight at most is kept for falling (MPC_THR_MIN), a thrust to steer with
-_MAX_THRUST = 0.92  # of full thrust for following a velocity; the rest steers
-_MAX_FORCE_M_S2 = GRAVITY_M_S2  # unknown acceleration ever learnt: the ground's push at landing
+_MIN_COSINE = 0.5  # thrust is raised for tilt up to 60 degrees, and decreases to none from there to 90
+_MIN_LIFT = 0.2  # share of the weight: a thrust for attitude control in descent, if MPC_THR_MIN is not less
+_MAX_THRUST = 0.92  # share of full thrust for following a velocity; the rest is for attitude control
+_MAX_FORCE_M_S2 = GRAVITY_M_S2  # greatest acceleration learnt: the ground's reaction at landing
 _MAX_MOMENT_RAD_S2 = 20.0
 _TURN_LEARNT = 0.04  # per step: within a tenth of a second
-_TURN_NOTICED = 1e-5  # speed^2 x turn^2 x period: below a centripetal acceleration of 0.05 m/s^2
+_MIN_TURN = 1e-5  # speed^2 x turn^2 x period, a centripetal acceleration of 0.05 m/s^2
 
-_Wish = tuple[float, float, float, float]
-"""Thrust in N and body rates in rad/s that a command comes down to."""
+_Target = tuple[float, float, float, float]
+"""The thrust in N and body rates in rad/s that a command needs."""
+
+
+class DisturbanceObserver:
+    """Estimates an unknown acceleration `d` per axis from a velocity and the expected acceleration `a`.
+
+    A Luenberger observer of v' = a + d, d' = 0 with both poles at one bandwidth (Franklin, Powell & Workman,
+    "Digital Control of Dynamic Systems", 1998, section 8.5). Subtracting d from the desired acceleration is
+    integral action that cannot wind up, because `a` is the acceleration within all limits; and it does not
+    depend on which command is followed.
+
+    Args:
+        bandwidth_rad_s: of both poles.
+        period_s: time between corrections.
+        limit: bound of |d|, per axis.
+    """
+
+    __slots__ = ("_fresh", "_gain", "_gain_d", "_limit", "_period_s", "_x", "_y", "_z", "d")
+
+    def __init__(self, bandwidth_rad_s: float, period_s: float, limit: float) -> None:
+        self._period_s = period_s
+        self._gain = 2.0 * bandwidth_rad_s * period_s
+        self._gain_d = bandwidth_rad_s**2 * period_s
+        self._limit = limit
+        self.reset()
+
+    def reset(self) -> None:
+        """Forget everything."""
+        self._x = self._y = self._z = 0.0
+        self._fresh = True
+        self.d: Vec3 = (0.0, 0.0, 0.0)
+
+    def hold(self, velocity: Vec3) -> None:
+        """Learn nothing in this period, in which the ground may carry the vehicle."""
+        self._x, self._y, self._z = velocity
+        self._fresh = False
+
+    def correct(self, velocity: Vec3) -> None:
+        """Compare the velocity with the one predicted; update `d`."""
+        if self._fresh:
+            self.hold(velocity)
+            return
+        x, y, z = velocity
+        x, y, z = x - self._x, y - self._y, z - self._z
+        gain, gain_d, limit = self._gain, self._gain_d, self._limit
+        self._x += gain * x
+        self._y += gain * y
+        self._z += gain * z
+        dx, dy, dz = self.d
+        dx, dy, dz = dx + gain_d * x, dy + gain_d * y, dz + gain_d * z
+        if max(dx, dy, dz, -dx, -dy, -dz) > limit:
+            dx, dy, dz = (max(-limit, min(limit, value)) for value in (dx, dy, dz))
+        self.d = (dx, dy, dz)
+
+    def predict(self, x: float, y: float, z: float) -> None:
+        """Integrate the acceleration expected from the motor commands over one period."""
+        dx, dy, dz = self.d
+        period_s = self._period_s
+        self._x += (x + dx) * period_s
+        self._y += (y + dy) * period_s
+        self._z += (z + dz) * period_s
 
 
 class VectorLaw:
-    """Holds two observers and the lag of the motors; everything else is `design_bandwidths`.
+    """The nested loops of `design_bandwidths`, two observers and the lag of the motors.
 
     Args:
-        airframe: the numbers to design from.
+        airframe: what flies.
         period_s: time between calls of `step`.
-        weights: of the design; by default what the airframe declares.
-        limits: what may change in flight.
+        limits: may change in flight.
         mixer: of that airframe.
     """
 
-    def __init__(
-        self, airframe: Airframe, period_s: float, weights: Weights | None, limits: FlightLimits, mixer: Mixer
-    ) -> None:
-        weights = weights or airframe.stabiliser
-        loops = design_bandwidths(airframe, period_s, weights)
+    def __init__(self, airframe: Airframe, period_s: float, limits: FlightLimits, mixer: Mixer) -> None:
+        weights, loops = airframe.stabiliser, design_bandwidths(airframe, period_s)
         self._k_velocity, self._k_attitude, self._k_rate = loops.velocity_level, loops.attitude, loops.rate
         self._limits = limits
         self._mixer = mixer
@@ -73,11 +127,11 @@ class VectorLaw:
         self._force = DisturbanceObserver(weights.observer_force_rad_s, period_s, _MAX_FORCE_M_S2)
         self._moment = DisturbanceObserver(weights.observer_moment_rad_s, period_s, _MAX_MOMENT_RAD_S2)
         self._lag = period_s / (period_s + airframe.motor.time_constant_s)
-        self._wrench = (airframe.weight_n, 0.0, 0.0, 0.0)  # thrust and moments now, behind their commands
+        self._wrench = (airframe.weight_n, 0.0, 0.0, 0.0)  # thrust and moments now, with the motors' lag
         self._hover_n = airframe.weight_n
         self._period_s = period_s
-        self._wanted = (0.0, 0.0)  # velocity wanted in the last step, north and east
-        self._turning = 0.0  # how much of the commanded turn it takes part in, 0..1
+        self._wanted = (0.0, 0.0)  # desired velocity in the last step, north and east
+        self._turning = 0.0  # share of the commanded turn by which the desired velocity turns, 0..1
 
     def reset(self) -> None:
         """Forget what was learnt: at arming and on the ground."""
@@ -87,20 +141,20 @@ class VectorLaw:
         self._turning = 0.0
 
     def enter(self, state: VehicleState) -> None:
-        """Take over in flight from another law: begin to learn."""
+        """Take over in flight from another law."""
         del state
         self.reset()
 
     def leave(self, state: VehicleState) -> None:
-        """Give over in flight; what was learnt will be stale."""
+        """Hand over in flight; `enter` forgets what was learnt."""
 
     def step(self, state: VehicleState, command: ControlCommand, grounded: bool) -> MotorOutput:
         """Return the motor commands for one control period.
 
         Args:
-            state: the vehicle now.
+            state: of the vehicle now.
             command: what to follow.
-            grounded: it still stands on something; nothing is learnt, or it would learn the ground.
+            grounded: the vehicle still touches the ground; nothing is learnt, or its reaction would be.
         """
         velocity, rates = state.velocity_ned_m_s, state.angular_rate_frd_rad_s
         if grounded:
@@ -113,32 +167,32 @@ class VectorLaw:
         drag = self._drag_ned(m, velocity)
         p, q, r = rates
         i_roll, i_pitch, i_yaw = self._inertia
-        # What the turning body itself takes, by Euler's equations and the drag declared, N m.
+        # Moments of the rotation itself, by Euler's equations and the declared drag, N m.
         drag_roll, drag_pitch, drag_yaw = self._drag_moment
         own_roll = (i_yaw - i_pitch) * q * r + drag_roll * p * abs(p)
         own_pitch = (i_roll - i_yaw) * p * r + drag_pitch * q * abs(q)
         own_yaw = (i_pitch - i_roll) * p * q + drag_yaw * r * abs(r)
         if type(command) is MotorCommand:
-            output = self._straight_through(command)
-            asked = self._mixer.wrench(output.speeds_rad_s)
+            output = self._motor_output(command)
+            wrench = self._mixer.wrench(output.speeds_rad_s)
         else:
-            thrust_n, want_p, want_q, want_r = self._wish(state, command, m, drag)
+            thrust_n, want_p, want_q, want_r = self._target(state, command, m, drag)
             k_roll, k_pitch, k_yaw = self._k_rate
             d_roll, d_pitch, d_yaw = self._moment.d
             roll_nm = i_roll * (k_roll * (want_p - p) - d_roll) + own_roll
             pitch_nm = i_pitch * (k_pitch * (want_q - q) - d_pitch) + own_pitch
             yaw_nm = i_yaw * (k_yaw * (want_r - r) - d_yaw) + own_yaw
             output = self._mixer.mix(thrust_n, roll_nm, pitch_nm, yaw_nm)
-            asked = (thrust_n, roll_nm, pitch_nm, yaw_nm)
-            if output.thrust_high or output.thrust_low or output.yaw_cut:  # what was left of it
-                asked = self._mixer.wrench(output.speeds_rad_s)
+            wrench = (thrust_n, roll_nm, pitch_nm, yaw_nm)
+            if output.thrust_high or output.thrust_low or output.yaw_cut:
+                wrench = self._mixer.wrench(output.speeds_rad_s)
 
         lag = self._lag
         thrust, roll, pitch, yaw = self._wrench
-        thrust += lag * (asked[0] - thrust)
-        roll += lag * (asked[1] - roll)
-        pitch += lag * (asked[2] - pitch)
-        yaw += lag * (asked[3] - yaw)
+        thrust += lag * (wrench[0] - thrust)
+        roll += lag * (wrench[1] - roll)
+        pitch += lag * (wrench[2] - pitch)
+        yaw += lag * (wrench[3] - yaw)
         self._wrench = (thrust, roll, pitch, yaw)
         lift = thrust / self._mass_kg
         self._force.predict(
@@ -149,7 +203,7 @@ class VectorLaw:
         )
         return output
 
-    def _wish(self, state: VehicleState, command: ControlCommand, m: Rotation, drag: Vec3) -> _Wish:
+    def _target(self, state: VehicleState, command: ControlCommand, m: Rotation, drag: Vec3) -> _Target:
         if type(command) is VelocityCommand:
             return self._follow_velocity(state, command, m, drag)
         if type(command) is AccelerationCommand:
@@ -164,12 +218,12 @@ class VectorLaw:
             return self._hold_tilt(state, command, command.thrust * self._full_n, m)
         if type(command) is BodyRateCommand:
             p, q, r = command.rate_frd_rad_s
-            return (command.thrust * self._full_n if command.thrust > 0.0 else 0.0, p, q, r)  # NaN: none
+            return (command.thrust * self._full_n if command.thrust > 0.0 else 0.0, p, q, r)  # NaN: 0
         raise TypeError(f"not a command of the stabiliser: {type(command).__name__}")
 
     def _follow_velocity(
         self, state: VehicleState, command: VelocityCommand, m: Rotation, drag: Vec3
-    ) -> _Wish:
+    ) -> _Target:
         north, east, down = state.velocity_ned_m_s
         cos_yaw, sin_yaw = cos(state.yaw_rad), sin(state.yaw_rad)
         forward, right = cos_yaw * north + sin_yaw * east, cos_yaw * east - sin_yaw * north
@@ -191,16 +245,15 @@ class VectorLaw:
         return self._point(state, (ahead, aside, GRAVITY_M_S2 - below), m, command.yaw_rate_rad_s)
 
     def _turn_of(self, north: float, east: float, yaw_rate_rad_s: float) -> float:
-        """How fast the velocity wanted turns with the yaw, rad/s: what its centripetal acceleration is for.
+        """How fast the desired velocity turns with the yaw, rad/s, for its centripetal acceleration.
 
-        A velocity that is constant in level axes turns with them; one that is constant in the world does not,
-        and its components in level axes are only how it was told. Which of the two it is shows in how it
-        changes in the world: the part that the commanded turn explains, none to all.
+        A velocity that is constant in level axes turns with them; one that is constant in NED does not. The
+        share of the commanded turn, 0..1, is estimated from the velocity's change in NED.
         """
         before_north, before_east = self._wanted
         self._wanted = (north, east)
         size = (north * north + east * east) * yaw_rate_rad_s * self._period_s
-        if size * yaw_rate_rad_s < _TURN_NOTICED:
+        if size * yaw_rate_rad_s < _MIN_TURN:
             return 0.0
         part = (north * (east - before_east) - east * (north - before_north)) / size
         self._turning += _TURN_LEARNT * (max(0.0, min(part, 1.0)) - self._turning)
@@ -208,8 +261,8 @@ class VectorLaw:
 
     def _hold_tilt(
         self, state: VehicleState, command: TiltCommand | AttitudeCommand, thrust_n: float, m: Rotation
-    ) -> _Wish:
-        """Tilt and thrust as asked; the limit of tilt is for what the loops above ask."""
+    ) -> _Target:
+        """Tilt and thrust as commanded; the limit of tilt holds only for accelerations."""
         cos_roll = cos(command.roll_rad)
         down_level = (
             sin(command.pitch_rad) * cos_roll,
@@ -218,8 +271,8 @@ class VectorLaw:
         )
         return (thrust_n, *self._turn_to(state, down_level, m, command.yaw_rate_rad_s))
 
-    def _point(self, state: VehicleState, specific: Vec3, m: Rotation, yaw_rate_rad_s: float) -> _Wish:
-        """Turn to a thrust per mass given as forward, right and up in level axes, m/s^2; up has priority."""
+    def _point(self, state: VehicleState, specific: Vec3, m: Rotation, yaw_rate_rad_s: float) -> _Target:
+        """Turn to a thrust per mass, m/s^2, given as forward, right and up in level axes; up has priority."""
         ahead, aside, up = specific
         up = self._lift(up)
         room = min(up * self._limits.tilt_tangent, sqrt(max(self._max_lift() ** 2 - up * up, 0.0)))
@@ -231,7 +284,7 @@ class VectorLaw:
         return (self._thrust(up, m), *self._turn_to(state, down_level, m, yaw_rate_rad_s))
 
     def _lift(self, up: float) -> float:
-        """Vertical thrust per mass within what there is and may be used."""
+        """Vertical thrust per mass within its limits, m/s^2."""
         lowest = min(_MIN_LIFT * GRAVITY_M_S2, self._limits.min_thrust * self._full_lift)
         return max(lowest, min(up, self._max_lift()))
 
@@ -239,14 +292,14 @@ class VectorLaw:
         return min(_MAX_THRUST, self._limits.max_thrust) * self._full_lift
 
     def _thrust(self, up: float, m: Rotation) -> float:
-        """Thrust along the body's axis as it stands that lifts so much, N."""
+        """Thrust along the body's axis at its present tilt for a vertical thrust per mass, N."""
         cosine = m[8]
         if cosine < _MIN_COSINE:
             return self._mass_kg * up * max(cosine, 0.0) / _MIN_COSINE**2
         return self._mass_kg * up / cosine
 
     def _turn_to(self, state: VehicleState, down_level: Vec3, m: Rotation, yaw_rate_rad_s: float) -> Vec3:
-        """Body rates that turn body down to a unit vector in level axes, and all about world down."""
+        """Body rates that turn body down to a unit vector in level axes, with a yaw rate about world down."""
         cos_yaw, sin_yaw = cos(state.yaw_rad), sin(state.yaw_rad)
         x, y, z = down_level
         roll, pitch = tilt_error(m, (cos_yaw * x - sin_yaw * y, sin_yaw * x + cos_yaw * y, z))
@@ -255,18 +308,18 @@ class VectorLaw:
         max_rad_s = min(self._rate_limit_rad_s, self._limits.rate_rad_s)
         if rate > max_rad_s:
             p, q = p * max_rad_s / rate, q * max_rad_s / rate
-        # With the right side down a pitch rate also turns the heading, by its share of world down; yaw makes
-        # up for it. Else a velocity kept in axes of the heading would feed back into the pitch it asks for.
+        # When rolled, a pitch rate also turns the heading, by its share of world down; yaw compensates it.
+        # Otherwise a velocity constant in level axes would feed back into the pitch that it commands.
         r = -q * m[7] / max(m[8], _MIN_COSINE)
         return (p + m[6] * yaw_rate_rad_s, q + m[7] * yaw_rate_rad_s, r + m[8] * yaw_rate_rad_s)
 
     def _drag_ned(self, m: Rotation, velocity_ned: Vec3) -> Vec3:
-        """Acceleration by the drag declared, in still air, world NED."""
+        """Acceleration by the declared drag in still air, NED, m/s^2."""
         forward, right, down = self._drag
         x, y, z = to_body(m, *velocity_ned)
         return to_world(m, -forward * x * abs(x), -right * y * abs(y), -down * z * abs(z))
 
-    def _straight_through(self, command: MotorCommand) -> MotorOutput:
+    def _motor_output(self, command: MotorCommand) -> MotorOutput:
         outputs = [min(value, 1.0) if value > 0.0 else 0.0 for value in command.outputs]  # NaN: off
         outputs = (outputs + [0.0] * self._rotors)[: self._rotors]
         speeds = tuple([self._max_speed_rad_s * sqrt(value) for value in outputs])

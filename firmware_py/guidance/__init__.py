@@ -1,1 +1,1 @@
-"""Guidance: what each flight mode asks of the stabiliser."""
+"""Guidance: the flight modes and their commands to the stabiliser."""

@@ -1,4 +1,4 @@
-"""The follow mode: stays beside a target that reports itself."""
+"""The follow mode: follows a target that reports its position."""
 
 from __future__ import annotations
 
@@ -9,21 +9,21 @@ from math import atan2, cos, hypot, isnan, radians, remainder, sin, tau
 from firmware_py.airframe import Airframe
 from firmware_py.commands import ControlCommand
 from firmware_py.guidance.limits import clamp
-from firmware_py.guidance.mode import JourneyMode, ModeContext, ModeEntry
+from firmware_py.guidance.mode import ModeContext, ModeEntry, TrajectoryMode
 from firmware_py.parameters import Parameters
 from firmware_py.types import VehicleState
 from geometry.vectors import ZERO3, Vec3
 
 _COURSE_M_S = 1.0  # slower than this, the target's course is noise
-_MAX_DELAY_S = 5.0  # how long FLW_TGT_RS = 1 takes to believe a change of velocity
-_MAX_AHEAD_S = 1.0  # a target that is silent for longer is thought to stand from then on
+_MAX_DELAY_S = 5.0  # filter time of the target's velocity for FLW_TGT_RS = 1
+_MAX_AHEAD_S = 1.0  # a target not heard for longer is assumed to stand from then on
 _LOST_US = 3_000_000
-_MIN_HEIGHT_M = 1.0  # over home; PX4 climbs again when it is lower over the ground
+_MIN_HEIGHT_M = 1.0  # above home
 _NEVER_US = -(10**15)
 
 
 class FollowHeight(IntEnum):
-    """FLW_TGT_ALT_M: what the height counts from."""
+    """FLW_TGT_ALT_M: what the height is above."""
 
     HOME = 0
     TERRAIN = 1
@@ -35,12 +35,12 @@ class FollowSettings:
     """How a target is followed.
 
     Attributes:
-        distance_m: horizontal, from it.
-        height_m: above home or target.
+        distance_m: horizontal distance to it.
+        height_m: above home or the target.
         angle_rad: clockwise from its course: pi is behind it.
-        height: what the height counts from.
-        slowness: 0 believes its reports at once, 1 takes long.
-        around_m_s: how fast to fly around it when its course changes.
+        height: what `height_m` is above.
+        slowness: how slowly its velocity is filtered, 0..1.
+        around_m_s: speed around it when its course changes.
     """
 
     distance_m: float
@@ -52,7 +52,7 @@ class FollowSettings:
 
 
 def follow_settings(parameters: Parameters) -> FollowSettings:
-    """What the FLW_TGT_ parameters say."""
+    """The FLW_TGT_ parameters."""
     value = parameters.value
     return FollowSettings(
         value("FLW_TGT_DST"),
@@ -65,12 +65,12 @@ def follow_settings(parameters: Parameters) -> FollowSettings:
 
 
 class TargetFollower:
-    """Knows where the target is, and where to be beside it.
+    """Estimates the target's motion, and gives the place from which to follow it.
 
     Attributes:
         settings: how it is followed.
-        velocity_ned_m_s: the target's, as it is believed, shape (3,).
-        seen_us: when the target last reported; far in the past before.
+        velocity_ned_m_s: the target's filtered velocity, shape (3,).
+        seen_us: vehicle time of the target's last report; far in the past before the first.
     """
 
     __slots__ = (
@@ -93,18 +93,18 @@ class TargetFollower:
         self._turned_us = 0
 
     def report(self, time_us: int, position_ned_m: Vec3, velocity_ned_m_s: Vec3) -> None:
-        """Take a report; a velocity with NaN in it counts as standing."""
+        """Take a report; a velocity with NaN in it counts as zero."""
         standing = any(isnan(component) for component in velocity_ned_m_s)
-        told = ZERO3 if standing else velocity_ned_m_s
+        reported = ZERO3 if standing else velocity_ned_m_s
         share = 1.0
         if not self.is_lost(time_us):
             since_s = (time_us - self.seen_us) / 1e6
             share = since_s / (since_s + self.settings.slowness * _MAX_DELAY_S) if since_s > 0.0 else 0.0
         before = self.velocity_ned_m_s
         self.velocity_ned_m_s = (
-            before[0] + share * (told[0] - before[0]),
-            before[1] + share * (told[1] - before[1]),
-            before[2] + share * (told[2] - before[2]),
+            before[0] + share * (reported[0] - before[0]),
+            before[1] + share * (reported[1] - before[1]),
+            before[2] + share * (reported[2] - before[2]),
         )
         self.seen_us, self._position_ned_m = time_us, position_ned_m
         north_m_s, east_m_s, _ = self.velocity_ned_m_s
@@ -112,22 +112,22 @@ class TargetFollower:
             self._course_rad = atan2(east_m_s, north_m_s)
 
     def is_lost(self, now_us: int) -> bool:
-        """Whether it was not heard for too long, or never."""
+        """Whether the last report is too old, or there is none."""
         return now_us - self.seen_us > _LOST_US
 
     def start(self) -> None:
-        """Begin to follow: at once on the side wanted."""
+        """Begin to follow, directly at the configured angle."""
         self._angle_rad = None
 
     def position(self, now_us: int) -> Vec3:
-        """Where the target is now, NED metres, counted on from its last report."""
+        """Where the target is now, NED metres, extrapolated from its last report."""
         ahead_s = min(max(now_us - self.seen_us, 0) / 1e6, _MAX_AHEAD_S)
         north_m, east_m, down_m = self._position_ned_m
         north_m_s, east_m_s, _ = self.velocity_ned_m_s
         return (north_m + ahead_s * north_m_s, east_m + ahead_s * east_m_s, down_m)
 
     def place(self, state: VehicleState, home_down_m: float) -> tuple[Vec3, float]:
-        """Where to be (NED, metres) and where to look (rad) now."""
+        """The place from which to follow (NED, metres) and the yaw (rad) now."""
         settings = self.settings
         north_m, east_m, down_m = self.position(state.time_us)
         angle_rad = self._turn(state.time_us)
@@ -140,7 +140,7 @@ class TargetFollower:
         return place, atan2(east_m - state.position_ned_m[1], north_m - state.position_ned_m[0])
 
     def _turn(self, now_us: int) -> float:
-        """The side to be on; it goes round the target no faster than allowed."""
+        """The angle around the target, which changes no faster than allowed."""
         settings = self.settings
         wanted_rad = self._course_rad + settings.angle_rad
         before = self._angle_rad
@@ -153,11 +153,11 @@ class TargetFollower:
         return angle_rad
 
 
-class FollowMode(JourneyMode):
-    """Follows the target that reports itself; until it does, and when it is lost, stays.
+class FollowMode(TrajectoryMode):
+    """Follows the target; stays where it is before the first report, and when the target is lost.
 
     Attributes:
-        follower: knows the target.
+        follower: takes the target's reports.
     """
 
     def __init__(self, context: ModeContext, airframe: Airframe, parameters: Parameters) -> None:
@@ -165,27 +165,27 @@ class FollowMode(JourneyMode):
         super().__init__(context, airframe, parameters)
 
     def configure(self, airframe: Airframe, parameters: Parameters) -> None:
-        """Take over how it is followed."""
+        """Apply the FLW_TGT_ parameters."""
         self.follower.settings = follow_settings(parameters)
 
     def enter(self, state: VehicleState, entry: ModeEntry) -> None:
         """Begin here."""
-        self._begin(state)
+        self._start(state)
         self.follower.start()
-        self._show_journey(state)
+        self._show_target(state)
 
     def step(self, state: VehicleState) -> ControlCommand:
-        """Lead the point to the place beside the target, moving as the target does."""
+        """Fly to the place beside the target, which moves with it."""
         context, follower = self._context, self.follower
-        traveller, limits = context.traveller, context.limits
+        trajectory, limits = context.trajectory, context.limits
         if follower.is_lost(state.time_us):
-            if not isnan(traveller.speed_m_s):
-                traveller.start(state, limits)
-            return self._travel(state)
+            if not isnan(trajectory.speed_m_s):
+                trajectory.start(state, limits)
+            return self._fly_to_target(state)
         place, yaw_rad = follower.place(state, context.home_ned_m[2])
         north_m_s, east_m_s, _ = follower.velocity_ned_m_s
-        traveller.target_ned_m, traveller.yaw_rad = place, yaw_rad
-        traveller.speed_m_s = limits.cruise_m_s
-        traveller.drift_ned_m_s = (north_m_s, east_m_s, 0.0)
-        velocity_ned_m_s, yaw_rad = traveller.step(state, limits, context.period_s)
-        return self._chase(state, velocity_ned_m_s, yaw_rad)
+        trajectory.target_ned_m, trajectory.yaw_rad = place, yaw_rad
+        trajectory.speed_m_s = limits.cruise_m_s
+        trajectory.drift_ned_m_s = (north_m_s, east_m_s, 0.0)
+        velocity_ned_m_s, yaw_rad = trajectory.step(state, limits, context.period_s)
+        return self._follow(state, velocity_ned_m_s, yaw_rad)

@@ -1,16 +1,47 @@
-"""Limits and gains of guidance, and the velocities and turns made within them."""
+"""Limits and gains of guidance, and the velocities and yaw rates computed within them."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from math import cos, hypot, inf, isnan, nan, radians, remainder, sin, tau
+from math import cos, hypot, inf, isnan, nan, radians, remainder, sin, sqrt, tau
 
 from firmware_py.airframe import Airframe
 from firmware_py.commands import VelocityCommand
-from firmware_py.guidance.reference import Pace
 from firmware_py.parameters import Parameters
 from firmware_py.types import VehicleState
 from geometry.vectors import Vec3
+
+VELOCITY_GAIN = 5.0
+"""Acceleration of a reference point per velocity error where that is small, 1/s."""
+
+
+@dataclass(frozen=True, slots=True)
+class AccelerationLimits:
+    """Limits of a reference point's motion, all positive.
+
+    Attributes:
+        level_m_s2: horizontal acceleration.
+        up_m_s2: acceleration upwards.
+        down_m_s2: acceleration downwards.
+        jerk_m_s3: change of acceleration.
+    """
+
+    level_m_s2: float = 3.0
+    up_m_s2: float = 4.0
+    down_m_s2: float = 3.0
+    jerk_m_s3: float = 4.0
+
+    def stopping_level(self, distance_m: float, passing_m_s: float = 0.0) -> float:
+        """The horizontal speed from which another speed can be reached within a distance, m/s."""
+        return stopping_speed(distance_m, self.level_m_s2, self.jerk_m_s3, passing_m_s)
+
+    def stopping_down(self, depth_m: float) -> float:
+        """The vertical velocity from which a stop is possible so far below (below zero: above), m/s."""
+        if depth_m == 0.0:
+            return 0.0
+        if depth_m > 0.0:
+            return stopping_speed(depth_m, self.up_m_s2, self.jerk_m_s3)
+        return -stopping_speed(-depth_m, self.down_m_s2, self.jerk_m_s3)
 
 
 @dataclass(slots=True)
@@ -18,23 +49,23 @@ class SpeedLimits:
     """Limits and gains of guidance, all positive.
 
     Attributes:
-        horizontal_m_s: any horizontal velocity.
-        up_m_s: any climb.
-        down_m_s: any descent.
-        yaw_rate_rad_s: any turn.
+        horizontal_m_s: maximum horizontal speed.
+        up_m_s: maximum climb.
+        down_m_s: maximum descent.
+        yaw_rate_rad_s: maximum yaw rate.
         takeoff_m_s: climb of a take-off.
         takeoff_m_s2: how fast that climb is built up; infinite: at once.
         land_m_s: descent near the ground.
-        cruise_m_s: of a journey by itself.
-        auto_up_m_s: climb of a journey.
-        auto_down_m_s: descent of a journey, and of a landing high up.
-        pace: accelerations and jerk of a journey.
-        auto_yaw_rate_rad_s: turn of a journey.
+        cruise_m_s: horizontal speed of automatic modes.
+        auto_up_m_s: climb of automatic modes.
+        auto_down_m_s: descent of automatic modes, and of a landing far above the ground.
+        acceleration: in automatic modes.
+        auto_yaw_rate_rad_s: yaw rate of automatic modes.
         position_gain: horizontal velocity per distance, 1/s.
         height_gain: vertical velocity per height, 1/s.
-        yaw_gain: turn per angle, 1/s.
-        land_slow_below_m: height above home from which a landing is slow.
-        land_fast_above_m: height above home down to which it is fast.
+        yaw_gain: yaw rate per angle, 1/s.
+        land_slow_below_m: height above home below which a landing has `land_m_s`.
+        land_fast_above_m: height above home down to which it has its full speed.
     """
 
     horizontal_m_s: float
@@ -47,7 +78,7 @@ class SpeedLimits:
     cruise_m_s: float = 5.0
     auto_up_m_s: float = 3.0
     auto_down_m_s: float = 1.5
-    pace: Pace = field(default_factory=Pace)
+    acceleration: AccelerationLimits = field(default_factory=AccelerationLimits)
     auto_yaw_rate_rad_s: float = 1.0
     position_gain: float = 1.0
     height_gain: float = 1.0
@@ -63,37 +94,37 @@ class SpeedLimits:
             north_m_s, east_m_s = north_m_s * scale, east_m_s * scale
         return (north_m_s, east_m_s, clamp(down_m_s, -self.up_m_s, self.down_m_s))
 
-    def landing_m_s(self, height_m: float, high_up_m_s: float) -> float:
-        """Descent at a height above home: slow near the ground, and as told high up, as PX4's."""
-        if high_up_m_s <= self.land_m_s:
-            return high_up_m_s
+    def landing_m_s(self, height_m: float, full_m_s: float) -> float:
+        """Descent at a height above home: slow near the ground, `full_m_s` far above it, as PX4's."""
+        if full_m_s <= self.land_m_s:
+            return full_m_s
         if height_m <= self.land_slow_below_m:
             return self.land_m_s
         span_m = max(self.land_fast_above_m - self.land_slow_below_m, 0.1)
         share = min((height_m - self.land_slow_below_m) / span_m, 1.0)
-        return self.land_m_s + share * (high_up_m_s - self.land_m_s)
+        return self.land_m_s + share * (full_m_s - self.land_m_s)
 
 
 def speed_limits(airframe: Airframe, parameters: Parameters) -> SpeedLimits:
-    """The smaller of what the airframe can do and what the parameters allow."""
-    can, value = airframe.limits, parameters.value
-    up_m_s = min(can.speed_up_m_s, value("MPC_Z_VEL_MAX_UP"))
-    down_m_s = min(can.speed_down_m_s, value("MPC_Z_VEL_MAX_DN"))
-    horizontal_m_s = min(can.speed_horizontal_m_s, value("MPC_XY_VEL_MAX"))
+    """The smaller of the airframe's limits and the parameters'."""
+    own, value = airframe.limits, parameters.value
+    up_m_s = min(own.speed_up_m_s, value("MPC_Z_VEL_MAX_UP"))
+    down_m_s = min(own.speed_down_m_s, value("MPC_Z_VEL_MAX_DN"))
+    horizontal_m_s = min(own.speed_horizontal_m_s, value("MPC_XY_VEL_MAX"))
     takeoff_m_s = min(up_m_s, value("MPC_TKO_SPEED"))
     ramp_s = value("MPC_TKO_RAMP_T")
     return SpeedLimits(
         horizontal_m_s=horizontal_m_s,
         up_m_s=up_m_s,
         down_m_s=down_m_s,
-        yaw_rate_rad_s=min(can.yaw_rate_rad_s, radians(value("MC_YAWRATE_MAX"))),
+        yaw_rate_rad_s=min(own.yaw_rate_rad_s, radians(value("MC_YAWRATE_MAX"))),
         takeoff_m_s=takeoff_m_s,
         takeoff_m_s2=takeoff_m_s / ramp_s if ramp_s > 0.0 else inf,
         land_m_s=min(down_m_s, value("MPC_LAND_SPEED")),
         cruise_m_s=min(horizontal_m_s, value("MPC_XY_CRUISE")),
         auto_up_m_s=min(up_m_s, value("MPC_Z_V_AUTO_UP")),
         auto_down_m_s=min(down_m_s, value("MPC_Z_V_AUTO_DN")),
-        pace=Pace(
+        acceleration=AccelerationLimits(
             min(value("MPC_ACC_HOR"), value("MPC_ACC_HOR_MAX")),
             value("MPC_ACC_UP_MAX"),
             value("MPC_ACC_DOWN_MAX"),
@@ -108,20 +139,34 @@ def speed_limits(airframe: Airframe, parameters: Parameters) -> SpeedLimits:
     )
 
 
+def stopping_speed(
+    distance_m: float, acceleration_m_s2: float, jerk_m_s3: float, passing_m_s: float = 0.0
+) -> float:
+    """The speed from which another (by default: none) can be reached within a distance.
+
+    Braking with a needs v^2 / 2a, and building up a needs a time t more, at unreduced speed: the distance is
+    d = (v^2 - w^2) / 2a + (v - w) t, solved for v. t is a / j and what `VELOCITY_GAIN` adds; half as much
+    again, because on a short path the point still accelerates when it should begin to brake.
+    """
+    delay_s = acceleration_m_s2 / jerk_m_s3 + 1.5 / VELOCITY_GAIN
+    root_s = passing_m_s / acceleration_m_s2 + delay_s
+    return acceleration_m_s2 * (sqrt(root_s * root_s + 2.0 * distance_m / acceleration_m_s2) - delay_s)
+
+
 def clamp(value: float, low: float, high: float) -> float:
     """The nearest value within limits."""
     return low if value < low else high if value > high else value
 
 
 def level(state: VehicleState, vector_ned: Vec3) -> Vec3:
-    """A vector NED in level axes turned with the yaw: forward, right, down."""
+    """A vector in level axes, which turn with the yaw: forward, right, down."""
     north, east, down = vector_ned
     cos_yaw, sin_yaw = cos(state.yaw_rad), sin(state.yaw_rad)
     return (cos_yaw * north + sin_yaw * east, cos_yaw * east - sin_yaw * north, down)
 
 
 def level_pair(state: VehicleState, one_ned: Vec3, other_ned: Vec3) -> tuple[Vec3, Vec3]:
-    """The same for two vectors."""
+    """The same for two vectors, in less time than twice."""
     north, east, down = one_ned
     other_north, other_east, other_down = other_ned
     cos_yaw, sin_yaw = cos(state.yaw_rad), sin(state.yaw_rad)
@@ -136,7 +181,7 @@ def level_pair(state: VehicleState, one_ned: Vec3, other_ned: Vec3) -> tuple[Vec
 
 
 def yaw_rate(yaw_now_rad: float, yaw_rad: float, yaw_rate_rad_s: float, limits: SpeedLimits) -> float:
-    """The yaw rate that turns the shortest way to a yaw, and a yaw rate beside it; NaN: not asked for."""
+    """The yaw rate towards a yaw by the shorter turn, plus a yaw rate; NaN: not given."""
     rate_rad_s = 0.0 if isnan(yaw_rate_rad_s) else yaw_rate_rad_s
     if not isnan(yaw_rad):
         rate_rad_s += limits.yaw_gain * remainder(yaw_rad - yaw_now_rad, tau)
@@ -151,13 +196,13 @@ def velocity_command(
     limits: SpeedLimits,
     yaw_rate_rad_s: float = nan,
 ) -> VelocityCommand:
-    """Limit a velocity, turn it into level axes, and find the yaw rate."""
+    """The command for a velocity, which is limited, and a yaw."""
     velocity_m_s = level(state, limits.clip(*velocity_ned_m_s))
     return VelocityCommand(velocity_m_s, yaw_rate(state.yaw_rad, yaw_rad, yaw_rate_rad_s, limits))
 
 
 def velocity_towards(target: Vec3, place: Vec3, velocity: Vec3, limits: SpeedLimits) -> Vec3:
-    """Velocity plus a proportional pull to the target in the components that have one."""
+    """A velocity plus one proportional to the distance to the target, in components that are not NaN."""
     tx, ty, tz = target
     vx, vy, vz = velocity
     if not isnan(tx):

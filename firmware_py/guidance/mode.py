@@ -1,4 +1,4 @@
-"""A flight mode as an object: what it is told on entry, and what it asks of the stabiliser each tick."""
+"""A flight mode as an object: what it gets on entry, and what it commands each tick."""
 
 from __future__ import annotations
 
@@ -11,21 +11,21 @@ from firmware_py.airframe import Airframe
 from firmware_py.commands import ControlCommand, VelocityCommand
 from firmware_py.guidance.limits import SpeedLimits, clamp, level_pair, yaw_rate
 from firmware_py.guidance.orbit import Orbit
-from firmware_py.guidance.travel import Traveller
+from firmware_py.guidance.trajectory import Trajectory
 from firmware_py.parameters import Parameters
 from firmware_py.setpoints import Setpoint, TrajectorySetpoint
 from firmware_py.types import ManualInput, VehicleState
 from geometry.vectors import NAN3, ZERO3, Vec3
 
-_FACING_M = 0.5  # nearer than this, a region of interest says nothing about where to look
-_RAMP_FROM_M_S = -2.45  # PX4's: without thrust, g over its velocity gain
-_WOUND_UP_M_S = 0.95  # fitted to heights of x500 flights: PX4's velocity loop winds up during the ramp
-_CATCHING_UP = 1.2  # of MPC_Z_V_AUTO_UP: what PX4 leaves modes that fly by themselves
+_FACING_M = 0.5  # nearer than this, the direction of a region of interest is not used
+_RAMP_FROM_M_S = -2.45  # PX4's: no thrust, g over its velocity gain
+_WIND_UP_M_S = 0.95  # fitted to heights of x500 flights: PX4's velocity loop winds up during the ramp
+_AUTO_CLIMB_SHARE = 1.2  # of MPC_Z_V_AUTO_UP: the limit of PX4's automatic modes
 
 
 @dataclass(frozen=True, slots=True)
 class ClimbRamp:
-    """What climb is allowed while taking off, m/s; as PX4's, it leads to a limit and not to the climb wanted.
+    """The climb allowed during a take-off, m/s; as PX4's, it ends at a limit, not at the commanded climb.
 
     Attributes:
         from_m_s: at its beginning; below zero.
@@ -38,20 +38,20 @@ class ClimbRamp:
 
 @dataclass(slots=True)
 class ModeContext:
-    """What all modes share; `Guidance` keeps it up to date.
+    """What all modes share; `Guidance` updates it.
 
     Attributes:
         limits: speeds, accelerations and gains.
         period_s: of control.
-        traveller: the point that modes lead which fly by themselves.
+        trajectory: of automatic modes.
         sticks: a pilot's newest input.
         home_ned_m: heights of return, landing and following count from it, shape (3,).
-        region_ned_m: a place to look at on journeys and in hold, shape (3,); None: none.
+        region_ned_m: a place to look at while flying to targets and in hold, shape (3,); None: none.
     """
 
     limits: SpeedLimits
     period_s: float
-    traveller: Traveller = field(default_factory=Traveller)
+    trajectory: Trajectory = field(default_factory=Trajectory)
     sticks: ManualInput = field(default_factory=lambda: ManualInput(0))
     home_ned_m: Vec3 = ZERO3
     region_ned_m: Vec3 | None = None
@@ -59,12 +59,12 @@ class ModeContext:
 
 @dataclass(frozen=True, slots=True)
 class ModeEntry:
-    """What a mode is told when it is entered.
+    """What a mode gets when it is entered.
 
     Attributes:
         previous: the mode flown until now.
-        target_ned_m: where to take off to, land or return to, shape (3,); NaN: open.
-        keep_target: hold: go on to the present target.
+        target_ned_m: where to take off to, land or return to, shape (3,); NaN: not given.
+        keep_target: hold mode: continue to the present target.
         orbit: the circle to fly.
     """
 
@@ -75,17 +75,12 @@ class ModeEntry:
 
 
 class Mode(ABC):
-    """One way to fly.
-
-    Args:
-        context: shared by all modes.
-        airframe: what flies.
-        parameters: see `configure`.
+    """A flight mode.
 
     Attributes:
         takes_off: it leaves the ground by itself.
-        setpoint: what is followed, for telemetry.
-        target_reached: a take-off is at its height.
+        setpoint: followed now, for telemetry.
+        target_reached: a take-off has reached its height.
     """
 
     takes_off: ClassVar[bool] = False
@@ -97,7 +92,7 @@ class Mode(ABC):
         self.configure(airframe, parameters)
 
     def configure(self, airframe: Airframe, parameters: Parameters) -> None:
-        """Take over changed parameters, beside the limits; at the start too."""
+        """Apply changed parameters, except for the limits; called at the start too."""
         del airframe, parameters
 
     @abstractmethod
@@ -106,78 +101,77 @@ class Mode(ABC):
 
     @abstractmethod
     def step(self, state: VehicleState) -> ControlCommand:
-        """What the stabiliser has to follow in this tick."""
+        """The command of this tick."""
 
     def departs(self, state: VehicleState) -> bool:
-        """Whether it is on the way to a place well above it: then it leaves the ground even from hold."""
+        """Whether the mode flies to a place well above, for which it leaves the ground even in hold."""
         del state
         return False
 
     @property
     def climb_ramp(self) -> ClimbRamp:
-        """How the climb of a take-off grows in this mode."""
+        """The limit of the climb during a take-off in this mode."""
         limits = self._context.limits
         if self.takes_off:
-            return ClimbRamp(_RAMP_FROM_M_S, _CATCHING_UP * limits.auto_up_m_s)
-        return ClimbRamp(_RAMP_FROM_M_S - _WOUND_UP_M_S, limits.up_m_s)
+            return ClimbRamp(_RAMP_FROM_M_S, _AUTO_CLIMB_SHARE * limits.auto_up_m_s)
+        return ClimbRamp(_RAMP_FROM_M_S - _WIND_UP_M_S, limits.up_m_s)
 
     @property
     def hold_target(self) -> tuple[Vec3, float] | None:
-        """Place (NED, metres) and yaw (rad) that a hold which keeps the target goes on to; None: its own."""
+        """Place (NED, metres) and yaw (rad) to which a hold that keeps the target continues; None: none."""
         return None
 
 
-class JourneyMode(Mode):
-    """A mode that leads a point which moves smoothly, and follows it; the stabiliser does the rest."""
+class TrajectoryMode(Mode):
+    """A mode that follows a smooth trajectory."""
 
-    _shown_ned_m = NAN3  # the target that `setpoint` tells
+    _shown_ned_m = NAN3  # the target in `setpoint`
 
-    def _begin(self, state: VehicleState) -> None:
-        """Lead the point another way, from the velocity there is."""
+    def _start(self, state: VehicleState) -> None:
+        """Start a trajectory from the present motion: brake and stay."""
         context = self._context
-        context.traveller.start(state, context.limits)
+        context.trajectory.start(state, context.limits)
 
-    def _travel(self, state: VehicleState) -> ControlCommand:
-        """Go on to the traveller's target."""
+    def _fly_to_target(self, state: VehicleState) -> ControlCommand:
         context = self._context
-        traveller = context.traveller
-        velocity_ned_m_s, yaw_rad = traveller.step(state, context.limits, context.period_s)
-        if traveller.target_ned_m is not self._shown_ned_m:
-            self._show_journey(state)
+        trajectory = context.trajectory
+        velocity_ned_m_s, yaw_rad = trajectory.step(state, context.limits, context.period_s)
+        if trajectory.target_ned_m is not self._shown_ned_m:
+            self._show_target(state)
         if context.region_ned_m is not None:
-            yaw_rad = _facing(state, context.region_ned_m, yaw_rad)
-        return self._chase(state, velocity_ned_m_s, yaw_rad)
+            yaw_rad = _yaw_towards(state, context.region_ned_m, yaw_rad)
+        return self._follow(state, velocity_ned_m_s, yaw_rad)
 
-    def _sink(self, state: VehicleState) -> ControlCommand:
-        """Descend at the traveller's target, slower near the ground."""
+    def _descend(self, state: VehicleState) -> ControlCommand:
+        """Descend over the target, slower near the ground."""
         context = self._context
-        traveller, limits = context.traveller, context.limits
+        trajectory, limits = context.trajectory, context.limits
         height_m = context.home_ned_m[2] - state.position_ned_m[2]
-        traveller.drift_ned_m_s = (0.0, 0.0, limits.landing_m_s(height_m, limits.auto_down_m_s))
-        velocity_ned_m_s, yaw_rad = traveller.step(state, limits, context.period_s, height_bound=False)
-        return self._chase(state, velocity_ned_m_s, yaw_rad)
+        trajectory.drift_ned_m_s = (0.0, 0.0, limits.landing_m_s(height_m, limits.auto_down_m_s))
+        velocity_ned_m_s, yaw_rad = trajectory.step(state, limits, context.period_s, height_bound=False)
+        return self._follow(state, velocity_ned_m_s, yaw_rad)
 
-    def _chase(
+    def _follow(
         self, state: VehicleState, velocity_ned_m_s: Vec3, yaw_rad: float, turn_rad_s: float = 0.0
     ) -> VelocityCommand:
-        """Follow the point: limited velocity, its acceleration, and a turn that is not hasty."""
+        """The command for a velocity, with the reference point's acceleration, and a yaw."""
         context = self._context
         limits = context.limits
         max_rad_s = limits.auto_yaw_rate_rad_s
         velocity, acceleration = level_pair(
-            state, limits.clip(*velocity_ned_m_s), context.traveller.reference.acceleration_ned_m_s2
+            state, limits.clip(*velocity_ned_m_s), context.trajectory.reference.acceleration_ned_m_s2
         )
         turn_rad_s = yaw_rate(state.yaw_rad, yaw_rad, turn_rad_s, limits)
         return VelocityCommand(velocity, clamp(turn_rad_s, -max_rad_s, max_rad_s), acceleration)
 
-    def _show_journey(self, state: VehicleState) -> None:
-        traveller = self._context.traveller
-        self._shown_ned_m = traveller.target_ned_m
-        self.setpoint = TrajectorySetpoint(state.time_us, traveller.target_ned_m, yaw_rad=traveller.yaw_rad)
+    def _show_target(self, state: VehicleState) -> None:
+        trajectory = self._context.trajectory
+        self._shown_ned_m = trajectory.target_ned_m
+        self.setpoint = TrajectorySetpoint(state.time_us, trajectory.target_ned_m, yaw_rad=trajectory.yaw_rad)
 
 
-def _facing(state: VehicleState, region_ned_m: Vec3, yaw_rad: float) -> float:
-    """The yaw that looks at a place; too near to it, the one given."""
+def _yaw_towards(state: VehicleState, region_ned_m: Vec3, yaw_rad: float) -> float:
+    """The yaw towards a place; very near to it, the given one."""
     north_m = region_ned_m[0] - state.position_ned_m[0]
     east_m = region_ned_m[1] - state.position_ned_m[1]
     return atan2(east_m, north_m) if hypot(north_m, east_m) > _FACING_M else yaw_rad

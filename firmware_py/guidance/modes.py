@@ -1,4 +1,4 @@
-"""Guidance: all flight modes, and which of them flies each state of the commander."""
+"""Guidance: all flight modes, and the mode of each state of the commander."""
 
 from __future__ import annotations
 
@@ -7,14 +7,20 @@ from math import nan
 from firmware_py.airframe import Airframe
 from firmware_py.commander_table import State
 from firmware_py.commands import ControlCommand
-from firmware_py.guidance.auto_modes import DescendMode, HoldMode, LandMode, OrbitMode, TakeoffMode
+from firmware_py.guidance.auto_modes import (
+    DescendMode,
+    HoldMode,
+    LandMode,
+    OrbitMode,
+    ReturnMode,
+    TakeoffMode,
+)
 from firmware_py.guidance.following import FollowMode
 from firmware_py.guidance.limits import speed_limits
 from firmware_py.guidance.mode import Mode, ModeContext, ModeEntry
 from firmware_py.guidance.orbit import Orbit
-from firmware_py.guidance.returning import ReturnMode
 from firmware_py.guidance.sticks import AcroMode, AltitudeMode, PositionMode, StabilizedMode
-from firmware_py.guidance.travel import YawMode
+from firmware_py.guidance.trajectory import YawMode
 from firmware_py.missions.flight import Leg, LegKind
 from firmware_py.parameters import Parameters
 from firmware_py.setpoints import Setpoint
@@ -28,13 +34,13 @@ class OffboardMode(Mode):
     _constant: ControlCommand | None = None  # the command, if it is the same in every tick
 
     def accept(self, setpoint: Setpoint) -> None:
-        """Take the next setpoint, one that is usable; it is followed as soon as the mode is entered."""
+        """Take a usable setpoint; it is followed while the mode is flown."""
         limits = self._context.limits
         self.setpoint = setpoint = setpoint.bounded(limits)
         self._constant = setpoint.constant_command(limits)
 
     def enter(self, state: VehicleState, entry: ModeEntry) -> None:
-        """Follow the newest setpoint."""
+        """Nothing to prepare."""
 
     def step(self, state: VehicleState) -> ControlCommand:
         """The setpoint's command."""
@@ -50,8 +56,8 @@ class Guidance:
         period_s: of control.
 
     Attributes:
-        mode: the one flown, or flown last.
-        command_down_m_s: vertical velocity last asked for; for a thrust, its sign.
+        mode: the one flown now or last.
+        command_down_m_s: vertical velocity of the last command; for a thrust, its sign.
     """
 
     def __init__(self, airframe: Airframe, parameters: Parameters, period_s: float = 0.004) -> None:
@@ -86,19 +92,19 @@ class Guidance:
         self._configure_shared(parameters)
 
     def configure(self, airframe: Airframe, parameters: Parameters) -> None:
-        """Take over changed parameters."""
+        """Apply changed parameters."""
         self._context.limits = speed_limits(airframe, parameters)
         for mode in dict.fromkeys(self._modes.values()):
             mode.configure(airframe, parameters)
         self._configure_shared(parameters)
 
     def _configure_shared(self, parameters: Parameters) -> None:
-        self._context.traveller.yaw_mode = YawMode(parameters.integer("MPC_YAW_MODE"))
+        self._context.trajectory.yaw_mode = YawMode(parameters.integer("MPC_YAW_MODE"))
         self._hover_thrust = parameters.value("MPC_THR_HOVER")
 
     def set_home(self, home_ned_m: Vec3) -> None:
-        """Heights of return, landing and following count from here, shape (3,)."""
-        self._context.home_ned_m = self._context.traveller.home_ned_m = home_ned_m
+        """Set the place from which heights of return, landing and following count, shape (3,)."""
+        self._context.home_ned_m = self._context.trajectory.home_ned_m = home_ned_m
 
     def enter(
         self,
@@ -109,7 +115,7 @@ class Guidance:
         keep_target: bool = False,
         orbit: Orbit | None = None,
     ) -> None:
-        """Fly the mode of a state of the commander from now on; see `ModeEntry`."""
+        """Start the mode of a state of the commander; see `ModeEntry`."""
         entry = ModeEntry(self.mode, target_ned_m, keep_target, orbit or Orbit())
         self.mode = self._modes[flown]
         self.mode.enter(state, entry)
@@ -132,13 +138,13 @@ class Guidance:
             self._hold.fly_leg(state, leg, begins=begins)
 
     def step(self, state: VehicleState) -> ControlCommand:
-        """What the stabiliser has to follow in this tick."""
+        """The command of this tick."""
         command = self.mode.step(state)
         self.command_down_m_s = command.vertical_intent(self._hover_thrust)
         return command
 
     def accept(self, setpoint: Setpoint | None) -> None:
-        """Take the next offboard setpoint, one that is usable; None: there is none."""
+        """Take a usable offboard setpoint; None changes nothing."""
         if setpoint is not None:
             self._offboard.accept(setpoint)
 
@@ -151,13 +157,13 @@ class Guidance:
         self._follow.follower.report(time_us, position_ned_m, velocity_ned_m_s)
 
     def look_at(self, region_ned_m: Vec3 | None) -> None:
-        """On journeys and in hold, turn the nose to a place, shape (3,); None: no more."""
+        """Turn to a place, shape (3,), while flying to targets and in hold; None: no longer."""
         self._context.region_ned_m = region_ned_m
 
     def change_speed(self, speed_m_s: float) -> None:
-        """Fly the present journey at another horizontal speed; NaN: the cruising speed."""
-        self._context.traveller.speed_m_s = speed_m_s
+        """Fly to the present target at another horizontal speed; NaN: the cruising speed."""
+        self._context.trajectory.speed_m_s = speed_m_s
 
     def left_ground(self) -> None:
-        """Go on from where the vehicle is: what led it off the ground has run ahead."""
-        self._context.traveller.resume()
+        """Continue from where the vehicle is: the reference point has moved ahead on the ground."""
+        self._context.trajectory.resume()

@@ -1,4 +1,4 @@
-"""The circle of an orbit: the velocity that leads to it and along it, and where the nose points."""
+"""The circle of an orbit: the velocity to it and along it, and the yaw."""
 
 from __future__ import annotations
 
@@ -6,14 +6,13 @@ from dataclasses import dataclass
 from enum import IntEnum
 from math import atan2, hypot, nan, pi
 
-from firmware_py.guidance.limits import clamp
-from firmware_py.guidance.reference import Pace
+from firmware_py.guidance.limits import AccelerationLimits, clamp
 from firmware_py.types import VehicleState
 from geometry.vectors import Vec3
 
-_MIN_DISTANCE_M = 0.5  # nearer to the centre than this, it says nothing about where to look
-_MAX_CENTRIPETAL_M_S2 = 2.0  # PX4 limits the centripetal acceleration of an orbit so
-_NEAR_M = 3.0  # nearer to the circle than this, it goes along it
+_MIN_DISTANCE_M = 0.5  # nearer to the centre than this, its direction is not used
+_MAX_CENTRIPETAL_M_S2 = 2.0  # as in PX4
+_NEAR_M = 3.0  # nearer to the circle than this, the velocity has a part along it
 
 
 class OrbitYaw(IntEnum):
@@ -45,24 +44,26 @@ class Orbit:
     initial_yaw_rad: float = 0.0
 
     def speed_within(self, max_m_s2: float) -> float:
-        """The speed along it that turns no harder than this, m/s."""
+        """The speed along it within a limit of centripetal acceleration, m/s."""
         max_m_s = (min(max_m_s2, _MAX_CENTRIPETAL_M_S2) * self.radius_m) ** 0.5
         return clamp(self.speed_m_s, -max_m_s, max_m_s)
 
-    def velocity(self, place_ned_m: Vec3, pace: Pace, cruise_m_s: float) -> tuple[float, float]:
-        """Velocity north and east (m/s) at a place: far from the circle towards it, near by along it."""
+    def velocity(
+        self, place_ned_m: Vec3, limits: AccelerationLimits, cruise_m_s: float
+    ) -> tuple[float, float]:
+        """Velocity north and east (m/s) at a place: towards the circle, and near it along it."""
         north_m, east_m, distance_m = self._from_centre(place_ned_m)
         outside_m = distance_m - self.radius_m
         gap_m = abs(outside_m)
-        inward_m_s = min(cruise_m_s, pace.stopping_level(gap_m)) * (1.0 if outside_m > 0.0 else -1.0)
-        along_m_s = self.speed_within(pace.level_m_s2) * max(0.0, 1.0 - gap_m / min(self.radius_m, _NEAR_M))
+        inward_m_s = min(cruise_m_s, limits.stopping_level(gap_m)) * (1.0 if outside_m > 0.0 else -1.0)
+        along_m_s = self.speed_within(limits.level_m_s2) * max(0.0, 1.0 - gap_m / min(self.radius_m, _NEAR_M))
         if distance_m == 0.0:
-            return -inward_m_s, 0.0  # out of the centre by any way
+            return -inward_m_s, 0.0  # away from the centre in any direction
         north, east = north_m / distance_m, east_m / distance_m
         return -inward_m_s * north - along_m_s * east, -inward_m_s * east + along_m_s * north
 
     def look(self, state: VehicleState, stick_rad_s: float) -> tuple[float, float]:
-        """Yaw (rad; NaN: open) and beside it the yaw rate (rad/s) that the nose needs."""
+        """Yaw (rad; NaN: not controlled) and yaw rate (rad/s) at the vehicle's place and velocity."""
         if self.yaw is OrbitYaw.INITIAL:
             return self.initial_yaw_rad, 0.0
         if self.yaw in (OrbitYaw.UNCONTROLLED, OrbitYaw.STICKS):

@@ -1,4 +1,4 @@
-"""The manual modes: what a pilot's sticks mean in each."""
+"""Manual modes: what a pilot's sticks command in each."""
 
 from __future__ import annotations
 
@@ -13,9 +13,9 @@ from firmware_py.commands import (
     TiltCommand,
     VelocityCommand,
 )
-from firmware_py.guidance.limits import level_pair
+from firmware_py.guidance.limits import AccelerationLimits, level_pair
 from firmware_py.guidance.mode import Mode, ModeEntry
-from firmware_py.guidance.reference import Pace, Reference
+from firmware_py.guidance.trajectory import Reference
 from firmware_py.parameters import Parameters
 from firmware_py.setpoints import TrajectorySetpoint
 from firmware_py.types import ManualInput, VehicleState
@@ -25,22 +25,22 @@ _FULL_THRUST = 1.0
 
 @dataclass(frozen=True, slots=True)
 class StickSettings:
-    """What full sticks mean: m/s, rad, rad/s; thrusts as shares of the greatest.
+    """What full sticks command; thrusts are shares of full thrust.
 
     Attributes:
         forward_m_s: horizontal speed in position mode.
         back_m_s: the same backwards.
         side_m_s: the same sideways.
         tilt_rad: in modes that control the tilt.
-        yaw_rate_rad_s: acro mode apart.
+        yaw_rate_rad_s: except in acro mode.
         acro_rate_frd_rad_s: body rates in acro mode, shape (3,).
-        min_thrust: throttle down, where height is not controlled.
-        hover_thrust: throttle in the middle.
-        dead: nearer to its middle than this, a stick is let go.
-        hold_level_m_s: let go, it keeps its place from below this horizontal speed; 0: at once.
-        hold_vertical_m_s: the same for its height.
-        moving: how hard it speeds up.
-        braking: how hard it stops.
+        min_thrust: at the lowest throttle, where height is not controlled.
+        hover_thrust: at centred throttle.
+        dead: deflection below which a stick counts as centred.
+        hold_level_m_s: horizontal speed below which the position is held at centred sticks; 0: any.
+        hold_vertical_m_s: the same for the height.
+        moving: acceleration limits towards a commanded velocity.
+        braking: the same at centred sticks.
     """
 
     forward_m_s: float
@@ -54,11 +54,11 @@ class StickSettings:
     dead: float
     hold_level_m_s: float
     hold_vertical_m_s: float
-    moving: Pace
-    braking: Pace
+    moving: AccelerationLimits
+    braking: AccelerationLimits
 
-    def released(self, stick: float) -> float:
-        """A stick's value with the dead zone around its centre taken out, -1..1."""
+    def without_dead_zone(self, stick: float) -> float:
+        """A stick's value without the dead zone around its centre, -1..1."""
         dead = self.dead
         if -dead <= stick <= dead:
             return 0.0
@@ -69,7 +69,7 @@ class StickSettings:
         return (
             sticks.right * self.tilt_rad,
             -sticks.forward * self.tilt_rad,
-            self.released(sticks.yaw) * self.yaw_rate_rad_s,
+            self.without_dead_zone(sticks.yaw) * self.yaw_rate_rad_s,
         )
 
     def thrust(self, sticks: ManualInput) -> float:
@@ -86,7 +86,7 @@ def stick_settings(airframe: Airframe, parameters: Parameters) -> StickSettings:
     forward_m_s = min(can.speed_horizontal_m_s, value("MPC_VEL_MANUAL"))
     back_m_s, side_m_s = value("MPC_VEL_MAN_BACK"), value("MPC_VEL_MAN_SIDE")
     max_m_s2 = value("MPC_ACC_HOR_MAX")
-    moving = Pace(
+    moving = AccelerationLimits(
         min(value("MPC_ACC_HOR"), max_m_s2),
         value("MPC_ACC_UP_MAX"),
         value("MPC_ACC_DOWN_MAX"),
@@ -110,19 +110,19 @@ def stick_settings(airframe: Airframe, parameters: Parameters) -> StickSettings:
 
 
 class ManualMode(Mode):
-    """A mode flown by hand; telemetry shows no setpoint."""
+    """A mode flown by the sticks; telemetry shows no setpoint."""
 
     def configure(self, airframe: Airframe, parameters: Parameters) -> None:
-        """Take over what full sticks mean."""
+        """Apply the meaning of full sticks."""
         self._settings = stick_settings(airframe, parameters)
 
     def enter(self, state: VehicleState, entry: ModeEntry) -> None:
-        """Begin as it moves now."""
+        """Begin with the present motion."""
         self.setpoint = TrajectorySetpoint(state.time_us)
 
 
 class StabilizedMode(ManualMode):
-    """Tilt and thrust by hand."""
+    """Tilt and thrust by the sticks."""
 
     def step(self, state: VehicleState) -> ControlCommand:
         """The sticks' tilt and thrust."""
@@ -132,7 +132,7 @@ class StabilizedMode(ManualMode):
 
 
 class AcroMode(ManualMode):
-    """Body rates and thrust by hand."""
+    """Body rates and thrust by the sticks."""
 
     def step(self, state: VehicleState) -> ControlCommand:
         """The sticks' rates and thrust."""
@@ -143,10 +143,10 @@ class AcroMode(ManualMode):
 
 
 class AltitudeMode(ManualMode):
-    """Tilt by hand, height held."""
+    """Tilt by the sticks, height held."""
 
     def enter(self, state: VehicleState, entry: ModeEntry) -> None:
-        """Begin as it moves now."""
+        """Begin with the present motion."""
         super().enter(state, entry)
         self._reference = Reference()
         self._reference.start(state, self._settings.moving)
@@ -155,16 +155,18 @@ class AltitudeMode(ManualMode):
         """The sticks' tilt, and the vertical velocity of the throttle."""
         context = self._context
         limits = context.limits
-        self._lead(state, (0.0, 0.0), level_bound=False)
-        velocity_ned_m_s = self._reference.chase(state, limits.position_gain, limits.height_gain)
+        self._move_reference(state, (0.0, 0.0), level_bound=False)
+        velocity_ned_m_s = self._reference.tracking_velocity(state, limits.position_gain, limits.height_gain)
         roll_rad, pitch_rad, yaw_rate_rad_s = self._settings.tilt(context.sticks)
         return TiltCommand(roll_rad, pitch_rad, yaw_rate_rad_s, limits.clip(*velocity_ned_m_s)[2])
 
-    def _lead(self, state: VehicleState, level_ned_m_s: tuple[float, float], *, level_bound: bool) -> None:
-        """Move the point by the throttle and a horizontal velocity."""
+    def _move_reference(
+        self, state: VehicleState, level_ned_m_s: tuple[float, float], *, level_bound: bool
+    ) -> None:
+        """Move the reference point by the throttle and a horizontal velocity."""
         context, settings = self._context, self._settings
         limits = context.limits
-        up = settings.released(context.sticks.up)
+        up = settings.without_dead_zone(context.sticks.up)
         if up > 0.0:
             wanted_down_m_s = -up * limits.up_m_s
         else:  # slower near the ground, as a landing
@@ -172,11 +174,11 @@ class AltitudeMode(ManualMode):
             wanted_down_m_s = -up * limits.landing_m_s(height_m, limits.down_m_s)
         bound = settings.hold_vertical_m_s
         height_bound = up == 0.0 and (bound <= 0.0 or abs(state.velocity_ned_m_s[2]) < bound)
-        pace = settings.braking if level_ned_m_s == (0.0, 0.0) else settings.moving
+        acceleration = settings.braking if level_ned_m_s == (0.0, 0.0) else settings.moving
         self._reference.move(
             state,
             (*level_ned_m_s, wanted_down_m_s),
-            pace,
+            acceleration,
             context.period_s,
             level_bound=level_bound,
             height_bound=height_bound,
@@ -184,18 +186,18 @@ class AltitudeMode(ManualMode):
 
 
 class PositionMode(AltitudeMode):
-    """Velocities in level axes by hand; with the sticks centred it brakes and stays."""
+    """Velocities in level axes by the sticks; with centred sticks the vehicle brakes and stays."""
 
     def enter(self, state: VehicleState, entry: ModeEntry) -> None:
-        """Begin as it moves now."""
+        """Begin with the present motion."""
         super().enter(state, entry)
         self._level_held = False
 
     def step(self, state: VehicleState) -> ControlCommand:
-        """The sticks' velocity, or the place held."""
+        """The sticks' velocity, or the position held."""
         settings, reference = self._settings, self._reference
         sticks, limits = self._context.sticks, self._context.limits
-        forward, right = settings.released(sticks.forward), settings.released(sticks.right)
+        forward, right = settings.without_dead_zone(sticks.forward), settings.without_dead_zone(sticks.right)
         size = hypot(forward, right)
         if size > 1.0:
             forward, right = forward / size, right / size
@@ -210,11 +212,11 @@ class PositionMode(AltitudeMode):
             self._level_held = False
         elif not self._level_held:
             self._level_held = settings.hold_level_m_s <= 0.0 or speed_m_s < settings.hold_level_m_s
-        self._lead(state, (north_m_s, east_m_s), level_bound=self._level_held)
-        velocity_ned_m_s = reference.chase(state, limits.position_gain, limits.height_gain)
+        self._move_reference(state, (north_m_s, east_m_s), level_bound=self._level_held)
+        velocity_ned_m_s = reference.tracking_velocity(state, limits.position_gain, limits.height_gain)
         velocity, acceleration = level_pair(
             state, limits.clip(*velocity_ned_m_s), reference.acceleration_ned_m_s2
         )
         return VelocityCommand(
-            velocity, settings.released(sticks.yaw) * settings.yaw_rate_rad_s, acceleration
+            velocity, settings.without_dead_zone(sticks.yaw) * settings.yaw_rate_rad_s, acceleration
         )

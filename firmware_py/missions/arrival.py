@@ -1,4 +1,4 @@
-"""When an item's place, height, heading and waiting time are reached."""
+"""When an item's place, height and heading are reached and its waiting time is over."""
 
 from __future__ import annotations
 
@@ -9,23 +9,14 @@ from firmware_py.missions.items import Do, MissionItem
 from firmware_py.parameters import Parameters
 from geometry.vectors import Vec3
 
-_LONGEST_S = 1e9
-_HOLDING = frozenset({Do.WAYPOINT, Do.LOITER_TIME, Do.DELAY})
-
-
-def hold_us(item: MissionItem) -> int:
-    """How long an item keeps the vehicle, microseconds."""
-    hold_s = item.params[0] if item.command in _HOLDING else 0.0
-    return round(min(hold_s, _LONGEST_S) * 1e6) if hold_s > 0.0 else 0
-
 
 class Arrival:
-    """What counts as reached, by the parameters, and since when the present item's place is.
+    """Acceptance limits by the parameters, and since when the present item's place is reached.
 
     Attributes:
-        radius_m: horizontal distance within which a place is reached that names none.
-        height_m: difference of height within which it is.
-        takeoff_m: how far to climb when the first place does not say.
+        radius_m: horizontal distance within which a place counts as reached, if the item gives none.
+        height_m: height difference within which it does.
+        takeoff_m: climb of a take-off, if the item gives none.
     """
 
     __slots__ = (
@@ -34,7 +25,7 @@ class Arrival:
         "_since_us",
         "_version",
         "_yaw_error_rad",
-        "_yaw_forgiven",
+        "_yaw_ignored",
         "height_m",
         "radius_m",
         "takeoff_m",
@@ -46,7 +37,7 @@ class Arrival:
         self.begin()
 
     def configure(self, parameters: Parameters) -> None:
-        """Take over the parameters if one has changed."""
+        """Apply the parameters if one has changed."""
         if parameters.version == self._version:
             return
         self._version = parameters.version
@@ -56,10 +47,10 @@ class Arrival:
         self.takeoff_m = value("MIS_TAKEOFF_ALT")
         self._circle_m = abs(value("NAV_LOITER_RAD"))
         self._yaw_error_rad = radians(value("MIS_YAW_ERR"))
-        self._yaw_forgiven = value("MIS_YAW_TMT") > 0.0  # as in PX4: a limit means not to wait for the yaw
+        self._yaw_ignored = value("MIS_YAW_TMT") > 0.0  # as in PX4: with a time limit there is no wait
 
     def begin(self) -> None:
-        """A new item: nothing of it is reached."""
+        """Begin a new item."""
         self._since_us = -1
         self._heading_reached = False
 
@@ -72,7 +63,7 @@ class Arrival:
         return own_m if isfinite(own_m) and own_m > 0.0 else self.radius_m
 
     def has_climbed(self, leg: Leg, view: View) -> bool:
-        """Whether it is high enough; for a very low climb half of it must be done."""
+        """Whether the vehicle is high enough; for a very low climb, half of it must be done."""
         if view.landed:
             return False
         tolerance_m = self.height_m
@@ -83,7 +74,7 @@ class Arrival:
         return view.position_ned_m[2] < leg.target_ned_m[2] + tolerance_m
 
     def is_there(self, leg: Leg, view: View) -> bool:
-        """Whether the vehicle is at the leg's target now."""
+        """Whether the vehicle is at the leg's target."""
         north_m, east_m, down_m = leg.target_ned_m
         here_ned_m = view.position_ned_m
         return (
@@ -92,7 +83,7 @@ class Arrival:
         )
 
     def has_arrived(self, leg: Leg, view: View) -> bool:
-        """Whether it is or was in the air at the target, and has looked the way it should."""
+        """Whether the vehicle was in the air at the target and has reached its heading."""
         if self._since_us < 0:
             if view.landed or not self.is_there(leg, view):
                 return False
@@ -101,20 +92,20 @@ class Arrival:
             yaw_rad = leg.yaw_rad
             self._heading_reached = (
                 isnan(yaw_rad)
-                or self._yaw_forgiven
+                or self._yaw_ignored
                 or abs(remainder(yaw_rad - view.yaw_rad, tau)) < self._yaw_error_rad
             )
         return self._heading_reached
 
     def has_waited(self, item: MissionItem, view: View) -> bool:
-        """Whether the item's time is over; it runs since the arrival or, without one, the first call."""
+        """Whether the item's waiting time is over, since the arrival or else since the first call."""
         if self._since_us < 0:
             self._since_us = view.time_us
-        return view.time_us - self._since_us >= hold_us(item)
+        return view.time_us - self._since_us >= item.hold_us
 
 
 def is_behind(gate_ned_m: Vec3, leg: Leg, view: View) -> bool:
-    """Whether a gate is passed: the vehicle is on the far side of it, as seen on the way to the target."""
+    """Whether the vehicle has passed a gate on its path to the leg's target."""
     along_north_m, along_east_m = leg.target_ned_m[0] - gate_ned_m[0], leg.target_ned_m[1] - gate_ned_m[1]
     north_m = view.position_ned_m[0] - gate_ned_m[0]
     east_m = view.position_ned_m[1] - gate_ned_m[1]

@@ -1,4 +1,4 @@
-"""Whether a mission can be flown: the checks that PX4 makes after an upload and before a start."""
+"""Whether a mission can be flown: PX4's checks after an upload and before a start."""
 
 from __future__ import annotations
 
@@ -10,12 +10,11 @@ from firmware_py.missions.geofence import Geofence
 from firmware_py.missions.items import Do, MissionItem
 from firmware_py.missions.route import jump_of
 from firmware_py.parameters import Parameters
-from firmware_py.types import StatusText
+from firmware_py.types import CRITICAL, INFO, StatusText
 
-_CRITICAL, _INFO = 2, 6  # MAV_SEVERITY
-_NOT_FLOWN = frozenset({Do.CONDITION_DELAY, Do.CONDITION_DISTANCE})  # can be uploaded, as to PX4
+_NOT_FLOWN = frozenset({Do.CONDITION_DELAY, Do.CONDITION_DISTANCE})  # accepted at upload, as by PX4
 _VTOL = frozenset({Do.VTOL_TAKEOFF, Do.VTOL_LAND, Do.VTOL_TRANSITION})
-_GATE_APART_M = 0.05
+_MIN_GATE_DISTANCE_M = 0.05
 
 
 def mission_faults(
@@ -27,15 +26,15 @@ def mission_faults(
         items: of the mission.
         view: of the vehicle now.
         parameters: for MIS_DIST_1WP.
-        fence: that all places must respect.
+        fence: in which all places must be.
 
     Returns:
-        Whether it can be flown, and what people are told; a text alone does not mean that it cannot.
+        Whether it can be flown, and texts for people, some of which are only warnings.
     """
     if not items:
         return False, []
     if view.home_ned_m is None or view.projection is None:
-        return False, [StatusText(_INFO, "Not yet ready for mission, no position lock.")]
+        return False, [StatusText(INFO, "Not yet ready for mission, no position lock.")]
     faults = [
         fault
         for faults in (
@@ -47,7 +46,7 @@ def mission_faults(
         for fault in faults
     ]
     texts = [*faults, *_first_place_warnings(items, view, parameters)]
-    return not faults, [StatusText(_CRITICAL, text) for text in texts]
+    return not faults, [StatusText(CRITICAL, text) for text in texts]
 
 
 def _item_faults(items: Sequence[MissionItem], view: View) -> Iterator[str]:
@@ -64,7 +63,7 @@ def _item_faults(items: Sequence[MissionItem], view: View) -> Iterator[str]:
 
 
 def _takeoff_faults(items: Sequence[MissionItem], view: View) -> Iterator[str]:
-    """A take-off stands before all other places and goes up."""
+    """A take-off must be before all other places and lead upwards."""
     home_down_m = view.home_ned_m[2] if view.home_ned_m is not None else 0.0
     place_seen = False
     for item in items:
@@ -77,7 +76,7 @@ def _takeoff_faults(items: Sequence[MissionItem], view: View) -> Iterator[str]:
 
 
 def _gate_faults(items: Sequence[MissionItem], view: View) -> Iterator[str]:
-    """A gate and the places beside it need a direction."""
+    """A gate and the places before and after it must differ, to have a direction."""
     before: MissionItem | None = None
     for item in items:
         if not item.has_place and item.command != Do.CONDITION_GATE:
@@ -85,7 +84,7 @@ def _gate_faults(items: Sequence[MissionItem], view: View) -> Iterator[str]:
         if before is not None and Do.CONDITION_GATE in (item.command, before.command):
             one_ned_m, other_ned_m = view.place_of(before), view.place_of(item)
             apart_m = hypot(one_ned_m[0] - other_ned_m[0], one_ned_m[1] - other_ned_m[1])
-            if apart_m < _GATE_APART_M:
+            if apart_m < _MIN_GATE_DISTANCE_M:
                 yield f"Distance between waypoint and gate too close: {apart_m:.2f} meters"
         before = item
 
@@ -96,10 +95,10 @@ def _fence_faults(items: Sequence[MissionItem], view: View, fence: Geofence) -> 
             continue
         north_m, east_m, down_m = view.place_of(item)
         if isnan(north_m):
-            continue  # where the vehicle is then
+            continue  # at the vehicle's position then
         breach = fence.breach_at((north_m, east_m, down_m), view)
         if breach is not None:
-            yield f"Geofence violation for waypoint {item.seq + 1}: {breach.where}"
+            yield f"Geofence violation for waypoint {item.seq + 1}: {breach}"
             return
 
 

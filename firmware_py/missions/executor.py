@@ -1,4 +1,4 @@
-"""Flies the mission of the store, item by item, as PX4's navigator does it for a multicopter."""
+"""Flies the store's mission, item by item, as PX4's navigator does for a multicopter."""
 
 from __future__ import annotations
 
@@ -7,61 +7,39 @@ from enum import Enum
 from math import hypot, isfinite, isnan, nan, radians, remainder, tau
 
 from firmware_py.missions import route
-from firmware_py.missions.arrival import Arrival, hold_us, is_behind
-from firmware_py.missions.camera import CameraTriggers, RegionOfInterest
+from firmware_py.missions.actions import MissionActions
+from firmware_py.missions.arrival import Arrival, is_behind
 from firmware_py.missions.flight import IssuedCommand, Leg, LegKind, View
 from firmware_py.missions.items import Do, MissionItem
 from firmware_py.missions.store import MissionStore
 from firmware_py.parameters import Parameters
-from firmware_py.types import StatusText
-from geometry.vectors import Vec3
+from firmware_py.types import CRITICAL, INFO, StatusText
+from geometry.vectors import ZERO3, Vec3
 
-_CRITICAL, _WARNING, _INFO = 2, 4, 6  # MAV_SEVERITY
-_MIN_CLIMB_M = 0.5  # a first place no higher than this is no take-off: it climbs to MIS_TAKEOFF_ALT
+_MIN_CLIMB_M = 0.5  # a first place no higher than this gives no climb: it is MIS_TAKEOFF_ALT
 _SAME_YAW_RAD = 0.01
-_CAMERA = frozenset(
-    {
-        Do.CONTROL_VIDEO,
-        Do.DIGICAM_CONTROL,
-        Do.GIMBAL_CONFIGURE,
-        Do.GIMBAL_PITCHYAW,
-        Do.IMAGE_START_CAPTURE,
-        Do.IMAGE_STOP_CAPTURE,
-        Do.MOUNT_CONFIGURE,
-        Do.MOUNT_CONTROL,
-        Do.SET_CAMERA_FOCUS,
-        Do.SET_CAMERA_MODE,
-        Do.SET_CAMERA_SOURCE,
-        Do.TRIGGER_CONTROL,
-        Do.VIDEO_START_CAPTURE,
-        Do.VIDEO_STOP_CAPTURE,
-    }
-)
-_ABSENT = frozenset({Do.GRIPPER, Do.WINCH, Do.SET_ACTUATOR, Do.OBLIQUE_SURVEY, Do.VTOL_TRANSITION})
-_REGIONS = frozenset({Do.NAV_ROI, Do.SET_ROI, Do.SET_ROI_LOCATION, Do.SET_ROI_NONE, Do.SET_ROI_WPNEXT_OFFSET})
 _YAWING = frozenset({Do.WAYPOINT, Do.LOITER_UNLIM, Do.LOITER_TIME})
 
 
 class _Phase(Enum):
-    CLIMB = "climb"  # straight up, before the item
-    APPROACH = "approach"  # to above the landing place, or to a loiter before its height is taken
+    CLIMB = "climb"  # vertically, before the item
+    APPROACH = "approach"  # to above the landing place, or to a loiter at the present height
     ITEM = "item"
-    WAIT = "wait"  # the item is done and does not let go on
+    WAIT = "wait"  # the item is done, without autocontinue
     OVER = "over"
 
 
 class MissionExecutor:
     """Decides what to fly next. `enter` at mode entry, `step` each tick, `leave` at mode exit.
 
-    A step in which nothing changes costs a few comparisons and gives the same `Leg` again. One item is begun
-    or ended per step.
+    A step in which nothing changes makes a few comparisons and returns the same `Leg` again. One item is
+    begun or ended per step.
     """
 
     __slots__ = (
+        "_actions",
         "_arrival",
-        "_camera",
         "_climb_first",
-        "_events",
         "_gate_ned_m",
         "_home_ned_m",
         "_item",
@@ -70,7 +48,6 @@ class MissionExecutor:
         "_leg",
         "_parameters",
         "_phase",
-        "_region",
         "_replay",
         "_restart",
         "_seen",
@@ -82,11 +59,9 @@ class MissionExecutor:
         self._store = store
         self._parameters = parameters
         self._arrival = Arrival(parameters)
-        self._events: list[IssuedCommand | StatusText] = []
-        self._camera = CameraTriggers()
-        self._region = RegionOfInterest()
+        self._actions = MissionActions()
         self._jumps: dict[int, int] = {}
-        self._leg = Leg(LegKind.DONE, (0.0, 0.0, 0.0))
+        self._leg = Leg(LegKind.DONE, ZERO3)
         self._item: MissionItem | None = None
         self._phase = _Phase.OVER
         self._seen = (-1, -1)
@@ -96,10 +71,10 @@ class MissionExecutor:
         self._climb_first = False
         self._restart = False
         self._left_at = 0
-        self._replay: tuple[int, MissionItem] | None = None  # after which item to trigger again, and how
+        self._replay: tuple[int, MissionItem] | None = None  # an item, and the trigger to repeat behind it
 
     def enter(self, view: View) -> None:
-        """Begin, or go on at the current item; from below the first place, climb to its height first."""
+        """Begin, or continue at the current item; from below its place, climb to its height first."""
         store = self._store
         self._arrival.configure(self._parameters)
         if store.mission.version != self._seen[0]:
@@ -118,7 +93,7 @@ class MissionExecutor:
             self._begin_item(view)
 
     def step(self, view: View) -> Leg:
-        """What to fly now."""
+        """The leg to fly now."""
         store = self._store
         if self._seen != (store.mission.version, store.selections):
             self._change(view)
@@ -127,61 +102,56 @@ class MissionExecutor:
         if self._phase is _Phase.OVER or self._phase is _Phase.WAIT or self._item is None:
             return self._leg
         self._arrival.configure(self._parameters)
-        self._camera.move(view.position_ned_m)
+        self._actions.move(view.position_ned_m)
         self._look(view)
         if self._is_done(self._item, view):
             self._go_on(self._item, view)
         return self._leg
 
     def leave(self) -> None:
-        """The mode has ended: no more pictures; the current item begins anew when it is entered again."""
-        self._camera.stop()
+        """The mode has ended: no more pictures; `enter` begins the current item again."""
+        self._actions.stop()
         self._left_at = self._store.current
         self._item = None
         self._phase = _Phase.OVER
 
     def disarmed(self) -> None:
-        """The motors have stopped: a mission at its last item begins again from its first."""
+        """The motors have stopped: a mission at its last item begins again at its first."""
         self._restart = self._store.started
 
     def take_events(self) -> list[IssuedCommand | StatusText]:
         """Texts and commands to others since the last call."""
-        if not self._events and not self._camera.commands:
-            return []
-        events = [*self._events, *self._camera.commands]
-        self._events.clear()
-        self._camera.commands.clear()
-        return events
+        return self._actions.take_events()
 
     # Beginning and changing the mission
 
     def _begin_mission(self, view: View) -> bool:
-        """Whether there is a mission to fly; if not, it stays where it is."""
+        """Whether there is a mission to fly; if not, the vehicle stays where it is."""
         store = self._store
         self._seen = (store.mission.version, store.selections)
         self._home_ned_m = view.home_ned_m
-        self._region.release()
+        self._actions.region.release()
         self._item = None
         if not store.valid or view.projection is None:
-            wish = "refusing takeoff" if view.landed else "loitering"
-            self._say(_CRITICAL, f"No valid mission available, {wish}")
-            self._end(view)
+            reaction = "refusing takeoff" if view.landed else "loitering"
+            self._actions.say(CRITICAL, f"No valid mission available, {reaction}")
+            self._end(view, finished=False)
             return False
         found = route.behind_jumps(store.mission.items, store.current, self._jumps, follow=True)
         if found is None:
-            self._finish(view)
+            self._end(view, finished=True)
             return False
         store.current = found
         store.started, store.finished = True, False
         return True
 
     def _resume(self) -> None:
-        """Restore what items before the current one have set; take no picture less than without a pause."""
+        """Restore the settings of earlier items; an interrupted series of pictures misses none."""
         store, items = self._store, self._store.mission.items
-        self._say(_INFO, "Executing Mission")
+        self._actions.say(INFO, "Executing Mission")
         self._speed_m_s = route.speed_before(items, store.current)
         for item in route.settings_before(items, store.current):
-            self._camera.pass_on(item)
+            self._actions.command_camera(item)
         trigger = route.trigger_before(items, store.current)
         self._replay = None
         if trigger is not None:
@@ -192,7 +162,7 @@ class MissionExecutor:
         self._left_at = 0
 
     def _change(self, view: View) -> None:
-        """Another mission, or another item, while this one is flown."""
+        """Begin another mission, or another item, while this one is flown."""
         if self._store.mission.version != self._seen[0]:
             self._jumps.clear()
             self._replay = None
@@ -201,7 +171,7 @@ class MissionExecutor:
             self._begin_item(view)
 
     def _move_home(self, view: View) -> None:
-        """Heights above home have moved with it."""
+        """Adapt a height above home to a new home."""
         before, self._home_ned_m = self._home_ned_m, view.home_ned_m
         if before is None or view.home_ned_m is None or self._item is None or not self._item.is_relative:
             return
@@ -216,17 +186,24 @@ class MissionExecutor:
         self._arrival.begin()
         self._phase = _Phase.ITEM
         if self._replay is not None and self._store.current > self._replay[0]:
-            self._issue(self._replay[1], view)
+            self._actions.perform(self._replay[1], view)
             self._replay = None
         if item.has_place:
             self._begin_place(item, view)
-        elif item.command == Do.CONDITION_GATE:
-            self._begin_gate(item, view)
+        elif item.command == Do.CONDITION_GATE:  # fly on; with no place behind it the gate is passed already
+            onward = route.next_place(self._store.mission.items, item.seq + 1, self._jumps)
+            self._gate_ned_m = None if onward is None else self._target_of(item, view)
+            if onward is not None:
+                target_ned_m = self._target_of(onward, view)
+                self._leg = Leg(LegKind.FLY, target_ned_m, nan, self._speed_m_s, self._arrival.radius_m)
+        elif item.command == Do.CHANGE_SPEED:
+            self._speed_m_s = route.commanded_speed(item)
+            self._leg = replace(self._leg, speed_m_s=self._speed_m_s)
         else:
-            self._issue(item, view)
+            self._actions.perform(item, view)
 
     def _begin_place(self, item: MissionItem, view: View) -> None:
-        """Climb first if need be, else fly to the item's place."""
+        """Climb first if necessary, else fly to the item's place."""
         climb_first, self._climb_first = self._climb_first, False
         here_ned_m, target_ned_m = view.position_ned_m, self._target_of(item, view)
         if item.command == Do.LAND:
@@ -239,7 +216,7 @@ class MissionExecutor:
                 climb_m = self._arrival.takeoff_m
             down_m = here_ned_m[2] - climb_m
             above_home_m = -down_m if view.home_ned_m is None else view.home_ned_m[2] - down_m
-            self._say(_INFO, f"Climb to {above_home_m:.1f} meters above home")
+            self._actions.say(INFO, f"Climb to {above_home_m:.1f} meters above home")
             kind = LegKind.TAKEOFF if view.landed else LegKind.FLY
             self._phase = _Phase.CLIMB
             self._leg = Leg(
@@ -251,19 +228,29 @@ class MissionExecutor:
     def _fly_to(self, item: MissionItem, target_ned_m: Vec3, view: View) -> None:
         yaw_deg = item.params[3] if item.command in _YAWING else nan
         if item.command == Do.LOITER_TO_ALT and view.position_ned_m[2] != target_ned_m[2]:
-            self._phase = _Phase.APPROACH  # the height is taken at the place only
+            self._phase = _Phase.APPROACH  # the height is changed only at the place
             target_ned_m = (target_ned_m[0], target_ned_m[1], view.position_ned_m[2])
+        next_ned_m = onward = None
+        if self._phase is _Phase.ITEM:
+            onward = route.next_without_stop(self._store.mission.items, item, self._jumps)
+        if onward is not None:
+            north_m, east_m, down_m = view.place_of(onward)
+            next_ned_m = (
+                target_ned_m[0] if isnan(north_m) else north_m,
+                target_ned_m[1] if isnan(east_m) else east_m,
+                down_m if isfinite(down_m) else target_ned_m[2],
+            )
         self._leg = Leg(
             LegKind.FLY,
             target_ned_m,
             remainder(radians(yaw_deg), tau) if isfinite(yaw_deg) else nan,
             self._speed_m_s,
             self._arrival.radius_of(item),
-            self._next_of(item, target_ned_m, view),
+            next_ned_m,
         )
 
     def _begin_landing(self, target_ned_m: Vec3, view: View) -> None:
-        """Land there; from farther away, fly there first at the present height."""
+        """Land at the target; from farther away, fly there first at the present height."""
         here_ned_m = view.position_ned_m
         north_m, east_m, _ = target_ned_m
         if hypot(north_m - here_ned_m[0], east_m - here_ned_m[1]) > self._arrival.radius_m:
@@ -274,33 +261,6 @@ class MissionExecutor:
         else:
             self._phase = _Phase.ITEM
             self._leg = Leg(LegKind.LAND, (north_m, east_m, here_ned_m[2]))
-
-    def _begin_gate(self, item: MissionItem, view: View) -> None:
-        """Fly to what comes after the gate; without anything there the gate is passed already."""
-        onward = self._place_after(item)
-        self._gate_ned_m = None if onward is None else self._target_of(item, view)
-        if onward is not None:
-            target_ned_m = self._target_of(onward, view)
-            self._leg = Leg(LegKind.FLY, target_ned_m, nan, self._speed_m_s, self._arrival.radius_m)
-
-    def _issue(self, item: MissionItem, view: View) -> None:
-        """Do what an item without a place says."""
-        command = item.command
-        if command == Do.CHANGE_SPEED:
-            self._speed_m_s = route.commanded_speed(item)
-            self._leg = replace(self._leg, speed_m_s=self._speed_m_s)
-        elif command in _REGIONS:
-            self._region.turn(item, view)
-        elif command in _CAMERA:
-            self._camera.pass_on(item)
-        elif command == Do.SET_CAM_TRIGG_DIST:
-            self._camera.start_by_distance(item, view.position_ned_m)
-        elif command == Do.SET_CAM_TRIGG_INTERVAL:
-            self._camera.start_by_time(item)
-        elif command in (Do.SET_HOME, Do.ARM_DISARM):
-            self._events.append(IssuedCommand(command, (*item.params, item.x, item.y, item.z)))
-        elif command in _ABSENT:
-            self._say(_WARNING, f"Mission item {item.seq + 1} does nothing: no such device here")
 
     # Ending an item
 
@@ -326,7 +286,7 @@ class MissionExecutor:
         return done
 
     def _go_on(self, item: MissionItem, view: View) -> None:
-        """The next phase of the item, or the next item."""
+        """Begin the next phase of the item, or the next item."""
         if self._phase is _Phase.CLIMB:
             self._phase = _Phase.ITEM
             self._fly_to(item, self._target_of(item, view), view)
@@ -356,64 +316,37 @@ class MissionExecutor:
             self._item, self._phase = None, _Phase.OVER
             self._leg = Leg(LegKind.RETURN, view.position_ned_m)
         elif found is None:
-            self._finish(view)
+            self._end(view, finished=True)
         else:
             store.current = found
             self._begin_item(view)
 
-    def _finish(self, view: View) -> None:
-        self._say(_INFO, f"Mission finished, {'landed' if view.landed else 'loitering'}")
-        self._jumps.clear()
-        self._store.finished = True
-        self._end(view)
-
-    def _end(self, view: View) -> None:
-        """Stay: at the place flown to, else here."""
+    def _end(self, view: View, *, finished: bool) -> None:
+        """Stay: at the target flown to, else here."""
+        if finished:
+            self._actions.say(INFO, f"Mission finished, {'landed' if view.landed else 'loitering'}")
+            self._jumps.clear()
+            self._store.finished = True
         flown_to = self._leg.kind is LegKind.FLY and not view.landed
         target_ned_m = self._leg.target_ned_m if flown_to else view.position_ned_m
         self._item, self._phase = None, _Phase.OVER
         self._leg = Leg(LegKind.DONE, target_ned_m, self._leg.yaw_rad, self._speed_m_s)
 
-    # Small things
-
     def _look(self, view: View) -> None:
         """Yaw towards the region of interest; not while climbing, taking off or landing."""
         if self._phase is not _Phase.ITEM or self._leg.kind is not LegKind.FLY:
             return
-        yaw_rad = self._region.yaw_rad(view, self._leg.target_ned_m, self._arrival.radius_m)
+        yaw_rad = self._actions.region.yaw_rad(view, self._leg.target_ned_m, self._arrival.radius_m)
         if isnan(yaw_rad):
             return
-        if not abs(remainder(yaw_rad - self._leg.yaw_rad, tau)) <= _SAME_YAW_RAD:  # also when it was NaN
+        if not abs(remainder(yaw_rad - self._leg.yaw_rad, tau)) <= _SAME_YAW_RAD:  # also if it was NaN
             self._leg = replace(self._leg, yaw_rad=yaw_rad)
 
     def _target_of(self, item: MissionItem, view: View) -> Vec3:
-        """The item's place; what it leaves open is where the vehicle is, or the height it flies at."""
+        """The item's place; what it does not give is the vehicle's position, or the height of its leg."""
         north_m, east_m, down_m = view.place_of(item)
         if isnan(north_m):
             north_m, east_m, _ = view.position_ned_m
         if not isfinite(down_m):
             down_m = self._leg.target_ned_m[2] if self._leg.kind is LegKind.FLY else view.position_ned_m[2]
         return (north_m, east_m, down_m)
-
-    def _place_after(self, item: MissionItem, *, without_stop: bool = False) -> MissionItem | None:
-        items = self._store.mission.items
-        return route.next_place(items, item.seq + 1, self._jumps, without_stop=without_stop)
-
-    def _next_of(self, item: MissionItem, target_ned_m: Vec3, view: View) -> Vec3 | None:
-        """Where it goes on to without a stop at the target."""
-        if self._phase is not _Phase.ITEM or not item.autocontinue or hold_us(item) > 0:
-            return None
-        if item.command == Do.LOITER_UNLIM:
-            return None
-        onward = self._place_after(item, without_stop=True)
-        if onward is None:
-            return None
-        north_m, east_m, down_m = view.place_of(onward)
-        return (
-            target_ned_m[0] if isnan(north_m) else north_m,
-            target_ned_m[1] if isnan(east_m) else east_m,
-            down_m if isfinite(down_m) else target_ned_m[2],
-        )
-
-    def _say(self, severity: int, text: str) -> None:
-        self._events.append(StatusText(severity, text))

@@ -1,4 +1,4 @@
-"""What the mission executor and the fence see of the vehicle, and what the executor asks of it."""
+"""What missions and the fence get of the vehicle, and what the mission executor requests of it."""
 
 from __future__ import annotations
 
@@ -16,14 +16,14 @@ SevenParams = tuple[float, float, float, float, float, float, float]
 
 @dataclass(slots=True)
 class View:
-    """The vehicle as missions see it; one object, updated in place by who flies.
+    """The vehicle's state for missions; one object, updated in place.
 
     Attributes:
         time_us: vehicle time.
         position_ned_m: in the local frame, shape (3,).
         velocity_ned_m_s: shape (3,).
         yaw_rad: clockwise from north.
-        landed: stands on the ground.
+        landed: on the ground.
         projection: of the local frame; None before the first position.
         home_ned_m: home in the local frame, shape (3,); None before it is known.
     """
@@ -37,9 +37,9 @@ class View:
     home_ned_m: Vec3 | None = None
 
     def place_of(self, item: MissionItem) -> Vec3:
-        """Where a global item is, NED metres; each component that it leaves open is NaN.
+        """Where a global item is, NED metres; components that it does not give are NaN.
 
-        Without a projection or, for a relative altitude, without home everything needed is NaN.
+        Without a projection all are NaN; so is the height of a relative altitude without home.
         """
         if self.projection is None:
             return (nan, nan, nan)
@@ -54,9 +54,9 @@ class View:
 class LegKind(Enum):
     """How to fly a leg.
 
-    TAKEOFF: climb straight up to the target's height. FLY: to the target; stop there unless there is a next
-    place. LAND: sink at the target's place until down. RETURN: switch to return mode. HOLD: stay at the
-    target. DONE: the mission is over; stay at the target, or on the ground.
+    TAKEOFF: climb vertically to the target's height. FLY: to the target; stop there unless there is a next
+    place. LAND: land at the target. RETURN: switch to return mode. HOLD: stay at the target. DONE: the
+    mission is over; stay at the target, or on the ground.
     """
 
     TAKEOFF = "takeoff"
@@ -69,15 +69,15 @@ class LegKind(Enum):
 
 @dataclass(frozen=True, slots=True)
 class Leg:
-    """What to do now; the same object as long as nothing changes.
+    """What to fly now; the same object until something changes.
 
     Attributes:
         kind: see `LegKind`.
         target_ned_m: shape (3,), always finite.
-        yaw_rad: NaN: as MPC_YAW_MODE says.
+        yaw_rad: NaN: by MPC_YAW_MODE.
         speed_m_s: horizontal; NaN: MPC_XY_CRUISE.
-        radius_m: the place counts as reached within this horizontal distance.
-        next_ned_m: where it goes on to without a stop, shape (3,); None: stop at the target.
+        radius_m: the target counts as reached within this horizontal distance.
+        next_ned_m: where to fly next without a stop, shape (3,); None: stop at the target.
     """
 
     kind: LegKind
@@ -90,7 +90,7 @@ class Leg:
 
 @dataclass(frozen=True, slots=True)
 class IssuedCommand:
-    """A command of the mission to somebody else: the camera, or the commander (home, arming).
+    """A command of the mission to another component: the camera, or the commander (home, arming).
 
     Attributes:
         command: MAV_CMD.

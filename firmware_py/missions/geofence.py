@@ -1,10 +1,9 @@
-"""The fence: polygons, circles and distances from home that the vehicle must not leave."""
+"""The geofence: polygons, circles and distances from home that the vehicle must not leave."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from enum import Enum
 from itertools import pairwise
 from math import hypot, isfinite
 
@@ -13,42 +12,15 @@ from firmware_py.missions.flight import View
 from firmware_py.missions.items import CIRCLES, POLYGONS, Do, MissionItem
 from firmware_py.missions.store import MissionStore
 from firmware_py.parameters import Parameters
-from firmware_py.types import StatusText
+from firmware_py.types import CRITICAL, StatusText
 from geometry.vectors import Vec3
 
 MIN_VERTICES = 3
 """Of a polygon."""
 
-_CRITICAL = 2  # MAV_SEVERITY
 _KEEP_IN = frozenset({Do.POLYGON_INCLUSION, Do.CIRCLE_INCLUSION})
 
 Edge = tuple[float, float, float, float]  # north and east of one end, then of the other
-
-
-class BreachKind(Enum):
-    """Which limit was passed."""
-
-    DISTANCE = "distance"
-    HEIGHT = "height"
-    SHAPE = "shape"
-
-
-@dataclass(frozen=True, slots=True)
-class Breach:
-    """The fence is left.
-
-    Attributes:
-        kind: which limit.
-        where: names what was left, as "outside circle of item 1".
-    """
-
-    kind: BreachKind
-    where: str
-
-    @property
-    def text(self) -> str:
-        """For people."""
-        return f"Geofence violation: {self.where}"
 
 
 @dataclass(frozen=True, slots=True)
@@ -56,8 +28,8 @@ class Shape:
     """A polygon, or a circle if it has no edges.
 
     Attributes:
-        name: which it is, for people.
-        keep_in: whether the vehicle must stay inside; otherwise outside.
+        name: for people.
+        keep_in: whether the vehicle must stay inside; else outside.
         edges: of the polygon, metres.
         centre_ne_m: of the circle, shape (2,).
         radius_m: of the circle.
@@ -75,7 +47,7 @@ class Shape:
         return self.contains(north_m, east_m) == self.keep_in
 
     def contains(self, north_m: float, east_m: float) -> bool:
-        """Whether a place is inside; a ray that crosses the edges an odd number of times says so."""
+        """Whether a place is inside: a ray from it crosses the edges an odd number of times."""
         if not self.edges:
             north_m -= self.centre_ne_m[0]
             east_m -= self.centre_ne_m[1]
@@ -90,7 +62,7 @@ class Shape:
 
 
 def fence_fault(items: Sequence[MissionItem]) -> str | None:
-    """What is wrong with a fence as a whole, for people; None: nothing."""
+    """What makes a fence invalid, for people; None: nothing."""
     index = 0
     while index < len(items):
         if items[index].command not in POLYGONS:
@@ -110,13 +82,13 @@ def fence_fault(items: Sequence[MissionItem]) -> str | None:
 
 
 def vertex_count(item: MissionItem) -> int:
-    """How many vertices a polygon's item says the polygon has."""
+    """The number of vertices that a polygon's item gives for its polygon."""
     count = item.params[0]
     return int(count + 0.5) if isfinite(count) and count >= 0.0 else 0
 
 
 def shapes_of(items: Sequence[MissionItem], view: View) -> Iterator[Shape]:
-    """The shapes of a sound fence in the local frame; a view without a projection gives none."""
+    """The shapes of a valid fence in the local frame; none without a projection."""
     if view.projection is None:
         return
     index = 0
@@ -140,8 +112,10 @@ def shapes_of(items: Sequence[MissionItem], view: View) -> Iterator[Shape]:
 class Geofence:
     """The store's fence and the GF_ parameters, prepared once for quick checks.
 
-    As in PX4 a shape that home breaks from the start is left out, with a text; so is one that the vehicle in
-    flight would break at the moment of the upload, unless GF_ACTION is 0.
+    As in PX4 a shape that home would breach is left out, with a text; so is one that the vehicle in flight
+    would breach at the moment of the upload, unless GF_ACTION is 0.
+
+    A breach is returned as text for people, such as "outside circle of item 1"; None: no breach.
     """
 
     __slots__ = (
@@ -164,38 +138,38 @@ class Geofence:
         self._shapes: tuple[Shape, ...] = ()
         self._texts: list[StatusText] = []
 
-    def check(self, view: View) -> Breach | None:
-        """Whether the vehicle is outside; with GF_PREDICT, whether it will be before it can stop."""
+    def check(self, view: View) -> str | None:
+        """The breach of the vehicle; with GF_PREDICT, of the place where it can stop."""
         self._prepare(view)
         if self._braking is None:
             return self._breach(view.position_ned_m, view)
         return self._breach(_stopping_place(view, *self._braking), view)
 
-    def breach_at(self, position_ned_m: Vec3, view: View) -> Breach | None:
-        """Whether a place in the local frame is outside: to be asked before flying there."""
+    def breach_at(self, position_ned_m: Vec3, view: View) -> str | None:
+        """The breach of a place in the local frame."""
         self._prepare(view)
         return self._breach(position_ned_m, view)
 
     def take_texts(self) -> list[StatusText]:
-        """What is wrong with the fence, since the last call."""
+        """Texts about shapes that were left out since the last call."""
         texts, self._texts = self._texts, []
         return texts
 
-    def _breach(self, position_ned_m: Vec3, view: View) -> Breach | None:
+    def _breach(self, position_ned_m: Vec3, view: View) -> str | None:
         home_ned_m = view.home_ned_m
         if home_ned_m is not None:
             north_m, east_m, down_m = position_ned_m
             if 0.0 < self._radius_m <= hypot(north_m - home_ned_m[0], east_m - home_ned_m[1]):
-                return Breach(BreachKind.DISTANCE, f"farther from home than {self._radius_m:g} m")
+                return f"farther from home than {self._radius_m:g} m"
             if 0.0 < self._height_m <= home_ned_m[2] - down_m:
-                return Breach(BreachKind.HEIGHT, f"higher above home than {self._height_m:g} m")
+                return f"higher above home than {self._height_m:g} m"
         for shape in self._shapes:
             if not shape.allows(position_ned_m):
-                return Breach(BreachKind.SHAPE, f"{'outside' if shape.keep_in else 'inside'} {shape.name}")
+                return f"{'outside' if shape.keep_in else 'inside'} {shape.name}"
         return None
 
     def _prepare(self, view: View) -> None:
-        """Take over the plan and the parameters when they have changed."""
+        """Apply the plan and the parameters when they have changed."""
         if self._parameters.version != self._parameters_version:
             self._configure()
         state = (self._store.fence.version, view.projection)
@@ -215,7 +189,7 @@ class Geofence:
 
     def _reject(self, shape: Shape, whom: str) -> None:
         verb = "doesn't contain" if shape.keep_in else "excludes"
-        self._texts.append(StatusText(_CRITICAL, f"Geofence invalid, {verb} {whom}: {shape.name}"))
+        self._texts.append(StatusText(CRITICAL, f"Geofence invalid, {verb} {whom}: {shape.name}"))
 
     def _configure(self) -> None:
         value = self._parameters.value
@@ -228,9 +202,9 @@ class Geofence:
 
 
 def _stopping_place(view: View, horizontal_m_s2: float, downward_m_s2: float, jerk_m_s3: float) -> Vec3:
-    """Where the vehicle comes to rest when it brakes now; a descent is left out, nothing ends below.
+    """Where the vehicle comes to rest if it brakes now; a descent is ignored, no fence is below.
 
-    The way is v^2 / (2 a) and, for the time that the acceleration takes to build up, v a / j.
+    The distance is v^2 / (2 a) and, for the time in which the acceleration builds up, v a / j.
     """
     north_m_s, east_m_s, down_m_s = view.velocity_ned_m_s
     north_m, east_m, down_m = view.position_ned_m

@@ -18,7 +18,7 @@ class PlanType(IntEnum):
 
 
 class Frame(IntEnum):
-    """The frames an item may have."""
+    """The frames that an item may have."""
 
     GLOBAL = 0
     MISSION = 2  # no place: x and y are plain numbers
@@ -32,7 +32,7 @@ RELATIVE_FRAMES = frozenset({Frame.GLOBAL_RELATIVE_ALT, Frame.GLOBAL_RELATIVE_AL
 
 
 class Do(IntEnum):
-    """MAV_CMD, as far as items have them."""
+    """MAV_CMD of mission, fence and rally items."""
 
     WAYPOINT = 16
     LOITER_UNLIM = 17
@@ -103,6 +103,8 @@ PLACES = frozenset(
 POLYGONS = frozenset({Do.POLYGON_INCLUSION, Do.POLYGON_EXCLUSION})
 CIRCLES = frozenset({Do.CIRCLE_INCLUSION, Do.CIRCLE_EXCLUSION})
 ROI_NONE, ROI_WPNEXT, ROI_WPINDEX, ROI_LOCATION = 0, 1, 2, 3  # MAV_ROI
+_HOLDING = frozenset({Do.WAYPOINT, Do.LOITER_TIME, Do.DELAY})
+_MAX_HOLD_S = 1e9
 
 Params = tuple[float, float, float, float]
 
@@ -112,7 +114,7 @@ class MissionItem:
     """One item as it was uploaded.
 
     Attributes:
-        seq: its place in the plan, from 0.
+        seq: its index in the plan, from 0.
         frame: `Frame`.
         command: `Do`.
         params: params 1 to 4.
@@ -133,23 +135,29 @@ class MissionItem:
 
     @property
     def has_place(self) -> bool:
-        """Whether it flies to a place of its own."""
+        """Whether its command flies to its place."""
         return self.command in PLACES
 
     @property
     def is_relative(self) -> bool:
-        """Whether its altitude counts from home."""
+        """Whether its altitude is relative to home."""
         return self.frame in RELATIVE_FRAMES
+
+    @property
+    def hold_us(self) -> int:
+        """How long to wait at it, microseconds."""
+        hold_s = self.params[0] if self.command in _HOLDING else 0.0
+        return round(min(hold_s, _MAX_HOLD_S) * 1e6) if hold_s > 0.0 else 0
 
 
 _PACKED = Struct("<BHB7d")
 
 
 def opaque_id(items: Iterable[MissionItem]) -> int:
-    """What MAVLink calls a plan's opaque id: the same for the same items, 0 for none.
+    """MAVLink's opaque id of a plan: the same for the same items, 0 for none.
 
-    It is a CRC-32 over each item's frame, command, autocontinue and seven parameters, as in PX4; clients may
-    compare it and not compute it.
+    A CRC-32 over each item's frame, command, autocontinue and seven parameters, as in PX4; clients may
+    compare it but not compute it.
     """
     crc, count = 0, 0
     for item in items:

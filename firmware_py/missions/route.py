@@ -1,4 +1,4 @@
-"""The order of a mission's items: jumps, what comes next, and what still counts from before an item."""
+"""The order of a mission's items: jumps, the next place, and the settings that earlier items have made."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from math import inf, isfinite, nan
 
 from firmware_py.missions.items import Do, MissionItem
 
-_JUMPS_AT_ONCE = 10  # jumps that lead to jumps; PX4 gives up then, too
+_MAX_JUMPS = 10  # jumps that lead to jumps; PX4 stops then, too
 _STOPS = frozenset(
     {Do.DELAY, Do.RETURN_TO_LAUNCH, Do.ARM_DISARM, Do.LAND, Do.VTOL_LAND, Do.GRIPPER, Do.WINCH}
 )
@@ -28,21 +28,21 @@ Jumps = MutableMapping[int, int]
 
 
 def jump_of(item: MissionItem) -> tuple[int, float]:
-    """A jump's target, and how often it is to be followed (a negative number: for ever)."""
+    """A jump's target, and how often to follow it (a negative number: for ever)."""
     target, repeats = item.params[0], item.params[1]
     return int(target) if isfinite(target) else -1, inf if repeats < 0 else repeats
 
 
 def behind_jumps(items: Items, index: int, jumps: Jumps, *, follow: bool) -> int | None:
-    """The first item from an index on that is no jump; None when that leads out of the mission.
+    """The first item from an index on that is no jump; None when jumps lead out of the mission.
 
     Args:
         items: of the mission.
         index: where to begin.
         jumps: how often each was followed.
-        follow: count the jumps that are followed; otherwise only look.
+        follow: count the jumps that are followed.
     """
-    for _ in range(_JUMPS_AT_ONCE):
+    for _ in range(_MAX_JUMPS):
         if not 0 <= index < len(items):
             return None
         item = items[index]
@@ -65,7 +65,7 @@ def next_place(items: Items, index: int, jumps: Jumps, *, without_stop: bool = F
         items: of the mission.
         index: where to begin.
         jumps: how often each was followed.
-        without_stop: None when the vehicle has to stop on the way there.
+        without_stop: return None if the vehicle has to stop before.
     """
     for _ in range(len(items)):
         found = behind_jumps(items, index, jumps, follow=False)
@@ -78,6 +78,13 @@ def next_place(items: Items, index: int, jumps: Jumps, *, without_stop: bool = F
             return item
         index = found + 1
     return None
+
+
+def next_without_stop(items: Items, item: MissionItem, jumps: Jumps) -> MissionItem | None:
+    """The next item with a place after one at which the vehicle need not stop; None: it stops."""
+    if not item.autocontinue or item.hold_us > 0 or item.command == Do.LOITER_UNLIM:
+        return None
+    return next_place(items, item.seq + 1, jumps, without_stop=True)
 
 
 def place_before(items: Items, index: int) -> int | None:
@@ -94,13 +101,13 @@ def speed_before(items: Items, index: int) -> float:
 
 
 def commanded_speed(item: MissionItem) -> float:
-    """The speed in m/s that a speed item asks for; NaN: back to MPC_XY_CRUISE."""
+    """The speed in m/s of a speed item; NaN: back to MPC_XY_CRUISE."""
     speed_m_s = item.params[1]
     return speed_m_s if isfinite(speed_m_s) and speed_m_s > 0.0 else nan
 
 
 def trigger_before(items: Items, index: int) -> MissionItem | None:
-    """The earlier item that has a camera taking pictures by itself at this one; None: there is none."""
+    """The earlier item by which a camera takes repeated pictures at this one; None: there is none."""
     for item in reversed(items[:index]):
         if item.command in _TRIGGERS:
             return item if _takes_pictures(item) else None
@@ -110,7 +117,7 @@ def trigger_before(items: Items, index: int) -> MissionItem | None:
 def _takes_pictures(item: MissionItem) -> bool:
     match item.command:
         case Do.IMAGE_START_CAPTURE:
-            return item.params[2] != 1.0  # a single picture is done
+            return item.params[2] != 1.0  # not a single picture
         case Do.SET_CAM_TRIGG_DIST | Do.SET_CAM_TRIGG_INTERVAL:
             return item.params[0] > 0.0
         case Do.TRIGGER_CONTROL:

@@ -1,4 +1,4 @@
-"""The plans a vehicle carries, shared by the protocol that fills them and the executor that flies them."""
+"""The stored plans, shared by the protocol that uploads them and the executor that flies them."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ _REACHED_KEPT = 100
 
 @dataclass(frozen=True, slots=True)
 class Plan:
-    """What was uploaded at once.
+    """The items of one upload.
 
     Attributes:
         items: in order.
@@ -27,13 +27,13 @@ class Plan:
 
 
 class MissionStore:
-    """Mission, fence and rally points in memory, and how far the mission has come.
+    """Mission, fence and rally points in memory, and the mission's progress.
 
     Attributes:
-        current: index of the mission item flown or to be flown.
-        selections: counts how often somebody from outside has chosen the current item.
-        valid: whether the mission passed its checks; they are run by who knows the vehicle.
-        started: whether the mission has been flown since it was uploaded.
+        current: index of the mission item that is flown now or next.
+        selections: counts how often `select` has chosen the current item.
+        valid: whether the mission has passed its checks, which need the vehicle and run elsewhere.
+        started: whether the mission has been started since its upload.
         finished: whether its last item is done.
     """
 
@@ -70,15 +70,15 @@ class MissionStore:
     def replace(
         self, plan_type: PlanType, items: Sequence[MissionItem], *, current: int | None = None
     ) -> int:
-        """Put a whole plan in the place of the old one.
+        """Replace a whole plan.
 
-        As in PX4 nothing at all changes when the items are the same as before, and a new mission goes on at
-        the old index (or its last item) unless the upload marks an item as the current one.
+        As in PX4 nothing changes when the items are the same as before, and a new mission continues at the
+        old index (or its last item) unless the upload marks an item as the current one.
 
         Args:
-            plan_type: of what.
+            plan_type: which plan.
             items: numbered 0, 1, 2, ...
-            current: the item marked as current.
+            current: index of the item marked as current.
 
         Returns:
             The plan's opaque id.
@@ -96,11 +96,11 @@ class MissionStore:
         return identity
 
     def clear(self, plan_type: PlanType) -> None:
-        """Forget a plan."""
+        """Remove a plan."""
         self.replace(plan_type, (), current=0)
 
     def select(self, seq: int) -> bool:
-        """Choose the item to fly next, from outside; False when there is no such item."""
+        """Choose the item to fly next; False when there is no such item."""
         if not 0 <= seq < len(self.mission.items):
             return False
         self.current = seq
@@ -109,7 +109,7 @@ class MissionStore:
         return True
 
     def report_reached(self, seq: int) -> None:
-        """Note that an item is done, for who tells people."""
+        """Note that an item is done, for `take_reached`."""
         self._reached.append(seq)
 
     def take_reached(self) -> list[int]:

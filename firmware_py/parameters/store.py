@@ -1,4 +1,4 @@
-"""The values of all parameters, now."""
+"""The values of all parameters."""
 
 from __future__ import annotations
 
@@ -6,16 +6,15 @@ from collections.abc import Callable, Mapping
 from struct import pack
 from zlib import crc32
 
-from firmware_py.parameters.declarations import DECLARATIONS
-from firmware_py.parameters.model import Parameter, ParameterError
+from firmware_py.parameters.declarations import DECLARATIONS, Parameter, ParameterError
 
 
 class Parameters:
-    """The values now, in the declarations' order (by name, as PX4 lists them).
+    """The present values, in the declarations' order (by name, as PX4 lists them).
 
     Attributes:
-        declarations: what there is, with this vehicle's defaults; the position is the MAVLink index.
-        version: counts changes, so that a reader can tell cheaply whether to look again.
+        declarations: with this vehicle's defaults; the position is the MAVLink index.
+        version: counts changes, so that a reader can detect them cheaply.
     """
 
     __slots__ = ("_index", "_listeners", "_save_listeners", "_values", "declarations", "version")
@@ -30,13 +29,13 @@ class Parameters:
         """Start from the defaults.
 
         Args:
-            values: what differs from the defaults.
-            declarations: what there is, sorted by name.
+            values: those that differ from the defaults.
+            declarations: sorted by name.
             defaults: this vehicle's own defaults where they differ from the declared ones. They do not count
-                as changes, and they alone can state another fact (SYS_AUTOSTART of an airframe).
+                as changes, and only they can set a constant (SYS_AUTOSTART of an airframe).
 
         Raises:
-            ParameterError: a value is unknown or cannot be.
+            ParameterError: an unknown name or an invalid value.
         """
         self._index = {declared.name: place for place, declared in enumerate(declarations)}
         own = list(declarations)
@@ -52,7 +51,7 @@ class Parameters:
             self.set(name, value)
 
     def value(self, name: str) -> float:
-        """The value of a declared parameter; one dictionary look-up, made for every tick."""
+        """The value of a declared parameter; one dictionary look-up, quick enough for every tick."""
         return self._values[name]
 
     def integer(self, name: str) -> int:
@@ -78,7 +77,7 @@ class Parameters:
         return self.declarations[self._place(name)]
 
     def changed(self) -> dict[str, float]:
-        """What differs from this vehicle's defaults, by name, in order."""
+        """The values that differ from this vehicle's defaults, by name, in order."""
         return {
             declared.name: self._values[declared.name]
             for declared in self.declarations
@@ -89,7 +88,7 @@ class Parameters:
         """Change a value.
 
         Raises:
-            ParameterError: unknown, not finite, not whole or out of range; nothing has changed then.
+            ParameterError: unknown, not finite, not whole or out of range; nothing is changed.
         """
         declared = self.declaration(name)
         kept = declared.checked(value)
@@ -103,7 +102,7 @@ class Parameters:
             listener(name, kept)
 
     def reset(self) -> None:
-        """Give every parameter its default again; listeners hear of each change."""
+        """Set every parameter to its default; listeners are called for each change."""
         for name in self.changed():
             self.set(name, self.declaration(name).default)
 
@@ -112,14 +111,14 @@ class Parameters:
         self._listeners.append(listener)
 
     def on_save(self, listener: Callable[[], None]) -> None:
-        """Have a function called when somebody asks to save; who keeps the values in a file asks for it."""
+        """Have a function called by `save`, which stores the values in a file."""
         self._save_listeners.append(listener)
 
     def save(self) -> bool:
-        """Ask whoever keeps the values to save them now.
+        """Store the values now.
 
         Returns:
-            Whether anybody keeps them.
+            Whether they are stored anywhere.
         """
         for listener in self._save_listeners:
             listener()

@@ -1,7 +1,7 @@
 """ULog's messages as bytes (file format version 1, PX4's developer guide, "ULog File Format").
 
-Each is a header (length of what follows, one letter for the kind) and its content, little-endian. A topic's
-data come ready to be packed by one `Struct`, so that a sample costs one call.
+Each is a header (length of the content, one letter for the kind) and its content, little-endian. A topic's
+sample is packed by one call of a `Struct`.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ _MAGIC = b"ULog\x01\x12\x35"
 _VERSION = 1
 _DEFAULTS_INCLUDED = 1  # compatible flag: there are messages about default values
 _SYSTEM_AND_SETUP_DEFAULT = 3
-_LONGEST_TEXT = 127
+_MAX_TEXT = 127
 
 _CODES = {
     "uint64_t": "Q",
@@ -36,7 +36,7 @@ def _message(kind: bytes, content: bytes) -> bytes:
 
 
 def file_header(start_us: int) -> bytes:
-    """The first bytes of a log that begins at that vehicle time, and the flags, which must follow them."""
+    """The first bytes of a log that begins at a vehicle time, and the flags, which must follow."""
     flags = bytes((_DEFAULTS_INCLUDED, *[0] * 7)) + bytes(8) + bytes(3 * 8)
     return _MAGIC + pack("<BQ", _VERSION, start_us) + _message(b"B", flags)
 
@@ -59,15 +59,15 @@ def parameter(declared: Parameter, value: float) -> bytes:
 
 
 def parameter_default(declared: Parameter) -> bytes:
-    """The default of a parameter that has another value."""
+    """A parameter's default, if its value differs."""
     key, data = _typed(declared, declared.default)
     return _keyed(b"Q", key, data, bytes((_SYSTEM_AND_SETUP_DEFAULT,)))
 
 
 def logged_text(time_us: int, severity: int, text: str) -> bytes:
-    """What was said to people; the level is a digit, as in Linux' kernel and MAV_SEVERITY."""
+    """A status text; the level is a digit, as in the Linux kernel and MAV_SEVERITY."""
     level = ord("0") + min(max(severity, 0), 7)
-    return _message(b"L", pack("<BQ", level, time_us) + text.encode("ascii", "replace")[:_LONGEST_TEXT])
+    return _message(b"L", pack("<BQ", level, time_us) + text.encode("ascii", "replace")[:_MAX_TEXT])
 
 
 def _typed(declared: Parameter, value: float) -> tuple[str, bytes]:
@@ -88,7 +88,7 @@ class Topic:
         name: PX4's name of the topic.
         fields: types and names as PX4's message files have them, `float[4] q; bool landed`. The first is
             `uint64_t timestamp`; nothing is padded.
-        number: by which the log refers to it.
+        number: of the topic in the log.
 
     Attributes:
         name: see above.
@@ -106,12 +106,12 @@ class Topic:
         self.header = pack("<HcH", self.values.size + 2, b"D", number)
 
     def definition(self) -> bytes:
-        """The message that says how samples are laid out."""
+        """The message with the layout of samples."""
         text = self.name + ":" + "".join(each + ";" for each in self._fields)
         return _message(b"F", text.encode())
 
     def subscription(self) -> bytes:
-        """The message that says which number the topic has."""
+        """The message with the topic's number."""
         return _message(b"A", pack("<BH", 0, self._number) + self.name.encode())
 
 

@@ -1,6 +1,6 @@
 """Writes a log of each flight, from arming to disarming (PX4's SDLOG_MODE 0), into the vehicle's storage.
 
-What was flown so far can be read and downloaded at any time; it reaches the storage once a second.
+A log can be read and downloaded while it is written; it is stored once a second.
 """
 
 from __future__ import annotations
@@ -12,21 +12,20 @@ from dataclasses import dataclass
 from firmware_py.autopilot import Autopilot
 from firmware_py.mavlink.telemetry.connection import FOLLOWED_PX4_VERSION, OWN_VERSION, packed_version
 from firmware_py.storage import Path, Storage
-from firmware_py.types import StatusText
+from firmware_py.types import WARNING, StatusText
 from firmware_py.ulog import messages
 from firmware_py.ulog.topics import LOGGED, STATUS_TOPIC, Logged, Sample
 
 _FLUSH_US = 1_000_000
-_WARNING = 4
 _LOG_FOLDER: Path = ("log",)
-_GPS_DATA_FORMAT = 2  # vehicle_gps_position in degrees: Flight Review asks
+_GPS_DATA_FORMAT = 2  # vehicle_gps_position in degrees; for Flight Review
 
 NameLog = Callable[[int], Path]
-"""Vehicle time in microseconds to the path of a log that begins then."""
+"""From the vehicle time in microseconds to the path of a log that begins then."""
 
 
 def name_by_time(time_us: int) -> Path:
-    """A log's path where the time of day is not known, in the manner of PX4's sess001/log001.ulg."""
+    """A log's path where the time of day is not known, as PX4's sess001/log001.ulg."""
     return ("log", "sess001", f"log{time_us // 1_000_000:06d}.ulg")
 
 
@@ -43,8 +42,8 @@ class UlogRecorder:
     """Records flights.
 
     Args:
-        storage: where logs go; the oldest make room when it is full.
-        name_log: how they are called.
+        storage: of the logs; the oldest are removed when it is full.
+        name_log: gives their paths.
         boot_unix_us: time of boot in microseconds since 1970; 0: not known.
 
     Attributes:
@@ -62,7 +61,7 @@ class UlogRecorder:
         self._groups = _by_rate()
         self._due_us = 0
         self._flush_us = 0
-        self._heard: Autopilot | None = None
+        self._recorded: Autopilot | None = None
         self._nav: tuple[object, ...] = ()
 
     def update(self, autopilot: Autopilot) -> None:
@@ -90,23 +89,23 @@ class UlogRecorder:
             self._flush(autopilot)
 
     def finish(self, autopilot: Autopilot) -> None:
-        """Hand over what is left of a log, when the program ends in flight."""
+        """End a log, when the program ends in flight."""
         if self.path is not None:
             self._end(autopilot, autopilot.state.time_us)
 
     def hear_text(self, time_us: int, said: StatusText) -> None:
-        """Log what was said to people at a vehicle time; nothing happens between flights."""
+        """Log a status text of a vehicle time; between flights it is dropped."""
         if self.path is not None:
             self._buffer += messages.logged_text(time_us, said.severity, said.text)
 
-    def _hear_parameter(self, name: str, value: float) -> None:
-        if self.path is not None and self._heard is not None:
-            self._buffer += messages.parameter(self._heard.parameters.declaration(name), value)
+    def _log_parameter(self, name: str, value: float) -> None:
+        if self.path is not None and self._recorded is not None:
+            self._buffer += messages.parameter(self._recorded.parameters.declaration(name), value)
 
     def _begin(self, autopilot: Autopilot) -> None:
-        if self._heard is None:
-            self._heard = autopilot
-            autopilot.parameters.on_change(self._hear_parameter)
+        if self._recorded is None:
+            self._recorded = autopilot
+            autopilot.parameters.on_change(self._log_parameter)
         time_us = autopilot.state.time_us
         self.path = self._name_log(time_us)
         self._size = 0
@@ -117,7 +116,7 @@ class UlogRecorder:
         self._buffer = bytearray(self._definitions(autopilot, time_us))
 
     def _definitions(self, autopilot: Autopilot, time_us: int) -> bytes:
-        """All that comes before the data."""
+        """Everything before the data."""
         parameters = autopilot.parameters
         own = ".".join(map(str, OWN_VERSION))
         system_id = parameters.integer("MAV_SYS_ID")
@@ -170,7 +169,7 @@ class UlogRecorder:
             self._buffer += logged.topic.values.pack(*values)
 
     def _flush(self, autopilot: Autopilot) -> None:
-        """Hand over what was gathered; a log that was erased meanwhile begins anew."""
+        """Store the buffer; a log that was erased meanwhile is begun again."""
         path = self.path
         if path is None:
             return
@@ -180,7 +179,7 @@ class UlogRecorder:
             self._size = 0
             self._buffer = bytearray(self._definitions(autopilot, autopilot.state.time_us))
         except OSError as error:
-            autopilot.say(_WARNING, f"Logging stopped: {error.strerror or error}")
+            autopilot.say(WARNING, f"Logging stopped: {error.strerror or error}")
             self.path = None
             self._paused = True
 
@@ -199,7 +198,7 @@ class UlogRecorder:
                 return
 
     def _remove_oldest(self, current: Path) -> bool:
-        """Remove the oldest log but the one being written; whether there was one."""
+        """Remove the oldest log except the present one; return whether there was one."""
         for folder in self._storage.entries(_LOG_FOLDER):
             if not folder.is_folder:
                 continue

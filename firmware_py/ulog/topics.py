@@ -1,7 +1,7 @@
-"""What is logged: PX4's topics, with the fields of PX4 v1.17's messages that this vehicle has something for.
+"""The logged topics: PX4's, with the fields of PX4 v1.17's messages that this vehicle has values for.
 
-A log describes itself, and its readers look for fields by name; so what does not exist here (reset counters,
-airspeed, a second anything) is left out instead of filled with zeros.
+A log describes itself, and its readers look for fields by name; so values that do not exist here (reset
+counters, airspeed, second sensors) are left out instead of filled with zeros.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ _SLOW_US = 500_000
 _ARMED, _DISARMED = 2, 1  # vehicle_status.arming_state
 _ROTARY_WING = 1
 # estimator_status.control_mode_flags: tilt and yaw aligned, GNSS position, magnetic heading, barometer
-# height, GNSS velocity; the bit in between says that it flies.
+# height, GNSS velocity; the bit in between means in the air.
 _ESTIMATOR_MODE = 1 << 0 | 1 << 1 | 1 << 2 | 1 << 4 | 1 << 9 | 1 << 44
 _ESTIMATOR_IN_AIR = 1 << 7
 _SOLUTION_GOOD = 0x033F  # attitude, velocities and positions; no height above ground, not standing still
@@ -36,13 +36,13 @@ _SOLUTION_GOOD = 0x033F  # attitude, velocities and positions; no height above g
 
 @dataclass(frozen=True, slots=True)
 class Sample:
-    """One moment, with what several topics need worked out once.
+    """One sample of the autopilot, with values that several topics need.
 
     Attributes:
-        autopilot: whose moment.
+        autopilot: which is sampled.
         time_us: vehicle time.
         unix_us: the same since 1970; 0: not known.
-        place: where on Earth; None: not known.
+        place: position on Earth; None: not known.
     """
 
     autopilot: Autopilot
@@ -52,7 +52,7 @@ class Sample:
 
 
 Collector = Callable[[Sample], Values | None]
-"""Values of one sample in the topic's order; None: there is nothing to log."""
+"""From a sample to values in the topic's order; None: nothing to log."""
 
 
 def _attitude(sample: Sample) -> Values:
@@ -90,7 +90,7 @@ def _thrust_setpoint(sample: Sample) -> Values:
 
 
 def _actuator_motors(sample: Sample) -> Values:
-    """Thrust of each motor as a share of the most; NaN while it must not turn, as PX4's."""
+    """Thrust of each motor as a share of full thrust; NaN while disarmed, as PX4's."""
     autopilot = sample.autopilot
     speeds, full_rad_s = autopilot.output.speeds_rad_s, autopilot.airframe.motor.max_speed_rad_s
     turning = speeds[:_MOTORS] if autopilot.status.armed else ()
@@ -166,7 +166,7 @@ def _global_position(sample: Sample) -> Values | None:
 
 
 def _gps(sample: Sample) -> Values | None:
-    """With the figures of GPS_RAW_INT, which are PX4's simulated ones."""
+    """With the accuracies of GPS_RAW_INT, which are PX4's simulated ones."""
     place = sample.place
     if place is None:
         return None
@@ -281,7 +281,7 @@ def _estimator_status(sample: Sample) -> Values:
 
 @dataclass(frozen=True, slots=True)
 class Logged:
-    """A topic, how often it is logged, and where its values come from."""
+    """A topic, the period in which it is logged, and its collector."""
 
     topic: Topic
     period_us: int

@@ -25,7 +25,7 @@ from sitl.world import World
 
 ORIGIN = GeodeticPoint(47.397742, 8.545594, 489.0)
 TICKS_PER_S = 250
-_STREAM_TICKS = 12  # setpoints and sticks come at 20 Hz
+_STREAM_TICKS = 12  # setpoints and sticks are sent at 20 Hz
 _SAMPLE_TICKS = 5
 _KINDS = {
     "attitude": AttitudeSetpoint,
@@ -37,7 +37,7 @@ _KINDS = {
 
 @dataclass(frozen=True, slots=True)
 class Sample:
-    """The truth at one moment, relative to where it was switched on."""
+    """The true state in one tick, relative to the start position."""
 
     time_s: float
     position_ned_m: Vec3
@@ -108,7 +108,7 @@ class Flight:
         return self.world.time_us / 1e6
 
     def run(self, seconds: float, until: Callable[[], object] | None = None) -> list[Sample]:
-        """Go on for a time, or until something holds; the samples of it."""
+        """Run for a time, or until a condition holds; return the samples."""
         start = len(self.track)
         for _ in range(round(seconds * TICKS_PER_S)):
             if until is not None and until():
@@ -118,7 +118,7 @@ class Flight:
         return self.track[start:]
 
     def take(self, seconds: float, until: Callable[[], object]) -> float:
-        """Go on until something holds, which it must within a time; how long it took, in seconds."""
+        """Run until a condition holds, which it must within a time; return the duration in seconds."""
         start_s = self.time_s
         self.run(seconds, until)
         assert until(), f"not within {seconds} s: {self.now}, {self.texts[-3:]}"
@@ -138,7 +138,7 @@ class Flight:
         return self
 
     def fly(self, seconds: float, **setpoint: object) -> list[Sample]:
-        """Fly offboard by a setpoint, which is sent again and again."""
+        """Fly offboard by a setpoint, which is sent repeatedly."""
         self.send(**setpoint)
         if self.mode is not FlightMode.OFFBOARD:
             self._tick()
@@ -146,19 +146,19 @@ class Flight:
         return self.run(seconds)
 
     def send(self, **setpoint: object) -> None:
-        """Send a setpoint from now on, again and again."""
+        """Send a setpoint repeatedly from now on."""
         kind = next((_KINDS[name] for name in setpoint if name in _KINDS), TrajectorySetpoint)
         self.setpoint = kind(0, **setpoint)
         self._stream()
 
     def steer(self, seconds: float, **sticks: float) -> list[Sample]:
-        """Hold sticks; what is not given is centred."""
+        """Hold the sticks; those not given are centred."""
         self.sticks = ManualInput(0, **sticks)
         self._stream()
         return self.run(seconds)
 
     def amsl_m(self, height_m: float) -> float:
-        """Height above sea level of one above where it started."""
+        """The altitude above sea level of a height above the start."""
         assert self.autopilot.status.home is not None
         return self.autopilot.status.home.altitude_m + height_m
 
@@ -196,7 +196,7 @@ class Flight:
 
 
 def without_gps(sensors: Sensors) -> Sensors:
-    """What is sensed when satellites are lost: horizontal position and velocity are unknown."""
+    """The sensors without GNSS: horizontal position and velocity are NaN."""
     return replace(
         sensors,
         position_ned_m=(nan, nan, sensors.position_ned_m[2]),

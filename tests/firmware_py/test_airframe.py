@@ -1,4 +1,4 @@
-"""Airframe files: what is declared, what is refused and in which words."""
+"""Airframe files: declared values, and the messages of refused ones."""
 
 import pytest
 import yaml
@@ -11,7 +11,7 @@ def declared(name, **changes):
 
 
 @pytest.mark.parametrize("name", ["abejorro", "x500"])
-def test_a_declaration_survives_being_written_and_read(name, tmp_path):
+def test_an_airframe_written_and_read_is_the_same(name, tmp_path):
     path = tmp_path / "copy.yaml"
     path.write_text(yaml.safe_dump(declared(name)))
     assert load_airframe(str(path)) == load_airframe(name)
@@ -32,14 +32,14 @@ def test_the_x500_has_its_published_figures():
 
 
 @pytest.mark.parametrize("name", ["mpc_thr_hover", "MPC THR", "A_NAME_OF_SEVENTEE", "", "9LIVES"])
-def test_parameters_need_names_that_px4_could_have(name, tmp_path):
+def test_parameter_names_must_be_valid_for_px4(name, tmp_path):
     path = tmp_path / "odd.yaml"
     path.write_text(yaml.safe_dump(declared("x500", parameters={name: 1.0})))
     with pytest.raises(AirframeError, match=r"odd\.yaml: parameters"):
         load_airframe(str(path))
 
 
-def test_a_weight_that_is_none_is_refused(tmp_path):
+def test_an_unknown_weight_is_refused(tmp_path):
     path = tmp_path / "odd.yaml"
     path.write_text(yaml.safe_dump(declared("x500", stabiliser={"tilt": 1.0})))
     with pytest.raises(AirframeError, match=r"stabiliser\.tilt"):

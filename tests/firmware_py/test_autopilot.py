@@ -1,4 +1,4 @@
-"""The whole autopilot on a point mass that flies exactly what the stabiliser is told."""
+"""The whole autopilot on a point mass that follows the stabiliser's commands exactly."""
 
 from dataclasses import replace
 from math import cos, nan, sin
@@ -9,8 +9,7 @@ from hypothesis import strategies as st
 
 from firmware_py.airframe import load_airframe
 from firmware_py.autopilot import Autopilot
-from firmware_py.commands import VelocityCommand
-from firmware_py.control.limits import FlightLimits
+from firmware_py.commands import FlightLimits, VelocityCommand
 from firmware_py.parameters import Parameters
 from firmware_py.setpoints import TrajectorySetpoint
 from firmware_py.status import CommandResult, FlightMode, LandedState
@@ -26,7 +25,7 @@ UP, STILL, DOWN, NORTH = (0.0, 0.0, -0.5), (0.0, 0.0, 0.0), (0.0, 0.0, 0.5), (1.
 
 
 class Obedient:
-    """A stabiliser that only remembers; low thrust means "told to go down"."""
+    """A stabiliser that only records commands; low thrust stands for a descent."""
 
     def __init__(self):
         self.command = None
@@ -136,7 +135,7 @@ def test_it_boots_in_hold_disarmed_and_is_ready_within_a_second():
     assert flight.texts == ["Arming denied: Resolve system health failures first", "Ready for takeoff!"]
 
 
-def test_origin_and_home_are_where_it_booted():
+def test_origin_and_home_are_at_the_boot_position():
     flight = Flight().run(0.1)
     origin = flight.status.origin
     assert origin is not None
@@ -146,7 +145,7 @@ def test_origin_and_home_are_where_it_booted():
     assert flight.autopilot.state.position_ned_m == STILL
 
 
-def test_home_moves_to_where_it_is_armed():
+def test_home_moves_to_the_arming_position():
     flight = Flight().run(1.0)
     flight.sensors = replace(flight.sensors, position_ned_m=(12.0, -1.0, BASE[2]))
     flight.run(0.1)
@@ -155,7 +154,7 @@ def test_home_moves_to_where_it_is_armed():
     assert flight.status.home == flight.autopilot.global_position()
 
 
-def test_takeoff_first_and_arming_second_flies_at_once_to_the_default_height():
+def test_arming_after_a_takeoff_command_flies_to_the_default_height():
     flight = Flight().run(1.0)
     assert flight.autopilot.takeoff() is OK
     assert flight.status.mode is FlightMode.TAKEOFF
@@ -180,7 +179,7 @@ def test_takeoff_to_an_altitude_above_the_sea():
 
 
 @pytest.mark.parametrize("altitude_m", [0.0, -1e9, 489.5])
-def test_takeoff_to_below_stays_on_the_ground(altitude_m):
+def test_takeoff_to_a_lower_altitude_stays_on_the_ground(altitude_m):
     flight = Flight().run(1.0)
     flight.autopilot.arm()
     assert flight.autopilot.takeoff(altitude_m) is OK
@@ -188,7 +187,7 @@ def test_takeoff_to_below_stays_on_the_ground(altitude_m):
     assert flight.height_m == 0.0
 
 
-def test_takeoff_to_below_stays_in_the_air():
+def test_takeoff_to_a_lower_altitude_stays_in_the_air():
     flight = Flight().airborne()
     assert flight.autopilot.takeoff(490.0) is OK
     flight.run(2.0)
@@ -231,7 +230,7 @@ def test_landing_ends_with_motors_off_two_seconds_after_touching():
     assert [text for text in flight.texts if "anding" in text] == ["Landing detected", "Disarmed by landing"]
 
 
-def test_disarming_in_the_air_takes_force():
+def test_disarming_in_the_air_must_be_forced():
     flight = Flight().airborne()
     assert flight.autopilot.disarm() is NO
     assert flight.texts == []
@@ -275,7 +274,7 @@ def test_offboard_chosen_disarmed_without_setpoints_is_not_ready():
 
 
 @pytest.mark.parametrize("velocity", [STILL, DOWN, NORTH, (0.0, 0.0, -0.01)])
-def test_offboard_on_the_ground_idles_until_told_to_climb(velocity):
+def test_offboard_on_the_ground_idles_until_a_climb_is_commanded(velocity):
     flight = Flight().run(1.0, velocity)
     flight.autopilot.set_mode(FlightMode.OFFBOARD)
     flight.autopilot.arm()
@@ -292,7 +291,7 @@ def test_offboard_on_the_ground_idles_until_told_to_climb(velocity):
     assert flight.stabiliser.command.velocity_level_m_s[2] == -0.25
 
 
-def test_a_body_too_heavy_to_leave_at_once_gets_its_integrals_back():
+def test_integrals_are_released_when_lift_off_takes_longer():
     flight = Flight().run(1.0, UP)
     flight.autopilot.set_mode(FlightMode.OFFBOARD)
     flight.autopilot.arm()
@@ -304,7 +303,7 @@ def test_a_body_too_heavy_to_leave_at_once_gets_its_integrals_back():
     assert not flight.stabiliser.grounded
 
 
-def test_offboard_flies_what_it_is_told():
+def test_offboard_flies_its_setpoint():
     flight = Flight().in_offboard()
     before = flight.sensors.position_ned_m
     flight.run(2.0, (0.5, 0.25, -0.1), yaw_rate_rad_s=0.5)
@@ -357,7 +356,7 @@ def test_offboard_resumes_when_setpoints_return(lost_s):
     assert flight.sensors.velocity_ned_m_s == NORTH
 
 
-def test_another_mode_ends_the_failsafe_for_good():
+def test_another_mode_ends_the_failsafe():
     flight = Flight().in_offboard()
     flight.run(2.0)
     assert flight.autopilot.set_mode(FlightMode.HOLD) is OK
@@ -375,7 +374,7 @@ def test_setpoints_lost_on_the_ground_end_disarmed():
     assert flight.texts[-2:] == ["Disarmed by failsafe", "Ready for takeoff!"]
 
 
-def test_what_cannot_be_flown_is_refused_once_and_counts_as_no_setpoint():
+def test_an_unusable_setpoint_is_refused_with_one_text_and_ignored():
     flight = Flight().in_offboard()
     flight.run(1.5, (nan, nan, nan))
     assert flight.status.failsafe
@@ -385,7 +384,7 @@ def test_what_cannot_be_flown_is_refused_once_and_counts_as_no_setpoint():
     ]
 
 
-def test_a_changed_parameter_acts_in_flight():
+def test_a_changed_parameter_takes_effect_in_flight():
     flight = Flight().in_offboard()
     flight.autopilot.parameters.set("COM_OF_LOSS_T", 0.2)
     flight.autopilot.parameters.set("MPC_XY_VEL_MAX", 0.5)
@@ -426,7 +425,7 @@ def test_lost_sensors_are_bridged_and_then_stop_the_motors(fault):
     assert flight.autopilot.take_texts()[0].text == "Sensors lost: motors stopped"
 
 
-def test_texts_that_nobody_takes_do_not_pile_up():
+def test_texts_that_are_not_taken_are_limited():
     autopilot = Flight().autopilot
     for number in range(1000):
         autopilot.say(6, f"text {number}")
@@ -476,7 +475,7 @@ def test_no_sequence_of_commands_breaks_the_rules(names):
         assert (status.mode is FlightMode.OFFBOARD) <= (status.intended_mode is FlightMode.OFFBOARD)
 
 
-def test_two_same_flights_are_the_same_to_the_bit():
+def test_the_same_flight_twice_is_bit_identical():
     def fly():
         flight = Flight().in_offboard()
         flight.run(1.0, (0.3, -0.2, -0.1), yaw_rate_rad_s=0.7)

@@ -58,7 +58,7 @@ def test_takeoff_hold_and_landing_where_it_started(flight):
     assert down_m == pytest.approx(0.0, abs=0.01)
 
 
-def test_a_gentle_climb_in_offboard_leaves_the_base_at_once(flight):
+def test_a_slow_climb_in_offboard_leaves_the_base_at_once(flight):
     flight.run(0.1, (0.0, 0.0, 0.0))
     flight.autopilot.set_mode(FlightMode.OFFBOARD)
     flight.autopilot.arm()
@@ -94,8 +94,8 @@ def test_lost_setpoints_at_speed_stop_land_and_disarm(flight):
     flight.autopilot.arm()
     flight.run(3.0, (0.0, 0.0, -0.5))
     flight.run(2.0, (1.0, 0.0, 0.0))
-    flight.run(3.0)  # the first second of it to notice
-    assert hypot(*flight.autopilot.state.velocity_ned_m_s) < 0.12  # what is left of an overshoot
+    flight.run(3.0)  # the first second to detect it
+    assert hypot(*flight.autopilot.state.velocity_ned_m_s) < 0.12  # rest of an overshoot
     flight.run(1.5)
     assert flight.status.failsafe
     assert hypot(*flight.autopilot.state.velocity_ned_m_s) < 0.05
@@ -104,7 +104,7 @@ def test_lost_setpoints_at_speed_stop_land_and_disarm(flight):
     assert flight.status.landed_state is LandedState.ON_GROUND
 
 
-def test_motors_off_in_the_air_falls_and_ends_on_the_ground(flight):
+def test_with_motors_off_in_the_air_it_falls_to_the_ground(flight):
     flight.autopilot.takeoff()
     flight.autopilot.arm()
     flight.run(4.0)
@@ -115,7 +115,7 @@ def test_motors_off_in_the_air_falls_and_ends_on_the_ground(flight):
     assert flight.status.landed_state is LandedState.ON_GROUND
 
 
-def test_hold_keeps_its_place_within_two_centimetres(flight):
+def test_hold_keeps_its_position_within_two_centimetres(flight):
     flight.autopilot.takeoff(489.51 + 1.0)
     flight.autopilot.arm()
     flight.run(10.0)

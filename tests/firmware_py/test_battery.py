@@ -13,7 +13,7 @@ def settings(**parameters):
     return battery_settings(X500, Parameters(parameters, defaults=X500.parameters))
 
 
-def test_what_parameters_leave_open_is_the_airframes():
+def test_the_airframes_values_apply_where_parameters_give_none():
     own = settings()
     assert own.capacity_mah == X500.battery.capacity_mah
     assert own.resistance_ohm == X500.battery.resistance_ohm
@@ -24,19 +24,19 @@ def test_what_parameters_leave_open_is_the_airframes():
 @pytest.mark.parametrize(
     ("voltage_v", "remaining"), [(17.0, 1.0), (16.2, 1.0), (15.3, 0.5), (14.4, 0.0), (9.0, 0.0)]
 )
-def test_the_voltage_at_rest_tells_the_charge(voltage_v, remaining):
+def test_the_voltage_without_load_gives_the_charge(voltage_v, remaining):
     monitor = BatteryMonitor(X500, Parameters(defaults=X500.parameters))
     monitor.update(0, voltage_v, 0.0)
     assert monitor.state.remaining == pytest.approx(remaining)
 
 
-def test_the_sag_under_load_is_no_charge_lost():
+def test_voltage_drop_under_load_is_not_lost_charge():
     monitor = BatteryMonitor(X500, Parameters(defaults=X500.parameters))
     monitor.update(0, 15.3 - 20.0 * X500.battery.resistance_ohm, 20.0)
     assert monitor.state.remaining == pytest.approx(0.5)
 
 
-def test_what_is_drawn_is_counted():
+def test_the_current_is_integrated():
     monitor = BatteryMonitor(X500, Parameters(defaults=X500.parameters))
     for tenth in range(601):
         monitor.update(tenth * 100_000, 16.0, 12.0)
@@ -44,7 +44,7 @@ def test_what_is_drawn_is_counted():
 
 
 @given(st.floats(0.0, 1.0), st.floats(0.0, 1.0))
-def test_less_charge_never_worries_less(one, other):
+def test_less_charge_never_gives_a_milder_warning(one, other):
     low, high = sorted((one, other))
     assert warning(low, settings()) >= warning(high, settings())
 

@@ -29,8 +29,8 @@ OK, NO = CommandResult.ACCEPTED, CommandResult.TEMPORARILY_REJECTED
 
 FLYING = Situation(
     now_us=NOW,
-    unsound_us=0,
-    sound_us=NOW,
+    unusable_us=0,
+    usable_us=NOW,
     position_us=NOW,
     manual_us=NOW,
     has_mission=True,
@@ -57,8 +57,8 @@ CHOICES = (
 
 
 def _flights():
-    """Combinations of what makes a flight well or ill, the vehicle's own side."""
-    for unsound_us, sound_us, upright_us, airborne_us, flown in product(
+    """Combinations of the vehicle's own conditions."""
+    for unusable_us, usable_us, upright_us, airborne_us, flown in product(
         (LONG_AGO, NOW - 100_000),
         (NOW, LONG_AGO),
         (NOW, NOW - 4000, LONG_AGO),
@@ -67,8 +67,8 @@ def _flights():
     ):
         for entered_us, armed_us, reached in product((NOW, LONG_AGO), (NOW, LONG_AGO), (False, True)):
             yield {
-                "unsound_us": unsound_us,
-                "sound_us": sound_us,
+                "unusable_us": unusable_us,
+                "usable_us": usable_us,
                 "upright_us": upright_us,
                 "airborne_us": airborne_us,
                 "landed": airborne_us < NOW,
@@ -80,7 +80,7 @@ def _flights():
 
 
 def _circumstances():
-    """Combinations of what comes from outside."""
+    """Combinations of inputs from outside."""
     for setpoint_us, position_us, manual_us, has_mission, intended in product(
         (NOW, NEVER_US), (NOW, LONG_AGO), (NOW, NEVER_US), (False, True), FlightMode
     ):
@@ -94,14 +94,14 @@ def _circumstances():
 
 
 def situations():
-    """Every flight with an ordinary day around it, and an ordinary flight with everything around it."""
+    """All vehicle conditions with normal inputs, and a normal flight with all inputs."""
     outside = {"setpoint_us": NOW, "position_us": NOW, "manual_us": NOW, "has_mission": True}
     found = [
         Situation(now_us=NOW, **flight, **outside, intended=intended)
         for flight in _flights()
         for intended in (FlightMode.OFFBOARD, FlightMode.LAND)
     ]
-    ordinary = {"now_us": NOW, "sound_us": NOW, "upright_us": NOW, "armed_us": NOW, "entered_us": LONG_AGO}
+    ordinary = {"now_us": NOW, "usable_us": NOW, "upright_us": NOW, "armed_us": NOW, "entered_us": LONG_AGO}
     found += [
         Situation(
             **ordinary, landed=landed, flown=True, **around, choices=choices, cause=cause, follow_up=then
@@ -210,7 +210,7 @@ def test_commands_in_flight(state, event, cell):
 
 @pytest.mark.parametrize("mode", MODES)
 @pytest.mark.parametrize("state", State)
-def test_every_mode_can_be_asked_for_in_every_state(state, mode):
+def test_every_mode_can_be_requested_in_every_state(state, mode):
     row = first_match(RULES[state, MODE_EVENT[mode]], FLYING)
     assert row is not None
     if state is State.TERMINATED:
@@ -239,18 +239,18 @@ def test_a_mode_that_cannot_be_flown_is_refused_in_flight(state, mode):
 
 
 @pytest.mark.parametrize("state", State)
-def test_nothing_happens_by_itself_when_all_is_well(state):
+def test_nothing_changes_without_a_cause(state):
     assert first_match(RULES[state, Event.TICK], replace(FLYING)) is None
 
 
 @pytest.mark.parametrize("state", sorted(ARMED - {State.TERMINATED}, key=lambda state: state.value))
-def test_offboard_resumes_from_wherever_its_loss_led(state):
+def test_offboard_resumes_from_every_state_after_the_loss_of_setpoints(state):
     row = first_match(RULES[state, Event.TICK], replace(FLYING, cause=Cause.SETPOINTS))
     assert row is not None
     assert row.target is State.OFFBOARD
 
 
-def test_nothing_resumes_once_the_flight_is_terminated():
+def test_nothing_resumes_after_termination():
     assert first_match(RULES[State.TERMINATED, Event.TICK], replace(FLYING, cause=Cause.SETPOINTS)) is None
 
 
@@ -305,7 +305,7 @@ def test_a_failsafe_never_leads_back_to_a_milder_one(state, event):
         (Reaction.STABILIZED, State.STABILIZED),
     ],
 )
-def test_lost_setpoints_leave_it_to_the_pilot_if_there_is_one(reaction, state):
+def test_lost_setpoints_give_control_to_a_pilot_with_sticks(reaction, state):
     choices = Choices({Cause.SETPOINTS: reaction}, without_sticks=Reaction.LAND)
     row = first_match(RULES[State.OFFBOARD, Event.SETPOINTS_LOST], replace(FLYING, choices=choices))
     assert row is not None
@@ -331,7 +331,7 @@ def test_only_arming_arms_and_only_when_checks_pass():
 
 
 @pytest.mark.parametrize("state", sorted(ARMED, key=lambda state: state.value))
-def test_in_the_air_only_force_or_a_hopeless_failure_stops_the_motors(state):
+def test_in_the_air_only_force_or_a_hard_failure_stops_the_motors(state):
     stopping = [event for event in Event if any(row.target is State.DISARMED for row in RULES[state, event])]
     in_the_air = [now for now in SITUATIONS if not now.landed]
     for event, now in product(stopping, in_the_air):
@@ -346,7 +346,7 @@ def test_in_the_air_only_force_or_a_hopeless_failure_stops_the_motors(state):
 
 
 @pytest.mark.parametrize("state", sorted(ARMED - {State.TERMINATED}, key=lambda state: state.value))
-def test_failsafes_stand_before_all_else(state):
+def test_failsafes_come_first(state):
     for now in SITUATIONS:
         row = first_match(RULES[state, Event.TICK], now)
         if when.sensors_lost(now):
@@ -370,8 +370,8 @@ def test_offboard_is_entered_only_with_setpoints(state):
 @pytest.mark.parametrize(
     ("state", "change", "target", "text"),
     [
-        (State.HOLD, {"sound_us": NOW - 300_001}, State.DISARMED, "Sensors lost: motors stopped"),
-        (State.HOLD, {"sound_us": NOW - 300_000}, None, ""),
+        (State.HOLD, {"usable_us": NOW - 300_001}, State.DISARMED, "Sensors lost: motors stopped"),
+        (State.HOLD, {"usable_us": NOW - 300_000}, None, ""),
         (
             State.LAND,
             {"upright_us": NOW - 300_001},
@@ -432,7 +432,7 @@ def test_what_a_tick_does(state, change, target, text):
 @pytest.mark.parametrize(
     ("change", "text"),
     [
-        ({"unsound_us": NOW - 700_000}, "Arming denied: Resolve system health failures first"),
+        ({"unusable_us": NOW - 700_000}, "Arming denied: Resolve system health failures first"),
         ({"upright_us": NOW - 4000}, "Arming denied: vehicle is tipped over"),
         ({"position_us": LONG_AGO}, "Arming denied: no position estimate"),
         ({"battery_arms": False}, "Arming denied: low battery"),
@@ -484,7 +484,7 @@ def test_parameters_set_times_and_choices():
     assert choices.arm_needs_ground_station
 
 
-def test_defaults_return_home_when_setpoints_stop_and_nobody_holds_sticks():
+def test_defaults_return_home_when_setpoints_stop_without_manual_control():
     commander = Commander()
     commander.configure(Parameters())
     assert commander.situation.choices.reaction(Cause.SETPOINTS) is Reaction.RETURN
@@ -510,34 +510,34 @@ def _until(commander, now_us, condition, limit_s=30, **conditions):
 def test_a_lost_ground_station_holds_and_then_returns_with_px4s_timing():
     commander, now_us = _flying_commander()
     commander.configure(Parameters({"NAV_DLL_ACT": 2}))
-    commander.ground_station_heard()
+    commander.note_ground_station()
     held_s = _until(commander, now_us, lambda: commander.state is State.FAILSAFE_HOLD)
     assert held_s == pytest.approx(12.28, abs=0.06)
     assert commander.failsafe
     now_us += round(held_s * 1e6)
     returned_s = _until(commander, now_us, lambda: commander.state is State.FAILSAFE_RETURN)
     assert returned_s == pytest.approx(5.0, abs=0.02)
-    commander.ground_station_heard()  # it does not come back by itself
+    commander.note_ground_station()  # it does not come back by itself
     _ticks(commander, now_us + 5_100_000, 100, landed=False)
     assert commander.state is State.FAILSAFE_RETURN
 
 
-def test_a_failsafe_that_was_overruled_comes_again_only_after_it_was_over():
+def test_a_failsafe_that_was_overridden_acts_again_only_after_its_cause_has_ended():
     commander, now_us = _flying_commander()
     commander.configure(Parameters({"NAV_DLL_ACT": 2, "COM_DL_LOSS_T": 5}))
-    commander.ground_station_heard()
+    commander.note_ground_station()
     _until(commander, now_us, lambda: commander.state is State.FAILSAFE_HOLD)
     commander.handle(Event.SET_HOLD)
     now_us = _ticks(commander, commander.situation.now_us + 4000, 500, landed=False)
     assert commander.state is State.HOLD
-    commander.ground_station_heard()
+    commander.note_ground_station()
     _until(commander, now_us, lambda: commander.state is State.FAILSAFE_HOLD)
 
 
 @pytest.mark.parametrize(
     ("level", "state"), [(2, State.HOLD), (3, State.FAILSAFE_RETURN), (4, State.FAILSAFE_LAND)]
 )
-def test_an_emptying_battery_warns_returns_and_lands(level, state):
+def test_a_discharging_battery_warns_returns_and_lands(level, state):
     commander, now_us = _flying_commander()
     for warning in range(1, level + 1):
         commander.situation.battery_warning = warning
@@ -547,7 +547,7 @@ def test_an_emptying_battery_warns_returns_and_lands(level, state):
 
 def test_sticks_that_stop_in_a_manual_mode_hold_and_then_return():
     commander, now_us = _flying_commander()
-    commander.sticks_came()
+    commander.note_manual_input()
     commander.handle(Event.SET_POSITION)
     lost_s = _until(commander, now_us, lambda: commander.state is State.FAILSAFE_HOLD)
     assert lost_s == pytest.approx(0.5, abs=0.05)
@@ -557,7 +557,7 @@ def test_sticks_that_stop_in_a_manual_mode_hold_and_then_return():
     )
 
 
-def test_nobody_misses_sticks_that_were_never_there():
+def test_sticks_that_were_missing_at_arming_are_not_lost():
     commander, now_us = _flying_commander()
     _ticks(commander, now_us, 1000, landed=False)
     assert commander.state is State.HOLD
@@ -565,11 +565,11 @@ def test_nobody_misses_sticks_that_were_never_there():
 
 def test_a_lost_position_descends():
     commander, now_us = _flying_commander()
-    lost_s = _until(commander, now_us, lambda: commander.state is State.FAILSAFE_DESCEND, placed=False)
+    lost_s = _until(commander, now_us, lambda: commander.state is State.FAILSAFE_DESCEND, has_position=False)
     assert lost_s == pytest.approx(1.0, abs=0.05)
 
 
-def test_a_broken_fence_holds():
+def test_a_geofence_breach_holds():
     commander, now_us = _flying_commander()
     commander.situation.fence_breached = True
     _until(commander, now_us, lambda: commander.state is State.FAILSAFE_HOLD, limit_s=0.1)
@@ -580,41 +580,41 @@ def test_a_broken_fence_holds():
 
 
 def _ticks(commander, start_us, count, **conditions):
-    seen = Observation(0, sound=True, placed=True, upright=True, landed=True, target_reached=False)
+    seen = Observation(0, usable=True, has_position=True, upright=True, landed=True, target_reached=False)
     for tick in range(count):
         commander.tick(seen._replace(now_us=start_us + 4000 * tick, **conditions))
     return start_us + 4000 * count
 
 
-def test_ready_comes_with_settled_sensors_whenever_they_start():
+def test_ready_after_usable_samples_for_the_settling_time():
     for first_us in (0, 3_000_000):
         commander = Commander()
         now_us = _ticks(commander, first_us, 200)
-        assert not commander.ready
+        assert commander.refusal
         _ticks(commander, now_us, 1)
-        assert commander.ready
+        assert not commander.refusal
 
 
-def test_one_bad_sample_starts_the_wait_again():
+def test_one_unusable_sample_restarts_the_settling_time():
     commander = Commander()
     now_us = _ticks(commander, 0, 300)
-    assert commander.ready
-    now_us = _ticks(commander, now_us, 1, sound=False)
-    assert not commander.ready
+    assert not commander.refusal
+    now_us = _ticks(commander, now_us, 1, usable=False)
+    assert commander.refusal
     _ticks(commander, now_us, 201)
-    assert commander.ready
+    assert not commander.refusal
 
 
 def test_a_setpoint_from_the_future_does_not_stay_fresh_for_ever():
     commander = Commander()
     now_us = _ticks(commander, 0, 300)
-    commander.setpoint_came(10**12)
+    commander.note_setpoint(10**12)
     assert not when.setpoint_lost(commander.situation)
     _ticks(commander, now_us, 300)
     assert when.setpoint_lost(commander.situation)
 
 
-def test_the_diagram_shows_every_state_and_every_way_out_of_offboard():
+def test_the_diagram_shows_every_state_and_every_transition_from_offboard():
     diagram = mermaid()
     assert diagram.startswith("stateDiagram-v2\n")
     for state in State:

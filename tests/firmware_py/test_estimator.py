@@ -11,7 +11,7 @@ REST = Sensors(
 )
 
 
-def test_positions_count_from_the_first_sample():
+def test_positions_are_relative_to_the_first_sample():
     estimator = Estimator()
     assert estimator.update(REST)
     assert estimator.origin_ned_m == (1.0, 2.0, -3.0)
@@ -53,6 +53,6 @@ def test_a_sample_must_be_newer_than_the_last():
     assert estimator.update(replace(REST, time_us=4001))
 
 
-def test_an_attitude_that_is_no_rotation_is_unusable():
+def test_an_attitude_that_is_not_a_rotation_is_unusable():
     assert not Estimator().update(replace(REST, attitude=(0.0, 0.0, 0.0, 0.0)))
     assert not Estimator().update(replace(REST, attitude=(2.0, 0.0, 0.0, 0.0)))

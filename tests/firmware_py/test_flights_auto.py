@@ -1,4 +1,4 @@
-"""The x500 in the field, flying by itself: take-off, hold, journeys, circles, return, landing."""
+"""Flights of the x500 in automatic modes: take-off, hold, reposition, orbit, return, landing."""
 
 from itertools import pairwise
 from math import atan2, cos, degrees, dist, hypot, isnan, nan, radians, remainder, sin, tau
@@ -38,11 +38,11 @@ def test_two_seconds_after_takeoff_it_has_left_the_ground():
     assert max(sample.height_m for sample in flight.run(2.0)) < 0.01
     assert flight.autopilot.takeoff() is CommandResult.ACCEPTED
     flight.run(2.0)
-    assert 0.2 < flight.now.height_m < 0.5  # PX4 tells 0.3 to 0.4 m
+    assert 0.2 < flight.now.height_m < 0.5  # PX4: 0.3 to 0.4 m
     climb_m_s = [-sample.velocity_ned_m_s[2] for sample in flight.track]
     assert max(climb_m_s) < 1.0
     steps_m_s = [after - before for before, after in pairwise(climb_m_s)]
-    assert max(steps_m_s) < 0.06  # 3 m/s^2: it ramps, it does not jump
+    assert max(steps_m_s) < 0.06  # 3 m/s^2: a ramp, no jump
 
 
 def test_hold_drifts_by_millimetres():
@@ -90,7 +90,7 @@ def test_the_speed_changes_on_the_way():
     assert max(sample.position_ned_m[0] for sample in way) < 150.05
 
 
-def test_height_alone_and_yaw_alone_leave_the_rest():
+def test_reposition_of_height_or_yaw_alone_keeps_the_rest():
     flight = Flight().climb_to(10.0)
     flight.autopilot.reposition((nan, nan, -20.0))
     climb = flight.run(9.0)
@@ -103,7 +103,7 @@ def test_height_alone_and_yaw_alone_leave_the_rest():
     assert abs(flight.now.height_m - 20.0) < 0.02
 
 
-def test_told_to_stay_on_the_way_it_brakes_smoothly_and_never_comes_back():
+def test_hold_on_the_way_brakes_smoothly_without_flying_back():
     flight = Flight().climb_to(10.0)
     flight.autopilot.reposition((150.0, 0.0, -10.0), speed_m_s=8.0)
     flight.run(8.0)
@@ -115,7 +115,7 @@ def test_told_to_stay_on_the_way_it_brakes_smoothly_and_never_comes_back():
     assert max(sample.tilt_deg for sample in brake) < 22.0
 
 
-def test_it_looks_where_mpc_yaw_mode_says():
+def test_the_heading_follows_mpc_yaw_mode():
     for mode, yaw_rad in ((1, -3.14159), (2, 0.0), (3, 1.5708), (5, 0.0)):
         flight = Flight(MPC_YAW_MODE=mode).climb_to(5.0)
         flight.autopilot.reposition((0.0, 30.0, -5.0) if mode in (3, 5) else (30.0, 0.0, -5.0))
@@ -123,7 +123,7 @@ def test_it_looks_where_mpc_yaw_mode_says():
         assert yaw_error_deg(flight.now, yaw_rad) < 3.0, mode
 
 
-def test_it_turns_before_it_flies_where_mpc_yaw_mode_says_so():
+def test_mpc_yaw_mode_can_turn_before_flying():
     flight = Flight(MPC_YAW_MODE=4).climb_to(5.0)
     flight.autopilot.reposition((-30.0, 0.0, -5.0))
     flight.take(6.0, lambda: yaw_error_deg(flight.now, 3.14159) < 15.0)
@@ -161,14 +161,14 @@ def test_an_orbit_far_away_is_flown_to_first_and_may_look_along_itself():
 
 
 def returned(flight):
-    """Fly home from here; how long it took and how high it went."""
+    """Return home; the duration and the maximum height."""
     start = len(flight.track)
     assert flight.autopilot.set_mode(FlightMode.RETURN) is CommandResult.ACCEPTED
     took_s = flight.take(120.0, lambda: not flight.armed)
     return took_s, max(sample.height_m for sample in flight.track[start:])
 
 
-def test_return_climbs_comes_home_waits_and_lands():
+def test_return_climbs_flies_home_waits_and_lands():
     flight = Flight(RTL_LAND_DELAY=4.0).climb_to(20.0)
     flight.autopilot.reposition((60.0, 0.0, -20.0))
     flight.run(20.0)
@@ -199,7 +199,7 @@ def test_return_goes_to_a_nearer_rally_point():
 
 
 def follow(flight, seconds, place, velocity):
-    """A target that reports itself once a second; the samples."""
+    """Fly with a target that reports its position once a second; return the samples."""
     samples = []
     for _ in range(seconds):
         flight.autopilot.follow_target((place[0], place[1], 0.0), (*velocity, 0.0))
@@ -212,7 +212,7 @@ def follow(flight, seconds, place, velocity):
 def test_follow_keeps_behind_a_target_that_moves_turns_and_stops():
     flight = Flight().climb_to(5.0)
     flight.autopilot.set_mode(FlightMode.FOLLOW)
-    assert flight.run(2.0)[-1].distance_m() < 0.02  # nobody there yet
+    assert flight.run(2.0)[-1].distance_m() < 0.02  # no target yet
     place = [30.0, 0.0]
     follow(flight, 10, place, (0.0, 0.0))
     assert dist(flight.now.position_ned_m, (22.0, 0.0, -8.0)) < 0.2
@@ -224,11 +224,11 @@ def test_follow_keeps_behind_a_target_that_moves_turns_and_stops():
     assert dist(flight.now.position_ned_m, (place[0], place[1] - 8.0, -8.0)) < 0.3
     assert yaw_error_deg(flight.now, radians(90.0)) < 2.0
     assert max(sample.tilt_deg for sample in turning) < 25.0
-    flight.run(8.0)  # it is silent
+    flight.run(8.0)  # no reports
     assert hypot(*flight.now.velocity_ned_m_s) < 0.02
 
 
-def test_home_elsewhere_is_where_it_returns_to():
+def test_return_flies_to_a_changed_home():
     flight = Flight().climb_to(5.0)
     home = flight.autopilot.global_position()
     flight.autopilot.reposition((10.0, 0.0, -5.0))

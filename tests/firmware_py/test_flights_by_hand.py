@@ -12,7 +12,7 @@ from tests.firmware_py.missions.mission_world import plan, waypoint
 
 
 def by_hand(mode, **parameters):
-    """Armed in a mode, throttle down."""
+    """A vehicle armed in a mode, throttle down."""
     flight = Flight(**parameters)
     flight.steer(0.2, up=-1.0)
     flight.arm(mode)
@@ -20,7 +20,7 @@ def by_hand(mode, **parameters):
 
 
 def lifted(mode, **parameters):
-    """In the air in that mode, throttle in the middle."""
+    """A vehicle in the air in a mode, throttle centred."""
     flight = by_hand(mode, **parameters)
     flight.steer(5.0, up=0.8)
     flight.steer(2.0)
@@ -49,7 +49,7 @@ def test_position_mode_flies_fast_brakes_and_stays():
     assert max(dist(s.position_ned_m, stopped.position_ned_m) for s in flight.steer(8.0)) < 0.05
 
 
-def test_position_mode_back_and_side_have_speeds_of_their_own():
+def test_position_mode_has_other_speeds_backwards_and_sideways():
     flight = lifted(FlightMode.POSITION, MPC_VEL_MAN_BACK=2.0, MPC_VEL_MAN_SIDE=3.0)
     flight.steer(5.0, forward=-1.0)
     assert flight.now.velocity_ned_m_s[0] == pytest.approx(-2.0, abs=0.05)
@@ -57,7 +57,7 @@ def test_position_mode_back_and_side_have_speeds_of_their_own():
     assert flight.now.velocity_ned_m_s[1] == pytest.approx(3.0, abs=0.05)
 
 
-def test_position_mode_turns_on_the_spot_and_ignores_what_is_within_the_dead_zone():
+def test_position_mode_yaws_in_place_and_ignores_the_dead_zone():
     flight = lifted(FlightMode.POSITION, MAN_DEADZONE=0.2)
     here = flight.now.position_ned_m
     flight.steer(2.0, forward=0.15, right=-0.15, up=0.15)
@@ -69,7 +69,7 @@ def test_position_mode_turns_on_the_spot_and_ignores_what_is_within_the_dead_zon
 
 
 @pytest.mark.parametrize("mode", [FlightMode.POSITION, FlightMode.ALTITUDE])
-def test_throttle_down_sinks_slowly_near_the_ground_lands_and_disarms(mode):
+def test_throttle_down_descends_slowly_near_the_ground_lands_and_disarms(mode):
     flight = lifted(mode)
     start = len(flight.track)
     flight.sticks = None
@@ -80,7 +80,7 @@ def test_throttle_down_sinks_slowly_near_the_ground_lands_and_disarms(mode):
     assert abs(flight.now.height_m) < 0.01
 
 
-def test_altitude_mode_tilts_as_told_and_keeps_its_height():
+def test_altitude_mode_tilts_by_the_sticks_and_keeps_its_height():
     flight = lifted(FlightMode.ALTITUDE)
     height_m = flight.now.height_m
     way = flight.steer(4.0, forward=0.5)
@@ -90,7 +90,7 @@ def test_altitude_mode_tilts_as_told_and_keeps_its_height():
 
 
 @pytest.mark.parametrize("mode", [FlightMode.STABILIZED, FlightMode.MANUAL, FlightMode.ACRO])
-def test_without_height_control_the_throttle_carries_tilts_and_lands(mode):
+def test_without_height_control_the_throttle_commands_thrust_and_lands(mode):
     flight = by_hand(mode)
     flight.steer(2.0, up=-1.0)
     assert flight.landed
@@ -107,7 +107,7 @@ def test_without_height_control_the_throttle_carries_tilts_and_lands(mode):
 
 
 def offboard():
-    """In offboard at some height, at rest."""
+    """A vehicle in offboard at rest at a height."""
     flight = Flight()
     flight.send(velocity_ned_m_s=(0.0, 0.0, 0.0))
     flight.run(0.1)
@@ -140,7 +140,7 @@ def test_offboard_climbs_from_the_ground_at_once_when_the_motors_turn():
     assert max(-sample.velocity_ned_m_s[2] for sample in flight.track) < 1.1
 
 
-def test_offboard_position_is_reached_fast_and_not_passed():
+def test_offboard_position_is_reached_fast_without_overshoot():
     flight = offboard()
     start = flight.now
     way = flight.fly(14.0, position_ned_m=(40.0, 30.0, -10.0), yaw_rad=1.0)
@@ -151,7 +151,7 @@ def test_offboard_position_is_reached_fast_and_not_passed():
     assert flight.now.yaw_rad == pytest.approx(1.0, abs=0.01)
 
 
-def test_offboard_velocity_in_the_world_and_in_the_body():
+def test_offboard_velocity_in_ned_and_in_body_axes():
     flight = offboard()
     flight.fly(5.0, velocity_ned_m_s=(3.0, -2.0, 0.5), yaw_rad=2.0)
     assert dist(flight.now.velocity_ned_m_s, (3.0, -2.0, 0.5)) < 0.03
@@ -166,7 +166,7 @@ def test_offboard_velocity_in_the_world_and_in_the_body():
     assert rate_rad_s == pytest.approx(0.5, abs=0.01)
 
 
-def test_offboard_below_the_velocity():
+def test_offboard_acceleration_attitude_rates_and_outputs():
     flight = offboard()
     flight.fly(2.0, acceleration_ned_m_s2=(1.0, 0.0, 0.0))
     assert flight.now.velocity_ned_m_s[0] == pytest.approx(1.8, abs=0.15)
@@ -197,7 +197,7 @@ SWEPT = [mode for mode in FlightMode if mode is not FlightMode.TERMINATION]
 
 
 @pytest.mark.parametrize("first", SWEPT, ids=lambda mode: mode.name.lower())
-def test_any_mode_follows_any_other_at_speed_without_a_jerk(first):
+def test_every_change_of_mode_at_speed_is_smooth(first):
     flight = Flight(COM_RC_OVERRIDE=0)
     far_away = plan(waypoint(900.0, 0.0, 30.0), waypoint(999.0, 0.0, 30.0))
     flight.autopilot.missions.replace(PlanType.MISSION, far_away)

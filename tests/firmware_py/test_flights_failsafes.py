@@ -17,7 +17,7 @@ def offboard(speed_m_s=3.0, **parameters):
 
 
 LOST = [
-    (0, FlightMode.RETURN),  # position mode, but there are no sticks
+    (0, FlightMode.RETURN),  # position mode, but there is no manual control
     (3, FlightMode.RETURN),
     (4, FlightMode.LAND),
     (5, FlightMode.HOLD),
@@ -26,7 +26,7 @@ LOST = [
 
 
 @pytest.mark.parametrize(("action", "mode"), LOST)
-def test_lost_setpoints_lead_where_com_obl_rc_act_says(action, mode):
+def test_lost_setpoints_follow_com_obl_rc_act(action, mode):
     flight = offboard(COM_OBL_RC_ACT=action)
     flight.setpoint = None
     took_s = flight.take(2.0, lambda: flight.mode is not FlightMode.OFFBOARD)
@@ -39,7 +39,7 @@ def test_lost_setpoints_lead_where_com_obl_rc_act_says(action, mode):
     assert flight.mode is (FlightMode.OFFBOARD if mode is not FlightMode.TERMINATION else mode)
 
 
-def test_lost_setpoints_leave_a_pilot_at_the_sticks_in_position_mode():
+def test_lost_setpoints_with_manual_control_enter_position_mode():
     flight = offboard()
     flight.steer(0.1)
     flight.setpoint = None
@@ -62,7 +62,7 @@ def test_a_lost_ground_station_holds_and_then_acts(action, mode):
 
 
 def takeoff_after_one_stick_message(quiet_s=0.05):
-    """Sticks are sent once, then it is armed and told to take off."""
+    """Send sticks once, then arm and take off."""
     flight = Flight()
     flight.autopilot.manual_input(ManualInput(flight.world.time_us))
     flight.run(quiet_s)
@@ -81,7 +81,7 @@ def test_sticks_sent_once_before_arming_let_it_take_off():
     assert abs(flight.now.height_m) < 0.01
 
 
-def test_sticks_that_come_back_after_such_a_takeoff_fly_it():
+def test_sticks_that_return_after_such_a_takeoff_are_used():
     flight = takeoff_after_one_stick_message()
     flight.run(5.0)
     flight.steer(0.1)
@@ -92,7 +92,7 @@ def test_sticks_that_come_back_after_such_a_takeoff_fly_it():
     assert flight.now.speed_m_s > 1.0
 
 
-def test_hold_commanded_on_the_ground_takes_a_takeoff_back():
+def test_hold_commanded_on_the_ground_cancels_a_takeoff():
     flight = Flight()
     flight.arm()
     flight.autopilot.takeoff()
@@ -117,7 +117,7 @@ def test_lost_sticks_hold_and_then_return():
     ("charge", "warning", "mode"),
     [(0.12, 2, FlightMode.HOLD), (0.06, 3, FlightMode.RETURN), (0.03, 4, FlightMode.LAND)],
 )
-def test_a_battery_that_runs_empty(charge, warning, mode):
+def test_a_discharged_battery(charge, warning, mode):
     flight = Flight().climb_to(10.0)
     cell_v = 3.6 + charge * (4.05 - 3.6)  # BAT1_V_EMPTY, BAT1_V_CHARGED
     flight.sensed = lambda sensors: replace(sensors, battery_voltage_v=4 * cell_v, battery_current_a=0.0)
@@ -137,7 +137,7 @@ def test_a_battery_that_runs_empty(charge, warning, mode):
         (5, FlightMode.LAND),
     ],
 )
-def test_a_fence_is_enforced_as_gf_action_says(action, mode):
+def test_a_fence_breach_follows_gf_action(action, mode):
     flight = Flight(GF_MAX_HOR_DIST=20.0, GF_ACTION=action).climb_to(10.0)
     flight.fly(0.02, velocity_ned_m_s=(5.0, 0.0, 0.0))
     flight.take(10.0, lambda: flight.now.distance_m() > 20.0)
@@ -150,7 +150,7 @@ def test_a_fence_is_enforced_as_gf_action_says(action, mode):
 
 
 @pytest.mark.parametrize(("speed_m_s", "drift_m"), [(0.0, 0.1), (3.0, 8.0)])
-def test_without_satellites_it_brakes_descends_and_disarms(speed_m_s, drift_m):
+def test_without_a_position_it_brakes_descends_and_disarms(speed_m_s, drift_m):
     flight = offboard(speed_m_s)
     lost = flight.now
     flight.sensed = without_gps

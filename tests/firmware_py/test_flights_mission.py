@@ -18,13 +18,13 @@ def loaded(*items, **parameters):
 
 
 def near(flight, north_m, east_m, within_m=2.5):
-    """Samples near a place, at whatever height."""
+    """Samples near a place, at any height."""
     return [sample for sample in flight.track if sample.distance_m(north_m, east_m) < within_m]
 
 
 @pytest.fixture(scope="module")
 def flown():
-    """Straight on, a change of speed, round a corner, a delay, home."""
+    """A straight line, a change of speed, a corner, a delay, home."""
     flight = loaded(
         placed(Do.TAKEOFF, 0.0, 0.0, 10.0),
         waypoint(30.0, 0.0, 10.0),
@@ -46,7 +46,7 @@ def test_it_ends_on_the_ground_at_home(flown):
     assert max(sample.height_m for sample in flown.track) == pytest.approx(30.0, abs=0.1)
 
 
-def test_waypoints_straight_on_are_passed_at_full_speed(flown):
+def test_waypoints_in_a_straight_line_are_passed_at_full_speed(flown):
     passed = near(flown, 30.0, 0.0)
     assert passed
     assert min(sample.speed_m_s for sample in passed) > 4.9
@@ -58,7 +58,7 @@ def test_a_corner_is_flown_slowly_and_near(flown):
     assert min(sample.distance_m(60.0, 0.0) for sample in corner) < 1.5
 
 
-def test_the_speed_changes_and_never_is_more(flown):
+def test_the_speed_changes_and_is_never_exceeded(flown):
     leg = [s for s in flown.track if 25.0 < s.position_ned_m[1] < 35.0 and s.mode is FlightMode.MISSION]
     assert max(sample.speed_m_s for sample in leg) == pytest.approx(8.0, abs=0.15)
 
@@ -69,11 +69,11 @@ def test_a_delay_waits_in_place(flown):
     assert min(sample.speed_m_s for sample in waiting) < 0.3
 
 
-def test_it_is_smooth_all_the_way(flown):
+def test_the_flight_is_smooth(flown):
     assert max(sample.tilt_deg for sample in flown.track) < 35.0
 
 
-def test_it_lands_where_the_mission_says_and_pauses_when_told():
+def test_it_lands_at_the_missions_place_and_can_be_paused():
     flight = loaded(
         placed(Do.TAKEOFF, 0.0, 0.0, 5.0), waypoint(25.0, 0.0, 5.0), placed(Do.LAND, 40.0, 5.0, 0.0)
     )

@@ -19,7 +19,7 @@ metres = st.floats(-20_000, 20_000)
 
 
 @given(origin=origins, north=metres, east=metres, down=metres)
-def test_there_and_back_is_the_same_place(origin, north, east, down):
+def test_to_geodetic_and_back_is_the_same_place(origin, north, east, down):
     projection = LocalProjection(origin)
     back = projection.to_local(projection.to_geodetic((north, east, down)))
     assert back == pytest.approx((north, east, down), abs=1e-5)
@@ -31,14 +31,14 @@ def test_the_origin_is_exactly_itself():
     assert projection.to_local(HOME) == (0.0, 0.0, 0.0)
 
 
-def test_a_millimetre_survives():
+def test_a_millimetre_is_resolved():
     projection = LocalProjection(HOME)
     assert projection.to_local(projection.to_geodetic((1e-3, -1e-3, 0.0))) == pytest.approx(
         (1e-3, -1e-3, 0.0), abs=1e-7
     )
 
 
-def test_north_east_and_up_go_where_they_should():
+def test_north_east_and_up_change_the_right_coordinates():
     projection = LocalProjection(HOME)
     degree_m = EARTH_RADIUS_M * radians(1.0)
     north = projection.to_geodetic((100.0, 0.0, 0.0))
@@ -50,8 +50,8 @@ def test_north_east_and_up_go_where_they_should():
     assert east.altitude_m == 499.0
 
 
-def test_distance_from_the_origin_is_true_on_the_sphere():
-    # A quarter of the way round, straight east along the equator.
+def test_distance_from_the_origin_is_exact_on_the_sphere():
+    # A quarter of the circumference, east along the equator.
     projection = LocalProjection(GeodeticPoint(0.0, 0.0, 0.0))
     quarter_m = EARTH_RADIUS_M * radians(90.0)
     assert projection.to_geodetic((0.0, quarter_m, 0.0)).longitude_deg == pytest.approx(90.0)

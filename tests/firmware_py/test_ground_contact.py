@@ -37,11 +37,11 @@ def test_it_boots_on_the_ground_and_stays_there():
     assert Bench().run(5.0, armed=False) is None
 
 
-def test_lift_off_is_seen_at_once_by_its_speed():
+def test_lift_off_is_detected_at_once_by_its_speed():
     assert Bench().run(1.0, down_m_s=-0.2, lifting=True, command=-0.25) == 0.004
 
 
-def test_a_crawling_lift_off_is_seen_by_its_height():
+def test_a_slow_lift_off_is_detected_by_its_height():
     bench = Bench()
     bench.run(0.1)
     seconds = bench.run(2.0, down_m_s=-0.06, lifting=True, command=-0.06)
@@ -49,18 +49,18 @@ def test_a_crawling_lift_off_is_seen_by_its_height():
     assert 0.4 < seconds < 0.6
 
 
-def test_a_climb_that_does_not_move_it_is_no_flight():
+def test_a_commanded_climb_without_motion_is_not_flight():
     assert Bench().run(3.0, lifting=True, command=-0.25) is None
 
 
-def test_a_knock_is_no_flight_but_a_fall_is():
+def test_a_short_impact_is_not_flight_but_a_fall_is():
     bench = Bench()
     assert bench.run(0.05, down_m_s=1.0) is None
     bench.run(0.1)
     assert bench.run(1.0, down_m_s=2.0, armed=False) is not None
 
 
-def test_told_to_descend_and_standing_with_low_thrust_is_ground():
+def test_a_commanded_descent_without_motion_at_low_thrust_is_ground():
     bench = Bench()
     bench.take_off()
     seconds = bench.run(2.0, command=0.5, throttle=0.4 * HOVER)
@@ -86,7 +86,7 @@ def test_a_fast_descent_with_low_thrust_is_flight():
     assert bench.run(5.0, down_m_s=0.25, command=0.25, throttle=0.5 * HOVER) is None
 
 
-def test_held_up_by_its_own_thrust_is_flight():
+def test_carried_by_its_own_thrust_is_flight():
     bench = Bench()
     bench.take_off()
     assert bench.run(2.0, command=0.5, throttle=0.95 * HOVER) is None
@@ -98,7 +98,7 @@ def test_sliding_is_not_standing():
     assert bench.run(2.0, east_m_s=0.5, command=0.5, throttle=0.4 * HOVER) is None
 
 
-def test_after_motors_off_it_falls_in_the_air_and_then_lies_on_the_ground():
+def test_with_motors_off_a_fall_is_flight_until_it_ends():
     bench = Bench()
     bench.take_off()
     assert bench.run(1.0, down_m_s=3.0, armed=False) is None

@@ -50,7 +50,7 @@ def test_body_acceleration_turns_with_the_whole_attitude():
 
 
 @pytest.mark.parametrize("bit", [TargetMask.VX, TargetMask.VY, TargetMask.VZ])
-def test_one_ignored_body_velocity_drops_all_three(bit):
+def test_one_ignored_body_velocity_ignores_all_three(bit):
     assert body((1.0, 1.0, 1.0), BODY_VELOCITY | bit) == INVALID
 
 
@@ -86,7 +86,7 @@ def test_other_frames_are_refused(frame):
     assert refused.text == f"SET_POSITION_TARGET_LOCAL_NED coordinate frame {frame} unsupported"
 
 
-def test_nothing_to_follow_is_refused():
+def test_a_request_without_components_is_refused():
     assert local(0xFFF) == INVALID
     assert body((nan, nan, nan)) == INVALID
     assert body((inf, inf, -inf)) == INVALID
@@ -108,23 +108,23 @@ def test_one_component_not_finite_brakes(make, velocity):
     "mask",
     [
         0xFFF & ~TargetMask.X,  # half a pair
-        0xFFF & ~(TargetMask.X | TargetMask.Y),  # height left open
+        0xFFF & ~(TargetMask.X | TargetMask.Y),  # height not controlled
         0xFFF & ~TargetMask.VZ,  # only height
     ],
 )
-def test_an_axis_left_open_brakes(mask):
+def test_an_uncontrolled_axis_brakes(mask):
     setpoint = local(mask, position_m=(5.0, 5.0, -5.0), velocity_m_s=(1.0, 1.0, 1.0))
     assert setpoint.velocity_ned_m_s == (0.0, 0.0, 0.0)
     assert all_nan(setpoint.position_ned_m)
 
 
-def test_yaw_rate_not_finite_is_no_yaw_rate():
+def test_a_yaw_rate_that_is_not_finite_is_ignored():
     assert isnan(body((1.0, 0.0, 0.0), yaw_rate_rad_s=nan).yaw_rate_rad_s)
     assert isnan(body((1.0, 0.0, 0.0), yaw_rate_rad_s=inf).yaw_rate_rad_s)
 
 
 @given(st.tuples(st.floats(), st.floats(), st.floats()), st.floats(), st.floats(-4, 4))
-def test_the_way_without_packets_gives_the_same(velocity, yaw_rate, heading):
+def test_the_setpoint_without_a_packet_is_the_same(velocity, yaw_rate, heading):
     state = VehicleState(yaw_rad=heading)
     target = LocalTarget(BODY, BODY_VELOCITY, velocity_m_s=velocity, yaw_rate_rad_s=yaw_rate)
     by_message = setpoint_from_target(target, state, 7)
@@ -135,7 +135,7 @@ any3 = st.tuples(st.floats(), st.floats(), st.floats())
 
 
 @given(st.integers(0, 255), st.integers(0, 0xFFFF), any3, any3, any3, st.floats(), st.floats())
-def test_whatever_comes_a_setpoint_is_finite_or_open_and_holds_every_axis(frame, mask, p, v, a, yaw, rate):
+def test_every_setpoint_controls_every_axis_with_finite_values(frame, mask, p, v, a, yaw, rate):
     result = setpoint_from_target(LocalTarget(frame, mask, p, v, a, yaw, rate), STATE, 5)
     if isinstance(result, SetpointRefusal):
         return

@@ -7,6 +7,7 @@ from hypothesis import strategies as st
 from pydantic import ValidationError
 
 from firmware_py.parameters import DECLARATIONS, Parameter, ParameterError, Parameters
+from firmware_py.parameters.reference import reference_page
 
 
 def test_declarations_are_sorted_by_name_without_doubles():
@@ -15,7 +16,7 @@ def test_declarations_are_sorted_by_name_without_doubles():
 
 
 @pytest.mark.parametrize("declared", DECLARATIONS, ids=lambda declared: declared.name)
-def test_each_declaration_has_words_and_a_unit_when_it_is_a_quantity(declared):
+def test_each_declaration_has_a_description_and_a_unit_when_it_is_a_quantity(declared):
     assert declared.description
     assert declared.unit or declared.kind == "int32"
 
@@ -27,7 +28,7 @@ def test_starts_from_defaults_and_takes_given_values():
     assert parameters.integer("COM_OBL_RC_ACT") == 0
 
 
-def test_set_counts_and_tells_only_changes():
+def test_set_counts_and_reports_only_changes():
     parameters = Parameters()
     heard = []
     parameters.on_change(lambda name, value: heard.append((name, value)))
@@ -51,7 +52,7 @@ def test_set_counts_and_tells_only_changes():
             "COM_LOW_BAT_ACT: there is no choice 1; there are 0 Warning, 2 Land mode, "
             "3 Return at critical level, land at emergency level",
         ),
-        ("SYS_AUTOSTART", 10040, "SYS_AUTOSTART: stays 4001; it is a fact of this vehicle"),
+        ("SYS_AUTOSTART", 10040, "SYS_AUTOSTART: is 4001 and cannot be changed"),
         ("NO_SUCH", 1.0, "NO_SUCH: there is no such parameter"),
     ],
 )
@@ -75,7 +76,7 @@ def test_whatever_is_set_stays_in_range(declared, value):
     assert declared.minimum <= parameters.value(declared.name) <= declared.maximum
 
 
-def test_a_declaration_must_hold_together():
+def test_a_declaration_must_be_consistent():
     with pytest.raises(ValidationError, match="outside"):
         Parameter(name="A", kind="float", default=3, minimum=0, maximum=2, description="x")
     with pytest.raises(ValidationError, match="whole"):
@@ -101,7 +102,7 @@ def test_hash_is_the_plain_crc_over_names_and_bytes():
     assert Parameters(declarations=(declared,)).hash() == crc
 
 
-def test_a_vehicles_own_defaults_are_no_changes():
+def test_a_vehicles_own_defaults_do_not_count_as_changes():
     parameters = Parameters({"NAV_DLL_ACT": 3}, defaults={"MPC_THR_HOVER": 0.6, "SYS_AUTOSTART": 10040})
     assert parameters.value("MPC_THR_HOVER") == 0.6
     assert parameters.integer("SYS_AUTOSTART") == 10040
@@ -111,12 +112,12 @@ def test_a_vehicles_own_defaults_are_no_changes():
 
 
 @pytest.mark.parametrize("defaults", [{"MPC_THR_HOVER": 7.0}, {"NO_SUCH": 1.0}, {"SYS_AUTOSTART": nan}])
-def test_a_default_that_cannot_be_is_refused(defaults):
+def test_an_invalid_default_is_refused(defaults):
     with pytest.raises(ParameterError, match=next(iter(defaults))):
         Parameters(defaults=defaults)
 
 
-def test_a_default_that_came_in_four_bytes_is_the_default():
+def test_a_default_received_in_four_bytes_is_the_default():
     parameters = Parameters({"MPC_LAND_SPEED": 1.0})
     parameters.set("MPC_LAND_SPEED", 0.699999988079071)  # 0.7 as MAVLink carries it
     assert parameters.value("MPC_LAND_SPEED") == 0.7
@@ -125,7 +126,7 @@ def test_a_default_that_came_in_four_bytes_is_the_default():
     assert parameters.version == 2
 
 
-def test_reset_tells_each_change():
+def test_reset_reports_each_change():
     parameters = Parameters({"MIS_TAKEOFF_ALT": 1.5, "COM_OBL_RC_ACT": 4})
     heard = []
     parameters.on_change(lambda name, value: heard.append((name, value)))
@@ -134,7 +135,7 @@ def test_reset_tells_each_change():
     assert parameters.changed() == {}
 
 
-def test_choices_and_bits_hold_together():
+def test_choices_and_bits_must_be_consistent():
     with pytest.raises(ValidationError, match="none of its choices"):
         Parameter(
             name="A", kind="int32", default=1, minimum=0, maximum=2, description="x", choices={0: "a", 2: "b"}
@@ -144,7 +145,7 @@ def test_choices_and_bits_hold_together():
 
 
 @pytest.mark.parametrize("declared", DECLARATIONS, ids=lambda declared: declared.name)
-def test_each_declaration_reads_well(declared):
+def test_each_declaration_is_well_written(declared):
     assert declared.description[0].isupper() or declared.description[0].isdigit()
     assert not declared.description.endswith(".")
     assert not declared.details or declared.details.endswith(".")
@@ -157,7 +158,7 @@ def test_each_declaration_reads_well(declared):
 ROOT = Path(__file__).parents[2]
 
 
-def test_what_can_be_changed_is_used_somewhere():
+def test_every_parameter_that_can_be_changed_is_used():
     code = "".join(
         path.read_text(encoding="utf-8")
         for room in ("firmware_py", "sitl")
@@ -166,3 +167,13 @@ def test_what_can_be_changed_is_used_somewhere():
     )
     unused = {each.name for each in DECLARATIONS if not each.constant and f'"{each.name}"' not in code}
     assert unused == set()
+
+
+def test_the_reference_page_is_made_from_the_declarations():
+    page = ROOT / "docs" / "parameters.md"
+    assert page.read_text(encoding="utf-8") == reference_page(), "run `make parameters`"
+
+
+def test_the_reference_page_has_every_parameter():
+    rows = [line for line in reference_page().splitlines() if line.startswith("| `")]
+    assert sorted(row.split("`")[1] for row in rows) == [declared.name for declared in DECLARATIONS]

@@ -1,4 +1,4 @@
-"""What the stabiliser can be told beside a velocity, on both airframes, and changes from one to another."""
+"""Commands other than a velocity, on both airframes, and changes between commands."""
 
 from math import hypot, nan, pi, radians
 
@@ -31,7 +31,7 @@ def hover(request):
     return flight
 
 
-def test_acceleration_tilts_the_thrust_vector_and_leaves_the_velocity_alone():
+def test_an_acceleration_does_not_control_the_velocity():
     hover = Hover(load_airframe("x500"))
     hover.fly(2.0, VelocityCommand())
     samples = hover.fly(1.5, AccelerationCommand((2.0, -1.0, 0.0)))
@@ -61,14 +61,14 @@ def test_tilt_and_yaw_rate_are_held_with_the_vertical_velocity(hover):
     assert turned == pytest.approx(0.5, abs=0.01)
 
 
-def test_a_tilt_asked_for_directly_may_exceed_the_limit_of_velocity_flight():
+def test_a_commanded_tilt_may_exceed_the_limit_of_velocity_flight():
     hover = Hover(load_airframe("x500"))
-    hover.stabiliser.limits.tilt_rad = radians(20)
+    hover.stabiliser.limits.limit_tilt(radians(20))
     last = hover.fly(1.0, AttitudeCommand(radians(40), 0.0, 0.0, 0.7))[-1]
     assert last.state.roll_rad == pytest.approx(radians(40), abs=0.02)
 
 
-def test_thrust_is_a_share_of_all_there_is(hover):
+def test_thrust_is_a_share_of_full_thrust(hover):
     share = hover_share(hover.airframe)
     level = hover.fly(1.0, AttitudeCommand(0.0, 0.0, 0.0, share))[-1]
     assert abs(level.down_m_s) < 0.02
@@ -94,7 +94,7 @@ def test_body_rates_hold_against_an_unknown_moment():
     assert last.state.angular_rate_frd_rad_s == pytest.approx((0.0, 0.0, 0.0), abs=0.01)
 
 
-def test_a_roll_over_the_top_and_back(hover):
+def test_recovery_from_a_roll_beyond_inverted(hover):
     share = hover_share(hover.airframe)
     highest = max(sample.tilt_rad for sample in hover.fly(1.5, BodyRateCommand((4.3, 0.0, 0.0), share)))
     assert highest > radians(120)
@@ -103,7 +103,7 @@ def test_a_roll_over_the_top_and_back(hover):
     assert hypot(*last.state.velocity_ned_m_s) < 0.05
 
 
-def test_actuators_go_straight_through(hover):
+def test_motor_outputs_are_passed_through(hover):
     maximum = hover.airframe.motor.max_speed_rad_s
     output = hover.stabiliser.step(VehicleState(), MotorCommand((0.0, 0.25, 1.0, 4.0)))
     assert output.speeds_rad_s == pytest.approx((0.0, maximum / 2, maximum, maximum))
@@ -111,7 +111,7 @@ def test_actuators_go_straight_through(hover):
 
 
 @pytest.mark.parametrize("outputs", [(), (nan,) * 4, (-1.0,) * 4, (0.0,) * 16])
-def test_odd_actuator_outputs_stop_the_motors(outputs):
+def test_invalid_motor_outputs_stop_the_motors(outputs):
     stabiliser = Stabiliser(load_airframe("x500"), PERIOD_S)
     assert stabiliser.step(VehicleState(), MotorCommand(outputs)).speeds_rad_s == (0.0,) * 4
 
@@ -135,7 +135,7 @@ def others(airframe):
 
 
 @pytest.mark.parametrize("kind", range(5))
-def test_changing_between_commands_makes_no_bump_at_hover(hover, kind):
+def test_changing_between_commands_is_smooth_at_hover(hover, kind):
     hover.fly(0.3, others(hover.airframe)[kind])
     back = hover.fly(1.0, VelocityCommand())
     for sample in hover.samples[450:]:
@@ -144,7 +144,7 @@ def test_changing_between_commands_makes_no_bump_at_hover(hover, kind):
     assert hypot(*back[-1].state.velocity_ned_m_s) < 0.02
 
 
-def test_velocity_is_taken_over_at_speed_without_a_jolt(hover):
+def test_a_change_to_velocity_is_smooth_at_speed(hover):
     speed = 1.5
     steady = hover.fly(6.0, VelocityCommand((speed, 0.0, 0.0)))[-1]
     hover.fly(0.1, TiltCommand(0.0, steady.state.pitch_rad))
@@ -153,7 +153,7 @@ def test_velocity_is_taken_over_at_speed_without_a_jolt(hover):
     assert all(abs(sample.down_m_s) < 0.06 for sample in after)
 
 
-def test_acceleration_feed_forward_helps_a_velocity_along():
+def test_acceleration_feed_forward_quickens_a_velocity():
     for name in NAMES:
         plain, helped = Hover(load_airframe(name)), Hover(load_airframe(name))
         for flight, feed in ((plain, 0.0), (helped, 2.0)):

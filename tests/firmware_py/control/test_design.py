@@ -5,8 +5,15 @@ import numpy as np
 import pytest
 
 from firmware_py.airframe import GRAVITY_M_S2, load_airframe
-from firmware_py.control.design import cost_matrices, design, design_bandwidths
-from firmware_py.control.linear_model import allocation, discretise, hover_model, with_integrals
+from firmware_py.control.design import (
+    cost_matrices,
+    design,
+    design_bandwidths,
+    discretise,
+    hover_model,
+    with_integrals,
+)
+from firmware_py.control.mixer import allocation
 
 PERIOD_S = 0.004
 
@@ -18,7 +25,7 @@ def airframe():
 
 def test_gains_agree_with_python_control(airframe):
     a, b = with_integrals(discretise(hover_model(airframe), PERIOD_S), PERIOD_S)
-    q, r = cost_matrices(airframe, airframe.stabiliser)
+    q, r = cost_matrices(airframe)
     expected, _, poles = control.dlqr(a, b, q, r)
     gains = design(airframe, PERIOD_S)
     np.testing.assert_allclose(np.hstack([gains.kx, gains.ki]), expected, rtol=1e-6, atol=1e-9)
@@ -57,7 +64,7 @@ def test_discretisation_is_the_exact_zero_order_hold(airframe):
     np.testing.assert_allclose(exact.b, expected.B, atol=1e-12)
 
 
-def test_hover_model_has_the_physics_in_it(airframe):
+def test_the_hover_model_has_the_right_signs_and_sizes(airframe):
     model = hover_model(airframe)
     state = np.zeros(8)
     state[1] = -0.1  # nose down
@@ -113,7 +120,7 @@ def test_the_published_gains_are_a_design_for_the_true_arm(airframe):
 
 
 @pytest.mark.parametrize("scale", [0.3, 1.0, 4.0])
-def test_a_heavier_airframe_of_the_same_shape_gets_the_same_poles(airframe, scale):
+def test_a_scaled_airframe_has_the_same_poles(airframe, scale):
     motor = airframe.motor.model_copy(
         update={
             "thrust_n_s2": airframe.motor.thrust_n_s2 * scale,
@@ -139,9 +146,9 @@ def any_airframe(request):
     return load_airframe(request.param)
 
 
-def test_bandwidths_are_python_controls_regulator_without_integrals(any_airframe):
+def test_bandwidths_agree_with_python_control(any_airframe):
     model = discretise(hover_model(any_airframe), PERIOD_S)
-    q, r = cost_matrices(any_airframe, any_airframe.stabiliser)
+    q, r = cost_matrices(any_airframe)
     k, _, poles = control.dlqr(model.a, model.b, q[:8, :8], r)
     loops = design_bandwidths(any_airframe, PERIOD_S)
     i_roll, i_pitch, i_yaw = any_airframe.inertia_kg_m2

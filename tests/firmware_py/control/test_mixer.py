@@ -1,4 +1,4 @@
-"""The mixer gives what was asked where it can, and gives up yaw first."""
+"""The mixer gives the commanded wrench where possible, and cuts yaw first."""
 
 import numpy as np
 import pytest
@@ -6,8 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from firmware_py.airframe import load_airframe
-from firmware_py.control.linear_model import allocation
-from firmware_py.control.mixer import Mixer
+from firmware_py.control.mixer import Mixer, allocation
 
 AIRFRAME = load_airframe("abejorro")
 MIXER = Mixer(AIRFRAME)
@@ -19,7 +18,7 @@ def wrench(mixed):
 
 
 @given(st.floats(0.6, 1.6), st.floats(-0.03, 0.03), st.floats(-0.03, 0.03), st.floats(-0.01, 0.01))
-def test_gives_exactly_what_is_possible(weights, roll, pitch, yaw):
+def test_a_possible_wrench_is_exact(weights, roll, pitch, yaw):
     asked = [weights * AIRFRAME.weight_n, roll, pitch, yaw]
     mixed = MIXER.mix(*asked)
     assert not (mixed.thrust_high or mixed.thrust_low or mixed.yaw_cut)
@@ -27,12 +26,12 @@ def test_gives_exactly_what_is_possible(weights, roll, pitch, yaw):
 
 
 @given(st.floats(-1e3, 1e3), st.floats(-1e3, 1e3), st.floats(-1e3, 1e3), st.floats(-1e3, 1e3))
-def test_speeds_stay_within_limits_whatever_is_asked(thrust, roll, pitch, yaw):
+def test_speeds_stay_within_limits_for_every_wrench(thrust, roll, pitch, yaw):
     speeds = MIXER.mix(thrust, roll, pitch, yaw).speeds_rad_s
     assert all(0.25 * AIRFRAME.hover_speed_rad_s * 0.999 <= speed <= 1650.0 * 1.000001 for speed in speeds)
 
 
-def test_yaw_is_given_up_before_roll_and_thrust():
+def test_yaw_is_cut_before_roll_and_thrust():
     asked = [AIRFRAME.weight_n, 0.02, -0.01, 5.0]
     mixed = MIXER.mix(*asked)
     got = wrench(mixed)
@@ -41,7 +40,7 @@ def test_yaw_is_given_up_before_roll_and_thrust():
     np.testing.assert_allclose(got[:3], asked[:3], atol=1e-9)
 
 
-def test_thrust_is_given_up_before_roll():
+def test_thrust_is_cut_before_roll():
     asked = [60.0, 0.5, 0.0, 0.0]  # more thrust than there is
     mixed = MIXER.mix(*asked)
     got = wrench(mixed)

@@ -1,4 +1,4 @@
-"""The stabiliser flying the JSBSim model: the step responses that were promised."""
+"""Step responses of the stabiliser with the JSBSim model."""
 
 from math import dist, radians
 
@@ -56,7 +56,7 @@ def test_hover_after_flight_comes_to_rest():
     assert max(dist(settled[0].position_ned_m, sample.position_ned_m) for sample in settled) < 0.02
 
 
-def test_velocity_stays_in_turning_axes():
+def test_a_velocity_is_constant_in_turning_level_axes():
     last = fly([(6.0, VelocityCommand((1.0, 0.0, 0.0), 1.0))])[-1]
     assert last.forward_m_s == pytest.approx(1.0, abs=0.01)
     assert last.right_m_s == pytest.approx(0.0, abs=0.01)

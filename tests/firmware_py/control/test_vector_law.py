@@ -1,12 +1,13 @@
-"""The x500 at speed: large tilt, turns, climbs, unknown forces, recoveries."""
+"""The x500 at speed (large tilt, turns, climbs, unknown forces, recoveries), and the disturbance observer."""
 
-from math import cos, degrees, dist, hypot, radians, sin
+from math import cos, degrees, dist, exp, hypot, radians, sin
 
 import pytest
 
 from firmware_py.airframe import load_airframe
 from firmware_py.commands import BodyRateCommand, VelocityCommand
-from tests.flight import Hover
+from firmware_py.control.vector_law import DisturbanceObserver
+from tests.flight import PERIOD_S, Hover
 
 X500 = load_airframe("x500")
 
@@ -64,7 +65,7 @@ def test_to_twelve_metres_a_second_and_back(hover, field, velocity):
     assert radians(43) < max(sample.tilt_rad for sample in faster) < radians(46)
 
 
-def test_diagonal_climb_gives_the_vertical_its_due(hover):
+def test_a_diagonal_climb_keeps_the_vertical_velocity(hover):
     samples = hover.fly(4.0, VelocityCommand((8.0, 4.0, -3.0)))
     assert rise_s(samples, "down_m_s", -3.0) < 0.8
     assert samples[-1].forward_m_s == pytest.approx(8.0, abs=0.05)
@@ -72,7 +73,7 @@ def test_diagonal_climb_gives_the_vertical_its_due(hover):
     assert samples[-1].down_m_s == pytest.approx(-3.0, abs=0.02)
 
 
-def test_a_velocity_in_the_world_is_kept_while_the_nose_turns(hover):
+def test_a_velocity_in_ned_is_kept_while_yawing(hover):
     def eastwards(yaw_rate_rad_s):
         return lambda state: VelocityCommand(
             (12 * sin(state.yaw_rad), 12 * cos(state.yaw_rad), 0.0), yaw_rate_rad_s
@@ -87,7 +88,7 @@ def test_a_velocity_in_the_world_is_kept_while_the_nose_turns(hover):
 
 
 @pytest.mark.parametrize(("speed", "turn_deg_s"), [(5.0, 60.0), (10.0, -30.0)])
-def test_a_velocity_in_turning_axes_turns_with_them(hover, speed, turn_deg_s):
+def test_a_velocity_in_level_axes_turns_with_them(hover, speed, turn_deg_s):
     hover.fly(3.0, VelocityCommand((speed, 0.0, 0.0)))
     turning = hover.fly(5.0, VelocityCommand((speed, 0.0, 0.0), radians(turn_deg_s)))
     assert max(abs(sample.right_m_s) for sample in turning) < 0.9
@@ -95,23 +96,23 @@ def test_a_velocity_in_turning_axes_turns_with_them(hover, speed, turn_deg_s):
     assert turning[-1].right_m_s == pytest.approx(0.0, abs=0.02)
 
 
-def test_an_unknown_force_and_moment_are_learnt_and_then_forgotten(hover):
+def test_an_unknown_force_and_moment_are_learnt_and_unlearnt(hover):
     hover.dynamics.push((4.0, -2.0, -3.0), (0.05, 0.1, 0.02))
     pushed = hover.fly(5.0, VelocityCommand())
     assert hypot(*pushed[-1].state.velocity_ned_m_s) < 0.02
-    assert pushed[-1].tilt_rad > radians(10)  # it leans against the force
+    assert pushed[-1].tilt_rad > radians(10)  # tilted against the force
     hover.dynamics.push((0.0, 0.0, 0.0), (0.0, 0.0, 0.0))
     freed = hover.fly(5.0, VelocityCommand())
     assert hypot(*freed[-1].state.velocity_ned_m_s) < 0.02
     assert freed[-1].tilt_rad < radians(0.5)
 
 
-def test_a_speed_out_of_reach_winds_nothing_up(hover):
-    hover.stabiliser.limits.tilt_rad = radians(10)
+def test_an_unreachable_speed_winds_nothing_up(hover):
+    hover.stabiliser.limits.limit_tilt(radians(10))
     cruise = hover.fly(8.0, VelocityCommand((20.0, 0.0, 0.0)))
     assert max(sample.tilt_rad for sample in cruise) < radians(11)
     assert cruise[-1].forward_m_s < 12.0
-    hover.stabiliser.limits.tilt_rad = radians(90)  # no more than the airframe's own 45 degrees
+    hover.stabiliser.limits.limit_tilt(radians(90))  # no more than the airframe's own 45 degrees
     stop = hover.fly(4.0, VelocityCommand())
     assert max(sample.tilt_rad for sample in stop) < radians(46)
     assert min(sample.forward_m_s for sample in stop) > -0.1
@@ -135,3 +136,50 @@ def test_ten_seconds_of_hover_drift_less_than_two_centimetres(hover):
     samples = hover.fly(10.0, VelocityCommand())
     assert max(dist(samples[0].position_ned_m, sample.position_ned_m) for sample in samples) < 0.02
     assert samples[-1].output.throttle == pytest.approx(0.592, abs=0.002)  # near PX4's MPC_THR_HOVER, 0.6
+
+
+def learn(observer, push, seconds, *, known=0.0, velocity=0.0):
+    for _ in range(round(seconds / PERIOD_S)):
+        observer.correct((velocity, -velocity, 0.0))
+        observer.predict(known, -known, 0.0)
+        velocity += (push + known) * PERIOD_S
+    return velocity
+
+
+def test_learns_a_constant_disturbance_with_a_double_pole():
+    observer = DisturbanceObserver(2.0, PERIOD_S, 10.0)
+    learn(observer, 3.0, 1.0)
+    expected = 3.0 * (1 - exp(-2.0) * (1 + 2.0))
+    assert observer.d[0] == pytest.approx(expected, rel=0.02)
+    assert observer.d[1] == pytest.approx(-expected, rel=0.02)
+    assert observer.d[2] == 0.0
+
+
+def test_an_expected_acceleration_is_not_learnt():
+    observer = DisturbanceObserver(2.0, PERIOD_S, 10.0)
+    learn(observer, 0.0, 2.0, known=5.0)
+    assert observer.d == pytest.approx((0.0, 0.0, 0.0), abs=1e-9)
+
+
+def test_starts_at_any_velocity_without_a_jump():
+    observer = DisturbanceObserver(2.0, PERIOD_S, 10.0)
+    learn(observer, 0.0, 0.1, velocity=12.0)
+    assert observer.d == pytest.approx((0.0, 0.0, 0.0), abs=1e-9)
+
+
+def test_the_estimate_is_limited():
+    observer = DisturbanceObserver(2.0, PERIOD_S, 1.0)
+    learn(observer, 8.0, 3.0)
+    assert observer.d == (1.0, -1.0, 0.0)
+
+
+def test_while_held_it_learns_and_forgets_nothing():
+    observer = DisturbanceObserver(2.0, PERIOD_S, 10.0)
+    velocity = learn(observer, 3.0, 3.0)
+    before = observer.d
+    for _ in range(250):
+        observer.hold((velocity, -velocity, 0.0))
+    observer.correct((velocity, -velocity, 0.0))
+    assert observer.d == before
+    observer.reset()
+    assert observer.d == (0.0, 0.0, 0.0)

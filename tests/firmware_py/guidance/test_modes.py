@@ -49,7 +49,7 @@ def test_limits_are_the_smaller_of_airframe_and_parameters():
 
 
 @given(yaw=st.floats(-pi, pi))
-def test_a_velocity_north_is_seen_from_the_turned_body(yaw):
+def test_a_velocity_north_is_turned_into_level_axes(yaw):
     forward, right, down = offboard(velocity_ned_m_s=(1.0, 0.0, 0.2)).step(at(yaw=yaw)).velocity_level_m_s
     assert (forward, right, down) == pytest.approx((cos(yaw), -sin(yaw), 0.2))
 
@@ -59,7 +59,7 @@ def test_an_axis_without_a_velocity_brakes():
     assert command.velocity_level_m_s == (0.0, 0.4, 0.0)
 
 
-def test_a_position_pulls_and_a_velocity_beside_it_pushes():
+def test_a_velocity_beside_a_position_is_feed_forward():
     guidance = offboard(position_ned_m=(1.0, nan, -1.0), velocity_ned_m_s=(0.3, 0.5, nan))
     assert guidance.step(at(0.5, 7.0, -0.6)).velocity_level_m_s == pytest.approx((0.8, 0.5, -0.4))
 
@@ -73,7 +73,7 @@ def test_speeds_are_limited_and_keep_their_direction():
 @pytest.mark.parametrize(
     ("yaw", "target", "sign"), [(3.0, -3.0, 1), (-3.0, 3.0, -1), (0.1, 0.2, 1), (0.0, 2 * pi - 0.1, -1)]
 )
-def test_yaw_turns_the_shortest_way(yaw, target, sign):
+def test_yaw_takes_the_shorter_turn(yaw, target, sign):
     rate = offboard(velocity_ned_m_s=(0.0, 0.0, 0.0), yaw_rad=target).step(at(yaw=yaw)).yaw_rate_rad_s
     assert rate * sign > 0
     assert abs(rate) <= LIMITS.yaw_rate_rad_s
@@ -89,7 +89,7 @@ def test_yaw_rate_alone_with_yaw_and_neither():
 
 
 @given(position=any_vec3, velocity=any_vec3, yaw=any_float, rate=any_float)
-def test_whatever_is_asked_the_command_is_finite_and_limited(position, velocity, yaw, rate):
+def test_the_command_is_finite_and_limited_for_any_setpoint(position, velocity, yaw, rate):
     guidance = offboard(position_ned_m=position, velocity_ned_m_s=velocity, yaw_rad=yaw, yaw_rate_rad_s=rate)
     command = guidance.step(at(1.0, -2.0, -3.0, yaw=0.5))
     forward, right, down = command.velocity_level_m_s
@@ -111,21 +111,21 @@ def test_what_counts_as_a_setpoint():
     assert not MotorSetpoint(0, outputs=(0.5, nan, 0.5, 0.5)).is_usable
 
 
-def test_infinity_is_not_controlled_and_so_brakes():
-    told = TrajectorySetpoint(0, position_ned_m=(inf, nan, 1.0), velocity_ned_m_s=(inf, 1.0, -inf))
-    safe = told.bounded(LIMITS)
+def test_an_infinite_component_counts_as_not_controlled_and_brakes():
+    setpoint = TrajectorySetpoint(0, position_ned_m=(inf, nan, 1.0), velocity_ned_m_s=(inf, 1.0, -inf))
+    safe = setpoint.bounded(LIMITS)
     assert safe.position_ned_m[0] != safe.position_ned_m[0]
     assert safe.velocity_ned_m_s == (0.0, 1.0, 0.0)
 
 
-def test_hold_brakes_gently_and_then_keeps_the_place():
+def test_hold_brakes_smoothly_and_then_keeps_the_position():
     guidance = limited()
     state = at(velocity=(1.0, 0.0, 0.0), yaw=0.3)
     guidance.enter(State.HOLD, state)
     speeds = []
     for _ in range(500):
         speeds.append(guidance.step(state).velocity_level_m_s[0])
-        state.position_ned_m = guidance._context.traveller.reference.position_ned_m
+        state.position_ned_m = guidance._context.trajectory.reference.position_ned_m
     assert all(after < before + 1e-3 for before, after in pairwise(speeds))
     assert speeds[0] == pytest.approx(cos(0.3), rel=0.01)
     north_m, east_m, _ = guidance.mode.setpoint.position_ned_m
@@ -135,7 +135,7 @@ def test_hold_brakes_gently_and_then_keeps_the_place():
     assert command.yaw_rate_rad_s > 0
 
 
-def test_hold_of_what_stands_keeps_that_very_place():
+def test_hold_at_rest_keeps_the_exact_position():
     guidance = limited()
     guidance.enter(State.HOLD, at(1.0, 2.0, -3.0))
     guidance.step(at(1.0, 2.0, -3.0))
@@ -143,7 +143,7 @@ def test_hold_of_what_stands_keeps_that_very_place():
     assert guidance.step(at(0.5, 2.0, -3.1)).velocity_level_m_s == pytest.approx((0.5, 0.0, 0.1))
 
 
-def test_takeoff_climbs_straight_up_says_when_it_is_there_and_hold_keeps_its_height():
+def test_takeoff_climbs_vertically_reports_its_target_and_hold_keeps_it():
     guidance = limited()
     guidance.enter(State.TAKEOFF, at(1.0, 2.0, 0.0), target_ned_m=(nan, nan, -2.5))
     command = guidance.step(at(1.1, 2.0, 0.0))
@@ -156,14 +156,14 @@ def test_takeoff_climbs_straight_up_says_when_it_is_there_and_hold_keeps_its_hei
     assert guidance.mode.setpoint.position_ned_m == (1.0, 2.0, -2.5)
 
 
-def test_takeoff_to_below_stays():
+def test_takeoff_to_a_lower_height_stays():
     guidance = limited()
     guidance.enter(State.TAKEOFF, at(down=-5.0), target_ned_m=(nan, nan, -2.5))
     assert guidance.step(at(down=-5.0)).velocity_level_m_s == (0.0, 0.0, 0.0)
     assert guidance.mode.target_reached
 
 
-def test_land_descends_ever_faster_to_its_speed_and_keeps_its_place():
+def test_land_accelerates_to_its_speed_and_keeps_the_position():
     guidance = limited()
     guidance.enter(State.LAND, at(1.0, 1.0, -3.0))
     sinks = [guidance.step(at(1.0, 1.0, -3.0)).velocity_level_m_s[2] for _ in range(500)]

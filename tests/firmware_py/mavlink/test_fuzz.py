@@ -9,7 +9,7 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from firmware_py.autopilot import Autopilot
-from firmware_py.control.limits import FlightLimits
+from firmware_py.commands import FlightLimits
 from firmware_py.status import FlightMode
 from firmware_py.types import GeodeticPoint, MotorOutput, Sensors
 from tests.node_input import deliver

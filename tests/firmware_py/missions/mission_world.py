@@ -1,4 +1,4 @@
-"""A simple world that flies missions, and short ways to write them."""
+"""A simple world that flies missions, and helpers to write them."""
 
 from math import atan2, hypot, isnan, nan, remainder, tau
 
@@ -48,7 +48,7 @@ def doing(command, *params, **options):
 
 
 class World:
-    """A point that follows legs at once, with a speed limit."""
+    """A point mass without inertia that flies legs, with a speed limit."""
 
     def __init__(self, items, *, parameters=None, current=None):
         self.parameters = parameters or Parameters()
@@ -103,8 +103,8 @@ class World:
         if leg.kind is LegKind.TAKEOFF:
             to_north, to_east = north, east
         speed = CRUISE_M_S if isnan(leg.speed_m_s) else leg.speed_m_s
-        way = hypot(to_north - north, to_east - east)
-        share = min(1.0, speed * step_s / way) if way else 0.0
+        distance = hypot(to_north - north, to_east - east)
+        share = min(1.0, speed * step_s / distance) if distance else 0.0
         climb = max(-2.0 * step_s, min(2.0 * step_s, to_down - down))
         view.position_ned_m = (
             north + share * (to_north - north),
@@ -112,7 +112,7 @@ class World:
             min(0.0, down + climb),
         )
         view.landed = view.position_ned_m[2] > -0.05
-        ahead = atan2(to_east - east, to_north - north) if way > 1.0 else view.yaw_rad
+        ahead = atan2(to_east - east, to_north - north) if distance > 1.0 else view.yaw_rad
         yaw = ahead if isnan(leg.yaw_rad) else leg.yaw_rad
         turn = remainder(yaw - view.yaw_rad, tau)
         view.yaw_rad += max(-TURN_RAD_S * step_s, min(TURN_RAD_S * step_s, turn))

@@ -65,7 +65,7 @@ def test_missions_that_cannot_be_flown_and_why(makers, text):
     assert checked(*makers) == (False, [text])
 
 
-def test_a_landing_may_come_first_in_flight():
+def test_a_landing_may_be_first_in_flight():
     assert checked(placed(Do.LAND, 0, 0, 0), landed=False)[0]
 
 
@@ -85,7 +85,7 @@ def test_a_far_first_place_is_a_warning_only():
     assert checked(waypoint(0, 200, 10), MIS_DIST_1WP=0.0) == (True, [])
 
 
-def test_without_home_nothing_can_be_said():
+def test_without_home_a_mission_cannot_be_checked():
     assert checked(waypoint(0, 10, 10), home=None) == (
         False,
         ["Not yet ready for mission, no position lock."],

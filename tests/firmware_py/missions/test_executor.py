@@ -30,12 +30,12 @@ def test_a_take_off_item_climbs_straight_up_and_then_flies_to_its_place():
     world.run(until=lambda world: world.legs[-1].kind is not LegKind.TAKEOFF)
     assert world.view.position_ned_m[:2] == pytest.approx((0.0, 0.0), abs=0.1)
     assert -world.view.position_ned_m[2] >= 10.0 - 0.8 - 0.1
-    assert world.reached == []  # the climb alone is no arrival
+    assert world.reached == []  # the climb alone does not count
     world.run()
     assert world.reached == [0, 1]
 
 
-def test_legs_go_on_without_a_stop_unless_an_item_waits():
+def test_legs_continue_without_a_stop_unless_an_item_waits():
     world = World(
         plan(
             waypoint(0, 20, 10),
@@ -78,7 +78,7 @@ def test_the_heading_of_a_waypoint_is_waited_for():
     assert forgiving.view.time_us < world.view.time_us
 
 
-def test_delay_waits_where_it_is():
+def test_delay_waits_in_place():
     world = World(plan(waypoint(0, 10, 10), doing(Do.DELAY, 5), waypoint(0, 30, 10)))
     world.run(until=lambda world: world.store.current == 1)
     began_us = world.view.time_us
@@ -88,7 +88,7 @@ def test_delay_waits_where_it_is():
 
 
 @pytest.mark.parametrize("hold_s", [-1.0, nan, 0.0])
-def test_a_senseless_delay_is_none(hold_s):
+def test_an_invalid_delay_is_ignored(hold_s):
     world = World(plan(waypoint(0, 10, 10), doing(Do.DELAY, hold_s), waypoint(0, 30, 10)))
     world.run()
     assert world.reached == [0, 1, 2]
@@ -128,7 +128,7 @@ def test_a_jump_at_the_end_ends_the_mission_when_used_up():
     assert world.store.finished
 
 
-def test_jumps_in_a_ring_end_the_mission():
+def test_a_loop_of_jumps_ends_the_mission():
     world = World(plan(waypoint(0, 10, 10), doing(Do.JUMP, 2, -1), doing(Do.JUMP, 1, -1)))
     assert world.run().kind is LegKind.DONE
 
@@ -144,7 +144,7 @@ def test_landing_flies_there_first_and_ends_on_the_ground():
     assert world.texts[-1] == "Mission finished, landed"
 
 
-def test_return_hands_over_and_completes():
+def test_a_return_item_switches_to_return_mode_and_completes():
     world = World(plan(waypoint(0, 10, 10), doing(Do.RETURN_TO_LAUNCH)))
     assert world.run().kind is LegKind.RETURN
     assert world.reached == [0, 1]
@@ -225,7 +225,7 @@ def test_pictures_by_distance():
     assert [params[2:4] for _, params in world.commands] == [(1.0, float(n)) for n in range(1, 8)]
 
 
-def test_things_that_are_not_here_are_said_and_passed_over():
+def test_items_for_missing_devices_are_skipped_with_a_text():
     world = World(plan(waypoint(0, 10, 10), doing(Do.GRIPPER, 1, 0), waypoint(0, 20, 10)))
     world.run()
     assert "Mission item 2 does nothing: no such device here" in world.texts
@@ -292,7 +292,7 @@ def test_choosing_an_item_in_flight_jumps_there():
     assert not world.store.select(3)
 
 
-def test_a_new_mission_in_flight_goes_on_at_the_same_index_or_the_marked_one():
+def test_a_new_mission_in_flight_continues_at_the_same_index_or_the_marked_one():
     first = plan(waypoint(0, 20, 10), waypoint(0, 60, 10), waypoint(0, 80, 10))
     second = plan(waypoint(5, 20, 10), waypoint(5, 60, 10), waypoint(5, 80, 10))
     for current, expected in [(None, 60), (0, 20)]:
@@ -320,13 +320,13 @@ def test_a_cleared_mission_holds():
     assert world.texts[-1] == "No valid mission available, loitering"
 
 
-def test_no_valid_mission_is_said_and_nothing_flown():
+def test_without_a_valid_mission_there_is_a_text_and_no_flight():
     world = World([])
     assert world.tick().kind is LegKind.DONE
     assert world.texts == ["No valid mission available, refusing takeoff"]
 
 
-def test_after_disarming_a_finished_mission_begins_again_and_jumps_count_anew():
+def test_after_disarming_a_finished_mission_and_its_jumps_begin_again():
     world = World(
         plan(
             waypoint(0, 10, 10),
@@ -345,7 +345,7 @@ def test_after_disarming_a_finished_mission_begins_again_and_jumps_count_anew():
     assert world.reached == once * 2
 
 
-def test_without_autocontinue_it_stays():
+def test_without_autocontinue_the_mission_waits():
     world = World(plan(waypoint(0, 10, 10, autocontinue=False), waypoint(0, 20, 10)))
     leg = world.run(60.0)
     assert (leg.kind, leg.next_ned_m) == (LegKind.FLY, None)
@@ -353,7 +353,7 @@ def test_without_autocontinue_it_stays():
     assert not world.store.finished
 
 
-def test_an_altitude_left_open_is_the_present_one():
+def test_an_altitude_that_is_not_given_is_the_present_one():
     world = World(plan(waypoint(0, 10, 10), waypoint(0, 40, nan)))
     leg = world.run()
     assert leg.target_ned_m == pytest.approx((0, 40, -10), abs=1e-3)
@@ -366,7 +366,7 @@ def test_heights_move_with_home():
     assert world.tick().target_ned_m == pytest.approx((0, 60, -13), abs=1e-3)
 
 
-def test_a_quiet_step_gives_the_same_leg():
+def test_a_step_without_changes_gives_the_same_leg():
     world = World(plan(waypoint(0, 100, 10), waypoint(0, 200, 10)))
     world.run(until=lambda world: world.view.position_ned_m[1] > 50)
     assert world.tick() is world.tick()

@@ -5,7 +5,7 @@ from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
 from firmware_py.missions.flight import View
-from firmware_py.missions.geofence import BreachKind, Geofence, fence_fault
+from firmware_py.missions.geofence import Geofence, fence_fault
 from firmware_py.missions.items import Do, PlanType
 from firmware_py.missions.store import MissionStore
 from firmware_py.parameters import Parameters
@@ -44,41 +44,37 @@ def test_without_a_fence_everything_is_allowed():
 def test_an_inclusion_polygon_is_named_when_left():
     fence, view, _ = fence_of(*polygon(Do.POLYGON_INCLUSION, SQUARE))
     assert breach_at(fence, view, 19.9, -19.9, 1000) is None
-    breach = breach_at(fence, view, 20.1, 0)
-    assert (breach.kind, breach.text) == (
-        BreachKind.SHAPE,
-        "Geofence violation: outside polygon of items 1 to 4",
-    )
+    assert breach_at(fence, view, 20.1, 0) == "outside polygon of items 1 to 4"
 
 
-def test_all_shapes_count():
+def test_all_shapes_are_checked():
     fence, view, _ = fence_of(
         circle(Do.CIRCLE_INCLUSION, 0, 0, 50), *polygon(Do.POLYGON_EXCLUSION, [(10, 10), (10, 20), (20, 15)])
     )
     assert breach_at(fence, view, 0, 30) is None
-    assert breach_at(fence, view, 13, 15).where == "inside polygon of items 2 to 4"
-    assert breach_at(fence, view, 0, 51).where == "outside circle of item 1"
+    assert breach_at(fence, view, 13, 15) == "inside polygon of items 2 to 4"
+    assert breach_at(fence, view, 0, 51) == "outside circle of item 1"
 
 
 def test_distance_and_height_from_home():
     fence, view, _ = fence_of(GF_MAX_HOR_DIST=30.0, GF_MAX_VER_DIST=20.0)
     assert breach_at(fence, view, 20, 20, 19.9) is None
-    assert breach_at(fence, view, 30, 0).where == "farther from home than 30 m"
-    assert breach_at(fence, view, 0, 0, 20).where == "higher above home than 20 m"
+    assert breach_at(fence, view, 30, 0) == "farther from home than 30 m"
+    assert breach_at(fence, view, 0, 0, 20) == "higher above home than 20 m"
     view.home_ned_m = (100.0, 0.0, -100.0)
     assert breach_at(fence, view, 100, 20, 110) is None
 
 
-def test_parameters_and_plans_act_when_changed():
+def test_changed_parameters_and_plans_take_effect():
     store, parameters = MissionStore(), Parameters()
     view = View(projection=PROJECTION, home_ned_m=(0.0, 0.0, 0.0), position_ned_m=(30.0, 0.0, 0.0))
     fence = Geofence(store, parameters)
     assert fence.check(view) is None
     parameters.set("GF_MAX_HOR_DIST", 25.0)
-    assert fence.check(view).kind is BreachKind.DISTANCE
+    assert fence.check(view) == "farther from home than 25 m"
     parameters.set("GF_MAX_HOR_DIST", 0.0)
     store.replace(PlanType.FENCE, plan(circle(Do.CIRCLE_INCLUSION, 0, 0, 20)))
-    assert fence.check(view).kind is BreachKind.SHAPE
+    assert fence.check(view) == "outside circle of item 1"
     store.clear(PlanType.FENCE)
     assert fence.check(view) is None
 
@@ -96,14 +92,14 @@ def test_parameters_and_plans_act_when_changed():
         ),
     ],
 )
-def test_a_shape_that_home_breaks_is_left_out_and_said(makers, text):
+def test_a_shape_that_home_breaches_is_left_out_with_a_text(makers, text):
     fence, view, _ = fence_of(*makers)
     assert [said.text for said in fence.take_texts()] == [text]
     assert breach_at(fence, view, 0, 0) is None
     assert fence.take_texts() == []
 
 
-def test_a_shape_that_the_vehicle_breaks_at_upload_is_left_out_in_flight_only():
+def test_a_shape_that_the_vehicle_breaches_at_upload_is_left_out_in_flight_only():
     for landed, left_out in [(False, True), (True, False)]:
         fence, view, store = fence_of()
         view.position_ned_m, view.landed = (60.0, 0.0, -5.0), landed
@@ -116,7 +112,7 @@ def test_prediction_looks_ahead_of_a_fast_vehicle():
     ahead, view, _ = fence_of(circle(Do.CIRCLE_INCLUSION, 0, 0, 50), GF_PREDICT=1)
     late, _, _ = fence_of(circle(Do.CIRCLE_INCLUSION, 0, 0, 50))
     view.position_ned_m, view.velocity_ned_m_s = (40.0, 0.0, -5.0), (10.0, 0.0, 0.0)
-    assert ahead.check(view).kind is BreachKind.SHAPE
+    assert ahead.check(view) == "outside circle of item 1"
     assert late.check(view) is None
     view.velocity_ned_m_s = (-10.0, 0.0, 0.0)
     assert ahead.check(view) is None
@@ -148,7 +144,7 @@ def test_faults_of_a_fence(makers, fault):
 
 
 def winding_number(corners, north, east):
-    """How often the polygon goes round a place: the sum of the angles its edges are seen under."""
+    """The winding number of a polygon about a place: the sum of the angles of its edges."""
     angle = 0.0
     bearings = [atan2(corner[1] - east, corner[0] - north) for corner in corners]
     for one, other in zip(bearings, [*bearings[1:], bearings[0]], strict=True):
@@ -157,13 +153,13 @@ def winding_number(corners, north, east):
 
 
 def distance_to_edge(corners, north, east):
-    least = 1e9
+    minimum = 1e9
     for (n1, e1), (n2, e2) in zip(corners, [*corners[1:], corners[0]], strict=True):
         dn, de = n2 - n1, e2 - e1
         length2 = dn * dn + de * de
         share = 0.0 if length2 == 0 else max(0.0, min(1.0, ((north - n1) * dn + (east - e1) * de) / length2))
-        least = min(least, ((north - n1 - share * dn) ** 2 + (east - e1 - share * de) ** 2) ** 0.5)
-    return least
+        minimum = min(minimum, ((north - n1 - share * dn) ** 2 + (east - e1 - share * de) ** 2) ** 0.5)
+    return minimum
 
 
 @settings(max_examples=300)

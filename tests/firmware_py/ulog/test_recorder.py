@@ -1,4 +1,4 @@
-"""Logs of short lockstep flights, read by pyulog and held against the truth."""
+"""Logs of short lockstep flights, read by pyulog and compared with the true states."""
 
 from dataclasses import dataclass
 from io import BytesIO
@@ -33,7 +33,7 @@ class Truth:
 
 
 class Flight:
-    """Takes off, hovers and lands; every tick's truth is kept."""
+    """Take off, hover and land; record every tick's true state."""
 
     def __init__(self, storage=None):
         airframe = load_airframe("abejorro")
@@ -65,7 +65,7 @@ class Flight:
         )
 
     def take_off(self, height_m):
-        """From the first tick on: it can be armed a moment after."""
+        """From the first tick on; arming is possible shortly after."""
         self.run(1.0)
         assert self.autopilot.takeoff(ORIGIN.altitude_m + height_m) is CommandResult.ACCEPTED
         assert self.autopilot.arm() is CommandResult.ACCEPTED
@@ -99,7 +99,7 @@ def columns(data, name, count):
     return np.stack([data[f"{name}[{place}]"] for place in range(count)], axis=1)
 
 
-def test_the_file_is_sound_and_says_whose_it_is(log, flown):
+def test_the_file_is_valid_and_names_the_vehicle(log, flown):
     assert not log.file_corruption
     assert log.dropouts == []
     assert log.msg_info_dict["sys_name"] == "PX4"
@@ -111,7 +111,7 @@ def test_the_file_is_sound_and_says_whose_it_is(log, flown):
     assert log.last_timestamp == pytest.approx(last - 100_000, abs=8000)
 
 
-def test_attitude_position_and_rates_are_the_truth(log, flown):
+def test_attitude_position_and_rates_are_the_true_ones(log, flown):
     by_time = {each.time_us: each for each in flown.truth}
     attitude = log.get_dataset("vehicle_attitude").data
     truth = [by_time[int(time_us)] for time_us in attitude["timestamp"]]
@@ -123,7 +123,7 @@ def test_attitude_position_and_rates_are_the_truth(log, flown):
     for axis, name in enumerate("xyz"):
         assert place[name] == pytest.approx([each.position_ned_m[axis] for each in truth], abs=1e-5)
         assert place["v" + name] == pytest.approx([each.velocity_ned_m_s[axis] for each in truth], abs=1e-5)
-    assert -place["z"].min() > 0.9  # it did fly
+    assert -place["z"].min() > 0.9  # it has flown
 
 
 def test_rates_of_the_topics(log):
@@ -156,7 +156,7 @@ def test_parameters_their_defaults_and_changes(log, flown):
     assert (name, value) == ("MPC_LAND_SPEED", pytest.approx(0.7))
 
 
-def test_texts_come_with_their_level(log):
+def test_texts_have_their_level(log):
     (said,) = log.logged_messages
     assert (said.log_level_str(), said.message) == ("WARNING", "something to worry about")
 
@@ -175,7 +175,7 @@ def test_motors_gps_and_battery(log, flown):
     assert log.get_dataset("battery_status").data["voltage_v"].min() > 10.0
 
 
-# What Flight Review looks up without asking first, or needs for a plot (its plot_app, 2026).
+# Topics that Flight Review requires or plots (its plot_app, 2026).
 FLIGHT_REVIEW = {
     "vehicle_attitude": ["q[0]", "q[3]"],
     "vehicle_angular_velocity": ["xyz[0]", "xyz[2]"],
@@ -204,7 +204,7 @@ FLIGHT_REVIEW = {
 
 
 @pytest.mark.parametrize("topic", FLIGHT_REVIEW)
-def test_what_flight_review_looks_up_is_there(log, topic):
+def test_topics_that_flight_review_reads_exist(log, topic):
     data = log.get_dataset(topic).data
     missing = [name for name in FLIGHT_REVIEW[topic] if name not in data]
     assert missing == []
@@ -225,7 +225,7 @@ def test_a_log_can_be_read_while_it_is_written():
     assert 1.9 < seconds < 2.5
 
 
-def test_an_erased_log_begins_anew():
+def test_an_erased_log_is_begun_again():
     flight = Flight().take_off(1.0).run(1.5)
     flight.storage.remove(PATH)
     flight.storage.remove_folder(PATH[:2])
@@ -236,7 +236,7 @@ def test_an_erased_log_begins_anew():
     assert len(log.get_dataset("vehicle_attitude").data["timestamp"]) > 20
 
 
-def test_the_oldest_log_makes_room_and_a_full_storage_ends_logging_with_a_word():
+def test_the_oldest_log_is_removed_and_a_full_storage_ends_logging_with_a_text():
     storage = MemoryStorage(StorageLimits(total_bytes=60_000))
     for folder in (("log",), ("log", "2026-01-01")):
         storage.make_folder(folder)
@@ -252,7 +252,7 @@ def test_the_oldest_log_makes_room_and_a_full_storage_ends_logging_with_a_word()
     assert storage.entry(PATH).size <= 60_000
 
 
-def test_nothing_is_written_when_nothing_is_to_be_logged():
+def test_nothing_is_written_when_logging_is_off():
     flight = Flight()
     flight.autopilot.parameters.set("SDLOG_MODE", -1)
     flight.take_off(1.0).run(2.0)

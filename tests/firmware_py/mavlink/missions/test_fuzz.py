@@ -10,7 +10,7 @@ from firmware_py.missions.executor import MissionExecutor
 from firmware_py.missions.flight import View
 from firmware_py.missions.geofence import Geofence
 from firmware_py.missions.items import PlanType, opaque_id
-from firmware_py.missions.rally import destination
+from firmware_py.navigator import return_place
 from tests.firmware_py.mavlink.conftest import HOME, FakeAutopilot
 from wire.dialect import mavlink
 
@@ -163,6 +163,6 @@ def fly(autopilot):
         assert all(map(isfinite, leg.target_ned_m))
         view.position_ned_m = leg.target_ned_m
         fence.check(view)
-        assert all(map(isfinite, destination(view, store, autopilot.parameters).position_ned_m))
+        assert all(map(isfinite, return_place(view, store, autopilot.parameters)))
         executor.take_events()
     assert is_whole(store)
