@@ -27,7 +27,7 @@ from wire.simulator_api import REFEREE_PATH, SCENARIO_PATH, VIDEO_PATH
 from wire.transports.urls import is_loopback
 
 if TYPE_CHECKING:
-    from sitl.camera_feed import CameraFeed
+    from sitl.camera import CameraFeed
     from sitl.rtp import RtpSender
     from sitl.video import VideoServer
 
@@ -110,7 +110,7 @@ class ServedDrone:
             VideoError: a port is taken or an address is wrong.
         """
         await asyncio.to_thread(_import_video, rtp=self._settings.video_rtp is not None)
-        from sitl.camera_feed import CameraFeed
+        from sitl.camera import CameraFeed
         from sitl.video import VideoServer
 
         scenario = self.simulation.scenario
@@ -238,5 +238,5 @@ def _seen_from_outside(settings: ServerSettings) -> str:
 
 
 def _import_video(*, rtp: bool) -> None:
-    for module in ("sitl.camera_feed", "aiohttp.web", "sitl.video", *(("sitl.rtp",) if rtp else ())):
+    for module in ("sitl.camera", "aiohttp.web", "sitl.video", *(("sitl.rtp",) if rtp else ())):
         import_module(module)

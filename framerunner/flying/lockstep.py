@@ -19,7 +19,7 @@ from offboard.eyes import CAMERA_DEAD_S, CameraLostError
 from scenarios.models import Scenario
 from scenarios.result import RefereeReport, RefereeSnapshot
 from scenarios.truth import TrueState
-from sitl.camera_feed import CameraFeed
+from sitl.camera import CameraFeed
 from sitl.simulation import Simulation
 from vision.detector import detect
 from vision.types import Detections, Image

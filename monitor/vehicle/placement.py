@@ -5,7 +5,7 @@ from __future__ import annotations
 from enum import IntEnum
 from math import hypot, isfinite
 
-from geometry.alignment import ORIGIN, Alignment, Pose
+from geometry.axes import ORIGIN, Alignment, Pose
 from geometry.vectors import Vec3
 from wire.vehicle_telemetry import PositionReport, VehicleTelemetry
 

@@ -31,7 +31,7 @@ from offboard.mavsdk_drone import MavsdkDrone
 from offboard.mission import Mission
 from scenarios.models import Scenario
 from scenarios.truth import TrueState
-from sitl.camera_feed import CameraFeed
+from sitl.camera import CameraFeed
 from sitl.simulation import Simulation
 from vision.types import CameraFrame
 

@@ -27,7 +27,7 @@ from monitor.ports import Equipment, Message
 from scenarios.loader import list_scenarios, load_scenario
 from scenarios.models import Scenario
 from scenarios.truth import TrueState
-from sitl.camera_feed import CameraFeed
+from sitl.camera import CameraFeed
 from sitl.simulation import Simulation
 from sitl.video import VideoServer
 from sitl.world import CONTROL_PERIOD_US

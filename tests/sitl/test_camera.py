@@ -11,7 +11,7 @@ from geometry.vectors import Quaternion, Vec3
 from scenarios.models import Arena, Base, Camera, Frame, Light, Scenario
 from sitl.camera import Camera as PaintedCamera
 from sitl.camera import Image
-from sitl.camera_mesh import SUBPIXELS, Mesh, Pinhole
+from sitl.camera_projection import SUBPIXELS, Mesh, Pinhole
 from sitl.camera_scene import GROUND_BGR, SKY_BGR, build_scene
 from sitl.solids import Solid, base_solid, frame_solids
 

@@ -5,7 +5,7 @@ import pytest
 
 from scenarios.loader import load_scenario
 from sitl.camera import Camera
-from sitl.camera_drones import DRONE_BGR
+from sitl.camera_scene import DRONE_BGR
 from sitl.solids import Solid
 
 LEVEL = (1.0, 0.0, 0.0, 0.0)

@@ -5,7 +5,7 @@ import pytest
 
 from scenarios.models import Camera, Frame, Scenario
 from scenarios.truth import TrueState
-from sitl.camera_feed import CameraFeed
+from sitl.camera import CameraFeed
 
 TICK_US = 4_000
 
