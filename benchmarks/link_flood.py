@@ -30,7 +30,6 @@ from rich.table import Table
 
 from scenarios.loader import load_scenario
 from sitl import server
-from sitl.pacer import Pacer
 from sitl.server_settings import ServerSettings, parse_link
 from sitl.simulation import Simulation
 from wire.dialect import mavlink
@@ -85,7 +84,7 @@ def flood_bytes() -> dict[str, bytes]:
     return {name: data * max(1, size // max(1, len(data))) for name, data in kinds.items()}
 
 
-class TimedPacer(Pacer):
+class TimedPacer(server.Pacer):
     """Remembers, in seconds, how late each burst of ticks began and how long links were worked on before it.
 
     The first depends on what else the machine does, the second, processor time, does not.

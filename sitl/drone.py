@@ -13,13 +13,13 @@ from firmware_py.mavlink.camera.model import CameraModel, VideoEncoding, VideoSt
 from firmware_py.mavlink.node import MavlinkNode, NodeOptions
 from geometry.axes import flip_vector
 from scenarios.result import LocalFrame, Standing
-from sitl.drone_files import flight_recorder, open_storage
+from sitl.drone_files import PictureAlbum, flight_recorder
 from sitl.link_hub import LinkHub
 from sitl.parameter_file import ParameterKeeper, open_parameters
-from sitl.picture_album import PictureAlbum
 from sitl.server_settings import ServerSettings
 from sitl.simulation import Simulation
 from sitl.solids import Solid
+from sitl.storage import open_storage
 from sitl.time_grants import TimeGrants, Velocity
 from sitl.world import CONTROL_PERIOD_US
 from wire.dialect import mavlink

@@ -24,7 +24,6 @@ INSTALLED_LOCKS = [path for path in LOCKS if path.name != "mavproxy-without.txt"
 # Exceptions from the limits of 20, each with its reason. Take out what is no longer needed; the tests say so.
 LARGE_FOLDERS = {
     "monitor": "the server, its channels and the pilot's seat",
-    "sitl": "world, camera, links and the program that runs them",
 }
 LARGE_CLASSES = {
     "firmware_py/missions/executor.py MissionExecutor": "a method for each kind of mission item",
