@@ -79,7 +79,7 @@ def measure(scenario: Scenario) -> Parts:
     pin_to_one_core()
     cv2.setNumThreads(1)
     simulation = hovering(scenario)
-    raw_s = best(simulation.world._dynamics.run, 20_000)
+    raw_s = best(simulation.world.dynamics.run, 20_000)
     step_s = best(simulation.tick, 5_000) / STEPS_PER_CONTROL
     images: list[Image] = []
     poses: list[Pose] = []

@@ -24,9 +24,9 @@ from sitl.solids import Solid
 Floats = npt.NDArray[np.float64]
 Ints = npt.NDArray[np.int32]
 Point = tuple[float, float]
+Window = tuple[float, float, float, float]  # left, top, right, bottom
 
-SHIFT = 4
-"""Corners are given to OpenCV in sixteenths of a pixel (its `shift` argument)."""
+SHIFT = 4  # OpenCV's argument: corners are given in sixteenths of a pixel
 SUBPIXELS = float(1 << SHIFT)
 _BITS = 2.0 ** np.arange(10)
 _CUT_BITS = 0b00111101  # beyond the near plane or the window
@@ -35,21 +35,13 @@ _FARTHEST = 2.0**24  # sixteenths of a pixel, well within OpenCV's whole numbers
 
 @dataclass(frozen=True, slots=True)
 class Pinhole:
-    """An ideal camera.
-
-    Attributes:
-        width_px: of the image.
-        height_px: of the image.
-        focal_px: focal length.
-        near_m: depth from which on things are seen.
-        far_m: a face wholly beyond this depth is not seen.
-    """
+    """An ideal camera."""
 
     width_px: int
     height_px: int
     focal_px: float
-    near_m: float
-    far_m: float
+    near_m: float  # depth from which on things are seen
+    far_m: float  # a face wholly beyond this depth is not seen
 
     @property
     def centre_px(self) -> Point:
@@ -85,11 +77,7 @@ class MeshFace:
 
 
 class Mesh:
-    """The faces of a scene, ready to be projected.
-
-    Attributes:
-        faces: in the order given.
-    """
+    """The faces of a scene, in the order given, ready to be projected."""
 
     def __init__(self, faces: Sequence[Face], pinhole: Pinhole) -> None:
         stops = np.cumsum([len(face.corners_arena_m) for face in faces]).tolist()
@@ -127,36 +115,27 @@ class Mesh:
 
 @dataclass(frozen=True, slots=True)
 class Projection:
-    """All faces seen from one pose of the camera.
+    """All faces seen from one pose of the camera; u and v in sixteenths of a pixel."""
 
-    Attributes:
-        corners: columns (u w, v w, w, ...), one for every corner.
-        pixels: (u, v) of every corner in sixteenths of a pixel, shape (n, 2); wrong where cuts are needed.
-        seen: per face, 1 if it faces the eye and is not wholly outside the view.
-        to_cut: per face, not 0 if it must be cut.
-        near_m: depth of the near plane.
-        window: left, top, right, bottom to cut at.
-    """
-
-    corners: Floats
-    pixels: Ints
-    seen: bytes
-    to_cut: list[int]
-    near_m: float
-    window: tuple[float, float, float, float]
+    corners: Floats  # columns (u w, v w, w, ...), one for every corner
+    pixels: Ints  # (u, v) of every corner, shape (n, 2); wrong where cuts are needed
+    seen: bytes  # per face, 1 if it faces the eye and is not wholly outside the view
+    to_cut: list[int]  # per face, not 0 if it must be cut
+    near_m: float  # depth of the near plane
+    window: Window
 
     def outline(self, face: MeshFace) -> Ints | None:
         """Corners of a seen face in sixteenths of a pixel, shape (k, 2); None if it is cut away."""
         if not self.to_cut[face.index]:
             return self.pixels[face.start : face.stop]
         points = _clip_near(self.corners[:3, face.start : face.stop].T.tolist(), self.near_m)
-        points = _clip_window(points, *self.window)
+        points = _clip_window(points, self.window)
         if len(points) < 3:
             return None
         return np.array([(round(u), round(v)) for u, v in points], np.int32)
 
 
-def _borders(pinhole: Pinhole, window: tuple[float, float, float, float]) -> Floats:
+def _borders(pinhole: Pinhole, window: Window) -> Floats:
     """The matrix from (u w, v w, w) to itself and the distances from ten borders, shape (13, 3).
 
     A distance below zero is outside. Near and far plane (still to be moved to their depths), the window's
@@ -187,12 +166,13 @@ def _clip_near(corners: Sequence[Sequence[float]], near_m: float) -> list[Point]
     return kept
 
 
-def _clip_window(points: list[Point], left: float, top: float, right: float, bottom: float) -> list[Point]:
+def _clip_window(points: list[Point], window: Window) -> list[Point]:
     """Cut a convex polygon to a window of the image plane; fewer than three corners if nothing is left.
 
     OpenCV takes whole numbers of 32 bits and walks row by row from a polygon's topmost corner, however far
     above the image that is: this keeps it correct and fast.
     """
+    left, top, right, bottom = window
     if all(left <= u <= right and top <= v <= bottom for u, v in points):
         return points
     for a, b, c in ((1.0, 0.0, -left), (-1.0, 0.0, right), (0.0, 1.0, -top), (0.0, -1.0, bottom)):
@@ -224,13 +204,8 @@ def drone_outlines(
 ) -> list[tuple[float, Ints]]:
     """Distance (m) and outline (sixteenths of a pixel, shape (k, 2)) of each drone seen, the farthest first.
 
-    Drones that are behind the camera, too far away or so near that they reach the camera are left out.
-
-    Args:
-        drones: their boxes.
-        eye_arena_m: as of `Pinhole.matrix`.
-        rotation: as of `Pinhole.matrix`.
-        pinhole: the camera.
+    Drones that are behind the camera, too far away or so near that they reach the camera are left out. The
+    drones are given by their boxes, the pose of the camera as for `Pinhole.matrix`.
     """
     matrix = pinhole.matrix(eye_arena_m, rotation)
     limit = 8.0 * max(pinhole.width_px, pinhole.height_px) * SUBPIXELS

@@ -48,40 +48,29 @@ _UP: Vec3 = (0.0, 0.0, 1.0)
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Face:
-    """A convex flat polygon that is seen from one side.
+    """A convex flat polygon that is seen from one side."""
 
-    Attributes:
-        corners_arena_m: shape (k, 3), in order.
-        normal_arena: unit vector to the side it is seen from.
-        colour: as painted, shading included.
-    """
-
-    corners_arena_m: Floats
-    normal_arena: Vec3
-    colour: Bgr
+    corners_arena_m: Floats  # shape (k, 3), in order
+    normal_arena: Vec3  # unit vector to the side it is seen from
+    colour: Bgr  # as painted, shading included
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Body:
-    """A base or a frame.
+    """A base or a frame."""
 
-    Attributes:
-        hull: the box around it.
-        faces: in the order they may be painted: a later one is never hidden by an earlier one.
-    """
-
-    hull: Solid
-    faces: tuple[Face, ...]
+    hull: Solid  # the box around it
+    faces: tuple[Face, ...]  # in an order of painting: a later one is never hidden by an earlier one
 
 
 @dataclass(frozen=True, slots=True)
 class Scene:
-    """All that can be seen: the floor, every second mat of it (darker), shadows on it, base and frames."""
+    """All that can be seen."""
 
-    tatami: Face
-    mats: tuple[Face, ...]
-    shadows: tuple[Face, ...]
-    bodies: tuple[Body, ...]
+    tatami: Face  # the arena's floor
+    mats: tuple[Face, ...]  # every second mat of it, darker
+    shadows: tuple[Face, ...]  # on the floor
+    bodies: tuple[Body, ...]  # base and frames
 
 
 def build_scene(scenario: Scenario) -> Scene:
@@ -226,11 +215,7 @@ class _Node:
 
 
 class PaintTree:
-    """The faces of all bodies and their order of painting.
-
-    Attributes:
-        faces: all faces; some may be parts of the faces given.
-    """
+    """The faces of all bodies, some of them cut in parts, and their order of painting."""
 
     def __init__(self, bodies: Sequence[Body]) -> None:
         self.faces: list[Face] = []

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import errno
 from datetime import UTC, datetime
-from typing import TYPE_CHECKING, Protocol
+from typing import TYPE_CHECKING
 
 from firmware_py.mavlink.camera.model import PictureSpace
 from firmware_py.storage import Path, Storage
 from firmware_py.ulog import UlogRecorder
-from sitl.storage import MEBIBYTE
+from sitl.storage import MEBIBYTE, FolderStorage, MemoryStorage
 
 if TYPE_CHECKING:
     from sitl.camera import Image
@@ -34,14 +34,6 @@ def flight_recorder(storage: Storage, boot_unix_us: int) -> UlogRecorder:
     return UlogRecorder(storage, name_log, boot_unix_us=boot_unix_us)
 
 
-class MeasuredStorage(Storage, Protocol):
-    """A storage that can report how full it is."""
-
-    def space(self) -> tuple[int, int]:
-        """Bytes kept, and bytes that can be kept."""
-        ...
-
-
 class PictureAlbum:
     """Keeps the newest image when a picture is requested: `DCIM/20261120_140559/IMG_00000.jpg` (UTC of boot).
 
@@ -50,7 +42,7 @@ class PictureAlbum:
         boot_unix_us: time of boot in microseconds since 1970.
     """
 
-    def __init__(self, storage: MeasuredStorage, boot_unix_us: int) -> None:
+    def __init__(self, storage: MemoryStorage | FolderStorage, boot_unix_us: int) -> None:
         self._storage = storage
         self._folder: Path = ("DCIM", _utc(boot_unix_us, "%Y%m%d_%H%M%S"))
         self._newest: Image | None = None

@@ -56,9 +56,9 @@ class Failures:
             return False
         for index in range(count) if instance == 0 else (instance - 1,):
             if kind == _OK:
-                self._world.repair_motor(index)
+                self._world.dynamics.repair_motor(index)
             else:
-                self._world.fail_motor(index, stuck=kind == _STUCK)
+                self._world.dynamics.fail_motor(index, stuck=kind == _STUCK)
         return True
 
     def _falsified(self, sensors: Sensors) -> Sensors:
@@ -135,4 +135,4 @@ class Simulation:
         period_us = _BATTERY_PERIOD_US if self._battery_due_us else 0
         self._battery_due_us = time_us + _BATTERY_PERIOD_US
         armed = self.autopilot.status.armed
-        self.battery.step(period_us / 1e6, self.world.motor_speeds_rad_s(), armed=armed)
+        self.battery.step(period_us / 1e6, self.world.dynamics.motor_speeds_rad_s(), armed=armed)

@@ -19,21 +19,13 @@ _CYCLES = ((0, 1, 2), (1, 2, 0), (2, 0, 1))
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Solid:
-    """An upright box.
+    """An upright box."""
 
-    Attributes:
-        name: as in the referee's reports.
-        centre_arena_m: of the box.
-        yaw_rad: its heading, counter-clockwise from arena x.
-        half_extents_m: along its own axes.
-        turn: cosine and sine of the heading.
-    """
-
-    name: str
+    name: str  # as in the referee's reports
     centre_arena_m: Vec3
-    yaw_rad: float
-    half_extents_m: Vec3
-    turn: tuple[float, float] = field(init=False)
+    yaw_rad: float  # counter-clockwise from arena x
+    half_extents_m: Vec3  # along its own axes
+    turn: tuple[float, float] = field(init=False)  # cosine and sine of the yaw
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "turn", (cos(self.yaw_rad), sin(self.yaw_rad)))
@@ -69,17 +61,11 @@ class Solid:
 
 @dataclass(frozen=True, slots=True)
 class Touch:
-    """The overlap of two boxes.
+    """The overlap of two boxes."""
 
-    Attributes:
-        depth_m: along the normal.
-        normal_arena: unit vector from the solid to the drone.
-        point_arena_m: where they touch.
-    """
-
-    depth_m: float
-    normal_arena: Vec3
-    point_arena_m: Vec3
+    depth_m: float  # along the normal
+    normal_arena: Vec3  # unit vector from the solid to the drone
+    point_arena_m: Vec3  # where they touch
 
 
 def frame_solids(frame: Frame) -> tuple[Solid, ...]:

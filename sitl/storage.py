@@ -27,17 +27,11 @@ class StorageFolderError(UserError):
 
 @dataclass(frozen=True, slots=True)
 class StorageLimits:
-    """How much is kept.
+    """How much is kept."""
 
-    Attributes:
-        files: files and folders together.
-        file_bytes: of one file.
-        total_bytes: of all files.
-    """
-
-    files: int = 1000
-    file_bytes: int = 64 * MEBIBYTE
-    total_bytes: int = 256 * MEBIBYTE
+    files: int = 1000  # files and folders together
+    file_bytes: int = 64 * MEBIBYTE  # of one file
+    total_bytes: int = 256 * MEBIBYTE  # of all files
 
 
 class _Usage:
@@ -76,9 +70,7 @@ def open_storage(folder: DiskPath | None, instance: int) -> MemoryStorage | Fold
 
 @dataclass(slots=True)
 class _Node:
-    """A file, or a folder, which has no data; its time of change or birth."""
-
-    data: bytearray | None
+    data: bytearray | None  # None: a folder
     modified_unix_s: int
 
 

@@ -42,7 +42,8 @@ class Drone:
 async def drone_with(*urls):
     drone = Drone()
     try:
-        await drone.hub.open_all([parse_link(url) for url in urls])
+        for url in urls:
+            await drone.hub.open(parse_link(url))
         yield drone
     finally:
         drone.hub.close()

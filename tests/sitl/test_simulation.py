@@ -103,6 +103,7 @@ class FourMotors:
     airframe = SimpleNamespace(rotors=(None,) * 4)
 
     def __init__(self):
+        self.dynamics = self
         self.states = ["works"] * 4
 
     def fail_motor(self, index, *, stuck=False):
