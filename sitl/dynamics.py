@@ -7,7 +7,6 @@ air-relative velocity, so a physics step runs no Python. JSBSim's structural axe
 from __future__ import annotations
 
 import tempfile
-import xml.etree.ElementTree as ET
 from collections.abc import Callable
 from math import degrees, pi
 from pathlib import Path
@@ -17,7 +16,7 @@ import jsbsim
 from errors import UserError
 from firmware_py.airframe import Airframe
 from geometry.rotations import quaternion_from_euler
-from geometry.vectors import Quaternion, Vec3
+from geometry.vectors import ZERO3, Quaternion, Vec3
 
 _METRES_PER_FOOT = 0.3048
 _FEET_PER_METRE = 1 / _METRES_PER_FOOT
@@ -28,8 +27,7 @@ _COMMAND = "fcs/motor{}/command-rad_s"
 _SPEED = "fcs/motor{}/speed-rad_s"
 _TOUCH_FORCES = ("fcs/touch/force-x-n", "fcs/touch/force-y-n", "fcs/touch/force-z-n")
 _TOUCH_MOMENTS = ("fcs/touch/moment-roll-nm", "fcs/touch/moment-pitch-nm", "fcs/touch/moment-yaw-nm")
-_AXES = ("x", "y", "z")
-_UNITS = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
+_UNITS: dict[str, Vec3] = {"x": (1.0, 0.0, 0.0), "y": (0.0, 1.0, 0.0), "z": (0.0, 0.0, 1.0)}
 _AIR_VELOCITY_FPS = ("velocities/u-aero-fps", "velocities/v-aero-fps", "velocities/w-aero-fps")
 _RATE_RAD_S = ("velocities/p-aero-rad_sec", "velocities/q-aero-rad_sec", "velocities/r-aero-rad_sec")
 
@@ -215,127 +213,101 @@ def _ignore(_speed_rad_s: float) -> bool:
 
 def airframe_xml(airframe: Airframe) -> str:
     """The `fdm_config` document of an airframe."""
-    root = ET.Element("fdm_config", name=airframe.name, version="2.0", release="ALPHA")
-    ET.SubElement(root, "fileheader")
-    _metrics(root)
-    _mass_balance(root, airframe)
-    _ground_reactions(root, airframe)
-    _motors(root, airframe)
-    _external_reactions(root, airframe)
-    aerodynamics = ET.SubElement(root, "aerodynamics")  # JSBSim refuses a model without its axes
-    for name in ("DRAG", "SIDE", "LIFT", "ROLL", "PITCH", "YAW"):
-        ET.SubElement(aerodynamics, "axis", name=name)
-    ET.indent(root)
-    return ET.tostring(root, encoding="unicode", xml_declaration=True) + "\n"
+    ixx, iyy, izz = airframe.inertia_kg_m2
+    references = "".join(_location(ZERO3, name) for name in ("AERORP", "EYEPOINT", "VRP"))
+    axes = "".join(f'<axis name="{name}"/>' for name in ("DRAG", "SIDE", "LIFT", "ROLL", "PITCH", "YAW"))
+    return f"""<?xml version="1.0" encoding="UTF-8"?>
+<fdm_config name="{airframe.name}" version="2.0" release="ALPHA">
+<fileheader/>
+<metrics>
+  <wingarea unit="M2">1.0</wingarea> <wingspan unit="M">1.0</wingspan> <chord unit="M">1.0</chord>
+  {references}
+</metrics>
+<mass_balance>
+  <ixx unit="KG*M2">{ixx}</ixx> <iyy unit="KG*M2">{iyy}</iyy> <izz unit="KG*M2">{izz}</izz>
+  <emptywt unit="KG">{airframe.mass_kg}</emptywt>
+  {_location(ZERO3, "CG")}
+</mass_balance>
+<ground_reactions>{_contacts(airframe)}</ground_reactions>
+<system name="motors">{_motors(airframe)}</system>
+<external_reactions>{_external_reactions(airframe)}</external_reactions>
+<aerodynamics>{axes}</aerodynamics> <!-- JSBSim refuses a model without these axes -->
+</fdm_config>
+"""
 
 
-def _value(parent: ET.Element, tag: str, content: float | str, **attributes: str) -> None:
-    text = content if isinstance(content, str) else repr(float(content))
-    ET.SubElement(parent, tag, attributes).text = text
+def _location(position_m: Vec3, name: str = "") -> str:
+    """A position in structural axes."""
+    x, y, z = position_m
+    return f'<location name="{name}" unit="M"><x>{x}</x><y>{y}</y><z>{z}</z></location>'
 
 
-def _location(parent: ET.Element, position_m: Vec3, **attributes: str) -> None:
-    location = ET.SubElement(parent, "location", attributes, unit="M")
-    for axis, value in zip(_AXES, position_m, strict=True):
-        _value(location, axis, value)
-
-
-def _metrics(root: ET.Element) -> None:
-    metrics = ET.SubElement(root, "metrics")
-    _value(metrics, "wingarea", 1.0, unit="M2")
-    _value(metrics, "wingspan", 1.0, unit="M")
-    _value(metrics, "chord", 1.0, unit="M")
-    for name in ("AERORP", "EYEPOINT", "VRP"):
-        _location(metrics, (0.0, 0.0, 0.0), name=name)
-
-
-def _mass_balance(root: ET.Element, airframe: Airframe) -> None:
-    mass = ET.SubElement(root, "mass_balance")
-    for tag, inertia in zip(("ixx", "iyy", "izz"), airframe.inertia_kg_m2, strict=True):
-        _value(mass, tag, inertia, unit="KG*M2")
-    _value(mass, "emptywt", airframe.mass_kg, unit="KG")
-    _location(mass, (0.0, 0.0, 0.0), name="CG")
-
-
-def _ground_reactions(root: ET.Element, airframe: Airframe) -> None:
+def _contacts(airframe: Airframe) -> str:
     """Eight corners of the envelope can touch the ground, so the drone may also land upside down."""
-    ground = ET.SubElement(root, "ground_reactions")
     length, width, height = (extent / 2 for extent in airframe.envelope_m)
     contact = airframe.contact
     corners = [(x, y, z) for z in (-height, height) for x in (-length, length) for y in (-width, width)]
-    for index, (x, y, z) in enumerate(corners):
-        point = ET.SubElement(ground, "contact", type="STRUCTURE", name=f"CORNER{index}")
-        _location(point, (x, y, z))
-        _value(point, "static_friction", contact.friction)
-        _value(point, "dynamic_friction", contact.friction)
-        _value(point, "spring_coeff", contact.stiffness_n_m, unit="N/M")
-        _value(point, "damping_coeff", contact.damping_n_s_m, unit="N/M/SEC")
+    return "".join(
+        f"""
+  <contact type="STRUCTURE" name="CORNER{index}"> {_location(corner)}
+    <static_friction>{contact.friction}</static_friction>
+    <dynamic_friction>{contact.friction}</dynamic_friction>
+    <spring_coeff unit="N/M">{contact.stiffness_n_m}</spring_coeff>
+    <damping_coeff unit="N/M/SEC">{contact.damping_n_s_m}</damping_coeff>
+  </contact>"""
+        for index, corner in enumerate(corners)
+    )
 
 
-def _motors(root: ET.Element, airframe: Airframe) -> None:
-    system = ET.SubElement(root, "system", name="motors")
-    for name in (*_TOUCH_FORCES, *_TOUCH_MOMENTS):
-        _value(system, "property", name, value="0.0")
-    channel = ET.SubElement(system, "channel", name="motors")
-    lag_s = airframe.motor.time_constant_s
-    for index in range(len(airframe.rotors)):
-        command, speed = _COMMAND.format(index), _SPEED.format(index)
-        _value(system, "property", command, value="0.0")
-        tag, gain = ("lag_filter", ("c1", 1 / lag_s)) if lag_s > 0 else ("pure_gain", ("gain", 1.0))
-        component = ET.SubElement(channel, tag, name=speed)
-        _value(component, "input", command)
-        _value(component, *gain)
-        _value(component, "output", speed)
+def _motors(airframe: Airframe) -> str:
+    """The properties that `Dynamics` sets, and the rotors' speeds, which follow their commands with a lag."""
+    lag_s, rotors = airframe.motor.time_constant_s, range(len(airframe.rotors))
+    names = (*_TOUCH_FORCES, *_TOUCH_MOMENTS, *(_COMMAND.format(index) for index in rotors))
+    properties = "".join(f'<property value="0.0">{name}</property>' for name in names)
+    tag, gain = ("lag_filter", f"<c1>{1 / lag_s}</c1>") if lag_s > 0 else ("pure_gain", "<gain>1.0</gain>")
+    filters = "".join(
+        f'<{tag} name="{_SPEED.format(index)}"><input>{_COMMAND.format(index)}</input>'
+        f"{gain}<output>{_SPEED.format(index)}</output></{tag}>"
+        for index in rotors
+    )
+    return f'{properties}<channel name="motors">{filters}</channel>'
 
 
-def _product(parent: ET.Element, factor: float, *properties: str, magnitude_of: str | None = None) -> None:
-    product = ET.SubElement(parent, "product")
-    _value(product, "value", factor)
-    for name in properties:
-        _value(product, "property", name)
+def _product(factor: float, *properties: str, magnitude_of: str | None = None) -> str:
+    factors = "".join(f"<property>{name}</property>" for name in properties)
     if magnitude_of is not None:
-        _value(ET.SubElement(product, "abs"), "property", magnitude_of)
+        factors += f"<abs><property>{magnitude_of}</property></abs>"
+    return f"<product><value>{factor}</value>{factors}</product>"
 
 
-def _reaction(parent: ET.Element, name: str, direction: Vec3, at_m: Vec3 | None) -> ET.Element:
-    """Add a force at a structural position, or a moment (no position); return its `function` element.
-
-    The direction is a unit vector in body FRD.
-    """
-    reaction = ET.SubElement(parent, "moment" if at_m is None else "force", name=name, frame="BODY")
-    function = ET.SubElement(reaction, "function")
-    if at_m is not None:
-        _location(reaction, at_m)
-    element = ET.SubElement(reaction, "direction")
-    for letter, value in zip(_AXES, direction, strict=True):
-        _value(element, letter, value)
-    return function
+def _reaction(tag: str, name: str, direction: Vec3, content: str) -> str:
+    """A force or a moment along a unit vector in body FRD; the content has its function."""
+    x, y, z = direction
+    along = f"<direction><x>{x}</x><y>{y}</y><z>{z}</z></direction>"
+    return f'<{tag} name="{name}" frame="BODY">{content}{along}</{tag}>\n'
 
 
-def _external_reactions(root: ET.Element, airframe: Airframe) -> None:
-    reactions = ET.SubElement(root, "external_reactions")
-    motor = airframe.motor
+def _external_reactions(airframe: Airframe) -> str:
+    """Each rotor's thrust; forces and moments of drag, touch and the rotors' torques on the body's axes."""
+    motor, drag = airframe.motor, airframe.drag
+    reactions, torques = "", ""
     for index, rotor in enumerate(airframe.rotors):
-        speed = _SPEED.format(index)
-        forward, right, down = rotor.position_frd_m
-        function = _reaction(reactions, f"rotor{index}", (0.0, 0.0, -1.0), (-forward, right, -down))
-        _product(function, motor.thrust_n_s2 * _POUNDS_PER_NEWTON, speed, speed)
-
-    for axis, letter in enumerate(_AXES):
-        function = _reaction(reactions, f"body-{letter}", _UNITS[axis], (0.0, 0.0, 0.0))
-        total = ET.SubElement(function, "sum")
-        drag = -airframe.drag.force_n_s2_m2[axis] * _POUNDS_PER_NEWTON / _FEET_PER_METRE**2
-        _product(total, drag, _AIR_VELOCITY_FPS[axis], magnitude_of=_AIR_VELOCITY_FPS[axis])
-        _product(total, _POUNDS_PER_NEWTON, _TOUCH_FORCES[axis])
-
-    for axis, letter in enumerate(_AXES):
-        function = _reaction(reactions, f"body-moment-{letter}", _UNITS[axis], None)
-        total = ET.SubElement(function, "sum")
-        drag = -airframe.drag.moment_nm_s2[axis] * _POUND_FEET_PER_NEWTON_METRE
-        _product(total, drag, _RATE_RAD_S[axis], magnitude_of=_RATE_RAD_S[axis])
-        _product(total, _POUND_FEET_PER_NEWTON_METRE, _TOUCH_MOMENTS[axis])
-        if axis == 2:
-            for index, rotor in enumerate(airframe.rotors):
-                speed = _SPEED.format(index)
-                torque = rotor.yaw_sign * motor.torque_nm_s2 * _POUND_FEET_PER_NEWTON_METRE
-                _product(total, torque, speed, speed)
+        speed, (forward, right, down) = _SPEED.format(index), rotor.position_frd_m
+        thrust = _product(motor.thrust_n_s2 * _POUNDS_PER_NEWTON, speed, speed)
+        content = f"<function>{thrust}</function>{_location((-forward, right, -down))}"
+        reactions += _reaction("force", f"rotor{index}", (0.0, 0.0, -1.0), content)
+        torques += _product(rotor.yaw_sign * motor.torque_nm_s2 * _POUND_FEET_PER_NEWTON_METRE, speed, speed)
+    for axis, (letter, unit) in enumerate(_UNITS.items()):
+        speed, factor = _AIR_VELOCITY_FPS[axis], -drag.force_n_s2_m2[axis] * _POUNDS_PER_NEWTON
+        total = _product(factor / _FEET_PER_METRE**2, speed, magnitude_of=speed)
+        total += _product(_POUNDS_PER_NEWTON, _TOUCH_FORCES[axis])
+        content = f"<function><sum>{total}</sum></function>{_location(ZERO3)}"
+        reactions += _reaction("force", f"body-{letter}", unit, content)
+    for axis, (letter, unit) in enumerate(_UNITS.items()):
+        rate, factor = _RATE_RAD_S[axis], -drag.moment_nm_s2[axis] * _POUND_FEET_PER_NEWTON_METRE
+        total = _product(factor, rate, magnitude_of=rate)
+        total += _product(_POUND_FEET_PER_NEWTON_METRE, _TOUCH_MOMENTS[axis])
+        total += torques if letter == "z" else ""
+        content = f"<function><sum>{total}</sum></function>"
+        reactions += _reaction("moment", f"body-moment-{letter}", unit, content)
+    return reactions
