@@ -42,6 +42,7 @@ Image = npt.NDArray[np.uint8]
 FIRST_EXPOSURE_US = 36_000
 _HAZE_BAND = 0.09  # height of a band of haze above the horizon, as a share of the focal length
 _MARGIN_PX = 2  # painted around the image and cut off: OpenCV is not exact at the border of its canvas
+_INSIDE = (slice(_MARGIN_PX, -_MARGIN_PX), slice(_MARGIN_PX, -_MARGIN_PX))
 _BANDS_BGR = (*SKY_BGR[1:], GROUND_BGR)
 _OVERLAP_PX = 2.0  # of neighbouring bands of colour, so that no gap is seen between them
 _FAR_HEIGHTS = 4.0  # of the image: lines farther away than this are cut before they are painted
@@ -97,7 +98,7 @@ class Camera:
         rotation = _rows(attitude_arena)
         eye = self._eye(position_arena_m, rotation)
         if eye[2] <= 0.0:
-            return self._without_margin(self._underground.copy())
+            return self._underground[_INSIDE].copy()
         canvas = self._sky.copy()
         self._paint_background(canvas, rotation)
         if max(map(abs, eye)) < _FAR_M:
@@ -113,7 +114,7 @@ class Camera:
                 cv2.fillConvexPoly(canvas, outline, DRONE_BGR, cv2.LINE_8, SHIFT)
                 faces = faces[behind:]
             _paint(canvas, projection, faces)
-        return self._without_margin(canvas)
+        return canvas[_INSIDE]
 
     def _count_farther(self, faces: Sequence[MeshFace], eye: Vec3, distance_m: float) -> int:
         """Number of faces, in the order of painting, before the first that is nearer than a distance."""
@@ -121,10 +122,6 @@ class Camera:
             if dist(eye, self._centres_m[face.index]) < distance_m:
                 return count
         return len(faces)
-
-    @staticmethod
-    def _without_margin(canvas: Image) -> Image:
-        return canvas[_MARGIN_PX:-_MARGIN_PX, _MARGIN_PX:-_MARGIN_PX]
 
     def _eye(self, position: Vec3, rotation: RotationRows) -> Vec3:
         if not all(map(isfinite, position)):

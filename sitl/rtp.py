@@ -8,6 +8,7 @@ that a new receiver shows an image within a second.
 from __future__ import annotations
 
 import threading
+from contextlib import suppress
 from fractions import Fraction
 
 import av
@@ -114,27 +115,23 @@ class RtpSender:
                 newest, self._newest = self._newest, None
                 closing = self._closing
             if newest is not None:
-                self._encode(*newest)
+                self._send(self._frame(*newest))
             if closing:
-                self._finish()
-                return
+                break
+        self._send(None)
+        with suppress(av.FFmpegError, OSError):
+            self._container.close()
 
-    def _encode(self, image: Image, time_us: int) -> None:
+    def _frame(self, image: Image, time_us: int) -> av.VideoFrame:
         cut = np.ascontiguousarray(image[: self._height_px, : self._width_px])
         frame = av.VideoFrame.from_ndarray(cut, format="bgr24")
         frame.pts = round(time_us * _CLOCK_HZ / 1e6 / self._speed)
         frame.time_base = Fraction(1, _CLOCK_HZ)
         frame.pict_type = PictureType.NONE
-        try:
+        return frame
+
+    def _send(self, frame: av.VideoFrame | None) -> None:
+        """Send a frame, or what the encoder still holds; lost if the receiver is not reachable now."""
+        with suppress(av.FFmpegError, OSError):
             for packet in self._stream.encode(frame):
                 self._container.mux(packet)
-        except (av.FFmpegError, OSError):
-            pass  # not reachable now; the next image may be
-
-    def _finish(self) -> None:
-        try:
-            for packet in self._stream.encode(None):
-                self._container.mux(packet)
-            self._container.close()
-        except (av.FFmpegError, OSError):
-            pass

@@ -110,7 +110,7 @@ class MemoryStorage:
         """Write into an existing file."""
         file = self._file(path)
         if data:
-            self._resize(path, max(len(file), offset + len(data)))
+            self.truncate(path, max(len(file), offset + len(data)))
             file[offset : offset + len(data)] = data
 
     def create(self, path: Path) -> None:
@@ -122,7 +122,13 @@ class MemoryStorage:
 
     def truncate(self, path: Path, size: int) -> None:
         """Set the size of a file."""
-        self._resize(path, size)
+        file = self._file(path)
+        before = len(file)
+        self._usage.check_size(path, before, size)
+        self._usage.bytes += size - before
+        self._nodes[path].modified_unix_s = int(self._now())
+        del file[size:]
+        file += bytes(max(0, size - before))
 
     def remove(self, path: Path) -> None:
         """Remove a file."""
@@ -184,15 +190,6 @@ class MemoryStorage:
         self._usage.check_count(path)
         self._usage.files += 1
         self._nodes[path] = _Node(data, int(self._now()))
-
-    def _resize(self, path: Path, size: int) -> None:
-        file = self._file(path)
-        before = len(file)
-        self._usage.check_size(path, before, size)
-        self._usage.bytes += size - before
-        self._nodes[path].modified_unix_s = int(self._now())
-        del file[size:]
-        file += bytes(max(0, size - before))
 
 
 class FolderStorage:

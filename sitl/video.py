@@ -64,12 +64,8 @@ class _VideoImage:
 
 def encode_jpeg(image: Image) -> bytes:
     """Compress a BGR image; thin coloured bars keep their colour by full chroma resolution and quality 98."""
-    settings = [
-        cv2.IMWRITE_JPEG_QUALITY,
-        JPEG_QUALITY,
-        cv2.IMWRITE_JPEG_SAMPLING_FACTOR,
-        cv2.IMWRITE_JPEG_SAMPLING_FACTOR_444,
-    ]
+    chroma = (cv2.IMWRITE_JPEG_SAMPLING_FACTOR, cv2.IMWRITE_JPEG_SAMPLING_FACTOR_444)
+    settings = [cv2.IMWRITE_JPEG_QUALITY, JPEG_QUALITY, *chroma]
     done, data = cv2.imencode(".jpg", image, settings)
     if not done:
         raise VideoError(f"an image of shape {image.shape} cannot be compressed")
@@ -92,7 +88,7 @@ class VideoServer:
         self._port = port
         self._newest: _VideoImage | None = None
         self._documents: dict[str, JsonProvider] = {}
-        self._texts: dict[str, tuple[str, str]] = {}
+        self._texts = {"/": ("text/html", _PAGE)}
         self._loop: asyncio.AbstractEventLoop | None = None
         self._runner: web.AppRunner | None = None
         self._arrived = asyncio.Event()
@@ -129,10 +125,9 @@ class VideoServer:
         """
         web = await asyncio.to_thread(import_module, "aiohttp.web")
         app = web.Application()
-        app.router.add_get("/", self._page)
         app.router.add_get(VIDEO_PATH, self._video, allow_head=False)
         app.router.add_get("/image.jpg", self._image)
-        app.router.add_get("/{path:.+}", self._document)
+        app.router.add_get("/{path:.*}", self._document)
         runner = web.AppRunner(app, access_log=None, shutdown_timeout=_CLOSE_S)
         await runner.setup()
         try:
@@ -204,11 +199,6 @@ class VideoServer:
             return web.Response(status=503, text="no image yet\n", headers={"Retry-After": "1"})
         headers = {"X-Time-Us": str(self._newest.time_us), "Cache-Control": "no-store"}
         return web.Response(body=self._newest.compressed(), content_type="image/jpeg", headers=headers)
-
-    async def _page(self, request: web.Request) -> web.Response:
-        from aiohttp import web
-
-        return web.Response(text=_PAGE, content_type="text/html")
 
     async def _document(self, request: web.Request) -> web.Response:
         from aiohttp import web
