@@ -138,14 +138,14 @@ def show_comparison(console: Console, results: Results, job: Job) -> None:
 
 def comparison_row(comparison: Comparison) -> tuple[str, ...]:
     peer, contender = comparison.peer, comparison.contender
-    least, greatest = comparison.spread
+    smallest, largest = comparison.spread
     return (
         f"{contender.name} {peer.version}",
         contender.settings,
         f"{1 / cost(peer):.1f}",
         f"{comparison.ratio:.1f}",
         f">= {contender.target:g} {verdict(comparison.reached)}",
-        f"{least:.1f} - {greatest:.1f}",
+        f"{smallest:.1f} - {largest:.1f}",
         peer.rates,
         peer.renderer.partition(" (")[0],
     )

@@ -36,7 +36,7 @@ _PRESET = {
 
 
 class RtpSender:
-    """Sends a camera's images to one address; they are lost if nobody listens.
+    """Sends a camera's images to one address; they are lost if there is no receiver.
 
     Args:
         remote: host and port; the next port receives RTCP.

@@ -78,7 +78,7 @@ class Simulation:
     """One drone in one scenario.
 
     Args:
-        scenario: what is flown.
+        scenario: the simulated one.
         airframe: the drone; by default the one that the scenario names.
 
     Attributes:

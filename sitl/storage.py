@@ -1,6 +1,6 @@
 """A vehicle's files: in memory, gone with the program, or in a folder on disk.
 
-Both have limits, so that nobody on a link can fill the machine. The folder cannot be left: every name of a
+Both have limits, so that a link cannot fill the machine. The folder cannot be left: every name of a
 path is opened by itself, from the folder down, and none may be a symbolic link.
 """
 

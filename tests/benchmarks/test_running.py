@@ -77,7 +77,7 @@ def write_program(path, text):
 
 @pytest.fixture
 def folder(tmp_path):
-    """An environment whose Python does what a test says, and never reaches for a network."""
+    """An environment whose Python does what a test says, and uses no network."""
     write_program(tmp_path / FOLDER / "bin" / "pip", "exit 1")
     return tmp_path / FOLDER
 
@@ -85,18 +85,18 @@ def folder(tmp_path):
 def test_what_is_installed_is_used_again_without_asking(folder):
     write_program(folder / "bin" / "python", "exit 1")
     (folder / "installed-mujoco").write_text(REQUIREMENTS["mujoco"])
-    said = []
-    assert ensure_peer("mujoco", folder.parent, said.append) == folder / "bin" / "python"
-    assert said == []
+    lines = []
+    assert ensure_peer("mujoco", folder.parent, lines.append) == folder / "bin" / "python"
+    assert lines == []
 
 
 def test_another_requirement_is_installed_and_remembered(folder):
     write_program(folder / "bin" / "python", 'echo "Collecting $*"')
     (folder / "installed-mujoco").write_text("mujoco==1.0")
-    said = []
-    ensure_peer("mujoco", folder.parent, said.append)
-    assert said[0] == f"installing {REQUIREMENTS['mujoco']}"
-    assert said[1].startswith("Collecting -m pip install")
+    lines = []
+    ensure_peer("mujoco", folder.parent, lines.append)
+    assert lines[0] == f"installing {REQUIREMENTS['mujoco']}"
+    assert lines[1].startswith("Collecting -m pip install")
     assert (folder / "installed-mujoco").read_text() == REQUIREMENTS["mujoco"]
 
 

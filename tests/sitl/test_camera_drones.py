@@ -1,4 +1,4 @@
-"""Other drones in the picture."""
+"""Other drones in the image."""
 
 import numpy as np
 import pytest
