@@ -69,7 +69,7 @@ def open_storage(folder: DiskPath | None, instance: int) -> MemoryStorage | Fold
 
 
 @dataclass(slots=True)
-class _Node:
+class _Stored:
     data: bytearray | None  # None: a folder
     modified_unix_s: int
 
@@ -85,7 +85,7 @@ class MemoryStorage:
     def __init__(self, limits: StorageLimits | None = None, now: Callable[[], float] = time.time) -> None:
         self._usage = _Usage(limits or StorageLimits(total_bytes=128 * MEBIBYTE))
         self._now = now
-        self._nodes: dict[Path, _Node] = {(): _Node(None, 0)}
+        self._nodes: dict[Path, _Stored] = {(): _Stored(None, 0)}
 
     def space(self) -> tuple[int, int]:
         """Bytes kept, and bytes that can be kept."""
@@ -170,7 +170,7 @@ class MemoryStorage:
             new + path[depth:] if path[:depth] == old else path: node for path, node in self._nodes.items()
         }
 
-    def _node(self, path: Path) -> _Node:
+    def _node(self, path: Path) -> _Stored:
         if path not in self._nodes:
             raise refuse(errno.ENOENT, path)
         return self._nodes[path]
@@ -189,7 +189,7 @@ class MemoryStorage:
         self._check_folder(path[:-1])
         self._usage.check_count(path)
         self._usage.files += 1
-        self._nodes[path] = _Node(data, int(self._now()))
+        self._nodes[path] = _Stored(data, int(self._now()))
 
 
 class FolderStorage:
