@@ -29,8 +29,8 @@ Floats = npt.NDArray[np.float64]
 
 FRAME_BGR: dict[str, Bgr] = {"red": (0, 0, 255), "green": (0, 255, 0), "blue": (255, 0, 0)}
 # None of these passes the detector's colour test, lit, shaded or after JPEG.
+# The sky's are from the zenith down to the horizon.
 SKY_BGR: tuple[Bgr, ...] = ((222, 206, 190), (224, 210, 196), (226, 214, 202), (228, 218, 208))
-"""From the zenith down to the horizon."""
 GROUND_BGR: Bgr = (132, 134, 134)
 UNDERGROUND_BGR: Bgr = (28, 30, 32)
 TATAMI_BGR: Bgr = (56, 176, 226)
@@ -76,7 +76,7 @@ class Scene:
 def build_scene(scenario: Scenario) -> Scene:
     """Make the faces that the camera paints."""
     light, arena, base = scenario.light, scenario.arena, base_solid(scenario)
-    solids = [base, *(bar for frame in scenario.frames for bar in frame_solids(frame))]
+    solids = [base, *(bar for frame in scenario.frames for bar in _overlapping_bars(frame))]
     return Scene(
         tatami=_on_floor(_rectangle(arena, 0.0, 1.0, 0.0, 1.0), _lit(TATAMI_BGR, _UP, light)),
         mats=_mats(arena, light),
@@ -182,6 +182,13 @@ def _side(half: Vec3, axis: int, sign: int) -> list[Vec3]:
     return corners
 
 
+def _overlapping_bars(frame: Frame) -> list[Solid]:
+    """The four bars of a frame, all of full length, so that their shadows leave no gap between them."""
+    top, bottom, *sides = frame_solids(frame)
+    half_m = (frame.bar_m / 2, frame.bar_m / 2, frame.outer_height_m / 2)
+    return [top, bottom, *(replace(side, half_extents_m=half_m) for side in sides)]
+
+
 def _shadow(solid: Solid, arena: Arena, light: Light) -> list[Face]:
     """The shadow of a solid on the floor; none if the sun does not shine from above."""
     sun = np.array(light.sun_direction_arena)
@@ -197,21 +204,17 @@ def _shadow(solid: Solid, arena: Arena, light: Light) -> list[Face]:
 
 
 @dataclass(frozen=True, slots=True)
-class _Leaf:
-    """Numbers of faces in the order of painting."""
-
-    faces: tuple[int, ...]
-
-
-@dataclass(frozen=True, slots=True)
 class _Node:
-    """A plane normal . p = offset, the faces that lie on it and what is on each side of it."""
+    """A plane normal . p = offset, the faces that lie on it and the trees on each side of it."""
 
     normal: Vec3
     offset: float
-    behind: _Leaf | _Node
+    behind: _Tree
     faces: tuple[int, ...]
-    before: _Leaf | _Node
+    before: _Tree
+
+
+_Tree = tuple[int, ...] | _Node  # a leaf has the numbers of faces in the order of painting
 
 
 class PaintTree:
@@ -227,9 +230,9 @@ class PaintTree:
         _walk(self._root, eye_arena_m, order)
         return order
 
-    def _part_bodies(self, bodies: Sequence[Body]) -> _Leaf | _Node:
+    def _part_bodies(self, bodies: Sequence[Body]) -> _Tree:
         if len(bodies) < 2:
-            return _Leaf(self._keep([face for body in bodies for face in body.faces]))
+            return self._keep([face for body in bodies for face in body.faces])
         plane = _plane_between(bodies)
         if plane is None:
             return self._part_faces([face for body in bodies for face in body.faces])
@@ -238,9 +241,9 @@ class PaintTree:
         near = [body for body in bodies if body not in beyond]
         return _Node(normal, offset, self._part_bodies(beyond), (), self._part_bodies(near))
 
-    def _part_faces(self, faces: list[Face]) -> _Leaf | _Node:
+    def _part_faces(self, faces: list[Face]) -> _Tree:
         if not faces:
-            return _Leaf(())
+            return ()
         chosen = min(faces, key=lambda face: sum(_is_cut(face, other) for other in faces))
         normal, offset = chosen.normal_arena, float(np.dot(chosen.normal_arena, chosen.corners_arena_m[0]))
         behind: list[Face] = []
@@ -265,14 +268,14 @@ class PaintTree:
         return tuple(range(first, len(self.faces)))
 
 
-def _walk(tree: _Leaf | _Node, eye: Vec3, order: list[int]) -> None:
+def _walk(tree: _Tree, eye: Vec3, order: list[int]) -> None:
     while isinstance(tree, _Node):
         normal = tree.normal
         above = normal[0] * eye[0] + normal[1] * eye[1] + normal[2] * eye[2] > tree.offset
         _walk(tree.behind if above else tree.before, eye, order)
         order.extend(tree.faces)
         tree = tree.before if above else tree.behind
-    order.extend(tree.faces)
+    order.extend(tree)
 
 
 def _plane_between(bodies: Sequence[Body]) -> tuple[Vec3, float] | None:

@@ -52,17 +52,11 @@ class PictureAlbum:
         self._newest = image
 
     def capture(self, time_us: int, index: int) -> str | None:
-        """Keep the newest image.
+        """Keep the newest image under a number, and return its address for MAVLink FTP at component 1.
 
-        Args:
-            time_us: vehicle time; not used, as the newest image is at most a period old.
-            index: of the picture.
-
-        Returns:
-            Its address for MAVLink FTP at component 1; empty if the storage is full; None before the first
-            image.
+        The address is empty if the storage is full, and None before the first image.
         """
-        del time_us
+        del time_us  # the newest image is at most a period old
         if self._newest is None:
             return None
         from sitl.video import encode_jpeg  # not earlier: telemetry must not wait for its imports

@@ -13,15 +13,12 @@ from fractions import Fraction
 
 import av
 import numpy as np
-import numpy.typing as npt
 from av.video.frame import PictureType
 from av.video.stream import VideoStream
 
 from scenarios.models import Camera
-from sitl.video import VideoError
+from sitl.video import Image, VideoError
 from wire.transports.sockets import Address, resolved_ipv4
-
-Image = npt.NDArray[np.uint8]
 
 PAYLOAD_TYPE = 96  # the first of the dynamic types
 _CLOCK_HZ = 90_000  # RTP's, for video
