@@ -1,4 +1,4 @@
-"""The benchmarks in one command: what a flight of ours costs, part by part, and beside its peers.
+"""The benchmarks in one command: what our flight costs, part by part, and beside its peers.
 
     python -m benchmarks [--peers none|mujoco|pyflyt|all] [--repeats 3] [--json FILE]
 
@@ -14,10 +14,8 @@ from pathlib import Path
 
 from rich.console import Console
 
-from benchmarks.compare import BadResultError
-from benchmarks.contenders import IMAGE_RATES_HZ, chosen
-from benchmarks.parts import part_rows
-from benchmarks.report import as_json, machine, show_comparison, show_parts
+from benchmarks.compare import IMAGE_RATES_HZ, BadResultError, chosen
+from benchmarks.report import as_json, machine, part_rows, show_comparison, show_parts
 from benchmarks.run import compare_all, job_for, measure_parts
 from scenarios.loader import load_scenario
 from scenarios.models import Scenario, ScenarioError
@@ -29,7 +27,7 @@ EXIT_INTERRUPTED = 130
 
 
 def main() -> int:
-    """Measure, show, write down; return the exit code."""
+    """Measure, show, save; return the exit code."""
     options = read_options()
     console = Console(width=None if sys.stdout.isatty() else 130)
     try:
@@ -47,7 +45,7 @@ def read_options() -> argparse.Namespace:
     """Read and check the command line."""
     parser = argparse.ArgumentParser(prog="python -m benchmarks", description=__doc__.partition("\n")[0])
     parser.add_argument(
-        "--peers", default="all", choices=("none", "mujoco", "pyflyt", "all"), help="whom to compare with"
+        "--peers", default="all", choices=("none", "mujoco", "pyflyt", "all"), help="compared with ours"
     )
     parser.add_argument("--repeats", type=int, default=3, metavar="N", help="pairs of flights (default 3)")
     parser.add_argument("--image-rate", type=int, default=10, choices=IMAGE_RATES_HZ, help="Hz (default 10)")
@@ -66,7 +64,7 @@ def read_options() -> argparse.Namespace:
 
 
 def measure(options: argparse.Namespace, scenario: Scenario, console: Console) -> int:
-    """Measure all that was asked for, showing each part when it is there."""
+    """Measure what the options select, showing each part when it is ready."""
     job = job_for(scenario, options.scenario, options.seconds, options.image_rate)
     if options.pictures:
         options.pictures.mkdir(parents=True, exist_ok=True)
@@ -92,7 +90,7 @@ def measure(options: argparse.Namespace, scenario: Scenario, console: Console) -
 
 
 def keep_pictures(folder: Path) -> None:
-    """Turn the images that the programs left into PNG files."""
+    """Convert the images that the programs saved to PNG files."""
     import cv2
     import numpy as np
 

@@ -1,14 +1,15 @@
-"""Whole flights over bad links, in simulated time: what became of them, and how near the box they came.
+"""Whole flights over bad links, in simulated time: how they ended and how near they came to the box's limits.
 
     python -m benchmarks.bad_links --mission careful_crossing --scenario test-case-1 --seeds 20
 
-The quick selection that is tested stands in `tests/framerunner/test_bad_links.py`.
+The quick selection that is tested is `tests/framerunner/test_bad_links.py`.
 """
 
 from __future__ import annotations
 
 import argparse
 from collections import Counter
+from math import isfinite
 
 from joblib import Parallel, delayed
 
@@ -19,25 +20,32 @@ from tests.framerunner.test_bad_links import IMPAIRMENTS, silence_later
 
 
 def fly(name: str, scenario: str, mission: str, seed: int) -> tuple[str, float, float, float, bool]:
-    """One flight: how it ended, m outside, least height, seconds kept in the box, whether it ended safely."""
+    """One flight: how it ended, m outside, minimum height, s limited by the box, whether it ended safely."""
     flight = fly_over(
         silence_later(IMPAIRMENTS[name], 5 * seed), load_scenario(scenario), load_mission(mission), seed=seed
     )
-    return (
-        _end(flight),
-        flight.farthest_outside_m,
-        flight.lowest_m(),
-        flight.outcome.kept_in_box_s,
-        flight.ended_safely,
-    )
+    kept_s = flight.outcome.kept_in_box_s
+    return end_of(flight), flight.farthest_outside_m, flight.lowest_m(), kept_s, flight.ended_safely
 
 
-def _end(flight: LinkedFlight) -> str:
-    crossed = f"{len(flight.frames)} frames"
+def end_of(flight: LinkedFlight) -> str:
     if flight.outcome.ended == "finished":
-        return f"completed, {crossed}"
+        return f"completed, {len(flight.frames)} frames"
     reason = "link lost" if flight.outcome.reason.startswith("link lost") else flight.outcome.reason[:40]
     return f"{reason}: {flight.mode.name}"
+
+
+def summary(rows: list[tuple[str, float, float, float, bool]]) -> str:
+    """One line about all flights over one kind of link."""
+    ends = ", ".join(f"{count} {end}" for end, count in Counter(row[0] for row in rows).most_common())
+    _, outside_m, height_m, kept_s, safely = zip(*rows, strict=True)
+    farthest_m, lowest_m = max(outside_m), min(height_m)
+    box = f"at most {farthest_m:.2f} m outside" if farthest_m > 0 else f"at least {-farthest_m:.2f} m inside"
+    height = f"at least {lowest_m:.2f} m high" if isfinite(lowest_m) else "no drone left its start"
+    return (
+        f"{sum(safely)} of {len(rows)} ended safely; {box} the box, {height}, "
+        f"limited for {max(kept_s):.1f} s; {ends}"
+    )
 
 
 def main() -> None:
@@ -50,14 +58,7 @@ def main() -> None:
     given = parser.parse_args()
     for name in IMPAIRMENTS:
         work = (delayed(fly)(name, given.scenario, given.mission, seed) for seed in range(given.seeds))
-        rows = Parallel(n_jobs=given.jobs)(work)
-        ends = ", ".join(f"{count} {end}" for end, count in Counter(row[0] for row in rows).most_common())
-        _, outside_m, height_m, kept_s, safely = zip(*rows, strict=True)
-        print(
-            f"{name}: {sum(safely)} of {len(rows)} ended safely; at most {max(outside_m):.2f} m outside the "
-            f"box, at least {min(height_m):.2f} m high, limited for {max(kept_s):.1f} s; {ends}",
-            flush=True,
-        )
+        print(f"{name}: {summary(Parallel(n_jobs=given.jobs)(work))}", flush=True)
 
 
 if __name__ == "__main__":

@@ -1,4 +1,4 @@
-"""From the lines that programs print to ratios. Pure: nothing is run here."""
+"""The contenders, and from the lines that programs print to ratios. Pure: nothing is run here."""
 
 from __future__ import annotations
 
@@ -7,17 +7,51 @@ from collections.abc import Iterable
 from dataclasses import dataclass, fields
 from typing import Any
 
-from benchmarks.contenders import Contender
 from benchmarks.peers.job import Flight, Goal, Job
 
-IMAGES_MAY_DIFFER = 2  # at the ends of a flight: exposures are on grids of their own
-LEAST_CONTRAST = 1.0  # of 255; a grey image is none
-GREATEST_MISS_M = 1.0
+IMAGE_RATES_HZ = (5, 10, 30)  # rates at which all programs can take images
+MAX_IMAGES_MISSING = 2  # at the ends of a flight: each program has its own grid of exposures
+MIN_CONTRAST = 1.0  # of 255; a plain grey image has none
+MAX_MISS_M = 1.0
 GOAL_EVERY_S = 2.0
 
 
 class BadResultError(Exception):
     """What a program printed cannot be used; the message is one line."""
+
+
+@dataclass(frozen=True, slots=True)
+class Contender:
+    """A peer with its settings."""
+
+    peer: str  # key of its package
+    name: str  # as shown
+    variant: str  # key of its settings, for its module
+    settings: str  # as shown
+    module: str  # runs it, in the peers' environment
+    target: float  # how many times cheaper our flight should be
+
+    @property
+    def key(self) -> str:
+        """Names it in files."""
+        return f"{self.peer}-{self.variant}"
+
+
+_MUJOCO = "benchmarks.peers.mujoco_flight"
+_PYFLYT = "benchmarks.peers.pyflyt_flight"
+
+CONTENDERS = (
+    Contender("mujoco", "MuJoCo", "default", "as it comes", _MUJOCO, 4.0),
+    Contender("mujoco", "MuJoCo", "alike", "drawn like ours", _MUJOCO, 4.0),
+    Contender("mujoco", "MuJoCo", "fastest", "fastest", _MUJOCO, 4.0),
+    Contender("pyflyt", "PyFlyt", "default", "as it comes", _PYFLYT, 15.0),
+    Contender("pyflyt", "PyFlyt", "fastest", "fastest", _PYFLYT, 15.0),
+)
+
+
+def chosen(peers: str) -> tuple[Contender, ...]:
+    """The contenders of a choice: "none", "all" or the key of one peer."""
+    return tuple(each for each in CONTENDERS if peers in ("all", each.peer))
 
 
 @dataclass(frozen=True, slots=True)
@@ -47,13 +81,13 @@ class Comparison:
 
     @property
     def spread(self) -> tuple[float, float]:
-        """The least and the greatest ratio of a single pair."""
+        """The smallest and the largest ratio of a single pair."""
         ratios = [cost(pair.peer) / cost(pair.ours) for pair in self.pairs]
         return min(ratios), max(ratios)
 
     @property
     def reached(self) -> bool:
-        """Whether our flight is as much cheaper as it is to be."""
+        """Whether our flight is as much cheaper as it should be."""
         return self.ratio >= self.contender.target
 
 
@@ -63,7 +97,7 @@ def cost(flight: Flight) -> float:
 
 
 def best(flights: Iterable[Flight]) -> Flight:
-    """The cheapest; what else the machine does makes a flight dearer, never cheaper."""
+    """The cheapest flight; other load on the machine only makes flights more expensive."""
     return min(flights, key=cost)
 
 
@@ -102,8 +136,8 @@ def last_object(output: str) -> dict[str, Any]:
     return values
 
 
-def least(runs: list[dict[str, Any]]) -> dict[str, Any]:
-    """The least of every number of several runs; what is no number is the same in all."""
+def minima(runs: list[dict[str, Any]]) -> dict[str, Any]:
+    """The minimum of every number over several runs; other values are the same in all."""
     first = runs[0]
     return {
         key: min(run[key] for run in runs) if isinstance(value, int | float) else value
@@ -112,17 +146,17 @@ def least(runs: list[dict[str, Any]]) -> dict[str, Any]:
 
 
 def check_flight(flight: Flight, job: Job) -> None:
-    """See that a flight did the job that it was timed for.
+    """Check that a flight did the job that it was timed for.
 
     Raises:
-        BadResultError: images are missing or empty, or the drone is somewhere else.
+        BadResultError: images are missing or empty, or the drone is not where it was sent.
     """
     wanted = job.seconds * job.image_rate_hz
-    if abs(flight.images - wanted) > IMAGES_MAY_DIFFER:
+    if abs(flight.images - wanted) > MAX_IMAGES_MISSING:
         raise BadResultError(f"{flight.images} images delivered instead of {wanted:g}")
-    if flight.contrast < LEAST_CONTRAST:
+    if flight.contrast < MIN_CONTRAST:
         raise BadResultError("its last image shows nothing")
-    if flight.miss_m > GREATEST_MISS_M:
+    if flight.miss_m > MAX_MISS_M:
         raise BadResultError(f"its drone ended {flight.miss_m:.1f} m from where it was sent")
 
 
@@ -130,20 +164,12 @@ def goals_along(path: tuple[tuple[float, ...], ...]) -> tuple[Goal, ...]:
     """Turn a flight into steps of position: every two seconds to where it was two seconds later.
 
     Args:
-        path: time (s), x, y, z (m), yaw (rad), in order of time.
-
-    Returns:
-        The start, then the steps.
+        path: time (s), x, y, z (m), yaw (rad), in order of time; its first point becomes the first goal.
     """
-    goals = [_goal(0.0, path[0])]
+    goals = [Goal(0.0, path[0][1:4], path[0][4])]
     next_s = GOAL_EVERY_S
-    for point in path:
-        if point[0] >= next_s:
-            goals.append(_goal(next_s - GOAL_EVERY_S, point))
+    for time_s, x, y, z, yaw_rad in path:
+        if time_s >= next_s:
+            goals.append(Goal(next_s - GOAL_EVERY_S, (x, y, z), yaw_rad))
             next_s += GOAL_EVERY_S
     return tuple(goals)
-
-
-def _goal(time_s: float, point: tuple[float, ...]) -> Goal:
-    _, x, y, z, yaw_rad = point
-    return Goal(time_s, (x, y, z), yaw_rad)

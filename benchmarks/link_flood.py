@@ -2,10 +2,10 @@
 
     python -m benchmarks.link_flood [--rate 10] [--seconds 4]
 
-For each kind of link and each kind of bytes: the latest control tick, the longest that the links kept the
-processor between two ticks, the share of real time reached, and how many sound packets were heard of those
-sent amid the flood and of those sent on a second link. The sender is a process of its own. Uses the fixed
-ports of `framerunner sim`.
+For each kind of link and each kind of bytes: the latest control tick, the longest processor time that links
+took between two ticks, the share of real time reached, and how many valid packets were received of those sent
+amid the flood and of those sent on a second link. The sender is a process of its own. Uses the fixed ports of
+`framerunner sim`.
 """
 
 from __future__ import annotations
@@ -30,7 +30,6 @@ from rich.table import Table
 
 from scenarios.loader import load_scenario
 from sitl import server
-from sitl.pacer import Pacer
 from sitl.server_settings import ServerSettings, parse_link
 from sitl.simulation import Simulation
 from wire.dialect import mavlink
@@ -41,22 +40,14 @@ TCP_PORT = 5790
 ONBOARD_PORT = 14580
 GROUND_PORT = 18570
 PIECE_BYTES = {"udp": 1400, "udp, 60 kB": 60_000, "tcp": 60_000, "serial": 4000}
-PACKETS_HZ = 50  # sound packets amid the flood, and on the quiet link
+PACKETS_HZ = 50  # valid packets amid the flood, and on the other link
 HEARTBEAT = mavlink.MAVLink_heartbeat_message(mavlink.MAV_TYPE_GCS, 8, 0, 0, 4, 3)
 SETPOINT = mavlink.MAVLink_set_position_target_local_ned_message(0, 1, 1, 8, 0x5C7, *[0.0] * 11)
 COLUMNS = (
-    "link",
-    "bytes",
-    "MB/s sent",
-    "latest tick (ms)",
-    "99 % (ms)",
-    "links, CPU (ms)",
-    "of real time",
-    "of a core",
-    "heard amid it",
-    "on the other link",
+    *("link", "bytes", "MB/s sent", "latest tick (ms)", "99 % (ms)", "links, CPU (ms)"),
+    *("of real time", "of a core", "received amid it", "on the other link"),
 )
-FLOODER, STRANGER, FRIEND = 77, 78, 79  # system ids
+FLOODER, AMID, OTHER = 77, 78, 79  # system ids: of the flood, of valid packets amid it, on the other link
 
 
 def packed(message: object, system_id: int) -> bytes:
@@ -64,10 +55,9 @@ def packed(message: object, system_id: int) -> bytes:
 
 
 def flood_bytes() -> dict[str, bytes]:
-    """A megabyte or so of each kind of flood."""
+    """About a megabyte of each kind of flood."""
     rng = random.Random(1)
     setpoint, beat = packed(SETPOINT, FLOODER), packed(HEARTBEAT, FLOODER)
-    bad = bytes((*setpoint[:-1], setpoint[-1] ^ 0xFF))
     size = 1 << 20
     kinds = {
         "nothing": b"",
@@ -75,9 +65,9 @@ def flood_bytes() -> dict[str, bytes]:
         "zeros": bytes(size),
         "all 0xFE": b"\xfe" * size,
         "all 0xFD": b"\xfd" * size,
-        # each header asks for 255 bytes of payload and the next one stands within it
+        # each header announces 255 bytes of payload and the next one is within them
         "false headers": b"\xfd\xff\x00\x00\x00\x01\x01\x54\x00\x00",
-        "bad checksums": bad,
+        "bad checksums": bytes((*setpoint[:-1], setpoint[-1] ^ 0xFF)),
         "truncated": setpoint[:-9],
         "heartbeats": beat,
         "setpoints": setpoint,
@@ -85,10 +75,10 @@ def flood_bytes() -> dict[str, bytes]:
     return {name: data * max(1, size // max(1, len(data))) for name, data in kinds.items()}
 
 
-class TimedPacer(Pacer):
-    """Remembers, in seconds, how late each burst of ticks began and how long links were worked on before it.
+class TimedPacer(server.Pacer):
+    """Records how late each burst of ticks began and how long links were served before it, seconds.
 
-    The first depends on what else the machine does, the second, processor time, does not.
+    The first depends on the load of the machine, the second, processor time, does not.
     """
 
     late_s: ClassVar[list[float]] = []
@@ -109,32 +99,29 @@ class TimedPacer(Pacer):
         return target_us
 
 
-class Heard:
-    """Counts the sound packets of each sender, by system id."""
+received: Counter[int] = Counter()  # valid packets by system id
+count_traffic = Traffic.receive
 
-    packets: ClassVar[Counter[int]] = Counter()
-    count = Traffic.receive
 
-    @staticmethod
-    def hear(traffic: Traffic, sender: tuple[int, int], sequence: int, size: int) -> None:
-        Heard.packets[sender[0]] += 1
-        Heard.count(traffic, sender, sequence, size)
+def count_packet(traffic: Traffic, sender: tuple[int, int], sequence: int, size: int) -> None:
+    received[sender[0]] += 1
+    count_traffic(traffic, sender, sequence, size)
 
 
 def send(link: str, line: int, data: bytes, options: argparse.Namespace, done: Connection) -> None:
-    """Flood a link and put sound packets of another sender in between; a friend speaks on the ground link."""
+    """Flood a link, with valid packets of another sender in between and on the ground link."""
     write = opened(link, line)
     ground = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
-    stranger, friend = (mavlink.MAVLink(None, system, 190) for system in (STRANGER, FRIEND))
+    amid, other = (mavlink.MAVLink(None, system, 190) for system in (AMID, OTHER))
     piece = PIECE_BYTES[link]
     began_s = time.monotonic()
     sent = place = packets = refused = 0
     while (passed_s := time.monotonic() - began_s) < options.seconds:
         if passed_s * PACKETS_HZ >= packets:
             packets += 1
-            stranger.seq = friend.seq = packets % 256
-            refused += not write(bytes(HEARTBEAT.pack(stranger)))
-            ground.sendto(HEARTBEAT.pack(friend), ("127.0.0.1", GROUND_PORT))
+            amid.seq = other.seq = packets % 256
+            refused += not write(bytes(HEARTBEAT.pack(amid)))
+            ground.sendto(HEARTBEAT.pack(other), ("127.0.0.1", GROUND_PORT))
         if data and sent < passed_s * options.rate * 1e6:
             write(data[place : place + piece])
             sent += piece
@@ -145,7 +132,7 @@ def send(link: str, line: int, data: bytes, options: argparse.Namespace, done: C
 
 
 def opened(link: str, line: int) -> Callable[[bytes], bool]:
-    """What writes to a link; it says whether there was room."""
+    """A function that writes to a link and returns whether there was room."""
     if link.startswith("udp"):
         udp = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
         return lambda data: udp.sendto(data, ("127.0.0.1", ONBOARD_PORT)) > 0
@@ -172,39 +159,31 @@ def opened(link: str, line: int) -> Callable[[bytes], bool]:
 
 
 async def flooded(link: str, data: bytes, options: argparse.Namespace) -> list[str]:
-    """Fly while one link is flooded; a row of the table."""
+    """Fly while one link is flooded; return a row of the table."""
     ours, theirs = pty.openpty()
     urls = (f"tcpin://127.0.0.1:{TCP_PORT}", f"serial://{os.ttyname(theirs)}:921600")
     settings = ServerSettings(links=tuple(parse_link(url) for url in urls))
-    greeted = asyncio.Event()
-    notices: list[str] = []
-
-    def notice(line: str) -> None:
-        notices.append(line)
-        if "Ctrl-C" in line:
-            greeted.set()
-
+    ready = asyncio.Event()
     simulation = Simulation(load_scenario(options.scenario))
-    sim = server.SimulatorServer(simulation, settings, notice)
+    sim = server.SimulatorServer(simulation, settings, lambda line: "Ctrl-C" in line and ready.set())
     running = asyncio.create_task(sim.run())
-    await greeted.wait()
+    await ready.wait()
     drain = asyncio.create_task(drained(ours))
     await asyncio.sleep(1.0)
-    inlet, outlet = multiprocessing.get_context("fork").Pipe(duplex=False)
-    arguments = (link, ours, data, options, outlet)
-    sender = multiprocessing.get_context("fork").Process(target=send, args=arguments)
+    fork = multiprocessing.get_context("fork")
+    result, sender_end = fork.Pipe(duplex=False)
+    sender = fork.Process(target=send, args=(link, ours, data, options, sender_end))
     sender.start()
     TimedPacer.late_s.clear()
     TimedPacer.worked_s.clear()
-    Heard.packets.clear()
+    received.clear()
     began = (time.monotonic(), time.process_time(), simulation.time_us)
-    rate, packets, refused = await asyncio.to_thread(inlet.recv)
+    rate, packets, refused = await asyncio.to_thread(result.recv)
     wall_s, cpu_s = time.monotonic() - began[0], time.process_time() - began[1]
     flown_s = (simulation.time_us - began[2]) / 1e6
     late_s = sorted(TimedPacer.late_s)
     sender.join()
     await asyncio.sleep(0.2)
-    heard = Heard.packets
     running.cancel()
     drain.cancel()
     with contextlib.suppress(asyncio.CancelledError):
@@ -218,13 +197,13 @@ async def flooded(link: str, data: bytes, options: argparse.Namespace) -> list[s
         f"{max(TimedPacer.worked_s) * 1e3:.1f}",
         f"{flown_s / wall_s:.2f}",
         f"{cpu_s / wall_s:.2f}",
-        f"{heard[STRANGER]}/{packets - refused}",
-        f"{heard[FRIEND]}/{packets}",
+        f"{received[AMID]}/{packets - refused}",
+        f"{received[OTHER]}/{packets}",
     ]
 
 
 async def drained(line: int) -> None:
-    """Read what the drone says on the serial line."""
+    """Discard what the drone sends on the serial line."""
     os.set_blocking(line, False)
     while True:
         with contextlib.suppress(OSError):
@@ -233,7 +212,6 @@ async def drained(line: int) -> None:
 
 
 def read_options() -> argparse.Namespace:
-    """Read the command line."""
     parser = argparse.ArgumentParser(
         prog="python -m benchmarks.link_flood", description=__doc__.partition("\n")[0]
     )
@@ -246,11 +224,11 @@ def read_options() -> argparse.Namespace:
 
 
 def main() -> int:
-    """Flood each link with everything and show what came of it."""
+    """Flood each link with each kind of bytes and show the results."""
     options = read_options()
     server.Pacer = TimedPacer  # type: ignore[misc]
-    Traffic.receive = Heard.hear  # type: ignore[method-assign]
-    table = Table(title=f"a link flooded with up to {options.rate:g} MB/s for {options.seconds:g} s")
+    Traffic.receive = count_packet  # type: ignore[method-assign]
+    table = Table(title=f"one link flooded with up to {options.rate:g} MB/s for {options.seconds:g} s")
     for column in COLUMNS:
         table.add_column(column, justify="left" if column in ("link", "bytes") else "right")
     for link in options.links:

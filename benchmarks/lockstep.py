@@ -1,10 +1,10 @@
 """What a flight in lockstep costs, part by part, as ratios measured in one run on one core.
 
-    python benchmarks/lockstep.py [SCENARIO] [--json]
+    python -m benchmarks.lockstep [SCENARIO] [--json]
 
 Absolute times differ from machine to machine and from minute to minute; the ratios to one `run()` of JSBSim
 with this drone's model, measured beside them, do not. Processor time is counted, so that other programs on
-the machine disturb little.
+the machine have little effect.
 """
 
 from __future__ import annotations
@@ -12,13 +12,12 @@ from __future__ import annotations
 import json
 import os
 import sys
-import time
 from collections.abc import Callable
 from dataclasses import asdict, dataclass
 
-os.environ.update({"OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1"})  # before NumPy is imported
-if hasattr(os, "sched_setaffinity"):
-    os.sched_setaffinity(0, {min(os.sched_getaffinity(0))})
+from benchmarks.peers.job import SINGLE_THREADS, Stopwatch, pin_to_one_core
+
+os.environ.update(SINGLE_THREADS)  # before NumPy is imported
 
 import cv2
 
@@ -42,29 +41,17 @@ Pose = tuple[tuple[float, float, float], tuple[float, float, float, float]]
 
 @dataclass(frozen=True, slots=True)
 class Parts:
-    """What the parts of a flight cost: processor time, seconds.
-
-    Attributes:
-        scenario: its name.
-        image_rate_hz: of the camera.
-        simulated_s: length of the whole flight.
-        raw_s: one `run()` of JSBSim with this drone's model.
-        step_s: one step of physics with the autopilot, the referee and all else of a control tick.
-        render_s: one image painted, the mean over the flight.
-        detect_s: the same image searched for frames.
-        flight_s: the whole flight with everything.
-        flight_wall_s: the same by the wall clock.
-    """
+    """What the parts of a flight cost: processor time, seconds."""
 
     scenario: str
     image_rate_hz: float
-    simulated_s: float
-    raw_s: float
-    step_s: float
-    render_s: float
-    detect_s: float
-    flight_s: float
-    flight_wall_s: float
+    simulated_s: float  # length of the whole flight
+    raw_s: float  # one `run()` of JSBSim with this drone's model
+    step_s: float  # one step of physics with autopilot, referee and the rest of a control tick
+    render_s: float  # one image painted, the mean over the flight
+    detect_s: float  # the same image searched for frames
+    flight_s: float  # the whole flight with everything
+    flight_wall_s: float  # the same by the wall clock
 
 
 def main() -> None:
@@ -75,51 +62,37 @@ def main() -> None:
     if "--json" in words:
         print(json.dumps(asdict(parts)))
         return
-    flight_s, raw_s = parts.simulated_s, parts.raw_s
-    by_wall = f"{flight_s / parts.flight_s:.0f} x real time, by the wall {flight_s / parts.flight_wall_s:.0f}"
-    rows = [
-        ("JSBSim run()", raw_s, f"{1 / raw_s / PHYSICS_RATE_HZ:.0f} x real time"),
-        (
-            "physics, autopilot, referee: a step",
-            parts.step_s,
-            f"{1 / parts.step_s / PHYSICS_RATE_HZ:.0f} x real time",
-        ),
-        ("an image: render", parts.render_s, ""),
-        ("an image: detect", parts.detect_s, ""),
-        ("the whole flight", parts.flight_s, by_wall),
-    ]
-    print(f"{parts.scenario}, camera {parts.image_rate_hz:g} Hz, {flight_s:.1f} s simulated, one core\n")
-    for name, cost_s, note in rows:
-        print(f"{name:37s}{cost_s * 1e6:12.1f} us {cost_s / raw_s:12.1f} run()s   {note}")
+    from rich.console import Console
+
+    from benchmarks.report import part_rows, show_parts
+
+    flight = (
+        f"{parts.scenario}, {parts.simulated_s:.1f} s of flight, camera {parts.image_rate_hz:g} Hz, one core"
+    )
+    by_wall = f"{parts.simulated_s / parts.flight_wall_s:.0f} x real time by the wall clock"
+    console = Console(width=None if sys.stdout.isatty() else 130)
+    show_parts(console, part_rows(asdict(parts), PHYSICS_RATE_HZ), f"{flight}; {by_wall}")
 
 
 def measure(scenario: Scenario) -> Parts:
     """Measure all parts, one after another."""
+    pin_to_one_core()
     cv2.setNumThreads(1)
     simulation = hovering(scenario)
-    raw_s = best(simulation.world._dynamics.run, 20_000)
+    raw_s = best(simulation.world.dynamics.run, 20_000)
     step_s = best(simulation.tick, 5_000) / STEPS_PER_CONTROL
     images: list[Image] = []
     poses: list[Pose] = []
-    flown_s, wall_s, flight_s = fly(scenario, images, poses)
+    flight_s, wall_s, simulated_s = fly(scenario, images, poses)
     camera = Camera(scenario)
     render_s = best(lambda: [camera.render(*pose) for pose in poses], 1) / len(poses)
     detect_s = best(lambda: [detect(image) for image in images], 1) / len(images)
-    return Parts(
-        scenario.name,
-        scenario.camera.rate_hz,
-        flight_s,
-        raw_s,
-        step_s,
-        render_s,
-        detect_s,
-        flown_s,
-        wall_s,
-    )
+    rate_hz = scenario.camera.rate_hz
+    return Parts(scenario.name, rate_hz, simulated_s, raw_s, step_s, render_s, detect_s, flight_s, wall_s)
 
 
 def hovering(scenario: Scenario) -> Simulation:
-    """A simulation in the air, away from everything, in hold."""
+    """A simulation of a drone that hovers in hold, far from all solids."""
     simulation = Simulation(scenario)
     while not simulation.autopilot.status.ready:
         simulation.tick()
@@ -144,19 +117,19 @@ def fly(scenario: Scenario, images: list[Image], poses: list[Pose]) -> tuple[flo
 
 
 def timed_flight(plan: FlightPlan) -> tuple[float, float]:
-    wall_s, cpu_s = time.perf_counter(), time.process_time()
+    stopwatch = Stopwatch()
     fly_lockstep(plan)
-    return time.process_time() - cpu_s, time.perf_counter() - wall_s
+    return stopwatch.read()
 
 
 def best(work: Callable[[], object], times: int) -> float:
-    """Processor time of one call, the best of several rounds, seconds."""
+    """Processor time of one call, the minimum of several rounds, seconds."""
     rounds = []
     for _ in range(REPEATS):
-        started_s = time.process_time()
+        stopwatch = Stopwatch()
         for _ in range(times):
             work()
-        rounds.append((time.process_time() - started_s) / times)
+        rounds.append(stopwatch.read()[0] / times)
     return min(rounds)
 
 

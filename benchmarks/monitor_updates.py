@@ -2,10 +2,10 @@
 
     python -m benchmarks.monitor_updates
 
-Each way has a server in a process of its own and ten viewers that read what comes, 20 poses a second. With
-`ui.scene`, each viewer's drone (one group, its rotors standing still) is moved and turned from Python; by
-WebSocket one JSON text with everything of the message "pose" is written once and sent to all. Printed are
-the processor time of the server as a share of one core, and the messages a viewer gets.
+Each method has a server in a process of its own and ten viewers that read 20 poses a second. With `ui.scene`,
+each viewer's drone (one group, its rotors not turning) is moved and turned from Python; by WebSocket one JSON
+text with all of the message "pose" is made once and sent to all. Printed are the processor time of the server
+as a share of one core, and the messages sent to each viewer.
 """
 
 from __future__ import annotations
@@ -17,7 +17,6 @@ import re
 import socket
 import sys
 import time
-from collections.abc import Iterator
 
 from starlette.websockets import WebSocket
 
@@ -25,39 +24,33 @@ VIEWERS = 10
 RATE_HZ = 20
 SECONDS = 10.0
 SETTLE_S = 1.0
-WAYS = ("scene", "websocket")
 
 
-async def serve(way: str, port: int) -> None:
-    """Serve until standard input ends; a line on it asks for the processor time used so far."""
+async def serve(method: str, port: int) -> None:
+    """Serve until standard input ends; a line on it requests the processor time used so far."""
     import uvicorn
     from fastapi import FastAPI
     from nicegui import ui
 
     web = FastAPI()
-    tick = {"scene": add_scene, "websocket": add_websocket}[way](web)
+    tick = METHODS[method][0](web)
     ui.run_with(web, show_welcome_message=False)
-    server = uvicorn.Server(
-        uvicorn.Config(
-            web,
-            port=port,
-            timeout_graceful_shutdown=1,
-            log_level="critical",
-            access_log=False,
-            ws_per_message_deflate=False,
-            lifespan="on",
-        )
-    )
+    options = {
+        "log_level": "critical",
+        "access_log": False,
+        "ws_per_message_deflate": False,
+        "lifespan": "on",
+    }
+    server = uvicorn.Server(uvicorn.Config(web, port=port, timeout_graceful_shutdown=1, **options))
     serving = asyncio.create_task(server.serve())
     moving = asyncio.create_task(at_rate(tick))
-    answering = asyncio.create_task(asyncio.to_thread(tell_processor_time))
-    await answering
+    await asyncio.to_thread(print_processor_time)
     moving.cancel()
     server.should_exit = True
     await serving
 
 
-def tell_processor_time() -> None:
+def print_processor_time() -> None:
     for _ in sys.stdin:
         print(json.dumps([time.process_time(), time.monotonic()]), flush=True)
 
@@ -83,7 +76,7 @@ def add_scene(web):
             scene.box(0.3, 0.3, 0.1)
             for x, y in ((1, 1), (1, -1), (-1, 1), (-1, -1)):
                 scene.cylinder(0.1, 0.1, 0.02).move(0.2 * x, 0.2 * y, 0.05)
-        scene._initialized_event.set()  # else it waits for the browser's word
+        scene._initialized_event.set()  # else it waits for the browser's message
         drones.append(drone)
 
     def tick(t):
@@ -95,10 +88,8 @@ def add_scene(web):
 
 
 def add_websocket(web):
-    """Write one text, send it to all."""
-    from monitor.live_channel import LiveChannel, Viewer, encode
-
-    now = {"t": 0.0}
+    """Make one text and send it to all."""
+    from monitor.live_channel import LiveChannel, Viewer
 
     class Drones:
         def welcome(self):
@@ -116,16 +107,11 @@ def add_websocket(web):
                 await websocket.send_text(text)
         channel.leave(viewer)
 
-    def tick(t):
-        now["t"] = t
-        channel.send(pose(t))
-
-    assert encode(pose(1.0))
-    return tick
+    return lambda t: channel.send(pose(t))
 
 
 def pose(t):
-    """A message of the contract, with digits as telemetry has them."""
+    """A message as the monitor's channel has them, with as many digits as telemetry has."""
     x = 0.123456789 * t
     drone = {
         "id": 1,
@@ -143,7 +129,7 @@ def pose(t):
 
 
 async def watch_scene(port, counts, number):
-    """Do what a browser does with a page, without drawing it."""
+    """Act as a browser with a page does, without drawing."""
     import aiohttp
     import socketio
 
@@ -181,17 +167,20 @@ async def watch_websocket(port, counts, number):
             counts[number] += 1
 
 
-async def measure(way: str) -> tuple[float, float]:
-    """Return the server's share of a core, and the messages each viewer gets a second."""
+METHODS = {"scene": (add_scene, watch_scene), "websocket": (add_websocket, watch_websocket)}
+
+
+async def measure(method: str) -> tuple[float, float]:
+    """The server's share of a core, and the messages sent to each viewer a second."""
     port = free_port()
-    arguments = (sys.executable, "-m", "benchmarks.monitor_updates", way, str(port))
+    arguments = (sys.executable, "-m", "benchmarks.monitor_updates", method, str(port))
     pipe = asyncio.subprocess.PIPE
     server = await asyncio.create_subprocess_exec(*arguments, stdin=pipe, stdout=pipe)
     counts = [0] * VIEWERS
     watching = []
     try:
         await reachable(port)
-        watch = {"scene": watch_scene, "websocket": watch_websocket}[way]
+        watch = METHODS[method][1]
         watching = [asyncio.create_task(watch(port, counts, number)) for number in range(VIEWERS)]
         await asyncio.sleep(SETTLE_S)
         before, seen = await processor_time(server), sum(counts)
@@ -231,15 +220,13 @@ def free_port() -> int:
         return listener.getsockname()[1]
 
 
-def report() -> Iterator[str]:
-    for way in WAYS:
-        share, rate = asyncio.run(measure(way))
-        yield f"{way:10} {100 * share:5.1f} % of a core, {rate:5.1f} messages a second and viewer"
-
-
 if __name__ == "__main__":
     if len(sys.argv) > 1:
         asyncio.run(serve(sys.argv[1], int(sys.argv[2])))
     else:
-        for line in report():
-            print(line, flush=True)
+        for method in METHODS:
+            share, rate = asyncio.run(measure(method))
+            print(
+                f"{method:10} {100 * share:5.1f} % of a core, {rate:5.1f} messages a second and viewer",
+                flush=True,
+            )

@@ -1,22 +1,71 @@
-"""Shows what was measured, and writes it down."""
+"""The tables of what was measured, and the same as JSON. Costs of parts are ratios to JSBSim's own step."""
 
 from __future__ import annotations
 
 import os
 import platform
 import sys
-from dataclasses import asdict, replace
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any
 
 from rich.console import Console
 from rich.table import Table
 
-from benchmarks.compare import Comparison, cost
-from benchmarks.contenders import CONTENDERS
-from benchmarks.parts import PartRow
+from benchmarks.compare import CONTENDERS, Comparison, cost
 from benchmarks.peers.job import Flight, Job
 from benchmarks.run import Results
+
+STEP_AIM_RUNS = 10.0
+# 60 times real time where a `run()` takes 2.5 µs: each of the 500 steps a second may then cost
+# 1 / (60 * 500 * 2.5e-6) = 13.3 `run()`s, on any machine.
+FLIGHT_AIM_RUNS = 40.0 / 3.0
+
+
+@dataclass(frozen=True, slots=True)
+class PartRow:
+    """The cost of one part of a flight."""
+
+    name: str
+    cost_s: float  # once
+    runs: float  # the same in `run()`s of JSBSim
+    share: float | None = None  # of the whole flight's cost; None for what is not a part of it by itself
+    real_time: float | None = None  # how many times faster than real time, where that means something
+    aim_runs: float | None = None  # maximum cost aimed at
+
+    @property
+    def reached(self) -> bool | None:
+        """Whether the aim is reached; None without an aim."""
+        return None if self.aim_runs is None else self.runs <= self.aim_runs
+
+
+def part_rows(parts: dict[str, Any], physics_rate_hz: float) -> list[PartRow]:
+    """The rows of the table.
+
+    Args:
+        parts: what `python -m benchmarks.lockstep --json` printed.
+        physics_rate_hz: steps of JSBSim in a second of flight.
+    """
+    raw_s, step_s = parts["raw_s"], parts["step_s"]
+    image_rate_hz = parts["image_rate_hz"]
+    whole_s = parts["flight_s"] / (parts["simulated_s"] * physics_rate_hz)  # a step's share of the flight
+    images_a_step = image_rate_hz / physics_rate_hz
+    rest_s = whole_s - step_s - images_a_step * (parts["render_s"] + parts["detect_s"])
+
+    def step(name: str, cost_s: float, share: float | None, aim_runs: float | None = None) -> PartRow:
+        return PartRow(name, cost_s, cost_s / raw_s, share, 1 / (cost_s * physics_rate_hz), aim_runs)
+
+    def image(name: str, cost_s: float) -> PartRow:
+        return PartRow(name, cost_s, cost_s / raw_s, images_a_step * cost_s / whole_s)
+
+    return [
+        step("JSBSim run()", raw_s, None),
+        step("physics + autopilot, a step", step_s, step_s / whole_s, STEP_AIM_RUNS),
+        image("an image painted", parts["render_s"]),
+        image("an image searched", parts["detect_s"]),
+        PartRow("navigator and all the rest, a step", rest_s, rest_s / raw_s, rest_s / whole_s),
+        step("the whole challenge, a step", whole_s, 1.0, FLIGHT_AIM_RUNS),
+    ]
 
 
 def machine() -> dict[str, str]:
@@ -30,7 +79,7 @@ def machine() -> dict[str, str]:
 
 
 def processor() -> str:
-    """The processor's name, where the system tells it."""
+    """The processor's name, where the system has it."""
     try:
         lines = Path("/proc/cpuinfo").read_text(encoding="utf-8").splitlines()
     except OSError:
@@ -39,15 +88,20 @@ def processor() -> str:
     return names[0] if names else "unknown"
 
 
-def show_parts(console: Console, rows: list[PartRow], title: str) -> None:
-    """What the parts of our flight cost."""
+def table_of(title: str, *columns: str) -> Table:
+    """An empty table; a column whose name begins with ">" is aligned to the right."""
     table = Table(title=title, title_justify="left")
-    table.add_column("part of ours", no_wrap=True)
-    table.add_column("costs", justify="right")
-    table.add_column("x run()", justify="right")
-    table.add_column("aim", no_wrap=True)
-    table.add_column("of the whole", justify="right")
-    table.add_column("x real time", justify="right")
+    for name in columns:
+        right = name.startswith(">")
+        table.add_column(
+            name.removeprefix(">"), justify="right" if right else "left", no_wrap=name != "settings"
+        )
+    return table
+
+
+def show_parts(console: Console, rows: list[PartRow], title: str) -> None:
+    """Show what the parts of our flight cost."""
+    table = table_of(title, "part of ours", ">costs", ">x run()", "aim", ">of the whole", ">x real time")
     for row in rows:
         table.add_row(
             row.name,
@@ -61,23 +115,16 @@ def show_parts(console: Console, rows: list[PartRow], title: str) -> None:
 
 
 def verdict(reached: bool | None) -> str:
-    """Whether an aim is reached, in a word."""
+    """Whether an aim is reached, as shown."""
     return "reached" if reached else "missed"
 
 
 def show_comparison(console: Console, results: Results, job: Job) -> None:
-    """Ours beside the peers."""
+    """Show our flight beside the peers'."""
     image = f"{job.width_px} x {job.height_px} image at {job.image_rate_hz:g} Hz"
     title = f"{job.seconds:g} s of flight, {image}, one core"
-    table = Table(title=title, title_justify="left")
-    table.add_column("program", no_wrap=True)
-    table.add_column("settings")
-    table.add_column("x real time", justify="right")
-    table.add_column("costs x ours", justify="right")
-    table.add_column("aim")
-    table.add_column("pairs", justify="right")
-    table.add_column("rates")
-    table.add_column("drawn by")
+    columns = ("program", "settings", ">x real time", ">costs x ours", "aim", ">pairs", "rates", "drawn by")
+    table = table_of(title, *columns)
     ours = results.ours
     program = f"framerunner {ours.version}"
     table.add_row(program, "all of it", f"{1 / cost(ours):.1f}", "1.0", "", "", ours.rates, ours.renderer)
@@ -90,16 +137,15 @@ def show_comparison(console: Console, results: Results, job: Job) -> None:
 
 
 def comparison_row(comparison: Comparison) -> tuple[str, ...]:
-    """A row of the table."""
     peer, contender = comparison.peer, comparison.contender
-    least, greatest = comparison.spread
+    smallest, largest = comparison.spread
     return (
         f"{contender.name} {peer.version}",
         contender.settings,
         f"{1 / cost(peer):.1f}",
         f"{comparison.ratio:.1f}",
         f">= {contender.target:g} {verdict(comparison.reached)}",
-        f"{least:.1f} - {greatest:.1f}",
+        f"{smallest:.1f} - {largest:.1f}",
         peer.rates,
         peer.renderer.partition(" (")[0],
     )

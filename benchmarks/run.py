@@ -1,10 +1,14 @@
-"""Runs programs in processes of their own and collects what they print."""
+"""Runs each program in a process of its own and reads what it prints.
+
+The peers have an environment of their own (`.venv-bench`), made when it is first needed and used again then.
+"""
 
 from __future__ import annotations
 
 import os
 import subprocess
 import sys
+from collections import deque
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from math import atan, tan
@@ -14,24 +18,24 @@ from typing import Any
 from benchmarks.compare import (
     BadResultError,
     Comparison,
+    Contender,
     Pair,
     best,
     check_flight,
     goals_along,
     last_object,
-    least,
+    minima,
     read_flight,
 )
-from benchmarks.contenders import Contender
-from benchmarks.one_core import SINGLE_THREADS
-from benchmarks.peers.environment import PeerMissingError, ensure
-from benchmarks.peers.job import EXIT_CANNOT_FLY, Box, Flight, Job
+from benchmarks.peers.job import EXIT_CANNOT_FLY, SINGLE_THREADS, Box, Flight, Job
 from scenarios.models import Scenario
 from sitl.solids import base_solid, frame_solids
 
 ROOT = Path(__file__).parents[1]
 LIMIT_S = 900.0
 OURS = "benchmarks.peers.ours_flight"
+FOLDER = ".venv-bench"
+REQUIREMENTS = {"mujoco": "mujoco>=3.3", "pyflyt": "PyFlyt>=0.29"}
 _RGB = {
     "red": (1.0, 0.0, 0.0),
     "green": (0.0, 1.0, 0.0),
@@ -39,18 +43,21 @@ _RGB = {
     "base": (0.6, 0.6, 0.6),
 }
 
+_UNREACHABLE = (
+    "NewConnectionError",
+    "NameResolutionError",
+    "ConnectTimeoutError",
+    "ProxyError",
+    "Temporary failure in name resolution",
+    "Network is unreachable",
+)
+
 Say = Callable[[str], None]
 
 
 @dataclass(frozen=True, slots=True)
 class Results:
-    """What was measured.
-
-    Attributes:
-        ours: our cheapest flight of all.
-        comparisons: with the contenders that could be measured.
-        failed: contender's key to the reason, for the others.
-    """
+    """Our cheapest flight, the comparisons, and why (by contender's key) others could not be measured."""
 
     ours: Flight
     comparisons: tuple[Comparison, ...]
@@ -80,25 +87,25 @@ def job_for(scenario: Scenario, name: str, seconds: float, image_rate_hz: float)
 
 
 def measure_parts(scenario: str, repeats: int, say: Say) -> dict[str, Any]:
-    """What the parts of a flight of ours cost, the least of several runs; see `benchmarks/lockstep.py`."""
+    """What the parts of our flight cost, the minimum of several runs; see `benchmarks/lockstep.py`."""
     command = [sys.executable, "-m", "benchmarks.lockstep", scenario, "--json"]
     runs = []
     for number in range(1, repeats + 1):
         say(f"the parts of our flight, {number} of {repeats}")
         runs.append(last_object(run_program(command, "")))
-    return least(runs)
+    return minima(runs)
 
 
 def compare_all(
     job: Job, contenders: tuple[Contender, ...], repeats: int, say: Say, pictures: Path | None = None
 ) -> Results:
-    """Fly ours and each contender's in turn, so that a change of the machine's speed meets both.
+    """Fly ours and each contender's in turn, so that a change of the machine's speed affects both.
 
     Args:
         job: without goals.
-        contenders: which.
-        repeats: how many pairs of each.
-        say: told what goes on.
+        contenders: the peers.
+        repeats: pairs of flights with each.
+        say: called with lines about the progress.
         pictures: folder for the last image of each.
 
     Raises:
@@ -134,7 +141,7 @@ def _install(contenders: tuple[Contender, ...], say: Say) -> tuple[dict[str, Pat
     failed: dict[str, str] = {}
     for peer in dict.fromkeys(each.peer for each in contenders):
         try:
-            interpreters[peer] = ensure(peer, ROOT, say)
+            interpreters[peer] = ensure_peer(peer, ROOT, say)
         except PeerMissingError as error:
             failed |= {each.key: str(error) for each in contenders if each.peer == peer}
     return interpreters, failed
@@ -152,7 +159,7 @@ def run_program(command: list[str], text: str) -> str:
     """Run a program to its end.
 
     Raises:
-        BadResultError: it fails or takes too long; with the last line of what it complains of.
+        BadResultError: it fails or takes too long; with the last line of its errors.
     """
     try:
         done = subprocess.run(
@@ -173,3 +180,94 @@ def run_program(command: list[str], text: str) -> str:
         known = done.returncode == EXIT_CANNOT_FLY
         raise BadResultError(complaints[-1] if known else f"failed: {complaints[-1]}")
     return done.stdout
+
+
+class PeerMissingError(Exception):
+    """A peer cannot be installed here; the message is one line that says why and what to do."""
+
+
+def ensure_peer(peer: str, root: Path, say: Say) -> Path:
+    """Install a peer unless it is installed; return the interpreter that runs it.
+
+    Each peer is installed by itself, so that a failure does not affect the others.
+
+    Args:
+        peer: a key of `REQUIREMENTS`.
+        root: the folder that holds the environment's folder.
+        say: called with lines about the progress.
+
+    Raises:
+        PeerMissingError: it cannot be installed.
+    """
+    folder = root / FOLDER
+    interpreter = folder / "bin" / "python"
+    stamp = folder / f"installed-{peer}"
+    requirement = REQUIREMENTS[peer]
+    if interpreter.exists() and stamp.exists() and stamp.read_text(encoding="utf-8") == requirement:
+        return interpreter
+    if not (folder / "bin" / "pip").exists() or not interpreter.exists():
+        _make_environment(folder, say)
+    _install_peer(interpreter, requirement, folder / f"pip-{peer}.log", say)
+    stamp.write_text(requirement, encoding="utf-8")
+    return interpreter
+
+
+def _make_environment(folder: Path, say: Say) -> None:
+    say(f"making {folder.name}")
+    code, tail = run_logged([sys.executable, "-m", "venv", str(folder)], folder.parent / "venv.log", say)
+    (folder.parent / "venv.log").unlink(missing_ok=True)
+    if code != 0:
+        words = tail[-1] if tail else f"code {code}"
+        raise PeerMissingError(
+            f"{folder.name} could not be made ({words}). On Debian and Ubuntu: sudo apt install python3-venv"
+        )
+
+
+def _install_peer(interpreter: Path, requirement: str, log: Path, say: Say) -> None:
+    say(f"installing {requirement}")
+    options = ["--disable-pip-version-check", "--no-input", "--prefer-binary", "--progress-bar", "off"]
+    command = [str(interpreter), "-m", "pip", "install", *options, "--retries", "2", requirement]
+    code, tail = run_logged(command, log, say)
+    if code != 0:
+        raise PeerMissingError(why_not_installed(requirement, tail, log))
+
+
+def why_not_installed(requirement: str, lines: list[str], log: Path) -> str:
+    """Why pip failed, in one line, from the end of its output and the path of its log."""
+    place = f"{log.parent.name}/{log.name}"
+    if any(mark in line for mark in _UNREACHABLE for line in lines):
+        return (
+            f"{requirement} could not be installed: no connection to the package index. "
+            f"Connect once and run this again; pip's output is in {place}"
+        )
+    errors = [line for line in lines if line.startswith(("ERROR:", "error:"))]
+    last = (errors or lines or ["pip printed nothing"])[-1]
+    return f"{requirement} could not be installed: {last.removeprefix('ERROR: ')}; pip's output is in {place}"
+
+
+def run_logged(command: list[str], log: Path, say: Say) -> tuple[int, list[str]]:
+    """Run a command, its output into a log and to `say`; return exit code and last lines of output."""
+    tail: deque[str] = deque(maxlen=200)
+    with (
+        log.open("w", encoding="utf-8") as file,
+        subprocess.Popen(
+            command,
+            stdin=subprocess.DEVNULL,
+            stdout=subprocess.PIPE,
+            stderr=subprocess.STDOUT,
+            text=True,
+            errors="replace",
+        ) as process,
+    ):
+        assert process.stdout is not None
+        try:
+            for line in process.stdout:
+                file.write(line)
+                words = line.strip()
+                if words:
+                    tail.append(words)
+                    say(words)
+        except BaseException:
+            process.terminate()
+            raise
+    return process.returncode, list(tail)

@@ -3,7 +3,7 @@
 Quaternions are (w, x, y, z) of unit length; an attitude turns body vectors into world vectors. Euler angles
 are the aerospace sequence Z-Y-X (yaw, then pitch, then roll) that MAVLink's ATTITUDE has. The formulas are
 from J. Diebel, "Representing Attitude: Euler Angles, Unit Quaternions, and Rotation Vectors", Stanford, 2006.
-Nothing here knows where the axes point: the formulas hold for NED with FRD and for arena axes with FLU alike.
+The formulas hold for NED with FRD and for arena axes with FLU alike.
 """
 
 from __future__ import annotations
@@ -13,8 +13,8 @@ from math import asin, atan2, copysign, cos, hypot, pi, sin, sqrt
 from geometry.vectors import Quaternion, Vec3
 
 Rotation = tuple[float, float, float, float, float, float, float, float, float]
-"""Rows of the matrix from body to world, one after the other; of body FRD to world NED the last row is world
-down seen in body axes."""
+"""Rows of the matrix from body to world, one after the other. From FRD to NED, the last row is world down in
+body axes."""
 RotationRows = tuple[Vec3, Vec3, Vec3]
 
 
@@ -61,11 +61,11 @@ def to_world(m: Rotation, x: float, y: float, z: float) -> Vec3:
 
 
 def tilt_error(m: Rotation, down_ned: Vec3) -> tuple[float, float]:
-    """The shortest rotation that turns the body's down axis to where it should point.
+    """The shortest rotation that turns the body's down axis to a wanted direction.
 
     A reduced attitude error (Chaturvedi, Sanyal & McClamroch, "Rigid-Body Attitude Control", IEEE Control
-    Systems Magazine, 2011): it leaves the rotation about that axis alone, and has no singularity but at the
-    half turn, where any axis will do.
+    Systems Magazine, 2011): it is independent of the rotation about that axis, and singular only at the half
+    turn, where it takes one of the possible axes.
 
     Args:
         m: attitude now.
@@ -86,8 +86,8 @@ def euler_from_quaternion(attitude: Quaternion) -> Vec3:
     """Euler angles of an attitude.
 
     Returns:
-        Roll, pitch, yaw in radians, shape (3,); roll and yaw in -pi..pi, pitch in -pi/2..pi/2. Rounding may
-        carry the sine of the pitch beyond 1; then the pitch is a right angle.
+        Roll, pitch, yaw in radians; roll and yaw in -pi..pi, pitch in -pi/2..pi/2. If rounding makes the
+        sine of the pitch larger than 1, the pitch is a right angle.
     """
     w, x, y, z = attitude
     sin_pitch = 2.0 * (w * y - z * x)
@@ -139,7 +139,7 @@ def normalized(q: Quaternion) -> Quaternion:
 
 
 def rotated_by_rate(attitude: Quaternion, rate_rad_s: Vec3, step_s: float) -> Quaternion:
-    """Turn on with constant body rates: q times exp(rate step / 2)."""
+    """The attitude after a time with constant body rates: q times exp(rate step / 2)."""
     rate = hypot(*rate_rad_s)
     half = rate * step_s / 2
     scale = sin(half) / rate if rate > 1e-9 else step_s / 2
@@ -148,12 +148,9 @@ def rotated_by_rate(attitude: Quaternion, rate_rad_s: Vec3, step_s: float) -> Qu
 
 
 def interpolated(a: Quaternion, b: Quaternion, share: float) -> Quaternion:
-    """Between two attitudes, the short way: normalised linear interpolation, good for small angles.
+    """Between `a` (share 0) and `b` (share 1) by the shortest rotation: normalised linear interpolation.
 
-    Args:
-        a: where `share` is 0.
-        b: where `share` is 1.
-        share: 0 to 1.
+    Accurate for small angles.
     """
     # The two quaternions of one attitude differ in sign.
     sign = 1.0 if sum(p * q for p, q in zip(a, b, strict=True)) >= 0.0 else -1.0

@@ -18,7 +18,7 @@ from mavsdk.asyncio.plugins.offboard import OffboardAsync
 from mavsdk.asyncio.plugins.telemetry import TelemetryAsync
 from mavsdk.logging import log_subscribe
 
-from geometry.alignment import Alignment, Pose
+from geometry.axes import Alignment, Pose
 from offboard.drone import DroneError, DroneState, VelocityCommand
 from offboard.keep_in_box import Box, confine
 from offboard.link.commands import PendingRequests, SetpointStream

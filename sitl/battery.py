@@ -1,8 +1,8 @@
-"""The simulated battery: what the motors draw, and what is left.
+"""The simulated battery: current, voltage and remaining charge.
 
-The current is the mechanical power of the rotors, torque times speed, over motor and propeller losses and the
-voltage, beside what the electronics need. The voltage at rest falls in a straight line with the charge, and
-sags with the current over the internal resistance.
+The current is the mechanical power of the rotors, torque times speed, over efficiency and voltage, plus that
+of the electronics. The voltage at rest falls linearly with the charge; under load it is lower by current
+times internal resistance.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ class Battery:
     """One battery, full at first.
 
     Args:
-        airframe: its battery and motors.
+        airframe: declares battery and motors.
         parameters: SIM_BAT_DRAIN and SIM_BAT_MIN_PCT; BAT1_V_CHARGED and BAT1_V_EMPTY.
 
     Attributes:
@@ -40,16 +40,10 @@ class Battery:
         self.step(0.0, (), armed=False)
 
     def step(self, period_s: float, motor_speeds_rad_s: MotorSpeeds, *, armed: bool) -> None:
-        """Discharge.
-
-        Args:
-            period_s: since the last call.
-            motor_speeds_rad_s: now.
-            armed: for SIM_BAT_DRAIN, which drains by time and while armed only.
-        """
+        """Discharge for a period; SIM_BAT_DRAIN discharges by time, only while armed."""
         if self._version != self._parameters.version:
             self._configure()
-        drain_s, least, empty_v, charged_v = self._values
+        drain_s, min_charge, empty_v, charged_v = self._values
         battery, motor = self._airframe.battery, self._airframe.motor
         rest_v = battery.cells * (empty_v + self.charge * (charged_v - empty_v))
         power_w = motor.torque_nm_s2 * sum([abs(speed) ** 3 for speed in motor_speeds_rad_s])
@@ -59,8 +53,8 @@ class Battery:
             used = period_s / drain_s if armed else 0.0
         else:
             used = self.current_a * period_s / (battery.capacity_mah * _A_S_PER_MAH)
-        # Charge never comes back, so a floor that is raised later changes nothing.
-        self.charge = max(self.charge - used, min(least, self.charge))
+        # The charge never rises, also when its minimum is raised later.
+        self.charge = max(self.charge - used, min(min_charge, self.charge))
 
     def _configure(self) -> None:
         value = self._parameters.value

@@ -1,4 +1,4 @@
-"""A pinhole camera on the drone, painted with OpenCV.
+"""The drone's camera: `Camera` paints images with OpenCV, `CameraFeed` takes them in simulated time.
 
 Far to near: sky, ground to the horizon, tatami, shadows, then base and frames in an order in which nothing is
 painted over by what it hides.
@@ -11,7 +11,8 @@ pixel), and a bar thinner than a pixel does not vanish.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections import deque
+from collections.abc import Callable, Iterable, Sequence
 from math import dist, hypot, isfinite, tan
 
 import cv2
@@ -20,27 +21,35 @@ import numpy.typing as npt
 
 from geometry.rotations import RotationRows, normalized, rotation, rotation_rows
 from geometry.vectors import Quaternion, Vec3
-from scenarios.models import Scenario
-from sitl.camera_clip import clip_half_plane
-from sitl.camera_drones import DRONE_BGR, outlines
-from sitl.camera_mesh import SHIFT, SUBPIXELS, Mesh, MeshFace, Pinhole, Projection
-from sitl.camera_order import PaintTree
-from sitl.camera_scene import GROUND_BGR, SKY_BGR, UNDERGROUND_BGR, build_scene
+from scenarios.models import Scenario, TrueState
+from sitl.camera_projection import (
+    SHIFT,
+    SUBPIXELS,
+    Ints,
+    Mesh,
+    MeshFace,
+    Pinhole,
+    Projection,
+    clip_half_plane,
+    drone_outlines,
+)
+from sitl.camera_scene import DRONE_BGR, GROUND_BGR, SKY_BGR, UNDERGROUND_BGR, PaintTree, build_scene
 from sitl.solids import Solid
 
 Image = npt.NDArray[np.uint8]
-Outline = npt.NDArray[np.int32]
 
+FIRST_EXPOSURE_US = 36_000
 _HAZE_BAND = 0.09  # height of a band of haze above the horizon, as a share of the focal length
 _MARGIN_PX = 2  # painted around the image and cut off: OpenCV is not exact at the border of its canvas
+_INSIDE = (slice(_MARGIN_PX, -_MARGIN_PX), slice(_MARGIN_PX, -_MARGIN_PX))
 _BANDS_BGR = (*SKY_BGR[1:], GROUND_BGR)
 _OVERLAP_PX = 2.0  # of neighbouring bands of colour, so that no gap is seen between them
 _FAR_HEIGHTS = 4.0  # of the image: lines farther away than this are cut before they are painted
-_LOST_M = 1e5  # from farther away nothing but sky and ground is to be seen
+_FAR_M = 1e5  # from farther away only sky and ground are seen
 
 
 class Camera:
-    """The camera of a scenario. Nothing stays from one image to the next: same pose, same image."""
+    """The camera of a scenario. It has no state: the same pose gives the same image."""
 
     def __init__(self, scenario: Scenario) -> None:
         self._settings = settings = scenario.camera
@@ -73,9 +82,11 @@ class Camera:
         """Paint what the camera sees.
 
         Args:
-            position_arena_m: centre of the drone, shape (3,); the scenario says where on it the camera is.
+            position_arena_m: centre of the drone; the scenario has the camera's place on it.
             attitude_arena: quaternion (w, x, y, z), body FLU to arena; need not have unit length.
-            drones: boxes of other drones.
+            drones: boxes of other drones. They move, so they are not in the tree of faces: each is painted
+                before the first face that is nearer than its centre. That is correct unless it flies closer
+                to a bar or the base than about its own size.
 
         Returns:
             A new image, BGR, shape (height, width, 3), uint8; its rows do not follow each other in memory.
@@ -86,34 +97,30 @@ class Camera:
         rotation = _rows(attitude_arena)
         eye = self._eye(position_arena_m, rotation)
         if eye[2] <= 0.0:
-            return self._without_margin(self._underground.copy())
+            return self._underground[_INSIDE].copy()
         canvas = self._sky.copy()
         self._paint_background(canvas, rotation)
-        if max(map(abs, eye)) < _LOST_M:
+        if max(map(abs, eye)) < _FAR_M:
             projection = self._mesh.project(eye, rotation)
             seen = projection.seen
             _paint(canvas, projection, [face for face in self._floor if seen[face.index]])
             solid, first = self._solid, len(self._floor)
             order = self._tree.back_to_front(eye)
             faces = [solid[i] for i in order if seen[first + i]]
-            for distance_m, outline in outlines(drones, eye, rotation, self._pinhole) if drones else ():
+            for distance_m, outline in drone_outlines(drones, eye, rotation, self._pinhole) if drones else ():
                 behind = self._count_farther(faces, eye, distance_m)
                 _paint(canvas, projection, faces[:behind])
                 cv2.fillConvexPoly(canvas, outline, DRONE_BGR, cv2.LINE_8, SHIFT)
                 faces = faces[behind:]
             _paint(canvas, projection, faces)
-        return self._without_margin(canvas)
+        return canvas[_INSIDE]
 
     def _count_farther(self, faces: Sequence[MeshFace], eye: Vec3, distance_m: float) -> int:
-        """How many faces, in the order of painting, come before the first that is nearer than a distance."""
+        """Number of faces, in the order of painting, before the first that is nearer than a distance."""
         for count, face in enumerate(faces):
             if dist(eye, self._centres_m[face.index]) < distance_m:
                 return count
         return len(faces)
-
-    @staticmethod
-    def _without_margin(canvas: Image) -> Image:
-        return canvas[_MARGIN_PX:-_MARGIN_PX, _MARGIN_PX:-_MARGIN_PX]
 
     def _eye(self, position: Vec3, rotation: RotationRows) -> Vec3:
         if not all(map(isfinite, position)):
@@ -136,7 +143,7 @@ class Camera:
             if len(outline) > 2:
                 cv2.fillConvexPoly(canvas, outline, colour, cv2.LINE_8, SHIFT)
 
-    def _upright_bands(self, a: float, b: float, starts: Sequence[float]) -> list[Outline] | None:
+    def _upright_bands(self, a: float, b: float, starts: Sequence[float]) -> list[Ints] | None:
         """The bands from the left to the right border; None if they are too steep for that."""
         if abs(a) > b:
             return None
@@ -156,10 +163,10 @@ class Camera:
         )
         return list(np.rint(SUBPIXELS * corners).astype(np.int32))
 
-    def _tilted_bands(self, a: float, b: float, starts: Sequence[float]) -> list[Outline]:
+    def _tilted_bands(self, a: float, b: float, starts: Sequence[float]) -> list[Ints]:
         """The same for any attitude: half planes cut to the image."""
         overlap = _OVERLAP_PX * hypot(a, b)
-        bands: list[Outline] = []
+        bands: list[Ints] = []
         for i, start in enumerate(starts):
             points = clip_half_plane(self._corners_px, a, b, start)
             if i + 1 < len(starts):  # no farther than a little into the next colour
@@ -169,7 +176,7 @@ class Camera:
 
 
 def _paint(canvas: Image, projection: Projection, faces: Iterable[MeshFace]) -> None:
-    """Paint faces one over the other."""
+    """Paint faces in their order."""
     for face in faces:
         outline = projection.outline(face)
         if outline is not None:
@@ -182,3 +189,53 @@ def _rows(attitude: Quaternion) -> RotationRows:
     if not isfinite(norm) or norm == 0.0:
         raise ValueError(f"attitude_arena: need a finite quaternion other than zero, got {attitude}")
     return rotation_rows(rotation(normalized(attitude)))
+
+
+class CameraFeed:
+    """Takes images at the camera's rate and returns each after the camera's latency.
+
+    Exposures are on a grid of the camera's period that begins at 36 ms, each once; a rate above the control
+    rate gives one image a tick. The navigator's ticks are 50 ms apart and begin at 0: with the default
+    latency an image arrives 14 ms before one. That is recent, which the paper's navigator needs to keep its
+    height before a frame, and early enough that video and telemetry do not race.
+
+    Args:
+        scenario: camera settings and what is to be seen.
+        drones: called at each exposure for the boxes of other drones.
+
+    Attributes:
+        next_us: before this time there is nothing to do.
+    """
+
+    def __init__(self, scenario: Scenario, drones: Callable[[], Sequence[Solid]] = tuple) -> None:
+        self._camera = Camera(scenario)
+        self._drones = drones
+        self._period_us = 1e6 / scenario.camera.rate_hz
+        self._latency_us = round(scenario.camera.latency_s * 1e6)
+        self._taken = 0
+        self.next_us = 0
+        self._waiting: deque[tuple[int, Image]] = deque()  # with their times of exposure
+
+    def step(self, truth: TrueState) -> tuple[int, Image] | None:
+        """Take the image that is due at this tick, and return the one that arrives.
+
+        Args:
+            truth: pose of the drone now.
+
+        Returns:
+            Time of exposure, microseconds, and the image; None if none arrives at this tick.
+        """
+        if truth.time_us < self.next_us:
+            return None
+        index = int((truth.time_us - FIRST_EXPOSURE_US) // self._period_us)
+        if index >= self._taken:
+            self._taken = index + 1
+            image = self._camera.render(truth.position_arena_m, truth.attitude_arena, self._drones())
+            self._waiting.append((truth.time_us, image))
+        arrived = None
+        if self._waiting and self._waiting[0][0] + self._latency_us <= truth.time_us:
+            arrived = self._waiting.popleft()
+        self.next_us = int(FIRST_EXPOSURE_US + self._taken * self._period_us)
+        if self._waiting:
+            self.next_us = min(self.next_us, self._waiting[0][0] + self._latency_us)
+        return arrived

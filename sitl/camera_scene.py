@@ -1,135 +1,88 @@
-"""The scenario as flat, shaded polygons: made once, painted many times.
+"""The scenario as flat, shaded polygons, made once, and the order in which they are painted for any eye.
 
-Light does not move and nothing in the arena does, so every face has one colour (Lambert's law with ambient
+Neither the light nor anything in the arena moves, so every face has one colour (Lambert's law with ambient
 light) and every shadow on the floor is a fixed polygon.
+
+The order is that of a tree of planes: what lies on the eye's side of a plane may hide what lies beyond it and
+never the reverse (Fuchs, Kedem, Naylor, "On visible surface generation by a priori tree structures", 1980).
+Planes that pass between bodies come first: they separate the few bodies of an arena, and within one body its
+own order of faces holds. Only bodies that no plane separates, which intersect or interlock, are taken apart
+face by face, and faces cut in two where they must be.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
-from math import cos, hypot, sin
+from dataclasses import dataclass, replace
+from math import hypot
 
 import cv2
 import numpy as np
 import numpy.typing as npt
 
 from geometry.vectors import Vec3
-from scenarios.models import Arena, Base, Frame, Light, Scenario
+from scenarios.models import Arena, Frame, Light, Scenario
+from sitl.solids import Solid, base_solid, frame_solids
 
 Bgr = tuple[int, int, int]
 Floats = npt.NDArray[np.float64]
 
 FRAME_BGR: dict[str, Bgr] = {"red": (0, 0, 255), "green": (0, 255, 0), "blue": (255, 0, 0)}
 # None of these passes the detector's colour test, lit, shaded or after JPEG.
+# The sky's are from the zenith down to the horizon.
 SKY_BGR: tuple[Bgr, ...] = ((222, 206, 190), (224, 210, 196), (226, 214, 202), (228, 218, 208))
-"""From the zenith down to the horizon."""
 GROUND_BGR: Bgr = (132, 134, 134)
 UNDERGROUND_BGR: Bgr = (28, 30, 32)
 TATAMI_BGR: Bgr = (56, 176, 226)
 TATAMI_MAT_BGR: Bgr = (48, 164, 213)
 BASE_BGR: Bgr = (168, 170, 172)
 BASE_MARK_BGR: Bgr = (238, 238, 238)
+DRONE_BGR: Bgr = (64, 62, 60)
 
-MAT_M = 2.0
-"""Edge of one mat of the tatami."""
-DARKEST = 0.3
-"""No face is painted darker than this share of its colour: a frame's colour must stay recognisable."""
-SHADOW = 0.6
-"""Brightness of the floor in a shadow."""
-
-
-@dataclass(frozen=True, slots=True)
-class Box:
-    """An upright box.
-
-    Attributes:
-        centre_arena_m: shape (3,).
-        half_extents_m: along its own axes, shape (3,).
-        yaw_rad: of its first axis, counter-clockwise from arena x.
-    """
-
-    centre_arena_m: Vec3
-    half_extents_m: Vec3
-    yaw_rad: float = 0.0
-
-    def reach_m(self, axis: Vec3) -> float:
-        """Return how far it extends from its centre along a unit vector."""
-        c, s = cos(self.yaw_rad), sin(self.yaw_rad)
-        x, y, z = self.half_extents_m
-        along, across = c * axis[0] + s * axis[1], c * axis[1] - s * axis[0]
-        return x * abs(along) + y * abs(across) + z * abs(axis[2])
+_MAT_M = 2.0  # edge of one mat of the tatami
+_DARKEST = 0.3  # share of its colour that every face keeps: a frame's colour must stay recognisable
+_SHADOW = 0.6  # brightness of the floor in a shadow
+_FLAT_M = 1e-7  # corners nearer to a plane than this lie on it
+_UP: Vec3 = (0.0, 0.0, 1.0)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Face:
-    """A convex flat polygon that is seen from one side.
+    """A convex flat polygon that is seen from one side."""
 
-    Attributes:
-        corners_arena_m: shape (k, 3), in order.
-        normal_arena: unit vector to the side it is seen from.
-        colour: as painted, shading included.
-    """
-
-    corners_arena_m: Floats
-    normal_arena: Vec3
-    colour: Bgr
+    corners_arena_m: Floats  # shape (k, 3), in order
+    normal_arena: Vec3  # unit vector to the side it is seen from
+    colour: Bgr  # as painted, shading included
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Body:
-    """A solid thing.
+    """A base or a frame."""
 
-    Attributes:
-        hull: the box around it.
-        faces: in the order they may be painted: a later one is never hidden by an earlier one.
-    """
-
-    hull: Box
-    faces: tuple[Face, ...]
+    hull: Solid  # the box around it
+    faces: tuple[Face, ...]  # in an order of painting: a later one is never hidden by an earlier one
 
 
 @dataclass(frozen=True, slots=True)
 class Scene:
-    """All that can be seen.
+    """All that can be seen."""
 
-    Attributes:
-        tatami: the arena's floor.
-        mats: every second mat of it, darker.
-        shadows: on the floor.
-        bodies: the base and the frames.
-    """
-
-    tatami: Face
-    mats: tuple[Face, ...]
-    shadows: tuple[Face, ...]
-    bodies: tuple[Body, ...]
+    tatami: Face  # the arena's floor
+    mats: tuple[Face, ...]  # every second mat of it, darker
+    shadows: tuple[Face, ...]  # on the floor
+    bodies: tuple[Body, ...]  # base and frames
 
 
 def build_scene(scenario: Scenario) -> Scene:
-    """Turn a scenario into what the camera paints."""
-    light, arena = scenario.light, scenario.arena
-    bodies = (_base_body(scenario.base, light), *(_frame_body(frame, light) for frame in scenario.frames))
-    solids = [_upright_box_corners(bodies[0].hull)]
-    for frame in scenario.frames:
-        solids += _bar_corners(frame)
+    """Make the faces that the camera paints."""
+    light, arena, base = scenario.light, scenario.arena, base_solid(scenario)
+    solids = [base, *(bar for frame in scenario.frames for bar in _overlapping_bars(frame))]
     return Scene(
         tatami=_on_floor(_rectangle(arena, 0.0, 1.0, 0.0, 1.0), _lit(TATAMI_BGR, _UP, light)),
         mats=_mats(arena, light),
         shadows=tuple(face for solid in solids for face in _shadow(solid, arena, light)),
-        bodies=bodies,
+        bodies=(_base_body(base, light), *(_frame_body(frame, light) for frame in scenario.frames)),
     )
-
-
-def shade(normal: Vec3, light: Light) -> float:
-    """Return the brightness of a face, DARKEST..1: ambient light and the sun by Lambert's law."""
-    x, y, z = light.sun_direction_arena
-    length = hypot(x, y, z)
-    facing = -(normal[0] * x + normal[1] * y + normal[2] * z) / length if length > 0 else 0.0
-    return max(DARKEST, light.ambient + (1.0 - light.ambient) * max(0.0, facing))
-
-
-_UP: Vec3 = (0.0, 0.0, 1.0)
 
 
 def _dim(colour: Bgr, share: float) -> Bgr:
@@ -138,7 +91,11 @@ def _dim(colour: Bgr, share: float) -> Bgr:
 
 
 def _lit(colour: Bgr, normal: Vec3, light: Light) -> Bgr:
-    return _dim(colour, shade(normal, light))
+    """The colour of a face: ambient light and the sun by Lambert's law, no darker than `_DARKEST`."""
+    x, y, z = light.sun_direction_arena
+    length = hypot(x, y, z)
+    facing = -(normal[0] * x + normal[1] * y + normal[2] * z) / length if length > 0 else 0.0
+    return _dim(colour, max(_DARKEST, light.ambient + (1.0 - light.ambient) * max(0.0, facing)))
 
 
 def _on_floor(corners_xy: Sequence[Sequence[float]] | Floats, colour: Bgr) -> Face:
@@ -148,17 +105,17 @@ def _on_floor(corners_xy: Sequence[Sequence[float]] | Floats, colour: Bgr) -> Fa
 
 
 def _rectangle(arena: Arena, x0: float, x1: float, y0: float, y1: float) -> list[tuple[float, float]]:
-    """Return a part of the arena's floor, by shares 0..1 of its edges."""
+    """Corners of a part of the arena's floor, by shares 0..1 of its edges."""
     left, right = (x0 - 0.5) * arena.length_x_m, (x1 - 0.5) * arena.length_x_m
     near, far = (y0 - 0.5) * arena.width_y_m, (y1 - 0.5) * arena.width_y_m
     return [(left, near), (right, near), (right, far), (left, far)]
 
 
 def _mats(arena: Arena, light: Light) -> tuple[Face, ...]:
-    """Return every second mat as on a chessboard; at most 20 by 20 mats, so that a huge arena stays cheap."""
+    """Every second mat as on a chessboard; at most 20 by 20 mats, so that a huge arena stays cheap."""
     colour = _lit(TATAMI_MAT_BGR, _UP, light)
-    rows = min(20, max(1, round(arena.length_x_m / MAT_M)))
-    columns = min(20, max(1, round(arena.width_y_m / MAT_M)))
+    rows = min(20, max(1, round(arena.length_x_m / _MAT_M)))
+    columns = min(20, max(1, round(arena.width_y_m / _MAT_M)))
     return tuple(
         _on_floor(_rectangle(arena, i / rows, (i + 1) / rows, j / columns, (j + 1) / columns), colour)
         for i in range(rows)
@@ -167,34 +124,27 @@ def _mats(arena: Arena, light: Light) -> tuple[Face, ...]:
     )
 
 
-def _placed(box: Box, local: Sequence[Vec3]) -> Floats:
-    """Return points given in a box's own axes (metres from its centre) in arena axes, shape (k, 3)."""
-    c, s = cos(box.yaw_rad), sin(box.yaw_rad)
-    x, y, z = box.centre_arena_m
-    return np.array([(x + c * p[0] - s * p[1], y + s * p[0] + c * p[1], z + p[2]) for p in local])
-
-
-def _face(box: Box, local: Sequence[Vec3], normal: Vec3, colour: Bgr, light: Light) -> Face:
-    c, s = cos(box.yaw_rad), sin(box.yaw_rad)
+def _face(box: Solid, local: Sequence[Vec3], normal: Vec3, colour: Bgr, light: Light) -> Face:
+    """A face given in a box's own axes (metres from its centre)."""
+    c, s = box.turn
     turned = (c * normal[0] - s * normal[1], s * normal[0] + c * normal[1], normal[2])
-    return Face(_placed(box, local), turned, _lit(colour, turned, light))
+    return Face(np.array([box.to_arena(point) for point in local]), turned, _lit(colour, turned, light))
 
 
-def _base_body(base: Base, light: Light) -> Body:
-    half = base.edge_m / 2
-    box = Box((base.x_m, base.y_m, base.top_m / 2), (half, half, base.top_m / 2))
+def _base_body(box: Solid, light: Light) -> Body:
+    half, _, top = box.half_extents_m
     faces = [
         _face(box, _side(box.half_extents_m, axis, sign), _normal(axis, sign), BASE_BGR, light)
         for axis, sign in ((0, 1), (0, -1), (1, 1), (1, -1), (2, 1))
     ]
-    mark, top = 0.7 * half, base.top_m / 2
+    mark = 0.7 * half
     inset: list[Vec3] = [(-mark, -mark, top), (mark, -mark, top), (mark, mark, top), (-mark, mark, top)]
     faces.append(_face(box, inset, _UP, BASE_MARK_BGR, light))
     return Body(box, tuple(faces))
 
 
 def _frame_body(frame: Frame, light: Light) -> Body:
-    """Return a frame: the faces of its opening first, then those of its hull.
+    """The faces of a frame's opening first, then those of its hull.
 
     Whatever hides a part of the opening's faces from an eye lies on the hull, and the faces of the hull that
     an eye sees never hide one another, so this order is right from everywhere.
@@ -202,7 +152,7 @@ def _frame_body(frame: Frame, light: Light) -> Body:
     colour = FRAME_BGR[frame.colour]
     outer: Vec3 = (frame.bar_m / 2, frame.outer_width_m / 2, frame.outer_height_m / 2)
     inner: Vec3 = (outer[0], outer[1] - frame.bar_m, outer[2] - frame.bar_m)
-    box = Box(frame.position_arena_m, outer, frame.yaw_rad)
+    box = Solid(frame.colour, frame.position_arena_m, frame.yaw_rad, outer)
     around = ((1, 1), (1, -1), (2, 1), (2, -1))
     faces = [
         _face(box, _side(inner, axis, sign), _normal(axis, -sign), colour, light) for axis, sign in around
@@ -223,7 +173,7 @@ def _normal(axis: int, sign: int) -> Vec3:
 
 
 def _side(half: Vec3, axis: int, sign: int) -> list[Vec3]:
-    """Return the corners of one side of a box, in order around it."""
+    """Corners of one side of a box, in order around it."""
     corners = []
     for first, second in ((-1, -1), (1, -1), (1, 1), (-1, 1)):
         signs = [first, second]
@@ -232,29 +182,155 @@ def _side(half: Vec3, axis: int, sign: int) -> list[Vec3]:
     return corners
 
 
-def _upright_box_corners(box: Box) -> Floats:
-    return _placed(box, _side(box.half_extents_m, 2, 1) + _side(box.half_extents_m, 2, -1))
+def _overlapping_bars(frame: Frame) -> list[Solid]:
+    """The four bars of a frame, all of full length, so that their shadows leave no gap between them."""
+    top, bottom, *sides = frame_solids(frame)
+    half_m = (frame.bar_m / 2, frame.bar_m / 2, frame.outer_height_m / 2)
+    return [top, bottom, *(replace(side, half_extents_m=half_m) for side in sides)]
 
 
-def _bar_corners(frame: Frame) -> list[Floats]:
-    """Return the eight corners of each bar of a frame, in arena axes."""
-    box = Box(frame.position_arena_m, (0.0, 0.0, 0.0), frame.yaw_rad)
-    bar, y, z = frame.bar_m, frame.outer_width_m / 2, frame.outer_height_m / 2
-    spans = ((-y, y, z - bar, z), (-y, y, -z, bar - z), (y - bar, y, -z, z), (-y, bar - y, -z, z))
-    return [
-        _placed(box, [(a, b, c) for a in (-bar / 2, bar / 2) for b in (y0, y1) for c in (z0, z1)])
-        for y0, y1, z0, z1 in spans
-    ]
-
-
-def _shadow(corners: Floats, arena: Arena, light: Light) -> list[Face]:
-    """Return the shadow of a convex solid on the floor; none if the sun does not shine from above."""
+def _shadow(solid: Solid, arena: Arena, light: Light) -> list[Face]:
+    """The shadow of a solid on the floor; none if the sun does not shine from above."""
     sun = np.array(light.sun_direction_arena)
     if sun[2] >= -1e-3 * float(np.linalg.norm(sun)):
         return []
+    corners = np.array(solid.corners())
     cast = corners[:, :2] - corners[:, 2:] / sun[2] * sun[:2]
     outline = cv2.convexHull(cast.astype(np.float32)).reshape(-1, 2)
     x, y = cast.mean(axis=0)
     on_tatami = abs(x) <= arena.length_x_m / 2 and abs(y) <= arena.width_y_m / 2
     lit = _lit(TATAMI_BGR if on_tatami else GROUND_BGR, _UP, light)
-    return [_on_floor(outline, _dim(lit, SHADOW))]
+    return [_on_floor(outline, _dim(lit, _SHADOW))]
+
+
+@dataclass(frozen=True, slots=True)
+class _Node:
+    """A plane normal . p = offset, the faces that lie on it and the trees on each side of it."""
+
+    normal: Vec3
+    offset: float
+    behind: _Tree
+    faces: tuple[int, ...]
+    before: _Tree
+
+
+_Tree = tuple[int, ...] | _Node  # a leaf has the numbers of faces in the order of painting
+
+
+class PaintTree:
+    """The faces of all bodies, some of them cut in parts, and their order of painting."""
+
+    def __init__(self, bodies: Sequence[Body]) -> None:
+        self.faces: list[Face] = []
+        self._root = self._part_bodies(bodies)
+
+    def back_to_front(self, eye_arena_m: Vec3) -> list[int]:
+        """Indices of `faces` in the order of painting: none is hidden by one before it."""
+        order: list[int] = []
+        _walk(self._root, eye_arena_m, order)
+        return order
+
+    def _part_bodies(self, bodies: Sequence[Body]) -> _Tree:
+        if len(bodies) < 2:
+            return self._keep([face for body in bodies for face in body.faces])
+        plane = _plane_between(bodies)
+        if plane is None:
+            return self._part_faces([face for body in bodies for face in body.faces])
+        normal, offset = plane
+        beyond = [body for body in bodies if np.dot(normal, body.hull.centre_arena_m) < offset]
+        near = [body for body in bodies if body not in beyond]
+        return _Node(normal, offset, self._part_bodies(beyond), (), self._part_bodies(near))
+
+    def _part_faces(self, faces: list[Face]) -> _Tree:
+        if not faces:
+            return ()
+        chosen = min(faces, key=lambda face: sum(_is_cut(face, other) for other in faces))
+        normal, offset = chosen.normal_arena, float(np.dot(chosen.normal_arena, chosen.corners_arena_m[0]))
+        behind: list[Face] = []
+        on_it: list[Face] = []
+        before: list[Face] = []
+        for face in faces:
+            heights = _heights(chosen, face)
+            if abs(heights).max() <= _FLAT_M:
+                on_it.append(face)
+                continue
+            if heights.min() < -_FLAT_M:
+                behind.append(_below(face, heights))
+            if heights.max() > _FLAT_M:
+                before.append(_below(face, -heights))
+        far_side = self._part_faces(behind)
+        own = self._keep(on_it)
+        return _Node(normal, offset, far_side, own, self._part_faces(before))
+
+    def _keep(self, faces: Sequence[Face]) -> tuple[int, ...]:
+        first = len(self.faces)
+        self.faces.extend(faces)
+        return tuple(range(first, len(self.faces)))
+
+
+def _walk(tree: _Tree, eye: Vec3, order: list[int]) -> None:
+    while isinstance(tree, _Node):
+        normal = tree.normal
+        above = normal[0] * eye[0] + normal[1] * eye[1] + normal[2] * eye[2] > tree.offset
+        _walk(tree.behind if above else tree.before, eye, order)
+        order.extend(tree.faces)
+        tree = tree.before if above else tree.behind
+    order.extend(tree)
+
+
+def _plane_between(bodies: Sequence[Body]) -> tuple[Vec3, float] | None:
+    """The plane with the widest gap around it that separates the bodies without touching one, if any.
+
+    For two upright boxes a plane along a face of one of them is enough (separating axis theorem).
+    """
+    axes: list[Vec3] = [(0.0, 0.0, 1.0)]
+    for body in bodies:
+        c, s = body.hull.turn
+        axes += [(c, s, 0.0), (-s, c, 0.0)]
+    widest, plane = 0.0, None
+    for axis in axes:
+        spans = []
+        for body in bodies:
+            middle, reach = float(np.dot(axis, body.hull.centre_arena_m)), _reach_m(body.hull, axis)
+            spans.append((middle - reach, middle + reach))
+        spans.sort()
+        end = spans[0][1]
+        for low, high in spans[1:]:
+            if low - end > widest:
+                widest, plane = low - end, (axis, (low + end) / 2)
+            end = max(end, high)
+    return plane
+
+
+def _reach_m(box: Solid, axis: Vec3) -> float:
+    """How far a box extends from its centre along a unit vector."""
+    c, s = box.turn
+    x, y, z = box.half_extents_m
+    along, across = c * axis[0] + s * axis[1], c * axis[1] - s * axis[0]
+    return x * abs(along) + y * abs(across) + z * abs(axis[2])
+
+
+def _heights(plane: Face, face: Face) -> Floats:
+    """How far a face's corners are in front of the plane of another, metres, shape (k,)."""
+    heights: Floats = (face.corners_arena_m - plane.corners_arena_m[0]) @ np.array(plane.normal_arena)
+    return heights
+
+
+def _is_cut(plane: Face, face: Face) -> bool:
+    heights = _heights(plane, face)
+    return bool(heights.min() < -_FLAT_M and heights.max() > _FLAT_M)
+
+
+def _below(face: Face, heights: Floats) -> Face:
+    """The part of a face whose heights are not above zero."""
+    if heights.max() <= _FLAT_M:
+        return face
+    kept = []
+    for i, corner in enumerate(face.corners_arena_m):
+        last, here = heights[i - 1], heights[i]
+        if (last > 0.0) != (here > 0.0):
+            before = face.corners_arena_m[i - 1]
+            kept.append(before + (corner - before) * (last / (last - here)))
+        if here <= 0.0:
+            kept.append(corner)
+    return replace(face, corners_arena_m=np.array(kept))

@@ -13,13 +13,13 @@ from firmware_py.mavlink.camera.model import CameraModel, VideoEncoding, VideoSt
 from firmware_py.mavlink.node import MavlinkNode, NodeOptions
 from geometry.axes import flip_vector
 from scenarios.result import LocalFrame, Standing
-from sitl.drone_files import flight_recorder, open_storage
+from sitl.drone_files import PictureAlbum, flight_recorder
 from sitl.link_hub import LinkHub
 from sitl.parameter_file import ParameterKeeper, open_parameters
-from sitl.picture_album import PictureAlbum
 from sitl.server_settings import ServerSettings
 from sitl.simulation import Simulation
 from sitl.solids import Solid
+from sitl.storage import open_storage
 from sitl.time_grants import TimeGrants, Velocity
 from sitl.world import CONTROL_PERIOD_US
 from wire.dialect import mavlink
@@ -27,18 +27,18 @@ from wire.simulator_api import REFEREE_PATH, SCENARIO_PATH, VIDEO_PATH
 from wire.transports.urls import is_loopback
 
 if TYPE_CHECKING:
-    from sitl.camera_feed import CameraFeed
+    from sitl.camera import CameraFeed
     from sitl.rtp import RtpSender
     from sitl.video import VideoServer
 
 
 class ServedDrone:
-    """Puts one simulation on MAVLink and video; somebody else says when it advances.
+    """Puts one simulation on MAVLink and video; it advances when `tick` is called.
 
     Args:
-        simulation: what flies.
+        simulation: of the drone.
         settings: of this drone.
-        boot_unix_us: what time it is, microseconds since 1970.
+        boot_unix_us: time now, microseconds since 1970.
         notice: called with lines for people.
 
     Raises:
@@ -46,8 +46,8 @@ class ServedDrone:
         ParameterFileError: the file of its parameters cannot be read, or a line is wrong.
 
     Attributes:
-        simulation: what flies.
-        node: what speaks for it.
+        simulation: as given.
+        node: its MAVLink services.
     """
 
     def __init__(
@@ -63,6 +63,8 @@ class ServedDrone:
         if settings.parameters is not None:
             self._keeper = open_parameters(simulation.autopilot.parameters, settings.parameters, notice)
         storage = open_storage(settings.storage, settings.instance)
+        camera = simulation.scenario.camera
+        model = CameraModel(camera.width_px, camera.height_px, camera.horizontal_fov_rad, camera.rate_hz)
         self._album = PictureAlbum(storage, boot_unix_us)
         self._recorder = flight_recorder(storage, boot_unix_us)
         self.node = MavlinkNode(
@@ -75,7 +77,7 @@ class ServedDrone:
                 storage=storage,
                 shell=settings.shell,
                 log_text=self._recorder.hear_text,
-                camera=_camera_model(simulation) if settings.camera else None,
+                camera=model if settings.camera else None,
                 captures=self._album,
                 failures=simulation.failures,
             ),
@@ -88,29 +90,31 @@ class ServedDrone:
         self._image_us = -1
 
     async def open_links(self) -> None:
-        """Open the links and speak at once.
+        """Open the links and send at once.
 
         Raises:
             LinkError: one cannot be opened.
         """
-        for profile, addresses in self._settings.standing_links:
+        for profile, addresses in self._settings.default_links:
             await self._hub.open_udp(profile, addresses)
         self._hub.update(0)
         if self._keeper is not None:
             self._keeper.start()
-        await self._hub.open_all(self._settings.links)
+        for link in self._settings.links:
+            await self._hub.open(link)
 
     async def open_video(self, others: Callable[[], Sequence[Solid]] = tuple) -> None:
-        """Import what is heavy in a thread, telemetry must not wait for it, then serve the camera's images.
+        """Import large libraries in a thread, as telemetry must not wait, then serve the camera's images.
 
         Args:
-            others: asked at each exposure for the boxes of other drones.
+            others: called at each exposure for the boxes of other drones.
 
         Raises:
-            VideoError: a port is taken or an address is wrong.
+            VideoError: a port is in use or an address is wrong.
         """
-        await asyncio.to_thread(_import_video, rtp=self._settings.video_rtp is not None)
-        from sitl.camera_feed import CameraFeed
+        for module in ("sitl.camera", "aiohttp.web", "sitl.video"):
+            await asyncio.to_thread(import_module, module)
+        from sitl.camera import CameraFeed
         from sitl.video import VideoServer
 
         scenario = self.simulation.scenario
@@ -120,6 +124,7 @@ class ServedDrone:
         video.add_json(REFEREE_PATH, self._referee_answer)
         video.add_json(SCENARIO_PATH, lambda _query: scenario.model_dump(mode="json"))
         if self._settings.video_rtp is not None:
+            await asyncio.to_thread(import_module, "sitl.rtp")
             from sitl.rtp import RtpSender
 
             self._rtp = RtpSender(self._settings.video_rtp, scenario.camera, self._settings.speed)
@@ -129,16 +134,15 @@ class ServedDrone:
         self._camera = CameraFeed(scenario, others)
 
     def _warn(self, line: str) -> None:
-        """Tell people at the terminal and at ground stations."""
+        """Show a line at the terminal and at ground stations."""
         self._notice(line)
         self.simulation.autopilot.say(mavlink.MAV_SEVERITY_WARNING, line)
 
     def tick(self) -> None:
-        """Advance by one control period: fly, speak, look."""
+        """Advance by one control period, then serve the log, the links and the video."""
         simulation = self.simulation
-        sampled_us = (
-            simulation.time_us
-        )  # not the estimate's time: that stands still while sensors are unusable
+        # Not the estimate's time, which does not advance while sensors are unusable.
+        sampled_us = simulation.time_us
         simulation.tick()
         self._recorder.update(simulation.autopilot)
         self._hub.update(sampled_us)
@@ -154,10 +158,10 @@ class ServedDrone:
                 self._rtp.send(image, time_us)
 
     async def hold(self, grants: TimeGrants) -> None:
-        """Wait until simulated time may go on."""
+        """Wait until simulated time may advance."""
 
         def received() -> Velocity | None:
-            self._hub.read()  # a flooded link may have left a setpoint waiting
+            self._hub.read()  # on a flooded link, a setpoint may still wait
             return self.simulation.autopilot.setpoints.newest_velocity()
 
         await grants.hold(self.simulation.time_us - CONTROL_PERIOD_US, self._image_us, received)
@@ -174,7 +178,7 @@ class ServedDrone:
         self._hub.close()
 
     def greeting(self) -> str:
-        """Where to find it, one line for people."""
+        """One line for people: airframe, scenario and addresses."""
         scenario, settings = self.simulation.scenario, self._settings
         assert settings.onboard.remote is not None
         assert settings.ground.remote is not None
@@ -184,10 +188,10 @@ class ServedDrone:
         return f"{scenario.airframe} in {scenario.name}: MAVLink to UDP {ports}, video on {page}{rtp}"
 
     def _streams(self) -> tuple[VideoStream, ...]:
-        """What the camera component tells of the video; QGroundControl takes the first it can show."""
+        """The video streams that the camera component offers; QGroundControl takes the first it can show."""
         settings, camera = self._settings, self.simulation.scenario.camera
         common = (camera.width_px, camera.height_px, camera.rate_hz, degrees(camera.horizontal_fov_rad))
-        host = _seen_from_outside(settings)
+        host = _public_address(settings)
         page = VideoStream(
             f"http://{host}:{settings.http_port}{VIDEO_PATH}", VideoEncoding.MJPEG_HTTP, *common
         )
@@ -196,34 +200,23 @@ class ServedDrone:
         return (VideoStream(str(settings.video_rtp[1]), VideoEncoding.H264_RTP, *common), page)
 
     def _referee_answer(self, query: Mapping[str, str]) -> object:
-        """What `/referee.json?state=…&ended=…` tells: how the try stands, and the report if it ended now."""
+        """`/referee.json?state=…&ended=…`: how the try stands, and the report if it ended now."""
         simulation = self.simulation
         referee = simulation.referee
+        origin = simulation.autopilot.estimator.origin_ned_m  # None until the estimator sets it
         standing = Standing(
             scenario=simulation.scenario.name,
             source="truth",
             time_us=simulation.time_us,
-            local_frame=self._local_frame(),
+            local_frame=None if origin is None else LocalFrame(origin_arena_m=flip_vector(origin)),
             snapshot=referee.snapshot(),
             report=referee.report(query.get("state", ""), query.get("ended")),
         )
         return standing.model_dump(mode="json")
 
-    def _local_frame(self) -> LocalFrame | None:
-        """Where in the arena the vehicle's local frame is; None before the estimator has fixed its origin."""
-        origin_ned_m = self.simulation.autopilot.estimator.origin_ned_m
-        if origin_ned_m is None:
-            return None
-        return LocalFrame(origin_arena_m=flip_vector(origin_ned_m))
 
-
-def _camera_model(simulation: Simulation) -> CameraModel:
-    camera = simulation.scenario.camera
-    return CameraModel(camera.width_px, camera.height_px, camera.horizontal_fov_rad, camera.rate_hz)
-
-
-def _seen_from_outside(settings: ServerSettings) -> str:
-    """The address under which a ground station finds this machine, when all addresses are listened on."""
+def _public_address(settings: ServerSettings) -> str:
+    """The address under which a ground station reaches this machine, when all addresses are listened on."""
     if settings.bind != "0.0.0.0":
         return settings.bind
     remote = settings.ground.remote
@@ -231,12 +224,7 @@ def _seen_from_outside(settings: ServerSettings) -> str:
         return "127.0.0.1"
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
         try:
-            probe.connect(remote)  # sends nothing; the system chooses the way out
+            probe.connect(remote)  # sends nothing; the system chooses the route
             return str(probe.getsockname()[0])
         except OSError:
             return "127.0.0.1"
-
-
-def _import_video(*, rtp: bool) -> None:
-    for module in ("sitl.camera_feed", "aiohttp.web", "sitl.video", *(("sitl.rtp",) if rtp else ())):
-        import_module(module)

@@ -1,8 +1,7 @@
-"""Several drones in one world: where they start, and that they touch each other.
+"""Several drones in one world: their starting positions, and their contact with each other.
 
-Each drone has its own physics; they meet as boxes. While two are near, each sees the other as a solid that
-stands where the other is in this control period, so they push each other away and cannot pass through.
-The air behind one's rotors does not disturb another.
+Each drone has its own physics. While two are near, each is a solid box for the other at its position in this
+control period, so they push each other away. The downwash of one does not affect another.
 """
 
 from __future__ import annotations
@@ -14,13 +13,13 @@ from scenarios.models import Scenario, Start, is_over_base
 from sitl.solids import Solid
 from sitl.world import World
 
-_SPACING_M = 1.5  # between starting places, more where a drone is large
-_NEAR_M = 1.0  # of the centres, beyond the drones' own size
-_APART_TICKS = 5  # how often drones that are not near are looked at; 0.02 s
+_SPACING_M = 1.5  # between starting positions, more for large drones
+_NEAR_M = 1.0  # between the centres, beyond the drones' own size
+_APART_TICKS = 5  # between checks of drones that are not near; 0.02 s
 
 
 class Fleet:
-    """Tells the drones of one world where the others are.
+    """Places the drones of one world as solids in each other's world.
 
     Args:
         worlds: one a drone.
@@ -36,30 +35,28 @@ class Fleet:
         self._near = False
 
     def tick(self) -> None:
-        """Look around; to be called after all have advanced."""
+        """Update the neighbours of each drone; to be called after all have advanced."""
         if len(self._worlds) < 2:
             return
         self._ticks += 1
         if not self._near and self._ticks % _APART_TICKS:
             return
         worlds = self._worlds
-        places = [world.position_arena_m for world in worlds]
-        pairs = [
-            (i, j) for i in range(len(worlds)) for j in range(i) if dist(places[i], places[j]) < self._reach_m
-        ]
+        at = [world.position_arena_m for world in worlds]
+        pairs = [(i, j) for i in range(len(worlds)) for j in range(i) if dist(at[i], at[j]) < self._reach_m]
         if not pairs and not self._near:
             return
         self._near = bool(pairs)
         boxes = [world.box(_name(number)) for number, world in enumerate(worlds)]
         for i, world in enumerate(worlds):
-            world.meet(tuple(boxes[a + b - i] for a, b in pairs if i in (a, b)))
-        self._tell(pairs)
+            world.set_neighbours(tuple(boxes[a + b - i] for a, b in pairs if i in (a, b)))
+        self._report_touching(pairs)
 
     def others(self, number: int) -> list[Solid]:
         """The boxes of all drones but one, for its camera."""
         return [world.box(_name(i)) for i, world in enumerate(self._worlds) if i != number]
 
-    def _tell(self, pairs: list[tuple[int, int]]) -> None:
+    def _report_touching(self, pairs: list[tuple[int, int]]) -> None:
         touching = {
             (i, j)
             for i, j in pairs
@@ -75,24 +72,24 @@ def _name(number: int) -> str:
 
 
 def side_by_side(scenario: Scenario, count: int, width_m: float) -> list[Scenario]:
-    """The scenario once for each drone; the first starts where it says, the others around it on the floor.
+    """The scenario once for each drone: the first at its start, the others around it on the floor.
 
-    Places are those of a square grid around the start, the nearest first, inside the arena, beside the base
-    and the frames, 1.5 m or more apart; all have the heading of the scenario.
+    Positions are those of a square grid around the start, the nearest first, inside the arena, beside the
+    base and the frames, 1.5 m or more apart; all have the heading of the scenario.
 
     Args:
-        scenario: what is flown.
-        count: how many drones.
+        scenario: of the first drone.
+        count: number of drones.
         width_m: of a drone.
 
     Raises:
-        ValueError: so many have no room in the arena.
+        ValueError: the arena has no room for them.
     """
     spacing_m = max(_SPACING_M, 2 * width_m)
     places = [(scenario.start.x_m, scenario.start.y_m)]
     reach = int(max(scenario.arena.length_x_m, scenario.arena.width_y_m) / spacing_m) + 1
     steps = range(-reach, reach + 1)
-    grid = sorted(((i, j) for i in steps for j in steps if (i, j) != (0, 0)), key=_farness)
+    grid = sorted(((i, j) for i in steps for j in steps if (i, j) != (0, 0)), key=_order)
     for i, j in grid:
         if len(places) == count:
             break
@@ -107,8 +104,8 @@ def side_by_side(scenario: Scenario, count: int, width_m: float) -> list[Scenari
     ]
 
 
-def _farness(cell: tuple[int, int]) -> tuple[int, int, int]:
-    """Order of starting places: near ones first, then to the left and right before fore and aft."""
+def _order(cell: tuple[int, int]) -> tuple[int, int, int]:
+    """Order of starting positions: near ones first, then left and right before front and back."""
     i, j = cell
     return (i * i + j * j, abs(i), -j * 10 - i)
 

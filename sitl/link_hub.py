@@ -1,17 +1,17 @@
-"""Joins a vehicle's MAVLink node to what carries its bytes; links come and go with who connects."""
+"""Connects a vehicle's MAVLink node to its links, and bounds the processor time that their input takes."""
 
 from __future__ import annotations
 
 import time
 from collections import deque
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import replace
 
 from firmware_py.mavlink.node import MavlinkNode
 from sitl.links import (
     Joined,
-    LastingLink,
     Receive,
+    ReconnectingLink,
     StreamLink,
     StreamLinks,
     TcpServer,
@@ -20,14 +20,14 @@ from sitl.links import (
     connect_tcp_async,
     open_udp,
 )
-from sitl.server_settings import WantedLink
+from sitl.server_settings import RequestedLink
 from wire.link import LinkProfile
 from wire.transports.sockets import Stream, open_serial
 from wire.transports.urls import LinkUrl, is_loopback
 
 _INPUT_SHARE = 0.25  # of a core
-_MAX_SAVED_S = 0.004  # processor time for input after a quiet while: one control period
-_STEPS_A_TURN = 4  # at most some 0.4 ms
+_MAX_SAVED_S = 0.004  # processor time that may be saved up while no input is received: one control period
+_STEPS_A_TURN = 4  # at most about 0.4 ms
 _NOTICE_PERIOD_S = 10.0
 
 
@@ -35,7 +35,7 @@ class LinkHub:
     """All links of one vehicle.
 
     Args:
-        node: whose bytes they carry; it begins without links.
+        node: has no links yet.
         notice: called with lines for people.
     """
 
@@ -47,18 +47,18 @@ class LinkHub:
         self._joined = 0
 
     async def open_udp(self, profile: LinkProfile, addresses: UdpAddresses) -> None:
-        """Open a UDP link and speak on it from now on.
+        """Open a UDP link and send on it from now on.
 
         Raises:
-            LinkError: the local port is taken or an address is wrong.
+            LinkError: the local port is in use or an address is wrong.
         """
         link = await open_udp(addresses, self._receiver(profile.name))
         self._opened.append(link)
         self._node.add_link(profile)
         self._carriers[profile.name] = link
 
-    async def open(self, link: WantedLink) -> None:
-        """Open a link that a person asked for.
+    async def open(self, link: RequestedLink) -> None:
+        """Open a link that the user requested.
 
         Raises:
             LinkError: it cannot be opened.
@@ -72,28 +72,18 @@ class LinkHub:
         else:
             self._opened.append(self._open_stream(url, self._joiner(profile)))
 
-    async def open_all(self, links: Sequence[WantedLink]) -> None:
-        """Open links that a person asked for.
-
-        Raises:
-            LinkError: one cannot be opened.
-        """
-        for link in links:
-            await self.open(link)
-
     def read(self) -> None:
-        """Read input that waits, as far as there is time, and send the answers."""
+        """Process waiting input, as far as there is time, and send the answers."""
         self._input.work()
-        self.flush()
+        self._flush()
 
     def update(self, time_us: int) -> None:
-        """Read input that waits, then send what is due at a vehicle time."""
+        """Process waiting input, then send what is due at a vehicle time."""
         self._input.work()
         self._node.update(time_us)
-        self.flush()
+        self._flush()
 
-    def flush(self) -> None:
-        """Send what the node has to say."""
+    def _flush(self) -> None:
         for name, data in self._node.take_output():
             self._carriers[name].send(data)
 
@@ -106,17 +96,17 @@ class LinkHub:
         if url.scheme == "tcpin":
             return TcpServer(url.place, joined, self._leave)
         if url.scheme == "tcpout":
-            return LastingLink(lambda: connect_tcp_async(url.place), joined, self._leave)
+            return ReconnectingLink(lambda: connect_tcp_async(url.place), joined, self._leave)
 
         async def open_again() -> Stream:
             return open_serial(*url.place)
 
-        return LastingLink(open_again, joined, self._leave, open_serial(*url.place))
+        return ReconnectingLink(open_again, joined, self._leave, open_serial(*url.place))
 
     def _receiver(self, name: str) -> Receive:
         def receive(data: bytes) -> None:
             self._input.take(name, data)
-            self.flush()  # answers do not wait for the next tick
+            self._flush()  # answers do not wait for the next tick
 
         return receive
 
@@ -138,15 +128,15 @@ class LinkHub:
 
 
 class LinkInput:
-    """Input of all links of one vehicle, read so that no flood of it delays the control loop.
+    """Input of all links of one vehicle, processed so that a flood does not delay the control loop.
 
-    Reading and acting on input may take a quarter of one processor core. What comes faster waits, up to
-    64 KiB a link, and what finds no room there is dropped: a late command is worth less than a lost one.
-    Links take turns, so a flood on one delays the input of another by milliseconds.
+    Processing input may take a quarter of one processor core. What is received faster waits, up to 64 KiB
+    a link; what exceeds that is dropped, as a late command is worse than a lost one. Links take turns, so
+    a flood on one delays the input of another by milliseconds.
 
     Args:
-        node: reads it and acts on it.
-        notice: called with lines for people, when input was dropped.
+        node: processes the input.
+        notice: called with lines for people when input was dropped.
         clock: monotonic seconds.
         processor_clock: processor time of this thread in seconds.
     """
@@ -161,28 +151,22 @@ class LinkInput:
         self._node = node
         self._notice = notice
         self._clock, self._processor_clock = clock, processor_clock
-        self._waiting: deque[str] = deque()  # names of links, whose turn is next first
+        self._waiting: deque[str] = deque()  # names of links with input, the next one first
         self._filled_s = clock()
         self._saved_s = _MAX_SAVED_S
         self._dropped_bytes: dict[str, int] = {}
         self._noticed_s = -_NOTICE_PERIOD_S
 
     def take(self, link: str, data: bytes) -> None:
-        """Take bytes that came in on a link, and act on them at once as far as there is time.
-
-        Args:
-            link: its name.
-            data: any piece of the stream.
-        """
-        dropped_bytes = self._node.add_input(link, data)
-        if dropped_bytes:
+        """Take bytes received on a link, and process them as far as there is time."""
+        if dropped_bytes := self._node.add_input(link, data):
             self._dropped_bytes[link] = self._dropped_bytes.get(link, 0) + dropped_bytes
         if link not in self._waiting:
             self._waiting.append(link)
         self.work()
 
     def work(self) -> None:
-        """Act on input that waits, as far as there is time; to be called at every control tick."""
+        """Process waiting input, as far as there is time; to be called at every control tick."""
         now_s = self._clock()
         self._saved_s = min(_MAX_SAVED_S, self._saved_s + _INPUT_SHARE * (now_s - self._filled_s))
         self._filled_s = now_s
@@ -194,11 +178,7 @@ class LinkInput:
                 waiting.append(link)
             self._saved_s -= self._processor_clock() - began_s
         if self._dropped_bytes and now_s - self._noticed_s >= _NOTICE_PERIOD_S:
-            self._tell(now_s)
-
-    def _tell(self, now_s: float) -> None:
-        """Say what was dropped since it was last said."""
-        self._noticed_s = now_s
-        for link, dropped_bytes in self._dropped_bytes.items():
-            self._notice(f"too much input on link {link}: {dropped_bytes} bytes dropped")
-        self._dropped_bytes.clear()
+            self._noticed_s = now_s
+            for link, dropped_bytes in self._dropped_bytes.items():
+                self._notice(f"too much input on link {link}: {dropped_bytes} bytes dropped")
+            self._dropped_bytes.clear()

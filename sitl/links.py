@@ -1,6 +1,6 @@
-"""A vehicle's links on the asyncio loop: they send to all who listen and tell who comes and goes.
+"""A vehicle's links on the asyncio loop: UDP with several peers, TCP and serial lines.
 
-Links carry bytes; what the bytes mean is the autopilot's business.
+Links carry bytes; `link_hub` connects them to the vehicle's MAVLink node.
 """
 
 from __future__ import annotations
@@ -24,38 +24,32 @@ from wire.transports.sockets import (
 from wire.transports.urls import LinkError
 
 Receive = Callable[[bytes], None]
+Joined = Callable[["StreamLink"], Receive]  # called with a new connection; returns the receiver of its bytes
+Left = Callable[["StreamLink"], None]
 
-SILENCE_S = 5.0  # after that, a peer who sent something unasked is forgotten
+SILENCE_S = 5.0  # after that, a peer that is not the remote is removed
 MAX_PEERS = 8
 RETRY_S = 1.0  # before a lost connection or line is opened again
 _MAX_CLIENTS = 16
 
-Joined = Callable[["StreamLink"], Receive]  # told of a new connection; gives who takes its bytes
-Left = Callable[["StreamLink"], None]
-
 
 @dataclass(frozen=True, slots=True)
 class UdpAddresses:
-    """Where a link listens and to whom it speaks unasked.
+    """Addresses of a UDP link."""
 
-    Attributes:
-        bind: local address; port 0 lets the system choose one.
-        remote: whom it always sends to; None: only to those who spoke.
-    """
-
-    bind: Address
-    remote: Address | None
+    bind: Address  # local; port 0 lets the system choose one
+    remote: Address | None  # is always sent to; None: only peers that sent something
 
 
 class UdpLink:
-    """A UDP link: sends to its remote from the start, and to all who sent something within five seconds.
+    """A UDP link: sends to its remote from the start, and to peers that sent something within five seconds.
 
-    PX4 locks to the first who speaks. Here QGroundControl, MAVProxy and a script may share a link: one at the
-    remote address, others that send to this link's port from anywhere. They all hear the same.
+    PX4 locks to the first peer. Here QGroundControl, MAVProxy and a script may share a link: one at the
+    remote address, others that send to this link's port from anywhere. They all receive the same.
 
     Args:
         transport: bound; closed at the end.
-        remote: whom it always sends to; None: nobody.
+        remote: always sent to, if given.
         receive: called with each datagram.
         clock: monotonic seconds.
     """
@@ -76,13 +70,13 @@ class UdpLink:
         asyncio.get_running_loop().add_reader(transport, self._read)
 
     def send(self, data: bytes) -> None:
-        """Send a datagram to all peers; lost if nobody is there."""
+        """Send a datagram to all peers; lost if there are none."""
         if not self._is_open:
             return
         if self._remote is not None:
             self._transport.write(data, self._remote)
         if self._heard_s:
-            self._forget_the_silent(self._clock())
+            self._remove_silent(self._clock())
             for peer in self._heard_s:
                 self._transport.write(data, peer)
 
@@ -97,19 +91,19 @@ class UdpLink:
         try:
             data = self._transport.read()
         except OSError:
-            return  # no way there now: go on sending, as a radio would
+            return  # no route now: go on sending, as a radio would
         peer = self._transport.peer
         if not data or peer is None:
             return
-        if peer != self._remote and data[0] in MARKERS:  # who sends something else is no peer
+        if peer != self._remote and data[0] in MARKERS:  # a sender of anything else is no peer
             now_s = self._clock()
-            self._forget_the_silent(now_s)
+            self._remove_silent(now_s)
             if peer in self._heard_s or len(self._heard_s) < MAX_PEERS:
                 self._heard_s[peer] = now_s
         self._receive(data)
 
-    def _forget_the_silent(self, now_s: float) -> None:
-        for peer in [who for who, heard_s in self._heard_s.items() if now_s - heard_s > SILENCE_S]:
+    def _remove_silent(self, now_s: float) -> None:
+        for peer in [peer for peer, heard_s in self._heard_s.items() if now_s - heard_s > SILENCE_S]:
             del self._heard_s[peer]
 
 
@@ -117,7 +111,7 @@ async def open_udp(addresses: UdpAddresses, receive: Receive) -> UdpLink:
     """Open a link.
 
     Raises:
-        LinkError: the local port is taken or an address is wrong.
+        LinkError: the local port is in use or an address is wrong.
     """
     remote = None
     if addresses.remote is not None:
@@ -132,23 +126,20 @@ class StreamLink:
     Args:
         stream: open; closed at the end.
         joined: called at once.
-        left: called when it is over.
-
-    Attributes:
-        over: set when it is.
+        left: called when the connection has ended; `ended` is set then.
     """
 
     def __init__(self, stream: Stream, joined: Joined, left: Left) -> None:
         self._stream = stream
         self._left = left
         self._loop = asyncio.get_running_loop()
-        self.over = asyncio.Event()
+        self.ended = asyncio.Event()
         self._receive = joined(self)
         self._loop.add_reader(stream, self._read)
 
     def send(self, data: bytes) -> None:
-        """Send whole packets, or lose them when too many wait."""
-        if self.over.is_set():
+        """Send whole packets; they are lost when too many wait."""
+        if self.ended.is_set():
             return
         self._stream.write(data)
         if self._stream.has_unsent():
@@ -156,9 +147,9 @@ class StreamLink:
 
     def close(self) -> None:
         """Close the connection."""
-        if self.over.is_set():
+        if self.ended.is_set():
             return
-        self.over.set()
+        self.ended.set()
         self._loop.remove_reader(self._stream)
         self._loop.remove_writer(self._stream)
         self._stream.close()
@@ -180,11 +171,11 @@ class StreamLink:
 
 
 class StreamLinks(ABC):
-    """Links over streams, as they come and go; after a failure it is tried again, a second later.
+    """Links over streams that are opened and lost again; a failure is retried a second later.
 
     Args:
-        joined: called with each that is open.
-        left: called with each that is over.
+        joined: called with each open link.
+        left: called with each link that has ended.
     """
 
     def __init__(self, joined: Joined, left: Left) -> None:
@@ -219,10 +210,10 @@ class StreamLinks(ABC):
 
 
 class TcpServer(StreamLinks):
-    """Takes TCP clients; each is a link of its own.
+    """Accepts TCP clients; each is a link of its own.
 
     Raises:
-        LinkError: the port is taken or the address is not this machine's.
+        LinkError: the port is in use or the address is not this machine's.
     """
 
     def __init__(self, place: Address, joined: Joined, left: Left) -> None:
@@ -241,14 +232,14 @@ class TcpServer(StreamLinks):
             stream.close()
 
 
-class LastingLink(StreamLinks):
-    """A TCP connection or serial line that is opened again when it was lost.
+class ReconnectingLink(StreamLinks):
+    """A TCP connection or serial line that is opened again after it was lost.
 
     Args:
         open_stream: opens it; raises `LinkError` or `OSError`.
         joined: called each time it is open.
-        left: called each time it is over.
-        opened: the first one, if it is open already.
+        left: called each time it has ended.
+        opened: the first stream, if it is open already.
     """
 
     def __init__(
@@ -264,12 +255,12 @@ class LastingLink(StreamLinks):
 
     async def _serve_next(self) -> None:
         stream, self._opened = self._opened or await self._open_stream(), None
-        await self._add(stream).over.wait()
+        await self._add(stream).ended.wait()
         await asyncio.sleep(RETRY_S)
 
 
 async def connect_tcp_async(place: Address) -> Stream:
-    """Connect to a TCP server. Raises `OSError` if nobody answers."""
+    """Connect to a TCP server; raises `OSError` if that fails."""
     loop = asyncio.get_running_loop()
     failure = OSError()
     for family, kind, protocol, _, address in await loop.getaddrinfo(*place, type=socket.SOCK_STREAM):

@@ -1,7 +1,7 @@
-"""Parameters in a file: what differs from the defaults, a line each, as ground stations write them too.
+"""A file of the parameters that differ from their defaults, one a line, in the formats of ground stations.
 
 A line is `vehicle component NAME value type`, separated by tabs (QGroundControl's .params), or `NAME value`
-(MAVProxy's .parm); `#` begins a comment. MAV_SYS_ID is left out both ways: the instance decides it.
+(MAVProxy's .parm); `#` begins a comment. MAV_SYS_ID is neither read nor written: the instance sets it.
 """
 
 from __future__ import annotations
@@ -17,12 +17,11 @@ from tempfile import NamedTemporaryFile
 from errors import UserError
 from firmware_py.parameters import Parameter, ParameterError, Parameters
 
-SAVE_DELAY_S = 0.5
-"""Changes that follow each other this closely are saved at once."""
+SAVE_DELAY_S = 0.5  # changes within this time are saved together
 
 _TYPES = {"int32": 6, "float": 9}  # MAV_PARAM_TYPE
-_DECIDED_BY_INSTANCE = "MAV_SYS_ID"
-_NAMED_IN_NOTICE = 5
+_SYSTEM_ID = "MAV_SYS_ID"
+_MAX_NAMED = 5  # in a notice
 
 
 class ParameterFileError(UserError):
@@ -31,31 +30,22 @@ class ParameterFileError(UserError):
 
 @dataclass(slots=True)
 class LoadedParameters:
-    """What a file holds.
-
-    Attributes:
-        values: by name; each one can be.
-        unknown: names that this drone has no parameter for, and facts that it cannot change.
-    """
+    """The content of a file: valid values by name, and names that this drone does not have or cannot set."""
 
     values: dict[str, float] = field(default_factory=dict)
     unknown: list[str] = field(default_factory=list)
 
     def notice(self) -> str:
-        """One line about what was left out; empty when nothing was."""
+        """One line about unknown names; empty if there are none."""
         if not self.unknown:
             return ""
-        some = ", ".join(self.unknown[:_NAMED_IN_NOTICE])
-        more = len(self.unknown) - _NAMED_IN_NOTICE
+        some = ", ".join(self.unknown[:_MAX_NAMED])
+        more = len(self.unknown) - _MAX_NAMED
         return f"parameters left out, as this drone cannot set them: {some}{f' and {more} more' * (more > 0)}"
 
 
 def load_parameters(path: Path, parameters: Parameters) -> LoadedParameters:
-    """Read a file; one that is not there yet is empty.
-
-    Args:
-        path: of the file.
-        parameters: what there is and can be; it is not changed.
+    """Read a file; a missing one is empty. The parameters only declare what is valid and are not changed.
 
     Raises:
         ParameterFileError: it cannot be read, or a line is wrong; the message names the line.
@@ -76,15 +66,15 @@ def load_parameters(path: Path, parameters: Parameters) -> LoadedParameters:
         if not words:
             continue
         try:
-            _take(loaded, words, parameters)
+            _add_line(loaded, words, parameters)
         except ParameterError as error:
             raise ParameterFileError(f"{path}: line {number}: {error}") from None
     return loaded
 
 
-def _take(loaded: LoadedParameters, words: list[str], parameters: Parameters) -> None:
+def _add_line(loaded: LoadedParameters, words: list[str], parameters: Parameters) -> None:
     name, value = _name_and_value(words)
-    if name == _DECIDED_BY_INSTANCE:
+    if name == _SYSTEM_ID:
         return
     if name not in parameters:
         loaded.unknown.append(name)
@@ -112,20 +102,15 @@ def _name_and_value(words: list[str]) -> tuple[str, float]:
 
 
 def save_parameters(path: Path, changed: Mapping[str, float], parameters: Parameters) -> None:
-    """Write a file, whole or not at all.
-
-    Args:
-        path: of the file; what was in it is gone.
-        changed: values by name.
-        parameters: for the types.
+    """Replace a file by one with the changed values (by name); `parameters` gives their types.
 
     Raises:
-        ParameterFileError: it cannot be written; what was there is still there.
+        ParameterFileError: it cannot be written; the old file is unchanged.
     """
     lines = ["# Parameters that differ from their defaults.", "# Vehicle\tComponent\tName\tValue\tType"]
-    system_id = parameters.integer(_DECIDED_BY_INSTANCE)
+    system_id = parameters.integer(_SYSTEM_ID)
     for name, value in changed.items():
-        if name != _DECIDED_BY_INSTANCE:
+        if name != _SYSTEM_ID:
             declared = parameters.declaration(name)
             lines.append(f"{system_id}\t1\t{name}\t{_shortest(declared, value)}\t{_TYPES[declared.kind]}")
     temporary: Path | None = None
@@ -145,25 +130,20 @@ def save_parameters(path: Path, changed: Mapping[str, float], parameters: Parame
 
 
 def _shortest(declared: Parameter, value: float) -> str:
-    """The fewest digits that mean the same four bytes."""
+    """The fewest digits that give the same single-precision number."""
     if declared.kind == "int32":
         return str(int(value))
-    four = pack("<f", value)
-    (value,) = unpack("<f", four)
+    single = pack("<f", value)
+    (value,) = unpack("<f", single)
     texts = (f"{value:.{digits}g}" for digits in range(1, 10))
-    return next(text for text in texts if pack("<f", float(text)) == four)  # nine always do
+    return next(text for text in texts if pack("<f", float(text)) == single)  # true of nine digits
 
 
 def open_parameters(parameters: Parameters, path: Path, notice: Callable[[str], None]) -> ParameterKeeper:
-    """Take over what a file holds, and keep in it what changes from now on.
-
-    Args:
-        parameters: of the drone.
-        path: of the file.
-        notice: called with lines for people.
+    """Set the parameters that a file holds, and save later changes to it; notices are lines for people.
 
     Raises:
-        ParameterFileError: the file cannot be read, or a line is wrong; nothing has changed then.
+        ParameterFileError: the file cannot be read, or a line is wrong; no parameter is set then.
     """
     loaded = load_parameters(path, parameters)
     for name, value in loaded.values.items():
@@ -174,10 +154,10 @@ def open_parameters(parameters: Parameters, path: Path, notice: Callable[[str], 
 
 
 class ParameterKeeper:
-    """Saves parameters whenever they have changed, a moment later and in a thread.
+    """Saves parameters after they have changed, `SAVE_DELAY_S` later and in a thread.
 
     Args:
-        parameters: whose; to be changed on the event loop's thread only.
+        parameters: to be changed on the event loop's thread only.
         path: of the file.
         notice: called with a line for people when saving fails.
     """
@@ -192,11 +172,11 @@ class ParameterKeeper:
         parameters.on_save(self._changed.set)
 
     def start(self) -> None:
-        """Save from now on; to be called where an event loop runs."""
+        """Begin saving; to be called in an event loop."""
         self._running = asyncio.create_task(self._run())
 
     async def close(self) -> None:
-        """Save what is not saved yet, and nothing more."""
+        """Save what is not saved yet, and stop."""
         if self._running is not None:
             self._running.cancel()
             await asyncio.gather(self._running, return_exceptions=True)
@@ -213,7 +193,7 @@ class ParameterKeeper:
                 self._save(self._parameters.changed())
 
     def _note(self, name: str, _value: float) -> None:
-        if name != _DECIDED_BY_INSTANCE:
+        if name != _SYSTEM_ID:
             self._changed.set()
 
     def _save(self, changed: Mapping[str, float]) -> None:

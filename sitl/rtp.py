@@ -1,31 +1,29 @@
-"""Video out as H.264 in RTP over UDP, as QGroundControl and GStreamer want it (PX4's Gazebo sends the same).
+"""Video as H.264 in RTP over UDP, as QGroundControl and GStreamer expect it (PX4's Gazebo sends the same).
 
 Images are compressed in a thread of their own, the newest only: when the encoder is late, images are left
-out and the flight does not notice. Every second begins with a key frame that carries the stream's
-headers, so whoever starts listening sees something within a second.
+out and the flight is not delayed. Every second begins with a key frame that carries the stream's headers, so
+that a new receiver shows an image within a second.
 """
 
 from __future__ import annotations
 
 import threading
+from contextlib import suppress
 from fractions import Fraction
 
 import av
 import numpy as np
-import numpy.typing as npt
 from av.video.frame import PictureType
 from av.video.stream import VideoStream
 
 from scenarios.models import Camera
-from sitl.video import VideoError
+from sitl.video import Image, VideoError
 from wire.transports.sockets import Address, resolved_ipv4
 
-Image = npt.NDArray[np.uint8]
-
-PAYLOAD_TYPE = 96  # the first of those that a description must explain
+PAYLOAD_TYPE = 96  # the first of the dynamic types
 _CLOCK_HZ = 90_000  # RTP's, for video
 _PACKET_BYTES = 1200
-_BITS_PER_PIXEL = 0.8  # of an image: thin coloured bars stay recognisable
+_BITS_PER_PIXEL = 0.8  # of each image: thin coloured bars stay recognisable
 _PRESET = {
     "preset": "ultrafast",
     "tune": "zerolatency",
@@ -35,12 +33,12 @@ _PRESET = {
 
 
 class RtpSender:
-    """Sends a camera's images to one address; lost without a word if nobody listens.
+    """Sends a camera's images to one address; they are lost if there is no receiver.
 
     Args:
-        remote: host and port; the port after it gets RTCP.
+        remote: host and port; the next port receives RTCP.
         camera: size and rate of the images.
-        speed: simulated seconds a second; stamps of the images count the watcher's seconds.
+        speed: simulated seconds a second; timestamps of the images count real seconds.
 
     Raises:
         LinkError: there is no such host.
@@ -51,9 +49,9 @@ class RtpSender:
         self._host, self._port = resolved_ipv4(remote, "RTP")
         self._speed = speed
         self._newest: tuple[Image, int] | None = None
-        self._wanted = threading.Condition()
+        self._condition = threading.Condition()
         self._closing = False
-        # The usual H.264 has half as many colours each way, so sizes are even; a last odd line goes.
+        # Usual H.264 has half the resolution of colour, so sizes must be even; a last odd line is cut off.
         self._width_px, self._height_px = camera.width_px // 2 * 2, camera.height_px // 2 * 2
         try:
             url = f"rtp://{self._host}:{self._port}?pkt_size={_PACKET_BYTES}"
@@ -79,21 +77,19 @@ class RtpSender:
         return "\r\n".join(lines) + "\r\n"
 
     def send(self, image: Image, time_us: int) -> None:
-        """Give an image to the encoder; never blocks.
+        """Pass an image and its time of exposure (vehicle time) to the encoder; never blocks.
 
-        Args:
-            image: BGR, shape (height, width, 3), uint8; must not be changed afterwards.
-            time_us: vehicle time of its exposure, microseconds.
+        The image is BGR, shape (height, width, 3), and must not be changed afterwards.
         """
-        with self._wanted:
+        with self._condition:
             self._newest = (image, time_us)
-            self._wanted.notify()
+            self._condition.notify()
 
     def close(self) -> None:
         """Send what is left and stop."""
-        with self._wanted:
+        with self._condition:
             self._closing = True
-            self._wanted.notify()
+            self._condition.notify()
         self._thread.join()
 
     def _make_stream(self, rate_hz: float) -> VideoStream:
@@ -111,32 +107,28 @@ class RtpSender:
 
     def _run(self) -> None:
         while True:
-            with self._wanted:
-                self._wanted.wait_for(lambda: self._newest is not None or self._closing)
+            with self._condition:
+                self._condition.wait_for(lambda: self._newest is not None or self._closing)
                 newest, self._newest = self._newest, None
                 closing = self._closing
             if newest is not None:
-                self._encode(*newest)
+                self._send(self._frame(*newest))
             if closing:
-                self._finish()
-                return
+                break
+        self._send(None)
+        with suppress(av.FFmpegError, OSError):
+            self._container.close()
 
-    def _encode(self, image: Image, time_us: int) -> None:
+    def _frame(self, image: Image, time_us: int) -> av.VideoFrame:
         cut = np.ascontiguousarray(image[: self._height_px, : self._width_px])
         frame = av.VideoFrame.from_ndarray(cut, format="bgr24")
         frame.pts = round(time_us * _CLOCK_HZ / 1e6 / self._speed)
         frame.time_base = Fraction(1, _CLOCK_HZ)
         frame.pict_type = PictureType.NONE
-        try:
+        return frame
+
+    def _send(self, frame: av.VideoFrame | None) -> None:
+        """Send a frame, or what the encoder still holds; lost if the receiver is not reachable now."""
+        with suppress(av.FFmpegError, OSError):
             for packet in self._stream.encode(frame):
                 self._container.mux(packet)
-        except (av.FFmpegError, OSError):
-            pass  # nobody can be reached now; the next image may
-
-    def _finish(self) -> None:
-        try:
-            for packet in self._stream.encode(None):
-                self._container.mux(packet)
-            self._container.close()
-        except (av.FFmpegError, OSError):
-            pass

@@ -1,4 +1,4 @@
-"""Where the simulator listens and speaks: PX4's ports, shifted by instance as PX4 shifts them."""
+"""The simulator's addresses, links and speed: PX4's ports, shifted by instance as PX4 shifts them."""
 
 from __future__ import annotations
 
@@ -29,22 +29,15 @@ _MIN_RATE, _MAX_RATE = 100, 10_000_000  # bytes a second
 
 
 @dataclass(frozen=True, slots=True)
-class WantedLink:
-    """A link that a person asked for.
-
-    Attributes:
-        url: where it goes.
-        profile: its streams and how much it carries.
-    """
+class RequestedLink:
+    """A link that the user requested."""
 
     url: LinkUrl
-    profile: LinkProfile
+    profile: LinkProfile  # its streams and their rate
 
 
-def parse_link(text: str) -> WantedLink:
-    """Check `--link URL`, with `?streams=onboard|ground|normal&rate=BYTES` if wanted.
-
-    The rate is what streams may take a second.
+def parse_link(text: str) -> RequestedLink:
+    """Read `--link URL[?streams=onboard|ground|normal&rate=BYTES]`; the rate limits streams, bytes a second.
 
     Raises:
         LinkError: one line that says what is wrong, with examples.
@@ -68,51 +61,35 @@ def parse_link(text: str) -> WantedLink:
                 f"there are streams={'|'.join(_PROFILES)} and rate=BYTES"
             )
     trusted = is_serial or is_loopback(url.address)
-    return WantedLink(url, replace(profile, name=url.text, bytes_s=rate, trusted=trusted))
+    return RequestedLink(url, replace(profile, name=url.text, bytes_s=rate, trusted=trusted))
 
 
 def rtp_address(text: str, instance: int) -> Address:
-    """Where an instance sends its H.264, from HOST or HOST:PORT; by default two ports each from 5600.
+    """The address for an instance's H.264, from HOST or HOST:PORT; by default port 5600 plus two an instance.
 
     Raises:
-        LinkError: the port is no port.
+        LinkError: the port is not a port number.
     """
     return host_and_port(text, _RTP_PORT + 2 * instance)
 
 
 @dataclass(frozen=True, slots=True)
 class ServerSettings:
-    """Where the simulator listens and speaks, and how fast it runs.
+    """The simulator's addresses, links and speed, and what its drones have."""
 
-    Attributes:
-        instance: shifts ports and the system id, as PX4's instances do.
-        bind: address of all sockets.
-        onboard_remote: host, or host:port, to which the onboard link (14540) speaks unasked.
-        ground_remote: host, or host:port, to which the ground link (14550) speaks unasked.
-        video_port: TCP port of the video; None for port 8100 plus instance.
-        video_rtp: to which H.264 in RTP goes; None: nowhere.
-        speed: simulated seconds a second.
-        links: more links.
-        signing_key: with which MAVLink is signed; None: it is not.
-        storage: folder for the drones' files and logs; None: they are kept in memory.
-        shell: whether the drones have a shell over MAVLink.
-        camera: whether the drones tell of their camera over MAVLink.
-        parameters: file that keeps changed parameters (drone 2: NAME-2.params); None: nothing does.
-    """
-
-    instance: int = 0
-    bind: str = "127.0.0.1"
-    onboard_remote: str = "127.0.0.1"
-    ground_remote: str = "127.0.0.1"
-    video_port: int | None = None
-    video_rtp: Address | None = None
-    speed: float = 1.0
-    links: tuple[WantedLink, ...] = ()
-    signing_key: SigningKey | None = None
-    storage: Path | None = None
-    shell: bool = False
-    camera: bool = True
-    parameters: Path | None = None
+    instance: int = 0  # shifts ports and the system id, as PX4's instances do
+    bind: str = "127.0.0.1"  # address of all sockets
+    onboard_remote: str = "127.0.0.1"  # host, or host:port, that the onboard link (14540) always sends to
+    ground_remote: str = "127.0.0.1"  # host, or host:port, that the ground link (14550) always sends to
+    video_port: int | None = None  # TCP; None: 8100 plus instance
+    video_rtp: Address | None = None  # for H.264 in RTP; None: not sent
+    speed: float = 1.0  # simulated seconds a second
+    links: tuple[RequestedLink, ...] = ()  # further ones
+    signing_key: SigningKey | None = None  # of MAVLink; None: unsigned
+    storage: Path | None = None  # folder for the drones' files and logs; None: they are kept in memory
+    shell: bool = False  # over MAVLink
+    camera: bool = True  # a MAVLink camera component
+    parameters: Path | None = None  # file for changed ones (drone 2: NAME-2.params); None: they are not kept
 
     @property
     def onboard(self) -> UdpAddresses:
@@ -127,8 +104,8 @@ class ServerSettings:
         return UdpAddresses((self._from(remote[0]), 18570 + self.instance), remote)
 
     @property
-    def standing_links(self) -> tuple[tuple[LinkProfile, UdpAddresses], ...]:
-        """The two links that are always there."""
+    def default_links(self) -> tuple[tuple[LinkProfile, UdpAddresses], ...]:
+        """The onboard and the ground link."""
         return tuple(
             (replace(profile, trusted=is_loopback(addresses.bind[0])), addresses)
             for profile, addresses in ((ONBOARD, self.onboard), (GROUND, self.ground))
@@ -141,46 +118,43 @@ class ServerSettings:
 
     @property
     def is_open(self) -> bool:
-        """Whether somebody on another machine can command the drone without a key."""
-        links = [profile for profile, _ in self.standing_links] + [link.profile for link in self.links]
+        """Whether another machine can command the drone without a key."""
+        links = [profile for profile, _ in self.default_links] + [link.profile for link in self.links]
         return self.signing_key is None and not all(link.trusted for link in links)
 
     def check(self, count: int) -> None:
-        """See that addresses make sense, for so many drones.
+        """Check the ports of all drones.
 
         Raises:
-            LinkError: one does not.
+            LinkError: one is too large.
         """
         for by in range(count):
             drone = self.shifted(by)
-            ports = [addresses.remote for _, addresses in drone.standing_links]
+            ports = [addresses.remote for _, addresses in drone.default_links]
             ports += [drone.video_rtp, *((link.url.text, link.url.number) for link in drone.links)]
             for place in ports:
                 if place is not None and place[1] > MAX_PORT and not place[0].startswith("serial"):
                     raise LinkError(f"{place[0]}: port {place[1]} of drone {by + 1} is above {MAX_PORT}")
 
     def shifted(self, by: int) -> ServerSettings:
-        """Settings of another drone of the same program: every port it opens is higher by so much."""
+        """Settings of another drone of the same program: its ports and system id are higher by `by`."""
         if by == 0:
             return self
+        file = self.parameters
         return replace(
             self,
             instance=self.instance + by,
             video_port=None if self.video_port is None else self.video_port + by,
             video_rtp=None if self.video_rtp is None else (self.video_rtp[0], self.video_rtp[1] + 2 * by),
             links=tuple(_shifted(link, by) for link in self.links),
-            parameters=_own_file(self.parameters, self.instance + by + 1),
+            parameters=None if file is None else file.with_stem(f"{file.stem}-{self.instance + by + 1}"),
         )
 
     def _from(self, remote: str) -> str:
-        """What to listen on: from the loopback address nothing goes out to another machine."""
+        """The local address for a remote: a socket on the loopback address cannot send to another machine."""
         return self.bind if is_loopback(remote) or not is_loopback(self.bind) else "0.0.0.0"
 
 
-def _own_file(path: Path | None, system_id: int) -> Path | None:
-    return None if path is None else path.with_stem(f"{path.stem}-{system_id}")
-
-
-def _shifted(link: WantedLink, by: int) -> WantedLink:
+def _shifted(link: RequestedLink, by: int) -> RequestedLink:
     url = link.url
     return replace(link, url=replace(url, number=url.number + by)) if url.scheme in _PORT_SCHEMES else link

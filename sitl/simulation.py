@@ -1,35 +1,92 @@
-"""World, autopilot and referee joined into one thing that advances by ticks.
+"""World, autopilot, battery, failures and referee joined into one simulation that advances by ticks.
 
-Still no clock, socket or thread: the real-time server and lockstep flights both drive it.
+No clock, socket or thread: the real-time server and lockstep flights both drive it.
 """
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from dataclasses import replace
+from math import nan
+
 from firmware_py.airframe import Airframe, load_airframe
 from firmware_py.autopilot import Autopilot
-from firmware_py.types import GeodeticPoint
+from firmware_py.types import GeodeticPoint, Sensors
 from scenarios.models import Scenario
 from scenarios.referee import Referee
 from sitl.battery import Battery
-from sitl.failures import Failures
 from sitl.world import CONTROL_PERIOD_US, World
 
 _BATTERY_PERIOD_US = 100_000
+_UNIT_GPS, _UNIT_BATTERY, _UNIT_MOTOR = 4, 100, 101  # FAILURE_UNIT
+_OK, _OFF, _STUCK = 0, 1, 2  # FAILURE_TYPE
+
+
+class Failures:
+    """Injected failures: of motors, of the position sensor, of the battery's measurement.
+
+    Args:
+        world: whose motors fail.
+
+    Attributes:
+        falsify: changes each sample of the sensors as the failures do; None without a failed sensor.
+    """
+
+    def __init__(self, world: World) -> None:
+        self._world = world
+        self._failed: set[int] = set()
+        self.falsify: Callable[[Sensors], Sensors] | None = None
+
+    def inject(self, unit: int, kind: int, instance: int) -> bool:
+        """Make a part fail or work again, numbered from 1 (0: all); False if that is not supported."""
+        if unit == _UNIT_MOTOR:
+            return self._inject_motor(kind, instance)
+        if unit not in (_UNIT_GPS, _UNIT_BATTERY) or kind not in (_OK, _OFF) or instance > 1:
+            return False
+        if kind == _OFF:
+            self._failed.add(unit)
+        else:
+            self._failed.discard(unit)
+        self.falsify = self._falsified if self._failed else None
+        return True
+
+    def _inject_motor(self, kind: int, instance: int) -> bool:
+        count = len(self._world.airframe.rotors)
+        if kind not in (_OK, _OFF, _STUCK) or instance > count:
+            return False
+        for index in range(count) if instance == 0 else (instance - 1,):
+            if kind == _OK:
+                self._world.dynamics.repair_motor(index)
+            else:
+                self._world.dynamics.fail_motor(index, stuck=kind == _STUCK)
+        return True
+
+    def _falsified(self, sensors: Sensors) -> Sensors:
+        """Without GPS, only the barometer's height is left; a failed battery measures no voltage."""
+        if _UNIT_GPS in self._failed:
+            sensors = replace(
+                sensors,
+                position_ned_m=(nan, nan, sensors.position_ned_m[2]),
+                velocity_ned_m_s=(nan, nan, sensors.velocity_ned_m_s[2]),
+            )
+        if _UNIT_BATTERY in self._failed:
+            sensors = replace(sensors, battery_voltage_v=0.0)
+        return sensors
 
 
 class Simulation:
     """One drone in one scenario.
 
     Args:
-        scenario: what is flown.
+        scenario: the simulated one.
         airframe: the drone; by default the one that the scenario names.
 
     Attributes:
         world: the physics.
-        autopilot: what flies.
-        failures: what is broken on purpose.
-        referee: what judges, fed with the truth of every control tick.
-        battery: what feeds the drone.
+        autopilot: fed with the world's sensors; its motor speeds drive the world.
+        failures: injected ones.
+        referee: sees the true state of every control tick; a new one for each try.
+        battery: of the drone.
         truth: the true state now.
     """
 
@@ -44,7 +101,7 @@ class Simulation:
             control_period_s=CONTROL_PERIOD_US / 1e6,
         )
         self.referee = Referee(scenario, airframe.envelope_m)
-        self.failures = Failures(self.world, len(airframe.rotors))
+        self.failures = Failures(self.world)
         self.battery = Battery(airframe, self.autopilot.parameters)
         self._battery_due_us = 0
         self._sensors = self.world.sensors()
@@ -78,4 +135,4 @@ class Simulation:
         period_us = _BATTERY_PERIOD_US if self._battery_due_us else 0
         self._battery_due_us = time_us + _BATTERY_PERIOD_US
         armed = self.autopilot.status.armed
-        self.battery.step(period_us / 1e6, self.world.motor_speeds_rad_s(), armed=armed)
+        self.battery.step(period_us / 1e6, self.world.dynamics.motor_speeds_rad_s(), armed=armed)

@@ -1,6 +1,6 @@
-"""Solid boxes (bars of the frames, the base) and how the drone's box touches them.
+"""Solid boxes (bars of the frames, the base) and their contact with the drone's box.
 
-A touch is found by the separating axis theorem on two boxes (Gottschalk, Lin, Manocha, "OBBTree", 1996):
+Contact is found by the separating axis theorem on two boxes (Gottschalk, Lin, Manocha, "OBBTree", 1996):
 they overlap if and only if their projections overlap on all of 15 axes; the axis of least overlap is the
 direction that pushes them apart. Plain scalars: this runs at the physics rate while something is near.
 """
@@ -19,27 +19,19 @@ _CYCLES = ((0, 1, 2), (1, 2, 0), (2, 0, 1))
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Solid:
-    """An upright box that does not move.
+    """An upright box."""
 
-    Attributes:
-        name: what the referee calls it.
-        centre_arena_m: shape (3,).
-        yaw_rad: its heading, counter-clockwise.
-        half_extents_m: along its own axes, shape (3,).
-        turn: cosine and sine of the heading.
-    """
-
-    name: str
+    name: str  # as in the referee's reports
     centre_arena_m: Vec3
-    yaw_rad: float
-    half_extents_m: Vec3
-    turn: tuple[float, float] = field(init=False)
+    yaw_rad: float  # counter-clockwise from arena x
+    half_extents_m: Vec3  # along its own axes
+    turn: tuple[float, float] = field(init=False)  # cosine and sine of the yaw
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "turn", (cos(self.yaw_rad), sin(self.yaw_rad)))
 
     def is_within(self, reach_m: float, point_m: Vec3) -> bool:
-        """Whether a point (arena axes) is inside it or nearer to it than a distance."""
+        """Whether a point (arena axes) is inside the box or nearer to it than a distance."""
         offset = self.offset(point_m)
         square = 0.0
         for along, half in zip(offset, self.half_extents_m, strict=True):
@@ -49,48 +41,53 @@ class Solid:
         return square < reach_m * reach_m
 
     def offset(self, point_m: Vec3) -> Vec3:
-        """From its centre to a point (arena axes), in its own axes, metres."""
+        """From the centre to a point given in arena axes, in the box's own axes, metres."""
         c, s = self.turn
         x, y, z = self.centre_arena_m
         dx, dy = point_m[0] - x, point_m[1] - y
         return (c * dx + s * dy, c * dy - s * dx, point_m[2] - z)
 
+    def to_arena(self, offset_m: Vec3) -> Vec3:
+        """A point given from the centre in the box's own axes, in arena axes: the inverse of `offset`."""
+        c, s = self.turn
+        x, y, z = self.centre_arena_m
+        return (x + c * offset_m[0] - s * offset_m[1], y + s * offset_m[0] + c * offset_m[1], z + offset_m[2])
+
+    def corners(self) -> list[Vec3]:
+        """The eight corners, arena axes."""
+        a, b, c = self.half_extents_m
+        return [self.to_arena((x, y, z)) for x in (-a, a) for y in (-b, b) for z in (-c, c)]
+
 
 @dataclass(frozen=True, slots=True)
 class Touch:
-    """Two boxes overlap.
+    """The overlap of two boxes."""
 
-    Attributes:
-        depth_m: how far along the normal.
-        normal_arena: unit vector from the solid to the drone.
-        point_arena_m: where they touch.
-    """
-
-    depth_m: float
-    normal_arena: Vec3
-    point_arena_m: Vec3
+    depth_m: float  # along the normal
+    normal_arena: Vec3  # unit vector from the solid to the drone
+    point_arena_m: Vec3  # where they touch
 
 
 def frame_solids(frame: Frame) -> tuple[Solid, ...]:
-    """Return the four bars of a frame: top, bottom, left, right (right and left between the others)."""
+    """The four bars of a frame: top, bottom, left, right (left and right between the others)."""
     half_bar = frame.bar_m / 2
     half_width, half_height = frame.outer_width_m / 2, frame.outer_height_m / 2
     level = half_height - half_bar
     side = half_width - half_bar
     left_y, left_x = cos(frame.yaw_rad) * side, -sin(frame.yaw_rad) * side
     x, y, z = frame.position_arena_m
-    lying: Vec3 = (half_bar, half_width, half_bar)
-    standing: Vec3 = (half_bar, half_bar, half_height - frame.bar_m)
+    horizontal: Vec3 = (half_bar, half_width, half_bar)
+    upright: Vec3 = (half_bar, half_bar, half_height - frame.bar_m)
     return (
-        Solid(frame.colour, (x, y, z + level), frame.yaw_rad, lying),
-        Solid(frame.colour, (x, y, z - level), frame.yaw_rad, lying),
-        Solid(frame.colour, (x + left_x, y + left_y, z), frame.yaw_rad, standing),
-        Solid(frame.colour, (x - left_x, y - left_y, z), frame.yaw_rad, standing),
+        Solid(frame.colour, (x, y, z + level), frame.yaw_rad, horizontal),
+        Solid(frame.colour, (x, y, z - level), frame.yaw_rad, horizontal),
+        Solid(frame.colour, (x + left_x, y + left_y, z), frame.yaw_rad, upright),
+        Solid(frame.colour, (x - left_x, y - left_y, z), frame.yaw_rad, upright),
     )
 
 
 def base_solid(scenario: Scenario) -> Solid:
-    """Return the base's cube, from the floor to its top."""
+    """The base's box, from the floor to its top."""
     base = scenario.base
     half = base.edge_m / 2
     return Solid("base", (base.x_m, base.y_m, base.top_m / 2), 0.0, (half, half, base.top_m / 2))
@@ -99,23 +96,20 @@ def base_solid(scenario: Scenario) -> Solid:
 def touch(
     solid: Solid, centre_m: Vec3, rotation: RotationRows, half_extents_m: Vec3, entered: Vec3 | None = None
 ) -> Touch | None:
-    """Tell whether and how a box overlaps a solid.
+    """The overlap of a moving box with a solid; None while they are apart.
 
     Args:
-        solid: what stands still.
+        solid: does not move.
         centre_m: centre of the moving box, arena axes.
-        rotation: rows of the matrix that turns the box's own axes into arena axes.
+        rotation: rows of the matrix from the box's own axes to arena axes.
         half_extents_m: of the moving box.
-        entered: normal of the touch while it lasts (arena axes). A thin bar must push back to the side
+        entered: normal of the touch at its beginning (arena axes). A thin bar must push back to the side
             the drone came from, however deep it is; the shortest way out may be the far side.
-
-    Returns:
-        The touch, or None while they are apart.
     """
     c, s = solid.turn
     offset = solid.offset(centre_m)
     r0, r1, r2 = rotation
-    # The moving box's axes seen from the solid, as rows of the relative rotation.
+    # The moving box's axes in the solid's axes, as rows of the relative rotation.
     turn: RotationRows = (
         (c * r0[0] + s * r1[0], c * r0[1] + s * r1[1], c * r0[2] + s * r1[2]),
         (c * r1[0] - s * r0[0], c * r1[1] - s * r0[1], c * r1[2] - s * r0[2]),
@@ -131,18 +125,12 @@ def touch(
         columns = [(turn[0][j], turn[1][j], turn[2][j]) for j in range(3)]
         depth = max(_reach((nx, ny, nz), columns, solid.half_extents_m, half_extents_m) - along, 0.0)
     point = _touching_point(offset, turn, solid.half_extents_m, half_extents_m)
-    to_arena = (c * point[0] - s * point[1], s * point[0] + c * point[1], point[2])
-    sx, sy, sz = solid.centre_arena_m
-    return Touch(
-        depth,
-        (c * nx - s * ny, s * nx + c * ny, nz),
-        (sx + to_arena[0], sy + to_arena[1], sz + to_arena[2]),
-    )
+    return Touch(depth, (c * nx - s * ny, s * nx + c * ny, nz), solid.to_arena(point))
 
 
 def _least_overlap(offset: Vec3, turn: RotationRows, a: Vec3, b: Vec3) -> tuple[float, Vec3] | None:
-    """Return depth and normal (from the solid outwards, in its axes) of least overlap; None when apart."""
-    # Faces of the solid first: they part the boxes in nearly every case.
+    """Depth and normal (from the solid outwards, in its axes) of least overlap; None when apart."""
+    # Faces of the solid first: they separate the boxes in nearly every case.
     best_depth, best_normal = 1e9, (0.0, 0.0, 0.0)
     for i in range(3):
         row = turn[i]
@@ -182,7 +170,7 @@ def _least_overlap(offset: Vec3, turn: RotationRows, a: Vec3, b: Vec3) -> tuple[
 
 
 def _reach(normal: Vec3, columns: list[Vec3], a: Vec3, b: Vec3) -> float:
-    """Return the sum of both boxes' extents along a unit vector (in the solid's axes)."""
+    """The sum of both boxes' extents along a unit vector (in the solid's axes)."""
     nx, ny, nz = normal
     reach = a[0] * abs(nx) + a[1] * abs(ny) + a[2] * abs(nz)
     for half, column in zip(b, columns, strict=True):
@@ -191,7 +179,7 @@ def _reach(normal: Vec3, columns: list[Vec3], a: Vec3, b: Vec3) -> float:
 
 
 def _touching_point(offset: Vec3, turn: RotationRows, a: Vec3, b: Vec3) -> Vec3:
-    """Return the point of the moving box nearest to the solid's point nearest to the box's centre."""
+    """The point of the moving box nearest to the solid's point nearest to the box's centre."""
     near = [min(max(offset[i], -a[i]), a[i]) - offset[i] for i in range(3)]
     inside = []
     for j in range(3):

@@ -1,42 +1,41 @@
-"""A vehicle's files in memory, so that a simulation leaves nothing behind; and the limits of all storage.
+"""A vehicle's files: in memory, gone with the program, or in a folder on disk.
 
-Limits keep whoever is on a link from filling the machine.
+Both have limits, so that a link cannot fill the machine. The folder cannot be left: every name of a
+path is opened by itself, from the folder down, and none may be a symbolic link.
 """
 
 from __future__ import annotations
 
 import errno
+import os
+import stat
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
+from pathlib import Path as DiskPath
 
-from firmware_py.storage import Entry, Path, refuse
+from errors import UserError
+from firmware_py.storage import Entry, Path, refuse, sound_name
 
 MEBIBYTE = 1 << 20
 
 
+class StorageFolderError(UserError):
+    """A folder that cannot be used; the message is one line for people."""
+
+
 @dataclass(frozen=True, slots=True)
 class StorageLimits:
-    """How much is kept.
+    """How much is kept."""
 
-    Attributes:
-        files: files and folders together.
-        file_bytes: of one file.
-        total_bytes: of all files.
-    """
-
-    files: int = 1000
-    file_bytes: int = 64 * MEBIBYTE
-    total_bytes: int = 256 * MEBIBYTE
+    files: int = 1000  # files and folders together
+    file_bytes: int = 64 * MEBIBYTE  # of one file
+    total_bytes: int = 256 * MEBIBYTE  # of all files
 
 
-class Usage:
-    """Counts what is kept and refuses what would be too much.
-
-    Attributes:
-        files: files and folders together.
-        bytes: of all files.
-    """
+class _Usage:
+    """Counts files and folders together, and the bytes of all files; refuses what would be too much."""
 
     def __init__(self, limits: StorageLimits) -> None:
         self._limits = limits
@@ -45,157 +44,329 @@ class Usage:
 
     @property
     def space(self) -> tuple[int, int]:
-        """Bytes kept, and bytes that can be kept."""
         return self.bytes, self._limits.total_bytes
 
-    def one_more(self, path: Path) -> None:
+    def check_count(self, path: Path) -> None:
         """Refuse a file or folder beyond the limit."""
         if self.files >= self._limits.files:
             raise refuse(errno.ENOSPC, path)
 
-    def resize(self, path: Path, before: int, after: int) -> None:
-        """Refuse a file's new size if it or the sum goes beyond the limit."""
+    def check_size(self, path: Path, before: int, after: int) -> None:
+        """Refuse a file's new size if it or the sum exceeds the limit."""
         if after > max(before, self._limits.file_bytes):
             raise refuse(errno.EFBIG, path)
         if after > before and self.bytes + after - before > self._limits.total_bytes:
             raise refuse(errno.ENOSPC, path)
 
 
+def open_storage(folder: DiskPath | None, instance: int) -> MemoryStorage | FolderStorage:
+    """The storage of an instance: a folder with its number, as PX4's simulations have; without one, memory.
+
+    Raises:
+        StorageFolderError: the folder cannot be used.
+    """
+    return MemoryStorage() if folder is None else FolderStorage(folder / str(instance))
+
+
 @dataclass(slots=True)
-class _File:
-    data: bytearray
+class _Stored:
+    data: bytearray | None  # None: a folder
     modified_unix_s: int
 
 
 class MemoryStorage:
-    """Files in memory, gone with the process.
+    """Files in memory, gone with the process. The methods are those of `firmware_py.storage.Storage`.
 
     Args:
-        limits: how much.
+        limits: how much is kept.
         now: seconds since 1970.
     """
 
     def __init__(self, limits: StorageLimits | None = None, now: Callable[[], float] = time.time) -> None:
-        self._usage = Usage(limits or StorageLimits(total_bytes=128 * MEBIBYTE))
+        self._usage = _Usage(limits or StorageLimits(total_bytes=128 * MEBIBYTE))
         self._now = now
-        self._files: dict[Path, _File] = {}
-        self._folders: dict[Path, int] = {(): 0}  # with their time of birth
+        self._nodes: dict[Path, _Stored] = {(): _Stored(None, 0)}
 
     def space(self) -> tuple[int, int]:
         """Bytes kept, and bytes that can be kept."""
         return self._usage.space
 
     def entry(self, path: Path) -> Entry:
-        """What is there."""
-        if path in self._folders:
-            return Entry(path[-1] if path else "", 0, True, self._folders[path])
-        file = self._file(path)
-        return Entry(path[-1], len(file.data), False, file.modified_unix_s)
+        """The file or folder at a path."""
+        node = self._node(path)
+        return Entry(path[-1] if path else "", len(node.data or b""), node.data is None, node.modified_unix_s)
 
     def entries(self, path: Path) -> list[Entry]:
         """What a folder holds, by name."""
-        self._need_folder(path)
-        depth = len(path) + 1
-        inside = (each for each in (*self._files, *self._folders) if len(each) == depth and each[:-1] == path)
+        self._check_folder(path)
+        inside = (each for each in self._nodes if len(each) == len(path) + 1 and each[:-1] == path)
         return [self.entry(each) for each in sorted(inside)]
 
     def read(self, path: Path, offset: int, count: int) -> bytes:
         """At most `count` bytes of a file."""
-        return bytes(self._file(path).data[offset : offset + count])
+        return bytes(self._file(path)[offset : offset + count])
 
     def write(self, path: Path, offset: int, data: bytes) -> None:
-        """Write into a file that is there."""
+        """Write into an existing file."""
         file = self._file(path)
-        if not data:
-            return
-        if offset + len(data) > len(file.data):
-            self._resize(path, file, offset + len(data))
-        file.data[offset : offset + len(data)] = data
-        file.modified_unix_s = int(self._now())
+        if data:
+            self.truncate(path, max(len(file), offset + len(data)))
+            file[offset : offset + len(data)] = data
 
     def create(self, path: Path) -> None:
-        """Make an empty file, or empty the one that is there."""
-        if path in self._folders:
-            raise refuse(errno.EISDIR, path)
-        if path in self._files:
+        """Make an empty file, or empty an existing one."""
+        if path in self._nodes:
             self.truncate(path, 0)
-            return
-        self._need_folder(path[:-1])
-        self._usage.one_more(path)
-        self._usage.files += 1
-        self._files[path] = _File(bytearray(), int(self._now()))
+        else:
+            self._add(path, bytearray())
 
     def truncate(self, path: Path, size: int) -> None:
-        """Make a file that long."""
+        """Set the size of a file."""
         file = self._file(path)
-        self._resize(path, file, size)
-        file.modified_unix_s = int(self._now())
+        before = len(file)
+        self._usage.check_size(path, before, size)
+        self._usage.bytes += size - before
+        self._nodes[path].modified_unix_s = int(self._now())
+        del file[size:]
+        file += bytes(max(0, size - before))
 
     def remove(self, path: Path) -> None:
         """Remove a file."""
-        file = self._file(path)
+        self._usage.bytes -= len(self._file(path))
         self._usage.files -= 1
-        self._usage.bytes -= len(file.data)
-        del self._files[path]
+        del self._nodes[path]
 
     def make_folder(self, path: Path) -> None:
         """Make a folder."""
-        if path in self._folders or path in self._files:
+        if path in self._nodes:
             raise refuse(errno.EEXIST, path)
-        self._need_folder(path[:-1])
-        self._usage.one_more(path)
-        self._usage.files += 1
-        self._folders[path] = int(self._now())
+        self._add(path, None)
 
     def remove_folder(self, path: Path) -> None:
         """Remove an empty folder."""
-        self._need_folder(path)
+        self._check_folder(path)
         if not path:
             raise refuse(errno.EACCES, path)
         if self.entries(path):
             raise refuse(errno.ENOTEMPTY, path)
         self._usage.files -= 1
-        del self._folders[path]
+        del self._nodes[path]
 
     def rename(self, old: Path, new: Path) -> None:
         """Give a file or folder another path."""
-        self._need_folder(new[:-1])
-        if old in self._files and new not in self._folders:
-            if new in self._files and new != old:
+        self._check_folder(new[:-1])
+        replaced = self._nodes.get(new)
+        if self._node(old).data is not None and (replaced is None or replaced.data is not None):
+            if replaced is not None and new != old:
                 self.remove(new)
-            self._files[new] = self._files.pop(old)
-            return
-        self._need_folder(old)
-        if not old or new[: len(old)] == old:
-            raise refuse(errno.EINVAL, new)
-        if new in self._folders or new in self._files:
-            raise refuse(errno.EEXIST, new)
-        self._files = {_moved(path, old, new): file for path, file in self._files.items()}
-        self._folders = {_moved(path, old, new): born for path, born in self._folders.items()}
-
-    def _file(self, path: Path) -> _File:
-        if path in self._folders:
-            raise refuse(errno.EISDIR, path)
-        if path not in self._files:
-            raise refuse(errno.ENOENT, path)
-        return self._files[path]
-
-    def _need_folder(self, path: Path) -> None:
-        if path in self._files:
-            raise refuse(errno.ENOTDIR, path)
-        if path not in self._folders:
-            raise refuse(errno.ENOENT, path)
-
-    def _resize(self, path: Path, file: _File, size: int) -> None:
-        before = len(file.data)
-        self._usage.resize(path, before, size)
-        self._usage.bytes += size - before
-        if size < before:
-            del file.data[size:]
         else:
-            file.data += bytes(size - before)
+            self._check_folder(old)
+            if not old or new[: len(old)] == old:
+                raise refuse(errno.EINVAL, new)
+            if replaced is not None:
+                raise refuse(errno.EEXIST, new)
+        depth = len(old)
+        self._nodes = {
+            new + path[depth:] if path[:depth] == old else path: node for path, node in self._nodes.items()
+        }
+
+    def _node(self, path: Path) -> _Stored:
+        if path not in self._nodes:
+            raise refuse(errno.ENOENT, path)
+        return self._nodes[path]
+
+    def _file(self, path: Path) -> bytearray:
+        data = self._node(path).data
+        if data is None:
+            raise refuse(errno.EISDIR, path)
+        return data
+
+    def _check_folder(self, path: Path) -> None:
+        if self._node(path).data is not None:
+            raise refuse(errno.ENOTDIR, path)
+
+    def _add(self, path: Path, data: bytearray | None) -> None:
+        self._check_folder(path[:-1])
+        self._usage.check_count(path)
+        self._usage.files += 1
+        self._nodes[path] = _Stored(data, int(self._now()))
 
 
-def _moved(path: Path, old: Path, new: Path) -> Path:
-    """A path after the folder `old` became `new`."""
-    return new + path[len(old) :] if path[: len(old)] == old else path
+class FolderStorage:
+    """Files in a folder on disk. The methods are those of `firmware_py.storage.Storage`.
+
+    Args:
+        folder: made if it does not exist.
+        limits: how much is kept; what is in the folder already counts.
+
+    Raises:
+        StorageFolderError: the folder cannot be made or opened.
+    """
+
+    def __init__(self, folder: DiskPath, limits: StorageLimits | None = None) -> None:
+        limits = limits or StorageLimits()
+        self._usage = _Usage(limits)
+        try:
+            folder.mkdir(parents=True, exist_ok=True)
+            self._root = os.open(folder, os.O_RDONLY | os.O_DIRECTORY)
+        except OSError as error:
+            raise StorageFolderError(
+                f"{folder}: cannot be used for the drone's files ({error.strerror}); name a folder"
+            ) from error
+        for _, folders, files, place in os.fwalk(dir_fd=self._root, follow_symlinks=False):
+            self._usage.files += len(folders) + len(files)
+            for name in files:
+                self._usage.bytes += os.stat(name, dir_fd=place, follow_symlinks=False).st_size
+            if self._usage.files > limits.files:
+                break  # nothing more can be added; do not count a whole disk
+
+    def close(self) -> None:
+        """Close the folder."""
+        os.close(self._root)
+
+    def space(self) -> tuple[int, int]:
+        """Bytes kept, and bytes that can be kept."""
+        return self._usage.space
+
+    def entry(self, path: Path) -> Entry:
+        """The file or folder at a path."""
+        if not path:
+            return Entry("", 0, True)
+        with self._parent(path) as place:
+            return _entry_in(place, path)
+
+    def entries(self, path: Path) -> list[Entry]:
+        """What a folder holds, by name; links, devices and names that cannot be listed are left out."""
+        with self._folder(path) as place, os.scandir(place) as scan:
+            found = [
+                _entry(item.name, item.stat(follow_symlinks=False))
+                for item in scan
+                if sound_name(item.name)
+                and (item.is_file(follow_symlinks=False) or item.is_dir(follow_symlinks=False))
+            ]
+        return sorted(found, key=lambda each: each.name)
+
+    def read(self, path: Path, offset: int, count: int) -> bytes:
+        """At most `count` bytes of a file."""
+        with self._file(path, os.O_RDONLY) as file:
+            return os.pread(file, count, offset)
+
+    def write(self, path: Path, offset: int, data: bytes) -> None:
+        """Write into an existing file."""
+        with self._file(path, os.O_WRONLY) as file:
+            before = os.fstat(file).st_size
+            after = max(before, offset + len(data)) if data else before
+            self._usage.check_size(path, before, after)
+            with self._counted(file):
+                written = 0
+                while written < len(data):  # a full disk takes a part; the next call raises the reason
+                    written += os.pwrite(file, data[written:], offset + written)
+
+    def create(self, path: Path) -> None:
+        """Make an empty file, or empty an existing one."""
+        try:
+            self.truncate(path, 0)
+        except FileNotFoundError:
+            self._usage.check_count(path)
+            with self._file(path, os.O_WRONLY | os.O_CREAT | os.O_EXCL):
+                self._usage.files += 1
+
+    def truncate(self, path: Path, size: int) -> None:
+        """Set the size of a file."""
+        with self._file(path, os.O_WRONLY) as file:
+            self._usage.check_size(path, os.fstat(file).st_size, size)
+            with self._counted(file):
+                os.ftruncate(file, size)
+
+    def remove(self, path: Path) -> None:
+        """Remove a file."""
+        with self._parent(path) as place:
+            entry = _entry_in(place, path)
+            if entry.is_folder:
+                raise refuse(errno.EISDIR, path)
+            os.unlink(path[-1], dir_fd=place)
+            self._usage.files -= 1
+            self._usage.bytes -= entry.size
+
+    def make_folder(self, path: Path) -> None:
+        """Make a folder."""
+        with self._parent(path) as place:
+            self._usage.check_count(path)
+            os.mkdir(path[-1], dir_fd=place)
+            self._usage.files += 1
+
+    def remove_folder(self, path: Path) -> None:
+        """Remove an empty folder."""
+        with self._parent(path) as place:
+            os.rmdir(path[-1], dir_fd=place)
+            self._usage.files -= 1
+
+    def rename(self, old: Path, new: Path) -> None:
+        """Give a file or folder another path."""
+        with self._parent(old) as source, self._parent(new) as target:
+            moved = _entry_in(source, old)
+            try:
+                replaced = os.stat(new[-1], dir_fd=target, follow_symlinks=False)
+            except FileNotFoundError:
+                replaced = None
+            if replaced is not None and (moved.is_folder or not stat.S_ISREG(replaced.st_mode)):
+                raise refuse(errno.EEXIST, new)
+            os.rename(old[-1], new[-1], src_dir_fd=source, dst_dir_fd=target)
+            if replaced is not None and old != new:
+                self._usage.files -= 1
+                self._usage.bytes -= replaced.st_size
+
+    @contextmanager
+    def _counted(self, file: int) -> Iterator[None]:
+        """Count by how much a file has really grown, also when the disk refused."""
+        before = os.fstat(file).st_size
+        try:
+            yield
+        finally:
+            self._usage.bytes += os.fstat(file).st_size - before
+
+    @contextmanager
+    def _folder(self, path: Path) -> Iterator[int]:
+        """A folder, opened name by name so that no link is followed."""
+        place = os.dup(self._root)
+        try:
+            for name in path:
+                deeper = os.open(name, os.O_RDONLY | os.O_DIRECTORY | os.O_NOFOLLOW, dir_fd=place)
+                os.close(place)
+                place = deeper
+            yield place
+        finally:
+            os.close(place)
+
+    @contextmanager
+    def _parent(self, path: Path) -> Iterator[int]:
+        if not path:
+            raise refuse(errno.EACCES, path)
+        with self._folder(path[:-1]) as place:
+            yield place
+
+    @contextmanager
+    def _file(self, path: Path, flags: int) -> Iterator[int]:
+        """A regular file; O_NONBLOCK, as opening a named pipe would wait for its other end."""
+        with self._parent(path) as place:
+            file = os.open(path[-1], flags | os.O_NOFOLLOW | os.O_NONBLOCK, 0o644, dir_fd=place)
+        try:
+            mode = os.fstat(file).st_mode
+            if not stat.S_ISREG(mode):
+                raise refuse(errno.EISDIR if stat.S_ISDIR(mode) else errno.EACCES, path)
+            yield file
+        finally:
+            os.close(file)
+
+
+def _entry(name: str, found: os.stat_result) -> Entry:
+    folder = stat.S_ISDIR(found.st_mode)
+    return Entry(name, 0 if folder else found.st_size, folder, int(found.st_mtime))
+
+
+def _entry_in(place: int, path: Path) -> Entry:
+    """The entry of a file or folder in its parent; anything else is refused."""
+    found = os.stat(path[-1], dir_fd=place, follow_symlinks=False)
+    if not (stat.S_ISREG(found.st_mode) or stat.S_ISDIR(found.st_mode)):
+        raise refuse(errno.EACCES, path)
+    return _entry(path[-1], found)

@@ -2,7 +2,7 @@
 
 `/video` is a stream of JPEG images, each with the vehicle time of its exposure in the header `X-Time-Us`;
 `/image.jpg` is the latest one, `/` a page that shows the stream. An image is compressed when the first
-watcher wants it, and once for all of them. Nobody gets a backlog: whoever is slow misses images.
+client requests it, and once for all of them. There is no backlog: a slow client misses images.
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ Image = npt.NDArray[np.uint8]
 JsonProvider = Callable[[Mapping[str, str]], object]
 
 JPEG_QUALITY = 98  # of 3138 boxes none differs from the raw image's; at 95, 39 do, by a pixel
-_SEND_BUFFER_BYTES = 1 << 16  # the kernel would buffer seconds of video for a slow watcher
+_SEND_BUFFER_BYTES = 1 << 16  # the kernel would buffer seconds of video for a slow client
 _CLOSE_S = 1.0
 _PAGE = """<!doctype html>
 <html lang="en">
@@ -49,31 +49,23 @@ class VideoError(UserError):
 
 @dataclass(slots=True)
 class _VideoImage:
-    """An image and, once somebody wanted it, the same as JPEG."""
+    """An image, and its JPEG after it was first requested."""
 
     image: Image
     time_us: int
     jpeg: bytes | None = None
 
     def compressed(self) -> bytes:
-        """Return the JPEG, made on the first call."""
+        """The JPEG, made at the first call."""
         if self.jpeg is None:
             self.jpeg = encode_jpeg(self.image)
         return self.jpeg
 
 
 def encode_jpeg(image: Image) -> bytes:
-    """Compress an image so that thin coloured bars keep their colour: full chroma resolution, quality 98.
-
-    Args:
-        image: BGR, shape (height, width, 3), uint8.
-    """
-    settings = [
-        cv2.IMWRITE_JPEG_QUALITY,
-        JPEG_QUALITY,
-        cv2.IMWRITE_JPEG_SAMPLING_FACTOR,
-        cv2.IMWRITE_JPEG_SAMPLING_FACTOR_444,
-    ]
+    """Compress a BGR image; thin coloured bars keep their colour by full chroma resolution and quality 98."""
+    chroma = (cv2.IMWRITE_JPEG_SAMPLING_FACTOR, cv2.IMWRITE_JPEG_SAMPLING_FACTOR_444)
+    settings = [cv2.IMWRITE_JPEG_QUALITY, JPEG_QUALITY, *chroma]
     done, data = cv2.imencode(".jpg", image, settings)
     if not done:
         raise VideoError(f"an image of shape {image.shape} cannot be compressed")
@@ -84,7 +76,7 @@ class VideoServer:
     """Serves the images published to it, and JSON documents beside them."""
 
     def __init__(self, host: str = "127.0.0.1", port: int = 8100, *, options: str = "--port") -> None:
-        """Prepare; nothing is opened yet.
+        """Set the address; nothing is opened yet.
 
         Args:
             host: address to listen on.
@@ -96,7 +88,7 @@ class VideoServer:
         self._port = port
         self._newest: _VideoImage | None = None
         self._documents: dict[str, JsonProvider] = {}
-        self._texts: dict[str, tuple[str, str]] = {}
+        self._texts = {"/": ("text/html", _PAGE)}
         self._loop: asyncio.AbstractEventLoop | None = None
         self._runner: web.AppRunner | None = None
         self._arrived = asyncio.Event()
@@ -104,47 +96,38 @@ class VideoServer:
 
     @property
     def port(self) -> int:
-        """The TCP port; after `start`, the one really used."""
+        """The TCP port; after `start`, the one that is open."""
         return self._port
 
     @property
     def url(self) -> str:
-        """Where the page is."""
+        """Address of the page."""
         host = f"[{self._host}]" if ":" in self._host else self._host
         return f"http://{host}:{self._port}/"
 
     def add_json(self, path: str, provider: JsonProvider) -> None:
-        """Serve a document.
+        """Serve a JSON document at a path that begins with "/".
 
-        Args:
-            path: begins with "/".
-            provider: is called at each request with the query's parameters and returns what
-                `json.dumps` takes; numbers that are not finite become null.
+        The provider is called at each request with the query's parameters and returns what `json.dumps`
+        takes; numbers that are not finite become null.
         """
         self._documents[path] = provider
 
     def add_text(self, path: str, content_type: str, text: str) -> None:
-        """Serve a text that does not change.
-
-        Args:
-            path: begins with "/".
-            content_type: what it is, such as "application/sdp".
-            text: the text.
-        """
+        """Serve a constant text at a path that begins with "/"."""
         self._texts[path] = (content_type, text)
 
     async def start(self) -> None:
         """Listen. The HTTP library is only imported here, in a thread: it takes a third of a second.
 
         Raises:
-            VideoError: the port is taken or the address is not ours.
+            VideoError: the port is in use or the address is not this machine's.
         """
         web = await asyncio.to_thread(import_module, "aiohttp.web")
         app = web.Application()
-        app.router.add_get("/", self._page)
         app.router.add_get(VIDEO_PATH, self._video, allow_head=False)
         app.router.add_get("/image.jpg", self._image)
-        app.router.add_get("/{path:.+}", self._document)
+        app.router.add_get("/{path:.*}", self._document)
         runner = web.AppRunner(app, access_log=None, shutdown_timeout=_CLOSE_S)
         await runner.setup()
         try:
@@ -160,7 +143,7 @@ class VideoServer:
         self._loop, self._runner = asyncio.get_running_loop(), runner
 
     def publish(self, image: Image, time_us: int) -> None:
-        """Show an image to all who watch. Never blocks; may be called from any thread.
+        """Send an image to all clients. Never blocks; may be called from any thread.
 
         Args:
             image: BGR, shape (height, width, 3), uint8; must not be changed afterwards.
@@ -171,7 +154,7 @@ class VideoServer:
             self._loop.call_soon_threadsafe(self._wake)
 
     async def close(self) -> None:
-        """Send all watchers away and stop listening."""
+        """End all streams and stop listening."""
         self._closing = True
         self._wake()
         if self._runner is not None:
@@ -196,7 +179,7 @@ class VideoServer:
         response = web.StreamResponse(headers=STREAM_HEADERS)
         if request.transport is not None:
             request.transport.get_extra_info("socket").setsockopt(SOL_SOCKET, SO_SNDBUF, _SEND_BUFFER_BYTES)
-            # Zero: a write waits until all before it has gone to the kernel.
+            # Zero: a write waits until the kernel has taken all before it.
             request.transport.set_write_buffer_limits(high=0)
         try:
             await response.prepare(request)
@@ -206,7 +189,7 @@ class VideoServer:
                 await response.write(write_part(image.compressed(), image.time_us))
                 image = await self._next(image)
         except ConnectionError:
-            pass  # the watcher has gone
+            pass  # the client has disconnected
         return response
 
     async def _image(self, request: web.Request) -> web.Response:
@@ -216,11 +199,6 @@ class VideoServer:
             return web.Response(status=503, text="no image yet\n", headers={"Retry-After": "1"})
         headers = {"X-Time-Us": str(self._newest.time_us), "Cache-Control": "no-store"}
         return web.Response(body=self._newest.compressed(), content_type="image/jpeg", headers=headers)
-
-    async def _page(self, request: web.Request) -> web.Response:
-        from aiohttp import web
-
-        return web.Response(text=_PAGE, content_type="text/html")
 
     async def _document(self, request: web.Request) -> web.Response:
         from aiohttp import web

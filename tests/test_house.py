@@ -22,9 +22,7 @@ DOCUMENTS = sorted([*ROOT.glob("*.md"), *(ROOT / "docs").rglob("*.md")])
 LOCKS = sorted((ROOT / "locks").glob("*.txt"))
 INSTALLED_LOCKS = [path for path in LOCKS if path.name != "mavproxy-without.txt"]
 # Exceptions from the limits of 20, each with its reason. Take out what is no longer needed; the tests say so.
-LARGE_FOLDERS = {
-    "sitl": "world, camera, links and the program that runs them",
-}
+LARGE_FOLDERS = {}
 LARGE_CLASSES = {
     "framerunner/flying/lockstep_drone.py LockstepDrone": "implements the port `Drone`",
     "offboard/mavsdk_drone.py MavsdkDrone": "implements the port `Drone`",

@@ -1,7 +1,7 @@
 """A cascaded position controller in plain Python, for simulators that come without one.
 
-Position, velocity, attitude, body rates, one proportional loop inside the other: a small part of what our
-autopilot computes in a tick. Axes: world x forward, y left, z up; body the same.
+Proportional loops for position, velocity, attitude and body rates: a small part of what our autopilot
+computes in a tick. Axes of world and body: x forward, y left, z up.
 """
 
 from __future__ import annotations
@@ -9,7 +9,7 @@ from __future__ import annotations
 from math import asin, atan2, cos, pi, sin
 
 GRAVITY_M_S2 = 9.81
-POSITION_GAIN = 1.0  # 1/s, and so on inwards, each loop some three times as quick as the one around it
+POSITION_GAIN = 1.0  # 1/s; each inner loop is about three times as fast as the one around it
 VELOCITY_GAIN = 2.5
 ATTITUDE_GAIN = 7.0
 RATE_GAIN = 20.0
@@ -46,16 +46,13 @@ class Cascade:
     def step(
         self, position: list[float], velocity: list[float], goal: tuple[float, float, float], goal_yaw: float
     ) -> tuple[float, float, float, float]:
-        """One tick.
+        """The rotors' thrusts, N.
 
         Args:
             position: x, y, z (metres) and the attitude's quaternion w, x, y, z.
             velocity: in world axes (m/s), then the body rates (rad/s).
             goal: x, y, z, metres.
             goal_yaw: radians.
-
-        Returns:
-            Thrusts, N.
         """
         x, y, z, qw, qx, qy, qz = position
         vx, vy, vz, p, q, r = velocity
@@ -79,13 +76,8 @@ class Cascade:
     def _mix(
         self, thrust_n: float, moment_x: float, moment_y: float, moment_z: float
     ) -> tuple[float, float, float, float]:
-        each, mx, my, mz = (
-            thrust_n / 4,
-            moment_x / self._arm_m,
-            moment_y / self._arm_m,
-            moment_z / self._torque_m,
-        )
-        top = self._max_thrust_n
+        each, top = thrust_n / 4, self._max_thrust_n
+        mx, my, mz = moment_x / self._arm_m, moment_y / self._arm_m, moment_z / self._torque_m
         return (
             min(max(each - mx - my + mz, 0.0), top),
             min(max(each + mx + my + mz, 0.0), top),
@@ -101,5 +93,5 @@ def pull(distance_m: float, speed_m_s: float) -> float:
 
 
 def clamp(value: float, limit: float) -> float:
-    """The value, kept between minus and plus the limit."""
+    """The value limited to -limit..limit."""
     return min(max(value, -limit), limit)

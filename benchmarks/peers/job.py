@@ -1,21 +1,58 @@
-"""What every program in the comparison is given, and what it gives back: JSON on standard input and output.
+"""What the programs of the comparison share: the job they read, the flight they print, and how it is timed.
 
-Only the standard library, as the peers' environment has nothing of this project. Axes are the arena's: x
-forward, y left, z up, yaw counter-clockwise from x.
+Both are JSON, on standard input and output. Costs are processor time on one core with one thread, so that
+they can be compared between programs. Only the standard library, as this project is not installed in the
+peers' environment. Axes are the arena's: x forward, y left, z up, yaw counter-clockwise from x.
 """
 
 from __future__ import annotations
 
 import json
+import os
+import resource
 import sys
+import time
 from collections.abc import Callable
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, field
 from typing import Any
 
 EXIT_CANNOT_FLY = 3
-EGL_MEND = "On Debian and Ubuntu: sudo apt install libegl1 libgl1-mesa-dri"
+EGL_ADVICE = "On Debian and Ubuntu: sudo apt install libegl1 libgl1-mesa-dri"
 
 Vec3 = tuple[float, float, float]
+
+SINGLE_THREADS = {  # environment variables; libraries read them when they are loaded
+    "OMP_NUM_THREADS": "1",
+    "OPENBLAS_NUM_THREADS": "1",
+    "MKL_NUM_THREADS": "1",
+    "NUMBA_NUM_THREADS": "1",
+    "LP_NUM_THREADS": "0",  # llvmpipe, Mesa's OpenGL without a graphics card: draw in the calling thread
+    "LIBGL_ALWAYS_SOFTWARE": "1",  # the processor draws: a graphics card's work is in no processor time
+}
+
+
+def pin_to_one_core() -> None:
+    """Keep this process on one core, where the system can do that."""
+    if hasattr(os, "sched_setaffinity"):
+        os.sched_setaffinity(0, {min(os.sched_getaffinity(0))})
+
+
+def processor_time_s() -> float:
+    """Processor time of this process, its threads and its ended children, seconds."""
+    usages = (resource.getrusage(resource.RUSAGE_SELF), resource.getrusage(resource.RUSAGE_CHILDREN))
+    return sum(usage.ru_utime + usage.ru_stime for usage in usages)
+
+
+@dataclass(slots=True)
+class Stopwatch:
+    """Processor and wall time since it was made, seconds."""
+
+    _began_s: tuple[float, float] = field(default_factory=lambda: (processor_time_s(), time.perf_counter()))
+
+    def read(self) -> tuple[float, float]:
+        """Processor time and wall time so far, seconds."""
+        processor_s, wall_s = self._began_s
+        return processor_time_s() - processor_s, time.perf_counter() - wall_s
 
 
 class CannotFlyError(Exception):
@@ -43,37 +80,21 @@ class Goal:
 
 @dataclass(frozen=True, slots=True)
 class Job:
-    """One flight to be timed.
+    """One flight to be timed."""
 
-    Attributes:
-        variant: how the program is set; see `benchmarks.contenders`.
-        scenario: name or file, for the program that knows scenarios.
-        seconds: of the flight.
-        image_rate_hz: images a second of flight.
-        width_px: of an image.
-        height_px: of an image.
-        vertical_fov_rad: angle of view over the height.
-        camera_flu_m: where on the drone the camera is, looking forward.
-        arena_m: extent of the floor along x and y.
-        sun_direction: the way its light travels.
-        boxes: base and frames.
-        goals: in order of time; the first is the start.
-        image_file: where to leave the last image (NumPy's format); empty for nowhere.
-    """
-
-    variant: str
-    scenario: str
+    variant: str  # key of the program's settings; see `benchmarks.compare`
+    scenario: str  # name or file, for our own program
     seconds: float
-    image_rate_hz: float
+    image_rate_hz: float  # images a second of flight
     width_px: int = 320
     height_px: int = 240
     vertical_fov_rad: float = 1.29
-    camera_flu_m: Vec3 = (0.0, 0.0, 0.0)
-    arena_m: tuple[float, float] = (10.0, 10.0)
-    sun_direction: Vec3 = (0.0, 0.0, -1.0)
-    boxes: tuple[Box, ...] = ()
-    goals: tuple[Goal, ...] = ()
-    image_file: str = ""
+    camera_flu_m: Vec3 = (0.0, 0.0, 0.0)  # position on the drone; the camera looks forward
+    arena_m: tuple[float, float] = (10.0, 10.0)  # extent of the floor along x and y
+    sun_direction: Vec3 = (0.0, 0.0, -1.0)  # in which its light travels
+    boxes: tuple[Box, ...] = ()  # base and frames
+    goals: tuple[Goal, ...] = ()  # in order of time; the first is the start
+    image_file: str = ""  # for the last image (NumPy's format); empty: it is not saved
 
     def to_json(self) -> str:
         """The job on one line."""
@@ -90,35 +111,22 @@ class Job:
 
 @dataclass(frozen=True, slots=True)
 class Flight:
-    """What a flight cost.
+    """What a flight cost."""
 
-    Attributes:
-        version: of the program.
-        rates: of physics and control, in words.
-        renderer: what drew the images.
-        simulated_s: length of the flight.
-        processor_s: processor time, without start-up and warming up.
-        wall_s: the same by the wall clock.
-        images: how many were delivered.
-        contrast: standard deviation of the last image's values: 0 if nothing is to be seen.
-        miss_m: distance from the last goal at the end; 0 where there are no goals.
-        path: time, x, y, z, yaw along the flight, from the program whose flight the others repeat.
-    """
-
-    version: str
-    rates: str
-    renderer: str
+    version: str  # of the program
+    rates: str  # of physics and control, as shown
+    renderer: str  # what drew the images
     simulated_s: float
-    processor_s: float
+    processor_s: float  # without start-up and warming up
     wall_s: float
-    images: int
-    contrast: float
-    miss_m: float = 0.0
-    path: tuple[tuple[float, ...], ...] = ()
+    images: int  # delivered
+    contrast: float  # standard deviation of the last image's values: 0 if nothing is to be seen
+    miss_m: float = 0.0  # distance from the last goal at the end; 0 where there are no goals
+    path: tuple[tuple[float, ...], ...] = ()  # time, x, y, z, yaw of the flight that the others repeat
 
 
 class GoalFollower:
-    """Tells which goal holds; ask it in order of time."""
+    """The goal that holds at a time; times must not decrease."""
 
     def __init__(self, goals: tuple[Goal, ...]) -> None:
         self._goals = goals
@@ -144,7 +152,7 @@ def answer(fly: Callable[[Job], Flight]) -> None:
 
 
 def keep_image(job: Job, image: Any) -> float:
-    """Leave the last image where the job wants it; return its contrast."""
+    """Save the last image where the job says; return its contrast."""
     if job.image_file:
         import numpy as np
 

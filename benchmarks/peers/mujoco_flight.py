@@ -2,8 +2,8 @@
 
 Variants:
     default: MuJoCo's own quality: shadows from a map of 4096 × 4096, four samples a pixel.
-    alike: as plain as our painter: one sample a pixel, shadows from a map of 1024 × 1024: a pixel is
-        a centimetre, and the bars of the frames are two.
+    alike: as plain as our painter: one sample a pixel, shadows from a map of 1024 × 1024 (a pixel is a
+        centimetre, a frame's bar two).
     fastest: one sample a pixel, no shadows, no sky, no ground beyond the floor.
 """
 
@@ -15,9 +15,18 @@ from dataclasses import dataclass
 from math import degrees, dist
 from typing import Any
 
-from benchmarks.one_core import Stopwatch, pin_to_one_core
 from benchmarks.peers.cascade import Cascade
-from benchmarks.peers.job import EGL_MEND, CannotFlyError, Flight, GoalFollower, Job, answer, keep_image
+from benchmarks.peers.job import (
+    EGL_ADVICE,
+    CannotFlyError,
+    Flight,
+    GoalFollower,
+    Job,
+    Stopwatch,
+    answer,
+    keep_image,
+    pin_to_one_core,
+)
 
 MASS_KG = 0.300
 INERTIA_KG_M2 = (0.0010225, 0.0010225, 0.0020)
@@ -41,13 +50,13 @@ SKY = """<asset>
 GROUND = (
     '<geom type="plane" size="40 40 20" pos="0 0 -0.01" rgba="0.5 0.5 0.5 1" contype="0" conaffinity="0"/>'
 )
-"""Beyond the floor, as in our pictures. Not MuJoCo's infinite plane: that is a fine grid, dear to draw."""
+"""Beyond the floor, as in our images. Not MuJoCo's infinite plane: that is a fine grid, expensive to draw."""
 ROTORS = ((1, -1, 1), (-1, 1, 1), (1, 1, -1), (-1, -1, -1))
 """Signs of x, y and of the torque about z: front right, rear left, front left, rear right."""
 
 
 def model_xml(job: Job) -> str:
-    """The arena and the drone of the job in MuJoCo's language."""
+    """The arena and the drone of the job in MuJoCo's XML."""
     start = job.goals[0]
     boxes = "".join(
         f'<geom type="box" size="{words(box.half_m)}" pos="{words(box.centre_m)}" '
@@ -96,7 +105,7 @@ def words(values: tuple[float, ...]) -> str:
 
 
 def choose_display() -> None:
-    """Choose a way to draw without a screen, unless the user has."""
+    """Choose an OpenGL library that draws without a screen, unless the user has."""
     if os.environ.get("MUJOCO_GL"):
         return
     for name, library in (("egl", "libEGL.so.1"), ("osmesa", "libOSMesa.so.8"), ("osmesa", "libOSMesa.so.6")):
@@ -106,7 +115,7 @@ def choose_display() -> None:
             continue
         os.environ["MUJOCO_GL"] = name
         return
-    raise CannotFlyError(f"MuJoCo needs EGL to draw without a screen. {EGL_MEND}")
+    raise CannotFlyError(f"MuJoCo needs EGL to draw without a screen. {EGL_ADVICE}")
 
 
 @dataclass(frozen=True, slots=True)
@@ -119,15 +128,15 @@ class World:
 
 
 def make_world(job: Job) -> World:
-    """Compile the model and find a way to draw."""
+    """Compile the model and open a renderer."""
     choose_display()
     try:
         import mujoco
 
         model = mujoco.MjModel.from_xml_string(model_xml(job))
         return World(mujoco, model, mujoco.Renderer(model, job.height_px, job.width_px))
-    except Exception as error:  # whatever the system's OpenGL throws, one line must say what is missing
-        raise CannotFlyError(f"MuJoCo cannot draw without a screen ({error}). {EGL_MEND}") from error
+    except Exception as error:  # the system's OpenGL may raise anything; one line must say what is missing
+        raise CannotFlyError(f"MuJoCo cannot draw without a screen ({error}). {EGL_ADVICE}") from error
 
 
 def fly(job: Job) -> Flight:

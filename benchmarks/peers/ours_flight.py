@@ -1,16 +1,14 @@
 """Our flight in the comparison: the mission with everything, as `framerunner fly --lockstep` flies it.
 
 Unlike the peers, it also searches the images, runs the navigator's chart and judges the flight. Timed from
-motors on; what comes before (design of the stabiliser, start-up of the drone) is as little counted as the
-peers' loading of models.
+motors on: design of the stabiliser and start-up of the drone are not counted, nor is the peers' loading.
 """
 
 from __future__ import annotations
 
 from importlib import metadata
 
-from benchmarks.one_core import Stopwatch, pin_to_one_core
-from benchmarks.peers.job import CannotFlyError, Flight, Job, answer, keep_image
+from benchmarks.peers.job import CannotFlyError, Flight, Job, Stopwatch, answer, keep_image, pin_to_one_core
 from framerunner.flying.lockstep import fly_lockstep
 from framerunner.flying.plan import FlightPlan
 from offboard.app import Moment
@@ -23,7 +21,7 @@ WARM_UP_S = 1.0
 
 
 class Timing:
-    """Watches a flight; reads the clocks at its beginning and its end only."""
+    """Observes a flight; reads the clocks only at its beginning and its end."""
 
     def __init__(self, seconds: float) -> None:
         self._seconds = seconds
@@ -78,7 +76,7 @@ def fly(job: Job) -> Flight:
 
 
 def fly_once(job: Job, seconds: float) -> Timing:
-    """Fly the scenario of the job for so many seconds and a little more."""
+    """Fly the scenario of the job for some seconds and half a second more."""
     scenario = load_scenario(job.scenario)
     camera = scenario.camera.model_copy(update={"rate_hz": job.image_rate_hz})
     scenario = scenario.model_copy(update={"camera": camera, "try_limit_s": seconds + 0.5})

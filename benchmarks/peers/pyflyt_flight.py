@@ -16,8 +16,18 @@ from functools import partial
 from math import degrees, dist
 from typing import Any
 
-from benchmarks.one_core import Stopwatch, pin_to_one_core
-from benchmarks.peers.job import EGL_MEND, Box, CannotFlyError, Flight, GoalFollower, Job, answer, keep_image
+from benchmarks.peers.job import (
+    EGL_ADVICE,
+    Box,
+    CannotFlyError,
+    Flight,
+    GoalFollower,
+    Job,
+    Stopwatch,
+    answer,
+    keep_image,
+    pin_to_one_core,
+)
 
 PHYSICS_RATE_HZ = 240
 CONTROL_RATE_HZ = 120
@@ -85,16 +95,16 @@ def make_aviary(job: Job) -> Any:
 
 
 def draw_with_opengl(aviary: Any) -> None:
-    """Load PyBullet's plug-in; it draws only what is loaded after it, so the arena is loaded again."""
+    """Load PyBullet's plug-in, then the arena again: the plug-in draws only what is loaded after it."""
     import pybullet
 
     try:
         ctypes.CDLL("libEGL.so.1")  # without it, the plug-in ends the process
     except OSError:
-        raise CannotFlyError(f"PyBullet's OpenGL plug-in needs EGL. {EGL_MEND}") from None
+        raise CannotFlyError(f"PyBullet's OpenGL plug-in needs EGL. {EGL_ADVICE}") from None
     spec = importlib.util.find_spec("eglRenderer")
     if spec is None or aviary.loadPlugin(spec.origin, "_eglRendererPlugin") < 0:
-        raise CannotFlyError(f"PyBullet's OpenGL plug-in does not load. {EGL_MEND}")
+        raise CannotFlyError(f"PyBullet's OpenGL plug-in does not load. {EGL_ADVICE}")
     aviary.reset()
     aviary.getCameraImage = partial(
         aviary.getCameraImage,
@@ -105,7 +115,7 @@ def draw_with_opengl(aviary: Any) -> None:
 
 
 def add_box(aviary: Any, box: Box) -> None:
-    """Put a box, solid and to be seen, into the arena."""
+    """Put a solid, visible box into the arena."""
     import pybullet
 
     body = aviary.createMultiBody(

@@ -20,8 +20,7 @@ from framerunner.film.story import Floats, Instant, Story
 from framerunner.film.viewpoint import Viewpoint
 from framerunner.runs.drawing import STATE_COLOURS
 from scenarios.models import Light
-from sitl.camera_order import PaintTree
-from sitl.camera_scene import Face, build_scene
+from sitl.camera_scene import Face, PaintTree, build_scene
 
 Image = npt.NDArray[np.uint8]
 

@@ -18,7 +18,7 @@ from offboard.app import Moment, Observer
 from offboard.perception import CAMERA_DEAD_S, CameraLostError
 from scenarios.models import Scenario, TrueState
 from scenarios.result import RefereeReport, RefereeSnapshot
-from sitl.camera_feed import CameraFeed
+from sitl.camera import CameraFeed
 from sitl.simulation import Simulation
 from vision.detector import detect
 from vision.types import Detections, Image

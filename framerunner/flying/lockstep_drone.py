@@ -19,7 +19,7 @@ from struct import Struct
 from firmware_py.offboard_requests import SetpointRefusal, setpoint_from_body_velocity
 from firmware_py.status import CommandResult, FlightMode, LandedState
 from firmware_py.types import CRITICAL
-from geometry.alignment import Alignment, Pose
+from geometry.axes import Alignment, Pose
 from geometry.vectors import Vec3
 from offboard.drone import DroneError, DroneState, VelocityCommand
 from scenarios.models import TrueState

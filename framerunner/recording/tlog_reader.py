@@ -12,7 +12,7 @@ import cv2
 from framerunner.flying.plan import FlightPlan
 from framerunner.recording.errors import RecordingError
 from framerunner.recording.events import Event, Picture, time_of_event
-from geometry.alignment import Alignment, Pose
+from geometry.axes import Alignment, Pose
 from offboard.app import Moment
 from offboard.drone import DroneState, VelocityCommand
 from scenarios.models import Scenario

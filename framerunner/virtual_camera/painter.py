@@ -7,12 +7,11 @@ from __future__ import annotations
 
 from framerunner.flying.plan import FlightPlan
 from framerunner.virtual_camera.placement import Placement
-from geometry.alignment import ORIGIN, Pose
+from geometry.axes import ORIGIN, Pose
 from geometry.rotations import quaternion_from_yaw, yaw_of
 from scenarios.models import Scenario, TrueState
 from scenarios.result import LocalFrame, Standing
-from sitl.camera import Camera, Image
-from sitl.camera_feed import FIRST_EXPOSURE_US
+from sitl.camera import FIRST_EXPOSURE_US, Camera, Image
 from wire.dialect import Message, mavlink
 from wire.vehicle_telemetry import AHEAD_US, VehicleTelemetry
 

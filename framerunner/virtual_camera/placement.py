@@ -6,7 +6,7 @@ from collections import deque
 from dataclasses import dataclass
 from math import atan2, cos, sin
 
-from geometry.alignment import Alignment, Pose
+from geometry.axes import Alignment, Pose
 from geometry.rotations import yaw_of
 from geometry.vectors import Quaternion, Vec3
 from wire.vehicle_telemetry import VehiclePose

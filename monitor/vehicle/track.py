@@ -7,7 +7,7 @@ from enum import IntEnum
 from math import dist, hypot, isfinite
 from typing import Any
 
-from geometry.alignment import ORIGIN, Alignment, Pose
+from geometry.axes import ORIGIN, Alignment, Pose
 from geometry.rotations import yaw_of
 from geometry.vectors import Vec3
 from wire.vehicle_telemetry import PositionReport, VehicleTelemetry

@@ -6,18 +6,19 @@ from dataclasses import asdict, replace
 import pytest
 
 from benchmarks.compare import (
+    CONTENDERS,
     BadResultError,
     Comparison,
     Pair,
     best,
     check_flight,
+    chosen,
     goals_along,
-    least,
+    minima,
     read_flight,
 )
-from benchmarks.contenders import CONTENDERS, chosen
-from benchmarks.parts import part_rows
 from benchmarks.peers.job import Box, Flight, Goal, GoalFollower, Job
+from benchmarks.report import part_rows
 
 FLIGHT = Flight("1.0", "500/250 Hz", "OpenCV", 20.0, 2.0, 2.1, 200, 40.0)
 JOB = Job("", "test-case-1", 20.0, 10.0, goals=(Goal(0.0, (0.0, 0.0, 1.0), 0.0),))
@@ -105,9 +106,9 @@ def test_peers_are_chosen_by_name():
     assert len({each.key for each in CONTENDERS}) == len(CONTENDERS)
 
 
-def test_of_several_runs_the_least_counts_part_by_part():
+def test_of_several_runs_the_minimum_counts_part_by_part():
     runs = [{"name": "a", "raw_s": 2.0, "step_s": 5.0}, {"name": "a", "raw_s": 3.0, "step_s": 4.0}]
-    assert least(runs) == {"name": "a", "raw_s": 2.0, "step_s": 4.0}
+    assert minima(runs) == {"name": "a", "raw_s": 2.0, "step_s": 4.0}
 
 
 def test_parts_add_up_to_the_whole_flight():

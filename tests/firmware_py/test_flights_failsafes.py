@@ -162,7 +162,7 @@ def test_without_a_position_it_brakes_descends_and_disarms(speed_m_s, drift_m):
 
 def test_a_broken_motor_ends_in_termination_on_the_ground():
     flight = Flight().climb_to(10.0)
-    flight.world.fail_motor(0)
+    flight.world.dynamics.fail_motor(0)
     flight.take(1.5, lambda: flight.mode is FlightMode.TERMINATION)
     flight.run(4.0)
     assert set(flight.autopilot.output.speeds_rad_s) == {0.0}

@@ -13,7 +13,7 @@ import heapq
 import json
 import selectors
 from dataclasses import dataclass, field
-from math import degrees, radians
+from math import degrees, inf, radians
 from random import Random
 from types import SimpleNamespace
 
@@ -30,7 +30,7 @@ from offboard.mavsdk_drone import MavsdkDrone
 from offboard.mission import Mission
 from offboard.perception import CameraPerception
 from scenarios.models import Scenario, TrueState
-from sitl.camera_feed import CameraFeed
+from sitl.camera import CameraFeed
 from sitl.simulation import Simulation
 from vision.types import CameraFrame
 
@@ -348,7 +348,7 @@ class LinkedFlight:
         )
 
     def lowest_m(self, start_radius_m: float = 1.2) -> float:
-        """The least height away from the start while the app flew."""
+        """The minimum height away from the start while the app flew; infinite if it stayed there."""
         start_x, start_y = self.box.start_m
         return min(
             (
@@ -356,7 +356,7 @@ class LinkedFlight:
                 for x, y, z in (truth.position_arena_m for truth in self.truths[: self.flown])
                 if (x - start_x) ** 2 + (y - start_y) ** 2 > start_radius_m**2
             ),
-            default=9.0,
+            default=inf,
         )
 
 

@@ -26,7 +26,7 @@ from geometry.axes import flip_vector
 from monitor.ports import Equipment
 from scenarios.loader import list_scenarios, load_scenario
 from scenarios.models import Scenario, TrueState
-from sitl.camera_feed import CameraFeed
+from sitl.camera import CameraFeed
 from sitl.simulation import Simulation
 from sitl.video import VideoServer
 from sitl.world import CONTROL_PERIOD_US

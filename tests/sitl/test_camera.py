@@ -11,7 +11,7 @@ from geometry.vectors import Quaternion, Vec3
 from scenarios.models import Arena, Base, Camera, Frame, Light, Scenario
 from sitl.camera import Camera as PaintedCamera
 from sitl.camera import Image
-from sitl.camera_mesh import SUBPIXELS, Mesh, Pinhole
+from sitl.camera_projection import SUBPIXELS, Mesh, Pinhole
 from sitl.camera_scene import GROUND_BGR, SKY_BGR, build_scene
 from sitl.solids import Solid, base_solid, frame_solids
 
@@ -40,7 +40,7 @@ def quaternion(yaw: float, pitch: float = 0.0, roll: float = 0.0) -> Quaternion:
 
 
 def rotation(q: Quaternion) -> npt.NDArray[np.float64]:
-    """Rotation matrix by another way than the camera's: turn each axis by q v q*."""
+    """Rotation matrix by another method than the camera's: turn each axis by q v q*."""
     w, v = q[0], np.array(q[1:])
     return np.array([e + 2 * np.cross(v, np.cross(v, e) + w * e) for e in np.eye(3)]).T
 
@@ -102,7 +102,7 @@ def palette(scenario: Scenario) -> dict[int, int]:
 
 
 def classes(image: Image, scenario: Scenario) -> npt.NDArray[np.int64]:
-    """Tell by colour what every pixel shows."""
+    """What every pixel shows, by its colour."""
     codes = image.astype(np.int64) @ np.array([1 << 16, 1 << 8, 1])
     result = np.full(codes.shape, -1)
     for code, name in palette(scenario).items():
@@ -112,7 +112,7 @@ def classes(image: Image, scenario: Scenario) -> npt.NDArray[np.int64]:
 
 
 def traced(scenario: Scenario, position: Vec3, q: Quaternion) -> npt.NDArray[np.int64]:
-    """Tell by ray tracing what every part of a pixel shows.
+    """What every part of a pixel shows, by ray tracing.
 
     Shape (height + 2, width + 2) times OVERSAMPLING: with a border of one pixel around the image.
     """
@@ -141,10 +141,10 @@ def entry_of_rays(
     """Slab method: depth at which rays enter a box from outside, inf where they do not."""
     c, s = cos(solid.yaw_rad), sin(solid.yaw_rad)
     turn = np.array([[c, s, 0], [-s, c, 0], [0, 0, 1]])
-    start, way = turn @ (origin - np.array(solid.centre_arena_m)), rays @ turn.T
+    start, direction = turn @ (origin - np.array(solid.centre_arena_m)), rays @ turn.T
     half = np.array(solid.half_extents_m)
     with np.errstate(divide="ignore", invalid="ignore"):
-        one, other = (-half - start) / way, (half - start) / way
+        one, other = (-half - start) / direction, (half - start) / direction
     entry, leave = np.minimum(one, other).max(axis=1), np.maximum(one, other).min(axis=1)
     return np.where((entry < leave) & (entry > 0.01), entry, inf)
 

@@ -1,11 +1,11 @@
-"""Other drones in the picture."""
+"""Other drones in the image."""
 
 import numpy as np
 import pytest
 
 from scenarios.loader import load_scenario
 from sitl.camera import Camera
-from sitl.camera_drones import DRONE_BGR
+from sitl.camera_scene import DRONE_BGR
 from sitl.solids import Solid
 
 LEVEL = (1.0, 0.0, 0.0, 0.0)

@@ -57,13 +57,13 @@ def idle(worlds, fleet, ticks):
 
 def test_drones_that_overlap_push_each_other_apart_and_it_is_said():
     worlds = worlds_at((2.0, 0.0), (2.0 + 0.9 * AIRFRAME.envelope_m[0], 0.0))
-    said = []
-    fleet = Fleet(worlds, said.append)
+    notices = []
+    fleet = Fleet(worlds, notices.append)
     before_m = dist(worlds[0].position_arena_m, worlds[1].position_arena_m)
     idle(worlds, fleet, 250)
     after_m = dist(worlds[0].position_arena_m, worlds[1].position_arena_m)
     assert after_m > before_m + 0.01
-    assert said == ["drone 1 and drone 2 touch each other"]
+    assert notices == ["drone 1 and drone 2 touch each other"]
     first, second = (world.position_arena_m for world in worlds)
     assert first[0] < 2.0 - 0.005 and second[0] > 2.0 + 0.9 * AIRFRAME.envelope_m[0] + 0.005
 
@@ -72,9 +72,9 @@ def test_drones_apart_do_not_disturb_each_other():
     alone = worlds_at((2.0, 0.0))
     idle(alone, Fleet(alone), 100)
     together = worlds_at((2.0, 0.0), (2.0, 1.5))
-    said = []
-    idle(together, Fleet(together, said.append), 100)
-    assert said == []
+    notices = []
+    idle(together, Fleet(together, notices.append), 100)
+    assert notices == []
     assert together[0].position_arena_m == alone[0].position_arena_m
 
 

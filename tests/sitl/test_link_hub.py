@@ -21,11 +21,11 @@ from wire.transports.urls import LinkError
 
 STATION = mavlink.MAVLink(None, 255, 190)
 BEAT = mavlink.MAVLink_heartbeat_message(mavlink.MAV_TYPE_GCS, 8, 0, 0, 4, 3)
-ASK = mavlink.MAVLink_param_request_read_message(1, 1, b"MAV_SYS_ID", -1)
+REQUEST = mavlink.MAVLink_param_request_read_message(1, 1, b"MAV_SYS_ID", -1)
 
 
 class Drone:
-    """A node with its hub; its time passes when it is asked to."""
+    """A node with its hub; its time advances when a test says so."""
 
     def __init__(self):
         autopilot = Autopilot(load_airframe("abejorro"), GeodeticPoint(47.0, 8.0, 400.0))
@@ -42,7 +42,8 @@ class Drone:
 async def drone_with(*urls):
     drone = Drone()
     try:
-        await drone.hub.open_all([parse_link(url) for url in urls])
+        for url in urls:
+            await drone.hub.open(parse_link(url))
         yield drone
     finally:
         drone.hub.close()
@@ -50,7 +51,7 @@ async def drone_with(*urls):
 
 
 async def heard(drone, read, kind, message=BEAT):
-    """Say something and wait for a kind of message; `read` gives bytes that came, or b""."""
+    """Send a message and wait for a kind of message; `read` returns received bytes, or b""."""
     reader = PacketReader()
     for _ in range(300):
         drone.pass_time()
@@ -80,7 +81,7 @@ class TcpPeer:
         data, self._data = bytes(self._data), bytearray()
         return data
 
-    def say(self, message, packer=STATION):
+    def send(self, message, packer=STATION):
         self.writer.write(message.pack(packer))
 
     def leave(self):
@@ -95,7 +96,7 @@ async def test_tcp_clients_come_ask_and_go():
     port = free_port()
     async with drone_with(f"tcpin://127.0.0.1:{port}") as drone:
         first, second = await tcp_peer(port), await tcp_peer(port)
-        first.say(ASK)
+        first.send(REQUEST)
         value = await heard(drone, first.read, "PARAM_VALUE")
         assert value.param_id == "MAV_SYS_ID"
         await heard(drone, second.read, "HEARTBEAT")
@@ -112,7 +113,7 @@ async def test_tcp_clients_hear_each_other():
     port = free_port()
     async with drone_with(f"tcpin://127.0.0.1:{port}") as drone:
         first, second = await tcp_peer(port), await tcp_peer(port)
-        first.say(BEAT)
+        first.send(BEAT)
         await asyncio.sleep(0.05)
         app = mavlink.MAVLink(None, 245, 191)
         packet = bytes(BEAT.pack(app))
@@ -189,7 +190,7 @@ async def test_udp_out_speaks_first():
                     return
                 except BlockingIOError:
                     drone.pass_time()
-    raise AssertionError("nothing came")
+    raise AssertionError("nothing was received")
 
 
 async def test_a_tcp_client_is_heard_after_a_megabyte_of_noise():
@@ -200,7 +201,7 @@ async def test_a_tcp_client_is_heard_after_a_megabyte_of_noise():
             peer.writer.write(b"\xfe" * 50_000)
             drone.pass_time()
             await asyncio.sleep(0.005)
-        peer.say(ASK)
+        peer.send(REQUEST)
         assert (await heard(drone, peer.read, "PARAM_VALUE")).param_id == "MAV_SYS_ID"
         peer.leave()
 
@@ -217,7 +218,7 @@ async def test_a_serial_line_carries_both_ways():
 
     async with drone_with(f"serial://{os.ttyname(theirs)}:57600") as drone:
         assert (await heard(drone, read, "HEARTBEAT")).autopilot == mavlink.MAV_AUTOPILOT_PX4
-        os.write(ours, bytes(ASK.pack(STATION)))
+        os.write(ours, bytes(REQUEST.pack(STATION)))
         assert (await heard(drone, read, "PARAM_VALUE")).param_id == "MAV_SYS_ID"
     os.close(ours)
     os.close(theirs)
@@ -265,7 +266,7 @@ async def test_only_so_many_tcp_clients_are_let_in():
 
 
 @pytest.mark.parametrize(
-    ("url", "said"),
+    ("url", "complaint"),
     [
         ("serial:///dev/null:57600", "not a serial line"),
         ("serial:///dev/not-there:57600", "No such file"),
@@ -273,11 +274,11 @@ async def test_only_so_many_tcp_clients_are_let_in():
         ("tcpin://192.0.2.1:5760", "192.0.2.1:5760 cannot be listened on (Cannot assign requested address);"),
     ],
 )
-async def test_what_cannot_be_opened_is_said_in_one_line(url, said):
+async def test_a_link_that_cannot_be_opened_is_reported_in_one_line(url, complaint):
     with pytest.raises(LinkError) as error:
         async with drone_with(url):
             pass
-    assert said in str(error.value)
+    assert complaint in str(error.value)
     assert "\n" not in str(error.value)
 
 

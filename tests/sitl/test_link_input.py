@@ -1,4 +1,4 @@
-"""Input of links is bounded in what it costs a control tick, and links take turns."""
+"""The processor time that links' input takes of a control tick is bounded, and links take turns."""
 
 import pytest
 
@@ -22,8 +22,8 @@ class Inlet:
         self.node = MavlinkNode(autopilot, (ONBOARD, GROUND))
         self.now_s = 0.0
         self._readings = 0
-        self.said = []
-        self.input = LinkInput(self.node, self.said.append, lambda: self.now_s, self.processor_time)
+        self.notices = []
+        self.input = LinkInput(self.node, self.notices.append, lambda: self.now_s, self.processor_time)
 
     @property
     def used_s(self):
@@ -35,7 +35,7 @@ class Inlet:
         return self._readings // 2 * TURN_S
 
     def pass_time(self, seconds):
-        """Ticks of 4 ms; most that one of them used, in seconds."""
+        """Advance by ticks of 4 ms; return the maximum that one of them used, in seconds."""
         most_s = 0.0
         for _ in range(round(seconds / 0.004)):
             self.now_s += 0.004
@@ -58,7 +58,7 @@ def packets(count, system=255):
     return BEAT.pack(packer) * count
 
 
-def test_what_comes_alone_is_acted_on_at_once(inlet):
+def test_single_packets_are_processed_at_once(inlet):
     inlet.input.take("onboard", packets(3))
     assert inlet.heard("onboard") == 3
 
@@ -90,22 +90,22 @@ def test_a_flooded_link_starves_no_other(inlet):
         assert inlet.heard("ground") >= count - 1
 
 
-def test_what_is_dropped_is_told_but_not_each_time(inlet):
+def test_what_is_dropped_is_reported_but_not_each_time(inlet):
     for _ in range(100):
         inlet.input.take("onboard", bytes(40_000))
-    assert len(inlet.said) == 1
-    assert "link onboard" in inlet.said[0]
+    assert len(inlet.notices) == 1
+    assert "link onboard" in inlet.notices[0]
     inlet.pass_time(9.9)
-    assert len(inlet.said) == 1
+    assert len(inlet.notices) == 1
     inlet.pass_time(0.2)
-    assert len(inlet.said) == 2
+    assert len(inlet.notices) == 2
     inlet.pass_time(30.0)
-    assert len(inlet.said) == 2
+    assert len(inlet.notices) == 2
     status = inlet.node._exchange.links["onboard"]
     assert status.reader.overflows > 50
 
 
-def test_a_link_that_is_gone_is_passed_over(inlet):
+def test_a_removed_link_is_skipped(inlet):
     inlet.input.take("ground", packets(3000))
     inlet.node.remove_link("ground")
     inlet.input.take("ground", packets(1))

@@ -37,8 +37,8 @@ async def test_speaks_unasked_and_hears_the_answer():
 
 async def test_nobody_there_does_no_harm():
     with peer() as station:
-        nobody = station.getsockname()
-    link = await open_udp(UdpAddresses(("127.0.0.1", 0), nobody), lambda data: None)
+        closed = station.getsockname()
+    link = await open_udp(UdpAddresses(("127.0.0.1", 0), closed), lambda data: None)
     for _ in range(5):
         link.send(b"x")
         await asyncio.sleep(0.01)
@@ -56,7 +56,7 @@ async def test_a_taken_port_is_said_in_one_line():
 
 
 class FakeSocket:
-    """Hands out one datagram at a time and notes to whom others go."""
+    """Returns one datagram at a time and records the addresses that others are sent to."""
 
     def __init__(self):
         self.sent = []
@@ -80,12 +80,12 @@ class FakeSocket:
 
 @pytest.fixture
 async def link():
-    """A link that speaks to home: how to hear, its clock in seconds, and to whom its next datagram goes."""
+    """A link with the remote "home": how it receives, its clock (s), and the targets of its next datagram."""
     now = [0.0]
     transport = FakeSocket()
     link = UdpLink(transport, ("home", 1), lambda data: None, clock=lambda: now[0])
 
-    def hear(data, peer):
+    def receive(data, peer):
         transport.data, transport.peer = data, peer
         link._read()
 
@@ -94,18 +94,18 @@ async def link():
         link.send(b"")
         return transport.sent
 
-    yield hear, now, targets
+    yield receive, now, targets
     link.close()
 
 
 async def test_speaks_to_home_and_to_all_who_spoke_lately(link):
-    hear, now, targets = link
+    receive, now, targets = link
     assert targets() == [("home", 1)]
-    hear(PACKET, ("a", 1))
-    hear(PACKET, ("home", 1))
+    receive(PACKET, ("a", 1))
+    receive(PACKET, ("home", 1))
     assert targets() == [("home", 1), ("a", 1)]
     now[0] = 3.0
-    hear(PACKET, ("b", 2))
+    receive(PACKET, ("b", 2))
     assert targets() == [("home", 1), ("a", 1), ("b", 2)]
     now[0] = 5.1
     assert targets() == [("home", 1), ("b", 2)]
@@ -114,14 +114,14 @@ async def test_speaks_to_home_and_to_all_who_spoke_lately(link):
 
 
 async def test_what_is_not_mavlink_makes_no_peer(link):
-    hear, _, targets = link
+    receive, _, targets = link
     for noise in (b"", b"GET / HTTP/1.1", bytes(20)):
-        hear(noise, ("a", 1))
+        receive(noise, ("a", 1))
     assert targets() == [("home", 1)]
 
 
 async def test_peers_are_few(link):
-    hear, _, targets = link
+    receive, _, targets = link
     for port in range(20):
-        hear(PACKET, ("a", port))
+        receive(PACKET, ("a", port))
     assert len(targets()) == 1 + MAX_PEERS

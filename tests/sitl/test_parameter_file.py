@@ -152,8 +152,8 @@ async def test_saving_is_done_on_request_and_a_failure_is_said(path):
     await asyncio.sleep(0)
     assert parameters.save()
     await keeper.close()
-    (said,) = notices
-    assert said.startswith(f"parameters are not saved: {path}: cannot be written")
+    (notice,) = notices
+    assert notice.startswith(f"parameters are not saved: {path}: cannot be written")
 
 
 def test_opening_takes_over_what_is_there_and_says_what_is_not(path):

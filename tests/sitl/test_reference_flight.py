@@ -67,7 +67,7 @@ SETPOINT_PERIOD_S = 0.05
 
 
 class Replay:
-    """Sends what is due at each tick of a simulation and keeps what comes back, with its time."""
+    """Sends what is due at each tick of a simulation and keeps what is received, with its time."""
 
     def __init__(self):
         self.simulation = Simulation(load_scenario("open-field"))
@@ -109,7 +109,7 @@ class Replay:
         deliver(self.node, ONBOARD.name, message.pack(self._peer))
 
     def of(self, kind):
-        """What came of a kind of message, each with its time."""
+        """The messages received of a kind, each with its time."""
         return [(time_s, message) for time_s, message in self.received if message.get_type() == kind]
 
 
@@ -154,6 +154,6 @@ def test_heartbeats_and_landed_states_go_through_what_was_recorded(replay):
 ])  # fmt: skip
 def test_velocities_are_flown(replay, start_s, end_s, wanted):
     """PX4's own SIH reaches 80 to 107 % of them; the yaw is still that of the start, north."""
-    came = [place for time_s, place in replay.of("LOCAL_POSITION_NED") if start_s < time_s < end_s]
-    mean = [sum(getattr(place, axis) for place in came) / len(came) for axis in ("vx", "vy", "vz")]
+    positions = [place for time_s, place in replay.of("LOCAL_POSITION_NED") if start_s < time_s < end_s]
+    mean = [sum(getattr(place, axis) for place in positions) / len(positions) for axis in ("vx", "vy", "vz")]
     assert mean == pytest.approx(wanted, abs=0.1)

@@ -16,7 +16,7 @@ RED, GREEN, BLUE = (0, 0, 255), (0, 255, 0), (255, 0, 0)
 
 
 def even_free_port():
-    """A port whose neighbour, RTCP's, is free too."""
+    """A free port whose next one, RTCP's, is free too."""
     for _ in range(100):
         with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as first:
             first.bind(("127.0.0.1", 0))

@@ -24,7 +24,7 @@ GREETING = "Ctrl-C stops"
 
 
 class SlowSimulation(Simulation):
-    """Each tick takes at least two and a half times as long as it should; remembers the time of each."""
+    """Each tick takes at least two and a half times as long as it should; records the time of each."""
 
     def __init__(self, scenario):
         super().__init__(scenario)
@@ -38,21 +38,21 @@ class SlowSimulation(Simulation):
 
 @asynccontextmanager
 async def serving(simulation, *, count=1, **options):
-    """A server with all its ports open: what it says, and its settings."""
-    said = []
+    """A server with all its ports open: its notices, and its settings."""
+    lines = []
     instance = free_instance(count)
     options = {"ground_remote": f"127.0.0.1:{14550 + instance}", **options}
     settings = ServerSettings(instance=instance, **options)
-    task = asyncio.create_task(SimulatorServer(simulation, settings, said.append).run())
+    task = asyncio.create_task(SimulatorServer(simulation, settings, lines.append).run())
     try:
         for _ in range(1000):
             await asyncio.sleep(0.01)
-            if said or task.done():
+            if lines or task.done():
                 break
         if task.done():
             await task
-        assert GREETING in said[-1]
-        yield said, settings
+        assert GREETING in lines[-1]
+        yield lines, settings
     finally:
         task.cancel()
         with suppress(asyncio.CancelledError):
@@ -131,17 +131,17 @@ async def test_telemetry_goes_out_on_both_links_before_anybody_spoke():
 async def test_a_machine_that_is_too_slow_slows_time_and_skips_nothing(monkeypatch):
     monkeypatch.setattr("sitl.server._NOTICE_PERIOD_S", 1.0)
     simulation = SlowSimulation(load_scenario("empty"))
-    async with serving(simulation) as (said, _):
+    async with serving(simulation) as (lines, _):
         began_s, began_us = time.monotonic(), simulation.time_us
         for _ in range(200):
             await asyncio.sleep(0.1)
-            if len(said) >= 3:
+            if len(lines) >= 3:
                 break
         factor = (simulation.time_us - began_us) / 1e6 / (time.monotonic() - began_s)
-    assert len(said) >= 3
-    assert "cannot keep up" in said[2] and "nothing was skipped" in said[2]
+    assert len(lines) >= 3
+    assert "cannot keep up" in lines[2] and "nothing was skipped" in lines[2]
     assert factor < 0.45  # a tick of 4 ms takes more than 10 ms
-    assert float(said[2].partition("ran at ")[2].split()[0]) == pytest.approx(factor, abs=0.15)
+    assert float(lines[2].partition("ran at ")[2].split()[0]) == pytest.approx(factor, abs=0.15)
     steps = {b - a for a, b in zip(simulation.ticks_us, simulation.ticks_us[1:], strict=False)}
     assert steps == {CONTROL_PERIOD_US}
 
@@ -149,13 +149,13 @@ async def test_a_machine_that_is_too_slow_slows_time_and_skips_nothing(monkeypat
 @pytest.mark.parametrize("speed", [0.5, 2.0])
 async def test_time_runs_at_the_wanted_speed(speed):
     simulation = Simulation(load_scenario("empty"))
-    async with serving(simulation, speed=speed) as (said, _):
+    async with serving(simulation, speed=speed) as (lines, _):
         await asyncio.sleep(0.3)
         began_s, began_us = time.monotonic(), simulation.time_us
         await asyncio.sleep(2.0)
         factor = (simulation.time_us - began_us) / 1e6 / (time.monotonic() - began_s)
     assert factor < speed * 1.15
-    if len(said) == 1:  # else the machine was too busy, and the server said so
+    if len(lines) == 1:  # else the machine was too busy, and the server said so
         assert factor > speed * 0.7
 
 
@@ -182,16 +182,16 @@ async def test_a_busy_video_port_ends_it_and_frees_the_links():
 
 async def test_three_drones_in_one_process_have_their_own_links_and_video():
     scenarios = side_by_side(load_scenario("empty"), 3, 0.3)
-    async with serving([Simulation(one) for one in scenarios], count=3) as (said, settings):
+    async with serving([Simulation(one) for one in scenarios], count=3) as (lines, settings):
         for _ in range(500):
             await asyncio.sleep(0.01)
-            if len(said) >= 3:
+            if len(lines) >= 3:
                 break
         times_us = []
         for number in range(3):
             answer = await referee(settings.shifted(number))
             times_us.append(answer["time_us"])
-            assert str(14540 + settings.instance + number) in said[number]
+            assert str(14540 + settings.instance + number) in lines[number]
     assert min(times_us) > 0
     assert max(times_us) - min(times_us) < 5_000_000
 
@@ -200,8 +200,8 @@ async def test_the_description_of_the_rtp_stream_is_served():
     with bound(0) as listener:
         port = listener.getsockname()[1]
         rtp = {"video_rtp": ("127.0.0.1", port)}
-        async with serving(Simulation(load_scenario("empty")), **rtp) as (said, settings):
-            assert f"RTP to UDP {port}" in said[0]
+        async with serving(Simulation(load_scenario("empty")), **rtp) as (lines, settings):
+            assert f"RTP to UDP {port}" in lines[0]
             url = f"http://127.0.0.1:{settings.http_port}/video.sdp"
             async with aiohttp.ClientSession() as session, session.get(url) as response:
                 assert response.content_type == "application/sdp"
@@ -212,8 +212,8 @@ async def test_the_description_of_the_rtp_stream_is_served():
 
 
 async def test_an_open_drone_without_a_key_says_so():
-    async with serving(Simulation(load_scenario("empty")), ground_remote="192.0.2.1") as (said, _):
-        assert said[0] == "other machines can command the drone: MAVLink is unsigned; see --signing-key"
+    async with serving(Simulation(load_scenario("empty")), ground_remote="192.0.2.1") as (lines, _):
+        assert lines[0] == "other machines can command the drone: MAVLink is unsigned; see --signing-key"
 
 
 def test_ports_beyond_the_last_are_refused():
@@ -240,15 +240,15 @@ def test_instances_shift_every_port():
 
 
 def test_notices_come_once_a_period_and_only_with_cause():
-    said = []
-    notices = _Notices(said.append, 2.0)
-    start_s = notices._since_s
-    notices.lag(0.0, start_s + 6.0)
-    assert said == []
-    notices.lag(1.0, start_s + 8.0)
-    assert said == []  # the period is not over
-    notices.lag(0.5, start_s + 12.0)
-    assert len(said) == 1
-    assert "ran at 1.50 of real time (wanted 2) for the last 6 s" in said[0]
-    notices.lag(0.0, start_s + 30.0)
-    assert len(said) == 1
+    lines = []
+    lag_notices = _Notices(lines.append, 2.0)
+    start_s = lag_notices._since_s
+    lag_notices.lag(0.0, start_s + 6.0)
+    assert lines == []
+    lag_notices.lag(1.0, start_s + 8.0)
+    assert lines == []  # the period is not over
+    lag_notices.lag(0.5, start_s + 12.0)
+    assert len(lines) == 1
+    assert "ran at 1.50 of real time (wanted 2) for the last 6 s" in lines[0]
+    lag_notices.lag(0.0, start_s + 30.0)
+    assert len(lines) == 1

@@ -1,4 +1,4 @@
-"""Links that a person asks for."""
+"""Links that a user requests."""
 
 from math import inf
 
@@ -36,7 +36,7 @@ def test_good_addresses(text, parts, rates, bytes_s, trusted):
 
 
 @pytest.mark.parametrize(
-    ("text", "said"),
+    ("text", "complaint"),
     [
         ("", "examples"),
         ("192.168.1.20:14550", "examples"),
@@ -52,8 +52,8 @@ def test_good_addresses(text, parts, rates, bytes_s, trusted):
         ("udpout://a:1?rate=-5", "rate -5"),
     ],
 )
-def test_bad_addresses_are_refused_in_one_line(text, said):
+def test_bad_addresses_are_refused_in_one_line(text, complaint):
     with pytest.raises(LinkError) as error:
         parse_link(text)
-    assert said in str(error.value)
+    assert complaint in str(error.value)
     assert "\n" not in str(error.value)

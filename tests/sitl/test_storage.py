@@ -1,4 +1,4 @@
-"""Both keepers of files do the same, keep their limits, and the folder cannot be left."""
+"""Both storages behave alike and keep their limits, and the folder cannot be left."""
 
 import errno
 import os
@@ -10,9 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from firmware_py.storage import Entry, parse_path
-from sitl.drone_files import flight_recorder, open_storage
-from sitl.storage import MemoryStorage, StorageLimits
-from sitl.storage_folder import FolderStorage, StorageFolderError
+from sitl.storage import FolderStorage, MemoryStorage, StorageFolderError, StorageLimits, open_storage
 from tests.disk import disk_that_takes
 
 LIMITS = StorageLimits(files=6, file_bytes=1000, total_bytes=1500)
@@ -210,11 +208,7 @@ def test_a_folder_that_cannot_be_used_is_named(tmp_path):
         open_storage(tmp_path / "file", 0)
 
 
-def test_instances_have_folders_of_their_own_and_logs_the_time_of_day(tmp_path):
-    storage = open_storage(tmp_path, 3)
-    storage.create(("a",))
+def test_each_instance_has_its_own_folder(tmp_path):
+    open_storage(tmp_path, 3).create(("a",))
     assert (tmp_path / "3" / "a").exists()
-    boot_us = int(datetime(2026, 11, 20, 14, 5, 50, tzinfo=UTC).timestamp() * 1e6)
-    recorder = flight_recorder(storage, boot_us)
-    assert recorder._name_log(9_500_000) == ("log", "2026-11-20", "14_05_59.ulg")
     assert isinstance(open_storage(None, 0), MemoryStorage)

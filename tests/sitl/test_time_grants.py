@@ -39,7 +39,7 @@ class Caller:
         return self.simulation.time_us == before_us
 
     async def runs(self):
-        """Whether simulated time goes on by itself."""
+        """Whether simulated time advances by itself."""
         later_us = self.simulation.time_us + 200_000
         return await asyncio.to_thread(wait_until, lambda: self.simulation.time_us > later_us, LIMIT_S)
 
@@ -102,7 +102,7 @@ async def test_time_waits_for_the_setpoint_that_was_sent():
         assert not (await caller.held()).setpoint_missed
 
 
-async def test_a_setpoint_that_never_comes_is_told_and_ends_nothing(monkeypatch):
+async def test_a_setpoint_that_is_never_received_is_reported_and_ends_nothing(monkeypatch):
     monkeypatch.setattr("sitl.time_grants._POLLS", 100)
     async with serving() as caller:
         caller.grant(0)
@@ -111,7 +111,7 @@ async def test_a_setpoint_that_never_comes_is_told_and_ends_nothing(monkeypatch)
         assert (await caller.held()).setpoint_missed
 
 
-async def test_time_is_free_when_nobody_grants_it_any_more():
+async def test_time_is_free_after_the_channel_has_closed():
     async with serving() as caller:
         caller.grant(0)
         await caller.held()

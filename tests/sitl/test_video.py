@@ -1,4 +1,4 @@
-"""The video server: what watchers, browsers and cv2 get from it."""
+"""The video server: what clients, browsers and cv2 receive from it."""
 
 import asyncio
 import json
@@ -20,7 +20,7 @@ from sitl.video import Image, VideoError, VideoServer, encode_jpeg
 from vision.detector import detect
 
 
-def picture(value: int = 0) -> Image:
+def sample(value: int = 0) -> Image:
     image = np.full((240, 320, 3), 128, np.uint8)
     image[100:120, 100:140] = (0, 0, 200)
     image[0:16, 0:16] = value % 256
@@ -41,7 +41,7 @@ async def serving() -> AsyncIterator[VideoServer]:
 async def publishing(server: VideoServer, period_s: float = 0.02) -> AsyncIterator[None]:
     async def publish() -> None:
         for i in range(100_000):
-            server.publish(picture(i), 1000 * i)
+            server.publish(sample(i), 1000 * i)
             await asyncio.sleep(period_s)
 
     task = asyncio.create_task(publish())
@@ -80,12 +80,12 @@ async def test_latest_image_page_and_unknown_path() -> None:
     async with serving() as server:
         status, text, _ = await get(server.url + "image.jpg")
         assert (status, text) == (503, b"no image yet\n")
-        server.publish(picture(), 1)
-        server.publish(picture(), 123_456)
+        server.publish(sample(), 1)
+        server.publish(sample(), 123_456)
         status, data, headers = await get(server.url + "image.jpg")
         assert status == 200
         assert headers["X-Time-Us"] == "123456"
-        assert data == encode_jpeg(picture())
+        assert data == encode_jpeg(sample())
         status, page, headers = await get(server.url)
         assert (status, headers["Content-Type"]) == (200, "text/html; charset=utf-8")
         assert b'src="/video"' in page
@@ -115,20 +115,20 @@ async def test_an_image_is_compressed_once_and_only_if_wanted(monkeypatch: pytes
     monkeypatch.setattr("sitl.video.encode_jpeg", lambda image: calls.append(1) or encode_jpeg(image))
     async with serving() as server:
         for i in range(20):
-            server.publish(picture(i), i)
+            server.publish(sample(i), i)
         assert calls == []
         await asyncio.gather(*(get(server.url + "image.jpg") for _ in range(4)))
         assert calls == [1]
 
 
-async def test_a_slow_watcher_gets_the_latest_image_not_a_backlog() -> None:
+async def test_a_slow_client_receives_the_latest_image_not_a_backlog() -> None:
     noise = np.random.default_rng(0).integers(0, 255, (240, 320, 3)).astype(np.uint8)
     async with serving() as server:
         server.publish(noise, 0)
         reader, writer = await asyncio.open_connection("127.0.0.1", server.port, limit=1 << 16)
         writer.write(b"GET /video HTTP/1.1\r\nHost: x\r\n\r\n")
         await reader.readuntil(b"X-Time-Us: 0\r\n")
-        for i in range(1, 301):  # 300 images of 130 kB while the watcher does not read
+        for i in range(1, 301):  # 300 images of 130 kB while the client does not read
             server.publish(noise, i)
             await asyncio.sleep(0.001)
         received = b""
@@ -140,7 +140,7 @@ async def test_a_slow_watcher_gets_the_latest_image_not_a_backlog() -> None:
         assert len(times) < 60
 
 
-async def test_watchers_come_and_go_quietly(caplog: pytest.LogCaptureFixture) -> None:
+async def test_clients_connect_and_disconnect_quietly(caplog: pytest.LogCaptureFixture) -> None:
     async with serving() as server, publishing(server, 0.001):
         for cut in (0, 10, 5000, 50000):
             reader, writer = await asyncio.open_connection("127.0.0.1", server.port)
@@ -157,14 +157,14 @@ async def test_watchers_come_and_go_quietly(caplog: pytest.LogCaptureFixture) ->
 async def test_close_ends_open_streams() -> None:
     server = VideoServer(port=0)
     await server.start()
-    server.publish(picture(), 1)
+    server.publish(sample(), 1)
     reader, writer = await asyncio.open_connection("127.0.0.1", server.port)
     writer.write(b"GET /video HTTP/1.1\r\nHost: x\r\n\r\n")
     await reader.readuntil(b"X-Time-Us")
     await asyncio.wait_for(server.close(), 0.9)
     await asyncio.wait_for(reader.read(), 1)
     writer.close()
-    server.publish(picture(), 2)  # nobody minds
+    server.publish(sample(), 2)  # is ignored
 
 
 async def test_a_busy_port_is_one_line() -> None:
@@ -186,12 +186,12 @@ async def test_an_impossible_address_is_one_line(host: str, port: int) -> None:
 
 async def test_publishing_from_another_thread_and_before_start() -> None:
     server = VideoServer(port=0)
-    server.publish(picture(), 7)
+    server.publish(sample(), 7)
     await server.start()
     try:
         async with aiohttp.ClientSession() as session, session.get(server.url + "video") as response:
             await response.content.readuntil(b"X-Time-Us: 7\r\n")
-            await asyncio.to_thread(server.publish, picture(), 8)
+            await asyncio.to_thread(server.publish, sample(), 8)
             await asyncio.wait_for(response.content.readuntil(b"X-Time-Us: 8\r\n"), 2)
     finally:
         await server.close()

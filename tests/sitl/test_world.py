@@ -28,7 +28,7 @@ class Flight:
 
     def fly(self, seconds, command):
         for _ in range(round(seconds * 1e6 / CONTROL_PERIOD_US)):
-            state = state_of(self.world._dynamics, self.world.time_us)
+            state = state_of(self.world.dynamics, self.world.time_us)
             self.world.step(self.stabiliser.step(state, command).speeds_rad_s)
             self.truths.append(self.world.truth(self.world.sensors(), motors_on=True))
         return self.truths[-1]

@@ -120,7 +120,7 @@ def test_in_the_world_it_stands_and_a_lost_motor_tips_it_over():
     for _ in range(250):
         world.step(lift)
     assert world.sensors().position_ned_m[2] < before.position_ned_m[2] - 0.2
-    world.fail_motor(0)
+    world.dynamics.fail_motor(0)
     for _ in range(100):
         world.step(lift)
     _, x, y, _ = world.sensors().attitude

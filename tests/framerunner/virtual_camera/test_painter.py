@@ -11,10 +11,9 @@ from firmware_py.mavlink.node import MavlinkNode
 from firmware_py.mavlink.telemetry.streams import GROUND
 from framerunner.flying.plan import FlightPlan
 from framerunner.virtual_camera.painter import VirtualCamera
-from geometry.alignment import Pose
+from geometry.axes import Pose
 from scenarios.loader import load_scenario
-from sitl.camera import Camera
-from sitl.camera_feed import CameraFeed
+from sitl.camera import Camera, CameraFeed
 from sitl.simulation import Simulation
 from tests.node_input import deliver
 from vision.detector import detect

@@ -7,7 +7,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from framerunner.virtual_camera.placement import HELD_AFTER_FLIGHT_US, Placement
-from geometry.alignment import Pose
+from geometry.axes import Pose
 from geometry.rotations import quaternion_from_euler
 from wire.vehicle_telemetry import VehiclePose
 

@@ -1,10 +1,11 @@
+from datetime import UTC, datetime
+
 import cv2
 import numpy as np
 import pytest
 
-from sitl.picture_album import PictureAlbum
-from sitl.storage import MemoryStorage, StorageLimits
-from sitl.storage_folder import FolderStorage
+from sitl.drone_files import PictureAlbum, flight_recorder
+from sitl.storage import FolderStorage, MemoryStorage, StorageLimits
 
 BOOT_US = 1_795_000_000_000_000  # 2026-11-18 11:06:40 UTC
 FOLDER = ("DCIM", "20261118_110640")
@@ -14,6 +15,12 @@ IMAGE = np.full((24, 32, 3), (10, 20, 200), np.uint8)
 @pytest.fixture(params=["memory", "folder"])
 def storage(request, tmp_path):
     return MemoryStorage() if request.param == "memory" else FolderStorage(tmp_path)
+
+
+def test_a_log_is_named_by_the_time_of_day():
+    boot_us = int(datetime(2026, 11, 20, 14, 5, 50, tzinfo=UTC).timestamp() * 1e6)
+    recorder = flight_recorder(MemoryStorage(), boot_us)
+    assert recorder._name_log(9_500_000) == ("log", "2026-11-20", "14_05_59.ulg")
 
 
 def test_there_is_no_picture_before_the_first_image(storage):
@@ -44,7 +51,7 @@ def test_space_is_the_storages(storage):
     assert (after.used_mib - before.used_mib) * 2**20 == pytest.approx(size)
 
 
-def test_a_full_storage_keeps_nothing_and_no_half_picture():
+def test_a_full_storage_keeps_no_picture_and_no_part_of_one():
     storage = MemoryStorage(StorageLimits(total_bytes=100))
     album = PictureAlbum(storage, BOOT_US)
     album.show(IMAGE)

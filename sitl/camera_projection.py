@@ -1,0 +1,222 @@
+"""A pinhole camera's projection: all faces of a scene at once, cut to what can be seen, and other drones.
+
+One matrix product gives the image of every corner and its side of each border of the view. Per face that says
+whether it is out of sight, can be painted as it is, or must be cut first. Cuts go from corner to corner and
+keep what lies on the inner side (Sutherland & Hodgman, "Reentrant polygon clipping", 1974); they use plain
+scalars, as few polygons need them: those that reach beside or behind the camera.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from math import dist
+
+import cv2
+import numpy as np
+import numpy.typing as npt
+
+from geometry.rotations import RotationRows
+from geometry.vectors import Vec3
+from sitl.camera_scene import Bgr, Face
+from sitl.solids import Solid
+
+Floats = npt.NDArray[np.float64]
+Ints = npt.NDArray[np.int32]
+Point = tuple[float, float]
+Window = tuple[float, float, float, float]  # left, top, right, bottom
+
+SHIFT = 4  # OpenCV's argument: corners are given in sixteenths of a pixel
+SUBPIXELS = float(1 << SHIFT)
+_BITS = 2.0 ** np.arange(10)
+_CUT_BITS = 0b00111101  # beyond the near plane or the window
+_FARTHEST = 2.0**24  # sixteenths of a pixel, well within OpenCV's whole numbers of 32 bits
+
+
+@dataclass(frozen=True, slots=True)
+class Pinhole:
+    """An ideal camera."""
+
+    width_px: int
+    height_px: int
+    focal_px: float
+    near_m: float  # depth from which on things are seen
+    far_m: float  # a face wholly beyond this depth is not seen
+
+    @property
+    def centre_px(self) -> Point:
+        """Where the optical axis meets the image; whole numbers are pixel centres."""
+        return ((self.width_px - 1) / 2, (self.height_px - 1) / 2)
+
+    def matrix(self, eye_arena_m: Vec3, rotation: RotationRows) -> Floats:
+        """The projection of (x, y, z, 1) in arena axes to (u w, v w, w), shape (3, 4).
+
+        u and v are in sixteenths of a pixel, w is the depth in metres.
+
+        Args:
+            eye_arena_m: position of the camera.
+            rotation: rows of the matrix from forward, left, up to arena axes.
+        """
+        focal = self.focal_px * SUBPIXELS
+        cu, cv = (centre * SUBPIXELS for centre in self.centre_px)
+        rows = [(cu * fwd - focal * left, cv * fwd - focal * up, fwd) for fwd, left, up in rotation]
+        (a0, b0, c0), (a1, b1, c1), (a2, b2, c2) = rows
+        x, y, z = eye_arena_m
+        shift = (-a0 * x - a1 * y - a2 * z, -b0 * x - b1 * y - b2 * z, -c0 * x - c1 * y - c2 * z)
+        return np.array([*rows, shift]).T
+
+
+@dataclass(frozen=True, slots=True)
+class MeshFace:
+    """Number of a face, the range of its corners among all corners, and its colour."""
+
+    index: int
+    start: int
+    stop: int
+    colour: Bgr
+
+
+class Mesh:
+    """The faces of a scene, in the order given, ready to be projected."""
+
+    def __init__(self, faces: Sequence[Face], pinhole: Pinhole) -> None:
+        stops = np.cumsum([len(face.corners_arena_m) for face in faces]).tolist()
+        starts = [0, *stops[:-1]]
+        self.faces = tuple(
+            MeshFace(index, starts[index], stops[index], face.colour) for index, face in enumerate(faces)
+        )
+        corners = np.concatenate([face.corners_arena_m for face in faces])
+        self._corners = np.vstack([corners.T, np.ones(len(corners))])
+        self._starts = np.array(starts)
+        self._normals = np.array([face.normal_arena for face in faces])
+        self._offsets = np.array([np.dot(face.normal_arena, face.corners_arena_m[0]) for face in faces])
+        self._pinhole = pinhole
+        self._window = (-_FARTHEST, -8.0 * pinhole.height_px * SUBPIXELS, _FARTHEST, _FARTHEST)
+        self._borders = _borders(pinhole, self._window)
+
+    def project(self, eye_arena_m: Vec3, rotation: RotationRows) -> Projection:
+        """Project all faces; the arguments are those of `Pinhole.matrix`."""
+        matrix = self._borders @ self._pinhole.matrix(eye_arena_m, rotation)
+        near_m = self._pinhole.near_m
+        matrix[3, 3] -= near_m
+        matrix[4, 3] += self._pinhole.far_m
+        projected = matrix @ self._corners
+        # Ten borders are ten bits of one number a corner.
+        outside = (_BITS @ (projected[3:] < 0.0)).astype(np.uint16)
+        hidden = np.bitwise_and.reduceat(outside, self._starts)
+        seen = (self._normals @ eye_arena_m > self._offsets) & (hidden == 0)
+        crossing = np.bitwise_or.reduceat(outside, self._starts) & _CUT_BITS
+        flat = projected[:2] / np.maximum(projected[2], near_m)
+        np.maximum(flat, -_FARTHEST, out=flat)
+        np.minimum(flat, _FARTHEST, out=flat)
+        pixels = np.rint(flat, out=flat).T.astype(np.int32, order="C")
+        return Projection(projected, pixels, seen.tobytes(), crossing.tolist(), near_m, self._window)
+
+
+@dataclass(frozen=True, slots=True)
+class Projection:
+    """All faces seen from one pose of the camera; u and v in sixteenths of a pixel."""
+
+    corners: Floats  # columns (u w, v w, w, ...), one for every corner
+    pixels: Ints  # (u, v) of every corner, shape (n, 2); wrong where cuts are needed
+    seen: bytes  # per face, 1 if it faces the eye and is not wholly outside the view
+    to_cut: list[int]  # per face, not 0 if it must be cut
+    near_m: float  # depth of the near plane
+    window: Window
+
+    def outline(self, face: MeshFace) -> Ints | None:
+        """Corners of a seen face in sixteenths of a pixel, shape (k, 2); None if it is cut away."""
+        if not self.to_cut[face.index]:
+            return self.pixels[face.start : face.stop]
+        points = _clip_near(self.corners[:3, face.start : face.stop].T.tolist(), self.near_m)
+        points = _clip_window(points, self.window)
+        if len(points) < 3:
+            return None
+        return np.array([(round(u), round(v)) for u, v in points], np.int32)
+
+
+def _borders(pinhole: Pinhole, window: Window) -> Floats:
+    """The matrix from (u w, v w, w) to itself and the distances from ten borders, shape (13, 3).
+
+    A distance below zero is outside. Near and far plane (still to be moved to their depths), the window's
+    four sides, the image's four sides with a pixel to spare for outlines painted on the nearest pixel.
+    """
+    left, top, right, bottom = window
+    width, height = pinhole.width_px * SUBPIXELS, pinhole.height_px * SUBPIXELS
+    rows = [(1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0), (0.0, 0.0, 1.0), (0.0, 0.0, -1.0)]
+    for x0, y0, x1, y1 in ((left, top, right, bottom), (-SUBPIXELS, -SUBPIXELS, width, height)):
+        rows += [(1.0, 0.0, -x0), (-1.0, 0.0, x1), (0.0, 1.0, -y0), (0.0, -1.0, y1)]
+    return np.array(rows)
+
+
+def _clip_near(corners: Sequence[Sequence[float]], near_m: float) -> list[Point]:
+    """Cut a convex polygon with corners (u w, v w, w) at the near plane; return what is left as (u, v).
+
+    Before the division by w, straight lines in space are straight lines here too.
+    """
+    kept: list[Point] = []
+    x0, y0, w0 = corners[-1]
+    for x1, y1, w1 in corners:
+        if (w0 < near_m) != (w1 < near_m):
+            t = (near_m - w0) / (w1 - w0)
+            kept.append(((x0 + t * (x1 - x0)) / near_m, (y0 + t * (y1 - y0)) / near_m))
+        if w1 >= near_m:
+            kept.append((x1 / w1, y1 / w1))
+        x0, y0, w0 = x1, y1, w1
+    return kept
+
+
+def _clip_window(points: list[Point], window: Window) -> list[Point]:
+    """Cut a convex polygon to a window of the image plane; fewer than three corners if nothing is left.
+
+    OpenCV takes whole numbers of 32 bits and walks row by row from a polygon's topmost corner, however far
+    above the image that is: this keeps it correct and fast.
+    """
+    left, top, right, bottom = window
+    if all(left <= u <= right and top <= v <= bottom for u, v in points):
+        return points
+    for a, b, c in ((1.0, 0.0, -left), (-1.0, 0.0, right), (0.0, 1.0, -top), (0.0, -1.0, bottom)):
+        points = clip_half_plane(points, a, b, c)
+    return points
+
+
+def clip_half_plane(corners: Sequence[Point], a: float, b: float, c: float) -> list[Point]:
+    """Keep the part of a convex polygon where a u + b v + c >= 0."""
+    heights = [a * u + b * v + c for u, v in corners]
+    if not heights or min(heights) >= 0.0:
+        return list(corners)
+    kept: list[Point] = []
+    if max(heights) < 0.0:
+        return kept
+    (u0, v0), before = corners[-1], heights[-1]
+    for (u1, v1), now in zip(corners, heights, strict=True):
+        if (before < 0.0) != (now < 0.0):
+            t = before / (before - now)
+            kept.append((u0 + t * (u1 - u0), v0 + t * (v1 - v0)))
+        if now >= 0.0:
+            kept.append((u1, v1))
+        u0, v0, before = u1, v1, now
+    return kept
+
+
+def drone_outlines(
+    drones: Sequence[Solid], eye_arena_m: Vec3, rotation: RotationRows, pinhole: Pinhole
+) -> list[tuple[float, Ints]]:
+    """Distance (m) and outline (sixteenths of a pixel, shape (k, 2)) of each drone seen, the farthest first.
+
+    Drones that are behind the camera, too far away or so near that they reach the camera are left out. The
+    drones are given by their boxes, the pose of the camera as for `Pinhole.matrix`.
+    """
+    matrix = pinhole.matrix(eye_arena_m, rotation)
+    limit = 8.0 * max(pinhole.width_px, pinhole.height_px) * SUBPIXELS
+    seen: list[tuple[float, Ints]] = []
+    for drone in drones:
+        distance_m = dist(eye_arena_m, drone.centre_arena_m)
+        u, v, depth_m = matrix @ np.array([(*corner, 1.0) for corner in drone.corners()]).T
+        if distance_m > pinhole.far_m or depth_m.min() <= pinhole.near_m:
+            continue
+        points = np.array([u / depth_m, v / depth_m]).T
+        if np.abs(points).max() < limit:
+            hull = cv2.convexHull(points.astype(np.float32)).reshape(-1, 2)
+            seen.append((distance_m, np.rint(hull).astype(np.int32)))
+    return sorted(seen, key=lambda one: -one[0])
