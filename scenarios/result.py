@@ -10,6 +10,7 @@ from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, ValidationEr
 from pydantic.json_schema import GenerateJsonSchema
 from pydantic_core import CoreSchema
 
+from errors import UserError
 from scenarios.crossing import Side
 from scenarios.verdict import Verdict
 
@@ -32,8 +33,8 @@ Text = Annotated[str, BeforeValidator(_sound_text)]
 Ended = Literal["finished", "timed out", "aborted", "error", ""]
 
 
-class ResultError(ValueError):
-    """A result that makes no sense; the message is one line: field, then reason."""
+class ResultError(UserError):
+    """A result that cannot be used; the message is one line for people: field, then reason."""
 
 
 @dataclass(frozen=True, slots=True)

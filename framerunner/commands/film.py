@@ -8,7 +8,7 @@ from typing import Annotated
 
 from cyclopts import Parameter
 
-from framerunner.errors import SettingError
+from errors import SettingError
 
 _Size = Annotated[
     str | None, Parameter(help="width and height in pixels; 960x540, of a GIF 640x360 if not given")

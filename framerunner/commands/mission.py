@@ -88,7 +88,7 @@ def new(
 
         framerunner mission new my_mission --python --out missions
     """
-    from framerunner.errors import SettingError
+    from errors import SettingError
     from offboard.starter import starter
 
     if not _NAME.fullmatch(name):
@@ -115,7 +115,7 @@ def _load(mission: str | Path, pilot: Path | None) -> Mission:
 
 def _write(files: Starter) -> None:
     """Write all files or, if one of them is there already, none."""
-    from framerunner.errors import SettingError
+    from errors import SettingError
 
     for path in files.texts:
         if path.exists():

@@ -99,7 +99,7 @@ def random(
 
         framerunner scenario random --level calm --seed 17 --out calm-17.yaml
     """
-    from framerunner.errors import SettingError
+    from errors import SettingError
     from scenarios.level import load_level
     from scenarios.loader import dump_yaml
     from scenarios.random_scenarios import random_scenario

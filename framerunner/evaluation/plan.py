@@ -12,8 +12,8 @@ from importlib import metadata
 from pathlib import Path
 from typing import Any, Self
 
+from errors import SettingError
 from firmware_py.airframe import AirframeError, load_airframe
-from framerunner.errors import SettingError
 from framerunner.flying.plan import FlightPlan
 from offboard.mission import Mission
 from offboard.pilot_file import PilotFile

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from framerunner.errors import SettingError
+from errors import SettingError
 from framerunner.evaluation.plan import Identity
 from framerunner.evaluation.rows import Row
 from framerunner.runs.track import Track

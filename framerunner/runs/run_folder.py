@@ -9,7 +9,7 @@ from collections.abc import Callable
 from datetime import datetime
 from pathlib import Path
 
-from framerunner.errors import SettingError
+from errors import SettingError
 from framerunner.extras import advice
 from framerunner.runs.pictures import PictureError, track_picture
 from framerunner.runs.track import Track

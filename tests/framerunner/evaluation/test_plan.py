@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import pytest
 
-from framerunner.errors import SettingError
+from errors import SettingError
 from framerunner.evaluation.plan import Identity, plan_files, plan_level
 from offboard.mission import load_mission
 from offboard.pilot_file import PilotFile

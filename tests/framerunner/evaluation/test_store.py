@@ -4,7 +4,7 @@ import os
 
 import pytest
 
-from framerunner.errors import SettingError
+from errors import SettingError
 from framerunner.evaluation.plan import plan_level
 from framerunner.evaluation.store import FLIGHTS, open_folder, read_folder
 from framerunner.runs.track import Track

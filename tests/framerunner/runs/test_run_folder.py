@@ -5,7 +5,7 @@ import re
 
 import pytest
 
-from framerunner.errors import SettingError
+from errors import SettingError
 from framerunner.runs.run_folder import RunFolder
 from scenarios.result import FlightResult
 
