@@ -160,7 +160,7 @@ def _picture(folder: EvaluationFolder, row: Row) -> str | None:
     track = folder.track(row.scenario)
     if len(track) == 0:
         return None
-    from framerunner.runs.drawing import draw_track
+    from framerunner.runs.plots import draw_track
 
     try:
         scenario = load_scenario(folder.scenario_file(row.scenario))

@@ -18,7 +18,7 @@ from framerunner.film.colours import MAT, PAPER, RIM, SHADOW, STEM, TATAMI, WHIT
 from framerunner.film.drone_shape import DroneShape, Patch
 from framerunner.film.story import Floats, Instant, Story
 from framerunner.film.viewpoint import Viewpoint
-from framerunner.runs.drawing import STATE_COLOURS
+from framerunner.runs.plots import STATE_COLOURS
 from scenarios.models import Light
 from sitl.camera_order import PaintTree
 from sitl.camera_scene import Face, build_scene

@@ -15,7 +15,7 @@ import numpy.typing as npt
 from av.codec import Codec
 from av.filter import Graph
 
-from framerunner.runs.pictures import PictureError
+from framerunner.runs.plots import PlotError
 
 if TYPE_CHECKING:
     from av.video.stream import VideoStream
@@ -204,7 +204,7 @@ def film_file(path: Path, open_film: Callable[[Path], FilmFile]) -> Iterator[Fil
         open_film: opens it at another place in the same folder.
 
     Raises:
-        PictureError: it cannot be written.
+        PlotError: it cannot be written.
     """
     part = path.with_name(f".{path.name}.part")
     try:
@@ -216,6 +216,6 @@ def film_file(path: Path, open_film: Callable[[Path], FilmFile]) -> Iterator[Fil
             film.close()
         part.replace(path)
     except (OSError, av.error.FFmpegError) as error:
-        raise PictureError(f"film: cannot write '{path}': {error.strerror or error}") from None
+        raise PlotError(f"film: cannot write '{path}': {error.strerror or error}") from None
     finally:
         part.unlink(missing_ok=True)

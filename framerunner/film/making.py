@@ -73,7 +73,7 @@ def make_film(folder: Path, settings: FilmSettings, pilot: PilotFile | None = No
     Raises:
         RecordingError: there is no flight to show, or it is damaged.
         ScenarioError: its scenario is damaged.
-        PictureError: the film cannot be written.
+        PlotError: the film cannot be written.
     """
     scenario = _scenario(folder)
     with recorded_flight(folder, pilot) as recorded:
