@@ -15,8 +15,8 @@ from framerunner.film.sheet import Sheet
 from framerunner.film.story import Story
 from framerunner.flying.plan import FlightPlan
 from framerunner.recording.collected import CollectedFlight, collect
-from framerunner.recording.errors import RecordingError
-from framerunner.recording.find import recorded_flight
+from framerunner.recording.events import RecordingError
+from framerunner.recording.open_recording import recorded_flight
 from offboard.pilot_file import PilotFile
 from scenarios.loader import load_scenario
 from scenarios.models import Scenario

@@ -11,7 +11,7 @@ import numpy as np
 import numpy.typing as npt
 
 from framerunner.recording.collected import CollectedFlight
-from framerunner.recording.errors import RecordingError
+from framerunner.recording.events import RecordingError
 from offboard.app import Moment
 from scenarios.models import Scenario
 from scenarios.result import FlightResult

@@ -216,6 +216,7 @@ def _arrow(
     tail: tuple[float, float],
     yaw_rad: float,
     length_m: float,
+    *,
     colour: str,
     lw: float,
     zorder: int,

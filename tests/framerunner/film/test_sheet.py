@@ -11,7 +11,7 @@ from framerunner.film.sheet import Sheet
 from framerunner.film.story import Story
 from framerunner.film.viewpoint import Flyby, Viewpoint
 from framerunner.recording.collected import collect
-from framerunner.recording.find import recorded_flight
+from framerunner.recording.open_recording import recorded_flight
 from scenarios.loader import load_scenario
 
 SIZE = (640, 360)

@@ -11,10 +11,10 @@ import pytest
 from mcap.writer import CompressionType, Writer
 
 from framerunner.recording.collected import collect
-from framerunner.recording.errors import RecordingError
-from framerunner.recording.find import recorded_flight
+from framerunner.recording.events import RecordingError
 from framerunner.recording.mcap_file import MAX_CHUNK_BYTES
 from framerunner.recording.mcap_reader import McapRecording
+from framerunner.recording.open_recording import recorded_flight
 from tests.framerunner.recording.logs import write_log
 
 CLAIMED = (
@@ -90,7 +90,7 @@ def test_a_file_without_an_index_is_not_read_whole(tmp_path):
         McapRecording(path)
 
 
-def picture(data):
+def image_message(data):
     return json.dumps({"data": base64.b64encode(data).decode()}).encode()
 
 
@@ -117,7 +117,7 @@ def many_scans():
     ],
 )
 def test_an_image_that_costs_too_much_is_not_decoded(tmp_path, data, words):
-    path = recording_of(tmp_path / "image.mcap", picture(data), topic="/camera/image")
+    path = recording_of(tmp_path / "image.mcap", image_message(data), topic="/camera/image")
     with recorded_flight(path) as recorded, pytest.raises(RecordingError, match=words):
         collect(recorded)
 
@@ -129,7 +129,7 @@ def test_a_long_text_is_not_parsed(tmp_path):
 
 
 def test_a_log_of_more_hours_than_any_battery_lasts_is_refused(tmp_path, monkeypatch):
-    monkeypatch.setattr("framerunner.recording.tlog_reader._MAX_TICKS", 50)
+    monkeypatch.setattr("framerunner.recording.tlog_reader.MAX_TICKS", 50)
     write_log(tmp_path / "flight.tlog")
     with pytest.raises(RecordingError, match="longer than eight hours"):
         read_all(tmp_path)

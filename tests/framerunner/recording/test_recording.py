@@ -9,12 +9,10 @@ import numpy as np
 import pytest
 from mcap.reader import make_reader
 
-from framerunner.recording.errors import RecordingError
-from framerunner.recording.events import Crossed, Picture
+from framerunner.recording.events import Crossed, RecordedImage, RecordingError
 from framerunner.recording.mcap_reader import McapRecording
 from framerunner.recording.mcap_writer import FlightRecording
-from framerunner.recording.messages import box_edges, detections, time_of
-from framerunner.recording.scene import camera_transform, scene
+from framerunner.recording.messages import box_edges, camera_transform, detections, scene, time_of
 from framerunner.recording.schemas import TOPICS, schemas
 from offboard.app import Moment
 from offboard.drone import DroneState, VelocityCommand
@@ -131,8 +129,8 @@ def test_a_recording_gives_back_what_the_flight_s_observer_saw(recorded):
     moments = [event for event in events if isinstance(event, Moment)]
     assert moments == recorded.moments
     assert any(moment.detections.red.seen for moment in moments)
-    pictures = [event for event in events if isinstance(event, Picture)]
-    assert [picture.time_us for picture in pictures] == [time_us for time_us, _ in recorded.images]
+    images = [event for event in events if isinstance(event, RecordedImage)]
+    assert [image.time_us for image in images] == [time_us for time_us, _ in recorded.images]
     assert recording.result == recorded.flown.result
     assert recording.title == "test-case-1: frame_challenge"
 

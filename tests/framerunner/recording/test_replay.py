@@ -13,8 +13,8 @@ from mcap.writer import Writer
 
 from framerunner.cli import run
 from framerunner.recording import replay as replay_module
-from framerunner.recording.events import Crossed, Picture
-from framerunner.recording.find import recorded_flight
+from framerunner.recording.events import Crossed, RecordedImage
+from framerunner.recording.open_recording import recorded_flight
 from framerunner.recording.replay import replay
 from framerunner.runs.recorder import VideoFile
 from offboard.app import Moment
@@ -96,7 +96,7 @@ def test_a_lockstep_flight_without_a_recording_is_flown_again(lockstep_folder, c
     assert {path.name for path in lockstep_folder.iterdir()} == before
     with recorded_flight(lockstep_folder) as flight:
         assert flight.result.seed == 3
-        assert sum(isinstance(event, Picture) for event in flight.events()) > 30
+        assert sum(isinstance(event, RecordedImage) for event in flight.events()) > 30
 
 
 def test_flown_again_and_not_the_same_is_said(lockstep_folder, capsys):
@@ -135,17 +135,17 @@ def test_a_real_time_flight_is_shown_from_its_log_and_video(tmp_path, capsys):
     with recorded_flight(tmp_path) as flight:
         events = list(flight.events())
     moments = [event for event in events if isinstance(event, Moment)]
-    pictures = [event for event in events if isinstance(event, Picture)]
+    images = [event for event in events if isinstance(event, RecordedImage)]
     assert 190 <= len(moments) <= 201
     first, last = moments[0].state, moments[-1].state
     assert (first.x, first.y, first.yaw) == pytest.approx((0.0, 0.0, 0.0), abs=1e-6)
     assert last.z - first.z == pytest.approx(0.8, abs=0.01)
     assert last.armed and last.mode == "OFFBOARD"
     assert moments[-1].flight_time_s == pytest.approx(8.0, abs=0.1)
-    assert len(pictures) == 50
-    assert pictures[-1].time_us == last.time_us
-    assert pictures[0].time_us == last.time_us - 4_900_000
-    assert pictures[-1].image.mean() == pytest.approx(245, abs=3)
+    assert len(images) == 50
+    assert images[-1].time_us == last.time_us
+    assert images[0].time_us == last.time_us - 4_900_000
+    assert images[-1].image.mean() == pytest.approx(245, abs=3)
     assert run(["replay", str(tmp_path), "--fast"]) == 0
     said = capsys.readouterr()
     assert "offboard" in said.err
@@ -278,7 +278,7 @@ async def test_images_are_served_while_the_flight_is_shown():
             time_us = 0
             while not seen.is_set():
                 time_us += 100_000
-                yield Picture(time_us, image)
+                yield RecordedImage(time_us, image)
 
     showing = asyncio.create_task(replay(Endless(), 0.0, video))
     await begun.wait()
