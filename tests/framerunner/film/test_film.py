@@ -8,8 +8,7 @@ import pytest
 
 from framerunner.cli import run
 from framerunner.film import film_file as film_file_module
-from framerunner.film.film_file import Mp4File, film_file
-from framerunner.runs.plots import PlotError
+from framerunner.film.film_file import FilmError, Mp4File, film_file
 from tests.framerunner.recording.logs import write_log
 
 
@@ -167,7 +166,7 @@ def test_a_film_that_breaks_off_leaves_nothing(tmp_path):
 
 def test_a_folder_that_cannot_be_written_is_told_in_one_line(recorded_folder, tmp_path):
     with (
-        pytest.raises(PlotError, match="cannot write"),
+        pytest.raises(FilmError, match="cannot write"),
         film_file(tmp_path / "no" / "a.mp4", lambda part: Mp4File(part, (320, 180), 10.0, "libx264")),
     ):
         pass
