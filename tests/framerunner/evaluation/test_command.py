@@ -7,8 +7,8 @@ import pytest
 
 from framerunner.cli import run
 from framerunner.evaluation import evaluate as evaluate_module
-from framerunner.evaluation.progress import EvaluationProgress
 from framerunner.evaluation.rows import Row
+from framerunner.evaluation.terminal import EvaluationProgress
 from tests.framerunner.evaluation.flights import made_row, write_scenarios
 
 
@@ -127,7 +127,7 @@ def test_a_folder_of_something_else_is_refused(refused, capsys):
     line = refused("mine", "--mission", "soft_landing", "--out", "here")
     assert line == (
         "--out here: has an evaluation of mission frame_challenge, not soft_landing; "
-        "choose another, or --again to fly it anew"
+        "choose another, or --again to fly it again"
     )
     assert refused("mine", "--out", "here", "--compare", "here").startswith("--compare here: is this")
 
@@ -142,9 +142,9 @@ def iter_rows(**values):
     yield made_row("test-case-1", **values)
 
 
-def test_progress_tells_how_far_how_well_how_fast_and_how_long(monkeypatch):
+def test_progress_shows_counts_verdicts_speed_and_time_left(monkeypatch):
     now = [100.0]
-    monkeypatch.setattr("framerunner.evaluation.progress.time.monotonic", lambda: now[0])
+    monkeypatch.setattr("framerunner.evaluation.terminal.time.monotonic", lambda: now[0])
     rows: list[Row] = [made_row("a"), made_row("b", "timed out")]
     progress = EvaluationProgress(130, rows)
     assert progress.text() == "2 of 130 flown, 1 clean, 0 completed"

@@ -12,7 +12,7 @@ import pytest
 
 from framerunner.cli import build_app
 from framerunner.evaluation.plan import plan_level
-from framerunner.evaluation.report import Page, picked_for_pictures, replay_command, write_report
+from framerunner.evaluation.report import Page, picked_for_plots, replay_command, write_report
 from framerunner.evaluation.rows import COLUMNS, csv_text
 from framerunner.evaluation.statistics import summarise
 from framerunner.evaluation.store import open_folder
@@ -115,10 +115,10 @@ def test_the_replay_is_a_command_that_flies():
 def test_every_cause_is_drawn_before_any_is_drawn_often():
     rows = [made_row(f"a{number}", "timed out") for number in range(50)]
     rows += [made_row("b", "crashed"), made_row("c", "aborted")]
-    picked = picked_for_pictures(summarise(rows), 4)
+    picked = picked_for_plots(summarise(rows), 4)
     assert len(picked) == 4
     assert {"b", "c"} < picked
-    assert len(picked_for_pictures(summarise(rows), 100)) == 52
+    assert len(picked_for_plots(summarise(rows), 100)) == 52
 
 
 def test_the_table_has_a_row_a_flight_and_gives_the_numbers_back():

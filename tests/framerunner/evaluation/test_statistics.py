@@ -8,7 +8,7 @@ from framerunner.evaluation.compare import compare, mcnemar, mean_difference
 from framerunner.evaluation.plan import Identity
 from framerunner.evaluation.statistics import spread, summarise, wilson
 from framerunner.evaluation.store import FLIGHTS, EvaluationFolder
-from framerunner.evaluation.tables import comparison_lines
+from framerunner.evaluation.terminal import comparison_lines
 from scenarios.verdict import Verdict
 from tests.framerunner.evaluation.flights import made_row
 

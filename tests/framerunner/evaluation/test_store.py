@@ -72,14 +72,14 @@ def test_rubbish_in_between_costs_only_its_own_flight(tmp_path, plan):
     assert len(file.read_bytes().splitlines()) == 2
 
 
-def test_another_evaluation_is_refused_unless_it_shall_be_flown_anew(tmp_path, plan):
+def test_another_evaluation_is_refused_unless_it_is_to_be_flown_again(tmp_path, plan):
     keep(tmp_path, plan, made_row("calm-1"))
     other = plan_level("calm", 1, 4, load_mission("soft_landing"))
     with pytest.raises(SettingError) as caught:
         kept(tmp_path, other)
     assert str(caught.value) == (
         f"--out {tmp_path}: has an evaluation of mission frame_challenge, not soft_landing; "
-        "choose another, or --again to fly it anew"
+        "choose another, or --again to fly it again"
     )
     assert len(kept(tmp_path, plan)) == 1
     assert kept(tmp_path, other, again=True) == []
