@@ -31,11 +31,6 @@ class Pair:
         before, after = _RANK.get(self.before.verdict, 0), _RANK.get(self.after.verdict, 0)
         return (after > before) - (after < before)
 
-    @property
-    def longer_s(self) -> float:
-        """Seconds by which the try became longer."""
-        return self.after.try_time_s - self.before.try_time_s
-
 
 @dataclass(frozen=True, slots=True)
 class MeanDifference:
@@ -93,11 +88,6 @@ class Comparison:
         return tuple(pair for pair in self.pairs if pair.change < 0)
 
     @property
-    def same(self) -> int:
-        """Number of pairs with an equally good verdict."""
-        return sum(pair.change == 0 for pair in self.pairs)
-
-    @property
     def identical(self) -> int:
         """Number of pairs whose two flights are equal to the last bit."""
         return sum(pair.before.state_sha256 == pair.after.state_sha256 != "" for pair in self.pairs)
@@ -142,7 +132,7 @@ def compare(before: EvaluationFolder, after: EvaluationFolder) -> Comparison:
         won=won,
         lost=lost,
         p_value=mcnemar(won, lost),
-        try_time_s=mean_difference([pair.longer_s for pair in both]),
+        try_time_s=mean_difference([pair.after.try_time_s - pair.before.try_time_s for pair in both]),
     )
 
 

@@ -16,7 +16,7 @@ from framerunner.evaluation.plan import Plan
 from framerunner.evaluation.rows import Row, csv_text
 from framerunner.evaluation.runner import fly_all
 from framerunner.evaluation.statistics import summarise
-from framerunner.evaluation.store import EvaluationFolder, open_folder, read_folder
+from framerunner.evaluation.store import RESULTS, EvaluationFolder, open_folder, read_folder
 from framerunner.evaluation.terminal import EvaluationProgress, print_comparison, print_summary
 from framerunner.extras import advice, is_installed
 from scenarios.verdict import Verdict
@@ -119,7 +119,7 @@ def _report(settings: EvaluationSettings, folder: EvaluationFolder, before: Eval
     if comparison is not None:
         print_comparison(comparison)
     sys.stdout.flush()
-    folder.write(folder.results, csv_text(rows))
+    folder.write(RESULTS, csv_text(rows))
     code = 1 if Verdict.ERROR in summary.verdicts else 0
 
     if not is_installed("matplotlib"):

@@ -24,7 +24,7 @@ from matplotlib.ticker import MaxNLocator
 from framerunner.evaluation.compare import Comparison
 from framerunner.evaluation.rows import Row
 from framerunner.evaluation.statistics import Summary, crossing_offsets_m, mean_seconds_in_state
-from framerunner.evaluation.store import EvaluationFolder
+from framerunner.evaluation.store import REPORT, EvaluationFolder
 from framerunner.evaluation.terminal import comparison_lines, spread_cells
 from framerunner.runs.plots import draw_track
 from scenarios.loader import load_scenario
@@ -90,12 +90,7 @@ class Page:
 def write_report(
     folder: EvaluationFolder, page: Page, advance: Callable[[int, int], None] = lambda _done, _total: None
 ) -> None:
-    """Draw and write the page.
-
-    Args:
-        folder: of the evaluation.
-        page: its content.
-        advance: called before each plot of a track, with their number so far and in all.
+    """Draw and write the page; `advance` is called with the number of tracks plotted so far and in all.
 
     Raises:
         SettingError: the page cannot be written.
@@ -127,18 +122,11 @@ def write_report(
         failures=failures,
         max_plots=MAX_PLOTS,
     )
-    folder.write(folder.report, text)
+    folder.write(REPORT, text)
 
 
 def replay_command(path: Path, mission: str, pilot: str | None, seed: int) -> str:
-    """The command that flies one flight of an evaluation again, the same to the last bit.
-
-    Args:
-        path: the scenario's file.
-        mission: name or file.
-        pilot: a contestant's file; None without one.
-        seed: of the flight.
-    """
+    """The command that flies the scenario of a file again, the same to the last bit."""
     words = ["framerunner", "fly", str(path), "--mission", mission]
     words += ["--pilot", pilot] if pilot else []
     words += ["--seed", str(seed)] if seed else []

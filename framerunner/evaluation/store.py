@@ -22,8 +22,9 @@ from scenarios.models import Scenario
 
 FORMAT = 1
 IDENTITY, FLIGHTS, LOCK = "evaluation.json", "flights.jsonl", ".lock"
+RESULTS, REPORT = "results.csv", "report.html"
 _FOLDERS = ("scenarios", "tracks", "errors")
-_FILES = (IDENTITY, FLIGHTS, "results.csv", "report.html")
+_FILES = (IDENTITY, FLIGHTS, RESULTS, REPORT)
 
 
 @dataclass(frozen=True, slots=True)
@@ -39,16 +40,6 @@ class EvaluationFolder:
     path: Path
     identity: Identity
     done: set[str]
-
-    @property
-    def results(self) -> Path:
-        """The table."""
-        return self.path / "results.csv"
-
-    @property
-    def report(self) -> Path:
-        """The page."""
-        return self.path / "report.html"
 
     def scenario_file(self, name: str) -> Path:
         """The file of a scenario that was flown."""
@@ -92,10 +83,10 @@ class EvaluationFolder:
         except (OSError, ValueError, KeyError, TypeError):
             return Track()
 
-    def write(self, path: Path, text: str) -> None:
+    def write(self, name: str, text: str) -> None:
         """Write a file of the folder completely or not at all; raises `SettingError`."""
         with _writing(self.path):
-            _replace(path, text)
+            _replace(self.path / name, text)
 
     def _track_file(self, name: str) -> Path:
         return self.path / "tracks" / f"{name}.json"

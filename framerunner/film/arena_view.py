@@ -16,20 +16,8 @@ import numpy as np
 import numpy.typing as npt
 
 from firmware_py.airframe import Airframe, load_airframe
-from framerunner.film.style import (
-    MAT,
-    PAPER,
-    RIM,
-    SHADOW,
-    STEM,
-    SUBPIXEL_BITS,
-    TATAMI,
-    WHITE,
-    Bgr,
-    bgr,
-    fixed_point,
-    mixed,
-)
+from framerunner.film import style
+from framerunner.film.style import Bgr
 from framerunner.film.timeline import Floats, Instant, Timeline
 from framerunner.film.viewpoint import Viewpoint
 from framerunner.runs.plots import STATE_COLOURS
@@ -43,14 +31,14 @@ FINE = 2
 DRONE_SCALE = 1.6
 """The drone is drawn larger than it is: at its own size it is hard to see on a small screen."""
 _SLAB_M = 0.06  # thickness of the floor
-_TRAIL = [bgr(text) for text in STATE_COLOURS]
+_TRAIL = [style.bgr(text) for text in STATE_COLOURS]
 
-_BODY = bgr("#2b2f36")
-_TOP = bgr("#454b55")
-_ARM = bgr("#3a3f47")
-_NOSE = bgr("#ff9a1f")
-_DISC = bgr("#8d949e")
-_BLADE = bgr("#2b2f36")
+_BODY = style.bgr("#2b2f36")
+_TOP = style.bgr("#454b55")
+_ARM = style.bgr("#3a3f47")
+_NOSE = style.bgr("#ff9a1f")
+_DISC = style.bgr("#8d949e")
+_BLADE = style.bgr("#2b2f36")
 _CIRCLE_RAD = np.linspace(0.0, 2 * pi, 20, endpoint=False)
 _TURNS_PER_S = 2.3  # of the drawn rotors: at their true speed they would only flicker
 
@@ -68,26 +56,23 @@ class ArenaView:
         self._size_px = size_px
         scenario = timeline.scenario
         scene = build_scene(scenario.model_copy(update={"light": Light()}))
-        self._floor = [Face(scene.tatami.corners_arena_m, (0.0, 0.0, 1.0), TATAMI)]
-        self._floor += [Face(mat.corners_arena_m, mat.normal_arena, MAT) for mat in scene.mats]
-        self._floor += [Face(shadow.corners_arena_m, shadow.normal_arena, SHADOW) for shadow in scene.shadows]
+        self._floor = [Face(scene.tatami.corners_arena_m, (0.0, 0.0, 1.0), style.TATAMI)]
+        self._floor += [Face(mat.corners_arena_m, mat.normal_arena, style.MAT) for mat in scene.mats]
+        self._floor += [
+            Face(shadow.corners_arena_m, shadow.normal_arena, style.SHADOW) for shadow in scene.shadows
+        ]
         self._tree = PaintTree(scene.bodies)
         faces = self._tree.faces
         self._centres_m = np.array([face.corners_arena_m.mean(axis=0) for face in faces]).reshape(-1, 3)
         self._tops_m = np.array([face.corners_arena_m[:, 2].max() for face in faces])
         self._drone = _DroneShape(load_airframe(scenario.airframe), DRONE_SCALE)
         self._slab = _slab(scene.tatami.corners_arena_m)
-        self._paper = np.full((FINE * size_px[1], FINE * size_px[0], 3), PAPER, np.uint8)
+        self._paper = np.full((FINE * size_px[1], FINE * size_px[0], 3), style.PAPER, np.uint8)
         self._canvas = self._paper.copy()
         self._pen = max(1.0, FINE * size_px[1] / 430)  # pixels of a line's width at the usual size
 
     def paint(self, instant: Instant, viewpoint: Viewpoint, film_s: float) -> Image:
-        """Paint an instant of the flight.
-
-        Args:
-            instant: of the flight.
-            viewpoint: for an image of this view's size.
-            film_s: time of the film, turns the rotors.
+        """Paint an instant of the flight; the time of the film turns the rotors.
 
         Returns:
             A new image, BGR, shape (height, width, 3).
@@ -114,7 +99,7 @@ class ArenaView:
         drone_slot = int(self._slots(view, order, centre[None])[0])
         runs = _runs(slots, self._timeline.trail_kind[: len(slots)])
         if runs:  # a light line under the whole trail, so that it stands out from the floor
-            self._polyline(pixels[runs[0].first : runs[-1].end + 1], WHITE, round(4.2 * self._pen))
+            self._polyline(pixels[runs[0].first : runs[-1].end + 1], style.WHITE, round(4.2 * self._pen))
         patches = self._drone.patches(centre, instant.yaw_rad, film_s, instant.motors_on)
         painted = 0
         for slot in sorted({*(run.slot for run in runs), drone_slot, len(order)}):
@@ -152,7 +137,9 @@ class ArenaView:
         if len(outline) < 3:
             return
         if patch.opacity >= 1.0:
-            cv2.fillConvexPoly(self._canvas, fixed_point(outline), patch.colour, cv2.LINE_AA, SUBPIXEL_BITS)
+            cv2.fillConvexPoly(
+                self._canvas, style.fixed_point(outline), patch.colour, cv2.LINE_AA, style.SUBPIXEL_BITS
+            )
         else:
             self._fill_translucent(outline, patch.colour, patch.opacity)
 
@@ -164,14 +151,18 @@ class ArenaView:
             return
         under = self._canvas[top:bottom, left:right]
         over = under.copy()
-        cv2.fillConvexPoly(over, fixed_point(outline - (left, top)), colour, cv2.LINE_AA, SUBPIXEL_BITS)
+        cv2.fillConvexPoly(
+            over, style.fixed_point(outline - (left, top)), colour, cv2.LINE_AA, style.SUBPIXEL_BITS
+        )
         under[:] = cv2.addWeighted(over, opacity, under, 1.0 - opacity, 0.0)
 
     def _stems(self, view: Viewpoint) -> None:
         """Thin lines from the frames down to the floor, which show where they are."""
         for frame in self._timeline.scenario.frames:
             below_m = frame.z_m - frame.outer_height_m / 2
-            self._line(view, np.array([(frame.x_m, frame.y_m, 0.0), (frame.x_m, frame.y_m, below_m)]), STEM)
+            self._line(
+                view, np.array([(frame.x_m, frame.y_m, 0.0), (frame.x_m, frame.y_m, below_m)]), style.STEM
+            )
 
     def _drop_shadow(self, view: Viewpoint, centre_m: Floats) -> None:
         """The drone's shadow straight below it, and a line down to it."""
@@ -185,8 +176,8 @@ class ArenaView:
         spot = np.stack((x + radius * np.cos(angles), y + radius * np.sin(angles), np.zeros_like(angles)), 1)
         outline = view.polygon(spot)
         if len(outline) > 2:
-            self._fill_translucent(outline, mixed(SHADOW, (40, 50, 60), 0.5), 0.55)
-        self._line(view, np.array([(x, y, 0.0), (x, y, z)]), mixed(STEM, (40, 50, 60), 0.4))
+            self._fill_translucent(outline, style.mixed(style.SHADOW, (40, 50, 60), 0.5), 0.55)
+        self._line(view, np.array([(x, y, 0.0), (x, y, z)]), style.mixed(style.STEM, (40, 50, 60), 0.4))
 
     def _line(self, view: Viewpoint, ends_m: Floats, colour: Bgr) -> None:
         pixels = view.project(ends_m)
@@ -194,13 +185,15 @@ class ArenaView:
             self._polyline(pixels, colour, max(1, round(1.2 * self._pen)))
 
     def _polyline(self, pixels: Floats, colour: Bgr, width: int) -> None:
-        line = [fixed_point(pixels)]
-        cv2.polylines(self._canvas, line, False, colour, width, cv2.LINE_AA, SUBPIXEL_BITS)
+        line = [style.fixed_point(pixels)]
+        cv2.polylines(self._canvas, line, False, colour, width, cv2.LINE_AA, style.SUBPIXEL_BITS)
 
     def _fill(self, view: Viewpoint, corners_m: Floats, colour: Bgr) -> None:
         outline = view.polygon(corners_m)
         if len(outline) > 2:
-            cv2.fillConvexPoly(self._canvas, fixed_point(outline), colour, cv2.LINE_8, SUBPIXEL_BITS)
+            cv2.fillConvexPoly(
+                self._canvas, style.fixed_point(outline), colour, cv2.LINE_8, style.SUBPIXEL_BITS
+            )
 
 
 @dataclass(frozen=True, slots=True)
@@ -225,7 +218,7 @@ def _slab(corners_m: Floats) -> list[tuple[Floats, Bgr]]:
     """The edges of the floor, a slab a few centimetres thick; those behind it are painted over."""
     low = corners_m - np.array((0.0, 0.0, _SLAB_M))
     count = len(corners_m)
-    return [(np.array((low[i - 1], low[i], corners_m[i], corners_m[i - 1])), RIM) for i in range(count)]
+    return [(np.array((low[i - 1], low[i], corners_m[i], corners_m[i - 1])), style.RIM) for i in range(count)]
 
 
 @dataclass(frozen=True, slots=True)
@@ -254,11 +247,7 @@ class _DroneShape:
     def patches(self, centre_m: Floats, yaw_rad: float, time_s: float, motors_on: bool) -> list[_Patch]:
         """All pieces, in arena axes, in an order in which they can be painted when seen from above.
 
-        Args:
-            centre_m: of the drone, arena axes, shape (3,).
-            yaw_rad: its heading; it is drawn level.
-            time_s: of the film, turns the rotors.
-            motors_on: whether they turn.
+        The drone is level; its rotors turn with the time of the film if its motors are on.
         """
         c, s = cos(yaw_rad), sin(yaw_rad)
         axes = np.array(((c, s, 0.0), (-s, c, 0.0), (0.0, 0.0, 1.0)))  # forward, left, up

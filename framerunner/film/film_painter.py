@@ -7,25 +7,9 @@ from math import isfinite
 import cv2
 import numpy as np
 
+from framerunner.film import style
 from framerunner.film.arena_view import ArenaView, state_colour
-from framerunner.film.style import (
-    BAD,
-    FAINT,
-    FRAME,
-    GOOD,
-    INK,
-    LINE,
-    PAPER,
-    SUBPIXEL_BITS,
-    WHITE,
-    Bgr,
-    Box,
-    Letters,
-    draw_outline,
-    fixed_point,
-    lay_out,
-    mixed,
-)
+from framerunner.film.style import Bgr, Box, Letters
 from framerunner.film.timeline import Instant, Timeline
 from framerunner.film.viewpoint import Flyby
 from framerunner.recording.messages import box_edges
@@ -47,7 +31,7 @@ class FilmPainter:
         camera = timeline.scenario.camera
         self._timeline = timeline
         self._speed = speed
-        self._layout = lay_out(*size_px, camera.width_px / camera.height_px)
+        self._layout = style.lay_out(*size_px, camera.width_px / camera.height_px)
         view = self._layout.view
         self._flyby = Flyby(timeline, (view.width, view.height), speed)
         self._arena = ArenaView(timeline, (view.width, view.height))
@@ -55,15 +39,11 @@ class FilmPainter:
         self._camera = _CameraView(self._layout.camera, self._letters, self._layout.unit)
         present = {frame.colour for frame in timeline.scenario.frames}
         self._colours = [colour for colour in COLOURS if colour in present]
-        self._paper = np.full((size_px[1], size_px[0], 3), PAPER, np.uint8)
+        self._paper = np.full((size_px[1], size_px[0], 3), style.PAPER, np.uint8)
         self._draw_strip()
 
     def paint(self, time_s: float, *, over: bool = False) -> Image:
-        """Paint a time of the flight.
-
-        Args:
-            time_s: since motors on.
-            over: the flight is over; show its verdict.
+        """Paint a time of the flight, since motors on; if it is over, with its verdict.
 
         Returns:
             A new image, BGR, shape (height, width, 3).
@@ -87,9 +67,9 @@ class FilmPainter:
         unit, view = self._layout.unit, self._layout.view
         room = view.width - 40 * unit
         title = self._letters.shortened(self._timeline.title, 27 * unit, room, bold=True)
-        self._letters.write(image, (18 * unit, 40 * unit), title, 27 * unit, INK, bold=True)
+        self._letters.write(image, (18 * unit, 40 * unit), title, 27 * unit, style.INK, bold=True)
         mission = self._letters.shortened(self._timeline.mission.replace("_", " "), 19 * unit, room)
-        self._letters.write(image, (18 * unit, 66 * unit), mission, 19 * unit, FAINT)
+        self._letters.write(image, (18 * unit, 66 * unit), mission, 19 * unit, style.FAINT)
 
     def _write_state(self, image: Image, instant: Instant, over: bool) -> None:
         """Write the mission's state, with a dot of its trail's colour, and the drone's position."""
@@ -102,22 +82,22 @@ class FilmPainter:
         x = box.x + 28 * unit
         size = 27 * unit
         name = self._letters.shortened(name, size, box.right - x, bold=True)
-        x += self._letters.write(image, (x, y), name, size, INK, bold=True) + 10 * unit
+        x += self._letters.write(image, (x, y), name, size, style.INK, bold=True) + 10 * unit
         group = group.replace("_", " ")
         if x + self._letters.width(group, 20 * unit) <= box.right:
-            self._letters.write(image, (x, y), group, 20 * unit, FAINT)
+            self._letters.write(image, (x, y), group, 20 * unit, style.FAINT)
         if y + 34 * unit > box.bottom:
             return
         if over and self._timeline.result is not None:
             total = self._letters.shortened(_total_time(self._timeline.result), 20 * unit, box.width)
-            self._letters.write(image, (box.x, y + 36 * unit), total, 20 * unit, FAINT)
+            self._letters.write(image, (box.x, y + 36 * unit), total, 20 * unit, style.FAINT)
             return
         step = min(116 * unit, box.width / 3)
         for number, (axis, metres) in enumerate(zip("xyz", instant.position_arena_m, strict=True)):
             at = (box.x + number * step, y + 36 * unit)
-            width = self._letters.write(image, at, axis, 20 * unit, FAINT)
+            width = self._letters.write(image, at, axis, 20 * unit, style.FAINT)
             beside = (at[0] + width + 5 * unit, at[1])
-            self._letters.write(image, beside, f"{metres + 0.0:.2f}", 20 * unit, INK)
+            self._letters.write(image, beside, f"{metres + 0.0:.2f}", 20 * unit, style.INK)
 
     def _write_figures(self, image: Image, instant: Instant, over: bool) -> None:
         """Write the time, a chip for each frame, and the speed or, at the end, the verdict."""
@@ -128,7 +108,7 @@ class FilmPainter:
             time_s = min(time_s, self._timeline.try_end_s)
         x = box.x + 18 * unit
         size = 44 * unit
-        self._letters.write(image, (x, middle + 16 * unit), f"{time_s:.1f} s", size, INK, bold=True)
+        self._letters.write(image, (x, middle + 16 * unit), f"{time_s:.1f} s", size, style.INK, bold=True)
         x += self._letters.width("000.0 s", size, bold=True) + 22 * unit
         right = box.right - 16 * unit
         if over and self._timeline.result is not None:
@@ -136,7 +116,7 @@ class FilmPainter:
         elif not over:
             speed = f"{self._speed:.3g}×"
             right -= self._letters.width(speed, 20 * unit) + 10 * unit
-            self._letters.write(image, (right + 10 * unit, middle + 7 * unit), speed, 20 * unit, FAINT)
+            self._letters.write(image, (right + 10 * unit, middle + 7 * unit), speed, 20 * unit, style.FAINT)
         self._draw_chips(image, (x, right), instant)
 
     def _draw_chips(self, image: Image, span: tuple[float, float], instant: Instant) -> None:
@@ -151,15 +131,17 @@ class FilmPainter:
             left, top = span[0] + number * (width + gap), middle - height / 2
             when_s = instant.crossed.get(colour)
             crossed = when_s is not None
-            ink = FRAME[colour]
-            _pill(image, (left, top), (width, height), ink if crossed else mixed(ink, WHITE, 0.35))
+            ink = style.FRAME[colour]
+            _pill(
+                image, (left, top), (width, height), ink if crossed else style.mixed(ink, style.WHITE, 0.35)
+            )
             if not crossed:
                 edge = 2.2 * unit
-                _pill(image, (left + edge, top + edge), (width - 2 * edge, height - 2 * edge), PAPER)
+                _pill(image, (left + edge, top + edge), (width - 2 * edge, height - 2 * edge), style.PAPER)
             text = colour if when_s is None else f"{when_s:.1f} s"
             text_width = self._letters.width(text, size, bold=crossed)
             at = (left + (width - text_width) / 2, middle + 8 * unit)
-            letters = WHITE if crossed else mixed(ink, INK, 0.4)
+            letters = style.WHITE if crossed else style.mixed(ink, style.INK, 0.4)
             self._letters.write(image, at, text, size, letters, bold=crossed)
 
     def _write_verdict(self, image: Image, right: float, result: FlightResult) -> float:
@@ -169,9 +151,11 @@ class FilmPainter:
         width = self._letters.width(result.verdict, size, bold=True) + 40 * unit
         middle = box.y + box.height / 2
         left = right - width
-        _pill(image, (left, middle - height / 2), (width, height), GOOD if result.completed else BAD)
+        _pill(
+            image, (left, middle - height / 2), (width, height), style.GOOD if result.completed else style.BAD
+        )
         at = (left + 20 * unit, middle + 10 * unit)
-        self._letters.write(image, at, result.verdict, size, WHITE, bold=True)
+        self._letters.write(image, at, result.verdict, size, style.WHITE, bold=True)
         return left
 
     def _draw_strip(self) -> None:
@@ -179,8 +163,8 @@ class FilmPainter:
         strip = self._layout.strip
         for begin_s, end_s, kind in self._timeline.stretches:
             x0, x1 = self._strip_x(begin_s), self._strip_x(end_s)
-            self._paper[strip.y : strip.bottom, x0:x1] = mixed(state_colour(kind), PAPER, 0.55)
-        self._paper[strip.y - 1 : strip.y] = LINE
+            self._paper[strip.y : strip.bottom, x0:x1] = style.mixed(state_colour(kind), style.PAPER, 0.55)
+        self._paper[strip.y - 1 : strip.y] = style.LINE
 
     def _mark_time(self, image: Image, time_s: float) -> None:
         """Draw what has passed of the time line in full colours."""
@@ -191,7 +175,7 @@ class FilmPainter:
             if x1 > x0:
                 image[strip.y : strip.bottom, x0:x1] = state_colour(kind)
         half = max(1, round(1.5 * self._layout.unit))
-        image[strip.y : strip.bottom, max(0, until - half) : until + half] = INK
+        image[strip.y : strip.bottom, max(0, until - half) : until + half] = style.INK
 
     def _strip_x(self, time_s: float) -> int:
         strip, timeline = self._layout.strip, self._timeline
@@ -211,10 +195,10 @@ class _CameraView:
         """Paint the camera's image, BGR, onto the film's image; "no image" if it is None."""
         box = self._box
         if camera is None:
-            image[box.y : box.bottom, box.x : box.right] = LINE
+            image[box.y : box.bottom, box.x : box.right] = style.LINE
             text, size = "no image", 20 * self._unit
             x = box.x + (box.width - self._letters.width(text, size)) / 2
-            self._letters.write(image, (x, box.y + box.height / 2 + 0.35 * size), text, size, FAINT)
+            self._letters.write(image, (x, box.y + box.height / 2 + 0.35 * size), text, size, style.FAINT)
             return
         height, width = camera.shape[:2]
         scale = min(box.width / width, box.height / height)
@@ -235,8 +219,8 @@ class _CameraView:
         left, top = edges[0] - grow, edges[1] - grow
         right, bottom = edges[2] + grow, edges[3] + grow
         corners = np.array([(left, top), (right, top), (right, bottom), (left, bottom)])
-        for width, colour in ((3.6, INK), (1.8, WHITE)):
-            draw_outline(part, corners, colour, max(1, round(width * self._unit)))
+        for width, colour in ((3.6, style.INK), (1.8, style.WHITE)):
+            style.draw_outline(part, corners, colour, max(1, round(width * self._unit)))
         if isfinite(detection.d):
             angle = f"  {detection.a:.0f}°" if isfinite(detection.a) else ""
             self._label(part, (left, top, bottom), f"{detection.d:.2f} m{angle}")
@@ -252,8 +236,8 @@ class _CameraView:
             y = min(bottom + pad, part.shape[0] - height)
         x0, y0 = round(x), max(0, round(y))
         under = part[y0 : round(y0 + height), x0 : round(x0 + width)]
-        under[:] = under // 3 + np.array(INK, np.uint8) // 3 * 2
-        self._letters.write(part, (x0 + pad, y0 + 0.4 * pad + 0.86 * size), text, size, WHITE)
+        under[:] = under // 3 + np.array(style.INK, np.uint8) // 3 * 2
+        self._letters.write(part, (x0 + pad, y0 + 0.4 * pad + 0.86 * size), text, size, style.WHITE)
 
 
 def _total_time(result: FlightResult) -> str:
@@ -262,8 +246,8 @@ def _total_time(result: FlightResult) -> str:
 
 
 def _dot(image: Image, centre_px: tuple[float, float], radius_px: float, colour: Bgr) -> None:
-    x, y, radius = (round(value * (1 << SUBPIXEL_BITS)) for value in (*centre_px, radius_px))
-    cv2.circle(image, (x, y), radius, colour, cv2.FILLED, cv2.LINE_AA, SUBPIXEL_BITS)
+    x, y, radius = (round(value * (1 << style.SUBPIXEL_BITS)) for value in (*centre_px, radius_px))
+    cv2.circle(image, (x, y), radius, colour, cv2.FILLED, cv2.LINE_AA, style.SUBPIXEL_BITS)
 
 
 def _pill(image: Image, corner_px: tuple[float, float], size_px: tuple[float, float], colour: Bgr) -> None:
@@ -276,5 +260,5 @@ def _pill(image: Image, corner_px: tuple[float, float], size_px: tuple[float, fl
     across, along = radius * np.cos(angles), radius * np.sin(angles)
     right = np.stack((x + width - radius + across, y + height / 2 + along), 1)
     left = np.stack((x + radius - across, y + height / 2 - along), 1)
-    outline = fixed_point(np.concatenate((right, left)))
-    cv2.fillConvexPoly(image, outline, colour, cv2.LINE_AA, SUBPIXEL_BITS)
+    outline = style.fixed_point(np.concatenate((right, left)))
+    cv2.fillConvexPoly(image, outline, colour, cv2.LINE_AA, style.SUBPIXEL_BITS)

@@ -151,15 +151,7 @@ class Letters:
         *,
         bold: bool = False,
     ) -> int:
-        """Write one line; what is outside the image is cut off.
-
-        Args:
-            image: BGR, is written on.
-            at_px: left end of the baseline.
-            text: one line.
-            size_px: of the letters.
-            colour: of the letters.
-            bold: or plain.
+        """Write a line from the left end of its baseline; what is outside the image is cut off.
 
         Returns:
             Its width, pixels.

@@ -6,7 +6,6 @@ from bisect import bisect_right
 from dataclasses import dataclass
 from math import ceil
 from tempfile import TemporaryFile
-from types import TracebackType
 from typing import BinaryIO, cast
 
 import cv2
@@ -111,9 +110,7 @@ class CollectedFlight:
     def __enter__(self) -> CollectedFlight:
         return self
 
-    def __exit__(
-        self, _kind: type[BaseException] | None, _error: BaseException | None, _trace: TracebackType | None
-    ) -> None:
+    def __exit__(self, *_error: object) -> None:
         self.images.close()
 
 

@@ -68,11 +68,6 @@ def messages(
 ) -> Iterator[tuple[Channel, Message]]:
     """Yield the messages of some topics in order of their time.
 
-    Args:
-        file: the MCAP file.
-        summary: its index.
-        topics: names.
-
     Raises:
         RecordingError: a chunk is larger than a recording's can be.
     """

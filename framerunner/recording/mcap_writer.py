@@ -11,28 +11,12 @@ from collections.abc import Sequence
 from concurrent.futures import Future, ThreadPoolExecutor
 from importlib import metadata
 from pathlib import Path
-from types import TracebackType
 
 import cv2
 from mcap.writer import CompressionType, Writer
 
-from framerunner.recording import messages
+from framerunner.recording import messages, schemas
 from framerunner.recording.events import RecordingError
-from framerunner.recording.schemas import (
-    ANNOTATIONS,
-    CALIBRATION,
-    CROSSING,
-    DETECTIONS,
-    IMAGE,
-    LOG,
-    MISSION,
-    SCENE,
-    SETPOINT,
-    TELEMETRY,
-    TOPICS,
-    TRANSFORM,
-    schemas,
-)
 from offboard.app import Moment
 from offboard.mission import Mission
 from offboard.pilot_file import PilotFile
@@ -70,7 +54,7 @@ class FlightRecording:
         self._scenario = scenario
         self._size_px = (scenario.camera.width_px, scenario.camera.height_px)
         self._channels: dict[str, int] = {}
-        self._counts = dict.fromkeys(TOPICS, 0)
+        self._counts = dict.fromkeys(schemas.TOPICS, 0)
         self._scene_written = False
         self._first_us: int | None = None
         self._now_us: int | None = None
@@ -89,9 +73,7 @@ class FlightRecording:
     def __enter__(self) -> FlightRecording:
         return self
 
-    def __exit__(
-        self, _kind: type[BaseException] | None, _error: BaseException | None, _trace: TracebackType | None
-    ) -> None:
+    def __exit__(self, *_error: object) -> None:
         self.close()
 
     def see(self, moment: Moment) -> None:
@@ -104,9 +86,9 @@ class FlightRecording:
             self._enter_state(moment)
         if moment.detections != self._detections:
             self._detect(moment.detections, time_us)
-        self._write(SETPOINT, time_us, messages.setpoint(moment))
-        self._write(TRANSFORM, time_us, messages.transform(moment.state))
-        self._write(TELEMETRY, time_us, messages.telemetry(moment))
+        self._write(schemas.SETPOINT, time_us, messages.setpoint(moment))
+        self._write(schemas.TRANSFORM, time_us, messages.transform(moment.state))
+        self._write(schemas.TELEMETRY, time_us, messages.telemetry(moment))
 
     def see_image(self, time_us: int, image: Image) -> None:
         """Record a raw image, without loss.
@@ -131,7 +113,7 @@ class FlightRecording:
             self.see_image(time_us, frame.image)
         else:
             self._size_px = (frame.image.shape[1], frame.image.shape[0])
-            self._write(IMAGE, time_us, messages.image(frame.jpeg, "jpeg", time_us))
+            self._write(schemas.IMAGE, time_us, messages.image(frame.jpeg, "jpeg", time_us))
 
     def finish(self, result: FlightResult, track_time_s: Sequence[float]) -> None:
         """Add what is known only after the flight: crossings, the verdict, and the result as an attachment.
@@ -172,32 +154,31 @@ class FlightRecording:
         self._attach("mission.yaml", "application/yaml", mission.path.read_text(encoding="utf-8"), 0)
         if isinstance(mission.pilot, PilotFile):
             self._attach("pilot.py", "text/x-python", mission.pilot.text, 0)
-        ids = {
-            name: self._writer.register_schema(name, "jsonschema", text) for name, text in schemas().items()
-        }
-        for topic, name in TOPICS.items():
+        register = self._writer.register_schema
+        ids = {name: register(name, "jsonschema", text) for name, text in schemas.schema_texts().items()}
+        for topic, name in schemas.TOPICS.items():
             self._channels[topic] = self._writer.register_channel(topic, "json", ids[name])
 
     def _write_scene(self, time_us: int) -> None:
         """Write what does not change, before all else, at the time of the first message."""
         self._scene_written = True
-        self._write(SCENE, time_us, messages.scene(self._scenario, time_us))
-        self._write(TRANSFORM, time_us, messages.camera_transform(self._scenario, time_us))
-        self._write(CALIBRATION, time_us, messages.calibration(self._scenario, time_us))
+        self._write(schemas.SCENE, time_us, messages.scene(self._scenario, time_us))
+        self._write(schemas.TRANSFORM, time_us, messages.camera_transform(self._scenario, time_us))
+        self._write(schemas.CALIBRATION, time_us, messages.calibration(self._scenario, time_us))
 
     def _enter_state(self, moment: Moment) -> None:
         time_us = moment.state.time_us
         previous_s = (time_us - self._state_since_us) / 1e6 if self._state else 0.0
-        self._write(MISSION, time_us, messages.mission_state(moment, self._state, previous_s))
+        self._write(schemas.MISSION, time_us, messages.mission_state(moment, self._state, previous_s))
         previous = f" after {previous_s:.2f} s in {self._state}" if self._state else ""
         self._log(time_us, "mission", f"{moment.mission_state}{previous}")
         self._state, self._state_since_us = moment.mission_state, time_us
 
     def _detect(self, seen: Detections, time_us: int) -> None:
         self._detections = seen
-        self._write(DETECTIONS, time_us, messages.detections(seen, time_us))
+        self._write(schemas.DETECTIONS, time_us, messages.detections(seen, time_us))
         image_us = time_us if seen.time_us is None else seen.time_us
-        self._write(ANNOTATIONS, image_us, messages.boxes(seen, image_us, self._size_px))
+        self._write(schemas.ANNOTATIONS, image_us, messages.boxes(seen, image_us, self._size_px))
 
     def _keep_compressed(self) -> None:
         """Write the last raw image.
@@ -207,7 +188,7 @@ class FlightRecording:
         if self._compressing is not None:
             time_us, data = self._compressing
             self._compressing = None
-            self._write(IMAGE, time_us, messages.image(data.result(), "png", time_us))
+            self._write(schemas.IMAGE, time_us, messages.image(data.result(), "png", time_us))
 
     def _cross_frames(self, result: FlightResult, began_us: int) -> None:
         columns = (
@@ -219,12 +200,12 @@ class FlightRecording:
         for row in zip(*columns, strict=True):
             crossing = Crossing(*row)
             time_us = began_us + round(crossing.time_s * 1e6)
-            self._write(CROSSING, time_us, messages.crossing(time_us, crossing))
+            self._write(schemas.CROSSING, time_us, messages.crossing(time_us, crossing))
             offset_cm = 100 * crossing.offset_m
             self._log(time_us, "referee", f"crossed {crossing.colour}, {offset_cm:.1f} cm off its centre")
 
     def _log(self, time_us: int, name: str, text: str) -> None:
-        self._write(LOG, time_us, messages.log(time_us, name, text))
+        self._write(schemas.LOG, time_us, messages.log(time_us, name, text))
 
     def _write(self, topic: str, time_us: int, message: messages.Message) -> None:
         if self.problem:

@@ -121,13 +121,7 @@ def _detection(detection: Detection) -> Message:
 
 
 def boxes(seen: Detections, image_us: int, size_px: tuple[int, int]) -> Message:
-    """Boxes around the detections of one image, to be drawn over it.
-
-    Args:
-        seen: the detections.
-        image_us: vehicle time of the image, microseconds.
-        size_px: its width and height.
-    """
+    """Boxes around the detections of one image, to be drawn over it; the image has width and height."""
     time = time_of(image_us)
     outlines, texts = [], []
     for colour in COLOURS:
@@ -185,13 +179,7 @@ def image(data: bytes, kind: str, time_us: int) -> Message:
 
 
 def mission_state(moment: Moment, previous: str, previous_s: float) -> Message:
-    """The mission has entered a state.
-
-    Args:
-        moment: its first tick in the state.
-        previous: the state before; empty at the start.
-        previous_s: time spent in that, seconds.
-    """
+    """A mission's state at its first tick, and the state before, with the seconds spent in it."""
     taken = moment.transition
     guard: Message = {}
     if taken is not None:

@@ -258,6 +258,6 @@ TOPICS = {
 """Name of each topic's schema."""
 
 
-def schemas() -> dict[str, bytes]:
+def schema_texts() -> dict[str, bytes]:
     """All schemas as JSON, by name."""
     return {schema["title"]: json.dumps(schema).encode() for schema in (*_OWN, *_FOXGLOVE)}

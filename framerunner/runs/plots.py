@@ -6,11 +6,11 @@ state and need no display.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from math import cos, isfinite, nan, sin
 from pathlib import Path
 from textwrap import shorten
-from typing import Any, Literal, Protocol
+from typing import Any, Literal
 
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
@@ -27,6 +27,7 @@ from scenarios.result import FlightResult
 
 _Dash = Literal["-"] | tuple[float, Sequence[float]]
 _Styles = Mapping[str, tuple[str, _Dash]]
+_View = Callable[[float, float, float], tuple[float, float]]
 
 SUFFIXES = (".png", ".svg", ".pdf")
 FRAME_COLOURS = {"red": "#ff0000", "green": "#00ff00", "blue": "#0000ff"}
@@ -63,12 +64,6 @@ class PlotError(UserError):
     """A plot that cannot be written; the message is one line for people."""
 
 
-class _View(Protocol):
-    """Projects a position in the arena onto the two axes of a plot."""
-
-    def __call__(self, x: float, y: float, z: float) -> tuple[float, float]: ...
-
-
 def _from_above(x: float, y: float, z: float) -> tuple[float, float]:
     return (x, y)
 
@@ -96,10 +91,7 @@ def draw_scenario(scenario: Scenario) -> Figure:
 def draw_track(scenario: Scenario, track: Track, result: FlightResult | None) -> Figure:
     """Return a flight from above and from the side, its path coloured by the mission's state.
 
-    Args:
-        scenario: what was flown.
-        track: where the drone was; may be empty.
-        result: None if the flight was not judged.
+    The track may be empty; the result is None if the flight was not judged.
     """
     figure, top, side, notes = _new_figure()
     times_s = {} if result is None else result.times_s

@@ -115,11 +115,7 @@ class RunFolder:
 def write_outcome(folder: RunFolder, scenario: Scenario, track: Track, result: FlightResult) -> None:
     """Write `result.json` and `track.png`; report on standard error what could not be written.
 
-    Args:
-        folder: of the flight.
-        scenario: what was flown, its frames where they were.
-        track: where the drone was.
-        result: of the flight.
+    The scenario must have its frames where they were in this flight.
     """
 
     def plot() -> None:

@@ -113,7 +113,7 @@ def test_pairs_are_scenarios_with_the_same_content(tmp_path):
     assert [pair.after.scenario for pair in found.pairs] == ["a", "b", "c", "e"]
     assert [pair.after.scenario for pair in found.better] == ["b", "c"]
     assert [pair.after.scenario for pair in found.worse] == ["a"]
-    assert (found.same, found.identical, found.won, found.lost, found.p_value) == (1, 1, 1, 1, 1.0)
+    assert (found.identical, found.won, found.lost, found.p_value) == (1, 1, 1, 1.0)
     assert (found.landed_before.count, found.landed_after.count) == (2, 2)
     assert (found.only_after, found.only_before) == (2, 2)
     assert (found.try_time_s.count, found.try_time_s.mean) == (1, -5.0)

@@ -13,7 +13,7 @@ from framerunner.recording.events import Crossed, RecordedImage, RecordingError
 from framerunner.recording.mcap_reader import McapRecording
 from framerunner.recording.mcap_writer import FlightRecording
 from framerunner.recording.messages import box_edges, camera_transform, detections, scene, time_of
-from framerunner.recording.schemas import TOPICS, schemas
+from framerunner.recording.schemas import TOPICS, schema_texts
 from offboard.app import Moment
 from offboard.drone import DroneState, VelocityCommand
 from offboard.mission import load_mission
@@ -67,9 +67,9 @@ def plain_types(schema, at="message"):
             plain_types(inner, where)
 
 
-@pytest.mark.parametrize("name", sorted(schemas()))
+@pytest.mark.parametrize("name", sorted(schema_texts()))
 def test_each_schema_is_valid_named_and_of_types_that_foxglove_reads(name):
-    schema = json.loads(schemas()[name])
+    schema = json.loads(schema_texts()[name])
     jsonschema.Draft202012Validator.check_schema(schema)
     assert schema["title"] == name
     plain_types(schema)
@@ -79,12 +79,12 @@ def test_every_message_is_as_its_schema_says(recorded):
     with recorded.path.open("rb") as file:
         reader = make_reader(file, validate_crcs=True)
         validators = {
-            name: jsonschema.Draft202012Validator(json.loads(text)) for name, text in schemas().items()
+            name: jsonschema.Draft202012Validator(json.loads(text)) for name, text in schema_texts().items()
         }
         seen = set()
         for schema, channel, message in reader.iter_messages():
             assert (schema.encoding, channel.message_encoding) == ("jsonschema", "json")
-            assert schema.data == schemas()[schema.name]
+            assert schema.data == schema_texts()[schema.name]
             content = json.loads(message.data)
             validators[schema.name].validate(content)
             assert content.keys() <= json.loads(schema.data)["properties"].keys()
