@@ -34,11 +34,6 @@ class Pool:
     jobs: int = 1
     address: str | None = None
 
-    @property
-    def in_process(self) -> bool:
-        """Whether no other process is needed."""
-        return self.backend == "loky" and self.jobs == 1
-
 
 def check_pool(pool: Pool) -> None:
     """Raise a `SettingError` if the settings contradict each other."""

@@ -148,7 +148,7 @@ def plan_level(level: str, first_seed: int, count: int, mission: Mission) -> Pla
     return Plan(title, f"{loaded.name}-{first_seed}-{count}", _checked(scenarios), mission, seeds)
 
 
-def plan_files(places: Sequence[str], mission: Mission) -> Plan:
+def plan_files(sources: Sequence[str], mission: Mission) -> Plan:
     """Plan given scenarios: names, files, or folders of scenario files.
 
     Raises:
@@ -157,32 +157,37 @@ def plan_files(places: Sequence[str], mission: Mission) -> Plan:
     """
     named: dict[str, str] = {}
     scenarios = []
-    for source in [source for place in places for source in _sources(place)]:
-        scenario = load_scenario(source)
+    for file in [file for source in sources for file in _files(source)]:
+        scenario = load_scenario(file)
         if scenario.name in named:
             raise SettingError(
-                f"{source}: its name {scenario.name} is that of {named[scenario.name]} too; give each its own"
+                f"{file}: its name {scenario.name} is that of {named[scenario.name]} too; give each its own"
             )
-        named[scenario.name] = str(source)
+        named[scenario.name] = file
         scenarios.append(scenario)
-    title = ", ".join(places) if len(places) <= 4 else f"{len(places)} scenarios"
-    label = re.sub(r"[^a-z0-9_-]+", "-", Path(places[0]).stem.lower()).strip("-") if len(places) == 1 else ""
+    title = ", ".join(sources) if len(sources) <= 4 else f"{len(sources)} scenarios"
+    label = (
+        re.sub(r"[^a-z0-9_-]+", "-", Path(sources[0]).stem.lower()).strip("-") if len(sources) == 1 else ""
+    )
     return Plan(title, label[:40] or "scenarios", _checked(scenarios), mission, [0] * len(scenarios))
 
 
-def _sources(place: str) -> list[str]:
-    path = Path(place)
+def _files(source: str) -> list[str]:
+    path = Path(source)
     if not path.is_dir():
-        return [place]
+        return [source]
     files = sorted(str(each) for each in path.iterdir() if each.suffix in SUFFIXES)
     if not files:
-        raise SettingError(f"{place}: has no scenario files; they end in {' or '.join(SUFFIXES)}")
+        raise SettingError(f"{source}: has no scenario files; they end in {' or '.join(SUFFIXES)}")
     return files
 
 
 def _checked(scenarios: list[Scenario]) -> list[Scenario]:
     """Load every airframe once, since a bad one would fail only at take-off."""
-    for scenario in {each.airframe: each for each in reversed(scenarios)}.values():
+    first: dict[str, Scenario] = {}
+    for scenario in scenarios:
+        first.setdefault(scenario.airframe, scenario)
+    for scenario in first.values():
         try:
             load_airframe(scenario.airframe)
         except AirframeError as error:

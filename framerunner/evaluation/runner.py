@@ -70,7 +70,7 @@ def fly_all(tasks: Iterable[FlightPlan], pool: Pool) -> Generator[Row, None, Non
     Raises:
         SettingError: see `open_pool`.
     """
-    if pool.in_process:
+    if pool.backend == "loky" and pool.jobs == 1:  # no other process is needed
         _prepare_process()
         yield from map(fly_task, tasks)
         return

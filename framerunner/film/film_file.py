@@ -69,11 +69,10 @@ class FilmFile(ABC):
         for packet in self._stream.encode(frame):
             self._container.mux(packet)
 
-    def _frame(self, image: Image) -> av.VideoFrame:
+    def _frame(self, image: Image, number: int, pixels: str) -> av.VideoFrame:
         frame = av.VideoFrame.from_ndarray(np.ascontiguousarray(image), format="bgr24")
-        frame.pts, frame.time_base = self._count, 1 / self._rate
-        self._count += 1
-        return frame
+        frame.pts, frame.time_base = number, 1 / self._rate
+        return frame.reformat(format=pixels)
 
 
 class Mp4File(FilmFile):
@@ -87,7 +86,8 @@ class Mp4File(FilmFile):
 
     def add(self, image: Image) -> None:
         """Add an image."""
-        self._encode(self._frame(image).reformat(format="yuv420p"))
+        self._encode(self._frame(image, self._count, "yuv420p"))
+        self._count += 1
 
     def finish(self) -> None:
         """Write the images that the encoder still holds."""
@@ -104,7 +104,8 @@ class GifFile(FilmFile):
 
     def add(self, image: Image) -> None:
         """Add an image."""
-        self._source.push(self._frame(image))
+        self._source.push(self._frame(image, self._count, "rgb32"))
+        self._count += 1
         self._encode_filtered()
 
     def finish(self) -> None:
@@ -126,11 +127,7 @@ class GifFile(FilmFile):
         chosen.link_to(sink)
         graph.configure()
         for number, image in enumerate(samples):
-            frame = av.VideoFrame.from_ndarray(np.ascontiguousarray(image), format="bgr24").reformat(
-                format="rgb32"
-            )
-            frame.pts, frame.time_base = number, 1 / self._rate
-            source.push(frame)
+            source.push(self._frame(image, number, "rgb32"))
         source.push(None)
         return next(_pulled(graph))
 
@@ -154,13 +151,6 @@ class GifFile(FilmFile):
         width, height = size_px
         pixels = av.VideoFormat("rgb32", width, height)
         return graph.add_buffer(width=width, height=height, format=pixels, time_base=1 / self._rate)
-
-    def _frame(self, image: Image) -> av.VideoFrame:
-        frame = super()._frame(image)
-        pts, time_base = frame.pts, frame.time_base
-        converted = frame.reformat(format="rgb32")
-        converted.pts, converted.time_base = pts, time_base
-        return converted
 
 
 def _pulled(graph: Graph) -> Iterator[av.VideoFrame]:

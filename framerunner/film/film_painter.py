@@ -218,9 +218,11 @@ class _CameraView:
         grow = 2.0 * self._unit
         left, top = edges[0] - grow, edges[1] - grow
         right, bottom = edges[2] + grow, edges[3] + grow
-        corners = np.array([(left, top), (right, top), (right, bottom), (left, bottom)])
+        corners = [(left, top), (right, top), (right, bottom), (left, bottom)]
+        outline = [style.fixed_point(np.array(corners))]
         for width, colour in ((3.6, style.INK), (1.8, style.WHITE)):
-            style.draw_outline(part, corners, colour, max(1, round(width * self._unit)))
+            thickness = max(1, round(width * self._unit))
+            cv2.polylines(part, outline, True, colour, thickness, cv2.LINE_AA, style.SUBPIXEL_BITS)
         if isfinite(detection.d):
             angle = f"  {detection.a:.0f}°" if isfinite(detection.a) else ""
             self._label(part, (left, top, bottom), f"{detection.d:.2f} m{angle}")

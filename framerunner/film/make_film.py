@@ -98,7 +98,7 @@ def _write_film(timeline: Timeline, settings: FilmSettings) -> FilmSummary:
         speed = flown_s / max(_MIN_MOVING_S, settings.seconds - HOLD_S)
     if flown_s / speed > MAX_FILM_S:
         raise RecordingError(
-            f"film: would take {flown_s / speed:.0f} s, at most {MAX_FILM_S:g} s are made; raise --speed"
+            f"film: would last {flown_s / speed:.0f} s, longer than {MAX_FILM_S:g} s; raise --speed"
         )
     held = round(HOLD_S * settings.fps)
     moving = max(2, round((flown_s / speed + HOLD_S) * settings.fps) - held)

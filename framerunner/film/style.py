@@ -6,7 +6,6 @@ from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
 
-import cv2
 import matplotlib
 import numpy as np
 import numpy.typing as npt
@@ -59,11 +58,6 @@ def fixed_point(pixels: npt.NDArray[np.float64]) -> npt.NDArray[np.int32]:
     kept = np.clip(pixels, -far, far)
     kept[np.isnan(kept)] = -far
     return np.rint(kept * (1 << SUBPIXEL_BITS)).astype(np.int32)
-
-
-def draw_outline(image: Image, corners_px: npt.NDArray[np.float64], colour: Bgr, width: int) -> None:
-    """Draw a closed line."""
-    cv2.polylines(image, [fixed_point(corners_px)], True, colour, width, cv2.LINE_AA, SUBPIXEL_BITS)
 
 
 @dataclass(frozen=True, slots=True)

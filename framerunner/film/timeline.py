@@ -83,7 +83,7 @@ class Timeline:
         self._flight = flight
         self._moments = [moment for moment in flight.moments if _is_drawable(moment)]
         if not self._moments:
-            raise RecordingError(f"film: {flight.title}: no moment of it has a place; nothing can be shown")
+            raise RecordingError(f"film: {flight.title}: has no position; nothing can be shown")
         self._times_s = [self._seconds(moment.state.time_us) for moment in self._moments]
         self._crossings = [(self._seconds(each.time_us), each.colour) for each in flight.crossings]
         self.result: FlightResult | None = flight.result

@@ -63,15 +63,11 @@ class ImageFile:
         self.spans.append((self._end, len(data)))
         self._end += len(data)
 
-    def jpeg(self, index: int) -> bytes:
-        """An image as JPEG."""
-        start, length = self.spans[index]
-        self._file.seek(start)
-        return self._file.read(length)
-
     def image(self, index: int) -> Image:
         """An image, BGR, shape (height, width, 3), uint8."""
-        decoded = cv2.imdecode(np.frombuffer(self.jpeg(index), np.uint8), cv2.IMREAD_COLOR)
+        start, length = self.spans[index]
+        self._file.seek(start)
+        decoded = cv2.imdecode(np.frombuffer(self._file.read(length), np.uint8), cv2.IMREAD_COLOR)
         return np.asarray(decoded, np.uint8)
 
     def latest_at(self, time_us: int) -> int | None:
@@ -86,7 +82,7 @@ class ImageFile:
 
 @dataclass(frozen=True, slots=True)
 class CollectedFlight:
-    """A whole flight; as a context, closes its images.
+    """A complete flight; as a context, closes its images.
 
     Attributes:
         title: what was flown, for people.

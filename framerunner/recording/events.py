@@ -1,4 +1,4 @@
-"""What a recorded flight gives back, and the error of recordings."""
+"""The events of a recorded flight, and the error of recordings."""
 
 from __future__ import annotations
 

@@ -8,6 +8,8 @@ from __future__ import annotations
 from collections.abc import Collection, Iterator
 from dataclasses import replace
 from heapq import heapify, heappop, heappush
+from os import SEEK_END
+from pathlib import Path
 from typing import BinaryIO
 
 import zstandard
@@ -16,6 +18,7 @@ from mcap.reader import SeekingReader
 from mcap.records import Channel, Chunk, ChunkIndex, Message
 from mcap.stream_reader import breakup_chunk
 from mcap.summary import Summary
+from mcap.writer import MCAP0_MAGIC
 
 from framerunner.recording.events import RecordingError
 
@@ -26,6 +29,18 @@ _MESSAGE_OVERHEAD_BYTES = 400
 _RECORD_HEAD_BYTES = 9
 
 _Waiting = tuple[int, int, int, ChunkIndex | Message]
+
+
+def first_and_last_bytes(path: Path) -> tuple[bytes, bytes]:
+    """Of a file; a complete MCAP file has `MCAP0_MAGIC` at both ends. Empty if it cannot be read."""
+    length = len(MCAP0_MAGIC)
+    try:
+        with path.open("rb") as file:
+            first = file.read(length)
+            file.seek(max(0, file.seek(0, SEEK_END) - length))
+            return first, file.read()
+    except OSError:
+        return b"", b""
 
 
 class BoundedFile:

@@ -6,7 +6,6 @@ import json
 import warnings
 from base64 import b64decode
 from collections.abc import Iterator
-from os import SEEK_END
 from pathlib import Path
 from typing import Any, BinaryIO, cast
 
@@ -17,7 +16,13 @@ from mcap.reader import SeekingReader
 from mcap.writer import MCAP0_MAGIC
 
 from framerunner.recording.events import Crossed, Event, RecordedImage, RecordingError
-from framerunner.recording.mcap_file import MAX_CHUNK_BYTES, BoundedFile, messages, summary_of
+from framerunner.recording.mcap_file import (
+    MAX_CHUNK_BYTES,
+    BoundedFile,
+    first_and_last_bytes,
+    messages,
+    summary_of,
+)
 from framerunner.recording.mcap_writer import METADATA
 from framerunner.recording.schemas import CROSSING, DETECTIONS, IMAGE, MISSION, SETPOINT, TELEMETRY
 from offboard.app import Moment
@@ -110,7 +115,7 @@ class McapRecording:
         """Say in one line what is wrong; a damaged file makes the libraries raise any error."""
         if isinstance(error, RecordingError) and str(error).startswith("recording '"):
             return error
-        first, last = self._ends()
+        first, last = first_and_last_bytes(self._path)
         if first != MCAP0_MAGIC:
             return RecordingError(
                 f"recording '{self._path}': not an MCAP file; name a recording or a run folder"
@@ -124,17 +129,6 @@ class McapRecording:
         return RecordingError(
             f"recording '{self._path}': {what}; `mcap recover` of the MCAP tools may save a part of it"
         )
-
-    def _ends(self) -> tuple[bytes, bytes]:
-        """First and last bytes of the file; a complete one has MCAP's magic bytes at both ends."""
-        length = len(MCAP0_MAGIC)
-        try:
-            with self._path.open("rb") as file:
-                first = file.read(length)
-                file.seek(max(0, file.seek(0, SEEK_END) - length))
-                return first, file.read()
-        except OSError:
-            return b"", b""
 
 
 class _EventBuilder:

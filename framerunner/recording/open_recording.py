@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from contextlib import closing, contextmanager
-from os import SEEK_END
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING
@@ -12,6 +11,7 @@ from typing import TYPE_CHECKING
 from mcap.writer import MCAP0_MAGIC
 
 from framerunner.recording.events import Recorded, RecordingError
+from framerunner.recording.mcap_file import first_and_last_bytes
 from offboard.app import INTERRUPTED
 from offboard.mission import MissionError, load_mission
 from offboard.pilot_file import PilotFile
@@ -45,8 +45,11 @@ def recorded_flight(path: Path, pilot: PilotFile | None = None) -> Iterator[Reco
     if not path.is_dir():
         raise RecordingError(f"replay '{path}': does not exist; name a run folder or an .mcap file")
     result = _read_result(path)
-    if (path / "flight.mcap").is_file() and not _was_killed(path, result):
-        with _mcap(path / "flight.mcap") as recorded:
+    recording, log = path / "flight.mcap", path / "flight.tlog"
+    # A real-time flight whose program was killed has no result, and its recording is incomplete.
+    was_killed = result is None and log.is_file() and first_and_last_bytes(recording)[1] != MCAP0_MAGIC
+    if recording.is_file() and not was_killed:
+        with _mcap(recording) as recorded:
             yield recorded
     elif result is not None and result.state_sha256 and (path / "mission.yaml").is_file():
         with TemporaryDirectory(prefix="framerunner-replay-") as folder:
@@ -54,7 +57,7 @@ def recorded_flight(path: Path, pilot: PilotFile | None = None) -> Iterator[Reco
             _fly_again(path, result, file, pilot)
             with _mcap(file) as recorded:
                 yield recorded
-    elif (path / "flight.tlog").is_file():
+    elif log.is_file():
         yield _tlog(path, result)
     elif result is not None:
         raise RecordingError(
@@ -75,15 +78,6 @@ def _read_result(folder: Path) -> FlightResult | None:
     except (OSError, ResultError) as error:
         reason = " ".join(str(error).split())
         raise RecordingError(f"replay '{path}': damaged: {reason:.120}") from None
-
-
-def _was_killed(path: Path, result: FlightResult | None) -> bool:
-    """Whether the program was killed during a real-time flight, so that its recording is incomplete."""
-    if result is not None or not (path / "flight.tlog").is_file():
-        return False
-    with (path / "flight.mcap").open("rb") as file:
-        file.seek(max(0, file.seek(0, SEEK_END) - len(MCAP0_MAGIC)))
-        return file.read() != MCAP0_MAGIC
 
 
 def _mcap(path: Path) -> closing[McapRecording]:

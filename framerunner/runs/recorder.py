@@ -97,8 +97,8 @@ class VideoFile:
         if self._writer is not None:
             self._writer.release()
             self._writer = None
-            if not _is_whole_avi(self._path):
-                self.problem = f"'{self._path}' is not whole: the disk did not take it"
+            if not _is_complete_avi(self._path):
+                self.problem = f"'{self._path}' is incomplete: not all of it could be written"
 
     def _compress(self, image: Image) -> None:
         if self._writer is None:
@@ -108,7 +108,7 @@ class VideoFile:
         self._writer.write(image)
 
 
-def _is_whole_avi(path: Path) -> bool:
+def _is_complete_avi(path: Path) -> bool:
     """Whether the file is as long as its header says.
 
     OpenCV does not report failed writes; it writes the length last, after the index.
@@ -157,7 +157,7 @@ class RecordingCamera:
 
     @property
     def problem(self) -> str:
-        """See `VideoFile`."""
+        """Of the video, see `VideoFile`."""
         return self._video.problem
 
 

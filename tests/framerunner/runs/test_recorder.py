@@ -76,12 +76,12 @@ async def test_images_are_handed_on_and_filmed(tmp_path):
     assert levels == pytest.approx([20.0 * number for number in range(8)], abs=4.0)
 
 
-async def test_a_video_that_the_disk_did_not_take_says_so(tmp_path):
+async def test_a_video_that_could_not_be_written_says_so(tmp_path):
     camera = RecordingCamera(Source(8), tmp_path / "video.avi", 10.0)
     with disk_that_takes(6000):
         assert len([frame async for frame in camera.frames()]) == 8
         camera.close()
-    assert camera.problem == f"'{tmp_path}/video.avi' is not whole: the disk did not take it"
+    assert camera.problem == f"'{tmp_path}/video.avi' is incomplete: not all of it could be written"
 
 
 async def test_without_images_there_is_no_video(tmp_path):
