@@ -57,7 +57,7 @@ def test_flights_are_flown_once_counted_and_reported(capsys):
     assert (folder / "results.csv").read_bytes() == table
 
 
-def test_a_level_is_drawn_seed_after_seed(capsys, monkeypatch):
+def test_a_level_is_drawn_with_consecutive_seeds(capsys, monkeypatch):
     def made(tasks, _pool):
         for task in tasks:
             yield made_row(task.scenario.name, seed=task.seed)
@@ -73,7 +73,7 @@ def test_a_level_is_drawn_seed_after_seed(capsys, monkeypatch):
     ]
 
 
-def test_a_flight_that_failed_by_a_fault_is_said_with_its_traceback(capsys, monkeypatch):
+def test_a_fault_of_the_program_is_reported_with_its_traceback(capsys, monkeypatch):
     def made(tasks, _pool):
         for task in tasks:
             yield made_row(task.scenario.name, "error", reason="ValueError: no", traceback="Traceback: why")
@@ -104,7 +104,7 @@ def test_two_evaluations_are_compared(capsys):
     assert not list(Path("runs").glob("*")) if Path("runs").exists() else True
 
 
-def test_what_does_not_go_together_is_refused(refused):
+def test_contradicting_options_are_refused(refused):
     assert refused().startswith("--level: say what to fly")
     assert "not both" in refused("test-case-1", "--level", "calm")
     assert refused("test-case-1", "--count", 3).startswith("--count 3: is for scenarios of a level")

@@ -1,4 +1,4 @@
-"""Rates, spreads and comparisons against numbers worked out elsewhere."""
+"""Rates, distributions and comparisons, against numbers from other sources."""
 
 import math
 
@@ -66,7 +66,7 @@ def test_a_summary_of_failures_only():
     assert summary.seconds_in_state == {}
 
 
-def test_mcnemar_is_a_toss_of_coins():
+def test_mcnemar_is_the_exact_binomial_test():
     assert mcnemar(0, 0) == 1.0
     assert mcnemar(5, 5) == pytest.approx(1.0)
     assert mcnemar(6, 0) == pytest.approx(2 * 0.5**6)

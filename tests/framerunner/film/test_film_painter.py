@@ -1,4 +1,4 @@
-"""What a film shows: the trail in the states' colours, the frames, what was crossed when, and it all fits."""
+"""What a film shows: the trail in the states' colours, frames, crossing times and verdict, at any image size."""
 
 import numpy as np
 import pytest
@@ -53,7 +53,7 @@ def test_an_instant_is_interpolated_between_ticks(timeline, flight):
     assert timeline.kinds[half.kind] == moment.mission_state.rpartition(".")[2]
 
 
-def test_the_trail_is_there_in_the_colours_of_its_states(timeline):
+def test_the_trail_has_the_colours_of_its_states(timeline):
     painter = FilmPainter(timeline, SIZE, 8.0)
     view = lay_out(*SIZE, 4 / 3).view
     early, late = (painter.paint(time_s)[view.y : view.bottom, view.x : view.right] for time_s in (0.5, 50.0))
@@ -62,7 +62,7 @@ def test_the_trail_is_there_in_the_colours_of_its_states(timeline):
         assert near(late, colour) > near(early, colour) + 60
 
 
-def test_chips_fill_as_frames_are_crossed_and_the_verdict_comes_last(timeline):
+def test_chips_are_filled_when_frames_are_crossed_and_the_verdict_is_shown_last(timeline):
     painter = FilmPainter(timeline, SIZE, 8.0)
     box = lay_out(*SIZE, 4 / 3).figures
     before, between, over = (

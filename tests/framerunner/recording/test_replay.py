@@ -1,4 +1,4 @@
-"""`framerunner replay`: what it shows of recordings, lockstep flights, logs and of what is none of these."""
+"""`framerunner replay`: what it shows of recordings, lockstep flights and logs, and what it refuses."""
 
 import asyncio
 import json
@@ -57,7 +57,7 @@ def moment_at(time_us, state):
 
 
 class Flight:
-    """A recorded flight of which the test says what happens."""
+    """A recorded flight with given events."""
 
     title = "a place: a mission"
     result = None
@@ -99,7 +99,7 @@ def test_a_lockstep_flight_without_a_recording_is_flown_again(lockstep_folder, c
         assert sum(isinstance(event, RecordedImage) for event in flight.events()) > 30
 
 
-def test_flown_again_and_not_the_same_is_said(lockstep_folder, capsys):
+def test_a_flight_that_differs_when_flown_again_is_refused(lockstep_folder, capsys):
     path = lockstep_folder / "scenario.yaml"
     text = path.read_text(encoding="utf-8")
     path.write_text(text.replace("try_limit_s: 4", "try_limit_s: 3"), encoding="utf-8")
@@ -215,7 +215,7 @@ def damage(tmp_path, recorded, how):
         ("missing", "does not exist"),
     ],
 )
-def test_what_cannot_be_shown_is_said_in_one_line(tmp_path, recorded, capsys, how, words):
+def test_what_cannot_be_shown_is_refused_in_one_line(tmp_path, recorded, capsys, how, words):
     assert run(["replay", str(damage(tmp_path, recorded, how)), "--fast"]) == 2
     lines = [line for line in capsys.readouterr().err.splitlines() if line.startswith("error: ")]
     assert len(lines) == 1
@@ -249,7 +249,7 @@ async def test_a_crossing_prints_a_line(capsys):
     assert [line.rpartition("crossed: ")[2] for line in lines] == ["none", "red"]
 
 
-async def test_vehicle_time_passes_as_wall_time_times_the_speed(monkeypatch):
+async def test_vehicle_time_is_wall_time_times_the_speed(monkeypatch):
     now_s, waits_s = 100.0, []
 
     async def sleep(seconds):
@@ -267,21 +267,21 @@ async def test_vehicle_time_passes_as_wall_time_times_the_speed(monkeypatch):
 async def test_images_are_served_while_the_flight_is_shown():
     video = VideoServer(port=0)
     image = np.full((48, 64, 3), 200, np.uint8)
-    begun, seen = asyncio.Event(), asyncio.Event()
+    started, seen = asyncio.Event(), asyncio.Event()
 
     class Endless(Flight):
         def __init__(self):
             pass
 
         def events(self):
-            begun.set()
+            started.set()
             time_us = 0
             while not seen.is_set():
                 time_us += 100_000
                 yield RecordedImage(time_us, image)
 
     showing = asyncio.create_task(replay(Endless(), 0.0, video))
-    await begun.wait()
+    await started.wait()
     async with aiohttp.ClientSession() as session:
         status, headers = 503, {}
         while status == 503:

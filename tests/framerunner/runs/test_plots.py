@@ -65,7 +65,7 @@ def test_time_in_states_adds_up_over_the_colours_and_to_the_whole():
     assert spent_s == {"start": 1.0, "turning": 2.0, "crossing": 1.0, "stop": 0.0}
 
 
-def test_a_position_lies_on_the_line_between_samples():
+def test_a_position_is_interpolated_between_samples():
     assert TRACK.position_at(0.5) == pytest.approx((-2.5, -2.5, 0.75))
     assert TRACK.position_at(4.0) == pytest.approx((-3.0, -3.0, 0.6))
     assert TRACK.position_at(-0.1) is None
@@ -126,7 +126,7 @@ def test_the_crossing_is_marked_where_the_drone_was_then():
     assert [(mark.get_xdata()[0], mark.get_ydata()[0]) for mark in marks] == [(3.0, 2.0)]
 
 
-def test_forty_states_can_be_told_apart():
+def test_forty_states_have_different_styles():
     count = 40
     numbers = [float(n) for n in range(count)]
     track = Track(
