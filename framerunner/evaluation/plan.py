@@ -10,7 +10,6 @@ from dataclasses import asdict, dataclass
 from functools import cached_property
 from importlib import metadata
 from pathlib import Path
-from typing import Any, Self
 
 from errors import SettingError
 from firmware_py.airframe import AirframeError, load_airframe
@@ -46,21 +45,10 @@ class Identity:
     seeds: tuple[int, ...]
     version: str
 
-    def as_dict(self) -> dict[str, Any]:
-        """As plain data for JSON."""
-        return asdict(self)
-
-    @classmethod
-    def from_dict(cls, data: Mapping[str, Any]) -> Self:
-        """The inverse of `as_dict`; raises `KeyError` or `TypeError` if the data is no identity."""
-        if not isinstance(data.get("scenarios"), Mapping):
-            raise TypeError("scenarios are missing")
-        return cls(**{**data, "seeds": tuple(data["seeds"])})
-
     @property
     def sha256(self) -> str:
         """Over all fields."""
-        return _sha256(json.dumps(self.as_dict()))
+        return _sha256(json.dumps(asdict(self)))
 
     def difference(self, other: Identity) -> str:
         """The first difference in a few words; empty if there is none."""

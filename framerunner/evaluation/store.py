@@ -9,9 +9,11 @@ import os
 import shutil
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
+
+from pydantic import TypeAdapter
 
 from errors import SettingError
 from framerunner.evaluation.plan import Identity
@@ -118,7 +120,7 @@ def open_folder(path: Path, identity: Identity, *, again: bool = False) -> Itera
         with _writing(path):
             if is_new:
                 _clear(path)
-                data = {"format": FORMAT, **identity.as_dict()}
+                data = {"format": FORMAT, **asdict(identity)}
                 _replace(path / IDENTITY, json.dumps(data, indent=2) + "\n")
             for name in _FOLDERS:
                 (path / name).mkdir(exist_ok=True)
@@ -168,7 +170,7 @@ def _identity(path: Path, option: str) -> Identity | None:
         data: dict[str, Any] = json.loads((path / IDENTITY).read_text(encoding="utf-8"))
         if data.pop("format") != FORMAT:
             raise SettingError(f"{option} {path}: was made by another version of framerunner; choose another")
-        return Identity.from_dict(data)
+        return TypeAdapter(Identity).validate_python(data)
     except (FileNotFoundError, NotADirectoryError):
         return None
     except (OSError, ValueError, TypeError, KeyError, AttributeError):

@@ -42,6 +42,7 @@ def test_rows_are_found_again_in_the_order_of_the_scenarios(tmp_path, plan):
     whole = [made_row("calm-1"), made_row("calm-2", "error"), made_row("calm-3", "timed out")]
     assert kept(tmp_path / "a" / "b", plan) == whole  # but for track and traceback
     folder = read_folder(tmp_path / "a" / "b", "--compare")
+    assert folder.identity == plan.identity
     assert folder.track("calm-3") == TRACK
     assert folder.track("calm-1") == Track()
     assert folder.rows()["calm-3"].track is None

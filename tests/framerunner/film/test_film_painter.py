@@ -1,4 +1,4 @@
-"""What a film shows: the trail in the states' colours, frames, crossing times and verdict, at any image size."""
+"""What a film shows: the trail in its colours, frames, crossing times and verdict, at any size."""
 
 import numpy as np
 import pytest
