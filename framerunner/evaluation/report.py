@@ -51,14 +51,7 @@ _MAX_STATES = 14
 
 @dataclass(frozen=True, slots=True)
 class Failure:
-    """What the page shows of a flight that failed.
-
-    Attributes:
-        row: its result.
-        command: flies it again.
-        plot: its track as a data URI; None without one.
-        traceback: if the program failed.
-    """
+    """What the page shows of a flight that failed; the command flies it again, the plot is a data URI."""
 
     row: Row
     command: str

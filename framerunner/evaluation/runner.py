@@ -40,12 +40,9 @@ class WorkerDiedError(UserError):
 
 @dataclass(frozen=True, slots=True)
 class _Task:
-    """A flight as it is sent to a worker, some 20 kB.
+    """A flight as it is sent to a worker, some 20 kB, by the process `sender`.
 
-    Attributes:
-        plan: without its mission.
-        mission: pickled once for all flights, and unpickled once in each process.
-        sender: id of the sending process.
+    The mission is taken out of the plan, pickled once for all flights, and unpickled once in each process.
     """
 
     plan: FlightPlan

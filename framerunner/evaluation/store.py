@@ -129,14 +129,10 @@ def open_folder(path: Path, identity: Identity, *, again: bool = False) -> Itera
 
 
 def read_folder(path: Path, option: str) -> EvaluationFolder:
-    """Read an evaluation without changing it; it may still be running.
-
-    Args:
-        path: the folder.
-        option: that named it, for messages.
+    """Read an evaluation, which may still be running, without changing it.
 
     Raises:
-        SettingError: there is no evaluation.
+        SettingError: there is none; the message names the option that named the folder.
     """
     identity = _identity(path, option)
     if identity is None:

@@ -23,9 +23,7 @@ _MAX_NAMES = 8
 class EvaluationProgress:
     """A live line on standard error in a terminal, elsewhere a line every five seconds.
 
-    Args:
-        total: flights of the evaluation.
-        kept: flights that were flown before.
+    It counts `total` flights, of which those in `kept` were flown before.
     """
 
     def __init__(self, total: int, kept: Sequence[Row]) -> None:

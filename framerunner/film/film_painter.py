@@ -19,13 +19,7 @@ from vision.types import Detection, Detections, Image
 
 
 class FilmPainter:
-    """Paints the images of one film, in any order.
-
-    Args:
-        timeline: the flight.
-        size_px: width and height.
-        speed: ratio of flight time to film time.
-    """
+    """Paints the images of one film, in any order; the speed is the ratio of flight time to film time."""
 
     def __init__(self, timeline: Timeline, size_px: tuple[int, int], speed: float) -> None:
         camera = timeline.scenario.camera

@@ -69,10 +69,7 @@ class Viewpoint:
 class Flyby:
     """A viewpoint that turns slowly around the arena and follows the drone a little.
 
-    Args:
-        timeline: the flight.
-        size_px: width and height of the image.
-        speed: ratio of flight time to film time.
+    The image has width and height; the speed is the ratio of flight time to film time.
     """
 
     def __init__(self, timeline: Timeline, size_px: tuple[int, int], speed: float) -> None:
@@ -85,17 +82,15 @@ class Flyby:
         # In the middle of the film the camera is behind the start, so that the drone flies away from it.
         x_m, y_m, _ = start_position(timeline.scenario)
         toward = np.array((x_m, y_m)) - self._middle[:2]
-        heading = (
-            float(np.arctan2(toward[1], toward[0])) if float(np.hypot(*toward)) > 0.5 else radians(-120.0)
-        )
-        self._first_rad = heading + radians(25.0) - self._rate * film_s / 2
+        is_far = float(np.hypot(*toward)) > 0.5
+        heading_rad = float(np.arctan2(toward[1], toward[0])) if is_far else radians(-120.0)
+        self._first_rad = heading_rad + radians(25.0) - self._rate * film_s / 2
         self._focal_px = size_px[0] / 2 / tan(FIELD_OF_VIEW_RAD / 2)
         points = _always_visible(timeline)
         self._samples_s = np.linspace(timeline.begin_s, timeline.end_s, _SAMPLES)
         needed = [self._distance(float(time_s), points) for time_s in self._samples_s]
-        self._distances_m = _smoothed(
-            np.array(needed), round(_DISTANCE_SMOOTHING_S * _SAMPLES / max(film_s, 1.0))
-        )
+        reach = round(_DISTANCE_SMOOTHING_S * _SAMPLES / max(film_s, 1.0))
+        self._distances_m = _smoothed(np.array(needed), reach)
 
     def at(self, time_s: float) -> Viewpoint:
         """The viewpoint at a time of the flight, seconds since motors on."""

@@ -111,11 +111,7 @@ class CollectedFlight:
 
 
 def collect(recorded: Recorded, images: ImageFile | None = None) -> CollectedFlight:
-    """Read a flight to its end.
-
-    Args:
-        recorded: the flight.
-        images: where to keep its images; by default in a temporary file.
+    """Read a flight to its end, its images by default into a temporary file.
 
     Raises:
         RecordingError: it is damaged, holds no telemetry, or there is no room for its images.

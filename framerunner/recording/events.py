@@ -18,12 +18,7 @@ class RecordingError(UserError):
 
 @dataclass(frozen=True, slots=True)
 class RecordedImage:
-    """An image of the drone's camera.
-
-    Attributes:
-        time_us: vehicle time, microseconds.
-        image: BGR, shape (height, width, 3), uint8.
-    """
+    """An image of the drone's camera, BGR, shape (height, width, 3), at a vehicle time in microseconds."""
 
     time_us: int
     image: Image
