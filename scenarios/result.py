@@ -12,6 +12,7 @@ from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, ValidationEr
 from pydantic.json_schema import GenerateJsonSchema
 from pydantic_core import CoreSchema
 
+from errors import UserError
 from scenarios.crossing import Side
 from scenarios.verdict import Verdict
 
@@ -34,7 +35,7 @@ Text = Annotated[str, BeforeValidator(_limit_text)]
 Ended = Literal["finished", "timed out", "aborted", "error", ""]
 
 
-class ResultError(ValueError):
+class ResultError(UserError):
     """An invalid result; the message is one line: field, then reason."""
 
 

@@ -7,7 +7,7 @@ from typing import Annotated
 
 from cyclopts import Parameter
 
-from framerunner.errors import SettingError
+from errors import SettingError
 
 
 def doctor(

@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING, Annotated, Literal
 
 from cyclopts import Parameter
 
+from errors import SettingError
 from framerunner.commands.options import WholeNumber
-from framerunner.errors import SettingError
 
 if TYPE_CHECKING:
     from framerunner.evaluation.plan import Plan

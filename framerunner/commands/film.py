@@ -8,7 +8,7 @@ from typing import Annotated
 
 from cyclopts import Parameter
 
-from framerunner.errors import SettingError
+from errors import SettingError
 
 _Size = Annotated[
     str | None, Parameter(help="width and height in pixels; 960x540, of a GIF 640x360 if not given")
@@ -63,14 +63,14 @@ def film(
     _check("--fps", fps, 1.0, 25.0 if suffix == ".gif" else 60.0)
     size_px = _size(size or ("640x360" if suffix == ".gif" else "960x540"))
 
-    from framerunner.film.making import FilmSettings, make_film
+    from framerunner.film.make_film import FilmSettings, make_film
     from offboard.pilot_file import read_pilot
 
     pilot_file = None if pilot is None else read_pilot(pilot)
     rate = fps or (10.0 if suffix == ".gif" else 25.0)
     made = make_film(flight, FilmSettings(target, size_px, rate, speed or 8.0, seconds), pilot_file)
     megabytes = target.stat().st_size / 1e6
-    print(f"{target}: {made.seconds:.1f} s, {made.pictures} pictures, {megabytes:.1f} MB")
+    print(f"{target}: {made.seconds:.1f} s, {made.images} pictures, {megabytes:.1f} MB")
     if made.codec == "mpeg4":
         print("encoded as MPEG-4, which browsers do not play: this FFmpeg has no H.264 encoder (libx264)")
     return 0

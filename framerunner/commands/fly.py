@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, Annotated
 
 from cyclopts import Parameter
 
+from errors import SettingError
 from framerunner.commands.options import WholeNumber
-from framerunner.errors import SettingError
 
 if TYPE_CHECKING:
     from wire.simulator_api import SimulatorApi

@@ -87,7 +87,7 @@ def new(
 
         framerunner mission new my_mission --python --out missions
     """
-    from framerunner.errors import SettingError
+    from errors import SettingError
     from offboard.mission import new_mission
 
     if not _NAME.fullmatch(name):
@@ -114,7 +114,7 @@ def _load(mission: str | Path, pilot: Path | None) -> Mission:
 
 def _write(files: NewMission) -> None:
     """Write all files or, if one of them is there already, none."""
-    from framerunner.errors import SettingError
+    from errors import SettingError
 
     for path in files.texts:
         if path.exists():

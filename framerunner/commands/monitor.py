@@ -11,8 +11,8 @@ from typing import Annotated
 
 from cyclopts import Parameter
 
+from errors import SettingError
 from framerunner.commands.options import WholeNumber
-from framerunner.errors import SettingError
 
 PASSWORD_VARIABLE = "FRAMERUNNER_JUDGE_PASSWORD"
 DATABASE = "sqlite:///framerunner.db"

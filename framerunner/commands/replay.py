@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, Annotated
 
 from cyclopts import Parameter
 
+from errors import SettingError
 from framerunner.commands.options import WholeNumber
-from framerunner.errors import SettingError
 
 if TYPE_CHECKING:
     from framerunner.recording.events import Recorded
@@ -48,7 +48,7 @@ def replay(
         raise SettingError(f"--port {port}: must be from 0 to 65535")
     with_video = speed > 0.0 if video is None else video
 
-    from framerunner.recording.find import recorded_flight
+    from framerunner.recording.open_recording import recorded_flight
     from framerunner.recording.replay import replay as show
     from offboard.pilot_file import read_pilot
     from sitl.video import VideoServer

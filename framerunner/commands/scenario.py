@@ -44,12 +44,12 @@ def show(
 
         framerunner scenario show my.yaml --out my.png
     """
-    from framerunner.runs.pictures import scenario_picture
+    from framerunner.runs.plots import draw_scenario, save_figure
     from scenarios.loader import dump_yaml, load_scenario
 
     loaded = load_scenario(scenario)
     path = out or Path(f"{loaded.name}.png")
-    scenario_picture(loaded, path)
+    save_figure(draw_scenario(loaded), path)
     print(dump_yaml(loaded), end="")
     print(f"drawn to {path}", file=sys.stderr)
     return 0
@@ -99,7 +99,7 @@ def random(
 
         framerunner scenario random --level calm --seed 17 --out calm-17.yaml
     """
-    from framerunner.errors import SettingError
+    from errors import SettingError
     from scenarios.loader import dump_yaml
     from scenarios.random_scenarios import load_level, random_scenario
 

@@ -11,8 +11,8 @@ from typing import TYPE_CHECKING, Annotated
 
 from cyclopts import Parameter
 
+from errors import SettingError
 from framerunner.commands.options import WholeNumber
-from framerunner.errors import SettingError
 from framerunner.extras import advice, is_installed
 
 if TYPE_CHECKING:

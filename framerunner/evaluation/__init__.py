@@ -1,1 +1,1 @@
-"""Many flights at once: flown on all cores or a cluster, kept as they end, counted and reported."""
+"""Evaluations: many flights on all cores or a cluster, kept as they end, then counted and reported."""

@@ -1,4 +1,4 @@
-"""Who flies: this machine's cores, a Dask cluster or a Ray cluster, all through joblib."""
+"""Where flights are flown: on this machine's cores, a Dask cluster or a Ray cluster, all through joblib."""
 
 from __future__ import annotations
 
@@ -8,16 +8,16 @@ from dataclasses import dataclass
 from itertools import islice
 from typing import Any, Literal, get_args
 
-from framerunner.errors import SettingError
+from errors import SettingError
 
 Backend = Literal["loky", "dask", "ray"]
 BACKENDS: tuple[Backend, ...] = get_args(Backend)
 CONNECT_S = 10.0
 _LOST_WORKER = {"BrokenProcessPool", "TerminatedWorkerError", "KilledWorker", "WorkerCrashedError"}
-"""Names, not classes: those of clusters may not be installed."""
+"""Errors by name: the clusters' packages may not be installed."""
 
 Workers = Callable[[Iterable[Any]], Generator[Any, None, None]]
-"""Takes joblib's delayed calls and gives what they return, in any order, as it comes."""
+"""Takes joblib's delayed calls and yields what they return, in any order."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -26,7 +26,7 @@ class Pool:
 
     Attributes:
         backend: see `BACKENDS`.
-        jobs: how many at once on this machine; a cluster knows that itself.
+        jobs: how many at once on this machine; ignored by a cluster.
         address: of the cluster's scheduler, such as "tcp://10.0.0.1:8786".
     """
 
@@ -34,18 +34,9 @@ class Pool:
     jobs: int = 1
     address: str | None = None
 
-    @property
-    def in_process(self) -> bool:
-        """No other process is needed."""
-        return self.backend == "loky" and self.jobs == 1
-
 
 def check_pool(pool: Pool) -> None:
-    """Refuse settings that do not go together, before anything is done.
-
-    Raises:
-        SettingError: naming the option.
-    """
+    """Raise a `SettingError` if the settings contradict each other."""
     if pool.backend not in BACKENDS:
         raise SettingError(f"--backend {pool.backend}: is not known; use {', '.join(BACKENDS)}")
     if pool.jobs < 1:
@@ -59,18 +50,17 @@ def check_pool(pool: Pool) -> None:
 
 
 def is_lost_worker(error: Exception) -> bool:
-    """Whether a process that flew has died, as the pools tell it."""
+    """Whether a pool reports by this error that one of its processes died."""
     return any(kind.__name__ in _LOST_WORKER for kind in type(error).__mro__)
 
 
 def open_pool(pool: Pool) -> AbstractContextManager[Workers]:
-    """Start or reach the workers; they are let go at the end.
+    """Start the workers or connect to them; the context stops or disconnects them.
 
     Raises:
-        SettingError: a package is not installed, or nobody answers at the address.
+        SettingError: a package is not installed, or no cluster answers at the address.
     """
-    makers = {"loky": _loky, "dask": _dask, "ray": _ray}
-    return makers[pool.backend](pool)
+    return {"loky": _loky, "dask": _dask, "ray": _ray}[pool.backend](pool)
 
 
 @contextmanager
@@ -119,7 +109,7 @@ def _ray(pool: Pool) -> Iterator[Workers]:
     try:
         register_ray()
         with parallel_config(backend="ray", n_jobs=-1):
-            yield _in_portions
+            yield _in_batches
     finally:
         ray.shutdown()
 
@@ -132,13 +122,13 @@ def _streaming(calls: Iterable[Any]) -> Generator[Any, None, None]:
     return rows
 
 
-def _in_portions(calls: Iterable[Any]) -> Generator[Any, None, None]:
-    """For a backend that gives its results only when all are there."""
+def _in_batches(calls: Iterable[Any]) -> Generator[Any, None, None]:
+    """For a backend that returns its results only when all are done."""
     from joblib import Parallel, effective_n_jobs
 
     calls = iter(calls)
-    while portion := list(islice(calls, 4 * effective_n_jobs())):
-        yield from Parallel(batch_size=1)(portion)
+    while batch := list(islice(calls, 4 * effective_n_jobs())):
+        yield from Parallel(batch_size=1)(batch)
 
 
 def _not_installed(backend: str) -> SettingError:

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from math import sqrt
 from pathlib import Path
 from statistics import fmean, stdev
 
-from framerunner.errors import SettingError
+from errors import SettingError
 from framerunner.evaluation.plan import Identity
 from framerunner.evaluation.rows import Row
 from framerunner.evaluation.statistics import CONFIDENCE, Rate, wilson
@@ -20,33 +20,21 @@ _RANK = {Verdict.CLEAN: 2, Verdict.COMPLETED: 1}
 
 @dataclass(frozen=True, slots=True)
 class Pair:
-    """One scenario in both evaluations."""
+    """The flights of one scenario in both evaluations."""
 
     before: Row
     after: Row
 
     @property
     def change(self) -> int:
-        """1 better, -1 worse, 0 alike: clean is above completed, and that above all the rest."""
+        """1 better, -1 worse, 0 equal: clean is better than completed, and that than all others."""
         before, after = _RANK.get(self.before.verdict, 0), _RANK.get(self.after.verdict, 0)
         return (after > before) - (after < before)
-
-    @property
-    def longer_s(self) -> float:
-        """Seconds by which the try became longer."""
-        return self.after.try_time_s - self.before.try_time_s
 
 
 @dataclass(frozen=True, slots=True)
 class MeanDifference:
-    """A mean of paired differences with its 95 % confidence interval (Student's t).
-
-    Attributes:
-        count: pairs.
-        mean: of the differences.
-        low: lower end of the interval; None with a single pair.
-        high: upper end.
-    """
+    """Mean of paired differences with its 95 % confidence interval (Student's t), None with a single pair."""
 
     count: int
     mean: float
@@ -61,19 +49,19 @@ class MeanDifference:
 
 @dataclass(frozen=True, slots=True)
 class Comparison:
-    """An evaluation against an earlier one.
+    """An evaluation compared with an earlier one.
 
     Attributes:
         path: folder of the earlier one.
-        mission: what it flew.
+        mission: of the earlier one.
         pairs: scenarios flown in both, in order.
-        only_after: scenarios flown in this one only, or with another content.
-        only_before: scenarios flown in the earlier one only.
+        only_after: number of scenarios flown in this one only, or with another content.
+        only_before: number of scenarios flown in the earlier one only.
         landed_before: of the pairs.
         landed_after: of the pairs.
-        won: pairs that landed only now.
-        lost: pairs that landed only before.
-        p_value: how likely so uneven a split of `won` and `lost` is if nothing changed (McNemar, exact).
+        won: number of pairs that landed only in this one.
+        lost: number of pairs that landed only in the earlier one.
+        p_value: see `mcnemar`.
         try_time_s: of pairs that landed both times, after minus before; None if there are none.
     """
 
@@ -100,29 +88,19 @@ class Comparison:
         return tuple(pair for pair in self.pairs if pair.change < 0)
 
     @property
-    def same(self) -> int:
-        """Number of pairs with a verdict as good as before."""
-        return sum(pair.change == 0 for pair in self.pairs)
-
-    @property
     def identical(self) -> int:
-        """Number of pairs that were the same flight to the last bit."""
-        return sum(_same_flight(pair) for pair in self.pairs)
+        """Number of pairs whose two flights are equal to the last bit."""
+        return sum(pair.before.state_sha256 == pair.after.state_sha256 != "" for pair in self.pairs)
 
 
-def common_scenarios(before: Identity, after: Identity) -> list[str]:
+def _common_scenarios(before: Identity, after: Identity) -> list[str]:
     """Names of scenarios that both have, with the same content."""
-    theirs: Mapping[str, str] = before.scenarios
-    return [name for name, digest in after.scenarios.items() if theirs.get(name) == digest]
+    return [name for name, digest in after.scenarios.items() if before.scenarios.get(name) == digest]
 
 
 def check_comparable(before: EvaluationFolder, after: Identity) -> None:
-    """Refuse a comparison that would have nothing to compare, before anything is flown.
-
-    Raises:
-        SettingError: no scenario is in both.
-    """
-    common = common_scenarios(before.identity, after)
+    """Raise a `SettingError` if no scenario is in both evaluations, or none of them was flown before."""
+    common = _common_scenarios(before.identity, after)
     if not common:
         raise SettingError(
             f"--compare {before.path}: no scenario is in both; fly that evaluation's: "
@@ -133,17 +111,12 @@ def check_comparable(before: EvaluationFolder, after: Identity) -> None:
 
 
 def compare(before: EvaluationFolder, after: EvaluationFolder) -> Comparison:
-    """Set an evaluation against an earlier one.
-
-    Args:
-        before: the earlier one.
-        after: this one.
-    """
-    theirs, ours = before.rows(), after.rows()
+    """Compare an evaluation with an earlier one."""
+    rows_before, rows_after = before.rows(), after.rows()
     pairs = tuple(
-        Pair(theirs[name], ours[name])
-        for name in common_scenarios(before.identity, after.identity)
-        if name in theirs and name in ours
+        Pair(rows_before[name], rows_after[name])
+        for name in _common_scenarios(before.identity, after.identity)
+        if name in rows_before and name in rows_after
     )
     won = sum(pair.after.completed and not pair.before.completed for pair in pairs)
     lost = sum(pair.before.completed and not pair.after.completed for pair in pairs)
@@ -152,19 +125,19 @@ def compare(before: EvaluationFolder, after: EvaluationFolder) -> Comparison:
         path=before.path,
         mission=before.identity.mission,
         pairs=pairs,
-        only_after=len(ours) - len(pairs),
-        only_before=len(theirs) - len(pairs),
+        only_after=len(rows_after) - len(pairs),
+        only_before=len(rows_before) - len(pairs),
         landed_before=wilson(sum(pair.before.completed for pair in pairs), len(pairs)),
         landed_after=wilson(sum(pair.after.completed for pair in pairs), len(pairs)),
         won=won,
         lost=lost,
         p_value=mcnemar(won, lost),
-        try_time_s=mean_difference([pair.longer_s for pair in both]),
+        try_time_s=mean_difference([pair.after.try_time_s - pair.before.try_time_s for pair in both]),
     )
 
 
 def mcnemar(won: int, lost: int) -> float:
-    """Exact two-sided p-value of McNemar's test: are flights won and lost like tosses of a coin?
+    """Exact two-sided p-value of McNemar's test: the probability of so uneven a split if nothing changed.
 
     Source: Q. McNemar, Note on the sampling error of the difference between correlated proportions (1947),
     with the binomial distribution in place of its approximation.
@@ -177,7 +150,7 @@ def mcnemar(won: int, lost: int) -> float:
 
 
 def mean_difference(differences: Sequence[float]) -> MeanDifference | None:
-    """Mean with its interval by Student's t; None of nothing."""
+    """Mean with its confidence interval by Student's t; None if there are no differences."""
     count = len(differences)
     if count == 0:
         return None
@@ -188,7 +161,3 @@ def mean_difference(differences: Sequence[float]) -> MeanDifference | None:
 
     half = float(t.ppf((1.0 + CONFIDENCE) / 2.0, count - 1)) * stdev(differences) / sqrt(count)
     return MeanDifference(count, mean, mean - half, mean + half)
-
-
-def _same_flight(pair: Pair) -> bool:
-    return pair.before.state_sha256 == pair.after.state_sha256 != ""

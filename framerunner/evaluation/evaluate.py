@@ -1,4 +1,4 @@
-"""An evaluation from its plan to its report."""
+"""An evaluation from its plan to its report: what `framerunner evaluate` does."""
 
 from __future__ import annotations
 
@@ -9,16 +9,15 @@ from pathlib import Path
 
 from rich.console import Console
 
-from framerunner.errors import SettingError
+from errors import SettingError
 from framerunner.evaluation.backends import Pool, check_pool
 from framerunner.evaluation.compare import check_comparable, compare
 from framerunner.evaluation.plan import Plan
-from framerunner.evaluation.progress import EvaluationProgress
 from framerunner.evaluation.rows import Row, csv_text
 from framerunner.evaluation.runner import fly_all
 from framerunner.evaluation.statistics import summarise
-from framerunner.evaluation.store import EvaluationFolder, open_folder, read_folder
-from framerunner.evaluation.tables import print_comparison, print_summary
+from framerunner.evaluation.store import RESULTS, EvaluationFolder, open_folder, read_folder
+from framerunner.evaluation.terminal import EvaluationProgress, print_comparison, print_summary
 from framerunner.extras import advice, is_installed
 from scenarios.verdict import Verdict
 
@@ -27,17 +26,17 @@ EXIT_INTERRUPTED = 130
 
 @dataclass(frozen=True, slots=True)
 class EvaluationSettings:
-    """How to fly a plan, and what to leave behind.
+    """How to fly a plan, and what to leave.
 
     Attributes:
         plan: what is flown.
-        pool: who flies.
+        pool: where it is flown.
         out: folder of the evaluation.
-        again: forget what was flown there before.
-        against: folder of an earlier evaluation to compare with; None for none.
+        again: delete what was flown there before.
+        against: folder of an earlier evaluation to compare with, if any.
         mission: name or file, as given on the command line.
         pilot: a contestant's file, as given; None without one.
-        command: goes on with this evaluation.
+        command: continues this evaluation.
     """
 
     plan: Plan
@@ -51,13 +50,13 @@ class EvaluationSettings:
 
 
 def evaluate(settings: EvaluationSettings) -> int:
-    """Fly what is not yet flown, then count, compare and report.
+    """Fly what is missing, then count, compare and report.
 
     Returns:
         0 all were flown, 1 a fault of the program ended some of them, 130 stopped with Ctrl-C.
 
     Raises:
-        SettingError: a setting or folder that cannot be used, or a cluster that cannot be reached.
+        SettingError: a setting or folder cannot be used, or a cluster cannot be reached.
     """
     check_pool(settings.pool)
     identity = settings.plan.identity
@@ -74,7 +73,9 @@ def evaluate(settings: EvaluationSettings) -> int:
             _fly_missing(settings, folder)
             return _report(settings, folder, before)
         except KeyboardInterrupt:
-            _say_interrupted(settings, folder)
+            count = len(folder.rows())  # from disk: the signal may have come between writing and counting
+            kept = f"{count} of {len(settings.plan)} flights are kept in {folder.path}"
+            _note(f"interrupted; {kept}; go on with:\n  {settings.command}")
             return EXIT_INTERRUPTED
 
 
@@ -118,7 +119,7 @@ def _report(settings: EvaluationSettings, folder: EvaluationFolder, before: Eval
     if comparison is not None:
         print_comparison(comparison)
     sys.stdout.flush()
-    folder.write(folder.results, csv_text(rows))
+    folder.write(RESULTS, csv_text(rows))
     code = 1 if Verdict.ERROR in summary.verdicts else 0
 
     if not is_installed("matplotlib"):
@@ -129,32 +130,24 @@ def _report(settings: EvaluationSettings, folder: EvaluationFolder, before: Eval
     with console.status("drawing the report") as status:
         from framerunner.evaluation.report import Page, write_report
 
-        page = Page(
-            settings.plan.title, settings.mission, settings.pilot, settings.command, summary, comparison
-        )
-        write_report(
-            folder,
-            page,
-            lambda done, total: status.update(f"drawing the report, picture {done + 1} of {total}"),
-        )
+        def advance(done: int, total: int) -> None:
+            status.update(f"drawing the report, plot {done + 1} of {total}")
+
+        plan = settings.plan
+        page = Page(plan.title, settings.mission, settings.pilot, settings.command, summary, comparison)
+        write_report(folder, page, advance)
     print(f"left in {folder.path}/: report.html, results.csv", flush=True)
     return code
 
 
 def _print_flown(settings: EvaluationSettings, folder: EvaluationFolder, last: Row) -> None:
-    """Print what was flown until the folder took no more, with the flight that it did not take."""
+    """Print what was flown until a flight could not be written, with that flight."""
     rows = [row for row in folder.rows().values() if row.scenario != last.scenario]
     flown = f"{len(rows) + 1} of {len(settings.plan)} flights"
     print_summary(
         summarise([*rows, last]), f"{settings.plan.title}: {folder.identity.mission}, the first {flown}"
     )
     sys.stdout.flush()
-
-
-def _say_interrupted(settings: EvaluationSettings, folder: EvaluationFolder) -> None:
-    count = len(folder.rows())  # as it is on the disk: the signal may have come between writing and noting
-    _note(f"interrupted; {count} of {len(settings.plan)} flights are kept in {folder.path}; go on with:")
-    _note(f"  {settings.command}")
 
 
 def _note(line: str) -> None:

@@ -1,4 +1,4 @@
-"""What an evaluation is of: which scenarios, which mission; and a sum by which to know it again."""
+"""What an evaluation flies, which scenarios and which mission, and the identity by which it is recognised."""
 
 from __future__ import annotations
 
@@ -10,10 +10,9 @@ from dataclasses import asdict, dataclass
 from functools import cached_property
 from importlib import metadata
 from pathlib import Path
-from typing import Any, Self
 
+from errors import SettingError
 from firmware_py.airframe import AirframeError, load_airframe
-from framerunner.errors import SettingError
 from framerunner.flying.plan import FlightPlan
 from offboard.mission import Mission
 from offboard.pilot_file import PilotFile
@@ -25,7 +24,7 @@ from scenarios.yaml_file import SUFFIXES
 
 @dataclass(frozen=True, slots=True)
 class Identity:
-    """What results depend on. Two evaluations of one identity have the same results.
+    """What results depend on: evaluations with equal identities have equal results.
 
     Attributes:
         scenarios: SHA-256 of each scenario's content, by name, in order.
@@ -45,33 +44,17 @@ class Identity:
     seeds: tuple[int, ...]
     version: str
 
-    def as_dict(self) -> dict[str, Any]:
-        """Plain data for JSON."""
-        return asdict(self)
-
-    @classmethod
-    def from_dict(cls, data: Mapping[str, Any]) -> Self:
-        """Read what `as_dict` gave.
-
-        Raises:
-            KeyError: a field is missing.
-            TypeError: it is something else.
-        """
-        if not isinstance(data.get("scenarios"), Mapping):
-            raise TypeError("scenarios are missing")
-        return cls(**{**data, "seeds": tuple(data["seeds"])})
-
     @property
     def sha256(self) -> str:
-        """One sum over all of it."""
-        return _sum(json.dumps(self.as_dict()))
+        """Over all fields."""
+        return _sha256(json.dumps(asdict(self)))
 
     def difference(self, other: Identity) -> str:
-        """In a few words the first thing that is not the same; empty if all is."""
+        """The first difference in a few words; empty if there is none."""
         for what in ("mission", "pilot", "version"):
-            mine, theirs = getattr(self, what), getattr(other, what)
-            if mine != theirs:
-                return f"{what} {theirs}, not {mine}"
+            ours, theirs = getattr(self, what), getattr(other, what)
+            if ours != theirs:
+                return f"{what} {theirs}, not {ours}"
         if self.mission_sha256 != other.mission_sha256:
             return f"another content of mission {self.mission}"
         if self.pilot_sha256 != other.pilot_sha256:
@@ -91,8 +74,8 @@ class Plan:
     """What is to be flown.
 
     Attributes:
-        title: what it is called for people, such as "level calm, seeds 1 to 200".
-        label: the same for a folder's name.
+        title: for people, such as "level calm, seeds 1 to 200".
+        label: for a folder's name.
         scenarios: in order; names are unique.
         mission: checked.
         seeds: of everything random in each flight; that of a random scenario is its own.
@@ -105,7 +88,6 @@ class Plan:
     seeds: Sequence[int]
 
     def __len__(self) -> int:
-        """Number of flights."""
         return len(self.scenarios)
 
     @cached_property
@@ -114,18 +96,18 @@ class Plan:
         mission, pilot = self.mission, self.mission.pilot
         variables = json.dumps(mission.spec.variables, sort_keys=True, default=repr)
         return Identity(
-            scenarios={each.name: _sum(each.model_dump_json()) for each in self.scenarios},
+            scenarios={each.name: _sha256(each.model_dump_json()) for each in self.scenarios},
             mission=mission.name,
-            mission_sha256=_sum(f"{mission.native}\n{variables}"),
+            mission_sha256=_sha256(f"{mission.native}\n{variables}"),
             pilot=pilot.name if isinstance(pilot, PilotFile) else pilot.__qualname__,
-            pilot_sha256=_sum(pilot.text) if isinstance(pilot, PilotFile) else "",
+            pilot_sha256=_sha256(pilot.text) if isinstance(pilot, PilotFile) else "",
             seeds=tuple(self.seeds),
             version=metadata.version("framerunner"),
         )
 
     @property
     def default_out(self) -> Path:
-        """A folder that the same command finds again, and no other."""
+        """A folder whose name depends on the identity, so that the same command finds it again."""
         return Path("runs") / f"evaluate-{self.label}-{self.mission.name}-{self.identity.sha256[:6]}"
 
     def tasks(self, done: Collection[str] = ()) -> Iterator[FlightPlan]:
@@ -136,13 +118,7 @@ class Plan:
 
 
 def plan_level(level: str, first_seed: int, count: int, mission: Mission) -> Plan:
-    """Plan random scenarios of a level, seed after seed.
-
-    Args:
-        level: name or file.
-        first_seed: of the first scenario.
-        count: how many.
-        mission: checked.
+    """Plan `count` random scenarios of a level, name or file, with consecutive seeds.
 
     Raises:
         SettingError: the count is not positive.
@@ -151,7 +127,7 @@ def plan_level(level: str, first_seed: int, count: int, mission: Mission) -> Pla
     if count < 1:
         raise SettingError(f"--count {count}: must be 1 or more")
     loaded = load_level(level)
-    random_scenario(loaded, first_seed + count - 1)  # out of range? said before thousands are drawn
+    random_scenario(loaded, first_seed + count - 1)  # checks the last seed before thousands are drawn
     seeds = range(first_seed, first_seed + count)
     scenarios = [random_scenario(loaded, seed) for seed in seeds]
     last = f" to {first_seed + count - 1}" if count > 1 else ""
@@ -159,60 +135,56 @@ def plan_level(level: str, first_seed: int, count: int, mission: Mission) -> Pla
     return Plan(title, f"{loaded.name}-{first_seed}-{count}", _checked(scenarios), mission, seeds)
 
 
-def plan_files(places: Sequence[str], mission: Mission) -> Plan:
-    """Plan given scenarios.
-
-    Args:
-        places: names, files, or folders of scenario files.
-        mission: checked.
+def plan_files(sources: Sequence[str], mission: Mission) -> Plan:
+    """Plan given scenarios: names, files, or folders of scenario files.
 
     Raises:
-        ScenarioError: one of them is not good.
-        SettingError: a folder has none, or two have one name.
+        ScenarioError: one of them is invalid.
+        SettingError: a folder has none, or two have the same name.
     """
     named: dict[str, str] = {}
     scenarios = []
-    for source in [source for place in places for source in _sources(place)]:
-        scenario = load_scenario(source)
+    for file in [file for source in sources for file in _files(source)]:
+        scenario = load_scenario(file)
         if scenario.name in named:
             raise SettingError(
-                f"{source}: its name {scenario.name} is that of {named[scenario.name]} too; give each its own"
+                f"{file}: its name {scenario.name} is that of {named[scenario.name]} too; give each its own"
             )
-        named[scenario.name] = str(source)
+        named[scenario.name] = file
         scenarios.append(scenario)
-    title = ", ".join(places) if len(places) <= 4 else f"{len(places)} scenarios"
-    label = re.sub(r"[^a-z0-9_-]+", "-", Path(places[0]).stem.lower()).strip("-") if len(places) == 1 else ""
+    title = ", ".join(sources) if len(sources) <= 4 else f"{len(sources)} scenarios"
+    label = (
+        re.sub(r"[^a-z0-9_-]+", "-", Path(sources[0]).stem.lower()).strip("-") if len(sources) == 1 else ""
+    )
     return Plan(title, label[:40] or "scenarios", _checked(scenarios), mission, [0] * len(scenarios))
 
 
-def _sources(place: str) -> list[str]:
-    path = Path(place)
+def _files(source: str) -> list[str]:
+    path = Path(source)
     if not path.is_dir():
-        return [place]
+        return [source]
     files = sorted(str(each) for each in path.iterdir() if each.suffix in SUFFIXES)
     if not files:
-        raise SettingError(f"{place}: has no scenario files; they end in {' or '.join(SUFFIXES)}")
+        raise SettingError(f"{source}: has no scenario files; they end in {' or '.join(SUFFIXES)}")
     return files
 
 
 def _checked(scenarios: list[Scenario]) -> list[Scenario]:
-    """Refuse what would fail at take-off."""
-    known: set[str] = set()
+    """Load every airframe once, since a bad one would fail only at take-off."""
+    first: dict[str, Scenario] = {}
     for scenario in scenarios:
-        if scenario.airframe in known:
-            continue
+        first.setdefault(scenario.airframe, scenario)
+    for scenario in first.values():
         try:
             load_airframe(scenario.airframe)
         except AirframeError as error:
             raise ScenarioError(f"scenario {scenario.name}: {error}") from None
-        known.add(scenario.airframe)
     return scenarios
 
 
-def _sum(text: str) -> str:
+def _sha256(text: str) -> str:
     return hashlib.sha256(text.encode()).hexdigest()
 
 
 def _count(scenarios: Mapping[str, str]) -> str:
-    first = next(iter(scenarios), "none")
-    return f"{len(scenarios)} from {first}"
+    return f"{len(scenarios)} from {next(iter(scenarios), 'none')}"

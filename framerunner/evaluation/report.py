@@ -1,60 +1,75 @@
-"""`report.html`: one page with everything in it, for a browser, a phone or a printer."""
+"""`report.html`: one self-contained page for a browser, a phone or a printer.
+
+Importing this imports matplotlib, which is an extra.
+"""
 
 from __future__ import annotations
 
+import re
 import shlex
 from base64 import b64encode
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from io import BytesIO
+from io import BytesIO, StringIO
+from math import ceil
 from pathlib import Path
 
+import matplotlib as mpl
 from jinja2 import Environment, PackageLoader, StrictUndefined
 from markupsafe import Markup
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.ticker import MaxNLocator
 
-from framerunner.evaluation.charts import offset_chart, rate_colours, state_chart, time_chart
 from framerunner.evaluation.compare import Comparison
 from framerunner.evaluation.rows import Row
-from framerunner.evaluation.statistics import Spread, Summary
-from framerunner.evaluation.store import EvaluationFolder
-from framerunner.evaluation.tables import comparison_lines
+from framerunner.evaluation.statistics import Summary, crossing_offsets_m, mean_seconds_in_state
+from framerunner.evaluation.store import REPORT, EvaluationFolder
+from framerunner.evaluation.terminal import comparison_lines, spread_cells
+from framerunner.runs.plots import draw_track
 from scenarios.loader import load_scenario
-from scenarios.models import ScenarioError
+from scenarios.models import COLOURS, ScenarioError
 from scenarios.verdict import Verdict
 
-PICTURES_AT_MOST = 150
-"""More would make a page that phones cannot show; some 60 kB each."""
-_PICTURE_DPI = 84
+MAX_PLOTS = 150
+"""Of tracks; some 60 kB each. Phones cannot show a page with more."""
+_PLOT_DPI = 84
+VERDICT_COLOURS = {
+    "clean": "#117733",
+    "completed": "#88bb66",
+    "timed out": "#ddaa33",
+    "crashed": "#bb3344",
+    "aborted": "#777777",
+    "wrong order": "#aa4499",
+    "error": "#222222",
+}
+_FRAME_COLOURS = {"red": "#cc3311", "green": "#228833", "blue": "#3355bb"}
+_INK, _FAINT = "#262626", "#6b6b6b"
+_WIDTH_IN = 5.4
+_MAX_STATES = 14
 
 
 @dataclass(frozen=True, slots=True)
 class Failure:
-    """What the page shows of a flight that failed.
-
-    Attributes:
-        row: its numbers.
-        command: replays it.
-        picture: its track as a data URI; None without one.
-        traceback: if the program failed.
-    """
+    """What the page shows of a flight that failed; the command flies it again, the plot is a data URI."""
 
     row: Row
     command: str
-    picture: str | None
+    plot: str | None
     traceback: str
 
 
 @dataclass(frozen=True, slots=True)
 class Page:
-    """What a report tells.
+    """The content of a report, beside the flights.
 
     Attributes:
         title: what was flown, such as "level calm, seeds 1 to 200".
-        mission: name or file, as the command line takes it.
-        pilot: a contestant's file, as the command line takes it; None without one.
+        mission: name or file, as on the command line.
+        pilot: a contestant's file, as on the command line; None without one.
         command: makes the same evaluation.
-        summary: its numbers.
-        comparison: against an earlier one; None without.
+        summary: of the flights.
+        comparison: with an earlier evaluation; None without.
     """
 
     title: str
@@ -68,15 +83,10 @@ class Page:
 def write_report(
     folder: EvaluationFolder, page: Page, advance: Callable[[int, int], None] = lambda _done, _total: None
 ) -> None:
-    """Draw and write the page.
-
-    Args:
-        folder: all flights are in it.
-        page: what to tell beside them.
-        advance: called with pictures drawn and pictures to draw.
+    """Draw and write the page; `advance` is called with the number of tracks plotted so far and in all.
 
     Raises:
-        SettingError: the disk does not take it.
+        SettingError: the page cannot be written.
     """
     environment = Environment(
         loader=PackageLoader("framerunner.evaluation"),
@@ -85,89 +95,80 @@ def write_report(
         trim_blocks=True,
         lstrip_blocks=True,
     )
-    environment.filters["spread"] = _spread_cells
+    environment.filters["spread"] = lambda spread, form: spread_cells(spread, form, "–")
     rows = list(folder.rows().values())
     failures = _failures(folder, page, advance)
+    with mpl.rc_context({"text.parse_math": False}):  # a state's name may have a dollar sign
+        charts = [
+            ("Try times", "how long from motors on to motors off", Markup(_time_chart(rows))),
+            ("Crossings", "how far off the opening's middle", Markup(_offset_chart(rows))),
+            ("Where time goes", "mean seconds in each state of the mission", Markup(_state_chart(rows))),
+        ]
     text = environment.get_template("report.html.j2").render(
         page=page,
         identity=folder.identity,
         summary=page.summary,
         comparison=page.comparison,
         comparison_lines=comparison_lines(page.comparison) if page.comparison else [],
-        charts=[
-            ("Try times", "how long from motors on to motors off", Markup(time_chart(rows))),
-            ("Crossings", "how far off the opening's middle", Markup(offset_chart(rows))),
-            ("Where time goes", "mean seconds in each state of the mission", Markup(state_chart(rows))),
-        ],
-        colours=rate_colours(),
+        charts=charts,
+        colours=VERDICT_COLOURS,
         failures=failures,
-        pictures_at_most=PICTURES_AT_MOST,
+        max_plots=MAX_PLOTS,
     )
-    folder.write(folder.report, text)
+    folder.write(REPORT, text)
 
 
 def replay_command(path: Path, mission: str, pilot: str | None, seed: int) -> str:
-    """The command that flies one flight of an evaluation again, the same to the last bit.
-
-    Args:
-        path: the scenario's file.
-        mission: name or file.
-        pilot: a contestant's file; None without one.
-        seed: of the flight.
-    """
+    """The command that flies the scenario of a file again, the same to the last bit."""
     words = ["framerunner", "fly", str(path), "--mission", mission]
     words += ["--pilot", pilot] if pilot else []
     words += ["--seed", str(seed)] if seed else []
     return shlex.join([*words, "--lockstep"])
 
 
-def picked_for_pictures(summary: Summary, most: int) -> set[str]:
-    """Names of failures to draw: of every cause in turn, so that none is left out by frequent ones."""
+def picked_for_plots(summary: Summary, count: int) -> set[str]:
+    """Names of failures to plot: of every cause in turn, so that rare causes are not left out."""
     picked: list[str] = []
-    deepest = max((len(cause.rows) for cause in summary.causes), default=0)
-    for index in range(deepest):
+    for index in range(max((len(cause.rows) for cause in summary.causes), default=0)):
         picked += [cause.rows[index].scenario for cause in summary.causes if index < len(cause.rows)]
-        if len(picked) >= most:
+        if len(picked) >= count:
             break
-    return set(picked[:most])
+    return set(picked[:count])
 
 
 def _failures(
     folder: EvaluationFolder, page: Page, advance: Callable[[int, int], None]
 ) -> list[tuple[str, str, list[Failure]]]:
-    """By cause: verdict, cause, flights."""
-    drawn = picked_for_pictures(page.summary, PICTURES_AT_MOST)
+    """Verdict, cause and flights, for each cause."""
+    picked = picked_for_plots(page.summary, MAX_PLOTS)
     done = 0
     groups = []
     for cause in page.summary.causes:
         failures = []
         for row in cause.rows:
-            picture = None
-            if row.scenario in drawn:
-                advance(done, len(drawn))
-                picture = _picture(folder, row)
+            plot = None
+            if row.scenario in picked:
+                advance(done, len(picked))
+                plot = _track_plot(folder, row)
                 done += 1
-            command = replay_command(
-                folder.scenario_file(row.scenario), page.mission, page.pilot, row.seed or 0
-            )
-            failures.append(Failure(row, command, picture, _traceback(folder, row)))
+            file = folder.scenario_file(row.scenario)
+            command = replay_command(file, page.mission, page.pilot, row.seed or 0)
+            failures.append(Failure(row, command, plot, _traceback(folder, row)))
         groups.append((cause.verdict, cause.cause, failures))
     return groups
 
 
-def _picture(folder: EvaluationFolder, row: Row) -> str | None:
-    """The track as a PNG within a data URI; None if the flight has none."""
+def _track_plot(folder: EvaluationFolder, row: Row) -> str | None:
+    """The track as a PNG in a data URI; None if it is not known."""
     track = folder.track(row.scenario)
     if len(track) == 0:
         return None
-    from framerunner.runs.drawing import draw_track
-
     try:
         scenario = load_scenario(folder.scenario_file(row.scenario))
     except ScenarioError:
-        return None  # somebody has tidied up; the page does without
+        return None  # the file was removed
     png = BytesIO()
-    draw_track(scenario, track, row).savefig(png, format="png", dpi=_PICTURE_DPI)
+    draw_track(scenario, track, row).savefig(png, format="png", dpi=_PLOT_DPI)
     return f"data:image/png;base64,{b64encode(png.getvalue()).decode()}"
 
 
@@ -180,8 +181,105 @@ def _traceback(folder: EvaluationFolder, row: Row) -> str:
         return ""
 
 
-def _spread_cells(spread: Spread | None, form: str) -> Sequence[str]:
-    """10 %, median, 90 % and mean, for a table."""
-    if spread is None:
-        return ["–"] * 4
-    return [format(number, form) for number in (spread.p10, spread.median, spread.p90, spread.mean)]
+def _time_chart(rows: Sequence[Row]) -> str:
+    """Histogram of try times by verdict, of all flights without an error."""
+    times: dict[str, list[float]] = {verdict: [] for verdict in VERDICT_COLOURS}
+    for row in rows:
+        if row.verdict is not Verdict.ERROR:
+            times[row.verdict].append(row.try_time_s)
+    verdicts = [verdict for verdict, times_s in times.items() if times_s]
+    figure, axes = _new_chart(2.9)
+    if verdicts:
+        last_s = max(max(times[verdict]) for verdict in verdicts)
+        step_s = 5.0 if last_s > 60.0 else max(last_s / 12.0, 0.1)
+        colours = [VERDICT_COLOURS[verdict] for verdict in verdicts]
+        _histogram(axes, [times[verdict] for verdict in verdicts], step_s, verdicts, colours)
+    _name_axes(axes, "try time (s)", "flights")
+    return _svg(figure, "time")
+
+
+def _offset_chart(rows: Sequence[Row]) -> str:
+    """Histogram of the crossings' distances from the frame's centre, by colour."""
+    offsets = {colour: crossing_offsets_m(rows, colour) for colour in COLOURS}
+    colours = [colour for colour in COLOURS if offsets[colour]]
+    figure, axes = _new_chart(2.9)
+    if colours:
+        step_m = 0.01 if max(max(offsets[colour]) for colour in colours) > 0.05 else 0.005
+        labels = [f"{colour} ({len(offsets[colour])})" for colour in colours]
+        fills = [_FRAME_COLOURS[colour] for colour in colours]
+        _histogram(axes, [offsets[colour] for colour in colours], step_m, labels, fills)
+    _name_axes(axes, "distance from the opening's middle (m)", "crossings")
+    return _svg(figure, "offset")
+
+
+def _histogram(
+    axes: Axes, parts: Sequence[Sequence[float]], step: float, labels: Sequence[str], colours: Sequence[str]
+) -> None:
+    """Draw a stacked histogram that begins at zero."""
+    last = max(max(part) for part in parts)
+    edges = [step * number for number in range(ceil(last / step + 1e-9) + 1)]
+    axes.hist(list(parts), edges, stacked=True, color=list(colours), label=list(labels), ec="white", lw=0.5)
+    axes.legend(frameon=False, fontsize=8, labelcolor=_INK)
+
+
+def _name_axes(axes: Axes, across: str, up: str) -> None:
+    axes.set_xlabel(across)
+    axes.set_ylabel(up)
+    axes.yaxis.set_major_locator(MaxNLocator(6, integer=True))
+    axes.set_xlim(left=0.0)
+
+
+def _state_chart(rows: Sequence[Row]) -> str:
+    """Mean seconds in each kind of state, of flights that landed in time and of those that failed."""
+    flown = [row for row in rows if row.verdict is not Verdict.ERROR]
+    groups = {
+        "landed in time": ([row for row in flown if row.completed], VERDICT_COLOURS["clean"]),
+        "failed": ([row for row in flown if not row.completed], VERDICT_COLOURS["timed out"]),
+    }
+    means_s = {name: mean_seconds_in_state(group) for name, (group, _) in groups.items()}
+    order = dict.fromkeys(state for row in flown for state in row.seconds_in_state)  # as they are flown
+    states = [state for state in order if any(mean.get(state, 0.0) >= 0.05 for mean in means_s.values())]
+    states = states[:_MAX_STATES]
+    figure, axes = _new_chart(max(0.7 + 0.34 * len(states), 1.4))
+    shown = [(name, len(group), colour) for name, (group, colour) in groups.items() if group]
+    height = 0.8 / max(len(shown), 1)
+    for number, (name, count, colour) in enumerate(shown):
+        positions = [index + (number - (len(shown) - 1) / 2) * height for index in range(len(states))]
+        seconds = [means_s[name].get(state, 0.0) for state in states]
+        bars = axes.barh(positions, seconds, height * 0.92, color=colour, label=f"{name} ({count})")
+        axes.bar_label(bars, [f"{value:.1f}" for value in seconds], padding=2, fontsize=7, color=_FAINT)
+    axes.set_yticks(range(len(states)), [state.replace("_", " ") or "no mission" for state in states])
+    axes.invert_yaxis()
+    axes.margins(x=0.12)
+    axes.set_xlabel("mean seconds a flight")
+    axes.grid(visible=False, axis="y")
+    if shown:
+        axes.legend(frameon=False, fontsize=8, labelcolor=_INK, loc="best")
+    return _svg(figure, "state")
+
+
+def _new_chart(height_in: float) -> tuple[Figure, Axes]:
+    figure = Figure(figsize=(_WIDTH_IN, height_in), layout="constrained")
+    axes = figure.add_subplot()
+    axes.set_axisbelow(True)
+    axes.grid(color="#000000", alpha=0.08, linewidth=0.6)
+    axes.tick_params(labelsize=8, colors=_INK, length=2)
+    axes.xaxis.label.set(fontsize=9, color=_INK)
+    axes.yaxis.label.set(fontsize=9, color=_INK)
+    for side, spine in axes.spines.items():
+        spine.set_visible(side in ("left", "bottom"))
+        spine.set_color("#bbbbbb")
+    return figure, axes
+
+
+def _svg(figure: Figure, name: str) -> str:
+    """The figure as an SVG element: no header, size or date, and ids that are unique within the page."""
+    text = StringIO()
+    with mpl.rc_context({"svg.hashsalt": name}):
+        figure.savefig(text, format="svg", metadata={"Date": None, "Creator": None}, transparent=True)
+    svg = text.getvalue()
+    svg = svg[svg.index("<svg") :]
+    svg = re.sub(r'(<svg[^>]*?) height="[^"]*"', r"\1", svg, count=1)
+    svg = re.sub(r'(<svg[^>]*?) width="[^"]*"', r"\1", svg, count=1)
+    svg = re.sub(r"<metadata>.*?</metadata>", "", svg, flags=re.DOTALL)
+    return re.sub(r'(\bid="|href="#|url\(#)', rf"\g<1>{name}-", svg)

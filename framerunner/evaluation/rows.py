@@ -1,4 +1,4 @@
-"""What is kept of a flight: a row in `flights.jsonl`, and one in `results.csv`."""
+"""What is kept of a flight: a row of `flights.jsonl` and of `results.csv`."""
 
 from __future__ import annotations
 
@@ -13,17 +13,17 @@ from framerunner.runs.track import Track
 from scenarios.result import FlightResult, spreadsheet_cell
 from scenarios.verdict import Verdict
 
-_NO_COLUMNS = ("lift_m", "timing", "wall_time_s", "real_time_factor", "started")  # of flights in real time
-COLUMNS = tuple(name for name in FlightResult.model_fields if name not in _NO_COLUMNS)
-_OF_ERRORS = ("scenario", "mission", "seed", "verdict", "reason", "version")
+_REAL_TIME_ONLY = ("lift_m", "timing", "wall_time_s", "real_time_factor", "started")
+COLUMNS = tuple(name for name in FlightResult.model_fields if name not in _REAL_TIME_ONLY)
+_COLUMNS_OF_ERRORS = ("scenario", "mission", "seed", "verdict", "reason", "version")
 
 
 class Row(FlightResult):
     """The result of a flight of an evaluation; the verdict is `error` if a fault of the program ended it.
 
     Attributes:
-        track: where the drone was, thinned out; only of flights that failed, and not in the files of rows.
-        traceback: of the fault that broke the flight off; empty if there was none, not in the files of rows.
+        track: reduced to fewer samples; only of flights that failed, and not in the files of rows.
+        traceback: of the fault that ended the flight; empty if there was none, not in the files of rows.
     """
 
     track: Track | None = Field(None, exclude=True, repr=False)
@@ -31,7 +31,7 @@ class Row(FlightResult):
 
     @property
     def cause(self) -> str:
-        """Where or by what a flight came to its end: the mission's state, or the kind of fault."""
+        """Why a flight ended: the mission's state, or the kind of fault."""
         return self.reason.partition(":")[0] if self.verdict is Verdict.ERROR else self.mission_state
 
     def to_json(self) -> str:
@@ -42,10 +42,7 @@ class Row(FlightResult):
 def csv_text(rows: Iterable[Row]) -> str:
     """The rows as comma-separated values with a header line; the same for the same flights.
 
-    Lists are joined by ";", times in states are written "turning=2.5;crossing=4", what is not known is empty.
-
-    Args:
-        rows: in the order in which they are to stand.
+    Lists are joined by ";", times in states are written "turning=2.5;crossing=4", unknown values are empty.
     """
     text = StringIO()
     writer = csv.writer(text, lineterminator="\n")
@@ -56,8 +53,8 @@ def csv_text(rows: Iterable[Row]) -> str:
 
 
 def _cell(row: Row, name: str) -> str:
-    if row.verdict is Verdict.ERROR and name not in _OF_ERRORS:
-        return ""  # it was not flown to its end: its numbers would be no results
+    if row.verdict is Verdict.ERROR and name not in _COLUMNS_OF_ERRORS:
+        return ""  # it did not end, so its numbers are no results
     value = getattr(row, name)
     if isinstance(value, Mapping):
         return ";".join(f"{spreadsheet_cell(key)}={number}" for key, number in value.items())

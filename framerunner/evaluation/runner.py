@@ -1,4 +1,4 @@
-"""Flies plans in this process, in others, or on a cluster, and hands each row on as soon as it is there."""
+"""Flies plans in this process, in others or on a cluster, and yields each row as its flight ends."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ import time
 import traceback
 import warnings
 from collections.abc import Generator, Iterable, Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass, replace
 from functools import lru_cache
 from importlib import metadata
@@ -18,6 +18,7 @@ from multiprocessing import get_context
 from multiprocessing.connection import Connection
 from typing import Any
 
+from errors import UserError
 from framerunner.evaluation.backends import Pool, Workers, is_lost_worker, open_pool
 from framerunner.evaluation.rows import Row
 from framerunner.flying.lockstep import fly_lockstep
@@ -26,25 +27,22 @@ from framerunner.runs.track import Track
 from offboard.mission import Mission
 from scenarios.verdict import Verdict
 
-_LOOK_UP_S = 0.5
+_PARENT_CHECK_S = 0.5
 TRACK_STEP_S = 0.2
-"""Between two samples that are kept for a picture."""
+"""Between two samples that are kept for a plot."""
 _ONE_AT_A_TIME = threading.Lock()
-"""A cluster's worker may have several threads; JSBSim promises nothing about being used by two of them."""
+"""A cluster's worker may have several threads, and JSBSim is not documented to be thread-safe."""
 
 
-class WorkerDiedError(Exception):
-    """The process that flew was ended, by its own code or from outside."""
+class WorkerDiedError(UserError):
+    """The process of a flight ended before the flight, by its own code or from outside; a line for people."""
 
 
 @dataclass(frozen=True, slots=True)
-class Parcel:
-    """A flight on its way to who flies it: some 20 kB.
+class _Task:
+    """A flight as it is sent to a worker, some 20 kB, by the process `sender`.
 
-    Attributes:
-        plan: without its mission.
-        mission: packed once for all, and unpacked once in each process.
-        sender: process id of who sent it.
+    The mission is taken out of the plan, pickled once for all flights, and unpickled once in each process.
     """
 
     plan: FlightPlan
@@ -53,92 +51,92 @@ class Parcel:
 
 
 def fly_all(tasks: Iterable[FlightPlan], pool: Pool) -> Generator[Row, None, None]:
-    """Fly all tasks.
+    """Fly all plans.
 
-    No more than a few are under way at a time, and nothing is kept here of those that are over. If a
-    worker dies, every flight that was under way is flown once more, each in a process of its own; the one
-    that ends its process again has the verdict "error".
+    Only a few are taken from `tasks` at a time, and nothing is kept of those that have ended. If a worker
+    dies, every flight that was running is flown once more, each in its own process; one that ends its process
+    again gets the verdict "error".
 
     Args:
-        tasks: flights; their scenarios have different names.
-        pool: who flies.
+        tasks: plans; their scenarios have different names.
+        pool: where they are flown.
 
     Yields:
         Rows as the flights end, in any order.
 
     Raises:
-        SettingError: the pool cannot be had.
+        SettingError: see `open_pool`.
     """
-    if pool.in_process:
+    if pool.backend == "loky" and pool.jobs == 1:  # no other process is needed
         _prepare_process()
         yield from map(fly_task, tasks)
         return
     waiting = iter(tasks)
     with open_pool(pool) as workers:
         while True:
-            under_way: dict[str, FlightPlan] = {}
+            running: dict[str, FlightPlan] = {}
             try:
-                yield from _fly_together(waiting, workers, under_way)
+                yield from _fly_in_pool(waiting, workers, running)
             except Exception as error:
                 if not is_lost_worker(error):
                     raise
             else:
                 return
-            yield from (fly_alone(task) for task in list(under_way.values()))
+            yield from (fly_alone(task) for task in list(running.values()))
 
 
-def _fly_together(
-    waiting: Iterator[FlightPlan], workers: Workers, under_way: dict[str, FlightPlan]
+def _fly_in_pool(
+    waiting: Iterator[FlightPlan], workers: Workers, running: dict[str, FlightPlan]
 ) -> Iterator[Row]:
-    """Fly in the pool; `under_way` has what has been handed out and has not come back."""
+    """Fly in the pool; `running` gets the plans that were sent and whose rows have not been received."""
     from joblib import delayed
 
-    packed = _Packer()
+    packer = _Packer()
 
-    def parcels() -> Iterator[Any]:
-        for task in waiting:
-            under_way[task.scenario.name] = task
-            yield delayed(_fly_parcel)(packed.parcel(task))
+    def calls() -> Iterator[Any]:
+        for plan in waiting:
+            running[plan.scenario.name] = plan
+            yield delayed(_fly_in_worker)(packer.task(plan))
 
-    with _hidden_from_ctrl_c():
-        rows = workers(parcels())
+    with _sigint_blocked():
+        rows = workers(calls())
     try:
         for row in rows:
-            del under_way[row.scenario]
+            del running[row.scenario]
             yield row
     finally:
-        with warnings.catch_warnings():  # that flights are broken off is what is wanted
+        with warnings.catch_warnings():  # joblib warns that it stops running flights, which is intended
             warnings.simplefilter("ignore")
             rows.close()
 
 
 class _Packer:
-    """Packs missions; the same one again without work."""
+    """Makes tasks of plans; pickles a mission once."""
 
     def __init__(self) -> None:
         self._mission: Mission | None = None
         self._packed = b""
 
-    def parcel(self, task: FlightPlan) -> Parcel:
-        """Make a task ready to be sent."""
-        if task.mission is not self._mission:
-            self._mission, self._packed = task.mission, pickle.dumps(task.mission)
-        return Parcel(replace(task, mission=None), self._packed, os.getpid())
+    def task(self, plan: FlightPlan) -> _Task:
+        if plan.mission is not self._mission:
+            self._mission, self._packed = plan.mission, pickle.dumps(plan.mission)
+        return _Task(replace(plan, mission=None), self._packed, os.getpid())
 
 
-def fly_alone(task: FlightPlan) -> Row:
-    """Fly in a process of its own, which may die."""
+def fly_alone(plan: FlightPlan) -> Row:
+    """Fly in a new process, which may die."""
     context = get_context("spawn")
     receiver, sender = context.Pipe(duplex=False)
-    process = context.Process(target=_send_flight, args=(_Packer().parcel(task), sender), daemon=True)
-    with _hidden_from_ctrl_c():
+    process = context.Process(target=_send_flight, args=(_Packer().task(plan), sender), daemon=True)
+    with _sigint_blocked():
         process.start()
     sender.close()
     try:
         row: Row = receiver.recv()
     except EOFError:
         process.join()
-        row = broken_off(task, WorkerDiedError(f"the flight ended its process ({_ending(process.exitcode)})"))
+        ending = _ending(process.exitcode)
+        row = _error_row(plan, WorkerDiedError(f"the flight ended its process ({ending})"))
     finally:
         process.kill()
         process.join()
@@ -152,33 +150,30 @@ def _ending(exit_code: int | None) -> str:
     return f"exit code {exit_code}"
 
 
-def _send_flight(parcel: Parcel, sender: Connection) -> None:
-    row = _fly_parcel(parcel)
-    try:
+def _send_flight(task: _Task, sender: Connection) -> None:
+    row = _fly_in_worker(task)
+    with suppress(BrokenPipeError):  # the receiver has gone
         sender.send(row)
-    except BrokenPipeError:
-        return  # nobody waits for it any more
 
 
-def _fly_parcel(parcel: Parcel) -> Row:
-    """Fly in a worker."""
+def _fly_in_worker(task: _Task) -> Row:
     _prepare_process()
-    if os.getppid() == parcel.sender:
-        _end_with(parcel.sender)
-    return fly_task(replace(parcel.plan, mission=_unpack(parcel.mission)))
+    if os.getppid() == task.sender:
+        _end_with(task.sender)
+    return fly_task(replace(task.plan, mission=_unpack(task.mission)))
 
 
 @lru_cache(maxsize=1)
 def _unpack(mission: bytes) -> Mission:
-    """The mission with its chart, which takes a while to build; it keeps nothing of a flight."""
-    unpacked = pickle.loads(mission)  # what `_Packer` has packed
+    """The mission, cached because its chart takes a while to build; a flight leaves nothing in it."""
+    unpacked = pickle.loads(mission)  # from `_Packer`
     assert isinstance(unpacked, Mission)
     return unpacked
 
 
 @lru_cache(maxsize=1)
 def _prepare_process() -> None:
-    """One flight, one core: images and matrices are too small to share among threads."""
+    """Use one core for one flight: images and matrices are too small for several threads."""
     import cv2
 
     cv2.setNumThreads(1)
@@ -186,21 +181,21 @@ def _prepare_process() -> None:
 
 @lru_cache(maxsize=1)
 def _end_with(parent: int) -> None:
-    """See to it that this process does not outlive the one that started it, however that ends."""
+    """End this process when its parent has ended, for whatever reason."""
 
     def watch() -> None:
         while os.getppid() == parent:
-            time.sleep(_LOOK_UP_S)
+            time.sleep(_PARENT_CHECK_S)
         os._exit(1)
 
     threading.Thread(target=watch, daemon=True).start()
 
 
 @contextmanager
-def _hidden_from_ctrl_c() -> Iterator[None]:
-    """Processes started within do not hear of Ctrl-C; this one hears of it afterwards, and ends them.
+def _sigint_blocked() -> Iterator[None]:
+    """Processes started within never get SIGINT; this one gets it afterwards, and ends them.
 
-    A terminal sends the signal to all of them; whether it is blocked, a child inherits.
+    A terminal sends SIGINT to all processes, and a child inherits whether it is blocked.
     """
     before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
     try:
@@ -210,16 +205,13 @@ def _hidden_from_ctrl_c() -> Iterator[None]:
 
 
 def fly_task(plan: FlightPlan) -> Row:
-    """Fly, and tell of it, whatever happens.
-
-    Args:
-        plan: what to fly; with a mission.
+    """Fly a plan with a mission.
 
     Returns:
         The flight's row; with the verdict "error" and a traceback if the program failed.
 
     Raises:
-        KeyboardInterrupt: somebody pressed Ctrl-C.
+        KeyboardInterrupt: Ctrl-C was pressed.
     """
     try:
         with _ONE_AT_A_TIME:
@@ -229,12 +221,12 @@ def fly_task(plan: FlightPlan) -> Row:
     except KeyboardInterrupt:
         raise
     except BaseException as error:  # a contestant's code may raise anything, SystemExit too
-        return broken_off(plan, error)
+        return _error_row(plan, error)
     track = None if flown.result.completed else thinned(flown.track)
     return Row(**dict(flown.result), track=track)
 
 
-def broken_off(plan: FlightPlan, error: BaseException) -> Row:
+def _error_row(plan: FlightPlan, error: BaseException) -> Row:
     """The row of a flight that a fault of the program ended."""
     text = " ".join(str(error).split())
     kind = type(error).__name__
@@ -251,14 +243,9 @@ def broken_off(plan: FlightPlan, error: BaseException) -> Row:
 
 
 def thinned(track: Track, step_s: float = TRACK_STEP_S) -> Track:
-    """Leave out what a picture does not need; changes of state stay where they are.
+    """Keep the samples that a plot needs: both ends, changes of state, and one every `step_s`.
 
-    Args:
-        track: as recorded.
-        step_s: between two samples that stay.
-
-    Returns:
-        Rounded to milliseconds and millimetres.
+    Times are rounded to milliseconds and positions to millimetres.
     """
     states, times = track.mission_state, track.time_s
     kept: list[int] = []

@@ -16,14 +16,7 @@ CONFIDENCE = 0.95
 
 @dataclass(frozen=True, slots=True)
 class Rate:
-    """How often something happened, and between what its true rate lies with 95 % confidence.
-
-    Attributes:
-        count: times it happened.
-        total: times it could have.
-        low: lower end of the interval, 0 to 1.
-        high: upper end.
-    """
+    """`count` of `total` flights, with the 95 % confidence interval of the true rate, 0 to 1."""
 
     count: int
     total: int
@@ -32,7 +25,7 @@ class Rate:
 
     @property
     def share(self) -> float:
-        """From 0 to 1; 0 of nothing."""
+        """From 0 to 1; 0 if the total is 0."""
         return self.count / self.total if self.total else 0.0
 
     def __str__(self) -> str:
@@ -42,15 +35,7 @@ class Rate:
 
 @dataclass(frozen=True, slots=True)
 class Spread:
-    """How numbers are spread.
-
-    Attributes:
-        count: of numbers.
-        mean: average.
-        p10: a tenth is below.
-        median: half is below.
-        p90: nine tenths are below.
-    """
+    """The distribution of some numbers: mean and the 10th, 50th and 90th percentile."""
 
     count: int
     mean: float
@@ -61,13 +46,7 @@ class Spread:
 
 @dataclass(frozen=True, slots=True)
 class Cause:
-    """Failures that ended alike.
-
-    Attributes:
-        verdict: of all of them.
-        cause: see `Row.cause`.
-        rows: the flights.
-    """
+    """Failures that have the verdict and the `Row.cause` in common."""
 
     verdict: str
     cause: str
@@ -80,13 +59,13 @@ class Summary:
 
     Attributes:
         flights: how many.
-        landed: clean or completed: the whole task within the limit.
+        landed: clean or completed: the whole task within the time limit.
         verdicts: by verdict, best first; only those that occurred.
         try_time_s: of flights that landed; None if none did.
         offset_m: of crossings, by the frame's colour; only those that were crossed.
         landing_error_m: of flights that landed; None if none did.
         penalised: flights that were outside the arena.
-        seconds_in_state: mean over all flights that were flown, by kind of state, longest first.
+        seconds_in_state: mean over all flights without an error, by kind of state, longest first.
         causes: of failures, most frequent first.
     """
 
@@ -102,13 +81,9 @@ class Summary:
 
 
 def wilson(count: int, total: int) -> Rate:
-    """A rate with its interval by Wilson's score, which holds for few flights and for rates near 0 and 1.
+    """A rate with its interval by Wilson's score, which is valid for few flights and rates near 0 and 1.
 
     Source: E. B. Wilson, Probable inference, the law of succession, and statistical inference (1927).
-
-    Args:
-        count: times it happened.
-        total: times it could have.
     """
     from scipy.stats import binomtest
 
@@ -119,7 +94,7 @@ def wilson(count: int, total: int) -> Rate:
 
 
 def spread(numbers: Sequence[float]) -> Spread | None:
-    """How numbers are spread; None if there are none."""
+    """The distribution of some numbers; None if there are none."""
     if not numbers:
         return None
     if len(numbers) == 1:
@@ -148,7 +123,7 @@ def summarise(rows: Sequence[Row]) -> Summary:
 
 
 def crossing_offsets_m(rows: Iterable[Row], colour: str) -> list[float]:
-    """How far from the middle of a frame of some colour it was crossed."""
+    """How far from the centre of the frame of a colour it was crossed, in all flights that crossed it."""
     return [
         offset_m
         for row in rows
@@ -158,7 +133,7 @@ def crossing_offsets_m(rows: Iterable[Row], colour: str) -> list[float]:
 
 
 def mean_seconds_in_state(rows: Sequence[Row]) -> dict[str, float]:
-    """Mean time a flight spends in each kind of state, longest first; flights that never came there count."""
+    """Mean time in each kind of state, longest first, over all flights, also those that never entered it."""
     sums: Counter[str] = Counter()
     for row in rows:
         sums.update(row.seconds_in_state)

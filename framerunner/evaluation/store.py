@@ -1,4 +1,4 @@
-"""The folder of an evaluation: every flight is kept at once, and a stopped evaluation is found again."""
+"""The folder of an evaluation: each flight is kept as it ends, and a stopped evaluation can be continued."""
 
 from __future__ import annotations
 
@@ -9,11 +9,13 @@ import os
 import shutil
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
-from framerunner.errors import SettingError
+from pydantic import TypeAdapter
+
+from errors import SettingError
 from framerunner.evaluation.plan import Identity
 from framerunner.evaluation.rows import Row
 from framerunner.runs.track import Track
@@ -22,49 +24,40 @@ from scenarios.models import Scenario
 
 FORMAT = 1
 IDENTITY, FLIGHTS, LOCK = "evaluation.json", "flights.jsonl", ".lock"
+RESULTS, REPORT = "results.csv", "report.html"
 _FOLDERS = ("scenarios", "tracks", "errors")
-_FILES = (IDENTITY, FLIGHTS, "results.csv", "report.html")
+_FILES = (IDENTITY, FLIGHTS, RESULTS, REPORT)
 
 
 @dataclass(frozen=True, slots=True)
 class EvaluationFolder:
-    """`evaluation.json` says what it is of, `flights.jsonl` has a line for each flight that is over.
+    """`evaluation.json` has the identity, `flights.jsonl` a line for each flight that has ended.
 
     Attributes:
         path: the folder.
-        identity: what it is of.
-        done: scenarios of all flights that are over; their rows stay on the disk, there may be thousands.
+        identity: of the evaluation.
+        done: scenarios of all flights that have ended; their rows stay on disk, there may be thousands.
     """
 
     path: Path
     identity: Identity
     done: set[str]
 
-    @property
-    def results(self) -> Path:
-        """The table."""
-        return self.path / "results.csv"
-
-    @property
-    def report(self) -> Path:
-        """The page."""
-        return self.path / "report.html"
-
     def scenario_file(self, name: str) -> Path:
         """The file of a scenario that was flown."""
         return self.path / "scenarios" / f"{name}.yaml"
 
     def error_file(self, name: str) -> Path:
-        """The traceback of a flight that was broken off."""
+        """The traceback of a flight that a fault of the program ended."""
         return self.path / "errors" / f"{name}.txt"
 
     def keep(self, scenario: Scenario, row: Row) -> None:
-        """Write a flight so that neither a kill nor a power cut takes it away.
+        """Write a flight so that it survives a kill and a power cut.
 
-        Its line comes last, so a flight that has one has all its files.
+        Its line is written last, so a flight that has a line has all its files.
 
         Raises:
-            SettingError: the disk does not take it.
+            SettingError: it cannot be written.
         """
         with _writing(self.path):
             self.scenario_file(row.scenario).write_text(dump_yaml(scenario), encoding="utf-8")
@@ -75,31 +68,27 @@ class EvaluationFolder:
                 self.error_file(row.scenario).write_text(row.traceback, encoding="utf-8")
             with (self.path / FLIGHTS).open("ab", buffering=0) as file:
                 line = row.to_json().encode() + b"\n"
-                if file.write(line) < len(line):  # a full disk takes a part; the next start takes that away
+                if file.write(line) < len(line):  # a part was written; the next start removes it
                     raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
                 os.fsync(file.fileno())
         self.done.add(row.scenario)
 
     def rows(self) -> dict[str, Row]:
-        """All rows by scenario, in the scenarios' order; without tracks."""
+        """All rows by scenario, in the scenarios' order, without tracks."""
         found, _ = _read_rows(self.path / FLIGHTS, self.identity)
         return {name: found[name] for name in self.identity.scenarios if name in found}
 
     def track(self, name: str) -> Track:
-        """Where the drone was in a flight that failed; empty if that is not known."""
+        """The track of a flight that failed; empty if it is not known."""
         try:
             return _track_from_dict(json.loads(self._track_file(name).read_text(encoding="utf-8")))
         except (OSError, ValueError, KeyError, TypeError):
             return Track()
 
-    def write(self, path: Path, text: str) -> None:
-        """Write a file of the folder whole or not at all.
-
-        Raises:
-            SettingError: the disk does not take it.
-        """
+    def write(self, name: str, text: str) -> None:
+        """Write a file of the folder completely or not at all; raises `SettingError`."""
         with _writing(self.path):
-            _replace(path, text)
+            _replace(self.path / name, text)
 
     def _track_file(self, name: str) -> Path:
         return self.path / "tracks" / f"{name}.json"
@@ -107,15 +96,15 @@ class EvaluationFolder:
 
 @contextmanager
 def open_folder(path: Path, identity: Identity, *, again: bool = False) -> Iterator[EvaluationFolder]:
-    """Make an evaluation's folder, or go on with the one that is there; nobody else can meanwhile.
+    """Make an evaluation's folder or continue an existing one, and lock it.
 
     Args:
         path: the folder.
         identity: of what is to be flown.
-        again: forget what was flown before.
+        again: delete what was flown before.
 
     Raises:
-        SettingError: the folder is of something else, is in use, or cannot be written to.
+        SettingError: the folder belongs to something else, is in use, or cannot be written to.
     """
     with _writing(path):
         path.mkdir(parents=True, exist_ok=True)
@@ -131,23 +120,19 @@ def open_folder(path: Path, identity: Identity, *, again: bool = False) -> Itera
         with _writing(path):
             if is_new:
                 _clear(path)
-                data = {"format": FORMAT, **identity.as_dict()}
+                data = {"format": FORMAT, **asdict(identity)}
                 _replace(path / IDENTITY, json.dumps(data, indent=2) + "\n")
             for name in _FOLDERS:
                 (path / name).mkdir(exist_ok=True)
-            done = _mended(path / FLIGHTS, identity)
+            done = _repair(path / FLIGHTS, identity)
         yield EvaluationFolder(path, identity, done)
 
 
 def read_folder(path: Path, option: str) -> EvaluationFolder:
-    """Read an evaluation without changing it; it may still be under way.
-
-    Args:
-        path: the folder.
-        option: that named it, for messages.
+    """Read an evaluation, which may still be running, without changing it.
 
     Raises:
-        SettingError: there is no evaluation.
+        SettingError: there is none; the message names the option that named the folder.
     """
     identity = _identity(path, option)
     if identity is None:
@@ -156,23 +141,22 @@ def read_folder(path: Path, option: str) -> EvaluationFolder:
 
 
 def _check(path: Path, identity: Identity, again: bool) -> bool:
-    """Whether the folder is to be begun anew; refuse one that is of something else."""
-    ours = {*_FILES, *_FOLDERS, LOCK}
+    """Whether the folder is to be cleared first; raises `SettingError` if it belongs to something else."""
     found = {each.name.removesuffix(".part") for each in path.iterdir()}
-    there = _identity(path, "--out")
-    if there is None:
+    existing = _identity(path, "--out")
+    if existing is None:
         if found <= {LOCK, IDENTITY}:
             return True
         raise SettingError(f"--out {path}: has other files in it; choose a new folder")
     if again:
-        if found <= ours:
+        others = sorted(found - {*_FILES, *_FOLDERS, LOCK})
+        if not others:
             return True
-        strange = sorted(found - ours)[0]
-        raise SettingError(f"--out {path}: {strange} in it is not of an evaluation; choose another")
-    difference = identity.difference(there)
+        raise SettingError(f"--out {path}: {others[0]} in it is not of an evaluation; choose another")
+    difference = identity.difference(existing)
     if difference:
         raise SettingError(
-            f"--out {path}: has an evaluation of {difference}; choose another, or --again to fly it anew"
+            f"--out {path}: has an evaluation of {difference}; choose another, or --again to fly it again"
         )
     return False
 
@@ -182,7 +166,7 @@ def _identity(path: Path, option: str) -> Identity | None:
         data: dict[str, Any] = json.loads((path / IDENTITY).read_text(encoding="utf-8"))
         if data.pop("format") != FORMAT:
             raise SettingError(f"{option} {path}: was made by another version of framerunner; choose another")
-        return Identity.from_dict(data)
+        return TypeAdapter(Identity).validate_python(data)
     except (FileNotFoundError, NotADirectoryError):
         return None
     except (OSError, ValueError, TypeError, KeyError, AttributeError):
@@ -196,32 +180,32 @@ def _clear(path: Path) -> None:
         shutil.rmtree(path / name, ignore_errors=True)
 
 
-def _mended(file: Path, identity: Identity) -> set[str]:
-    """What is done; a line that a kill or a power cut has torn is taken away, its flight is flown again."""
-    rows, is_whole = _read_rows(file, identity)
-    if not is_whole:
+def _repair(file: Path, identity: Identity) -> set[str]:
+    """Remove incomplete lines, whose flights will be flown again; returns the scenarios that are done."""
+    rows, is_complete = _read_rows(file, identity)
+    if not is_complete:
         _replace(file, "".join(row.to_json() + "\n" for row in rows.values()))
     return set(rows)
 
 
 def _read_rows(file: Path, identity: Identity) -> tuple[dict[str, Row], bool]:
-    """Return the rows, and whether all lines were whole."""
+    """Return the rows, and whether all lines were complete."""
     rows: dict[str, Row] = {}
-    is_whole = True
+    is_complete = True
     try:
         with file.open("r", encoding="utf-8", errors="replace") as lines:
             for line in lines:
                 try:
                     row = Row.model_validate_json(line)
                 except ValueError:
-                    is_whole = False
+                    is_complete = False
                     continue
-                is_whole = is_whole and line.endswith("\n")
+                is_complete = is_complete and line.endswith("\n")
                 if row.scenario in identity.scenarios:
                     rows[row.scenario] = row
     except FileNotFoundError:
         pass
-    return rows, is_whole
+    return rows, is_complete
 
 
 def _replace(path: Path, text: str) -> None:
@@ -239,13 +223,13 @@ def _writing(path: Path) -> Iterator[None]:
         yield
     except OSError as error:
         raise SettingError(
-            f"--out {path}: cannot be written to ({error.strerror}); mend it or choose another; "
+            f"--out {path}: cannot be written to ({error.strerror}); free some space or choose another; "
             "what was kept stays"
         ) from None
 
 
 def _track_as_dict(track: Track) -> dict[str, Any]:
-    """A track as plain data; states by number, for there are few."""
+    """A track as plain data, with states by number."""
     states: Sequence[str] = list(dict.fromkeys(track.mission_state))
     numbers = {state: number for number, state in enumerate(states)}
     return {

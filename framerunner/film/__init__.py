@@ -1,1 +1,1 @@
-"""Short films of flights: what is shown (story), how it is painted (sheet), how it is kept (film file)."""
+"""Short films of flights: what is shown when (timeline), how it is painted, and the file it is written to."""

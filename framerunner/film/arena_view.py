@@ -1,76 +1,77 @@
-"""The arena in perspective: floor, base, frames, the drone and where it has flown.
+"""The arena in perspective: floor, base, frames, the drone and its trail.
 
-Painted far to near at twice the size and made smaller: so all edges are smooth and nothing shows through the
-seams of neighbouring faces.
+Painted from back to front at twice the size and then reduced, so that edges are smooth and nothing shows
+through the seams between faces.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterable
+from dataclasses import dataclass
 from itertools import pairwise
+from math import cos, pi, sin
 
 import cv2
 import numpy as np
 import numpy.typing as npt
 
-from firmware_py.airframe import load_airframe
-from framerunner.film.colours import MAT, PAPER, RIM, SHADOW, STEM, TATAMI, WHITE, Bgr, bgr, mixed
-from framerunner.film.drone_shape import DroneShape, Patch
-from framerunner.film.story import Floats, Instant, Story
+from firmware_py.airframe import Airframe, load_airframe
+from framerunner.film import style
+from framerunner.film.style import Bgr
+from framerunner.film.timeline import Floats, Instant, Timeline
 from framerunner.film.viewpoint import Viewpoint
-from framerunner.runs.drawing import STATE_COLOURS
+from framerunner.runs.plots import STATE_COLOURS
 from scenarios.models import Light
 from sitl.camera_scene import Face, PaintTree, build_scene
-
-Image = npt.NDArray[np.uint8]
+from vision.types import Image
 
 FINE = 2
-"""Pixels painted for one that is shown, along each edge."""
+"""Painted pixels for each pixel of the result, along each edge."""
 DRONE_SCALE = 1.6
-"""How much larger than life the drone is drawn: at its own size it is lost on a small screen."""
-_SHIFT = 4
-_SLAB_M = 0.06  # the floor is drawn as a slab
-_TRAIL = [bgr(text) for text in STATE_COLOURS]
+"""The drone is drawn larger than it is: at its own size it is hard to see on a small screen."""
+_SLAB_M = 0.06  # thickness of the floor
+_TRAIL = [style.bgr(text) for text in STATE_COLOURS]
+
+_BODY = style.bgr("#2b2f36")
+_TOP = style.bgr("#454b55")
+_ARM = style.bgr("#3a3f47")
+_NOSE = style.bgr("#ff9a1f")
+_DISC = style.bgr("#8d949e")
+_BLADE = style.bgr("#2b2f36")
+_CIRCLE_RAD = np.linspace(0.0, 2 * pi, 20, endpoint=False)
+_TURNS_PER_S = 2.3  # of the drawn rotors: at their true speed they would only flicker
 
 
 def state_colour(kind: int) -> Bgr:
-    """The colour of a kind of state, as on the pictures that flights leave."""
+    """The colour of a kind of state, as in the plots of flights."""
     return _TRAIL[kind % len(_TRAIL)]
 
 
 class ArenaView:
-    """A view of one flight's arena.
+    """Paints the arena of one flight into images of one size, width and height in pixels."""
 
-    Args:
-        story: what is shown.
-        size_px: width and height of the picture.
-    """
-
-    def __init__(self, story: Story, size_px: tuple[int, int]) -> None:
-        self._story = story
+    def __init__(self, timeline: Timeline, size_px: tuple[int, int]) -> None:
+        self._timeline = timeline
         self._size_px = size_px
-        scenario = story.scenario
+        scenario = timeline.scenario
         scene = build_scene(scenario.model_copy(update={"light": Light()}))
-        self._floor = [Face(scene.tatami.corners_arena_m, (0.0, 0.0, 1.0), TATAMI)]
-        self._floor += [Face(mat.corners_arena_m, mat.normal_arena, MAT) for mat in scene.mats]
-        self._floor += [Face(shadow.corners_arena_m, shadow.normal_arena, SHADOW) for shadow in scene.shadows]
+        self._floor = [Face(scene.tatami.corners_arena_m, (0.0, 0.0, 1.0), style.TATAMI)]
+        self._floor += [Face(mat.corners_arena_m, mat.normal_arena, style.MAT) for mat in scene.mats]
+        self._floor += [
+            Face(shadow.corners_arena_m, shadow.normal_arena, style.SHADOW) for shadow in scene.shadows
+        ]
         self._tree = PaintTree(scene.bodies)
         faces = self._tree.faces
         self._centres_m = np.array([face.corners_arena_m.mean(axis=0) for face in faces]).reshape(-1, 3)
         self._tops_m = np.array([face.corners_arena_m[:, 2].max() for face in faces])
-        self._drone = DroneShape(load_airframe(scenario.airframe), DRONE_SCALE)
+        self._drone = _DroneShape(load_airframe(scenario.airframe), DRONE_SCALE)
         self._slab = _slab(scene.tatami.corners_arena_m)
-        self._paper = np.full((FINE * size_px[1], FINE * size_px[0], 3), PAPER, np.uint8)
+        self._paper = np.full((FINE * size_px[1], FINE * size_px[0], 3), style.PAPER, np.uint8)
         self._canvas = self._paper.copy()
-        self._pen = max(1.0, FINE * size_px[1] / 430)  # a line's width where the picture has its usual size
+        self._pen = max(1.0, FINE * size_px[1] / 430)  # pixels of a line's width at the usual size
 
     def paint(self, instant: Instant, viewpoint: Viewpoint, film_s: float) -> Image:
-        """Paint what is to be seen at a time.
-
-        Args:
-            instant: of the flight.
-            viewpoint: for a picture of this view's size.
-            film_s: time of the film, for what turns.
+        """Paint an instant of the flight; the time of the film turns the rotors.
 
         Returns:
             A new image, BGR, shape (height, width, 3).
@@ -83,28 +84,33 @@ class ArenaView:
             self._fill(view, face.corners_arena_m, face.colour)
         self._stems(view)
         centre = np.array(instant.position_arena_m)
-        self._drop(view, centre)
+        self._drop_shadow(view, centre)
         order = self._tree.back_to_front((float(view.eye_m[0]), float(view.eye_m[1]), float(view.eye_m[2])))
         self._solids_and_trail(view, order, instant, film_s)
         return np.asarray(cv2.resize(self._canvas, self._size_px, interpolation=cv2.INTER_AREA), np.uint8)
 
     def _solids_and_trail(self, view: Viewpoint, order: list[int], instant: Instant, film_s: float) -> None:
-        """Paint the faces; before the first that is nearer than a piece of the trail, that piece."""
+        """Paint the faces, and each piece of the trail before the first face that may hide it."""
         centre = np.array(instant.position_arena_m)
-        points = np.concatenate((self._story.trail_m[: instant.trail], centre[None]))
+        points = np.concatenate((self._timeline.trail_m[: instant.trail], centre[None]))
         pixels = view.project(points)
         slots = self._slots(view, order, (points[1:] + points[:-1]) / 2)
-        own = int(self._slots(view, order, centre[None])[0])
-        runs = _runs(slots, self._story.trail_kind[: len(slots)])
-        self._halo(pixels, runs)
+        drone_slot = int(self._slots(view, order, centre[None])[0])
+        runs = _runs(slots, self._timeline.trail_kind[: len(slots)])
+        if runs:  # a light line under the whole trail, so that it stands out from the floor
+            self._polyline(pixels[runs[0].first : runs[-1].end + 1], style.WHITE, round(4.2 * self._pen))
         patches = self._drone.patches(centre, instant.yaw_rad, film_s, instant.motors_on)
         painted = 0
-        for slot in sorted({*(slot for slot, *_ in runs), own, len(order)}):
+        for slot in sorted({*(run.slot for run in runs), drone_slot, len(order)}):
             self._faces(view, order[painted:slot])
             painted = slot
-            self._trail(pixels, [run for run in runs if run[0] == slot])
-            if slot == own:
-                self._patches(view, patches)
+            for run in runs:
+                if run.slot == slot:
+                    width = max(1, round(2.5 * self._pen))
+                    self._polyline(pixels[run.first : run.end + 1], state_colour(run.kind), width)
+            if slot == drone_slot:
+                for patch in patches:
+                    self._patch(view, patch)
 
     def _faces(self, view: Viewpoint, numbers: Iterable[int]) -> None:
         for number in numbers:
@@ -113,10 +119,10 @@ class ArenaView:
                 self._fill(view, face.corners_arena_m, face.colour)
 
     def _slots(self, view: Viewpoint, order: list[int], pieces_m: Floats) -> npt.NDArray[np.int64]:
-        """How many faces, in the order of painting, come before the first that may hide each piece.
+        """For each piece, how many faces are painted before the first that may hide it.
 
-        That is one which is nearer and reaches higher than the piece: the eye looks from above, so its line
-        of sight never comes below what it looks at.
+        A face may hide it if it is nearer and reaches higher than the piece: the eye looks down, so a line of
+        sight is never below the point that it ends at.
         """
         face_m = np.linalg.norm(self._centres_m[order] - view.eye_m, axis=1)
         piece_m = np.linalg.norm(pieces_m - view.eye_m, axis=1)
@@ -125,30 +131,18 @@ class ArenaView:
             return np.zeros(len(pieces_m), np.int64)
         return np.where(hides.any(axis=1), hides.argmax(axis=1), len(order))
 
-    def _halo(self, pixels: Floats, runs: list[tuple[int, int, int, int]]) -> None:
-        """A light line under the whole trail, so that it stands out from the floor."""
-        if runs:
-            line = _fixed(pixels[runs[0][2] : runs[-1][3] + 1])
-            cv2.polylines(self._canvas, [line], False, WHITE, round(4.2 * self._pen), cv2.LINE_AA, _SHIFT)
+    def _patch(self, view: Viewpoint, patch: _Patch) -> None:
+        outline = view.polygon(patch.corners_m)
+        if len(outline) < 3:
+            return
+        if patch.opacity >= 1.0:
+            cv2.fillConvexPoly(
+                self._canvas, style.fixed_point(outline), patch.colour, cv2.LINE_AA, style.SUBPIXEL_BITS
+            )
+        else:
+            self._fill_translucent(outline, patch.colour, patch.opacity)
 
-    def _trail(self, pixels: Floats, runs: list[tuple[int, int, int, int]]) -> None:
-        width = max(1, round(2.5 * self._pen))
-        for _, kind, first, last in runs:
-            line = _fixed(pixels[first : last + 1])
-            cv2.polylines(self._canvas, [line], False, state_colour(kind), width, cv2.LINE_AA, _SHIFT)
-
-    def _patches(self, view: Viewpoint, patches: list[Patch]) -> None:
-        for patch in patches:
-            outline = view.polygon(patch.corners_m)
-            if len(outline) < 3:
-                continue
-            if patch.solid >= 1.0:
-                cv2.fillConvexPoly(self._canvas, _fixed(outline), patch.colour, cv2.LINE_AA, _SHIFT)
-            else:
-                self._glaze(outline, patch.colour, patch.solid)
-
-    def _glaze(self, outline: Floats, colour: Bgr, solid: float) -> None:
-        """Fill a polygon through which something shines."""
+    def _fill_translucent(self, outline: Floats, colour: Bgr, opacity: float) -> None:
         height, width = self._canvas.shape[:2]
         left, top = np.clip(np.floor(outline.min(axis=0)) - 2, 0, (width, height)).astype(int)
         right, bottom = np.clip(np.ceil(outline.max(axis=0)) + 3, 0, (width, height)).astype(int)
@@ -156,63 +150,134 @@ class ArenaView:
             return
         under = self._canvas[top:bottom, left:right]
         over = under.copy()
-        cv2.fillConvexPoly(over, _fixed(outline - (left, top)), colour, cv2.LINE_AA, _SHIFT)
-        under[:] = cv2.addWeighted(over, solid, under, 1.0 - solid, 0.0)
+        cv2.fillConvexPoly(
+            over, style.fixed_point(outline - (left, top)), colour, cv2.LINE_AA, style.SUBPIXEL_BITS
+        )
+        under[:] = cv2.addWeighted(over, opacity, under, 1.0 - opacity, 0.0)
 
     def _stems(self, view: Viewpoint) -> None:
-        """Thin lines from the frames to the floor, so that the eye finds where they hang."""
-        for frame in self._story.scenario.frames:
+        """Thin lines from the frames down to the floor, which show where they are."""
+        for frame in self._timeline.scenario.frames:
             below_m = frame.z_m - frame.outer_height_m / 2
-            ends = np.array([(frame.x_m, frame.y_m, 0.0), (frame.x_m, frame.y_m, below_m)])
-            self._line(view, ends, STEM, 1.2)
+            self._line(
+                view, np.array([(frame.x_m, frame.y_m, 0.0), (frame.x_m, frame.y_m, below_m)]), style.STEM
+            )
 
-    def _drop(self, view: Viewpoint, centre_m: Floats) -> None:
+    def _drop_shadow(self, view: Viewpoint, centre_m: Floats) -> None:
         """The drone's shadow straight below it, and a line down to it."""
         x, y, z = centre_m
-        base = self._story.scenario.base
+        base = self._timeline.scenario.base
         over_base = max(abs(x - base.x_m), abs(y - base.y_m)) <= base.edge_m / 2
-        below_m = 0.0 if not over_base or z < base.top_m else base.top_m
-        if below_m > 0.0:
-            return  # it stands on the base or hangs close above it: the base is painted later
+        if over_base and z >= base.top_m > 0.0:
+            return  # the base is painted later
         angles = np.linspace(0.0, 2 * np.pi, 24, endpoint=False)
         radius = 0.8 * self._drone.radius_m
         spot = np.stack((x + radius * np.cos(angles), y + radius * np.sin(angles), np.zeros_like(angles)), 1)
         outline = view.polygon(spot)
         if len(outline) > 2:
-            self._glaze(outline, mixed(SHADOW, (40, 50, 60), 0.5), 0.55)
-        self._line(view, np.array([(x, y, 0.0), (x, y, z)]), mixed(STEM, (40, 50, 60), 0.4), 1.2)
+            self._fill_translucent(outline, style.mixed(style.SHADOW, (40, 50, 60), 0.5), 0.55)
+        self._line(view, np.array([(x, y, 0.0), (x, y, z)]), style.mixed(style.STEM, (40, 50, 60), 0.4))
 
-    def _line(self, view: Viewpoint, ends_m: Floats, colour: Bgr, width: float) -> None:
+    def _line(self, view: Viewpoint, ends_m: Floats, colour: Bgr) -> None:
         pixels = view.project(ends_m)
         if np.isfinite(pixels).all():
-            thickness = max(1, round(width * self._pen))
-            cv2.polylines(self._canvas, [_fixed(pixels)], False, colour, thickness, cv2.LINE_AA, _SHIFT)
+            self._polyline(pixels, colour, max(1, round(1.2 * self._pen)))
+
+    def _polyline(self, pixels: Floats, colour: Bgr, width: int) -> None:
+        line = [style.fixed_point(pixels)]
+        cv2.polylines(self._canvas, line, False, colour, width, cv2.LINE_AA, style.SUBPIXEL_BITS)
 
     def _fill(self, view: Viewpoint, corners_m: Floats, colour: Bgr) -> None:
         outline = view.polygon(corners_m)
         if len(outline) > 2:
-            cv2.fillConvexPoly(self._canvas, _fixed(outline), colour, cv2.LINE_8, _SHIFT)
+            cv2.fillConvexPoly(
+                self._canvas, style.fixed_point(outline), colour, cv2.LINE_8, style.SUBPIXEL_BITS
+            )
 
 
-def _fixed(pixels: Floats) -> npt.NDArray[np.int32]:
-    """Pixels as OpenCV's drawing takes them, in sixteenths; what is far beside the picture is kept finite."""
-    far = 20_000.0
-    kept = np.clip(pixels, -far, far)
-    kept[np.isnan(kept)] = -far
-    return np.rint(kept * (1 << _SHIFT)).astype(np.int32)
+@dataclass(frozen=True, slots=True)
+class _Run:
+    """Neighbouring pieces of the trail, `first` to `end` - 1, that have one slot and one kind of state."""
+
+    slot: int
+    kind: int
+    first: int
+    end: int
 
 
-def _runs(slots: npt.NDArray[np.int64], kinds: npt.NDArray[np.int32]) -> list[tuple[int, int, int, int]]:
-    """Neighbouring pieces of one slot and one kind: (slot, kind, first, one past the last)."""
+def _runs(slots: npt.NDArray[np.int64], kinds: npt.NDArray[np.int32]) -> list[_Run]:
     if not len(slots):
         return []
     ends = np.flatnonzero((np.diff(slots) != 0) | (np.diff(kinds) != 0)) + 1
     bounds = [0, *ends.tolist(), len(slots)]
-    return [(int(slots[a]), int(kinds[a]), a, b) for a, b in pairwise(bounds)]
+    return [_Run(int(slots[a]), int(kinds[a]), a, b) for a, b in pairwise(bounds)]
 
 
 def _slab(corners_m: Floats) -> list[tuple[Floats, Bgr]]:
-    """The edges of the floor, drawn as a slab a few centimetres thick; those behind it are painted over."""
+    """The edges of the floor, a slab a few centimetres thick; those behind it are painted over."""
     low = corners_m - np.array((0.0, 0.0, _SLAB_M))
     count = len(corners_m)
-    return [(np.array((low[i - 1], low[i], corners_m[i], corners_m[i - 1])), RIM) for i in range(count)]
+    return [(np.array((low[i - 1], low[i], corners_m[i], corners_m[i - 1])), style.RIM) for i in range(count)]
+
+
+@dataclass(frozen=True, slots=True)
+class _Patch:
+    """A flat piece of the drone; corners have shape (k, 3), opacity is from 0 to 1."""
+
+    corners_m: Floats
+    colour: Bgr
+    opacity: float = 1.0
+
+
+class _DroneShape:
+    """The drone as it is drawn: arms, body and turning rotors, `scale` times as large as its airframe."""
+
+    def __init__(self, airframe: Airframe, scale: float) -> None:
+        length_m, width_m, height_m = (scale * side for side in airframe.envelope_m)
+        self._half_height_m = scale * airframe.envelope_m[2] / 2
+        self._rotor_m = scale * airframe.motor.radius_m
+        hubs = [rotor.position_frd_m for rotor in airframe.rotors]
+        self._hubs_m = scale * np.array([(x, -y, -z + airframe.envelope_m[2] / 2) for x, y, z in hubs])
+        self._spins = [rotor.yaw_sign for rotor in airframe.rotors]
+        self._body = np.array((0.2 * length_m, 0.13 * width_m, 0.5 * height_m))
+        self._arm_m = 0.045 * length_m
+        self.radius_m = float(np.hypot(self._hubs_m[:, 0], self._hubs_m[:, 1]).max()) + self._rotor_m
+
+    def patches(self, centre_m: Floats, yaw_rad: float, time_s: float, motors_on: bool) -> list[_Patch]:
+        """All pieces, in arena axes, in an order in which they can be painted when seen from above.
+
+        The drone is level; its rotors turn with the time of the film if its motors are on.
+        """
+        c, s = cos(yaw_rad), sin(yaw_rad)
+        axes = np.array(((c, s, 0.0), (-s, c, 0.0), (0.0, 0.0, 1.0)))  # forward, left, up
+        found = [self._arm(hub) for hub in self._hubs_m] + self._box()
+        for hub, spin in zip(self._hubs_m, self._spins, strict=True):
+            found += self._rotor(hub, -spin * 2 * pi * _TURNS_PER_S * time_s if motors_on else 0.6, motors_on)
+        return [_Patch(centre_m + each.corners_m @ axes, each.colour, each.opacity) for each in found]
+
+    def _arm(self, hub_m: Floats) -> _Patch:
+        along = hub_m[:2] / max(1e-6, float(np.hypot(*hub_m[:2])))
+        across = self._arm_m / 2 * np.array((-along[1], along[0]))
+        corners = [across, hub_m[:2] + across, hub_m[:2] - across, -across]
+        return _Patch(np.array([(x, y, 0.3 * self._half_height_m) for x, y in corners]), _ARM)
+
+    def _box(self) -> list[_Patch]:
+        x, y, z = self._body
+        plan = ((x, y), (x, -y), (-x, -y), (-x, y))
+        sides = [
+            _Patch(np.array([(*a, -z), (*b, -z), (*b, z), (*a, z)]), _BODY)
+            for a, b in zip(plan, (*plan[1:], plan[0]), strict=True)
+        ]
+        top = _Patch(np.array([(*corner, z) for corner in plan]), _TOP)
+        nose = _Patch(np.array([(x, y, z), (x, -y, z), (0.35 * x, 0.0, z)]), _NOSE)
+        return [*sides, top, nose]
+
+    def _rotor(self, hub_m: Floats, angle_rad: float, turning: bool) -> list[_Patch]:
+        circle = np.stack((np.cos(_CIRCLE_RAD), np.sin(_CIRCLE_RAD), np.zeros_like(_CIRCLE_RAD)), axis=1)
+        disc = _Patch(hub_m + self._rotor_m * circle, _DISC, 0.45 if turning else 0.12)
+        c, s = np.cos(angle_rad), np.sin(angle_rad)
+        along = self._rotor_m * np.array((c, s, 0.0))
+        across = 0.14 * self._rotor_m * np.array((-s, c, 0.0))
+        tips = (hub_m + along, hub_m - along)
+        blade = np.array([tips[0] + across, tips[1] + across, tips[1] - across, tips[0] - across])
+        return [disc, _Patch(blade, _BLADE, 0.85)]

@@ -1,4 +1,4 @@
-"""Films as files: MP4 that phones and browsers play, or GIF."""
+"""Writes films as MP4, which phones and browsers play, or as GIF."""
 
 from __future__ import annotations
 
@@ -11,30 +11,31 @@ from typing import TYPE_CHECKING, Any, cast
 
 import av
 import numpy as np
-import numpy.typing as npt
 from av.codec import Codec
 from av.filter import Graph
 
-from framerunner.runs.pictures import PictureError
+from errors import UserError
+from vision.types import Image
 
 if TYPE_CHECKING:
     from av.video.stream import VideoStream
 
-Image = npt.NDArray[np.uint8]
-
-SUFFIXES = (".mp4", ".gif")
 _X264 = {"crf": "21", "preset": "medium", "tune": "animation"}
-_PALETTE_COLOURS = 160  # fewer make smaller files; flat shades need no more
+_PALETTE_COLOURS = 160  # fewer make smaller files, and flat shades need no more
+
+
+class FilmError(UserError):
+    """A film that cannot be written; the message is one line for people."""
 
 
 class FilmFile(ABC):
-    """A film that is being written.
+    """A film that is being written; `film_file` finishes and closes it.
 
     Args:
         path: the file.
         kind: container, as FFmpeg calls it.
-        size_px: width and height of all its pictures; both even.
-        fps: pictures a second.
+        size_px: width and height of the images; both even.
+        fps: images a second.
     """
 
     def __init__(self, path: Path, kind: str, size_px: tuple[int, int], fps: float) -> None:
@@ -47,14 +48,14 @@ class FilmFile(ABC):
 
     @abstractmethod
     def add(self, image: Image) -> None:
-        """Add a picture, BGR, shape (height, width, 3)."""
+        """Add an image, BGR, shape (height, width, 3)."""
 
     @abstractmethod
     def finish(self) -> None:
-        """Write what is still to be written."""
+        """Write the images that the encoder still holds."""
 
     def close(self) -> None:
-        """Let go of the file."""
+        """Close the file."""
         self._container.close()
 
     def _open_stream(self, codec: str, pixels: str, options: dict[str, str]) -> None:
@@ -68,22 +69,14 @@ class FilmFile(ABC):
         for packet in self._stream.encode(frame):
             self._container.mux(packet)
 
-    def _frame(self, image: Image) -> av.VideoFrame:
+    def _frame(self, image: Image, number: int, pixels: str) -> av.VideoFrame:
         frame = av.VideoFrame.from_ndarray(np.ascontiguousarray(image), format="bgr24")
-        frame.pts, frame.time_base = self._count, 1 / self._rate
-        self._count += 1
-        return frame
+        frame.pts, frame.time_base = number, 1 / self._rate
+        return frame.reformat(format=pixels)
 
 
 class Mp4File(FilmFile):
-    """H.264 in the form that every player has; MPEG-4 where FFmpeg was built without an encoder for that.
-
-    Args:
-        path: see `FilmFile`.
-        size_px: see `FilmFile`.
-        fps: see `FilmFile`.
-        codec: what to encode with; see `mp4_codec`.
-    """
+    """H.264 in yuv420p, which every player supports, or MPEG-4; see `mp4_codec` and `FilmFile`."""
 
     def __init__(self, path: Path, size_px: tuple[int, int], fps: float, codec: str) -> None:
         super().__init__(path, "mp4", size_px, fps)
@@ -92,23 +85,17 @@ class Mp4File(FilmFile):
             self._stream.bit_rate = 4_000_000
 
     def add(self, image: Image) -> None:
-        """Add a picture."""
-        self._encode(self._frame(image).reformat(format="yuv420p"))
+        """Add an image."""
+        self._encode(self._frame(image, self._count, "yuv420p"))
+        self._count += 1
 
     def finish(self) -> None:
-        """Write the last pictures."""
+        """Write the images that the encoder still holds."""
         self._encode(None)
 
 
 class GifFile(FilmFile):
-    """An animated GIF that begins again at its end.
-
-    Args:
-        path: see `FilmFile`.
-        size_px: see `FilmFile`.
-        fps: see `FilmFile`.
-        samples: some pictures of the film, from which its colours are chosen.
-    """
+    """An animated GIF that repeats; its palette is made from some sample images. See `FilmFile`."""
 
     def __init__(self, path: Path, size_px: tuple[int, int], fps: float, samples: Sequence[Image]) -> None:
         super().__init__(path, "gif", size_px, fps)
@@ -116,18 +103,18 @@ class GifFile(FilmFile):
         self._graph, self._source = self._palette_graph(self._palette(samples))
 
     def add(self, image: Image) -> None:
-        """Add a picture."""
-        self._source.push(self._frame(image))
-        self._take()
+        """Add an image."""
+        self._source.push(self._frame(image, self._count, "rgb32"))
+        self._count += 1
+        self._encode_filtered()
 
     def finish(self) -> None:
-        """Write the last pictures."""
+        """Write the images that filter and encoder still hold."""
         self._source.push(None)
-        self._take()
+        self._encode_filtered()
         self._encode(None)
 
-    def _take(self) -> None:
-        """Encode what the palette's filter has ready."""
+    def _encode_filtered(self) -> None:
         for frame in _pulled(self._graph):
             self._encode(frame)
 
@@ -140,11 +127,7 @@ class GifFile(FilmFile):
         chosen.link_to(sink)
         graph.configure()
         for number, image in enumerate(samples):
-            frame = av.VideoFrame.from_ndarray(np.ascontiguousarray(image), format="bgr24").reformat(
-                format="rgb32"
-            )
-            frame.pts, frame.time_base = number, 1 / self._rate
-            source.push(frame)
+            source.push(self._frame(image, number, "rgb32"))
         source.push(None)
         return next(_pulled(graph))
 
@@ -152,7 +135,7 @@ class GifFile(FilmFile):
         graph = Graph()
         source = self._buffer(graph, self._size_px)
         colours = self._buffer(graph, (palette.width, palette.height))
-        # Without dithering flat shades stay flat, and files small.
+        # Without dithering flat shades stay flat and files small.
         use = graph.add("paletteuse", "dither=none:diff_mode=rectangle")
         sink = graph.add("buffersink")
         source.link_to(use, 0, 0)
@@ -169,16 +152,9 @@ class GifFile(FilmFile):
         pixels = av.VideoFormat("rgb32", width, height)
         return graph.add_buffer(width=width, height=height, format=pixels, time_base=1 / self._rate)
 
-    def _frame(self, image: Image) -> av.VideoFrame:
-        frame = super()._frame(image)
-        pts, time_base = frame.pts, frame.time_base
-        converted = frame.reformat(format="rgb32")
-        converted.pts, converted.time_base = pts, time_base
-        return converted
-
 
 def _pulled(graph: Graph) -> Iterator[av.VideoFrame]:
-    """Frames that have come through a graph."""
+    """Frames that a graph has ready."""
     while True:
         try:
             yield cast("av.VideoFrame", graph.pull())
@@ -187,7 +163,7 @@ def _pulled(graph: Graph) -> Iterator[av.VideoFrame]:
 
 
 def mp4_codec() -> str:
-    """The best encoder for MP4 that FFmpeg was built with."""
+    """H.264's encoder, or "mpeg4" if FFmpeg was built without it."""
     try:
         Codec("libx264", "w")
     except (av.codec.codec.UnknownCodecError, ValueError):
@@ -197,14 +173,14 @@ def mp4_codec() -> str:
 
 @contextmanager
 def film_file(path: Path, open_film: Callable[[Path], FilmFile]) -> Iterator[FilmFile]:
-    """A film that is there whole after the block, or not at all.
+    """Write a film completely or not at all.
 
     Args:
-        path: where it is to be in the end; what is there is replaced.
-        open_film: opens it at another place in the same folder.
+        path: of the film; replaced at the end of the block.
+        open_film: opens it under a temporary name in the same folder.
 
     Raises:
-        PictureError: it cannot be written.
+        FilmError: it cannot be written.
     """
     part = path.with_name(f".{path.name}.part")
     try:
@@ -216,6 +192,6 @@ def film_file(path: Path, open_film: Callable[[Path], FilmFile]) -> Iterator[Fil
             film.close()
         part.replace(path)
     except (OSError, av.error.FFmpegError) as error:
-        raise PictureError(f"film: cannot write '{path}': {error.strerror or error}") from None
+        raise FilmError(f"film: cannot write '{path}': {error.strerror or error}") from None
     finally:
         part.unlink(missing_ok=True)

@@ -1,41 +1,37 @@
-"""From where the arena is looked at, and how it comes onto the picture."""
+"""The virtual camera of a film: its pose at each time, and the projection of points into its image."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 from math import cos, radians, sin, tan
-from typing import TYPE_CHECKING
 
 import numpy as np
 
-from framerunner.film.story import Floats
+from framerunner.film.timeline import Floats, Timeline
 from scenarios.models import Scenario, start_position
-
-if TYPE_CHECKING:
-    from framerunner.film.story import Story
 
 ELEVATION_RAD = radians(27.0)
 FIELD_OF_VIEW_RAD = radians(34.0)
 NEAR_M = 0.3
-_TURN_RAD_S = radians(5.0)  # of the film's time: slow enough not to make anybody dizzy
-_TURN_AT_MOST_RAD = radians(110.0)
-_FOLLOWED = 0.35  # how far the view goes along with the drone, 0 stands still, 1 follows it
-_SMOOTH_S = 2.0  # of the film's time
-_MARGIN = 0.9  # of half the picture
-_CENTRE = 0.53  # of the picture's height: there is a title above
+_TURN_RAD_S = radians(5.0)  # in film time
+_MAX_TURN_RAD = radians(110.0)
+_FOLLOWED = 0.35  # share of the drone's movement that the view follows, 0 to 1
+_SMOOTHING_S = 2.0  # of that movement, film time
+_MARGIN = 0.9  # of half the image
+_CENTRE = 0.53  # of the image's height: there is a title above
 _SAMPLES = 120
-_CALM_S = 2.5  # of the film's time: it comes nearer and goes farther no quicker
+_DISTANCE_SMOOTHING_S = 2.5  # film time
 
 
 @dataclass(frozen=True, slots=True)
 class Viewpoint:
-    """An eye with a pinhole before it.
+    """A pinhole camera.
 
     Attributes:
-        eye_m: arena axes, shape (3,).
-        axes: rows are right, down and ahead of the picture in arena axes, shape (3, 3).
+        eye_m: position, arena axes, shape (3,).
+        axes: rows are right, down and forward of the image in arena axes, shape (3, 3).
         focal_px: focal length.
-        centre_px: where the line of sight meets the picture.
+        centre_px: principal point.
     """
 
     eye_m: Floats
@@ -43,91 +39,88 @@ class Viewpoint:
     focal_px: float
     centre_px: tuple[float, float]
 
-    def seen(self, points_m: Floats) -> Floats:
-        """Points in the eye's own axes (right, down, ahead), metres, shape (n, 3)."""
+    def _camera_axes(self, points_m: Floats) -> Floats:
+        """Points in the camera's axes (right, down, forward), metres, shape (n, 3)."""
         turned: Floats = (points_m - self.eye_m) @ self.axes.T
         return turned
 
     def project(self, points_m: Floats) -> Floats:
-        """Where points come onto the picture, pixels, shape (n, 2); NaN for those behind the eye."""
-        seen = self.seen(points_m)
+        """Points in the image, pixels, shape (n, 2); NaN for those behind the camera."""
+        seen = self._camera_axes(points_m)
         ahead = np.where(seen[:, 2] > NEAR_M, seen[:, 2], np.nan)
         pixels: Floats = self.focal_px * seen[:, :2] / ahead[:, None] + np.array(self.centre_px)
         return pixels
 
     def polygon(self, corners_m: Floats) -> Floats:
-        """Corners of a convex polygon on the picture, cut where it reaches behind the eye, shape (k, 2)."""
-        seen = self.seen(corners_m)
+        """Corners of a convex polygon in the image, clipped at the near plane, pixels, shape (k, 2)."""
+        seen = self._camera_axes(corners_m)
         if float(seen[:, 2].min()) <= NEAR_M:
-            seen = _cut_near(seen)
+            seen = _clipped(seen)
         pixels: Floats = self.focal_px * seen[:, :2] / seen[:, 2:] + np.array(self.centre_px)
         return pixels
 
     def scaled(self, factor: float) -> Viewpoint:
-        """The same for a picture that many times as large."""
+        """The same camera with an image that is `factor` times as large."""
         u, v = self.centre_px
         return Viewpoint(self.eye_m, self.axes, self.focal_px * factor, (u * factor, v * factor))
 
 
 class Flyby:
-    """A viewpoint that turns slowly around the arena and goes along a little with the drone.
+    """A viewpoint that turns slowly around the arena and follows the drone a little.
 
-    Args:
-        story: what is shown.
-        size_px: width and height of the picture.
-        speed: flight time a film time.
+    The image has width and height; the speed is the ratio of flight time to film time.
     """
 
-    def __init__(self, story: Story, size_px: tuple[int, int], speed: float) -> None:
-        self._story = story
+    def __init__(self, timeline: Timeline, size_px: tuple[int, int], speed: float) -> None:
+        self._timeline = timeline
         self._size_px = size_px
         self._speed = speed
-        film_s = (story.end_s - story.begin_s) / speed
-        self._rate = min(_TURN_RAD_S, _TURN_AT_MOST_RAD / max(film_s, 1e-3))
-        self._middle = _middle(story.scenario)
-        # At the film's middle the arena is seen over the drone's start, so that it flies away from the eye.
-        x_m, y_m, _ = start_position(story.scenario)
+        film_s = (timeline.end_s - timeline.begin_s) / speed
+        self._rate = min(_TURN_RAD_S, _MAX_TURN_RAD / max(film_s, 1e-3))
+        self._middle = _middle(timeline.scenario)
+        # In the middle of the film the camera is behind the start, so that the drone flies away from it.
+        x_m, y_m, _ = start_position(timeline.scenario)
         toward = np.array((x_m, y_m)) - self._middle[:2]
-        heading = (
-            float(np.arctan2(toward[1], toward[0])) if float(np.hypot(*toward)) > 0.5 else radians(-120.0)
-        )
-        self._first_rad = heading + radians(25.0) - self._rate * film_s / 2
+        is_far = float(np.hypot(*toward)) > 0.5
+        heading_rad = float(np.arctan2(toward[1], toward[0])) if is_far else radians(-120.0)
+        self._first_rad = heading_rad + radians(25.0) - self._rate * film_s / 2
         self._focal_px = size_px[0] / 2 / tan(FIELD_OF_VIEW_RAD / 2)
-        things = _things(story)
-        self._samples_s = np.linspace(story.begin_s, story.end_s, _SAMPLES)
-        needed = [self._distance(float(time_s), things) for time_s in self._samples_s]
-        self._distances_m = _calmed(np.array(needed), round(_CALM_S * _SAMPLES / max(film_s, 1.0)))
+        points = _always_visible(timeline)
+        self._samples_s = np.linspace(timeline.begin_s, timeline.end_s, _SAMPLES)
+        needed = [self._distance(float(time_s), points) for time_s in self._samples_s]
+        reach = round(_DISTANCE_SMOOTHING_S * _SAMPLES / max(film_s, 1.0))
+        self._distances_m = _smoothed(np.array(needed), reach)
 
     def at(self, time_s: float) -> Viewpoint:
-        """From where it is looked at a time of the flight, seconds since motors on."""
+        """The viewpoint at a time of the flight, seconds since motors on."""
         axes, target = self._axes(time_s), self._target(time_s)
         distance_m = float(np.interp(time_s, self._samples_s, self._distances_m))
         centre = (self._size_px[0] / 2, _CENTRE * self._size_px[1])
         return Viewpoint(target - distance_m * axes[2], axes, self._focal_px, centre)
 
     def _target(self, time_s: float) -> Floats:
-        flown = self._story.mean_position(time_s, _SMOOTH_S * self._speed)
+        flown = self._timeline.mean_position(time_s, _SMOOTHING_S * self._speed)
         target: Floats = self._middle + _FOLLOWED * (flown - self._middle)
         return target
 
     def _axes(self, time_s: float) -> Floats:
-        azimuth = self._first_rad + self._rate * (time_s - self._story.begin_s) / self._speed
+        azimuth = self._first_rad + self._rate * (time_s - self._timeline.begin_s) / self._speed
         c, s = cos(ELEVATION_RAD), sin(ELEVATION_RAD)
         ahead = np.array((-c * cos(azimuth), -c * sin(azimuth), -s))
         right = np.array((-sin(azimuth), cos(azimuth), 0.0))
         return np.stack((right, np.cross(ahead, right), ahead))
 
-    def _distance(self, time_s: float, things_m: Floats) -> float:
-        """How far away all things, and the drone, come onto the picture with a margin."""
-        place = np.array([self._story.at(time_s).position_arena_m])
-        offsets = (np.concatenate((things_m, place)) - self._target(time_s)) @ self._axes(time_s).T
+    def _distance(self, time_s: float, points_m: Floats) -> float:
+        """Distance from which all points, and the drone, are in the image with a margin."""
+        drone_m = np.array([self._timeline.at(time_s).position_arena_m])
+        offsets = (np.concatenate((points_m, drone_m)) - self._target(time_s)) @ self._axes(time_s).T
         half = np.array(self._size_px) * (_MARGIN / 2, _MARGIN * (1.0 - _CENTRE))
         needed = np.abs(offsets[:, :2]) * self._focal_px / half - offsets[:, 2:]
         return max(2.0, float(needed.max()))
 
 
-def _calmed(needed_m: Floats, reach: int) -> Floats:
-    """Distances that are never too small, and change slowly."""
+def _smoothed(needed_m: Floats, reach: int) -> Floats:
+    """Distances that are never below the needed ones, and change slowly."""
     reach = min(max(reach, 1), len(needed_m) // 2)
     padded = np.pad(needed_m, 2 * reach, mode="edge")
     highest = np.lib.stride_tricks.sliding_window_view(padded, 2 * reach + 1).max(axis=1)
@@ -136,9 +129,9 @@ def _calmed(needed_m: Floats, reach: int) -> Floats:
     return smooth
 
 
-def _things(story: Story) -> Floats:
-    """What must be seen all the time: base and frames with a little around them."""
-    scenario = story.scenario
+def _always_visible(timeline: Timeline) -> Floats:
+    """Points that must always be in the image: around base and frames, or else the arena's corners."""
+    scenario = timeline.scenario
     points = [(scenario.base.x_m, scenario.base.y_m, z_m) for z_m in (0.0, scenario.base.top_m + 0.3)]
     for frame in scenario.frames:
         points += [(frame.x_m, frame.y_m, z_m) for z_m in (0.0, frame.z_m + frame.outer_height_m)]
@@ -149,14 +142,14 @@ def _things(story: Story) -> Floats:
 
 
 def _middle(scenario: Scenario) -> Floats:
-    places = [(frame.x_m, frame.y_m, frame.z_m) for frame in scenario.frames]
-    places.append((scenario.base.x_m, scenario.base.y_m, scenario.base.top_m))
-    array = np.array(places)
-    middle: Floats = (array.min(axis=0) + array.max(axis=0)) / 2
+    base = scenario.base
+    points = np.array([*(f.position_arena_m for f in scenario.frames), (base.x_m, base.y_m, base.top_m)])
+    middle: Floats = (points.min(axis=0) + points.max(axis=0)) / 2
     return middle
 
 
-def _cut_near(seen: Floats) -> Floats:
+def _clipped(seen: Floats) -> Floats:
+    """The part of a convex polygon, in the camera's axes, that is beyond the near plane."""
     kept: list[Floats] = []
     for i, here in enumerate(seen):
         before = seen[i - 1]

@@ -12,7 +12,7 @@ from asyncio.subprocess import PIPE, Process
 from collections.abc import Callable, Coroutine, Sequence
 from typing import Self, TypeVar
 
-from framerunner.errors import SettingError
+from errors import SettingError
 
 T = TypeVar("T")
 

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Protocol
 
 from pydantic import ValidationError
 
-from framerunner.errors import SettingError
+from errors import SettingError
 from framerunner.flying.plan import FlightPlan
 from offboard.app import Moment
 from scenarios.models import TrueState

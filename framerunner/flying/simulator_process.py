@@ -11,7 +11,7 @@ import asyncio
 import socket
 from typing import Self
 
-from framerunner.errors import SettingError
+from errors import SettingError
 from framerunner.flying.child_process import ChildProcess
 from framerunner.flying.lockstep_drone import TELEMETRY_DELAY_US, sent_yaw_rate, single
 from offboard.drone import DroneError, VelocityCommand

@@ -12,7 +12,7 @@ import numpy.typing as npt
 from gymnasium import spaces
 from gymnasium.error import ResetNeeded
 
-from framerunner.errors import SettingError
+from errors import SettingError
 from framerunner.flying.plan import FlightPlan
 from framerunner.gym.flight import SteppedFlight
 from framerunner.gym.observation import LONGEST_TRY_S, Observation, observation_space, observe, rgb

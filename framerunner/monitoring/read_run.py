@@ -19,8 +19,8 @@ import cv2
 from framerunner.flying.child_process import end_with_standard_input
 from framerunner.monitoring.run_json import FlownMission, flight_json
 from framerunner.recording.collected import CollectedFlight, ImageFile, collect
-from framerunner.recording.errors import RecordingError
-from framerunner.recording.find import recorded_flight
+from framerunner.recording.events import RecordingError
+from framerunner.recording.open_recording import recorded_flight
 from offboard.mission import MissionError, load_mission
 from scenarios.loader import load_scenario
 from scenarios.models import Scenario, ScenarioError

@@ -1,4 +1,4 @@
-"""A recorded flight, read once and kept whole: for those who go to and fro in it."""
+"""A recorded flight, read once and kept, so that its events can be read in any order."""
 
 from __future__ import annotations
 
@@ -6,33 +6,30 @@ from bisect import bisect_right
 from dataclasses import dataclass
 from math import ceil
 from tempfile import TemporaryFile
-from types import TracebackType
 from typing import BinaryIO, cast
 
 import cv2
 import numpy as np
 
-from framerunner.recording.errors import RecordingError
-from framerunner.recording.events import Crossed, Picture, Recorded
-from framerunner.recording.tlog_reader import TlogRecording
+from framerunner.recording.events import Crossed, Recorded, RecordedImage, RecordingError
+from framerunner.recording.tlog_reader import MAX_TICKS, TlogRecording
 from offboard.app import Moment
 from scenarios.result import FlightResult
 from vision.types import Image
 
 JPEG_QUALITY = 90
-_TICKS_AT_MOST = 576_000  # eight hours: a file that claims more is damaged
 _MAX_IMAGES_BYTES = 2_000_000_000
 
 
 class ImageFile:
-    """The images of a flight, compressed, in a file of their own: there may be more than memory holds.
+    """The images of a flight, compressed, in a file: they may not fit into memory.
 
     Args:
-        file: opened for reading and writing; closed with this. By default one that vanishes.
+        file: opened for reading and writing; closed with this. By default a temporary one.
 
     Attributes:
         time_us: vehicle time of each image, microseconds, not decreasing.
-        spans: where each begins in the file, and how long it is, bytes.
+        spans: offset and length of each image in the file, bytes.
     """
 
     def __init__(self, file: BinaryIO | None = None) -> None:
@@ -44,18 +41,17 @@ class ImageFile:
         self.spans: list[tuple[int, int]] = []
 
     def __len__(self) -> int:
-        """How many images there are."""
         return len(self.spans)
 
-    def add(self, picture: Picture) -> None:
-        """Keep an image.
+    def add(self, recorded: RecordedImage) -> None:
+        """Add an image.
 
         Raises:
             RecordingError: it cannot be written.
         """
         if self._end > _MAX_IMAGES_BYTES:
             raise RecordingError(f"recording: more than {_MAX_IMAGES_BYTES // 1_000_000_000} GB of images")
-        done, data = cv2.imencode(".jpg", picture.image, (cv2.IMWRITE_JPEG_QUALITY, JPEG_QUALITY))
+        done, data = cv2.imencode(".jpg", recorded.image, (cv2.IMWRITE_JPEG_QUALITY, JPEG_QUALITY))
         if not done:
             raise RecordingError("recording: an image cannot be compressed")
         try:
@@ -63,34 +59,30 @@ class ImageFile:
             self._file.write(data.tobytes())
         except OSError as error:
             raise RecordingError(f"recording: no room to unpack its images: {error.strerror}") from None
-        self.time_us.append(picture.time_us)
+        self.time_us.append(recorded.time_us)
         self.spans.append((self._end, len(data)))
         self._end += len(data)
 
-    def jpeg(self, index: int) -> bytes:
-        """One of the images."""
+    def image(self, index: int) -> Image:
+        """An image, BGR, shape (height, width, 3), uint8."""
         start, length = self.spans[index]
         self._file.seek(start)
-        return self._file.read(length)
-
-    def image(self, index: int) -> Image:
-        """One of the images, BGR, shape (height, width, 3), uint8."""
-        decoded = cv2.imdecode(np.frombuffer(self.jpeg(index), np.uint8), cv2.IMREAD_COLOR)
+        decoded = cv2.imdecode(np.frombuffer(self._file.read(length), np.uint8), cv2.IMREAD_COLOR)
         return np.asarray(decoded, np.uint8)
 
     def latest_at(self, time_us: int) -> int | None:
-        """The last image taken at a time or before; None if there is none."""
+        """Index of the last image taken at this time or before; None if there is none."""
         number = bisect_right(self.time_us, time_us)
         return number - 1 if number else None
 
     def close(self) -> None:
-        """Let go of the file."""
+        """Close the file."""
         self._file.close()
 
 
 @dataclass(frozen=True, slots=True)
 class CollectedFlight:
-    """All of a flight.
+    """A complete flight; as a context, closes its images.
 
     Attributes:
         title: what was flown, for people.
@@ -100,7 +92,7 @@ class CollectedFlight:
         crossings: of frames, in order of time.
         began_us: vehicle time of motors on, from which the referee counts, microseconds; of the first
             tick if the motors were never on.
-        mission_is_known: whether states and commands are the mission's; a MAVLink log knows neither.
+        mission_is_known: whether states and commands are the mission's; a MAVLink log contains neither.
     """
 
     title: str
@@ -112,22 +104,14 @@ class CollectedFlight:
     mission_is_known: bool
 
     def __enter__(self) -> CollectedFlight:
-        """Have it until the end of the block."""
         return self
 
-    def __exit__(
-        self, _kind: type[BaseException] | None, _error: BaseException | None, _trace: TracebackType | None
-    ) -> None:
-        """Let go of the images."""
+    def __exit__(self, *_error: object) -> None:
         self.images.close()
 
 
 def collect(recorded: Recorded, images: ImageFile | None = None) -> CollectedFlight:
-    """Read a flight to its end.
-
-    Args:
-        recorded: the flight.
-        images: where to keep its images; by default in a file that vanishes.
+    """Read a flight to its end, its images by default into a temporary file.
 
     Raises:
         RecordingError: it is damaged, holds no telemetry, or there is no room for its images.
@@ -138,35 +122,32 @@ def collect(recorded: Recorded, images: ImageFile | None = None) -> CollectedFli
     for event in recorded.events():
         if isinstance(event, Moment):
             moments.append(event)
-            if len(moments) > _TICKS_AT_MOST:
+            if len(moments) > MAX_TICKS:
                 raise RecordingError(
                     f"recording '{recorded.title}': longer than eight hours; it must be damaged"
                 )
-        elif isinstance(event, Picture):
+        elif isinstance(event, RecordedImage):
             images.add(event)
         else:
             crossings.append(event)
     if not moments:
         raise RecordingError(f"recording '{recorded.title}': holds no telemetry; nothing can be shown")
-    began_us = _began(moments, crossings, recorded.result)
-    crossings = crossings or _crossings_of(recorded.result, began_us)
-    known = not isinstance(recorded, TlogRecording)
+    result = recorded.result
+    times_s = {} if result is None else result.times_s
+    began_us = _began_us(moments, crossings, times_s)
+    if not crossings:
+        crossings = [Crossed(began_us + ceil(time_s * 1e6), colour) for colour, time_s in times_s.items()]
+    is_known = not isinstance(recorded, TlogRecording)
     return CollectedFlight(
-        recorded.title, recorded.result, tuple(moments), images, tuple(crossings), began_us, known
+        recorded.title, result, tuple(moments), images, tuple(crossings), began_us, is_known
     )
 
 
-def _began(moments: list[Moment], crossings: list[Crossed], result: FlightResult | None) -> int:
-    """When the motors went on: by the referee's own clock if crossings tell it, else by the mission's."""
-    times_s = {} if result is None else result.times_s
+def _began_us(moments: list[Moment], crossings: list[Crossed], times_s: dict[str, float]) -> int:
+    """When the motors went on: by the referee's time of the first crossing, else by the mission's time."""
     if crossings and crossings[0].colour in times_s:
         return crossings[0].time_us - round(times_s[crossings[0].colour] * 1e6)
     for moment in moments:
         if moment.flight_time_s > 0.0:
             return moment.state.time_us - round(moment.flight_time_s * 1e6)
     return moments[0].state.time_us
-
-
-def _crossings_of(result: FlightResult | None, began_us: int) -> list[Crossed]:
-    times_s = {} if result is None else result.times_s
-    return [Crossed(began_us + ceil(time_s * 1e6), colour) for colour, time_s in times_s.items()]

@@ -1,4 +1,4 @@
-"""What a recording gives back, one after another."""
+"""The events of a recorded flight, and the error of recordings."""
 
 from __future__ import annotations
 
@@ -6,19 +6,19 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Protocol
 
+from errors import UserError
 from offboard.app import Moment
 from scenarios.result import FlightResult
 from vision.types import Image
 
 
-@dataclass(frozen=True, slots=True)
-class Picture:
-    """An image of the drone's camera.
+class RecordingError(UserError):
+    """A recording that cannot be written or shown; the message is one line for people."""
 
-    Attributes:
-        time_us: vehicle time, microseconds.
-        image: BGR, shape (height, width, 3), uint8.
-    """
+
+@dataclass(frozen=True, slots=True)
+class RecordedImage:
+    """An image of the drone's camera, BGR, shape (height, width, 3), at a vehicle time in microseconds."""
 
     time_us: int
     image: Image
@@ -26,22 +26,17 @@ class Picture:
 
 @dataclass(frozen=True, slots=True)
 class Crossed:
-    """The drone crossed a frame.
-
-    Attributes:
-        time_us: vehicle time, microseconds.
-        colour: the frame.
-    """
+    """The drone crossed the frame of a colour, at a vehicle time in microseconds."""
 
     time_us: int
     colour: str
 
 
-Event = Moment | Picture | Crossed
+Event = Moment | RecordedImage | Crossed
 
 
 class Recorded(Protocol):
-    """A recorded flight, from whatever file."""
+    """A recorded flight, whatever file it is read from."""
 
     @property
     def title(self) -> str:
@@ -54,7 +49,7 @@ class Recorded(Protocol):
         ...
 
     def events(self) -> Iterator[Event]:
-        """All that happened, in order of vehicle time; raises `RecordingError` where the file is damaged."""
+        """All events in order of vehicle time; raises `RecordingError` where the file is damaged."""
         ...
 
 

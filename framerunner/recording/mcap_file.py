@@ -1,6 +1,6 @@
-"""Reads an MCAP file chunk by chunk within bounds: what it claims of its sizes is checked, not believed.
+"""Reads an MCAP file chunk by chunk, within bounds that do not depend on the sizes that the file claims.
 
-MCAP's own reader unpacks a chunk to whatever it holds; some kilobytes can hold gigabytes.
+MCAP's own reader unpacks whatever a chunk holds; some kilobytes can unpack to gigabytes.
 """
 
 from __future__ import annotations
@@ -8,6 +8,8 @@ from __future__ import annotations
 from collections.abc import Collection, Iterator
 from dataclasses import replace
 from heapq import heapify, heappop, heappush
+from os import SEEK_END
+from pathlib import Path
 from typing import BinaryIO
 
 import zstandard
@@ -16,40 +18,49 @@ from mcap.reader import SeekingReader
 from mcap.records import Channel, Chunk, ChunkIndex, Message
 from mcap.stream_reader import breakup_chunk
 from mcap.summary import Summary
+from mcap.writer import MCAP0_MAGIC
 
-from framerunner.recording.errors import RecordingError
+from framerunner.recording.events import RecordingError
 
 MAX_CHUNK_BYTES = 24 << 20
 """Of a chunk, packed or not; the writer ends one at a megabyte and the message that exceeds it."""
-_MAX_WAITING_BYTES = 256 << 20  # of messages in memory, each with what Python adds
+_MAX_WAITING_BYTES = 256 << 20  # of messages in memory, with Python's overhead
 _MESSAGE_OVERHEAD_BYTES = 400
 _RECORD_HEAD_BYTES = 9
 
 _Waiting = tuple[int, int, int, ChunkIndex | Message]
 
 
-class BoundedFile:
-    """A file of which nobody reads more than a chunk at once, whatever length stands in it.
+def first_and_last_bytes(path: Path) -> tuple[bytes, bytes]:
+    """Of a file; a complete MCAP file has `MCAP0_MAGIC` at both ends. Empty if it cannot be read."""
+    length = len(MCAP0_MAGIC)
+    try:
+        with path.open("rb") as file:
+            first = file.read(length)
+            file.seek(max(0, file.seek(0, SEEK_END) - length))
+            return first, file.read()
+    except OSError:
+        return b"", b""
 
-    Args:
-        file: to read from.
-    """
+
+class BoundedFile:
+    """A file from which at most one chunk is read at a time, whatever length a record claims."""
 
     def __init__(self, file: BinaryIO) -> None:
         self._file = file
 
     def read(self, size: int = -1) -> bytes:
-        """Read some bytes; raises `RecordingError` if more are asked for than any record may have."""
+        """Read some bytes; raises `RecordingError` if they are more than any record may have."""
         if not 0 <= size <= MAX_CHUNK_BYTES:
             raise RecordingError(f"a part of it is said to have {size} bytes; {MAX_CHUNK_BYTES} are the most")
         return self._file.read(size)
 
     def seek(self, offset: int, whence: int = 0) -> int:
-        """As a file's."""
+        """See `BinaryIO`."""
         return self._file.seek(offset, whence)
 
     def tell(self) -> int:
-        """As a file's."""
+        """See `BinaryIO`."""
         return self._file.tell()
 
 
@@ -62,8 +73,7 @@ def summary_of(reader: SeekingReader) -> Summary:
     summary = reader.get_summary()
     if summary is None or not summary.chunk_indexes:
         raise RecordingError("it has no index")
-    places = {index.chunk_start_offset for index in summary.chunk_indexes}
-    if len(places) != len(summary.chunk_indexes):
+    if len({index.chunk_start_offset for index in summary.chunk_indexes}) != len(summary.chunk_indexes):
         raise RecordingError("its index names a chunk twice")
     return summary
 
@@ -71,12 +81,7 @@ def summary_of(reader: SeekingReader) -> Summary:
 def messages(
     file: BoundedFile, summary: Summary, topics: Collection[str]
 ) -> Iterator[tuple[Channel, Message]]:
-    """Give the messages of some topics in order of their time.
-
-    Args:
-        file: of which the summary is.
-        summary: its index.
-        topics: which are wanted.
+    """Yield the messages of some topics in order of their time.
 
     Raises:
         RecordingError: a chunk is larger than a recording's can be.
@@ -106,19 +111,17 @@ def messages(
 
 
 def _unpacked(chunk: Chunk) -> Chunk:
-    size = chunk.uncompressed_size
+    size, data = chunk.uncompressed_size, chunk.data
     if size > MAX_CHUNK_BYTES:
         raise RecordingError(f"a chunk is said to hold {size} bytes; {MAX_CHUNK_BYTES} are the most")
     if chunk.compression not in ("", "zstd"):
         raise RecordingError(f"compressed by '{chunk.compression:.20}'; recordings use zstd")
-    data = chunk.data
     if chunk.compression == "zstd" and size:
-        told = zstandard.get_frame_parameters(data).content_size
-        if told not in (size, zstandard.CONTENTSIZE_UNKNOWN):
+        claimed = zstandard.get_frame_parameters(data).content_size
+        if claimed not in (size, zstandard.CONTENTSIZE_UNKNOWN):
             raise RecordingError("a chunk holds another number of bytes than it says")
-        data = zstandard.ZstdDecompressor(max_window_size=MAX_CHUNK_BYTES).decompress(
-            data, max_output_size=size
-        )
+        unpacker = zstandard.ZstdDecompressor(max_window_size=MAX_CHUNK_BYTES)
+        data = unpacker.decompress(data, max_output_size=size)
     if len(data) != size:
         raise RecordingError("a chunk holds another number of bytes than it says")
     return replace(chunk, compression="", data=data)

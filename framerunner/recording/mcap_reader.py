@@ -1,4 +1,4 @@
-"""Reads back the recordings that `mcap_writer` writes."""
+"""Reads the recordings that `mcap_writer` writes."""
 
 from __future__ import annotations
 
@@ -6,7 +6,6 @@ import json
 import warnings
 from base64 import b64decode
 from collections.abc import Iterator
-from os import SEEK_END
 from pathlib import Path
 from typing import Any, BinaryIO, cast
 
@@ -16,31 +15,37 @@ from mcap.exceptions import McapError
 from mcap.reader import SeekingReader
 from mcap.writer import MCAP0_MAGIC
 
-from framerunner.recording.errors import RecordingError
-from framerunner.recording.events import Crossed, Event, Picture
-from framerunner.recording.image_limits import check_image
-from framerunner.recording.mcap_file import MAX_CHUNK_BYTES, BoundedFile, messages, summary_of
+from framerunner.recording.events import Crossed, Event, RecordedImage, RecordingError
+from framerunner.recording.mcap_file import (
+    MAX_CHUNK_BYTES,
+    BoundedFile,
+    first_and_last_bytes,
+    messages,
+    summary_of,
+)
 from framerunner.recording.mcap_writer import METADATA
 from framerunner.recording.schemas import CROSSING, DETECTIONS, IMAGE, MISSION, SETPOINT, TELEMETRY
 from offboard.app import Moment
 from offboard.drone import DroneState, VelocityCommand
 from offboard.engine import TransitionTaken
 from scenarios.result import FlightResult, ResultError
-from vision.types import Detection, Detections
+from vision.jpeg import JPEG_START, MAX_PIXELS, ImageError, jpeg_structure
+from vision.types import Detection, Detections, Image
 
 _MAX_TEXT_BYTES = 1_000_000  # of a message that is no image
+_PNG_START = b"\x89PNG\r\n\x1a\n"
 Json = dict[str, Any]
 
 
 class McapRecording:
-    """A recording of framerunner's; whoever opened it closes it.
+    """A recording of framerunner's; call `close` at the end.
 
     Args:
         path: an MCAP file.
 
     Attributes:
         title: scenario and mission.
-        result: the attached result; None if the flight did not come to one.
+        result: the attached result; None if the flight left none.
 
     Raises:
         RecordingError: it cannot be read, is damaged, or is not one of framerunner's.
@@ -70,18 +75,18 @@ class McapRecording:
         self._file.close()
 
     def events(self) -> Iterator[Event]:
-        """All that happened, in order of vehicle time.
+        """All events, in order of vehicle time.
 
         Raises:
             RecordingError: the file is damaged.
         """
         topics = (TELEMETRY, SETPOINT, DETECTIONS, MISSION, IMAGE, CROSSING)
-        moments = _Moments()
+        builder = _EventBuilder()
         try:
             for channel, message in messages(self._bounded, self._summary, topics):
                 if channel.topic != IMAGE and len(message.data) > _MAX_TEXT_BYTES:
                     raise RecordingError(f"a message of {channel.topic} has {len(message.data)} bytes")
-                event = moments.take(channel.topic, message.log_time // 1000, json.loads(message.data))
+                event = builder.take(channel.topic, message.log_time // 1000, json.loads(message.data))
                 if event is not None:
                     yield event
         except Exception as error:
@@ -107,10 +112,10 @@ class McapRecording:
         )
 
     def _damaged(self, error: Exception) -> RecordingError:
-        """In one line, whatever a damaged file makes the libraries raise."""
+        """Say in one line what is wrong; a damaged file makes the libraries raise any error."""
         if isinstance(error, RecordingError) and str(error).startswith("recording '"):
             return error
-        first, last = self._ends()
+        first, last = first_and_last_bytes(self._path)
         if first != MCAP0_MAGIC:
             return RecordingError(
                 f"recording '{self._path}': not an MCAP file; name a recording or a run folder"
@@ -118,27 +123,16 @@ class McapRecording:
         if last != MCAP0_MAGIC:
             what = "cut short, as if its program had been killed"
         else:
-            told = isinstance(error, McapError | RecordingError)
-            text = " ".join(str(error).split()) if told else ""
+            is_plain = isinstance(error, McapError | RecordingError)
+            text = " ".join(str(error).split()) if is_plain else ""
             what = f"damaged ({text or type(error).__name__:.120})"
         return RecordingError(
             f"recording '{self._path}': {what}; `mcap recover` of the MCAP tools may save a part of it"
         )
 
-    def _ends(self) -> tuple[bytes, bytes]:
-        """First and last bytes of the file; a whole one has MCAP's mark at both."""
-        length = len(MCAP0_MAGIC)
-        try:
-            with self._path.open("rb") as file:
-                first = file.read(length)
-                file.seek(max(0, file.seek(0, SEEK_END) - length))
-                return first, file.read()
-        except OSError:
-            return b"", b""
 
-
-class _Moments:
-    """Puts messages together again to what the flight's observer saw."""
+class _EventBuilder:
+    """Builds events from messages: ticks as the flight's observer got them."""
 
     def __init__(self) -> None:
         self._state = ""
@@ -147,14 +141,14 @@ class _Moments:
         self._transition: TransitionTaken | None = None
 
     def take(self, topic: str, time_us: int, message: Json) -> Event | None:
-        """Take a message; telemetry is the last of a tick."""
+        """Add a message; telemetry is the last of a tick."""
         if topic == TELEMETRY:
             flight_time_s = float(message["flight_time_s"])
             state = _drone_state(time_us, message)
             taken, self._transition = self._transition, None
             return Moment(state, self._command, self._detections, self._state, flight_time_s, taken)
         if topic == IMAGE:
-            return _picture(time_us, message)
+            return RecordedImage(time_us, _decoded(b64decode(message["data"])))
         if topic == CROSSING:
             return Crossed(time_us, str(message["colour"]))
         if topic == SETPOINT:
@@ -185,7 +179,7 @@ def _drone_state(time_us: int, message: Json) -> DroneState:
 
 
 def _transition(time_us: int, message: Json) -> TransitionTaken | None:
-    """Why the mission went on; None at its start, and in recordings of before this was kept."""
+    """Why the mission changed its state; None at its start and in recordings of older versions."""
     if "when" not in message:
         return None
     values = tuple((str(each["name"]), _value(each)) for each in message["values"])
@@ -212,14 +206,34 @@ def _detections(message: Json) -> Detections:
 
 
 def _detection(message: Json) -> Detection:
-    """What is missing is unknown, as `Detection`'s defaults say it."""
+    """What is missing is unknown, as in `Detection`'s defaults."""
     return Detection(**{name: float(value) for name, value in message.items() if name != "seen"})
 
 
-def _picture(time_us: int, message: Json) -> Picture:
-    data = b64decode(message["data"])
-    check_image(data)
+def _decoded(data: bytes) -> Image:
+    """Decode a PNG or JPEG; one that is too large, or takes too long, is refused by its structure alone.
+
+    Raises:
+        RecordingError: it is refused.
+        ValueError: it is damaged.
+    """
+    try:
+        if data.startswith(JPEG_START):
+            jpeg_structure(data)
+        else:
+            _check_png(data)
+    except ImageError as error:
+        raise RecordingError(f"an image is {error}") from None
     image = cv2.imdecode(np.frombuffer(data, np.uint8), cv2.IMREAD_COLOR)
     if image is None:
         raise ValueError("an image cannot be decoded")
-    return Picture(time_us, image)
+    return np.asarray(image, np.uint8)
+
+
+def _check_png(data: bytes) -> None:
+    """Check width and height in the first chunk (PNG specification, 11.2.2)."""
+    if not data.startswith(_PNG_START) or len(data) < 24:
+        raise ImageError("neither PNG nor JPEG")
+    width, height = int.from_bytes(data[16:20]), int.from_bytes(data[20:24])
+    if width * height > MAX_PIXELS:
+        raise ImageError(f"of {width} x {height} pixels; {MAX_PIXELS} are the limit")

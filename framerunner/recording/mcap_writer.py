@@ -1,8 +1,7 @@
 """Writes a flight as an MCAP file that Foxglove opens and `framerunner replay` shows again.
 
-All times are vehicle time since its boot, so two same flights leave the same bytes. Messages go to the file
-in compressed chunks of about a megabyte; no more than one of them is in memory. Raw images are compressed in
-a thread of their own, beside the flight.
+All times are vehicle time since its boot, so two equal flights leave equal bytes. Messages are written in
+compressed chunks of about a megabyte; at most one is in memory. Raw images are compressed in a thread.
 """
 
 from __future__ import annotations
@@ -12,29 +11,12 @@ from collections.abc import Sequence
 from concurrent.futures import Future, ThreadPoolExecutor
 from importlib import metadata
 from pathlib import Path
-from types import TracebackType
 
 import cv2
 from mcap.writer import CompressionType, Writer
 
-from framerunner.recording import messages
-from framerunner.recording.errors import RecordingError
-from framerunner.recording.scene import calibration, camera_transform, scene
-from framerunner.recording.schemas import (
-    ANNOTATIONS,
-    CALIBRATION,
-    CROSSING,
-    DETECTIONS,
-    IMAGE,
-    LOG,
-    MISSION,
-    SCENE,
-    SETPOINT,
-    TELEMETRY,
-    TOPICS,
-    TRANSFORM,
-    schemas,
-)
+from framerunner.recording import messages, schemas
+from framerunner.recording.events import RecordingError
 from offboard.app import Moment
 from offboard.mission import Mission
 from offboard.pilot_file import PilotFile
@@ -49,14 +31,14 @@ _encode = json.JSONEncoder(separators=(",", ":"), allow_nan=False).encode
 
 
 class FlightRecording:
-    """The recording of one flight, from before it begins.
+    """The recording of one flight.
 
-    A disk that is full does not end a flight: recording stops, and `problem` says why.
+    A full disk does not end a flight: recording stops, and `problem` says why.
 
     Args:
         path: the file to write.
         scenario: what is flown; attached.
-        mission: what flies; its file is attached, and a contestant's Python file with it.
+        mission: its file is attached, and a contestant's Python file.
         seed: of a lockstep flight; None in real time.
 
     Attributes:
@@ -72,8 +54,8 @@ class FlightRecording:
         self._scenario = scenario
         self._size_px = (scenario.camera.width_px, scenario.camera.height_px)
         self._channels: dict[str, int] = {}
-        self._counts = dict.fromkeys(TOPICS, 0)
-        self._shown = False
+        self._counts = dict.fromkeys(schemas.TOPICS, 0)
+        self._scene_written = False
         self._first_us: int | None = None
         self._now_us: int | None = None
         self._state = ""
@@ -89,17 +71,13 @@ class FlightRecording:
         self._begin(mission, seed)
 
     def __enter__(self) -> FlightRecording:
-        """Record until the end of the block, whatever ends it."""
         return self
 
-    def __exit__(
-        self, _kind: type[BaseException] | None, _error: BaseException | None, _trace: TracebackType | None
-    ) -> None:
-        """Finish the file."""
+    def __exit__(self, *_error: object) -> None:
         self.close()
 
     def see(self, moment: Moment) -> None:
-        """Take a tick of the flight."""
+        """Record a tick."""
         time_us = moment.state.time_us
         self._now_us = time_us
         if self._first_us is None:
@@ -108,12 +86,12 @@ class FlightRecording:
             self._enter_state(moment)
         if moment.detections != self._detections:
             self._detect(moment.detections, time_us)
-        self._write(SETPOINT, time_us, messages.setpoint(moment))
-        self._write(TRANSFORM, time_us, messages.transform(moment.state))
-        self._write(TELEMETRY, time_us, messages.telemetry(moment))
+        self._write(schemas.SETPOINT, time_us, messages.setpoint(moment))
+        self._write(schemas.TRANSFORM, time_us, messages.transform(moment.state))
+        self._write(schemas.TELEMETRY, time_us, messages.telemetry(moment))
 
     def see_image(self, time_us: int, image: Image) -> None:
-        """Take a raw image; it is kept without loss.
+        """Record a raw image, without loss.
 
         Args:
             time_us: vehicle time of its exposure, microseconds.
@@ -124,9 +102,9 @@ class FlightRecording:
         self._compressing = (time_us, self._compressor.submit(_png, image))
 
     def see_frame(self, frame: CameraFrame) -> None:
-        """Take an image of a camera source, as it was compressed if it was.
+        """Record an image of a camera, as it was compressed if it was.
 
-        One without a time gets that of the last tick; before the first tick it has none and is left out.
+        One without a time gets that of the last tick; before the first tick it is left out.
         """
         time_us = self._now_us if frame.time_us is None else frame.time_us
         if time_us is None:
@@ -135,14 +113,14 @@ class FlightRecording:
             self.see_image(time_us, frame.image)
         else:
             self._size_px = (frame.image.shape[1], frame.image.shape[0])
-            self._write(IMAGE, time_us, messages.image(frame.jpeg, "jpeg", time_us))
+            self._write(schemas.IMAGE, time_us, messages.image(frame.jpeg, "jpeg", time_us))
 
     def finish(self, result: FlightResult, track_time_s: Sequence[float]) -> None:
         """Add what is known only after the flight: crossings, the verdict, and the result as an attachment.
 
         Args:
             result: without wall times.
-            track_time_s: of the ticks seen, since motors on; it tells when the try began.
+            track_time_s: of the recorded ticks, since motors on.
         """
         self._keep_compressed()
         end_us = self._now_us or 0
@@ -153,7 +131,7 @@ class FlightRecording:
         self._attach("result.json", "application/json", result.text(), end_us)
 
     def close(self) -> None:
-        """Finish the file, or take it away if there was nothing to record; a second time does nothing."""
+        """Finish the file, or remove it if nothing was recorded; a second call does nothing."""
         self._compressor.shutdown()
         if self._file.closed:
             return
@@ -162,7 +140,7 @@ class FlightRecording:
             if not self.problem:
                 self._writer.finish()  # type: ignore[no-untyped-call]
             self._file.close()
-            if not self._shown:
+            if not self._scene_written:
                 self._path.unlink()
         except OSError as error:
             self._stop(error)
@@ -176,42 +154,41 @@ class FlightRecording:
         self._attach("mission.yaml", "application/yaml", mission.path.read_text(encoding="utf-8"), 0)
         if isinstance(mission.pilot, PilotFile):
             self._attach("pilot.py", "text/x-python", mission.pilot.text, 0)
-        ids = {
-            name: self._writer.register_schema(name, "jsonschema", text) for name, text in schemas().items()
-        }
-        for topic, name in TOPICS.items():
+        register = self._writer.register_schema
+        ids = {name: register(name, "jsonschema", text) for name, text in schemas.schema_texts().items()}
+        for topic, name in schemas.TOPICS.items():
             self._channels[topic] = self._writer.register_channel(topic, "json", ids[name])
 
-    def _show(self, time_us: int) -> None:
-        """What does not change stands before all else, at the time of the first message."""
-        self._shown = True
-        self._write(SCENE, time_us, scene(self._scenario, time_us))
-        self._write(TRANSFORM, time_us, camera_transform(self._scenario, time_us))
-        self._write(CALIBRATION, time_us, calibration(self._scenario, time_us))
+    def _write_scene(self, time_us: int) -> None:
+        """Write what does not change, before all else, at the time of the first message."""
+        self._scene_written = True
+        self._write(schemas.SCENE, time_us, messages.scene(self._scenario, time_us))
+        self._write(schemas.TRANSFORM, time_us, messages.camera_transform(self._scenario, time_us))
+        self._write(schemas.CALIBRATION, time_us, messages.calibration(self._scenario, time_us))
 
     def _enter_state(self, moment: Moment) -> None:
         time_us = moment.state.time_us
         previous_s = (time_us - self._state_since_us) / 1e6 if self._state else 0.0
-        self._write(MISSION, time_us, messages.mission_state(moment, self._state, previous_s))
-        came_from = f" after {previous_s:.2f} s in {self._state}" if self._state else ""
-        self._log(time_us, "mission", f"{moment.mission_state}{came_from}")
+        self._write(schemas.MISSION, time_us, messages.mission_state(moment, self._state, previous_s))
+        previous = f" after {previous_s:.2f} s in {self._state}" if self._state else ""
+        self._log(time_us, "mission", f"{moment.mission_state}{previous}")
         self._state, self._state_since_us = moment.mission_state, time_us
 
     def _detect(self, seen: Detections, time_us: int) -> None:
         self._detections = seen
-        self._write(DETECTIONS, time_us, messages.detections(seen, time_us))
+        self._write(schemas.DETECTIONS, time_us, messages.detections(seen, time_us))
         image_us = time_us if seen.time_us is None else seen.time_us
-        self._write(ANNOTATIONS, image_us, messages.boxes(seen, image_us, self._size_px))
+        self._write(schemas.ANNOTATIONS, image_us, messages.boxes(seen, image_us, self._size_px))
 
     def _keep_compressed(self) -> None:
         """Write the last raw image.
 
-        Always when the next one comes, so that the file's bytes do not hang on how quick the thread is.
+        Always when the next one arrives, so that the file's bytes do not depend on the thread's speed.
         """
         if self._compressing is not None:
             time_us, data = self._compressing
             self._compressing = None
-            self._write(IMAGE, time_us, messages.image(data.result(), "png", time_us))
+            self._write(schemas.IMAGE, time_us, messages.image(data.result(), "png", time_us))
 
     def _cross_frames(self, result: FlightResult, began_us: int) -> None:
         rows = zip(
@@ -223,17 +200,17 @@ class FlightRecording:
         )
         for colour, time_s, offset_m, side in rows:
             time_us = began_us + round(time_s * 1e6)
-            self._write(CROSSING, time_us, messages.crossing(time_us, colour, time_s, offset_m, side))
+            self._write(schemas.CROSSING, time_us, messages.crossing(time_us, colour, time_s, offset_m, side))
             self._log(time_us, "referee", f"crossed {colour}, {100 * offset_m:.1f} cm off its centre")
 
     def _log(self, time_us: int, name: str, text: str) -> None:
-        self._write(LOG, time_us, messages.log(time_us, name, text))
+        self._write(schemas.LOG, time_us, messages.log(time_us, name, text))
 
     def _write(self, topic: str, time_us: int, message: messages.Message) -> None:
         if self.problem:
             return
-        if not self._shown:
-            self._show(time_us)
+        if not self._scene_written:
+            self._write_scene(time_us)
         data = _encode(message).encode()
         number = self._counts[topic]
         self._counts[topic] = number + 1
@@ -252,14 +229,14 @@ class FlightRecording:
             self._stop(error)
 
     def _stop(self, error: OSError) -> None:
-        """Go on without recording; what is in the file already can be read."""
+        """Stop recording; what is in the file already can be read."""
         self.problem = f"recording stopped: {error.strerror or error}"
         try:
             self._file.close()
-        except OSError:  # what was buffered does not fit either; the file is closed all the same
+        except OSError:  # what was buffered does not fit either; the file is closed anyway
             return
 
 
 def _png(image: Image) -> bytes:
-    """Compress without loss; OpenCV's defaults are its quickest."""
+    """Compress without loss; OpenCV's defaults are its fastest."""
     return bytes(cv2.imencode(".png", image)[1])

@@ -1,4 +1,7 @@
-"""From what a flight shows of itself to the messages of its recording. Plain data in, plain data out."""
+"""Makes the messages of a recording from the ticks of a flight and from its scenario.
+
+Arena axes (x forward, y left, z up) are also Foxglove's world axes.
+"""
 
 from __future__ import annotations
 
@@ -6,11 +9,13 @@ from base64 import b64encode
 from math import cos, isfinite, sin
 from typing import Any
 
+from firmware_py.airframe import load_airframe
 from geometry.vectors import Vec3
 from offboard.app import Moment
 from offboard.drone import DroneState
-from offboard.engine import TransitionTaken
-from scenarios.models import COLOURS
+from scenarios.models import COLOURS, Arena, Scenario
+from sitl.solids import Solid, base_solid, frame_solids
+from vision.intrinsics import camera_matrix
 from vision.types import Detection, Detections
 
 Message = dict[str, Any]
@@ -23,36 +28,40 @@ RGBA: dict[str, Message] = {
     "green": {"r": 0.0, "g": 0.8, "b": 0.0, "a": 1.0},
     "blue": {"r": 0.0, "g": 0.0, "b": 1.0, "a": 1.0},
 }
+_FLOOR = {"r": 0.88, "g": 0.69, "b": 0.22, "a": 0.6}
+_BORDER = {"r": 0.5, "g": 0.5, "b": 0.5, "a": 0.7}
+_BASE = {"r": 0.67, "g": 0.67, "b": 0.67, "a": 1.0}
+_BODY = {"r": 0.15, "g": 0.15, "b": 0.2, "a": 1.0}
+_NOSE = {"r": 1.0, "g": 0.6, "b": 0.0, "a": 1.0}
 _CLEAR = {"r": 0.0, "g": 0.0, "b": 0.0, "a": 0.0}
 _LABEL = {"r": 1.0, "g": 1.0, "b": 1.0, "a": 1.0}
-INFO = 2
-_TEXT_CHARACTERS = 80  # of a guard's value that is no number
+_INFO = 2
+_FLOOR_M = 0.01
+_MAX_TEXT = 80  # characters of a guard's value that is no number
 
 
 def time_of(time_us: int) -> Message:
-    """Vehicle time as a message has it."""
+    """Vehicle time, microseconds, as seconds and nanoseconds."""
     seconds, rest_us = divmod(time_us, 1_000_000)
     return {"sec": seconds, "nsec": rest_us * 1000}
 
 
-def vector_of(vector: Vec3) -> Message:
-    """A vector as a message has it."""
+def _vector(vector: Vec3) -> Message:
     return {"x": vector[0], "y": vector[1], "z": vector[2]}
 
 
-def turn_of(yaw_rad: float) -> Message:
-    """A turn about the vertical as a message has it."""
+def _yaw_quaternion(yaw_rad: float) -> Message:
     return {"x": 0.0, "y": 0.0, "z": sin(yaw_rad / 2), "w": cos(yaw_rad / 2)}
 
 
 def telemetry(moment: Moment) -> Message:
-    """What the drone told at a tick."""
+    """The drone's state at a tick."""
     state = moment.state
     return {
         "timestamp": time_of(state.time_us),
         "flight_time_s": moment.flight_time_s,
-        "position_arena_m": vector_of((state.x, state.y, state.z)),
-        "velocity_arena_m_s": vector_of(state.velocity_arena_m_s),
+        "position_arena_m": _vector((state.x, state.y, state.z)),
+        "velocity_arena_m_s": _vector(state.velocity_arena_m_s),
         "yaw_rad": state.yaw,
         "armed": state.armed,
         "offboard": state.offboard,
@@ -62,18 +71,23 @@ def telemetry(moment: Moment) -> Message:
 
 
 def transform(state: DroneState) -> Message:
-    """Where the drone is; telemetry tells no roll and pitch, so it is drawn level."""
+    """The drone's pose; it is drawn level, since the app's state has no roll and pitch."""
+    position_m = (state.x, state.y, state.z)
+    return _transform(state.time_us, (ARENA, DRONE), position_m, _yaw_quaternion(state.yaw))
+
+
+def _transform(time_us: int, frames: tuple[str, str], translation_m: Vec3, rotation: Message) -> Message:
     return {
-        "timestamp": time_of(state.time_us),
-        "parent_frame_id": ARENA,
-        "child_frame_id": DRONE,
-        "translation": vector_of((state.x, state.y, state.z)),
-        "rotation": turn_of(state.yaw),
+        "timestamp": time_of(time_us),
+        "parent_frame_id": frames[0],
+        "child_frame_id": frames[1],
+        "translation": _vector(translation_m),
+        "rotation": rotation,
     }
 
 
 def setpoint(moment: Moment) -> Message:
-    """What the mission asked of the drone at a tick."""
+    """The mission's command at a tick."""
     command = moment.command
     return {
         "timestamp": time_of(moment.state.time_us),
@@ -85,12 +99,7 @@ def setpoint(moment: Moment) -> Message:
 
 
 def detections(seen: Detections, time_us: int) -> Message:
-    """What the camera saw, as the mission was told.
-
-    Args:
-        seen: of one image.
-        time_us: vehicle time of the first tick that had them, microseconds.
-    """
+    """The detections of one image, at the vehicle time of the first tick that used them, microseconds."""
     message: Message = {"timestamp": time_of(time_us)}
     if seen.time_us is not None:
         message["image_timestamp"] = time_of(seen.time_us)
@@ -100,7 +109,7 @@ def detections(seen: Detections, time_us: int) -> Message:
 
 
 def _detection(detection: Detection) -> Message:
-    """Only what is known: JSON has neither infinity nor NaN."""
+    """Only finite numbers: JSON has neither infinity nor NaN."""
     message: Message = {"seen": detection.seen}
     for name in ("n", "s", "e", "w", "d", "a"):
         value: float = getattr(detection, name)
@@ -110,13 +119,7 @@ def _detection(detection: Detection) -> Message:
 
 
 def boxes(seen: Detections, image_us: int, size_px: tuple[int, int]) -> Message:
-    """Boxes around what was detected, to be drawn over the image.
-
-    Args:
-        seen: of one image.
-        image_us: vehicle time of that image, microseconds.
-        size_px: its width and height.
-    """
+    """Boxes around the detections of one image, to be drawn over it; the image has width and height."""
     time = time_of(image_us)
     outlines, texts = [], []
     for colour in COLOURS:
@@ -137,12 +140,12 @@ def boxes(seen: Detections, image_us: int, size_px: tuple[int, int]) -> Message:
                 "metadata": [],
             }
         )
-        known = f" {detection.d:.2f} m" if isfinite(detection.d) else ""
+        distance = f" {detection.d:.2f} m" if isfinite(detection.d) else ""
         texts.append(
             {
                 "timestamp": time,
                 "position": {"x": left, "y": top},
-                "text": f"{colour}{known}",
+                "text": f"{colour}{distance}",
                 "font_size": 10.0,
                 "text_color": _LABEL,
                 "background_color": {**RGBA[colour], "a": 0.6},
@@ -153,7 +156,7 @@ def boxes(seen: Detections, image_us: int, size_px: tuple[int, int]) -> Message:
 
 
 def box_edges(detection: Detection, size_px: tuple[int, int]) -> tuple[float, float, float, float]:
-    """Left, top, right and bottom edge of a box, pixels from the image's top left corner.
+    """Left, top, right and bottom edge of a detection's box, pixels from the image's top left corner.
 
     The paper counts rows and columns from 1, so n = height / 2 - row and e = column - (width / 2 + 1); see
     `vision.detector.measure`. The edges are those of the outer pixels, not their centres.
@@ -164,13 +167,7 @@ def box_edges(detection: Detection, size_px: tuple[int, int]) -> tuple[float, fl
 
 
 def image(data: bytes, kind: str, time_us: int) -> Message:
-    """An image.
-
-    Args:
-        data: compressed.
-        kind: "png" or "jpeg".
-        time_us: vehicle time of its exposure, microseconds.
-    """
+    """An image, compressed as `kind`, "png" or "jpeg"; time is the vehicle time of its exposure."""
     return {
         "timestamp": time_of(time_us),
         "frame_id": CAMERA,
@@ -180,37 +177,28 @@ def image(data: bytes, kind: str, time_us: int) -> Message:
 
 
 def mission_state(moment: Moment, previous: str, previous_s: float) -> Message:
-    """The mission has entered another state.
-
-    Args:
-        moment: its first tick in the new state.
-        previous: the state before; empty at the start.
-        previous_s: time spent in that, seconds.
-    """
+    """A mission's state at its first tick, and the state before, with the seconds spent in it."""
+    taken = moment.transition
+    guard: Message = {}
+    if taken is not None:
+        guard = {"when": taken.when, "values": [_guard_value(*each) for each in taken.values]}
     return {
         "timestamp": time_of(moment.state.time_us),
         "flight_time_s": moment.flight_time_s,
         "state": moment.mission_state,
         "previous": previous,
         "previous_s": previous_s,
-        **_guard(moment.transition),
+        **guard,
     }
 
 
-def _guard(taken: TransitionTaken | None) -> Message:
-    """Why the mission went on; nothing where that is not known."""
-    if taken is None:
-        return {}
-    return {"when": taken.when, "values": [_value(name, value) for name, value in taken.values]}
-
-
-def _value(name: str, value: object) -> Message:
+def _guard_value(name: str, value: object) -> Message:
     """A value of a guard; a contestant's pilot may hold anything."""
     try:
         if isinstance(value, bool):
             return {"name": name, "flag": value}
         if isinstance(value, str) or not hasattr(value, "__float__"):
-            return {"name": name, "text": str(value)[:_TEXT_CHARACTERS]}
+            return {"name": name, "text": str(value)[:_MAX_TEXT]}
         number = float(value)
     except Exception:  # whatever a contestant's conversion raises
         return {"name": name, "text": type(value).__name__}
@@ -230,11 +218,94 @@ def crossing(time_us: int, colour: str, time_s: float, offset_m: float, side: st
 
 def log(time_us: int, name: str, text: str) -> Message:
     """A line of text."""
+    timestamp = time_of(time_us)
+    return {"timestamp": timestamp, "level": _INFO, "message": text, "name": name, "file": "", "line": 0}
+
+
+def scene(scenario: Scenario, time_us: int) -> Message:
+    """Arena, base and frames, and the drone, which moves with its own axes, from a vehicle time on."""
+    arena = scenario.arena
+    floor = _cube((0.0, 0.0, -_FLOOR_M / 2), (arena.length_x_m, arena.width_y_m, _FLOOR_M), _FLOOR)
+    entities = [
+        _entity(time_us, "arena", ARENA, cubes=[floor], lines=[_border(arena)]),
+        _entity(time_us, "base", ARENA, cubes=[_solid(base_solid(scenario), _BASE)]),
+    ]
+    for frame in scenario.frames:
+        bars = [_solid(bar, RGBA[frame.colour]) for bar in frame_solids(frame)]
+        entities.append(_entity(time_us, f"{frame.colour} frame", ARENA, cubes=bars))
+    length_m, width_m, height_m = load_airframe(scenario.airframe).envelope_m
+    body = _cube((0.0, 0.0, 0.0), (length_m, width_m, height_m), _BODY)
+    nose = _cube(
+        (0.4 * length_m, 0.0, 0.6 * height_m), (0.2 * length_m, 0.2 * width_m, 0.2 * height_m), _NOSE
+    )
+    entities.append(_entity(time_us, "drone", DRONE, cubes=[body, nose]))
+    return {"deletions": [], "entities": entities}
+
+
+def camera_transform(scenario: Scenario, time_us: int) -> Message:
+    """The camera's pose on the drone, in the axes of images: x right, y down, z forward."""
+    rotation = {"x": -0.5, "y": 0.5, "z": -0.5, "w": 0.5}
+    return _transform(time_us, (DRONE, CAMERA), scenario.camera.position_flu_m, rotation)
+
+
+def calibration(scenario: Scenario, time_us: int) -> Message:
+    """The ideal pinhole camera of the scenario."""
+    camera = scenario.camera
+    matrix = camera_matrix(camera.width_px, camera.height_px, camera.horizontal_fov_rad).tolist()
     return {
         "timestamp": time_of(time_us),
-        "level": INFO,
-        "message": text,
-        "name": name,
-        "file": "",
-        "line": 0,
+        "frame_id": CAMERA,
+        "width": camera.width_px,
+        "height": camera.height_px,
+        "distortion_model": "plumb_bob",
+        "D": [0.0] * 5,
+        "K": [value for row in matrix for value in row],
+        "R": [1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0],
+        "P": [value for row in matrix for value in (*row, 0.0)],
+    }
+
+
+def _entity(time_us: int, name: str, axes: str, **primitives: list[Message]) -> Message:
+    """An entity without an end that moves with its axes."""
+    entity: dict[str, Any] = {
+        "timestamp": time_of(time_us),
+        "frame_id": axes,
+        "id": name,
+        "lifetime": {"sec": 0, "nsec": 0},
+        "frame_locked": True,
+        "metadata": [],
+        "cubes": [],
+        "lines": [],
+    }
+    return {**entity, **primitives}
+
+
+def _solid(solid: Solid, colour: Message) -> Message:
+    x, y, z = solid.half_extents_m
+    return _cube(solid.centre_arena_m, (2 * x, 2 * y, 2 * z), colour, solid.yaw_rad)
+
+
+def _cube(centre_m: Vec3, size_m: Vec3, colour: Message, yaw_rad: float = 0.0) -> Message:
+    pose = {"position": _vector(centre_m), "orientation": _yaw_quaternion(yaw_rad)}
+    return {"pose": pose, "size": _vector(size_m), "color": colour}
+
+
+def _border(arena: Arena) -> Message:
+    """The twelve edges of the flying space."""
+    x, y = arena.length_x_m / 2, arena.width_y_m / 2
+    plan = ((x, y), (-x, y), (-x, -y), (x, -y))
+    points: list[Vec3] = []
+    for (x0, y0), (x1, y1) in zip(plan, (*plan[1:], plan[0]), strict=True):
+        for z in (0.0, arena.height_m):
+            points += [(x0, y0, z), (x1, y1, z)]
+        points += [(x0, y0, 0.0), (x0, y0, arena.height_m)]
+    return {
+        "type": 2,  # LINE_LIST
+        "pose": {"position": _vector((0.0, 0.0, 0.0)), "orientation": _yaw_quaternion(0.0)},
+        "thickness": 1.0,
+        "scale_invariant": True,
+        "points": [_vector(point) for point in points],
+        "color": _BORDER,
+        "colors": [],
+        "indices": [],
     }

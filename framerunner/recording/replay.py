@@ -1,4 +1,4 @@
-"""Shows a recorded flight again, at the pace it was flown or another."""
+"""Shows a recorded flight in the terminal, and its images as video, at any speed."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from rich.live import Live
 from rich.table import Table
 
 from framerunner.flying.display import moment_table, place_in_words
-from framerunner.recording.events import Crossed, Picture, Recorded, time_of_event
+from framerunner.recording.events import Crossed, Recorded, time_of_event
 from offboard.app import Moment
 from sitl.video import VideoServer
 
@@ -21,11 +21,7 @@ _AHEAD_S = 0.005  # events due within this are shown now
 
 
 class ReplayDisplay:
-    """A live table in a terminal; elsewhere a line at every change of state, crossing and ten seconds.
-
-    Args:
-        title: what was flown.
-    """
+    """A live table in a terminal; elsewhere a line at every change of state and crossing, and every 10 s."""
 
     def __init__(self, title: str) -> None:
         self._title = title
@@ -37,19 +33,17 @@ class ReplayDisplay:
         self._line_s = 0.0
 
     def __enter__(self) -> ReplayDisplay:
-        """Take the terminal, if there is one."""
         if self._console.is_terminal:
             self._live = Live(console=self._console, auto_refresh=False, transient=True)
             self._live.start()
         return self
 
     def __exit__(self, *_error: object) -> None:
-        """Give it back."""
         if self._live is not None:
             self._live.stop()
 
     def cross(self, crossed: Crossed) -> None:
-        """A frame was crossed."""
+        """Count a crossing."""
         self._crossed.append(crossed.colour)
         self._line_state = ""  # makes the next moment print its line
 
@@ -81,12 +75,12 @@ async def replay(recorded: Recorded, speed: float, video: VideoServer | None) ->
 
     Args:
         recorded: the flight.
-        speed: vehicle time a wall time; 0 for as fast as possible.
-        video: server for the images; None shows none. It is started and closed here.
+        speed: ratio of vehicle time to wall time; 0 for as fast as possible.
+        video: server for the images, started and closed here; None serves none.
 
     Raises:
-        RecordingError: the recording is damaged; what comes before that is shown.
-        VideoError: the port is taken.
+        RecordingError: the recording is damaged; what precedes the damage is shown.
+        VideoError: the port is in use.
     """
     if video is not None:
         await video.start()
@@ -101,21 +95,21 @@ async def replay(recorded: Recorded, speed: float, video: VideoServer | None) ->
                 elif isinstance(event, Crossed):
                     display.cross(event)
                 elif video is not None:
-                    _publish(video, event)
+                    video.publish(event.image, event.time_us)
     finally:
         if video is not None:
             await video.close()
 
 
 class _Pace:
-    """Lets vehicle time pass as wall time does, times the speed."""
+    """Keeps the ratio of vehicle time to wall time."""
 
     def __init__(self, speed: float) -> None:
         self._speed = speed
         self._first: tuple[int, float] | None = None
 
     async def wait_for(self, time_us: int) -> None:
-        """Wait until something is due; give way in any case, so that Ctrl-C is heard."""
+        """Wait until a vehicle time is due; always yields, so that Ctrl-C is handled."""
         if self._first is None:
             self._first = (time_us, monotonic())
         ahead_s = 0.0
@@ -123,7 +117,3 @@ class _Pace:
             first_us, started_s = self._first
             ahead_s = (time_us - first_us) / 1e6 / self._speed - (monotonic() - started_s)
         await asyncio.sleep(ahead_s if ahead_s > _AHEAD_S else 0.0)
-
-
-def _publish(video: VideoServer, picture: Picture) -> None:
-    video.publish(picture.image, picture.time_us)

@@ -1,10 +1,15 @@
-"""What a recording holds: its topics, and the JSON Schemas of their messages."""
+"""What a recording holds: its topics, and the JSON Schemas of their messages.
+
+Foxglove draws messages whose schema has one of its well-known names, see
+https://docs.foxglove.dev/docs/sdk/schemas; those below hold its fields as far as they are used. Its reader of
+JSON Schemas requires one plain type for each field and no references: a number that may be unknown is left
+out of a message, never null.
+"""
 
 from __future__ import annotations
 
 import json
-
-from framerunner.recording.foxglove_schemas import FOXGLOVE, TIME, VECTOR_3, Schema, schema_of
+from typing import Any
 
 IMAGE = "/camera/image"
 CALIBRATION = "/camera/calibration"
@@ -18,95 +23,222 @@ DETECTIONS = "/detections"
 MISSION = "/mission"
 CROSSING = "/crossing"
 
+_Schema = dict[str, Any]
 
-def _said(kind: str, description: str) -> Schema:
+
+def _object(title: str, /, optional: tuple[str, ...] = (), **properties: _Schema) -> _Schema:
+    """An object that must have all its properties except the optional ones."""
+    required = [name for name in properties if name not in optional]
+    return {"title": title, "type": "object", "properties": properties, "required": required}
+
+
+def _array(items: _Schema) -> _Schema:
+    return {"type": "array", "items": items}
+
+
+def _choice(**names: int) -> _Schema:
+    return {"oneOf": [{"title": name, "const": value} for name, value in names.items()]}
+
+
+_NUMBER: _Schema = {"type": "number"}
+_STRING: _Schema = {"type": "string"}
+_BOOLEAN: _Schema = {"type": "boolean"}
+_NATURAL: _Schema = {"type": "integer", "minimum": 0}
+_NSEC: _Schema = {"type": "integer", "minimum": 0, "maximum": 999_999_999}
+_TIME = _object("time", sec=_NATURAL, nsec=_NSEC)
+_DURATION = _object("duration", sec={"type": "integer"}, nsec=_NSEC)
+_POINT_2 = _object("foxglove.Point2", x=_NUMBER, y=_NUMBER)
+_POINT_3 = _object("foxglove.Point3", x=_NUMBER, y=_NUMBER, z=_NUMBER)
+_VECTOR_3 = _object("foxglove.Vector3", x=_NUMBER, y=_NUMBER, z=_NUMBER)
+_QUATERNION = _object("foxglove.Quaternion", x=_NUMBER, y=_NUMBER, z=_NUMBER, w=_NUMBER)
+_COLOUR = _object("foxglove.Color", r=_NUMBER, g=_NUMBER, b=_NUMBER, a=_NUMBER)
+_POSE = _object("foxglove.Pose", position=_VECTOR_3, orientation=_QUATERNION)
+_PAIR = _object("foxglove.KeyValuePair", key=_STRING, value=_STRING)
+
+_CUBE = _object("foxglove.CubePrimitive", pose=_POSE, size=_VECTOR_3, color=_COLOUR)
+_LINE = _object(
+    "foxglove.LinePrimitive",
+    type=_choice(LINE_STRIP=0, LINE_LOOP=1, LINE_LIST=2),
+    pose=_POSE,
+    thickness=_NUMBER,
+    scale_invariant=_BOOLEAN,
+    points=_array(_POINT_3),
+    color=_COLOUR,
+    colors=_array(_COLOUR),
+    indices=_array(_NATURAL),
+)
+_SCENE_ENTITY = _object(
+    "foxglove.SceneEntity",
+    timestamp=_TIME,
+    frame_id=_STRING,
+    id=_STRING,
+    lifetime=_DURATION,
+    frame_locked=_BOOLEAN,
+    metadata=_array(_PAIR),
+    cubes=_array(_CUBE),
+    lines=_array(_LINE),
+)
+_SCENE_DELETION = _object(
+    "foxglove.SceneEntityDeletion", timestamp=_TIME, type=_choice(MATCHING_ID=0, ALL=1), id=_STRING
+)
+_POINTS_ANNOTATION = _object(
+    "foxglove.PointsAnnotation",
+    timestamp=_TIME,
+    type=_choice(UNKNOWN=0, POINTS=1, LINE_LOOP=2, LINE_STRIP=3, LINE_LIST=4),
+    points=_array(_POINT_2),
+    outline_color=_COLOUR,
+    outline_colors=_array(_COLOUR),
+    fill_color=_COLOUR,
+    thickness=_NUMBER,
+    metadata=_array(_PAIR),
+)
+_TEXT_ANNOTATION = _object(
+    "foxglove.TextAnnotation",
+    timestamp=_TIME,
+    position=_POINT_2,
+    text=_STRING,
+    font_size=_NUMBER,
+    text_color=_COLOUR,
+    background_color=_COLOUR,
+    metadata=_array(_PAIR),
+)
+_CIRCLE_ANNOTATION = _object(
+    "foxglove.CircleAnnotation",
+    timestamp=_TIME,
+    position=_POINT_2,
+    diameter=_NUMBER,
+    thickness=_NUMBER,
+    fill_color=_COLOUR,
+    outline_color=_COLOUR,
+    metadata=_array(_PAIR),
+)
+_MATRIX_3_BY_3: _Schema = {**_array(_NUMBER), "minItems": 9, "maxItems": 9}
+_MATRIX_3_BY_4: _Schema = {**_array(_NUMBER), "minItems": 12, "maxItems": 12}
+
+_FOXGLOVE: tuple[_Schema, ...] = (
+    _object(
+        "foxglove.CompressedImage",
+        timestamp=_TIME,
+        frame_id=_STRING,
+        data={"type": "string", "contentEncoding": "base64"},
+        format=_STRING,
+    ),
+    _object(
+        "foxglove.CameraCalibration",
+        timestamp=_TIME,
+        frame_id=_STRING,
+        width=_NATURAL,
+        height=_NATURAL,
+        distortion_model=_STRING,
+        D=_array(_NUMBER),
+        K=_MATRIX_3_BY_3,
+        R=_MATRIX_3_BY_3,
+        P=_MATRIX_3_BY_4,
+    ),
+    _object(
+        "foxglove.ImageAnnotations",
+        circles=_array(_CIRCLE_ANNOTATION),
+        points=_array(_POINTS_ANNOTATION),
+        texts=_array(_TEXT_ANNOTATION),
+    ),
+    _object(
+        "foxglove.FrameTransform",
+        timestamp=_TIME,
+        parent_frame_id=_STRING,
+        child_frame_id=_STRING,
+        translation=_VECTOR_3,
+        rotation=_QUATERNION,
+    ),
+    _object("foxglove.SceneUpdate", deletions=_array(_SCENE_DELETION), entities=_array(_SCENE_ENTITY)),
+    _object(
+        "foxglove.Log",
+        timestamp=_TIME,
+        level=_choice(UNKNOWN=0, DEBUG=1, INFO=2, WARNING=3, ERROR=4, FATAL=5),
+        message=_STRING,
+        name=_STRING,
+        file=_STRING,
+        line=_NATURAL,
+    ),
+)
+
+
+def _field(kind: str, description: str) -> _Schema:
     return {"type": kind, "description": description}
 
 
-_FLIGHT_TIME = _said("number", "vehicle time since motors on, seconds; 0 before")
+_FLIGHT_TIME = _field("number", "vehicle time since motors on, seconds; 0 before")
 _BOX = {
-    "n": _said("number", "upper edge of its box, pixels above the image's centre"),
-    "s": _said("number", "lower edge, pixels above the centre"),
-    "e": _said("number", "right edge, pixels right of the centre"),
-    "w": _said("number", "left edge, pixels right of the centre"),
-    "d": _said("number", "distance, metres; only of a frame wholly in view"),
-    "a": _said("number", "angle between line of sight and the frame's normal, degrees; only as d"),
+    "n": _field("number", "upper edge of its box, pixels above the image's centre"),
+    "s": _field("number", "lower edge, pixels above the centre"),
+    "e": _field("number", "right edge, pixels right of the centre"),
+    "w": _field("number", "left edge, pixels right of the centre"),
+    "d": _field("number", "distance, metres; only of a frame wholly in view"),
+    "a": _field("number", "angle between line of sight and the frame's normal, degrees; only as d"),
 }
-_DETECTION = schema_of(
+_DETECTION = _object(
     "framerunner.Detection",
-    {"seen": _said("boolean", "whether any pixel of the colour was seen"), **_BOX},
     optional=tuple(_BOX),
+    seen=_field("boolean", "whether any pixel of the colour was seen"),
+    **_BOX,
 )
 
-_VALUE = schema_of(
+_VALUE = _object(
     "framerunner.GuardValue",
-    {
-        "name": _said("string", "as the guard has it, such as frame.d"),
-        "number": _said("number", "its value then; missing if it was infinite or none"),
-        "flag": _said("boolean", "its value then, if it was true or false"),
-        "text": _said("string", "its value then, if it was neither"),
-    },
     optional=("number", "flag", "text"),
+    name=_field("string", "as the guard has it, such as frame.d"),
+    number=_field("number", "its value then; missing if it was infinite or none"),
+    flag=_field("boolean", "its value then, if it was true or false"),
+    text=_field("string", "its value then, if it was neither"),
 )
 
 _OWN = (
-    schema_of(
+    _object(
         "framerunner.Telemetry",
-        {
-            "timestamp": TIME,
-            "flight_time_s": _FLIGHT_TIME,
-            "position_arena_m": VECTOR_3,
-            "velocity_arena_m_s": VECTOR_3,
-            "yaw_rad": _said("number", "heading, counter-clockwise from the arena's x"),
-            "armed": _said("boolean", "motors are on"),
-            "offboard": _said("boolean", "the drone follows the app's setpoints"),
-            "landed": _said("boolean", "it stands on something"),
-            "mode": _said("string", "flight mode"),
-        },
+        timestamp=_TIME,
+        flight_time_s=_FLIGHT_TIME,
+        position_arena_m=_VECTOR_3,
+        velocity_arena_m_s=_VECTOR_3,
+        yaw_rad=_field("number", "heading, counter-clockwise from the arena's x"),
+        armed=_field("boolean", "motors are on"),
+        offboard=_field("boolean", "the drone follows the app's setpoints"),
+        landed=_field("boolean", "it stands on something"),
+        mode=_field("string", "flight mode"),
     ),
-    schema_of(
+    _object(
         "framerunner.Setpoint",
-        {
-            "timestamp": TIME,
-            "forward_m_s": _said("number", "in level axes turned with the yaw"),
-            "left_m_s": _said("number", "in level axes turned with the yaw"),
-            "up_m_s": _said("number", "upwards"),
-            "yaw_rate_rad_s": _said("number", "to the left"),
-        },
+        timestamp=_TIME,
+        forward_m_s=_field("number", "in level axes turned with the yaw"),
+        left_m_s=_field("number", "in level axes turned with the yaw"),
+        up_m_s=_field("number", "upwards"),
+        yaw_rate_rad_s=_field("number", "to the left"),
     ),
-    schema_of(
+    _object(
         "framerunner.Detections",
-        {
-            "timestamp": TIME,
-            "image_timestamp": TIME,
-            "red": _DETECTION,
-            "green": _DETECTION,
-            "blue": _DETECTION,
-        },
         optional=("image_timestamp",),
+        timestamp=_TIME,
+        image_timestamp=_TIME,
+        red=_DETECTION,
+        green=_DETECTION,
+        blue=_DETECTION,
     ),
-    schema_of(
+    _object(
         "framerunner.MissionState",
-        {
-            "timestamp": TIME,
-            "flight_time_s": _FLIGHT_TIME,
-            "state": _said("string", "entered, such as red.turning"),
-            "previous": _said("string", "left; empty at the start"),
-            "previous_s": _said("number", "time spent in it, seconds"),
-            "when": _said("string", "the guard that held"),
-            "values": {"type": "array", "items": _VALUE},
-        },
         optional=("when", "values"),
+        timestamp=_TIME,
+        flight_time_s=_FLIGHT_TIME,
+        state=_field("string", "entered, such as red.turning"),
+        previous=_field("string", "left; empty at the start"),
+        previous_s=_field("number", "time spent in it, seconds"),
+        when=_field("string", "the guard that held"),
+        values={"type": "array", "items": _VALUE},
     ),
-    schema_of(
+    _object(
         "framerunner.Crossing",
-        {
-            "timestamp": TIME,
-            "colour": _said("string", "of the frame"),
-            "time_s": _said("number", "since motors on, as in result.json"),
-            "offset_m": _said("number", "from the opening's centre, in its plane"),
-            "side": _said("string", "front or back, the side the drone came from"),
-        },
+        timestamp=_TIME,
+        colour=_field("string", "of the frame"),
+        time_s=_field("number", "since motors on, as in result.json"),
+        offset_m=_field("number", "from the opening's centre, in its plane"),
+        side=_field("string", "front or back, the side the drone came from"),
     ),
 )
 
@@ -126,6 +258,6 @@ TOPICS = {
 """Name of each topic's schema."""
 
 
-def schemas() -> dict[str, bytes]:
+def schema_texts() -> dict[str, bytes]:
     """All schemas as JSON, by name."""
-    return {schema["title"]: json.dumps(schema).encode() for schema in (*_OWN, *FOXGLOVE)}
+    return {schema["title"]: json.dumps(schema).encode() for schema in (*_OWN, *_FOXGLOVE)}

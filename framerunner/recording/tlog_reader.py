@@ -1,4 +1,4 @@
-"""A real-time flight without a recording, from what every one leaves: its MAVLink log and its video."""
+"""Reads a real-time flight that has no recording from its MAVLink log and its video."""
 
 from __future__ import annotations
 
@@ -10,8 +10,7 @@ from pathlib import Path
 import cv2
 
 from framerunner.flying.plan import FlightPlan
-from framerunner.recording.errors import RecordingError
-from framerunner.recording.events import Event, Picture, time_of_event
+from framerunner.recording.events import Event, RecordedImage, RecordingError, time_of_event
 from geometry.axes import Alignment, Pose
 from offboard.app import Moment
 from offboard.drone import DroneState, VelocityCommand
@@ -24,19 +23,20 @@ from wire.px4_modes import OFFBOARD, px4_name
 from wire.vehicle_telemetry import PositionReport, VehicleTelemetry
 
 TICK_US = 50_000
-_MAX_TICKS = 576_000  # eight hours: a log that holds more is damaged
+MAX_TICKS = 576_000
+"""Eight hours: what has more is damaged."""
 
 
 class TlogRecording:
-    """Telemetry and images of a run folder; the mission's states and what it detected are not in them.
+    """Telemetry and images of a run folder; they contain neither the mission's states nor its detections.
 
-    The video has no times: its last image is taken to be as old as the last telemetry, the others follow at
-    the camera's rate.
+    The video has no times: its last image gets the time of the last telemetry, the others are spaced at the
+    camera's rate.
 
     Args:
         folder: of the flight.
-        scenario: what was flown; None if that is not known: places then count from where the drone started.
-        result: what the flight came to, if it did.
+        scenario: what was flown; if None, positions are relative to the start.
+        result: None if the flight left none.
 
     Raises:
         RecordingError: the log holds no telemetry.
@@ -53,9 +53,9 @@ class TlogRecording:
 
     def events(self) -> Iterator[Event]:
         """Telemetry and images, in order of vehicle time."""
-        return heapq.merge(self._moments, self._pictures(), key=time_of_event)
+        return heapq.merge(self._moments, self._images(), key=time_of_event)
 
-    def _pictures(self) -> Iterator[Picture]:
+    def _images(self) -> Iterator[RecordedImage]:
         if not self._video.exists():
             return
         video = cv2.VideoCapture(str(self._video))
@@ -72,7 +72,7 @@ class TlogRecording:
                 if not read:
                     return
                 age_s = (count - 1 - number) / self._rate_hz
-                yield Picture(max(0, last_us - round(age_s * 1e6)), image)
+                yield RecordedImage(max(0, last_us - round(age_s * 1e6)), image)
         finally:
             video.release()
 
@@ -85,7 +85,7 @@ def _start(scenario: Scenario | None) -> Pose:
 
 
 def _read_moments(path: Path, start: Pose) -> list[Moment]:
-    """Put the log's messages together to ticks, 20 a second as the mission's.
+    """Build ticks from the log's messages, 20 a second like the mission's.
 
     Raises:
         RecordingError: the log cannot be read.
@@ -95,7 +95,7 @@ def _read_moments(path: Path, start: Pose) -> list[Moment]:
 
     try:
         log = mavutil.mavlink_connection(str(path), notimestamps=False)
-    except Exception as error:  # the library raises whatever comes
+    except Exception as error:  # the library may raise any error
         raise RecordingError(f"replay: '{path}' cannot be read: {error}") from None
     ticks = _Ticks(start)
     moments: list[Moment] = []
@@ -107,14 +107,14 @@ def _read_moments(path: Path, start: Pose) -> list[Moment]:
             moment = ticks.take(message)
             if moment is not None:
                 moments.append(moment)
-                if len(moments) > _MAX_TICKS:
+                if len(moments) > MAX_TICKS:
                     raise RecordingError(f"replay: '{path}' is longer than eight hours; it must be damaged")
     finally:
         log.close()
 
 
 class _Ticks:
-    """Makes ticks of what the log tells of the vehicle."""
+    """Builds ticks from messages."""
 
     def __init__(self, start: Pose) -> None:
         self._start = start
@@ -124,7 +124,7 @@ class _Ticks:
         self._next_us = 0
 
     def take(self, message: Message) -> Moment | None:
-        """Take a message; a position after an attitude makes a moment, if one is due."""
+        """Add a message; returns a tick with a position that follows an attitude, if one is due."""
         telemetry, kind = self._telemetry, message.get_msgId()
         if kind == mavlink.MAVLINK_MSG_ID_HEARTBEAT and not is_vehicle(message):
             return None

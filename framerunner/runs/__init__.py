@@ -1,1 +1,1 @@
-"""What a flight leaves behind: its folder, track, video and pictures."""
+"""What a flight leaves: its folder, result, track, plot and video."""

@@ -1,4 +1,4 @@
-"""Keeps what a flight shows of itself: its track, its times, its images."""
+"""Records a flight while it is flown: its latest tick, its pace and its images."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from collections.abc import AsyncIterator, Callable
 from concurrent.futures import Future, ThreadPoolExecutor
 from datetime import UTC, datetime
 from pathlib import Path
-from typing import TYPE_CHECKING, Protocol
+from typing import TYPE_CHECKING
 
 import cv2
 
@@ -20,20 +20,13 @@ from vision.types import CameraFrame, Image
 
 if TYPE_CHECKING:
     from framerunner.recording.mcap_writer import FlightRecording
+    from offboard.perception import Camera
 
 _MAX_WAITING_BYTES = 12 << 20  # of images that wait to be compressed: 50 of 320 x 240 pixels
 
 
-class FrameSource(Protocol):
-    """A camera source, as in `vision.sources`."""
-
-    def frames(self) -> AsyncIterator[CameraFrame]:
-        """Images as they come."""
-        ...
-
-
 class FlightRecorder:
-    """Remembers the latest tick of a flight and how fast wall time went by."""
+    """Records the latest tick of a flight, and wall time beside vehicle time."""
 
     def __init__(self) -> None:
         self._first: tuple[float, int] | None = None
@@ -41,7 +34,7 @@ class FlightRecorder:
         self.latest: Moment | None = None
 
     def see(self, moment: Moment) -> None:
-        """Take a tick."""
+        """Record a tick."""
         self._last = (time.monotonic(), moment.state.time_us)
         self._first = self._first or self._last
         self.latest = moment
@@ -60,14 +53,14 @@ class FlightRecorder:
 
 
 class VideoFile:
-    """Writes images to a video file (motion JPEG in AVI: every player has it), beside the flight.
+    """Writes images to a video file (motion JPEG in AVI, which every player supports), in a thread.
 
     Args:
         path: the video; made with the first image.
         rate_hz: images a second, for players.
 
     Attributes:
-        problem: why the file is not whole, known when it is closed; empty if it is.
+        problem: why the file is incomplete, set when it is closed; empty if it is complete.
     """
 
     def __init__(self, path: Path, rate_hz: float) -> None:
@@ -77,25 +70,26 @@ class VideoFile:
         self._writer: cv2.VideoWriter | None = None
         self._worker = ThreadPoolExecutor(1, "video")
         self._size: tuple[int, ...] = ()
-        self._under_way: deque[Future[None]] = deque()
+        self._waiting: deque[Future[None]] = deque()
 
     def write(self, image: Image, *, wait: bool = True) -> None:
-        """Add an image; one of another size than the first is left out.
+        """Add an image; one whose size differs from the first is left out.
 
         Args:
             image: BGR; it must not be changed afterwards.
-            wait: for room, if many images wait to be compressed; if not, the image is left out then.
+            wait: if too many images wait to be compressed, wait until there is room; if false, the image is
+                left out.
         """
         self._size = self._size or image.shape
         if image.shape != self._size:
             return
-        while self._under_way and self._under_way[0].done():
-            self._under_way.popleft().result()
-        if len(self._under_way) * image.nbytes > _MAX_WAITING_BYTES:
+        while self._waiting and self._waiting[0].done():
+            self._waiting.popleft().result()
+        if len(self._waiting) * image.nbytes > _MAX_WAITING_BYTES:
             if not wait:
                 return
-            self._under_way.popleft().result()
-        self._under_way.append(self._worker.submit(self._compress, image))
+            self._waiting.popleft().result()
+        self._waiting.append(self._worker.submit(self._compress, image))
 
     def close(self) -> None:
         """Finish the file."""
@@ -103,8 +97,8 @@ class VideoFile:
         if self._writer is not None:
             self._writer.release()
             self._writer = None
-            if not _is_whole_avi(self._path):
-                self.problem = f"'{self._path}' is not whole: the disk did not take it"
+            if not _is_complete_avi(self._path):
+                self.problem = f"'{self._path}' is incomplete: not all of it could be written"
 
     def _compress(self, image: Image) -> None:
         if self._writer is None:
@@ -114,10 +108,10 @@ class VideoFile:
         self._writer.write(image)
 
 
-def _is_whole_avi(path: Path) -> bool:
-    """Whether the length that stands in the file's head was written, and that much is there.
+def _is_complete_avi(path: Path) -> bool:
+    """Whether the file is as long as its header says.
 
-    OpenCV does not tell of failed writes; the length is written last, after the index.
+    OpenCV does not report failed writes; it writes the length last, after the index.
     """
     try:
         with path.open("rb") as file:
@@ -129,10 +123,10 @@ def _is_whole_avi(path: Path) -> bool:
 
 
 class RecordingCamera:
-    """Hands images on and writes them to a video file.
+    """A camera whose images are also written to a video file.
 
     Args:
-        source: where images come from.
+        source: the camera.
         path: the video; made with the first image.
         rate_hz: images a second, for players.
         on_frame: called with each image.
@@ -140,7 +134,7 @@ class RecordingCamera:
 
     def __init__(
         self,
-        source: FrameSource,
+        source: Camera,
         path: Path,
         rate_hz: float,
         on_frame: Callable[[CameraFrame], None] | None = None,
@@ -150,7 +144,7 @@ class RecordingCamera:
         self._video = VideoFile(path, rate_hz)
 
     async def frames(self) -> AsyncIterator[CameraFrame]:
-        """Images as they come, each written before it is handed on."""
+        """Images as they arrive, each after it was added to the video."""
         async for frame in self._source.frames():
             self._video.write(frame.image, wait=False)
             if self._on_frame is not None:
@@ -163,12 +157,12 @@ class RecordingCamera:
 
     @property
     def problem(self) -> str:
-        """Why the video is not whole, known when it is closed; empty if it is."""
+        """Of the video, see `VideoFile`."""
         return self._video.problem
 
 
 class RunRecords:
-    """Everything that keeps what a flight shows of itself.
+    """All that records a flight of `framerunner fly`.
 
     Attributes:
         folder: where it is kept.
@@ -183,23 +177,23 @@ class RunRecords:
         self.recording = recording
 
     def see(self, moment: Moment) -> None:
-        """Take a tick."""
+        """Record a tick."""
         self.recorder.see(moment)
         if self.recording is not None:
             self.recording.see(moment)
 
     def see_image(self, time_us: int, image: Image) -> None:
-        """Take a raw image, of the simulated camera."""
+        """Record a raw image of the simulated camera, and its vehicle time."""
         if self.recording is not None:
             self.recording.see_image(time_us, image)
 
     def see_frame(self, frame: CameraFrame) -> None:
-        """Take an image of a camera source."""
+        """Record an image of a camera."""
         if self.recording is not None:
             self.recording.see_frame(frame)
 
     def complete(self, result: FlightResult) -> FlightResult:
-        """What stands in `result.json`: a result with what tells of wall time."""
+        """Return a result with its wall times, as `result.json` has it."""
         wall = {
             "wall_time_s": self.recorder.wall_time_s,
             "real_time_factor": self.recorder.real_time_factor,
@@ -208,6 +202,6 @@ class RunRecords:
         return result.model_copy(update=wall)
 
     def finish(self, result: FlightResult, track: Track) -> None:
-        """Add what is known only after the flight."""
+        """Add the result to the recording."""
         if self.recording is not None:
             self.recording.finish(result, track.time_s)

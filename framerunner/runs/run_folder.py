@@ -1,4 +1,4 @@
-"""The folder that a flight leaves behind. A file that cannot be written costs one line, never the verdict."""
+"""The folder that a flight leaves. A file that cannot be written costs one warning, not the verdict."""
 
 from __future__ import annotations
 
@@ -9,9 +9,8 @@ from collections.abc import Callable
 from datetime import datetime
 from pathlib import Path
 
-from framerunner.errors import SettingError
+from errors import SettingError, UserError
 from framerunner.extras import advice
-from framerunner.runs.pictures import PictureError, track_picture
 from framerunner.runs.track import Track
 from offboard.mission import Mission
 from offboard.pilot_file import PilotFile
@@ -24,11 +23,11 @@ class RunFolder:
     """`<out>/<time>-<scenario>/`, made when a flight begins.
 
     Args:
-        out: folder of all runs; made if it is not there.
-        scenario: name for people.
+        out: folder of all runs; made if it does not exist.
+        scenario: its name.
 
     Attributes:
-        stopped_before_start: somebody stopped the flight before its first tick; set by whoever flies.
+        stopped_before_start: the flight was stopped before its first tick; set by the caller.
 
     Raises:
         SettingError: the folder cannot be made.
@@ -68,7 +67,7 @@ class RunFolder:
         """Write what is to be flown, so that the flight can be judged, replayed and flown again.
 
         Raises:
-            SettingError: the disk does not take it; nothing of it stays.
+            SettingError: it cannot be written.
         """
         source = mission.path.read_bytes()
         try:
@@ -83,10 +82,10 @@ class RunFolder:
             ) from None
 
     def write_result(self, result: FlightResult) -> None:
-        """Write `result.json` whole or not at all.
+        """Write `result.json`, complete or not at all.
 
         Raises:
-            OSError: the disk does not take it.
+            OSError: it cannot be written.
         """
         part = self.result.with_suffix(".part")
         try:
@@ -97,9 +96,9 @@ class RunFolder:
             raise
 
     def remove_if_empty(self) -> None:
-        """Take away empty files, and the folder if no result, log or recording remains.
+        """Remove empty files, and the folder if no result, log or recording remains.
 
-        All goes if the flight was stopped before it began; `out` too, if it was made for this flight.
+        If the flight was stopped before its first tick, all is removed, also `out` if it was made for it.
         """
         for path in self.path.iterdir():
             if path.stat().st_size == 0 or self.stopped_before_start:
@@ -114,31 +113,28 @@ class RunFolder:
 
 
 def write_outcome(folder: RunFolder, scenario: Scenario, track: Track, result: FlightResult) -> None:
-    """Write `result.json` and `track.png`; say on standard error what could not be written.
+    """Write `result.json` and `track.png`; report on standard error what could not be written.
 
-    Args:
-        folder: of the flight.
-        scenario: what was flown, its frames where they were.
-        track: where the drone was.
-        result: of the flight.
+    The scenario must have its frames where they were in this flight.
     """
+
+    def plot() -> None:
+        from framerunner.runs.plots import draw_track, save_figure
+
+        save_figure(draw_track(scenario, track, result), folder.track)
+
     _try(folder.result, lambda: folder.write_result(result))
-    _try(folder.track, lambda: track_picture(scenario, track, result, folder.track))
+    _try(folder.track, plot)
 
 
 def warn(problem: str) -> None:
-    """Say in one line what a flight does not leave; nothing if there is no problem."""
+    """Print a problem on standard error; nothing if it is empty."""
     if problem:
         print(f"warning: {problem}", file=sys.stderr, flush=True)
 
 
 def left_lines(folder: RunFolder, result: FlightResult) -> list[str]:
-    """Say where a flight's files are, and how to see it again; nothing that is not there.
-
-    Args:
-        folder: of the flight; it may be gone.
-        result: of the flight.
-    """
+    """Say where a flight's files are, if it left any, and how to replay it, if that is possible."""
     lines = [f"left in {folder.path}/"] if folder.path.is_dir() else []
     # A lockstep flight is flown again from its plan.
     shown_from = (folder.recording, folder.tlog) if result.seed is None else (folder.result,)
@@ -151,8 +147,8 @@ def left_lines(folder: RunFolder, result: FlightResult) -> list[str]:
 def _try(path: Path, write: Callable[[], None]) -> None:
     try:
         write()
-    except PictureError as error:
-        path.unlink(missing_ok=True)  # half a picture
+    except UserError as error:
+        path.unlink(missing_ok=True)  # an incomplete plot
         warn(str(error))
     except ModuleNotFoundError as error:
         missing = advice(error.name or "")

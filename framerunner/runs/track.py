@@ -21,6 +21,9 @@ class Track:
         y: see x.
         z: see x.
         mission_state: the state's id at each sample, such as "red.turning"; "" where there is none.
+
+    Raises:
+        ValueError: the sequences have different lengths.
     """
 
     time_s: Sequence[float] = ()
@@ -30,28 +33,22 @@ class Track:
     mission_state: Sequence[str] = ()
 
     def __post_init__(self) -> None:
-        """Refuse sequences of different lengths.
-
-        Raises:
-            ValueError: they differ.
-        """
         lengths = {name: len(getattr(self, name)) for name in ("time_s", "x", "y", "z", "mission_state")}
         if len(set(lengths.values())) > 1:
             raise ValueError(f"a track's sequences must have one length, not {lengths}")
 
     def __len__(self) -> int:
-        """Number of samples."""
         return len(self.time_s)
 
     def is_drawable(self, index: int) -> bool:
-        """Whether a sample has a place."""
+        """Whether the position of a sample is finite."""
         return isfinite(self.x[index]) and isfinite(self.y[index]) and isfinite(self.z[index])
 
-    def place_at(self, time_s: float) -> Vec3 | None:
-        """Where the drone was at a time, on the straight line between the samples around it.
+    def position_at(self, time_s: float) -> Vec3 | None:
+        """Where the drone was at a time, interpolated linearly between samples.
 
         Returns:
-            Arena metres, shape (3,); None before the first and after the last sample that has a place.
+            Arena metres, shape (3,); None before the first and after the last sample that is drawable.
         """
         known = [i for i in range(len(self)) if self.is_drawable(i)]
         for i, j in zip(known, known[1:] or known, strict=False):
@@ -66,8 +63,8 @@ class Track:
     def stretches(self) -> Iterator[tuple[str, range]]:
         """Stretches flown in one kind of state, in order of time.
 
-        The kind is the last part of the state's id: the drone turns for green as it does for red, and a dozen
-        colours can be told apart, three dozen cannot. Each stretch reaches to the first sample of the next.
+        The kind is the last part of the state's id, so turning towards green and towards red are one kind; a
+        dozen colours can be told apart, three dozen cannot. A stretch ends at the first sample of the next.
         """
         kinds = (state.rpartition(".")[2] for state in self.mission_state)
         for kind, group in groupby(enumerate(kinds), key=lambda pair: pair[1]):
@@ -84,7 +81,7 @@ class Track:
 
 
 class TrackRecorder:
-    """Remembers where the drone was at every tick of a flight."""
+    """Records where the drone is at every tick of a flight."""
 
     def __init__(self) -> None:
         self._time_us: list[int] = []
@@ -94,7 +91,7 @@ class TrackRecorder:
         self._mission_state: list[str] = []
 
     def see(self, moment: Moment) -> None:
-        """Take a tick."""
+        """Add a tick."""
         state = moment.state
         self._time_us.append(state.time_us)
         self._x.append(state.x)
@@ -103,11 +100,7 @@ class TrackRecorder:
         self._mission_state.append(moment.mission_state)
 
     def track(self, began_us: int | None) -> Track:
-        """Return where the drone was.
-
-        Args:
-            began_us: vehicle time from which to count, microseconds; None for the first tick's.
-        """
+        """Return the track so far; times count from `began_us`, vehicle time, or from the first tick."""
         if began_us is None:
             began_us = self._time_us[0] if self._time_us else 0
         time_s = [(time_us - began_us) / 1e6 for time_us in self._time_us]

@@ -64,7 +64,7 @@ def test_an_evaluation_on_a_full_disk_counts_what_it_flew_and_ends_in_one_line(t
     assert re.search(rf"^ timed out +{flown} ", done.stdout, re.MULTILINE), done.stdout
     assert done.stderr.splitlines()[-1] == (
         "error: --out disk/evaluation: cannot be written to (No space left on device); "
-        "mend it or choose another; what was kept stays"
+        "free some space or choose another; what was kept stays"
     )
     assert "Traceback" not in done.stderr
 

@@ -13,7 +13,7 @@ from pymavlink import mavutil
 
 from framerunner.flying.lockstep import fly_lockstep
 from framerunner.flying.plan import FlightPlan
-from framerunner.recording.find import recorded_flight
+from framerunner.recording.open_recording import recorded_flight
 from offboard.app import Moment
 from offboard.mission import load_mission
 from scenarios.loader import load_scenario

@@ -21,7 +21,7 @@ def write_scenarios(folder, seeds=(1, 2, 3), limit_s=LIMIT_S):
 
 
 def made_row(scenario="calm-1", verdict="clean", **values):
-    """A row as of a flight; what is not given is as of a landed one."""
+    """A row; what is not given is as of a flight that landed."""
     landed = verdict in ("clean", "completed")
     usual = {
         "mission": "frame_challenge",

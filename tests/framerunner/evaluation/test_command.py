@@ -7,8 +7,8 @@ import pytest
 
 from framerunner.cli import run
 from framerunner.evaluation import evaluate as evaluate_module
-from framerunner.evaluation.progress import EvaluationProgress
 from framerunner.evaluation.rows import Row
+from framerunner.evaluation.terminal import EvaluationProgress
 from tests.framerunner.evaluation.flights import made_row, write_scenarios
 
 
@@ -57,7 +57,7 @@ def test_flights_are_flown_once_counted_and_reported(capsys):
     assert (folder / "results.csv").read_bytes() == table
 
 
-def test_a_level_is_drawn_seed_after_seed(capsys, monkeypatch):
+def test_a_level_is_drawn_with_consecutive_seeds(capsys, monkeypatch):
     def made(tasks, _pool):
         for task in tasks:
             yield made_row(task.scenario.name, seed=task.seed)
@@ -73,7 +73,7 @@ def test_a_level_is_drawn_seed_after_seed(capsys, monkeypatch):
     ]
 
 
-def test_a_flight_that_failed_by_a_fault_is_said_with_its_traceback(capsys, monkeypatch):
+def test_a_fault_of_the_program_is_reported_with_its_traceback(capsys, monkeypatch):
     def made(tasks, _pool):
         for task in tasks:
             yield made_row(task.scenario.name, "error", reason="ValueError: no", traceback="Traceback: why")
@@ -104,7 +104,7 @@ def test_two_evaluations_are_compared(capsys):
     assert not list(Path("runs").glob("*")) if Path("runs").exists() else True
 
 
-def test_what_does_not_go_together_is_refused(refused):
+def test_contradicting_options_are_refused(refused):
     assert refused().startswith("--level: say what to fly")
     assert "not both" in refused("test-case-1", "--level", "calm")
     assert refused("test-case-1", "--count", 3).startswith("--count 3: is for scenarios of a level")
@@ -127,7 +127,7 @@ def test_a_folder_of_something_else_is_refused(refused, capsys):
     line = refused("mine", "--mission", "soft_landing", "--out", "here")
     assert line == (
         "--out here: has an evaluation of mission frame_challenge, not soft_landing; "
-        "choose another, or --again to fly it anew"
+        "choose another, or --again to fly it again"
     )
     assert refused("mine", "--out", "here", "--compare", "here").startswith("--compare here: is this")
 
@@ -142,9 +142,9 @@ def iter_rows(**values):
     yield made_row("test-case-1", **values)
 
 
-def test_progress_tells_how_far_how_well_how_fast_and_how_long(monkeypatch):
+def test_progress_shows_counts_verdicts_speed_and_time_left(monkeypatch):
     now = [100.0]
-    monkeypatch.setattr("framerunner.evaluation.progress.time.monotonic", lambda: now[0])
+    monkeypatch.setattr("framerunner.evaluation.terminal.time.monotonic", lambda: now[0])
     rows: list[Row] = [made_row("a"), made_row("b", "timed out")]
     progress = EvaluationProgress(130, rows)
     assert progress.text() == "2 of 130 flown, 1 clean, 0 completed"

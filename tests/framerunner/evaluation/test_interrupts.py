@@ -1,4 +1,4 @@
-"""Stopped in the middle by a real signal, and gone on with: nothing is lost, the results are the same."""
+"""An evaluation that a signal stopped and that is continued has the same results; nothing is lost."""
 
 import signal
 
@@ -16,7 +16,7 @@ def arguments(out, jobs):
 
 @pytest.fixture(scope="module")
 def place(tmp_path_factory):
-    """A folder with scenarios and the results of an evaluation that nobody stopped."""
+    """A folder with scenarios and the results of an evaluation that was not stopped."""
     folder = tmp_path_factory.mktemp("interrupts")
     write_scenarios(folder / "short", range(1, 1 + COUNT))
     with program(folder, *arguments("whole", 1)) as running:
@@ -33,7 +33,7 @@ def lines_in(path):
     [(1, signal.SIGINT), (2, signal.SIGINT), (2, signal.SIGKILL)],
     ids=["1-SIGINT", "2-SIGINT", "2-SIGKILL"],
 )
-def test_a_stopped_evaluation_goes_on_where_it_was(place, jobs, number):
+def test_a_stopped_evaluation_is_continued_where_it_was(place, jobs, number):
     out = f"{number.name}-{jobs}"
     flights = place / out / "flights.jsonl"
     with program(place, *arguments(out, jobs)) as running:

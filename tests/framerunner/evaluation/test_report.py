@@ -1,4 +1,4 @@
-"""The page and the table: everything in them, nothing from elsewhere, nothing taken for markup."""
+"""The page and the table are complete and self-contained, and text in them is escaped."""
 
 import csv
 import re
@@ -12,7 +12,7 @@ import pytest
 
 from framerunner.cli import build_app
 from framerunner.evaluation.plan import plan_level
-from framerunner.evaluation.report import Page, picked_for_pictures, replay_command, write_report
+from framerunner.evaluation.report import Page, picked_for_plots, replay_command, write_report
 from framerunner.evaluation.rows import COLUMNS, csv_text
 from framerunner.evaluation.statistics import summarise
 from framerunner.evaluation.store import open_folder
@@ -26,7 +26,7 @@ EMPTY = {"link", "meta", "img", "br", "use", "path", "input", "hr"}
 
 
 class Elements(HTMLParser):
-    """Checks that elements are closed as they were opened, and notes them."""
+    """Checks that elements are closed as they were opened, and lists them."""
 
     def __init__(self):
         super().__init__()
@@ -58,10 +58,10 @@ def report(path, rows, **values):
         drawn = []
         page = Page("level calm", "frame_challenge", None, "framerunner evaluate", summarise(rows), None)
         write_report(folder, replace(page, **values), lambda done, total: drawn.append((done, total)))
-        return folder.report.read_text(encoding="utf-8"), drawn
+        return (path / "report.html").read_text(encoding="utf-8"), drawn
 
 
-def test_the_page_stands_alone_and_shows_each_failure(tmp_path):
+def test_the_page_is_self_contained_and_shows_each_failure(tmp_path):
     rows = [
         made_row("calm-1"),
         made_row("calm-2", "timed out", track=TRACK, seed=2),
@@ -112,16 +112,16 @@ def test_the_replay_is_a_command_that_flies():
     build_app().parse_args(shlex.split(command)[1:], print_error=False, exit_on_error=False)
 
 
-def test_every_cause_is_drawn_before_any_is_drawn_often():
+def test_every_cause_is_plotted_once_before_any_is_plotted_twice():
     rows = [made_row(f"a{number}", "timed out") for number in range(50)]
     rows += [made_row("b", "crashed"), made_row("c", "aborted")]
-    picked = picked_for_pictures(summarise(rows), 4)
+    picked = picked_for_plots(summarise(rows), 4)
     assert len(picked) == 4
     assert {"b", "c"} < picked
-    assert len(picked_for_pictures(summarise(rows), 100)) == 52
+    assert len(picked_for_plots(summarise(rows), 100)) == 52
 
 
-def test_the_table_has_a_row_a_flight_and_gives_the_numbers_back():
+def test_the_table_has_a_row_for_each_flight_and_keeps_the_numbers():
     rows = [
         made_row("a", seconds_in_state={"turning": 3.1999999999999997, "crossing": 4.0}),
         made_row("b", "timed out", reason='he said "no", twice'),
@@ -146,5 +146,5 @@ def test_the_table_has_a_row_a_flight_and_gives_the_numbers_back():
 
 
 @pytest.mark.parametrize("count", [0, 1])
-def test_a_table_of_little(count):
+def test_a_table_of_no_row_or_one(count):
     assert len(csv_text([made_row()] * count).splitlines()) == 1 + count

@@ -1,10 +1,10 @@
-"""Who flies makes no difference; whoever dies over it stops nobody else."""
+"""All pools give the same rows, and a flight that ends its process does not stop the others."""
 
 import itertools
 
 import pytest
 
-from framerunner.errors import SettingError
+from errors import SettingError
 from framerunner.evaluation import backends
 from framerunner.evaluation.backends import Pool, check_pool
 from framerunner.evaluation.plan import plan_files
@@ -26,7 +26,7 @@ from offboard.pilot import Pilot
 class Deadly(Pilot):
     def hover(self):
         super().hover()
-        if abs(self.imu.x - {x_m}) < 0.1:  # of its start: by this it knows the scenario
+        if abs(self.imu.x - {x_m}) < 0.1:  # of its start, by which it recognises the scenario
             {end}
 """
 
@@ -43,7 +43,7 @@ def table(rows):
 
 @pytest.fixture(scope="module")
 def alone(plan):
-    """What one process makes of it, flight after flight."""
+    """The rows of one process."""
     return table(fly_all(plan.tasks(), Pool(jobs=1)))
 
 
@@ -68,7 +68,7 @@ def test_a_dask_cluster_of_processes_flies_as_one_does(plan, alone, tmp_path):
 
 
 @pytest.mark.parametrize("jobs", [1, 2])
-def test_flights_are_handed_out_only_as_others_come_back(jobs):
+def test_flights_are_sent_only_as_others_end(jobs):
     mission = load_mission("frame_challenge")
     seeds = itertools.count()
     endless = (FlightPlan(short_scenario(next(seeds), 0.2), mission) for _ in itertools.repeat(None))
@@ -119,14 +119,14 @@ def test_a_flight_alone_is_the_same_flight(plan, alone):
         (Pool(address="tcp://10.0.0.1:8786"), "--address tcp://10.0.0.1:8786: is for a cluster"),
     ],
 )
-def test_a_pool_that_cannot_be_is_refused(pool, message):
+def test_contradicting_settings_of_a_pool_are_refused(pool, message):
     with pytest.raises(SettingError) as caught:
         check_pool(pool)
     assert str(caught.value).startswith(message)
 
 
 @pytest.mark.parametrize("address", ["tcp://127.0.0.1:1", "nonsense://x", "tcp://127.0.0.1:notaport"])
-def test_a_scheduler_that_is_not_there_is_told(plan, monkeypatch, address):
+def test_a_scheduler_that_does_not_answer_is_reported(plan, monkeypatch, address):
     pytest.importorskip("distributed")
     monkeypatch.setattr(backends, "CONNECT_S", 0.5)
     with pytest.raises(SettingError, match=rf"--address {address}: no Dask scheduler there"):

@@ -1,10 +1,10 @@
-"""The folder of an evaluation: what was kept is found again, whatever happened meanwhile."""
+"""The folder of an evaluation: what was kept is read again after kills, damage and full disks."""
 
 import os
 
 import pytest
 
-from framerunner.errors import SettingError
+from errors import SettingError
 from framerunner.evaluation.plan import plan_level
 from framerunner.evaluation.store import FLIGHTS, open_folder, read_folder
 from framerunner.runs.track import Track
@@ -42,6 +42,7 @@ def test_rows_are_found_again_in_the_order_of_the_scenarios(tmp_path, plan):
     whole = [made_row("calm-1"), made_row("calm-2", "error"), made_row("calm-3", "timed out")]
     assert kept(tmp_path / "a" / "b", plan) == whole  # but for track and traceback
     folder = read_folder(tmp_path / "a" / "b", "--compare")
+    assert folder.identity == plan.identity
     assert folder.track("calm-3") == TRACK
     assert folder.track("calm-1") == Track()
     assert folder.rows()["calm-3"].track is None
@@ -50,7 +51,7 @@ def test_rows_are_found_again_in_the_order_of_the_scenarios(tmp_path, plan):
 
 
 @pytest.mark.parametrize("cut", [1, 2, 40, 10_000])
-def test_a_torn_last_line_is_flown_again_and_does_not_spoil_the_next(tmp_path, plan, cut):
+def test_the_flight_of_an_incomplete_last_line_is_flown_again(tmp_path, plan, cut):
     rows = [made_row("calm-1"), made_row("calm-2"), made_row("calm-3")]
     keep(tmp_path, plan, *rows[:2])
     file = tmp_path / FLIGHTS
@@ -63,7 +64,7 @@ def test_a_torn_last_line_is_flown_again_and_does_not_spoil_the_next(tmp_path, p
     assert kept(tmp_path, plan) == [*expected, rows[2]]
 
 
-def test_rubbish_in_between_costs_only_its_own_flight(tmp_path, plan):
+def test_a_damaged_line_costs_only_its_own_flight(tmp_path, plan):
     keep(tmp_path, plan, made_row("calm-1"), made_row("calm-2"), made_row("calm-3"))
     file = tmp_path / FLIGHTS
     lines = file.read_bytes().splitlines(keepends=True)
@@ -72,26 +73,26 @@ def test_rubbish_in_between_costs_only_its_own_flight(tmp_path, plan):
     assert len(file.read_bytes().splitlines()) == 2
 
 
-def test_another_evaluation_is_refused_unless_it_shall_be_flown_anew(tmp_path, plan):
+def test_another_evaluation_is_refused_unless_it_is_to_be_flown_again(tmp_path, plan):
     keep(tmp_path, plan, made_row("calm-1"))
     other = plan_level("calm", 1, 4, load_mission("soft_landing"))
     with pytest.raises(SettingError) as caught:
         kept(tmp_path, other)
     assert str(caught.value) == (
         f"--out {tmp_path}: has an evaluation of mission frame_challenge, not soft_landing; "
-        "choose another, or --again to fly it anew"
+        "choose another, or --again to fly it again"
     )
     assert len(kept(tmp_path, plan)) == 1
     assert kept(tmp_path, other, again=True) == []
     assert not list((tmp_path / "scenarios").iterdir())
 
 
-def test_again_forgets_the_same_too(tmp_path, plan):
+def test_again_deletes_the_same_evaluation_too(tmp_path, plan):
     keep(tmp_path, plan, made_row("calm-1"))
     assert kept(tmp_path, plan, again=True) == []
 
 
-def test_other_people_s_files_are_left_alone(tmp_path, plan):
+def test_other_files_are_not_deleted(tmp_path, plan):
     (tmp_path / "thesis.tex").write_text("years of work", encoding="utf-8")
     for again in (False, True):
         with pytest.raises(SettingError, match="has other files in it; choose a new folder"):
@@ -102,10 +103,10 @@ def test_other_people_s_files_are_left_alone(tmp_path, plan):
     with pytest.raises(SettingError, match=r"thesis\.tex in it is not of an evaluation"):
         kept(inside, plan, again=True)
     assert (inside / "thesis.tex").exists()
-    assert kept(inside, plan) == []  # going on beside it does no harm
+    assert kept(inside, plan) == []  # the evaluation can be continued beside it
 
 
-def test_a_folder_that_was_hardly_begun_is_begun_again(tmp_path, plan):
+def test_a_folder_without_a_complete_identity_is_started_again(tmp_path, plan):
     (tmp_path / ".lock").touch()
     (tmp_path / "evaluation.json.part").write_text('{"form', encoding="utf-8")
     assert kept(tmp_path, plan) == []
@@ -141,7 +142,7 @@ def test_a_folder_that_cannot_be_made_is_refused(tmp_path, plan):
         kept(tmp_path / "file" / "x", plan)
 
 
-def test_a_disk_that_fails_is_told_and_what_was_kept_stays(tmp_path, plan, monkeypatch):
+def test_a_disk_that_fails_is_reported_and_what_was_kept_stays(tmp_path, plan, monkeypatch):
     keep(tmp_path, plan, made_row("calm-1"))
 
     def full(_descriptor):

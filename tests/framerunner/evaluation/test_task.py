@@ -1,4 +1,4 @@
-"""One flight of an evaluation: its row, and that nothing that goes wrong in it comes out of it."""
+"""One flight of an evaluation: its row, and that its errors become rows too."""
 
 import json
 from dataclasses import replace
@@ -41,13 +41,13 @@ def test_a_row_has_the_result_s_fields_and_order():
     assert row.traceback == ""
 
 
-def test_a_row_of_before_the_box_can_be_read():
+def test_a_row_of_an_older_version_can_be_read():
     told = json.loads(made_row("calm-1").to_json())
     del told["kept_in_box_s"]
     assert Row.model_validate_json(json.dumps(told)) == made_row("calm-1")
 
 
-def test_a_failed_flight_brings_its_track_thinned_out():
+def test_the_row_of_a_failed_flight_has_a_thinned_track():
     flight = task()
     whole = fly_lockstep(flight).track
     track = fly_task(flight).track
@@ -55,7 +55,7 @@ def test_a_failed_flight_brings_its_track_thinned_out():
     assert (track.time_s[0], track.time_s[-1]) == (round(whole.time_s[0], 3), round(whole.time_s[-1], 3))
 
 
-def test_a_row_survives_json():
+def test_a_row_is_read_back_from_json():
     row = made_row(seconds_in_state={"turning": 3.1999999999999997})
     assert Row.model_validate_json(row.to_json()) == row
     for line in ("", "{}", "[]", "1", row.to_json()[:-1]):
@@ -78,7 +78,7 @@ def test_a_contestant_s_code_may_raise_anything():
     assert row.verdict == "aborted"
 
 
-def test_a_number_that_cannot_be_kept_is_the_flight_s_fault(monkeypatch):
+def test_a_number_that_is_not_finite_is_an_error_of_the_flight(monkeypatch):
     flight = task()
     monkeypatch.setattr("scenarios.referee.PENALTY_S_PER_S", float("nan"))
     row = fly_task(flight)
@@ -86,7 +86,7 @@ def test_a_number_that_cannot_be_kept_is_the_flight_s_fault(monkeypatch):
     assert "penalty_s" in row.reason
 
 
-def test_ctrl_c_is_no_verdict(monkeypatch):
+def test_ctrl_c_is_raised(monkeypatch):
     flight = task()
     flown = fly_lockstep(flight)
     stopped = replace(flown, outcome=replace(flown.outcome, ended="aborted", reason="interrupted"))

@@ -18,7 +18,7 @@ def fly(out, *arguments):
 
 @pytest.fixture(scope="session")
 def run_folder(tmp_path_factory):
-    """Of a whole flight, recorded."""
+    """Of a complete flight, recorded."""
     code, folder = fly(tmp_path_factory.mktemp("film") / "runs", "test-case-1", "--record")
     assert code == 0
     return folder

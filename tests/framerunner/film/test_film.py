@@ -1,4 +1,4 @@
-"""`framerunner film`: files that players open, whole or not at all; one line for what cannot be filmed."""
+"""`framerunner film`: complete files that players open, or one line of error and no file."""
 
 import shutil
 
@@ -8,8 +8,7 @@ import pytest
 
 from framerunner.cli import run
 from framerunner.film import film_file as film_file_module
-from framerunner.film.film_file import Mp4File, film_file
-from framerunner.runs.pictures import PictureError
+from framerunner.film.film_file import FilmError, Mp4File, film_file
 from tests.framerunner.recording.logs import write_log
 
 
@@ -41,17 +40,17 @@ def test_an_mp4_that_browsers_play(recorded_folder, tmp_path, capsys):
     assert frames[0].shape == (270, 480, 3)
     assert seconds_of(path) == pytest.approx(4.0, abs=0.05)
     assert np.abs(frames[0].astype(int) - frames[-1]).mean() > 3.0
-    # The verdict is held: the last pictures are the same, but for what compression makes of them.
+    # The verdict is shown for a while: the last images are equal, except for compression.
     assert np.abs(frames[-1].astype(int) - frames[-12]).mean() < 0.5
     with av.open(str(path)) as container:
         assert container.streams.video[0].codec_context.pix_fmt == "yuv420p"
     data = path.read_bytes()
-    assert data.index(b"moov") < data.index(b"mdat")  # so that it plays before it is wholly there
+    assert data.index(b"moov") < data.index(b"mdat")  # so that it plays before it is completely loaded
     assert capsys.readouterr().out.startswith(f"{path}: 4.0 s, 40 pictures, ")
     assert [each.name for each in tmp_path.iterdir()] == ["a.mp4"]
 
 
-def test_a_gif_that_begins_again_at_its_end(recorded_folder, tmp_path):
+def test_a_gif_repeats(recorded_folder, tmp_path):
     path = tmp_path / "a.gif"
     assert make(recorded_folder, "--out", str(path), "--size", "320x180", "--fps", "5", "--seconds", "4") == 0
     codec, frames = frames_of(path)
@@ -63,7 +62,7 @@ def test_a_gif_that_begins_again_at_its_end(recorded_folder, tmp_path):
     assert path.stat().st_size < 400_000
 
 
-def test_by_default_it_lies_in_the_recorded_folder_and_is_not_overwritten(recorded_folder, tmp_path, capsys):
+def test_the_default_file_is_in_the_run_folder_and_is_not_overwritten(recorded_folder, tmp_path, capsys):
     folder = tmp_path / "run"
     shutil.copytree(recorded_folder, folder)
     quick = ("--size", "320x180", "--fps", "2", "--speed", "20")
@@ -92,7 +91,7 @@ def test_a_flight_that_is_flown_again_is_filmed_to_its_verdict(short_folder, tmp
     assert make(short_folder, "--out", str(path), "--size", "320x180", "--fps", "4", "--speed", "4") == 0
     frames = frames_of(path)[1]
     right = frames[-1][130:170, 200:]
-    assert (right.astype(int) @ [2, -1, -1] > 150).sum() > 300  # a verdict that is not a good one is red
+    assert (right.astype(int) @ [2, -1, -1] > 150).sum() > 300  # the verdict of a failed try is red
     assert (frames[2][130:170, 250:].astype(int) @ [2, -1, -1] > 150).sum() == 0
 
 
@@ -150,24 +149,24 @@ def test_folders_without_a_flight_are_refused_in_one_line(recorded_folder, tmp_p
         assert not list(tmp_path.glob(f"{name}/*film*"))
 
 
-def test_a_film_that_breaks_off_leaves_nothing(tmp_path):
+def test_an_interrupted_film_leaves_no_file(tmp_path):
     path = tmp_path / "a.mp4"
     path.write_bytes(b"the one before")
 
-    def film_and_break_off():
+    def film_and_interrupt():
         with film_file(path, lambda part: Mp4File(part, (320, 180), 10.0, "libx264")) as film:
             film.add(np.zeros((180, 320, 3), np.uint8))
             raise KeyboardInterrupt
 
     with pytest.raises(KeyboardInterrupt):
-        film_and_break_off()
+        film_and_interrupt()
     assert path.read_bytes() == b"the one before"
     assert list(tmp_path.iterdir()) == [path]
 
 
-def test_a_folder_that_cannot_be_written_is_told_in_one_line(recorded_folder, tmp_path):
+def test_a_folder_that_cannot_be_written_is_refused_in_one_line(recorded_folder, tmp_path):
     with (
-        pytest.raises(PictureError, match="cannot write"),
+        pytest.raises(FilmError, match="cannot write"),
         film_file(tmp_path / "no" / "a.mp4", lambda part: Mp4File(part, (320, 180), 10.0, "libx264")),
     ):
         pass

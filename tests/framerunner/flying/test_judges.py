@@ -6,7 +6,7 @@ import aiohttp
 import pytest
 from aiohttp import web
 
-from framerunner.errors import SettingError
+from errors import SettingError
 from framerunner.flying.judges import TelemetryJudge, TruthJudge, ask_referee, choose_judge
 from framerunner.flying.plan import FlightPlan
 from offboard.app import Moment

@@ -8,7 +8,7 @@ import subprocess
 import aiohttp
 import pytest
 
-from framerunner.errors import SettingError
+from errors import SettingError
 from framerunner.flying.judges import ask_referee
 from framerunner.flying.simulator_process import SitlProcess
 from tests.processes import bound, free_instance, is_running, ports_are_free, program, simulator

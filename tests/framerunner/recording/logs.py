@@ -1,10 +1,10 @@
-"""MAVLink logs that no drone wrote."""
+"""MAVLink logs made for tests."""
 
 from pymavlink.dialects.v20 import common as mavlink
 
 
 def write_log(path):
-    """Ten seconds of telemetry; the vehicle's axes are turned and shifted against the arena's."""
+    """Ten seconds of telemetry; the vehicle's local frame is rotated and shifted against the arena."""
     link = mavlink.MAVLink(None, srcSystem=1, srcComponent=1)
     with path.open("wb") as file:
 

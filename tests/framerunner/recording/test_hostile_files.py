@@ -1,4 +1,4 @@
-"""Files that mean harm: some kilobytes that unpack to gigabytes are refused before they are unpacked."""
+"""Malicious files: some kilobytes that would unpack to gigabytes are refused before they are unpacked."""
 
 import base64
 import json
@@ -11,14 +11,14 @@ import pytest
 from mcap.writer import CompressionType, Writer
 
 from framerunner.recording.collected import collect
-from framerunner.recording.errors import RecordingError
-from framerunner.recording.find import recorded_flight
+from framerunner.recording.events import RecordingError
 from framerunner.recording.mcap_file import MAX_CHUNK_BYTES
 from framerunner.recording.mcap_reader import McapRecording
+from framerunner.recording.open_recording import recorded_flight
 from tests.framerunner.recording.logs import write_log
 
 CLAIMED = (
-    b"\x00\x40\x00\x00\x00\x00\x00\x00"  # 16384, little-endian, stands for the size in the index and chunk
+    b"\x00\x40\x00\x00\x00\x00\x00\x00"  # 16384, little-endian, replaces the size in the index and chunk
 )
 
 
@@ -45,7 +45,7 @@ def read_all(path):
 
 
 @pytest.mark.parametrize("compression", [CompressionType.ZSTD, CompressionType.LZ4])
-def test_a_chunk_that_unpacks_to_more_than_a_recording_s_is_refused_unpacked(tmp_path, compression):
+def test_a_chunk_that_is_larger_than_a_recording_s_is_not_unpacked(tmp_path, compression):
     path = recording_of(tmp_path / "bomb.mcap", b" " * (8 * MAX_CHUNK_BYTES), compression=compression)
     assert path.stat().st_size < 1_000_000
     before_mb = peak_mb()
@@ -54,25 +54,25 @@ def test_a_chunk_that_unpacks_to_more_than_a_recording_s_is_refused_unpacked(tmp
     assert peak_mb() - before_mb < 30
 
 
-def test_a_chunk_that_lies_about_its_size_is_refused_unpacked(tmp_path):
+def test_a_chunk_that_claims_a_wrong_size_is_not_unpacked(tmp_path):
     size = 8 * MAX_CHUNK_BYTES
-    path = recording_of(tmp_path / "liar.mcap", b" " * size)
+    path = recording_of(tmp_path / "wrong-size.mcap", b" " * size)
     data = path.read_bytes()
-    record = 9 + 22 + size  # of the message; the schema's and channel's come before it
-    told = next(
+    record = 9 + 22 + size  # of the message; after the schema's and the channel's
+    claimed = next(
         n.to_bytes(8, "little") for n in range(record, record + 500) if n.to_bytes(8, "little") in data
     )
-    path.write_bytes(data.replace(told, CLAIMED))
+    path.write_bytes(data.replace(claimed, CLAIMED))
     before_mb = peak_mb()
     with pytest.raises(RecordingError, match="another number of bytes than it says"):
         read_all(path)
     assert peak_mb() - before_mb < 30
 
 
-def test_a_length_beyond_the_file_is_not_made_room_for(tmp_path):
+def test_no_memory_is_allocated_for_a_length_beyond_the_file(tmp_path):
     path = recording_of(tmp_path / "long.mcap", b"{}")
     data = path.read_bytes()
-    place = data.index(b"zstd") + 4  # then comes the length of the packed data
+    place = data.index(b"zstd") + 4  # the length of the packed data follows
     path.write_bytes(data[:place] + (1 << 40).to_bytes(8, "little") + data[place + 8 :])
     before_mb = peak_mb()
     with pytest.raises(RecordingError, match="is said to have 1099511627776 bytes"):
@@ -80,7 +80,7 @@ def test_a_length_beyond_the_file_is_not_made_room_for(tmp_path):
     assert peak_mb() - before_mb < 30
 
 
-def test_a_file_without_an_index_is_not_read_whole(tmp_path):
+def test_a_file_without_an_index_is_refused(tmp_path):
     path = tmp_path / "bare.mcap"
     with path.open("wb") as file:
         writer = Writer(file, use_chunking=False)
@@ -90,12 +90,12 @@ def test_a_file_without_an_index_is_not_read_whole(tmp_path):
         McapRecording(path)
 
 
-def picture(data):
+def image_message(data):
     return json.dumps({"data": base64.b64encode(data).decode()}).encode()
 
 
 def wide_png():
-    """A PNG whose head claims 8000 x 8000 pixels."""
+    """A PNG whose header claims 8000 x 8000 pixels."""
     data = cv2.imencode(".png", np.zeros((4, 4, 3), np.uint8))[1].tobytes()
     head = data[12:16] + (8000).to_bytes(4, "big") * 2 + data[24:29]
     return data[:12] + head + zlib.crc32(head).to_bytes(4, "big") + data[33:]
@@ -117,7 +117,7 @@ def many_scans():
     ],
 )
 def test_an_image_that_costs_too_much_is_not_decoded(tmp_path, data, words):
-    path = recording_of(tmp_path / "image.mcap", picture(data), topic="/camera/image")
+    path = recording_of(tmp_path / "image.mcap", image_message(data), topic="/camera/image")
     with recorded_flight(path) as recorded, pytest.raises(RecordingError, match=words):
         collect(recorded)
 
@@ -128,8 +128,8 @@ def test_a_long_text_is_not_parsed(tmp_path):
         read_all(path)
 
 
-def test_a_log_of_more_hours_than_any_battery_lasts_is_refused(tmp_path, monkeypatch):
-    monkeypatch.setattr("framerunner.recording.tlog_reader._MAX_TICKS", 50)
+def test_a_log_of_more_than_eight_hours_is_refused(tmp_path, monkeypatch):
+    monkeypatch.setattr("framerunner.recording.tlog_reader.MAX_TICKS", 50)
     write_log(tmp_path / "flight.tlog")
     with pytest.raises(RecordingError, match="longer than eight hours"):
         read_all(tmp_path)

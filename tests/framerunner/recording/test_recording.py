@@ -9,13 +9,11 @@ import numpy as np
 import pytest
 from mcap.reader import make_reader
 
-from framerunner.recording.errors import RecordingError
-from framerunner.recording.events import Crossed, Picture
+from framerunner.recording.events import Crossed, RecordedImage, RecordingError
 from framerunner.recording.mcap_reader import McapRecording
 from framerunner.recording.mcap_writer import FlightRecording
-from framerunner.recording.messages import box_edges, detections, time_of
-from framerunner.recording.scene import camera_transform, scene
-from framerunner.recording.schemas import TOPICS, schemas
+from framerunner.recording.messages import box_edges, camera_transform, detections, scene, time_of
+from framerunner.recording.schemas import TOPICS, schema_texts
 from offboard.app import Moment
 from offboard.drone import DroneState, VelocityCommand
 from offboard.mission import load_mission
@@ -69,9 +67,9 @@ def plain_types(schema, at="message"):
             plain_types(inner, where)
 
 
-@pytest.mark.parametrize("name", sorted(schemas()))
+@pytest.mark.parametrize("name", sorted(schema_texts()))
 def test_each_schema_is_valid_named_and_of_types_that_foxglove_reads(name):
-    schema = json.loads(schemas()[name])
+    schema = json.loads(schema_texts()[name])
     jsonschema.Draft202012Validator.check_schema(schema)
     assert schema["title"] == name
     plain_types(schema)
@@ -81,12 +79,12 @@ def test_every_message_is_as_its_schema_says(recorded):
     with recorded.path.open("rb") as file:
         reader = make_reader(file, validate_crcs=True)
         validators = {
-            name: jsonschema.Draft202012Validator(json.loads(text)) for name, text in schemas().items()
+            name: jsonschema.Draft202012Validator(json.loads(text)) for name, text in schema_texts().items()
         }
         seen = set()
         for schema, channel, message in reader.iter_messages():
             assert (schema.encoding, channel.message_encoding) == ("jsonschema", "json")
-            assert schema.data == schemas()[schema.name]
+            assert schema.data == schema_texts()[schema.name]
             content = json.loads(message.data)
             validators[schema.name].validate(content)
             assert content.keys() <= json.loads(schema.data)["properties"].keys()
@@ -131,18 +129,18 @@ def test_a_recording_gives_back_what_the_flight_s_observer_saw(recorded):
     moments = [event for event in events if isinstance(event, Moment)]
     assert moments == recorded.moments
     assert any(moment.detections.red.seen for moment in moments)
-    pictures = [event for event in events if isinstance(event, Picture)]
-    assert [picture.time_us for picture in pictures] == [time_us for time_us, _ in recorded.images]
+    images = [event for event in events if isinstance(event, RecordedImage)]
+    assert [image.time_us for image in images] == [time_us for time_us, _ in recorded.images]
     assert recording.result == recorded.flown.result
     assert recording.title == "test-case-1: frame_challenge"
 
 
-def test_two_same_flights_leave_the_same_bytes(recorded, tmp_path):
+def test_equal_flights_leave_equal_bytes(recorded, tmp_path):
     again = record(tmp_path / "again.mcap")
     assert again.path.read_bytes() == recorded.path.read_bytes()
 
 
-def test_a_recording_stands_alone(recorded):
+def test_a_recording_has_scenario_mission_and_result_attached(recorded):
     with recorded.path.open("rb") as file:
         reader = make_reader(file)
         attached = {each.name: each.data.decode() for each in reader.iter_attachments()}
@@ -154,7 +152,7 @@ def test_a_recording_stands_alone(recorded):
     assert about.metadata["seed"] == "7"
 
 
-def test_crossings_stand_where_they_were_flown(tmp_path):
+def test_crossings_have_the_vehicle_time_at_which_they_were_flown(tmp_path):
     path = tmp_path / "flight.mcap"
     with new_recording(path) as recording:
         recording.see(moment_at(3_000_000))
@@ -178,7 +176,7 @@ def test_what_is_not_known_is_left_out():
     assert message["image_timestamp"] == time_of(1_250_000) == {"sec": 1, "nsec": 250_000_000}
 
 
-def test_boxes_lie_around_the_pixels_that_were_seen():
+def test_boxes_enclose_the_pixels_that_were_seen():
     image = np.full((240, 320, 3), 128, np.uint8)
     image[50:70, 200:241] = (0, 0, 255)
     assert box_edges(detect(image).red, (320, 240)) == (200, 50, 241, 70)
@@ -214,7 +212,7 @@ def test_the_camera_looks_ahead():
     assert rotation @ [0, 1, 0] == pytest.approx([0, 0, -1])  # down in it: down
 
 
-def test_compressed_images_are_kept_as_they_came(tmp_path):
+def test_compressed_images_are_kept_as_received(tmp_path):
     path = tmp_path / "flight.mcap"
     image = np.zeros((24, 32, 3), np.uint8)
     jpeg = bytes(cv2.imencode(".jpg", image)[1])
@@ -228,7 +226,7 @@ def test_compressed_images_are_kept_as_they_came(tmp_path):
     assert all(b64decode(content["data"]) == jpeg and content["format"] == "jpeg" for _, _, content in kept)
 
 
-def test_a_flight_that_breaks_off_keeps_what_was_recorded(tmp_path):
+def test_an_interrupted_flight_keeps_what_was_recorded(tmp_path):
     path = tmp_path / "flight.mcap"
 
     def fly():
@@ -242,7 +240,7 @@ def test_a_flight_that_breaks_off_keeps_what_was_recorded(tmp_path):
     assert {topic for topic, _, _ in messages(path)} >= {"/telemetry", "/camera/image", "/scene"}
 
 
-def test_a_flight_that_did_not_begin_leaves_no_recording(tmp_path):
+def test_a_flight_that_did_not_start_leaves_no_recording(tmp_path):
     with new_recording(tmp_path / "flight.mcap"):
         pass
     assert list(tmp_path.iterdir()) == []
@@ -260,6 +258,6 @@ def test_a_full_disk_stops_the_recording_only(tmp_path):
     assert recording.problem == "recording stopped: No space left on device"
 
 
-def test_a_place_that_cannot_be_written_to_is_said(tmp_path):
+def test_a_file_that_cannot_be_written_is_refused(tmp_path):
     with pytest.raises(RecordingError, match=r"cannot write .*missing.*No such file"):
         new_recording(tmp_path / "missing" / "flight.mcap")

@@ -1,4 +1,4 @@
-"""`framerunner replay`: what it shows of recordings, lockstep flights, logs and of what is none of these."""
+"""`framerunner replay`: what it shows of recordings, lockstep flights and logs, and what it refuses."""
 
 import asyncio
 import json
@@ -13,8 +13,8 @@ from mcap.writer import Writer
 
 from framerunner.cli import run
 from framerunner.recording import replay as replay_module
-from framerunner.recording.events import Crossed, Picture
-from framerunner.recording.find import recorded_flight
+from framerunner.recording.events import Crossed, RecordedImage
+from framerunner.recording.open_recording import recorded_flight
 from framerunner.recording.replay import replay
 from framerunner.runs.recorder import VideoFile
 from offboard.app import Moment
@@ -57,7 +57,7 @@ def moment_at(time_us, state):
 
 
 class Flight:
-    """A recorded flight of which the test says what happens."""
+    """A recorded flight with given events."""
 
     title = "a place: a mission"
     result = None
@@ -96,10 +96,10 @@ def test_a_lockstep_flight_without_a_recording_is_flown_again(lockstep_folder, c
     assert {path.name for path in lockstep_folder.iterdir()} == before
     with recorded_flight(lockstep_folder) as flight:
         assert flight.result.seed == 3
-        assert sum(isinstance(event, Picture) for event in flight.events()) > 30
+        assert sum(isinstance(event, RecordedImage) for event in flight.events()) > 30
 
 
-def test_flown_again_and_not_the_same_is_said(lockstep_folder, capsys):
+def test_a_flight_that_differs_when_flown_again_is_refused(lockstep_folder, capsys):
     path = lockstep_folder / "scenario.yaml"
     text = path.read_text(encoding="utf-8")
     path.write_text(text.replace("try_limit_s: 4", "try_limit_s: 3"), encoding="utf-8")
@@ -135,17 +135,17 @@ def test_a_real_time_flight_is_shown_from_its_log_and_video(tmp_path, capsys):
     with recorded_flight(tmp_path) as flight:
         events = list(flight.events())
     moments = [event for event in events if isinstance(event, Moment)]
-    pictures = [event for event in events if isinstance(event, Picture)]
+    images = [event for event in events if isinstance(event, RecordedImage)]
     assert 190 <= len(moments) <= 201
     first, last = moments[0].state, moments[-1].state
     assert (first.x, first.y, first.yaw) == pytest.approx((0.0, 0.0, 0.0), abs=1e-6)
     assert last.z - first.z == pytest.approx(0.8, abs=0.01)
     assert last.armed and last.mode == "OFFBOARD"
     assert moments[-1].flight_time_s == pytest.approx(8.0, abs=0.1)
-    assert len(pictures) == 50
-    assert pictures[-1].time_us == last.time_us
-    assert pictures[0].time_us == last.time_us - 4_900_000
-    assert pictures[-1].image.mean() == pytest.approx(245, abs=3)
+    assert len(images) == 50
+    assert images[-1].time_us == last.time_us
+    assert images[0].time_us == last.time_us - 4_900_000
+    assert images[-1].image.mean() == pytest.approx(245, abs=3)
     assert run(["replay", str(tmp_path), "--fast"]) == 0
     said = capsys.readouterr()
     assert "offboard" in said.err
@@ -215,7 +215,7 @@ def damage(tmp_path, recorded, how):
         ("missing", "does not exist"),
     ],
 )
-def test_what_cannot_be_shown_is_said_in_one_line(tmp_path, recorded, capsys, how, words):
+def test_what_cannot_be_shown_is_refused_in_one_line(tmp_path, recorded, capsys, how, words):
     assert run(["replay", str(damage(tmp_path, recorded, how)), "--fast"]) == 2
     lines = [line for line in capsys.readouterr().err.splitlines() if line.startswith("error: ")]
     assert len(lines) == 1
@@ -249,7 +249,7 @@ async def test_a_crossing_prints_a_line(capsys):
     assert [line.rpartition("crossed: ")[2] for line in lines] == ["none", "red"]
 
 
-async def test_vehicle_time_passes_as_wall_time_times_the_speed(monkeypatch):
+async def test_vehicle_time_is_wall_time_times_the_speed(monkeypatch):
     now_s, waits_s = 100.0, []
 
     async def sleep(seconds):
@@ -267,21 +267,21 @@ async def test_vehicle_time_passes_as_wall_time_times_the_speed(monkeypatch):
 async def test_images_are_served_while_the_flight_is_shown():
     video = VideoServer(port=0)
     image = np.full((48, 64, 3), 200, np.uint8)
-    begun, seen = asyncio.Event(), asyncio.Event()
+    started, seen = asyncio.Event(), asyncio.Event()
 
     class Endless(Flight):
         def __init__(self):
             pass
 
         def events(self):
-            begun.set()
+            started.set()
             time_us = 0
             while not seen.is_set():
                 time_us += 100_000
-                yield Picture(time_us, image)
+                yield RecordedImage(time_us, image)
 
     showing = asyncio.create_task(replay(Endless(), 0.0, video))
-    await begun.wait()
+    await started.wait()
     async with aiohttp.ClientSession() as session:
         status, headers = 503, {}
         while status == 503:

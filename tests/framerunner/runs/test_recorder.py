@@ -1,4 +1,4 @@
-"""What a flight shows of itself is kept."""
+"""Tracks, the pace and videos of flights."""
 
 from threading import Event
 
@@ -61,7 +61,7 @@ class Source:
             yield CameraFrame(image, 100_000 * number, 0.0)
 
 
-async def test_images_are_handed_on_and_filmed(tmp_path):
+async def test_images_are_yielded_and_written_to_the_video(tmp_path):
     camera = RecordingCamera(Source(8), tmp_path / "video.avi", 10.0)
     handed = [frame.time_us async for frame in camera.frames()]
     camera.close()
@@ -76,12 +76,12 @@ async def test_images_are_handed_on_and_filmed(tmp_path):
     assert levels == pytest.approx([20.0 * number for number in range(8)], abs=4.0)
 
 
-async def test_a_video_that_the_disk_did_not_take_says_so(tmp_path):
+async def test_a_video_that_could_not_be_written_says_so(tmp_path):
     camera = RecordingCamera(Source(8), tmp_path / "video.avi", 10.0)
     with disk_that_takes(6000):
         assert len([frame async for frame in camera.frames()]) == 8
         camera.close()
-    assert camera.problem == f"'{tmp_path}/video.avi' is not whole: the disk did not take it"
+    assert camera.problem == f"'{tmp_path}/video.avi' is incomplete: not all of it could be written"
 
 
 async def test_without_images_there_is_no_video(tmp_path):
@@ -92,16 +92,16 @@ async def test_without_images_there_is_no_video(tmp_path):
     assert not (tmp_path / "video.avi").exists()
 
 
-def test_a_film_that_falls_behind_leaves_images_out_instead_of_keeping_them(tmp_path, monkeypatch):
+def test_a_video_that_is_too_slow_leaves_images_out(tmp_path, monkeypatch):
     free = Event()
     compress = VideoFile._compress
     monkeypatch.setattr(VideoFile, "_compress", lambda self, image: (free.wait(10), compress(self, image)))
-    film = VideoFile(tmp_path / "video.avi", 10.0)
+    video_file = VideoFile(tmp_path / "video.avi", 10.0)
     for _ in range(10):
-        film.write(np.zeros((1080, 1920, 3), np.uint8), wait=False)
-        film.write(np.zeros((48, 64, 3), np.uint8), wait=False)  # a camera that changes its mind
+        video_file.write(np.zeros((1080, 1920, 3), np.uint8), wait=False)
+        video_file.write(np.zeros((48, 64, 3), np.uint8), wait=False)  # another size is left out
     free.set()
-    film.close()
+    video_file.close()
     video = cv2.VideoCapture(str(tmp_path / "video.avi"))
     assert video.get(cv2.CAP_PROP_FRAME_COUNT) == 3  # of 6 MB each, and 12 MB may wait
     assert video.read()[1].shape == (1080, 1920, 3)

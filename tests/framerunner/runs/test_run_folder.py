@@ -5,12 +5,12 @@ import re
 
 import pytest
 
-from framerunner.errors import SettingError
+from errors import SettingError
 from framerunner.runs.run_folder import RunFolder
 from scenarios.result import FlightResult
 
 
-def test_its_name_says_when_and_what(tmp_path):
+def test_its_name_has_time_and_scenario(tmp_path):
     folder = RunFolder(tmp_path / "runs" / "today", "test-case-1")
     assert folder.path.is_dir()
     assert re.fullmatch(r"\d{8}-\d{6}-test-case-1", folder.path.name)
@@ -22,26 +22,24 @@ def test_two_flights_in_one_second_have_a_folder_each(tmp_path):
     assert all(path.is_dir() for path in paths)
 
 
-def test_a_place_that_cannot_be_written_to_is_said(tmp_path):
+def test_a_folder_that_cannot_be_made_is_refused(tmp_path):
     (tmp_path / "file").write_text("", encoding="utf-8")
     with pytest.raises(SettingError, match=r"--out .*file.*choose another"):
         RunFolder(tmp_path / "file", "empty")
 
 
-def test_a_result_is_written_whole_or_not_at_all(tmp_path):
+def test_a_result_is_written_completely_or_not_at_all(tmp_path):
     folder = RunFolder(tmp_path, "empty")
     result = FlightResult(verdict="clean", seed=None)
     folder.write_result(result)
     assert json.loads(folder.result.read_text(encoding="utf-8")) == {"seed": None, "verdict": "clean"}
     with pytest.raises(ValueError, match="JSON"):
-        folder.write_result(
-            result.model_copy(update={"try_time_s": float("nan")})
-        )  # no reader of JSON takes NaN
+        folder.write_result(result.model_copy(update={"try_time_s": float("nan")}))  # JSON has no NaN
     assert json.loads(folder.result.read_text(encoding="utf-8"))["verdict"] == "clean"
     assert [path.name for path in folder.path.iterdir()] == ["result.json"]
 
 
-def test_a_flight_that_did_not_begin_leaves_nothing(tmp_path):
+def test_a_flight_that_did_not_start_leaves_nothing(tmp_path):
     folder = RunFolder(tmp_path, "empty")
     folder.scenario.write_text("name: empty\n", encoding="utf-8")
     folder.hang_report.write_text("", encoding="utf-8")
@@ -49,7 +47,7 @@ def test_a_flight_that_did_not_begin_leaves_nothing(tmp_path):
     assert not folder.path.exists()
 
 
-def test_a_flight_that_was_stopped_before_it_began_leaves_nothing(tmp_path):
+def test_a_flight_that_was_stopped_before_its_start_leaves_nothing(tmp_path):
     folder = RunFolder(tmp_path / "runs", "empty")
     folder.tlog.write_bytes(b"while it was connecting")
     folder.video.write_bytes(b"from the ground")

@@ -1,17 +1,15 @@
-"""What a film shows: the trail in the states' colours, the frames, what was crossed when, and it all fits."""
+"""What a film shows: the trail in its colours, frames, crossing times and verdict, at any size."""
 
 import numpy as np
 import pytest
 
 from framerunner.film.arena_view import state_colour
-from framerunner.film.colours import FRAME, GOOD
-from framerunner.film.layout import lay_out
-from framerunner.film.letters import Letters
-from framerunner.film.sheet import Sheet
-from framerunner.film.story import Story
+from framerunner.film.film_painter import FilmPainter
+from framerunner.film.style import FRAME, GOOD, Letters, lay_out
+from framerunner.film.timeline import Timeline
 from framerunner.film.viewpoint import Flyby, Viewpoint
 from framerunner.recording.collected import collect
-from framerunner.recording.find import recorded_flight
+from framerunner.recording.open_recording import recorded_flight
 from scenarios.loader import load_scenario
 
 SIZE = (640, 360)
@@ -24,8 +22,8 @@ def flight(run_folder):
 
 
 @pytest.fixture(scope="module")
-def story(flight):
-    return Story(flight, load_scenario("test-case-1"))
+def timeline(flight):
+    return Timeline(flight, load_scenario("test-case-1"))
 
 
 def near(image, colour, tolerance=25):
@@ -33,42 +31,43 @@ def near(image, colour, tolerance=25):
     return int((np.abs(image.astype(int) - np.array(colour)).max(axis=2) <= tolerance).sum())
 
 
-def test_the_story_tells_the_times_of_the_result(story, flight):
+def test_the_timeline_has_the_times_of_the_result(timeline, flight):
     times = dict(zip(flight.result.frames_crossed, flight.result.crossing_times_s, strict=True))
-    end = story.at(story.end_s)
+    end = timeline.at(timeline.end_s)
     assert end.crossed == pytest.approx(times, abs=1e-5)
-    assert story.at(times["green"] - 0.01).crossed == pytest.approx({"red": times["red"]}, abs=1e-5)
-    assert story.try_end_s == flight.result.try_time_s
-    assert story.begin_s == -1.0
-    assert story.result.verdict == "clean"
-    assert story.stretches[0][0] == story.begin_s
-    assert story.stretches[-1][1] == story.end_s
-    assert all(a[1] == b[0] for a, b in zip(story.stretches, story.stretches[1:], strict=False))
+    assert timeline.at(times["green"] - 0.01).crossed == pytest.approx({"red": times["red"]}, abs=1e-5)
+    assert timeline.try_end_s == flight.result.try_time_s
+    assert timeline.begin_s == -1.0
+    assert timeline.result.verdict == "clean"
+    assert timeline.stretches[0][0] == timeline.begin_s
+    assert timeline.stretches[-1][1] == timeline.end_s
+    assert all(a[1] == b[0] for a, b in zip(timeline.stretches, timeline.stretches[1:], strict=False))
 
 
-def test_an_instant_lies_between_the_ticks_around_it(story, flight):
+def test_an_instant_is_interpolated_between_ticks(timeline, flight):
     moment, after = flight.moments[700:702]
     began_us = flight.began_us
-    half = story.at(((moment.state.time_us + after.state.time_us) / 2 - began_us) / 1e6)
+    half = timeline.at(((moment.state.time_us + after.state.time_us) / 2 - began_us) / 1e6)
     assert half.position_arena_m[0] == pytest.approx((moment.state.x + after.state.x) / 2, abs=1e-9)
     assert half.state == moment.mission_state
-    assert story.kinds[half.kind] == moment.mission_state.rpartition(".")[2]
+    assert timeline.kinds[half.kind] == moment.mission_state.rpartition(".")[2]
 
 
-def test_the_trail_is_there_in_the_colours_of_its_states(story):
-    sheet = Sheet(story, SIZE, 8.0)
+def test_the_trail_has_the_colours_of_its_states(timeline):
+    painter = FilmPainter(timeline, SIZE, 8.0)
     view = lay_out(*SIZE, 4 / 3).view
-    early, late = (sheet.paint(time_s)[view.y : view.bottom, view.x : view.right] for time_s in (0.5, 50.0))
+    early, late = (painter.paint(time_s)[view.y : view.bottom, view.x : view.right] for time_s in (0.5, 50.0))
     for kind in ("frame_visible", "shift_right"):
-        colour = state_colour(story.kinds.index(kind))
+        colour = state_colour(timeline.kinds.index(kind))
         assert near(late, colour) > near(early, colour) + 60
 
 
-def test_chips_fill_as_frames_are_crossed_and_the_verdict_comes_last(story):
-    sheet = Sheet(story, SIZE, 8.0)
+def test_chips_are_filled_when_frames_are_crossed_and_the_verdict_is_shown_last(timeline):
+    painter = FilmPainter(timeline, SIZE, 8.0)
     box = lay_out(*SIZE, 4 / 3).figures
     before, between, over = (
-        sheet.paint(time_s, over=time_s > 100)[box.y : box.bottom] for time_s in (20.0, 40.0, story.end_s)
+        painter.paint(time_s, over=time_s > 100)[box.y : box.bottom]
+        for time_s in (20.0, 40.0, timeline.end_s)
     )
     full = 1000
     assert [near(image, FRAME["red"]) > full for image in (before, between, over)] == [False, True, True]
@@ -76,26 +75,26 @@ def test_chips_fill_as_frames_are_crossed_and_the_verdict_comes_last(story):
     assert [near(image, GOOD) > full for image in (before, between, over)] == [False, False, True]
 
 
-def test_base_and_frames_are_in_the_picture_all_the_time(story):
-    flyby = Flyby(story, (400, 300), 8.0)
-    scenario = story.scenario
+def test_base_and_frames_are_in_the_image_all_the_time(timeline):
+    flyby = Flyby(timeline, (400, 300), 8.0)
+    scenario = timeline.scenario
     points = [(scenario.base.x_m, scenario.base.y_m, 0.0), *(f.position_arena_m for f in scenario.frames)]
-    for time_s in np.linspace(story.begin_s, story.end_s, 40):
-        here = story.at(float(time_s)).position_arena_m
+    for time_s in np.linspace(timeline.begin_s, timeline.end_s, 40):
+        here = timeline.at(float(time_s)).position_arena_m
         pixels = flyby.at(float(time_s)).project(np.array([*points, here]))
         assert (pixels > 0).all()
         assert (pixels < (400, 300)).all()
 
 
-def test_the_viewpoint_turns_slowly(story):
-    flyby = Flyby(story, (400, 300), 8.0)
-    eyes = [flyby.at(float(t)).eye_m for t in np.arange(story.begin_s, story.end_s, 8.0 / 25)]
+def test_the_viewpoint_turns_slowly(timeline):
+    flyby = Flyby(timeline, (400, 300), 8.0)
+    eyes = [flyby.at(float(t)).eye_m for t in np.arange(timeline.begin_s, timeline.end_s, 8.0 / 25)]
     steps = np.linalg.norm(np.diff(eyes, axis=0), axis=1)
-    assert steps.max() < 0.15  # metres from one picture to the next
+    assert steps.max() < 0.15  # metres from one image to the next
     assert np.linalg.norm(eyes[0] - eyes[-1]) > 2.0
 
 
-def test_a_point_ahead_comes_to_the_middle_and_one_to_the_right_is_right():
+def test_a_point_ahead_is_in_the_middle_and_one_to_the_right_is_right():
     view = Viewpoint(np.zeros(3), np.array([(0, -1.0, 0), (0, 0, -1.0), (1.0, 0, 0)]), 100.0, (50.0, 40.0))
     pixels = view.project(np.array([(2.0, 0.0, 0.0), (2.0, -1.0, 0.5), (-1.0, 0.0, 0.0)]))
     assert pixels[:2].tolist() == [[50.0, 40.0], [100.0, 15.0]]
@@ -103,7 +102,7 @@ def test_a_point_ahead_comes_to_the_middle_and_one_to_the_right_is_right():
 
 
 @pytest.mark.parametrize("size", [(240, 180), (480, 270), (720, 1280), (1920, 1080), (640, 640)])
-def test_all_parts_lie_within_the_picture(story, size):
+def test_all_parts_are_within_the_image(timeline, size):
     layout = lay_out(*size, 4 / 3)
     for box in (layout.view, layout.camera, layout.state, layout.figures, layout.strip):
         assert box.x >= 0
@@ -111,10 +110,10 @@ def test_all_parts_lie_within_the_picture(story, size):
         assert box.right <= size[0]
         assert box.bottom <= size[1]
         assert min(box.width, box.height) > 0
-    assert Sheet(story, size, 8.0).paint(50.0).shape == (size[1], size[0], 3)
+    assert FilmPainter(timeline, size, 8.0).paint(50.0).shape == (size[1], size[0], 3)
 
 
-def test_words_that_are_too_long_are_cut():
+def test_a_text_that_is_too_long_is_cut():
     letters = Letters()
     cut = letters.shortened("a very long name of a scenario", 20, 100)
     assert cut.endswith("…")

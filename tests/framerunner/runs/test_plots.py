@@ -1,12 +1,11 @@
-"""Pictures are checked by what they are made of, not by their pixels."""
+"""Plots are checked by their matplotlib objects, not by their pixels."""
 
 from math import inf, nan
 
 import pytest
 from matplotlib.colors import to_hex
 
-from framerunner.runs.drawing import draw_scenario, draw_track
-from framerunner.runs.pictures import PictureError, scenario_picture, track_picture
+from framerunner.runs.plots import STATE_COLOURS, PlotError, draw_scenario, draw_track, save_figure
 from framerunner.runs.track import Track
 from scenarios.models import Arena, Base, Frame, Scenario, Start
 from scenarios.result import FlightResult
@@ -66,20 +65,20 @@ def test_time_in_states_adds_up_over_the_colours_and_to_the_whole():
     assert spent_s == {"start": 1.0, "turning": 2.0, "crossing": 1.0, "stop": 0.0}
 
 
-def test_a_place_lies_on_the_line_between_samples():
-    assert TRACK.place_at(0.5) == pytest.approx((-2.5, -2.5, 0.75))
-    assert TRACK.place_at(4.0) == pytest.approx((-3.0, -3.0, 0.6))
-    assert TRACK.place_at(-0.1) is None
-    assert TRACK.place_at(4.1) is None
-    assert Track().place_at(0.0) is None
+def test_a_position_is_interpolated_between_samples():
+    assert TRACK.position_at(0.5) == pytest.approx((-2.5, -2.5, 0.75))
+    assert TRACK.position_at(4.0) == pytest.approx((-3.0, -3.0, 0.6))
+    assert TRACK.position_at(-0.1) is None
+    assert TRACK.position_at(4.1) is None
+    assert Track().position_at(0.0) is None
 
 
-def test_a_place_bridges_samples_without_one():
+def test_a_position_is_interpolated_over_samples_without_one():
     track = Track([0.0, 1.0, 2.0], [0.0, nan, 2.0], [0.0] * 3, [1.0] * 3, ["s"] * 3)
-    assert track.place_at(1.0) == pytest.approx((1.0, 0.0, 1.0))
+    assert track.position_at(1.0) == pytest.approx((1.0, 0.0, 1.0))
 
 
-def test_the_scenario_picture_names_frames_and_heights():
+def test_the_plot_of_a_scenario_names_frames_and_heights():
     figure = draw_scenario(SCENARIO)
     assert {"two-frames", "red, 2 m", "green, 0.5 m", "start"} <= set(texts(figure))
     assert [axes.get_aspect() for axes in figure.axes[:2]] == [1.0, 1.0]
@@ -92,7 +91,7 @@ def test_frames_have_their_true_colours():
     assert "#0000ff" not in fills
 
 
-def test_the_track_picture_tells_verdict_times_and_reason():
+def test_the_plot_of_a_track_shows_verdict_times_and_reason():
     words = texts(draw_track(SCENARIO, TRACK, RESULT))
     assert "two-frames: timed out, 182.5 s (try 180.0 s, penalty 2.5 s)" in words
     assert "in green.turning" in words
@@ -115,8 +114,6 @@ def test_the_legend_has_the_states_in_order_of_appearance():
 def test_the_path_is_drawn_where_the_drone_was_in_both_views():
     track = Track([0.0, 1.0], [1.0, 2.0], [3.0, 4.0], [0.5, 1.5], ["a.fly", "a.fly"])
     figure = draw_track(SCENARIO, track, None)
-    from framerunner.runs.drawing import STATE_COLOURS
-
     for view, across, up in ((0, [1.0, 2.0], [3.0, 4.0]), (1, [1.0, 2.0], [0.5, 1.5])):
         line = coloured_line(figure, view, STATE_COLOURS[0])
         assert list(line.get_xdata())[:2] == across
@@ -129,7 +126,7 @@ def test_the_crossing_is_marked_where_the_drone_was_then():
     assert [(mark.get_xdata()[0], mark.get_ydata()[0]) for mark in marks] == [(3.0, 2.0)]
 
 
-def test_forty_states_can_be_told_apart():
+def test_forty_states_have_different_styles():
     count = 40
     numbers = [float(n) for n in range(count)]
     track = Track(
@@ -149,13 +146,13 @@ def test_forty_states_can_be_told_apart():
         Track([0.0], [nan], [1.0], [1.0], ["a"]),
         Track([0.0, 1.0, 2.0], [0.0, nan, 1e30], [0.0, inf, 1.0], [1.0, 1.0, -inf], ["a", "b", "$x_{$"]),
     ],
-    ids=["empty", "one sample", "no place at all", "absurd numbers"],
+    ids=["empty", "one sample", "no position at all", "absurd numbers"],
 )
 @pytest.mark.parametrize("outcome", [None, RESULT])
 @pytest.mark.filterwarnings("error")
-def test_odd_tracks_are_drawn_within_reach_of_the_arena(tmp_path, track, outcome):
+def test_odd_tracks_are_drawn_no_farther_out_than_the_arena_is_large(tmp_path, track, outcome):
     path = tmp_path / "track.png"
-    track_picture(SCENARIO.model_copy(update={"frames": ()}), track, outcome, path)
+    save_figure(draw_track(SCENARIO.model_copy(update={"frames": ()}), track, outcome), path)
     assert path.read_bytes().startswith(b"\x89PNG")
     low, high = draw_track(SCENARIO, track, outcome).axes[0].get_xlim()
     assert -20 < low < -5
@@ -170,16 +167,15 @@ def test_a_path_out_of_the_arena_is_shown():
 
 
 @pytest.mark.parametrize("suffix", [".png", ".svg", ".pdf", ".PNG"])
-def test_the_suffix_says_the_format(tmp_path, suffix):
+def test_the_suffix_selects_the_format(tmp_path, suffix):
     path = tmp_path / f"scenario{suffix}"
-    scenario_picture(Scenario(name="long-hall", arena=Arena(length_x_m=60, width_y_m=6)), path)
+    save_figure(draw_scenario(Scenario(name="long-hall", arena=Arena(length_x_m=60, width_y_m=6))), path)
     assert path.stat().st_size > 1000
 
 
-def test_pictures_that_cannot_be_made_are_refused_in_words(tmp_path):
-    with pytest.raises(
-        PictureError, match=r"'.*track\.xyz' has no known format; name it \.png, \.svg, \.pdf"
-    ):
-        track_picture(SCENARIO, TRACK, None, tmp_path / "track.xyz")
-    with pytest.raises(PictureError, match=r"cannot write '.*no/track\.png': No such file"):
-        track_picture(SCENARIO, TRACK, None, tmp_path / "no" / "track.png")
+def test_plots_that_cannot_be_written_are_refused_in_words(tmp_path):
+    figure = draw_track(SCENARIO, TRACK, None)
+    with pytest.raises(PlotError, match=r"'.*track\.xyz' has no known format; name it \.png, \.svg, \.pdf"):
+        save_figure(figure, tmp_path / "track.xyz")
+    with pytest.raises(PlotError, match=r"cannot write '.*no/track\.png': No such file"):
+        save_figure(figure, tmp_path / "no" / "track.png")
