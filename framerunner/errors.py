@@ -1,7 +1,44 @@
-"""Errors of the front door."""
+"""`SettingError`, and what to tell a user whose installation lacks a package."""
+
+from __future__ import annotations
+
+from importlib.util import find_spec
 
 from errors import UserError
+
+_EXTRAS = {
+    "av": "video",
+    "fastapi": "monitor",
+    "ifaddr": "monitor",
+    "matplotlib": "plots",
+    "multipart": "monitor",
+    "nicegui": "monitor",
+    "PIL": "video",
+    "segno": "monitor",
+    "sqlalchemy": "monitor",
+    "starlette": "monitor",
+    "uvicorn": "monitor",
+}
 
 
 class SettingError(UserError):
     """A setting that cannot be used; the message is one line for people."""
+
+
+def is_installed(module: str) -> bool:
+    """Whether a top-level module can be imported, without importing it."""
+    return find_spec(module) is not None
+
+
+def install_advice(module: str) -> str | None:
+    """The command that installs a missing module, as one clause for people.
+
+    Args:
+        module: what could not be imported, such as "nicegui" or "matplotlib.figure".
+
+    Returns:
+        None if the module is in none of this project's extras.
+    """
+    package = module.partition(".")[0]
+    extra = _EXTRAS.get(package)
+    return None if extra is None else f"{package} is not installed; pip install 'framerunner[{extra}]'"

@@ -11,7 +11,7 @@ import hashlib
 from collections.abc import Callable, Sequence
 from struct import Struct
 
-from framerunner.flying.fly import Flown, fly
+from framerunner.flying.fly import FinishedFlight, fly
 from framerunner.flying.lockstep_drone import LockstepDrone, TruthObserver
 from framerunner.flying.plan import FlightPlan
 from offboard.app import Moment, Observer
@@ -25,6 +25,7 @@ from vision.detector import detect
 from vision.types import Detections, Image
 
 ImageObserver = Callable[[int, Image], None]
+"""Called with time of exposure (microseconds) and each image as it arrives."""
 
 _ROW = Struct("<12d")  # time in us, position, velocity, attitude, motors on
 _ROW_BYTES = _ROW.size
@@ -33,20 +34,20 @@ _CHUNK_BYTES = _ROW_BYTES * 1000
 
 def fly_lockstep(
     plan: FlightPlan, *, observers: Sequence[Observer] = (), on_image: ImageObserver | None = None
-) -> Flown:
+) -> FinishedFlight:
     """Fly a plan as fast as the machine can; see `lockstep_flight`, which does it within an event loop."""
     return asyncio.run(lockstep_flight(plan, observers=observers, on_image=on_image))
 
 
 async def lockstep_flight(
     plan: FlightPlan, *, observers: Sequence[Observer] = (), on_image: ImageObserver | None = None
-) -> Flown:
+) -> FinishedFlight:
     """Fly a plan as fast as the machine can.
 
     Args:
         plan: with a mission; its seed is recorded, nothing is random yet.
         observers: called at every tick of the mission.
-        on_image: called with time of exposure (microseconds) and each image as it arrives.
+        on_image: see `ImageObserver`.
 
     Raises:
         DroneError: the drone does not get ready.
@@ -68,11 +69,11 @@ class LockstepVehicle:
 
     Args:
         plan: whose drone it is.
-        on_image: called with time of exposure (microseconds) and image as each arrives.
-        observers: called with the truth of every control tick.
+        on_image: see `ImageObserver`.
+        observers: called with the true state of every control tick.
 
     Attributes:
-        simulation: moves on only while the drone is asked for something.
+        simulation: advances only while the drone is used.
         drone: the port by which it is flown.
         eyes: what its camera shows.
     """
@@ -90,7 +91,7 @@ class LockstepVehicle:
 
 
 class _SimulationJudge:
-    """The simulation's own referee, which has seen the truth of every control tick."""
+    """The simulation's own referee, which sees the true state of every control tick."""
 
     source = "truth"
 
@@ -98,27 +99,25 @@ class _SimulationJudge:
         self._vehicle = vehicle
 
     def see(self, moment: Moment) -> None:
-        """The referee sees for itself."""
+        pass
 
     async def standing(self) -> RefereeSnapshot:
-        """How the try stands now."""
         return self._vehicle.simulation.referee.snapshot()
 
     async def report(self, mission_state: str, ended: str | None) -> RefereeReport:
-        """The report, when the drone has come to rest."""
         self._vehicle.drone.settle()
         return self._vehicle.simulation.referee.report(mission_state, ended)
 
 
 class LockstepEyes:
-    """Sees each image when the camera's latency is over; fed with the truth of every control tick.
+    """Sees each image when the camera's latency is over; `follow` is given the state of every control tick.
 
-    Args:
-        scenario: camera settings and what is to be seen.
-        on_image: called with time of exposure (microseconds) and image as each arrives.
+    Attributes:
+        image: the latest that has arrived, BGR, shape (height, width, 3), uint8; None before the first.
     """
 
     def __init__(self, scenario: Scenario, on_image: ImageObserver | None = None) -> None:
+        self.image: Image | None = None
         self._feed = CameraFeed(scenario)
         self._on_image = on_image
         self._arrived: tuple[int, Image] | None = None
@@ -126,20 +125,21 @@ class LockstepEyes:
         self._detections = Detections()
 
     def follow(self, truth: TrueState) -> None:
-        """Let the camera take the control tick that has just passed."""
+        """Let the camera see the control tick that has just passed."""
         if truth.time_us < self._feed.next_us:
             return
         arrived = self._feed.step(truth)
         if arrived is not None:
             self._arrived = arrived
+            self.image = arrived[1]
             if self._on_image is not None:
                 self._on_image(*arrived)
 
     async def open(self) -> None:
-        """Nothing to wait for: images come while the drone gets ready."""
+        """Nothing to wait for: images arrive while the drone gets ready."""
 
     def latest(self, time_us: int) -> Detections:
-        """What the latest image showed; the detector looks only at images that are asked for.
+        """What the latest image showed; the detector processes an image only when this is called.
 
         Args:
             time_us: vehicle time now.
@@ -157,13 +157,13 @@ class LockstepEyes:
         return self._detections
 
     async def close(self) -> None:
-        """Nothing to let go of."""
+        """Nothing to close."""
 
 
 class StateHash:
-    """One number for a whole flight, equal only if every true state was equal to the last bit.
+    """One hash for a whole flight, equal only if every true state was equal to the last bit.
 
-    SHA-256 over the states as little-endian float64s; whole microseconds are exact in them.
+    SHA-256 over the states as little-endian float64s, which hold whole microseconds exactly.
     """
 
     __slots__ = ("_filled", "_rows", "_sha256")
@@ -174,7 +174,7 @@ class StateHash:
         self._filled = 0
 
     def add(self, truth: TrueState) -> None:
-        """Take the next state."""
+        """Add the next state."""
         _ROW.pack_into(
             self._rows,
             self._filled,
@@ -190,7 +190,7 @@ class StateHash:
             self._filled = 0
 
     def hexdigest(self) -> str:
-        """The sum of all states so far."""
+        """Return the hash of all states so far."""
         so_far = self._sha256.copy()
         so_far.update(memoryview(self._rows)[: self._filled])
         return so_far.hexdigest()

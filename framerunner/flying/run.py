@@ -1,4 +1,4 @@
-"""`framerunner fly`: one flight with everything it leaves behind, in real time or in lockstep."""
+"""`framerunner fly`: one flight with all the files it writes, in real time or in lockstep."""
 
 from __future__ import annotations
 
@@ -10,8 +10,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 from urllib.parse import urlsplit
 
-from framerunner.flying.flight_result import result_lines, timing_line
-from framerunner.flying.fly import Flown
+from framerunner.flying.display import LockstepProgress, result_lines, timing_line
+from framerunner.flying.fly import FinishedFlight
 from framerunner.flying.plan import FlightPlan
 from framerunner.flying.real_time import RealTimeSettings, fly_in_real_time
 from framerunner.runs.recorder import RunRecords, VideoFile
@@ -27,15 +27,15 @@ _INTERRUPTED_CODE = 130
 
 @dataclass(frozen=True, slots=True)
 class FlightSettings:
-    """What to fly and what to keep of it.
+    """What to fly and what to write.
 
     Attributes:
-        plan: with a mission, which is told only where the drone stands.
+        plan: with a mission.
         real_time: what is flown in real time; None: simulated in this process, in lockstep.
         out: folder of all runs.
-        record: write everything to an MCAP file, too.
-        video: write what the camera saw in lockstep, too.
-        monitor: open the Game Monitor for it.
+        record: write an MCAP file too.
+        video: write a video in lockstep too.
+        monitor: open the Game Monitor.
     """
 
     plan: FlightPlan
@@ -59,9 +59,9 @@ async def fly_once(settings: FlightSettings) -> int:
     """
     if settings.real_time is None or not settings.monitor:
         return await _fly_and_judge(settings, None)
-    from framerunner.monitoring.monitor_process import MonitorProcess
+    from framerunner.child_process import MonitorProcess
 
-    # A drone of one's own brings no referee; the simulator does.
+    # The simulator that is started has a referee; a running drone may have none.
     scenario = None if settings.real_time.drone_url is None else settings.plan.scenario
     async with MonitorProcess(scenario, settings.out, _camera_hosts(settings.real_time)) as monitor:
         await monitor.opened()
@@ -72,7 +72,7 @@ async def fly_once(settings: FlightSettings) -> int:
 
 
 def _camera_hosts(settings: RealTimeSettings) -> tuple[str, ...]:
-    """The hosts that the user named as the camera's or the simulator's: the monitor, too, may ask there."""
+    """The hosts that the user named as the camera's or the simulator's: the monitor may use them too."""
     named = (SimulatorApi.of_video(settings.camera_url or ""), settings.simulator)
     hosts = (urlsplit(api.url).hostname for api in named if api is not None)
     return tuple(dict.fromkeys(host for host in hosts if host))
@@ -102,12 +102,11 @@ async def _fly_and_judge(settings: FlightSettings, monitor_url: str | None) -> i
     return 0 if result.completed else 1
 
 
-async def _fly_in_lockstep(settings: FlightSettings, records: RunRecords) -> Flown:
-    from framerunner.flying.display import LockstepProgress
+async def _fly_in_lockstep(settings: FlightSettings, records: RunRecords) -> FinishedFlight:
     from framerunner.flying.lockstep import lockstep_flight
 
     plan = settings.plan
-    video = VideoFile(records.folder.video, plan.scenario.camera.rate_hz)  # made with its first image
+    video = VideoFile(records.folder.video, plan.scenario.camera.rate_hz)
     with closing(video), LockstepProgress(plan.limit_s) as progress:
 
         def keep(time_us: int, image: Image) -> None:
@@ -122,7 +121,7 @@ async def _fly_in_lockstep(settings: FlightSettings, records: RunRecords) -> Flo
 
 @contextmanager
 def _run_folder(settings: FlightSettings) -> Iterator[RunFolder]:
-    """Make the folder; take it away again if the flight did not begin and left nothing."""
+    """Make the folder; remove it if the flight did not begin and wrote nothing."""
     plan = settings.plan
     folder = RunFolder(settings.out, plan.scenario.name)
     try:
@@ -134,7 +133,7 @@ def _run_folder(settings: FlightSettings) -> Iterator[RunFolder]:
 
 @contextmanager
 def _recording(settings: FlightSettings, folder: RunFolder) -> Iterator[FlightRecording | None]:
-    """Open the recording, if one is wanted, and close it whatever happens."""
+    """Open the recording, if one is requested, and close it in any case."""
     if not settings.record:
         yield None
         return

@@ -9,8 +9,7 @@ from collections.abc import Callable
 from datetime import datetime
 from pathlib import Path
 
-from framerunner.errors import SettingError
-from framerunner.extras import advice
+from framerunner.errors import SettingError, install_advice
 from framerunner.runs.pictures import PictureError, track_picture
 from framerunner.runs.track import Track
 from offboard.mission import Mission
@@ -155,7 +154,7 @@ def _try(path: Path, write: Callable[[], None]) -> None:
         path.unlink(missing_ok=True)  # half a picture
         warn(str(error))
     except ModuleNotFoundError as error:
-        missing = advice(error.name or "")
+        missing = install_advice(error.name or "")
         if missing is None:
             raise
         warn(f"{path.name} was not drawn: {missing}")

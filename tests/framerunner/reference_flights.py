@@ -21,7 +21,7 @@ from itertools import pairwise
 from math import cos, dist, sin
 from pathlib import Path
 
-from framerunner.flying.fly import Flown
+from framerunner.flying.fly import FinishedFlight
 from framerunner.flying.lockstep import fly_lockstep
 from framerunner.flying.plan import FlightPlan
 from offboard.app import Moment
@@ -71,7 +71,7 @@ class Tick:
 
 
 @functools.cache
-def fly(name: str) -> tuple[Flown, tuple[Tick, ...]]:
+def fly(name: str) -> tuple[FinishedFlight, tuple[Tick, ...]]:
     """Fly a scenario in lockstep, once in a process however many tests look at it."""
     ticks: list[Tick] = []
     flown = fly_lockstep(
