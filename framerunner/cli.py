@@ -23,7 +23,7 @@ def build_app() -> App:
     """Return the program with all its commands."""
     from importlib import metadata
 
-    from cyclopts import App
+    from cyclopts import App, Parameter
 
     from framerunner.commands import (
         camera,
@@ -42,7 +42,8 @@ def build_app() -> App:
         name="framerunner",
         help="A simulated MAVLink drone, and an app that flies the frame challenge with it.",
         version=metadata.version("framerunner"),
-        help_format="markdown",
+        help_format="markdown",  # options are described in the Args of a command's docstring
+        default_parameter=Parameter(negative=()),
         suppress_keyboard_interrupt=False,
         result_action="return_value",
     )

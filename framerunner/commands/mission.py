@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import re
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING
 
-from cyclopts import App, Parameter
+from cyclopts import App
 
 from framerunner.commands import load_mission_with
 from framerunner.errors import SettingError
@@ -17,9 +17,6 @@ if TYPE_CHECKING:
 app = App(name="mission", help="List, show, check and create missions.")
 
 _NAME = re.compile(r"[a-z][a-z0-9_]{0,59}")
-PilotOption = Annotated[
-    Path | None, Parameter(help="Python file with a subclass of Pilot that the mission uses; it is executed")
-]
 
 
 @app.command(name="list")
@@ -38,7 +35,7 @@ def list_() -> int:
 
 
 @app.command
-def show(mission: Annotated[str, Parameter(help="name or file")], *, pilot: PilotOption = None) -> int:
+def show(mission: str, *, pilot: Path | None = None) -> int:
     """Print a mission's diagram in Mermaid's language (paste it into any Markdown page or mermaid.live).
 
     **Examples**
@@ -48,6 +45,10 @@ def show(mission: Annotated[str, Parameter(help="name or file")], *, pilot: Pilo
         framerunner mission show my_mission.yaml > my_mission.mmd
 
         framerunner mission show my_mission.yaml --pilot my_mission.py
+
+    Args:
+        mission: name or file
+        pilot: Python file with a subclass of Pilot that the mission uses; it is executed
     """
     from offboard.mission import mermaid
 
@@ -56,7 +57,7 @@ def show(mission: Annotated[str, Parameter(help="name or file")], *, pilot: Pilo
 
 
 @app.command
-def check(file: Annotated[Path, Parameter(help="YAML file")], *, pilot: PilotOption = None) -> int:
+def check(file: Path, *, pilot: Path | None = None) -> int:
     """Say whether a mission file is good, or every fault with its line.
 
     **Examples**
@@ -64,6 +65,10 @@ def check(file: Annotated[Path, Parameter(help="YAML file")], *, pilot: PilotOpt
         framerunner mission check my_mission.yaml
 
         framerunner mission check my_mission.yaml --pilot my_mission.py
+
+    Args:
+        file: YAML file
+        pilot: Python file with a subclass of Pilot that the mission uses; it is executed
     """
     loaded = load_mission_with(file, pilot)
     with_pilot = f" and {pilot}" if pilot is not None else ""
@@ -72,14 +77,7 @@ def check(file: Annotated[Path, Parameter(help="YAML file")], *, pilot: PilotOpt
 
 
 @app.command
-def new(
-    name: Annotated[str, Parameter(help="of the mission: small letters, digits and _")],
-    *,
-    python: Annotated[
-        bool, Parameter(negative=(), help="with a Python file that adds a primitive of its own")
-    ] = False,
-    out: Annotated[Path, Parameter(help="folder to write to")] = Path("."),
-) -> int:
+def new(name: str, *, python: bool = False, out: Path = Path(".")) -> int:
     """Create a mission: write a small one that flies, with comments that explain it.
 
     Nothing is ever overwritten.
@@ -89,6 +87,11 @@ def new(
         framerunner mission new my_mission
 
         framerunner mission new my_mission --python --out missions
+
+    Args:
+        name: of the mission: small letters, digits and _
+        python: with a Python file that adds a primitive of its own
+        out: folder to write to
     """
     from offboard.starter import starter
 
