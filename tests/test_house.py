@@ -28,7 +28,6 @@ LARGE_FOLDERS = {
 }
 LARGE_CLASSES = {
     "firmware_py/missions/executor.py MissionExecutor": "a method for each kind of mission item",
-    "framerunner/flying/lockstep_drone.py LockstepDrone": "implements the port `Drone`",
     "monitor/competition/service.py CompetitionService": "a method for each request of the contest's pages",
     "monitor/fleet.py Fleet": "a method for each kind of message from a vehicle",
     "monitor/pilot_seat.py PilotSeat": "a method for each order of a pilot",
