@@ -231,11 +231,7 @@ async def _wait_or_cancel(work: asyncio.Task[T], watching: asyncio.Task[str]) ->
 
 
 async def until_standard_input_ends(work: Coroutine[object, object, None]) -> None:
-    """Do some work until it is done or standard input ends, because the parent process has ended.
-
-    Args:
-        work: is cancelled in the second case.
-    """
+    """Do some work until it is done; cancel it if standard input ends, because the parent has ended."""
     running = asyncio.create_task(work)
     watching = asyncio.create_task(_standard_input_ends())
     done, _ = await asyncio.wait({running, watching}, return_when=asyncio.FIRST_COMPLETED)
@@ -255,11 +251,7 @@ async def _standard_input_ends() -> None:
 
 
 def end_with_standard_input(clean_up: Callable[[], None]) -> None:
-    """Have this process, which has no event loop, end at once when standard input ends.
-
-    Args:
-        clean_up: is called before.
-    """
+    """Have this process, which has no event loop, clean up and end at once when standard input ends."""
 
     def watch() -> None:
         while os.read(0, 1024):

@@ -42,7 +42,7 @@ def build_app() -> App:
         name="framerunner",
         help="A simulated MAVLink drone, and an app that flies the frame challenge with it.",
         version=metadata.version("framerunner"),
-        help_format="markdown",  # options are described in the Args of a command's docstring
+        help_format="markdown",
         default_parameter=Parameter(negative=()),
         suppress_keyboard_interrupt=False,
         result_action="return_value",

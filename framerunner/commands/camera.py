@@ -3,18 +3,29 @@
 from __future__ import annotations
 
 import asyncio
+from typing import Annotated
+
+from cyclopts import Parameter
 
 from framerunner.commands import WholeNumber, check_range, say
 
 
 def camera(
     *,
-    drone: str = "udpin://127.0.0.1:14550",
-    scenario: str = "test-case-1",
-    no_base: bool = False,
-    level: bool = False,
-    bind: str = "127.0.0.1",
-    port: WholeNumber = 8100,
+    drone: Annotated[
+        str, Parameter(help="MAVLink URL on which the drone is heard")
+    ] = "udpin://127.0.0.1:14550",
+    scenario: Annotated[
+        str, Parameter(help="name or file of the scenario whose frames are seen")
+    ] = "test-case-1",
+    no_base: Annotated[
+        bool, Parameter(help="the drone starts from the floor: there is no base under it")
+    ] = False,
+    level: Annotated[
+        bool, Parameter(help="held level, as by a gimbal, whatever the drone's roll and pitch")
+    ] = False,
+    bind: Annotated[str, Parameter(help="address to serve the video on")] = "127.0.0.1",
+    port: Annotated[WholeNumber, Parameter(help="TCP port of the video")] = 8100,
 ) -> int:
     """Render what a camera on a drone would see of the arena, from the pose that the drone reports.
 
@@ -30,14 +41,6 @@ def camera(
         framerunner camera --scenario test-case-1 --no-base --port 8081
 
         framerunner camera --drone serial:///dev/ttyUSB1:921600 --bind 0.0.0.0
-
-    Args:
-        drone: MAVLink URL on which the drone is heard
-        scenario: name or file of the scenario whose frames are seen
-        no_base: the drone starts from the floor: there is no base under it
-        level: held level, as by a gimbal, whatever the drone's roll and pitch
-        bind: address to serve the video on
-        port: TCP port of the video
     """
     check_range("--port", port, 1, 65535)
 

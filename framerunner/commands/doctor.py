@@ -3,11 +3,18 @@
 from __future__ import annotations
 
 from contextlib import closing
+from typing import Annotated
+
+from cyclopts import Parameter
 
 from framerunner.commands import check_range
 
 
-def doctor(*, drone: str = "udpin://0.0.0.0:14540", seconds: float = 6.0) -> int:
+def doctor(
+    *,
+    drone: Annotated[str, Parameter(help="MAVLink URL of the drone")] = "udpin://0.0.0.0:14540",
+    seconds: Annotated[float, Parameter(help="how long to listen")] = 6.0,
+) -> int:
     """Listen to a drone, request its data, and say in one page whether it can fly the challenge.
 
     Any PX4 vehicle, simulated or real. It is never armed and nothing in it is changed.
@@ -21,10 +28,6 @@ def doctor(*, drone: str = "udpin://0.0.0.0:14540", seconds: float = 6.0) -> int
         framerunner doctor --drone udpin://0.0.0.0:14540
 
         framerunner doctor --drone serial:///dev/ttyUSB0:57600 --seconds 15
-
-    Args:
-        drone: MAVLink URL of the drone
-        seconds: how long to listen
     """
     check_range("--seconds", seconds, 2.0, 600.0)
 

@@ -5,31 +5,42 @@ from __future__ import annotations
 import shlex
 from collections.abc import Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING, Literal
+from typing import Annotated, Literal
+
+from cyclopts import Parameter
 
 from framerunner.commands import WholeNumber, load_mission_with
 from framerunner.errors import SettingError
 
-if TYPE_CHECKING:
-    from framerunner.evaluation.plan import Plan
-    from offboard.mission import Mission
-
 _COUNT, _SEED = 100, 1
+_Level = Annotated[str | None, Parameter(help="draw scenarios of this level, name or file")]
+_CountOption = Annotated[WholeNumber | None, Parameter(help=f"how many scenarios of the level; {_COUNT}")]
+_SeedOption = Annotated[
+    WholeNumber | None, Parameter(help=f"of the first scenario; each next one has one more; {_SEED}")
+]
+_Jobs = Annotated[WholeNumber | None, Parameter(help="flights at once; as many as there are cores")]
+_Out = Annotated[
+    Path | None, Parameter(help="folder; by default one in `runs/` that the same command finds again")
+]
+_Again = Annotated[bool, Parameter(help="fly again what is in the folder already")]
+_Backend = Annotated[
+    Literal["loky", "dask", "ray"], Parameter(help="loky: this machine; the others: a cluster")
+]
 
 
 def evaluate(
-    *scenarios: str,
-    level: str | None = None,
-    count: WholeNumber | None = None,
-    seed: WholeNumber | None = None,
-    mission: str = "frame_challenge",
-    pilot: Path | None = None,
-    jobs: WholeNumber | None = None,
-    out: Path | None = None,
-    again: bool = False,
-    compare: Path | None = None,
-    backend: Literal["loky", "dask", "ray"] = "loky",
-    address: str | None = None,
+    *scenarios: Annotated[str, Parameter(help="names, files or folders of scenarios, instead of --level")],
+    level: _Level = None,
+    count: _CountOption = None,
+    seed: _SeedOption = None,
+    mission: Annotated[str, Parameter(help="name or file of the mission")] = "frame_challenge",
+    pilot: Annotated[Path | None, Parameter(help="Python file with a subclass of Pilot")] = None,
+    jobs: _Jobs = None,
+    out: _Out = None,
+    again: _Again = False,
+    compare: Annotated[Path | None, Parameter(help="folder of an earlier evaluation")] = None,
+    backend: _Backend = "loky",
+    address: Annotated[str | None, Parameter(help="of the cluster's scheduler")] = None,
 ) -> int:
     """Fly a mission on many scenarios in lockstep; report how often it lands, how well, and why it fails.
 
@@ -49,20 +60,6 @@ def evaluate(
         framerunner evaluate test-case-1 test-case-2 calm-17 --jobs 1
 
         framerunner evaluate --level calm --backend dask --address tcp://10.0.0.1:8786
-
-    Args:
-        scenarios: names, files or folders of scenarios, instead of --level
-        level: draw scenarios of this level, name or file
-        count: how many scenarios of the level; 100
-        seed: of the first scenario; each next one has one more; 1
-        mission: name or file of the mission
-        pilot: Python file with a subclass of Pilot
-        jobs: flights at once; as many as there are cores
-        out: folder; by default one in `runs/` that the same command finds again
-        again: fly again what is in the folder already
-        compare: folder of an earlier evaluation
-        backend: loky: this machine; the others: a cluster
-        address: of the cluster's scheduler
     """
     given = dict(locals())
     _check(scenarios, level, count, seed)
@@ -72,8 +69,13 @@ def evaluate(
     from framerunner.evaluation.backends import Pool
     from framerunner.evaluation.evaluate import EvaluationSettings
     from framerunner.evaluation.evaluate import evaluate as evaluate_all
+    from framerunner.evaluation.plan import plan_files, plan_level
 
-    plan = _plan(scenarios, level, count, seed, load_mission_with(mission, pilot))
+    loaded = load_mission_with(mission, pilot)
+    if level is None:
+        plan = plan_files(scenarios, loaded)
+    else:
+        plan = plan_level(level, _SEED if seed is None else seed, _COUNT if count is None else count, loaded)
     settings = EvaluationSettings(
         plan=plan,
         pool=Pool(backend, cpu_count() if jobs is None else jobs, address),
@@ -85,16 +87,6 @@ def evaluate(
         command=_command(scenarios, given),
     )
     return evaluate_all(settings)
-
-
-def _plan(
-    scenarios: tuple[str, ...], level: str | None, count: int | None, seed: int | None, mission: Mission
-) -> Plan:
-    from framerunner.evaluation.plan import plan_files, plan_level
-
-    if level is None:
-        return plan_files(scenarios, mission)
-    return plan_level(level, _SEED if seed is None else seed, _COUNT if count is None else count, mission)
 
 
 def _check(scenarios: tuple[str, ...], level: str | None, count: int | None, seed: int | None) -> None:

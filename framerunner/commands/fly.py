@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import asyncio
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Annotated
+
+from cyclopts import Parameter
 
 from framerunner.commands import WholeNumber, check_range, load_mission_with
 from framerunner.errors import SettingError
@@ -12,23 +14,47 @@ from framerunner.errors import SettingError
 if TYPE_CHECKING:
     from wire.simulator_api import SimulatorApi
 
+_Drone = Annotated[
+    str | None, Parameter(help="MAVLink URL of a running drone; without it a simulated one is started")
+]
+_Camera = Annotated[str | None, Parameter(help="URL, device or folder of its camera; needed with --drone")]
+_Simulator = Annotated[
+    str | None,
+    Parameter(
+        help="with --drone: http://HOST:PORT of the simulator that flies it: its referee judges, and without "
+        "--camera its camera is used. By default that of an http --camera, if there is one"
+    ),
+]
+_Lockstep = Annotated[
+    bool, Parameter(help="in simulated time, as fast as the machine can, the same each time; no log")
+]
+_Seed = Annotated[
+    WholeNumber | None, Parameter(help="of everything random in a lockstep flight; 0 if not given")
+]
+_Record = Annotated[bool, Parameter(help="write flight.mcap as well, for `framerunner replay` and Foxglove")]
+_Video = Annotated[
+    bool, Parameter(help="write video.avi also in lockstep; in real time it is always written")
+]
+_Monitor = Annotated[bool, Parameter(help="open the Game Monitor as well, on http://127.0.0.1:8080/")]
+_Pilot = Annotated[Path | None, Parameter(help="Python file with primitives of your own; it is executed")]
+
 
 def fly(
-    scenario: str = "test-case-1",
+    scenario: Annotated[str, Parameter(help="name or file of the scenario")] = "test-case-1",
     *,
-    mission: str = "frame_challenge",
-    drone: str | None = None,
-    camera: str | None = None,
-    simulator: str | None = None,
-    speed: float = 1.0,
-    instance: WholeNumber = 0,
-    lockstep: bool = False,
-    seed: WholeNumber | None = None,
-    record: bool = False,
-    video: bool = False,
-    monitor: bool = False,
-    pilot: Path | None = None,
-    out: Path = Path("runs"),
+    mission: Annotated[str, Parameter(help="name or file of the mission")] = "frame_challenge",
+    drone: _Drone = None,
+    camera: _Camera = None,
+    simulator: _Simulator = None,
+    speed: Annotated[float, Parameter(help="of the simulated drone: simulated seconds a second")] = 1.0,
+    instance: Annotated[WholeNumber, Parameter(help="of the simulated drone: shifts its ports, 0 to 9")] = 0,
+    lockstep: _Lockstep = False,
+    seed: _Seed = None,
+    record: _Record = False,
+    video: _Video = False,
+    monitor: _Monitor = False,
+    pilot: _Pilot = None,
+    out: Annotated[Path, Parameter(help="folder in which this flight's folder is made")] = Path("runs"),
 ) -> int:
     """Fly a mission, show it live, and write result, track, log and video to `runs/<time>-<scenario>/`.
 
@@ -51,23 +77,6 @@ def fly(
         framerunner fly --drone udpin://0.0.0.0:14540 --simulator http://10.0.0.2:8100
 
         framerunner fly --drone serial:///dev/ttyUSB0:57600 --camera rtsp://10.0.0.2/1
-
-    Args:
-        scenario: name or file of the scenario
-        mission: name or file of the mission
-        drone: MAVLink URL of a running drone; without it a simulated one is started
-        camera: URL, device or folder of its camera; needed with --drone
-        simulator: with --drone: http://HOST:PORT of the simulator that flies it: its referee judges, and
-            without --camera its camera is used. By default that of an http --camera, if there is one
-        speed: of the simulated drone: simulated seconds a second
-        instance: of the simulated drone: shifts its ports, 0 to 9
-        lockstep: in simulated time, as fast as the machine can, the same each time; no log
-        seed: of everything random in a lockstep flight; 0 if not given
-        record: write flight.mcap as well, for `framerunner replay` and Foxglove
-        video: write video.avi also in lockstep; in real time it is always written
-        monitor: open the Game Monitor as well, on http://127.0.0.1:8080/
-        pilot: Python file with primitives of your own; it is executed
-        out: folder in which this flight's folder is made
     """
     api = _simulator_api(simulator, drone)
     if api is not None and camera is None:

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import re
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Annotated
 
-from cyclopts import App
+from cyclopts import App, Parameter
 
 from framerunner.commands import load_mission_with
 from framerunner.errors import SettingError
@@ -17,6 +17,9 @@ if TYPE_CHECKING:
 app = App(name="mission", help="List, show, check and create missions.")
 
 _NAME = re.compile(r"[a-z][a-z0-9_]{0,59}")
+PilotOption = Annotated[
+    Path | None, Parameter(help="Python file with a subclass of Pilot that the mission uses; it is executed")
+]
 
 
 @app.command(name="list")
@@ -35,7 +38,7 @@ def list_() -> int:
 
 
 @app.command
-def show(mission: str, *, pilot: Path | None = None) -> int:
+def show(mission: Annotated[str, Parameter(help="name or file")], *, pilot: PilotOption = None) -> int:
     """Print a mission's diagram in Mermaid's language (paste it into any Markdown page or mermaid.live).
 
     **Examples**
@@ -45,10 +48,6 @@ def show(mission: str, *, pilot: Path | None = None) -> int:
         framerunner mission show my_mission.yaml > my_mission.mmd
 
         framerunner mission show my_mission.yaml --pilot my_mission.py
-
-    Args:
-        mission: name or file
-        pilot: Python file with a subclass of Pilot that the mission uses; it is executed
     """
     from offboard.mission import mermaid
 
@@ -57,7 +56,7 @@ def show(mission: str, *, pilot: Path | None = None) -> int:
 
 
 @app.command
-def check(file: Path, *, pilot: Path | None = None) -> int:
+def check(file: Annotated[Path, Parameter(help="YAML file")], *, pilot: PilotOption = None) -> int:
     """Say whether a mission file is good, or every fault with its line.
 
     **Examples**
@@ -65,10 +64,6 @@ def check(file: Path, *, pilot: Path | None = None) -> int:
         framerunner mission check my_mission.yaml
 
         framerunner mission check my_mission.yaml --pilot my_mission.py
-
-    Args:
-        file: YAML file
-        pilot: Python file with a subclass of Pilot that the mission uses; it is executed
     """
     loaded = load_mission_with(file, pilot)
     with_pilot = f" and {pilot}" if pilot is not None else ""
@@ -77,7 +72,12 @@ def check(file: Path, *, pilot: Path | None = None) -> int:
 
 
 @app.command
-def new(name: str, *, python: bool = False, out: Path = Path(".")) -> int:
+def new(
+    name: Annotated[str, Parameter(help="of the mission: small letters, digits and _")],
+    *,
+    python: Annotated[bool, Parameter(help="with a Python file that adds a primitive of its own")] = False,
+    out: Annotated[Path, Parameter(help="folder to write to")] = Path("."),
+) -> int:
     """Create a mission: write a small one that flies, with comments that explain it.
 
     Nothing is ever overwritten.
@@ -87,11 +87,6 @@ def new(name: str, *, python: bool = False, out: Path = Path(".")) -> int:
         framerunner mission new my_mission
 
         framerunner mission new my_mission --python --out missions
-
-    Args:
-        name: of the mission: small letters, digits and _
-        python: with a Python file that adds a primitive of its own
-        out: folder to write to
     """
     from offboard.starter import starter
 

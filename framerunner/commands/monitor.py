@@ -28,15 +28,28 @@ COMPONENT_ID = 190  # MAV_COMP_ID_MISSIONPLANNER, as ground stations use it
 
 def monitor(
     *,
-    drone: str = "udpin://127.0.0.1:14550",
-    scenario: str | None = None,
-    bind: str = "127.0.0.1",
-    port: WholeNumber = 8080,
-    database: str = DATABASE,
-    runs: Path = Path("runs"),
-    camera_host: tuple[str, ...] = (),
-    trusted_proxy: tuple[str, ...] = (),
-    lifeline: Annotated[bool, Parameter(show=False)] = False,
+    drone: Annotated[
+        str, Parameter(help="MAVLink URL: where drones send to ground stations")
+    ] = "udpin://127.0.0.1:14550",
+    scenario: Annotated[
+        str | None, Parameter(help="name or file; for a drone without a referee, such as a real one")
+    ] = None,
+    bind: Annotated[
+        str, Parameter(help="address to listen on; 0.0.0.0 lets other machines in")
+    ] = "127.0.0.1",
+    port: Annotated[WholeNumber, Parameter(help="TCP port of the pages; 0 lets the system choose")] = 8080,
+    database: Annotated[str, Parameter(help="of teams and tries; SQLAlchemy URL")] = DATABASE,
+    runs: Annotated[Path, Parameter(help="folder of recorded flights")] = Path("runs"),
+    camera_host: Annotated[
+        tuple[str, ...],
+        Parameter(
+            help="HOST or HOST:PORT of a camera, if a drone names one that its packets do not come from"
+        ),
+    ] = (),
+    trusted_proxy: Annotated[
+        tuple[str, ...], Parameter(help="address or network of a proxy whose X-Forwarded-For is believed")
+    ] = (),
+    lifeline: Annotated[bool, Parameter(show=False, help="stop when standard input ends")] = False,
 ) -> int:
     """Open the Game Monitor on http://127.0.0.1:8080/: watch and fly drones, judge tries, replay flights.
 
@@ -51,17 +64,6 @@ def monitor(
         framerunner monitor --bind 0.0.0.0 --port 80
 
         framerunner monitor --drone serial:///dev/ttyUSB0:57600 --scenario test-case-1
-
-    Args:
-        drone: MAVLink URL: where drones send to ground stations
-        scenario: name or file; for a drone without a referee, such as a real one
-        bind: address to listen on; 0.0.0.0 lets other machines in
-        port: TCP port of the pages; 0 lets the system choose
-        database: of teams and tries; SQLAlchemy URL
-        runs: folder of recorded flights
-        camera_host: HOST or HOST:PORT of a camera, if a drone names one that its packets do not come from
-        trusted_proxy: address or network of a proxy whose X-Forwarded-For is believed
-        lifeline: stop when standard input ends
     """
     check_range("--port", port, 0, 65535)
 

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import json
 from pathlib import Path
+from typing import Annotated
 
-from cyclopts import App
+from cyclopts import App, Parameter
 
 from framerunner.commands import WholeNumber, say
 from framerunner.errors import SettingError
@@ -30,7 +31,11 @@ def list_() -> int:
 
 
 @app.command
-def show(scenario: str, *, out: Path | None = None) -> int:
+def show(
+    scenario: Annotated[str, Parameter(help="name or file")],
+    *,
+    out: Annotated[Path | None, Parameter(help="PNG file to write; by default `<name>.png`")] = None,
+) -> int:
     """Draw a scenario from above and from the side, and print it.
 
     **Examples**
@@ -38,10 +43,6 @@ def show(scenario: str, *, out: Path | None = None) -> int:
         framerunner scenario show test-case-1
 
         framerunner scenario show my.yaml --out my.png
-
-    Args:
-        scenario: name or file
-        out: PNG file to write; by default `<name>.png`
     """
     from framerunner.runs.pictures import scenario_picture
     from scenarios.loader import dump_yaml, load_scenario
@@ -55,15 +56,12 @@ def show(scenario: str, *, out: Path | None = None) -> int:
 
 
 @app.command
-def check(file: Path) -> int:
+def check(file: Annotated[Path, Parameter(help="YAML file")]) -> int:
     """Say whether a scenario file is good, or what is wrong and where.
 
     **Example**
 
         framerunner scenario check my.yaml
-
-    Args:
-        file: YAML file
     """
     from scenarios.loader import load_scenario
 
@@ -87,7 +85,12 @@ def schema() -> int:
 
 
 @app.command
-def random(*, level: str, seed: WholeNumber, out: Path | None = None) -> int:
+def random(
+    *,
+    level: Annotated[str, Parameter(help="level of difficulty, name or file")],
+    seed: Annotated[WholeNumber, Parameter(help="a whole number; the same seed gives the same scenario")],
+    out: Annotated[Path | None, Parameter(help="YAML file to write; by default it is printed")] = None,
+) -> int:
     """Draw a scenario at random.
 
     **Examples**
@@ -95,11 +98,6 @@ def random(*, level: str, seed: WholeNumber, out: Path | None = None) -> int:
         framerunner scenario random --level calm --seed 17
 
         framerunner scenario random --level calm --seed 17 --out calm-17.yaml
-
-    Args:
-        level: level of difficulty, name or file
-        seed: a whole number; the same seed gives the same scenario
-        out: YAML file to write; by default it is printed
     """
     from scenarios.level import load_level
     from scenarios.loader import dump_yaml

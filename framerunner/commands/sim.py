@@ -28,57 +28,75 @@ _MAX_COUNT = 20
 @Parameter(name="*")
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Onboard:
-    """What the drone has besides flying.
+    """What the drone has besides flying."""
 
-    Attributes:
-        storage: folder for its files and flight logs, DIR/0 for instance 0; else kept in memory
-        parameters: file of changed parameters (.params), read at start and saved when one changes
-        shell: answer MAVLink's shell (SERIAL_CONTROL), for the drone only
-        camera: announce the camera over MAVLink, as a separate component, and take photos
-    """
-
-    storage: Path | None = None
-    parameters: Path | None = None
-    shell: bool = False
-    camera: Annotated[bool, Parameter(negative="--no-camera")] = True
+    storage: Annotated[
+        Path | None,
+        Parameter(help="folder for its files and flight logs, DIR/0 for instance 0; else kept in memory"),
+    ] = None
+    parameters: Annotated[
+        Path | None,
+        Parameter(help="file of changed parameters (.params), read at start and saved when one changes"),
+    ] = None
+    shell: Annotated[bool, Parameter(help="answer MAVLink's shell (SERIAL_CONTROL), for the drone only")] = (
+        False
+    )
+    camera: Annotated[
+        bool,
+        Parameter(
+            negative="--no-camera",
+            help="announce the camera over MAVLink, as a separate component, and take photos",
+        ),
+    ] = True
 
 
 @Parameter(name="*")
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Connections:
-    """Where the simulator listens and sends.
+    """Where the simulator listens and sends."""
 
-    Attributes:
-        bind: address to listen on
-        onboard_remote: host or host:port that gets the onboard link, UDP 14540 + instance
-        ground_remote: host or host:port that gets the ground link, UDP 14550
-        link: one more link: udpout://HOST:PORT, udpin://…, tcpin://…, tcpout://…, serial:///TTY:BAUD,
-            optionally followed by ?streams=onboard|ground|normal&rate=BYTES; may be repeated
-        signing_key: file with 64 hexadecimal digits or a passphrase: sign MAVLink 2 with it
-        video_port: TCP port of the video; 8100 + instance
-        video_rtp: host or host:port that gets the video as H.264 in RTP, UDP 5600, or off
-    """
-
-    bind: str = "127.0.0.1"
-    onboard_remote: str = "127.0.0.1"
-    ground_remote: str = "127.0.0.1"
-    link: tuple[str, ...] = ()
-    signing_key: Path | None = None
-    video_port: WholeNumber | None = None
-    video_rtp: str = "127.0.0.1"
+    bind: Annotated[str, Parameter(help="address to listen on")] = "127.0.0.1"
+    onboard_remote: Annotated[
+        str, Parameter(help="host or host:port that gets the onboard link, UDP 14540 + instance")
+    ] = "127.0.0.1"
+    ground_remote: Annotated[
+        str, Parameter(help="host or host:port that gets the ground link, UDP 14550")
+    ] = "127.0.0.1"
+    link: Annotated[
+        tuple[str, ...],
+        Parameter(
+            help="one more link: udpout://HOST:PORT, udpin://…, tcpin://…, tcpout://…, serial:///TTY:BAUD, "
+            "optionally followed by ?streams=onboard|ground|normal&rate=BYTES; may be repeated"
+        ),
+    ] = ()
+    signing_key: Annotated[
+        Path | None, Parameter(help="file with 64 hexadecimal digits or a passphrase: sign MAVLink 2 with it")
+    ] = None
+    video_port: Annotated[WholeNumber | None, Parameter(help="TCP port of the video; 8100 + instance")] = None
+    video_rtp: Annotated[
+        str, Parameter(help="host or host:port that gets the video as H.264 in RTP, UDP 5600, or off")
+    ] = "127.0.0.1"
 
 
 def sim(
     *,
-    scenario: str = "open-field",
-    speed: float = 1.0,
-    instance: WholeNumber = 0,
-    count: WholeNumber = 1,
+    scenario: Annotated[
+        str, Parameter(help="name or file; without it an open field and an x500")
+    ] = "open-field",
+    speed: Annotated[float, Parameter(help="simulated seconds a second, 0.01 to 1000")] = 1.0,
+    instance: Annotated[WholeNumber, Parameter(help="shifts ports and the system id, 0 to 9")] = 0,
+    count: Annotated[
+        WholeNumber, Parameter(help="how many drones fly side by side; they have the next instances' ports")
+    ] = 1,
     connections: Connections | None = None,
     onboard: Onboard | None = None,
-    monitor: bool = False,
-    lifeline: Annotated[bool, Parameter(show=False)] = False,
-    time_grants: Annotated[int | None, Parameter(show=False)] = None,
+    monitor: Annotated[
+        bool, Parameter(help="open the Game Monitor as well, on http://127.0.0.1:8080/")
+    ] = False,
+    lifeline: Annotated[bool, Parameter(show=False, help="stop when standard input ends")] = False,
+    time_grants: Annotated[
+        int | None, Parameter(show=False, help="descriptor of a socket by which the caller grants time")
+    ] = None,
 ) -> int:
     """Start the simulated drone: MAVLink on UDP 14540 and 14550, video on http://127.0.0.1:8100/.
 
@@ -101,17 +119,6 @@ def sim(
         framerunner sim --link tcpin://127.0.0.1:5760
 
         framerunner sim --link serial:///dev/ttyUSB0:57600
-
-    Args:
-        scenario: name or file; without it an open field and an x500
-        speed: simulated seconds a second, 0.01 to 1000
-        instance: shifts ports and the system id, 0 to 9
-        count: how many drones fly side by side; they have the next instances' ports
-        connections: see `Connections`
-        onboard: see `Onboard`
-        monitor: open the Game Monitor as well, on http://127.0.0.1:8080/
-        lifeline: stop when standard input ends
-        time_grants: descriptor of a socket by which the caller grants time
     """
     check_range("--speed", speed, 0.01, 1000)
     check_range("--instance", instance, 0, 9)
@@ -161,13 +168,18 @@ def _settings(
     twice = next((link.url.text for number, link in enumerate(links) if link in links[:number]), None)
     if twice is not None:
         raise SettingError(f"--link {twice}: given twice; leave one out")
+    rtp = None
+    if chosen.video_rtp != "off" and is_installed("av"):
+        rtp = rtp_address(chosen.video_rtp, instance)
+    elif chosen.video_rtp != "off":
+        say(f"warning: no video in RTP: {install_advice('av')}")
     settings = ServerSettings(
         instance=instance,
         bind=chosen.bind,
         onboard_remote=chosen.onboard_remote,
         ground_remote=chosen.ground_remote,
         video_port=chosen.video_port,
-        video_rtp=rtp_address(chosen.video_rtp, instance) if _sends_rtp(chosen.video_rtp) else None,
+        video_rtp=rtp,
         speed=speed,
         links=links,
         signing_key=_read_key(chosen.signing_key),
@@ -178,16 +190,6 @@ def _settings(
     )
     settings.check(count)
     return settings
-
-
-def _sends_rtp(video_rtp: str) -> bool:
-    """Whether H.264 video is requested and can be encoded; a small installation flies without."""
-    if video_rtp == "off":
-        return False
-    if not is_installed("av"):
-        say(f"warning: no video in RTP: {install_advice('av')}")
-        return False
-    return True
 
 
 def _simulations(scenario: Scenario, count: int) -> list[Simulation]:

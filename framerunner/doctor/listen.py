@@ -313,12 +313,6 @@ def listen(link: VehicleLink, record: Record, seconds: float, progress: Progress
 
     To a disarmed vehicle this is a ground station, since PX4 reports its reasons only to one. To an armed
     one it is not: the vehicle would take its end for a lost ground station.
-
-    Args:
-        link: to the vehicle.
-        record: of it, with its system id.
-        seconds: how long.
-        progress: see `Progress`.
     """
     began_s = request_s = time.monotonic()
     beat_s = requested_s = -10.0

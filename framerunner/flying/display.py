@@ -29,13 +29,7 @@ _PROGRESS_LINE_S = 2.0
 class FlightDisplay:
     """A live table in a terminal; elsewhere a line at every change of state and every ten seconds.
 
-    Shown while it is entered as a context.
-
-    Args:
-        title: scenario and mission.
-        limit_s: of the try.
-        recorder: has the latest tick.
-        judge: reports how the try stands.
+    Shown while it is entered as a context; the recorder has the latest tick, the judge how the try stands.
     """
 
     def __init__(self, title: str, limit_s: float, recorder: FlightRecorder, judge: Judge) -> None:
@@ -148,11 +142,7 @@ def _seen(detection: Detection) -> str:
 
 
 class LockstepProgress:
-    """A status line in a terminal, elsewhere a line every two seconds; nothing in the first second.
-
-    Args:
-        limit_s: of the try.
-    """
+    """A status line in a terminal, elsewhere a line every two seconds; nothing in the first second."""
 
     def __init__(self, limit_s: float) -> None:
         self._limit_s = limit_s

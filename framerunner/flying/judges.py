@@ -47,12 +47,6 @@ class TruthJudge:
     """The simulator's referee, which sees the true state of every control tick, over HTTP.
 
     If the simulator ends, the verdict is made from the telemetry seen so far.
-
-    Args:
-        api: of the simulator.
-        session: for the requests.
-        plan: of the flight, for the substitute.
-        source: as the simulator's referee reports it.
     """
 
     def __init__(
@@ -68,7 +62,7 @@ class TruthJudge:
         self._substitute.see(moment)
 
     async def standing(self) -> RefereeSnapshot | None:
-        """Request the snapshot."""
+        """As of now, or None without a valid answer."""
         answer = await ask_referee(self._api, self._session)
         return None if answer is None else answer.snapshot
 
@@ -90,8 +84,7 @@ class TruthJudge:
     async def _settle(self, *, motors_stopped: bool) -> None:
         """Wait until the referee sees the drone at rest, for 5 s of vehicle time at most.
 
-        Args:
-            motors_stopped: the motors are known to be off, even if the referee does not know it yet.
+        If `motors_stopped`, the motors are known to be off, even if the referee has not seen it yet.
         """
         loop = asyncio.get_running_loop()
         began_us = newest_us = -1
@@ -165,7 +158,7 @@ async def choose_judge(
         plan: of the flight; a simulator with another scenario cannot judge it.
         api: where a simulator may be; None: nowhere.
         session: for the requests.
-        named: whether the user named the simulator; only then must it be there.
+        named: whether the user named the simulator, which must then answer.
 
     Returns:
         The judge, and the plan with its frames as high as the simulator has them.

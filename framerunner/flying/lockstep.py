@@ -42,15 +42,11 @@ def fly_lockstep(
 async def lockstep_flight(
     plan: FlightPlan, *, observers: Sequence[Observer] = (), on_image: ImageObserver | None = None
 ) -> FinishedFlight:
-    """Fly a plan as fast as the machine can.
-
-    Args:
-        plan: with a mission; its seed is recorded, nothing is random yet.
-        observers: called at every tick of the mission.
-        on_image: see `ImageObserver`.
+    """Fly a plan as fast as the machine can; its seed is recorded, nothing is random yet.
 
     Raises:
         DroneError: the drone does not get ready.
+        ValueError: the plan has no mission.
     """
     states = StateHash()
     vehicle = LockstepVehicle(plan, on_image, observers=(states.add,))
@@ -65,17 +61,9 @@ async def lockstep_flight(
 
 
 class LockstepVehicle:
-    """A plan's drone on its start, with its eyes: one simulation in this process.
+    """A plan's drone on its start and its eyes: a simulation that advances only while the drone is used.
 
-    Args:
-        plan: whose drone it is.
-        on_image: see `ImageObserver`.
-        observers: called with the true state of every control tick.
-
-    Attributes:
-        simulation: advances only while the drone is used.
-        drone: the port by which it is flown.
-        eyes: what its camera shows.
+    Its observers are called with the true state of every control tick.
     """
 
     def __init__(
@@ -141,11 +129,8 @@ class LockstepEyes:
     def latest(self, time_us: int) -> Detections:
         """What the latest image showed; the detector processes an image only when this is called.
 
-        Args:
-            time_us: vehicle time now.
-
         Raises:
-            CameraLostError: the last image is older than a second.
+            CameraLostError: the last image is older than a second of vehicle time.
         """
         if self._arrived is not None:
             self._image_us, image = self._arrived

@@ -14,13 +14,7 @@ from offboard.mission import Mission, mermaid
 from scenarios.result import FlightResult
 from vision.types import CameraFrame, Detection, Detections
 from wire.mission_codec import PayloadError, split_document
-from wire.mission_messages import (
-    TEXT_PREFIX,
-    Box,
-    DocumentKind,
-    MissionDetections,
-    MissionState,
-)
+from wire.mission_messages import TEXT_PREFIX, Box, DocumentKind, MissionDetections, MissionState
 
 STATE_TICKS = 2  # 10 Hz of vehicle time
 HISTORY = 10
@@ -37,7 +31,7 @@ class MissionReporter:
         companion: sends.
         mission: what is flown.
         source: text of its file.
-        scenario: name of the scenario.
+        scenario: its name.
         start_arena: x, y, z (metres) and yaw (radians) before the first tick.
     """
 

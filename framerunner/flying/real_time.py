@@ -51,9 +51,7 @@ class _Endpoints:
     """Where drone, camera and API are.
 
     Attributes:
-        drone_url: of its MAVLink.
-        camera_url: of its camera.
-        api: of its simulator, or where one may be; None: nowhere.
+        api: of the drone's simulator, or where one may be; None: nowhere.
         image_size_px: width and height, if known before.
         sitl: the simulator that was started here.
         shared_with: URL of the monitor, if it receives the drone's packets only through this program.
@@ -70,12 +68,12 @@ class _Endpoints:
 async def fly_in_real_time(
     plan: FlightPlan, settings: RealTimeSettings, records: RunRecords, monitor_url: str | None
 ) -> FinishedFlight:
-    """Fly a plan over MAVLink, with the display in the terminal and all that is recorded.
+    """Fly a plan over MAVLink, with the display in the terminal and the records of all ticks and images.
 
     Args:
         plan: with a mission.
         settings: what is flown.
-        records: are given every tick and image.
+        records: of the flight.
         monitor_url: where the monitor listens for the drone; None: there is none.
 
     Raises:
@@ -196,16 +194,16 @@ def _timing(
     drone: MavsdkDrone,
     eyes: CameraEyes,
     clock: SimulatorClock | None,
-    real_time_factor: float | None,
+    factor: float | None,
     speed: float,
 ) -> Timing:
-    """What was late in a flight, and so whether the machine was fast enough.
+    """What was late in a flight, and so whether the machine was fast enough for the requested speed.
 
     Args:
         drone: that was flown.
         eyes: through which it saw.
         clock: of a simulator whose time waits for this program; None: vehicle time does not wait.
-        real_time_factor: vehicle time per wall time; None before two ticks.
+        factor: vehicle time per wall time; None before two ticks.
         speed: the requested factor.
     """
     late = {
@@ -213,11 +211,11 @@ def _timing(
         "late_images": 0 if clock is None else clock.images_missed,
         "late_setpoints": 0 if clock is None else clock.setpoints_missed,
     }
-    slow = real_time_factor is not None and real_time_factor < SLOW_FACTOR * speed
+    slow = factor is not None and factor < SLOW_FACTOR * speed
     return Timing(
         kept_up=not slow and not any(late.values()),
         vehicle_time_waits=clock is not None,
-        speed=speed if real_time_factor is None else real_time_factor / speed,
+        speed=speed if factor is None else factor / speed,
         **late,
         oldest_image_s=eyes.oldest_s,
     )

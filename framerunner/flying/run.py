@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 import asyncio
-from collections.abc import Iterator
-from contextlib import closing, contextmanager
+from contextlib import AbstractContextManager, closing, nullcontext
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -47,10 +46,7 @@ class FlightSettings:
 
 
 async def fly_once(settings: FlightSettings) -> int:
-    """Fly, judge, write.
-
-    Returns:
-        0 completed, 1 flown but not completed, 130 stopped with Ctrl-C.
+    """Fly, judge, write; returns 0 if completed, 1 if flown but not completed, 130 after Ctrl-C.
 
     Raises:
         DroneError: the drone cannot be reached or made ready.
@@ -72,34 +68,49 @@ async def fly_once(settings: FlightSettings) -> int:
 
 
 def _camera_hosts(settings: RealTimeSettings) -> tuple[str, ...]:
-    """The hosts that the user named as the camera's or the simulator's: the monitor may use them too."""
+    """Hosts that the user named, which the monitor may use too."""
     named = (SimulatorApi.of_video(settings.camera_url or ""), settings.simulator)
     hosts = (urlsplit(api.url).hostname for api in named if api is not None)
     return tuple(dict.fromkeys(host for host in hosts if host))
 
 
 async def _fly_and_judge(settings: FlightSettings, monitor_url: str | None) -> int:
-    with _run_folder(settings) as folder:
+    plan = settings.plan
+    folder = RunFolder(settings.out, plan.scenario.name)
+    try:
+        folder.write_plan(plan.scenario, plan.chart)
         with _recording(settings, folder) as recording:
             records = RunRecords(folder, recording)
             try:
                 if settings.real_time is None:
                     flown = await _fly_in_lockstep(settings, records)
                 else:
-                    flown = await fly_in_real_time(settings.plan, settings.real_time, records, monitor_url)
+                    flown = await fly_in_real_time(plan, settings.real_time, records, monitor_url)
             except (asyncio.CancelledError, KeyboardInterrupt):
                 folder.stopped_before_start = records.recorder.latest is None
                 raise
             records.finish(flown.result, flown.track)
+        if recording is not None:
+            warn(recording.problem)
         result = records.complete(flown.result)
-        layout = settings.plan.lifted(result.lift_m).layout
-        write_outcome(folder, layout, flown.track, result)
+        write_outcome(folder, plan.lifted(result.lift_m).layout, flown.track, result)
+    finally:
+        folder.remove_if_empty()
     late = timing_line(result.timing)
     lines = [result_lines(result), *([late] if late else []), *left_lines(folder, result)]
     print("\n".join(lines), flush=True)
     if flown.outcome.interrupted:
         return _INTERRUPTED_CODE
     return 0 if result.completed else 1
+
+
+def _recording(settings: FlightSettings, folder: RunFolder) -> AbstractContextManager[FlightRecording | None]:
+    if not settings.record:
+        return nullcontext()
+    from framerunner.recording.mcap_writer import FlightRecording
+
+    plan = settings.plan
+    return FlightRecording(folder.recording, plan.scenario, plan.chart, plan.seed)
 
 
 async def _fly_in_lockstep(settings: FlightSettings, records: RunRecords) -> FinishedFlight:
@@ -117,29 +128,3 @@ async def _fly_in_lockstep(settings: FlightSettings, records: RunRecords) -> Fin
         flown = await lockstep_flight(plan, observers=(records.see, progress.see), on_image=keep)
     warn(video.problem)
     return flown
-
-
-@contextmanager
-def _run_folder(settings: FlightSettings) -> Iterator[RunFolder]:
-    """Make the folder; remove it if the flight did not begin and wrote nothing."""
-    plan = settings.plan
-    folder = RunFolder(settings.out, plan.scenario.name)
-    try:
-        folder.write_plan(plan.scenario, plan.chart)
-        yield folder
-    finally:
-        folder.remove_if_empty()
-
-
-@contextmanager
-def _recording(settings: FlightSettings, folder: RunFolder) -> Iterator[FlightRecording | None]:
-    """Open the recording, if one is requested, and close it in any case."""
-    if not settings.record:
-        yield None
-        return
-    from framerunner.recording.mcap_writer import FlightRecording
-
-    plan = settings.plan
-    with FlightRecording(folder.recording, plan.scenario, plan.chart, plan.seed) as recording:
-        yield recording
-    warn(recording.problem)

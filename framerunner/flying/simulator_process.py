@@ -29,13 +29,7 @@ _ANSWER_US = CONTROL_PERIOD_US + TELEMETRY_DELAY_US - 1
 
 
 class SitlProcess(ChildProcess):
-    """`framerunner sim` as a child process.
-
-    Args:
-        scenario: name or file.
-        speed: simulated seconds a second.
-        instance: shifts its ports.
-        links: further links, as `--link` takes them.
+    """`framerunner sim` as a child process, with its options.
 
     Attributes:
         clock: its time, which waits for this program after `SimulatorClock.stop`.
@@ -82,9 +76,6 @@ class SitlProcess(ChildProcess):
 
 class SimulatorClock:
     """This program's end of the simulator's time grants.
-
-    Args:
-        channel: connected to the simulator.
 
     Attributes:
         images_missed: ticks whose image did not arrive in time.

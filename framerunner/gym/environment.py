@@ -206,13 +206,7 @@ def observation_space(camera: Camera, *, image: bool) -> spaces.Dict:
 def observe(
     state: DroneState, detections: Detections, time_left_s: float, image: Image | None = None
 ) -> Observation:
-    """Put what a mission would see into arrays.
-
-    Args:
-        state: of the drone.
-        detections: of the latest image.
-        time_left_s: until the try's limit.
-        image: the latest image, BGR; None to leave it out.
+    """Put what a mission would see into arrays; the image, if given, is BGR.
 
     Returns:
         imu: x, y, z (metres), yaw (-pi..pi), arena axes; shape (4,).

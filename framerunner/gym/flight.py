@@ -80,11 +80,7 @@ class SteppedFlight:
         return self._eyes.latest(self.state.time_us)
 
     def step(self, command: VelocityCommand) -> None:
-        """Fly a velocity for a tick of 50 ms, or land; see `_is_landing`.
-
-        Args:
-            command: within the limits.
-        """
+        """Fly a velocity within the limits for a tick of 50 ms, or land; see `_is_landing`."""
         try:
             if self._is_landing(command):
                 run_through(self._drone.motors_off())
@@ -139,10 +135,7 @@ def final_reward(report: RefereeReport) -> float:
 
 
 def run_through(coroutine: Coroutine[object, None, None]) -> None:
-    """Run a coroutine of the lockstep drone, which never waits, without an event loop.
-
-    Args:
-        coroutine: not yet started.
+    """Run a new coroutine of the lockstep drone, which never waits, without an event loop.
 
     Raises:
         RuntimeError: it waits after all.

@@ -76,12 +76,7 @@ def main() -> int:
 
 
 def limit_resources(memory_bytes: int, processor_s: int) -> None:
-    """Have this process fail with MemoryError, or be killed, when it uses more than this.
-
-    Args:
-        memory_bytes: that it may use from now on.
-        processor_s: of processor time in all.
-    """
+    """Have this process fail with MemoryError, or be killed, above so much more memory or processor time."""
     with open("/proc/self/statm", encoding="ascii") as file:
         held_bytes = int(file.read().split()[5]) * resource.getpagesize()  # data and stacks
     for what, limit in (

@@ -29,13 +29,7 @@ _PENDING = 200  # poses between two heartbeats
 
 @dataclass(frozen=True, slots=True)
 class ArenaPose:
-    """A vehicle's pose in the arena.
-
-    Attributes:
-        position_arena_m: shape (3,).
-        velocity_arena_m_s: shape (3,).
-        attitude_arena: unit quaternion (w, x, y, z), body FLU to arena.
-    """
+    """A vehicle's pose in the arena; its attitude is a unit quaternion (w, x, y, z), body FLU to arena."""
 
     position_arena_m: Vec3
     velocity_arena_m_s: Vec3
@@ -49,7 +43,7 @@ class Placement:
     therefore wait until the next heartbeat confirms that they were taken disarmed; their mean is used.
 
     Args:
-        start: where the vehicle stands, arena axes; its z is that of the vehicle's centre.
+        start: of the vehicle's centre, arena axes.
 
     Attributes:
         alignment: from local NED to arena; None before the vehicle was seen disarmed.
@@ -179,12 +173,7 @@ class VirtualCamera:
         return exposure_us, self._camera.render(where.position_arena_m, attitude)
 
     def standing(self, state: str = "", ended: str | None = None) -> Standing:
-        """How the try stands, for `/referee.json`.
-
-        Args:
-            state: the mission's, for the report.
-            ended: why the flight was aborted, if it was.
-        """
+        """How the try stands, for `/referee.json`; `ended` is why the flight was aborted, if it was."""
         local_frame: LocalFrame | None = None
         if self.placement.alignment is not None:
             origin = self.placement.alignment.pose(ORIGIN)

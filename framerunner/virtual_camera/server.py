@@ -33,14 +33,7 @@ Say = Callable[[str], None]
 
 
 class CameraServer:
-    """Reads a vehicle's telemetry, renders, serves.
-
-    Args:
-        camera: renders.
-        link: to the vehicle; closed at the end.
-        video: serves the images.
-        say: see `Say`.
-    """
+    """Reads a vehicle's telemetry from a link, which is closed at the end; serves the rendered images."""
 
     def __init__(self, camera: VirtualCamera, link: VehicleLink, video: VideoServer, say: Say) -> None:
         self._camera = camera
