@@ -131,16 +131,13 @@ class MonitorProcess(ChildProcess):
         scenario: for a drone without a referee; None if it has one.
         runs: folder of recorded flights; None for the monitor's own default.
         camera_hosts: HOST or HOST:PORT of cameras whose drones' packets are sent by this process.
-
-    Attributes:
-        link: URL, as `--link` takes it, to which the drones' packets are to be sent.
     """
 
     def __init__(
         self, scenario: Scenario | None = None, runs: Path | None = None, camera_hosts: Sequence[str] = ()
     ) -> None:
         port = _free_port()
-        self.link = f"udpout://127.0.0.1:{port}"
+        self.link = f"udpout://127.0.0.1:{port}"  # to which the drones' packets are to be sent
         arguments = ["monitor", "--lifeline", "--drone", f"udpin://127.0.0.1:{port}"]
         self._folder = TemporaryDirectory(prefix="framerunner-monitor-")
         if scenario is not None:
@@ -162,7 +159,9 @@ class MonitorProcess(ChildProcess):
         Raises:
             SettingError: it could not start; its last line is the reason.
         """
-        await self.guard(asyncio.create_task(self._until_open()))
+        opening = asyncio.wait_for(self._open.wait(), _MONITOR_START_S)
+        with contextlib.suppress(TimeoutError):
+            await self.guard(asyncio.create_task(opening))
         self._watching = asyncio.create_task(self._warn_of_its_end())
 
     async def __aexit__(self, *problem: object) -> None:
@@ -174,7 +173,7 @@ class MonitorProcess(ChildProcess):
         self._folder.cleanup()
 
     async def failed(self) -> str:
-        """As for every child; its advice names options that the command here does not have."""
+        """As of every child, but its advice names options that this process's command has."""
         reason = await super().failed()
         return reason.replace(
             "choose another with --port",
@@ -194,10 +193,6 @@ class MonitorProcess(ChildProcess):
     async def _warn_of_its_end(self) -> None:
         """The monitor's end must not end a flight."""
         print(f"warning: {await self.failed()}", file=sys.stderr, flush=True)
-
-    async def _until_open(self) -> None:
-        with contextlib.suppress(TimeoutError):
-            await asyncio.wait_for(self._open.wait(), _MONITOR_START_S)
 
     def _relay(self, line: str) -> None:
         if not line.startswith("error: "):  # the reason of its end is printed by what waits for it

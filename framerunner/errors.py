@@ -31,13 +31,9 @@ def is_installed(module: str) -> bool:
 
 
 def install_advice(module: str) -> str | None:
-    """The command that installs a missing module, as one clause for people.
+    """The command that installs a missing module such as "matplotlib.figure", as one clause for people.
 
-    Args:
-        module: what could not be imported, such as "nicegui" or "matplotlib.figure".
-
-    Returns:
-        None if the module is in none of this project's extras.
+    None if the module is in none of this project's extras.
     """
     package = module.partition(".")[0]
     extra = _EXTRAS.get(package)

@@ -16,11 +16,7 @@ if TYPE_CHECKING:
 
 
 def _whole(_type: Any, tokens: Sequence[Token]) -> int:  # noqa: ANN401 - the library's signature
-    """Accept whole numbers only: the library's own conversion accepts 1.5 as 2.
-
-    Raises:
-        ValueError: it is not a whole number.
-    """
+    """Accept whole numbers only: the library's own conversion accepts 1.5 as 2."""
     text = tokens[0].value
     try:
         return int(text)
@@ -32,11 +28,7 @@ WholeNumber = Annotated[int, Parameter(converter=_whole)]
 
 
 def check_range(option: str, value: float | None, low: float, high: float) -> None:
-    """Refuse a number outside low to high; None is an option that was not given.
-
-    Raises:
-        SettingError: it is outside, or not a number.
-    """
+    """Raise SettingError for a number outside low to high, or not a number; None is an option not given."""
     if value is not None and not low <= value <= high:
         given, lowest, highest = (f"{n:g}" if isinstance(n, float) else n for n in (value, low, high))
         raise SettingError(f"{option} {given}: must be from {lowest} to {highest}")

@@ -88,7 +88,7 @@ def monitor(
 def equipment(
     drone_url: str, scenario: Scenario | None, runs: Path, camera_hosts: tuple[str, ...] = ()
 ) -> Equipment:
-    """Return what the monitor, which imports no other room's functions, is given of them."""
+    """What the monitor, which may not import other rooms' functions, is given of them."""
     from framerunner.flying.plan import FlightPlan
     from framerunner.monitoring.run_library import RunFolders
     from monitor.ports import Equipment

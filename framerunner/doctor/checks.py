@@ -62,11 +62,8 @@ _SENSORS = {
     mavlink.MAV_SYS_STATUS_SENSOR_Z_ALTITUDE_CONTROL: "height control",
 }
 # Values of PX4's parameters.
-_OFFBOARD_LOSS = dict(
-    enumerate(
-        ("position mode", "altitude mode", "stabilised mode", "return", "land", "hold", "terminate", "disarm")
-    )
-)
+_OFFBOARD_LOSS = {0: "position mode", 1: "altitude mode", 2: "stabilised mode", 3: "return", 4: "land"}
+_OFFBOARD_LOSS |= {5: "hold", 6: "terminate", 7: "disarm"}
 _LINK_LOSS = {0: "nothing", 1: "hold", 2: "return", 3: "land", 5: "terminate", 6: "disarm"}
 _LOW_BATTERY = {0: "warns", 2: "lands", 3: "returns, then lands"}
 _HEIGHT_SOURCE = {0: "barometer", 1: "GPS", 2: "range finder", 3: "vision"}
@@ -82,14 +79,7 @@ class Level(Enum):
 
 @dataclass(frozen=True, slots=True)
 class Finding:
-    """One thing about the drone.
-
-    Attributes:
-        level: whether the challenge can be flown with it.
-        subject: a word or two.
-        text: what is the case.
-        advice: what to do; empty if nothing.
-    """
+    """One thing about the drone: a subject, what is the case, and what to do, which is empty if nothing."""
 
     level: Level
     subject: str

@@ -93,14 +93,10 @@ class ArmingReport:
 
     PX4 sends it as EVENTs: a summary, then an event for each failed check, then a summary of its sensors'
     health (https://mavlink.io/en/services/events.html; the arguments are those of PX4 1.14 and later).
-
-    Attributes:
-        armable_modes: bits of the navigation states in which it can be armed; None before the first report.
-        failures: what prevents arming for a flight in offboard, in words.
     """
 
-    armable_modes: int | None = None
-    failures: tuple[str, ...] = ()
+    armable_modes: int | None = None  # bits of the navigation states; None before the first report
+    failures: tuple[str, ...] = ()  # what prevents arming for a flight in offboard, in words
 
     @property
     def ready_for_offboard(self) -> bool:
@@ -121,16 +117,12 @@ class ArmingReport:
 
 
 class StreamCounter:
-    """Packets of one component, counted against their sequence numbers.
-
-    Attributes:
-        received: packets received.
-        passed: packets sent meanwhile, by their numbers.
-    """
+    """Packets of one component, counted against their sequence numbers."""
 
     def __init__(self) -> None:
         self._last: int | None = None
-        self.received = self.passed = 0
+        self.received = 0
+        self.passed = 0  # sent meanwhile, by their numbers
 
     def take(self, sequence: int) -> None:
         """Count a packet by its number, 0 to 255; one that is received after its successor is not lost."""
@@ -151,39 +143,21 @@ class StreamCounter:
 
 @dataclass(slots=True)
 class Record:
-    """All that was received on one link about one vehicle.
+    """All that was received on one link about one vehicle."""
 
-    Attributes:
-        system_id: of the vehicle; None before its first heartbeat.
-        latest: the latest message of each name from its autopilot.
-        counts: how many messages of each name were received.
-        times_s: wall time of the first and of the latest of each name.
-        packets: of the autopilot, against its sequence numbers.
-        octets: bytes of the autopilot's packets.
-        cameras: component ids of cameras.
-        stations: (system, component) of ground stations on the same link.
-        parameters: by name, as numbers.
-        modes: names of the modes it lists, by custom_mode.
-        texts: (severity, text), the latest last.
-        clock_ms: the vehicle's time stamps of attitude, first and latest, each with its wall time, seconds.
-        places: local positions received, NED metres.
-        arming: its report of its arming checks.
-        telemetry: its state.
-    """
-
-    system_id: int | None = None
-    latest: dict[str, Message] = field(default_factory=dict)
-    counts: dict[str, int] = field(default_factory=dict)
-    times_s: dict[str, tuple[float, float]] = field(default_factory=dict)
-    packets: StreamCounter = field(default_factory=StreamCounter)
-    octets: int = 0
-    cameras: set[int] = field(default_factory=set)
-    stations: set[tuple[int, int]] = field(default_factory=set)
-    parameters: dict[str, float] = field(default_factory=dict)
-    modes: dict[int, str] = field(default_factory=dict)
-    texts: deque[tuple[int, str]] = field(default_factory=lambda: deque(maxlen=TEXTS_KEPT))
-    clock_ms: list[tuple[int, float]] = field(default_factory=list)
-    places: list[tuple[float, float, float]] = field(default_factory=list)
+    system_id: int | None = None  # of the vehicle; None before its first heartbeat
+    latest: dict[str, Message] = field(default_factory=dict)  # by name, from its autopilot
+    counts: dict[str, int] = field(default_factory=dict)  # messages received, by name
+    times_s: dict[str, tuple[float, float]] = field(default_factory=dict)  # wall time, first and latest
+    packets: StreamCounter = field(default_factory=StreamCounter)  # of the autopilot
+    octets: int = 0  # bytes of the autopilot's packets
+    cameras: set[int] = field(default_factory=set)  # component ids
+    stations: set[tuple[int, int]] = field(default_factory=set)  # (system, component) on the same link
+    parameters: dict[str, float] = field(default_factory=dict)  # by name, as numbers
+    modes: dict[int, str] = field(default_factory=dict)  # names of the modes it lists, by custom_mode
+    texts: deque[tuple[int, str]] = field(default_factory=lambda: deque(maxlen=TEXTS_KEPT))  # with severity
+    clock_ms: list[tuple[int, float]] = field(default_factory=list)  # first and latest, with wall time, s
+    places: list[tuple[float, float, float]] = field(default_factory=list)  # local positions, NED metres
     arming: ArmingReport = field(default_factory=ArmingReport)
     telemetry: VehicleTelemetry = field(default_factory=VehicleTelemetry)
     _texts: TextAssembler = field(default_factory=TextAssembler)

@@ -24,17 +24,11 @@ Run = Callable[[Coroutine[Any, Any, MissionEnd]], Awaitable[MissionEnd]]
 
 @dataclass(frozen=True, slots=True)
 class FinishedFlight:
-    """A flight that is over.
+    """A flight that is over."""
 
-    Attributes:
-        result: without wall times.
-        outcome: how the mission ended.
-        track: where the drone was, 20 times a second.
-    """
-
-    result: FlightResult
-    outcome: MissionEnd
-    track: Track
+    result: FlightResult  # without wall times
+    outcome: MissionEnd  # how the mission ended
+    track: Track  # where the drone was, 20 times a second
 
 
 async def fly(

@@ -28,8 +28,6 @@ ImageObserver = Callable[[int, Image], None]
 """Called with time of exposure (microseconds) and each image as it arrives."""
 
 _ROW = Struct("<12d")  # time in us, position, velocity, attitude, motors on
-_ROW_BYTES = _ROW.size
-_CHUNK_BYTES = _ROW_BYTES * 1000
 
 
 def fly_lockstep(
@@ -98,14 +96,10 @@ class _SimulationJudge:
 
 
 class LockstepEyes:
-    """Sees each image when the camera's latency is over; `follow` is given the state of every control tick.
-
-    Attributes:
-        image: the latest that has arrived, BGR, shape (height, width, 3), uint8; None before the first.
-    """
+    """Sees each image when the camera's latency is over; `follow` is called at every control tick."""
 
     def __init__(self, scenario: Scenario, on_image: ImageObserver | None = None) -> None:
-        self.image: Image | None = None
+        self.image: Image | None = None  # the latest: BGR, shape (height, width, 3), uint8
         self._feed = CameraFeed(scenario)
         self._on_image = on_image
         self._arrived: tuple[int, Image] | None = None
@@ -151,31 +145,20 @@ class StateHash:
     SHA-256 over the states as little-endian float64s, which hold whole microseconds exactly.
     """
 
-    __slots__ = ("_filled", "_rows", "_sha256")
-
     def __init__(self) -> None:
         self._sha256 = hashlib.sha256()
-        self._rows = bytearray(_CHUNK_BYTES)
-        self._filled = 0
 
     def add(self, truth: TrueState) -> None:
         """Add the next state."""
-        _ROW.pack_into(
-            self._rows,
-            self._filled,
+        row = _ROW.pack(
             truth.time_us,
             *truth.position_arena_m,
             *truth.velocity_arena_m_s,
             *truth.attitude_arena,
             truth.motors_on,
         )
-        self._filled += _ROW_BYTES
-        if self._filled == _CHUNK_BYTES:
-            self._sha256.update(self._rows)
-            self._filled = 0
+        self._sha256.update(row)
 
     def hexdigest(self) -> str:
         """Return the hash of all states so far."""
-        so_far = self._sha256.copy()
-        so_far.update(memoryview(self._rows)[: self._filled])
-        return so_far.hexdigest()
+        return self._sha256.hexdigest()

@@ -54,16 +54,14 @@ class LockstepDrone:
     """A simulated vehicle whose time advances only while something is awaited of it.
 
     Its coroutines never wait for an event, so a flight runs straight through. Only when its task has been
-    cancelled (Ctrl-C) do its ticks yield to the event loop, so that the flight is cancelled.
+    cancelled (Ctrl-C) do its ticks yield to the event loop, so that the flight is cancelled. Its methods
+    raise DroneError if the vehicle refuses a request, or if telemetry does not confirm it in time.
 
     Args:
         simulation: just made, disarmed.
         start_arena: where the drone stands: x, y, z (metres) and yaw (radians), arena axes.
         observers: called with the true state of every control tick.
-        telemetry_delay_us: see `TELEMETRY_DELAY_US`; below the 50 ms between ticks.
-
-    Raises:
-        ValueError: a delay that does not fit between ticks.
+        telemetry_delay_us: see `TELEMETRY_DELAY_US`; ValueError if not below the 50 ms between ticks.
     """
 
     def __init__(
@@ -98,11 +96,7 @@ class LockstepDrone:
         """Nothing to find."""
 
     async def ready(self) -> None:
-        """Let time pass until the vehicle can be armed; then fix the axes.
-
-        Raises:
-            DroneError: it does not get ready, or is armed already.
-        """
+        """Let time pass until the vehicle, which must be disarmed, can be armed; then fix the axes."""
         status = self._autopilot.status
         if status.armed:
             raise DroneError("the vehicle is armed already; land and disarm it, then put it on its start")
@@ -116,11 +110,7 @@ class LockstepDrone:
         )
 
     async def ticks(self) -> AsyncIterator[DroneState]:
-        """States at 20 Hz of vehicle time.
-
-        Raises:
-            DroneError: as `next_state`.
-        """
+        """States at 20 Hz of vehicle time; see `next_state`."""
         task = asyncio.current_task()
         while True:
             if task is not None and task.cancelling():
@@ -155,11 +145,7 @@ class LockstepDrone:
         return state
 
     async def motors_on(self) -> None:
-        """Enter offboard with zero setpoints, then arm; both are confirmed by a heartbeat.
-
-        Raises:
-            DroneError: refused, or not confirmed.
-        """
+        """Enter offboard with zero setpoints, then arm; both are confirmed by a heartbeat."""
         self._send(VelocityCommand())
         self._pass(STREAM_BEFORE_OFFBOARD_US)
         self._confirm(
@@ -171,20 +157,12 @@ class LockstepDrone:
         self._commanding = True
 
     async def motors_off(self) -> None:
-        """Stop the motors at once (forced disarm), in the air too.
-
-        Raises:
-            DroneError: refused, or not confirmed.
-        """
+        """Stop the motors at once (forced disarm), in the air too."""
         self._stop_commanding()
         self._confirm("stopping the motors", self._autopilot.disarm(force=True), lambda: not self._armed)
 
     async def land(self) -> None:
-        """Let the vehicle land until it has disarmed itself.
-
-        Raises:
-            DroneError: landing was aborted or takes too long.
-        """
+        """Let the vehicle land until it has disarmed itself; DroneError if the landing is aborted."""
         self._stop_commanding()
         landing = self._autopilot.land()
         self._confirm("landing", landing, lambda: self._mode is FlightMode.LAND or not self._armed)
@@ -197,11 +175,7 @@ class LockstepDrone:
             raise DroneError(f"still not landed after {LAND_LIMIT_US / 1e6:g} s{texts}")
 
     async def hold(self) -> None:
-        """Stop commanding and request hold, unless another mode than offboard is active already.
-
-        Raises:
-            DroneError: refused, or not confirmed.
-        """
+        """Stop commanding and request hold, unless another mode than offboard is active already."""
         self._stop_commanding()
         if self._mode is FlightMode.OFFBOARD:
             answer = self._autopilot.set_mode(FlightMode.HOLD)

@@ -29,40 +29,25 @@ SLOW_FACTOR = 0.95  # of the requested speed; below, vehicle time had to wait
 
 @dataclass(frozen=True, slots=True)
 class RealTimeSettings:
-    """What is flown in real time.
+    """What is flown in real time."""
 
-    Attributes:
-        drone_url: MAVLink URL of a running drone; None starts a simulator.
-        camera_url: of the drone's camera; None with a simulator that is started.
-        simulator: that simulates the running drone, if the user named it.
-        speed: of the simulator that is started: simulated seconds a second.
-        instance: of the simulator that is started: shifts its ports.
-    """
-
-    drone_url: str | None = None
-    camera_url: str | None = None
-    simulator: SimulatorApi | None = None
-    speed: float = 1.0
-    instance: int = 0
+    drone_url: str | None = None  # MAVLink URL of a running drone; None starts a simulator
+    camera_url: str | None = None  # of the running drone
+    simulator: SimulatorApi | None = None  # of the running drone, if the user named it
+    speed: float = 1.0  # of the simulator that is started: simulated seconds a second
+    instance: int = 0  # of the simulator that is started: shifts its ports
 
 
 @dataclass(frozen=True, slots=True)
 class _Endpoints:
-    """Where drone, camera and API are.
-
-    Attributes:
-        api: of the drone's simulator, or where one may be; None: nowhere.
-        image_size_px: width and height, if known before.
-        sitl: the simulator that was started here.
-        shared_with: URL of the monitor, if it receives the drone's packets only through this program.
-    """
+    """Where drone, camera and API are."""
 
     drone_url: str
     camera_url: str
-    api: SimulatorApi | None
-    image_size_px: tuple[int, int] | None
-    sitl: SitlProcess | None = None
-    shared_with: str | None = None
+    api: SimulatorApi | None  # of the drone's simulator, or where one may be; None: nowhere
+    image_size_px: tuple[int, int] | None  # width and height, if known before
+    sitl: SitlProcess | None = None  # the simulator that was started here
+    shared_with: str | None = None  # URL of the monitor, if it receives the drone only through this program
 
 
 async def fly_in_real_time(
@@ -148,11 +133,7 @@ async def _vehicle(
 
 
 def _drone(
-    plan: FlightPlan,
-    vehicle: _Endpoints,
-    records: RunRecords,
-    stack: AsyncExitStack,
-    companion: Companion,
+    plan: FlightPlan, vehicle: _Endpoints, records: RunRecords, stack: AsyncExitStack, companion: Companion
 ) -> MavsdkDrone:
     """The drone on its link, which is closed with the stack."""
     from offboard.mavsdk_drone import MavsdkDrone
@@ -191,11 +172,7 @@ async def _camera(
 
 
 def _timing(
-    drone: MavsdkDrone,
-    eyes: CameraEyes,
-    clock: SimulatorClock | None,
-    factor: float | None,
-    speed: float,
+    drone: MavsdkDrone, eyes: CameraEyes, clock: SimulatorClock | None, factor: float | None, speed: float
 ) -> Timing:
     """What was late in a flight, and so whether the machine was fast enough for the requested speed.
 

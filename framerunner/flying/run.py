@@ -26,23 +26,14 @@ _INTERRUPTED_CODE = 130
 
 @dataclass(frozen=True, slots=True)
 class FlightSettings:
-    """What to fly and what to write.
+    """What to fly and what to write."""
 
-    Attributes:
-        plan: with a mission.
-        real_time: what is flown in real time; None: simulated in this process, in lockstep.
-        out: folder of all runs.
-        record: write an MCAP file too.
-        video: write a video in lockstep too.
-        monitor: open the Game Monitor.
-    """
-
-    plan: FlightPlan
-    real_time: RealTimeSettings | None
-    out: Path
-    record: bool = False
-    video: bool = False
-    monitor: bool = False
+    plan: FlightPlan  # with a mission
+    real_time: RealTimeSettings | None  # None: simulated in this process, in lockstep
+    out: Path  # folder of all runs
+    record: bool = False  # write an MCAP file too
+    video: bool = False  # write a video in lockstep too
+    monitor: bool = False  # open the Game Monitor
 
 
 async def fly_once(settings: FlightSettings) -> int:

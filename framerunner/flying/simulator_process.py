@@ -29,14 +29,7 @@ _ANSWER_US = CONTROL_PERIOD_US + TELEMETRY_DELAY_US - 1
 
 
 class SitlProcess(ChildProcess):
-    """`framerunner sim` as a child process, with its options.
-
-    Attributes:
-        clock: its time, which waits for this program after `SimulatorClock.stop`.
-        system_id: MAVLink id of its drone.
-        drone_url: on which its MAVLink is received.
-        api: where it serves video and referee.
-    """
+    """`framerunner sim` as a child process, with its options."""
 
     def __init__(
         self, scenario: str, speed: float = 1.0, instance: int = 0, links: tuple[str, ...] = ()
@@ -50,7 +43,7 @@ class SitlProcess(ChildProcess):
         ]
         super().__init__("the simulator", arguments, inherited=there)
         self.clock = SimulatorClock(here)
-        self.system_id = instance + 1
+        self.system_id = instance + 1  # MAVLink id of its drone
         self.drone_url = f"udpin://127.0.0.1:{14540 + instance}"
         self.api = SimulatorApi(f"http://127.0.0.1:{VIDEO_PORT + instance}")
 
@@ -75,16 +68,11 @@ class SitlProcess(ChildProcess):
 
 
 class SimulatorClock:
-    """This program's end of the simulator's time grants.
-
-    Attributes:
-        images_missed: ticks whose image did not arrive in time.
-        setpoints_missed: setpoints that did not arrive in time.
-    """
+    """This program's end of the simulator's time grants."""
 
     def __init__(self, channel: socket.socket) -> None:
-        self.images_missed = 0
-        self.setpoints_missed = 0
+        self.images_missed = 0  # ticks whose image did not arrive in time
+        self.setpoints_missed = 0  # setpoints that did not arrive in time
         self._channel = channel
         self._reader: asyncio.StreamReader | None = None
         self._writer: asyncio.StreamWriter | None = None

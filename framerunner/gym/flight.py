@@ -13,37 +13,18 @@ from scenarios.result import RefereeReport
 from scenarios.verdict import Verdict
 from vision.types import Detections, Image
 
-TAKEN_OFF_M = 0.3
-"""Height above the start from which on a descent to the base is a landing."""
-STOP_ABOVE_BASE_M = 0.1
-"""Height of the drone's underside above the base at which the motors are stopped."""
-
-CROSSING = 1.0
-"""For each frame crossed in order."""
-LANDING = 2.0
-"""For landing on the base after all frames."""
-CONTACT = -0.2
-"""For each contact with a frame."""
-OUTSIDE_PER_S = -0.05
-"""For each second outside the arena."""
-FAILURE = -1.0
-"""For a crash, or a frame crossed in the wrong order."""
+TAKEN_OFF_M = 0.3  # above the start; from there on a descent to the base is a landing
+STOP_ABOVE_BASE_M = 0.1  # of the drone's underside; there the motors are stopped
+# Rewards.
+CROSSING = 1.0  # for each frame crossed in order
+LANDING = 2.0  # on the base after all frames
+CONTACT = -0.2  # for each contact with a frame
+OUTSIDE_PER_S = -0.05  # for each second outside the arena
+FAILURE = -1.0  # for a crash, or a frame crossed in the wrong order
 
 
 class SteppedFlight:
-    """A try that has begun: the drone stands on its start with its motors on.
-
-    Args:
-        plan: what is flown; an agent replaces the mission.
-
-    Attributes:
-        state: of the drone by telemetry, as of the present tick.
-        ended: why the drone can no longer be flown; empty while it can.
-        failed_order: a frame was crossed in the wrong order.
-
-    Raises:
-        DroneError: the drone does not get ready.
-    """
+    """A try that has begun: the drone stands on its start, motors on; an agent replaces the mission."""
 
     def __init__(self, plan: FlightPlan) -> None:
         vehicle = LockstepVehicle(plan)
@@ -54,11 +35,11 @@ class SteppedFlight:
         self._crossed = self._contacts = 0
         self._penalty_s = 0.0
         self.referee: Referee = vehicle.simulation.referee
-        self.ended = ""
-        self.failed_order = False
+        self.ended = ""  # why the drone can no longer be flown; empty while it can
+        self.failed_order = False  # a frame was crossed in the wrong order
         run_through(self._drone.ready())
         run_through(self._drone.motors_on())
-        self.state: DroneState = self._drone.next_state()
+        self.state: DroneState = self._drone.next_state()  # by telemetry, as of the present tick
 
     @property
     def over(self) -> bool:

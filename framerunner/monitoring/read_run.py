@@ -13,8 +13,7 @@ import os
 import resource
 import shutil
 import sys
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping, Sequence
 from math import cos, isfinite, pi, sin
 from pathlib import Path
 from typing import Any
@@ -45,14 +44,8 @@ _MEGABYTE = 1_000_000
 _MAX_TEXT = 500
 
 Json = dict[str, Any]
-
-
-@dataclass(frozen=True, slots=True)
-class _LoadedMission:
-    """A mission and the text of its file."""
-
-    mission: Mission
-    source: str
+Clock = Callable[[int], float]
+"""From vehicle time, microseconds, to seconds since motors on."""
 
 
 def main() -> int:
@@ -101,36 +94,43 @@ def read_run(folder: Path, target: Path) -> None:
     """
     scenario_file = folder / "scenario.yaml"
     scenario = load_scenario(scenario_file) if scenario_file.is_file() else None
-    loaded = _load_mission(folder / "mission.yaml")
+    mission, source = _load_mission(folder / "mission.yaml")
     with (target / IMAGES).open("w+b") as file:
         with recorded_flight(folder) as recorded:
             flight = collect(recorded, ImageFile(file))
-        recording = _flight_json(folder.name, flight, scenario, loaded)
+        recording = _flight_json(folder.name, flight, scenario, mission, source)
         (target / SPANS).write_text(json.dumps(flight.images.spans), encoding="utf-8")
         text = json.dumps(recording, allow_nan=False, separators=(",", ":"))
         (target / RECORDING).write_text(text, encoding="utf-8")
 
 
-def _load_mission(path: Path) -> _LoadedMission | None:
-    """None if there is none that loads without executing Python."""
+def _load_mission(path: Path) -> tuple[Mission | None, str]:
+    """A mission and the text of its file; None if there is none that loads without executing Python."""
     try:
         source = path.read_text(encoding="utf-8")
-        return _LoadedMission(load_mission(path), source) if len(source) < _MEGABYTE else None
+        return (load_mission(path) if len(source) < _MEGABYTE else None), source
     except (OSError, ValueError, MissionError):
-        return None
+        return None, ""
 
 
 def _flight_json(
-    name: str, flight: CollectedFlight, scenario: Scenario | None, loaded: _LoadedMission | None
+    name: str, flight: CollectedFlight, scenario: Scenario | None, mission: Mission | None, source: str
 ) -> Json:
     """All of a flight except its images."""
     result = flight.result
+    chart: Json | None = None
+    leaves: tuple[str, ...] = ()
+    if mission is not None:
+        leaves = tuple(mission.leaves)
+        chart = {"name": mission.name, "mermaid": mermaid(mission), "states": list(leaves), "source": source}
     # The mission's states, then any others: a log has flight modes instead.
-    leaves = () if loaded is None else tuple(loaded.mission.leaves)
     recorded = (moment.mission_state for moment in flight.moments if moment.mission_state)
     states = list(dict.fromkeys((*leaves, *recorded)))
     numbers = {state: number for number, state in enumerate(states)}
-    clock = _Clock(flight.began_us)
+
+    def clock(time_us: int) -> float:
+        return round((time_us - flight.began_us) / 1e6, 3)
+
     return {
         "name": name,
         "world": {
@@ -138,13 +138,13 @@ def _flight_json(
             "lift_m": 0.0 if result is None else result.lift_m,
             "source": "" if result is None else result.judged_by,
         },
-        "chart": None if loaded is None else _chart(loaded),
+        "chart": chart,
         "states": states,
         "poses": _poses(flight, numbers, clock),
         "detections": _detections(flight.moments, clock, _image_size(flight, scenario)),
-        "transitions": _transitions(flight, clock, loaded),
-        "images": [clock.seconds(time_us) for time_us in flight.images.time_us],
-        "crossings": [{"t": clock.seconds(each.time_us), "colour": each.colour} for each in flight.crossings],
+        "transitions": _transitions(flight, clock, mission),
+        "images": [clock(time_us) for time_us in flight.images.time_us],
+        "crossings": [{"t": clock(each.time_us), "colour": each.colour} for each in flight.crossings],
         "result": None if result is None else result.as_json(),
     }
 
@@ -156,26 +156,7 @@ def _image_size(flight: CollectedFlight, scenario: Scenario | None) -> tuple[int
     return (320, 240) if scenario is None else (scenario.camera.width_px, scenario.camera.height_px)
 
 
-@dataclass(frozen=True, slots=True)
-class _Clock:
-    began_us: int
-
-    def seconds(self, time_us: int) -> float:
-        """Seconds since motors on, to the millisecond."""
-        return round((time_us - self.began_us) / 1e6, 3)
-
-
-def _chart(loaded: _LoadedMission) -> Json:
-    mission = loaded.mission
-    return {
-        "name": mission.name,
-        "mermaid": mermaid(mission),
-        "states": list(mission.leaves),
-        "source": loaded.source,
-    }
-
-
-def _poses(flight: CollectedFlight, numbers: Mapping[str, int], clock: _Clock) -> list[Json]:
+def _poses(flight: CollectedFlight, numbers: Mapping[str, int], clock: Clock) -> list[Json]:
     moments = [moment for moment in flight.moments if _has_pose(moment)]
     poses: list[Json] = []
     for number, moment in enumerate(moments):
@@ -188,7 +169,7 @@ def _poses(flight: CollectedFlight, numbers: Mapping[str, int], clock: _Clock) -
         sent = (command.forward_m_s, command.left_m_s, command.up_m_s, command.yaw_rate_rad_s)
         poses.append(
             {
-                "t": clock.seconds(state.time_us),
+                "t": clock(state.time_us),
                 "p": _rounded(state.x, state.y, state.z),
                 "q": _rounded(*quaternion_from_yaw(state.yaw)),
                 "v": _rounded(c * vx + s * vy, c * vy - s * vx, vz),
@@ -206,7 +187,7 @@ def _has_pose(moment: Moment) -> bool:
     return all(map(isfinite, (state.x, state.y, state.z, state.yaw)))
 
 
-def _detections(moments: Sequence[Moment], clock: _Clock, size_px: tuple[int, int]) -> list[Json]:
+def _detections(moments: Sequence[Moment], clock: Clock, size_px: tuple[int, int]) -> list[Json]:
     found: list[Json] = []
     last: Detections | None = None
     for moment in moments:
@@ -216,7 +197,7 @@ def _detections(moments: Sequence[Moment], clock: _Clock, size_px: tuple[int, in
         last = seen
         time_us = moment.state.time_us if seen.time_us is None else seen.time_us
         boxes = {colour: _box(getattr(seen, colour)) for colour in COLOURS}
-        at_s = clock.seconds(time_us)
+        at_s = clock(time_us)
         if not found or found[-1]["t"] <= at_s:
             found.append({"t": at_s, "width": size_px[0], "height": size_px[1], "boxes": boxes})
     return found
@@ -228,7 +209,7 @@ def _box(detection: Detection) -> list[float | None] | None:
     return _rounded(detection.n, detection.s, detection.e, detection.w, detection.d, detection.a)
 
 
-def _transitions(flight: CollectedFlight, clock: _Clock, loaded: _LoadedMission | None) -> list[Json]:
+def _transitions(flight: CollectedFlight, clock: Clock, mission: Mission | None) -> list[Json]:
     """As the engine recorded them or, in older recordings and logs, from the states alone."""
     found: list[Json] = []
     state, since_us = flight.moments[0].mission_state, flight.moments[0].state.time_us
@@ -238,11 +219,11 @@ def _transitions(flight: CollectedFlight, clock: _Clock, loaded: _LoadedMission 
         if taken is None and moment.mission_state == state:
             continue
         if taken is None:
-            when = _guard(loaded, state, moment.mission_state)
+            when = _guard(mission, state, moment.mission_state)
             taken = TransitionTaken(state, moment.mission_state, when, (), now_us, (now_us - since_us) / 1e6)
         found.append(
             {
-                "time_s": clock.seconds(now_us),
+                "time_s": clock(now_us),
                 "from": taken.source[:_MAX_TEXT],
                 "to": taken.target[:_MAX_TEXT],
                 "when": taken.when[:_MAX_TEXT],
@@ -254,9 +235,9 @@ def _transitions(flight: CollectedFlight, clock: _Clock, loaded: _LoadedMission 
     return found
 
 
-def _guard(loaded: _LoadedMission | None, source: str, target: str) -> str:
+def _guard(mission: Mission | None, source: str, target: str) -> str:
     """The guard between two states, if there is only one in the chart."""
-    leaf = None if loaded is None else loaded.mission.leaves.get(source)
+    leaf = None if mission is None else mission.leaves.get(source)
     if leaf is None:
         return ""
     guards = {each.when for each in leaf.transitions if target == each.to or target.startswith(f"{each.to}.")}

@@ -66,10 +66,9 @@ class _Failed:
 
 
 class RunFolders:
-    """The run folders in a folder, as `monitor.ports.RunLibrary`; may be used from several threads.
+    """The run folders in a folder, which need not exist yet; may be used from several threads.
 
-    Args:
-        path: the folder; it need not exist yet.
+    Implements `monitor.ports.RunLibrary`, which says what is returned and raised.
     """
 
     def __init__(self, path: Path) -> None:
@@ -88,20 +87,12 @@ class RunFolders:
             return [each.info for each in sorted(self._seen.values(), key=lambda one: -one.order)]
 
     def recording(self, name: str) -> Mapping[str, Any]:
-        """A run as `docs/monitor-channels.md` specifies; reads it first, which may take seconds.
-
-        Raises:
-            RunError: there is no such run, or it cannot be shown.
-        """
+        """Read a run, unless it is known."""
         known = self.kept(name)
         return self._read(name).recording if known is None else known
 
     def kept(self, name: str) -> Mapping[str, Any] | None:
-        """A run that was read and has not changed since, at once; None: it has to be read.
-
-        Raises:
-            RunError: there is no such run.
-        """
+        """A run that was read and has not changed since."""
         folder = self._folder(name)
         known = self._kept(name)
         return known.recording if known is not None and known.mark == _mark(folder) else None
@@ -111,12 +102,7 @@ class RunFolders:
         self._readers.close()
 
     def image(self, name: str, index: int) -> bytes:
-        """A JPEG of its camera.
-
-        Raises:
-            RunNotReadError: the run is to be read first; `recording` does so.
-            RunError: there is no such run or image.
-        """
+        """A JPEG of its camera."""
         self._folder(name)
         run = self._kept(name)
         if run is None:
@@ -228,12 +214,7 @@ def _info(folder: Path) -> RunInfo:
 
 
 def _result(path: Path) -> FlightResult | None:
-    """The valid fields of a result; None if there is none, or no verdict in it.
-
-    Raises:
-        ValueError: it is damaged.
-        OSError: it cannot be read.
-    """
+    """The valid fields of a result; None without one. ValueError: damaged; OSError: cannot be read."""
     if not path.exists():
         return None
     if path.is_symlink() or not path.is_file() or path.stat().st_size > MAX_RESULT_BYTES:
@@ -272,13 +253,9 @@ class Readers:
         self._closed = False
 
     def run(self, command: Sequence[str]) -> tuple[int, str]:
-        """Run a process to its end; its standard input ends with this process, however that ends.
+        """Run a process to its end; returns its exit code and standard error.
 
-        Returns:
-            Its exit code and its standard error.
-
-        Raises:
-            OSError: it cannot be started, or `close` was called.
+        Its standard input ends with this process. OSError: it cannot be started, or `close` was called.
         """
         with self._lock:
             if self._closed:
@@ -311,11 +288,7 @@ class Readers:
 
 
 def _unpack(folder: Path, mark: Mark, readers: Readers) -> _Unpacked:
-    """Read a run in a separate process.
-
-    Raises:
-        RunError: it cannot be shown.
-    """
+    """Read a run in a separate process; RunError if it cannot be shown."""
     linked = [name for name in _FILES if (folder / name).is_symlink()]
     if linked:
         raise RunError(f"run '{folder.name}': its {linked[0]} is a link; linked files are not shown")

@@ -42,12 +42,7 @@ class Placement:
     Only heartbeats, one a second, report arming, so the vehicle may have taken off before one does. Poses
     therefore wait until the next heartbeat confirms that they were taken disarmed; their mean is used.
 
-    Args:
-        start: of the vehicle's centre, arena axes.
-
-    Attributes:
-        alignment: from local NED to arena; None before the vehicle was seen disarmed.
-        armed: by the last heartbeat; None before the first.
+    The start is that of the vehicle's centre, arena axes.
     """
 
     def __init__(self, start: Pose) -> None:
@@ -55,8 +50,8 @@ class Placement:
         self._pending: deque[tuple[Vec3, float]] = deque(maxlen=_PENDING)
         self._rest: Pose | None = None
         self._landed_us: int | None = None
-        self.alignment: Alignment | None = None
-        self.armed: bool | None = None
+        self.alignment: Alignment | None = None  # local NED to arena, once the vehicle was seen disarmed
+        self.armed: bool | None = None  # by the last heartbeat; None before the first
 
     def see_pose(self, pose: VehiclePose) -> None:
         """Take a pose; while the vehicle is armed it is ignored."""
@@ -105,16 +100,9 @@ class VirtualCamera:
     extrapolated.
 
     Args:
-        scenario: what is to be seen.
+        scenario: what is to be seen; its frames are higher than declared if there is no base.
         level: whether the camera is held level, as by a gimbal, and follows the heading only.
         base: whether the drone starts from the scenario's base; else it starts from the floor.
-
-    Attributes:
-        plan: the flight that is seen; its frames are higher than declared if there is no base.
-        placement: of the arena at the vehicle.
-        telemetry: of the vehicle.
-        images: rendered so far.
-        restarts: how often the vehicle has restarted.
     """
 
     def __init__(self, scenario: Scenario, *, level: bool = False, base: bool = True) -> None:
@@ -123,7 +111,7 @@ class VirtualCamera:
         self._camera = Camera(self.plan.layout)
         self._period_us = 1e6 / scenario.camera.rate_hz
         self._wait_us = max(0, round(scenario.camera.latency_s * 1e6) - REPORT_GAP_US)
-        self.images = self.restarts = 0
+        self.restarts = 0  # of the vehicle
         self._restart()
 
     def _restart(self) -> None:
@@ -168,7 +156,6 @@ class VirtualCamera:
         if where is None:
             return None
         self._next = index + 1
-        self.images += 1
         attitude = quaternion_from_yaw(yaw_of(where.attitude_arena)) if self._level else where.attitude_arena
         return exposure_us, self._camera.render(where.position_arena_m, attitude)
 

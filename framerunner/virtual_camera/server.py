@@ -159,11 +159,7 @@ class CameraServer:
 
 
 class _TelemetryWatch:
-    """Says once what is missing and once when it is received again.
-
-    Attributes:
-        stale: attitude or position is no longer received.
-    """
+    """Says once what is missing and once when it is received again."""
 
     def __init__(self, say: Say, url: str) -> None:
         self._say = say
@@ -172,7 +168,7 @@ class _TelemetryWatch:
         self._began_s = time.monotonic()
         self._waiting_said = False
         self._placed: bool | None = None
-        self.stale = False
+        self.stale = False  # attitude or position is no longer received
 
     def see(self, kind: str, now_s: float) -> None:
         """Note a message's arrival."""
