@@ -154,11 +154,7 @@ class MonitorProcess(ChildProcess):
         super().__init__("the monitor", arguments, self._relay)
 
     async def opened(self) -> None:
-        """Wait until its pages are served; on a slow machine no longer than 20 s.
-
-        Raises:
-            SettingError: it could not start; its last line is the reason.
-        """
+        """Wait until its pages are served, for 20 s at most; SettingError with its last line if it ends."""
         opening = asyncio.wait_for(self._open.wait(), _MONITOR_START_S)
         with contextlib.suppress(TimeoutError):
             await self.guard(asyncio.create_task(opening))

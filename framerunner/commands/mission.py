@@ -96,11 +96,9 @@ def new(
         )
     files = starter(name, out, python=python)
     _write(files)
-    print(f"written: {', '.join(map(str, files.texts))}")
-    print()
+    print(f"written: {', '.join(map(str, files.texts))}\n")
     print(f"  framerunner mission check {files.arguments}")
-    print(f"  framerunner fly test-case-1 --lockstep --mission {files.arguments}")
-    print()
+    print(f"  framerunner fly test-case-1 --lockstep --mission {files.arguments}\n")
     print("The first says whether it is good, the second flies it. The comments in the file explain it.")
     print("It crosses red only, so the referee will judge the flight aborted: add green and blue yourself.")
     return 0

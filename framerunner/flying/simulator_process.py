@@ -48,11 +48,7 @@ class SitlProcess(ChildProcess):
         self.api = SimulatorApi(f"http://127.0.0.1:{VIDEO_PORT + instance}")
 
     async def __aenter__(self) -> Self:
-        """Start it, and wait until all its ports are open.
-
-        Raises:
-            SettingError: it cannot start; its last line is the reason.
-        """
+        """Start it, and wait until all its ports are open; SettingError with its last line if it cannot."""
         await super().__aenter__()
         try:
             await self.guard(asyncio.create_task(self.clock.up()))
@@ -68,7 +64,7 @@ class SitlProcess(ChildProcess):
 
 
 class SimulatorClock:
-    """This program's end of the simulator's time grants."""
+    """This program's end of the simulator's time grants; DroneError: the simulator has ended."""
 
     def __init__(self, channel: socket.socket) -> None:
         self.images_missed = 0  # ticks whose image did not arrive in time
@@ -93,11 +89,7 @@ class SimulatorClock:
             await asyncio.sleep(START_S)
 
     async def stop(self) -> int:
-        """Stop vehicle time; returns that of the last control tick, microseconds.
-
-        Raises:
-            DroneError: the simulator has ended.
-        """
+        """Stop vehicle time; returns that of the last control tick, microseconds."""
         return (await self._granted(Grant(0))).time_us
 
     async def advance(self, tick_us: int, command: VelocityCommand | None) -> None:
@@ -106,9 +98,6 @@ class SimulatorClock:
         Args:
             tick_us: multiple of 50 ms.
             command: must be received first; None: time does not wait for a command.
-
-        Raises:
-            DroneError: the simulator has ended.
         """
         held = await self._granted(Grant(tick_us + _ANSWER_US, None if command is None else _sent(command)))
         if held.setpoint_missed:

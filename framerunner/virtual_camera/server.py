@@ -171,11 +171,10 @@ class _TelemetryWatch:
         self.stale = False  # attitude or position is no longer received
 
     def see(self, kind: str, now_s: float) -> None:
-        """Note a message's arrival."""
         self._seen_s["ATTITUDE" if kind == "ATTITUDE_QUATERNION" else kind] = now_s
 
     def check(self, now_s: float) -> None:
-        """Compare the arrivals with the clock."""
+        """Say what has not been received for too long, or is received again."""
         ages = {
             name: now_s - self._seen_s.get(key, self._began_s)
             for name, key in (("attitude", "ATTITUDE"), ("local position", "LOCAL_POSITION_NED"))
