@@ -1,9 +1,9 @@
 """The real app and its MAVSDK adapter over a bad link, in simulated time.
 
 All of the app runs: mission, box, `MavsdkDrone`, its telemetry feed, `CameraEyes` and the detector. MAVSDK
-and UDP are replaced by a link that loses, swaps, duplicates, delays and stops in both directions, by a seed; at
-its other end are the simulation's autopilot and camera. The event loop's clock is the simulation's: where it
-would wait, the simulation advances. So a flight needs no real time and repeats exactly.
+and UDP are replaced by a link that loses, swaps, duplicates, delays and stops in both directions, by a seed;
+at its other end are the simulation's autopilot and camera. The event loop's clock is the simulation's: where
+it would wait, the simulation advances. So a flight needs no real time and repeats exactly.
 """
 
 from __future__ import annotations
