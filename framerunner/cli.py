@@ -1,4 +1,4 @@
-"""The command line: parses, calls, and turns every foreseen failure into one line and an exit code."""
+"""The command line: parses, calls, and turns every expected failure into one line and an exit code."""
 
 from __future__ import annotations
 
@@ -20,10 +20,10 @@ _DISK_REFUSES = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EROFS, errno.EIO
 
 
 def build_app() -> App:
-    """Return the command with all its parts."""
+    """Return the program with all its commands."""
     from importlib import metadata
 
-    from cyclopts import App
+    from cyclopts import App, Parameter
 
     from framerunner.commands import (
         camera,
@@ -40,9 +40,10 @@ def build_app() -> App:
 
     app = App(
         name="framerunner",
-        help="A simulated drone that speaks MAVLink, and an app that flies the frame challenge with it.",
+        help="A simulated MAVLink drone, and an app that flies the frame challenge with it.",
         version=metadata.version("framerunner"),
         help_format="markdown",
+        default_parameter=Parameter(negative=()),
         suppress_keyboard_interrupt=False,
         result_action="return_value",
     )
@@ -62,8 +63,8 @@ def build_app() -> App:
 def main() -> None:
     """Run the command line and exit."""
     _handle_signals()
-    # Read by libraries when they are first imported: matrices here are too small to share among threads,
-    # and a dead camera URL is reported by us, in one line.
+    # Read by libraries when they are first imported: matrices here are too small for several threads,
+    # and a camera that cannot be opened is reported by this program in one line.
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     os.environ.setdefault("OPENCV_LOG_LEVEL", "ERROR")
     os.environ.setdefault("OPENCV_FFMPEG_LOGLEVEL", "-8")
@@ -77,7 +78,7 @@ def run(arguments: list[str]) -> int:
     """Run one command.
 
     Args:
-        arguments: what stands after the program's name.
+        arguments: without the program's name.
 
     Returns:
         The exit code: 0 done, 1 flown but not completed, 2 bad input, 130 Ctrl-C.
@@ -88,50 +89,46 @@ def run(arguments: list[str]) -> int:
         print("interrupted", file=sys.stderr)
         return EXIT_INTERRUPTED
     except BrokenPipeError:
-        _forget_output()  # whoever read it has gone
+        _discard_output()  # its reader has ended
         return 0
     except Exception as error:
         reason = _reason(error)
         if reason is None:
             raise
-        return _refuse(reason)
+        print(f"error: {reason}", file=sys.stderr)
+        return EXIT_BAD_INPUT
     return code if isinstance(code, int) else 0
 
 
 def _reason(error: Exception) -> str | None:
-    """What to tell people of a failure; None for a fault of this program."""
+    """The message for the user; None for a fault of this program."""
     from cyclopts import CycloptsError
 
     from errors import UserError
-    from framerunner.extras import advice
+    from framerunner.errors import install_advice
 
     if isinstance(error, CycloptsError):
         return " ".join(str(error).split()) + " Try --help."
     if isinstance(error, UserError):
         return str(error)
     if isinstance(error, ModuleNotFoundError):
-        return advice(error.name or "")
+        return install_advice(error.name or "")
     if isinstance(error, OSError) and error.errno in _DISK_REFUSES:
-        _forget_output()
+        _discard_output()
         what = error.filename or "standard output or a file"
         return f"{what}: cannot be written to ({error.strerror}); free some space"
     return None
 
 
-def _refuse(reason: str) -> int:
-    print(f"error: {reason}", file=sys.stderr)
-    return EXIT_BAD_INPUT
-
-
-def _forget_output() -> None:
-    """Throw away what could not be written; Python must not complain about it again at exit."""
+def _discard_output() -> None:
+    """Discard what could not be written, so that Python does not report it again at exit."""
     os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
 
 
 def _handle_signals() -> None:
     """Let SIGTERM do what Ctrl-C does, also where Ctrl-C is ignored."""
     if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
-        # Started in the background by a script. Ctrl-C stays without effect, but asyncio ends its tasks in
+        # Started in the background by a script. Ctrl-C keeps having no effect, but asyncio ends its tasks in
         # order only where SIGINT has Python's own handler, which `_terminate` calls.
         signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
         signal.signal(signal.SIGINT, signal.default_int_handler)
@@ -140,7 +137,7 @@ def _handle_signals() -> None:
     report = sys.unraisablehook
 
     def interrupt_again(unraisable: sys.UnraisableHookArgs) -> None:
-        """Repeat an interrupt that came where Python drops exceptions, as in a destructor."""
+        """Repeat an interrupt that was raised where Python drops exceptions, as in a destructor."""
         if issubclass(unraisable.exc_type, KeyboardInterrupt):
             signal.setitimer(signal.ITIMER_REAL, _INTERRUPT_AGAIN_S)  # not within this function
         else:
@@ -150,7 +147,7 @@ def _handle_signals() -> None:
 
 
 def _terminate(number: int, frame: FrameType | None) -> None:
-    """Leave by the same way as Ctrl-C: what was recorded is kept and nothing is left running."""
+    """End as after Ctrl-C: what was recorded is kept and no process is left running."""
     interrupt = signal.getsignal(signal.SIGINT)
     if not callable(interrupt):
         raise KeyboardInterrupt

@@ -24,7 +24,6 @@ INSTALLED_LOCKS = [path for path in LOCKS if path.name != "mavproxy-without.txt"
 # Exceptions from the limits of 20, each with its reason. Take out what is no longer needed; the tests say so.
 LARGE_FOLDERS = {}
 LARGE_CLASSES = {
-    "framerunner/flying/lockstep_drone.py LockstepDrone": "implements the port `Drone`",
     "offboard/mavsdk_drone.py MavsdkDrone": "implements the port `Drone`",
 }
 HASHED = re.compile(r"\S+==[^\n]* \\\n( {4}--hash=sha256:[0-9a-f]{64}( \\)?\n)+( {4}#.*\n?)*\Z")

@@ -1,1 +1,47 @@
-"""The commands, one module each. Heavy imports wait until a command runs."""
+"""The commands, one module each, and what several share. Heavy imports wait until a command runs."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+from cyclopts import Parameter, Token
+
+from errors import SettingError
+
+if TYPE_CHECKING:
+    from offboard.mission import Mission
+
+
+def _whole(_type: Any, tokens: Sequence[Token]) -> int:  # noqa: ANN401 - the library's signature
+    """Accept whole numbers only: the library's own conversion accepts 1.5 as 2."""
+    text = tokens[0].value
+    try:
+        return int(text)
+    except ValueError:
+        raise ValueError(f'"{text}" is not a whole number.') from None
+
+
+WholeNumber = Annotated[int, Parameter(converter=_whole)]
+
+
+def check_range(option: str, value: float | None, low: float, high: float) -> None:
+    """Raise SettingError for a number outside low to high, or not a number; None is an option not given."""
+    if value is not None and not low <= value <= high:
+        given, lowest, highest = (f"{n:g}" if isinstance(n, float) else n for n in (value, low, high))
+        raise SettingError(f"{option} {given}: must be from {lowest} to {highest}")
+
+
+def load_mission_with(mission: str | Path, pilot: Path | None) -> Mission:
+    """Load a mission, with the user's Python file if there is one, which is executed."""
+    from offboard.mission import load_mission
+    from offboard.pilot_file import read_pilot
+
+    return load_mission(mission, None if pilot is None else read_pilot(pilot))
+
+
+def say(line: str) -> None:
+    """Print a line on standard error at once."""
+    print(line, file=sys.stderr, flush=True)

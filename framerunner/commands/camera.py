@@ -1,15 +1,13 @@
-"""`framerunner camera`: the arena's camera image for any drone that tells its pose."""
+"""`framerunner camera`: the arena's camera image for any drone that reports its pose."""
 
 from __future__ import annotations
 
 import asyncio
-import sys
 from typing import Annotated
 
 from cyclopts import Parameter
 
-from errors import SettingError
-from framerunner.commands.options import WholeNumber
+from framerunner.commands import WholeNumber, check_range, say
 
 
 def camera(
@@ -21,19 +19,19 @@ def camera(
         str, Parameter(help="name or file of the scenario whose frames are seen")
     ] = "test-case-1",
     no_base: Annotated[
-        bool, Parameter(negative=(), help="the drone starts from the floor: there is no base under it")
+        bool, Parameter(help="the drone starts from the floor: there is no base under it")
     ] = False,
     level: Annotated[
-        bool, Parameter(negative=(), help="held level, as by a gimbal, however the drone leans")
+        bool, Parameter(help="held level, as by a gimbal, whatever the drone's roll and pitch")
     ] = False,
     bind: Annotated[str, Parameter(help="address to serve the video on")] = "127.0.0.1",
     port: Annotated[WholeNumber, Parameter(help="TCP port of the video")] = 8100,
 ) -> int:
-    """Paint what a camera on a drone would see of the arena, from the pose that the drone reports.
+    """Render what a camera on a drone would see of the arena, from the pose that the drone reports.
 
     For a drone without frames around it: a genuine PX4 SITL, or a real drone in an empty hall. Put it on
-    its start and start this while it is disarmed: the arena is laid so that the drone stands on the
-    scenario's start, looking the start's way, whatever its compass says. Video and `/referee.json` are
+    its start and start this while it is disarmed: the arena is placed so that the drone stands on the
+    scenario's start with the start's heading, whatever its compass says. Video and `/referee.json` are
     those of `framerunner sim`. Stop it with Ctrl-C.
 
     **Examples**
@@ -44,10 +42,9 @@ def camera(
 
         framerunner camera --drone serial:///dev/ttyUSB1:921600 --bind 0.0.0.0
     """
-    if not 1 <= port <= 65535:
-        raise SettingError(f"--port {port}: must be from 1 to 65535")
+    check_range("--port", port, 1, 65535)
 
-    from framerunner.virtual_camera.painter import VirtualCamera
+    from framerunner.virtual_camera.camera import VirtualCamera
     from framerunner.virtual_camera.server import COMPONENT_ID, SYSTEM_ID, CameraServer
     from scenarios.loader import load_scenario
     from sitl.video import VideoServer
@@ -55,10 +52,6 @@ def camera(
 
     loaded = load_scenario(scenario)
     link = VehicleLink(drone, system_id=SYSTEM_ID, component_id=COMPONENT_ID)
-    painter = VirtualCamera(loaded, level=level, base=not no_base)
-    asyncio.run(CameraServer(painter, link, VideoServer(bind, port), _say).run())
+    virtual = VirtualCamera(loaded, level=level, base=not no_base)
+    asyncio.run(CameraServer(virtual, link, VideoServer(bind, port), say).run())
     return 0
-
-
-def _say(line: str) -> None:
-    print(line, file=sys.stderr, flush=True)

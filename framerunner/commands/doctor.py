@@ -1,4 +1,4 @@
-"""`framerunner doctor`: what a drone says of itself, and what it lacks for the challenge."""
+"""`framerunner doctor`: what a drone reports about itself, and what it lacks for the challenge."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from typing import Annotated
 
 from cyclopts import Parameter
 
-from errors import SettingError
+from framerunner.commands import check_range
 
 
 def doctor(
@@ -15,7 +15,7 @@ def doctor(
     drone: Annotated[str, Parameter(help="MAVLink URL of the drone")] = "udpin://0.0.0.0:14540",
     seconds: Annotated[float, Parameter(help="how long to listen")] = 6.0,
 ) -> int:
-    """Listen to a drone, ask it, and say in one page whether it can fly the challenge.
+    """Listen to a drone, request its data, and say in one page whether it can fly the challenge.
 
     Any PX4 vehicle, simulated or real. It is never armed and nothing in it is changed.
 
@@ -29,16 +29,14 @@ def doctor(
 
         framerunner doctor --drone serial:///dev/ttyUSB0:57600 --seconds 15
     """
-    if not 2.0 <= seconds <= 600.0:
-        raise SettingError(f"--seconds {seconds:g}: must be from 2 to 600")
+    check_range("--seconds", seconds, 2.0, 600.0)
 
     from rich.console import Console
     from rich.progress import BarColumn, Progress, TextColumn
 
     from framerunner.doctor.checks import can_fly, examine
+    from framerunner.doctor.listen import COMPONENT_ID, FIND_S, SYSTEM_ID, Record, find, listen
     from framerunner.doctor.page import print_page
-    from framerunner.doctor.record import Record
-    from framerunner.doctor.visit import COMPONENT_ID, FIND_S, SYSTEM_ID, find, listen
     from wire.transports.vehicle_link import VehicleLink
 
     record = Record()

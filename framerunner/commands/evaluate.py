@@ -5,28 +5,24 @@ from __future__ import annotations
 import shlex
 from collections.abc import Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Literal
+from typing import Annotated, Literal
 
 from cyclopts import Parameter
 
 from errors import SettingError
-from framerunner.commands.options import WholeNumber
-
-if TYPE_CHECKING:
-    from framerunner.evaluation.plan import Plan
-    from offboard.mission import Mission
+from framerunner.commands import WholeNumber, load_mission_with
 
 _COUNT, _SEED = 100, 1
-
-
 _Level = Annotated[str | None, Parameter(help="draw scenarios of this level, name or file")]
 _CountOption = Annotated[WholeNumber | None, Parameter(help=f"how many scenarios of the level; {_COUNT}")]
-_SeedOption = Annotated[WholeNumber | None, Parameter(help=f"of the first; the next has the next; {_SEED}")]
+_SeedOption = Annotated[
+    WholeNumber | None, Parameter(help=f"of the first scenario; each next one has one more; {_SEED}")
+]
 _Jobs = Annotated[WholeNumber | None, Parameter(help="flights at once; as many as there are cores")]
 _Out = Annotated[
     Path | None, Parameter(help="folder; by default one in `runs/` that the same command finds again")
 ]
-_Again = Annotated[bool, Parameter(negative=(), help="fly anew what is in the folder already")]
+_Again = Annotated[bool, Parameter(help="fly again what is in the folder already")]
 _Backend = Annotated[
     Literal["loky", "dask", "ray"], Parameter(help="loky: this machine; the others: a cluster")
 ]
@@ -46,10 +42,10 @@ def evaluate(
     backend: _Backend = "loky",
     address: Annotated[str | None, Parameter(help="of the cluster's scheduler")] = None,
 ) -> int:
-    """Fly a mission on many scenarios in lockstep, and tell how often it lands, how well, and why it fails.
+    """Fly a mission on many scenarios in lockstep; report how often it lands, how well, and why it fails.
 
-    Every flight is kept as soon as it is over. Ctrl-C loses none of them: the same command goes on where it
-    stopped, and ends with the same results.
+    Every flight is saved as soon as it is over. Ctrl-C loses none of them: the same command continues where
+    it stopped, and ends with the same results.
 
     Exit code 0: all were flown, 1: a fault of the program ended some of them, 2: bad input.
 
@@ -73,11 +69,13 @@ def evaluate(
     from framerunner.evaluation.backends import Pool
     from framerunner.evaluation.evaluate import EvaluationSettings
     from framerunner.evaluation.evaluate import evaluate as evaluate_all
-    from offboard.mission import load_mission
-    from offboard.pilot_file import read_pilot
+    from framerunner.evaluation.plan import plan_files, plan_level
 
-    own = None if pilot is None else read_pilot(pilot)
-    plan = _plan(scenarios, level, count, seed, load_mission(mission, own))
+    loaded = load_mission_with(mission, pilot)
+    if level is None:
+        plan = plan_files(scenarios, loaded)
+    else:
+        plan = plan_level(level, _SEED if seed is None else seed, _COUNT if count is None else count, loaded)
     settings = EvaluationSettings(
         plan=plan,
         pool=Pool(backend, cpu_count() if jobs is None else jobs, address),
@@ -89,16 +87,6 @@ def evaluate(
         command=_command(scenarios, given),
     )
     return evaluate_all(settings)
-
-
-def _plan(
-    scenarios: tuple[str, ...], level: str | None, count: int | None, seed: int | None, mission: Mission
-) -> Plan:
-    from framerunner.evaluation.plan import plan_files, plan_level
-
-    if level is None:
-        return plan_files(scenarios, mission)
-    return plan_level(level, _SEED if seed is None else seed, _COUNT if count is None else count, mission)
 
 
 def _check(scenarios: tuple[str, ...], level: str | None, count: int | None, seed: int | None) -> None:
@@ -116,21 +104,9 @@ def _check(scenarios: tuple[str, ...], level: str | None, count: int | None, see
 
 
 def _command(scenarios: tuple[str, ...], given: Mapping[str, object]) -> str:
-    """The command that goes on with this evaluation (--again would begin anew)."""
+    """The command that continues this evaluation; --again would start it from the beginning."""
     words = ["framerunner", "evaluate", *scenarios]
-    for name in (
-        "level",
-        "count",
-        "seed",
-        "mission",
-        "pilot",
-        "jobs",
-        "out",
-        "compare",
-        "backend",
-        "address",
-    ):
-        value = given[name]
-        if value is not None and (name, value) != ("backend", "loky"):
+    for name, value in given.items():
+        if value is not None and name not in ("scenarios", "again") and (name, value) != ("backend", "loky"):
             words += [f"--{name}", str(value)]
     return shlex.join(words)

@@ -9,11 +9,12 @@ from typing import Annotated
 from cyclopts import Parameter
 
 from errors import SettingError
+from framerunner.commands import check_range
 
 _Size = Annotated[
     str | None, Parameter(help="width and height in pixels; 960x540, of a GIF 640x360 if not given")
 ]
-_Fps = Annotated[float | None, Parameter(help="pictures a second; 25, of a GIF 10 if not given")]
+_Fps = Annotated[float | None, Parameter(help="images a second; 25, of a GIF 10 if not given")]
 
 
 def film(
@@ -26,18 +27,18 @@ def film(
         float | None, Parameter(help="seconds of the flight in a second of the film; 8 if not given")
     ] = None,
     seconds: Annotated[
-        float | None, Parameter(help="how long the film is to be; it chooses the speed")
+        float | None, Parameter(help="length of the film, from which the speed follows")
     ] = None,
     size: _Size = None,
     fps: _Fps = None,
-    force: Annotated[bool, Parameter(negative=(), help="replace a film that is there")] = False,
+    force: Annotated[bool, Parameter(help="replace a film that is there")] = False,
     pilot: Annotated[
         Path | None, Parameter(help="Python file of a mission that has to be flown again and needs one")
     ] = None,
 ) -> int:
     """Make a short film of a flight: the arena, the camera's image, the mission's state, times and verdict.
 
-    Shows whatever `framerunner replay` shows: recordings, lockstep flights (flown again), log and video of
+    Shows what `framerunner replay` shows: recordings, lockstep flights (flown again), log and video of
     flights in real time.
 
     **Examples**
@@ -57,10 +58,10 @@ def film(
     if not target.parent.is_dir() and flight.is_dir():
         raise SettingError(f"--out {target}: its folder does not exist; make it first")
     if speed is not None and seconds is not None:
-        raise SettingError("--seconds: chooses the speed itself; leave out --speed or it")
-    _check("--speed", speed, 0.1, 200.0)
-    _check("--seconds", seconds, 3.0, 600.0)
-    _check("--fps", fps, 1.0, 25.0 if suffix == ".gif" else 60.0)
+        raise SettingError("--seconds: chooses the speed itself; leave out --speed or --seconds")
+    check_range("--speed", speed, 0.1, 200.0)
+    check_range("--seconds", seconds, 3.0, 600.0)
+    check_range("--fps", fps, 1.0, 25.0 if suffix == ".gif" else 60.0)
     size_px = _size(size or ("640x360" if suffix == ".gif" else "960x540"))
 
     from framerunner.film.make_film import FilmSettings, make_film
@@ -76,17 +77,8 @@ def film(
     return 0
 
 
-def _check(option: str, value: float | None, low: float, high: float) -> None:
-    if value is not None and not low <= value <= high:
-        raise SettingError(f"{option} {value:g}: must be from {low:g} to {high:g}")
-
-
 def _size(text: str) -> tuple[int, int]:
-    """Width and height; even, as video wants it.
-
-    Raises:
-        SettingError: it is no size, or none that can be painted.
-    """
+    """Width and height; even, as video encoders require."""
     found = re.fullmatch(r"(\d{1,5})[x×](\d{1,5})", text)
     if not found:
         raise SettingError(f"--size {text}: must be width and height in pixels, such as 960x540")

@@ -9,14 +9,13 @@ from typing import TYPE_CHECKING, Annotated
 from cyclopts import Parameter
 
 from errors import SettingError
-from framerunner.commands.options import WholeNumber
+from framerunner.commands import WholeNumber, check_range, load_mission_with
 
 if TYPE_CHECKING:
     from wire.simulator_api import SimulatorApi
 
 _Drone = Annotated[
-    str | None,
-    Parameter(help="MAVLink URL of a drone that is there; without it a simulated one is started"),
+    str | None, Parameter(help="MAVLink URL of a running drone; without it a simulated one is started")
 ]
 _Camera = Annotated[str | None, Parameter(help="URL, device or folder of its camera; needed with --drone")]
 _Simulator = Annotated[
@@ -27,21 +26,16 @@ _Simulator = Annotated[
     ),
 ]
 _Lockstep = Annotated[
-    bool,
-    Parameter(negative=(), help="in simulated time, as fast as the machine can, the same each time; no log"),
+    bool, Parameter(help="in simulated time, as fast as the machine can, the same each time; no log")
 ]
 _Seed = Annotated[
     WholeNumber | None, Parameter(help="of everything random in a lockstep flight; 0 if not given")
 ]
-_Record = Annotated[
-    bool, Parameter(negative=(), help="write flight.mcap as well, for `framerunner replay` and Foxglove")
-]
+_Record = Annotated[bool, Parameter(help="write flight.mcap as well, for `framerunner replay` and Foxglove")]
 _Video = Annotated[
-    bool, Parameter(negative=(), help="write video.avi in lockstep, too; in real time it is always written")
+    bool, Parameter(help="write video.avi also in lockstep; in real time it is always written")
 ]
-_Monitor = Annotated[
-    bool, Parameter(negative=(), help="open the Game Monitor as well, on http://127.0.0.1:8080/")
-]
+_Monitor = Annotated[bool, Parameter(help="open the Game Monitor as well, on http://127.0.0.1:8080/")]
 _Pilot = Annotated[Path | None, Parameter(help="Python file with primitives of your own; it is executed")]
 
 
@@ -62,7 +56,7 @@ def fly(
     pilot: _Pilot = None,
     out: Annotated[Path, Parameter(help="folder in which this flight's folder is made")] = Path("runs"),
 ) -> int:
-    """Fly a mission, show it live, and leave result, track, log and video in `runs/<time>-<scenario>/`.
+    """Fly a mission, show it live, and write result, track, log and video to `runs/<time>-<scenario>/`.
 
     In lockstep there is no log, and a video only with --video.
 
@@ -93,23 +87,19 @@ def fly(
     from framerunner.flying.plan import FlightPlan
     from framerunner.flying.real_time import RealTimeSettings
     from framerunner.flying.run import FlightSettings, fly_once
-    from offboard.mission import load_mission
-    from offboard.pilot_file import read_pilot
     from scenarios.loader import load_scenario
 
     loaded = load_scenario(scenario)
-    chart = load_mission(mission, None if pilot is None else read_pilot(pilot))
-    plan = FlightPlan(loaded, chart, (seed or 0) if lockstep else None)
+    plan = FlightPlan(loaded, load_mission_with(mission, pilot), (seed or 0) if lockstep else None)
     real_time = None if lockstep else RealTimeSettings(drone, camera, api, speed, instance)
     return asyncio.run(fly_once(FlightSettings(plan, real_time, out, record, video, monitor)))
 
 
 def _simulator_api(url: str | None, drone: str | None) -> SimulatorApi | None:
-    """The simulator that flies a drone which is there already."""
     if url is None:
         return None
     if drone is None:
-        raise SettingError("--simulator: is for a drone that is there already; name it with --drone")
+        raise SettingError("--simulator: is for a drone that is running already; name it with --drone")
     from wire.simulator_api import SimulatorApi
 
     try:
@@ -132,16 +122,13 @@ def _check(drone: str | None, camera: str | None, speed: float, instance: int, l
         raise SettingError(
             f"--lockstep: flies a simulated drone in this process; leave out {' and '.join(given)}"
         )
-    if not 0.01 <= speed <= 100:
-        raise SettingError(f"--speed {speed:g}: must be from 0.01 to 100")
-    if not 0 <= instance <= 9:
-        raise SettingError(f"--instance {instance}: must be from 0 to 9")
+    check_range("--speed", speed, 0.01, 100)
+    check_range("--instance", instance, 0, 9)
 
 
 def _check_lockstep(seed: int | None, monitor: bool, lockstep: bool) -> None:
-    """Refuse a seed that is none or has no use, and a monitor of what takes no real time."""
     if monitor and lockstep:
-        raise SettingError("--monitor: looks on in real time; leave it out with --lockstep")
+        raise SettingError("--monitor: shows flights in real time; leave it out with --lockstep")
     if seed is None:
         return
     if not lockstep:

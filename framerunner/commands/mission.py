@@ -1,4 +1,4 @@
-"""`framerunner mission`: the statecharts that fly."""
+"""`framerunner mission`: missions, which are statecharts."""
 
 from __future__ import annotations
 
@@ -8,10 +8,13 @@ from typing import TYPE_CHECKING, Annotated
 
 from cyclopts import App, Parameter
 
-if TYPE_CHECKING:
-    from offboard.mission import Mission, NewMission
+from errors import SettingError
+from framerunner.commands import load_mission_with
 
-app = App(name="mission", help="List, show, check and begin missions.")
+if TYPE_CHECKING:
+    from offboard.mission import NewMission
+
+app = App(name="mission", help="List, show, check and create missions.")
 
 _NAME = re.compile(r"[a-z][a-z0-9_]{0,59}")
 PilotOption = Annotated[
@@ -48,7 +51,7 @@ def show(mission: Annotated[str, Parameter(help="name or file")], *, pilot: Pilo
     """
     from offboard.mission import mermaid
 
-    print(mermaid(_load(mission, pilot)))
+    print(mermaid(load_mission_with(mission, pilot)))
     return 0
 
 
@@ -62,7 +65,7 @@ def check(file: Annotated[Path, Parameter(help="YAML file")], *, pilot: PilotOpt
 
         framerunner mission check my_mission.yaml --pilot my_mission.py
     """
-    loaded = _load(file, pilot)
+    loaded = load_mission_with(file, pilot)
     with_pilot = f" and {pilot}" if pilot is not None else ""
     print(f"{file}{with_pilot}: good, mission '{loaded.name}' with {len(loaded.leaves)} states")
     return 0
@@ -72,12 +75,10 @@ def check(file: Annotated[Path, Parameter(help="YAML file")], *, pilot: PilotOpt
 def new(
     name: Annotated[str, Parameter(help="of the mission: small letters, digits and _")],
     *,
-    python: Annotated[
-        bool, Parameter(negative=(), help="with a Python file that adds words of its own")
-    ] = False,
+    python: Annotated[bool, Parameter(help="with a Python file that adds a primitive of its own")] = False,
     out: Annotated[Path, Parameter(help="folder to write to")] = Path("."),
 ) -> int:
-    """Begin a mission: write a small one that flies, with comments that explain it.
+    """Create a mission: write a small one that flies, with comments that explain it.
 
     Nothing is ever overwritten.
 
@@ -87,35 +88,24 @@ def new(
 
         framerunner mission new my_mission --python --out missions
     """
-    from errors import SettingError
     from offboard.mission import new_mission
 
     if not _NAME.fullmatch(name):
-        mend = "use small letters, digits and _, a letter first, such as 'my_mission'"
-        raise SettingError(f"NAME '{name}': {mend}")
+        raise SettingError(
+            f"NAME '{name}': use small letters, digits and _, a letter first, such as 'my_mission'"
+        )
     files = new_mission(name, out, python=python)
     _write(files)
-    print(f"written: {', '.join(map(str, files.texts))}")
-    print()
+    print(f"written: {', '.join(map(str, files.texts))}\n")
     print(f"  framerunner mission check {files.arguments}")
-    print(f"  framerunner fly test-case-1 --lockstep --mission {files.arguments}")
-    print()
-    print("The first says whether it is good, the second flies it. The comments in the file explain it all.")
-    print("It crosses red only, so the referee will call the flight aborted: green and blue are left to you.")
+    print(f"  framerunner fly test-case-1 --lockstep --mission {files.arguments}\n")
+    print("The first says whether it is good, the second flies it. The comments in the file explain it.")
+    print("It crosses red only, so the referee will judge the flight aborted: add green and blue yourself.")
     return 0
-
-
-def _load(mission: str | Path, pilot: Path | None) -> Mission:
-    from offboard.mission import load_mission
-    from offboard.pilot_file import read_pilot
-
-    return load_mission(mission, None if pilot is None else read_pilot(pilot))
 
 
 def _write(files: NewMission) -> None:
     """Write all files or, if one of them is there already, none."""
-    from errors import SettingError
-
     for path in files.texts:
         if path.exists():
             raise SettingError(f"{path} is there already and is left as it is; choose another NAME or --out")

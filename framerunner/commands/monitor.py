@@ -7,48 +7,54 @@ import os
 import resource
 import sys
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 from cyclopts import Parameter
 
-from errors import SettingError
-from framerunner.commands.options import WholeNumber
+from framerunner.commands import WholeNumber, check_range, say
+
+if TYPE_CHECKING:
+    from monitor.ports import Equipment
+    from scenarios.models import Scenario
 
 PASSWORD_VARIABLE = "FRAMERUNNER_JUDGE_PASSWORD"
 DATABASE = "sqlite:///framerunner.db"
 _OPEN_FILES = 4096
-_NICENESS = 5  # beside a flight: who looks on must not slow it
+_NICENESS = 5  # beside a flight, which the monitor must not slow down
+# The doctor has 247, the virtual camera 246, MAVSDK 245, other ground stations 255.
+SYSTEM_ID = 250
+COMPONENT_ID = 190  # MAV_COMP_ID_MISSIONPLANNER, as ground stations use it
 
 
 def monitor(
     *,
     drone: Annotated[
-        str, Parameter(help="MAVLink URL: where drones speak to ground stations")
+        str, Parameter(help="MAVLink URL: where drones send to ground stations")
     ] = "udpin://127.0.0.1:14550",
     scenario: Annotated[
-        str | None, Parameter(help="name or file; for a drone that brings no referee, as a real one")
+        str | None, Parameter(help="name or file; for a drone without a referee, such as a real one")
     ] = None,
-    bind: Annotated[str, Parameter(help="address to listen on; 0.0.0.0 lets others look")] = "127.0.0.1",
+    bind: Annotated[
+        str, Parameter(help="address to listen on; 0.0.0.0 lets other machines in")
+    ] = "127.0.0.1",
     port: Annotated[WholeNumber, Parameter(help="TCP port of the pages; 0 lets the system choose")] = 8080,
     database: Annotated[str, Parameter(help="of teams and tries; SQLAlchemy URL")] = DATABASE,
-    runs: Annotated[Path, Parameter(help="folder of flights to show again")] = Path("runs"),
+    runs: Annotated[Path, Parameter(help="folder of recorded flights")] = Path("runs"),
     camera_host: Annotated[
         tuple[str, ...],
         Parameter(
-            negative=(),
-            help="HOST or HOST:PORT of a camera, if a drone names one that its packets do not come from",
+            help="HOST or HOST:PORT of a camera, if a drone names one that its packets do not come from"
         ),
     ] = (),
     trusted_proxy: Annotated[
-        tuple[str, ...],
-        Parameter(negative=(), help="address or network of a proxy whose X-Forwarded-For is believed"),
+        tuple[str, ...], Parameter(help="address or network of a proxy whose X-Forwarded-For is believed")
     ] = (),
     lifeline: Annotated[bool, Parameter(show=False, help="stop when standard input ends")] = False,
 ) -> int:
-    """Open the Game Monitor on http://127.0.0.1:8080/: see drones, fly them, judge tries, show flights again.
+    """Open the Game Monitor on http://127.0.0.1:8080/: watch and fly drones, judge tries, replay flights.
 
     It connects like a ground station and finds camera and referee by itself. Judges log in with the password
-    in FRAMERUNNER_JUDGE_PASSWORD or, without one, with the link that is printed; onlookers need none. Stop it
+    in FRAMERUNNER_JUDGE_PASSWORD or, without one, with the link that is printed; viewers need none. Stop it
     with Ctrl-C.
 
     **Examples**
@@ -59,11 +65,9 @@ def monitor(
 
         framerunner monitor --drone serial:///dev/ttyUSB0:57600 --scenario test-case-1
     """
-    if not 0 <= port <= 65535:
-        raise SettingError(f"--port {port}: must be from 0 to 65535")
+    check_range("--port", port, 0, 65535)
 
-    from framerunner.flying.child_process import until_standard_input_ends
-    from framerunner.monitoring.equipment import equipment
+    from framerunner.child_process import until_standard_input_ends
     from monitor.run import serve
     from monitor.settings import MonitorSettings
     from scenarios.loader import load_scenario
@@ -76,13 +80,35 @@ def monitor(
     _allow_many_files()
     if lifeline:
         os.nice(_NICENESS)
-    work = serve(given, settings, _say)
+    work = serve(given, settings, say)
     asyncio.run(until_standard_input_ends(work) if lifeline else work)
     return 0
 
 
+def equipment(
+    drone_url: str, scenario: Scenario | None, runs: Path, camera_hosts: tuple[str, ...] = ()
+) -> Equipment:
+    """What the monitor, which may not import other rooms' functions, is given of them."""
+    from framerunner.flying.plan import FlightPlan
+    from framerunner.monitoring.run_library import RunFolders
+    from monitor.ports import Equipment
+    from scenarios.loader import list_scenarios, load_scenario
+    from wire.transports.vehicle_link import VehicleLink
+
+    return Equipment(
+        make_referee=lambda flown: FlightPlan(flown).new_referee(),
+        open_link=lambda: VehicleLink(drone_url, system_id=SYSTEM_ID, component_id=COMPONENT_ID),
+        scenario=scenario,
+        list_scenarios=list_scenarios,
+        load_scenario=load_scenario,
+        runs=RunFolders(runs),
+        start_pose=lambda flown: FlightPlan(flown).start_pose,
+        camera_hosts=camera_hosts,
+    )
+
+
 def _allow_many_files() -> None:
-    """Raise this process's limit of open files, each connection being one, as far as it may."""
+    """Raise this process's limit of open files, as each connection is one, as far as allowed."""
     soft, hard = resource.getrlimit(resource.RLIMIT_NOFILE)
     wanted = _OPEN_FILES if hard == resource.RLIM_INFINITY else min(_OPEN_FILES, hard)
     if soft != resource.RLIM_INFINITY and soft < wanted:
@@ -90,9 +116,4 @@ def _allow_many_files() -> None:
 
 
 def _shows_qr_codes() -> bool:
-    """Whether somebody sits at a terminal that can show them."""
     return sys.stderr.isatty() and "utf" in (sys.stderr.encoding or "").lower()
-
-
-def _say(line: str) -> None:
-    print(line, file=sys.stderr, flush=True)

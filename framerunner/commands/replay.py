@@ -4,24 +4,24 @@ from __future__ import annotations
 
 import asyncio
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated
 
 from cyclopts import Parameter
 
 from errors import SettingError
-from framerunner.commands.options import WholeNumber
-
-if TYPE_CHECKING:
-    from framerunner.recording.events import Recorded
+from framerunner.commands import WholeNumber, check_range
 
 
 def replay(
     flight: Annotated[Path, Parameter(help="run folder, or an MCAP file of framerunner's")],
     *,
     speed: Annotated[float, Parameter(help="simulated seconds a second; 0 as fast as possible")] = 1.0,
-    fast: Annotated[bool, Parameter(negative=(), help="as fast as possible, as --speed 0")] = False,
+    fast: Annotated[bool, Parameter(help="as fast as possible, as --speed 0")] = False,
     video: Annotated[
-        bool | None, Parameter(help="serve the images; by default if the flight is shown at some speed")
+        bool | None,
+        Parameter(
+            negative="--no-video", help="serve the images; by default if the flight is shown at some speed"
+        ),
     ] = None,
     port: Annotated[WholeNumber, Parameter(help="TCP port of the video; 0 lets the system choose")] = 8090,
     pilot: Annotated[
@@ -31,7 +31,7 @@ def replay(
     """Show a flight again: its states in the terminal, its images at http://127.0.0.1:8090/.
 
     Shows what `framerunner fly --record` wrote. Without a recording, a lockstep flight is flown again, which
-    gives the very same one, and a real-time flight is shown from its log and video. Stop it with Ctrl-C.
+    gives exactly the same one, and a real-time flight is shown from its log and video. Stop it with Ctrl-C.
 
     **Examples**
 
@@ -44,10 +44,10 @@ def replay(
     speed = 0.0 if fast else speed
     if speed != 0.0 and not 0.01 <= speed <= 1000:
         raise SettingError(f"--speed {speed:g}: must be from 0.01 to 1000, or 0 for as fast as possible")
-    if not 0 <= port <= 65535:
-        raise SettingError(f"--port {port}: must be from 0 to 65535")
+    check_range("--port", port, 0, 65535)
     with_video = speed > 0.0 if video is None else video
 
+    from framerunner.flying.display import result_lines
     from framerunner.recording.open_recording import recorded_flight
     from framerunner.recording.replay import replay as show
     from offboard.pilot_file import read_pilot
@@ -57,14 +57,6 @@ def replay(
     server = VideoServer(port=port) if with_video else None
     with recorded_flight(flight, pilot_file) as recorded:
         asyncio.run(show(recorded, speed, server))
-        _say_result(recorded)
+        result = recorded.result
+        print("no result: the flight was not judged" if result is None else result_lines(result))
     return 0
-
-
-def _say_result(recorded: Recorded) -> None:
-    from framerunner.flying.flight_result import result_lines
-
-    if recorded.result is None:
-        print("no result: the flight was not judged")
-        return
-    print(result_lines(recorded.result))

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import json
-import sys
 from pathlib import Path
 from typing import Annotated
 
 from cyclopts import App, Parameter
 
-from framerunner.commands.options import WholeNumber
+from errors import SettingError
+from framerunner.commands import WholeNumber, say
 
 app = App(name="scenario", help="List, show and check scenarios.")
 
@@ -51,13 +51,13 @@ def show(
     path = out or Path(f"{loaded.name}.png")
     save_figure(draw_scenario(loaded), path)
     print(dump_yaml(loaded), end="")
-    print(f"drawn to {path}", file=sys.stderr)
+    say(f"drawn to {path}")
     return 0
 
 
 @app.command
 def check(file: Annotated[Path, Parameter(help="YAML file")]) -> int:
-    """Say whether a scenario file is good, or what to mend where.
+    """Say whether a scenario file is good, or what is wrong and where.
 
     **Example**
 
@@ -99,7 +99,6 @@ def random(
 
         framerunner scenario random --level calm --seed 17 --out calm-17.yaml
     """
-    from errors import SettingError
     from scenarios.loader import dump_yaml
     from scenarios.random_scenarios import load_level, random_scenario
 
@@ -111,5 +110,5 @@ def random(
         out.write_text(dump_yaml(drawn), encoding="utf-8")
     except OSError as error:
         raise SettingError(f"--out {out}: cannot be written ({error.strerror}); choose another") from None
-    print(f"scenario '{drawn.name}' written to {out}", file=sys.stderr)
+    say(f"scenario '{drawn.name}' written to {out}")
     return 0

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import asyncio
-import sys
 from contextlib import AsyncExitStack
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -12,11 +11,11 @@ from typing import TYPE_CHECKING, Annotated
 from cyclopts import Parameter
 
 from errors import SettingError
-from framerunner.commands.options import WholeNumber
-from framerunner.extras import advice, is_installed
+from framerunner.commands import WholeNumber, check_range, say
+from framerunner.errors import install_advice, is_installed
 
 if TYPE_CHECKING:
-    from framerunner.monitoring.monitor_process import MonitorProcess
+    from framerunner.child_process import MonitorProcess
     from scenarios.models import Scenario
     from sitl.server import SimulatorServer
     from sitl.server_settings import ServerSettings
@@ -40,18 +39,22 @@ class Onboard:
         Path | None,
         Parameter(help="file of changed parameters (.params), read at start and saved when one changes"),
     ] = None
-    shell: Annotated[
-        bool, Parameter(help="answer MAVLink's shell (SERIAL_CONTROL), about the drone only", negative=())
-    ] = False
+    shell: Annotated[bool, Parameter(help="answer MAVLink's shell (SERIAL_CONTROL), for the drone only")] = (
+        False
+    )
     camera: Annotated[
-        bool, Parameter(help="tell of the camera over MAVLink, as a component of its own, and take pictures")
+        bool,
+        Parameter(
+            negative="--no-camera",
+            help="announce the camera over MAVLink, as a separate component, and take photos",
+        ),
     ] = True
 
 
 @Parameter(name="*")
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Connections:
-    """Where the simulator listens and to whom it speaks."""
+    """Where the simulator listens and sends."""
 
     bind: Annotated[str, Parameter(help="address to listen on")] = "127.0.0.1"
     onboard_remote: Annotated[
@@ -64,13 +67,11 @@ class Connections:
         tuple[str, ...],
         Parameter(
             help="one more link: udpout://HOST:PORT, udpin://…, tcpin://…, tcpout://…, serial:///TTY:BAUD, "
-            "behind it ?streams=onboard|ground|normal&rate=BYTES if wanted; may be repeated",
-            negative=(),
+            "optionally followed by ?streams=onboard|ground|normal&rate=BYTES; may be repeated"
         ),
     ] = ()
     signing_key: Annotated[
-        Path | None,
-        Parameter(help="file with 64 hexadecimal digits or a passphrase: sign MAVLink 2 with it"),
+        Path | None, Parameter(help="file with 64 hexadecimal digits or a passphrase: sign MAVLink 2 with it")
     ] = None
     video_port: Annotated[WholeNumber | None, Parameter(help="TCP port of the video; 8100 + instance")] = None
     video_rtp: Annotated[
@@ -91,7 +92,7 @@ def sim(
     connections: Connections | None = None,
     onboard: Onboard | None = None,
     monitor: Annotated[
-        bool, Parameter(negative=(), help="open the Game Monitor as well, on http://127.0.0.1:8080/")
+        bool, Parameter(help="open the Game Monitor as well, on http://127.0.0.1:8080/")
     ] = False,
     lifeline: Annotated[bool, Parameter(show=False, help="stop when standard input ends")] = False,
     time_grants: Annotated[
@@ -120,7 +121,9 @@ def sim(
 
         framerunner sim --link serial:///dev/ttyUSB0:57600
     """
-    _check(speed, instance, count)
+    check_range("--speed", speed, 0.01, 1000)
+    check_range("--instance", instance, 0, 9)
+    check_range("--count", count, 1, _MAX_COUNT)
     chosen = connections or Connections()
     watcher = _monitor(chosen.video_port, count) if monitor else None
     if watcher is not None:
@@ -131,19 +134,9 @@ def sim(
     from sitl.server import SimulatorServer
 
     simulations = _simulations(load_scenario(scenario), count)
-    server = SimulatorServer(simulations, settings, notice=_say, grants=_grants(time_grants))
-    asyncio.run(_run(server, monitor=watcher, lifeline=lifeline))
+    server = SimulatorServer(simulations, settings, notice=say, grants=_grants(time_grants))
+    asyncio.run(_run(server, watcher, lifeline=lifeline))
     return 0
-
-
-def _check(speed: float, instance: int, count: int) -> None:
-    """Refuse numbers that are out of range."""
-    if not 0.01 <= speed <= 1000:
-        raise SettingError(f"--speed {speed:g}: must be from 0.01 to 1000")
-    if not 0 <= instance <= 9:
-        raise SettingError(f"--instance {instance}: must be from 0 to 9")
-    if not 1 <= count <= _MAX_COUNT:
-        raise SettingError(f"--count {count}: must be from 1 to {_MAX_COUNT}")
 
 
 def _grants(descriptor: int | None) -> TimeGrants | None:
@@ -157,7 +150,7 @@ def _grants(descriptor: int | None) -> TimeGrants | None:
 
 
 def _monitor(video_port: int | None, count: int) -> MonitorProcess:
-    from framerunner.monitoring.monitor_process import MonitorProcess
+    from framerunner.child_process import MonitorProcess
 
     ports = () if video_port is None else range(video_port, video_port + count)
     return MonitorProcess(camera_hosts=[f"127.0.0.1:{port}" for port in ports])
@@ -166,9 +159,7 @@ def _monitor(video_port: int | None, count: int) -> MonitorProcess:
 def _settings(
     chosen: Connections, onboard: Onboard, speed: float, instance: int, count: int
 ) -> ServerSettings:
-    port = chosen.video_port
-    if port is not None and not 1 <= port <= 65536 - count:
-        raise SettingError(f"--video-port {port}: must be from 1 to {65536 - count}")
+    check_range("--video-port", chosen.video_port, 1, 65536 - count)
 
     from sitl.server_settings import ServerSettings, parse_link, rtp_address
 
@@ -178,13 +169,18 @@ def _settings(
     twice = next((link.url.text for number, link in enumerate(links) if link in links[:number]), None)
     if twice is not None:
         raise SettingError(f"--link {twice}: given twice; leave one out")
+    rtp = None
+    if chosen.video_rtp != "off" and is_installed("av"):
+        rtp = rtp_address(chosen.video_rtp, instance)
+    elif chosen.video_rtp != "off":
+        say(f"warning: no video in RTP: {install_advice('av')}")
     settings = ServerSettings(
         instance=instance,
         bind=chosen.bind,
         onboard_remote=chosen.onboard_remote,
         ground_remote=chosen.ground_remote,
-        video_port=port,
-        video_rtp=rtp_address(chosen.video_rtp, instance) if _sends_rtp(chosen.video_rtp) else None,
+        video_port=chosen.video_port,
+        video_rtp=rtp,
         speed=speed,
         links=links,
         signing_key=_read_key(chosen.signing_key),
@@ -195,14 +191,6 @@ def _settings(
     )
     settings.check(count)
     return settings
-
-
-def _sends_rtp(video_rtp: str) -> bool:
-    """Whether H.264 video is wanted and can be made; a small installation flies without."""
-    missing = None if video_rtp == "off" or is_installed("av") else advice("av")
-    if missing is not None:
-        _say(f"warning: no video in RTP: {missing}")
-    return video_rtp != "off" and missing is None
 
 
 def _simulations(scenario: Scenario, count: int) -> list[Simulation]:
@@ -221,7 +209,7 @@ def _simulations(scenario: Scenario, count: int) -> list[Simulation]:
 
 
 def _read_key(path: Path | None) -> SigningKey | None:
-    """Read the key of a file; what is in it is never shown."""
+    """Read the key in a file; the file's content is never shown."""
     if path is None:
         return None
     from wire.signing import SigningKey
@@ -238,15 +226,11 @@ def _read_key(path: Path | None) -> SigningKey | None:
         raise SettingError(f"--signing-key {path}: {error}") from None
 
 
-async def _run(server: SimulatorServer, *, monitor: MonitorProcess | None, lifeline: bool) -> None:
-    from framerunner.flying.child_process import until_standard_input_ends
+async def _run(server: SimulatorServer, monitor: MonitorProcess | None, *, lifeline: bool) -> None:
+    from framerunner.child_process import until_standard_input_ends
 
     async with AsyncExitStack() as stack:
         if monitor is not None:
             await stack.enter_async_context(monitor)
             await monitor.opened()
         await (until_standard_input_ends(server.run()) if lifeline else server.run())
-
-
-def _say(line: str) -> None:
-    print(line, file=sys.stderr, flush=True)

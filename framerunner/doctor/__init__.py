@@ -1,1 +1,1 @@
-"""What a drone says of itself, and what it lacks for the challenge. Listens and asks; changes nothing."""
+"""Whether a MAVLink drone can fly the challenge. It listens and requests; it changes nothing in the drone."""

@@ -1,7 +1,7 @@
-"""What stands between a drone and the challenge: findings, each with what to do. A record in, words out.
+"""What a drone lacks for the challenge: findings, each with what to do. A record in, words out.
 
-How well a drone knows where it is: PX4's ESTIMATOR_STATUS tells which sensors are in use and how accurate the
-estimate is; parameters tell only what was asked for.
+How well a drone knows its position: PX4's ESTIMATOR_STATUS shows which sensors are in use and how accurate
+the estimate is; parameters show only what was requested.
 """
 
 from __future__ import annotations
@@ -9,31 +9,64 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from enum import Enum
+from functools import partial
 from math import isfinite
 
-from framerunner.doctor import names
-from framerunner.doctor.record import Record
+from framerunner.doctor.listen import Record
 from wire.dialect import Message, mavlink
 from wire.px4_modes import OFFBOARD
 
-WANTED_HZ = 50.0  # what `fly` and `camera` ask for
+WANTED_HZ = 50.0  # as `fly` and `camera` request
 LOW_HZ = 20.0  # the mission's own rate
 LOST_SHARE = 0.05
 BATTERY_PERCENT = 40
-CHALLENGE_HEIGHT_M = 3.0  # frames hang up to 2 m, the mission flies up from them
+CHALLENGE_HEIGHT_M = 3.0  # frames are at up to 2 m, the mission climbs from them
 CHALLENGE_REACH_M = 8.0
-ACCURATE_M = 0.1  # standard deviation; PX4 with GPS says 0.3, with motion capture 0.01
+ACCURATE_M = 0.1  # standard deviation; PX4 reports 0.3 with GPS, 0.01 with motion capture
 WANDER_M = 0.1
 _GUIDE = "docs/real-drone.md, section 3"
 _EV_POSITION, _EV_HEIGHT = 1, 2  # bits of EKF2_EV_CTRL
 _SLOW_ESTIMATOR = (
-    # name, more than this is too much, unit
+    # name, upper limit, unit
     ("EKF2_EVP_NOISE", 0.05, "m"),
     ("EKF2_EVV_NOISE", 0.05, "m/s"),
     ("EKF2_DELAY_MAX", 50.0, "ms"),
     ("EKF2_TAU_POS", 0.15, "s"),
     ("EKF2_TAU_VEL", 0.15, "s"),
 )
+_ATTITUDES = ("ATTITUDE", "ATTITUDE_QUATERNION")
+_MULTICOPTERS = (
+    mavlink.MAV_TYPE_QUADROTOR,
+    mavlink.MAV_TYPE_HEXAROTOR,
+    mavlink.MAV_TYPE_OCTOROTOR,
+    mavlink.MAV_TYPE_TRICOPTER,
+    mavlink.MAV_TYPE_COAXIAL,
+)
+_SENSORS = {
+    mavlink.MAV_SYS_STATUS_SENSOR_3D_GYRO: "gyroscope",
+    mavlink.MAV_SYS_STATUS_SENSOR_3D_ACCEL: "accelerometer",
+    mavlink.MAV_SYS_STATUS_SENSOR_3D_MAG: "compass",
+    mavlink.MAV_SYS_STATUS_SENSOR_ABSOLUTE_PRESSURE: "barometer",
+    mavlink.MAV_SYS_STATUS_SENSOR_GPS: "GPS",
+    mavlink.MAV_SYS_STATUS_SENSOR_OPTICAL_FLOW: "optical flow",
+    mavlink.MAV_SYS_STATUS_SENSOR_VISION_POSITION: "vision position",
+    mavlink.MAV_SYS_STATUS_SENSOR_LASER_POSITION: "range finder",
+    mavlink.MAV_SYS_STATUS_SENSOR_MOTOR_OUTPUTS: "motor outputs",
+    mavlink.MAV_SYS_STATUS_SENSOR_RC_RECEIVER: "radio control",
+    mavlink.MAV_SYS_STATUS_GEOFENCE: "geofence",
+    mavlink.MAV_SYS_STATUS_AHRS: "attitude estimate",
+    mavlink.MAV_SYS_STATUS_LOGGING: "logging",
+    mavlink.MAV_SYS_STATUS_SENSOR_BATTERY: "battery",
+    mavlink.MAV_SYS_STATUS_SENSOR_PROPULSION: "propulsion",
+    mavlink.MAV_SYS_STATUS_SENSOR_XY_POSITION_CONTROL: "position control",
+    mavlink.MAV_SYS_STATUS_SENSOR_Z_ALTITUDE_CONTROL: "height control",
+}
+# Values of PX4's parameters.
+_OFFBOARD_LOSS = {0: "position mode", 1: "altitude mode", 2: "stabilised mode", 3: "return", 4: "land"}
+_OFFBOARD_LOSS |= {5: "hold", 6: "terminate", 7: "disarm"}
+_LINK_LOSS = {0: "nothing", 1: "hold", 2: "return", 3: "land", 5: "terminate", 6: "disarm"}
+_LOW_BATTERY = {0: "warns", 2: "lands", 3: "returns, then lands"}
+_HEIGHT_SOURCE = {0: "barometer", 1: "GPS", 2: "range finder", 3: "vision"}
 
 
 class Level(Enum):
@@ -46,19 +79,18 @@ class Level(Enum):
 
 @dataclass(frozen=True, slots=True)
 class Finding:
-    """One thing about the drone.
-
-    Attributes:
-        level: whether the challenge can be flown with it.
-        subject: a word or two.
-        text: what is the case.
-        advice: what to do; empty if nothing.
-    """
+    """One thing about the drone: a subject, what is the case, and what to do, which is empty if nothing."""
 
     level: Level
     subject: str
     text: str
     advice: str = ""
+
+
+_good = partial(Finding, Level.GOOD)
+_note = partial(Finding, Level.NOTE)
+_missing = partial(Finding, Level.MISSING)
+Findings = Iterator[Finding]
 
 
 def can_fly(findings: list[Finding]) -> bool:
@@ -67,220 +99,215 @@ def can_fly(findings: list[Finding]) -> bool:
 
 
 def examine(record: Record) -> list[Finding]:
-    """Everything there is to say, in the order of a flight's needs."""
-    return [finding for check in CHECKS for finding in check(record)]
+    """All findings, in the order in which a flight needs them."""
+    return [finding for check in _CHECKS for finding in check(record)]
 
 
-def check_autopilot(record: Record) -> Iterator[Finding]:
-    """PX4, and a multicopter."""
+def _autopilot(record: Record) -> Findings:
     heartbeat = record.latest["HEARTBEAT"]
-    kind = names.kind_name(heartbeat.type)
     if heartbeat.autopilot != mavlink.MAV_AUTOPILOT_PX4:
-        name = names.AUTOPILOTS.get(heartbeat.autopilot, f"autopilot {heartbeat.autopilot}")
-        yield Finding(Level.MISSING, "autopilot", name, "fly speaks PX4's modes; use a PX4 vehicle")
+        yield _missing("autopilot", record.autopilot_name, "fly uses PX4's modes; use a PX4 vehicle")
     elif heartbeat.type not in _MULTICOPTERS:
-        yield Finding(Level.MISSING, "autopilot", f"PX4, {kind}", "the challenge needs a multicopter")
+        yield _missing("autopilot", f"PX4, {record.type_name}", "the challenge needs a multicopter")
     else:
-        yield Finding(Level.GOOD, "autopilot", f"PX4, {kind}")
+        yield _good("autopilot", f"PX4, {record.type_name}")
 
 
-def check_armed(record: Record) -> Iterator[Finding]:
-    """Disarmed, on the ground, no failsafe."""
-    heartbeat = record.latest["HEARTBEAT"]
-    mode = names.mode_name(heartbeat.custom_mode, record.modes)
+def _armed(record: Record) -> Findings:
     if record.armed:
-        yield Finding(Level.MISSING, "armed", f"in {mode}", "land and disarm; fly arms by itself")
+        yield _missing("armed", f"in {record.mode_name}", "land and disarm; fly arms by itself")
     elif record.telemetry.landed is False:
-        yield Finding(Level.MISSING, "landed", "it takes itself to be in the air", "put it down; restart it")
+        yield _missing("landed", "it reports that it is in the air", "put it down; restart it")
     else:
-        yield Finding(Level.GOOD, "state", f"disarmed on the ground, in {mode}")
-    if heartbeat.system_status >= mavlink.MAV_STATE_CRITICAL:
-        yield Finding(
-            Level.MISSING, "failsafe", names.STATES[heartbeat.system_status], "see what it says below"
-        )
+        yield _good("state", f"disarmed on the ground, in {record.mode_name}")
+    if record.latest["HEARTBEAT"].system_status >= mavlink.MAV_STATE_CRITICAL:
+        yield _missing("failsafe", record.state_name, "see its status texts below")
 
 
-def check_health(record: Record) -> Iterator[Finding]:
-    """Pre-arm checks, and which sensors are not well.
+def _health(record: Record) -> Findings:
+    """Pre-arm checks and unhealthy sensors.
 
-    PX4's checks are those of its present mode. Hold wants a global position; offboard, to which `fly` goes,
+    PX4's checks are those of its present mode. Hold requires a global position; offboard, which `fly` enters,
     does not.
     """
     status = record.latest.get("SYS_STATUS")
     if status is None:
-        yield Finding(Level.MISSING, "health", "no SYS_STATUS", "let the link carry it; see MAV_x_MODE")
+        yield _missing("health", "no SYS_STATUS", "let the link carry it; see MAV_x_MODE")
         return
-    sick = status.onboard_control_sensors_enabled & status.onboard_control_sensors_present
-    sick &= ~status.onboard_control_sensors_health
-    sick_names = ", ".join(name for bit, name in names.SENSORS.items() if sick & bit)
+    unhealthy = status.onboard_control_sensors_enabled & status.onboard_control_sensors_present
+    unhealthy &= ~status.onboard_control_sensors_health
+    unhealthy_names = ", ".join(name for bit, name in _SENSORS.items() if unhealthy & bit)
     ready = status.onboard_control_sensors_health & mavlink.MAV_SYS_STATUS_PREARM_CHECK
-    mode = names.mode_name(record.latest["HEARTBEAT"].custom_mode, record.modes).lower()
+    mode = record.mode_name.lower()
     if not ready and not record.armed and record.arming.ready_for_offboard:
-        text = f"passed for offboard, where fly arms it; not in {mode}"
-        yield Finding(Level.GOOD, "pre-arm checks", text)
+        yield _good("pre-arm checks", f"passed for offboard, where fly arms it; not in {mode}")
     elif not ready and not record.armed:
-        reasons = "; ".join((*record.arming.failures, *((sick_names,) if sick_names else ())))
+        reasons = "; ".join((*record.arming.failures, *((unhealthy_names,) if unhealthy_names else ())))
         words = f"not passed in {mode}" + (f": {reasons}" if reasons else "")
-        advice = "mend what is named, here and below"
+        advice = "correct what is named, here and below"
         if record.arming.armable_modes is None:
-            advice = "it does not tell why; fly may pass in offboard, which needs no global position"
-        yield Finding(Level.MISSING, "pre-arm checks", words, advice)
-    elif sick_names:
-        yield Finding(Level.NOTE, "health", f"not well: {sick_names}", "mend it before flying")
+            advice = "it reports no reasons; fly may pass in offboard, which needs no global position"
+        yield _missing("pre-arm checks", words, advice)
+    elif unhealthy_names:
+        yield _note("health", f"unhealthy: {unhealthy_names}", "correct it before flying")
     else:
-        yield Finding(Level.GOOD, "pre-arm checks", "passed")
+        yield _good("pre-arm checks", "passed")
 
 
-def check_offboard(record: Record) -> Iterator[Finding]:
-    """Offboard mode with velocities."""
+def _offboard(record: Record) -> Findings:
     version = record.latest.get("AUTOPILOT_VERSION")
+    advice = "use PX4 1.13 or later"
     if record.modes and OFFBOARD.custom_mode not in record.modes:
-        yield Finding(Level.MISSING, "offboard", "not among its modes", "use PX4 1.13 or later")
+        yield _missing("offboard", "not among its modes", advice)
     elif version is None:
-        yield Finding(Level.NOTE, "offboard", "it does not say what it can do", "use PX4 1.13 or later")
+        yield _note("offboard", "it does not report its capabilities", advice)
     elif not version.capabilities & mavlink.MAV_PROTOCOL_CAPABILITY_SET_POSITION_TARGET_LOCAL_NED:
-        yield Finding(Level.MISSING, "offboard", "takes no local setpoints", "use PX4 1.13 or later")
+        yield _missing("offboard", "takes no local setpoints", advice)
     else:
-        yield Finding(Level.GOOD, "offboard", "takes velocities in body axes")
+        yield _good("offboard", "takes velocities in body axes")
 
 
-def check_streams(record: Record) -> Iterator[Finding]:
-    """Attitude and position, often enough."""
+def _streams(record: Record) -> Findings:
     for kinds, what in ((_ATTITUDES, "attitude"), (("LOCAL_POSITION_NED",), "local position")):
         rate_hz = max(record.rate_hz(kind) for kind in kinds)
         if rate_hz == 0.0:
             advice = "give it GPS, optical flow, vision or motion capture; wait for its estimate"
-            yield Finding(Level.MISSING, what, f"no {' or '.join(kinds)} comes", advice)
+            yield _missing(what, f"no {' or '.join(kinds)} is received", advice)
         elif rate_hz < LOW_HZ:
-            advice = f"fly asks for {WANTED_HZ:g} Hz; see that the line can carry it"
-            yield Finding(Level.NOTE, what, f"only {rate_hz:.0f} Hz", advice)
+            advice = f"fly requests {WANTED_HZ:g} Hz; use a link that can carry it"
+            yield _note(what, f"only {rate_hz:.0f} Hz", advice)
         else:
-            yield Finding(Level.GOOD, what, f"{rate_hz:.0f} Hz")
+            yield _good(what, f"{rate_hz:.0f} Hz")
 
 
-def check_link(record: Record) -> Iterator[Finding]:
-    """Packets lost on the way."""
+def _link(record: Record) -> Findings:
     lost = record.packets.lost_share
     words = f"{lost:.1%} of {record.packets.passed} packets lost"
     if lost > LOST_SHARE:
-        yield Finding(Level.MISSING, "link", words, "come nearer, or use a better line")
+        yield _missing("link", words, "move nearer, or use a better link")
     else:
-        yield Finding(Level.GOOD, "link", words)
+        yield _good("link", words)
 
 
-def check_battery(record: Record) -> Iterator[Finding]:
-    """Enough for a try."""
+def _battery(record: Record) -> Findings:
     status = record.latest.get("SYS_STATUS")
     if status is None or status.battery_remaining < 0:
-        yield Finding(Level.NOTE, "battery", "it does not say how full it is", "measure it")
+        yield _note("battery", "its charge is not reported", "measure it")
         return
     volts = "" if status.voltage_battery in (0, 65535) else f", {status.voltage_battery / 1000:.1f} V"
     words = f"{status.battery_remaining} %{volts}"
-    critical = 100 * record.parameters.get("BAT_CRIT_THR", 0.07)
-    if status.battery_remaining <= critical:
-        yield Finding(Level.MISSING, "battery", words, "charge it: it would land at once")
+    if status.battery_remaining <= 100 * record.parameters.get("BAT_CRIT_THR", 0.07):
+        yield _missing("battery", words, "charge it: it would land at once")
     elif status.battery_remaining < BATTERY_PERCENT:
-        yield Finding(Level.NOTE, "battery", words, "charge it: a try takes three minutes")
+        yield _note("battery", words, "charge it: a try takes three minutes")
     else:
-        yield Finding(Level.GOOD, "battery", words)
+        yield _good("battery", words)
 
 
-def check_limits(record: Record) -> Iterator[Finding]:
-    """Parameters that hold the drone back or end the flight."""
+def _limits(record: Record) -> Findings:
+    """Parameters that slow the drone down or end the flight."""
     parameters = record.parameters
     if not parameters:
-        yield Finding(Level.NOTE, "parameters", "none was answered", "see that the link is not read-only")
+        yield _note("parameters", "no parameter was received", "check that the link is not read-only")
         return
-    for name, least, unit in (
+    for name, minimum, unit in (
         ("MPC_XY_VEL_MAX", 1.0, "m/s"),
         ("MPC_Z_VEL_MAX_UP", 1.0, "m/s"),
         ("MPC_Z_VEL_MAX_DN", 1.0, "m/s"),
         ("MC_YAWRATE_MAX", 60.0, "deg/s"),
     ):
         value = parameters.get(name)
-        if value is not None and value < least:
-            yield Finding(Level.MISSING, name, f"{value:g} {unit}", f"set it to {least:g} or more")
+        if value is not None and value < minimum:
+            yield _missing(name, f"{value:g} {unit}", f"set it to {minimum:g} or more")
     yield from _fence(record)
     preflight_s = parameters.get("COM_DISARM_PRFLT", 0.0)
     if 0.0 < preflight_s < 5.0:
-        advice = "set it to 10: take-off begins by a slow ramp"
-        yield Finding(Level.MISSING, "COM_DISARM_PRFLT", f"{preflight_s:g} s", advice)
+        advice = "set it to 10: take-off begins with a slow ramp"
+        yield _missing("COM_DISARM_PRFLT", f"{preflight_s:g} s", advice)
 
 
-def _fence(record: Record) -> Iterator[Finding]:
+def _fence(record: Record) -> Findings:
     parameters = record.parameters
     limits = (("GF_MAX_VER_DIST", CHALLENGE_HEIGHT_M), ("GF_MAX_HOR_DIST", CHALLENGE_REACH_M))
     if not parameters.get("GF_ACTION") or not any(parameters.get(name, 0.0) > 0.0 for name, _ in limits):
         return
     status = record.latest.get("ESTIMATOR_STATUS")
     if status is not None and not status.flags & mavlink.ESTIMATOR_POS_HORIZ_ABS:
-        text = "PX4's fence does nothing without a global position"
-        yield Finding(Level.NOTE, "fence", text, "put a net around the flying space")
+        text = "PX4's fence has no effect without a global position"
+        yield _note("fence", text, "put a net around the flying space")
         return
-    for name, least_m in limits:
+    for name, minimum_m in limits:
         value = parameters.get(name, 0.0)
-        if 0.0 < value < least_m:
-            advice = f"the challenge needs {least_m:g} m; set more, or 0"
-            yield Finding(Level.MISSING, name, f"fence at {value:g} m", advice)
+        if 0.0 < value < minimum_m:
+            yield _missing(
+                name, f"fence at {value:g} m", f"the challenge needs {minimum_m:g} m; set more, or 0"
+            )
 
 
-def check_failsafes(record: Record) -> Iterator[Finding]:
-    """What the drone does when it is left alone: a person must have wanted it so."""
+def _failsafes(record: Record) -> Findings:
+    """What the drone does without commands, for a person to confirm."""
     parameters = record.parameters
     climb_m = parameters.get("RTL_RETURN_ALT")
     climbs = "" if climb_m is None else f", which climbs to {climb_m:g} m first"
     action, loss_s = parameters.get("COM_OBL_RC_ACT"), parameters.get("COM_OF_LOSS_T")
     if action is not None:
         after = "" if loss_s is None else f" after {loss_s:g} s"
-        words = names.OFFBOARD_LOSS.get(int(action), f"action {action:g}")
+        words = _OFFBOARD_LOSS.get(int(action), f"action {action:g}")
         if action <= 2 and parameters.get("NAV_RCL_ACT") == 2:
             words += f" or, without radio control, return{climbs}"
         elif action == 3:
             words += climbs
         advice = "under a roof set COM_OBL_RC_ACT to 4 (land)" if "return" in words else ""
-        level = Level.NOTE if advice else Level.GOOD
-        yield Finding(level, "setpoints lost", f"{words}{after}", advice)
+        yield Finding(Level.NOTE if advice else Level.GOOD, "setpoints lost", f"{words}{after}", advice)
     if loss_s is not None and loss_s < 0.5:
-        advice = "set it to 1: the app's watchdog needs half a second"
-        yield Finding(Level.MISSING, "COM_OF_LOSS_T", f"{loss_s:g} s", advice)
+        yield _missing(
+            "COM_OF_LOSS_T", f"{loss_s:g} s", "set it to 1: the app's watchdog needs half a second"
+        )
     station = parameters.get("NAV_DLL_ACT")
     if station is not None:
-        words = names.LINK_LOSS.get(int(station), f"action {station:g}")
-        needed = "; it arms only while it hears one, as fly is" if station else ""
-        yield Finding(Level.GOOD, "ground station lost", words + (climbs if station == 2 else "") + needed)
+        words = _LINK_LOSS.get(int(station), f"action {station:g}")
+        needed = "; it arms only while it receives one's heartbeats, which fly sends" if station else ""
+        yield _good("ground station lost", words + (climbs if station == 2 else "") + needed)
     low = parameters.get("COM_LOW_BAT_ACT")
     if low is not None:
-        yield Finding(Level.GOOD, "battery low", names.LOW_BATTERY.get(int(low), f"action {low:g}"))
+        yield _good("battery low", _LOW_BATTERY.get(int(low), f"action {low:g}"))
 
 
-def check_position(record: Record) -> Iterator[Finding]:
-    """Something tells the drone its place, to within a part of a frame's opening."""
+def _position(record: Record) -> Findings:
+    """Whether the position is accurate to a part of a frame's opening."""
     status = record.latest.get("ESTIMATOR_STATUS")
     if status is None:
-        yield Finding(Level.NOTE, "position", "it does not say what its estimate is made from")
+        yield _note("position", "it does not report what its estimate is made from")
         return
-    if not status.flags & mavlink.ESTIMATOR_PRED_POS_HORIZ_REL:
-        yield Finding(
-            Level.MISSING, "position", "no sensor tells the drone where it is", _position_advice(record)
+    advice = f"give it its position by motion capture or visual odometry: {_GUIDE}"
+    if int(record.parameters.get("EKF2_EV_CTRL", 0)) & _EV_POSITION:
+        advice = (
+            "EKF2_EV_CTRL requests vision, but none is used: send ODOMETRY with estimator type VISION (not "
+            f"MOCAP), or VISION_POSITION_ESTIMATE, at 50 Hz: {_GUIDE}"
         )
+    if not status.flags & mavlink.ESTIMATOR_PRED_POS_HORIZ_REL:
+        yield _missing("position", "no sensor measures the drone's position", advice)
         return
-    source, accuracy_m = _position_source(record, status), status.pos_horiz_accuracy
+    sources = ["GPS"] if status.flags & mavlink.ESTIMATOR_PRED_POS_HORIZ_ABS else []
+    sources += ["vision"] if _vision_in_use(record, status) else []
+    source = " and ".join(sources) or "optical flow or another relative sensor"
+    accuracy_m = status.pos_horiz_accuracy
     if accuracy_m <= ACCURATE_M:
-        yield Finding(Level.GOOD, "position", f"by {source}, estimated accuracy {accuracy_m:.2f} m")
+        yield _good("position", f"by {source}, estimated accuracy {accuracy_m:.2f} m")
         return
     accuracy = f"estimated accuracy {accuracy_m:.1f} m" if isfinite(accuracy_m) else "unknown accuracy"
     text = f"by {source}, {accuracy}: the drone will stray; a frame's opening is 0.38 m wide"
-    yield Finding(Level.MISSING, "position", text, _position_advice(record))
+    yield _missing("position", text, advice)
 
 
-def check_height(record: Record) -> Iterator[Finding]:
-    """The height comes from something better than air pressure or GPS."""
+def _height(record: Record) -> Findings:
+    """Whether the height is from something better than air pressure or GPS."""
     status, parameters = record.latest.get("ESTIMATOR_STATUS"), record.parameters
     if status is None:
         return
     reference = parameters.get("EKF2_HGT_REF")
     if not status.flags & mavlink.ESTIMATOR_POS_VERT_ABS:
-        yield Finding(Level.MISSING, "height", "no sensor tells the drone its height", f"see {_GUIDE}")
+        yield _missing("height", "no sensor measures the drone's height", f"see {_GUIDE}")
         return
     accuracy_m = status.pos_vert_accuracy
     accuracy = f"estimated accuracy {accuracy_m:.2f} m"
@@ -289,18 +316,23 @@ def check_height(record: Record) -> Iterator[Finding]:
         advice = "" if fine else f"take height from vision or a range finder: {_GUIDE}"
         yield Finding(Level.GOOD if fine else Level.MISSING, "height", accuracy, advice)
         return
-    wished = names.HEIGHT_SOURCE.get(int(reference), "unknown means")
-    source = _height_source(record, status, wished)
+    requested = _HEIGHT_SOURCE.get(int(reference), "unknown means")
+    source = _height_source(record, status, requested)
     if source in ("vision", "range finder") and accuracy_m <= ACCURATE_M:
-        yield Finding(Level.GOOD, "height", f"by {source}, {accuracy}")
+        yield _good("height", f"by {source}, {accuracy}")
         return
-    but = "" if source == wished else f", though EKF2_HGT_REF asks for {wished}"
-    text = f"by {source}{but}, {accuracy}; in flight it wanders, and a frame's opening is 0.18 m high"
-    yield Finding(Level.MISSING, "height", text, _height_advice(record, wished))
+    advice = "as for the position"
+    if requested != "vision":
+        advice = f"take height from vision (EKF2_HGT_REF 3) or a range finder (2): {_GUIDE}"
+    elif not int(parameters.get("EKF2_EV_CTRL", 0)) & _EV_HEIGHT:
+        advice = f"set EKF2_EV_CTRL to 15: {_GUIDE}"
+    but = "" if source == requested else f", though EKF2_HGT_REF asks for {requested}"
+    text = f"by {source}{but}, {accuracy}; in flight it drifts, and a frame's opening is 0.18 m high"
+    yield _missing("height", text, advice)
 
 
-def check_vision_settings(record: Record) -> Iterator[Finding]:
-    """With vision: the estimate follows it closely."""
+def _vision_settings(record: Record) -> Findings:
+    """With vision: whether the estimate follows it closely."""
     status = record.latest.get("ESTIMATOR_STATUS")
     if status is None or not _vision_in_use(record, status):
         return
@@ -312,86 +344,52 @@ def check_vision_settings(record: Record) -> Iterator[Finding]:
     if slow:
         text = f"follows vision too slowly for the frames: {', '.join(slow)}"
         advice = "set what docs/real-drone.md, section 7.3, advises, then restart the drone"
-        yield Finding(Level.MISSING, "estimator", text, advice)
+        yield _missing("estimator", text, advice)
 
 
-def check_still(record: Record) -> Iterator[Finding]:
-    """The position stays where the drone stands."""
+def _still(record: Record) -> Findings:
+    """Whether the position stays the same while the drone stands."""
     if not record.places or record.armed:
         return
     wander_m = record.wander_m
     if wander_m > WANDER_M:
-        text = f"wanders {wander_m:.2f} m while it stands; a frame's opening is 0.18 m high"
-        yield Finding(Level.NOTE, "estimate", text, f"see {_GUIDE}")
+        text = f"drifts {wander_m:.2f} m while it stands; a frame's opening is 0.18 m high"
+        yield _note("estimate", text, f"see {_GUIDE}")
     else:
-        yield Finding(Level.GOOD, "estimate", f"still within {wander_m:.2f} m")
-
-
-def _position_advice(record: Record) -> str:
-    if int(record.parameters.get("EKF2_EV_CTRL", 0)) & _EV_POSITION:
-        return (
-            "EKF2_EV_CTRL asks for vision, but none is used: send ODOMETRY with estimator type VISION (not "
-            f"MOCAP), or VISION_POSITION_ESTIMATE, at 50 Hz: {_GUIDE}"
-        )
-    return f"give it its position by motion capture or visual odometry: {_GUIDE}"
-
-
-def _height_advice(record: Record, wished: str) -> str:
-    if wished != "vision":
-        return f"take height from vision (EKF2_HGT_REF 3) or a range finder (2): {_GUIDE}"
-    if not int(record.parameters.get("EKF2_EV_CTRL", 0)) & _EV_HEIGHT:
-        return f"set EKF2_EV_CTRL to 15: {_GUIDE}"
-    return "as for the position"
+        yield _good("estimate", f"still within {wander_m:.2f} m")
 
 
 def _vision_in_use(record: Record, status: Message) -> bool:
-    """Whether external vision is what the position is made from, as far as flags and accuracy can tell."""
+    """Whether the position is from external vision, as far as flags and accuracy show."""
     asked = int(record.parameters.get("EKF2_EV_CTRL", 0)) & _EV_POSITION
     aided = status.flags & mavlink.ESTIMATOR_PRED_POS_HORIZ_REL
     return bool(asked and aided and status.pos_horiz_accuracy <= ACCURATE_M)
 
 
-def _position_source(record: Record, status: Message) -> str:
-    sources = []
-    if status.flags & mavlink.ESTIMATOR_PRED_POS_HORIZ_ABS:
-        sources.append("GPS")
-    if _vision_in_use(record, status):
-        sources.append("vision")
-    return " and ".join(sources) or "optical flow or another relative sensor"
-
-
-def _height_source(record: Record, status: Message, wished: str) -> str:
-    """Where the height comes from: PX4 turns to the barometer when its reference is not there."""
+def _height_source(record: Record, status: Message, requested: str) -> str:
+    """Where the height is from: PX4 falls back to the barometer when its reference is missing."""
     parameters = record.parameters
-    there = {
+    present = {
         "barometer": True,
         "GPS": bool(status.flags & mavlink.ESTIMATOR_PRED_POS_HORIZ_ABS),
         "range finder": bool(parameters.get("EKF2_RNG_CTRL", 1.0)) and "DISTANCE_SENSOR" in record.counts,
         "vision": _vision_in_use(record, status) and bool(int(parameters["EKF2_EV_CTRL"]) & _EV_HEIGHT),
     }
-    return wished if there.get(wished) else "barometer"
+    return requested if present.get(requested) else "barometer"
 
 
-_ATTITUDES = ("ATTITUDE", "ATTITUDE_QUATERNION")
-_MULTICOPTERS = (
-    mavlink.MAV_TYPE_QUADROTOR,
-    mavlink.MAV_TYPE_HEXAROTOR,
-    mavlink.MAV_TYPE_OCTOROTOR,
-    mavlink.MAV_TYPE_TRICOPTER,
-    mavlink.MAV_TYPE_COAXIAL,
-)
-CHECKS: tuple[Callable[[Record], Iterator[Finding]], ...] = (
-    check_autopilot,
-    check_armed,
-    check_health,
-    check_offboard,
-    check_streams,
-    check_link,
-    check_position,
-    check_height,
-    check_vision_settings,
-    check_still,
-    check_battery,
-    check_limits,
-    check_failsafes,
+_CHECKS: tuple[Callable[[Record], Findings], ...] = (
+    _autopilot,
+    _armed,
+    _health,
+    _offboard,
+    _streams,
+    _link,
+    _position,
+    _height,
+    _vision_settings,
+    _still,
+    _battery,
+    _limits,
+    _failsafes,
 )

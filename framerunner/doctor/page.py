@@ -1,4 +1,4 @@
-"""The page a person reads: the drone, what was found, its streams, what it says."""
+"""The page that a person reads: the drone, what was found, its streams, its status texts."""
 
 from __future__ import annotations
 
@@ -10,50 +10,51 @@ from rich.markup import escape
 from rich.table import Table
 from rich.text import Text
 
-from framerunner.doctor import names
 from framerunner.doctor.checks import Finding, Level, can_fly
-from framerunner.doctor.record import Record
+from framerunner.doctor.listen import Record
+from wire.dialect import mavlink
+from wire.px4_modes import mode_words
 
 _MARKS = {Level.GOOD: "[green]ok[/]", Level.NOTE: "[yellow]note[/]", Level.MISSING: "[red]MISSING[/]"}
 _STREAMS = (
-    "HEARTBEAT",
-    "ATTITUDE",
-    "ATTITUDE_QUATERNION",
-    "LOCAL_POSITION_NED",
-    "GLOBAL_POSITION_INT",
-    "SYS_STATUS",
-    "EXTENDED_SYS_STATE",
-    "BATTERY_STATUS",
-    "DISTANCE_SENSOR",
-    "ODOMETRY",
-    "POSITION_TARGET_LOCAL_NED",
-    "ESTIMATOR_STATUS",
+    *("HEARTBEAT", "ATTITUDE", "ATTITUDE_QUATERNION", "LOCAL_POSITION_NED", "GLOBAL_POSITION_INT"),
+    *("SYS_STATUS", "EXTENDED_SYS_STATE", "BATTERY_STATUS", "DISTANCE_SENSOR", "ODOMETRY"),
+    *("POSITION_TARGET_LOCAL_NED", "ESTIMATOR_STATUS"),
 )
 _SEVERITIES = ("emergency", "alert", "critical", "error", "warning", "notice", "info", "debug")
+_CAPABILITIES = {
+    mavlink.MAV_PROTOCOL_CAPABILITY_SET_POSITION_TARGET_LOCAL_NED: "local setpoints",
+    mavlink.MAV_PROTOCOL_CAPABILITY_SET_ATTITUDE_TARGET: "attitude setpoints",
+    mavlink.MAV_PROTOCOL_CAPABILITY_MISSION_INT: "missions",
+    mavlink.MAV_PROTOCOL_CAPABILITY_MISSION_FENCE: "geofence",
+    mavlink.MAV_PROTOCOL_CAPABILITY_FTP: "files",
+    mavlink.MAV_PROTOCOL_CAPABILITY_MAVLINK2: "MAVLink 2",
+}
+_RELEASES = {0: " dev", 64: " alpha", 128: " beta", 192: " rc"}  # last byte of flight_sw_version; else final
 
 
 def print_page(console: Console, url: str, record: Record, findings: list[Finding]) -> None:
-    """Print all that is to be said.
-
-    Args:
-        console: where to.
-        url: on which the drone was heard.
-        record: what it told.
-        findings: what was made of it.
-    """
+    """Print what was received on a URL, and the findings."""
     console.print(Group(*_page(url, record, findings)))
 
 
 def _page(url: str, record: Record, findings: list[Finding]) -> Iterator[RenderableType]:
     yield Text(f"Vehicle {record.system_id} on {url}", style="bold")
-    yield _facts(record)
+    facts = _table("", "")
+    for name, value in _facts(record):
+        facts.add_row(name, escape(value))
+    yield facts
     yield ""
-    yield _found(findings)
+    found = Table(show_header=False, box=None, pad_edge=False)
+    for finding in findings:
+        advice = f"[dim]{escape(finding.advice)}[/]"
+        found.add_row(_MARKS[finding.level], escape(finding.subject), escape(finding.text), advice)
+    yield found
     yield ""
     yield Columns([_streams(record), _parameters(record)], padding=(0, 4))
     if record.texts:
         yield ""
-        yield Text("It says", style="bold")
+        yield Text("Its status texts", style="bold")
         for severity, text in record.texts:
             yield Text(f"  {_SEVERITIES[min(severity, 7)]}: {text}")
     yield ""
@@ -65,29 +66,17 @@ def _page(url: str, record: Record, findings: list[Finding]) -> Iterator[Rendera
         yield Text(f"It cannot fly the challenge yet: {things} missing.", style="bold red")
 
 
-def _facts(record: Record) -> Table:
-    table = Table(show_header=False, box=None, pad_edge=False)
-    table.add_column(style="dim")
-    table.add_column()
-    for name, value in _fact_lines(record):
-        table.add_row(name, escape(value))
-    return table
-
-
-def _fact_lines(record: Record) -> Iterator[tuple[str, str]]:
-    heartbeat = record.latest["HEARTBEAT"]
-    autopilot = names.AUTOPILOTS.get(heartbeat.autopilot, f"autopilot {heartbeat.autopilot}")
+def _facts(record: Record) -> Iterator[tuple[str, str]]:
     version = record.latest.get("AUTOPILOT_VERSION")
-    number = "" if version is None else f" {names.version_text(version.flight_sw_version)}"
-    yield "autopilot", f"{autopilot}{number}, {names.kind_name(heartbeat.type)}"
-    mode = names.mode_name(heartbeat.custom_mode, record.modes)
+    number = "" if version is None else f" {_version_text(version.flight_sw_version)}"
+    yield "autopilot", f"{record.autopilot_name}{number}, {record.type_name}"
     armed = "armed" if record.armed else "disarmed"
-    yield "state", f"{armed}, {mode}, {names.STATES[min(heartbeat.system_status, len(names.STATES) - 1)]}"
+    yield "state", f"{armed}, {record.mode_name}, {record.state_name}"
     if version is not None:
-        able = [text for bit, text in names.CAPABILITIES.items() if version.capabilities & bit]
-        yield "can do", ", ".join(able) or "it does not say"
+        able = [text for bit, text in _CAPABILITIES.items() if version.capabilities & bit]
+        yield "can do", ", ".join(able) or "not reported"
     if record.modes:
-        yield "modes", ", ".join(names.mode_name(number, record.modes) for number in sorted(record.modes))
+        yield "modes", ", ".join(name or mode_words(mode) for mode, name in sorted(record.modes.items()))
     factor = record.real_time_factor
     if factor is not None:
         yield "clock", f"runs at {factor:.2f} of real time"
@@ -100,28 +89,29 @@ def _fact_lines(record: Record) -> Iterator[tuple[str, str]]:
         yield "stations", f"others on this link: {stations}"
 
 
+def _version_text(number: int) -> str:
+    """A flight_sw_version: three bytes and the kind of release."""
+    return f"{number >> 24}.{number >> 16 & 0xFF}.{number >> 8 & 0xFF}{_RELEASES.get(number & 0xFF, '')}"
+
+
 def _place(message: object) -> str:
     latitude, longitude = getattr(message, "latitude", None), getattr(message, "longitude", None)
     altitude = getattr(message, "altitude", None)
     if latitude is None or longitude is None or altitude is None:
-        return "not known; the challenge needs none"
-    return f"{latitude / 1e7:.6f}, {longitude / 1e7:.6f}, {altitude / 1e3:.1f} m above the sea"
+        return "unknown; the challenge needs none"
+    return f"{latitude / 1e7:.6f}, {longitude / 1e7:.6f}, {altitude / 1e3:.1f} m above sea level"
 
 
-def _found(findings: list[Finding]) -> Table:
-    table = Table(show_header=False, box=None, pad_edge=False)
-    for column in ("", "", "", ""):
-        table.add_column(column)
-    for finding in findings:
-        advice = f"[dim]{escape(finding.advice)}[/]"
-        table.add_row(_MARKS[finding.level], escape(finding.subject), escape(finding.text), advice)
+def _table(*columns: str, title: str | None = None) -> Table:
+    table = Table(*columns, title=title, title_justify="left", show_header=any(columns), box=None)
+    table.pad_edge = False
+    table.columns[0].style = "dim"
+    table.columns[1].justify = "right" if title else "left"
     return table
 
 
 def _streams(record: Record) -> Table:
-    table = Table(title="Streams", title_justify="left", box=None, pad_edge=False)
-    table.add_column("message", style="dim")
-    table.add_column("Hz", justify="right")
+    table = _table("message", "Hz", title="Streams")
     for kind in _STREAMS:
         if kind in record.counts:
             table.add_row(kind, f"{record.rate_hz(kind):.1f}")
@@ -134,9 +124,7 @@ def _streams(record: Record) -> Table:
 
 
 def _parameters(record: Record) -> Table:
-    table = Table(title="Parameters", title_justify="left", box=None, pad_edge=False)
-    table.add_column("name", style="dim")
-    table.add_column("value", justify="right")
+    table = _table("name", "value", title="Parameters")
     for name, value in sorted(record.parameters.items()):
-        table.add_row(name, f"{value:g}")
+        table.add_row(escape(name), f"{value:g}")
     return table

@@ -10,6 +10,7 @@ from pathlib import Path
 from rich.console import Console
 
 from errors import SettingError
+from framerunner.errors import install_advice, is_installed
 from framerunner.evaluation.backends import Pool, check_pool
 from framerunner.evaluation.compare import check_comparable, compare
 from framerunner.evaluation.plan import Plan
@@ -18,7 +19,6 @@ from framerunner.evaluation.runner import fly_all
 from framerunner.evaluation.statistics import summarise
 from framerunner.evaluation.store import RESULTS, EvaluationFolder, open_folder, read_folder
 from framerunner.evaluation.terminal import EvaluationProgress, print_comparison, print_summary
-from framerunner.extras import advice, is_installed
 from scenarios.verdict import Verdict
 
 EXIT_INTERRUPTED = 130
@@ -123,7 +123,7 @@ def _report(settings: EvaluationSettings, folder: EvaluationFolder, before: Eval
     code = 1 if Verdict.ERROR in summary.verdicts else 0
 
     if not is_installed("matplotlib"):
-        _note(f"warning: report.html was not made: {advice('matplotlib')}")
+        _note(f"warning: report.html was not made: {install_advice('matplotlib')}")
         print(f"left in {folder.path}/: results.csv", flush=True)
         return code
     console = Console(stderr=True)

@@ -1,1 +1,1 @@
-"""How a flight is flown: its plan, and real time or lockstep to fly it in."""
+"""How a flight is flown: its plan, and flights in real time and in lockstep."""

@@ -1,4 +1,4 @@
-"""What the terminal shows during a flight."""
+"""What the terminal shows during a flight, and the result in words."""
 
 from __future__ import annotations
 
@@ -6,7 +6,6 @@ import asyncio
 import sys
 import time
 from math import isfinite
-from types import TracebackType
 
 from rich.console import Console
 from rich.live import Live
@@ -17,7 +16,7 @@ from rich.table import Table
 from framerunner.flying.judges import Judge
 from framerunner.runs.recorder import FlightRecorder
 from offboard.app import Moment
-from scenarios.result import RefereeSnapshot
+from scenarios.result import FlightResult, RefereeSnapshot, Timing
 from vision.types import Detection
 
 _REFRESH_S = 0.2
@@ -30,13 +29,7 @@ _PROGRESS_LINE_S = 2.0
 class FlightDisplay:
     """A live table in a terminal; elsewhere a line at every change of state and every ten seconds.
 
-    Shown while it is entered as a context.
-
-    Args:
-        title: scenario and mission.
-        limit_s: of the try.
-        recorder: knows the latest tick.
-        judge: knows how the try stands.
+    Shown while it is entered as a context; the recorder has the latest tick, the judge how the try stands.
     """
 
     def __init__(self, title: str, limit_s: float, recorder: FlightRecorder, judge: Judge) -> None:
@@ -45,17 +38,17 @@ class FlightDisplay:
         self._recorder = recorder
         self._judge = judge
         self._console = Console(file=sys.stderr)
-        self._line_state = ""  # what the last line said
+        self._line_state = ""  # in the last line
         self._line_s = -_LINE_S
         self._showing: asyncio.Task[None] | None = None
 
     async def __aenter__(self) -> FlightDisplay:
-        """Begin to show."""
+        """Start to show."""
         self._showing = asyncio.create_task(self._show())
         return self
 
     async def __aexit__(self, *_: object) -> None:
-        """Take the table away."""
+        """Remove the table."""
         if self._showing is not None:
             self._showing.cancel()
             await asyncio.gather(self._showing, return_exceptions=True)
@@ -80,10 +73,10 @@ class FlightDisplay:
             return
         self._line_state, self._line_s = moment.mission_state + paused, time_s
         crossed = ", ".join(standing.crossed) if standing else ""
-        place, told = place_in_words(moment), paused or moment.remark
+        place, note = place_in_words(moment), paused or moment.remark
         print(
             f"{time_s:6.1f} s  {moment.mission_state:22s} {place}  crossed: {crossed or 'none'}"
-            f"{'  ' if told else ''}{told}",
+            f"{'  ' if note else ''}{note}",
             file=sys.stderr,
             flush=True,
         )
@@ -102,13 +95,7 @@ class FlightDisplay:
 
 
 def moment_table(title: str, moment: Moment, time: str) -> Table:
-    """A tick of a flight as a table.
-
-    Args:
-        title: scenario and mission.
-        moment: the tick.
-        time: how to say its time.
-    """
+    """A tick of a flight as a table, with its time in words."""
     table = _empty_table(title)
     table.add_row("state", escape(moment.mission_state))
     if moment.paused:
@@ -131,13 +118,13 @@ def _empty_table(title: str) -> Table:
 
 
 def place_in_words(moment: Moment) -> str:
-    """Where the drone is."""
+    """Position and yaw of the drone."""
     state = moment.state
     return f"x {state.x:5.2f}  y {state.y:5.2f}  z {state.z:4.2f} m  yaw {state.yaw:5.2f} rad"
 
 
 def pause_in_words(moment: Moment) -> str:
-    """Who has the drone while the mission waits, and why it went on waiting; empty when it does not wait."""
+    """Why the mission is paused; empty if it is not."""
     if not moment.paused:
         return ""
     mode = moment.state.mode
@@ -155,11 +142,7 @@ def _seen(detection: Detection) -> str:
 
 
 class LockstepProgress:
-    """A status line in a terminal, elsewhere a line every two seconds; nothing in the first second.
-
-    Args:
-        limit_s: of the try.
-    """
+    """A status line in a terminal, elsewhere a line every two seconds; nothing in the first second."""
 
     def __init__(self, limit_s: float) -> None:
         self._limit_s = limit_s
@@ -169,18 +152,16 @@ class LockstepProgress:
         self._next_s = self._started_s + _PROGRESS_QUIET_S
 
     def __enter__(self) -> LockstepProgress:
-        """Begin to count the first second."""
+        """Start to count the first second."""
         return self
 
-    def __exit__(
-        self, _kind: type[BaseException] | None, _error: BaseException | None, _trace: TracebackType | None
-    ) -> None:
-        """Take the status line away."""
+    def __exit__(self, *_: object) -> None:
+        """Remove the status line."""
         if self._status is not None:
             self._status.stop()
 
     def see(self, moment: Moment) -> None:
-        """Take a tick of the flight."""
+        """Show a tick of the flight, if the last one shown is old enough."""
         now_s = time.monotonic()
         if now_s < self._next_s:
             return
@@ -198,3 +179,34 @@ class LockstepProgress:
             self._status = self._console.status(text)
             self._status.start()
         self._status.update(text)
+
+
+def result_lines(result: FlightResult) -> str:
+    """A result in two lines for people."""
+    error_m = result.landing_error_m
+    landing = "did not land" if error_m is None else f"landed {100 * error_m:.1f} cm from the base's centre"
+    verdict, reason = result.verdict, result.reason
+    sentence = reason if reason.startswith(verdict) else f"{verdict}: {reason}"
+    kept = f", kept in its box for {result.kept_in_box_s:.1f} s" if result.kept_in_box_s else ""
+    return (
+        f"{sentence}\n"
+        f"try {result.try_time_s:.1f} s, penalty {result.penalty_s:.1f} s, "
+        f"path {result.path_length_m:.1f} m, {landing}, judged by {result.judged_by}{kept}"
+    )
+
+
+def timing_line(timing: Timing | None) -> str:
+    """One line for people if the machine was too slow; empty if it was not, or that is unknown."""
+    if timing is None or timing.kept_up:
+        return ""
+    counts = {"ticks": timing.late_ticks, "images": timing.late_images, "setpoints": timing.late_setpoints}
+    late = ", ".join(f"{count} {what}" for what, count in counts.items() if count)
+    if late:
+        return (
+            f"the machine did not keep up: {late} came late (oldest image {timing.oldest_image_s:.2f} s); "
+            "the flight may differ from one on a free machine"
+        )
+    return (
+        f"the machine did not keep up: vehicle time ran at {timing.speed:.2f} of the requested speed; "
+        "it waited for the app, so the flight is the same as on a free machine"
+    )

@@ -1,4 +1,4 @@
-"""Where the verdict comes from: the simulator, which knows the truth, or a drone's own telemetry."""
+"""The source of the verdict: the simulator, which has the true states, or a drone's own telemetry."""
 
 from __future__ import annotations
 
@@ -16,46 +16,37 @@ from scenarios.referee import Referee
 from scenarios.result import RefereeReport, RefereeSnapshot, Standing
 from wire.simulator_api import SimulatorApi
 
-if TYPE_CHECKING:  # a flight in lockstep asks nobody over HTTP
+if TYPE_CHECKING:  # a flight in lockstep needs no HTTP
     import aiohttp
 
 _ANSWER_S = 2.0
 _POLL_S = 0.1
-# Vehicle time. A heartbeat a second tells each link of the disarming; then the referee needs at most 2 s.
+# Vehicle time. Heartbeats, one a second, show the disarming; the referee then needs at most 2 s.
 _SETTLE_LIMIT_US = 5_000_000
 _CLOCK_STOPPED_S = 3.0  # wall time without progress of vehicle time
 
 
 class Judge(Protocol):
-    """A referee, wherever it is.
-
-    Attributes:
-        source: by what it judges: "truth" or "telemetry".
-    """
+    """A referee in this process or elsewhere."""
 
     source: str
+    """The states that it judges by: "truth" or "telemetry"."""
 
     def see(self, moment: Moment) -> None:
         """Take a tick of the flight."""
 
     async def standing(self) -> RefereeSnapshot | None:
-        """How the try stands now; None if it cannot be had."""
+        """How the try stands now; None if that is unknown."""
 
     async def report(self, mission_state: str, ended: str | None) -> RefereeReport:
-        """The report, when the drone has come to rest."""
+        """Return the report, when the drone has come to rest."""
         ...
 
 
 class TruthJudge:
-    """Asks the simulator's referee, which sees the true state of every control tick.
+    """The simulator's referee, which sees the true state of every control tick, over HTTP.
 
-    Should the simulator die, the verdict comes from the telemetry seen so far.
-
-    Args:
-        api: of the simulator.
-        session: for asking.
-        plan: of the flight, for the substitute.
-        source: by what its referee judges, as it says itself.
+    If the simulator ends, the verdict is made from the telemetry seen so far.
     """
 
     def __init__(
@@ -67,19 +58,20 @@ class TruthJudge:
         self._substitute = TelemetryJudge(plan.new_referee())
 
     def see(self, moment: Moment) -> None:
-        """The referee sees for itself; the substitute follows."""
+        """Show the tick to the substitute; the referee itself sees the simulation."""
         self._substitute.see(moment)
 
     async def standing(self) -> RefereeSnapshot | None:
-        """Ask for the snapshot."""
+        """As of now, or None without a valid answer."""
         answer = await ask_referee(self._api, self._session)
         return None if answer is None else answer.snapshot
 
     async def report(self, mission_state: str, ended: str | None) -> RefereeReport:
-        """Ask for the report once the drone is at rest.
+        """Request the report once the drone is at rest.
 
-        A mission that finished has seen the motors stop; the referee's own link may tell it later. A flight
-        that was broken off may go on, in hold, with the motors on: that is not waited for.
+        A mission that finished has seen the motors stop; the referee may learn of it later, over another
+        link. After a flight that was aborted the drone may stay in hold with its motors on; this does not
+        wait for their end.
         """
         await self._settle(motors_stopped=ended is None)
         parameters = {"state": mission_state, **({"ended": ended} if ended else {})}
@@ -92,8 +84,7 @@ class TruthJudge:
     async def _settle(self, *, motors_stopped: bool) -> None:
         """Wait until the referee sees the drone at rest, for 5 s of vehicle time at most.
 
-        Args:
-            motors_stopped: the motors are known to be off, whatever the referee has heard yet.
+        If `motors_stopped`, the motors are known to be off, even if the referee has not seen it yet.
         """
         loop = asyncio.get_running_loop()
         began_us = newest_us = -1
@@ -112,11 +103,7 @@ class TruthJudge:
 
 
 class TelemetryJudge:
-    """Judges by what the drone says of itself; contacts with frames remain unseen.
-
-    Args:
-        referee: is shown what telemetry tells.
-    """
+    """A referee in this process that sees the drone's telemetry, and so no contacts with frames."""
 
     source = "telemetry"
 
@@ -124,7 +111,7 @@ class TelemetryJudge:
         self._referee = referee
 
     def see(self, moment: Moment) -> None:
-        """Follow the drone's state."""
+        """Show the drone's state to the referee."""
         state = moment.state
         half = state.yaw / 2
         self._referee.update(
@@ -138,18 +125,18 @@ class TelemetryJudge:
         )
 
     async def standing(self) -> RefereeSnapshot | None:
-        """From the last tick."""
+        """As of the last tick."""
         return self._referee.snapshot()
 
     async def report(self, mission_state: str, ended: str | None) -> RefereeReport:
-        """Judge what was seen."""
+        """Judge what was seen so far."""
         return self._referee.report(mission_state, ended)
 
 
 async def ask_referee(
     api: SimulatorApi, session: aiohttp.ClientSession, parameters: dict[str, str] | None = None
 ) -> Standing | None:
-    """Get a simulator's `referee.json`; None if there is none."""
+    """Request a simulator's `referee.json`; None if there is no valid answer."""
     import aiohttp
 
     timeout = aiohttp.ClientTimeout(total=_ANSWER_S)
@@ -165,24 +152,24 @@ async def ask_referee(
 async def choose_judge(
     plan: FlightPlan, api: SimulatorApi | None, session: aiohttp.ClientSession, *, named: bool = False
 ) -> tuple[Judge, FlightPlan]:
-    """Take the referee of the simulator that flies, or judge by telemetry.
+    """Choose the referee of the simulator that flies or, without one, telemetry.
 
     Args:
         plan: of the flight; a simulator with another scenario cannot judge it.
-        api: where the simulator may be; None: the drone is none.
-        session: for asking.
-        named: whether somebody said that a simulator is there; else it is not missed.
+        api: where a simulator may be; None: nowhere.
+        session: for the requests.
+        named: whether the user named the simulator, which must then answer.
 
     Returns:
         The judge, and the plan with its frames as high as the simulator has them.
 
     Raises:
-        SettingError: the simulator that was named does not judge this scenario.
+        SettingError: the named simulator does not judge this scenario.
     """
     answer = None if api is None else await ask_referee(api, session)
     if api is not None and answer is not None and answer.scenario == plan.scenario.name:
         plan = plan.lifted(answer.lift_m)
-        return TruthJudge(api, session, plan, answer.source), plan  # a virtual camera's lives on telemetry
+        return TruthJudge(api, session, plan, answer.source), plan
     if api is not None and named:
         raise SettingError(
             f"--simulator {api.url}: "

@@ -11,7 +11,7 @@ import hashlib
 from collections.abc import Callable, Sequence
 from struct import Struct
 
-from framerunner.flying.fly import Flown, fly
+from framerunner.flying.fly import FinishedFlight, fly
 from framerunner.flying.lockstep_drone import LockstepDrone, TruthObserver
 from framerunner.flying.plan import FlightPlan
 from offboard.app import Moment, Observer
@@ -24,38 +24,33 @@ from vision.detector import detect
 from vision.types import Detections, Image
 
 ImageObserver = Callable[[int, Image], None]
+"""Called with time of exposure (microseconds) and each image as it arrives."""
 
 _ROW = Struct("<12d")  # time in us, position, velocity, attitude, motors on
-_ROW_BYTES = _ROW.size
-_CHUNK_BYTES = _ROW_BYTES * 1000
 
 
 def fly_lockstep(
     plan: FlightPlan, *, observers: Sequence[Observer] = (), on_image: ImageObserver | None = None
-) -> Flown:
+) -> FinishedFlight:
     """Fly a plan as fast as the machine can; see `lockstep_flight`, which does it within an event loop."""
     return asyncio.run(lockstep_flight(plan, observers=observers, on_image=on_image))
 
 
 async def lockstep_flight(
     plan: FlightPlan, *, observers: Sequence[Observer] = (), on_image: ImageObserver | None = None
-) -> Flown:
-    """Fly a plan as fast as the machine can.
-
-    Args:
-        plan: with a mission; its seed is recorded, nothing is random yet.
-        observers: called at every tick of the mission.
-        on_image: called with time of exposure (microseconds) and each image as it arrives.
+) -> FinishedFlight:
+    """Fly a plan as fast as the machine can; its seed is recorded, nothing is random yet.
 
     Raises:
         DroneError: the drone does not get ready.
+        ValueError: the plan has no mission.
     """
     states = StateHash()
     vehicle = LockstepVehicle(plan, on_image, observers=(states.add,))
     return await fly(
         plan,
         vehicle.drone,
-        vehicle.eyes,
+        vehicle.perception,
         _SimulationJudge(vehicle),
         observers,
         measured=lambda: {"state_sha256": states.hexdigest()},
@@ -63,17 +58,9 @@ async def lockstep_flight(
 
 
 class LockstepVehicle:
-    """A plan's drone on its start, with its eyes: one simulation in this process.
+    """A plan's drone on its start and its perception: a simulation that advances only while the drone is used.
 
-    Args:
-        plan: whose drone it is.
-        on_image: called with time of exposure (microseconds) and image as each arrives.
-        observers: called with the truth of every control tick.
-
-    Attributes:
-        simulation: moves on only while the drone is asked for something.
-        drone: the port by which it is flown.
-        eyes: what its camera shows.
+    Its observers are called with the true state of every control tick.
     """
 
     def __init__(
@@ -84,12 +71,14 @@ class LockstepVehicle:
         observers: Sequence[TruthObserver] = (),
     ) -> None:
         self.simulation = Simulation(plan.scenario, plan.airframe)
-        self.eyes = LockstepEyes(plan.scenario, on_image)
-        self.drone = LockstepDrone(self.simulation, plan.start_pose, observers=(*observers, self.eyes.follow))
+        self.perception = LockstepPerception(plan.scenario, on_image)
+        self.drone = LockstepDrone(
+            self.simulation, plan.start_pose, observers=(*observers, self.perception.follow)
+        )
 
 
 class _SimulationJudge:
-    """The simulation's own referee, which has seen the truth of every control tick."""
+    """The simulation's own referee, which sees the true state of every control tick."""
 
     source = "truth"
 
@@ -97,27 +86,21 @@ class _SimulationJudge:
         self._vehicle = vehicle
 
     def see(self, moment: Moment) -> None:
-        """The referee sees for itself."""
+        pass
 
     async def standing(self) -> RefereeSnapshot:
-        """How the try stands now."""
         return self._vehicle.simulation.referee.snapshot()
 
     async def report(self, mission_state: str, ended: str | None) -> RefereeReport:
-        """The report, when the drone has come to rest."""
         self._vehicle.drone.settle()
         return self._vehicle.simulation.referee.report(mission_state, ended)
 
 
-class LockstepEyes:
-    """Sees each image when the camera's latency is over; fed with the truth of every control tick.
-
-    Args:
-        scenario: camera settings and what is to be seen.
-        on_image: called with time of exposure (microseconds) and image as each arrives.
-    """
+class LockstepPerception:
+    """The camera's images, each when its latency is over; `follow` is called at every control tick."""
 
     def __init__(self, scenario: Scenario, on_image: ImageObserver | None = None) -> None:
+        self.image: Image | None = None  # the latest: BGR, shape (height, width, 3), uint8
         self._feed = CameraFeed(scenario)
         self._on_image = on_image
         self._arrived: tuple[int, Image] | None = None
@@ -125,26 +108,24 @@ class LockstepEyes:
         self._detections = Detections()
 
     def follow(self, truth: TrueState) -> None:
-        """Let the camera take the control tick that has just passed."""
+        """Let the camera see the control tick that has just passed."""
         if truth.time_us < self._feed.next_us:
             return
         arrived = self._feed.step(truth)
         if arrived is not None:
             self._arrived = arrived
+            self.image = arrived[1]
             if self._on_image is not None:
                 self._on_image(*arrived)
 
     async def open(self) -> None:
-        """Nothing to wait for: images come while the drone gets ready."""
+        """Nothing to wait for: images arrive while the drone gets ready."""
 
     def latest(self, time_us: int) -> Detections:
-        """What the latest image showed; the detector looks only at images that are asked for.
-
-        Args:
-            time_us: vehicle time now.
+        """What the latest image showed; the detector processes an image only when this is called.
 
         Raises:
-            CameraLostError: the last image is older than a second.
+            CameraLostError: the last image is older than a second of vehicle time.
         """
         if self._arrived is not None:
             self._image_us, image = self._arrived
@@ -156,40 +137,29 @@ class LockstepEyes:
         return self._detections
 
     async def close(self) -> None:
-        """Nothing to let go of."""
+        """Nothing to close."""
 
 
 class StateHash:
-    """One number for a whole flight, equal only if every true state was equal to the last bit.
+    """One hash for a whole flight, equal only if every true state was equal to the last bit.
 
-    SHA-256 over the states as little-endian float64s; whole microseconds are exact in them.
+    SHA-256 over the states as little-endian float64s, which hold whole microseconds exactly.
     """
-
-    __slots__ = ("_filled", "_rows", "_sha256")
 
     def __init__(self) -> None:
         self._sha256 = hashlib.sha256()
-        self._rows = bytearray(_CHUNK_BYTES)
-        self._filled = 0
 
     def add(self, truth: TrueState) -> None:
-        """Take the next state."""
-        _ROW.pack_into(
-            self._rows,
-            self._filled,
+        """Add the next state."""
+        row = _ROW.pack(
             truth.time_us,
             *truth.position_arena_m,
             *truth.velocity_arena_m_s,
             *truth.attitude_arena,
             truth.motors_on,
         )
-        self._filled += _ROW_BYTES
-        if self._filled == _CHUNK_BYTES:
-            self._sha256.update(self._rows)
-            self._filled = 0
+        self._sha256.update(row)
 
     def hexdigest(self) -> str:
-        """The sum of all states so far."""
-        so_far = self._sha256.copy()
-        so_far.update(memoryview(self._rows)[: self._filled])
-        return so_far.hexdigest()
+        """Return the hash of all states so far."""
+        return self._sha256.hexdigest()

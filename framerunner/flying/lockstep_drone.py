@@ -1,12 +1,12 @@
 """The `Drone` port onto a simulation in the same process: simulated time only, no sockets, no waiting.
 
-What a link does in time is kept, so that a mission flies as it does in real time: telemetry comes a little
-later than what it tells, mode and arming are learnt from heartbeats once a second, and motors are switched on
-in the same order. What is asked of the vehicle goes through the functions that packets go through.
+The timing of a link is kept, so that a mission flies as it does in real time: telemetry arrives a little
+later than the state it reports, mode and arming are known from heartbeats once a second, and the motors are
+switched on in the same order. Requests call the functions that handle the packets of a link.
 
-Numbers become what they are on a link: MAVLink carries single precision, MAVSDK goes through degrees. The
-paper's navigator decides by single pixels, so even a ten-millionth of a metre may turn a flight. With the
-link's rounding in it, a lockstep flight is the same as one over UDP until something else differs.
+Numbers are rounded as on a link: MAVLink carries single precision, MAVSDK converts to degrees. The paper's
+navigator decides by single pixels, so even a ten-millionth of a metre may change a flight. With the link's
+rounding, a lockstep flight is the same as one over UDP until something else differs.
 """
 
 from __future__ import annotations
@@ -16,6 +16,7 @@ from collections.abc import AsyncIterator, Callable, Sequence
 from math import degrees, isfinite, pi, radians
 from struct import Struct
 
+from firmware_py.autopilot import Autopilot
 from firmware_py.offboard_requests import SetpointRefusal, setpoint_from_body_velocity
 from firmware_py.status import CommandResult, FlightMode, LandedState
 from firmware_py.types import CRITICAL
@@ -30,12 +31,12 @@ HEARTBEAT_US = 1_000_000
 POSITION_US = 20_000
 """Between two position messages; a tick, made by an attitude message, has the last one before it."""
 POSITION_PHASE_US = 16_000
-"""Beside the ticks' grid, for the reason that the camera's is."""
+"""Off the ticks' grid, for the same reason as the camera's exposures."""
 TELEMETRY_DELAY_US = 4_000
 """From a state to the setpoint that answers it: one control tick, as measured over UDP and MAVSDK."""
 STREAM_BEFORE_OFFBOARD_US = 300_000
 RESEND_US = 60_000
-"""A velocity holds until changed, so it is sent again; just later than the next tick's would come."""
+"""A velocity holds until changed, so it is sent again, just later than the next tick's would be."""
 LINK_LOST_US = 1_000_000
 READY_LIMIT_US = 30_000_000
 CONFIRM_LIMIT_US = 6_000_000
@@ -50,19 +51,17 @@ TruthObserver = Callable[[TrueState], None]
 
 
 class LockstepDrone:
-    """A simulated vehicle that moves on only while something is awaited of it.
+    """A simulated vehicle whose time advances only while something is awaited of it.
 
     Its coroutines never wait for an event, so a flight runs straight through. Only when its task has been
-    cancelled (Ctrl-C) do its ticks give way, so that the flight hears of it.
+    cancelled (Ctrl-C) do its ticks yield to the event loop, so that the flight is cancelled. Its methods
+    raise DroneError if the vehicle refuses a request, or if telemetry does not confirm it in time.
 
     Args:
         simulation: just made, disarmed.
         start_arena: where the drone stands: x, y, z (metres) and yaw (radians), arena axes.
-        observers: called with the truth of every control tick.
-        telemetry_delay_us: see `TELEMETRY_DELAY_US`; below the 50 ms between ticks.
-
-    Raises:
-        ValueError: a delay that the ticks cannot have.
+        observers: called with the true state of every control tick.
+        telemetry_delay_us: see `TELEMETRY_DELAY_US`; ValueError if not below the 50 ms between ticks.
     """
 
     def __init__(
@@ -97,27 +96,21 @@ class LockstepDrone:
         """Nothing to find."""
 
     async def ready(self) -> None:
-        """Let time pass until the vehicle can be armed; then fix the axes.
-
-        Raises:
-            DroneError: it does not get ready, or is armed already.
-        """
+        """Let time pass until the vehicle, which must be disarmed, can be armed; then fix the axes."""
         status = self._autopilot.status
         if status.armed:
             raise DroneError("the vehicle is armed already; land and disarm it, then put it on its start")
-        if not self._passes(lambda: status.ready, READY_LIMIT_US):
-            limit_s = READY_LIMIT_US / 1e6
-            raise DroneError(f"not ready within {limit_s:g} s: pre-arm checks not passed{self._said()}")
+        if not self._pass(READY_LIMIT_US, until=lambda: status.ready):
+            raise DroneError(
+                f"not ready within {READY_LIMIT_US / 1e6:g} s: "
+                f"pre-arm checks not passed{_vehicle_texts(self._autopilot)}"
+            )
         self._alignment = Alignment(
-            self._start_arena, Pose(self._position_ned_m, told_yaw(self._autopilot.state.yaw_rad))
+            self._start_arena, Pose(self._position_ned_m, _received_yaw(self._autopilot.state.yaw_rad))
         )
 
     async def ticks(self) -> AsyncIterator[DroneState]:
-        """States at 20 Hz of vehicle time.
-
-        Raises:
-            DroneError: as `next_state`.
-        """
+        """States at 20 Hz of vehicle time; see `next_state`."""
         task = asyncio.current_task()
         while True:
             if task is not None and task.cancelling():
@@ -125,7 +118,7 @@ class LockstepDrone:
             yield self.next_state()
 
     def next_state(self) -> DroneState:
-        """Let time pass until the next tick, and return its state; for whoever has no event loop.
+        """Let time pass until the next tick, and return its state; for callers without an event loop.
 
         Raises:
             DroneError: not ready yet, values not finite, a failsafe took over or disarmed the vehicle.
@@ -134,83 +127,79 @@ class LockstepDrone:
             raise DroneError("the drone's ticks were asked for before it was ready; call ready() first")
         self._sample = None
         lost_us = self._simulation.time_us + LINK_LOST_US
-        while (told := self._sample) is None:
+        while (state := self._sample) is None:
             if self._simulation.time_us >= lost_us:
                 raise DroneError("link lost: the vehicle's clock stands still")
             self._advance(lost_us)
         self._pass(self._delay_us)
-        self._check(told)
-        return told
+        vx, vy, vz = state.velocity_arena_m_s
+        if not isfinite(state.x + state.y + state.z + state.yaw + vx + vy + vz):
+            raise DroneError("the vehicle's position, velocity or heading is not finite")
+        if self._commanding and not (state.armed and state.offboard):
+            what = (
+                f"the pilot or a failsafe took over: mode {state.mode}"
+                if state.armed
+                else "the vehicle was disarmed by others"
+            )
+            raise DroneError(what + _vehicle_texts(self._autopilot))
+        return state
 
     async def motors_on(self) -> None:
-        """Enter offboard with zero setpoints, then arm; both count when a heartbeat shows them.
-
-        Raises:
-            DroneError: refused, or not shown.
-        """
+        """Enter offboard with zero setpoints, then arm; both are confirmed by a heartbeat."""
         self._send(VelocityCommand())
         self._pass(STREAM_BEFORE_OFFBOARD_US)
-        self._ask("offboard mode", self._autopilot.set_mode(FlightMode.OFFBOARD))
-        self._confirm("offboard mode", lambda: self._mode is FlightMode.OFFBOARD)
-        self._ask("arming", self._autopilot.arm())
-        self._confirm("arming", lambda: self._armed)
+        self._confirm(
+            "offboard mode",
+            self._autopilot.set_mode(FlightMode.OFFBOARD),
+            lambda: self._mode is FlightMode.OFFBOARD,
+        )
+        self._confirm("arming", self._autopilot.arm(), lambda: self._armed)
         self._commanding = True
 
     async def motors_off(self) -> None:
-        """Stop the motors at once (forced disarm), in the air too.
-
-        Raises:
-            DroneError: refused, or not shown.
-        """
-        self._fall_silent()
-        self._ask("stopping the motors", self._autopilot.disarm(force=True))
-        self._confirm("stopping the motors", lambda: not self._armed)
+        """Stop the motors at once (forced disarm), in the air too."""
+        self._stop_commanding()
+        self._confirm("stopping the motors", self._autopilot.disarm(force=True), lambda: not self._armed)
 
     async def land(self) -> None:
-        """Let the vehicle land until it has disarmed itself.
-
-        Raises:
-            DroneError: landing was broken off or takes too long.
-        """
-        self._fall_silent()
-        self._ask("landing", self._autopilot.land())
-        self._confirm("landing", lambda: self._mode is FlightMode.LAND or not self._armed)
-        ended = self._passes(lambda: not self._armed or self._mode is not FlightMode.LAND, LAND_LIMIT_US)
+        """Let the vehicle land until it has disarmed itself; DroneError if the landing is aborted."""
+        self._stop_commanding()
+        landing = self._autopilot.land()
+        self._confirm("landing", landing, lambda: self._mode is FlightMode.LAND or not self._armed)
+        ended = self._pass(LAND_LIMIT_US, until=lambda: not self._armed or self._mode is not FlightMode.LAND)
         if self._armed and ended:
-            raise DroneError(f"landing was broken off: mode {self._mode.name}{self._said()}")
+            texts = _vehicle_texts(self._autopilot)
+            raise DroneError(f"landing was broken off: mode {self._mode.name}{texts}")
         if not ended:
-            raise DroneError(f"still not landed after {LAND_LIMIT_US / 1e6:g} s{self._said()}")
+            texts = _vehicle_texts(self._autopilot)
+            raise DroneError(f"still not landed after {LAND_LIMIT_US / 1e6:g} s{texts}")
 
     async def hold(self) -> None:
-        """Stop commanding and ask for hold, unless another hand has the vehicle already.
-
-        Raises:
-            DroneError: refused, or not shown.
-        """
-        self._fall_silent()
+        """Stop commanding and request hold, unless another mode than offboard is active already."""
+        self._stop_commanding()
         if self._mode is FlightMode.OFFBOARD:
-            self._ask("hold", self._autopilot.set_mode(FlightMode.HOLD))
-            self._confirm("hold", lambda: self._mode is FlightMode.HOLD)
+            answer = self._autopilot.set_mode(FlightMode.HOLD)
+            self._confirm("hold", answer, lambda: self._mode is FlightMode.HOLD)
 
     async def refuse(self) -> None:
-        """No pilot takes this drone, so none gives it back: as `hold`."""
+        """As `hold`: no pilot takes this drone, so none gives it back."""
         await self.hold()
 
     def command(self, command: VelocityCommand) -> None:
-        """Set the velocity to fly from now on. Without motors on it is passed over."""
+        """Set the velocity to fly from now on. Without motors on it is ignored."""
         if self._commanding:
             self._send(command)
 
     async def close(self) -> None:
-        """Let go of the vehicle."""
-        self._fall_silent()
+        """Stop commanding."""
+        self._stop_commanding()
 
     def settle(self) -> None:
         """Let the drone come to rest, if its motors are off, so that the referee can judge."""
         simulation, status = self._simulation, self._autopilot.status
-        self._passes(lambda: simulation.referee.settled or status.armed, SETTLE_LIMIT_US)
+        self._pass(SETTLE_LIMIT_US, until=lambda: simulation.referee.settled or status.armed)
 
-    def _fall_silent(self) -> None:
+    def _stop_commanding(self) -> None:
         self._commanding = False
         self._resend_us = _NEVER_US
 
@@ -230,7 +219,7 @@ class LockstepDrone:
             self._autopilot.accept_setpoint(setpoint)
 
     def _advance(self, until_us: int = 0) -> None:
-        """Let time pass: a control tick, and more until a time or until the link does something by itself."""
+        """Let a control tick pass, and more until a time or until the link sends something by itself."""
         simulation, observers, state = self._simulation, self._observers, self._autopilot.state
         until_us = min(until_us, self._resend_us, self._heartbeat_us, self._tick_us, self._position_us)
         while True:
@@ -243,7 +232,7 @@ class LockstepDrone:
         self._exchange(state.time_us)
 
     def _exchange(self, now_us: int) -> None:
-        """What a link brings by itself at this time."""
+        """Do what a link does by itself at this time."""
         if now_us >= self._resend_us:
             self._send(self._command)
         if now_us >= self._heartbeat_us:
@@ -252,75 +241,54 @@ class LockstepDrone:
             self._mode = self._autopilot.status.mode
         if now_us >= self._tick_us:
             self._tick_us += TICK_US
-            self._sample = self._told()
+            if self._alignment is not None:
+                self._sample = self._reported_state(self._alignment)
         if now_us >= self._position_us:
             self._position_us += POSITION_US
             self._position_ned_m = single(self._autopilot.state.position_ned_m)
             self._velocity_ned_m_s = single(self._autopilot.state.velocity_ned_m_s)
 
-    def _pass(self, duration_us: int) -> None:
-        """Let so much time pass."""
-        end_us = self._simulation.time_us + duration_us
-        while self._simulation.time_us < end_us:
-            self._advance()
-
-    def _passes(self, condition: Callable[[], bool], limit_us: int) -> bool:
+    def _pass(self, limit_us: int, until: Callable[[], bool] = lambda: False) -> bool:
         """Let time pass until a condition holds; False if it does not within the limit."""
         end_us = self._simulation.time_us + limit_us
-        while not condition():
+        while not until():
             if self._simulation.time_us >= end_us:
                 return False
             self._advance()
         return True
 
-    def _ask(self, what: str, answer: CommandResult) -> None:
+    def _confirm(self, what: str, answer: CommandResult, shown: Callable[[], bool]) -> None:
+        """Wait until telemetry shows what was requested; DroneError if it was refused or is not shown."""
         if answer is not CommandResult.ACCEPTED:
-            raise DroneError(f"{what} was refused: {answer.name}{self._said()}")
-
-    def _confirm(self, what: str, shown: Callable[[], bool]) -> None:
+            raise DroneError(f"{what} was refused: {answer.name}{_vehicle_texts(self._autopilot)}")
         self._pass(self._delay_us)
-        if not self._passes(shown, CONFIRM_LIMIT_US):
+        if not self._pass(CONFIRM_LIMIT_US, until=shown):
             armed = "armed" if self._armed else "disarmed"
             raise DroneError(
                 f"{what} was acknowledged, but telemetry still shows mode {self._mode.name}, {armed} "
-                f"after {CONFIRM_LIMIT_US / 1e6:g} s{self._said()}"
+                f"after {CONFIRM_LIMIT_US / 1e6:g} s{_vehicle_texts(self._autopilot)}"
             )
 
-    def _told(self) -> DroneState | None:
-        """What telemetry has told by now; None before the axes are fixed."""
-        if self._alignment is None:
-            return None
+    def _reported_state(self, alignment: Alignment) -> DroneState:
+        """The state as telemetry shows it: heading now, position and mode as of their last messages."""
         state = self._autopilot.state
-        pose = self._alignment.pose(Pose(self._position_ned_m, told_yaw(state.yaw_rad)))
-        x, y, z = pose.position_m
+        pose = alignment.pose(Pose(self._position_ned_m, _received_yaw(state.yaw_rad)))
         return DroneState(
             state.time_us,
-            x,
-            y,
-            z,
+            *pose.position_m,
             pose.yaw_rad,
-            self._alignment.vector(self._velocity_ned_m_s),
+            alignment.vector(self._velocity_ned_m_s),
             self._armed,
             self._mode is FlightMode.OFFBOARD,
             self._mode.name,
             self._autopilot.status.landed_state is LandedState.ON_GROUND,
         )
 
-    def _check(self, state: DroneState) -> None:
-        vx, vy, vz = state.velocity_arena_m_s
-        if not isfinite(state.x + state.y + state.z + state.yaw + vx + vy + vz):
-            raise DroneError("the vehicle's position, velocity or heading is not finite")
-        if not self._commanding:
-            return
-        if not state.armed:
-            raise DroneError(f"the vehicle was disarmed by others{self._said()}")
-        if not state.offboard:
-            raise DroneError(f"the pilot or a failsafe took over: mode {state.mode}{self._said()}")
 
-    def _said(self) -> str:
-        """What the vehicle said since it was last asked, for the end of an error message."""
-        texts = list(dict.fromkeys(text.text for text in self._autopilot.take_texts()))[-_TEXTS_KEPT:]
-        return f"; the vehicle says: {' | '.join(texts)}" if texts else ""
+def _vehicle_texts(autopilot: Autopilot) -> str:
+    """The vehicle's status texts since the last call, for the end of an error message."""
+    texts = list(dict.fromkeys(text.text for text in autopilot.take_texts()))[-_TEXTS_KEPT:]
+    return f"; the vehicle says: {' | '.join(texts)}" if texts else ""
 
 
 def single(vector: Vec3) -> Vec3:
@@ -329,8 +297,8 @@ def single(vector: Vec3) -> Vec3:
     return (x, y, z)
 
 
-def told_yaw(yaw_rad: float) -> float:
-    """A yaw as ATTITUDE and then MAVSDK's degrees bring it, radians.
+def _received_yaw(yaw_rad: float) -> float:
+    """A yaw, radians, as it is after ATTITUDE and MAVSDK's degrees.
 
     MAVSDK multiplies by 180/pi in single precision. A product of two singles is exact in double precision,
     so rounding it once gives the same.
@@ -339,7 +307,7 @@ def told_yaw(yaw_rad: float) -> float:
 
 
 def sent_yaw_rate(yaw_rate_rad_s: float) -> float:
-    """A yaw rate as it is on the wire after MAVSDK has turned it from degrees, rad/s."""
+    """A yaw rate, rad/s, as it is on the wire after MAVSDK has converted it from degrees."""
     return _rounded(_RADIANS * _rounded(degrees(yaw_rate_rad_s)))
 
 

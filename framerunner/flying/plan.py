@@ -1,4 +1,4 @@
-"""What is known of a flight before it begins. Whoever flies, judges or shows one derives it here."""
+"""What is known of a flight before it begins, for all that flies, judges or shows it."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from offboard.keep_in_box import Box, flight_box
 from scenarios.models import Scenario, start_position
 from scenarios.referee import Referee
 
-if TYPE_CHECKING:  # it brings the statechart library, which the virtual camera does without
+if TYPE_CHECKING:  # it imports the statechart library, which the virtual camera does not need
     from offboard.mission import Mission
 
 StartPose = tuple[float, float, float, float]
@@ -24,11 +24,11 @@ class FlightPlan:
 
     Attributes:
         scenario: the layout, as declared.
-        mission: the chart that flies; None if something else does: an agent, a pilot.
+        mission: the chart that flies; None if an agent or a pilot flies.
         seed: of everything random; None in real time, which does not repeat.
         lift_m: how much higher than declared the frames and the ceiling are. A drone that starts from the
-            floor, without a base, counts heights from there, and its app takes that for the base's top.
-            Lifted by the base's height, all is as high above the real floor as the scenario says.
+            floor, without a base, measures heights from there, and its app takes that for the base's top.
+            Lifted by the base's height, everything is as high above the real floor as the scenario says.
     """
 
     scenario: Scenario
@@ -38,33 +38,25 @@ class FlightPlan:
 
     @property
     def chart(self) -> Mission:
-        """The mission, of a plan that must have one.
-
-        Raises:
-            ValueError: it has none.
-        """
+        """The mission of a plan that must have one; ValueError if it has none."""
         if self.mission is None:
             raise ValueError("the plan has no mission to be flown")
         return self.mission
 
     @cached_property
     def airframe(self) -> Airframe:
-        """The drone.
-
-        Raises:
-            AirframeError: the scenario names none that there is.
-        """
+        """The drone; AirframeError if there is none of the scenario's name."""
         return load_airframe(self.scenario.airframe)
 
     @cached_property
     def start_pose(self) -> StartPose:
-        """Where the drone stands at first, on the base if its start is over it."""
+        """Where the drone stands before take-off, on the base if its start is over it."""
         x_m, y_m, surface_m = start_position(self.scenario)
         return (x_m, y_m, surface_m + self.airframe.envelope_m[2] / 2, self.scenario.start.yaw_rad)
 
     @cached_property
     def layout(self) -> Scenario:
-        """The scenario with its frames and ceiling where they are, `lift_m` higher."""
+        """The scenario with its frames and ceiling where they are, `lift_m` higher than declared."""
         scenario, lift_m = self.scenario, self.lift_m
         if not lift_m:
             return scenario
@@ -74,7 +66,7 @@ class FlightPlan:
 
     @property
     def box(self) -> Box:
-        """Where the drone is kept, whatever its mission asks for."""
+        """The space that the drone is kept in, whatever its mission commands."""
         return flight_box(self.scenario, self.lift_m)
 
     @property
@@ -87,5 +79,5 @@ class FlightPlan:
         return Referee(self.layout, self.airframe.envelope_m, self.lift_m)
 
     def lifted(self, lift_m: float) -> FlightPlan:
-        """The same flight with the frames so much higher than declared."""
+        """The same flight with another `lift_m`."""
         return replace(self, lift_m=lift_m)

@@ -1,4 +1,4 @@
-"""A flight in real time, over MAVLink and video: of a drone that is there, or a simulator started here."""
+"""A flight in real time, over MAVLink and video: of a running drone, or of a simulator started here."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from contextlib import AsyncExitStack
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
-from framerunner.flying.fly import Flown, fly
+from framerunner.flying.fly import FinishedFlight, fly
 from framerunner.flying.plan import FlightPlan
 from framerunner.runs.recorder import RecordingCamera, RunRecords
 from framerunner.runs.run_folder import warn
@@ -17,65 +17,47 @@ from scenarios.result import Timing
 from vision.types import CameraFrame
 from wire.simulator_api import SimulatorApi
 
-if TYPE_CHECKING:  # what is heavy is imported when a flight begins
-    from framerunner.flying.mission_teller import MissionTeller
+if TYPE_CHECKING:  # these are imported when a flight begins, as they are slow to import
+    from framerunner.flying.mission_reporter import MissionReporter
     from framerunner.flying.simulator_process import SimulatorClock, SitlProcess
     from offboard.link.companion import Companion
     from offboard.mavsdk_drone import MavsdkDrone
-    from offboard.perception import CameraPerception
 
-SLOW_FACTOR = 0.95  # of the wanted speed; below, vehicle time had to wait
+SLOW_FACTOR = 0.95  # of the requested speed; below, vehicle time had to wait
 
 
 @dataclass(frozen=True, slots=True)
 class RealTimeSettings:
-    """What is flown in real time.
+    """What is flown in real time."""
 
-    Attributes:
-        drone_url: MAVLink URL of a drone that is there; None starts a simulator.
-        camera_url: of the drone's camera; None with a simulator that is started.
-        simulator: what the drone is simulated by, if somebody named it.
-        speed: of the simulator that is started: simulated seconds a second.
-        instance: of the simulator that is started: shifts its ports.
-    """
-
-    drone_url: str | None = None
-    camera_url: str | None = None
-    simulator: SimulatorApi | None = None
-    speed: float = 1.0
-    instance: int = 0
+    drone_url: str | None = None  # MAVLink URL of a running drone; None starts a simulator
+    camera_url: str | None = None  # of the running drone
+    simulator: SimulatorApi | None = None  # of the running drone, if the user named it
+    speed: float = 1.0  # of the simulator that is started: simulated seconds a second
+    instance: int = 0  # of the simulator that is started: shifts its ports
 
 
 @dataclass(frozen=True, slots=True)
 class _Endpoints:
-    """Where drone, camera and API are.
-
-    Attributes:
-        drone_url: of its MAVLink.
-        camera_url: of its camera.
-        api: of its simulator, or where one may be; None: nowhere.
-        image_size_px: width and height, if known before.
-        sitl: the simulator that was started for it; None if it was there.
-        shared_with: URL of the monitor, if it can hear the drone only through this program.
-    """
+    """Where drone, camera and API are."""
 
     drone_url: str
     camera_url: str
-    api: SimulatorApi | None
-    image_size_px: tuple[int, int] | None
-    sitl: SitlProcess | None = None
-    shared_with: str | None = None
+    api: SimulatorApi | None  # of the drone's simulator, or where one may be; None: nowhere
+    image_size_px: tuple[int, int] | None  # width and height, if known before
+    sitl: SitlProcess | None = None  # the simulator that was started here
+    shared_with: str | None = None  # URL of the monitor, if it receives the drone only through this program
 
 
 async def fly_in_real_time(
     plan: FlightPlan, settings: RealTimeSettings, records: RunRecords, monitor_url: str | None
-) -> Flown:
-    """Fly a plan over MAVLink, with the display in the terminal and all that is recorded.
+) -> FinishedFlight:
+    """Fly a plan over MAVLink, with the display in the terminal and the records of all ticks and images.
 
     Args:
         plan: with a mission.
         settings: what is flown.
-        records: keep what the flight shows of itself.
+        records: of the flight.
         monitor_url: where the monitor listens for the drone; None: there is none.
 
     Raises:
@@ -87,7 +69,7 @@ async def fly_in_real_time(
 
     from framerunner.flying.display import FlightDisplay
     from framerunner.flying.judges import choose_judge
-    from framerunner.flying.mission_teller import MissionTeller
+    from framerunner.flying.mission_reporter import MissionReporter
     from offboard.link.companion import Companion
     from offboard.perception import CameraPerception
 
@@ -99,11 +81,13 @@ async def fly_in_real_time(
         companion = Companion()
         stack.push_async_callback(companion.close)
         source = records.folder.mission.read_text(encoding="utf-8")
-        teller = MissionTeller(companion, plan.chart, source, plan.scenario.name, plan.start_pose)
+        reporter = MissionReporter(companion, plan.chart, source, plan.scenario.name, plan.start_pose)
         drone = _drone(plan, vehicle, records, stack, companion)
-        camera = await _camera(plan, vehicle, records, stack, teller)
-        eyes = CameraPerception(camera)
-        timing = FlightTiming(drone, eyes, None if vehicle.sitl is None else vehicle.sitl.clock)
+        camera = await _camera(plan, vehicle, records, stack, reporter)
+        perception = CameraPerception(camera)
+        clock = None if vehicle.sitl is None else vehicle.sitl.clock
+        if clock is not None:
+            clock.wait_for_images_of(perception)
         title = f"{plan.scenario.name}: {plan.chart.name}"
         display = FlightDisplay(title, plan.limit_s, records.recorder, judge)
 
@@ -115,16 +99,14 @@ async def fly_in_real_time(
             warn(camera.problem)
             return outcome
 
-        flown = await fly(
-            plan,
-            drone,
-            eyes,
-            judge,
-            (records.see, teller.see),
-            run=run,
-            measured=lambda: {"timing": timing.report(records.recorder.real_time_factor, settings.speed)},
-        )
-        await teller.tell_result(records.complete(flown.result))
+        def timing() -> dict[str, Timing]:
+            return {
+                "timing": _timing(drone, perception, clock, records.recorder.real_time_factor, settings.speed)
+            }
+
+        observers = (records.see, reporter.see)
+        flown = await fly(plan, drone, perception, judge, observers, run=run, measured=timing)
+        await reporter.send_result(records.complete(flown.result))
     return flown
 
 
@@ -135,13 +117,13 @@ async def _vehicle(
     stack: AsyncExitStack,
     monitor_url: str | None,
 ) -> _Endpoints:
-    """Find the drone that is there, or start a simulator."""
+    """Those of the running drone, or of a simulator that is started."""
     if settings.drone_url is not None and settings.camera_url is not None:
         api = settings.simulator or SimulatorApi.of_video(settings.camera_url)
         return _Endpoints(settings.drone_url, settings.camera_url, api, None, shared_with=monitor_url)
     from framerunner.flying.simulator_process import SitlProcess
 
-    # The simulator reads the very scenario that was checked here, whatever becomes of its file.
+    # The simulator reads the scenario that was checked here, even if the user's file changes.
     scenario_file, links = str(records.folder.scenario), () if monitor_url is None else (monitor_url,)
     sitl = await stack.enter_async_context(
         SitlProcess(scenario_file, settings.speed, settings.instance, links)
@@ -152,13 +134,9 @@ async def _vehicle(
 
 
 def _drone(
-    plan: FlightPlan,
-    vehicle: _Endpoints,
-    records: RunRecords,
-    stack: AsyncExitStack,
-    companion: Companion,
+    plan: FlightPlan, vehicle: _Endpoints, records: RunRecords, stack: AsyncExitStack, companion: Companion
 ) -> MavsdkDrone:
-    """The drone on its link, which is let go of when the stack is left."""
+    """The drone on its link, which is closed with the stack."""
     from offboard.mavsdk_drone import MavsdkDrone
 
     hang_report = stack.enter_context(records.folder.hang_report.open("w", encoding="utf-8"))
@@ -170,7 +148,7 @@ def _drone(
         drone.use_clock(vehicle.sitl.clock, vehicle.sitl.system_id)
     if vehicle.shared_with is not None:
         drone.share_with(vehicle.shared_with)
-    stack.push_async_callback(drone.disconnect)  # not before the result has been told, over its link
+    stack.push_async_callback(drone.disconnect)  # not before the result has been sent over its link
     return drone
 
 
@@ -179,14 +157,14 @@ async def _camera(
     vehicle: _Endpoints,
     records: RunRecords,
     stack: AsyncExitStack,
-    teller: MissionTeller,
+    reporter: MissionReporter,
 ) -> RecordingCamera:
-    """The camera, whose images are recorded; let go of when the stack is left."""
+    """The camera, whose images are recorded; closed with the stack."""
     from vision.sources import open_source
 
     def keep(frame: CameraFrame) -> None:
         records.see_frame(frame)
-        teller.see_frame(frame)
+        reporter.see_frame(frame)
 
     source = await stack.enter_async_context(open_source(vehicle.camera_url, size_px=vehicle.image_size_px))
     camera = RecordingCamera(source, records.folder.video, plan.scenario.camera.rate_hz, keep)
@@ -194,40 +172,32 @@ async def _camera(
     return camera
 
 
-class FlightTiming:
-    """Counts what came late in a real-time flight: whether the machine kept up.
+def _timing(
+    drone: MavsdkDrone,
+    perception: CameraPerception,
+    clock: SimulatorClock | None,
+    factor: float | None,
+    speed: float,
+) -> Timing:
+    """What was late in a flight, and so whether the machine was fast enough for the requested speed.
 
     Args:
-        drone: what is flown.
-        eyes: through which it sees.
+        drone: that was flown.
+        perception: through which it saw.
         clock: of a simulator whose time waits for this program; None: vehicle time does not wait.
+        factor: vehicle time per wall time; None before two ticks.
+        speed: the requested factor.
     """
-
-    def __init__(self, drone: MavsdkDrone, eyes: CameraPerception, clock: SimulatorClock | None) -> None:
-        self._drone = drone
-        self._eyes = eyes
-        self._clock = clock
-        if clock is not None:
-            clock.look_through(eyes)
-
-    def report(self, real_time_factor: float | None, speed: float) -> Timing:
-        """What the flight's result says of it.
-
-        Args:
-            real_time_factor: vehicle time a wall time; None before two ticks.
-            speed: the wanted one.
-        """
-        clock = self._clock
-        late = {
-            "late_ticks": self._drone.late_ticks,
-            "late_images": 0 if clock is None else clock.images_missed,
-            "late_setpoints": 0 if clock is None else clock.setpoints_missed,
-        }
-        slow = real_time_factor is not None and real_time_factor < SLOW_FACTOR * speed
-        return Timing(
-            kept_up=not slow and not any(late.values()),
-            vehicle_time_waits=clock is not None,
-            speed=speed if real_time_factor is None else real_time_factor / speed,
-            **late,
-            oldest_image_s=self._eyes.oldest_s,
-        )
+    late = {
+        "late_ticks": drone.late_ticks,
+        "late_images": 0 if clock is None else clock.images_missed,
+        "late_setpoints": 0 if clock is None else clock.setpoints_missed,
+    }
+    slow = factor is not None and factor < SLOW_FACTOR * speed
+    return Timing(
+        kept_up=not slow and not any(late.values()),
+        vehicle_time_waits=clock is not None,
+        speed=speed if factor is None else factor / speed,
+        **late,
+        oldest_image_s=perception.oldest_s,
+    )

@@ -1,17 +1,16 @@
-"""`framerunner fly`: one flight with everything it leaves behind, in real time or in lockstep."""
+"""`framerunner fly`: one flight with all the files it writes, in real time or in lockstep."""
 
 from __future__ import annotations
 
 import asyncio
-from collections.abc import Iterator
-from contextlib import closing, contextmanager
+from contextlib import AbstractContextManager, closing, nullcontext
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 from urllib.parse import urlsplit
 
-from framerunner.flying.flight_result import result_lines, timing_line
-from framerunner.flying.fly import Flown
+from framerunner.flying.display import LockstepProgress, result_lines, timing_line
+from framerunner.flying.fly import FinishedFlight
 from framerunner.flying.plan import FlightPlan
 from framerunner.flying.real_time import RealTimeSettings, fly_in_real_time
 from framerunner.runs.recorder import RunRecords, VideoFile
@@ -27,30 +26,18 @@ _INTERRUPTED_CODE = 130
 
 @dataclass(frozen=True, slots=True)
 class FlightSettings:
-    """What to fly and what to keep of it.
+    """What to fly and what to write."""
 
-    Attributes:
-        plan: with a mission, which is told only where the drone stands.
-        real_time: what is flown in real time; None: simulated in this process, in lockstep.
-        out: folder of all runs.
-        record: write everything to an MCAP file, too.
-        video: write what the camera saw in lockstep, too.
-        monitor: open the Game Monitor for it.
-    """
-
-    plan: FlightPlan
-    real_time: RealTimeSettings | None
-    out: Path
-    record: bool = False
-    video: bool = False
-    monitor: bool = False
+    plan: FlightPlan  # with a mission
+    real_time: RealTimeSettings | None  # None: simulated in this process, in lockstep
+    out: Path  # folder of all runs
+    record: bool = False  # write an MCAP file too
+    video: bool = False  # write a video in lockstep too
+    monitor: bool = False  # open the Game Monitor
 
 
 async def fly_once(settings: FlightSettings) -> int:
-    """Fly, judge, write.
-
-    Returns:
-        0 completed, 1 flown but not completed, 130 stopped with Ctrl-C.
+    """Fly, judge, write; returns 0 if completed, 1 if flown but not completed, 130 after Ctrl-C.
 
     Raises:
         DroneError: the drone cannot be reached or made ready.
@@ -59,9 +46,9 @@ async def fly_once(settings: FlightSettings) -> int:
     """
     if settings.real_time is None or not settings.monitor:
         return await _fly_and_judge(settings, None)
-    from framerunner.monitoring.monitor_process import MonitorProcess
+    from framerunner.child_process import MonitorProcess
 
-    # A drone of one's own brings no referee; the simulator does.
+    # The simulator that is started has a referee; a running drone may have none.
     scenario = None if settings.real_time.drone_url is None else settings.plan.scenario
     async with MonitorProcess(scenario, settings.out, _camera_hosts(settings.real_time)) as monitor:
         await monitor.opened()
@@ -72,28 +59,34 @@ async def fly_once(settings: FlightSettings) -> int:
 
 
 def _camera_hosts(settings: RealTimeSettings) -> tuple[str, ...]:
-    """The hosts that the user named as the camera's or the simulator's: the monitor, too, may ask there."""
+    """Hosts that the user named, which the monitor may use too."""
     named = (SimulatorApi.of_video(settings.camera_url or ""), settings.simulator)
     hosts = (urlsplit(api.url).hostname for api in named if api is not None)
     return tuple(dict.fromkeys(host for host in hosts if host))
 
 
 async def _fly_and_judge(settings: FlightSettings, monitor_url: str | None) -> int:
-    with _run_folder(settings) as folder:
+    plan = settings.plan
+    folder = RunFolder(settings.out, plan.scenario.name)
+    try:
+        folder.write_plan(plan.scenario, plan.chart)
         with _recording(settings, folder) as recording:
             records = RunRecords(folder, recording)
             try:
                 if settings.real_time is None:
                     flown = await _fly_in_lockstep(settings, records)
                 else:
-                    flown = await fly_in_real_time(settings.plan, settings.real_time, records, monitor_url)
+                    flown = await fly_in_real_time(plan, settings.real_time, records, monitor_url)
             except (asyncio.CancelledError, KeyboardInterrupt):
                 folder.stopped_before_start = records.recorder.latest is None
                 raise
             records.finish(flown.result, flown.track)
+        if recording is not None:
+            warn(recording.problem)
         result = records.complete(flown.result)
-        layout = settings.plan.lifted(result.lift_m).layout
-        write_outcome(folder, layout, flown.track, result)
+        write_outcome(folder, plan.lifted(result.lift_m).layout, flown.track, result)
+    finally:
+        folder.remove_if_empty()
     late = timing_line(result.timing)
     lines = [result_lines(result), *([late] if late else []), *left_lines(folder, result)]
     print("\n".join(lines), flush=True)
@@ -102,12 +95,20 @@ async def _fly_and_judge(settings: FlightSettings, monitor_url: str | None) -> i
     return 0 if result.completed else 1
 
 
-async def _fly_in_lockstep(settings: FlightSettings, records: RunRecords) -> Flown:
-    from framerunner.flying.display import LockstepProgress
+def _recording(settings: FlightSettings, folder: RunFolder) -> AbstractContextManager[FlightRecording | None]:
+    if not settings.record:
+        return nullcontext()
+    from framerunner.recording.mcap_writer import FlightRecording
+
+    plan = settings.plan
+    return FlightRecording(folder.recording, plan.scenario, plan.chart, plan.seed)
+
+
+async def _fly_in_lockstep(settings: FlightSettings, records: RunRecords) -> FinishedFlight:
     from framerunner.flying.lockstep import lockstep_flight
 
     plan = settings.plan
-    video = VideoFile(records.folder.video, plan.scenario.camera.rate_hz)  # made with its first image
+    video = VideoFile(records.folder.video, plan.scenario.camera.rate_hz)
     with closing(video), LockstepProgress(plan.limit_s) as progress:
 
         def keep(time_us: int, image: Image) -> None:
@@ -118,29 +119,3 @@ async def _fly_in_lockstep(settings: FlightSettings, records: RunRecords) -> Flo
         flown = await lockstep_flight(plan, observers=(records.see, progress.see), on_image=keep)
     warn(video.problem)
     return flown
-
-
-@contextmanager
-def _run_folder(settings: FlightSettings) -> Iterator[RunFolder]:
-    """Make the folder; take it away again if the flight did not begin and left nothing."""
-    plan = settings.plan
-    folder = RunFolder(settings.out, plan.scenario.name)
-    try:
-        folder.write_plan(plan.scenario, plan.chart)
-        yield folder
-    finally:
-        folder.remove_if_empty()
-
-
-@contextmanager
-def _recording(settings: FlightSettings, folder: RunFolder) -> Iterator[FlightRecording | None]:
-    """Open the recording, if one is wanted, and close it whatever happens."""
-    if not settings.record:
-        yield None
-        return
-    from framerunner.recording.mcap_writer import FlightRecording
-
-    plan = settings.plan
-    with FlightRecording(folder.recording, plan.scenario, plan.chart, plan.seed) as recording:
-        yield recording
-    warn(recording.problem)

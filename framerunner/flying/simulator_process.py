@@ -1,8 +1,7 @@
-"""The simulator as a child process, whose time waits for this program at each tick.
+"""The simulator as a child process whose time waits for this program at each tick; see `sitl.time_grants`.
 
-See `sitl.time_grants`. What the app is given at a tick is then a function of vehicle time alone, as in
-lockstep: the image that was sent last, the telemetry of that tick; and the setpoint that answers it arrives
-one control period later.
+What the app receives at a tick is then a function of vehicle time alone, as in lockstep: the image that was
+sent last and the telemetry of that tick. The setpoint that answers it arrives one control period later.
 """
 
 from __future__ import annotations
@@ -12,7 +11,7 @@ import socket
 from typing import Self
 
 from errors import SettingError
-from framerunner.flying.child_process import ChildProcess
+from framerunner.child_process import ChildProcess
 from framerunner.flying.lockstep_drone import TELEMETRY_DELAY_US, sent_yaw_rate, single
 from offboard.drone import DroneError, VelocityCommand
 from offboard.perception import CameraPerception
@@ -23,27 +22,14 @@ from wire.simulator_api import SimulatorApi
 
 START_S = 20.0
 ANSWER_S = 20.0  # wall time in which a simulator runs 50 ms, on the busiest machine
-_LAST_WORDS_S = 3.0
-IMAGE_S = 2.0  # wall time for an image to come and be looked at
+_LAST_LINE_S = 3.0
+IMAGE_S = 2.0  # wall time for an image to arrive and be processed
 _ANSWER_US = CONTROL_PERIOD_US + TELEMETRY_DELAY_US - 1
-"""From a multiple of 50 ms to the last control tick before the one that flies the answer."""
+"""From a multiple of 50 ms to the last control tick before the one that applies the answer."""
 
 
 class SitlProcess(ChildProcess):
-    """`framerunner sim` as a child process.
-
-    Args:
-        scenario: name or file.
-        speed: simulated seconds a second.
-        instance: shifts its ports.
-        links: more links, as `--link` takes them.
-
-    Attributes:
-        clock: its time, which waits for this program once asked to.
-        system_id: MAVLink id of its drone.
-        drone_url: where its MAVLink arrives.
-        api: where it serves video and referee.
-    """
+    """`framerunner sim` as a child process, with its options."""
 
     def __init__(
         self, scenario: str, speed: float = 1.0, instance: int = 0, links: tuple[str, ...] = ()
@@ -55,18 +41,14 @@ class SitlProcess(ChildProcess):
             *("--time-grants", str(there.fileno())),
             *(word for link in links for word in ("--link", link)),
         ]
-        super().__init__("the simulator", arguments, handed=there)
+        super().__init__("the simulator", arguments, inherited=there)
         self.clock = SimulatorClock(here)
-        self.system_id = instance + 1
+        self.system_id = instance + 1  # MAVLink id of its drone
         self.drone_url = f"udpin://127.0.0.1:{14540 + instance}"
         self.api = SimulatorApi(f"http://127.0.0.1:{VIDEO_PORT + instance}")
 
     async def __aenter__(self) -> Self:
-        """Start it, and wait until it says that all its ports are open.
-
-        Raises:
-            SettingError: it cannot start; its own words are the reason.
-        """
+        """Start it, and wait until all its ports are open; SettingError with its last line if it cannot."""
         await super().__aenter__()
         try:
             await self.guard(asyncio.create_task(self.clock.up()))
@@ -82,69 +64,49 @@ class SitlProcess(ChildProcess):
 
 
 class SimulatorClock:
-    """This program's end of the simulator's time grants.
-
-    Args:
-        channel: connected to the simulator.
-
-    Attributes:
-        images_missed: ticks without the image that belongs to them: it did not come in time.
-        setpoints_missed: setpoints that did not arrive in time.
-    """
+    """This program's end of the simulator's time grants; DroneError: the simulator has ended."""
 
     def __init__(self, channel: socket.socket) -> None:
-        self.images_missed = 0
-        self.setpoints_missed = 0
+        self.images_missed = 0  # ticks whose image did not arrive in time
+        self.setpoints_missed = 0  # setpoints that did not arrive in time
         self._channel = channel
         self._reader: asyncio.StreamReader | None = None
         self._writer: asyncio.StreamWriter | None = None
-        self._eyes: CameraPerception | None = None
+        self._perception: CameraPerception | None = None
 
-    def look_through(self, eyes: CameraPerception) -> None:
-        """Wait at each tick until these have seen the image that was sent last."""
-        self._eyes = eyes
+    def wait_for_images_of(self, perception: CameraPerception) -> None:
+        """Wait at each tick until it has processed the image that was sent last."""
+        self._perception = perception
 
     async def up(self) -> None:
-        """Wait until the simulator says that it is up.
-
-        Raises:
-            SettingError: it does not.
-        """
+        """Wait until the simulator reports that it is up; SettingError if it does not."""
         self._reader, self._writer = await asyncio.open_connection(sock=self._channel)
         try:
             line = await asyncio.wait_for(self._reader.readline(), START_S)
         except TimeoutError:
             raise SettingError(f"the simulator did not start within {START_S:g} s") from None
-        if not line:  # it has ended; whoever guards it knows its last words
+        if not line:  # it has ended; `guard` reports its last line
             await asyncio.sleep(START_S)
 
     async def stop(self) -> int:
-        """Let time stand still; returns the time of the last control tick, microseconds.
-
-        Raises:
-            DroneError: the simulator is gone.
-        """
+        """Stop vehicle time; returns that of the last control tick, microseconds."""
         return (await self._granted(Grant(0))).time_us
 
     async def advance(self, tick_us: int, command: VelocityCommand | None) -> None:
-        """Let time go on to a tick and the control period after it; then wait for the image.
+        """Grant time up to a tick and the control period after it; then wait for the image.
 
         Args:
             tick_us: multiple of 50 ms.
-            command: must arrive first; None: nothing must.
-
-        Raises:
-            DroneError: the simulator is gone.
+            command: must be received first; None: time does not wait for a command.
         """
-        setpoint = None if command is None else _sent(command)
-        held = await self._granted(Grant(tick_us + _ANSWER_US, setpoint))
+        held = await self._granted(Grant(tick_us + _ANSWER_US, None if command is None else _sent(command)))
         if held.setpoint_missed:
             self.setpoints_missed += 1
-        if self._eyes is not None and not await self._eyes.seen(held.image_us, IMAGE_S):
+        if self._perception is not None and not await self._perception.seen(held.image_us, IMAGE_S):
             self.images_missed += 1
 
     def release(self) -> None:
-        """Let time go on by itself."""
+        """Let time run freely."""
         if self._writer is not None and not self._writer.is_closing():
             self._writer.write(Grant(FREE_US).line())
 
@@ -166,7 +128,7 @@ class SimulatorClock:
         except OSError:
             line = b""
         if not line:
-            await asyncio.sleep(_LAST_WORDS_S)  # whoever guards it has better words
+            await asyncio.sleep(_LAST_LINE_S)  # `guard` has a better reason
             raise DroneError("the simulator has ended")
         return Held.parse(line)
 

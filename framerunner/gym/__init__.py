@@ -1,10 +1,4 @@
-"""The frame challenge as an environment of Gymnasium: import this package, then make `FrameChallenge-v0`.
-
-import gymnasium
-import framerunner.gym
-
-env = gymnasium.make("FrameChallenge-v0")
-"""
+"""The frame challenge as an environment of Gymnasium: import this package, then make `FrameChallenge-v0`."""
 
 try:
     from gymnasium import register

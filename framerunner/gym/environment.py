@@ -1,11 +1,12 @@
-"""`FrameChallenge-v0`: fly the four rates, see what a mission sees, be paid by the referee."""
+"""`FrameChallenge-v0`: an agent flies by velocities and observes what a mission sees."""
 
 from __future__ import annotations
 
-from math import isfinite
+from math import isfinite, pi
 from pathlib import Path
 from typing import Any
 
+import cv2
 import gymnasium
 import numpy as np
 import numpy.typing as npt
@@ -14,18 +15,21 @@ from gymnasium.error import ResetNeeded
 
 from errors import SettingError
 from framerunner.flying.plan import FlightPlan
-from framerunner.gym.flight import SteppedFlight
-from framerunner.gym.observation import LONGEST_TRY_S, Observation, observation_space, observe, rgb
-from framerunner.gym.reward import Scorer, final_reward
-from offboard.drone import VelocityCommand
+from framerunner.gym.flight import SteppedFlight, final_reward
+from offboard.drone import DroneState, VelocityCommand
 from scenarios.loader import load_scenario
-from scenarios.models import Camera, Scenario
+from scenarios.models import COLOURS, Camera, Scenario
 from scenarios.random_scenarios import load_level, random_scenario
 from scenarios.verdict import Verdict
-from vision.types import Image
+from vision.types import Detection, Detections, Image
 
 Action = npt.NDArray[np.float32]
+Observation = dict[str, Any]
+"""Arrays by name; see `observe`."""
 
+FAR_M = 1000.0
+"""Positions and distances are clipped to this; none is reached at 1 m/s."""
+LONGEST_TRY_S = 36_000.0
 _OPTIONS = ("scenario", "level")
 _SEEDS = 1 << 31
 
@@ -34,7 +38,7 @@ class FrameChallengeEnv(gymnasium.Env[Observation, Action]):
     """One try an episode, in lockstep and in simulated time.
 
     An action is held for a tick of the mission, 50 ms: forward, left, up (m/s) and yaw rate to the left
-    (rad/s), each from -1 to 1. What is seen is as late as it is to a mission. See docs/gymnasium.md.
+    (rad/s), each from -1 to 1. Observations are as late as a mission's. See docs/gymnasium.md.
 
     Args:
         scenario: name, file or `Scenario`, the same in every episode; None for random ones.
@@ -84,35 +88,34 @@ class FrameChallengeEnv(gymnasium.Env[Observation, Action]):
             options: for this episode only, "scenario" (name, file or `Scenario`) or "level".
 
         Raises:
-            SettingError: an unknown option, or a scenario whose camera has another image.
+            SettingError: an unknown option, or a scenario with another image size.
             ScenarioError: there is no such scenario or level.
         """
         super().reset(seed=seed)
         self._flying = self._choose(options or {})
         self._flight = SteppedFlight(FlightPlan(self._flying))
-        self._scorer = Scorer(self._flight.referee)
         return self._observe(self._flight), self._info(self._flight)
 
     def step(self, action: Action) -> tuple[Observation, float, bool, bool, dict[str, Any]]:
         """Fly for a step.
 
         Args:
-            action: forward, left, up (m/s) and yaw rate to the left (rad/s); held within -1 and 1.
+            action: forward, left, up (m/s) and yaw rate to the left (rad/s); clipped to -1 and 1.
 
         Raises:
-            SettingError: the action has not four finite numbers.
+            SettingError: the action is not four finite numbers.
             ResetNeeded: the episode is over, or none has begun.
         """
         flight = self._flight
-        if flight is None or flight.over or self._scorer.failed_order:
+        if flight is None or flight.over or flight.failed_order:
             raise ResetNeeded("the episode is over, or none has begun; call reset()")
         command = _command(action)
         for _ in range(self._ticks_per_step):
             flight.step(command)
             if flight.over:
                 break
-        reward = self._scorer.reward()
-        over = flight.over or self._scorer.failed_order
+        reward = flight.reward()
+        over = flight.over or flight.failed_order
         info = self._info(flight)
         timed_out = False
         if over:
@@ -126,10 +129,10 @@ class FrameChallengeEnv(gymnasium.Env[Observation, Action]):
         """Return the camera's latest image, RGB, shape (height, width, 3); None without a render mode."""
         if self.render_mode is None or self._flight is None:
             return None
-        return rgb(self._flight.image)
+        return _rgb(self._flight.image)
 
     def close(self) -> None:
-        """Let go of the simulation."""
+        """Delete the simulation."""
         self._flight = None
 
     def _choose(self, options: dict[str, Any]) -> Scenario:
@@ -180,3 +183,59 @@ def _command(action: Action) -> VelocityCommand:
         raise SettingError(f"action {action!r}: must be four finite numbers, forward, left, up, yaw rate")
     forward, left, up, yaw_rate = (min(max(rate, -1.0), 1.0) for rate in rates)
     return VelocityCommand(forward, left, up, yaw_rate)
+
+
+def observation_space(camera: Camera, *, image: bool) -> spaces.Dict:
+    """The space of `observe`, for a size of image; with the image itself, if `image`."""
+    right_px, top_px = camera.width_px / 2, camera.height_px / 2
+    low = np.array([-top_px, -top_px, -right_px, -right_px, 0.0, 0.0], np.float32)
+    high = np.array([top_px, top_px, right_px, right_px, FAR_M, 180.0], np.float32)
+    place = np.array([FAR_M, FAR_M, FAR_M, 4.0], np.float32)  # pi is a little more in 32 bits
+    found: dict[str, spaces.Space[Any]] = {
+        "imu": spaces.Box(-place, place, dtype=np.float32),
+        "cam": spaces.Box(np.tile(low, (3, 1)), np.tile(high, (3, 1)), dtype=np.float32),
+        "seen": spaces.MultiBinary([3, 2]),
+        "time_left_s": spaces.Box(0.0, LONGEST_TRY_S, (1,), np.float32),
+    }
+    if image:
+        found["image"] = spaces.Box(0, 255, (camera.height_px, camera.width_px, 3), np.uint8)
+    return spaces.Dict(found)
+
+
+def observe(
+    state: DroneState, detections: Detections, time_left_s: float, image: Image | None = None
+) -> Observation:
+    """Put what a mission would see into arrays; the image, if given, is BGR.
+
+    Returns:
+        imu: x, y, z (metres), yaw (-pi..pi), arena axes; shape (4,).
+        cam: red, green, blue; each n, s, e, w (pixels), d (metres), a (degrees), 0 where unknown; (3, 6).
+        seen: red, green, blue; each whether n, s, e, w and whether d, a are known; (3, 2).
+        time_left_s: shape (1,).
+        image: RGB, shape (height, width, 3).
+    """
+    found = [getattr(detections, colour) for colour in COLOURS]
+    x, y, z = (min(max(value, -FAR_M), FAR_M) for value in (state.x, state.y, state.z))
+    yaw = min(max(state.yaw, -pi), pi)
+    observation: Observation = {
+        "imu": np.array([x, y, z, yaw], np.float32),
+        "cam": np.array([_six_numbers(detection) for detection in found], np.float32),
+        "seen": np.array([(detection.seen, isfinite(detection.d)) for detection in found], np.int8),
+        "time_left_s": np.array([max(0.0, time_left_s)], np.float32),
+    }
+    if image is not None:
+        observation["image"] = _rgb(image)
+    return observation
+
+
+def _rgb(image: Image) -> Image:
+    return np.asarray(cv2.cvtColor(image, cv2.COLOR_BGR2RGB), np.uint8)
+
+
+def _six_numbers(detection: Detection) -> tuple[float, ...]:
+    if not detection.seen:
+        return (0.0,) * 6
+    edges = (detection.n, detection.s, detection.e, detection.w)
+    if not isfinite(detection.d):
+        return (*edges, 0.0, 0.0)
+    return (*edges, min(detection.d, FAR_M), detection.a)

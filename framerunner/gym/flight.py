@@ -1,4 +1,4 @@
-"""One try, step by step: a simulation, its drone and its eyes. Knows nothing of Gymnasium."""
+"""One try, step by step, and its reward, which depends on the referee only. It does not use Gymnasium."""
 
 from __future__ import annotations
 
@@ -7,52 +7,39 @@ from collections.abc import Coroutine
 from framerunner.flying.lockstep import LockstepVehicle
 from framerunner.flying.plan import FlightPlan
 from offboard.drone import DroneError, DroneState, VelocityCommand
-from scenarios.models import COLOURS, is_over_base
+from scenarios.models import is_over_base
 from scenarios.referee import Referee
 from scenarios.result import RefereeReport
+from scenarios.verdict import Verdict
 from vision.types import Detections, Image
 
-TAKEN_OFF_M = 0.3
-"""Rise above the start from which on coming down to the base is a landing."""
-STOP_ABOVE_BASE_M = 0.1
-"""Height of the drone's underside above the base at which the motors are stopped."""
+TAKEN_OFF_M = 0.3  # above the start; from there on a descent to the base is a landing
+STOP_ABOVE_BASE_M = 0.1  # of the drone's underside; there the motors are stopped
+# Rewards.
+CROSSING = 1.0  # for each frame crossed in order
+LANDING = 2.0  # on the base after all frames
+CONTACT = -0.2  # for each contact with a frame
+OUTSIDE_PER_S = -0.05  # for each second outside the arena
+FAILURE = -1.0  # for a crash, or a frame crossed in the wrong order
 
 
 class SteppedFlight:
-    """A try that has begun: the drone stands on its start with its motors on.
-
-    Args:
-        plan: what is flown; an agent takes the place of the mission.
-
-    Attributes:
-        state: of the drone, as telemetry told it at the present tick.
-        ended: why the drone can no longer be flown; empty while it can.
-
-    Raises:
-        DroneError: the drone does not get ready.
-    """
+    """A try that has begun: the drone stands on its start, motors on; an agent replaces the mission."""
 
     def __init__(self, plan: FlightPlan) -> None:
-        vehicle = LockstepVehicle(plan, self._take)
+        vehicle = LockstepVehicle(plan)
         self._plan = plan
-        self._simulation, self._drone, self._eyes = vehicle.simulation, vehicle.drone, vehicle.eyes
-        self._image: Image | None = None
+        self._drone, self._perception = vehicle.drone, vehicle.perception
         self._taken_off = False
-        self._colours = tuple(
-            colour for colour in COLOURS if colour in {frame.colour for frame in plan.scenario.frames}
-        )
-        self.ended = ""
+        self._frames = len({frame.colour for frame in plan.scenario.frames})
+        self._crossed = self._contacts = 0
+        self._penalty_s = 0.0
+        self.referee: Referee = vehicle.simulation.referee
+        self.ended = ""  # why the drone can no longer be flown; empty while it can
+        self.failed_order = False  # a frame was crossed in the wrong order
         run_through(self._drone.ready())
         run_through(self._drone.motors_on())
-        self.state: DroneState = self._drone.next_state()
-
-    def _take(self, _time_us: int, image: Image) -> None:
-        self._image = image
-
-    @property
-    def referee(self) -> Referee:
-        """What judges this try."""
-        return self._simulation.referee
+        self.state: DroneState = self._drone.next_state()  # by telemetry, as of the present tick
 
     @property
     def over(self) -> bool:
@@ -62,23 +49,19 @@ class SteppedFlight:
     @property
     def image(self) -> Image:
         """The latest image that has arrived: BGR, shape (height, width, 3), uint8. Not to be written to."""
-        assert self._image is not None, "the camera gives its first image while the drone gets ready"
-        return self._image
+        assert self._perception.image is not None, "the first image arrives while the drone gets ready"
+        return self._perception.image
 
     def report(self) -> RefereeReport:
-        """What the try was worth; what the vehicle said counts where the referee has not the last word."""
+        """The referee's report; the vehicle's reason for the end is used if the referee has none."""
         return self.referee.report(ended=None if self.referee.over else self.ended or None)
 
     def detections(self) -> Detections:
         """What the latest image showed."""
-        return self._eyes.latest(self.state.time_us)
+        return self._perception.latest(self.state.time_us)
 
     def step(self, command: VelocityCommand) -> None:
-        """Fly a velocity for a tick of 50 ms, or land if this is one; see `_is_landing`.
-
-        Args:
-            command: within the limits.
-        """
+        """Fly a velocity within the limits for a tick of 50 ms, or land; see `_is_landing`."""
         try:
             if self._is_landing(command):
                 run_through(self._drone.motors_off())
@@ -93,11 +76,25 @@ class SteppedFlight:
             run_through(self._drone.close())
             self._drone.settle()
 
+    def reward(self) -> float:
+        """For what has happened since the last call."""
+        now = self.referee.snapshot()
+        reward = 0.0  # so that a sum of zeros is not -0.0
+        reward += CONTACT * (now.contacts - self._contacts)
+        reward += OUTSIDE_PER_S * (now.penalty_s - self._penalty_s)
+        self._contacts, self._penalty_s = now.contacts, now.penalty_s
+        if len(now.crossed) > self._crossed:
+            self.failed_order = self.referee.report().verdict is Verdict.WRONG_ORDER
+            if not self.failed_order:
+                reward += CROSSING * (len(now.crossed) - self._crossed)
+            self._crossed = len(now.crossed)
+        return reward
+
     def _is_landing(self, command: VelocityCommand) -> bool:
         """Whether to stop the motors now, as the paper's navigator does just above the base.
 
-        That is when all frames are crossed and the drone, which has taken off, is a hand's breadth above the
-        base or lower, and is told to go down.
+        That is when all frames are crossed and the drone, which has taken off, is `STOP_ABOVE_BASE_M` above
+        the base or lower, and is commanded to descend.
         """
         state = self.state
         underside_m = state.z - self._plan.airframe.envelope_m[2] / 2
@@ -107,15 +104,19 @@ class SteppedFlight:
             and self._taken_off
             and underside_m < base.top_m + STOP_ABOVE_BASE_M
             and is_over_base(base, state.x, state.y)
-            and len(self.referee.crossed) == len(self._colours)
+            and len(self.referee.crossed) == self._frames
         )
 
 
-def run_through(coroutine: Coroutine[object, None, None]) -> None:
-    """Run a coroutine of the lockstep drone, none of which ever waits, without an event loop.
+def final_reward(report: RefereeReport) -> float:
+    """What the verdict adds at the end of a try."""
+    if report.completed:
+        return LANDING
+    return FAILURE if report.verdict in (Verdict.CRASHED, Verdict.WRONG_ORDER) else 0.0
 
-    Args:
-        coroutine: not yet begun.
+
+def run_through(coroutine: Coroutine[object, None, None]) -> None:
+    """Run a new coroutine of the lockstep drone, which never waits, without an event loop.
 
     Raises:
         RuntimeError: it waits after all.
@@ -125,4 +126,4 @@ def run_through(coroutine: Coroutine[object, None, None]) -> None:
     except StopIteration:
         return
     coroutine.close()
-    raise RuntimeError("a coroutine of the lockstep drone waits for something; nothing can come of it here")
+    raise RuntimeError("a coroutine of the lockstep drone waits for an event, which needs an event loop")

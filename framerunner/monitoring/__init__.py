@@ -1,1 +1,1 @@
-"""What the monitor is given: links, referees, scenarios and recorded flights."""
+"""Recorded flights for the monitor: the runs of a folder, and the process that reads one."""

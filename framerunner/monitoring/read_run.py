@@ -1,7 +1,8 @@
-"""Reads one run in a process of its own: `python -m framerunner.monitoring.read_run FOLDER TARGET`.
+"""Reads one run in a separate process: `python -m framerunner.monitoring.read_run FOLDER TARGET`.
 
-A lockstep flight is flown again, which keeps a processor busy for seconds; the monitor and what it watches
-must not feel that. What is damaged, or larger than memory, ends this process and no other.
+A lockstep flight is flown again, which uses a processor for seconds; the monitor and the flights that it
+shows must not be slowed by that. A damaged run, or one larger than memory, ends only this process. The
+format is that of `docs/monitor-channels.md`, section 5.
 """
 
 from __future__ import annotations
@@ -12,84 +13,51 @@ import os
 import resource
 import shutil
 import sys
+from collections.abc import Callable, Mapping, Sequence
+from math import cos, isfinite, pi, sin
 from pathlib import Path
+from typing import Any
 
 import cv2
 
-from framerunner.flying.child_process import end_with_standard_input
-from framerunner.monitoring.run_json import FlownMission, flight_json
+from framerunner.child_process import end_with_standard_input
 from framerunner.recording.collected import CollectedFlight, ImageFile, collect
 from framerunner.recording.events import RecordingError
 from framerunner.recording.open_recording import recorded_flight
-from offboard.mission import MissionError, load_mission
+from geometry.rotations import quaternion_from_yaw
+from offboard.app import Moment
+from offboard.engine import TransitionTaken
+from offboard.mission import Mission, MissionError, load_mission, mermaid
 from scenarios.loader import load_scenario
-from scenarios.models import Scenario, ScenarioError
+from scenarios.models import COLOURS, Scenario, ScenarioError
+from vision.types import Detection, Detections
 
 RECORDING = "recording.json"
 IMAGES = "images"
 SPANS = "spans.json"
-LONGEST_READ_S = 180
-"""Of processor time; a flight of three minutes is flown again in some seconds."""
+MAX_READ_S = 180
+"""Processor time; a flight of three minutes is flown again in some seconds."""
 MEMORY_BYTES = 1 << 30
 """Beyond the libraries'. A recording of an hour takes less than a third of it."""
 _NICENESS = 10
 _MEGABYTE = 1_000_000
+_MAX_TEXT = 500
 
-
-def read_run(folder: Path, target: Path) -> None:
-    """Write a run as the monitor wants it.
-
-    Args:
-        folder: of the run.
-        target: folder to which `recording.json`, the images one behind the other, and their places are
-            written.
-
-    Raises:
-        RecordingError: there is nothing to show, or it is damaged.
-    """
-    scenario, mission = _scenario(folder), _mission(folder)
-    with (target / IMAGES).open("w+b") as file:
-        with recorded_flight(folder) as recorded:
-            flight = collect(recorded, ImageFile(file))
-        size_px = _image_size(flight, scenario)
-        recording = flight_json(folder.name, flight, scenario, mission, size_px)
-        (target / SPANS).write_text(json.dumps(flight.images.spans), encoding="utf-8")
-        text = json.dumps(recording, allow_nan=False, separators=(",", ":"))
-        (target / RECORDING).write_text(text, encoding="utf-8")
-
-
-def _scenario(folder: Path) -> Scenario | None:
-    path = folder / "scenario.yaml"
-    return load_scenario(path) if path.is_file() else None
-
-
-def _mission(folder: Path) -> FlownMission | None:
-    """The run's mission; None if there is none that loads without running Python."""
-    path = folder / "mission.yaml"
-    try:
-        source = path.read_text(encoding="utf-8")
-        return FlownMission(load_mission(path), source) if len(source) < _MEGABYTE else None
-    except (OSError, ValueError, MissionError):
-        return None
-
-
-def _image_size(flight: CollectedFlight, scenario: Scenario | None) -> tuple[int, int]:
-    if len(flight.images):
-        height, width = flight.images.image(0).shape[:2]
-        return width, height
-    return (320, 240) if scenario is None else (scenario.camera.width_px, scenario.camera.height_px)
+Json = dict[str, Any]
+Clock = Callable[[int], float]
+"""From vehicle time, microseconds, to seconds since motors on."""
 
 
 def main() -> int:
-    """Read the run that the command line names; what goes wrong is the last line on standard error."""
+    """Read the run that the command line names; on failure the last line on standard error is the reason."""
     folder, target = Path(sys.argv[1]), Path(sys.argv[2])
     end_with_standard_input(lambda: shutil.rmtree(target, ignore_errors=True))
     with contextlib.suppress(OSError):
         os.nice(_NICENESS)
-    cv2.setNumThreads(1)  # each has a stack, and the flight that is watched wants the processors
-    limit_resources(MEMORY_BYTES, LONGEST_READ_S)
+    cv2.setNumThreads(1)  # each has a stack, and the flight that is shown live needs the processors
+    limit_resources(MEMORY_BYTES, MAX_READ_S)
     try:
-        os.chdir(folder.parent)  # so that no message tells strangers where the runs lie
+        os.chdir(folder.parent)  # so that no message shows the path of the runs
         read_run(Path(folder.name), target)
     except MemoryError:
         print(f"it needs more than {MEMORY_BYTES >> 20} MB of memory; it must be damaged", file=sys.stderr)
@@ -101,12 +69,7 @@ def main() -> int:
 
 
 def limit_resources(memory_bytes: int, processor_s: int) -> None:
-    """Have this process fail with MemoryError, or be killed, when it takes more than this.
-
-    Args:
-        memory_bytes: that it may take from now on.
-        processor_s: of processor time in all.
-    """
+    """Have this process fail with MemoryError, or be killed, above so much more memory or processor time."""
     with open("/proc/self/statm", encoding="ascii") as file:
         held_bytes = int(file.read().split()[5]) * resource.getpagesize()  # data and stacks
     for what, limit in (
@@ -117,6 +80,179 @@ def limit_resources(memory_bytes: int, processor_s: int) -> None:
         hard = resource.getrlimit(what)[1]
         wanted = limit if hard == resource.RLIM_INFINITY else min(limit, hard)
         resource.setrlimit(what, (wanted, wanted))
+
+
+def read_run(folder: Path, target: Path) -> None:
+    """Write a run as the monitor's replay reads it.
+
+    Args:
+        folder: of the run.
+        target: folder for `recording.json`, a file with all images, and their places in it.
+
+    Raises:
+        RecordingError: there is nothing to show, or it is damaged.
+    """
+    scenario_file = folder / "scenario.yaml"
+    scenario = load_scenario(scenario_file) if scenario_file.is_file() else None
+    mission, source = _load_mission(folder / "mission.yaml")
+    with (target / IMAGES).open("w+b") as file:
+        with recorded_flight(folder) as recorded:
+            flight = collect(recorded, ImageFile(file))
+        recording = _flight_json(folder.name, flight, scenario, mission, source)
+        (target / SPANS).write_text(json.dumps(flight.images.spans), encoding="utf-8")
+        text = json.dumps(recording, allow_nan=False, separators=(",", ":"))
+        (target / RECORDING).write_text(text, encoding="utf-8")
+
+
+def _load_mission(path: Path) -> tuple[Mission | None, str]:
+    """A mission and the text of its file; None if there is none that loads without executing Python."""
+    try:
+        source = path.read_text(encoding="utf-8")
+        return (load_mission(path) if len(source) < _MEGABYTE else None), source
+    except (OSError, ValueError, MissionError):
+        return None, ""
+
+
+def _flight_json(
+    name: str, flight: CollectedFlight, scenario: Scenario | None, mission: Mission | None, source: str
+) -> Json:
+    """All of a flight except its images."""
+    result = flight.result
+    chart: Json | None = None
+    leaves: tuple[str, ...] = ()
+    if mission is not None:
+        leaves = tuple(mission.leaves)
+        chart = {"name": mission.name, "mermaid": mermaid(mission), "states": list(leaves), "source": source}
+    # The mission's states, then any others: a log has flight modes instead.
+    recorded = (moment.mission_state for moment in flight.moments if moment.mission_state)
+    states = list(dict.fromkeys((*leaves, *recorded)))
+    numbers = {state: number for number, state in enumerate(states)}
+
+    def clock(time_us: int) -> float:
+        return round((time_us - flight.began_us) / 1e6, 3)
+
+    return {
+        "name": name,
+        "world": {
+            "scenario": None if scenario is None else scenario.model_dump(mode="json"),
+            "lift_m": 0.0 if result is None else result.lift_m,
+            "source": "" if result is None else result.judged_by,
+        },
+        "chart": chart,
+        "states": states,
+        "poses": _poses(flight, numbers, clock),
+        "detections": _detections(flight.moments, clock, _image_size(flight, scenario)),
+        "transitions": _transitions(flight, clock, mission),
+        "images": [clock(time_us) for time_us in flight.images.time_us],
+        "crossings": [{"t": clock(each.time_us), "colour": each.colour} for each in flight.crossings],
+        "result": None if result is None else result.as_json(),
+    }
+
+
+def _image_size(flight: CollectedFlight, scenario: Scenario | None) -> tuple[int, int]:
+    if len(flight.images):
+        height, width = flight.images.image(0).shape[:2]
+        return width, height
+    return (320, 240) if scenario is None else (scenario.camera.width_px, scenario.camera.height_px)
+
+
+def _poses(flight: CollectedFlight, numbers: Mapping[str, int], clock: Clock) -> list[Json]:
+    moments = [moment for moment in flight.moments if _has_pose(moment)]
+    poses: list[Json] = []
+    for number, moment in enumerate(moments):
+        before, after = moments[max(0, number - 1)], moments[min(number + 1, len(moments) - 1)]
+        span_s = (after.state.time_us - before.state.time_us) / 1e6
+        turn_rad = (after.state.yaw - before.state.yaw + pi) % (2 * pi) - pi
+        state, command = moment.state, moment.command
+        c, s = cos(state.yaw), sin(state.yaw)
+        vx, vy, vz = state.velocity_arena_m_s
+        sent = (command.forward_m_s, command.left_m_s, command.up_m_s, command.yaw_rate_rad_s)
+        poses.append(
+            {
+                "t": clock(state.time_us),
+                "p": _rounded(state.x, state.y, state.z),
+                "q": _rounded(*quaternion_from_yaw(state.yaw)),
+                "v": _rounded(c * vx + s * vy, c * vy - s * vx, vz),
+                "r": _rounded(turn_rad / span_s if span_s > 0 else 0.0)[0],
+                "c": _rounded(*sent) if flight.mission_is_known else None,
+                "on": state.armed,
+                "s": numbers.get(moment.mission_state, -1),
+            }
+        )
+    return poses
+
+
+def _has_pose(moment: Moment) -> bool:
+    state = moment.state
+    return all(map(isfinite, (state.x, state.y, state.z, state.yaw)))
+
+
+def _detections(moments: Sequence[Moment], clock: Clock, size_px: tuple[int, int]) -> list[Json]:
+    found: list[Json] = []
+    last: Detections | None = None
+    for moment in moments:
+        seen = moment.detections
+        if seen == last:
+            continue
+        last = seen
+        time_us = moment.state.time_us if seen.time_us is None else seen.time_us
+        boxes = {colour: _box(getattr(seen, colour)) for colour in COLOURS}
+        at_s = clock(time_us)
+        if not found or found[-1]["t"] <= at_s:
+            found.append({"t": at_s, "width": size_px[0], "height": size_px[1], "boxes": boxes})
+    return found
+
+
+def _box(detection: Detection) -> list[float | None] | None:
+    if not detection.seen:
+        return None
+    return _rounded(detection.n, detection.s, detection.e, detection.w, detection.d, detection.a)
+
+
+def _transitions(flight: CollectedFlight, clock: Clock, mission: Mission | None) -> list[Json]:
+    """As the engine recorded them or, in older recordings and logs, from the states alone."""
+    found: list[Json] = []
+    state, since_us = flight.moments[0].mission_state, flight.moments[0].state.time_us
+    for moment in flight.moments:
+        now_us = moment.state.time_us
+        taken = moment.transition
+        if taken is None and moment.mission_state == state:
+            continue
+        if taken is None:
+            when = _guard(mission, state, moment.mission_state)
+            taken = TransitionTaken(state, moment.mission_state, when, (), now_us, (now_us - since_us) / 1e6)
+        found.append(
+            {
+                "time_s": clock(now_us),
+                "from": taken.source[:_MAX_TEXT],
+                "to": taken.target[:_MAX_TEXT],
+                "when": taken.when[:_MAX_TEXT],
+                "values": [[name[:_MAX_TEXT], _plain(value)] for name, value in taken.values],
+                "seconds": round(taken.seconds_in_source, 3),
+            }
+        )
+        state, since_us = moment.mission_state, now_us
+    return found
+
+
+def _guard(mission: Mission | None, source: str, target: str) -> str:
+    """The guard between two states, if there is only one in the chart."""
+    leaf = None if mission is None else mission.leaves.get(source)
+    if leaf is None:
+        return ""
+    guards = {each.when for each in leaf.transitions if target == each.to or target.startswith(f"{each.to}.")}
+    return guards.pop() if len(guards) == 1 else ""
+
+
+def _plain(value: object) -> object:
+    if isinstance(value, float):
+        return value if isfinite(value) else None
+    return value if value is None or isinstance(value, bool | int) else str(value)[:_MAX_TEXT]
+
+
+def _rounded(*values: float) -> list[float | None]:
+    """To a tenth of a millimetre, which is enough for display; what is not finite is null."""
+    return [round(value, 4) if isfinite(value) else None for value in values]
 
 
 if __name__ == "__main__":

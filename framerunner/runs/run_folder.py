@@ -10,7 +10,7 @@ from datetime import datetime
 from pathlib import Path
 
 from errors import SettingError, UserError
-from framerunner.extras import advice
+from framerunner.errors import install_advice
 from framerunner.runs.track import Track
 from offboard.mission import Mission
 from offboard.pilot_file import PilotFile
@@ -151,7 +151,7 @@ def _try(path: Path, write: Callable[[], None]) -> None:
         path.unlink(missing_ok=True)  # an incomplete plot
         warn(str(error))
     except ModuleNotFoundError as error:
-        missing = advice(error.name or "")
+        missing = install_advice(error.name or "")
         if missing is None:
             raise
         warn(f"{path.name} was not drawn: {missing}")

@@ -1,1 +1,1 @@
-"""A camera for a drone that has none: painted from the pose that its telemetry reports."""
+"""A camera for a drone that has none: images rendered from the pose that its telemetry reports."""

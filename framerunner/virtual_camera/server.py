@@ -8,7 +8,7 @@ import time
 from collections import deque
 from collections.abc import Callable, Mapping
 
-from framerunner.virtual_camera.painter import VirtualCamera
+from framerunner.virtual_camera.camera import VirtualCamera
 from sitl.video import VideoServer
 from wire.dialect import (
     AUTOPILOT_COMPONENT_ID,
@@ -27,43 +27,39 @@ SYSTEM_ID = 246  # MAVSDK has 245, ground stations 255
 COMPONENT_ID = mavlink.MAV_COMP_ID_ONBOARD_COMPUTER
 WANTED_HZ = 50.0
 ENOUGH_HZ = 40.0
-_ASKS = 5
-_HOUSEKEEPING_S = 0.1
+_MAX_RATE_REQUESTS = 5
+_UPDATE_S = 0.1
+_HEARTBEAT_S = 1.0
 _RATE_PERIOD_S = 2.0
 _WAITING_LINE_S = 10.0
 _RECEIVE_S = 0.1
 
 Say = Callable[[str], None]
+"""Called with lines for people."""
 
 
 class CameraServer:
-    """Reads a vehicle's telemetry, paints, serves.
-
-    Args:
-        camera: paints.
-        link: to the vehicle; closed at the end.
-        video: where images are shown.
-        say: called with lines for people.
-    """
+    """Reads a vehicle's telemetry from a link, which is closed at the end; serves the rendered images."""
 
     def __init__(self, camera: VirtualCamera, link: VehicleLink, video: VideoServer, say: Say) -> None:
         self._camera = camera
         self._link = link
         self._video = video
         self._say = say
-        self._watch = _Watch(say, link.url)
+        self._watch = _TelemetryWatch(say, link.url)
         self._vehicle: int | None = None
         self._to_send: deque[Message] = deque()  # by the thread that reads
-        self._halt = threading.Event()
+        self._stop = threading.Event()
         self._failed: asyncio.Future[None] | None = None
-        self._rates = _Rates()
+        self._reports = (0, 0)  # of attitude and position when the rates were measured last
+        self._rate_requests = 0
         self._restarts = 0
 
     async def run(self) -> None:
         """Serve until cancelled.
 
         Raises:
-            VideoError: the TCP port is taken.
+            VideoError: the TCP port is in use.
             LinkError: the link failed.
         """
         loop = asyncio.get_running_loop()
@@ -72,7 +68,7 @@ class CameraServer:
         scenario = self._camera.plan.scenario
         self._video.add_json(SCENARIO_PATH, lambda _query: scenario.model_dump(mode="json"))
         reader = threading.Thread(target=self._read, args=(loop,), name="telemetry", daemon=True)
-        keeper: asyncio.Task[None] | None = None
+        updates: asyncio.Task[None] | None = None
         try:
             await self._video.start()
             self._say(
@@ -80,20 +76,20 @@ class CameraServer:
                 f"listening for a vehicle on {self._link.url}"
             )
             reader.start()
-            keeper = asyncio.create_task(self._keep_house())
+            updates = asyncio.create_task(self._update_forever())
             await self._failed
         finally:
-            self._halt.set()
-            if keeper is not None:
-                keeper.cancel()
+            self._stop.set()
+            if updates is not None:
+                updates.cancel()
             await self._video.close()
             if reader.ident is not None:
                 await asyncio.to_thread(reader.join)
             self._link.close()
 
     def _read(self, loop: asyncio.AbstractEventLoop) -> None:
-        """On a thread that alone uses the link: send, wait for packets, hand them to the loop."""
-        while not self._halt.is_set():
+        """On the only thread that uses the link: send, wait for packets, pass them to the loop."""
+        while not self._stop.is_set():
             try:
                 while self._to_send:
                     self._link.send(self._to_send.popleft())
@@ -101,7 +97,7 @@ class CameraServer:
             except LinkError as error:
                 loop.call_soon_threadsafe(self._fail, error)
                 return
-            if messages and not self._halt.is_set():
+            if messages and not self._stop.is_set():
                 loop.call_soon_threadsafe(self._take, messages)
 
     def _fail(self, error: LinkError) -> None:
@@ -113,79 +109,63 @@ class CameraServer:
             if self._vehicle is None and is_vehicle(message):
                 self._vehicle = message.get_srcSystem()
                 self._say(f"vehicle {self._vehicle} found")
-            if self._vehicle is None or not self._is_ours(message):
-                continue
-            self._camera.take(message)
-            self._watch.see(message.get_type(), time.monotonic())
+            sender = (message.get_srcSystem(), message.get_srcComponent())
+            if self._vehicle is not None and sender == (self._vehicle, AUTOPILOT_COMPONENT_ID):
+                self._camera.take(message)
+                self._watch.see(message.get_type(), time.monotonic())
         if self._camera.restarts != self._restarts:
             self._restarts = self._camera.restarts
-            self._rates = _Rates()
-            self._say("the vehicle has started anew; the arena is laid under it again")
-        self._watch.tell_placement(self._camera)
+            self._reports, self._rate_requests = (0, 0), 0
+            self._say("the vehicle has restarted; the arena is placed again")
+        self._watch.report_placement(self._camera)
         shot = self._camera.step()
         if shot is not None and not self._watch.stale:
             self._video.publish(shot[1], shot[0])
 
-    def _is_ours(self, message: Message) -> bool:
-        return bool(
-            message.get_srcSystem() == self._vehicle and message.get_srcComponent() == AUTOPILOT_COMPONENT_ID
-        )
-
-    async def _keep_house(self) -> None:
-        """Heartbeat once a second, rates, and the word when telemetry stays away."""
-        beat_s = rates_s = time.monotonic()
-        self._to_send.append(companion_heartbeat())  # over udpout the vehicle does not know us before
+    async def _update_forever(self) -> None:
+        """Send heartbeats, request rates, and report telemetry that is no longer received."""
+        beat_s, rates_s = float("-inf"), time.monotonic()
         while True:
-            await asyncio.sleep(_HOUSEKEEPING_S)
             now_s = time.monotonic()
-            if now_s - beat_s >= 1.0:
+            if now_s - beat_s >= _HEARTBEAT_S:
                 beat_s = now_s
+                # Over udpout the vehicle cannot send before it has received something.
                 self._to_send.append(companion_heartbeat())
             self._watch.check(now_s)
             if self._vehicle is not None and now_s - rates_s >= _RATE_PERIOD_S:
-                self._ask_for_rates(now_s - rates_s)
+                self._request_rates(self._vehicle, now_s - rates_s)
                 rates_s = now_s
+            await asyncio.sleep(_UPDATE_S)
 
-    def _ask_for_rates(self, span_s: float) -> None:
-        """Ask for more where too little comes; a link that cannot carry it is told of and left alone."""
-        telemetry, rates = self._camera.telemetry, self._rates
-        attitude_hz = (telemetry.attitudes - rates.attitudes) / span_s
-        position_hz = (telemetry.positions - rates.positions) / span_s
-        rates.attitudes, rates.positions = telemetry.attitudes, telemetry.positions
-        if min(attitude_hz, position_hz) >= ENOUGH_HZ or rates.asked > _ASKS:
+    def _request_rates(self, vehicle: int, span_s: float) -> None:
+        """Request higher rates where they are too low; after some requests, report the low rates."""
+        reports = (self._camera.telemetry.attitudes, self._camera.telemetry.positions)
+        attitude_hz, position_hz = (
+            (now - before) / span_s for now, before in zip(reports, self._reports, strict=True)
+        )
+        self._reports = reports
+        if min(attitude_hz, position_hz) >= ENOUGH_HZ or self._rate_requests > _MAX_RATE_REQUESTS:
             return
-        rates.asked += 1
-        if rates.asked > _ASKS:
+        self._rate_requests += 1
+        if self._rate_requests > _MAX_RATE_REQUESTS:
             self._say(
-                f"attitude comes at {attitude_hz:.0f} Hz and position at {position_hz:.0f} Hz, less than the "
-                f"{WANTED_HZ:.0f} Hz asked for; the images stutter with it"
+                f"attitude is received at {attitude_hz:.0f} Hz and position at {position_hz:.0f} Hz, less "
+                f"than the {WANTED_HZ:.0f} Hz requested; the video is no smoother than that"
             )
             return
-        assert self._vehicle is not None
         for number, rate_hz in (
             (mavlink.MAVLINK_MSG_ID_ATTITUDE_QUATERNION, attitude_hz),
             (mavlink.MAVLINK_MSG_ID_LOCAL_POSITION_NED, position_hz),
         ):
             if rate_hz < ENOUGH_HZ:
-                self._to_send.append(request_rate(self._vehicle, number, WANTED_HZ))
+                self._to_send.append(request_rate(vehicle, number, WANTED_HZ))
 
     def _referee_answer(self, query: Mapping[str, str]) -> object:
         return self._camera.standing(query.get("state", ""), query.get("ended")).model_dump(mode="json")
 
 
-class _Rates:
-    """What had come when the rates were last looked at."""
-
-    def __init__(self) -> None:
-        self.attitudes = self.positions = self.asked = 0
-
-
-class _Watch:
-    """Says once what is missing and once when it is there again.
-
-    Attributes:
-        stale: attitude or position stays away.
-    """
+class _TelemetryWatch:
+    """Says once what is missing and once when it is received again."""
 
     def __init__(self, say: Say, url: str) -> None:
         self._say = say
@@ -194,38 +174,39 @@ class _Watch:
         self._began_s = time.monotonic()
         self._waiting_said = False
         self._placed: bool | None = None
-        self.stale = False
+        self.stale = False  # attitude or position is no longer received
 
     def see(self, kind: str, now_s: float) -> None:
-        """Note a message's arrival."""
         self._seen_s["ATTITUDE" if kind == "ATTITUDE_QUATERNION" else kind] = now_s
 
     def check(self, now_s: float) -> None:
-        """Compare with the clock."""
+        """Say what has not been received for too long, or is received again."""
         ages = {
             name: now_s - self._seen_s.get(key, self._began_s)
             for name, key in (("attitude", "ATTITUDE"), ("local position", "LOCAL_POSITION_NED"))
         }
         missing = [name for name, age_s in ages.items() if age_s > STALE_S]
+        words = " and no ".join(missing)
         if not {"ATTITUDE", "LOCAL_POSITION_NED"} <= set(self._seen_s):
             if missing and not self._waiting_said and now_s - self._began_s > _WAITING_LINE_S:
                 self._waiting_said = True
-                self._say(f"still no {' and no '.join(missing)} on {self._url}; no images until they come")
+                self._say(f"still no {words} on {self._url}; no images until they are received")
             return
         if missing and not self.stale:
-            self._say(f"no {' and no '.join(missing)} for {STALE_S:g} s; no new images until they are back")
+            self._say(f"no {words} for {STALE_S:g} s; no new images until they are back")
         if self.stale and not missing:
             self._say("telemetry is back")
         self.stale = bool(missing)
 
-    def tell_placement(self, camera: VirtualCamera) -> None:
-        """Say when the arena is laid, or why it is not."""
+    def report_placement(self, camera: VirtualCamera) -> None:
+        """Say when the arena is placed, or why it is not."""
         placement = camera.placement
         placed = placement.alignment is not None
         if placed == self._placed or not (placed or placement.armed):
             return
         self._placed = placed
-        if placed:
-            self._say("the arena lies so that the vehicle stands on the start, looking the start's way")
-        else:
-            self._say("no place for the arena yet: the vehicle must stand disarmed on its start")
+        self._say(
+            "the arena is placed: the vehicle stands on the start, with the start's heading"
+            if placed
+            else "the arena is not placed yet: the vehicle must stand disarmed on its start"
+        )

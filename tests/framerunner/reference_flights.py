@@ -6,7 +6,7 @@ change flights.
 One file for each scenario in `reference_flights/`: CSV, compressed (`zcat` shows it), one row for each tick.
 Two machines may compute the last bits of a state differently. Such a difference stays below a micrometre in
 these flights: a start moved by 1e-7 m moves no position by 0.1 mm. One of 1e-3 m lets the detector see other
-pixels, after which a flight is another one. The tolerances lie between.
+pixels, after which the flight differs. The tolerances are between.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ from itertools import pairwise
 from math import cos, dist, sin
 from pathlib import Path
 
-from framerunner.flying.fly import Flown
+from framerunner.flying.fly import FinishedFlight
 from framerunner.flying.lockstep import fly_lockstep
 from framerunner.flying.plan import FlightPlan
 from offboard.app import Moment
@@ -32,7 +32,7 @@ FOLDER = Path(__file__).with_suffix("")
 SCENARIOS = ("test-case-1", "test-case-2", "test-case-3", "round-1")
 POSITION_TOLERANCE_M = 0.02
 HEADING_TOLERANCE = 0.02  # distance of the two unit vectors; about radians
-LENGTH_TOLERANCE = 2  # ticks: a transition may come one tick earlier or later
+LENGTH_TOLERANCE = 2  # ticks: a transition may be one tick earlier or later
 
 
 @dataclass(frozen=True, slots=True)
@@ -71,8 +71,8 @@ class Tick:
 
 
 @functools.cache
-def fly(name: str) -> tuple[Flown, tuple[Tick, ...]]:
-    """Fly a scenario in lockstep, once in a process however many tests look at it."""
+def fly(name: str) -> tuple[FinishedFlight, tuple[Tick, ...]]:
+    """Fly a scenario in lockstep, once in a process for all tests."""
     ticks: list[Tick] = []
     flown = fly_lockstep(
         FlightPlan(load_scenario(name), load_mission("frame_challenge")),

@@ -1,9 +1,9 @@
 """The real app and its MAVSDK adapter over a bad link, in simulated time.
 
-All of the app runs: mission, box, `MavsdkDrone`, its telemetry feed, `CameraPerception` and the detector. In
-place of MAVSDK and UDP there is a link whose two ways lose, swap, double, delay and fall silent, by a seed;
-at its other end are the simulation's autopilot and camera. The event loop's clock is the simulation's: where
-it would wait, the simulation moves on. So a flight needs no real time and repeats exactly.
+All of the app runs: mission, box, `MavsdkDrone`, its telemetry feed, `CameraPerception` and the detector.
+MAVSDK and UDP are replaced by a link that loses, swaps, duplicates, delays and stops in both directions, by a
+seed; at its other end are the simulation's autopilot and camera. The event loop's clock is the simulation's:
+where it would wait, the simulation advances. So a flight needs no real time and repeats exactly.
 """
 
 from __future__ import annotations
@@ -44,15 +44,15 @@ AFTER_US = 2_500_000
 
 @dataclass(frozen=True)
 class Impairment:
-    """What a link does to datagrams, both ways and images alike.
+    """What a link does to datagrams, in both directions, and to images.
 
     Attributes:
         loss: share that is lost.
-        swap_every_s: so often, one datagram is overtaken by the next one.
-        doubled: share that comes twice.
+        swap_every_s: time between two datagrams that are overtaken by the next one.
+        doubled: share that is received twice.
         delay_s: of each.
-        jitter_s: at most so much is added, uniformly.
-        silent_s: begin and end of a time in which all is lost, vehicle time.
+        jitter_s: maximum of a uniform further delay.
+        silent_s: vehicle time from and to which all are lost.
     """
 
     loss: float = 0.0
@@ -63,8 +63,8 @@ class Impairment:
     silent_s: tuple[float, float] = (0.0, 0.0)
 
 
-class Way:
-    """One way of a link. A datagram is what is to be done when it arrives."""
+class Direction:
+    """One direction of a link. A datagram is a function that is called when it arrives."""
 
     def __init__(self, impairment: Impairment, random: Random):
         self._is, self._random = impairment, random
@@ -106,9 +106,9 @@ class LinkedVehicle:
         self.simulation = Simulation(scenario)
         self.autopilot = self.simulation.autopilot
         self.truths: list[TrueState] = []
-        self.down = Way(impairment, Random(f"down {seed}"))
-        self.up = Way(impairment, Random(f"up {seed}"))
-        self.video = Way(impairment, Random(f"video {seed}"))
+        self.down = Direction(impairment, Random(f"down {seed}"))
+        self.up = Direction(impairment, Random(f"up {seed}"))
+        self.video = Direction(impairment, Random(f"video {seed}"))
         self.telemetry, self.direct = Callbacks(), Callbacks()
         self.offboard = Offboard(self)
         self.images: asyncio.Queue[CameraFrame] = asyncio.Queue()
@@ -142,10 +142,10 @@ class LinkedVehicle:
     def _tell_motion(self, now_us):
         state = self.autopilot.state
         euler = SimpleNamespace(yaw_deg=degrees(state.yaw_rad), timestamp_us=state.time_us)
-        told = {"time_boot_ms": state.time_us // 1000}
-        told |= zip("xyz", state.position_ned_m, strict=True)
-        told |= zip(("vx", "vy", "vz"), state.velocity_ned_m_s, strict=True)
-        position = SimpleNamespace(fields_json=json.dumps(told))
+        fields = {"time_boot_ms": state.time_us // 1000}
+        fields |= zip("xyz", state.position_ned_m, strict=True)
+        fields |= zip(("vx", "vy", "vz"), state.velocity_ned_m_s, strict=True)
+        position = SimpleNamespace(fields_json=json.dumps(fields))
 
         def arrive():
             self.direct.call("LOCAL_POSITION_NED", position)
@@ -169,7 +169,7 @@ class LinkedVehicle:
         self.down.send(now_us, arrive)
 
     async def command(self, act):
-        """As MAVSDK: asked four times, half a second apart, until an acknowledgement comes."""
+        """As MAVSDK: sent four times, half a second apart, until an acknowledgement is received."""
         answered = asyncio.get_running_loop().create_future()
 
         def at_vehicle():
@@ -189,7 +189,7 @@ class LinkedVehicle:
 
 
 class Callbacks:
-    """What is subscribed to."""
+    """Subscriptions."""
 
     def __init__(self):
         self._called = {}
@@ -206,7 +206,7 @@ class Callbacks:
 
 
 class Offboard:
-    """As MAVSDK's plugin: a setpoint goes out at once and on at 20 Hz, until another mode is heard."""
+    """As MAVSDK's plugin: sends a setpoint at once and then at 20 Hz, until another mode is received."""
 
     def __init__(self, vehicle):
         self._vehicle = vehicle
@@ -214,8 +214,8 @@ class Offboard:
         self._velocity = None
         self._due_us = self._asked_us = 0
 
-    def set_velocity_body(self, told):
-        self._velocity = ((told.forward_m_s, told.right_m_s, told.down_m_s), radians(told.yawspeed_deg_s))
+    def set_velocity_body(self, sent):
+        self._velocity = ((sent.forward_m_s, sent.right_m_s, sent.down_m_s), radians(sent.yawspeed_deg_s))
         self._due_us = 0
         self.update(self._vehicle.time_us)
 
@@ -277,7 +277,7 @@ async def _refuse(_rate_hz):
 
 
 class _Selector(selectors.DefaultSelector):
-    """Waits by letting the simulation move on until something happens in the loop."""
+    """Waits by advancing the simulation until something happens in the loop."""
 
     vehicle: LinkedVehicle
     loop: SimulatedTimeLoop
@@ -310,15 +310,15 @@ class SimulatedTimeLoop(asyncio.SelectorEventLoop):
 
 @dataclass
 class LinkedFlight:
-    """What came of a flight.
+    """The result of a flight.
 
     Attributes:
-        outcome: as the app tells it.
-        flown: how many of the truths there were when the app ended.
-        box: in which it was to stay.
-        truths: of every control tick, to some seconds after its end.
+        outcome: as the app reports it.
+        flown: how many true states there were when the app ended.
+        box: in which the drone is kept.
+        truths: true states of every control tick, to some seconds after the end.
         mode: of the vehicle at the end.
-        armed: likewise.
+        armed: at the end.
         moments: every tick of the mission.
     """
 
@@ -340,7 +340,7 @@ class LinkedFlight:
 
     @property
     def farthest_outside_m(self) -> float:
-        """How far outside the box it ever was, sideways and upwards; below 0 inside."""
+        """Largest distance outside the box, horizontally and upwards; below 0 inside."""
         low, high = self.box.low_m, self.box.high_m
         return max(
             max(low[0] - x, x - high[0], low[1] - y, y - high[1], z - high[2])

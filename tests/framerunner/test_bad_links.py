@@ -1,4 +1,4 @@
-"""Flights over links that lose, swap, double, delay and fall silent: all end well, inside the box."""
+"""Flights over links that lose, swap, duplicate, delay and stop: all end safely, inside the box."""
 
 import pytest
 
@@ -22,7 +22,7 @@ SLOW_AND_LOSSY = IMPAIRMENTS["5 % lost, 100 ± 100 ms"]
 
 
 def before_a_low_frame():
-    """Test case 1, but the drone starts before red, which hangs low: after seconds it shifts before it."""
+    """Test case 1, but the drone starts before red, which is low: after seconds it shifts before it."""
     scenario = load_scenario("test-case-1")
     base = scenario.base.model_copy(update={"x_m": 1.5, "y_m": 2.0})
     start = scenario.start.model_copy(update={"x_m": 1.5, "y_m": 2.0, "yaw_rad": 0.0})
@@ -37,20 +37,20 @@ def silence_later(impairment, seed):
     begin_s, end_s = impairment.silent_s
     if end_s == 0.0:
         return impairment
-    late_s = 0.3 * seed
-    return Impairment(silent_s=(begin_s + late_s, end_s + late_s))
+    later_s = 0.3 * seed
+    return Impairment(silent_s=(begin_s + later_s, end_s + later_s))
 
 
 @pytest.mark.parametrize("name", IMPAIRMENTS)
-def test_every_flight_ends_well_inside_its_box(name):
+def test_every_flight_ends_safely_inside_its_box(name):
     scenario, mission = before_a_low_frame(), load_mission("frame_challenge")
     for seed in SEEDS:
         flight = fly_over(silence_later(IMPAIRMENTS[name], seed), scenario, mission, seed=seed)
-        told = f"{name}, seed {seed}: {flight.outcome}, {flight.mode.name}"
-        assert flight.ended_safely, told
-        assert flight.farthest_outside_m < 0.0, told
-        assert flight.lowest_m() > 0.1, told
-        assert "ran back" not in flight.outcome.reason, told
+        message = f"{name}, seed {seed}: {flight.outcome}, {flight.mode.name}"
+        assert flight.ended_safely, message
+        assert flight.farthest_outside_m < 0.0, message
+        assert flight.lowest_m() > 0.1, message
+        assert "ran back" not in flight.outcome.reason, message
 
 
 @pytest.mark.parametrize("mission", ["frame_challenge", "careful_crossing"])

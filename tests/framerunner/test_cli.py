@@ -1,4 +1,4 @@
-"""The command line: every foreseen fault is one line and exit code 2; the small commands work."""
+"""The command line: every expected fault is one line and exit code 2; the small commands work."""
 
 import json
 import os
@@ -39,10 +39,10 @@ def _own_folder(tmp_path, monkeypatch):
 
 @pytest.fixture
 def refused(capsys):
-    """Run a command that must be refused; what its one line says."""
+    """Run a command that must be refused; its one line."""
 
     def refuse(*arguments):
-        signal.alarm(30)  # ends this test run if the command is not refused but goes on
+        signal.alarm(30)  # ends this test run if the command is not refused
         code = run([str(argument) for argument in arguments])
         signal.alarm(0)
         captured = capsys.readouterr()
@@ -130,7 +130,7 @@ def test_a_drone_needs_a_camera_and_a_camera_a_drone(refused):
     assert "--drone" in refused("fly", "--camera", "http://127.0.0.1:1/video")
 
 
-def test_a_simulator_that_is_there_needs_the_url_of_its_drone_and_a_good_one_itself(refused):
+def test_a_running_simulator_needs_the_url_of_its_drone_and_a_valid_one_itself(refused):
     assert "--drone" in refused("fly", "--simulator", "http://127.0.0.1:8100")
     line = refused("fly", "--drone", "udpin://127.0.0.1:25099", "--simulator", "127.0.0.1:8100")
     assert "--simulator '127.0.0.1:8100'" in line and "http://HOST:PORT" in line
@@ -207,7 +207,7 @@ def test_a_bind_address_of_another_machine_is_refused(refused):
     assert "192.0.2.1" in refused("sim", "--instance", free_instance(), "--bind", "192.0.2.1")
 
 
-def test_a_busy_port_of_the_simulator_is_what_fly_says(refused):
+def test_fly_reports_a_busy_port_of_the_simulator(refused):
     instance = free_instance()
     with bound(14580 + instance):
         line = refused("fly", "--instance", instance)
@@ -336,7 +336,7 @@ def test_sigterm_while_a_flight_starts_ends_it_without_a_traceback(tmp_path, sec
     with subprocess.Popen(
         program, cwd=tmp_path, env=environment, stderr=subprocess.PIPE, text=True
     ) as running:
-        time.sleep(seconds)  # whatever it does by then
+        time.sleep(seconds)  # at any point of the start
         running.send_signal(signal.SIGTERM)
         said = running.communicate(timeout=20)[1]
     assert "Traceback" not in said
@@ -365,7 +365,7 @@ def test_sigterm_ends_a_flight_in_order_where_ctrl_c_is_ignored(tmp_path):
     assert "interrupted" in result["reason"]
 
 
-def test_a_reader_that_goes_away_is_no_fault():
+def test_a_reader_that_closes_its_pipe_is_no_fault():
     schema = [sys.executable, "-m", "framerunner", "scenario", "schema"]
     environment = {**os.environ, "PYTHONPATH": str(ROOT)}
     with subprocess.Popen(schema, env=environment, stdout=subprocess.PIPE, stderr=subprocess.PIPE) as writer:
@@ -374,11 +374,11 @@ def test_a_reader_that_goes_away_is_no_fault():
         assert writer.wait(20) == 0
 
 
-def test_the_version_is_told(capsys):
+def test_the_version_is_printed(capsys):
     assert run(["--version"]) == 0
     assert capsys.readouterr().out.strip().count(".") == 2
 
 
-def test_help_keeps_what_stands_in_pointed_brackets(capsys):
+def test_help_keeps_text_in_angle_brackets(capsys):
     assert run(["fly", "--help"]) == 0
     assert "runs/<time>-<scenario>/" in capsys.readouterr().out

@@ -1,4 +1,4 @@
-"""A disk that fills up during a flight: each file that does not fit is one line, the verdict stays."""
+"""A disk that fills up during a flight: each file that does not fit is one line, the verdict is kept."""
 
 import re
 import subprocess
@@ -22,16 +22,16 @@ def can_mount(folder):
 
 
 def run(folder, size, *arguments):
-    """Run a command whose folder `disk` holds only so much."""
+    """Run a command in a folder with a `disk` of a size."""
     if not can_mount(folder):
-        pytest.skip("this system lets nobody mount a small disk")
+        pytest.skip("a small disk cannot be mounted on this system")
     program = [sys.executable, "-m", "framerunner", *arguments]
     command = ["unshare", "--mount", "--map-root-user", "sh", "-c", ON_SMALL_DISK, size, *program]
     environment = {"PYTHONPATH": str(ROOT), "OPENBLAS_NUM_THREADS": "1"}
     return subprocess.run(command, cwd=folder, env=environment, capture_output=True, text=True, check=False)
 
 
-def test_a_flight_on_a_full_disk_keeps_its_verdict_and_says_what_it_does_not_leave(tmp_path):
+def test_a_flight_on_a_full_disk_keeps_its_verdict_and_names_the_missing_files(tmp_path):
     (tmp_path / "short.yaml").write_text(SHORT, encoding="utf-8")
     done = run(tmp_path, "16k", "fly", "short.yaml", "--lockstep", "--record", "--video", "--out", "disk")
     assert done.returncode == 1, done.stderr

@@ -101,7 +101,7 @@ def test_a_flight_repeats_to_the_last_bit_here_and_elsewhere():
     assert other.result.state_sha256 != first.result.state_sha256
 
 
-def test_looking_on_changes_nothing():
+def test_observers_change_nothing():
     moments, images = [], []
     watched = fly(
         short("test-case-1", 6.0),
@@ -118,7 +118,7 @@ def test_looking_on_changes_nothing():
     assert {moment.state.time_us % 50_000 for moment in flown} == {0, 2_000}
 
 
-def test_a_video_is_written_if_asked_for(tmp_path, monkeypatch):
+def test_a_video_is_written_on_request(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     (tmp_path / "short.yaml").write_text("name: short\ntry_limit_s: 2\n", encoding="utf-8")
     run(["fly", "short.yaml", "--lockstep", "--video"])
@@ -130,7 +130,7 @@ def test_a_video_is_written_if_asked_for(tmp_path, monkeypatch):
     assert 20 <= count <= 80  # 10 a second, from before take-off
 
 
-def test_the_command_leaves_what_a_flight_in_real_time_leaves(tmp_path, capsys, monkeypatch):
+def test_the_command_writes_what_a_flight_in_real_time_writes(tmp_path, capsys, monkeypatch):
     monkeypatch.chdir(tmp_path)
     (tmp_path / "short.yaml").write_text(
         "name: short\nbase: {x_m: 0, y_m: 0}\nstart: {x_m: 0, y_m: 0}\nframes: []\ntry_limit_s: 2\n",
@@ -157,6 +157,6 @@ def test_the_command_leaves_what_a_flight_in_real_time_leaves(tmp_path, capsys, 
 @pytest.mark.parametrize(
     "options", [["--speed", "2"], ["--instance", "1"], ["--drone", "udpin://0.0.0.0:1", "--camera", "0"]]
 )
-def test_lockstep_refuses_what_it_has_no_use_for(options, capsys):
+def test_lockstep_refuses_options_of_real_time(options, capsys):
     assert run(["fly", "empty", "--lockstep", *options]) == 2
     assert "--lockstep" in capsys.readouterr().err

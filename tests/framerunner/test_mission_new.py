@@ -1,4 +1,4 @@
-"""`mission new` writes a mission that is good, explains itself and flies, and overwrites nothing."""
+"""`mission new` writes a valid mission with comments that flies, and overwrites nothing."""
 
 import fnmatch
 import re
@@ -35,7 +35,7 @@ def fly(scenario, mission, pilot=None):
 
 
 def with_exercise_done(text):
-    """Green and blue as well, by taking the # away as the comment says."""
+    """Green and blue as well, by removing the # as the comment says."""
     start, end = text.index("  # First exercise"), text.index("  go_home:")
     lines = text[start:end].splitlines()[1:]
     done = "\n".join(line.replace("  # ", "  ", 1) for line in lines)
@@ -43,7 +43,7 @@ def with_exercise_done(text):
 
 
 @pytest.mark.parametrize("scenario", ["test-case-1", "test-case-2", "test-case-3"])
-def test_the_starter_crosses_red_and_comes_home(scenario):
+def test_the_starter_crosses_red_and_lands(scenario):
     new("mine")
     result = fly(scenario, "mine.yaml").result
     assert result.ended == "finished", result.reason
@@ -58,7 +58,7 @@ def test_the_starter_with_python_does_so_too():
     assert result.ended == "finished", result.reason
     assert result.frames_crossed == ("red",)
     assert result.landed_on_base
-    assert result.seconds_in_state["circle"] > 1.0  # its own primitive did fly
+    assert result.seconds_in_state["circle"] > 1.0  # its own primitive was flown
 
 
 def test_its_first_exercise_flies_the_whole_challenge():

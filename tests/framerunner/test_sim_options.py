@@ -1,4 +1,4 @@
-"""Options of `framerunner sim` that cannot be: one line each, and nothing is opened."""
+"""Invalid options of `framerunner sim`: one line each, and nothing is opened."""
 
 import pytest
 
@@ -7,7 +7,7 @@ from framerunner.cli import run
 
 @pytest.fixture
 def refused(capsys):
-    """Run the simulator with options that it must refuse; the one line it says."""
+    """Run the simulator with options that it must refuse; its one line."""
 
     def ask(*options):
         assert run(["sim", *map(str, options)]) == 2
@@ -60,7 +60,7 @@ def test_a_bad_port_behind_a_host(refused, option):
     assert "station:port: must be a host, or host:port" in refused(option, "station:port")
 
 
-def test_a_key_that_is_none(refused, tmp_path):
+def test_an_invalid_key(refused, tmp_path):
     key = tmp_path / "key"
     assert f"--signing-key {key}: cannot be read" in refused("--signing-key", key)
     key.write_text("\n", encoding="utf-8")
@@ -71,3 +71,19 @@ def test_a_key_that_is_none(refused, tmp_path):
     line = refused("--signing-key", key)
     assert "not all zero" in line
     assert "00" * 32 not in line
+
+
+@pytest.mark.parametrize(
+    ("text", "complaint"),
+    [
+        ("1 1 MIS_TAKEOFF_ALT up 9\n", "line 1: MIS_TAKEOFF_ALT: up is not a number"),
+        ("# mine\nCOM_DL_LOSS_T 2\n", "line 2: COM_DL_LOSS_T: 2 is outside 5 to 300 s"),
+    ],
+)
+def test_a_bad_line_of_the_parameter_file(tmp_path, capsys, text, complaint):
+    path = tmp_path / "drone.params"
+    path.write_text(text)
+    assert run(["sim", "--instance", "6", "--parameters", str(path)]) == 2
+    (line,) = capsys.readouterr().err.splitlines()
+    assert line == f"error: {path}: {complaint}"
+    assert path.read_text() == text

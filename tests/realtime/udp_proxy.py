@@ -8,7 +8,7 @@ import threading
 import time
 from random import Random
 
-from tests.framerunner.simulated_link import Impairment, Way
+from tests.framerunner.simulated_link import Direction, Impairment
 
 
 class UdpProxy(threading.Thread):
@@ -28,7 +28,7 @@ class UdpProxy(threading.Thread):
         self.port = self._vehicle_side.getsockname()[1]
         self._app = ("127.0.0.1", app_port)
         self._vehicle = None
-        self._ways = Way(impairment, Random(f"down {seed}")), Way(impairment, Random(f"up {seed}"))
+        self._ways = tuple(Direction(impairment, Random(f"{way} {seed}")) for way in ("down", "up"))
         self._halt = threading.Event()
 
     def run(self):

@@ -1,11 +1,11 @@
-"""What a drone lacks, and what is said of it."""
+"""What a drone lacks, and what the doctor says about it."""
 
 import struct
 
 import pytest
 
 from framerunner.doctor.checks import Level, can_fly, examine
-from framerunner.doctor.record import SUMMARY, Record, event_id
+from framerunner.doctor.listen import SUMMARY, Record, event_id
 from wire.dialect import mavlink
 
 GOOD_PARAMETERS = {
@@ -56,8 +56,8 @@ def summary(armable_modes):
     return event("commander_arming_check_summary", "<BIIII", 0, 0x1100000, 0x80, armable_modes, armable_modes)
 
 
-def tell(record, message):
-    """Let a record know a message of which it counts nothing."""
+def put(record, message):
+    """Put a message into a record, without its counts."""
     record.latest[message.get_type()] = message
     record.telemetry.take(message)
 
@@ -71,7 +71,7 @@ def healthy(**parameters):
         estimator_status(),
         mavlink.MAVLink_extended_sys_state_message(0, mavlink.MAV_LANDED_STATE_ON_GROUND),
     ):
-        tell(record, message)
+        put(record, message)
     for name, count in (("ATTITUDE", 301), ("LOCAL_POSITION_NED", 181)):
         record.counts[name], record.times_s[name] = count, (0.0, 6.0)
     for number in range(200):
@@ -110,7 +110,7 @@ def test_a_healthy_drone_can_fly():
 )
 def test_what_a_message_shows_to_be_missing(message, subject):
     record = healthy()
-    tell(record, message)
+    put(record, message)
     assert missing(record) == {subject}
     assert not can_fly(examine(record))
 
@@ -128,7 +128,7 @@ def test_what_a_message_shows_to_be_missing(message, subject):
 )
 def test_parameters_that_would_end_the_flight(name, value):
     record = healthy(**{name: value})
-    tell(record, estimator_status(*VISION_AND_GPS[0]))
+    put(record, estimator_status(*VISION_AND_GPS[0]))
     assert missing(record) == {name}
 
 
@@ -137,7 +137,7 @@ def test_a_fence_that_does_nothing_is_no_fence():
 
 
 @pytest.mark.parametrize("name", ["ATTITUDE", "LOCAL_POSITION_NED"])
-def test_streams_that_do_not_come_are_missing_and_slow_ones_noted(name):
+def test_streams_that_are_not_received_are_missing_and_slow_ones_noted(name):
     what = {"ATTITUDE": "attitude", "LOCAL_POSITION_NED": "local position"}[name]
     record = healthy()
     record.counts[name] = 13
@@ -160,7 +160,7 @@ def test_a_bad_link_is_missing():
     assert missing(record) == {"link"}
 
 
-def test_an_estimate_that_wanders_is_noted():
+def test_an_estimate_that_drifts_is_noted():
     record = healthy()
     record.places.append((0.0, 0.0, 0.4))
     assert notes(record) == {"estimate"}
@@ -170,12 +170,12 @@ def test_an_estimate_that_wanders_is_noted():
 GPS = (1023, 0.2928, 0.0716), True, 0x807F3AB0
 GPS_AND_RANGE_FINDER = (959, 0.2917, 0.0646), True, 0x807F3AB0
 VISION = (431, 0.0028, 0.0020), False, 0x807F3A80
-VISION_WANTED = (165, 0.0127, 0.3256), False, 0x80013A80  # nobody sends it, or with estimator type MOCAP
+VISION_REQUESTED = (165, 0.0127, 0.3256), False, 0x80013A80  # not sent, or with estimator type MOCAP
 VISION_AND_GPS = (959, 0.0183, 0.0170), True, 0x807F3AB0
 
 
 @pytest.mark.parametrize(
-    ("told", "parameters", "lacks"),
+    ("reported", "parameters", "lacks"),
     [
         (GPS, {"EKF2_EV_CTRL": 0.0, "EKF2_HGT_REF": 1.0}, {"position", "height"}),
         (GPS, {"EKF2_EV_CTRL": 15.0, "EKF2_HGT_REF": 3.0}, {"position", "height"}),
@@ -185,16 +185,16 @@ VISION_AND_GPS = (959, 0.0183, 0.0170), True, 0x807F3AB0
         (VISION, {"EKF2_EV_CTRL": 13.0}, {"height"}),
         (VISION, {"EKF2_HGT_REF": 2.0, "EKF2_RNG_CTRL": 0.0}, {"height"}),
         (VISION, {"EKF2_DELAY_MAX": 110.0}, {"estimator"}),
-        (VISION_WANTED, {}, {"pre-arm checks", "position", "height"}),
+        (VISION_REQUESTED, {}, {"pre-arm checks", "position", "height"}),
         (VISION_AND_GPS, {}, set()),
     ],
 )
-def test_the_verdict_on_what_px4_says_of_its_estimate(told, parameters, lacks):
-    estimate, passed, armable_modes = told
+def test_the_verdict_on_what_px4_reports_of_its_estimate(reported, parameters, lacks):
+    estimate, passed, armable_modes = reported
     record = healthy(**parameters)
     record.counts["DISTANCE_SENSOR"] = 60
-    tell(record, estimator_status(*estimate))
-    tell(record, sys_status(health=ALL if passed else ALL & ~0x10000000))
+    put(record, estimator_status(*estimate))
+    put(record, sys_status(health=ALL if passed else ALL & ~0x10000000))
     record.arming.take(summary(armable_modes))
     assert missing(record) == lacks
 
@@ -204,31 +204,31 @@ def finding_of(record, subject):
     return finding
 
 
-def test_the_height_is_said_to_come_from_what_is_used_not_from_what_is_wished():
+def test_the_source_of_height_is_the_one_in_use_not_the_one_requested():
     record = healthy()
     assert finding_of(record, "height").text == "by vision, estimated accuracy 0.00 m"
-    tell(record, estimator_status(*VISION_WANTED[0]))
+    put(record, estimator_status(*VISION_REQUESTED[0]))
     height = finding_of(record, "height")
     assert height.text.startswith(
         "by barometer, though EKF2_HGT_REF asks for vision, estimated accuracy 0.33 m"
     )
     assert "not MOCAP" in finding_of(record, "position").advice
     assert height.advice == "as for the position"
-    tell(record, estimator_status(*GPS[0]))
+    put(record, estimator_status(*GPS[0]))
     assert "the drone will stray" in finding_of(record, "position").text
 
 
 def test_an_ideal_drone_with_a_position_from_gps_can_fly():
     record = healthy()
     del record.parameters["EKF2_HGT_REF"], record.parameters["EKF2_EV_CTRL"]
-    tell(record, estimator_status(959, 0.0, 0.0))
+    put(record, estimator_status(959, 0.0, 0.0))
     assert missing(record) == set()
 
 
 def test_what_keeps_it_from_arming_in_offboard_is_named():
     record = healthy()
-    tell(record, sys_status(health=0x2F))
-    assert "it does not tell why" in finding_of(record, "pre-arm checks").advice
+    put(record, sys_status(health=0x2F))
+    assert "it reports no reasons" in finding_of(record, "pre-arm checks").advice
     for message in (
         summary(0),
         event("check_modes_global_pos", "<IB", 0x38, 24),
@@ -243,14 +243,14 @@ def test_what_keeps_it_from_arming_in_offboard_is_named():
     assert finding_of(record, "pre-arm checks").text == "passed for offboard, where fly arms it; not in hold"
 
 
-def test_the_summary_is_known_by_its_number():
+def test_the_summary_has_px4_s_number():
     assert SUMMARY == 0x01A893E0  # as PX4 sends it
 
 
 def test_a_fence_of_px4_without_a_global_position_is_noted():
     record = healthy(GF_MAX_VER_DIST=3.5)
     assert notes(record) == {"fence"}
-    tell(record, estimator_status(*VISION_AND_GPS[0]))
+    put(record, estimator_status(*VISION_AND_GPS[0]))
     assert notes(record) == set()
 
 
@@ -262,9 +262,9 @@ def test_a_return_under_a_roof_is_warned_of(action):
     assert "climbs to 30 m first" in finding.text
 
 
-def test_a_silent_drone_is_judged_by_what_there_is():
+def test_a_drone_that_sends_little_is_judged_by_that():
     record = Record(system_id=1)
-    tell(record, heartbeat())
+    put(record, heartbeat())
     assert missing(record) == {"health", "attitude", "local position"}
     assert "parameters" in notes(record)
 

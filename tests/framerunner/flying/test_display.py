@@ -1,4 +1,4 @@
-"""What people see during a flight."""
+"""What the terminal shows during a flight."""
 
 import asyncio
 from io import StringIO
@@ -38,14 +38,14 @@ def see(recorder, time_s, state, mode="OFFBOARD", **fields):
 
 
 async def shown(display, recorder, moments):
-    """Run the display while moments come."""
+    """Run the display while moments are seen."""
     async with display:
         for time_s, state, *how in moments:
             see(recorder, time_s, state, **(how[0] if how else {}))
             await asyncio.sleep(0.25)
 
 
-async def test_without_a_terminal_a_line_comes_with_each_state_and_each_ten_seconds(flight, capsys):
+async def test_without_a_terminal_a_line_is_printed_at_each_state_and_each_ten_seconds(flight, capsys):
     recorder, display = flight
     times = [(0.0, "take_off.start"), (0.1, "take_off.start"), (0.2, "red.turning"), (9.0, "red.turning")]
     await shown(display, recorder, [*times, (10.3, "red.turning")])
@@ -74,14 +74,14 @@ async def test_a_pause_is_a_line_and_its_end_another(flight, capsys):
     ]
 
 
-def test_the_table_tells_of_a_pause(flight):
+def test_the_table_shows_a_pause(flight):
     recorder, display = flight
     see(recorder, 12.3, "red.turning", "POSCTL", paused=True)
     text = rendered(display._table(None))
     assert "paused" in text and "the pilot has the sticks (POSCTL)" in text
 
 
-async def test_before_the_first_tick_nothing_is_said(flight, capsys):
+async def test_before_the_first_tick_nothing_is_printed(flight, capsys):
     recorder, display = flight
     await shown(display, recorder, [])
     assert capsys.readouterr().err == ""
@@ -93,7 +93,7 @@ def rendered(table):
     return console.export_text()
 
 
-def test_in_a_terminal_a_table_tells_state_place_and_detections(flight):
+def test_in_a_terminal_a_table_shows_state_position_and_detections(flight):
     recorder, display = flight
     assert "waiting until the drone is ready" in rendered(display._table(None))
     see(recorder, 12.3, "red.turning")

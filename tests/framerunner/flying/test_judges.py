@@ -1,4 +1,4 @@
-"""Where the verdict comes from, and that a judge which fails ends nothing."""
+"""The source of the verdict, and that a judge which fails does not end a flight."""
 
 from contextlib import asynccontextmanager
 
@@ -18,7 +18,7 @@ from wire.simulator_api import SimulatorApi
 
 SCENARIO = load_scenario("test-case-1")
 PLAN = FlightPlan(SCENARIO)
-NOBODY = SimulatorApi("http://127.0.0.1:9")
+NO_SIMULATOR = SimulatorApi("http://127.0.0.1:9")
 SNAPSHOT = {
     "began_us": 3,
     "try_time_s": 7.5,
@@ -35,7 +35,7 @@ SNAPSHOT = {
 
 @asynccontextmanager
 async def referee(*answers):
-    """A server whose last answer comes again and again: its root URL, a session, the queries it got."""
+    """A server that repeats its last answer: its root URL, a session, the queries received."""
     queue, queries = list(answers), []
 
     async def answer(request):
@@ -74,7 +74,7 @@ async def test_the_simulator_of_the_camera_is_the_judge():
         assert (standing.try_time_s, standing.crossed, standing.contacts) == (7.5, ("red",), 1)
 
 
-async def test_a_referee_that_lives_on_telemetry_is_not_taken_for_the_truth():
+async def test_a_referee_by_telemetry_is_not_taken_for_the_truth():
     async with referee({**answer(), "source": "telemetry"}) as (root, session, _):
         judge, _ = await choose_judge(PLAN, SimulatorApi(root), session)
         assert isinstance(judge, TruthJudge)
@@ -84,7 +84,7 @@ async def test_a_referee_that_lives_on_telemetry_is_not_taken_for_the_truth():
 @pytest.mark.parametrize(
     "body", [answer("another-place"), "not json", {"weather": "fine"}, answer(contacts="many")], ids=str
 )
-async def test_whoever_is_not_the_referee_of_this_scenario_does_not_judge(body):
+async def test_what_is_not_the_referee_of_this_scenario_does_not_judge(body):
     async with referee(body) as (root, session, _):
         judge, plan = await choose_judge(PLAN, SimulatorApi(root), session)
         assert (judge.source, plan) == ("telemetry", PLAN)
@@ -97,7 +97,7 @@ async def test_another_camera_leaves_the_verdict_to_telemetry(url):
         assert judge.source == "telemetry"
 
 
-async def test_frames_hang_where_the_referee_has_them():
+async def test_frames_are_where_the_referee_has_them():
     async with referee({**answer(), "source": "telemetry", "lift_m": 0.25}) as (root, session, _):
         _, plan = await choose_judge(PLAN, SimulatorApi(root), session)
     assert plan == PLAN.lifted(0.25)
@@ -118,7 +118,7 @@ async def test_a_simulator_that_was_named_must_judge(body, words):
     assert f"--simulator {root}" in str(refused.value)
 
 
-async def test_the_report_is_asked_for_when_the_drone_is_at_rest():
+async def test_the_report_is_requested_when_the_drone_is_at_rest():
     async with referee(answer(), answer(), answer(settled=True)) as (root, session, queries):
         judge = TruthJudge(SimulatorApi(root), session, PLAN)
         assert await judge.report("landing.stop", None) == RefereeReport(verdict="clean")
@@ -131,8 +131,8 @@ async def test_a_drone_that_flies_on_is_not_waited_for():
     assert queries == [{}, {"state": "red.turning", "ended": "link lost & gone"}]
 
 
-async def test_the_disarming_may_reach_the_referee_later_than_the_app():
-    """Heartbeats come once a second, on each link at another moment; then the referee looks for rest."""
+async def test_the_referee_may_see_the_disarming_later_than_the_app():
+    """Heartbeats are sent once a second, on each link at another time; then the referee waits for rest."""
     late = [answer(time_us=250_000 * step, motors_on=True) for step in range(8)]
     async with referee(*late, answer(time_us=2_100_000, settled=True)) as (root, session, queries):
         judge = TruthJudge(SimulatorApi(root), session, PLAN)
@@ -140,7 +140,7 @@ async def test_the_disarming_may_reach_the_referee_later_than_the_app():
     assert queries == [{}] * 9 + [{"state": "landing.touch_down"}]
 
 
-async def test_a_disarming_that_never_comes_is_waited_for_in_vehicle_time(monkeypatch):
+async def test_the_wait_for_a_missing_disarming_is_in_vehicle_time(monkeypatch):
     monkeypatch.setattr("framerunner.flying.judges._POLL_S", 0.0)
     never = [answer(time_us=500_000 * step, motors_on=True) for step in range(20)]
     async with referee(*never) as (root, session, queries):
@@ -155,10 +155,10 @@ async def test_a_referee_whose_clock_stands_still_is_not_waited_for(monkeypatch)
     assert 2 <= len(queries) <= 5
 
 
-async def test_a_referee_that_is_gone_has_no_standing():
+async def test_a_referee_that_has_ended_has_no_standing():
     async with aiohttp.ClientSession() as session:
-        assert await ask_referee(NOBODY, session) is None
-        assert await TruthJudge(NOBODY, session, PLAN).standing() is None
+        assert await ask_referee(NO_SIMULATOR, session) is None
+        assert await TruthJudge(NO_SIMULATOR, session, PLAN).standing() is None
 
 
 def moment(time_s, x, z, *, armed=True):
@@ -166,7 +166,7 @@ def moment(time_s, x, z, *, armed=True):
     return Moment(state, VelocityCommand(), Detections(), "take_off.rise", time_s)
 
 
-async def test_telemetry_is_judged_as_it_comes():
+async def test_telemetry_is_judged_tick_by_tick():
     judge = TelemetryJudge(PLAN.new_referee())
     judge.see(moment(10.0, -3.0, 0.55, armed=False))
     for tick in range(100):
@@ -182,7 +182,7 @@ async def test_telemetry_is_judged_as_it_comes():
 
 @pytest.mark.parametrize(("x_m", "z_m"), [(-2.93, 0.3), (-2.93, 0.55), (-2.6, 0.55)])
 async def test_without_a_base_it_lands_where_the_base_would_be_or_beside_it(x_m, z_m):
-    """A floor may be soft, or the estimate low: what counts is the place in plan."""
+    """A floor may be soft, or the estimate low: only x and y count."""
     judge = TelemetryJudge(PLAN.lifted(SCENARIO.base.top_m).new_referee())
     for tick in range(20):
         judge.see(moment(10.0 + 0.05 * tick, -3.0, 0.55 + 0.05 * tick))
@@ -193,9 +193,9 @@ async def test_without_a_base_it_lands_where_the_base_would_be_or_beside_it(x_m,
     assert report.landing_error_m == pytest.approx(x_m + 3.0)
 
 
-async def test_telemetry_judges_when_the_simulator_has_died():
+async def test_telemetry_judges_when_the_simulator_has_ended():
     async with aiohttp.ClientSession() as session:
-        judge = TruthJudge(NOBODY, session, PLAN)
+        judge = TruthJudge(NO_SIMULATOR, session, PLAN)
         assert judge.source == "truth"
         for tick in range(40):
             judge.see(moment(10.0 + 0.05 * tick, -3.0, 0.6 + 0.05 * tick, armed=tick > 0))

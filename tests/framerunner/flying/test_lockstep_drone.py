@@ -7,14 +7,14 @@ from math import nan
 import pytest
 
 from firmware_py.status import CommandResult, FlightMode
-from framerunner.flying.lockstep import LockstepEyes
+from framerunner.flying.lockstep import LockstepPerception
 from framerunner.flying.lockstep_drone import TICK_US, LockstepDrone
 from offboard.drone import DroneError, VelocityCommand
 from offboard.perception import CameraLostError
 from scenarios.loader import load_scenario
 from sitl.simulation import Simulation
 
-START = (1.0, 2.0, 0.5, 0.3)  # not where the simulation has it: the axes must be turned to this
+START = (1.0, 2.0, 0.5, 0.3)  # not the simulation's own start: the axes must be aligned to this
 
 
 @pytest.fixture
@@ -44,14 +44,14 @@ async def in_the_air(drone):
     return await fly(drone, VelocityCommand(up_m_s=0.5), 60)
 
 
-async def test_ticks_stand_on_the_50_ms_grid_in_the_arenas_axes(drone):
+async def test_ticks_are_on_the_50_ms_grid_in_the_arenas_axes(drone):
     await drone.ready()
     states = await fly(drone, VelocityCommand(), 6)
     assert [state.time_us // TICK_US - states[0].time_us // TICK_US for state in states] == list(range(6))
     assert all(state.time_us % TICK_US < 4_000 for state in states)
-    told = states[-1]
-    assert (told.x, told.y, told.z, told.yaw) == pytest.approx(START, abs=1e-4)
-    assert (told.armed, told.offboard, told.landed) == (False, False, True)
+    last = states[-1]
+    assert (last.x, last.y, last.z, last.yaw) == pytest.approx(START, abs=1e-4)
+    assert (last.armed, last.offboard, last.landed) == (False, False, True)
 
 
 async def test_motors_run_only_in_offboard_and_a_velocity_holds_until_changed(drone, simulation):
@@ -80,21 +80,21 @@ async def test_motors_off_land_and_hold(drone, simulation):
     assert not simulation.autopilot.status.armed
 
 
-async def test_says_who_took_over(drone, simulation):
+async def test_reports_that_another_mode_took_over(drone, simulation):
     await in_the_air(drone)
     simulation.autopilot.set_mode(FlightMode.HOLD)
     with pytest.raises(DroneError, match="the pilot or a failsafe took over: mode HOLD"):
         await fly(drone, VelocityCommand(), 25)
 
 
-async def test_says_that_it_was_disarmed(drone, simulation):
+async def test_reports_that_it_was_disarmed(drone, simulation):
     await in_the_air(drone)
     simulation.autopilot.disarm(force=True)
     with pytest.raises(DroneError, match=r"disarmed by others; the vehicle says: .*Disarmed by external"):
         await fly(drone, VelocityCommand(), 25)
 
 
-async def test_a_command_that_is_no_number_brakes_as_a_packet_with_it_does(drone):
+async def test_a_command_with_a_nan_brakes_as_a_packet_with_it_does(drone):
     await in_the_air(drone)
     states = await fly(drone, VelocityCommand(up_m_s=nan), 40)
     assert states[-1].velocity_arena_m_s[2] == pytest.approx(0.0, abs=0.02)
@@ -111,14 +111,14 @@ async def test_refuses_an_armed_vehicle_and_ticks_before_ready(drone, simulation
         await drone.ready()
 
 
-async def test_says_what_the_vehicle_refuses(drone, simulation, monkeypatch):
+async def test_reports_what_the_vehicle_refuses(drone, simulation, monkeypatch):
     await drone.ready()
     monkeypatch.setattr(simulation.autopilot, "arm", lambda: CommandResult.TEMPORARILY_REJECTED)
     with pytest.raises(DroneError, match=r"arming was refused: TEMPORARILY_REJECTED; .*Ready for takeoff"):
         await drone.motors_on()
 
 
-async def test_says_that_the_vehicles_clock_stands_still(drone, simulation, monkeypatch):
+async def test_reports_that_the_vehicles_clock_stands_still(drone, simulation, monkeypatch):
     await drone.ready()
     sample = replace(simulation.world.sensors(), position_ned_m=(nan, nan, nan))
     monkeypatch.setattr(simulation.world, "sensors", lambda: sample)
@@ -151,11 +151,11 @@ def test_refuses_a_delay_that_does_not_fit_between_ticks(simulation, delay_us):
 
 
 def test_a_camera_without_fresh_images_is_lost(simulation):
-    eyes = LockstepEyes(simulation.scenario)
-    assert not eyes.latest(900_000).red.seen
+    perception = LockstepPerception(simulation.scenario)
+    assert not perception.latest(900_000).red.seen
     for _ in range(50):
         simulation.tick()
-        eyes.follow(simulation.truth)
-    assert eyes.latest(simulation.time_us).time_us == 136_000
+        perception.follow(simulation.truth)
+    assert perception.latest(simulation.time_us).time_us == 136_000
     with pytest.raises(CameraLostError, match=r"no image for 1\.1 s"):
-        eyes.latest(1_250_000)
+        perception.latest(1_250_000)

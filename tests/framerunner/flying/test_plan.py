@@ -1,4 +1,4 @@
-"""What a plan says of a flight before it begins."""
+"""What a plan contains before the flight begins."""
 
 import pickle
 
@@ -33,11 +33,11 @@ def test_each_try_has_a_referee_of_its_own():
     assert PLAN.new_referee() is not PLAN.new_referee()
 
 
-def test_it_travels():
+def test_it_can_be_pickled():
     sent = pickle.loads(pickle.dumps(PLAN))
     assert (sent, sent.start_pose) == (PLAN, PLAN.start_pose)
 
 
-def test_a_plan_without_a_mission_has_none_to_be_flown():
+def test_a_plan_without_a_mission_has_no_chart():
     with pytest.raises(ValueError, match="no mission"):
         _ = PLAN.chart

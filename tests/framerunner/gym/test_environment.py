@@ -1,4 +1,4 @@
-"""FrameChallenge-v0: Gymnasium's own checks, episodes that repeat, and what the referee pays for."""
+"""FrameChallenge-v0: Gymnasium's own checks, episodes that repeat, and rewards."""
 
 import subprocess
 import sys
@@ -14,7 +14,7 @@ from gymnasium.utils.env_checker import check_env
 import framerunner.gym
 from errors import SettingError
 from framerunner.gym.environment import FrameChallengeEnv
-from framerunner.gym.reward import CONTACT, CROSSING, FAILURE, LANDING
+from framerunner.gym.flight import CONTACT, CROSSING, FAILURE, LANDING
 from scenarios.models import Scenario, ScenarioError
 from scenarios.random_scenarios import LevelError
 
@@ -42,16 +42,16 @@ def make(**options):
     return gymnasium.make(framerunner.gym.ENVIRONMENT_ID, disable_env_checker=True, **options)
 
 
-def towards(observation, goal_m, least=0.0):
-    """The action that flies straight to a place, as a mission's fly_to_goal does."""
+def towards(observation, goal_m):
+    """The action that flies straight to a position, as a mission's fly_to_goal does."""
     x, y, z, yaw = observation["imu"].tolist()
     dx, dy, dz = (0.5 * (goal - now) for goal, now in zip(goal_m, (x, y, z), strict=True))
     forward, left = cos(yaw) * dx + sin(yaw) * dy, cos(yaw) * dy - sin(yaw) * dx
-    return np.clip([forward + least, left, dz, 0.0], -0.6, 0.6).astype(np.float32)
+    return np.clip([forward, left, dz, 0.0], -0.6, 0.6).astype(np.float32)
 
 
 class Episode:
-    """An episode under way, with all it has been paid."""
+    """An episode, with all its rewards."""
 
     def __init__(self, env, **reset):
         self.env = env
@@ -64,7 +64,7 @@ class Episode:
         return self.terminated or self.truncated
 
     @property
-    def paid(self):
+    def rewarded(self):
         return [round(reward, 6) for reward in self.rewards if reward]
 
     def step(self, action):
@@ -84,7 +84,7 @@ class Episode:
     [{}, {"image": True}, {"scenario": "test-case-1", "ticks_per_step": 2, "render_mode": "rgb_array"}],
     ids=["random", "image", "fixed"],
 )
-def test_gymnasium_finds_no_fault(options):
+def test_gymnasium_s_checks_pass(options):
     with warnings.catch_warnings():
         warnings.simplefilter("error")
         env = gymnasium.make(framerunner.gym.ENVIRONMENT_ID, **options)
@@ -92,7 +92,7 @@ def test_gymnasium_finds_no_fault(options):
         env.close()
 
 
-def test_it_is_made_by_its_module_s_name_alone():
+def test_it_is_made_by_its_module_s_name():
     code = "import gymnasium; print(gymnasium.make('framerunner.gym:FrameChallenge-v0').action_space)"
     made = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert made.stdout.strip() == "Box(-1.0, 1.0, (4,), float32)"
@@ -111,7 +111,7 @@ def test_same_seed_and_actions_give_the_same_episode():
     actions[:20] = UP
     flown = []
     for env in (make(), make()):
-        env.reset(seed=3)  # another episode before: it must leave nothing behind
+        env.reset(seed=3)  # another episode before: it must not affect the next one
         env.step(UP)
         episode = Episode(env, seed=11)
         seen = [episode.observation]
@@ -132,7 +132,7 @@ def test_each_episode_has_another_scenario_of_the_level():
     assert env.reset(seed=1)[1]["scenario"] == names[0]
 
 
-def test_the_drone_waits_with_its_motors_on_and_rises_when_told_to():
+def test_the_drone_waits_with_its_motors_on_and_climbs_on_command():
     episode = Episode(make(scenario=scenario()))
     first = episode.observation
     assert first["imu"][:2] == pytest.approx([0, 0], abs=0.01)
@@ -143,7 +143,7 @@ def test_the_drone_waits_with_its_motors_on_and_rises_when_told_to():
     for _ in range(30):
         episode.step(UP)
     assert 1.0 < episode.observation["imu"][2] < 2.2
-    assert episode.paid == []
+    assert episode.rewarded == []
     assert 178 > episode.observation["time_left_s"][0] > 176
 
 
@@ -158,11 +158,11 @@ def test_left_and_yaw_have_the_arena_s_signs():
     assert yaw > 0.4
 
 
-def test_the_whole_task_is_paid_frame_by_frame_and_for_the_landing():
+def test_each_frame_and_the_landing_are_rewarded():
     episode = Episode(make(scenario=scenario(frame("red", 1.0), frame("green", 2.0))))
     episode.fly_to(0, 0, 1)
     episode.fly_to(1.5, 0, 1)
-    assert (episode.paid, episode.info["crossed"], episode.info["next_colour"]) == (
+    assert (episode.rewarded, episode.info["crossed"], episode.info["next_colour"]) == (
         [CROSSING],
         ("red",),
         "green",
@@ -170,43 +170,43 @@ def test_the_whole_task_is_paid_frame_by_frame_and_for_the_landing():
     episode.fly_to(2.6, 0, 1)
     episode.fly_to(2.6, 0, 2)
     episode.fly_to(0, 0, 2)
-    episode.fly_to(0, 0, 0.4)  # below the base's top: its motors stop on the way
+    episode.fly_to(0, 0, 0.4)  # below the base's top: its motors stop before
     assert (episode.terminated, episode.truncated) == (True, False)
-    assert episode.paid == [CROSSING, CROSSING, LANDING]
+    assert episode.rewarded == [CROSSING, CROSSING, LANDING]
     assert episode.info["report"]["verdict"] == "clean", episode.info["report"]["reason"]
     with pytest.raises(ResetNeeded):
         episode.env.unwrapped.step(UP)
 
 
-def test_coming_home_without_all_frames_is_not_paid():
+def test_landing_without_all_frames_is_not_rewarded():
     episode = Episode(make(scenario=scenario(frame("red", 3.0))))
     episode.fly_to(0, 0, 1.2)
     for _ in range(400):
-        episode.step(-UP)  # the autopilot stops the motors itself when it has landed
+        episode.step(-UP)  # the autopilot stops the motors after the landing
         if episode.over:
             break
-    assert (episode.terminated, episode.paid) == (True, [])
+    assert (episode.terminated, episode.rewarded) == (True, [])
     assert "landed on the base without crossing red" in episode.info["report"]["reason"]
 
 
-def test_an_agent_that_never_takes_off_is_switched_off_by_the_autopilot():
+def test_an_agent_that_never_takes_off_is_disarmed_by_the_autopilot():
     episode = Episode(make(scenario=scenario(), ticks_per_step=20))
     while not episode.over:
         episode.step(STILL)
-    assert (episode.terminated, episode.paid) == (True, [])
+    assert (episode.terminated, episode.rewarded) == (True, [])
     assert 9 < episode.info["try_time_s"] < 12
     assert "preflight disarming" in episode.info["report"]["reason"]
 
 
-def test_a_frame_before_its_turn_ends_the_episode():
+def test_a_frame_in_the_wrong_order_ends_the_episode():
     episode = Episode(make(scenario=scenario(frame("green", 1.0), frame("red", 3.0))))
     episode.fly_to(0, 0, 1)
     episode.fly_to(1.5, 0, 1)
-    assert (episode.terminated, episode.paid) == (True, [FAILURE])
+    assert (episode.terminated, episode.rewarded) == (True, [FAILURE])
     assert episode.info["report"]["verdict"] == "wrong order"
 
 
-def test_hitting_a_frame_costs():
+def test_a_contact_has_a_negative_reward():
     episode = Episode(make(scenario=scenario(frame("red", 1.0, 1.08))))
     episode.fly_to(0, 0, 1, near_m=0.03)
     for _ in range(60):
@@ -214,7 +214,7 @@ def test_hitting_a_frame_costs():
         if episode.info["contacts"]:
             break
     assert episode.info["contacts"] == 1
-    assert episode.paid[0] == CONTACT
+    assert episode.rewarded[0] == CONTACT
 
 
 def test_time_runs_out():
@@ -227,7 +227,7 @@ def test_time_runs_out():
     assert episode.info["report"]["verdict"] == "timed out"
 
 
-def test_what_is_not_seen_is_zero_and_says_so():
+def test_what_is_not_seen_is_zero_and_not_marked_as_seen():
     episode = Episode(make(scenario=scenario(frame("red", 2.0), frame("blue", -2.0))))
     episode.fly_to(0, 0, 1)
     cam, seen = episode.observation["cam"], episode.observation["seen"]
@@ -261,7 +261,7 @@ def test_a_reset_may_choose_a_scenario_or_a_level():
     assert env.reset()[1]["scenario"].startswith("calm-")
 
 
-def test_bad_settings_are_refused_in_words():
+def test_bad_settings_are_refused_with_a_reason():
     with pytest.raises(SettingError, match="ticks_per_step 0"):
         make(ticks_per_step=0)
     with pytest.raises(SettingError, match="render_mode 'ansi'"):

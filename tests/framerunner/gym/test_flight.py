@@ -43,6 +43,6 @@ def test_its_states_are_those_of_a_mission_s_ticks():
     assert states[-1].z > 0.7
 
 
-def test_a_coroutine_that_waits_is_not_taken_for_done():
-    with pytest.raises(RuntimeError, match="waits for something"):
+def test_a_coroutine_that_waits_is_an_error():
+    with pytest.raises(RuntimeError, match="waits for an event"):
         run_through(asyncio.sleep(0))

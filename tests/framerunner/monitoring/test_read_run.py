@@ -1,4 +1,4 @@
-"""The process that reads a run: bounded in memory and time, and never without its parent."""
+"""The process that reads a run: limited in memory and time, and ended with its parent."""
 
 import subprocess
 import sys
@@ -30,7 +30,7 @@ run_library._unpack(Path({folder!r}), (), run_library.Readers())
 
 
 def is_alive(pid):
-    """Whether a process is there and does something."""
+    """Whether a process exists and is no zombie."""
     try:
         return Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()[0] != "Z"
     except OSError:
@@ -40,29 +40,29 @@ def is_alive(pid):
 def until(condition, limit_s=30.0):
     end_s = time.monotonic() + limit_s
     while not (found := condition()):
-        assert time.monotonic() < end_s, "did not come"
+        assert time.monotonic() < end_s, "did not happen"
         time.sleep(0.02)
     return found
 
 
 def slow_reader(tmp_path):
-    """A program that does what the reader does before it reads, says its process id, and then never ends."""
-    said = tmp_path / "pid"
+    """A program that starts as the reader does, writes its process id to a file, and then never ends."""
+    pid_file = tmp_path / "pid"
     code = (
         "import os, time\n"
-        "from framerunner.flying.child_process import end_with_standard_input\n"
+        "from framerunner.child_process import end_with_standard_input\n"
         "end_with_standard_input(lambda: None)\n"
-        f"open({str(said)!r}, 'w').write(str(os.getpid()) + '\\n')\n"
+        f"open({str(pid_file)!r}, 'w').write(str(os.getpid()) + '\\n')\n"
         "while True: sum(range(10**6))\n"
     )
     script = tmp_path / "python"
     script.write_text(f"#!{sys.executable}\n{code}", encoding="utf-8")
     script.chmod(0o755)
-    return script, said
+    return script, pid_file
 
 
-def pid_in(said):
-    text = said.read_text() if said.exists() else ""
+def pid_in(pid_file):
+    text = pid_file.read_text() if pid_file.exists() else ""
     return int(text) if text.endswith("\n") else None
 
 
@@ -75,11 +75,11 @@ def test_memory_is_limited():
 
 
 def test_the_reader_ends_when_its_parent_is_killed(tmp_path):
-    script, said = slow_reader(tmp_path)
+    script, pid_file = slow_reader(tmp_path)
     code = PARENT.format(script=str(script), folder=str(tmp_path / "run"))
     parent = subprocess.Popen([sys.executable, "-c", code])
     try:
-        pid = until(lambda: pid_in(said))
+        pid = until(lambda: pid_in(pid_file))
         assert is_alive(pid)
     finally:
         parent.kill()
@@ -87,29 +87,29 @@ def test_the_reader_ends_when_its_parent_is_killed(tmp_path):
     until(lambda: not is_alive(pid))
 
 
-def test_closing_the_library_breaks_off_what_is_read(tmp_path, monkeypatch):
-    script, said = slow_reader(tmp_path)
+def test_closing_the_library_ends_the_reading(tmp_path, monkeypatch):
+    script, pid_file = slow_reader(tmp_path)
     monkeypatch.setattr(run_library.sys, "executable", str(script))
     folder = tmp_path / "runs" / "slow"
     folder.mkdir(parents=True)
     (folder / "flight.tlog").write_bytes(b"\0")
     library = RunFolders(tmp_path / "runs")
-    told = []
+    messages = []
 
     def read():
         with pytest.raises(RunError) as refused:
             library.recording("slow")
-        told.append(str(refused.value))
+        messages.append(str(refused.value))
 
     reading = threading.Thread(target=read)
     reading.start()
-    pid = until(lambda: pid_in(said))
+    pid = until(lambda: pid_in(pid_file))
     library.close()
     reading.join(20)
-    assert told == ["run 'slow': reading it takes too long"]
+    assert messages == ["run 'slow': reading it takes too long"]
     assert not is_alive(pid)
     with pytest.raises(RunError, match="takes too long"):
-        library.recording("slow")  # not tried again at once
+        library.recording("slow")  # not read again at once
 
 
 def test_what_could_not_be_read_is_not_read_again_until_it_changes(tmp_path, monkeypatch):

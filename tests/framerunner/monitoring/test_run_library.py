@@ -1,4 +1,4 @@
-"""Run folders as the monitor sees them: listed quickly, read apart, and nothing else is opened."""
+"""Run folders as the monitor sees them: listed quickly, read in another process, nothing else opened."""
 
 import json
 import os
@@ -45,7 +45,7 @@ def recording(library, flown):
 
 
 def result_in(runs, name, **changes):
-    """A run folder with nothing but a result."""
+    """A run folder that contains only a result."""
     result = {
         "scenario": "place",
         "mission": "task",
@@ -129,7 +129,7 @@ def test_hundreds_of_runs_are_listed_at_once_and_read_only_once(tmp_path, monkey
     assert read == ["run-7"]
 
 
-def test_a_lockstep_flight_is_flown_again_and_told_whole(recording, flown):
+def test_a_lockstep_flight_is_flown_again_and_read_completely(recording, flown):
     result = json.loads((flown / "result.json").read_text(encoding="utf-8"))
     scenario = load_scenario(flown / "scenario.yaml")
     assert recording["name"] == flown.name
@@ -177,7 +177,7 @@ def test_detections_and_images_have_their_times(recording, library, flown):
     assert (box @ [-1, -1, 2] > 200).any()
 
 
-def test_a_real_time_flight_is_told_from_its_log_and_video(tmp_path):
+def test_a_real_time_flight_is_read_from_its_log_and_video(tmp_path):
     folder = tmp_path / "run"
     folder.mkdir()
     (folder / "scenario.yaml").write_text(SHORT, encoding="utf-8")
@@ -190,7 +190,7 @@ def test_a_real_time_flight_is_told_from_its_log_and_video(tmp_path):
     poses = recording["poses"]
     assert (recording["chart"], recording["result"], recording["detections"][0]["width"]) == (None, None, 64)
     assert all(pose["c"] is None for pose in poses)
-    assert poses[0]["t"] == pytest.approx(-2.0, abs=0.1)  # motors on come after two of ten seconds
+    assert poses[0]["t"] == pytest.approx(-2.0, abs=0.1)  # motors on after two of ten seconds
     assert poses[-1]["t"] == pytest.approx(8.0, abs=0.1)
     assert poses[-1]["p"][2] - poses[0]["p"][2] == pytest.approx(0.8, abs=0.02)
     assert recording["states"][poses[-1]["s"]] == "offboard"
@@ -202,7 +202,7 @@ def test_it_is_json_without_nan(recording):
     json.dumps(recording, allow_nan=False)
 
 
-def test_a_second_look_does_not_fly_again(library, flown, recording, monkeypatch):
+def test_a_second_request_does_not_fly_again(library, flown, recording, monkeypatch):
     monkeypatch.setattr(run_library, "_unpack", None)
     assert library.recording(flown.name) is recording
     assert library.image(flown.name, 0)[:2] == b"\xff\xd8"
@@ -219,13 +219,13 @@ def test_only_names_of_the_listing_are_opened(tmp_path, name):
     library = RunFolders(runs)
     assert [each.name for each in library.runs()] == ["good"]
     for ask in (lambda: library.recording(name), lambda: library.image(name, 0)):
-        with pytest.raises(RunError, match="there is no such run") as told:
+        with pytest.raises(RunError, match="there is no such run") as refused:
             ask()
-        assert "\n" not in str(told.value)
-        assert len(str(told.value)) < 300 + len(str(tmp_path))
+        assert "\n" not in str(refused.value)
+        assert len(str(refused.value)) < 300 + len(str(tmp_path))
 
 
-def test_files_that_lead_elsewhere_are_not_followed(tmp_path, flown):
+def test_linked_files_are_not_read(tmp_path, flown):
     folder = tmp_path / "run"
     shutil.copytree(flown, folder)
     (folder / "scenario.yaml").unlink()
@@ -251,15 +251,15 @@ def test_an_image_that_is_not_there(library, flown, recording):
         (lambda folder: (folder / "flight.mcap").write_bytes(b"no recording"), "not an MCAP file"),
     ],
 )
-def test_what_cannot_be_shown_is_told_in_one_line(tmp_path, flown, damage, words):
+def test_what_cannot_be_shown_is_refused_in_one_line(tmp_path, flown, damage, words):
     folder = tmp_path / "run"
     shutil.copytree(flown, folder)
     damage(folder)
-    with pytest.raises(RunError, match=words) as told:
+    with pytest.raises(RunError, match=words) as refused:
         RunFolders(tmp_path).recording("run")
-    assert str(told.value).startswith("run 'run': cannot be shown: ")
-    assert "\n" not in str(told.value)
-    assert str(tmp_path) not in str(told.value)
+    assert str(refused.value).startswith("run 'run': cannot be shown: ")
+    assert "\n" not in str(refused.value)
+    assert str(tmp_path) not in str(refused.value)
 
 
 def test_a_contestant_s_file_is_never_executed(tmp_path, flown):

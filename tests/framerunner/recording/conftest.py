@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from framerunner.flying.fly import Flown
+from framerunner.flying.fly import FinishedFlight
 from framerunner.flying.lockstep import fly_lockstep
 from framerunner.flying.plan import FlightPlan
 from framerunner.recording.mcap_writer import FlightRecording
@@ -18,7 +18,7 @@ SEED = 7
 @dataclass(frozen=True)
 class Recorded:
     path: Path
-    flown: Flown
+    flown: FinishedFlight
     moments: list
     images: list
 

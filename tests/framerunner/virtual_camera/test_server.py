@@ -1,4 +1,4 @@
-"""The virtual camera as a program: what it serves, asks for and says."""
+"""The virtual camera as a program: what it serves, requests and says."""
 
 import asyncio
 import threading
@@ -8,7 +8,7 @@ from contextlib import asynccontextmanager, suppress
 import aiohttp
 import pytest
 
-from framerunner.virtual_camera.painter import VirtualCamera
+from framerunner.virtual_camera.camera import VirtualCamera
 from framerunner.virtual_camera.server import CameraServer
 from scenarios.loader import load_scenario
 from sitl.video import VideoServer
@@ -57,7 +57,7 @@ class Link:
 
 async def until(condition):
     async with asyncio.timeout(20):
-        while not condition():  # noqa: ASYNC110 - what is waited for happens on another thread
+        while not condition():  # noqa: ASYNC110 - it is changed by another thread
             await asyncio.sleep(0.01)
 
 
@@ -77,10 +77,10 @@ async def serving(link):
         assert link.closed
 
 
-async def test_serves_images_and_the_referee_until_telemetry_stays_away_and_again_after():
+async def test_serves_images_and_the_referee_while_telemetry_is_received():
     link = Link()
     async with serving(link) as (video, said, _), aiohttp.ClientSession() as session:
-        await until(lambda: any("the arena lies" in line for line in said))
+        await until(lambda: any("the arena is placed" in line for line in said))
         status = 503
         while status == 503:
             async with session.get(f"{video.url}image.jpg") as response:
@@ -102,7 +102,7 @@ async def test_serves_images_and_the_referee_until_telemetry_stays_away_and_agai
     assert all(message.type == mavlink.MAV_TYPE_ONBOARD_CONTROLLER for message in link.sent[:1])
 
 
-async def test_a_flying_vehicle_is_told_to_be_put_on_its_start():
+async def test_it_says_that_a_flying_vehicle_must_be_put_on_its_start():
     async with serving(Link(armed=True)) as (_, said, _):
         await until(lambda: any("must stand disarmed on its start" in line for line in said))
 

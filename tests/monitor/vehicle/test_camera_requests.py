@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 from aiohttp import web
 
-from framerunner.monitoring.equipment import equipment
+from framerunner.commands.monitor import equipment
 from tests.monitor.watching import watching
 from wire.dialect import mavlink
 

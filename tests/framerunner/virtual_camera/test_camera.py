@@ -1,26 +1,31 @@
-"""From telemetry to images: the simulator's own drone gives the simulator's own images."""
+"""From telemetry to images: the arena is placed at the vehicle, and the images are the simulator's own."""
 
 from itertools import pairwise
 from math import cos, pi, sin
 
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 from pymavlink.dialects.v20 import common as mavlink
 
 from firmware_py.mavlink.node import MavlinkNode
 from firmware_py.mavlink.telemetry.streams import GROUND
 from framerunner.flying.plan import FlightPlan
-from framerunner.virtual_camera.painter import VirtualCamera
+from framerunner.virtual_camera.camera import HELD_AFTER_FLIGHT_US, Placement, VirtualCamera
 from geometry.axes import Pose
+from geometry.rotations import quaternion_from_euler
 from scenarios.loader import load_scenario
 from sitl.camera import Camera, CameraFeed
 from sitl.simulation import Simulation
 from tests.node_input import deliver
 from vision.detector import detect
+from wire.vehicle_telemetry import VehiclePose
 
 SCENARIO = load_scenario("test-case-1")
 START_POSE = FlightPlan(SCENARIO).start_pose
 START = Pose(START_POSE[:3], START_POSE[3])
+PLACEMENT_START = Pose((-3.0, -3.0, 0.55), 1.0)
 
 
 def heartbeat(armed):
@@ -37,7 +42,7 @@ def reports(time_us, north=0.0, east=0.0, up=0.0, yaw=0.0, armed=None):
     return sent if armed is None else [*sent, heartbeat(armed)]
 
 
-def tell(camera, messages):
+def send(camera, messages):
     for message in messages:
         camera.take(message)
 
@@ -46,7 +51,7 @@ def ready_camera(scenario=SCENARIO, yaw=0.0):
     """A camera on a disarmed vehicle that has stood for a second."""
     camera = VirtualCamera(scenario)
     for time_us in range(0, 1_000_001, 20_000):
-        tell(camera, reports(time_us, yaw=yaw))
+        send(camera, reports(time_us, yaw=yaw))
     camera.take(heartbeat(False))
     return camera
 
@@ -60,20 +65,20 @@ def test_a_vehicle_at_rest_sees_what_the_start_shows_whatever_its_heading():
         np.testing.assert_array_equal(image, wanted)
 
 
-def test_no_image_before_the_arena_is_laid():
+def test_no_image_before_the_arena_is_placed():
     camera = VirtualCamera(SCENARIO)
     for time_us in range(0, 1_000_001, 20_000):
-        tell(camera, reports(time_us))
+        send(camera, reports(time_us))
         assert camera.step() is None
     camera.take(heartbeat(True))
     assert camera.step() is None
 
 
-def test_exposures_keep_to_the_grid_and_none_comes_twice():
+def test_exposures_are_on_the_grid_and_none_is_repeated():
     camera = ready_camera()
     times = [camera.step()[0]]
     for time_us in range(1_000_000, 2_000_001, 20_000):
-        tell(camera, reports(time_us))
+        send(camera, reports(time_us))
         shot = camera.step()
         if shot is not None:
             times.append(shot[0])
@@ -81,28 +86,28 @@ def test_exposures_keep_to_the_grid_and_none_comes_twice():
     assert times == [936_000 + 100_000 * k for k in range(11)]
 
 
-def test_after_a_hole_in_the_telemetry_only_the_latest_image_is_painted():
+def test_after_a_gap_in_the_telemetry_only_the_latest_image_is_rendered():
     camera = ready_camera()
     assert camera.step() is not None
     for time_us in (5_000_000, 5_020_000, 5_040_000, 5_100_000):
-        tell(camera, reports(time_us))
+        send(camera, reports(time_us))
     assert camera.step()[0] == 5_036_000
     assert camera.step() is None
 
 
-def test_a_vehicle_that_starts_anew_gets_its_arena_anew():
+def test_after_a_restart_of_the_vehicle_the_arena_is_placed_again():
     camera = ready_camera()
-    tell(camera, reports(100_000_000))
-    tell(camera, reports(2_000_000))
+    send(camera, reports(100_000_000))
+    send(camera, reports(2_000_000))
     assert camera.restarts == 1
     assert camera.placement.alignment is None
     for time_us in range(2_020_000, 2_500_000, 20_000):
-        tell(camera, reports(time_us, north=4.0))
+        send(camera, reports(time_us, north=4.0))
     camera.take(heartbeat(False))
     assert camera.step() is not None
 
 
-def test_euler_angles_serve_where_no_quaternion_comes():
+def test_euler_angles_are_used_where_no_quaternion_is_received():
     camera = VirtualCamera(SCENARIO)
     for time_us in range(0, 1_000_001, 20_000):
         ms = time_us // 1000
@@ -112,23 +117,23 @@ def test_euler_angles_serve_where_no_quaternion_comes():
     half = START.yaw_rad / 2
     wanted = Camera(SCENARIO).render(START.position_m, (cos(half), 0.0, 0.0, sin(half)))
     difference = np.abs(camera.step()[1].astype(int) - wanted)
-    assert np.mean(difference > 8) < 0.001  # single precision of the angles moves a border here and there
+    assert np.mean(difference > 8) < 0.001  # single precision of the angles moves some edges
 
 
-def test_a_level_camera_turns_with_the_heading_only():
-    leaning, level = VirtualCamera(SCENARIO), VirtualCamera(SCENARIO, level=True)
+def test_a_level_camera_follows_the_heading_only():
+    tilted, level = VirtualCamera(SCENARIO), VirtualCamera(SCENARIO, level=True)
     for time_us in range(0, 1_000_001, 20_000):
-        for camera in (leaning, level):
-            tell(camera, reports(time_us, armed=False if time_us == 1_000_000 else None))
+        for camera in (tilted, level):
+            send(camera, reports(time_us, armed=False if time_us == 1_000_000 else None))
     for time_us in range(1_020_000, 1_100_001, 20_000):
         ms = time_us // 1000
-        for camera in (leaning, level):
+        for camera in (tilted, level):
             camera.take(mavlink.MAVLink_attitude_message(ms, 0.2, -0.3, 0.1, 0.0, 0.0, 0.0))
             camera.take(mavlink.MAVLink_local_position_ned_message(ms, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0))
     half = (START.yaw_rad - 0.1) / 2
     upright = Camera(SCENARIO).render(START.position_m, (cos(half), 0.0, 0.0, sin(half)))
     assert np.mean(np.abs(level.step()[1].astype(int) - upright) > 8) < 0.01
-    assert np.mean(np.abs(leaning.step()[1].astype(int) - upright) > 8) > 0.2
+    assert np.mean(np.abs(tilted.step()[1].astype(int) - upright) > 8) > 0.2
 
 
 def test_the_referee_follows_a_flight_through_a_frame_and_back():
@@ -136,11 +141,11 @@ def test_the_referee_follows_a_flight_through_a_frame_and_back():
     camera = ready_camera()
     red = SCENARIO.frames[0]
     x, y, z = START.position_m
-    ahead = (-cos(red.yaw_rad), -sin(red.yaw_rad))  # red looks towards the drone
+    ahead = (-cos(red.yaw_rad), -sin(red.yaw_rad))  # red's normal points to the drone
     stations = [(x, y, z), (red.x_m - ahead[0], red.y_m - ahead[1], red.z_m)]
     stations += [(red.x_m + ahead[0], red.y_m + ahead[1], red.z_m), (x, y, 3.0), (x, y, z)]
     time_us = 1_020_000
-    tell(camera, reports(time_us, armed=True))
+    send(camera, reports(time_us, armed=True))
     for start, end in pairwise(stations):
         for step in range(1, 151):
             time_us += 20_000
@@ -148,12 +153,12 @@ def test_the_referee_follows_a_flight_through_a_frame_and_back():
             # The vehicle stood at its local zero, looking along the arena's start yaw as north.
             c, s = cos(START.yaw_rad), sin(START.yaw_rad)
             north, left = c * (px - x) + s * (py - y), -s * (px - x) + c * (py - y)
-            tell(camera, reports(time_us, north, -left, pz - z))
+            send(camera, reports(time_us, north, -left, pz - z))
     assert camera.standing().snapshot.crossed == ("red",)
     assert camera.standing().snapshot.motors_on
     for step in range(150):
         time_us += 20_000
-        tell(camera, reports(time_us, armed=False if step % 50 == 0 else None))
+        send(camera, reports(time_us, armed=False if step % 50 == 0 else None))
     standing = camera.standing("landing.stop")
     assert standing.scenario == "test-case-1" and standing.source == "telemetry"
     assert standing.snapshot.settled
@@ -162,7 +167,7 @@ def test_the_referee_follows_a_flight_through_a_frame_and_back():
     assert standing.report.frames_crossed == ("red",)
 
 
-def test_without_a_base_all_hangs_as_high_above_where_the_drone_stands_as_above_the_floor():
+def test_without_a_base_the_layout_is_as_high_above_the_start_as_declared_above_the_floor():
     camera = VirtualCamera(SCENARIO, base=False)
     lift_m = camera.standing().lift_m
     assert lift_m == SCENARIO.base.top_m
@@ -180,7 +185,7 @@ def fly_simulation(scenario, seconds):
     node = MavlinkNode(simulation.autopilot, (GROUND,))
     wire, pilot = mavlink.MAVLink(None), mavlink.MAVLink(None, srcSystem=255, srcComponent=190)
     orders = {3_000_000: (22, 0, 0, 0, 0, 0, 0, 491.0), 3_200_000: (400, 1, 0, 0, 0, 0, 0, 0)}
-    own, painted = {}, {}
+    own, rendered = {}, {}
     while simulation.time_us < seconds * 1_000_000:
         simulation.tick()
         order = orders.get(simulation.time_us)
@@ -191,23 +196,137 @@ def fly_simulation(scenario, seconds):
             for message in wire.parse_buffer(data) or ():
                 if message.get_srcComponent() == 1:
                     camera.take(message)
-        for store, shot in ((own, feed.step(simulation.truth)), (painted, camera.step())):
+        for store, shot in ((own, feed.step(simulation.truth)), (rendered, camera.step())):
             if shot is not None:
                 store[shot[0]] = shot[1]
-    return simulation, own, painted
+    return simulation, own, rendered
 
 
 def test_beside_the_simulator_the_images_are_the_simulators_own_within_a_pixel_or_two():
-    simulation, own, painted = fly_simulation(SCENARIO, 10)
+    simulation, own, rendered = fly_simulation(SCENARIO, 10)
     assert simulation.truth.position_arena_m[2] > 1.5  # it did fly
-    common = sorted(own.keys() & painted.keys())
+    common = sorted(own.keys() & rendered.keys())
     assert len(common) > 80
     off_px = []
     for exposure_us in common:
-        ours, theirs = detect(painted[exposure_us], None), detect(own[exposure_us], None)
+        ours, theirs = detect(rendered[exposure_us], None), detect(own[exposure_us], None)
         for colour in ("red", "green", "blue"):
             a, b = getattr(ours, colour), getattr(theirs, colour)
             if a.seen and b.seen:
                 off_px += [abs(getattr(a, side) - getattr(b, side)) for side in ("n", "s", "e", "w")]
     assert len(off_px) > 500
     assert max(off_px) <= 2.0
+
+
+places = st.tuples(st.floats(-500, 500), st.floats(-500, 500), st.floats(-50, 50))
+angles = st.floats(-pi, pi)
+
+
+def pose(position=(0.0, 0.0, 0.0), yaw=0.0, velocity=(0.0, 0.0, 0.0), roll=0.0, pitch=0.0):
+    return VehiclePose(0, position, velocity, quaternion_from_euler(roll, pitch, yaw))
+
+
+def placed(position=(0.0, 0.0, 0.0), yaw=0.0):
+    """A placement at a vehicle that stands disarmed."""
+    placement = Placement(PLACEMENT_START)
+    placement.see_pose(pose(position, yaw))
+    placement.see_heartbeat(0, armed=False)
+    return placement
+
+
+def axes(quaternion):
+    """Forward and up of a body, in the axes of its attitude."""
+    w, x, y, z = quaternion
+    forward = (1 - 2 * (y * y + z * z), 2 * (x * y + w * z), 2 * (x * z - w * y))
+    return forward, (2 * (x * z + w * y), 2 * (y * z - w * x), 1 - 2 * (x * x + y * y))
+
+
+@given(places, angles)
+def test_the_standing_vehicle_is_on_the_start_with_the_starts_heading(position, yaw):
+    where = placed(position, yaw).arena_pose(pose(position, yaw))
+    assert where.position_arena_m == pytest.approx(PLACEMENT_START.position_m, abs=1e-9)
+    forward, up = axes(where.attitude_arena)
+    assert forward == pytest.approx((cos(1.0), sin(1.0), 0.0), abs=1e-9)
+    assert up == pytest.approx((0.0, 0.0, 1.0), abs=1e-9)
+
+
+@given(places, angles, st.floats(0, 5), st.floats(-2, 2))
+def test_flying_ahead_and_up_is_ahead_and_up_in_the_arena(position, yaw, ahead_m, up_m):
+    north, east, down = position
+    moved = (north + ahead_m * cos(yaw), east + ahead_m * sin(yaw), down - up_m)
+    velocity = (cos(yaw), sin(yaw), -0.5)
+    where = placed(position, yaw).arena_pose(pose(moved, yaw, velocity))
+    x, y, z = PLACEMENT_START.position_m
+    assert where.position_arena_m == pytest.approx(
+        (x + ahead_m * cos(1.0), y + ahead_m * sin(1.0), z + up_m), abs=1e-6
+    )
+    assert where.velocity_arena_m_s == pytest.approx((cos(1.0), sin(1.0), 0.5))
+
+
+@given(angles, st.floats(-0.5, 0.5), st.floats(-0.5, 0.5))
+def test_yaw_roll_and_pitch_are_the_same_in_the_arena(yaw, roll, pitch):
+    placement = placed(yaw=yaw)
+    turned, _ = axes(placement.arena_pose(pose(yaw=yaw + 0.3)).attitude_arena)
+    assert turned == pytest.approx((cos(0.7), sin(0.7), 0.0), abs=1e-9)
+    forward, up = axes(placement.arena_pose(pose(yaw=yaw, roll=roll, pitch=pitch)).attitude_arena)
+    assert forward[2] == pytest.approx(sin(pitch), abs=1e-9)
+    rightwards = up[0] * sin(1.0) - up[1] * cos(1.0)
+    assert rightwards == pytest.approx(sin(roll), abs=1e-9)
+
+
+def test_a_vehicle_in_the_air_has_no_arena():
+    placement = Placement(PLACEMENT_START)
+    placement.see_pose(pose())
+    placement.see_heartbeat(0, armed=True)
+    placement.see_pose(pose())
+    assert placement.arena_pose(pose()) is None
+
+
+def test_poses_after_the_last_disarmed_heartbeat_do_not_move_the_arena():
+    """The vehicle may have been armed and have moved since."""
+    placement = placed()
+    placement.see_pose(pose((0.0, 0.0, -0.4)))
+    placement.see_heartbeat(1_000_000, armed=True)
+    assert placement.arena_pose(pose()).position_arena_m == pytest.approx(PLACEMENT_START.position_m)
+
+
+def test_the_arena_follows_a_vehicle_that_is_carried_before_its_flight():
+    placement = placed()
+    placement.see_pose(pose((5.0, 1.0, 0.0), yaw=2.0))
+    placement.see_heartbeat(1_000_000, armed=False)
+    assert placement.arena_pose(pose((5.0, 1.0, 0.0), yaw=2.0)).position_arena_m == pytest.approx(
+        PLACEMENT_START.position_m
+    )
+
+
+def test_noise_at_rest_is_averaged_also_across_south():
+    placement = Placement(PLACEMENT_START)
+    for north, yaw in ((0.02, pi - 0.02), (-0.02, -pi + 0.02)):
+        placement.see_pose(pose((north, 0.0, 0.0), yaw))
+    placement.see_heartbeat(0, armed=False)
+    where = placement.arena_pose(pose(yaw=pi))
+    assert where.position_arena_m == pytest.approx(PLACEMENT_START.position_m)
+    assert axes(where.attitude_arena)[0] == pytest.approx((cos(1.0), sin(1.0), 0.0))
+
+
+def test_after_a_landing_the_arena_stays_until_the_verdict_is_made():
+    placement = placed()
+    landed = pose((0.1, 0.0, 0.0))
+    placement.see_heartbeat(1_000_000, armed=True)
+    for time_us in (5_000_000, 6_000_000, 5_000_000 + HELD_AFTER_FLIGHT_US - 1):
+        placement.see_heartbeat(time_us, armed=False)
+        placement.see_pose(landed)
+        assert placement.arena_pose(landed).position_arena_m != pytest.approx(PLACEMENT_START.position_m)
+    placement.see_heartbeat(5_000_000 + HELD_AFTER_FLIGHT_US, armed=False)
+    assert placement.arena_pose(landed).position_arena_m == pytest.approx(PLACEMENT_START.position_m)
+
+
+def test_a_try_soon_after_another_begins_where_the_vehicle_stands():
+    placement = placed()
+    landed = pose((0.1, 0.0, 0.0))
+    placement.see_heartbeat(1_000_000, armed=True)
+    placement.see_heartbeat(5_000_000, armed=False)
+    placement.see_pose(landed)
+    placement.see_heartbeat(6_000_000, armed=False)
+    placement.see_heartbeat(7_000_000, armed=True)
+    assert placement.arena_pose(landed).position_arena_m == pytest.approx(PLACEMENT_START.position_m)

@@ -1,4 +1,4 @@
-"""Tells whoever watches how a mission goes: state, what is seen, why it went on, and the result."""
+"""Reports a mission over MAVLink while it is flown: its state, detections, transitions, and the result."""
 
 from __future__ import annotations
 
@@ -25,20 +25,20 @@ from wire.mission_tunnel import (
 
 STATE_TICKS = 2  # 10 Hz of vehicle time
 HISTORY = 10
-_TEXT_CHARACTERS = 80  # of a guard's value that is no number
-_EXACT = 2**53  # integers beyond are no JSON numbers for everybody
+_TEXT_CHARACTERS = 80  # of a guard's value that is not a number
+_EXACT = 2**53  # larger integers lose digits in some JSON readers
 
 logger = logging.getLogger(__name__)
 
 
-class MissionTeller:
-    """Sees a flight tick by tick and tells of it through a companion. It never raises: nobody must listen.
+class MissionReporter:
+    """Sees a flight tick by tick and reports it through a companion. It never raises.
 
     Args:
         companion: sends.
         mission: what is flown.
         source: text of its file.
-        scenario: name of where.
+        scenario: its name.
         start_arena: x, y, z (metres) and yaw (radians) before the first tick.
     """
 
@@ -53,12 +53,12 @@ class MissionTeller:
         self._companion = companion
         self._numbers = {leaf_id: number for number, leaf_id in enumerate(mission.leaves)}
         self._finishes = mission.finishes
-        self._crc = self._tell_mission(mission, source, scenario)
+        self._crc = self._report_mission(mission, source, scenario)
         self._history: deque[dict[str, object]] = deque(maxlen=HISTORY)
         self._transitions = 0
         self._mission_state = ""
         self._entered_us = 0
-        self._told: tuple[object, ...] = ()
+        self._reported: tuple[object, ...] = ()
         self._ticks = 0
         self._image_size_px = (0, 0)
         self._detections: Detections | None = None
@@ -67,46 +67,46 @@ class MissionTeller:
         companion.send_state(MissionState(self._crc, -1, 0, 0, 0, False, False, False, still, start_arena))
 
     def see_frame(self, frame: CameraFrame) -> None:
-        """Note how large the images are."""
+        """Note the size of the images."""
         height, width = frame.image.shape[:2]
         self._image_size_px = (width, height)
 
     def see(self, moment: Moment) -> None:
-        """Tell of a tick."""
+        """Report a tick."""
         if self._broken:
             return
         try:
             self._see(moment)
-        except Exception as error:  # the flight goes on whatever happens here
+        except Exception as error:  # must not end the flight
             self._broken = True
-            logger.warning("the mission is not told of any more: %r", error)
+            logger.warning("the mission is no longer reported: %r", error)
 
-    async def tell_result(self, result: FlightResult) -> None:
-        """Tell how the flight was judged, at once and twice, and wait 0.3 s until that has gone out."""
-        if self._tell_document(DocumentKind.RESULT, result.as_json()) is not None:
+    async def send_result(self, result: FlightResult) -> None:
+        """Send how the flight was judged, at once and twice, and wait 0.3 s until that has been sent."""
+        if self._send_document(DocumentKind.RESULT, result.as_json()) is not None:
             await self._companion.send_finally(DocumentKind.RESULT)
 
     def _see(self, moment: Moment) -> None:
         time_us = moment.state.time_us
         if moment.transition is not None:
             self._transitions += 1
-            self._history.append(_told_transition(moment.transition))
-            self._tell_document(DocumentKind.HISTORY, {"transitions": list(self._history)})
+            self._history.append(_transition_json(moment.transition))
+            self._send_document(DocumentKind.HISTORY, {"transitions": list(self._history)})
         if moment.mission_state != self._mission_state or moment.transition is not None:
             self._entered_us = time_us
         flying = moment.state.armed and moment.state.offboard and not moment.paused
         changing = (self._transitions, moment.mission_state, moment.paused, flying)
-        if changing != self._told or self._ticks % STATE_TICKS == 0:
-            self._told = changing
+        if changing != self._reported or self._ticks % STATE_TICKS == 0:
+            self._reported = changing
             self._ticks = 0
-            self._tell_state(moment, flying)
+            self._send_state(moment, flying)
         self._ticks += 1
         if moment.mission_state != self._mission_state:
             self._mission_state = moment.mission_state
             self._companion.send_text(f"{TEXT_PREFIX}{moment.mission_state}")
-        self._tell_detections(moment)
+        self._send_detections(moment)
 
-    def _tell_state(self, moment: Moment, flying: bool) -> None:
+    def _send_state(self, moment: Moment, flying: bool) -> None:
         state, command = moment.state, moment.command
         self._companion.send_state(
             MissionState(
@@ -118,30 +118,25 @@ class MissionTeller:
                 flying=flying,
                 paused=moment.paused,
                 finished=moment.mission_state in self._finishes,
-                command=(
-                    command.forward_m_s,
-                    command.left_m_s,
-                    command.up_m_s,
-                    command.yaw_rate_rad_s,
-                ),
+                command=(command.forward_m_s, command.left_m_s, command.up_m_s, command.yaw_rate_rad_s),
                 pose_arena=(state.x, state.y, state.z, state.yaw),
             )
         )
 
-    def _tell_detections(self, moment: Moment) -> None:
-        """Of each image once: the eyes hand out the same object until there is another image."""
+    def _send_detections(self, moment: Moment) -> None:
+        """Once for each image: perception returns the same object until there is another image."""
         seen = moment.detections
         if seen is self._detections or self._image_size_px == (0, 0):
             return
         self._detections = seen
         if moment.mission_state in self._finishes:
-            return  # nobody looks any more
+            return  # the image is not used any more
         width, height = self._image_size_px
         red, green, blue = _box(seen.red), _box(seen.green), _box(seen.blue)
         self._companion.send_detections(MissionDetections(seen.time_us, width, height, red, green, blue))
 
-    def _tell_mission(self, mission: Mission, source: str, scenario: str) -> int:
-        """Tell what is flown, without what makes it too large; its CRC."""
+    def _report_mission(self, mission: Mission, source: str, scenario: str) -> int:
+        """Send what is flown, without the parts that make it too large; returns its CRC."""
         document = {
             "name": mission.name,
             "description": mission.description,
@@ -151,23 +146,23 @@ class MissionTeller:
             "source": source,
         }
         for left_out in ((), ("source",), ("source", "mermaid"), ("source", "mermaid", "states")):
-            crc = self._tell_document(DocumentKind.MISSION, {**document, **dict.fromkeys(left_out, "")})
+            crc = self._send_document(DocumentKind.MISSION, {**document, **dict.fromkeys(left_out, "")})
             if crc is not None:
                 return crc
         return 0
 
-    def _tell_document(self, kind: DocumentKind, content: Mapping[str, Any]) -> int | None:
-        """Its CRC; None if it cannot be told."""
+    def _send_document(self, kind: DocumentKind, content: Mapping[str, Any]) -> int | None:
+        """Returns its CRC; None if it cannot be sent."""
         try:
             crc, pieces = split_document(kind, content)
         except PayloadError as error:
-            logger.warning("not told: %s", error)
+            logger.warning("not reported: %s", error)
             return None
         self._companion.send_document(kind, pieces)
         return crc
 
 
-def _told_transition(taken: TransitionTaken) -> dict[str, object]:
+def _transition_json(taken: TransitionTaken) -> dict[str, object]:
     return {
         "from": taken.source,
         "to": taken.target,
@@ -179,7 +174,7 @@ def _told_transition(taken: TransitionTaken) -> dict[str, object]:
 
 
 def _plain(value: object) -> object:
-    """A value of a guard as JSON has it; a contestant's pilot may hold anything."""
+    """A value of a guard as JSON; a contestant's pilot may hold any type."""
     if value is None or isinstance(value, bool):
         return value
     if isinstance(value, int) and abs(value) < _EXACT:
@@ -188,7 +183,7 @@ def _plain(value: object) -> object:
         if not isinstance(value, str) and hasattr(value, "__float__"):
             return float(value)
         return str(value)[:_TEXT_CHARACTERS]
-    except Exception:  # whatever a contestant's conversion raises
+    except Exception:  # any that a contestant's conversion raises
         return type(value).__name__
 
 

@@ -1,4 +1,4 @@
-"""The simulator as a program: it starts, serves, and is gone with all its ports when it should be."""
+"""The simulator as a program: it starts, serves, and ends with all its ports closed."""
 
 import asyncio
 import os
@@ -60,7 +60,7 @@ async def answering(sitl):
         return await ask_referee(sitl.api, session)
 
 
-async def test_a_child_simulator_answers_and_is_gone_afterwards():
+async def test_a_child_simulator_answers_and_has_ended_afterwards():
     instance = free_instance()
     async with SitlProcess("test-case-1", instance=instance) as sitl:
         pid = sitl._process.pid
@@ -72,13 +72,13 @@ async def test_a_child_simulator_answers_and_is_gone_afterwards():
     assert ports_are_free(instance)
 
 
-async def test_its_own_last_words_are_the_reason_when_it_cannot_start():
+async def test_its_last_line_is_the_reason_when_it_cannot_start():
     with pytest.raises(SettingError, match=r"code 2: unknown scenario .no-such-place"):
         async with SitlProcess("no-such-place", instance=free_instance()):
             pytest.fail("it has not started")
 
 
-async def test_its_death_ends_what_is_done_with_it():
+async def test_its_end_cancels_the_work_that_it_guards():
     async with SitlProcess("empty", instance=free_instance()) as sitl:
         work = asyncio.create_task(asyncio.sleep(30))
         os.kill(sitl._process.pid, signal.SIGKILL)
@@ -87,7 +87,7 @@ async def test_its_death_ends_what_is_done_with_it():
         assert work.cancelled()
 
 
-async def test_work_that_answers_a_cancellation_with_a_result_is_heard():
+async def test_the_result_of_work_that_was_cancelled_is_returned():
     async def flight():
         try:
             await asyncio.sleep(30)

@@ -1,4 +1,4 @@
-"""Packages that a small installation leaves out, and how to get them."""
+"""What to say to a user whose installation lacks a package."""
 
 from __future__ import annotations
 
@@ -20,18 +20,14 @@ _EXTRAS = {
 
 
 def is_installed(module: str) -> bool:
-    """Whether a module of an extra can be imported, without importing it."""
+    """Whether a top-level module can be imported, without importing it."""
     return find_spec(module) is not None
 
 
-def advice(module: str) -> str | None:
-    """Return what is missing and the command that installs it, as one clause for people.
+def install_advice(module: str) -> str | None:
+    """The command that installs a missing module such as "matplotlib.figure", as one clause for people.
 
-    Args:
-        module: what could not be imported, such as "nicegui" or "matplotlib.figure".
-
-    Returns:
-        None if no extra of this project brings the module.
+    None if the module is in none of this project's extras.
     """
     package = module.partition(".")[0]
     extra = _EXTRAS.get(package)

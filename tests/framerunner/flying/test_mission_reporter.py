@@ -1,4 +1,4 @@
-"""What is told of a mission while it is flown."""
+"""What is reported of a mission while it is flown."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from math import inf
 import numpy as np
 import pytest
 
-from framerunner.flying.mission_teller import HISTORY, MissionTeller
+from framerunner.flying.mission_reporter import HISTORY, MissionReporter
 from offboard.app import Moment, fly_mission
 from offboard.drone import DroneState, VelocityCommand
 from offboard.engine import TransitionTaken
@@ -25,7 +25,7 @@ START = (-3.0, -3.0, 0.53, 1.0)
 
 
 class Listener:
-    """Stands where the companion is; keeps what it is to send."""
+    """Replaces the companion; keeps what it is to send."""
 
     def __init__(self):
         self.states, self.detections, self.texts, self.documents, self.farewells = [], [], [], [], []
@@ -52,9 +52,9 @@ class Listener:
         return [document.content for document in self.documents if document.kind == kind]
 
 
-def make_teller(source="name: frame_challenge\n"):
+def make_reporter(source="name: frame_challenge\n"):
     listener = Listener()
-    return listener, MissionTeller(listener, MISSION, source, "test-case-1", START)
+    return listener, MissionReporter(listener, MISSION, source, "test-case-1", START)
 
 
 def moment(tick, mission_state="red.turning", **changes):
@@ -69,8 +69,8 @@ def taken(number, source="red.turning", target="red.frame_visible", values=()):
     return TransitionTaken(source, target, "frame.d < 1", values, 50_000 * number, 0.05 * number)
 
 
-def test_the_mission_is_told_before_it_begins():
-    listener, _ = make_teller("name: x # ü\n")
+def test_the_mission_is_sent_before_it_begins():
+    listener, _ = make_reporter("name: x # ü\n")
     (document,) = listener.documents
     assert document.content == {
         "name": "frame_challenge",
@@ -85,26 +85,26 @@ def test_the_mission_is_told_before_it_begins():
     assert state.pose_arena == START
 
 
-def test_a_mission_that_is_too_large_is_told_without_its_text(caplog):
+def test_a_mission_that_is_too_large_is_sent_without_its_text(caplog):
     noise = np.random.default_rng(1).integers(33, 0x2000, 60_000)
-    listener, _ = make_teller("".join(map(chr, noise)))
+    listener, _ = make_reporter("".join(map(chr, noise)))
     (content,) = listener.contents(DocumentKind.MISSION)
     assert (content["source"], content["mermaid"], content["states"]) == ("", mermaid(MISSION), LEAVES)
     assert "pieces; the limit is 255" in caplog.text
 
 
-def test_the_state_is_told_every_second_tick_and_at_once_when_it_changes():
-    listener, teller = make_teller()
+def test_the_state_is_sent_every_second_tick_and_at_once_when_it_changes():
+    listener, reporter = make_reporter()
     listener.states.clear()
     for tick in range(4):
-        teller.see(moment(tick))
+        reporter.see(moment(tick))
     assert [state.time_us for state in listener.states] == [0, 100_000]
-    teller.see(moment(4, paused=True))
-    teller.see(moment(5, flying=False))
-    teller.see(moment(6, "red.frame_visible", transition=taken(6)))
-    teller.see(moment(7, "landing.stop", transition=taken(7, "red.frame_visible", "landing.stop")))
-    teller.see(moment(8, "landing.stop"))
-    teller.see(moment(9, "landing.stop"))
+    reporter.see(moment(4, paused=True))
+    reporter.see(moment(5, flying=False))
+    reporter.see(moment(6, "red.frame_visible", transition=taken(6)))
+    reporter.see(moment(7, "landing.stop", transition=taken(7, "red.frame_visible", "landing.stop")))
+    reporter.see(moment(8, "landing.stop"))
+    reporter.see(moment(9, "landing.stop"))
     assert [state.time_us // 50_000 for state in listener.states] == [0, 2, 4, 5, 6, 7, 9]
     assert [state.flying for state in listener.states[:5]] == [True, True, False, False, True]
     assert [state.paused for state in listener.states[:4]] == [False, False, True, False]
@@ -114,17 +114,17 @@ def test_the_state_is_told_every_second_tick_and_at_once_when_it_changes():
     assert (last.command, last.pose_arena) == ((0.1, 0.2, 0.3, 0.4), (1.0, 2.0, 3.0, 0.5))
 
 
-def test_each_new_state_is_said_once():
-    listener, teller = make_teller()
+def test_each_new_state_is_one_status_text():
+    listener, reporter = make_reporter()
     for tick, state in enumerate(("red.turning", "red.turning", "red.crossing", "red.turning")):
-        teller.see(moment(tick, state))
+        reporter.see(moment(tick, state))
     assert listener.texts == ["mission: red.turning", "mission: red.crossing", "mission: red.turning"]
 
 
-def test_a_state_that_leads_to_itself_is_entered_anew():
-    listener, teller = make_teller()
-    teller.see(moment(1))
-    teller.see(moment(2, transition=taken(2, target="red.turning")))
+def test_a_state_that_leads_to_itself_is_entered_again():
+    listener, reporter = make_reporter()
+    reporter.see(moment(1))
+    reporter.see(moment(2, transition=taken(2, target="red.turning")))
     assert [(state.entered_us, state.transitions) for state in listener.states[1:]] == [
         (50_000, 0),
         (100_000, 1),
@@ -133,7 +133,7 @@ def test_a_state_that_leads_to_itself_is_entered_anew():
 
 
 def test_the_history_keeps_the_last_ten_with_the_values_of_their_guards():
-    listener, teller = make_teller()
+    listener, reporter = make_reporter()
 
     class Odd:
         def __str__(self):
@@ -150,12 +150,12 @@ def test_the_history_keeps_the_last_ten_with_the_values_of_their_guards():
         ("memory.none", None),
     )
     for number in range(12):
-        teller.see(moment(number, transition=taken(number, values=values)))
+        reporter.see(moment(number, transition=taken(number, values=values)))
     histories = listener.contents(DocumentKind.HISTORY)
     assert [len(history["transitions"]) for history in histories] == [*range(1, HISTORY), *[HISTORY] * 3]
-    told = histories[-1]["transitions"]
-    assert [transition["time_us"] // 50_000 for transition in told] == list(range(2, 12))
-    assert told[-1] == {
+    sent = histories[-1]["transitions"]
+    assert [transition["time_us"] // 50_000 for transition in sent] == list(range(2, 12))
+    assert sent[-1] == {
         "from": "red.turning",
         "to": "red.frame_visible",
         "time_us": 550_000,
@@ -174,61 +174,61 @@ def test_the_history_keeps_the_last_ten_with_the_values_of_their_guards():
     }
 
 
-def test_each_image_s_detections_are_told_once_with_the_image_s_size():
-    listener, teller = make_teller()
+def test_each_image_s_detections_are_sent_once_with_the_image_s_size():
+    listener, reporter = make_reporter()
     first = Detections(red=Detection(10.0, -10.0, 20.0, -20.0, 1.5, 30.0), time_us=7)
-    teller.see(moment(0, detections=first))
-    assert listener.detections == []  # how large the image is was not known yet
-    teller.see_frame(CameraFrame(np.zeros((240, 320, 3), np.uint8), 7, 0.0))
+    reporter.see(moment(0, detections=first))
+    assert listener.detections == []  # the image's size was not known yet
+    reporter.see_frame(CameraFrame(np.zeros((240, 320, 3), np.uint8), 7, 0.0))
     second = replace(first, time_us=None)
     for tick, seen in enumerate((first, first, second, second)):
-        teller.see(moment(tick, detections=seen))
-    assert [(told.time_us, told.width_px, told.height_px) for told in listener.detections] == [
+        reporter.see(moment(tick, detections=seen))
+    assert [(sent.time_us, sent.width_px, sent.height_px) for sent in listener.detections] == [
         (7, 320, 240),
         (None, 320, 240),
     ]
     assert listener.detections[0].red == (10.0, -10.0, 20.0, -20.0, 1.5, 30.0)
     assert listener.detections[0].blue == (-inf, inf, -inf, inf, inf, inf)
-    teller.see(moment(5, "landing.stop", detections=Detections()))
+    reporter.see(moment(5, "landing.stop", detections=Detections()))
     assert len(listener.detections) == 2
 
 
-async def test_the_result_is_told_and_nothing_else_follows_until_it_is_out():
-    listener, teller = make_teller()
+async def test_the_result_is_sent_and_nothing_else_follows_until_it_is_sent():
+    listener, reporter = make_reporter()
     result = {"seed": None, "verdict": "clean", "crossing_times_s": [1.5, 2.5], "total_time_s": 88.9}
-    await teller.tell_result(FlightResult(**result))
+    await reporter.send_result(FlightResult(**result))
     assert listener.contents(DocumentKind.RESULT) == [result]
     assert listener.farewells == [DocumentKind.RESULT]
 
 
-async def test_a_result_that_cannot_be_told_is_passed_over(caplog):
-    listener, teller = make_teller()
-    await teller.tell_result(FlightResult(verdict="clean", contact_frames=("x" * 200,) * 9000))
+async def test_a_result_that_cannot_be_sent_is_logged(caplog):
+    listener, reporter = make_reporter()
+    await reporter.send_result(FlightResult(verdict="clean", contact_frames=("x" * 200,) * 9000))
     assert listener.farewells == []
-    assert "not told: result document: 1827" in caplog.text
+    assert "not reported: result document: 1827" in caplog.text
 
 
-def test_a_fault_in_telling_does_not_reach_the_flight(caplog):
-    listener, teller = make_teller()
+def test_a_fault_in_reporting_does_not_reach_the_flight(caplog):
+    listener, reporter = make_reporter()
     listener.send_text = lambda text: 1 / 0
-    told = len(listener.states)
+    sent = len(listener.states)
     with caplog.at_level(logging.WARNING):
         for tick in range(5):
-            teller.see(moment(tick))
-    assert len(listener.states) == told + 1
+            reporter.see(moment(tick))
+    assert len(listener.states) == sent + 1
     assert [record.message.partition(":")[0] for record in caplog.records] == [
-        "the mission is not told of any more"
+        "the mission is no longer reported"
     ]
 
 
-async def test_a_whole_flight_is_told_in_order():
-    listener, teller = make_teller()
+async def test_a_whole_flight_is_reported_in_order():
+    listener, reporter = make_reporter()
     drone = KinematicDrone(*START_1[:2], START_1[2])
     seen = []
 
     def observe(moment):
         seen.append((moment.state.time_us, moment.mission_state))
-        teller.see(moment)
+        reporter.see(moment)
 
     perception = GeometricPerception(drone, TEST_CASE_1)
     outcome = await fly_mission(drone, perception, MISSION, observer=observe)
