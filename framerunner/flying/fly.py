@@ -1,7 +1,7 @@
 """One flight as planned: the mission flown, the flight judged, its result put together.
 
-Real time and lockstep differ in drone, perception and judge. The Gymnasium environment cannot use this: here the
-mission is called at every tick, while an agent calls the environment.
+Real time and lockstep differ in drone, perception and judge. The Gymnasium environment cannot use this: here
+the mission is called at every tick, while an agent calls the environment.
 """
 
 from __future__ import annotations

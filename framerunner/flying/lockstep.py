@@ -58,7 +58,7 @@ async def lockstep_flight(
 
 
 class LockstepVehicle:
-    """A plan's drone on its start and its perception: a simulation that advances only while the drone is used.
+    """A plan's drone and its perception: a simulation that advances only while the drone is used.
 
     Its observers are called with the true state of every control tick.
     """

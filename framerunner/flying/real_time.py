@@ -22,6 +22,7 @@ if TYPE_CHECKING:  # these are imported when a flight begins, as they are slow t
     from framerunner.flying.simulator_process import SimulatorClock, SitlProcess
     from offboard.link.companion import Companion
     from offboard.mavsdk_drone import MavsdkDrone
+    from offboard.perception import CameraPerception
 
 SLOW_FACTOR = 0.95  # of the requested speed; below, vehicle time had to wait
 
