@@ -220,13 +220,6 @@ class Access:
             raise HTTPException(403, "only judges may do this; log in at /login")
         return visitor
 
-    def require_pilot(self, connection: HTTPConnection) -> Visitor:
-        """The visitor; raises `HTTPException` 403 if they may not fly."""
-        visitor = self.visitor(connection)
-        if not visitor.may_fly:
-            raise HTTPException(403, "flying from another machine needs a log-in; log in at /login")
-        return visitor
-
     async def log_in(self, name: str, secret: str, address: str) -> str:
         """Start a session; a wrong secret is answered after a delay.
 

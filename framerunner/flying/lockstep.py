@@ -33,7 +33,11 @@ def fly_lockstep(
     plan: FlightPlan, *, observers: Sequence[Observer] = (), on_image: ImageObserver | None = None
 ) -> FinishedFlight:
     """Fly a plan as fast as the machine can; see `lockstep_flight`, which does it within an event loop."""
-    return asyncio.run(lockstep_flight(plan, observers=observers, on_image=on_image))
+    flight = lockstep_flight(plan, observers=observers, on_image=on_image)
+    try:
+        return asyncio.run(flight)
+    finally:
+        flight.close()  # if a signal came before the event loop had started it; otherwise nothing is left
 
 
 async def lockstep_flight(

@@ -7,7 +7,7 @@ import pytest
 from tests.framerunner.evaluation.flights import write_scenarios
 from tests.processes import is_running, program, wait_until
 
-COUNT = 8
+COUNT = 6
 
 
 def arguments(out, jobs):
