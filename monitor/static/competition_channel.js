@@ -1,14 +1,20 @@
-/** How the contest's pages speak with the monitor: they ask, judges send, and a WebSocket says when to ask anew. */
+/** How the contest's pages exchange data with the monitor: requests, judges' changes, and a WebSocket that reports changes. */
 
 const LONGEST_PAUSE_MS = 2000;
 
+/** Tries that are being flown, as the WebSocket sent them last, and how many times it did. */
+const latest = { running: [], messages: 0 };
+
 /**
- * Ask for something.
+ * Request something. The tries of an answer are replaced by those that the WebSocket sent while it was under way.
  * @param {string} path below /api/competition/
  * @returns {Promise<object>} throws an Error with one line for people
  */
 export async function ask(path) {
-  return answer(await reach(fetch(`/api/competition/${path}`, { cache: "no-store" })));
+  const before = latest.messages;
+  const given = await answer(await reach(fetch(`/api/competition/${path}`, { cache: "no-store" })));
+  if (latest.messages !== before && given.running !== undefined) given.running = latest.running;
+  return given;
 }
 
 /**
@@ -67,7 +73,11 @@ export function watch(hear) {
     socket.onmessage = (event) => {
       const message = JSON.parse(event.data);
       if (message.kind === "changed") hear.changed(message);
-      else if (message.kind === "running") hear.running(message.tries);
+      else if (message.kind === "running") {
+        latest.running = message.tries;
+        latest.messages += 1;
+        hear.running(message.tries);
+      }
     };
     socket.onclose = () => {
       hear.link(false);

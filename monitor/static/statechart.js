@@ -235,6 +235,14 @@ async function draw(text, direction) {
   return document.importNode(page.documentElement, true);
 }
 
+/** Load Mermaid and its parser before a mission is received: in flight that would stop the page for up to a second. */
+function prepare() {
+  draw("stateDiagram-v2\n    [*] --> ready", "TB").catch((error) => console.info(`no diagrams: ${error.message}`));
+}
+
+if ("requestIdleCallback" in window) requestIdleCallback(prepare, { timeout: 2000 });
+else setTimeout(prepare, 500);
+
 /** Where a node is in the drawing's own measure. */
 function boxOf(node) {
   const box = node.getBBox();

@@ -113,6 +113,15 @@ async def frames_drawn(page):
     return int(await page.locator(".m-arena").get_attribute("data-frames") or 0)
 
 
+async def test_the_library_for_diagrams_is_loaded_before_a_mission_is_received(chromium, fake):
+    fake.welcome = [world()]
+    page, complaints = await visit(chromium, fake)
+    await page.wait_for_function(
+        "performance.getEntriesByType('resource').some((each) => /stateDiagram/.test(each.name))"
+    )
+    assert complaints == []
+
+
 async def test_figures_are_those_that_were_sent(chromium, fake):
     page, complaints = await visit(chromium, fake)
     for name, shown in (

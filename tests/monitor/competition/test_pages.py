@@ -1,5 +1,7 @@
 """The contest's pages in a real browser."""
 
+import asyncio
+
 import pytest
 import pytest_asyncio
 
@@ -181,6 +183,27 @@ async def test_a_whole_contest_by_hand(running, chromium):
     await page.wait_for_function("document.body.innerText.includes('the last counts')")
     assert (await running.get("ranking"))[1]["rule"]["who"] == "Ada"
     assert [each for each in faults(page) if "422" not in each] == []
+
+
+async def test_an_answer_that_a_message_overtook_shows_no_older_time(running, chromium):
+    page = await open_page(chromium, running, "competition")
+    await page.wait_for_selector(".teams")
+    asked, answered = asyncio.Event(), asyncio.Event()
+
+    async def answer_late(route):
+        response = await route.fetch()
+        asked.set()
+        await answered.wait()
+        await route.fulfill(response=response)
+
+    await page.route("**/api/competition/state", answer_late)
+    running.fleet.tell(event("began", "k", time_s=0.0))
+    await asyncio.wait_for(asked.wait(), 30.0)
+    running.fleet.tell(event("running", "k", time_s=12.0))
+    await page.wait_for_function("document.querySelector('.flight .clock')?.textContent === '12.0'")
+    answered.set()
+    await page.wait_for_selector(".tries tr[data-state='running']")
+    assert await page.inner_text(".flight .clock") == "12.0"
 
 
 async def test_a_form_that_another_judge_saved_meanwhile_is_refused(running, chromium):
