@@ -119,8 +119,9 @@ def return_place(view: View, store: MissionStore, parameters: Parameters) -> Vec
         min_m = inf
     places = []
     if rtl_type != _HOME_OR_RALLY and store.valid:
-        landings = (view.place_of(item) for item in store.mission.items if item.command == Do.LAND)
-        places += [*landings][:1]
+        landing = next((item for item in store.mission.items if item.command == Do.LAND), None)
+        if landing is not None:
+            places.append(view.place_of(landing))
     if not follows_mission:
         rally_points = (view.place_of(item) for item in store.rally.items if item.command == Do.RALLY_POINT)
         places += [place for place in rally_points if _distance_m(home_ned_m, place) > _OF_HOME_M]

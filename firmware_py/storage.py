@@ -1,6 +1,6 @@
 """The interface to a vehicle's file storage, and the paths in it.
 
-`sitl/storage.py` implements it in memory, `sitl/storage_folder.py` in a folder. A path is a tuple of names
+`sitl/storage.py` implements it in memory and in a folder. A path is a tuple of names
 that was checked once, so no implementation parses text from a link.
 """
 

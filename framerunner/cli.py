@@ -105,7 +105,7 @@ def _reason(error: Exception) -> str | None:
     from cyclopts import CycloptsError
 
     from errors import UserError
-    from framerunner.errors import install_advice
+    from framerunner.extras import install_advice
 
     if isinstance(error, CycloptsError):
         return " ".join(str(error).split()) + " Try --help."

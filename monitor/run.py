@@ -33,6 +33,7 @@ async def serve(equipment: Equipment, settings: MonitorSettings, say: Callable[[
         MonitorError: a setting cannot be used, or the port is taken.
     """
     settings.check()
+    # First, so that a taken port is reported at once.
     with _listen(settings.bind, settings.port) as listener:
         # Importing the libraries takes more than a second, so other tasks of this loop run meanwhile.
         await asyncio.to_thread(_import_server)
@@ -64,7 +65,7 @@ async def serve(equipment: Equipment, settings: MonitorSettings, say: Callable[[
 
 
 def _listen(bind: str, port: int) -> socket.socket:
-    """Open the listening socket. Raises `MonitorError` if the port is taken or the address is not ours."""
+    """Open the listening socket; `MonitorError` if the port is taken or the address is of another machine."""
     try:
         family, kind, protocol, _, address = socket.getaddrinfo(
             bind, port, type=socket.SOCK_STREAM, flags=socket.AI_PASSIVE

@@ -157,7 +157,7 @@ class _Flight:
         ticks = self._drone.ticks()
         try:
             async for state in ticks:
-                if self._is_timed_out(state.time_us):
+                if self._update_time(state.time_us):
                     return True
                 await self._tick(state)
                 if self._engine.finished:
@@ -168,7 +168,7 @@ class _Flight:
         raise DroneError("the drone's ticks ended")
 
     async def _tick(self, state: DroneState) -> None:
-        if self._flying and (self._paused or not state.offboard) and await self._is_paused(state):
+        if self._flying and (self._paused or not state.offboard) and await self._update_pause(state):
             return
         detections = self._perception.latest(state.time_us)
         imu = Imu(state.x, state.y, state.z, state.yaw)
@@ -210,7 +210,7 @@ class _Flight:
             logger.warning("%s (x %.1f, y %.1f, z %.1f m)", keeper.remark, state.x, state.y, state.z)
         return kept
 
-    async def _is_paused(self, state: DroneState) -> bool:
+    async def _update_pause(self, state: DroneState) -> bool:
         """Start, continue or end a pause; True if the mission waits in this tick."""
         if not self._paused:
             self._paused = True
@@ -240,8 +240,8 @@ class _Flight:
         self._observe(state, STILL, detections)
         return True
 
-    def _is_timed_out(self, time_us: int) -> bool:
-        """Whether the limit has ended; it counts from motors on, and before that from the first tick."""
+    def _update_time(self, time_us: int) -> bool:
+        """Note the time; True past the limit, which counts from motors on; before, from the first tick."""
         self._now_us = time_us
         if self._first_us is None:
             self._first_us = time_us

@@ -77,7 +77,7 @@ class Drone(Protocol):
         """Let the vehicle land by itself and wait until it is disarmed."""
 
     async def hold(self) -> None:
-        """Stop commanding permanently and request hold, unless a pilot has the vehicle."""
+        """Stop commanding permanently and request hold, unless a pilot or a failsafe has the vehicle."""
 
     async def refuse(self) -> None:
         """Let the vehicle that a pilot gave back hold, and wait until it is given back again."""

@@ -18,7 +18,8 @@ FLOOR_M = 0.15  # minimum height of the drone's centre away from its start
 START_RADIUS_M = 1.0  # horizontally; there the drone takes off and lands, so there is no floor
 REACTION_S = 0.6
 """The distance to a side counts from where the drone will be after this time. A vehicle that follows a
-velocity within 0.6 s, as PX4 does with its default gains, over a link that takes 0.4 s, then stops there."""
+velocity within 0.6 s, as PX4 does with its default gains, over a link that takes 0.4 s, then stops at the
+side."""
 BRAKE_LEVEL_S = 0.8  # that distance, divided by this, is the speed allowed
 BRAKE_HEIGHT_S = 0.5  # likewise for height: frames hang low, so the drone must be allowed near the floor
 RETURN_M_S = 0.5  # maximum speed back into the box

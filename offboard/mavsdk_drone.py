@@ -54,9 +54,10 @@ class MavsdkDrone:
     wall's. Wall time is used only to find out whether link and app are alive.
 
     Safety: setpoints are sent by MAVSDK's own thread at 20 Hz, so a watchdog guards the app (see
-    `Watchdog`). After a pilot has taken the vehicle out of offboard, this class never requests a mode. While
-    a pilot has it, a velocity of zero is sent with each tick, because PX4 refuses offboard without
-    setpoints; that ends when the app hangs, and with the link or the flight.
+    `Watchdog`). While the vehicle is out of offboard during a flight, this class requests no mode; when a
+    pilot gives it back, `refuse` requests hold. While a pilot has it, a velocity of zero is sent with each
+    tick, because PX4 refuses offboard without setpoints; that ends when the app hangs, and with the link or
+    the flight.
 
     Args:
         url: udpin://, udpout://, tcpout://, tcpin:// or serial:// (see `parse_url`).
@@ -431,11 +432,13 @@ class MavsdkDrone:
         feed = self._feed
         try:
             await self._requests.wait(request)
-            if shown is not None:
-                await self._until(shown, CONFIRM_S)
         except MavsdkError as error:
             result = getattr(getattr(error, "result", None), "name", str(error))
             raise DroneError(f"{what} was refused: {result}{feed.recent_texts()}") from None
+        if shown is None:
+            return
+        try:
+            await self._until(shown, CONFIRM_S)
         except TimeoutError:
             armed = "armed" if feed.armed else "disarmed"
             raise DroneError(

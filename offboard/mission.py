@@ -122,9 +122,11 @@ def _find(name: str, folder: Path, place: Place) -> Path:
 
 def _read_text(path: Path) -> str:
     try:
-        if path.stat().st_size > MAX_FILE_BYTES:
+        with path.open("rb") as file:  # a file may grow, or have no size, such as a device
+            data = file.read(MAX_FILE_BYTES + 1)
+        if len(data) > MAX_FILE_BYTES:
             raise mission_error(Place(path.name), "is larger than 1 MB; a mission is a page or two")
-        return path.read_text(encoding="utf-8")
+        return data.decode("utf-8").replace("\r\n", "\n").replace("\r", "\n")
     except (OSError, UnicodeDecodeError) as error:
         reason = getattr(error, "strerror", None) or "is not UTF-8 text"
         raise mission_error(Place(path.name), f"cannot be read: {reason}") from None

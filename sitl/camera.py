@@ -89,7 +89,7 @@ class Camera:
                 to a bar or the base than about its own size.
 
         Returns:
-            A new image, BGR, shape (height, width, 3), uint8; its rows do not follow each other in memory.
+            A new image, BGR, shape (height, width, 3), uint8; its rows need not follow each other in memory.
 
         Raises:
             ValueError: a number is not finite, or the quaternion is zero.

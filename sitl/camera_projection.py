@@ -212,8 +212,10 @@ def drone_outlines(
     seen: list[tuple[float, Ints]] = []
     for drone in drones:
         distance_m = dist(eye_arena_m, drone.centre_arena_m)
+        if distance_m > pinhole.far_m:
+            continue
         u, v, depth_m = matrix @ np.array([(*corner, 1.0) for corner in drone.corners()]).T
-        if distance_m > pinhole.far_m or depth_m.min() <= pinhole.near_m:
+        if depth_m.min() <= pinhole.near_m:
             continue
         points = np.array([u / depth_m, v / depth_m]).T
         if np.abs(points).max() < limit:

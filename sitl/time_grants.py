@@ -31,7 +31,7 @@ class Grant:
     """How far simulated time may advance."""
 
     until_us: int  # time of the last control tick that may run
-    setpoint: Velocity | None = None  # that the autopilot must have received before; None: any
+    setpoint: Velocity | None = None  # that the autopilot must have received before; None: none is awaited
 
     def line(self) -> bytes:
         """As sent."""

@@ -9,7 +9,8 @@ import numpy as np
 
 from vision.jpeg import ImageError, jpeg_structure
 from vision.types import Image
-from vision.worker import DECODE_LIMIT_S, Request, WorkerEndedError, WorkerProcess
+from vision.worker import DECODE_LIMIT_S, Request
+from vision.worker_process import WorkerEndedError, WorkerProcess
 
 
 class ImageDecoder:

@@ -16,7 +16,8 @@ from urllib.parse import urlsplit
 from vision.decoder import ImageDecoder
 from vision.jpeg import JPEG_START, ImageError
 from vision.types import CameraError, CameraFrame, CameraSource, shown_url
-from vision.worker import Answer, Reply, Request, WorkerEndedError, WorkerProcess
+from vision.worker import Reply, Request
+from vision.worker_process import Answer, WorkerEndedError, WorkerProcess
 
 IMAGE_SUFFIXES = (".png", ".jpg", ".jpeg", ".bmp")
 MAX_FILE_BYTES = 64 * 1024 * 1024

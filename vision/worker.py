@@ -1,7 +1,7 @@
-"""The process in which images of unknown origin are decoded: how it is started, and what it does.
+"""The process in which images of unknown origin are decoded, and its protocol.
 
 OpenCV and its codecs are native code. A hostile image can make them hang, crash or take all memory, and a
-thread in them cannot be stopped; a process can. `WorkerProcess` starts
+thread in them cannot be stopped; a process can. `worker_process` starts
 `python -m vision.worker SOCKET MEMORY` with two inherited file descriptors. Requests are sent over the
 socket; each is answered by one `ANSWER`, and an image by its pixels at the beginning of the shared memory.
 When its parent has ended, the process ends too.
@@ -9,7 +9,6 @@ When its parent has ended, the process ends too.
 
 from __future__ import annotations
 
-import asyncio
 import contextlib
 import mmap
 import os
@@ -17,15 +16,11 @@ import resource
 import signal
 import socket
 import struct
-import subprocess
 import sys
-import tempfile
 import threading
 import time
 from collections.abc import Iterator
-from dataclasses import dataclass
 from enum import IntEnum
-from typing import BinaryIO, cast
 
 import cv2
 import numpy as np
@@ -36,7 +31,6 @@ MAX_IMAGE_BYTES = 3 * 4096 * 4096
 MEMORY_LIMIT_BYTES = 4 << 30
 DECODE_LIMIT_S = 0.5
 """Longest time for one image: thirty times what a baseline JPEG of 1920 x 1080 pixels takes."""
-_START_LIMIT_S = 10.0
 _PARENT_CHECK_S = 1.0
 REQUEST = struct.Struct("<BI")  # kind, and the number of bytes that follow
 ANSWER = struct.Struct("<BIId")  # kind, width and height (pixels), monotonic time of arrival (seconds)
@@ -60,135 +54,6 @@ class Reply(IntEnum):
     NOT_OPENED = 5
     END_OF_FILE = 6
     END_OF_STREAM = 7
-
-
-class WorkerEndedError(Exception):
-    """The process has crashed, run out of memory or time, or sent an invalid answer."""
-
-
-@dataclass(frozen=True, slots=True)
-class Answer:
-    """What the process has answered."""
-
-    reply: Reply
-    image: Image | None  # BGR, shape (height, width, 3), uint8; None unless `reply` is `Reply.IMAGE`
-    received_s: float  # monotonic wall time at which a captured image arrived, seconds
-
-
-class WorkerProcess:
-    """The process as its parent sees it. There is none before `start` and after `end`."""
-
-    def __init__(self) -> None:
-        self._process: subprocess.Popen[bytes] | None = None
-        self._link: socket.socket | None = None
-        self._memory: mmap.mmap | None = None
-
-    @property
-    def pid(self) -> int | None:
-        """Process id, while there is a process."""
-        return None if self._process is None else self._process.pid
-
-    async def start(self) -> None:
-        """Start the process, if there is none, and wait until it is ready. Raises `WorkerEndedError`."""
-        if self._process is not None:
-            return
-        with self._ended_by_errors("does not start"):
-            self._spawn()
-            async with asyncio.timeout(_START_LIMIT_S):
-                await self._answer()
-
-    async def request(self, kind: Request, data: bytes = b"") -> Answer:
-        """Send one request and wait for its answer. Cancelling the wait ends the process.
-
-        Raises:
-            WorkerEndedError: the process has ended, or was ended because its answer was invalid.
-        """
-        await self.start()
-        assert self._link is not None
-        with self._ended_by_errors("has ended"):
-            head = REQUEST.pack(kind, len(data))
-            await asyncio.get_running_loop().sock_sendall(self._link, head + data)
-            return await self._answer()
-
-    def end(self) -> None:
-        """Kill the process."""
-        process, self._process = self._process, None
-        if self._link is not None:
-            self._link.close()
-            self._link = None
-        if self._memory is not None:
-            self._memory.close()
-            self._memory = None
-        if process is not None:
-            process.kill()
-            # The system needs a moment to take back its memory; the event loop does not wait for that.
-            threading.Thread(target=process.wait, daemon=True).start()
-
-    @contextlib.contextmanager
-    def _ended_by_errors(self, problem: str) -> Iterator[None]:
-        """End the process after any error, also a cancelled wait: the next request would get its answer."""
-        try:
-            yield
-        except BaseException as error:
-            self.end()
-            if isinstance(error, OSError):
-                raise WorkerEndedError(f"the process that decodes images {problem}: {error}") from error
-            raise
-
-    async def _answer(self) -> Answer:
-        """Wait for the next answer."""
-        assert self._link is not None
-        answer = bytearray()
-        while len(answer) < ANSWER.size:
-            size = ANSWER.size - len(answer)
-            chunk = await asyncio.get_running_loop().sock_recv(self._link, size)
-            if not chunk:
-                raise ConnectionResetError("connection closed")
-            answer += chunk
-        return self._checked(bytes(answer))
-
-    def _spawn(self) -> None:
-        ours, theirs = socket.socketpair()
-        ours.setblocking(False)
-        with theirs, _shared_file() as file:
-            descriptors = (theirs.fileno(), file.fileno())
-            self._process = subprocess.Popen(
-                [sys.executable, "-m", "vision.worker", *map(str, descriptors)],
-                stdin=subprocess.DEVNULL,
-                stdout=subprocess.DEVNULL,
-                stderr=subprocess.DEVNULL,  # an image can make a decoder print anything
-                pass_fds=descriptors,
-                start_new_session=True,  # a Ctrl-C in the terminal is handled by the flight
-                env={**os.environ, "OPENCV_IO_MAX_IMAGE_PIXELS": str(MAX_IMAGE_BYTES // 3)},
-            )
-            self._link = ours
-            self._memory = mmap.mmap(file.fileno(), MAX_IMAGE_BYTES, prot=mmap.PROT_READ)
-
-    def _checked(self, answer: bytes) -> Answer:
-        """Check an answer: an image may have taken control of the process."""
-        assert self._memory is not None
-        kind, width, height, received_s = ANSWER.unpack(answer)
-        size_fits = 0 < width * height * 3 <= MAX_IMAGE_BYTES
-        if kind not in tuple(Reply) or (kind == Reply.IMAGE and not size_fits):
-            raise WorkerEndedError("the process that decodes images sent an invalid answer")
-        image: Image | None = None
-        if kind == Reply.IMAGE:
-            shared = np.frombuffer(self._memory, np.uint8, width * height * 3)
-            image = shared.reshape(height, width, 3).copy()
-        return Answer(Reply(kind), image, received_s)
-
-
-def _shared_file() -> BinaryIO:
-    """A file of `MAX_IMAGE_BYTES` without a name; only pages that are written take memory."""
-    if hasattr(os, "memfd_create"):
-        file: BinaryIO = os.fdopen(os.memfd_create("framerunner-image"), "r+b")
-    else:
-        file = cast(BinaryIO, tempfile.TemporaryFile(prefix="framerunner-"))  # noqa: SIM115 - the caller closes it
-    file.truncate(MAX_IMAGE_BYTES)
-    return file
-
-
-# From here on: what runs in the process.
 
 
 class _Capture:

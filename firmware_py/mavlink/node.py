@@ -67,12 +67,10 @@ def _services(autopilot: Autopilot, exchange: Exchange, options: NodeOptions) ->
         files = ExtraFiles(autopilot.parameters)
     events = EventService(autopilot, exchange)
     mission = MissionExecution(autopilot, exchange, camera)
-    state_messages: dict[int, AutopilotSource] = {
-        **MOTION,
-        **SENSORS,
-        **CONDITION,
-        mavlink.MAVLINK_MSG_ID_ESC_INFO: lambda autopilot: esc_info(autopilot, exchange.time_us),
+    clocked: dict[int, AutopilotSource] = {
+        mavlink.MAVLINK_MSG_ID_ESC_INFO: lambda autopilot: esc_info(autopilot, exchange.time_us)
     }
+    state_messages = merged((MOTION, SENSORS, CONDITION, clocked))
     services: tuple[Service, ...] = (
         HomeAndOriginService(autopilot, exchange),
         StatusTextService(autopilot, exchange, events.send_text, options.log_text),

@@ -122,6 +122,6 @@ def merged(tables: Iterable[Mapping[int, Entry]]) -> dict[int, Entry]:
     for table in tables:
         twice = all_entries.keys() & table.keys()
         if twice:
-            raise ValueError(f"two services have an entry for id {min(twice)}")
+            raise ValueError(f"two tables have an entry for id {min(twice)}")
         all_entries.update(table)
     return all_entries

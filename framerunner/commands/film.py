@@ -71,7 +71,7 @@ def film(
     rate = fps or (10.0 if suffix == ".gif" else 25.0)
     made = make_film(flight, FilmSettings(target, size_px, rate, speed or 8.0, seconds), pilot_file)
     megabytes = target.stat().st_size / 1e6
-    print(f"{target}: {made.seconds:.1f} s, {made.images} pictures, {megabytes:.1f} MB")
+    print(f"{target}: {made.seconds:.1f} s, {made.images} images, {megabytes:.1f} MB")
     if made.codec == "mpeg4":
         print("encoded as MPEG-4, which browsers do not play: this FFmpeg has no H.264 encoder (libx264)")
     return 0

@@ -65,7 +65,10 @@ def check(file: Annotated[Path, Parameter(help="YAML file")], *, pilot: PilotOpt
 
         framerunner mission check my_mission.yaml --pilot my_mission.py
     """
+    from offboard.chart.native import load_chart
+
     loaded = load_mission_with(file, pilot)
+    load_chart(loaded.spec, validate=True)
     with_pilot = f" and {pilot}" if pilot is not None else ""
     print(f"{file}{with_pilot}: good, mission '{loaded.name}' with {len(loaded.leaves)} states")
     return 0

@@ -44,11 +44,14 @@ def show(
 
         framerunner scenario show my.yaml --out my.png
     """
-    from framerunner.runs.plots import draw_scenario, save_figure
+    from framerunner.runs import check_plot_format
     from scenarios.loader import dump_yaml, load_scenario
 
     loaded = load_scenario(scenario)
     path = out or Path(f"{loaded.name}.png")
+    check_plot_format(path)
+    from framerunner.runs.plots import draw_scenario, save_figure
+
     save_figure(draw_scenario(loaded), path)
     print(dump_yaml(loaded), end="")
     say(f"drawn to {path}")

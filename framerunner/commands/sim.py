@@ -12,7 +12,7 @@ from cyclopts import Parameter
 
 from errors import SettingError
 from framerunner.commands import WholeNumber, check_range, say
-from framerunner.errors import install_advice, is_installed
+from framerunner.extras import install_advice, is_installed
 
 if TYPE_CHECKING:
     from framerunner.child_process import MonitorProcess

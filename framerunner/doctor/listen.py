@@ -188,9 +188,7 @@ class Record:
             self.arming.take(message)
         elif kind == "PARAM_VALUE":
             self.parameters[message.param_id] = parameter_value(message)
-        elif kind == "AVAILABLE_MODES" and not message.mode_name.startswith(
-            "("
-        ):  # else an unused mode of PX4
+        elif kind == "AVAILABLE_MODES" and not message.mode_name.startswith("("):  # "(": PX4 does not use it
             self.modes[message.custom_mode] = message.mode_name
 
     def rate_hz(self, kind: str) -> float:

@@ -10,7 +10,6 @@ from pathlib import Path
 from rich.console import Console
 
 from errors import SettingError
-from framerunner.errors import install_advice, is_installed
 from framerunner.evaluation.backends import Pool, check_pool
 from framerunner.evaluation.compare import check_comparable, compare
 from framerunner.evaluation.plan import Plan
@@ -19,6 +18,7 @@ from framerunner.evaluation.runner import fly_all
 from framerunner.evaluation.statistics import summarise
 from framerunner.evaluation.store import RESULTS, EvaluationFolder, open_folder, read_folder
 from framerunner.evaluation.terminal import EvaluationProgress, print_comparison, print_summary
+from framerunner.extras import install_advice, is_installed
 from scenarios.verdict import Verdict
 
 EXIT_INTERRUPTED = 130
@@ -75,7 +75,7 @@ def evaluate(settings: EvaluationSettings) -> int:
         except KeyboardInterrupt:
             count = len(folder.rows())  # from disk: the signal may have come between writing and counting
             kept = f"{count} of {len(settings.plan)} flights are kept in {folder.path}"
-            _note(f"interrupted; {kept}; go on with:\n  {settings.command}")
+            _note(f"interrupted; {kept}; continue with:\n  {settings.command}")
             return EXIT_INTERRUPTED
 
 

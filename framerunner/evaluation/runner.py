@@ -18,7 +18,6 @@ from multiprocessing import get_context
 from multiprocessing.connection import Connection
 from typing import Any
 
-from errors import UserError
 from framerunner.evaluation.backends import Pool, Workers, is_lost_worker, open_pool
 from framerunner.evaluation.rows import Row
 from framerunner.flying.lockstep import fly_lockstep
@@ -34,8 +33,8 @@ _ONE_AT_A_TIME = threading.Lock()
 """A cluster's worker may have several threads, and JSBSim is not documented to be thread-safe."""
 
 
-class WorkerDiedError(UserError):
-    """The process of a flight ended before the flight, by its own code or from outside; a line for people."""
+class WorkerDiedError(Exception):
+    """The process of a flight ended before the flight, by its own code or from outside."""
 
 
 @dataclass(frozen=True, slots=True)

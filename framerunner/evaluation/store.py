@@ -9,7 +9,7 @@ import os
 import shutil
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, fields
 from pathlib import Path
 from typing import Any
 
@@ -166,6 +166,8 @@ def _identity(path: Path, option: str) -> Identity | None:
         data: dict[str, Any] = json.loads((path / IDENTITY).read_text(encoding="utf-8"))
         if data.pop("format") != FORMAT:
             raise SettingError(f"{option} {path}: was made by another version of framerunner; choose another")
+        if set(data) != {each.name for each in fields(Identity)}:
+            raise ValueError("other fields")
         return TypeAdapter(Identity).validate_python(data)
     except (FileNotFoundError, NotADirectoryError):
         return None
@@ -223,7 +225,7 @@ def _writing(path: Path) -> Iterator[None]:
         yield
     except OSError as error:
         raise SettingError(
-            f"--out {path}: cannot be written to ({error.strerror}); free some space or choose another; "
+            f"--out {path}: cannot be written to ({error.strerror}); correct that or choose another; "
             "what was kept stays"
         ) from None
 

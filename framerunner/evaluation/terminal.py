@@ -93,7 +93,8 @@ def print_summary(summary: Summary, title: str) -> None:
     spreads = _table("", "10 %", "median", "90 %", "mean")
     spreads.add_row("try time of the landed (s)", *spread_cells(summary.try_time_s, ".1f", "-"))
     for colour, offset_m in summary.offset_m.items():
-        spreads.add_row(f"off the middle of {colour} (m)", *spread_cells(offset_m, ".3f", "-"))
+        name = f"crossing offset from the centre of {colour} (m)"
+        spreads.add_row(name, *spread_cells(offset_m, ".3f", "-"))
     spreads.add_row("landing error (m)", *spread_cells(summary.landing_error_m, ".3f", "-"))
     console.print(spreads)
 

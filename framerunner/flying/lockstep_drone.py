@@ -169,7 +169,7 @@ class LockstepDrone:
         ended = self._pass(LAND_LIMIT_US, until=lambda: not self._armed or self._mode is not FlightMode.LAND)
         if self._armed and ended:
             texts = _vehicle_texts(self._autopilot)
-            raise DroneError(f"landing was broken off: mode {self._mode.name}{texts}")
+            raise DroneError(f"landing was interrupted: mode {self._mode.name}{texts}")
         if not ended:
             texts = _vehicle_texts(self._autopilot)
             raise DroneError(f"still not landed after {LAND_LIMIT_US / 1e6:g} s{texts}")

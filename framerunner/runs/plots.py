@@ -19,7 +19,7 @@ from matplotlib.patches import Polygon, Rectangle
 from matplotlib.patheffects import withStroke
 from matplotlib.ticker import MaxNLocator
 
-from errors import UserError
+from framerunner.runs import PlotError, check_plot_format
 from framerunner.runs.track import Track
 from scenarios.models import Frame, Scenario, start_position
 from scenarios.result import FlightResult
@@ -28,7 +28,6 @@ _Dash = Literal["-"] | tuple[float, Sequence[float]]
 _Styles = Mapping[str, tuple[str, _Dash]]
 _View = Callable[[float, float, float], tuple[float, float]]
 
-SUFFIXES = (".png", ".svg", ".pdf")
 FRAME_COLOURS = {"red": "#ff0000", "green": "#00ff00", "blue": "#0000ff"}
 # Paul Tol's "muted" scheme, which colour-blind people can tell apart, and three more.
 STATE_COLOURS = (
@@ -57,10 +56,6 @@ _BASE = "#c9b892"
 _HALO = [withStroke(linewidth=2.5, foreground="white")]
 _CROSSING_MARK: dict[str, Any] = {"marker": "o", "ms": 5.5, "mfc": "white", "mec": _INK, "mew": 1.3}
 _END_MARK: dict[str, Any] = {"marker": "X", "ms": 8, "mfc": _INK, "mec": "white"}
-
-
-class PlotError(UserError):
-    """A plot that cannot be written; the message is one line for people."""
 
 
 def _from_above(x: float, y: float, z: float) -> tuple[float, float]:
@@ -111,13 +106,12 @@ def draw_track(scenario: Scenario, track: Track, result: FlightResult | None) ->
 
 
 def save_figure(figure: Figure, path: Path) -> None:
-    """Write a figure to a file; its suffix, one of `SUFFIXES`, selects the format.
+    """Write a figure to a file; its suffix, one of `PLOT_SUFFIXES`, selects the format.
 
     Raises:
         PlotError: the suffix is not known, or the file cannot be written.
     """
-    if path.suffix.lower() not in SUFFIXES:
-        raise PlotError(f"plot: '{path}' has no known format; name it {', '.join(SUFFIXES)}")
+    check_plot_format(path)
     try:
         figure.savefig(path)
     except OSError as error:

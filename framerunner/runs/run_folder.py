@@ -9,8 +9,9 @@ from collections.abc import Callable
 from datetime import datetime
 from pathlib import Path
 
-from errors import SettingError, UserError
-from framerunner.errors import install_advice
+from errors import SettingError
+from framerunner.extras import install_advice
+from framerunner.runs import PlotError
 from framerunner.runs.track import Track
 from offboard.mission import Mission
 from offboard.pilot_file import PilotFile
@@ -147,7 +148,7 @@ def left_lines(folder: RunFolder, result: FlightResult) -> list[str]:
 def _try(path: Path, write: Callable[[], None]) -> None:
     try:
         write()
-    except UserError as error:
+    except PlotError as error:
         path.unlink(missing_ok=True)  # an incomplete plot
         warn(str(error))
     except ModuleNotFoundError as error:

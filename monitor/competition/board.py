@@ -26,6 +26,7 @@ from monitor.competition.validation import from_wire
 from monitor.competition.views import (
     Board,
     CallView,
+    Counting,
     DrawView,
     JudgementView,
     LastCallView,
@@ -139,7 +140,9 @@ def _read_rule(session: Session) -> tuple[Rule, RuleView]:
     row = session.scalars(newest).first()
     if row is None:
         return Rule(), RuleView(**asdict(Rule()), who="", at=None)
-    return Rule(row.limit_s, row.missing_frame_s, row.scenarios, row.counting), RuleView.model_validate(row)
+    counting: Counting = "last" if row.counting == "last" else "best"
+    rule = Rule(row.limit_s, row.missing_frame_s, row.scenarios, counting)
+    return rule, RuleView(**asdict(rule), who=row.who, at=row.at)
 
 
 def _read_tries(session: Session, *conditions: ColumnElement[bool]) -> list[_Judged]:
@@ -217,9 +220,10 @@ def _countable(
 
 def _barrier(row: tables.Try, teams: Mapping[int, tables.Team], countable: frozenset[str] | None) -> str:
     """See `TryView.barrier`; "" if a ranking has the try or may still have it."""
-    if row.team_id is None:
+    team = None if row.team_id is None else teams.get(row.team_id)
+    if team is None:
         return "no team"
-    if teams[row.team_id].withdrawn:
+    if team.withdrawn:
         return "withdrawn"
     if not row.scenario:
         return "no scenario"
@@ -246,7 +250,8 @@ def _ranking(
 
 
 def _name(teams: Mapping[int, tables.Team], team_id: int | None) -> str:
-    return teams[team_id].name if team_id is not None else ""
+    team = None if team_id is None else teams.get(team_id)  # another process may have added it meanwhile
+    return "" if team is None else team.name
 
 
 def _try_view(

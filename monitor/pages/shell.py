@@ -67,13 +67,14 @@ def html_page(
         visitor: who opened the page.
         here: path that is marked in the navigation.
         title: for the browser's tab.
-        content: HTML within `<main>`.
-        head: further HTML for the head.
+        content: HTML within `<main>`; what it shows of others is escaped already.
+        head: further HTML for the head, likewise.
         classes: CSS classes of `<main>`.
         status: HTTP status.
     """
     return HTMLResponse(
-        f'<!doctype html><html lang="en"><head><meta charset="utf-8"><title>{title} – framerunner</title>'
+        '<!doctype html><html lang="en"><head><meta charset="utf-8">'
+        f"<title>{escape(title)} – framerunner</title>"
         '<meta name="viewport" content="width=device-width, initial-scale=1">'
         f"{HEAD}{head}</head><body>{header_html(visitor, here)}"
         f'<main class="page {classes}" id="main" tabindex="-1">{content}</main></body></html>',

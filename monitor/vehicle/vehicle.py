@@ -275,7 +275,7 @@ class Vehicle:
         return {"kind": "history", "id": self.id, "poses": self._history.rows()}
 
     def _report_problems(self) -> None:
-        """Report what was wrong with its messages, once each."""
+        """Report refused video URLs and, of the mission's unreadable payloads, only the first of a boot."""
         mission, camera = self._mission, self.camera
         if camera.problem:
             self._callbacks.notice("warning", f"drone {self.id}: {camera.problem}")

@@ -29,17 +29,22 @@ RESUME = "resume"
 def native_document(mission: MissionFile) -> dict[str, Any]:
     """A mission that is expanded and checked, as a document of python-statemachine.
 
-    Tests compare the documents with the library's JSON Schema; that takes too long at every start.
+    `mission check` and tests compare it with the library's JSON Schema; that takes too long at every start.
     """
     by_leaf = {leaf.state.id: leaf for leaf in leaves(mission.states)}
     states = {s.id: _state(s, s.name == mission.initial, by_leaf) for s in mission.states}
     return {"name": mission.name, "states": states}
 
 
-def load_chart(mission: MissionFile) -> type[StateChart]:
-    """Build the chart's class; `MissionError` if the library refuses what the checker accepts."""
+def load_chart(mission: MissionFile, *, validate: bool = False) -> type[StateChart]:
+    """Build the chart's class; `MissionError` if the library refuses what the checker accepts.
+
+    Args:
+        mission: expanded and checked.
+        validate: compare the document with the library's JSON Schema, too.
+    """
     try:
-        chart: type[StateChart] = load(json.dumps(native_document(mission)), format="json")
+        chart: type[StateChart] = load(json.dumps(native_document(mission)), format="json", validate=validate)
     except (InvalidDefinition, ValueError) as error:
         raise mission_error(mission.place, " ".join(str(error).split())) from None
     chart.catch_errors_as_events = False

@@ -143,6 +143,7 @@ def test_a_fence_breach_follows_gf_action(action, mode):
     flight.take(10.0, lambda: flight.now.distance_m() > 20.0)
     flight.run(0.3)
     assert flight.mode is mode
+    assert "Geofence violation: farther from home than 20 m" in flight.texts
     if mode is FlightMode.HOLD:
         flight.run(4.0)
         assert 20.0 < flight.now.distance_m() < 28.0

@@ -1,7 +1,9 @@
+from importlib import resources
 from math import inf, nan
 from pathlib import Path
 
 import pytest
+import yaml
 from hypothesis import given
 from hypothesis import strategies as st
 from pydantic import ValidationError
@@ -13,6 +15,15 @@ from firmware_py.parameters.reference import reference_page
 def test_declarations_are_sorted_by_name_without_doubles():
     names = [declared.name for declared in DECLARATIONS]
     assert names == sorted(set(names))
+
+
+def test_no_name_is_declared_twice_in_the_file():
+    text = resources.files("firmware_py.parameters").joinpath("declarations.yaml").read_text(encoding="utf-8")
+    groups = yaml.compose(text, yaml.SafeLoader).value
+    names = [name.value for _, rows in groups for name, _ in rows.value]
+    headings = [heading.value for heading, _ in groups]
+    assert sorted(names) == [each.name for each in DECLARATIONS]
+    assert len(set(headings)) == len(headings)
 
 
 @pytest.mark.parametrize("declared", DECLARATIONS, ids=lambda declared: declared.name)

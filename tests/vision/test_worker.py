@@ -14,7 +14,8 @@ import pytest
 from tests.vision.hostile_images import progressive_of_many_scans
 from vision.decoder import ImageDecoder
 from vision.jpeg import ImageError
-from vision.worker import Reply, Request, WorkerEndedError, WorkerProcess
+from vision.worker import Reply, Request
+from vision.worker_process import WorkerEndedError, WorkerProcess
 
 IMAGE = np.arange(30 * 40 * 3, dtype=np.uint8).reshape(30, 40, 3)
 PNG = bytes(cv2.imencode(".png", IMAGE)[1])
@@ -96,7 +97,8 @@ async def test_closing_ends_a_process_at_work() -> None:
 
 PARENT = """
 import asyncio, sys
-from vision.worker import Request, WorkerProcess
+from vision.worker import Request
+from vision.worker_process import WorkerProcess
 async def main():
     worker = WorkerProcess()
     await worker.start()

@@ -17,6 +17,7 @@ from firmware_py.mavlink.camera.model import (
     CAMERA_COMPONENT_ID,
     CameraModel,
     CaptureSink,
+    PictureSpace,
     VideoStream,
 )
 from firmware_py.mavlink.service import Command, Service
@@ -225,7 +226,6 @@ class CameraComponent(Service):
 
     def _requested(self, message_id: int, index: int) -> list[Message]:
         time_us, captures = self._exchange.time_us, self._captures
-        space = None if self._sink is None else self._sink.space()
         match message_id:
             case mavlink.MAVLINK_MSG_ID_CAMERA_INFORMATION:
                 streams = bool(self._video)
@@ -233,14 +233,18 @@ class CameraComponent(Service):
             case mavlink.MAVLINK_MSG_ID_CAMERA_SETTINGS:
                 message = messages.settings(time_us)
             case mavlink.MAVLINK_MSG_ID_STORAGE_INFORMATION if index <= 1:
-                message = messages.storage_information(space, time_us)
+                message = messages.storage_information(self._space(), time_us)
             case mavlink.MAVLINK_MSG_ID_CAMERA_CAPTURE_STATUS:
+                space = self._space()
                 message = messages.capture_status(captures.interval_s, captures.count, space, time_us)
             case mavlink.MAVLINK_MSG_ID_CAMERA_IMAGE_CAPTURED:
                 message = captures.sent(index)
             case _:
                 return self._of_streams(message_id, index)
         return [] if message is None else [message]
+
+    def _space(self) -> PictureSpace | None:
+        return None if self._sink is None else self._sink.space()
 
     def _of_streams(self, message_id: int, index: int) -> list[Message]:
         """The messages of a stream, numbered from 1, or of all, 0."""

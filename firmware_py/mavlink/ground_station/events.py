@@ -11,6 +11,7 @@ from collections import deque
 from dataclasses import dataclass
 
 from firmware_py.autopilot import Autopilot
+from firmware_py.commander_guards import UNARMABLE
 from firmware_py.mavlink.ground_station.event_definitions import (
     ALL_MODES,
     ARMING_SUMMARY,
@@ -36,16 +37,7 @@ _KEPT = 20
 _SEQUENCE_PERIOD_US = 3_000_000
 _HEALTH_PERIOD_US = 100_000  # between assessments
 _REPORT_GAP_US = 2_000_000  # between unrequested reports
-_UNARMABLE = sum(
-    1 << MODE_GROUPS[mode]
-    for mode in (
-        FlightMode.RETURN,
-        FlightMode.LAND,
-        FlightMode.ORBIT,
-        FlightMode.FOLLOW,
-        FlightMode.TERMINATION,
-    )
-)
+_UNARMABLE = sum(1 << MODE_GROUPS[mode] for mode in UNARMABLE)
 _ALWAYS_THERE = Part.GYRO | Part.ACCEL | Part.MAGNETOMETER | Part.ABSOLUTE_PRESSURE | Part.ATTITUDE_ESTIMATE
 _PLACED = Part.GPS | Part.LOCAL_POSITION_ESTIMATE | Part.GLOBAL_POSITION_ESTIMATE
 _LOW_BATTERY = 2  # MAV_BATTERY_CHARGE_STATE_LOW

@@ -50,8 +50,12 @@ class ExtraFiles(Mapping[str, bytes]):
         self._parameters = parameters
 
     def __getitem__(self, path: str) -> bytes:
-        declared = DECLARATIONS if self._parameters is None else self._parameters.declarations
-        return _files(tuple((each.name, each.default) for each in declared))[path]
+        if path not in FILES:
+            raise KeyError(path)
+        vehicle = DECLARATIONS if self._parameters is None else self._parameters.declarations
+        pairs = zip(vehicle, DECLARATIONS, strict=True)
+        own = tuple((each.name, each.default) for each, plain in pairs if each.default != plain.default)
+        return _files(own)[path]
 
     def __iter__(self) -> Iterator[str]:
         return iter(FILES)
@@ -66,8 +70,8 @@ def file_crc(content: bytes) -> int:
 
 
 @lru_cache(maxsize=4)
-def _files(defaults: tuple[tuple[str, float], ...]) -> dict[str, bytes]:
-    declarations = Parameters(defaults=dict(defaults)).declarations
+def _files(own_defaults: tuple[tuple[str, float], ...]) -> dict[str, bytes]:
+    declarations = Parameters(defaults=dict(own_defaults)).declarations
     files = {
         PARAMETERS_FILE: _compressed(parameters_json(declarations)),
         EVENTS_FILE: _compressed(events_json()),

@@ -46,7 +46,7 @@ def test_a_stopped_evaluation_is_continued_where_it_was(place, jobs, number):
     assert wait_until(lambda: not any(is_running(worker) for worker in workers), 20)
     if number is not signal.SIGKILL:
         assert code == 130
-        assert f"interrupted; {kept} of {COUNT} flights are kept in {out}; go on with:" in said
+        assert f"interrupted; {kept} of {COUNT} flights are kept in {out}; continue with:" in said
         command = f"framerunner evaluate short --mission frame_challenge --jobs {jobs} --out {out}"
         assert said.splitlines()[-1].strip() == command
         assert "Traceback" not in said

@@ -46,7 +46,7 @@ def test_an_mp4_that_browsers_play(recorded_folder, tmp_path, capsys):
         assert container.streams.video[0].codec_context.pix_fmt == "yuv420p"
     data = path.read_bytes()
     assert data.index(b"moov") < data.index(b"mdat")  # so that it plays before it is completely loaded
-    assert capsys.readouterr().out.startswith(f"{path}: 4.0 s, 40 pictures, ")
+    assert capsys.readouterr().out.startswith(f"{path}: 4.0 s, 40 images, ")
     assert [each.name for each in tmp_path.iterdir()] == ["a.mp4"]
 
 

@@ -5,7 +5,8 @@ from math import inf, nan
 import pytest
 from matplotlib.colors import to_hex
 
-from framerunner.runs.plots import STATE_COLOURS, PlotError, draw_scenario, draw_track, save_figure
+from framerunner.runs import PlotError
+from framerunner.runs.plots import STATE_COLOURS, draw_scenario, draw_track, save_figure
 from framerunner.runs.track import Track
 from scenarios.models import Arena, Base, Frame, Scenario, Start
 from scenarios.result import FlightResult

@@ -3,14 +3,17 @@
 import asyncio
 import threading
 from contextlib import asynccontextmanager
+from dataclasses import asdict
 from random import Random
 
 import pytest
 
 from monitor.competition.database import DatabaseError
+from monitor.competition.rules import Rule
 from monitor.competition.service import CompetitionService
 from monitor.competition.store import Store
 from monitor.competition.validation import RefusedError
+from monitor.competition.views import RuleView
 from tests.monitor.competition.harness import COLOURS, EQUIPMENT, event
 
 
@@ -50,7 +53,7 @@ async def test_requests_wait_until_the_database_is_open_but_not_for_ever(url, mo
     early = asyncio.create_task(service.change(lambda store: store.board().rule))
     board = asyncio.create_task(service.board())
     work = asyncio.create_task(service.run())
-    assert (await early).who == "" and (await board).version > 0
+    assert await early == RuleView(**asdict(Rule()), who="", at=None) and (await board).version > 0
     work.cancel()
     await asyncio.gather(work, return_exceptions=True)
 

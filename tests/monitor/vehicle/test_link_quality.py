@@ -2,7 +2,9 @@
 
 import pytest
 
+from monitor.ports import Equipment
 from monitor.vehicle.link_quality import LinkQuality, RateWatch, RepeatedRequest
+from monitor.vehicle.vehicle import Vehicle, VehicleCallbacks
 from wire.dialect import mavlink, request_message
 
 
@@ -78,3 +80,27 @@ def test_a_request_is_repeated_every_two_seconds_a_few_times():
     assert request.due(1.0) is None
     assert request.due(2.0) is message
     assert sum(request.due(3.0 * count) is not None for count in range(2, 40)) == 3
+
+
+def boot_time_requests(unix_us):
+    """What is requested in two minutes from a drone whose SYSTEM_TIME has this date; None: it sends none."""
+    sent = []
+    silent = Equipment(None, None, None, None, None, None)
+    callbacks = VehicleCallbacks(sent.append, *[lambda *_: None] * 3)
+    vehicle, packer = Vehicle(1, silent, callbacks, 0.0), mavlink.MAVLink(None, srcSystem=1, srcComponent=1)
+    for second in range(120):
+        messages = [mavlink.MAVLink_heartbeat_message(2, 12, 0, 0, 3, 3)]
+        if unix_us is not None:
+            messages.append(mavlink.MAVLink_system_time_message(unix_us + 1_000_000 * second, 1000 * second))
+        for message in messages:
+            packet = message.pack(packer)
+            packer.seq = (packer.seq + 1) % 256
+            vehicle.take(mavlink.MAVLink(None).parse_buffer(packet)[0], float(second))
+        vehicle.tick(second + 0.1)
+    return [each for each in wanted(sent) if each[1] == mavlink.MAV_CMD_REQUEST_MESSAGE]
+
+
+def test_the_boot_time_is_requested_five_times_at_most_and_not_once_it_is_known():
+    system_time = (1, mavlink.MAV_CMD_REQUEST_MESSAGE, mavlink.MAVLINK_MSG_ID_SYSTEM_TIME, 0)
+    assert boot_time_requests(None) == [system_time] * 5
+    assert boot_time_requests(1_700_000_000_000_000) == []
