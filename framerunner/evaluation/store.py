@@ -224,9 +224,10 @@ def _writing(path: Path) -> Iterator[None]:
     try:
         yield
     except OSError as error:
+        is_full = error.errno in (errno.ENOSPC, errno.EDQUOT)
+        remedy = "free some space or choose another" if is_full else "choose another"
         raise SettingError(
-            f"--out {path}: cannot be written to ({error.strerror}); correct that or choose another; "
-            "what was kept stays"
+            f"--out {path}: cannot be written to ({error.strerror}); {remedy}; what was kept stays"
         ) from None
 
 
