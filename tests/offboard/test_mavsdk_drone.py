@@ -15,7 +15,7 @@ from pymavlink import mavutil
 
 from offboard.drone import DroneError, VelocityCommand
 from offboard.mavsdk_drone import MavsdkDrone
-from tests.offboard.conftest import free_port
+from tests.free_ports import free_port
 from tests.offboard.udp_vehicle import POSCTL, UdpVehicle
 
 pytestmark = pytest.mark.realtime

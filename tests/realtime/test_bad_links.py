@@ -11,7 +11,7 @@ import pytest
 from scenarios.loader import dump_yaml
 from tests.framerunner.simulated_link import Impairment
 from tests.framerunner.test_bad_links import before_a_low_frame
-from tests.offboard.conftest import free_port
+from tests.free_ports import free_port
 from tests.processes import program, simulator
 from tests.realtime.conftest import Peer
 from tests.realtime.udp_proxy import UdpProxy

@@ -13,6 +13,7 @@ from firmware_py.mavlink.node import MavlinkNode
 from firmware_py.types import GeodeticPoint
 from sitl.link_hub import LinkHub
 from sitl.server_settings import parse_link
+from tests.free_ports import free_port
 from tests.processes import bound
 from wire.dialect import mavlink
 from wire.framing import PacketReader
@@ -60,11 +61,6 @@ async def heard(drone, read, kind, message=BEAT):
             if got.get_type() == kind and got.get_srcSystem() == 1:
                 return got
     raise AssertionError(f"no {kind}")
-
-
-def free_port():
-    with bound(0) as sock:
-        return sock.getsockname()[1]
 
 
 class TcpPeer:

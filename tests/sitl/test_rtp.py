@@ -9,26 +9,11 @@ import pytest
 
 from scenarios.models import Camera
 from sitl.rtp import RtpSender
+from tests.free_ports import free_port
 from wire.transports.urls import LinkError
 
 CAMERA = Camera(width_px=320, height_px=240, rate_hz=10.0)
 RED, GREEN, BLUE = (0, 0, 255), (0, 255, 0), (255, 0, 0)
-
-
-def even_free_port():
-    """A free port whose next one, RTCP's, is free too."""
-    for _ in range(100):
-        with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as first:
-            first.bind(("127.0.0.1", 0))
-            port = first.getsockname()[1] // 2 * 2
-        try:
-            for number in (port, port + 1):
-                with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as sock:
-                    sock.bind(("127.0.0.1", number))
-        except OSError:
-            continue
-        return port
-    raise AssertionError("no free pair of ports")
 
 
 def painted(colour, camera=CAMERA):
@@ -60,7 +45,7 @@ class Watcher(threading.Thread):
 
 
 def test_a_watcher_sees_the_painted_colours(tmp_path):
-    sender = RtpSender(("127.0.0.1", even_free_port()), CAMERA)
+    sender = RtpSender(("127.0.0.1", free_port(2)), CAMERA)
     description = tmp_path / "video.sdp"
     description.write_text(sender.description(), encoding="ascii")
     watcher = Watcher(description, 30)
@@ -85,7 +70,7 @@ def test_a_watcher_sees_the_painted_colours(tmp_path):
 
 def test_who_comes_late_sees_something_within_a_second_of_video():
     packets = []
-    port = even_free_port()
+    port = free_port(2)
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as listener:
         listener.bind(("127.0.0.1", port))
         listener.settimeout(5.0)
@@ -116,13 +101,13 @@ def _units(payload):
 
 
 def test_odd_sizes_are_sent():
-    sender = RtpSender(("127.0.0.1", even_free_port()), Camera(width_px=321, height_px=241))
+    sender = RtpSender(("127.0.0.1", free_port(2)), Camera(width_px=321, height_px=241))
     sender.send(painted(RED, Camera(width_px=321, height_px=241)), 0)
     sender.close()
 
 
 def test_stamps_count_the_watchers_seconds():
-    ports = even_free_port()
+    ports = free_port(2)
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as listener:
         listener.bind(("127.0.0.1", ports))
         listener.settimeout(5.0)

@@ -8,15 +8,10 @@ import threading
 import pytest
 from pymavlink.dialects.v20 import common as mavlink
 
+from tests.free_ports import free_port
 from wire.dialect import companion_heartbeat, is_vehicle, request_message
 from wire.transports.urls import LinkError
 from wire.transports.vehicle_link import VehicleLink
-
-
-def free_port(kind=socket.SOCK_DGRAM):
-    with socket.socket(socket.AF_INET, kind) as probe:
-        probe.bind(("127.0.0.1", 0))
-        return probe.getsockname()[1]
 
 
 def open_link(url):
@@ -115,7 +110,7 @@ def test_calling_over_tcp_and_the_other_side_hanging_up():
 
 
 def test_being_called_over_tcp_again_and_again():
-    port = free_port(socket.SOCK_STREAM)
+    port = free_port()
     link = open_link(f"tcpin://127.0.0.1:{port}")
     try:
         for _ in range(2):
@@ -189,7 +184,7 @@ def test_an_address_that_cannot_be_had_is_one_clear_line(url, words):
 
 def test_a_closed_tcp_port_and_a_taken_udp_port_are_one_clear_line():
     with pytest.raises(LinkError, match="refused"):
-        open_link(f"tcpout://127.0.0.1:{free_port(socket.SOCK_STREAM)}")
+        open_link(f"tcpout://127.0.0.1:{free_port()}")
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as other:
         other.bind(("127.0.0.1", 0))
         with pytest.raises(LinkError, match="another flight or ground station"):

@@ -9,6 +9,7 @@ import pytest
 from aiohttp import web
 
 from framerunner.commands.monitor import equipment
+from tests.free_ports import free_port
 from tests.monitor.watching import watching
 from wire.dialect import mavlink
 
@@ -54,12 +55,6 @@ class FakeDrone:
 
     def close(self):
         self._socket.close()
-
-
-def free_port():
-    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
-        probe.bind(("127.0.0.1", 0))
-        return probe.getsockname()[1]
 
 
 @pytest.mark.parametrize(
