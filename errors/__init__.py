@@ -1,4 +1,8 @@
-"""The base of all errors whose message is for people, and the one for settings, which all programs share."""
+"""The bases of errors whose message is for people, and advice on files that cannot be written."""
+
+from __future__ import annotations
+
+import errno
 
 
 class UserError(Exception):
@@ -11,3 +15,13 @@ class UserError(Exception):
 
 class SettingError(UserError):
     """A command-line option or another setting that cannot be used; the message is one line for people."""
+
+
+def is_disk_full(error: OSError) -> bool:
+    """Whether a file was not written because there is no space, or none left of the user's quota."""
+    return error.errno in (errno.ENOSPC, errno.EDQUOT)
+
+
+def write_advice(error: OSError) -> str:
+    """What to do about an option's file or folder that cannot be written to."""
+    return "free some space or choose another" if is_disk_full(error) else "choose another"

@@ -69,6 +69,10 @@ def main() -> None:
     os.environ.setdefault("OPENCV_LOG_LEVEL", "ERROR")
     os.environ.setdefault("OPENCV_FFMPEG_LOGLEVEL", "-8")
     code = run(sys.argv[1:])
+    try:
+        sys.stdout.flush()
+    except OSError:
+        _discard_output()  # the command's own error is reported already
     for number in (signal.SIGALRM, signal.SIGINT, signal.SIGTERM):
         signal.signal(number, signal.SIG_DFL)  # an exception at shutdown would be a traceback
     sys.exit(code)
@@ -85,6 +89,7 @@ def run(arguments: list[str]) -> int:
     """
     try:
         code = build_app()(arguments or ["--help"], print_error=False, exit_on_error=False)
+        sys.stdout.flush()  # here, where an error is reported in one line
     except KeyboardInterrupt:
         print("interrupted", file=sys.stderr)
         return EXIT_INTERRUPTED
@@ -104,7 +109,7 @@ def _reason(error: Exception) -> str | None:
     """The message for the user; None for a fault of this program."""
     from cyclopts import CycloptsError
 
-    from errors import UserError
+    from errors import UserError, is_disk_full
     from framerunner.extras import install_advice
 
     if isinstance(error, CycloptsError):
@@ -116,7 +121,8 @@ def _reason(error: Exception) -> str | None:
     if isinstance(error, OSError) and error.errno in _DISK_REFUSES:
         _discard_output()
         what = error.filename or "standard output or a file"
-        return f"{what}: cannot be written to ({error.strerror}); free some space"
+        advice = "free some space" if is_disk_full(error) else "choose another place"
+        return f"{what}: cannot be written to ({error.strerror}); {advice}"
     return None
 
 

@@ -112,7 +112,8 @@ def _find(name: str, folder: Path, place: Place) -> Path:
         path = (folder / name).resolve()
         if path.is_file():
             return path
-        raise mission_error(place, f"mission file '{name}' does not exist")
+        problem = "is not a regular file" if path.exists() else "does not exist"
+        raise mission_error(place, f"mission file '{name}' {problem}")
     known = list_missions()
     if name in known:
         return MISSIONS / f"{name}.yaml"

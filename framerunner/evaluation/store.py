@@ -15,7 +15,7 @@ from typing import Any
 
 from pydantic import TypeAdapter
 
-from errors import SettingError
+from errors import SettingError, write_advice
 from framerunner.evaluation.plan import Identity
 from framerunner.evaluation.rows import Row
 from framerunner.runs.track import Track
@@ -224,10 +224,9 @@ def _writing(path: Path) -> Iterator[None]:
     try:
         yield
     except OSError as error:
-        is_full = error.errno in (errno.ENOSPC, errno.EDQUOT)
-        remedy = "free some space or choose another" if is_full else "choose another"
         raise SettingError(
-            f"--out {path}: cannot be written to ({error.strerror}); {remedy}; what was kept stays"
+            f"--out {path}: cannot be written to ({error.strerror}); {write_advice(error)}; "
+            "what was kept stays"
         ) from None
 
 

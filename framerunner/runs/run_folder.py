@@ -9,7 +9,7 @@ from collections.abc import Callable
 from datetime import datetime
 from pathlib import Path
 
-from errors import SettingError
+from errors import SettingError, write_advice
 from framerunner.extras import install_advice
 from framerunner.runs import PlotError
 from framerunner.runs.track import Track
@@ -78,8 +78,7 @@ class RunFolder:
                 self.pilot.write_text(mission.pilot.text, encoding="utf-8")
         except OSError as error:
             raise SettingError(
-                f"--out {self.path.parent}: cannot be written to ({error.strerror}); free some space "
-                "or choose another"
+                f"--out {self.path.parent}: cannot be written to ({error.strerror}); {write_advice(error)}"
             ) from None
 
     def write_result(self, result: FlightResult) -> None:

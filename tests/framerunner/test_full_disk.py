@@ -9,6 +9,7 @@ import pytest
 from tests.processes import ROOT
 
 SHORT = "name: short\nbase: {x_m: 0, y_m: 0}\nstart: {x_m: 0, y_m: 0}\nframes: []\ntry_limit_s: 3\n"
+ENVIRONMENT = {"PYTHONPATH": str(ROOT), "OPENBLAS_NUM_THREADS": "1"}
 ON_SMALL_DISK = 'mount -t tmpfs -o size="$0" small disk && exec "$@"'
 
 
@@ -27,8 +28,7 @@ def run(folder, size, *arguments):
         pytest.skip("a small disk cannot be mounted on this system")
     program = [sys.executable, "-m", "framerunner", *arguments]
     command = ["unshare", "--mount", "--map-root-user", "sh", "-c", ON_SMALL_DISK, size, *program]
-    environment = {"PYTHONPATH": str(ROOT), "OPENBLAS_NUM_THREADS": "1"}
-    return subprocess.run(command, cwd=folder, env=environment, capture_output=True, text=True, check=False)
+    return subprocess.run(command, cwd=folder, env=ENVIRONMENT, capture_output=True, text=True, check=False)
 
 
 def test_a_flight_on_a_full_disk_keeps_its_verdict_and_names_the_missing_files(tmp_path):
@@ -72,8 +72,21 @@ def test_an_evaluation_on_a_full_disk_counts_what_it_flew_and_ends_in_one_line(t
 def test_output_that_cannot_be_written_is_one_line():
     with open("/dev/full", "w", encoding="utf-8") as full:
         program = [sys.executable, "-m", "framerunner", "scenario", "list"]
-        done = subprocess.run(program, cwd=ROOT, stdout=full, stderr=subprocess.PIPE, text=True, check=False)
+        done = subprocess.run(
+            program, cwd=ROOT, env=ENVIRONMENT, stdout=full, stderr=subprocess.PIPE, text=True, check=False
+        )
     assert done.returncode == 2
     assert done.stderr == (
         "error: standard output or a file: cannot be written to (No space left on device); free some space\n"
+    )
+
+
+def test_only_a_full_disk_is_said_to_need_space(tmp_path):
+    limited = ["sh", "-c", 'ulimit -f 0; exec "$@" > listed.txt', "sh"]
+    program = [sys.executable, "-m", "framerunner", "scenario", "list"]
+    command = [*limited, *program]
+    done = subprocess.run(command, cwd=tmp_path, env=ENVIRONMENT, capture_output=True, text=True, check=False)
+    assert done.returncode == 2
+    assert done.stderr == (
+        "error: standard output or a file: cannot be written to (File too large); choose another place\n"
     )

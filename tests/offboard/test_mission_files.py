@@ -163,6 +163,8 @@ def test_unknown_name_and_missing_file():
         load_mission("frame_chalenge")
     with pytest.raises(MissionError, match="does not exist"):
         load_mission("no/such/file.yaml")
+    with pytest.raises(MissionError, match="'/dev/zero' is not a regular file"):
+        load_mission("/dev/zero")
 
 
 def test_a_mission_cannot_extend_itself(tmp_path):
