@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from typing import Protocol
 
 from errors import UserError
+from geometry.vectors import Quaternion
 
 
 class DroneError(UserError):
@@ -30,7 +31,8 @@ class DroneState:
     offboard: bool = False  # it follows this app's setpoints
     mode: str = ""  # name of the flight mode, for people
     landed: bool = True  # on the ground or on the base
-    position_age_s: float = 0.0  # how much older the position is than `time_us`
+    position_age_s: float = 0.0  # how much older the position and the velocity are than `time_us`
+    attitude_arena: Quaternion = (1.0, 0.0, 0.0, 0.0)  # body FLU to arena, with the heading `yaw`
 
 
 @dataclass(frozen=True, slots=True)

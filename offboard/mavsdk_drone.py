@@ -19,6 +19,7 @@ from mavsdk.asyncio.plugins.telemetry import TelemetryAsync
 from mavsdk.logging import log_subscribe
 
 from geometry.axes import Alignment, Pose
+from geometry.rotations import quaternion_from_euler
 from offboard.drone import DroneError, DroneState, VelocityCommand
 from offboard.keep_in_box import Box, confine
 from offboard.link.commands import PendingRequests, SetpointStream
@@ -378,6 +379,7 @@ class MavsdkDrone:
         assert self._alignment is not None, "ready() comes first"
         feed, sample = self._feed, self._feed.sample
         pose = self._alignment.pose(Pose(sample.position_ned_m, sample.yaw_ned_rad))
+        attitude_ned = quaternion_from_euler(sample.roll_rad, sample.pitch_rad, sample.yaw_ned_rad)
         return DroneState(
             time_us=sample.time_us,
             x=pose.position_m[0],
@@ -390,6 +392,7 @@ class MavsdkDrone:
             mode=feed.mode,
             landed=feed.landed,
             position_age_s=max(0.0, (sample.time_us - sample.position_us) * 1e-6),
+            attitude_arena=self._alignment.attitude(attitude_ned),
         )
 
     def _check_alive(self, tick_received: bool) -> None:

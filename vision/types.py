@@ -12,6 +12,7 @@ import numpy as np
 import numpy.typing as npt
 
 from errors import UserError
+from geometry.vectors import Vec3
 
 Image = npt.NDArray[np.uint8]
 
@@ -26,6 +27,7 @@ class Detection:
     w: float = inf  # left edge, pixels right of the centre
     d: float = inf  # distance, metres; +inf unless the whole frame is in view
     a: float = inf  # unsigned angle of line of sight to the frame's normal, degrees; +inf unless whole
+    signed_a: float = inf  # that angle, positive if flying left makes it smaller; +inf if not known
 
     @property
     def seen(self) -> bool:
@@ -37,6 +39,48 @@ NOT_SEEN = Detection()
 
 
 @dataclass(frozen=True, slots=True)
+class FrameCorner:
+    """A corner of a frame's outer outline in the image, pixels from the optical axis, with errors (1 sigma)."""
+
+    right_px: float
+    down_px: float
+    std_right_px: float
+    std_down_px: float
+
+
+@dataclass(frozen=True, slots=True)
+class FramePose:
+    """A pose of a frame that explains its outline, in the camera's axes: forward, left, up."""
+
+    position_flu_m: Vec3  # from the camera to the opening's centre
+    normal_flu: Vec3  # unit vector, perpendicular to the opening, on the side from which it is seen
+    error_px: float  # root mean square of the distances between the outline and the pose's
+
+
+@dataclass(frozen=True, slots=True)
+class FrameSighting:
+    """One frame in one image."""
+
+    colour: str  # red, green, blue, or the colour of a frame that is no part of the task
+    corners: tuple[FrameCorner | None, FrameCorner | None, FrameCorner | None, FrameCorner | None]
+    """Upper left, upper right, lower right and lower left as seen; None if hidden or outside the image."""
+    whole: bool  # nothing of it is hidden or outside the image
+    poses: tuple[FramePose, ...]  # none if too little is seen; else one or two, the better one first
+
+
+@dataclass(frozen=True, slots=True)
+class ObstacleEdge:
+    """The lower end of an obstacle in one column of the image, pixels from the optical axis.
+
+    An obstacle stands on the floor, so this is where its column of the image meets the floor.
+    """
+
+    right_px: float
+    down_px: float
+    cut: bool  # it continues below the image
+
+
+@dataclass(frozen=True, slots=True)
 class Detections:
     """What one image showed."""
 
@@ -44,6 +88,8 @@ class Detections:
     green: Detection = NOT_SEEN
     blue: Detection = NOT_SEEN
     time_us: int | None = None  # vehicle time of the image; None if the source does not send it
+    frames: tuple[FrameSighting, ...] = ()  # by shape; only from the frame finder
+    obstacle_edges: tuple[ObstacleEdge, ...] = ()  # from left to right; only from the frame finder
 
 
 @dataclass(frozen=True, slots=True)

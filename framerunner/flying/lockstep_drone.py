@@ -21,6 +21,7 @@ from firmware_py.offboard_requests import SetpointRefusal, setpoint_from_body_ve
 from firmware_py.status import CommandResult, FlightMode, LandedState
 from firmware_py.types import CRITICAL
 from geometry.axes import Alignment, Pose
+from geometry.rotations import quaternion_from_euler
 from geometry.vectors import Vec3
 from offboard.drone import DroneError, DroneState, VelocityCommand
 from scenarios.models import TrueState
@@ -82,6 +83,7 @@ class LockstepDrone:
         self._alignment: Alignment | None = None
         self._heartbeat_us = 0
         self._position_us = POSITION_PHASE_US
+        self._sent_position_us = 0
         self._position_ned_m: Vec3 = (0.0, 0.0, 0.0)
         self._velocity_ned_m_s: Vec3 = (0.0, 0.0, 0.0)
         self._tick_us = TICK_US
@@ -106,7 +108,7 @@ class LockstepDrone:
                 f"pre-arm checks not passed{_vehicle_texts(self._autopilot)}"
             )
         self._alignment = Alignment(
-            self._start_arena, Pose(self._position_ned_m, _received_yaw(self._autopilot.state.yaw_rad))
+            self._start_arena, Pose(self._position_ned_m, _received_angle(self._autopilot.state.yaw_rad))
         )
 
     async def ticks(self) -> AsyncIterator[DroneState]:
@@ -247,6 +249,7 @@ class LockstepDrone:
             self._position_us += POSITION_US
             self._position_ned_m = single(self._autopilot.state.position_ned_m)
             self._velocity_ned_m_s = single(self._autopilot.state.velocity_ned_m_s)
+            self._sent_position_us = now_us
 
     def _pass(self, limit_us: int, until: Callable[[], bool] = lambda: False) -> bool:
         """Let time pass until a condition holds; False if it does not within the limit."""
@@ -272,7 +275,9 @@ class LockstepDrone:
     def _reported_state(self, alignment: Alignment) -> DroneState:
         """The state as telemetry shows it: heading now, position and mode as of their last messages."""
         state = self._autopilot.state
-        pose = alignment.pose(Pose(self._position_ned_m, _received_yaw(state.yaw_rad)))
+        yaw_rad = _received_angle(state.yaw_rad)
+        pose = alignment.pose(Pose(self._position_ned_m, yaw_rad))
+        roll_rad, pitch_rad = _received_angle(state.roll_rad), _received_angle(state.pitch_rad)
         return DroneState(
             state.time_us,
             *pose.position_m,
@@ -282,6 +287,8 @@ class LockstepDrone:
             self._mode is FlightMode.OFFBOARD,
             self._mode.name,
             self._autopilot.status.landed_state is LandedState.ON_GROUND,
+            (state.time_us - self._sent_position_us) * 1e-6,
+            alignment.attitude(quaternion_from_euler(roll_rad, pitch_rad, yaw_rad)),
         )
 
 
@@ -297,13 +304,13 @@ def single(vector: Vec3) -> Vec3:
     return (x, y, z)
 
 
-def _received_yaw(yaw_rad: float) -> float:
-    """A yaw, radians, as it is after ATTITUDE and MAVSDK's degrees.
+def _received_angle(angle_rad: float) -> float:
+    """An angle of the attitude, radians, as it is after ATTITUDE and MAVSDK's degrees.
 
     MAVSDK multiplies by 180/pi in single precision. A product of two singles is exact in double precision,
     so rounding it once gives the same.
     """
-    return radians(_rounded(_DEGREES * _rounded(yaw_rad)))
+    return radians(_rounded(_DEGREES * _rounded(angle_rad)))
 
 
 def sent_yaw_rate(yaw_rate_rad_s: float) -> float:

@@ -45,6 +45,8 @@ class Sample:
     position_ned_m: Vec3  # latest by then
     velocity_ned_m_s: Vec3
     position_us: int = 0  # of position and velocity, microseconds since boot
+    roll_rad: float = 0.0  # with `yaw_ned_rad` the attitude: Euler angles Z-Y-X, body FRD to NED
+    pitch_rad: float = 0.0
 
 
 class TelemetryFeed:
@@ -154,7 +156,13 @@ class TelemetryFeed:
         if tick != self.tick_number:
             self.tick_number = tick
             self.sample = Sample(
-                time_us, self.yaw_ned_rad, self.position_ned_m, self.velocity_ned_m_s, self.position_us
+                time_us,
+                self.yaw_ned_rad,
+                self.position_ned_m,
+                self.velocity_ned_m_s,
+                self.position_us,
+                radians(euler.roll_deg),
+                radians(euler.pitch_deg),
             )
             self._wake()
 

@@ -141,7 +141,12 @@ class LinkedVehicle:
 
     def _tell_motion(self, now_us):
         state = self.autopilot.state
-        euler = SimpleNamespace(yaw_deg=degrees(state.yaw_rad), timestamp_us=state.time_us)
+        euler = SimpleNamespace(
+            roll_deg=degrees(state.roll_rad),
+            pitch_deg=degrees(state.pitch_rad),
+            yaw_deg=degrees(state.yaw_rad),
+            timestamp_us=state.time_us,
+        )
         fields = {"time_boot_ms": state.time_us // 1000}
         fields |= zip("xyz", state.position_ned_m, strict=True)
         fields |= zip(("vx", "vy", "vz"), state.velocity_ned_m_s, strict=True)

@@ -36,7 +36,9 @@ class Plugin:
         self.called[name] = callback
 
     def attitude(self, ms):
-        self.called["subscribe_attitude_euler"](SimpleNamespace(yaw_deg=0.0, timestamp_us=ms * 1000), None)
+        self.called["subscribe_attitude_euler"](
+            SimpleNamespace(roll_deg=0.0, pitch_deg=0.0, yaw_deg=0.0, timestamp_us=ms * 1000), None
+        )
 
     def position(self, ms, x):
         told = {"time_boot_ms": ms, "x": x, "y": 0.0, "z": None, "vx": 0.0, "vy": 0.0, "vz": 0.0}

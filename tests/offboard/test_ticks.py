@@ -39,7 +39,7 @@ class Clock:
 
 
 def attitude(feed, time_us):
-    feed._on_attitude(SimpleNamespace(yaw_deg=0.0, timestamp_us=time_us), None)
+    feed._on_attitude(SimpleNamespace(roll_deg=0.0, pitch_deg=0.0, yaw_deg=0.0, timestamp_us=time_us), None)
 
 
 @pytest.fixture

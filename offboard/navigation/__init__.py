@@ -1,0 +1,1 @@
+"""Navigation by a map of frames: seen, remembered, planned, flown."""

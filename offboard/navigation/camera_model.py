@@ -1,0 +1,69 @@
+"""Where a point of the arena is in the image: a pinhole camera, fixed to the drone, without tilt."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from math import tan
+from typing import Self
+
+from geometry.rotations import Rotation, rotation, to_body, to_world
+from geometry.vectors import Quaternion, Vec3
+from scenarios.models import Camera
+
+NEAREST_M = 0.05  # points nearer than this are not projected
+
+
+@dataclass(frozen=True, slots=True)
+class CameraModel:
+    """The camera of a scenario.
+
+    Attributes:
+        focal_px: focal length.
+        half_width_px: from the optical axis to the image's left and right edges.
+        half_height_px: to its upper and lower edges.
+        position_flu_m: of the camera on the drone: forward, left, up.
+    """
+
+    focal_px: float
+    half_width_px: float
+    half_height_px: float
+    position_flu_m: Vec3
+
+    @classmethod
+    def of(cls, camera: Camera) -> Self:
+        """The model of a scenario's camera."""
+        half_width_px = camera.width_px / 2
+        focal_px = half_width_px / tan(camera.horizontal_fov_rad / 2)
+        return cls(focal_px, half_width_px, camera.height_px / 2, camera.position_flu_m)
+
+    def pose(self, drone_m: Vec3, attitude_arena: Quaternion) -> CameraPose:
+        """The camera's pose with the drone's centre and attitude (body FLU to arena)."""
+        turn = rotation(attitude_arena)
+        x, y, z = to_world(turn, *self.position_flu_m)
+        return CameraPose((drone_m[0] + x, drone_m[1] + y, drone_m[2] + z), turn)
+
+    def project(self, pose: CameraPose, point_m: Vec3) -> tuple[float, float] | None:
+        """Pixels right of and below the optical axis, of a point in the arena; None if not before the camera.
+
+        The result may lie outside the image.
+        """
+        at = pose.position_m
+        ahead, left, up = to_body(pose.rotation, point_m[0] - at[0], point_m[1] - at[1], point_m[2] - at[2])
+        if ahead < NEAREST_M:
+            return None
+        return (-self.focal_px * left / ahead, -self.focal_px * up / ahead)
+
+    def contains(self, right_px: float, down_px: float, margin_px: float = 0.0) -> bool:
+        """Whether a projected point is in the image, at least a margin from its edges."""
+        return (
+            abs(right_px) <= self.half_width_px - margin_px
+            and abs(down_px) <= self.half_height_px - margin_px
+        )
+
+
+@dataclass(frozen=True, slots=True)
+class CameraPose:
+    """Where the camera was when an image was exposed."""
+
+    position_m: Vec3  # arena axes
+    rotation: Rotation  # body FLU to arena
