@@ -40,7 +40,7 @@ NOT_SEEN = Detection()
 
 @dataclass(frozen=True, slots=True)
 class FrameCorner:
-    """A corner of a frame's outer outline in the image, pixels from the optical axis, with errors (1 sigma)."""
+    """A corner of a frame's outer outline: pixels from the optical axis, with standard deviations."""
 
     right_px: float
     down_px: float
