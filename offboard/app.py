@@ -13,6 +13,7 @@ from offboard.drone import Drone, DroneError, DroneState, VelocityCommand
 from offboard.engine import MissionEngine, MissionRunError, TransitionTaken
 from offboard.keep_in_box import Box, KeepInBox, OutsideBoxError
 from offboard.mission import Mission
+from offboard.navigation.view import NavigationView
 from offboard.perception import CameraLostError, Perception
 from offboard.pilot import Imu
 from vision.types import Detections
@@ -20,6 +21,7 @@ from vision.types import Detections
 INTERRUPTED = "interrupted"
 MICROSECONDS = 1_000_000
 STILL = VelocityCommand()
+NAVIGATION_US = 200_000  # vehicle time between two views of the navigator's map
 REST_US = 3 * MICROSECONDS  # time to fall onto the base, and for telemetry to show the drone at rest
 
 
@@ -30,6 +32,7 @@ class Moment:
     Attributes:
         remark: in a pause, why the mission did not continue when the pilot last gave the drone back;
             otherwise how the mission's command was changed to keep the drone in its box; empty if it was not.
+        navigation: the navigator's map and plan, renewed five times a second; None without a navigator.
     """
 
     state: DroneState
@@ -40,6 +43,7 @@ class Moment:
     transition: TransitionTaken | None = None  # the one taken in this tick
     paused: bool = False  # a pilot has the sticks; the mission waits
     remark: str = ""
+    navigation: NavigationView | None = None
 
 
 Observer = Callable[[Moment], None]
@@ -132,6 +136,8 @@ class _Flight:
         self._paused = False
         self._pauses = 0
         self._remark = ""
+        self._navigation: NavigationView | None = None
+        self._navigation_us: int | None = None
 
     async def run(self) -> MissionEnd:
         """Fly until the flight ends, for whatever reason."""
@@ -197,7 +203,14 @@ class _Flight:
         if not self._paused:
             remark = "" if self._keeper is None else self._keeper.remark
         what = (state, command, detections, engine.state, flight_time_s, engine.transition)
-        self._observer(Moment(*what, self._paused, remark))
+        self._observer(Moment(*what, self._paused, remark, self._navigation_at(state.time_us)))
+
+    def _navigation_at(self, time_us: int) -> NavigationView | None:
+        """The navigator's map and plan, at most `NAVIGATION_US` old."""
+        made_us = self._navigation_us
+        if made_us is None or time_us - made_us >= NAVIGATION_US:
+            self._navigation, self._navigation_us = self._engine.navigation, time_us
+        return self._navigation
 
     def _kept_in_box(self, command: VelocityCommand, state: DroneState) -> VelocityCommand:
         """The command limited to the box; the first change in a flight is logged."""
@@ -276,7 +289,8 @@ class _Flight:
                 if self._observer is not None:
                     since_us = state.time_us if self._started_us is None else self._started_us
                     flight_time_s = (state.time_us - since_us) / MICROSECONDS
-                    self._observer(Moment(state, STILL, Detections(), self._engine.state, flight_time_s))
+                    what = (state, STILL, Detections(), self._engine.state, flight_time_s)
+                    self._observer(Moment(*what, navigation=self._navigation))
                 if state.time_us >= end_us:
                     break
         except DroneError:

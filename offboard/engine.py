@@ -20,6 +20,7 @@ from offboard.chart.native import RESUME, TICK
 from offboard.chart.spec import Action, Leaf, Transition
 from offboard.drone import VelocityCommand
 from offboard.mission import Mission
+from offboard.navigation.view import NavigationView
 from offboard.pilot import Imu, Pilot, PilotError, velocity_command
 from offboard.pilot_file import PilotFile, in_words, place_in
 from scenarios.models import COLOURS
@@ -99,6 +100,11 @@ class MissionEngine:
     def finished(self) -> bool:
         """The mission has reached its end."""
         return self._present is not None and self._present.finish
+
+    @property
+    def navigation(self) -> NavigationView | None:
+        """The map and the plan of the pilot's navigator, made anew at each call; None without a navigator."""
+        return None
 
     def tick(self, imu: Imu, cam: Detections, time_us: int) -> VelocityCommand:
         """Run one step of the chart, at this vehicle time. After a pause this continues the mission.

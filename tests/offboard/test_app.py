@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+from itertools import pairwise
 from textwrap import dedent
 
 import numpy as np
@@ -10,7 +11,9 @@ import pytest
 
 from offboard.app import fly_mission
 from offboard.drone import DroneError
+from offboard.engine import MissionEngine
 from offboard.mission import load_mission
+from offboard.navigation.view import NavigationView
 from offboard.perception import CameraLostError, CameraPerception
 from offboard.pilot import Pilot
 from tests.offboard.fakes import START_1, TEST_CASE_1, GeometricPerception, KinematicDrone, NoCamera
@@ -235,3 +238,22 @@ async def test_old_images_from_a_buffer_count_as_old():
     with pytest.raises(CameraLostError, match=r"no image for 1\.1 s"):
         perception.latest(drone.time_us + 1_100_000)
     await perception.close()
+
+
+async def test_observers_get_the_navigators_map_five_times_a_second(monkeypatch):
+    made = []
+
+    def view(engine):
+        made.append(NavigationView(goal=engine.state))
+        return made[-1]
+
+    monkeypatch.setattr(MissionEngine, "navigation", property(view))
+    drone, perception = starting()
+    moments = []
+    outcome = await fly_mission(drone, perception, MISSION, observer=moments.append)
+    assert outcome.ended == "finished"
+    renewed = [now for last, now in pairwise(moments) if now.navigation is not last.navigation]
+    between_us = {now.state.time_us - last.state.time_us for last, now in pairwise(renewed)}
+    assert between_us == {200_000}
+    assert [moment.navigation for moment in renewed] == made[1:]
+    assert moments[-1].navigation is made[-1]  # also at rest after the flight

@@ -1,0 +1,23 @@
+"""What a navigator shows of its map and its plan, for displays and records."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from geometry.vectors import Vec3
+from offboard.navigation.frame_estimate import FrameEstimate
+
+
+@dataclass(frozen=True, slots=True)
+class NavigationView:
+    """The map of frames and the plan at one time.
+
+    Attributes:
+        frames: all frames seen so far.
+        path_m: points of the planned path, in order, arena axes; empty without a plan.
+        goal: what the navigator does now, a word or a short phrase such as "explore" or "cross red".
+    """
+
+    frames: tuple[FrameEstimate, ...] = ()
+    path_m: tuple[Vec3, ...] = ()
+    goal: str = ""
