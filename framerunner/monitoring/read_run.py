@@ -24,7 +24,6 @@ from framerunner.child_process import end_with_standard_input
 from framerunner.recording.collected import CollectedFlight, ImageFile, collect
 from framerunner.recording.events import RecordingError
 from framerunner.recording.open_recording import recorded_flight
-from geometry.rotations import quaternion_from_yaw
 from offboard.app import Moment
 from offboard.engine import TransitionTaken
 from offboard.mission import Mission, MissionError, load_mission, mermaid
@@ -171,7 +170,7 @@ def _poses(flight: CollectedFlight, numbers: Mapping[str, int], clock: Clock) ->
             {
                 "t": clock(state.time_us),
                 "p": _rounded(state.x, state.y, state.z),
-                "q": _rounded(*quaternion_from_yaw(state.yaw)),
+                "q": _rounded(*state.attitude_arena),
                 "v": _rounded(c * vx + s * vy, c * vy - s * vx, vz),
                 "r": _rounded(turn_rad / span_s if span_s > 0 else 0.0)[0],
                 "c": _rounded(*sent) if flight.mission_is_known else None,
@@ -184,7 +183,7 @@ def _poses(flight: CollectedFlight, numbers: Mapping[str, int], clock: Clock) ->
 
 def _has_pose(moment: Moment) -> bool:
     state = moment.state
-    return all(map(isfinite, (state.x, state.y, state.z, state.yaw)))
+    return all(map(isfinite, (state.x, state.y, state.z, *state.attitude_arena)))
 
 
 def _detections(moments: Sequence[Moment], clock: Clock, size_px: tuple[int, int]) -> list[Json]:

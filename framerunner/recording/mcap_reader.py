@@ -25,6 +25,8 @@ from framerunner.recording.mcap_file import (
 )
 from framerunner.recording.mcap_writer import METADATA
 from framerunner.recording.schemas import CROSSING, DETECTIONS, IMAGE, MISSION, SETPOINT, TELEMETRY
+from geometry.rotations import quaternion_from_yaw
+from geometry.vectors import Vec3
 from offboard.app import Moment
 from offboard.drone import DroneState, VelocityCommand
 from offboard.engine import TransitionTaken
@@ -162,19 +164,24 @@ class _EventBuilder:
         return None
 
 
+def _vector(message: Json) -> Vec3:
+    return (float(message["x"]), float(message["y"]), float(message["z"]))
+
+
 def _drone_state(time_us: int, message: Json) -> DroneState:
-    position, velocity = message["position_arena_m"], message["velocity_arena_m_s"]
+    """Recordings of older versions have no attitude; the drone is then level."""
+    yaw_rad, attitude = float(message["yaw_rad"]), message.get("attitude_arena")
     return DroneState(
         time_us,
-        float(position["x"]),
-        float(position["y"]),
-        float(position["z"]),
-        float(message["yaw_rad"]),
-        (float(velocity["x"]), float(velocity["y"]), float(velocity["z"])),
+        *_vector(message["position_arena_m"]),
+        yaw_rad,
+        _vector(message["velocity_arena_m_s"]),
         bool(message["armed"]),
         bool(message["offboard"]),
         str(message["mode"]),
         bool(message["landed"]),
+        float(message.get("position_age_s", 0.0)),
+        quaternion_from_yaw(yaw_rad) if attitude is None else (float(attitude["w"]), *_vector(attitude)),
     )
 
 

@@ -6,11 +6,12 @@ Arena axes (x forward, y left, z up) are also Foxglove's world axes.
 from __future__ import annotations
 
 from base64 import b64encode
-from math import cos, isfinite, sin
+from math import isfinite
 from typing import Any
 
 from firmware_py.airframe import load_airframe
-from geometry.vectors import Vec3
+from geometry.rotations import quaternion_from_yaw
+from geometry.vectors import Quaternion, Vec3
 from offboard.app import Moment
 from offboard.drone import DroneState
 from scenarios.models import COLOURS, Arena, Scenario
@@ -50,8 +51,12 @@ def _vector(vector: Vec3) -> Message:
     return {"x": vector[0], "y": vector[1], "z": vector[2]}
 
 
+def _quaternion(attitude: Quaternion) -> Message:
+    return {"x": attitude[1], "y": attitude[2], "z": attitude[3], "w": attitude[0]}
+
+
 def _yaw_quaternion(yaw_rad: float) -> Message:
-    return {"x": 0.0, "y": 0.0, "z": sin(yaw_rad / 2), "w": cos(yaw_rad / 2)}
+    return _quaternion(quaternion_from_yaw(yaw_rad))
 
 
 def telemetry(moment: Moment) -> Message:
@@ -62,6 +67,8 @@ def telemetry(moment: Moment) -> Message:
         "flight_time_s": moment.flight_time_s,
         "position_arena_m": _vector((state.x, state.y, state.z)),
         "velocity_arena_m_s": _vector(state.velocity_arena_m_s),
+        "position_age_s": state.position_age_s,
+        "attitude_arena": _quaternion(state.attitude_arena),
         "yaw_rad": state.yaw,
         "armed": state.armed,
         "offboard": state.offboard,
@@ -71,9 +78,9 @@ def telemetry(moment: Moment) -> Message:
 
 
 def transform(state: DroneState) -> Message:
-    """The drone's pose; it is drawn level, since the app's state has no roll and pitch."""
+    """The drone's pose."""
     position_m = (state.x, state.y, state.z)
-    return _transform(state.time_us, (ARENA, DRONE), position_m, _yaw_quaternion(state.yaw))
+    return _transform(state.time_us, (ARENA, DRONE), position_m, _quaternion(state.attitude_arena))
 
 
 def _transform(time_us: int, frames: tuple[str, str], translation_m: Vec3, rotation: Message) -> Message:
@@ -111,7 +118,7 @@ def detections(seen: Detections, time_us: int) -> Message:
 def _detection(detection: Detection) -> Message:
     """Only finite numbers: JSON has neither infinity nor NaN."""
     message: Message = {"seen": detection.seen}
-    for name in ("n", "s", "e", "w", "d", "a"):
+    for name in ("n", "s", "e", "w", "d", "a", "signed_a"):
         value: float = getattr(detection, name)
         if isfinite(value):
             message[name] = value

@@ -174,6 +174,9 @@ _BOX = {
     "w": _field("number", "left edge, pixels right of the centre"),
     "d": _field("number", "distance, metres; only of a frame wholly in view"),
     "a": _field("number", "angle between line of sight and the frame's normal, degrees; only as d"),
+    "signed_a": _field(
+        "number", "that angle, positive if flying left makes it smaller; missing if not known"
+    ),
 }
 _DETECTION = _object(
     "framerunner.Detection",
@@ -198,6 +201,8 @@ _OWN = (
         flight_time_s=_FLIGHT_TIME,
         position_arena_m=_VECTOR_3,
         velocity_arena_m_s=_VECTOR_3,
+        position_age_s=_field("number", "how much older position and velocity are than the timestamp"),
+        attitude_arena=_QUATERNION,
         yaw_rad=_field("number", "heading, counter-clockwise from the arena's x"),
         armed=_field("boolean", "motors are on"),
         offboard=_field("boolean", "the drone follows the app's setpoints"),

@@ -20,7 +20,7 @@ from vision.jpeg import MAX_PIXELS
 from vision.types import Detections
 from wire.dialect import Message, is_vehicle, mavlink
 from wire.px4_modes import OFFBOARD, px4_name
-from wire.vehicle_telemetry import PositionReport, VehicleTelemetry
+from wire.vehicle_telemetry import AttitudeReport, PositionReport, VehicleTelemetry
 
 TICK_US = 50_000
 MAX_TICKS = 576_000
@@ -135,12 +135,13 @@ class _Ticks:
         position = telemetry.position
         if kind != mavlink.MAVLINK_MSG_ID_LOCAL_POSITION_NED or not is_newest or position is None:
             return None
-        if telemetry.attitude is None or position.time_us < self._next_us:
+        attitude = telemetry.attitude
+        if attitude is None or position.time_us < self._next_us:
             return None
         self._next_us = (position.time_us // TICK_US + 1) * TICK_US
-        return self._moment(position)
+        return self._moment(position, attitude)
 
-    def _moment(self, position: PositionReport) -> Moment:
+    def _moment(self, position: PositionReport, attitude: AttitudeReport) -> Moment:
         telemetry = self._telemetry
         ned = Pose(position.position_ned_m, position.yaw_ned_rad)
         if self._alignment is None:
@@ -155,6 +156,7 @@ class _Ticks:
             telemetry.armed,
             telemetry.mode is OFFBOARD,
             mode,
+            attitude_arena=self._alignment.attitude(attitude.attitude_ned),
         )
         flight_time_s = max(0.0, (position.time_us - self._armed_us) / 1e6) if self._armed_us else 0.0
         return Moment(state, VelocityCommand(), Detections(), mode.lower(), flight_time_s)

@@ -128,6 +128,7 @@ def test_a_recording_gives_back_what_the_flight_s_observer_saw(recorded):
     recording.close()
     moments = [event for event in events if isinstance(event, Moment)]
     assert moments == recorded.moments
+    assert any(abs(moment.state.attitude_arena[2]) > 0.01 for moment in moments)  # it pitches
     assert any(moment.detections.red.seen for moment in moments)
     images = [event for event in events if isinstance(event, RecordedImage)]
     assert [image.time_us for image in images] == [time_us for time_us, _ in recorded.images]
