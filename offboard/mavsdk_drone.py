@@ -413,9 +413,9 @@ class MavsdkDrone:
             raise DroneError(f"link lost: no heartbeat for {heartbeat_age_s:.1f} s")
 
     def _check_state(self, state: DroneState) -> None:
-        values = (state.x, state.y, state.z, state.yaw, *state.velocity_arena_m_s)
+        values = (state.x, state.y, state.z, state.yaw, *state.velocity_arena_m_s, *state.attitude_arena)
         if not all(map(isfinite, values)):
-            raise DroneError("the vehicle's position, velocity or heading is not finite")
+            raise DroneError("the vehicle's position, velocity or attitude is not finite")
         if not self._commanding or self._pilot_has_it:
             return
         if not state.armed:

@@ -135,8 +135,8 @@ class LockstepDrone:
             self._advance(lost_us)
         self._pass(self._delay_us)
         vx, vy, vz = state.velocity_arena_m_s
-        if not isfinite(state.x + state.y + state.z + state.yaw + vx + vy + vz):
-            raise DroneError("the vehicle's position, velocity or heading is not finite")
+        if not isfinite(state.x + state.y + state.z + state.yaw + vx + vy + vz + sum(state.attitude_arena)):
+            raise DroneError("the vehicle's position, velocity or attitude is not finite")
         if self._commanding and not (state.armed and state.offboard):
             what = (
                 f"the pilot or a failsafe took over: mode {state.mode}"

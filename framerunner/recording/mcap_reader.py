@@ -6,6 +6,8 @@ import json
 import warnings
 from base64 import b64decode
 from collections.abc import Iterator
+from dataclasses import replace
+from math import inf
 from pathlib import Path
 from typing import Any, BinaryIO, cast
 
@@ -24,17 +26,30 @@ from framerunner.recording.mcap_file import (
     summary_of,
 )
 from framerunner.recording.mcap_writer import METADATA
-from framerunner.recording.schemas import CROSSING, DETECTIONS, IMAGE, MISSION, SETPOINT, TELEMETRY
+from framerunner.recording.schemas import (
+    CROSSING,
+    DETECTIONS,
+    IMAGE,
+    MAP,
+    MISSION,
+    PATH,
+    SETPOINT,
+    TELEMETRY,
+)
 from geometry.rotations import quaternion_from_yaw
 from geometry.vectors import Vec3
 from offboard.app import Moment
 from offboard.drone import DroneState, VelocityCommand
 from offboard.engine import TransitionTaken
+from offboard.navigation.frame_estimate import FrameEstimate
+from offboard.navigation.view import NavigationView
 from scenarios.result import FlightResult, ResultError
 from vision.jpeg import JPEG_START, MAX_PIXELS, ImageError, jpeg_structure
 from vision.types import Detection, Detections, Image
 
 _MAX_TEXT_BYTES = 1_000_000  # of a message that is no image
+_MAX_FRAMES = 100  # of a map, and points of a path, that are kept
+_MAX_PATH = 1000
 _PNG_START = b"\x89PNG\r\n\x1a\n"
 Json = dict[str, Any]
 
@@ -82,7 +97,7 @@ class McapRecording:
         Raises:
             RecordingError: the file is damaged.
         """
-        topics = (TELEMETRY, SETPOINT, DETECTIONS, MISSION, IMAGE, CROSSING)
+        topics = (TELEMETRY, SETPOINT, DETECTIONS, MISSION, IMAGE, CROSSING, MAP, PATH)
         builder = _EventBuilder()
         try:
             for channel, message in messages(self._bounded, self._summary, topics):
@@ -141,6 +156,7 @@ class _EventBuilder:
         self._command = VelocityCommand()
         self._detections = Detections()
         self._transition: TransitionTaken | None = None
+        self._navigation: NavigationView | None = None
 
     def take(self, topic: str, time_us: int, message: Json) -> Event | None:
         """Add a message; telemetry is the last of a tick."""
@@ -148,7 +164,8 @@ class _EventBuilder:
             flight_time_s = float(message["flight_time_s"])
             state = _drone_state(time_us, message)
             taken, self._transition = self._transition, None
-            return Moment(state, self._command, self._detections, self._state, flight_time_s, taken)
+            what = (state, self._command, self._detections, self._state, flight_time_s, taken)
+            return Moment(*what, navigation=self._navigation)
         if topic == IMAGE:
             return RecordedImage(time_us, _decoded(b64decode(message["data"])))
         if topic == CROSSING:
@@ -161,6 +178,13 @@ class _EventBuilder:
         elif topic == MISSION:
             self._state = str(message["state"])
             self._transition = _transition(time_us, message)
+        elif topic == MAP:
+            frames = tuple(map(_frame_estimate, message["frames"][:_MAX_FRAMES]))
+            view = self._navigation or NavigationView()
+            self._navigation = replace(view, frames=frames, goal=str(message["goal"]))
+        elif topic == PATH:
+            path_m = tuple(_vector(pose["position"]) for pose in message["poses"][:_MAX_PATH])
+            self._navigation = replace(self._navigation or NavigationView(), path_m=path_m)
         return None
 
 
@@ -185,6 +209,26 @@ def _drone_state(time_us: int, message: Json) -> DroneState:
     )
 
 
+def _frame_estimate(message: Json) -> FrameEstimate:
+    """An unknown standard deviation is infinite."""
+    std = message.get("position_std_m")
+    return FrameEstimate(
+        str(message["colour"]),
+        _vector(message["position_arena_m"]),
+        float(message["yaw_rad"]),
+        (inf, inf, inf) if std is None else _vector(std),
+        float(message.get("yaw_std_rad", inf)),
+        bool(message["ambiguous"]),
+        bool(message["certain"]),
+        int(message["views"]),
+        _time_us(message["seen"]),
+    )
+
+
+def _time_us(message: Json) -> int:
+    return int(message["sec"]) * 1_000_000 + int(message["nsec"]) // 1000
+
+
 def _transition(time_us: int, message: Json) -> TransitionTaken | None:
     """Why the mission changed its state; None at its start and in recordings of older versions."""
     if "when" not in message:
@@ -207,7 +251,7 @@ def _value(message: Json) -> object:
 
 def _detections(message: Json) -> Detections:
     image_time = message.get("image_timestamp")
-    time_us = None if image_time is None else image_time["sec"] * 1_000_000 + image_time["nsec"] // 1000
+    time_us = None if image_time is None else _time_us(image_time)
     red, green, blue = (_detection(message[colour]) for colour in ("red", "green", "blue"))
     return Detections(red, green, blue, time_us)
 

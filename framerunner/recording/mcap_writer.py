@@ -19,6 +19,7 @@ from framerunner.recording import messages, schemas
 from framerunner.recording.events import RecordingError
 from offboard.app import Moment
 from offboard.mission import Mission
+from offboard.navigation.view import NavigationView
 from offboard.pilot_file import PilotFile
 from scenarios.loader import dump_yaml
 from scenarios.models import Scenario
@@ -61,6 +62,7 @@ class FlightRecording:
         self._state = ""
         self._state_since_us = 0
         self._detections = Detections()
+        self._navigation = NavigationView()
         self._compressor = ThreadPoolExecutor(1, "compress images")
         self._compressing: tuple[int, Future[bytes]] | None = None
         try:
@@ -86,6 +88,8 @@ class FlightRecording:
             self._enter_state(moment)
         if moment.detections != self._detections:
             self._detect(moment.detections, time_us)
+        if moment.navigation is not None:
+            self._navigate(moment.navigation, time_us)
         self._write(schemas.SETPOINT, time_us, messages.setpoint(moment))
         self._write(schemas.TRANSFORM, time_us, messages.transform(moment.state))
         self._write(schemas.TELEMETRY, time_us, messages.telemetry(moment))
@@ -179,6 +183,15 @@ class FlightRecording:
         self._write(schemas.DETECTIONS, time_us, messages.detections(seen, time_us))
         image_us = time_us if seen.time_us is None else seen.time_us
         self._write(schemas.ANNOTATIONS, image_us, messages.boxes(seen, image_us, self._size_px))
+
+    def _navigate(self, view: NavigationView, time_us: int) -> None:
+        """Write what of the map and the plan has changed."""
+        last, self._navigation = self._navigation, view
+        if (view.frames, view.goal) != (last.frames, last.goal):
+            self._write(schemas.MAP, time_us, messages.frame_map(view, time_us))
+            self._write(schemas.MAP_SCENE, time_us, messages.map_scene(view, self._scenario, time_us))
+        if view.path_m != last.path_m:
+            self._write(schemas.PATH, time_us, messages.path(view, time_us))
 
     def _keep_compressed(self) -> None:
         """Write the last raw image.

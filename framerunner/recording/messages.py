@@ -6,7 +6,8 @@ Arena axes (x forward, y left, z up) are also Foxglove's world axes.
 from __future__ import annotations
 
 from base64 import b64encode
-from math import isfinite
+from itertools import pairwise
+from math import cos, isfinite, sin
 from typing import Any
 
 from firmware_py.airframe import load_airframe
@@ -14,6 +15,8 @@ from geometry.rotations import quaternion_from_yaw
 from geometry.vectors import Quaternion, Vec3
 from offboard.app import Moment
 from offboard.drone import DroneState
+from offboard.navigation.frame_estimate import FrameEstimate
+from offboard.navigation.view import NavigationView
 from scenarios.models import COLOURS, Arena, Scenario
 from sitl.solids import Solid, base_solid, frame_solids
 from vision.intrinsics import camera_matrix
@@ -29,6 +32,7 @@ RGBA: dict[str, Message] = {
     "green": {"r": 0.0, "g": 0.8, "b": 0.0, "a": 1.0},
     "blue": {"r": 0.0, "g": 0.0, "b": 1.0, "a": 1.0},
 }
+_OTHER = {"r": 0.5, "g": 0.5, "b": 0.5, "a": 1.0}  # a frame that is no part of the task
 _FLOOR = {"r": 0.88, "g": 0.69, "b": 0.22, "a": 0.6}
 _BORDER = {"r": 0.5, "g": 0.5, "b": 0.5, "a": 0.7}
 _BASE = {"r": 0.67, "g": 0.67, "b": 0.67, "a": 1.0}
@@ -38,6 +42,8 @@ _CLEAR = {"r": 0.0, "g": 0.0, "b": 0.0, "a": 0.0}
 _LABEL = {"r": 1.0, "g": 1.0, "b": 1.0, "a": 1.0}
 _INFO = 2
 _FLOOR_M = 0.01
+_FRAME_SIZE_M = (0.42, 0.22)  # outer width and height of one that is no part of the scenario
+_DASHES_A_LEG = 4
 _MAX_TEXT = 80  # characters of a guard's value that is no number
 
 
@@ -229,6 +235,88 @@ def log(time_us: int, name: str, text: str) -> Message:
     return {"timestamp": timestamp, "level": _INFO, "message": text, "name": name, "file": "", "line": 0}
 
 
+def frame_map(view: NavigationView, time_us: int) -> Message:
+    """The navigator's map; a number that is not finite is left out, with its frame if that has no place."""
+    frames = [_mapped_frame(frame) for frame in view.frames if _has_place(frame)]
+    return {"timestamp": time_of(time_us), "goal": view.goal[:_MAX_TEXT], "frames": frames}
+
+
+def _has_place(frame: FrameEstimate) -> bool:
+    return all(map(isfinite, (*frame.position_m, frame.yaw_rad)))
+
+
+def _mapped_frame(frame: FrameEstimate) -> Message:
+    message = {
+        "colour": frame.colour,
+        "position_arena_m": _vector(frame.position_m),
+        "yaw_rad": frame.yaw_rad,
+        "ambiguous": frame.ambiguous,
+        "certain": frame.certain,
+        "views": frame.views,
+        "seen": time_of(frame.seen_us),
+    }
+    if all(map(isfinite, frame.position_std_m)):
+        message["position_std_m"] = _vector(frame.position_std_m)
+    if isfinite(frame.yaw_std_rad):
+        message["yaw_std_rad"] = frame.yaw_std_rad
+    return message
+
+
+def path(view: NavigationView, time_us: int) -> Message:
+    """The navigator's planned path."""
+    points = [point for point in view.path_m if all(map(isfinite, point))]
+    poses = [{"position": _vector(point), "orientation": _yaw_quaternion(0.0)} for point in points]
+    return {"timestamp": time_of(time_us), "frame_id": ARENA, "poses": poses}
+
+
+def map_scene(view: NavigationView, scenario: Scenario, time_us: int) -> Message:
+    """The map as a drawing: outlines, dashed until certain, with ellipsoids of two standard deviations."""
+    sizes_m: dict[str, tuple[float, float]] = {
+        frame.colour: (frame.outer_width_m, frame.outer_height_m) for frame in scenario.frames
+    }
+    entities = [
+        _entity(
+            time_us,
+            f"{number} {frame.colour}",
+            ARENA,
+            **_drawn_estimate(frame, sizes_m.get(frame.colour, _FRAME_SIZE_M)),
+        )
+        for number, frame in enumerate(view.frames)
+        if _has_place(frame)
+    ]
+    return {"deletions": [{"timestamp": time_of(time_us), "type": 1, "id": ""}], "entities": entities}
+
+
+def _drawn_estimate(frame: FrameEstimate, size_m: tuple[float, float]) -> dict[str, list[Message]]:
+    colour = RGBA.get(frame.colour, _OTHER)
+    half_width, half_height = size_m[0] / 2, size_m[1] / 2
+    c, s = cos(frame.yaw_rad), sin(frame.yaw_rad)
+    x, y, z = frame.position_m
+    corners = [(-1, -1), (1, -1), (1, 1), (-1, 1), (-1, -1)]
+    loop = [(x - s * a * half_width, y + c * a * half_width, z + b * half_height) for a, b in corners]
+    lines = [_lines(_dashes(loop) if not frame.certain else _pairs(loop), colour, 2.0)]
+    if not all(map(isfinite, frame.position_std_m)):
+        return {"lines": lines}
+    sigma_x, sigma_y, sigma_z = frame.position_std_m
+    sphere = _cube(frame.position_m, (4 * sigma_x, 4 * sigma_y, 4 * sigma_z), {**colour, "a": 0.25})
+    return {"lines": lines, "spheres": [sphere]}
+
+
+def _pairs(points: list[Vec3]) -> list[Vec3]:
+    """The ends of each leg of a line."""
+    return [end for leg in pairwise(points) for end in leg]
+
+
+def _dashes(points: list[Vec3]) -> list[Vec3]:
+    """The ends of the dashes of a dashed line."""
+    ends: list[Vec3] = []
+    for (x0, y0, z0), (x1, y1, z1) in pairwise(points):
+        for number in range(2 * _DASHES_A_LEG):
+            part = number / (2 * _DASHES_A_LEG - 1)
+            ends.append((x0 + part * (x1 - x0), y0 + part * (y1 - y0), z0 + part * (z1 - z0)))
+    return ends
+
+
 def scene(scenario: Scenario, time_us: int) -> Message:
     """Arena, base and frames, and the drone, which moves with its own axes, from a vehicle time on."""
     arena = scenario.arena
@@ -282,6 +370,7 @@ def _entity(time_us: int, name: str, axes: str, **primitives: list[Message]) -> 
         "frame_locked": True,
         "metadata": [],
         "cubes": [],
+        "spheres": [],
         "lines": [],
     }
     return {**entity, **primitives}
@@ -306,13 +395,18 @@ def _border(arena: Arena) -> Message:
         for z in (0.0, arena.height_m):
             points += [(x0, y0, z), (x1, y1, z)]
         points += [(x0, y0, 0.0), (x0, y0, arena.height_m)]
+    return _lines(points, _BORDER, 1.0)
+
+
+def _lines(ends: list[Vec3], colour: Message, thickness_px: float) -> Message:
+    """Lines, each between two successive ends."""
     return {
         "type": 2,  # LINE_LIST
         "pose": {"position": _vector((0.0, 0.0, 0.0)), "orientation": _yaw_quaternion(0.0)},
-        "thickness": 1.0,
+        "thickness": thickness_px,
         "scale_invariant": True,
-        "points": [_vector(point) for point in points],
-        "color": _BORDER,
+        "points": [_vector(point) for point in ends],
+        "color": colour,
         "colors": [],
         "indices": [],
     }

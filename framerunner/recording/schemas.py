@@ -22,6 +22,9 @@ SETPOINT = "/setpoint"
 DETECTIONS = "/detections"
 MISSION = "/mission"
 CROSSING = "/crossing"
+MAP = "/map"
+MAP_SCENE = "/map/scene"
+PATH = "/path"
 
 _Schema = dict[str, Any]
 
@@ -56,6 +59,7 @@ _POSE = _object("foxglove.Pose", position=_VECTOR_3, orientation=_QUATERNION)
 _PAIR = _object("foxglove.KeyValuePair", key=_STRING, value=_STRING)
 
 _CUBE = _object("foxglove.CubePrimitive", pose=_POSE, size=_VECTOR_3, color=_COLOUR)
+_SPHERE = _object("foxglove.SpherePrimitive", pose=_POSE, size=_VECTOR_3, color=_COLOUR)
 _LINE = _object(
     "foxglove.LinePrimitive",
     type=_choice(LINE_STRIP=0, LINE_LOOP=1, LINE_LIST=2),
@@ -76,6 +80,7 @@ _SCENE_ENTITY = _object(
     frame_locked=_BOOLEAN,
     metadata=_array(_PAIR),
     cubes=_array(_CUBE),
+    spheres=_array(_SPHERE),
     lines=_array(_LINE),
 )
 _SCENE_DELETION = _object(
@@ -149,6 +154,7 @@ _FOXGLOVE: tuple[_Schema, ...] = (
         translation=_VECTOR_3,
         rotation=_QUATERNION,
     ),
+    _object("foxglove.PosesInFrame", timestamp=_TIME, frame_id=_STRING, poses=_array(_POSE)),
     _object("foxglove.SceneUpdate", deletions=_array(_SCENE_DELETION), entities=_array(_SCENE_ENTITY)),
     _object(
         "foxglove.Log",
@@ -192,6 +198,20 @@ _VALUE = _object(
     number=_field("number", "its value then; missing if it was infinite or none"),
     flag=_field("boolean", "its value then, if it was true or false"),
     text=_field("string", "its value then, if it was neither"),
+)
+
+_MAPPED_FRAME = _object(
+    "framerunner.MappedFrame",
+    optional=("position_std_m", "yaw_std_rad"),
+    colour=_STRING,
+    position_arena_m=_VECTOR_3,
+    yaw_rad=_field("number", "heading of its normal, counter-clockwise from the arena's x"),
+    position_std_m=_VECTOR_3,
+    yaw_std_rad=_field("number", "standard deviation of the yaw"),
+    ambiguous=_field("boolean", "another yaw explains the images nearly as well"),
+    certain=_field("boolean", "known well enough to fly through"),
+    views=_field("integer", "how many images have been used"),
+    seen=_TIME,
 )
 
 _OWN = (
@@ -245,6 +265,12 @@ _OWN = (
         offset_m=_field("number", "from the opening's centre, in its plane"),
         side=_field("string", "front or back, the side the drone came from"),
     ),
+    _object(
+        "framerunner.Map",
+        timestamp=_TIME,
+        goal=_field("string", "what the navigator does, such as cross red"),
+        frames=_array(_MAPPED_FRAME),
+    ),
 )
 
 TOPICS = {
@@ -253,6 +279,9 @@ TOPICS = {
     DETECTIONS: "framerunner.Detections",
     MISSION: "framerunner.MissionState",
     CROSSING: "framerunner.Crossing",
+    MAP: "framerunner.Map",
+    MAP_SCENE: "foxglove.SceneUpdate",
+    PATH: "foxglove.PosesInFrame",
     IMAGE: "foxglove.CompressedImage",
     CALIBRATION: "foxglove.CameraCalibration",
     ANNOTATIONS: "foxglove.ImageAnnotations",

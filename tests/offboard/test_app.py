@@ -33,7 +33,7 @@ def starting():
         "the pilot took over: mode POSCTL",
         "link lost: no telemetry for 1.0 s",
         "the vehicle was disarmed by others",
-        "the vehicle's position, velocity or heading is not finite",
+        "the vehicle's position, velocity or attitude is not finite",
     ],
 )
 async def test_a_drone_error_stops_commanding_and_asks_for_hold(reason):

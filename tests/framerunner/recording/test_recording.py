@@ -2,6 +2,7 @@
 
 import json
 from base64 import b64decode
+from math import inf, nan, pi
 
 import cv2
 import jsonschema
@@ -12,11 +13,21 @@ from mcap.reader import make_reader
 from framerunner.recording.events import Crossed, RecordedImage, RecordingError
 from framerunner.recording.mcap_reader import McapRecording
 from framerunner.recording.mcap_writer import FlightRecording
-from framerunner.recording.messages import box_edges, camera_transform, detections, scene, time_of
+from framerunner.recording.messages import (
+    box_edges,
+    camera_transform,
+    detections,
+    frame_map,
+    map_scene,
+    scene,
+    time_of,
+)
 from framerunner.recording.schemas import TOPICS, schema_texts
 from offboard.app import Moment
 from offboard.drone import DroneState, VelocityCommand
 from offboard.mission import load_mission
+from offboard.navigation.frame_estimate import FrameEstimate
+from offboard.navigation.view import NavigationView
 from scenarios.loader import load_scenario, parse_scenario
 from scenarios.result import FlightResult
 from tests.framerunner.recording.conftest import record
@@ -45,7 +56,8 @@ def messages(path, *topics):
 def moment_at(time_us, state="a.b", **fields):
     drone = DroneState(time_us, 1.0, 2.0, 0.5, 0.25)
     seen = fields.get("seen", Detections())
-    return Moment(drone, VelocityCommand(), seen, state, fields.get("flight_time_s", 0.0))
+    flight_time_s, navigation = fields.get("flight_time_s", 0.0), fields.get("navigation")
+    return Moment(drone, VelocityCommand(), seen, state, flight_time_s, navigation=navigation)
 
 
 def new_recording(path):
@@ -89,7 +101,7 @@ def test_every_message_is_as_its_schema_says(recorded):
             validators[schema.name].validate(content)
             assert content.keys() <= json.loads(schema.data)["properties"].keys()
             seen.add(channel.topic)
-    assert seen == TOPICS.keys() - {"/crossing"}
+    assert seen == TOPICS.keys() - {"/crossing", "/map", "/map/scene", "/path"}
 
 
 def test_counts_and_times_are_those_of_the_flight(recorded):
@@ -167,6 +179,54 @@ def test_crossings_have_the_vehicle_time_at_which_they_were_flown(tmp_path):
     crossed = [event for event in recording.events() if isinstance(event, Crossed)]
     recording.close()
     assert crossed == [Crossed(5_000_000, "red"), Crossed(7_750_000, "green")]
+
+
+def test_the_map_and_the_path_are_written_when_they_change_and_read_back(tmp_path):
+    sure = FrameEstimate("red", (3, 2, 2), 0.5, (0.02, 0.01, 0.03), 0.1, False, True, 12, 2_950_000)
+    guessed = FrameEstimate("yellow", (1, 0, 1), -1.5, (0.4, 0.5, 0.1), inf, True, False, 1, 2_900_000)
+    views = [
+        None,
+        NavigationView(goal="explore"),
+        NavigationView((sure, guessed), (), "explore"),
+        NavigationView((sure, guessed), ((0.0, 0.0, 1.0), (3.0, 2.0, 2.0)), "cross red"),
+        NavigationView((sure, guessed), ((0.0, 0.0, 1.0), (3.0, 2.0, 2.0)), "cross red"),
+        NavigationView((sure,), (), "land"),
+    ]
+    moments = [
+        moment_at(3_000_000 + 50_000 * tick, navigation=view)
+        for tick, view in enumerate(view for view in views for _ in range(4))
+    ]
+    path = tmp_path / "flight.mcap"
+    with new_recording(path) as recording:
+        for moment in moments:
+            recording.see(moment)
+    ticks = {topic: [] for topic in ("/map", "/map/scene", "/path")}
+    for topic, time_ns, content in messages(path, *ticks):
+        jsonschema.validate(content, json.loads(schema_texts()[TOPICS[topic]]))
+        ticks[topic].append((time_ns - 3_000_000_000) // 50_000_000)
+    assert ticks == {"/map": [4, 8, 12, 20], "/map/scene": [4, 8, 12, 20], "/path": [12, 20]}
+    recording = McapRecording(path)
+    assert list(recording.events()) == moments
+    recording.close()
+
+
+def test_the_drawn_map_has_dashed_outlines_until_a_frame_is_certain():
+    sure = FrameEstimate("red", (3, 2, 2), 0.0, (0.02, 0.01, 0.03), 0.1, False, True, 12, 0)
+    unsure = FrameEstimate("green", (1, 1, 1), pi / 2, (inf, 0.1, 0.1), 0.1, False, False, 1, 0)
+    lost = FrameEstimate("blue", (nan, 1, 1), 0.0, (0.1, 0.1, 0.1), 0.1, False, False, 1, 0)
+    view = NavigationView((sure, unsure, lost))
+    assert [each["colour"] for each in frame_map(view, 0)["frames"]] == ["red", "green"]
+    drawn = map_scene(view, load_scenario("test-case-1"), 0)
+    assert [each["type"] for each in drawn["deletions"]] == [1]
+    red, green = drawn["entities"]
+    assert [len(each["lines"][0]["points"]) for each in (red, green)] == [8, 32]
+    (ellipsoid,) = red["spheres"]
+    assert ellipsoid["size"] == {"x": 0.08, "y": 0.04, "z": 0.12}  # two standard deviations each way
+    assert green["spheres"] == []
+    edges = [point["y"] for point in red["lines"][0]["points"]]
+    assert (min(edges), max(edges)) == pytest.approx((2 - 0.21, 2 + 0.21))
+    across = [point["x"] for point in green["lines"][0]["points"]]
+    assert (min(across), max(across)) == pytest.approx((1 - 0.21, 1 + 0.21))
 
 
 def test_what_is_not_known_is_left_out():
