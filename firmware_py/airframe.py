@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from functools import cached_property
 from importlib import resources
+from math import cos, inf, sin
 from pathlib import Path
 from typing import Annotated, Literal, Self
 
@@ -146,6 +147,21 @@ class Airframe(_Part):
     def full_thrust_n(self) -> float:
         """Thrust of all rotors at maximum speed."""
         return len(self.rotors) * self.motor.thrust_n_s2 * self.motor.max_speed_rad_s**2
+
+    @cached_property
+    def level_speed_m_s(self) -> float:
+        """The highest speed forward at a height that stays: drag needs all of the tilt, or a limit holds.
+
+        Along the flight and upwards, with drag in body axes and tilt t, forces are in balance:
+        T sin t = v^2 (k1 cos^3 t + k3 sin^3 t) and T cos t = m g + v^2 sin t cos t (k3 sin t - k1 cos t).
+        """
+        drag_forward, _, drag_down = self.drag.force_n_s2_m2
+        sine, cosine = sin(self.limits.tilt_rad), cos(self.limits.tilt_rad)
+        along = drag_forward * cosine**3 + drag_down * sine**3
+        down = sine * cosine * (drag_down * sine - drag_forward * cosine)
+        drag = along * cosine - down * sine
+        fastest_m_s = (self.weight_n * sine / drag) ** 0.5 if drag > 0.0 else inf
+        return min(fastest_m_s, self.limits.speed_horizontal_m_s)
 
     @cached_property
     def hover_speed_rad_s(self) -> float:

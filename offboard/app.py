@@ -12,6 +12,7 @@ from typing import Literal
 from offboard.drone import Drone, DroneError, DroneState, VelocityCommand
 from offboard.engine import MissionEngine, MissionRunError, TransitionTaken
 from offboard.keep_in_box import Box, KeepInBox, OutsideBoxError
+from offboard.limits import CONTEST, CommandLimits
 from offboard.mission import Mission
 from offboard.navigation.view import NavigationView
 from offboard.perception import CameraLostError, Perception
@@ -76,6 +77,7 @@ async def fly_mission(
     limit_s: float = 180.0,
     observer: Observer | None = None,
     box: Box | None = None,
+    limits: CommandLimits = CONTEST,
 ) -> MissionEnd:
     """Connect, fly the mission, disconnect.
 
@@ -89,14 +91,16 @@ async def fly_mission(
         mission: checked.
         limit_s: vehicle time from motors on, seconds.
         observer: called at every tick; must be quick.
-        box: keeps the drone inside, whatever the mission commands; None: no limits.
+        box: keeps the drone inside, whatever the mission commands; None: it may fly anywhere.
+        limits: of the mission's commands.
 
     Raises:
         DroneError: the drone cannot be reached or is not ready.
         CameraLostError: the camera gives no image at the start.
     """
     keeper = None if box is None else KeepInBox(box)
-    flight = _Flight(drone, perception, MissionEngine(mission), limit_s, observer, keeper=keeper)
+    engine = MissionEngine(mission, limits=limits)
+    flight = _Flight(drone, perception, engine, limit_s, observer, keeper=keeper)
     try:
         await drone.connect()
         await perception.open()

@@ -19,6 +19,7 @@ from offboard.chart.expressions import compile_value, names_in
 from offboard.chart.native import RESUME, TICK
 from offboard.chart.spec import Action, Leaf, Transition
 from offboard.drone import VelocityCommand
+from offboard.limits import CONTEST, CommandLimits
 from offboard.mission import Mission
 from offboard.navigation.view import NavigationView
 from offboard.pilot import Imu, Pilot, PilotError, velocity_command
@@ -73,17 +74,27 @@ class MissionEngine:
         mission: what to fly.
         pilot: by default a new one of the mission's class.
         quiet_ticks: do not send the chart the ticks that change nothing.
+        limits: of the commands.
 
     Attributes:
         state: full id of the present state, such as "red.turning"; empty before the first tick.
         transition: the transition taken in the last tick; None if none was.
     """
 
-    def __init__(self, mission: Mission, pilot: Pilot | None = None, *, quiet_ticks: bool = True) -> None:
+    def __init__(
+        self,
+        mission: Mission,
+        pilot: Pilot | None = None,
+        *,
+        quiet_ticks: bool = True,
+        limits: CommandLimits = CONTEST,
+    ) -> None:
         self.state = ""
         self.transition: TransitionTaken | None = None
         self.mission = mission
         self.pilot = mission.new_pilot() if pilot is None else pilot
+        self.pilot.limits = limits
+        self._limits = limits
         self._states = {
             leaf_id: _FastState(leaf, leaf_id in mission.finishes) for leaf_id, leaf in mission.leaves.items()
         }
@@ -132,7 +143,7 @@ class MissionEngine:
                 self._paused_us is not None and self._resume(self._present, self._paused_us, time_us)
             ):
                 self._step(self._present, time_us)
-            return velocity_command(pilot.cmd)
+            return velocity_command(pilot.cmd, self._limits)
         except PilotError as error:
             raise self._error(str(error)) from None
         except MissionRunError:

@@ -17,6 +17,8 @@ from offboard.chart.read import read_mission_file
 from offboard.chart.spec import Leaf, MissionFile, State, all_states, expand, leaves, merge_extended
 from offboard.pilot import Pilot
 from offboard.pilot_file import PilotFile
+from scenarios.models import MissionClass
+from vision.types import Vision
 
 __all__ = ["Mission", "MissionError", "list_missions", "load_mission", "mermaid", "new_mission"]
 
@@ -32,6 +34,8 @@ class Mission:
     Attributes:
         spec: the expanded chart.
         pilot: what the mission was checked against: a contestant's file or a class.
+        mission_class: by which limits it flies.
+        vision: how it sees frames.
     """
 
     name: str
@@ -39,6 +43,8 @@ class Mission:
     path: Path
     spec: MissionFile = field(repr=False)
     pilot: PilotFile | type[Pilot] = field(repr=False)
+    mission_class: MissionClass = "contest"
+    vision: Vision = "boxes"
 
     def __getstate__(self) -> dict[str, object]:
         """Only the fields: the chart's class cannot be pickled."""
@@ -53,6 +59,11 @@ class Mission:
     def native(self) -> str:
         """The expanded chart as a YAML document of python-statemachine: equal if missions fly alike."""
         return yaml.safe_dump(native_document(self.spec), sort_keys=False, width=110)
+
+    @property
+    def rules(self) -> str:
+        """By which limits it flies and how it sees, in words."""
+        return f"class {self.mission_class}, vision {self.vision}"
 
     @cached_property
     def leaves(self) -> dict[str, Leaf]:
@@ -95,7 +106,15 @@ def load_mission(name_or_path: str | Path, pilot: PilotFile | type[Pilot] | None
     spec = expand(merge_extended(written, _read_base), problems)
     check(spec, pilot.pilot_class() if isinstance(pilot, PilotFile) else pilot, problems)
     problems.raise_if_any()
-    mission = Mission(spec.name, spec.description, path, spec, pilot)
+    mission = Mission(
+        spec.name,
+        spec.description,
+        path,
+        spec,
+        pilot,
+        mission_class=spec.mission_class or "contest",
+        vision=spec.vision or "boxes",
+    )
     mission.new_pilot()  # now, so that an error in the pilot or the chart is raised now
     mission.chart  # noqa: B018
     return mission

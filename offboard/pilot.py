@@ -15,11 +15,11 @@ from types import SimpleNamespace
 from errors import UserError
 from geometry.vectors import Vec3
 from offboard.drone import VelocityCommand
+from offboard.limits import CONTEST, CommandLimits, clamped
 from scenarios.models import COLOURS, Colour
 from vision.types import Detection, Detections
 
-MAX_VELOCITY_M_S = 1.0
-MAX_YAW_RATE_RAD_S = 1.0
+FLY_M_S = 1.0  # of `fly_to_goal`: the paper's
 LOOK_TURN_PX = 80.0  # horizontal offset that gives 1 rad/s: the paper's gains, for its image of 320 x 240
 LOOK_CLIMB_PX = 120.0  # vertical offset that gives 1 m/s
 
@@ -63,6 +63,7 @@ class Pilot:
     colour: Colour  # of the frame to find: red, green or blue; assign it, then read `frame`
     goal_m: Vec3  # where `fly_to_goal` flies, (x, y, z) in the arena
     memory: Memory  # the mission's own variables
+    limits: CommandLimits  # of its commands, by its class
     seconds_in_state: float  # since the present state was entered
     seconds_in_mission: float  # since the mission started
     seconds_unseen: float  # since `frame` was last wholly in view, or the mission started or continued
@@ -75,6 +76,7 @@ class Pilot:
         self.colour = COLOURS[0]
         self.goal_m = (0.0, 0.0, 0.0)
         self.memory = Memory(**(variables or {}))
+        self.limits = CONTEST
         self.seconds_in_state = 0.0
         self.seconds_in_mission = 0.0
         self.seconds_unseen = 0.0
@@ -112,7 +114,7 @@ class Pilot:
         x, y, z = self.goal_m
         x_m_s, y_m_s, up_m_s = (x - imu.x) / 2, (y - imu.y) / 2, (z - imu.z) / 2
         speed = sqrt(x_m_s**2 + y_m_s**2 + up_m_s**2)
-        scale = MAX_VELOCITY_M_S / speed if speed > MAX_VELOCITY_M_S else 1.0
+        scale = FLY_M_S / speed if speed > FLY_M_S else 1.0
         cos_yaw, sin_yaw = cos(imu.yaw), sin(imu.yaw)
         cmd.vel_x = scale * (cos_yaw * x_m_s + sin_yaw * y_m_s)
         cmd.vel_y = scale * (cos_yaw * y_m_s - sin_yaw * x_m_s)
@@ -141,8 +143,8 @@ class Pilot:
         self.cmd.land = True
 
 
-def velocity_command(cmd: Command) -> VelocityCommand:
-    """The command as it may be flown: each rate limited to +-1 m/s and +-1 rad/s.
+def velocity_command(cmd: Command, limits: CommandLimits = CONTEST) -> VelocityCommand:
+    """The command as it may be flown: each rate within the limits.
 
     An infinite rate becomes the limit, as in the paper's stabiliser: its navigator commands infinite speed
     ahead when it loses a frame while shifting, and then flies 1 m/s forward. That is a known fault of that
@@ -151,20 +153,20 @@ def velocity_command(cmd: Command) -> VelocityCommand:
     Raises:
         PilotError: a rate is no number.
     """
+    forward_m_s, left_m_s = limits.level(_number("vel_x", cmd.vel_x), _number("vel_y", cmd.vel_y))
     return VelocityCommand(
-        _limited("vel_x", cmd.vel_x, MAX_VELOCITY_M_S),
-        _limited("vel_y", cmd.vel_y, MAX_VELOCITY_M_S),
-        _limited("vel_z", cmd.vel_z, MAX_VELOCITY_M_S),
-        _limited("rot_z", cmd.rot_z, MAX_YAW_RATE_RAD_S),
+        forward_m_s,
+        left_m_s,
+        clamped(_number("vel_z", cmd.vel_z), limits.down_m_s, limits.up_m_s),
+        clamped(_number("rot_z", cmd.rot_z), limits.yaw_rate_rad_s, limits.yaw_rate_rad_s),
     )
 
 
-def _limited(name: str, value: float, limit: float) -> float:
+def _number(name: str, value: float) -> float:
+    """The same value; it may be infinite. Raises `PilotError` if it is no number."""
     try:
-        if -limit <= value <= limit:
+        if not isnan(value):
             return value
     except (TypeError, ValueError):  # None, a text, an array: a subclass may assign anything
         raise PilotError(f"cmd.{name} is {value!r}, which is no number; correct what sets it") from None
-    if isnan(value):
-        raise PilotError(f"cmd.{name} is not a number; correct the expression that sets it")
-    return limit if value > 0 else -limit
+    raise PilotError(f"cmd.{name} is not a number; correct the expression that sets it")

@@ -13,6 +13,8 @@ from geometry.vectors import Quaternion, Vec3
 
 Colour = Literal["red", "green", "blue"]
 COLOURS: tuple[Colour, ...] = ("red", "green", "blue")
+MissionClass = Literal["contest", "open"]
+"""By which limits a mission flies: the paper's, or what the drone can do. Only `contest` counts."""
 
 Metres = Annotated[float, Field(ge=-1000, le=1000, allow_inf_nan=False)]
 Radians = Annotated[float, Field(ge=-6.3, le=6.3, allow_inf_nan=False)]

@@ -14,6 +14,7 @@ from pydantic_core import CoreSchema
 
 from errors import UserError
 from scenarios.crossing import Side
+from scenarios.models import MissionClass
 from scenarios.verdict import Verdict
 
 MAX_RESULT_BYTES = 1_000_000
@@ -149,6 +150,9 @@ class _Flown(_Record):
     mission: Text = Field("", description="name of the mission")
     seed: int | None = Field(
         None, strict=True, description="of everything random in a lockstep flight; null in real time"
+    )
+    mission_class: MissionClass = Field(
+        "contest", description="by which limits it flew; only `contest` counts in a competition"
     )
 
 

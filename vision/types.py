@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import AsyncIterator
 from dataclasses import dataclass, field
 from math import inf
-from typing import Protocol, Self
+from typing import Literal, Protocol, Self
 from urllib.parse import urlsplit
 
 import numpy as np
@@ -15,6 +15,8 @@ from errors import UserError
 from geometry.vectors import Vec3
 
 Image = npt.NDArray[np.uint8]
+Vision = Literal["boxes", "frames"]
+"""How frames are detected: the paper's box of each colour, or by contour and shape."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -33,7 +33,8 @@ def list_() -> int:
     from offboard.mission import list_missions, load_mission
 
     for name in list_missions():
-        print(f"{name:18s} {load_mission(name).description}")
+        mission = load_mission(name)
+        print(f"{name:18s} {mission.description} ({mission.rules})")
     return 0
 
 
@@ -70,7 +71,9 @@ def check(file: Annotated[Path, Parameter(help="YAML file")], *, pilot: PilotOpt
     loaded = load_mission_with(file, pilot)
     load_chart(loaded.spec, validate=True)
     with_pilot = f" and {pilot}" if pilot is not None else ""
-    print(f"{file}{with_pilot}: good, mission '{loaded.name}' with {len(loaded.leaves)} states")
+    print(
+        f"{file}{with_pilot}: good, mission '{loaded.name}' with {len(loaded.leaves)} states, {loaded.rules}"
+    )
     return 0
 
 

@@ -29,7 +29,7 @@ class Identity:
     Attributes:
         scenarios: SHA-256 of each scenario's content, by name, in order.
         mission: its name.
-        mission_sha256: of the expanded chart with its variables.
+        mission_sha256: of the expanded chart with its variables, class and vision.
         pilot: name of the contestant's file or class.
         pilot_sha256: of the contestant's file; empty for a class of the package.
         seeds: of everything random in each flight, in the scenarios' order.
@@ -98,7 +98,7 @@ class Plan:
         return Identity(
             scenarios={each.name: _sha256(each.model_dump_json()) for each in self.scenarios},
             mission=mission.name,
-            mission_sha256=_sha256(f"{mission.native}\n{variables}"),
+            mission_sha256=_sha256(f"{mission.native}\n{variables}\n{mission.rules}"),
             pilot=pilot.name if isinstance(pilot, PilotFile) else pilot.__qualname__,
             pilot_sha256=_sha256(pilot.text) if isinstance(pilot, PilotFile) else "",
             seeds=tuple(self.seeds),

@@ -232,6 +232,7 @@ def _error_row(plan: FlightPlan, error: BaseException) -> Row:
     return Row(
         scenario=plan.scenario.name,
         mission="" if plan.mission is None else plan.mission.name,
+        mission_class="contest" if plan.mission is None else plan.mission.mission_class,
         seed=plan.seed,
         verdict=Verdict.ERROR,
         reason=f"{kind}: {text}" if text else kind,

@@ -64,7 +64,15 @@ async def fly(
         for see in watching:
             see(moment)
 
-    flight = fly_mission(drone, perception, plan.chart, limit_s=plan.limit_s, observer=observe, box=plan.box)
+    flight = fly_mission(
+        drone,
+        perception,
+        plan.chart,
+        limit_s=plan.limit_s,
+        observer=observe,
+        box=plan.box,
+        limits=plan.command_limits,
+    )
     outcome = await (flight if run is None else run(flight))
     report = await judge.report(
         outcome.mission_state, None if outcome.ended == "finished" else outcome.reason
@@ -88,6 +96,7 @@ def _result(
     return FlightResult(
         scenario=plan.scenario.name,
         mission=plan.chart.name,
+        mission_class=plan.chart.mission_class,
         seed=plan.seed,
         **dict(report),
         mission_state=end.mission_state,

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 
 from firmware_py.airframe import Airframe, load_airframe
 from offboard.keep_in_box import Box, flight_box
+from offboard.limits import CONTEST, CommandLimits
 from scenarios.models import Scenario, start_position
 from scenarios.referee import Referee
 
@@ -29,12 +30,14 @@ class FlightPlan:
         lift_m: how much higher than declared the frames and the ceiling are. A drone that starts from the
             floor, without a base, measures heights from there, and its app takes that for the base's top.
             Lifted by the base's height, everything is as high above the real floor as the scenario says.
+        drone_limits: of a real drone, for a mission of the class `open`; None: those of the airframe.
     """
 
     scenario: Scenario
     mission: Mission | None = None
     seed: int | None = 0
     lift_m: float = 0.0
+    drone_limits: CommandLimits | None = None
 
     @property
     def chart(self) -> Mission:
@@ -70,6 +73,21 @@ class FlightPlan:
         return flight_box(self.scenario, self.lift_m)
 
     @property
+    def command_limits(self) -> CommandLimits:
+        """What the mission may command: the contest's limits or, in the class `open`, the drone's."""
+        if self.mission is None or self.mission.mission_class == "contest":
+            return CONTEST
+        return self.drone_limits or airframe_limits(self.airframe)
+
+    @property
+    def corrects_commands(self) -> bool:
+        """Whether commands are corrected on their way to a vehicle that answers late.
+
+        A mission that sees frames by shape corrects its own.
+        """
+        return self.mission is not None and self.mission.vision == "boxes"
+
+    @property
     def limit_s(self) -> float:
         """Longest try, motors on to motors off."""
         return self.scenario.try_limit_s
@@ -81,3 +99,16 @@ class FlightPlan:
     def lifted(self, lift_m: float) -> FlightPlan:
         """The same flight with another `lift_m`."""
         return replace(self, lift_m=lift_m)
+
+
+def airframe_limits(airframe: Airframe) -> CommandLimits:
+    """What an airframe can fly; sideways as forward, although it may be slower there."""
+    own, speed_m_s = airframe.limits, airframe.level_speed_m_s
+    return CommandLimits(
+        forward_m_s=speed_m_s,
+        left_m_s=speed_m_s,
+        up_m_s=own.speed_up_m_s,
+        down_m_s=own.speed_down_m_s,
+        yaw_rate_rad_s=own.yaw_rate_rad_s,
+        level_m_s=speed_m_s,
+    )

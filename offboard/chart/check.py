@@ -11,7 +11,7 @@ from offboard.pilot import Pilot
 
 def check(mission: MissionFile, pilot_class: type[Pilot], problems: ProblemList) -> None:
     """Check an expanded mission, and its names against a pilot class; `problems` takes what is found."""
-    vocabulary = Vocabulary(pilot_class, mission.variables)
+    vocabulary = Vocabulary(pilot_class, mission.variables, contest=mission.mission_class != "open")
     if not mission.states:
         problems.add(mission.place, "has no 'states'; write 'states:' and below it the states, indented")
         return

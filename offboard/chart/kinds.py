@@ -12,14 +12,15 @@ from typing import get_args, get_origin
 from geometry.vectors import Vec3
 from offboard.chart.problems import cut
 from offboard.chart.vocabulary import Vocabulary, choices_of, path_of
-from offboard.pilot import MAX_VELOCITY_M_S, MAX_YAW_RATE_RAD_S
+from offboard.limits import CONTEST
 
 LIMITS: Mapping[tuple[str, ...], tuple[float, str]] = {
-    ("cmd", "vel_x"): (MAX_VELOCITY_M_S, "m/s"),
-    ("cmd", "vel_y"): (MAX_VELOCITY_M_S, "m/s"),
-    ("cmd", "vel_z"): (MAX_VELOCITY_M_S, "m/s"),
-    ("cmd", "rot_z"): (MAX_YAW_RATE_RAD_S, "rad/s"),
+    ("cmd", "vel_x"): (CONTEST.forward_m_s, "m/s"),
+    ("cmd", "vel_y"): (CONTEST.left_m_s, "m/s"),
+    ("cmd", "vel_z"): (CONTEST.up_m_s, "m/s"),
+    ("cmd", "rot_z"): (CONTEST.yaw_rate_rad_s, "rad/s"),
 }
+"""Of the class `contest`; those of the class `open` depend on the drone."""
 _ORDER = (ast.Lt, ast.LtE, ast.Gt, ast.GtE)
 _QUOTED = re.compile(r"'[^']*'|\"[^\"]*\"")
 _DECIMAL_COMMA = re.compile(r"(?<![\w.])(\d+),(\d+)(?![\w.])")
@@ -127,7 +128,7 @@ class Kinds:
         if choices and isinstance(node, ast.Constant) and node.value not in choices:
             listed = ", ".join(map(repr, choices))
             raise KindError(node, f"{name} cannot be {node.value!r}; it is one of {listed}")
-        limit, value = LIMITS.get(path), _number(node)
+        limit, value = LIMITS.get(path) if self._vocabulary.contest else None, _number(node)
         if limit is not None and value is not None and abs(value) > limit[0]:
             text = f"{name} = {value:g} is too fast; at most {limit[0]:g} {limit[1]} is flown"
             raise KindError(node, f"{text}: write a number from -{limit[0]:g} to {limit[0]:g}")

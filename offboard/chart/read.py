@@ -5,12 +5,22 @@ from __future__ import annotations
 import ast
 import re
 from pathlib import Path
+from typing import TypeVar, get_args
 
 from offboard.chart.problems import Place, ProblemList, cut, did_you_mean
 from offboard.chart.spec import Action, MissionFile, State, Transition
 from offboard.chart.yaml_nodes import ListNode, MapNode, Node, Scalar, parse_yaml
+from scenarios.models import MissionClass
+from vision.types import Vision
 
-_MISSION_KEYS = ("name", "description", "extends", "initial", "variables", "templates", "states")
+Choice = TypeVar("Choice", bound=str)
+
+_MISSION_KEYS = (
+    *("name", "description", "class", "vision", "extends"),
+    *("initial", "variables", "templates", "states"),
+)
+_CLASSES: tuple[MissionClass, ...] = get_args(MissionClass)
+_VISIONS: tuple[Vision, ...] = get_args(Vision)
 _STATE_KEYS = (
     *("initial", "final", "then", "use", "resume"),
     *("enter", "during", "exit", "transitions", "states"),
@@ -60,6 +70,8 @@ class _Reader:
             path=path,
             name=self._mission_name(root, path),
             description=self._text(root, "description"),
+            mission_class=self._choice(root, "class", _CLASSES),
+            vision=self._choice(root, "vision", _VISIONS),
             extends=self._text(root, "extends"),
             initial=self._text(root, "initial"),
             initial_place=_value_place(root, "initial"),
@@ -249,6 +261,19 @@ class _Reader:
             return child.text.strip()
         self._problems.add(node.keys[key], f"'{key}' must be one line of text")
         return ""
+
+    def _choice(self, node: MapNode, key: str, choices: tuple[Choice, ...]) -> Choice | None:
+        """The one of some words that a key has; None if it has none."""
+        if key not in node.items:
+            return None
+        text = self._text(node, key)
+        for choice in choices:
+            if text == choice:
+                return choice
+        if isinstance(node.items[key], Scalar):
+            advice = did_you_mean(text.lower(), choices, f"it is {' or '.join(choices)}")
+            self._problems.add(node.items[key].place, f"unknown {key} '{cut(text, 40)}'; {advice}")
+        return None
 
     def _flag(self, node: MapNode, key: str) -> bool:
         text = self._text(node, key).lower()

@@ -16,6 +16,8 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 from offboard.chart.problems import NOWHERE, Place, ProblemList, cut, did_you_mean, mission_error
+from scenarios.models import MissionClass
+from vision.types import Vision
 
 MAX_EXTENDS = 5
 MAX_STATES = 1000
@@ -78,6 +80,8 @@ class MissionFile:
     path: Path
     name: str = ""
     description: str = ""
+    mission_class: MissionClass | None = None  # None: not given
+    vision: Vision | None = None  # None: not given
     extends: str = ""
     initial: str = ""
     initial_place: Place = NOWHERE
@@ -144,6 +148,8 @@ def _merge(base: MissionFile, top: MissionFile) -> MissionFile:
         initial=top.initial or base.initial,
         initial_place=top.initial_place if top.initial else base.initial_place,
         description=top.description or base.description,
+        mission_class=top.mission_class or base.mission_class,
+        vision=top.vision or base.vision,
         variables={**base.variables, **top.variables},
         templates={**base.templates, **top.templates},
         states=kept + tuple(replaced.values()),

@@ -32,13 +32,17 @@ class Vocabulary:
     Args:
         pilot_class: `Pilot` or a subclass with more primitives.
         variables: the mission's own variables.
+        contest: the mission flies by the limits of the class `contest`.
 
     Attributes:
         primitives: docstrings of the methods by name.
         values: types of the attributes and properties by name.
     """
 
-    def __init__(self, pilot_class: type[Pilot], variables: Mapping[str, object]) -> None:
+    def __init__(
+        self, pilot_class: type[Pilot], variables: Mapping[str, object], *, contest: bool = True
+    ) -> None:
+        self.contest = contest
         self._pilot_class = pilot_class
         self._variables = variables
         self.primitives = {

@@ -5,12 +5,15 @@ The mistakes of people who write their first missions are in `test_mission_mista
 
 from __future__ import annotations
 
+from math import hypot
 from pathlib import Path
 from textwrap import dedent
 
 import pytest
 
+from offboard.drone import VelocityCommand
 from offboard.engine import MissionEngine, MissionRunError
+from offboard.limits import CommandLimits
 from offboard.mission import MissionError, list_missions, load_mission, mermaid
 from offboard.pilot import Imu, Pilot
 from offboard.pilot_file import read_pilot
@@ -52,6 +55,54 @@ def test_the_package_has_its_missions():
     assert {"careful_crossing", "frame_challenge", "soft_landing"} <= set(list_missions())
     for name in list_missions():
         assert load_mission(name).description
+
+
+def test_class_and_vision_are_inherited_and_have_defaults(tmp_path):
+    plain = load(tmp_path, MINIMAL)
+    assert (plain.mission_class, plain.vision) == ("contest", "boxes")
+    (tmp_path / "base.yaml").write_text(f"class: open\nvision: frames\n{MINIMAL}", encoding="utf-8")
+    inherited = load(tmp_path, "extends: base.yaml\n")
+    assert (inherited.mission_class, inherited.vision) == ("open", "frames")
+    replaced = load(tmp_path, "extends: base.yaml\nclass: contest\n")
+    assert (replaced.mission_class, replaced.vision) == ("contest", "frames")
+
+
+@pytest.mark.parametrize(
+    ("line", "expected"),
+    [
+        ("class: Contets", "m.yaml:1:8: unknown class 'Contets'; did you mean 'contest'?"),
+        ("class: 7", "m.yaml:1:8: unknown class '7'; it is contest or open"),
+        ("class:", "m.yaml:1:7: unknown class ''; it is contest or open"),
+        ("vision: box", "m.yaml:1:9: unknown vision 'box'; did you mean 'boxes'?"),
+        ("vision: [frames]", "m.yaml:1:1: 'vision' must be one line of text"),
+    ],
+)
+def test_an_unknown_class_or_vision_is_one_problem(tmp_path, line, expected):
+    assert problems(tmp_path, f"{line}\n{MINIMAL}") == expected
+
+
+def test_numbers_in_the_file_are_limited_in_the_class_contest_only(tmp_path):
+    fast = MINIMAL.replace("- hover", "- cmd.vel_x = 1.5")
+    assert "at most 1 m/s" in problems(tmp_path, fast)
+    assert load(tmp_path, f"class: open\n{fast}").mission_class == "open"
+
+
+def test_the_engine_limits_commands_and_tells_the_pilot_the_limits(tmp_path):
+    text = MINIMAL.replace(
+        "- hover", "- cmd.vel_x = 3 * limits.forward_m_s\n      - cmd.vel_y = -9\n      - cmd.vel_z = -9"
+    )
+    mission = load(tmp_path, "class: open\n" + text.replace("- fly_to_goal", "- cmd.rot_z = 9"))
+    limits = CommandLimits(2.0, 1.5, 1.4, 0.7, 1.2, level_m_s=2.0)
+    engine = MissionEngine(mission, limits=limits)
+    assert engine.pilot.limits is limits
+    engine.tick(Imu(), Detections(), 0)
+    sent = engine.tick(Imu(), Detections(), 50_000)
+    assert hypot(sent.forward_m_s, sent.left_m_s) == pytest.approx(2.0)
+    assert sent.left_m_s / sent.forward_m_s == pytest.approx(-1.5 / 2.0)
+    assert (sent.up_m_s, sent.yaw_rate_rad_s) == (-0.7, 1.2)
+    contest = MissionEngine(mission)
+    contest.tick(Imu(), Detections(), 0)
+    assert contest.tick(Imu(), Detections(), 50_000) == VelocityCommand(1.0, -1.0, -1.0, 1.0)
 
 
 def test_the_minimal_mission_is_fine(tmp_path):

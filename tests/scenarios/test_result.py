@@ -23,6 +23,7 @@ LOCKSTEP = {
     "scenario": "calm-1",
     "mission": "frame_challenge",
     "seed": 3,
+    "mission_class": "open",
     "verdict": "completed",
     "reason": "completed after 90.5 s in landing.stop; crossed: red, green, blue",
     "frames_crossed": ["red", "green", "blue"],
