@@ -111,7 +111,10 @@ def test_the_minimal_mission_is_fine(tmp_path):
 
 GUARD = "seconds_in_state > 1"
 BAD_GUARDS = [
-    ("cam.red.q < 1", "m.yaml:11:15: when 'cam.red.q < 1': 'cam.red' has no 'q'; it has n s e w d a seen"),
+    (
+        "cam.red.q < 1",
+        "m.yaml:11:15: when 'cam.red.q < 1': 'cam.red' has no 'q'; it has n s e w d a signed_a seen",
+    ),
     ("cam.rde.d < 1", "'cam' has no 'rde'; did you mean 'cam.red'?"),
     ("secondsinstate > 4", "unknown name 'secondsinstate'; did you mean 'seconds_in_state'?"),
     ("hover", "'hover' is an action, not a value"),
