@@ -1,0 +1,134 @@
+"""What of the arena has been seen so far: for each cell and heading of a frame's normal, by the best view."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from math import hypot, inf, remainder, tau
+from typing import Final
+
+import numpy as np
+
+from geometry.rotations import to_world, yaw_of
+from geometry.vectors import Quaternion, Vec3
+from offboard.navigation.camera_model import CameraModel, CameraPose
+from offboard.navigation.frame_visibility import (
+    BEST_QUALITY,
+    HEADINGS,
+    Floats,
+    FrameVisibility,
+    SearchGrid,
+    block_means,
+    view_qualities,
+)
+from scenarios.models import Arena
+from vision.types import ObstacleEdge
+
+_MOVED_M: Final = 0.15  # an image from a pose nearer than this and _TURNED_RAD to the last one is skipped
+_TURNED_RAD: Final = 0.12
+_MARGIN_M: Final = 0.12  # beyond a frame at a cell's centre: it may be elsewhere in the cell
+_FADE: Final = 0.9998  # of what has been seen, an image used: what was seen long ago is looked at again
+_COLUMNS: Final = 40  # of the image, when obstacles hide a part of it
+
+
+class Coverage:
+    """Remembers how well each place has been seen.
+
+    Attributes:
+        grid: the cells.
+    """
+
+    def __init__(self, camera: CameraModel, arena: Arena) -> None:
+        self.grid = SearchGrid.of(arena)
+        self._camera = camera
+        self._visibility = FrameVisibility(camera)
+        self._centres = self.grid.centres()
+        self._seen = np.zeros((HEADINGS, self._centres[0].size), dtype=np.float32)
+        self._last: tuple[Vec3, float] | None = None
+
+    def update(
+        self, position_m: Vec3, attitude_arena: Quaternion, obstacle_edges: Sequence[ObstacleEdge] = ()
+    ) -> None:
+        """Take in an image, whatever it showed.
+
+        Args:
+            position_m: of the drone's centre when the image was exposed, arena axes.
+            attitude_arena: body FLU to arena.
+            obstacle_edges: where obstacles stand; nothing behind them counts as seen.
+        """
+        if not self._is_new(position_m, yaw_of(attitude_arena)):
+            return
+        pose = self._camera.pose(position_m, attitude_arena)
+        in_view = self._in_view(pose)
+        dx_m, dy_m, dz_m = (
+            axis[in_view] - np.float32(at) for axis, at in zip(self._centres, pose.position_m, strict=True)
+        )
+        if obstacle_edges:
+            clear = self._clear(pose, obstacle_edges, dx_m, dy_m, dz_m)
+            in_view, dx_m, dy_m, dz_m = in_view[clear], dx_m[clear], dy_m[clear], dz_m[clear]
+        self._seen *= np.float32(_FADE)
+        for seen, quality in zip(self._seen, view_qualities(dx_m, dy_m, dz_m), strict=True):
+            seen[in_view] = np.maximum(seen[in_view], quality)
+
+    def blocks(self) -> Floats:
+        """Quality of the best view, 0 to 1, by heading and block of the grid: shape (HEADINGS, blocks)."""
+        means = block_means(self._seen.reshape(HEADINGS, *self.grid.shape))
+        flat: Floats = means.reshape(HEADINGS, -1)
+        return flat
+
+    def in_plan(self) -> Floats:
+        """Share seen over all heights and headings, 0 to 1, for pictures: shape (cells x, cells y)."""
+        cells = self._seen.reshape(HEADINGS, *self.grid.shape)
+        means: Floats = cells.mean(axis=(0, 3)) / np.float32(BEST_QUALITY)
+        return means
+
+    def _is_new(self, position_m: Vec3, yaw_rad: float) -> bool:
+        if self._last is not None:
+            (x, y, z), last_yaw_rad = self._last
+            moved_m = hypot(position_m[0] - x, position_m[1] - y, position_m[2] - z)
+            if moved_m < _MOVED_M and abs(remainder(yaw_rad - last_yaw_rad, tau)) < _TURNED_RAD:
+                return False
+        self._last = (position_m, yaw_rad)
+        return True
+
+    def _in_view(self, pose: CameraPose) -> np.ndarray[tuple[int], np.dtype[np.intp]]:
+        """Indices of the cells in which a frame is wholly in the image."""
+        m = pose.rotation
+        dx, dy, dz = (
+            axis - np.float32(at)
+            for axis, at in zip((self.grid.x_m, self.grid.y_m, self.grid.z_m), pose.position_m, strict=True)
+        )
+        ahead, left, up = (
+            ((dx * np.float32(m[at]))[:, None, None] + (dy * np.float32(m[at + 3]))[:, None])
+            + dz * np.float32(m[at + 6])
+            for at in range(3)
+        )
+        return np.flatnonzero(self._visibility.in_view(ahead, left, up, _MARGIN_M))
+
+    def _clear(
+        self, pose: CameraPose, edges: Sequence[ObstacleEdge], dx_m: Floats, dy_m: Floats, dz_m: Floats
+    ) -> np.ndarray[tuple[int], np.dtype[np.bool_]]:
+        """Which places are in front of all obstacles, or in a column of the image without any."""
+        camera, m = self._camera, pose.rotation
+        scale = _COLUMNS / (2 * camera.half_width_px)
+        free_m = [inf] * _COLUMNS
+        for edge in edges:
+            column = min(max(int((edge.right_px + camera.half_width_px) * scale), 0), _COLUMNS - 1)
+            free_m[column] = min(free_m[column], self._range_m(pose, edge))
+        ahead = dx_m * np.float32(m[0]) + dy_m * np.float32(m[3]) + dz_m * np.float32(m[6])
+        left = dx_m * np.float32(m[1]) + dy_m * np.float32(m[4]) + dz_m * np.float32(m[7])
+        right_px = -left / ahead * np.float32(camera.focal_px)
+        columns = ((right_px + np.float32(camera.half_width_px)) * np.float32(scale)).astype(np.intp)
+        limits_m = np.array(free_m, dtype=np.float32)
+        np.clip(columns, 0, _COLUMNS - 1, out=columns)
+        clear: np.ndarray[tuple[int], np.dtype[np.bool_]] = (
+            dx_m * dx_m + dy_m * dy_m < limits_m[columns] * limits_m[columns]
+        )
+        return clear
+
+    def _range_m(self, pose: CameraPose, edge: ObstacleEdge) -> float:
+        """Distance in plan to where an obstacle stands; 0 if that is not known."""
+        focal_px = self._camera.focal_px
+        x, y, z = to_world(pose.rotation, 1.0, -edge.right_px / focal_px, -edge.down_px / focal_px)
+        if edge.cut or z > -1e-3:
+            return 0.0
+        return hypot(x, y) * pose.position_m[2] / -z

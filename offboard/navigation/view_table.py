@@ -1,0 +1,110 @@
+"""What could be seen from a fixed set of places and headings: tables made once for a camera and an arena."""
+
+from __future__ import annotations
+
+from math import atan, cos, remainder, sin, tau
+from typing import Final
+
+import numpy as np
+import numpy.typing as npt
+
+from offboard.navigation.camera_model import CameraModel
+from offboard.navigation.frame_visibility import HEADINGS, Floats, SearchGrid, view_qualities
+from scenarios.models import Arena
+
+Doubles = npt.NDArray[np.float64]
+Indices = npt.NDArray[np.intp]
+
+YAWS: Final = tuple(remainder(index * tau / 12, tau) for index in range(12))
+_PLACES: Final = 9  # along x and y
+_WALL_M: Final = 1.0  # from the outermost places to the arena's sides
+_LOW_M, _MIDDLE_M, _BELOW_CEILING_M = 0.6, 1.5, 1.3
+_EDGE_RAD: Final = 0.08  # at the sides of the image, where a frame is cut
+_NEAREST_M: Final = 0.7
+
+
+class ViewTable:
+    """Gains of all views from a grid of places, fast and roughly: the image is taken as a sector in plan.
+
+    Attributes:
+        places_m: x, y, z of the places, arena axes, shape (places, 3).
+    """
+
+    def __init__(self, camera: CameraModel, arena: Arena, blocks: SearchGrid) -> None:
+        self.places_m = _places(arena)
+        x_m, y_m, z_m = blocks.centres()
+        dx_m, dy_m, dz_m = (
+            centres[None, :] - self.places_m[:, axis, None].astype(np.float32)
+            for axis, centres in enumerate((x_m, y_m, z_m))
+        )
+        plan_2 = dx_m * dx_m + dy_m * dy_m
+        steepest = np.float32(0.9 * camera.half_height_px / camera.focal_px)
+        reached = (dz_m * dz_m <= plan_2 * steepest * steepest) & (plan_2 >= np.float32(_NEAREST_M**2))
+        self._qualities = [quality * reached for quality in view_qualities(dx_m, dy_m, dz_m)]
+        bearings = _pseudo_angle(dx_m, dy_m)
+        self._order: Indices = np.argsort(bearings, axis=1, kind="stable")
+        ordered = np.take_along_axis(bearings, self._order, axis=1)
+        half_rad = atan(camera.half_width_px / camera.focal_px) - _EDGE_RAD
+        self._first = _counts_below(ordered, [yaw - half_rad for yaw in YAWS])
+        self._end = _counts_below(ordered, [yaw + half_rad for yaw in YAWS])
+
+    def gains(self, seen: Floats, weights: Floats) -> Doubles:
+        """How much would be newly seen.
+
+        Args:
+            seen: quality of the best view so far, shape (HEADINGS, blocks).
+            weights: how likely a frame is in each block, shape (blocks,).
+
+        Returns:
+            Gain of each view, shape (places, `YAWS`).
+        """
+        new = np.zeros_like(self._qualities[0])
+        gain = np.empty_like(new)
+        for heading in range(HEADINGS):
+            np.subtract(self._qualities[heading], seen[heading], out=gain)
+            new += np.maximum(gain, np.float32(0.0), out=gain)
+        new *= weights
+        # Cumulative sums have one order of adding on every processor, so that ties are decided alike.
+        sums = np.zeros((new.shape[0], new.shape[1] + 1))
+        np.cumsum(np.take_along_axis(new, self._order, axis=1), axis=1, out=sums[:, 1:], dtype=np.float64)
+        end = np.take_along_axis(sums, self._end, axis=1)
+        first = np.take_along_axis(sums, self._first, axis=1)
+        around = np.where(self._end < self._first, sums[:, -1:], 0.0)
+        gains: Doubles = end - first + around
+        return gains
+
+
+def _places(arena: Arena) -> Doubles:
+    def along(length_m: float) -> Doubles:
+        reach_m = max(length_m / 2 - _WALL_M, 0.0)
+        return np.linspace(-reach_m, reach_m, _PLACES)
+
+    heights_m = sorted(
+        {
+            min(_LOW_M, arena.height_m / 2),
+            min(_MIDDLE_M, arena.height_m / 2),
+            max(arena.height_m - _BELOW_CEILING_M, arena.height_m / 2),
+        }
+    )
+    x_m, y_m, z_m = np.meshgrid(
+        along(arena.length_x_m), along(arena.width_y_m), np.array(heights_m), indexing="ij"
+    )
+    return np.stack([x_m.ravel(), y_m.ravel(), z_m.ravel()], axis=1)
+
+
+def _pseudo_angle(x: Floats, y: Floats) -> Floats:
+    """-2..2, rises with the angle -pi..pi; unlike the arc tangent, the same to the bit on every processor."""
+    slope = y / np.maximum(np.abs(x) + np.abs(y), np.float32(1e-6))
+    angle: Floats = np.where(
+        x >= 0, slope, np.where(y >= 0, np.float32(2.0) - slope, np.float32(-2.0) - slope)
+    )
+    return angle
+
+
+def _counts_below(ordered: Floats, angles_rad: list[float]) -> Indices:
+    """How many of each row are below each angle: shape (rows, angles)."""
+    at = _pseudo_angle(
+        np.array([cos(angle) for angle in angles_rad], dtype=np.float32),
+        np.array([sin(angle) for angle in angles_rad], dtype=np.float32),
+    )
+    return np.stack([np.count_nonzero(ordered < limit, axis=1) for limit in at], axis=1)
