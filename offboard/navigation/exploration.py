@@ -1,4 +1,4 @@
-"""Where to look next for frames: the view that shows most of what has not been seen, for the time it takes."""
+"""Where to look next for frames: the view that shows most of what has not been seen, for its time."""
 
 from __future__ import annotations
 
@@ -9,6 +9,7 @@ from typing import Final
 
 import numpy as np
 
+from geometry.axes import Pose
 from geometry.vectors import Quaternion, Vec3
 from offboard.navigation.camera_model import CameraModel
 from offboard.navigation.coverage import Coverage
@@ -63,6 +64,14 @@ class Obstacle:
     radius_m: float
 
 
+@dataclass(frozen=True, slots=True)
+class _Unseen:
+    """What there is to see, by block of the grid."""
+
+    seen: Floats  # quality of the best view so far, shape (HEADINGS, blocks)
+    weights: Floats  # how likely a frame is there, shape (blocks,)
+
+
 class Explorer:
     """Remembers what has been seen and chooses the next view. The same calls give the same answers.
 
@@ -107,7 +116,7 @@ class Explorer:
         found: Sequence[Vec3] = (),
         hints: Sequence[LineOfSight] = (),
         obstacles: Sequence[Obstacle] = (),
-    ) -> Viewpoint | None:
+    ) -> Viewpoint:
         """Choose the view with the largest gain for its time, counting what is seen on the way.
 
         Ask again about twice a second, also before the drone is there.
@@ -120,17 +129,21 @@ class Explorer:
             obstacles: where the drone cannot go.
 
         Returns:
-            The viewpoint; None if obstacles block all places.
+            The viewpoint. The drone can turn where it is, so there is always one.
         """
         seen = self.coverage.blocks()
-        weights = self._weights(seen, found, hints)
-        self._count_visit(position_m, yaw_rad)
+        unseen = _Unseen(seen, self._weights(seen, found, hints))
+        here = Pose(position_m, yaw_rad)
+        place, yaw = self._nearest(position_m, yaw_rad)
+        self._visits[place, yaw] += 1.0
         blocked = [(each.x_m, each.y_m, each.radius_m + _CLEAR_M) for each in obstacles]
         blocked += [(x, y, _CLEAR_M) for x, y, _ in found]
-        candidates = self._candidates(position_m, yaw_rad, seen, weights, blocked)
-        if not candidates:
-            return None
-        scores = self._scores(candidates, position_m, yaw_rad, seen, weights)
+        candidates = [
+            each
+            for each in self._candidates(here, unseen)
+            if each.position_m == position_m or _is_clear(each, blocked)
+        ]
+        scores = self._scores(candidates, here, unseen)
         best = candidates[int(np.argmax(scores))]
         self._last = best
         return best
@@ -168,65 +181,40 @@ class Explorer:
         )
         return on_ray
 
-    def _count_visit(self, position_m: Vec3, yaw_rad: float) -> None:
-        place, yaw = self._nearest(position_m, yaw_rad)
-        self._visits[place, yaw] += 1.0
-
     def _nearest(self, position_m: Vec3, yaw_rad: float) -> tuple[int, int]:
         """Index of the table's view nearest to a pose."""
         dx, dy, dz = (self._table.places_m[:, axis] - position_m[axis] for axis in range(3))
         place = int(np.argmin(dx * dx + dy * dy + dz * dz))
         return place, round(yaw_rad / tau * len(YAWS)) % len(YAWS)
 
-    def _candidates(
-        self,
-        position_m: Vec3,
-        yaw_rad: float,
-        seen: Floats,
-        weights: Floats,
-        blocked: Sequence[tuple[float, float, float]],
-    ) -> list[Viewpoint]:
+    def _candidates(self, here: Pose, unseen: _Unseen) -> list[Viewpoint]:
         """Views to look at closely: the last choice, some from about here, and the table's best."""
-        x, y, z = position_m
+        x, y, z = here.position_m
         candidates = [] if self._last is None else [self._last]
         heights_m = [z, *(float(height) for height in self._heights_m if abs(height - z) > 0.3)]
         for height_m in heights_m:
             candidates += [
-                Viewpoint((x, y, height_m), remainder(yaw_rad + turn, tau))
+                Viewpoint((x, y, height_m), remainder(here.yaw_rad + turn, tau))
                 for turn in _TURNS
                 if turn != 0.0 or height_m != z
             ]
         places_m = self._table.places_m
-        gains = self._table.gains(seen, weights) / (1.0 + _USED * self._visits)
+        gains = self._table.gains(unseen.seen, unseen.weights) / (1.0 + _USED * self._visits)
         level_m = np.sqrt((places_m[:, 0] - x) ** 2 + (places_m[:, 1] - y) ** 2)
         fly_s = _START_S + np.maximum(level_m / SPEED_M_S, np.abs(places_m[:, 2] - z) / CLIMB_M_S)
-        turn_s = np.array([abs(remainder(yaw - yaw_rad, tau)) for yaw in YAWS]) / TURN_RAD_S
+        turn_s = np.array([abs(remainder(yaw - here.yaw_rad, tau)) for yaw in YAWS]) / TURN_RAD_S
         scores = gains / (np.maximum(fly_s[:, None], turn_s[None, :]) + _START_S)
         best_yaw = np.argmax(scores, axis=1)
         best = np.take_along_axis(scores, best_yaw[:, None], axis=1)[:, 0]
         for place in np.argsort(-best, kind="stable")[:_FAR_PLACES]:
             px, py, pz = places_m[place]
             candidates.append(Viewpoint((float(px), float(py), float(pz)), YAWS[best_yaw[place]]))
-        return [
-            each
-            for each in candidates
-            if all(
-                hypot(each.position_m[0] - bx, each.position_m[1] - by) >= radius_m
-                for bx, by, radius_m in blocked
-            )
-        ]
+        return candidates
 
-    def _scores(
-        self,
-        candidates: Sequence[Viewpoint],
-        position_m: Vec3,
-        yaw_rad: float,
-        seen: Floats,
-        weights: Floats,
-    ) -> list[float]:
+    def _scores(self, candidates: Sequence[Viewpoint], here: Pose, unseen: _Unseen) -> list[float]:
         """Gain of each view and of those on the way to it, for its time."""
-        times_s = [_time_s(each, position_m, yaw_rad) for each in candidates]
-        gains = self._gains(candidates, times_s, position_m, yaw_rad, seen, weights)
+        times_s = [_time_s(each, here) for each in candidates]
+        gains = self._gains(candidates, times_s, here, unseen)
         scores = []
         for index, each in enumerate(candidates):
             place, yaw = self._nearest(each.position_m, each.yaw_rad)
@@ -236,20 +224,15 @@ class Explorer:
         return scores
 
     def _gains(
-        self,
-        candidates: Sequence[Viewpoint],
-        times_s: Sequence[float],
-        position_m: Vec3,
-        yaw_rad: float,
-        seen: Floats,
-        weights: Floats,
+        self, candidates: Sequence[Viewpoint], times_s: Sequence[float], here: Pose, unseen: _Unseen
     ) -> Doubles:
+        """Gains of the views and of those on the way to them."""
         count = len(candidates)
-        best_view = np.repeat(seen[:, None, :], count, axis=1)
+        best_view = np.repeat(unseen.seen[:, None, :], count, axis=1)
         gains = np.zeros(count)
         for sample in range(1, _SAMPLES + 1):
             poses = [
-                _on_the_way(position_m, yaw_rad, each, time_s * sample / _SAMPLES)
+                _on_the_way(here, each, time_s * sample / _SAMPLES)
                 for each, time_s in zip(candidates, times_s, strict=True)
             ]
             at = np.array(poses, dtype=np.float32)
@@ -264,7 +247,7 @@ class Explorer:
                 after = np.maximum(before, quality)
                 layer[which, block] = after
                 new += after - before
-            gains += np.bincount(which, weights=new * weights[block], minlength=count)
+            gains += np.bincount(which, weights=new * unseen.weights[block], minlength=count)
         return gains
 
 
@@ -277,22 +260,25 @@ def _prior(z_m: Floats, levels_m: Floats) -> Floats:
     return prior
 
 
-def _time_s(viewpoint: Viewpoint, position_m: Vec3, yaw_rad: float) -> float:
+def _time_s(viewpoint: Viewpoint, here: Pose) -> float:
     """Time to fly to a viewpoint, turning on the way."""
-    x, y, z = (to - at for to, at in zip(viewpoint.position_m, position_m, strict=True))
+    x, y, z = (to - at for to, at in zip(viewpoint.position_m, here.position_m, strict=True))
     fly_s = max(hypot(x, y) / SPEED_M_S, abs(z) / CLIMB_M_S)
-    turn_s = abs(remainder(viewpoint.yaw_rad - yaw_rad, tau)) / TURN_RAD_S
+    turn_s = abs(remainder(viewpoint.yaw_rad - here.yaw_rad, tau)) / TURN_RAD_S
     return max(fly_s + _START_S if fly_s > 0.1 else 0.0, turn_s)
 
 
-def _on_the_way(
-    position_m: Vec3, yaw_rad: float, viewpoint: Viewpoint, time_s: float
-) -> tuple[float, float, float, float, float]:
+def _on_the_way(here: Pose, viewpoint: Viewpoint, time_s: float) -> tuple[float, float, float, float, float]:
     """Position, cosine and sine of the heading some time after leaving for a viewpoint."""
-    x, y, z = (to - at for to, at in zip(viewpoint.position_m, position_m, strict=True))
+    x, y, z = (to - at for to, at in zip(viewpoint.position_m, here.position_m, strict=True))
     fly_s = max(hypot(x, y) / SPEED_M_S, abs(z) / CLIMB_M_S)
     share = min(max(time_s - _START_S, 0.0) / fly_s, 1.0) if fly_s > 0.1 else 1.0
-    turn_rad = remainder(viewpoint.yaw_rad - yaw_rad, tau)
-    yaw = yaw_rad + copysign(min(abs(turn_rad), TURN_RAD_S * time_s), turn_rad)
-    px, py, pz = position_m
+    turn_rad = remainder(viewpoint.yaw_rad - here.yaw_rad, tau)
+    yaw = here.yaw_rad + copysign(min(abs(turn_rad), TURN_RAD_S * time_s), turn_rad)
+    px, py, pz = here.position_m
     return (px + share * x, py + share * y, pz + share * z, cos(yaw), sin(yaw))
+
+
+def _is_clear(viewpoint: Viewpoint, blocked: Sequence[tuple[float, float, float]]) -> bool:
+    x, y, _ = viewpoint.position_m
+    return all(hypot(x - bx, y - by) >= radius_m for bx, by, radius_m in blocked)

@@ -126,7 +126,7 @@ def test_a_line_of_sight_is_looked_along_first():
         assert viewpoint.yaw_rad * bearing > 0
 
 
-def test_viewpoints_keep_clear_of_obstacles_and_there_may_be_none():
+def test_viewpoints_keep_clear_of_obstacles_and_turning_is_always_possible():
     search = Search((), (0.0, 0.0, 1.0), 0.0)
     post = Obstacle(2.0, 0.0, 1.5)
     for _ in range(40):
@@ -135,7 +135,9 @@ def test_viewpoints_keep_clear_of_obstacles_and_there_may_be_none():
         search.explorer.update(search.position_m, quaternion_from_yaw(search.yaw_rad))
         search.step(viewpoint)
     everywhere = Obstacle(0.0, 0.0, 20.0)
-    assert search.explorer.next_viewpoint(search.position_m, 0.0, obstacles=[everywhere]) is None
+    blocked = search.explorer.next_viewpoint(search.position_m, 0.0, obstacles=[everywhere])
+    assert blocked.position_m == search.position_m
+    assert blocked.yaw_rad != 0.0
 
 
 def test_nothing_behind_an_obstacle_counts_as_seen():
