@@ -2,19 +2,35 @@
 
 from __future__ import annotations
 
+import itertools
+from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import Annotated, Literal, Self
+from math import atan2, cos, hypot, sin, sqrt
+from typing import Annotated, Any, Literal, Self
 
-from pydantic import BaseModel, ConfigDict, Field, model_validator
+from pydantic import (
+    BaseModel,
+    ConfigDict,
+    Field,
+    SerializerFunctionWrapHandler,
+    model_serializer,
+    model_validator,
+)
 from pydantic_core import PydanticCustomError
 
 from errors import UserError
+from geometry.solids import Solid
 from geometry.vectors import Quaternion, Vec3
 
 Colour = Literal["red", "green", "blue"]
 COLOURS: tuple[Colour, ...] = ("red", "green", "blue")
 MissionClass = Literal["contest", "open"]
 """By which limits a mission flies: the paper's, or what the drone can do. Only `contest` counts."""
+DecoyColour = Literal["cyan", "magenta"]
+DECOY_COLOURS: tuple[DecoyColour, ...] = ("cyan", "magenta")
+
+_SHORTEST_M = 0.001  # of a part of a wall; a doorway may end where the wall does
+START_CLEAR_M = 0.3  # from the start's centre to a pole or wall: more than half of any airframe
 
 Metres = Annotated[float, Field(ge=-1000, le=1000, allow_inf_nan=False)]
 Radians = Annotated[float, Field(ge=-6.3, le=6.3, allow_inf_nan=False)]
@@ -65,6 +81,12 @@ class Base(Part):
     edge_m: float = Field(0.5, gt=0.1, le=10, description="edge of the square top")
     top_m: float = Field(0.51, gt=0, le=10, description="height of the top above the floor")
 
+    @property
+    def solid(self) -> Solid:
+        """Its box, from the floor to its top."""
+        half_m = self.edge_m / 2
+        return Solid("base", (self.x_m, self.y_m, self.top_m / 2), 0.0, (half_m, half_m, self.top_m / 2))
+
 
 class Start(Part):
     """The drone's start pose; its height follows from what is under it."""
@@ -74,10 +96,10 @@ class Start(Part):
     yaw_rad: Radians = Field(0.0, description="heading, counter-clockwise from x")
 
 
-class Frame(Part):
+class UprightFrame(Part):
     """An upright rectangular frame floating in the arena; its normal is its local x axis."""
 
-    colour: Colour = Field(description="pure red, green or blue; crossed in this order")
+    colour: str
     x_m: Metres = Field(description="centre of the opening")
     y_m: Metres = Field(description="centre of the opening")
     z_m: float = Field(gt=0, le=100, description="centre of the opening above the floor")
@@ -96,6 +118,12 @@ class Frame(Part):
         """Clear width and height between the bars."""
         return (self.outer_width_m - 2 * self.bar_m, self.outer_height_m - 2 * self.bar_m)
 
+    @property
+    def hull(self) -> Solid:
+        """The box around it, its opening included."""
+        half_m = (self.bar_m / 2, self.outer_width_m / 2, self.outer_height_m / 2)
+        return Solid(self.colour, self.position_arena_m, self.yaw_rad, half_m)
+
     @model_validator(mode="after")
     def _has_opening_above_floor(self) -> Self:
         if min(self.opening_m) <= 0:
@@ -105,6 +133,96 @@ class Frame(Part):
                 self.z_m, f"sinks the frame into the floor; use {self.outer_height_m / 2} or more", "z_m"
             )
         return self
+
+
+class Frame(UprightFrame):
+    """A frame to be crossed."""
+
+    colour: Colour = Field(description="pure red, green or blue; crossed in this order")
+
+
+class Decoy(UprightFrame):
+    """A frame of another colour: to cross it means nothing, to touch it is a contact."""
+
+    colour: DecoyColour = Field(description="pure cyan or magenta")
+
+
+Height = Annotated[float, Field(gt=0, le=1000)]
+
+
+class Pole(Part):
+    """A vertical pole on the floor, square in plan, its sides along the arena's axes."""
+
+    x_m: Metres = Field(description="centre")
+    y_m: Metres = Field(description="centre")
+    edge_m: float = Field(0.15, ge=0.02, le=2, description="edge of its square")
+    height_m: Height | None = Field(None, description="of its top above the floor; by default the ceiling's")
+
+    def solids(self, ceiling_m: float) -> tuple[Solid, ...]:
+        """Its box, up to the ceiling if it has no height of its own."""
+        height_m = self.height_m or ceiling_m
+        return (_standing("pole", (self.x_m, self.y_m), 0.0, (self.edge_m, self.edge_m, height_m)),)
+
+
+class Doorway(Part):
+    """A gap in a wall, from the floor to the wall's top."""
+
+    offset_m: float = Field(ge=0, le=1000, description="its middle, along the wall from x_m, y_m")
+    width_m: float = Field(1.2, ge=1.0, le=1000, description="of the gap")
+
+
+class Wall(Part):
+    """A straight wall on the floor."""
+
+    x_m: Metres = Field(description="where it begins")
+    y_m: Metres = Field(description="where it begins")
+    end_x_m: Metres = Field(description="where it ends")
+    end_y_m: Metres = Field(description="where it ends")
+    thickness_m: float = Field(0.1, ge=0.02, le=2, description="of the wall")
+    height_m: Height | None = Field(None, description="of its top above the floor; by default the ceiling's")
+    doorway: Doorway | None = Field(None, description="gap in the wall; without it there is none")
+
+    @property
+    def length_m(self) -> float:
+        """From end to end, doorway included."""
+        return hypot(self.end_x_m - self.x_m, self.end_y_m - self.y_m)
+
+    def solids(self, ceiling_m: float) -> tuple[Solid, ...]:
+        """Its boxes, on each side of the doorway one, up to the ceiling if it has no height of its own."""
+        if self.doorway is None:
+            return (self._part(0.0, self.length_m, ceiling_m),)
+        begin_m, end_m = _span(self.doorway)
+        parts = ((0.0, begin_m), (end_m, self.length_m))
+        return tuple(self._part(*part, ceiling_m) for part in parts if part[1] - part[0] > _SHORTEST_M)
+
+    def _part(self, begin_m: float, end_m: float, ceiling_m: float) -> Solid:
+        yaw_rad = atan2(self.end_y_m - self.y_m, self.end_x_m - self.x_m)
+        middle_m = (begin_m + end_m) / 2
+        x_m, y_m = self.x_m + middle_m * cos(yaw_rad), self.y_m + middle_m * sin(yaw_rad)
+        height_m = self.height_m or ceiling_m
+        return _standing("wall", (x_m, y_m), yaw_rad, (end_m - begin_m, self.thickness_m, height_m))
+
+    @model_validator(mode="after")
+    def _has_room_for_its_doorway(self) -> Self:
+        if self.length_m < self.thickness_m:
+            raise refusal(self.end_x_m, "makes the wall shorter than it is thick; move its end", "end_x_m")
+        if self.doorway is not None:
+            begin_m, end_m = _span(self.doorway)
+            if begin_m < 0.0 or end_m > self.length_m:
+                message = f"puts the doorway past an end of the wall, which is {self.length_m:.3g} m long"
+                raise refusal(self.doorway.offset_m, message, "doorway", "offset_m")
+        return self
+
+
+def _span(doorway: Doorway) -> tuple[float, float]:
+    """Where a doorway begins and ends, along its wall."""
+    return (doorway.offset_m - doorway.width_m / 2, doorway.offset_m + doorway.width_m / 2)
+
+
+def _standing(name: str, place_m: tuple[float, float], yaw_rad: float, size_m: Vec3) -> Solid:
+    """A box on the floor."""
+    length_m, width_m, height_m = size_m
+    return Solid(name, (*place_m, height_m / 2), yaw_rad, (length_m / 2, width_m / 2, height_m / 2))
 
 
 class Camera(Part):
@@ -160,6 +278,9 @@ class Scenario(Part):
     base: Base = Field(Base(), description="where to land")
     start: Start = Field(Start(), description="the drone's start pose")
     frames: tuple[Frame, ...] = Field((), description="at most one of each colour, in any order")
+    decoys: tuple[Decoy, ...] = Field((), description="frames that are not to be crossed, solid too")
+    poles: tuple[Pole, ...] = Field((), description="obstacles that stand on the floor")
+    walls: tuple[Wall, ...] = Field((), description="obstacles that stand on the floor")
     camera: Camera = Field(Camera(), description="the drone's camera")
     light: Light = Field(Light(), description="sun and sky")
     try_limit_s: float = Field(180.0, gt=0, le=36000, description="longest try, motors on to motors off")
@@ -178,19 +299,63 @@ class Scenario(Part):
     @model_validator(mode="after")
     def _all_inside_arena(self) -> Self:
         arena = self.arena
-        placed: list[tuple[Part, tuple[str | int, ...]]] = [(self.start, ("start",)), (self.base, ("base",))]
-        placed += [(frame, ("frames", index)) for index, frame in enumerate(self.frames)]
-        for part, at in placed:
-            for field, limit_m in (("x_m", arena.length_x_m / 2), ("y_m", arena.width_y_m / 2)):
-                value_m: float = getattr(part, field)
+        limits_m = {"x_m": arena.length_x_m / 2, "y_m": arena.width_y_m / 2}
+        limits_m |= {f"end_{field}": limit_m for field, limit_m in limits_m.items()}
+        for part, at in self._placed():
+            for field, limit_m in limits_m.items():
+                value_m: float = getattr(part, field, 0.0)
                 if abs(value_m) > limit_m:
                     message = f"is outside the arena; keep within ±{limit_m} or enlarge the arena"
                     raise refusal(value_m, message, *at, field)
-        for index, frame in enumerate(self.frames):
-            if frame.z_m > arena.height_m:
-                message = f"is above the arena; use {arena.height_m} or less"
-                raise refusal(frame.z_m, message, "frames", index, "z_m")
+            for field in ("z_m", "height_m"):
+                height_m: float | None = getattr(part, field, None)
+                if height_m is not None and height_m > arena.height_m:
+                    raise refusal(height_m, f"is above the arena; use {arena.height_m} or less", *at, field)
         return self
+
+    @model_validator(mode="after")
+    def _start_and_base_are_free(self) -> Self:
+        base_m = self.base.edge_m / 2 * sqrt(2.0)  # a circle around it: the message can say how far is enough
+        clear = (
+            ("start", self.start.x_m, self.start.y_m, START_CLEAR_M),
+            ("base", self.base.x_m, self.base.y_m, base_m),
+        )
+        for part, at in self._placed():
+            if not isinstance(part, Pole | Wall):
+                continue
+            for solid, (where, x_m, y_m, clear_m) in itertools.product(
+                part.solids(self.arena.height_m), clear
+            ):
+                if solid.plan_distance_m(x_m, y_m) < clear_m:
+                    message = f"is over the {where}; keep the {solid.name} {clear_m:.3g} m from its centre"
+                    raise refusal(part.x_m, message, *at, "x_m")
+        return self
+
+    @model_serializer(mode="wrap")
+    def _without_empty_obstacles(self, write: SerializerFunctionWrapHandler) -> dict[str, Any]:
+        """Leave out kinds of obstacles that it has not: evaluations compare scenarios by what is written."""
+        written: dict[str, Any] = write(self)
+        empty = [field for field in ("decoys", "poles", "walls") if not getattr(self, field)]
+        return {field: value for field, value in written.items() if field not in empty}
+
+    @property
+    def all_frames(self) -> tuple[UprightFrame, ...]:
+        """Frames and decoys."""
+        return (*self.frames, *self.decoys)
+
+    @property
+    def prisms(self) -> tuple[Solid, ...]:
+        """Boxes of the poles and walls: all stand on the floor."""
+        obstacles: tuple[Pole | Wall, ...] = (*self.poles, *self.walls)
+        return tuple(solid for obstacle in obstacles for solid in obstacle.solids(self.arena.height_m))
+
+    def _placed(self) -> Iterator[tuple[Part, tuple[str | int, ...]]]:
+        """All that is in the arena, with its path in the file."""
+        yield self.start, ("start",)
+        yield self.base, ("base",)
+        for name in ("frames", "decoys", "poles", "walls"):
+            for index, part in enumerate(getattr(self, name)):
+                yield part, (name, index)
 
 
 @dataclass(slots=True)
@@ -202,7 +367,7 @@ class TrueState:
     velocity_arena_m_s: Vec3
     attitude_arena: Quaternion  # unit quaternion (w, x, y, z), body FLU to arena
     motors_on: bool
-    contacts: tuple[str, ...] = ()  # what the drone touches: names of frames ("red"), "base" or "floor"
+    contacts: tuple[str, ...] = ()  # what it touches: colours of frames, "pole", "wall", "base" or "floor"
 
 
 def is_over_base(base: Base, x_m: float, y_m: float) -> bool:

@@ -60,6 +60,10 @@ class Referee:
         self._boundary = Boundary(scenario.arena)
         self._frames = sorted(scenario.frames, key=lambda frame: COLOURS.index(frame.colour))
         self._expected = tuple(frame.colour for frame in self._frames)
+        self._solids = {
+            *(each.colour for each in scenario.all_frames),
+            *(each.name for each in scenario.prisms),
+        }
         self._ignored = 0
         self._over = False
         self._time_us = -1
@@ -145,7 +149,7 @@ class Referee:
         return next((colour for colour in self._expected if colour not in self._crossings), None)
 
     def _watch(self, state: TrueState) -> None:
-        """Look for contacts with frames and for crashes."""
+        """Look for contacts with frames and obstacles, and for crashes."""
         if state.contacts:
             self._count_contacts(state)
         crash = self._crash_watch.follow(state, self._taken_off)
@@ -155,7 +159,7 @@ class Referee:
 
     def _count_contacts(self, state: TrueState) -> None:
         for name in state.contacts:
-            if name not in self._expected:
+            if name not in self._solids:
                 continue
             last_us = self._touched_us.get(name)
             if last_us is None or state.time_us - last_us >= CONTACT_GAP_US:

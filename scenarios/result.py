@@ -49,7 +49,7 @@ class RefereeSnapshot:
     penalty_s: Seconds
     crossed: Annotated[tuple[Text, ...], Field(max_length=10)]  # colours
     next_colour: Text | None  # the frame to cross next; None when all are crossed
-    contacts: int  # with frames
+    contacts: int  # with frames and obstacles
     inside: bool  # the drone is inside the arena
     motors_on: bool
     settled: bool  # motors off and at rest
@@ -79,9 +79,9 @@ class RefereeReport(_Record):
     crossing_sides: tuple[Side, ...] = Field(
         (), max_length=10, description="the side the drone came from, one for each"
     )
-    contacts: Count = Field(0, description="number of contacts with frames")
+    contacts: Count = Field(0, description="number of contacts with frames and obstacles")
     contact_frames: tuple[Text, ...] = Field(
-        (), max_length=10_000, description="the frame of each contact, in order"
+        (), max_length=10_000, description="what was touched, in order: a frame's colour, `pole` or `wall`"
     )
     outside_s: Seconds = Field(0.0, description="time outside the arena with motors on")
     try_time_s: Seconds = Field(

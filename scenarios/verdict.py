@@ -27,7 +27,7 @@ class TryFacts:
 
     expected: tuple[str, ...]  # colours to cross, in order
     crossed: tuple[str, ...]  # colours crossed, each once, in order of its first crossing
-    contact_frames: tuple[str, ...]  # the frame of each contact
+    contact_frames: tuple[str, ...]  # what was touched at each contact
     outside_s: float
     try_time_s: float  # motors on to motors off, or to now
     began: bool  # the motors were on

@@ -20,6 +20,7 @@ import numpy as np
 import numpy.typing as npt
 
 from geometry.rotations import RotationRows, normalized, rotation, rotation_rows
+from geometry.solids import Solid
 from geometry.vectors import Quaternion, Vec3
 from scenarios.models import Scenario, TrueState
 from sitl.camera_projection import (
@@ -34,7 +35,6 @@ from sitl.camera_projection import (
     drone_outlines,
 )
 from sitl.camera_scene import DRONE_BGR, GROUND_BGR, SKY_BGR, UNDERGROUND_BGR, PaintTree, build_scene
-from sitl.solids import Solid
 
 Image = npt.NDArray[np.uint8]
 

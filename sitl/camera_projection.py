@@ -17,9 +17,9 @@ import numpy as np
 import numpy.typing as npt
 
 from geometry.rotations import RotationRows
+from geometry.solids import Solid
 from geometry.vectors import Vec3
 from sitl.camera_scene import Bgr, Face
-from sitl.solids import Solid
 
 Floats = npt.NDArray[np.float64]
 Ints = npt.NDArray[np.int32]

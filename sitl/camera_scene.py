@@ -20,21 +20,24 @@ import cv2
 import numpy as np
 import numpy.typing as npt
 
+from geometry.solids import Solid
 from geometry.vectors import Vec3
-from scenarios.models import Arena, Frame, Light, Scenario
-from sitl.solids import Solid, base_solid, frame_solids
+from scenarios.models import Arena, Light, Scenario, UprightFrame
+from sitl.solids import frame_solids
 
 Bgr = tuple[int, int, int]
 Floats = npt.NDArray[np.float64]
 
 FRAME_BGR: dict[str, Bgr] = {"red": (0, 0, 255), "green": (0, 255, 0), "blue": (255, 0, 0)}
-# None of these passes the detector's colour test, lit, shaded or after JPEG.
+DECOY_BGR: dict[str, Bgr] = {"cyan": (255, 255, 0), "magenta": (255, 0, 255)}
+# Neither decoys nor these pass the detector's colour test, lit, shaded or after JPEG.
 # The sky's are from the zenith down to the horizon.
 SKY_BGR: tuple[Bgr, ...] = ((222, 206, 190), (224, 210, 196), (226, 214, 202), (228, 218, 208))
 GROUND_BGR: Bgr = (132, 134, 134)
 UNDERGROUND_BGR: Bgr = (28, 30, 32)
 TATAMI_BGR: Bgr = (56, 176, 226)
 TATAMI_MAT_BGR: Bgr = (48, 164, 213)
+PRISM_BGR: Bgr = (180, 70, 120)  # of poles and walls: violet
 BASE_BGR: Bgr = (168, 170, 172)
 BASE_MARK_BGR: Bgr = (238, 238, 238)
 DRONE_BGR: Bgr = (64, 62, 60)
@@ -57,7 +60,7 @@ class Face:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Body:
-    """A base or a frame."""
+    """A base, a frame, a pole or a part of a wall."""
 
     hull: Solid  # the box around it
     faces: tuple[Face, ...]  # in an order of painting: a later one is never hidden by an earlier one
@@ -70,18 +73,25 @@ class Scene:
     tatami: Face  # the arena's floor
     mats: tuple[Face, ...]  # every second mat of it, darker
     shadows: tuple[Face, ...]  # on the floor
-    bodies: tuple[Body, ...]  # base and frames
+    bodies: tuple[Body, ...]  # base, frames, decoys, poles and walls
 
 
 def build_scene(scenario: Scenario) -> Scene:
     """Make the faces that the camera paints."""
-    light, arena, base = scenario.light, scenario.arena, base_solid(scenario)
-    solids = [base, *(bar for frame in scenario.frames for bar in _overlapping_bars(frame))]
+    light, arena, base = scenario.light, scenario.arena, scenario.base.solid
+    frames, prisms = scenario.all_frames, scenario.prisms
+    solids = [base, *(bar for frame in frames for bar in _overlapping_bars(frame))]
+    shadows = [face for solid in solids for face in _shadow(solid, arena, light)]
+    shadows += [face for prism in prisms for face in _long_shadow(prism, arena, light)]
     return Scene(
         tatami=_on_floor(_rectangle(arena, 0.0, 1.0, 0.0, 1.0), _lit(TATAMI_BGR, _UP, light)),
         mats=_mats(arena, light),
-        shadows=tuple(face for solid in solids for face in _shadow(solid, arena, light)),
-        bodies=(_base_body(base, light), *(_frame_body(frame, light) for frame in scenario.frames)),
+        shadows=tuple(shadows),
+        bodies=(
+            _base_body(base, light),
+            *(_frame_body(frame, light) for frame in frames),
+            *(Body(prism, _upright_faces(prism, PRISM_BGR, light)) for prism in prisms),
+        ),
     )
 
 
@@ -133,26 +143,30 @@ def _face(box: Solid, local: Sequence[Vec3], normal: Vec3, colour: Bgr, light: L
 
 def _base_body(box: Solid, light: Light) -> Body:
     half, _, top = box.half_extents_m
-    faces = [
-        _face(box, _side(box.half_extents_m, axis, sign), _normal(axis, sign), BASE_BGR, light)
-        for axis, sign in ((0, 1), (0, -1), (1, 1), (1, -1), (2, 1))
-    ]
     mark = 0.7 * half
     inset: list[Vec3] = [(-mark, -mark, top), (mark, -mark, top), (mark, mark, top), (-mark, mark, top)]
-    faces.append(_face(box, inset, _UP, BASE_MARK_BGR, light))
-    return Body(box, tuple(faces))
+    mark_face = _face(box, inset, _UP, BASE_MARK_BGR, light)
+    return Body(box, (*_upright_faces(box, BASE_BGR, light), mark_face))
 
 
-def _frame_body(frame: Frame, light: Light) -> Body:
+def _upright_faces(box: Solid, colour: Bgr, light: Light) -> tuple[Face, ...]:
+    """The sides and the top of a box on the floor."""
+    return tuple(
+        _face(box, _side(box.half_extents_m, axis, sign), _normal(axis, sign), colour, light)
+        for axis, sign in ((0, 1), (0, -1), (1, 1), (1, -1), (2, 1))
+    )
+
+
+def _frame_body(frame: UprightFrame, light: Light) -> Body:
     """The faces of a frame's opening first, then those of its hull.
 
     Whatever hides a part of the opening's faces from an eye lies on the hull, and the faces of the hull that
     an eye sees never hide one another, so this order is right from everywhere.
     """
-    colour = FRAME_BGR[frame.colour]
-    outer: Vec3 = (frame.bar_m / 2, frame.outer_width_m / 2, frame.outer_height_m / 2)
+    colour = (FRAME_BGR | DECOY_BGR)[frame.colour]
+    box = frame.hull
+    outer = box.half_extents_m
     inner: Vec3 = (outer[0], outer[1] - frame.bar_m, outer[2] - frame.bar_m)
-    box = Solid(frame.colour, frame.position_arena_m, frame.yaw_rad, outer)
     around = ((1, 1), (1, -1), (2, 1), (2, -1))
     faces = [
         _face(box, _side(inner, axis, sign), _normal(axis, -sign), colour, light) for axis, sign in around
@@ -182,7 +196,7 @@ def _side(half: Vec3, axis: int, sign: int) -> list[Vec3]:
     return corners
 
 
-def _overlapping_bars(frame: Frame) -> list[Solid]:
+def _overlapping_bars(frame: UprightFrame) -> list[Solid]:
     """The four bars of a frame, all of full length, so that their shadows leave no gap between them."""
     top, bottom, *sides = frame_solids(frame)
     half_m = (frame.bar_m / 2, frame.bar_m / 2, frame.outer_height_m / 2)
@@ -191,16 +205,44 @@ def _overlapping_bars(frame: Frame) -> list[Solid]:
 
 def _shadow(solid: Solid, arena: Arena, light: Light) -> list[Face]:
     """The shadow of a solid on the floor; none if the sun does not shine from above."""
-    sun = np.array(light.sun_direction_arena)
-    if sun[2] >= -1e-3 * float(np.linalg.norm(sun)):
+    cast = _cast(solid, light)
+    if cast is None:
         return []
-    corners = np.array(solid.corners())
-    cast = corners[:, :2] - corners[:, 2:] / sun[2] * sun[:2]
-    outline = cv2.convexHull(cast.astype(np.float32)).reshape(-1, 2)
     x, y = cast.mean(axis=0)
     on_tatami = abs(x) <= arena.length_x_m / 2 and abs(y) <= arena.width_y_m / 2
-    lit = _lit(TATAMI_BGR if on_tatami else GROUND_BGR, _UP, light)
-    return [_on_floor(outline, _dim(lit, _SHADOW))]
+    return [_in_shadow(_outline(cast), TATAMI_BGR if on_tatami else GROUND_BGR, light)]
+
+
+def _long_shadow(solid: Solid, arena: Arena, light: Light) -> list[Face]:
+    """The same for a solid whose shadow may reach beyond the tatami: on the ground, then on the tatami."""
+    cast = _cast(solid, light)
+    if cast is None:
+        return []
+    outline = _outline(cast)
+    tatami = np.array(_rectangle(arena, 0.0, 1.0, 0.0, 1.0), np.float32)
+    area, on_tatami = cv2.intersectConvexConvex(outline, tatami)
+    faces = [_in_shadow(outline, GROUND_BGR, light)]
+    return [*faces, _in_shadow(on_tatami.reshape(-1, 2), TATAMI_BGR, light)] if area > 0.0 else faces
+
+
+def _cast(solid: Solid, light: Light) -> Floats | None:
+    """Where the sun casts a solid's corners on the floor, shape (8, 2); None if it is not above."""
+    sun = np.array(light.sun_direction_arena)
+    if sun[2] >= -1e-3 * float(np.linalg.norm(sun)):
+        return None
+    corners = np.array(solid.corners())
+    cast: Floats = corners[:, :2] - corners[:, 2:] / sun[2] * sun[:2]
+    return cast
+
+
+def _outline(points: Floats) -> npt.NDArray[np.float32]:
+    """The convex hull of points in plan, shape (k, 2)."""
+    hull: npt.NDArray[np.float32] = cv2.convexHull(points.astype(np.float32)).reshape(-1, 2)
+    return hull
+
+
+def _in_shadow(outline: npt.NDArray[np.float32], colour: Bgr, light: Light) -> Face:
+    return _on_floor(outline.tolist(), _dim(_lit(colour, _UP, light), _SHADOW))
 
 
 @dataclass(frozen=True, slots=True)

@@ -12,13 +12,13 @@ from typing import TYPE_CHECKING
 from firmware_py.mavlink.camera.model import CameraModel, VideoEncoding, VideoStream
 from firmware_py.mavlink.node import MavlinkNode, NodeOptions
 from geometry.axes import flip_vector
+from geometry.solids import Solid
 from scenarios.result import LocalFrame, Standing
 from sitl.drone_files import PictureAlbum, flight_recorder
 from sitl.link_hub import LinkHub
 from sitl.parameter_file import ParameterKeeper, open_parameters
 from sitl.server_settings import ServerSettings
 from sitl.simulation import Simulation
-from sitl.solids import Solid
 from sitl.storage import open_storage
 from sitl.time_grants import TimeGrants, Velocity
 from sitl.world import CONTROL_PERIOD_US

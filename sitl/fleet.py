@@ -9,8 +9,8 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from math import dist
 
+from geometry.solids import Solid
 from scenarios.models import Scenario, Start, is_over_base
-from sitl.solids import Solid
 from sitl.world import World
 
 _SPACING_M = 1.5  # between starting positions, more for large drones
@@ -75,7 +75,7 @@ def side_by_side(scenario: Scenario, count: int, width_m: float) -> list[Scenari
     """The scenario once for each drone: the first at its start, the others around it on the floor.
 
     Positions are those of a square grid around the start, the nearest first, inside the arena, beside the
-    base and the frames, 1.5 m or more apart; all have the heading of the scenario.
+    base, frames and obstacles, 1.5 m or more apart; all have the heading of the scenario.
 
     Args:
         scenario: of the first drone.
@@ -118,6 +118,9 @@ def _has_room(scenario: Scenario, place: tuple[float, float], width_m: float) ->
     base = scenario.base.model_copy(update={"edge_m": scenario.base.edge_m + 2 * width_m})
     if is_over_base(base, x_m, y_m):
         return False
+    if any(prism.plan_distance_m(x_m, y_m) <= width_m for prism in scenario.prisms):
+        return False
     return all(
-        dist(place, (frame.x_m, frame.y_m)) > frame.outer_width_m / 2 + width_m for frame in scenario.frames
+        dist(place, (frame.x_m, frame.y_m)) > frame.outer_width_m / 2 + width_m
+        for frame in scenario.all_frames
     )

@@ -1,4 +1,4 @@
-"""Solid boxes (bars of the frames, the base) and their contact with the drone's box.
+"""The bars of frames as solid boxes, and the contact of solid boxes with the drone's box.
 
 Contact is found by the separating axis theorem on two boxes (Gottschalk, Lin, Manocha, "OBBTree", 1996):
 they overlap if and only if their projections overlap on all of 15 axes; the axis of least overlap is the
@@ -7,56 +7,15 @@ direction that pushes them apart. Plain scalars: this runs at the physics rate w
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from math import cos, sin, sqrt
 
 from geometry.rotations import RotationRows
+from geometry.solids import Solid
 from geometry.vectors import Vec3
-from scenarios.models import Frame, Scenario
+from scenarios.models import UprightFrame
 
 _CYCLES = ((0, 1, 2), (1, 2, 0), (2, 0, 1))
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class Solid:
-    """An upright box."""
-
-    name: str  # as in the referee's reports
-    centre_arena_m: Vec3
-    yaw_rad: float  # counter-clockwise from arena x
-    half_extents_m: Vec3  # along its own axes
-    turn: tuple[float, float] = field(init=False)  # cosine and sine of the yaw
-
-    def __post_init__(self) -> None:
-        object.__setattr__(self, "turn", (cos(self.yaw_rad), sin(self.yaw_rad)))
-
-    def is_within(self, reach_m: float, point_m: Vec3) -> bool:
-        """Whether a point (arena axes) is inside the box or nearer to it than a distance."""
-        offset = self.offset(point_m)
-        square = 0.0
-        for along, half in zip(offset, self.half_extents_m, strict=True):
-            beyond = abs(along) - half
-            if beyond > 0.0:
-                square += beyond * beyond
-        return square < reach_m * reach_m
-
-    def offset(self, point_m: Vec3) -> Vec3:
-        """From the centre to a point given in arena axes, in the box's own axes, metres."""
-        c, s = self.turn
-        x, y, z = self.centre_arena_m
-        dx, dy = point_m[0] - x, point_m[1] - y
-        return (c * dx + s * dy, c * dy - s * dx, point_m[2] - z)
-
-    def to_arena(self, offset_m: Vec3) -> Vec3:
-        """A point given from the centre in the box's own axes, in arena axes: the inverse of `offset`."""
-        c, s = self.turn
-        x, y, z = self.centre_arena_m
-        return (x + c * offset_m[0] - s * offset_m[1], y + s * offset_m[0] + c * offset_m[1], z + offset_m[2])
-
-    def corners(self) -> list[Vec3]:
-        """The eight corners, arena axes."""
-        a, b, c = self.half_extents_m
-        return [self.to_arena((x, y, z)) for x in (-a, a) for y in (-b, b) for z in (-c, c)]
 
 
 @dataclass(frozen=True, slots=True)
@@ -68,7 +27,7 @@ class Touch:
     point_arena_m: Vec3  # where they touch
 
 
-def frame_solids(frame: Frame) -> tuple[Solid, ...]:
+def frame_solids(frame: UprightFrame) -> tuple[Solid, ...]:
     """The four bars of a frame: top, bottom, left, right (left and right between the others)."""
     half_bar = frame.bar_m / 2
     half_width, half_height = frame.outer_width_m / 2, frame.outer_height_m / 2
@@ -84,13 +43,6 @@ def frame_solids(frame: Frame) -> tuple[Solid, ...]:
         Solid(frame.colour, (x + left_x, y + left_y, z), frame.yaw_rad, upright),
         Solid(frame.colour, (x - left_x, y - left_y, z), frame.yaw_rad, upright),
     )
-
-
-def base_solid(scenario: Scenario) -> Solid:
-    """The base's box, from the floor to its top."""
-    base = scenario.base
-    half = base.edge_m / 2
-    return Solid("base", (base.x_m, base.y_m, base.top_m / 2), 0.0, (half, half, base.top_m / 2))
 
 
 def touch(

@@ -1,4 +1,4 @@
-"""The simulated world: one drone, the ground, the base and the frames, advanced in fixed steps of time."""
+"""The simulated world: one drone, ground, base, frames and obstacles, advanced in fixed steps of time."""
 
 from __future__ import annotations
 
@@ -8,10 +8,11 @@ from firmware_py.airframe import Airframe
 from firmware_py.types import MotorSpeeds, Sensors
 from geometry.axes import flip_quaternion, flip_vector, flip_yaw
 from geometry.rotations import rotation, rotation_rows, to_body, to_world, yaw_of
+from geometry.solids import Solid
 from geometry.vectors import ZERO3, Vec3
 from scenarios.models import Scenario, TrueState, is_over_base, start_position
 from sitl.dynamics import Dynamics
-from sitl.solids import Solid, base_solid, frame_solids, touch
+from sitl.solids import frame_solids, touch
 
 PHYSICS_RATE_HZ = 500
 STEPS_PER_CONTROL = 2
@@ -46,8 +47,9 @@ class World:
         self._reach_m = self.radius_m + self._margin_m
         self._base_top_m = scenario.base.top_m
         self._base_level_m = scenario.base.top_m - self._half_m[2]  # a centre on the base is higher than this
-        self._groups = [_Group(frame.position_arena_m, frame_solids(frame)) for frame in scenario.frames]
-        base = base_solid(scenario)
+        self._groups = [_Group(frame.position_arena_m, frame_solids(frame)) for frame in scenario.all_frames]
+        self._prisms = scenario.prisms
+        base = scenario.base.solid
         self._base = _Group(base.centre_arena_m, (base,))
         self._far_ticks = 0  # during which nothing can be touched
         self._ground_m = 0.0
@@ -161,6 +163,11 @@ class World:
             nearest_m = min(nearest_m, gap_m)
             if gap_m < reach:
                 near += tuple([solid for solid in group.solids if solid.is_within(reach, position)])
+        for prism in self._prisms:  # too long for a sphere around them
+            gap_m = prism.distance_m(position)
+            nearest_m = min(nearest_m, gap_m)
+            if gap_m < reach:
+                near += (prism,)
         self._far_ticks = min(int((nearest_m - reach) / self._margin_m), _MAX_FAR_TICKS)
         if self._neighbours:
             self._far_ticks = 0

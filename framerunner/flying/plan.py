@@ -4,17 +4,18 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, TypeVar
 
 from firmware_py.airframe import Airframe, load_airframe
 from offboard.keep_in_box import Box, flight_box
 from offboard.limits import CONTEST, CommandLimits
-from scenarios.models import Scenario, start_position
+from scenarios.models import Part, Scenario, start_position
 from scenarios.referee import Referee
 
 if TYPE_CHECKING:  # it imports the statechart library, which the virtual camera does not need
     from offboard.mission import Mission
 
+P = TypeVar("P", bound=Part)
 StartPose = tuple[float, float, float, float]
 """x, y, z of the drone's centre (metres) and yaw (radians), arena axes."""
 
@@ -59,13 +60,19 @@ class FlightPlan:
 
     @cached_property
     def layout(self) -> Scenario:
-        """The scenario with its frames and ceiling where they are, `lift_m` higher than declared."""
+        """The scenario with its frames, ceiling and tops of obstacles `lift_m` higher than declared."""
         scenario, lift_m = self.scenario, self.lift_m
         if not lift_m:
             return scenario
-        frames = tuple(frame.model_copy(update={"z_m": frame.z_m + lift_m}) for frame in scenario.frames)
-        arena = scenario.arena.model_copy(update={"height_m": scenario.arena.height_m + lift_m})
-        return scenario.model_copy(update={"frames": frames, "arena": arena})
+        return scenario.model_copy(
+            update={
+                "frames": tuple(_raised(frame, "z_m", lift_m) for frame in scenario.frames),
+                "decoys": tuple(_raised(decoy, "z_m", lift_m) for decoy in scenario.decoys),
+                "poles": tuple(_raised(pole, "height_m", lift_m) for pole in scenario.poles),
+                "walls": tuple(_raised(wall, "height_m", lift_m) for wall in scenario.walls),
+                "arena": _raised(scenario.arena, "height_m", lift_m),
+            }
+        )
 
     @property
     def box(self) -> Box:
@@ -112,3 +119,9 @@ def airframe_limits(airframe: Airframe) -> CommandLimits:
         yaw_rate_rad_s=own.yaw_rate_rad_s,
         level_m_s=speed_m_s,
     )
+
+
+def _raised(part: P, field: str, lift_m: float) -> P:
+    """A part of a scenario with a height raised, unless it has none of its own."""
+    height_m: float | None = getattr(part, field)
+    return part if height_m is None else part.model_copy(update={field: height_m + lift_m})

@@ -12,13 +12,14 @@ from typing import Any
 
 from firmware_py.airframe import load_airframe
 from geometry.rotations import quaternion_from_yaw
+from geometry.solids import Solid
 from geometry.vectors import Quaternion, Vec3
 from offboard.app import Moment
 from offboard.drone import DroneState
 from offboard.navigation.frame_estimate import FrameEstimate
 from offboard.navigation.view import NavigationView
 from scenarios.models import COLOURS, Arena, Scenario
-from sitl.solids import Solid, base_solid, frame_solids
+from sitl.solids import frame_solids
 from vision.intrinsics import camera_matrix
 from vision.types import Detection, Detections
 
@@ -323,7 +324,7 @@ def scene(scenario: Scenario, time_us: int) -> Message:
     floor = _cube((0.0, 0.0, -_FLOOR_M / 2), (arena.length_x_m, arena.width_y_m, _FLOOR_M), _FLOOR)
     entities = [
         _entity(time_us, "arena", ARENA, cubes=[floor], lines=[_border(arena)]),
-        _entity(time_us, "base", ARENA, cubes=[_solid(base_solid(scenario), _BASE)]),
+        _entity(time_us, "base", ARENA, cubes=[_solid(scenario.base.solid, _BASE)]),
     ]
     for frame in scenario.frames:
         bars = [_solid(bar, RGBA[frame.colour]) for bar in frame_solids(frame)]

@@ -7,16 +7,21 @@ import numpy as np
 import numpy.typing as npt
 import pytest
 
+from geometry.solids import Solid
 from geometry.vectors import Quaternion, Vec3
-from scenarios.models import Arena, Base, Camera, Frame, Light, Scenario
+from scenarios.models import Arena, Base, Camera, Decoy, Doorway, Frame, Light, Pole, Scenario, Wall
 from sitl.camera import Camera as PaintedCamera
 from sitl.camera import Image
 from sitl.camera_projection import SUBPIXELS, Mesh, Pinhole
 from sitl.camera_scene import GROUND_BGR, SKY_BGR, build_scene
-from sitl.solids import Solid, base_solid, frame_solids
+from sitl.solids import frame_solids
+from sitl.video import encode_jpeg
+from vision.detector import detect
+from vision.types import NOT_SEEN
 
-SKY, GROUND, TATAMI, BASE, RED, GREEN, BLUE = range(7)
+SKY, GROUND, TATAMI, BASE, RED, GREEN, BLUE, CYAN, MAGENTA, VIOLET = range(10)
 CLASSES = {"base": BASE, "red": RED, "green": GREEN, "blue": BLUE}
+CLASSES |= {"cyan": CYAN, "magenta": MAGENTA, "pole": VIOLET, "wall": VIOLET}
 OVERSAMPLING = 3
 
 
@@ -87,11 +92,12 @@ def facing(
 def palette(scenario: Scenario) -> dict[int, int]:
     """What every painted colour stands for."""
     scene = build_scene(scenario)
-    names = [BASE, *(CLASSES[one.colour] for one in scenario.frames)]
+    names = [BASE, *(CLASSES[one.colour] for one in scenario.all_frames)]
+    names += [CLASSES[prism.name] for prism in scenario.prisms]
     colours = [(colour, SKY) for colour in SKY_BGR] + [(GROUND_BGR, GROUND), (scene.tatami.colour, TATAMI)]
     colours += [(face.colour, TATAMI) for face in scene.mats]
     for face in scene.shadows:
-        on_tatami = bool((abs(face.corners_arena_m.mean(axis=0)) <= 5).all())
+        on_tatami = face.colour[2] > 1.5 * face.colour[0]  # it is golden, the ground is grey
         colours.append((face.colour, TATAMI if on_tatami else GROUND))
     for name, body in zip(names, scene.bodies, strict=True):
         colours += [(face.colour, name) for face in body.faces]
@@ -127,7 +133,8 @@ def traced(scenario: Scenario, position: Vec3, q: Quaternion) -> npt.NDArray[np.
     with np.errstate(invalid="ignore", over="ignore"):
         place = origin[:2] + np.where(to_floor < inf, to_floor, 0.0)[:, None] * rays[:, :2]
     result[(to_floor < inf) & (abs(place) <= 5).all(axis=1)] = TATAMI
-    solids = [base_solid(scenario)] + [bar for one in scenario.frames for bar in frame_solids(one)]
+    solids = [scenario.base.solid] + [bar for one in scenario.all_frames for bar in frame_solids(one)]
+    solids += scenario.prisms
     for solid in solids:
         entry = entry_of_rays(solid, origin, rays)
         hit = entry < nearest
@@ -155,7 +162,7 @@ def wrong_pixels(scenario: Scenario, position: Vec3, q: Quaternion) -> npt.NDArr
     truth, n = traced(scenario, position, q), OVERSAMPLING
     height, width = painted.shape
     wrong = np.zeros(painted.shape, np.bool_)
-    for name in range(7):
+    for name in range(VIOLET + 1):
         around = cv2.dilate((truth == name).astype(np.uint8), np.ones((2 * n + 1, 2 * n + 1), np.uint8))
         pixels = around.reshape(height + 2, n, width + 2, n).max(axis=(1, 3))
         wrong |= (painted == name) & (pixels[1:-1, 1:-1] == 0)
@@ -175,6 +182,18 @@ WALL = Scenario(
 )
 
 
+CROWD = SMALL.model_copy(
+    update={
+        "decoys": (
+            Decoy(colour="cyan", x_m=0.9, y_m=1.2, z_m=1.0, yaw_rad=1.4),
+            Decoy(colour="magenta", x_m=0.2, y_m=-3, z_m=1.5, yaw_rad=0.3),
+        ),
+        "poles": (Pole(x_m=-1.5, y_m=-1.5), Pole(x_m=4.8, y_m=2.2), Pole(x_m=0.9, y_m=-2.5, height_m=1.5)),
+        "walls": (Wall(x_m=0, y_m=-2, end_x_m=1, end_y_m=3, doorway=Doorway(offset_m=3.3)),),
+    }
+)
+
+
 @pytest.mark.parametrize("seed", range(12))
 def test_agrees_with_a_ray_tracer_anywhere(seed: int) -> None:
     rng = np.random.default_rng(seed)
@@ -189,6 +208,18 @@ def test_agrees_with_a_ray_tracer_upside_down_and_close_to_the_floor(seed: int) 
     x, y, z = rng.uniform((-5, -5, 0.1), (5, 5, 0.3))
     yaw, pitch, roll = rng.uniform((-pi, -pi / 2, -pi), (pi, pi / 2, pi))
     assert not wrong_pixels(SMALL, (x, y, z), quaternion(yaw, pitch, roll)).any()
+
+
+@pytest.mark.parametrize("seed", range(10))
+def test_agrees_with_a_ray_tracer_between_obstacles(seed: int) -> None:
+    rng = np.random.default_rng(400 + seed)
+    position = rng.uniform((-5, -5, 0.1), (5, 5, 4.5))
+    if any(solid.distance_m(position) < 0.15 for solid in CROWD.prisms):
+        position[0] -= 0.5
+    aim = rng.uniform((-0.5, -2.5, 0.5), (1.5, 3.0, 3.0)) - position  # at the wall and what is around it
+    pitch, roll = atan2(-aim[2], np.hypot(aim[0], aim[1])), rng.uniform(-0.3, 0.3)
+    x, y, z = position
+    assert not wrong_pixels(CROWD, (x, y, z), quaternion(atan2(aim[1], aim[0]), pitch, roll)).any()
 
 
 @pytest.mark.parametrize("seed", range(24))
@@ -301,6 +332,19 @@ def test_nothing_but_frames_has_a_frame_colour(ambient: float) -> None:
         for shown, following, other in ((r, g, b), (g, b, r), (b, r, g)):
             # Well away from the detector's limits, so that compression cannot bring it over them.
             assert not ((shown - following > 35) & (abs(following - other) < 30)).any()
+
+
+@pytest.mark.parametrize("ambient", [0.0, 0.5, 1.0])
+def test_the_papers_detector_sees_no_obstacle(ambient: float) -> None:
+    scenario = CROWD.model_copy(update={"frames": (), "camera": Camera(), "light": Light(ambient=ambient)})
+    camera, rng = PaintedCamera(scenario), np.random.default_rng(7)
+    for yaw in np.linspace(-pi, pi, 8, endpoint=False):
+        x, y = 0.5 - 3.5 * cos(yaw), 0.5 - 3.5 * sin(yaw)
+        image = camera.render((x, y, float(rng.uniform(0.5, 3.0))), quaternion(float(yaw)))
+        sent = cv2.imdecode(np.frombuffer(encode_jpeg(image), np.uint8), cv2.IMREAD_COLOR)
+        for each in (image, sent):
+            found = detect(np.ascontiguousarray(each))
+            assert (found.red, found.green, found.blue) == (NOT_SEEN,) * 3
 
 
 @pytest.mark.parametrize(

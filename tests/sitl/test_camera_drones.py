@@ -3,10 +3,10 @@
 import numpy as np
 import pytest
 
+from geometry.solids import Solid
 from scenarios.loader import load_scenario
 from sitl.camera import Camera
 from sitl.camera_scene import DRONE_BGR
-from sitl.solids import Solid
 
 LEVEL = (1.0, 0.0, 0.0, 0.0)
 HALF_M = (0.15, 0.15, 0.05)

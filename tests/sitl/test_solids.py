@@ -7,8 +7,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from geometry.solids import Solid
 from scenarios.models import Frame
-from sitl.solids import Solid, frame_solids, touch
+from sitl.solids import frame_solids, touch
 
 DRONE = (0.125, 0.125, 0.0225)
 

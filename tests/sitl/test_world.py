@@ -7,7 +7,7 @@ import pytest
 from firmware_py.airframe import load_airframe
 from firmware_py.commands import VelocityCommand
 from firmware_py.control.stabiliser import Stabiliser
-from scenarios.models import Base, Frame, Scenario, Start
+from scenarios.models import Base, Decoy, Frame, Pole, Scenario, Start, Wall
 from sitl.world import CONTROL_PERIOD_US, World
 from tests.flight import state_of
 
@@ -95,6 +95,25 @@ def test_a_frame_is_solid(speed_m_s):
     # The drone's front face stays short of the bar's far side (it gives by a spring's travel).
     assert max(truth.position_arena_m[0] for truth in touched) < 1.2 - 0.01 - 0.125 + 0.025
     assert all(hypot(*truth.velocity_arena_m_s) < speed_m_s * 1.3 for truth in flight.truths[before:])
+
+
+@pytest.mark.parametrize(
+    ("name", "parts"),
+    [
+        ("pole", {"poles": (Pole(x_m=1.2, y_m=0.1),)}),
+        ("wall", {"walls": (Wall(x_m=1.2, y_m=-3, end_x_m=1.2, end_y_m=3),)}),
+        ("cyan", {"decoys": (Decoy(colour="cyan", x_m=1.2, y_m=0.2, z_m=1.0),)}),
+    ],
+)
+def test_obstacles_are_solid(name, parts):
+    flight = Flight(world(base=Base(x_m=-4), **parts))
+    flight.fly(1.6, VelocityCommand((0.0, 0.0, -0.65)))
+    flight.fly(1.0, VelocityCommand())
+    flight.fly(2.5, VelocityCommand((1.0, 0.0, 0.0)))
+    touched = [truth for truth in flight.truths if name in truth.contacts]
+    assert touched
+    near_side_m = 1.2 - {"pole": 0.075, "wall": 0.05, "cyan": 0.01}[name]
+    assert max(truth.position_arena_m[0] for truth in touched) < near_side_m - 0.125 + 0.025
 
 
 def test_the_side_of_the_base_is_solid():
