@@ -67,6 +67,7 @@ class MavsdkDrone:
         ready_limit_s: wall time until it can be armed.
         hang_report: a real file for the stack of a hung app; by default standard error.
         box: commands that were corrected here do not leave it; None: there is none.
+        corrects: commands are corrected if the vehicle answers late; see `CommandTracker`.
 
     Attributes:
         recording_problem: why recording ended before the flight; set by `disconnect`.
@@ -84,6 +85,7 @@ class MavsdkDrone:
         ready_limit_s: float = 30.0,
         hang_report: TextIO | None = None,
         box: Box | None = None,
+        corrects: bool = True,
     ) -> None:
         self.recording_problem = ""
         self._url = parse_url(url)
@@ -102,6 +104,7 @@ class MavsdkDrone:
         self._direct: Any = None  # kept, because MAVSDK ends the subscriptions of a plugin that is deleted
         self._requests = PendingRequests()
         self._tracker = CommandTracker()
+        self._corrects = corrects
         self._latest: DroneState | None = None
         self._commanding = False
         self._pilot_has_it = False
@@ -332,7 +335,7 @@ class MavsdkDrone:
                 return
             self._pilot_has_it = False
             self._tracker.reset()  # the vehicle was moved by others
-        if latest is not None:
+        if latest is not None and self._corrects:
             command = self._tracker.correct(command, latest)
             if self._box is not None:
                 command, _ = confine(command, latest, self._box)

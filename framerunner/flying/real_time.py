@@ -141,7 +141,13 @@ def _drone(
     from offboard.mavsdk_drone import MavsdkDrone
 
     hang_report = stack.enter_context(records.folder.hang_report.open("w", encoding="utf-8"))
-    drone = MavsdkDrone(vehicle.drone_url, start_arena=plan.start_pose, hang_report=hang_report, box=plan.box)
+    drone = MavsdkDrone(
+        vehicle.drone_url,
+        start_arena=plan.start_pose,
+        hang_report=hang_report,
+        box=plan.box,
+        corrects=plan.corrects_commands,
+    )
     drone.record_to(records.folder.tlog)
     stack.callback(lambda: warn(drone.recording_problem))
     drone.use_companion(companion)

@@ -40,9 +40,11 @@ from monitor.competition.views import (
     TryDetail,
     TryView,
 )
-from scenarios.result import RefereeReport
+from scenarios.models import MissionClass
+from scenarios.result import FlightResult, RefereeReport
 
 MAX_TRIES_SHOWN = 500
+OPEN_CLASS = "open class"  # a barrier: the try did not fly by the contest's limits
 
 
 @dataclass(frozen=True, slots=True)
@@ -55,6 +57,7 @@ class _Judged:
     result: TryScore
     correction: tables.Judgement | None  # the last one
     judgements: int  # how often judges changed it
+    mission_class: MissionClass  # by the app's result; "contest" before
 
     @property
     def counts(self) -> bool:
@@ -128,10 +131,16 @@ def present_round(draws: Iterable[tables.Draw]) -> int:
 
 def stored_report(text: str) -> RefereeReport | None:
     """Read a referee's report as the database has it; None if the try was not judged."""
+    return RefereeReport.from_outside(_content(text))
+
+
+def _content(text: str) -> object:
+    """A stored report as plain data; None if it is no JSON."""
     try:
-        return RefereeReport.from_outside(json.loads(text))
+        content: object = json.loads(text)
     except ValueError:
         return None
+    return content
 
 
 def _read_rule(session: Session) -> tuple[Rule, RuleView]:
@@ -164,7 +173,9 @@ def _judge(row: tables.Try, entries: Sequence[tables.Judgement]) -> _Judged:
     if last is not None:
         crossed = None if last.crossed is None else tuple(last.crossed.split())
         correction = Correction(crossed, last.contacts, last.penalty_s, last.try_time_s, last.completed)
-    return _Judged(row, report, referee, correct(referee, correction), last, len(entries))
+    told = FlightResult.from_outside(_content(row.report))
+    mission_class = "contest" if told is None else told.mission_class
+    return _Judged(row, report, referee, correct(referee, correction), last, len(entries), mission_class)
 
 
 def _attempt_numbers(tries: Sequence[_Judged]) -> dict[int, int]:
@@ -180,11 +191,11 @@ def _attempt_numbers(tries: Sequence[_Judged]) -> dict[int, int]:
 
 
 def _attempts(tries: Iterable[_Judged]) -> list[Attempt]:
-    """Those of the tries that have a team and a result."""
+    """Those of the tries that have a team and a result, and flew by the contest's limits."""
     return [
         Attempt(judged.row.team_id, judged.row.scenario, judged.row.id, judged.result)
         for judged in tries
-        if judged.row.team_id is not None and judged.counts
+        if judged.row.team_id is not None and judged.counts and judged.mission_class == "contest"
     ]
 
 
@@ -218,8 +229,11 @@ def _countable(
     return frozenset(names) if is_complete else None
 
 
-def _barrier(row: tables.Try, teams: Mapping[int, tables.Team], countable: frozenset[str] | None) -> str:
+def _barrier(judged: _Judged, teams: Mapping[int, tables.Team], countable: frozenset[str] | None) -> str:
     """See `TryView.barrier`; "" if a ranking has the try or may still have it."""
+    row = judged.row
+    if judged.mission_class == "open":
+        return OPEN_CLASS
     team = None if row.team_id is None else teams.get(row.team_id)
     if team is None:
         return "no team"
@@ -273,7 +287,7 @@ def _try_view(
         frames=tuple(row.frames.split()),
         state=row.state,
         judged=judged.counts,
-        barrier=_barrier(row, teams, countable),
+        barrier=_barrier(judged, teams, countable),
         verdict="" if report is None else report.verdict,
         reason="" if report is None else from_wire(report.reason, 500),
         source=row.source,

@@ -9,6 +9,7 @@ from fastapi import Response
 from pydantic import Field
 
 from monitor.competition.api import json_response
+from monitor.competition.board import OPEN_CLASS
 from monitor.competition.views import Board, CallView, QueueView, RankingView, RunningView, TryView, View
 from scenarios.result import RefereeReport
 
@@ -90,7 +91,8 @@ def _select(board: Board) -> list[TryView | None]:
 
 
 def _best(tries: list[TryView]) -> TryView | None:
-    """The try that counts least; those without a team only if no team has flown."""
+    """The try that counts least; those without a team only if no team has flown, none of the class `open`."""
+    tries = [each for each in tries if each.barrier != OPEN_CLASS]
     of_teams = [each for each in tries if each.team is not None]
     crossed = [each for each in of_teams or tries if each.result.crossed]
     return min(

@@ -57,7 +57,8 @@ class TryView(View):
     state: str = Field(description='"running", "ended", or "interrupted": to be judged by hand')
     judged: bool = Field(description="it has a result: it ended, or a judge corrected it")
     barrier: str = Field(
-        description='why no ranking has it: "no team", "withdrawn", "no scenario", "not drawn"; "" if one has'
+        description='why no ranking has it: "open class", "no team", "withdrawn", "no scenario" or '
+        '"not drawn"; "" if one has'
     )
     verdict: str = Field(description="the referee's")
     reason: str = Field(description="the referee's, one sentence")

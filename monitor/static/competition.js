@@ -4,7 +4,7 @@ import { ask, oneAtATime, watch } from "./competition_channel.js";
 import { Draw, Rule } from "./competition_draw.js";
 import { Calls, Queue } from "./competition_queue.js";
 import { Teams } from "./competition_teams.js";
-import { frameMarks, moment, nameOf, notDrawn, orDash, seconds, standing } from "./competition_words.js";
+import { frameMarks, moment, nameOf, notCounted, orDash, seconds, standing } from "./competition_words.js";
 import { make, setText, whenThere } from "./dom.js";
 import { pageData } from "./start.js";
 
@@ -98,7 +98,7 @@ class Desk {
     return make("tr", { "data-try": String(each.id), "data-state": each.state, "data-open": String(open) },
       make("td", {}, `${each.id}`, make("span", { class: "when" }, moment(each.started))),
       make("td", { class: "team" }, team),
-      make("td", {}, orDash(each.scenario), make("span", { class: "when" }, each.round === 0 ? "before the draw" : `round ${each.round}`), notDrawn(each)),
+      make("td", {}, orDash(each.scenario), make("span", { class: "when" }, each.round === 0 ? "before the draw" : `round ${each.round}`), notCounted(each)),
       make("td", {}, standing(each), " ", running ? null : frameMarks(each.frames, each.result.crossed),
         each.corrected_by === "" ? null : make("span", { class: "when" }, "corrected by ", nameOf(each.corrected_by))),
       counts,

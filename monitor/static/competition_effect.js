@@ -3,6 +3,7 @@
 import { seconds, worth } from "./competition_words.js";
 
 const BARRIERS = {
+  "open class": "It is in no ranking: its mission is of the class open, faster than the contest allows.",
   "no team": "It counts for nobody until a team is set.",
   withdrawn: "It is in no ranking: the team is withdrawn.",
   "no scenario": "It is in no ranking: nobody knows which scenario was flown.",

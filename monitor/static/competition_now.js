@@ -1,6 +1,6 @@
 /** Who flies now, who is called, and who comes next: three things that the contest's pages never mix up. */
 
-import { frameMarks, nameOf, notDrawn } from "./competition_words.js";
+import { frameMarks, nameOf, notCounted } from "./competition_words.js";
 import { make } from "./dom.js";
 
 const NAMED_AFTER_NEXT = 3;
@@ -20,7 +20,7 @@ export function nowLines({ running, called, queue }) {
       each.team === null
         ? make("span", { class: "name" }, `drone ${each.drone_id}, no team`)
         : nameOf(each.team_name, { class: "name" }),
-      make("span", { class: "where" }, each.scenario), notDrawn(each), frameMarks(each.frames, each.crossed),
+      make("span", { class: "where" }, each.scenario), notCounted(each), frameMarks(each.frames, each.crossed),
       make("span", {}, clock, " s"));
   });
   if (isWaiting(called)) {

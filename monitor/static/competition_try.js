@@ -3,7 +3,7 @@
 import { ask, oneAtATime, send, watch } from "./competition_channel.js";
 import { effect, penaltyNote } from "./competition_effect.js";
 import { Fields } from "./competition_form.js";
-import { frameMarks, moment, nameOf, notDrawn, orDash, seconds, standing } from "./competition_words.js";
+import { frameMarks, moment, nameOf, notCounted, orDash, seconds, standing } from "./competition_words.js";
 import { make, setText, whenThere } from "./dom.js";
 import { pageData } from "./start.js";
 
@@ -136,7 +136,7 @@ class TryPage {
     const row = (term, ...values) => [make("dt", {}, term), make("dd", {}, ...values)];
     const rows = [
       ...row("Team", each.team === null ? make("span", { class: "tag warn" }, "no team") : nameOf(each.team_name)),
-      ...row("Scenario", orDash(each.scenario), each.round === 0 ? ", before the draw" : `, round ${each.round} `, notDrawn(each) ?? ""),
+      ...row("Scenario", orDash(each.scenario), each.round === 0 ? ", before the draw" : `, round ${each.round} `, notCounted(each) ?? ""),
       ...row("State", each.state === "running" ? "running" : standing(each)),
       ...(judge ? [] : values(each, result, row)),
       ...row("Counts", make("strong", {}, each.judged ? `${seconds(result.counted_s)} s` : "not yet judged")),

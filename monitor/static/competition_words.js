@@ -49,9 +49,11 @@ export function frameMarks(frames, crossed) {
   return marks;
 }
 
-/** A mark on a try at a scenario that no ranking has; null for all others. @param {object} each a try, also a running one */
-export function notDrawn(each) {
-  return each.barrier === "not drawn" ? make("span", { class: "tag warn" }, "not drawn: does not count") : null;
+const MARKED = ["not drawn", "open class"];
+
+/** A mark on a try that no ranking has for its scenario or class; null for all others. @param {object} each a try, also a running one */
+export function notCounted(each) {
+  return MARKED.includes(each.barrier) ? make("span", { class: "tag warn" }, `${each.barrier}: does not count`) : null;
 }
 
 /** Whether there is a team, scenario or none: a dash for none. */

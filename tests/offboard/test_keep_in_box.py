@@ -157,3 +157,12 @@ def test_what_the_adapter_adds_to_a_command_does_not_lead_out_either():
         drone._latest = state(z=z)
         drone.command(VelocityCommand())
     assert [command.up_m_s for command in sent] == pytest.approx([0.7, 0.2, -0.5])
+
+
+def test_a_mission_that_corrects_its_own_commands_has_them_sent_unchanged():
+    drone, sent = MavsdkDrone("udpin://127.0.0.1:14540", box=BOX, corrects=False), []
+    drone._commanding, drone._setpoints = True, SimpleNamespace(send=sent.append)
+    drone._tracker = SimpleNamespace(correct=lambda command, state: VelocityCommand(up_m_s=0.7))
+    drone._latest = state(z=3.0)
+    drone.command(VelocityCommand(forward_m_s=0.5))
+    assert sent == [VelocityCommand(forward_m_s=0.5)]

@@ -1,5 +1,6 @@
 """Who is called, who flies and who is next, as stored."""
 
+from dataclasses import replace
 from datetime import UTC, datetime, timedelta
 
 import pytest
@@ -8,6 +9,7 @@ from monitor.competition.calls import Entry
 from monitor.competition.database import Database
 from monitor.competition.store import Store
 from monitor.competition.validation import RefusedError
+from scenarios.result import FlightResult
 from tests.monitor.competition.harness import COLOURS, event
 
 NOW = datetime(2030, 5, 17, 12, 0, tzinfo=UTC)
@@ -227,3 +229,16 @@ def test_a_try_says_whether_a_ranking_has_it_and_which_other_would_count(store, 
     assert told(late) == ("not drawn", None) and told(one) == ("", other)
     store.change_team(teams[0], None, None, True, ADA)
     assert told(one) == ("withdrawn", other)
+
+
+def test_a_try_of_the_class_open_is_in_no_ranking_and_no_other_try_s_rival(store, teams):
+    store.call(teams[0], "", ADA)
+    slow = end(store, "a", time_s=40.0)
+    fast = event("ended", "b", time_s=20.0, final=True)
+    result = FlightResult(**dict(fast.report), mission_class="open")
+    store.call(teams[0], "", ADA)
+    fast_id = store.take(replace(fast, report=result), COLOURS, NOW)
+    assert store.detail(fast_id).attempt.barrier == "open class"
+    assert store.detail(slow).rival is None
+    (row,) = (row for row in store.board().rankings[0].rows if row.team == teams[0])
+    assert row.cells[0].attempt == slow and row.cells[0].tries == 1
