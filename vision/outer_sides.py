@@ -1,0 +1,136 @@
+"""First estimates of the four outer edges of a frame, from the outline of its pixels.
+
+The convex hull of a frame's pixels is nearly a quadrilateral: rounding to pixels and the bars' thickness add
+short edges. The edge whose removal, by prolonging its neighbours, adds the least area goes first, until four
+are left. Edges along the image's border belong to no frame: what they cut off is not known.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from math import hypot
+
+import cv2
+import numpy as np
+import numpy.typing as npt
+
+from vision.outline import Point, Segment, Sides
+
+_MIN_SIZE_PX = 2
+_MAX_ADDED = 0.03  # of the area: less than this is rounding, more is a side
+
+
+@dataclass(slots=True)
+class _Edge:
+    start: Point
+    end: Point
+    real: bool  # not along the image's border
+
+
+def outer_sides(points: npt.NDArray[np.int32], width_px: int, height_px: int) -> Sides | None:
+    """Find the sides of the quadrilateral around a region.
+
+    Args:
+        points: pixels on its outline, shape (n, 1, 2), columns and rows of the image.
+        width_px: of the image.
+        height_px: of the image.
+
+    Returns:
+        Top, right, bottom and left side, clockwise; None for a side that is not seen. None if there is no
+        such quadrilateral.
+    """
+    hull = cv2.convexHull(points)  # clockwise to the eye, as OpenCV's axes have y upwards
+    if len(hull) < 3:
+        return None
+    (left, top), (right, bottom) = hull.min(axis=(0, 1)).tolist(), hull.max(axis=(0, 1)).tolist()
+    if right - left < _MIN_SIZE_PX or bottom - top < _MIN_SIZE_PX:
+        return None
+    cut = left <= 0 or top <= 0 or right >= width_px - 1 or bottom >= height_px - 1
+    if cut:
+        edges = _reduced(_edges(hull.reshape(-1, 2).tolist(), width_px, height_px))
+        segments = [(edge.start, edge.end) for edge in edges if edge.real]
+    else:
+        corners = cv2.approxPolyN(hull.astype(np.float32), 4).reshape(-1, 2).tolist()
+        segments = [(tuple(corners[i - 1]), tuple(corners[i])) for i in range(len(corners))]
+    return _named(segments)
+
+
+def _named(segments: list[Segment]) -> Sides | None:
+    """Say which side is which: the upright pair is steeper in the image than the level one."""
+    if not 2 <= len(segments) <= 4:
+        return None
+    steepness = [_steepness(segment) for segment in segments]
+    if len(segments) == 4:
+        first_upright = steepness[0] + steepness[2] > steepness[1] + steepness[3]
+        upright = [(i % 2 == 0) == first_upright for i in range(4)]
+    elif len(segments) == 3 and _are_opposite(segments[2], segments[0]):
+        middle_upright = steepness[1] * 2.0 > steepness[0] + steepness[2]
+        upright = [not middle_upright, middle_upright, not middle_upright]
+    else:
+        upright = [value > 0.7 for value in steepness]
+    sides: list[Segment | None] = [None, None, None, None]
+    for segment, is_upright in zip(segments, upright, strict=True):
+        (x0, y0), (x1, y1) = segment
+        index = (1 if y1 > y0 else 3) if is_upright else (0 if x1 > x0 else 2)
+        if sides[index] is not None:
+            return None
+        sides[index] = segment
+    return (sides[0], sides[1], sides[2], sides[3])
+
+
+def _are_opposite(a: Segment, b: Segment) -> bool:
+    (ax0, ay0), (ax1, ay1) = a
+    (bx0, by0), (bx1, by1) = b
+    return (ax1 - ax0) * (bx1 - bx0) + (ay1 - ay0) * (by1 - by0) < 0.0
+
+
+def _steepness(segment: Segment) -> float:
+    """Share of a segment's length that is upright in the image, 0..1."""
+    (x0, y0), (x1, y1) = segment
+    return abs(y1 - y0) / max(hypot(x1 - x0, y1 - y0), 1e-9)
+
+
+def _edges(hull: list[list[int]], width_px: int, height_px: int) -> list[_Edge]:
+    """The edges of a hull; those along one border of the image in one piece."""
+    edges: list[_Edge] = []
+    for i, (x1, y1) in enumerate(hull):
+        x0, y0 = hull[i - 1]
+        border = (x0 == x1 and x0 in (0, width_px - 1)) or (y0 == y1 and y0 in (0, height_px - 1))
+        edges.append(_Edge((float(x0), float(y0)), (float(x1), float(y1)), not border))
+    return edges
+
+
+def _reduced(edges: list[_Edge]) -> list[_Edge]:
+    """Remove the shortest detours until four real edges are left, and further ones that are only rounding."""
+    area = abs(sum(e.start[0] * e.end[1] - e.end[0] * e.start[1] for e in edges)) / 2.0
+    while True:
+        real = [i for i, edge in enumerate(edges) if edge.real]
+        best: tuple[float, int, Point] | None = None
+        for i in real:
+            removal = _removal(edges[i - 1], edges[i], edges[(i + 1) % len(edges)])
+            if removal is not None and (best is None or removal[0] < best[0]):
+                best = (removal[0], i, removal[1])
+        if best is None or (len(real) <= 4 and best[0] > max(1.0, _MAX_ADDED * area)):
+            return edges
+        _, i, meeting = best
+        edges[i - 1].end = meeting
+        edges[(i + 1) % len(edges)].start = meeting
+        del edges[i]
+        if len(edges) < 4:
+            return edges
+
+
+def _removal(before: _Edge, edge: _Edge, after: _Edge) -> tuple[float, Point] | None:
+    """The area that is added when the neighbours of an edge are prolonged until they meet, and where."""
+    (x0, y0), (x1, y1) = edge.start, edge.end
+    ux, uy = x0 - before.start[0], y0 - before.start[1]
+    vx, vy = after.end[0] - x1, after.end[1] - y1
+    turn = ux * vy - uy * vx
+    if turn <= 1e-9:  # they do not meet on this side
+        return None
+    t = ((x1 - x0) * vy - (y1 - y0) * vx) / turn
+    if t < 0.0:
+        return None
+    x, y = x0 + t * ux, y0 + t * uy
+    area = 0.5 * abs((x1 - x0) * (y - y0) - (y1 - y0) * (x - x0))
+    return area, (x, y)
