@@ -66,8 +66,8 @@ class Coverage:
             clear = self._clear(pose, obstacle_edges, dx_m, dy_m, dz_m)
             in_view, dx_m, dy_m, dz_m = in_view[clear], dx_m[clear], dy_m[clear], dz_m[clear]
         self._seen *= np.float32(_FADE)
-        for seen, quality in zip(self._seen, view_qualities(dx_m, dy_m, dz_m), strict=True):
-            seen[in_view] = np.maximum(seen[in_view], quality)
+        qualities = view_qualities(dx_m, dy_m, dz_m)
+        self._seen[:, in_view] = np.maximum(np.take(self._seen, in_view, axis=1), qualities)
 
     def blocks(self) -> Floats:
         """Quality of the best view, 0 to 1, by heading and block of the grid: shape (HEADINGS, blocks)."""

@@ -93,7 +93,7 @@ class Explorer:
         self._table = ViewTable(camera, arena, blocks)
         self._x_m, self._y_m, self._z_m = blocks.centres()
         self._prior = _prior(self._z_m, blocks.z_m)
-        self._heights_m = np.unique(self._table.places_m[:, 2])
+        self._heights_m = self._table.heights_m
         self._visits = np.zeros((len(self._table.places_m), len(YAWS)))
         self._last: Viewpoint | None = None
 
@@ -134,7 +134,7 @@ class Explorer:
         seen = self.coverage.blocks()
         unseen = _Unseen(seen, self._weights(seen, found, hints))
         here = Pose(position_m, yaw_rad)
-        place, yaw = self._nearest(position_m, yaw_rad)
+        place, yaw = self._table.nearest(position_m, yaw_rad)
         self._visits[place, yaw] += 1.0
         blocked = [(each.x_m, each.y_m, each.radius_m + _CLEAR_M) for each in obstacles]
         blocked += [(x, y, _CLEAR_M) for x, y, _ in found]
@@ -181,17 +181,11 @@ class Explorer:
         )
         return on_ray
 
-    def _nearest(self, position_m: Vec3, yaw_rad: float) -> tuple[int, int]:
-        """Index of the table's view nearest to a pose."""
-        dx, dy, dz = (self._table.places_m[:, axis] - position_m[axis] for axis in range(3))
-        place = int(np.argmin(dx * dx + dy * dy + dz * dz))
-        return place, round(yaw_rad / tau * len(YAWS)) % len(YAWS)
-
     def _candidates(self, here: Pose, unseen: _Unseen) -> list[Viewpoint]:
         """Views to look at closely: the last choice, some from about here, and the table's best."""
         x, y, z = here.position_m
         candidates = [] if self._last is None else [self._last]
-        heights_m = [z, *(float(height) for height in self._heights_m if abs(height - z) > 0.3)]
+        heights_m = [z, *(height_m for height_m in self._heights_m if abs(height_m - z) > 0.3)]
         for height_m in heights_m:
             candidates += [
                 Viewpoint((x, y, height_m), remainder(here.yaw_rad + turn, tau))
@@ -217,7 +211,7 @@ class Explorer:
         gains = self._gains(candidates, times_s, here, unseen)
         scores = []
         for index, each in enumerate(candidates):
-            place, yaw = self._nearest(each.position_m, each.yaw_rad)
+            place, yaw = self._table.nearest(each.position_m, each.yaw_rad)
             score = float(gains[index]) / (times_s[index] + _START_S)
             score /= 1.0 + _USED * float(self._visits[place, yaw])
             scores.append(score * _KEEP if each is self._last else score)
@@ -228,7 +222,7 @@ class Explorer:
     ) -> Doubles:
         """Gains of the views and of those on the way to them."""
         count = len(candidates)
-        best_view = np.repeat(unseen.seen[:, None, :], count, axis=1)
+        best_view = np.tile(unseen.seen, (1, count))
         gains = np.zeros(count)
         for sample in range(1, _SAMPLES + 1):
             poses = [
@@ -239,15 +233,17 @@ class Explorer:
             dx, dy, dz = self._x_m - at[:, 0:1], self._y_m - at[:, 1:2], self._z_m - at[:, 2:3]
             cosine, sine = at[:, 3:4], at[:, 4:5]
             ahead, left = dx * cosine + dy * sine, dy * cosine - dx * sine
-            which, block = np.nonzero(self._visibility.in_view(ahead, left, dz, _SAMPLE_MARGIN_M))
-            qualities = view_qualities(dx[which, block], dy[which, block], dz[which, block])
-            new = np.zeros(which.size, dtype=np.float32)
-            for layer, quality in zip(best_view, qualities, strict=True):
-                before = layer[which, block]
-                after = np.maximum(before, quality)
-                layer[which, block] = after
-                new += after - before
-            gains += np.bincount(which, weights=new * unseen.weights[block], minlength=count)
+            in_view = np.flatnonzero(self._visibility.in_view(ahead, left, dz, _SAMPLE_MARGIN_M))
+            candidate, block = np.divmod(in_view, self._x_m.size)
+            qualities = view_qualities(dx.ravel()[in_view], dy.ravel()[in_view], dz.ravel()[in_view])
+            before = np.take(best_view, in_view, axis=1)
+            after = np.maximum(before, qualities)
+            best_view[:, in_view] = after
+            after -= before
+            new = after[0]
+            for layer in after[1:]:
+                new += layer
+            gains += np.bincount(candidate, weights=new * unseen.weights[block], minlength=count)
         return gains
 
 

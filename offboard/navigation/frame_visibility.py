@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from math import ceil, cos, pi, sin
+from math import ceil, cos, pi, radians, sin
 from typing import Final, Self
 
 import numpy as np
@@ -21,11 +21,19 @@ _CELL_M: Final = 0.5
 _MOST_CELLS: Final = 20  # along one axis; a larger arena has larger cells
 _HALF_WIDTH_M: Final = 0.21  # of a frame, bars included
 _HALF_HEIGHT_M: Final = 0.11
-_NEAR_M, _FAR_M, _UNSEEN_M = 3.0, 6.0, 7.5  # distances of full, good and no quality
-_FAR_QUALITY: Final = 0.85
-_STEEP: Final = tuple(cos(degrees * pi / 180) for degrees in (75.0, 65.0, 50.0))  # no, good, full quality
-_STEEP_QUALITY: Final = 0.75
-NORMALS: Final = tuple((cos(index * pi / HEADINGS), sin(index * pi / HEADINGS)) for index in range(HEADINGS))
+_Point = tuple[float, float]
+_NEAR: Final[_Point] = (3.0, BEST_QUALITY)  # metres, and quality of a view from there
+_FAR: Final[_Point] = (6.0, 0.85 * BEST_QUALITY)
+_TOO_FAR: Final[_Point] = (7.5, 0.0)
+_OPEN: Final[_Point] = (
+    cos(radians(50.0)),
+    1.0,
+)  # cosine of the angle to the normal, and factor of the quality
+_NARROW: Final[_Point] = (cos(radians(65.0)), 0.75)
+_EDGE_ON: Final[_Point] = (cos(radians(75.0)), 0.0)
+_NORMALS: Final[Floats] = np.array(
+    [[turn(index * pi / HEADINGS) for index in range(HEADINGS)] for turn in (cos, sin)], dtype=np.float32
+)
 
 
 @dataclass(frozen=True, slots=True)
@@ -89,29 +97,26 @@ class FrameVisibility:
         return seen
 
 
-def view_qualities(dx_m: Floats, dy_m: Floats, dz_m: Floats) -> list[Floats]:
+def view_qualities(dx_m: Floats, dy_m: Floats, dz_m: Floats) -> Floats:
     """How surely a frame is recognised that is wholly in view, 0 to `BEST_QUALITY`, for each heading.
 
     It falls with the distance beyond 3 m and with the angle of the line of sight to the frame's normal
     beyond 50 degrees, to nothing at 75 degrees.
 
     Args:
-        dx_m: from the camera to the frame, arena axes.
+        dx_m: from the camera to the frame, arena axes, any shape.
         dy_m: likewise.
         dz_m: likewise.
 
     Returns:
-        One array for each of the `NORMALS`.
+        Shape (HEADINGS, *shape): for a normal that is turned by index / HEADINGS of half a turn.
     """
     distance_m = np.maximum(np.sqrt(dx_m * dx_m + dy_m * dy_m + dz_m * dz_m), np.float32(0.1))
-    by_distance = _interpolated(
-        distance_m, (_NEAR_M, _FAR_M, _UNSEEN_M), (BEST_QUALITY, BEST_QUALITY * _FAR_QUALITY, 0.0)
-    )
-    ux, uy = dx_m / distance_m, dy_m / distance_m
-    qualities = []
-    for nx, ny in NORMALS:
-        facing = np.abs(ux * np.float32(nx) + uy * np.float32(ny))
-        qualities.append(by_distance * _interpolated(facing, _STEEP, (0.0, _STEEP_QUALITY, 1.0)))
+    by_distance = _falling(distance_m, _NEAR, _FAR, _TOO_FAR)
+    normals = _NORMALS.reshape(2, HEADINGS, *(1 for _ in dx_m.shape))
+    facing = normals[0] * (dx_m / distance_m) + normals[1] * (dy_m / distance_m)
+    qualities = _falling(np.abs(facing, out=facing), _OPEN, _NARROW, _EDGE_ON)
+    qualities *= by_distance
     return qualities
 
 
@@ -122,11 +127,12 @@ def _centres(length_m: float) -> Floats:
     return centres
 
 
-def _interpolated(at: Floats, points: tuple[float, ...], values: tuple[float, ...]) -> Floats:
-    """A line through three points, constant beyond the ends; in single precision, element by element."""
-    (p0, p1, p2), (v0, v1, v2) = points, values
-    low = np.float32(v0) + (at - np.float32(p0)) * np.float32((v1 - v0) / (p1 - p0))
-    high = np.float32(v1) + (at - np.float32(p1)) * np.float32((v2 - v1) / (p2 - p1))
-    line = np.where(at < np.float32(p1), low, high)
-    result: Floats = np.minimum(np.maximum(line, np.float32(min(v0, v2))), np.float32(max(v0, v2)))
-    return result
+def _falling(at: Floats, full: _Point, good: _Point, none: _Point) -> Floats:
+    """Two straight lines through three points, constant beyond them; steeper towards `none`."""
+    gentle, steep = (
+        (np.float32((b[1] - a[1]) / (b[0] - a[0])), np.float32(a[0]), np.float32(a[1]))
+        for a, b in ((full, good), (good, none))
+    )
+    value = (at - gentle[1]) * gentle[0] + gentle[2]
+    np.minimum(value, (at - steep[1]) * steep[0] + steep[2], out=value)
+    return np.clip(value, np.float32(none[1]), np.float32(full[1]), out=value)

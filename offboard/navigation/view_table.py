@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from itertools import product
 from math import atan, cos, remainder, sin, tau
 from typing import Final
 
 import numpy as np
 import numpy.typing as npt
 
+from geometry.vectors import Vec3
 from offboard.navigation.camera_model import CameraModel
 from offboard.navigation.frame_visibility import HEADINGS, Floats, SearchGrid, view_qualities
 from scenarios.models import Arena
@@ -27,11 +29,14 @@ class ViewTable:
     """Gains of all views from a grid of places, fast and roughly: the image is taken as a sector in plan.
 
     Attributes:
+        heights_m: heights of the places.
         places_m: x, y, z of the places, arena axes, shape (places, 3).
     """
 
     def __init__(self, camera: CameraModel, arena: Arena, blocks: SearchGrid) -> None:
-        self.places_m = _places(arena)
+        self.heights_m = _heights_m(arena)
+        self._axes_m = (_along(arena.length_x_m), _along(arena.width_y_m), self.heights_m)
+        self.places_m = np.array(list(product(*self._axes_m)))
         x_m, y_m, z_m = blocks.centres()
         dx_m, dy_m, dz_m = (
             centres[None, :] - self.places_m[:, axis, None].astype(np.float32)
@@ -40,13 +45,22 @@ class ViewTable:
         plan_2 = dx_m * dx_m + dy_m * dy_m
         steepest = np.float32(0.9 * camera.half_height_px / camera.focal_px)
         reached = (dz_m * dz_m <= plan_2 * steepest * steepest) & (plan_2 >= np.float32(_NEAREST_M**2))
-        self._qualities = [quality * reached for quality in view_qualities(dx_m, dy_m, dz_m)]
+        self._qualities = view_qualities(dx_m, dy_m, dz_m) * reached
         bearings = _pseudo_angle(dx_m, dy_m)
-        self._order: Indices = np.argsort(bearings, axis=1, kind="stable")
-        ordered = np.take_along_axis(bearings, self._order, axis=1)
+        rows = np.arange(len(bearings))[:, None] * bearings.shape[1]
+        self._order: Indices = np.argsort(bearings, axis=1, kind="stable") + rows  # of the flat array
+        ordered = np.take(bearings, self._order)
         half_rad = atan(camera.half_width_px / camera.focal_px) - _EDGE_RAD
         self._first = _counts_below(ordered, [yaw - half_rad for yaw in YAWS])
         self._end = _counts_below(ordered, [yaw + half_rad for yaw in YAWS])
+
+    def nearest(self, position_m: Vec3, yaw_rad: float) -> tuple[int, int]:
+        """Index of the view nearest to a pose: of its place and of its heading."""
+        place = 0
+        for axis_m, at_m in zip(self._axes_m, position_m, strict=True):
+            distances_m = [abs(each_m - at_m) for each_m in axis_m]
+            place = place * len(axis_m) + distances_m.index(min(distances_m))
+        return place, round(yaw_rad / tau * len(YAWS)) % len(YAWS)
 
     def gains(self, seen: Floats, weights: Floats) -> Doubles:
         """How much would be newly seen.
@@ -66,7 +80,7 @@ class ViewTable:
         new *= weights
         # Cumulative sums have one order of adding on every processor, so that ties are decided alike.
         sums = np.zeros((new.shape[0], new.shape[1] + 1))
-        np.cumsum(np.take_along_axis(new, self._order, axis=1), axis=1, out=sums[:, 1:], dtype=np.float64)
+        np.cumsum(np.take(new, self._order), axis=1, out=sums[:, 1:])
         end = np.take_along_axis(sums, self._end, axis=1)
         first = np.take_along_axis(sums, self._first, axis=1)
         around = np.where(self._end < self._first, sums[:, -1:], 0.0)
@@ -74,22 +88,14 @@ class ViewTable:
         return gains
 
 
-def _places(arena: Arena) -> Doubles:
-    def along(length_m: float) -> Doubles:
-        reach_m = max(length_m / 2 - _WALL_M, 0.0)
-        return np.linspace(-reach_m, reach_m, _PLACES)
+def _along(length_m: float) -> list[float]:
+    reach_m = max(length_m / 2 - _WALL_M, 0.0)
+    return [reach_m * (2 * index / (_PLACES - 1) - 1) for index in range(_PLACES)]
 
-    heights_m = sorted(
-        {
-            min(_LOW_M, arena.height_m / 2),
-            min(_MIDDLE_M, arena.height_m / 2),
-            max(arena.height_m - _BELOW_CEILING_M, arena.height_m / 2),
-        }
-    )
-    x_m, y_m, z_m = np.meshgrid(
-        along(arena.length_x_m), along(arena.width_y_m), np.array(heights_m), indexing="ij"
-    )
-    return np.stack([x_m.ravel(), y_m.ravel(), z_m.ravel()], axis=1)
+
+def _heights_m(arena: Arena) -> list[float]:
+    half_m = arena.height_m / 2
+    return [min(_LOW_M, half_m), min(_MIDDLE_M, half_m), max(arena.height_m - _BELOW_CEILING_M, half_m)]
 
 
 def _pseudo_angle(x: Floats, y: Floats) -> Floats:
