@@ -28,7 +28,7 @@ _TOO_FAR: Final[_Point] = (7.5, 0.0)
 _OPEN: Final[_Point] = (
     cos(radians(50.0)),
     1.0,
-)  # cosine of the angle to the normal, and factor of the quality
+)  # cosine of the angle to the normal, and factor
 _NARROW: Final[_Point] = (cos(radians(65.0)), 0.75)
 _EDGE_ON: Final[_Point] = (cos(radians(75.0)), 0.0)
 _NORMALS: Final[Floats] = np.array(
