@@ -1,0 +1,221 @@
+"""The map of frames: every frame seen is remembered, and each image makes its pose better known.
+
+How it works is in docs/navigation.md.
+"""
+
+from __future__ import annotations
+
+from math import cos, hypot, sin
+
+from offboard.navigation.camera_model import CameraModel, CameraPose
+from offboard.navigation.frame_estimate import FrameEstimate
+from offboard.navigation.frame_measurement import (
+    HALF_HEIGHT_M,
+    HALF_WIDTH_M,
+    Floats,
+    Prior,
+    View,
+    solutions,
+    view_of,
+)
+from offboard.navigation.frame_track import GATES, Fit, FrameTrack
+from offboard.navigation.pose_history import DronePose
+from scenarios.models import Arena
+from vision.types import Detections, ObstacleEdge
+
+# A frame that is nearer, less oblique and farther inside the image than this is found in all but few images.
+SURELY_FOUND_M = 5.0
+SURELY_FOUND_COSINE = 0.5
+SURELY_FOUND_MARGIN_PX = 8.0
+HIDING_MARGIN_PX = 4.0  # what comes nearer than this to an object before it may be hidden
+NEAR_PX = 6.0  # a sighting whose centre is this near to where a frame should be is of that frame,
+NEAR_SHARE = 0.5  # or this share of its width
+DUPLICATE_M = 0.25  # two frames cannot be nearer to each other
+
+
+class FrameMap:
+    """The frames seen so far.
+
+    Args:
+        camera: of the drone.
+        arena: frames are in it.
+    """
+
+    def __init__(self, camera: CameraModel, arena: Arena) -> None:
+        self._camera = camera
+        self._arena = arena
+        self._prior = Prior.of(arena)
+        self._tracks: list[FrameTrack] = []
+        self._time_us = -1
+
+    def best(self, colour: str) -> FrameEstimate | None:
+        """The frame of a colour; the one best known if there are several, None if there is none."""
+        tracks = [track for track in self._tracks if track.colour == colour]
+        return max(tracks, key=lambda track: track.rank).estimate() if tracks else None
+
+    def frames(self) -> tuple[FrameEstimate, ...]:
+        """All frames seen, of every colour, in the order in which they were found."""
+        return tuple(track.estimate() for track in self._tracks)
+
+    def observe(self, detections: Detections, pose: DronePose) -> None:
+        """Use an image; one that is not later than the last is ignored.
+
+        Args:
+            detections: the frames in it.
+            pose: of the drone when it was exposed.
+        """
+        if pose.time_us <= self._time_us:
+            return
+        self._time_us = pose.time_us
+        for track in self._tracks:
+            track.predict(pose.time_us)
+        unseen = list(self._tracks)
+        views: list[tuple[str, View]] = []
+        for sighting in detections.frames:
+            view = view_of(sighting, self._camera, pose)
+            if view is not None:
+                views.append((sighting.colour, view))
+        for colour, view in self._match(views, unseen):
+            self._explain(colour, view, unseen)
+        camera = self._camera.pose(pose.position_m, pose.attitude_arena)
+        for track in unseen:
+            if self._should_be_seen(track, camera, detections.obstacle_edges):
+                track.miss()
+        self._tracks = [
+            track for track in self._tracks if track.belief >= 0 and track.keep_inside(self._arena)
+        ]
+        self._drop_duplicates()
+
+    def _match(self, views: list[tuple[str, View]], unseen: list[FrameTrack]) -> list[tuple[str, View]]:
+        """Give views to the frames that they fit best; returns those that fit none."""
+        fits: list[tuple[float, int, FrameTrack, Fit]] = []
+        for number, (colour, view) in enumerate(views):
+            for track in unseen:
+                if track.colour == colour:
+                    fit = track.fit(view)
+                    if fit.inside:
+                        fits.append((fit.distance2, number, track, fit))
+        fits.sort(key=lambda candidate: candidate[:2])
+        matched: set[int] = set()
+        for _, number, track, fit in fits:
+            if number not in matched and track in unseen:
+                track.accept(views[number][1], fit)
+                matched.add(number)
+                unseen.remove(track)
+        return [view for number, view in enumerate(views) if number not in matched]
+
+    def _explain(self, colour: str, view: View, unseen: list[FrameTrack]) -> None:
+        """A view that fits no frame contradicts the one that should be seen there, or is of a new one."""
+        for track in self._tracks:
+            if track.colour == colour and self._is_near(track, view):
+                if track in unseen:
+                    unseen.remove(track)
+                    track.contradict(view, self._prior)
+                return
+        if sum(view.seen) < 3:
+            return
+        found = solutions([view], self._prior)
+        if found and found[0].cost <= GATES[sum(view.seen)]:
+            track = FrameTrack(colour, found, view)
+            if track.keep_inside(self._arena):
+                self._tracks.append(track)
+
+    def _is_near(self, track: FrameTrack, view: View) -> bool:
+        """Whether a view is where a frame should be in the image."""
+        x, y, z, _ = track.state.tolist()
+        centre = self._camera.project(view.camera, (x, y, z))
+        if centre is None:
+            return False
+        corners = view.corners_px.reshape(-1, 2)
+        right, down = corners.mean(axis=0).tolist()
+        distance_m = hypot(*(a - b for a, b in zip(view.camera.position_m, (x, y, z), strict=True)))
+        near_px = max(NEAR_PX, NEAR_SHARE * 2.0 * HALF_WIDTH_M * view.focal_px / distance_m)
+        return hypot(right - centre[0], down - centre[1]) <= near_px
+
+    def _should_be_seen(
+        self, track: FrameTrack, camera: CameraPose, obstacles: tuple[ObstacleEdge, ...]
+    ) -> bool:
+        """Whether an image must show a frame: it is near, not oblique, wholly inside, hidden by nothing."""
+        at = camera.position_m
+        x, y, _, yaw = track.state.tolist()
+        distance_m = _distance_m(track, camera)
+        facing = abs((at[0] - x) * cos(yaw) + (at[1] - y) * sin(yaw))
+        if distance_m > SURELY_FOUND_M or facing < SURELY_FOUND_COSINE * distance_m:
+            return False
+        outline = self._outline(track.state, camera)
+        if outline is None or not all(
+            self._camera.contains(right, down, SURELY_FOUND_MARGIN_PX)
+            for right, down in ((outline[0], outline[1]), (outline[2], outline[3]))
+        ):
+            return False
+        for other in self._tracks:
+            if other is not track and _distance_m(other, camera) < distance_m:
+                before = self._outline(other.state, camera)
+                if before is None or _overlap(outline, before):
+                    return False
+        return not any(self._hides(edge, outline, distance_m, camera) for edge in obstacles)
+
+    def _outline(self, state: Floats, camera: CameraPose) -> tuple[float, float, float, float] | None:
+        """The box around a frame in the image: left, top, right, bottom; None if not before the camera."""
+        x, y, z, yaw = state.tolist()
+        sx, sy = -sin(yaw) * HALF_WIDTH_M, cos(yaw) * HALF_WIDTH_M
+        corners = [
+            self._camera.project(camera, (x + side * sx, y + side * sy, z + up * HALF_HEIGHT_M))
+            for side in (-1.0, 1.0)
+            for up in (-1.0, 1.0)
+        ]
+        seen = [corner for corner in corners if corner is not None]
+        if len(seen) < len(corners):
+            return None
+        rights, downs = zip(*seen, strict=True)
+        return (min(rights), min(downs), max(rights), max(downs))
+
+    def _hides(
+        self,
+        edge: ObstacleEdge,
+        outline: tuple[float, float, float, float],
+        distance_m: float,
+        camera: CameraPose,
+    ) -> bool:
+        """Whether an obstacle's column of the image may be before a frame: where it stands says how far."""
+        if not outline[0] - HIDING_MARGIN_PX <= edge.right_px <= outline[2] + HIDING_MARGIN_PX:
+            return False
+        if edge.cut:
+            return True
+        m, focal_px = camera.rotation, self._camera.focal_px
+        left, up = -edge.right_px / focal_px, -edge.down_px / focal_px
+        sinking = -(m[6] + m[7] * left + m[8] * up)
+        if sinking <= 0.0:
+            return False
+        plan = hypot(m[0] + m[1] * left + m[2] * up, m[3] + m[4] * left + m[5] * up)
+        return camera.position_m[2] / sinking * plan < distance_m
+
+    def _drop_duplicates(self) -> None:
+        """Of frames of one colour that cannot both be there, keep the better known."""
+        kept: list[FrameTrack] = []
+        for track in self._tracks:
+            twin = next((other for other in kept if _are_one(other, track)), None)
+            if twin is None:
+                kept.append(track)
+            elif track.rank > twin.rank:
+                kept[kept.index(twin)] = track
+        self._tracks = kept
+
+
+def _distance_m(track: FrameTrack, camera: CameraPose) -> float:
+    x, y, z, _ = track.state.tolist()
+    at = camera.position_m
+    return hypot(at[0] - x, at[1] - y, at[2] - z)
+
+
+def _overlap(a: tuple[float, float, float, float], b: tuple[float, float, float, float]) -> bool:
+    margin = HIDING_MARGIN_PX
+    return a[0] < b[2] + margin and b[0] < a[2] + margin and a[1] < b[3] + margin and b[1] < a[3] + margin
+
+
+def _are_one(a: FrameTrack, b: FrameTrack) -> bool:
+    """Whether two tracks are of one frame: of one colour, and too near to each other for two frames."""
+    if a.colour != b.colour:
+        return False
+    x, y, z, _ = (a.state - b.state).tolist()
+    return hypot(x, y, z) < DUPLICATE_M

@@ -1,0 +1,202 @@
+"""One frame in the map: its hypotheses, how much it is believed, and whether the images contradict it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from math import hypot, sqrt
+
+import numpy as np
+
+from offboard.navigation.frame_estimate import FrameEstimate
+from offboard.navigation.frame_filter import FrameFilter, Update, half_turn
+from offboard.navigation.frame_measurement import Floats, Prior, Solution, View, solutions
+from scenarios.models import Arena
+
+# Squares of innovations that one view in a thousand exceeds by chance (chi-squared), by number of corners,
+# with half of it added: edges in an image have larger errors now and then.
+GATES = (0.0, 20.7, 27.7, 33.7, 39.2)
+
+NOVEL_PX = 0.5  # root mean square of the corners' shift from which on a view has errors of its own
+NOVEL_US = 1_000_000  # or this long after the last one
+OUTSIDE_M = 0.5  # a frame farther outside the arena is none
+
+MOST_BELIEF = 20  # images; so many in which it should be seen and is not make a well-known frame forgotten
+MISFITS = 3  # views in a row that contradict all hypotheses, after which they are made anew
+MISFITS_KEPT = 6
+DOUBTED_MISSES = 3
+
+PRUNED = 9.0  # natural logarithm of a ratio of likelihoods at which a hypothesis is dropped
+AMBIGUOUS = 4.6  # at which it no longer counts
+SAME_YAW_RAD = 0.06  # hypotheses nearer than this are one
+
+# Certain: 95 % of the errors of position within 1.5 cm, of the yaw within 2 degrees.
+CERTAIN_M = 0.015 / 1.8  # root of the sum of three variances; 1.6 (all alike) to 1.96 (one only) is exact
+CERTAIN_RAD = 0.035 / 1.96
+CERTAIN_VIEWS = 3
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Fit:
+    """How a view fits a track.
+
+    Attributes:
+        updates: what the view would make of each hypothesis; None if it cannot be seen so.
+        distance2: square of the smallest Mahalanobis distance.
+        gate: the largest that belongs to the frame.
+    """
+
+    updates: tuple[Update | None, ...]
+    distance2: float
+    gate: float
+
+    @property
+    def inside(self) -> bool:
+        """Whether the view can be of this frame."""
+        return self.distance2 <= self.gate
+
+
+class FrameTrack:
+    """A frame that has been seen.
+
+    Attributes:
+        colour: of the frame.
+        belief: images that showed it minus images that should have; negative: there is none.
+        missed: images in a row that should have shown it.
+        used_us: vehicle time of the last image that was looked at for it.
+        seen_us: of the last image that showed it.
+        views: how many were used.
+    """
+
+    def __init__(self, colour: str, found: list[Solution], view: View) -> None:
+        self.colour = colour
+        self.belief, self.missed, self.views = 1, 0, 1
+        self.time_us = self.seen_us = view.time_us
+        self._hypotheses = [FrameFilter(solution) for solution in found]
+        self._used = view
+        self._misfits: list[View] = []
+
+    @property
+    def state(self) -> Floats:
+        """x, y, z (metres), yaw (radians) of the likeliest hypothesis."""
+        return self._hypotheses[0].state
+
+    @property
+    def covariance(self) -> Floats:
+        """Its covariance."""
+        return self._hypotheses[0].covariance
+
+    @property
+    def rank(self) -> tuple[bool, int, float]:
+        """The larger, the better is it known: to choose among frames of a colour."""
+        return (self.missed < DOUBTED_MISSES, self.belief, -float(np.trace(self.covariance[:3, :3])))
+
+    def predict(self, time_us: int) -> None:
+        """Let time pass."""
+        elapsed_s = (time_us - self.time_us) * 1e-6
+        self.time_us = time_us
+        for hypothesis in self._hypotheses:
+            hypothesis.predict(elapsed_s)
+
+    def fit(self, view: View) -> Fit:
+        """How a view fits."""
+        updates = tuple(hypothesis.trial(view) for hypothesis in self._hypotheses)
+        distance2 = min((update.distance2 for update in updates if update is not None), default=np.inf)
+        return Fit(updates, distance2, GATES[sum(view.seen)])
+
+    def accept(self, view: View, fit: Fit) -> None:
+        """Use a view that fits; one from nearly the same place as the last adds nothing but belief."""
+        self._saw(view)
+        self._misfits.clear()
+        if not self._is_novel(view):
+            return
+        self._used = view
+        self.views += 1
+        for hypothesis, update in zip(self._hypotheses, fit.updates, strict=True):
+            if update is not None and update.distance2 <= 2.0 * fit.gate:
+                hypothesis.accept(update)
+            else:
+                hypothesis.log_weight -= fit.gate
+        self._prune()
+
+    def contradict(self, view: View, prior: Prior) -> None:
+        """A view of this frame that fits none of its hypotheses; after several, they are made anew."""
+        self._saw(view)
+        self._misfits.append(view)
+        if len(self._misfits) < MISFITS:
+            return
+        whole = [view for view in self._misfits if sum(view.seen) >= 3]
+        for views in (self._misfits, whole[-1:]):
+            found = solutions(views, prior) if views else []
+            if found and found[0].cost <= sum(GATES[sum(view.seen)] for view in views):
+                self._hypotheses = [FrameFilter(solution) for solution in found]
+                self._prune()
+                self.belief, self.views, self._used = len(views), len(views), view
+                self._misfits.clear()
+                return
+        del self._misfits[:-MISFITS_KEPT]
+
+    def miss(self) -> None:
+        """An image should have shown it and did not."""
+        self.belief -= 1
+        self.missed += 1
+
+    def keep_inside(self, arena: Arena) -> bool:
+        """Drop hypotheses outside the arena; false if none is left."""
+        limits = (arena.length_x_m / 2, arena.width_y_m / 2)
+        self._hypotheses = [
+            hypothesis
+            for hypothesis in self._hypotheses
+            if abs(hypothesis.state[0]) <= limits[0] + OUTSIDE_M
+            and abs(hypothesis.state[1]) <= limits[1] + OUTSIDE_M
+            and -OUTSIDE_M <= hypothesis.state[2] <= arena.height_m + OUTSIDE_M
+        ]
+        return bool(self._hypotheses)
+
+    def estimate(self) -> FrameEstimate:
+        """What is known of the frame."""
+        x, y, z, yaw = self.state.tolist()
+        vx, vy, vz, v_yaw = self.covariance.diagonal().tolist()
+        weights = [hypothesis.log_weight for hypothesis in self._hypotheses]
+        ambiguous = any(weight > weights[0] - AMBIGUOUS for weight in weights[1:])
+        exact = sqrt(vx + vy + vz) <= CERTAIN_M and sqrt(v_yaw) <= CERTAIN_RAD
+        return FrameEstimate(
+            colour=self.colour,
+            position_m=(x, y, z),
+            yaw_rad=half_turn(yaw),
+            position_std_m=(sqrt(vx), sqrt(vy), sqrt(vz)),
+            yaw_std_rad=sqrt(v_yaw),
+            ambiguous=ambiguous,
+            certain=exact and not ambiguous and self.views >= CERTAIN_VIEWS,
+            views=self.views,
+            seen_us=self.seen_us,
+        )
+
+    def _saw(self, view: View) -> None:
+        self.seen_us = view.time_us
+        self.missed = 0
+        self.belief = min(self.belief + 1, MOST_BELIEF)
+
+    def _is_novel(self, view: View) -> bool:
+        """Whether its errors differ from those of the last view: edges fall on other parts of pixels."""
+        last = self._used
+        if view.seen != last.seen or view.time_us - last.time_us >= NOVEL_US:
+            return True
+        shift = view.corners_px - last.corners_px
+        return bool(shift @ shift >= NOVEL_PX**2 * sum(view.seen))
+
+    def _prune(self) -> None:
+        """Likeliest first; drop those that are far less likely, or became the same as a likelier one."""
+        kept: list[FrameFilter] = []
+        for hypothesis in sorted(self._hypotheses, key=lambda hypothesis: -hypothesis.log_weight):
+            far_less = bool(kept) and hypothesis.log_weight < kept[0].log_weight - PRUNED
+            same = next((other for other in kept if _same(hypothesis.state, other.state)), None)
+            if same is not None:
+                same.absorb(hypothesis)
+            elif not far_less:
+                kept.append(hypothesis)
+        self._hypotheses = kept
+
+
+def _same(a: Floats, b: Floats) -> bool:
+    away = (a - b).tolist()
+    return abs(half_turn(away[3])) < SAME_YAW_RAD and hypot(*away[:3]) < 0.1

@@ -1,0 +1,142 @@
+"""The map of frames, shown frames by an ideal finder from flights along known paths."""
+
+from math import cos, pi, radians, sin
+
+import numpy as np
+import pytest
+
+from offboard.navigation.frame_estimate import FrameEstimate
+from offboard.navigation.frame_filter import half_turn
+from scenarios.models import Frame
+from tests.offboard.navigation.sightings import Flight, frame_at
+
+
+def errors(estimate: FrameEstimate | None, frame: Frame) -> tuple[float, float]:
+    """Errors of the position (metres) and the yaw (radians)."""
+    assert estimate is not None
+    away = np.subtract(estimate.position_m, frame.position_arena_m)
+    return float(np.linalg.norm(away)), abs(half_turn(estimate.yaw_rad - frame.yaw_rad))
+
+
+@pytest.mark.parametrize("angle_deg", [-60, -35, -10, 0, 20, 50])
+def test_approach_makes_a_frame_certain_and_right(angle_deg: float) -> None:
+    frame = frame_at(1.0, 2.0, 1.4, 2.6)
+    flight = Flight(seed=angle_deg + 100)
+    flight.approach(frame, radians(angle_deg), 4.0, 1.0)
+    (estimate,) = flight.map.frames()
+    assert estimate.certain
+    assert not estimate.ambiguous
+    position_m, yaw_rad = errors(estimate, frame)
+    assert position_m < 0.015
+    assert yaw_rad < radians(2.0)
+    assert estimate.seen_us == flight.time_us
+
+
+def test_far_view_is_ambiguous_until_another_side_view_decides() -> None:
+    frame = frame_at(0.0, 0.0, 1.5, 0.0)
+    flight = Flight()
+    flight.look([frame], (-4.5 * cos(0.7), -4.5 * sin(0.7), 1.5), 0.7)
+    first = flight.map.best("red")
+    assert first is not None
+    assert first.ambiguous
+    assert not first.certain
+    for step in range(25):
+        bearing = 0.7 - step * 0.04
+        flight.look([frame], (-4.0 * cos(bearing), -4.0 * sin(bearing), 1.5), bearing)
+    estimate = flight.map.best("red")
+    assert estimate is not None
+    assert not estimate.ambiguous
+    assert errors(estimate, frame)[1] < radians(6.0)
+
+
+def test_stated_deviations_are_those_of_the_errors() -> None:
+    squares = []
+    for seed in range(40):
+        flight = Flight(seed)
+        frame = frame_at(1.0, -1.0, 1.0 + seed / 40, seed / 7)
+        flight.approach(frame, radians(3.0 * seed - 60.0), 4.0, 2.0)
+        estimate = flight.map.best("red")
+        assert estimate is not None
+        away = np.subtract(estimate.position_m, frame.position_arena_m)
+        yaw_rad = half_turn(estimate.yaw_rad - frame.yaw_rad)
+        normalised = np.array((*away, yaw_rad)) / (*estimate.position_std_m, estimate.yaw_std_rad)
+        squares.append(normalised**2)
+    mean = np.mean(squares, axis=0)
+    assert (mean > 0.3).all(), mean
+    assert (mean < 1.7).all(), mean  # 1 is exact; of 40 samples 99.7 % are below
+
+
+def test_view_from_one_place_does_not_become_certain_by_repetition() -> None:
+    frame = frame_at(0.0, 0.0, 1.5, 0.0)
+    flight = Flight()
+    flight.approach(frame, 0.5, 4.0, 4.0)
+    before = flight.map.best("red")
+    for _ in range(5):
+        flight.time_us += 100_000
+        flight.random = np.random.default_rng(0)  # the same errors each time
+        flight.look([frame], (4.0 * cos(0.5), 4.0 * sin(0.5), 1.5), 0.5 + pi)
+    after = flight.map.best("red")
+    assert before is not None
+    assert after is not None
+    assert after.views <= before.views + 1
+
+
+def test_two_frames_in_line_and_one_partly_seen_are_kept_apart() -> None:
+    near, far = frame_at(0.0, 0.1, 1.5, 0.2), frame_at(2.0, -0.2, 1.4, -0.3, "green")
+    flight = Flight(3)
+    flight.approach(near, pi, 3.0, 0.5, (far,))
+    red, green = flight.map.best("red"), flight.map.best("green")
+    assert len(flight.map.frames()) == 2
+    assert errors(red, near)[0] < 0.015
+    assert errors(green, far)[0] < 0.06
+    # So near that only a part of it is in the image, what is seen still counts.
+    assert red is not None
+    flight.look([near, far], (-0.3, 0.25, 1.5), 0.2)
+    after = flight.map.best("red")
+    assert after is not None
+    assert after.seen_us == flight.time_us
+
+
+def test_two_frames_of_one_colour_are_two() -> None:
+    frames = [frame_at(0.0, 0.5, 1.5, 0.0, "red"), frame_at(0.0, -0.5, 1.2, 0.4)]
+    flight = Flight(4)
+    for step in range(20):
+        flight.look(frames, (-3.5 + step * 0.1, 0.0, 1.4), 0.0)
+    found = sorted(flight.map.frames(), key=lambda estimate: -estimate.position_m[1])
+    assert len(found) == 2
+    for estimate, frame in zip(found, frames, strict=True):
+        assert errors(estimate, frame)[0] < 0.05
+
+
+def test_ghost_is_forgotten_and_a_hidden_frame_is_not() -> None:
+    frame, ghost = frame_at(1.0, 0.0, 1.5, 0.0, "green"), frame_at(0.5, 1.0, 1.5, 0.0)
+    flight = Flight()
+    flight.look([frame, ghost], (-2.0, 0.0, 1.5), 0.0)
+    assert flight.map.best("red") is not None
+    for step in range(4):
+        flight.look([frame], (-2.0 + 0.1 * step, 0.0, 1.5), 0.0)
+    assert flight.map.best("red") is None
+    before = frame_at(0.0, 0.0, 1.5, 0.0, "blue")
+    flight.look([frame, before], (-1.6, 0.0, 1.5), 0.0)
+    for step in range(30):  # the blue frame hides the green one
+        flight.look([before], (-1.5, 0.01 * step, 1.5), 0.0)
+    assert {estimate.colour for estimate in flight.map.frames()} == {"green", "blue"}
+
+
+def test_wrong_start_is_corrected_by_the_images() -> None:
+    truth, wrong = frame_at(0.0, 0.0, 1.5, 0.5), frame_at(0.1, 0.05, 1.45, -0.4)
+    flight = Flight(1)
+    flight.approach(wrong, 0.4, 2.5, 2.0)
+    assert errors(flight.map.best("red"), wrong)[0] < 0.03
+    flight.approach(truth, -0.5, 2.5, 1.0)
+    (estimate,) = flight.map.frames()
+    position_m, yaw_rad = errors(estimate, truth)
+    assert position_m < 0.015
+    assert yaw_rad < radians(2.0)
+
+
+def test_frame_far_outside_the_arena_is_none() -> None:
+    flight = Flight()
+    for step in range(5):
+        flight.look([frame_at(6.5, 0.0, 1.5, 0.0)], (4.0 + 0.1 * step, 0.0, 1.5), 0.0)
+    assert flight.map.frames() == ()
