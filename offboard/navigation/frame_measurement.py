@@ -164,7 +164,7 @@ def _edges(right: float, up: float) -> tuple[tuple[float, float, float, float], 
         up: above it, metres.
 
     Returns:
-        For each corner: how far the upright edge is before the opening's plane and to the right of its centre,
+        For each corner: how far the upright edge is before the opening's plane and right of its centre,
         how far the level edge is before the plane and above the centre, metres.
     """
     left_at = -HALF_DEPTH_M if right < -HALF_WIDTH_M else HALF_DEPTH_M
