@@ -1,9 +1,8 @@
 """What an image says of a frame's pose: where the corners of its outline are, and how exactly that is known.
 
 A frame is upright and the drone's attitude is known, so its pose has four numbers: the state (x, y, z, yaw).
-The outline is that of the solid frame: its bars are as deep as they are wide, so from beside or above, an
-edge of the outline is one of the rear edges. All arrays are small; what is called for every image uses plain
-numbers up to the last step.
+The corners are those of a rectangle in the frame's middle plane. All arrays are small; what is called for
+every image uses plain numbers up to the last step.
 """
 
 from __future__ import annotations
@@ -24,7 +23,13 @@ Floats: TypeAlias = npt.NDArray[np.float64]
 
 HALF_WIDTH_M: float = Frame.model_fields["outer_width_m"].default / 2
 HALF_HEIGHT_M: float = Frame.model_fields["outer_height_m"].default / 2
-HALF_DEPTH_M: float = Frame.model_fields["bar_m"].default / 2
+# To the right and up: upper left, upper right, lower right, lower left as seen.
+_CORNERS_M = (
+    (-HALF_WIDTH_M, HALF_HEIGHT_M),
+    (HALF_WIDTH_M, HALF_HEIGHT_M),
+    (HALF_WIDTH_M, -HALF_HEIGHT_M),
+    (-HALF_WIDTH_M, -HALF_HEIGHT_M),
+)
 
 EDGE_ON = 0.08  # sine of the angle to the frame's plane below which its outline says nothing
 PIXEL_STD_PX = 0.1  # added to what the finder of frames states: its edges' errors are not all independent
@@ -119,64 +124,31 @@ def predicted(state: Floats, view: View) -> tuple[Floats, Floats, Floats] | None
     ahead = nx * dx + ny * dy
     if ahead < 0.0:
         nx, ny, ahead = -nx, -ny, -ahead
-    if ahead < max(2.0 * HALF_DEPTH_M, EDGE_ON * hypot(dx, dy, dz)):
+    if ahead < EDGE_ON * hypot(dx, dy, dz):
         return None
-    right = nx * dy - ny * dx
     m = camera.rotation
     numbers: list[float] = []
     curvature: list[float] = []
     rows: list[tuple[float, float, float, float]] = []
-    for seen, (along, across, level_at, up) in zip(view.seen, _edges(right, dz), strict=True):
+    for seen, (across, up) in zip(view.seen, _CORNERS_M, strict=True):
         if not seen:
             continue
-        # The upright edge and the level one may lie in different planes; in the image they still meet.
-        share = (up - dz) / (ahead - level_at)
-        meets, meets_turned = (
-            dz + share * (ahead - along),
-            share * right * (along - level_at) / (ahead - level_at),
-        )
-        px, py = along * nx - across * ny - dx, along * ny + across * nx - dy
-        pz = meets - dz
+        px, py, pz = -across * ny - dx, across * nx - dy, up - dz
         forward = m[0] * px + m[3] * py + m[6] * pz
         if forward < NEAREST_M:
             return None
         scale = -focal / forward
         u = scale * (m[1] * px + m[4] * py + m[7] * pz)
         v = scale * (m[2] * px + m[5] * py + m[8] * pz)
-        # Turning the frame moves the corner along (-ey, ex), where (ex, ey) is its place in plan.
-        tx, ty = -(along * ny + across * nx), along * nx - across * ny
         r = u / focal
         rx, ry, rz = scale * (m[1] + r * m[0]), scale * (m[4] + r * m[3]), scale * (m[7] + r * m[6])
         r = v / focal
         sx, sy, sz = scale * (m[2] + r * m[0]), scale * (m[5] + r * m[3]), scale * (m[8] + r * m[6])
         numbers += (u, v)
-        rows.append((rx, ry, rz, rx * tx + ry * ty + rz * meets_turned))
-        rows.append((sx, sy, sz, sx * tx + sy * ty + sz * meets_turned))
-        curvature += (ry * tx - rx * ty, sy * tx - sx * ty)
+        rows.append((rx, ry, rz, -across * (rx * nx + ry * ny)))
+        rows.append((sx, sy, sz, -across * (sx * nx + sy * ny)))
+        curvature += (across * (rx * ny - ry * nx), across * (sx * ny - sy * nx))
     return np.array(numbers), np.array(rows), np.array(curvature)
-
-
-def _edges(right: float, up: float) -> tuple[tuple[float, float, float, float], ...]:
-    """Which edges of the solid frame meet at each corner of its outline.
-
-    Args:
-        right: where the camera is, to the right of the opening's centre as seen, metres.
-        up: above it, metres.
-
-    Returns:
-        For each corner: how far the upright edge is before the opening's plane and right of its centre,
-        how far the level edge is before the plane and above the centre, metres.
-    """
-    left_at = -HALF_DEPTH_M if right < -HALF_WIDTH_M else HALF_DEPTH_M
-    right_at = -HALF_DEPTH_M if right > HALF_WIDTH_M else HALF_DEPTH_M
-    top_at = -HALF_DEPTH_M if up > HALF_HEIGHT_M else HALF_DEPTH_M
-    bottom_at = -HALF_DEPTH_M if up < -HALF_HEIGHT_M else HALF_DEPTH_M
-    return (
-        (left_at, -HALF_WIDTH_M, top_at, HALF_HEIGHT_M),
-        (right_at, HALF_WIDTH_M, top_at, HALF_HEIGHT_M),
-        (right_at, HALF_WIDTH_M, bottom_at, -HALF_HEIGHT_M),
-        (left_at, -HALF_WIDTH_M, bottom_at, -HALF_HEIGHT_M),
-    )
 
 
 def noise_of(view: View, jacobian: Floats) -> Floats:

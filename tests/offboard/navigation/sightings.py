@@ -1,4 +1,4 @@
-"""Frames as an ideal finder would see them: the outline of the solid frame, with noise."""
+"""Frames as an ideal finder would see them: corners of the outline, with noise."""
 
 from __future__ import annotations
 
@@ -28,41 +28,25 @@ def frame_at(x: float, y: float, z: float, yaw: float, colour: str = "red") -> F
     return Frame.model_validate({"colour": colour, "x_m": x, "y_m": y, "z_m": z, "yaw_rad": yaw})
 
 
-def hull_px(frame: Frame, drone_m: Vec3, attitude: Quaternion) -> Points | None:
-    """Corners of the box around a frame in the image, shape (8, 2); None if not before the camera."""
-    camera = CAMERA.pose(drone_m, attitude)
-    c, s = cos(frame.yaw_rad), sin(frame.yaw_rad)
-    points = []
-    for a in (-frame.bar_m / 2, frame.bar_m / 2):
-        for b in (-frame.outer_width_m / 2, frame.outer_width_m / 2):
-            for h in (-frame.outer_height_m / 2, frame.outer_height_m / 2):
-                point = (frame.x_m + a * c - b * s, frame.y_m + a * s + b * c, frame.z_m + h)
-                points.append(CAMERA.project(camera, point))
-    return None if None in points else np.array(points)
-
-
 def corners_px(frame: Frame, drone_m: Vec3, attitude: Quaternion) -> Points | None:
-    """Corners of the outline, shape (4, 2): its left-most and right-most uprights, cut by its long edges.
+    """Corners of the outline in the frame's middle plane, clockwise from the upper left as seen, (4, 2).
 
-    For an attitude that is nearly level.
+    None if one is not before the camera.
     """
-    points = hull_px(frame, drone_m, attitude)
-    if points is None:
+    camera = CAMERA.pose(drone_m, attitude)
+    half_m = frame.outer_width_m / 2
+    x, y = -half_m * sin(frame.yaw_rad), half_m * cos(frame.yaw_rad)
+    sides = [
+        [
+            CAMERA.project(camera, (frame.x_m + sign * x, frame.y_m + sign * y, frame.z_m + up))
+            for up in (frame.outer_height_m / 2, -frame.outer_height_m / 2)
+        ]
+        for sign in (-1.0, 1.0)
+    ]
+    if any(corner is None for side in sides for corner in side):
         return None
-    uprights = sorted(points.reshape(4, 2, 2).tolist(), key=lambda upright: upright[0][0] + upright[1][0])
-    level = [points[i::2] for i in (1, 0)]  # upper and lower ends
-    corners = []
-    for right in (False, True):
-        (low_u, low_v), (high_u, high_v) = uprights[-1 if right else 0]
-        for upper, ends in ((True, level[0]), (False, level[1])):
-            # The long edges, nearer and farther: the outline has that which is farther out.
-            lines = [np.polyfit(ends[i : i + 2, 0], ends[i : i + 2, 1], 1) for i in (0, 2)]
-            downs = [np.polyval(line, high_u if upper else low_u) for line in lines]
-            down = min(downs) if upper else max(downs)
-            share = (down - low_v) / (high_v - low_v)
-            corners.append((low_u + share * (high_u - low_u), down))
-    upper_left, lower_left, upper_right, lower_right = corners
-    return np.array((upper_left, upper_right, lower_right, lower_left))
+    left, right = sorted(np.array(sides), key=lambda side: float(side[:, 0].sum()))
+    return np.array((left[0], right[0], right[1], left[1]))
 
 
 def sighting(
