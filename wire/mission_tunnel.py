@@ -77,6 +77,7 @@ class DocumentKind(IntEnum):
     MISSION = 1
     HISTORY = 2
     RESULT = 3
+    MAP = 4
 
 
 @dataclass(frozen=True, slots=True)

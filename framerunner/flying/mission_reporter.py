@@ -7,6 +7,7 @@ from collections import deque
 from collections.abc import Mapping
 from typing import Any
 
+from framerunner.flying.navigation_reporter import NavigationReporter
 from offboard.app import Moment
 from offboard.engine import TransitionTaken
 from offboard.link.companion import Companion
@@ -62,6 +63,7 @@ class MissionReporter:
         self._ticks = 0
         self._image_size_px = (0, 0)
         self._detections: Detections | None = None
+        self._navigation = NavigationReporter()
         self._broken = False
         still = (0.0, 0.0, 0.0, 0.0)
         companion.send_state(MissionState(self._crc, -1, 0, 0, 0, False, False, False, still, start_arena))
@@ -105,6 +107,7 @@ class MissionReporter:
             self._mission_state = moment.mission_state
             self._companion.send_text(f"{TEXT_PREFIX}{moment.mission_state}")
         self._send_detections(moment)
+        self._send_map(moment)
 
     def _send_state(self, moment: Moment, flying: bool) -> None:
         state, command = moment.state, moment.command
@@ -134,6 +137,14 @@ class MissionReporter:
         width, height = self._image_size_px
         red, green, blue = _box(seen.red), _box(seen.green), _box(seen.blue)
         self._companion.send_detections(MissionDetections(seen.time_us, width, height, red, green, blue))
+
+    def _send_map(self, moment: Moment) -> None:
+        """Send the navigator's map if it is due; one that is still being sent is finished before."""
+        if self._companion.is_sending(DocumentKind.MAP):
+            return
+        navigation = self._navigation.document(moment)
+        if navigation is not None:
+            self._send_document(DocumentKind.MAP, {"mission_crc": self._crc, **navigation})
 
     def _report_mission(self, mission: Mission, source: str, scenario: str) -> int:
         """Send what is flown, without the parts that make it too large; returns its CRC."""

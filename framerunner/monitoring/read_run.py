@@ -21,12 +21,14 @@ from typing import Any
 import cv2
 
 from framerunner.child_process import end_with_standard_input
+from framerunner.flying.navigation_reporter import navigation_json
 from framerunner.recording.collected import CollectedFlight, ImageFile, collect
 from framerunner.recording.events import RecordingError
 from framerunner.recording.open_recording import recorded_flight
 from offboard.app import Moment
 from offboard.engine import TransitionTaken
 from offboard.mission import Mission, MissionError, load_mission, mermaid
+from offboard.navigation.view import NavigationView
 from scenarios.loader import load_scenario
 from scenarios.models import COLOURS, Scenario, ScenarioError
 from vision.types import Detection, Detections
@@ -141,6 +143,7 @@ def _flight_json(
         "states": states,
         "poses": _poses(flight, numbers, clock),
         "detections": _detections(flight.moments, clock, _image_size(flight, scenario)),
+        "maps": _maps(flight.moments, clock),
         "transitions": _transitions(flight, clock, mission),
         "images": [clock(time_us) for time_us in flight.images.time_us],
         "crossings": [{"t": clock(each.time_us), "colour": each.colour} for each in flight.crossings],
@@ -199,6 +202,20 @@ def _detections(moments: Sequence[Moment], clock: Clock, size_px: tuple[int, int
         at_s = clock(time_us)
         if not found or found[-1]["t"] <= at_s:
             found.append({"t": at_s, "width": size_px[0], "height": size_px[1], "boxes": boxes})
+    return found
+
+
+def _maps(moments: Sequence[Moment], clock: Clock) -> list[Json]:
+    """The navigator's map and plan, each time that something of it changed."""
+    found: list[Json] = []
+    last: NavigationView | None = None
+    for moment in moments:
+        view = moment.navigation
+        if view is not None and view is not last:
+            last = view
+            content = navigation_json(view)
+            if not found or {**content, "t": found[-1]["t"]} != found[-1]:
+                found.append({**content, "t": clock(moment.state.time_us)})
     return found
 
 

@@ -1,5 +1,5 @@
 import { kindOf, stateColour } from "./colours.js";
-import { isTyping, make, setAttribute } from "./dom.js";
+import { isTyping, make, setAttribute, setText } from "./dom.js";
 import { TopView } from "./topview.js";
 
 /**
@@ -25,6 +25,9 @@ export class Arena {
   #kinds = new Set();
   #buttons = {};
   #sizeButton;
+  #mapButton;
+  #goal;
+  #map = null;
   #painter = null; // a Stage or a TopView, once it is there
   #waiting = [];
   #last = new Map(); // newest pose by drone
@@ -79,6 +82,17 @@ export class Arena {
     });
   }
 
+  /**
+   * Show what a navigator knows and plans, until the next call.
+   * @param {import("./arena_map.js").NavigationMap|null} map as in the message "map"; null: there is none
+   */
+  setMap(map) {
+    if (map === this.#map) return;
+    this.#map = map;
+    this.#mapButton.hidden = !map;
+    this.#showMap();
+  }
+
   /** @param {"orbit"|"follow"|"onboard"} view */
   setView(view) {
     setAttribute(this.#box, "data-view", view);
@@ -122,6 +136,15 @@ export class Arena {
     this.#box.remove();
   }
 
+  /** Draw the map unless it is switched off. */
+  #showMap() {
+    const shown = this.#mapButton.getAttribute("aria-pressed") === "true" ? this.#map : null;
+    setText(this.#goal, shown ? `navigator: ${shown.goal}` : "");
+    this.#goal.hidden = !shown?.goal;
+    setAttribute(this.#box, "data-mapped", shown ? shown.frames.map((each) => each.colour).join(" ") : null);
+    this.#do((painter) => painter.setMap(shown));
+  }
+
   /** A trail begins anew with a flight. */
   #watchForNew(pose) {
     const before = this.#last.get(pose.id ?? 1);
@@ -142,7 +165,7 @@ export class Arena {
     } catch (error) {
       console.info(`no 3-D here (${error.message}); the arena is drawn from above`);
       this.#painter = new TopView(this.#box, "This browser draws no 3-D here, so the arena is shown from above.");
-      this.#box.querySelector(".m-views").hidden = true;
+      for (const button of [...Object.values(this.#buttons), this.#sizeButton]) button.hidden = true;
     }
     for (const what of this.#waiting.splice(0)) what(this.#painter);
   }
@@ -158,6 +181,12 @@ export class Arena {
       this.#buttons[view] = button;
       bar.append(button);
     });
+    const mapTitle = "show the frames as the navigator estimates them, and its path";
+    this.#mapButton = make("button", { type: "button", class: "m-map-button", "aria-pressed": "true", title: mapTitle, hidden: true }, "Map");
+    this.#mapButton.addEventListener("click", () => {
+      setAttribute(this.#mapButton, "aria-pressed", String(this.#mapButton.getAttribute("aria-pressed") !== "true"));
+      this.#showMap();
+    });
     const title = "show the drone no larger than it is";
     this.#sizeButton = make("button", { type: "button", "aria-pressed": "false", title }, "True size");
     this.#sizeButton.addEventListener("click", () => {
@@ -165,7 +194,8 @@ export class Arena {
       setAttribute(this.#sizeButton, "aria-pressed", String(isTrue));
       this.#do((painter) => painter.setTrueSize(isTrue));
     });
-    bar.append(this.#sizeButton);
+    this.#goal = make("p", { class: "m-arena-goal", hidden: true });
+    bar.append(this.#mapButton, this.#sizeButton, this.#goal);
     document.addEventListener("keydown", (event) => {
       const view = Object.keys(VIEWS)[Number(event.key) - 1];
       if (view && !event.ctrlKey && !event.metaKey && !event.altKey && !isTyping(event)) this.setView(view);

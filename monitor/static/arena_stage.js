@@ -3,6 +3,7 @@ import { onBeat, setPeriod } from "./beat.js";
 import { buildCone, buildWorld, discard, GROUND, SKY } from "./arena_world.js";
 import { DroneModel, SIZE_M } from "./arena_drone.js";
 import { ArenaEye } from "./arena_eye.js";
+import { MapModel } from "./arena_map.js";
 import { channels } from "./colours.js";
 import { isDark, make, onTheme, setAttribute, setText, wantsStillness } from "./dom.js";
 
@@ -25,7 +26,9 @@ export class Stage {
   #fog;
   #eye;
   #world = null;
-  #camera = null;
+  #scenario = null;
+  #mapModel;
+  #map = null;
   #drones = new Map();
   #selected = null;
   #isTrueSize = false;
@@ -56,6 +59,7 @@ export class Stage {
     const sun = new THREE.DirectionalLight("#ffffff", 1.6);
     sun.position.set(5, -1, 9);
     this.#scene.add(sun);
+    this.#mapModel = new MapModel(THREE, this.#scene);
     this.#eye = new ArenaEye(THREE, OrbitControls, box, () => this.#ask());
     box.prepend(canvas);
     this.#watch(canvas);
@@ -66,12 +70,20 @@ export class Stage {
     const scenario = world?.scenario ?? null;
     if (this.#world) discard(this.#world);
     this.#world = scenario ? buildWorld(this.#THREE, scenario, world.lift_m ?? 0) : null;
-    this.#camera = scenario?.camera ?? null;
+    this.#scenario = scenario;
+    this.#mapModel.set(this.#map, scenario);
     for (const drone of this.#drones.values()) this.#setCone(drone);
     if (scenario) {
       this.#scene.add(this.#world);
       this.#eye.setArena(scenario.arena, scenario.camera);
     }
+    this.#ask();
+  }
+
+  /** See `Arena`. */
+  setMap(map) {
+    this.#map = map;
+    this.#mapModel.set(map, this.#scenario);
     this.#ask();
   }
 
@@ -183,7 +195,7 @@ export class Stage {
 
   #setCone(drone) {
     if (drone.cone) discard(drone.cone);
-    drone.cone = this.#camera ? buildCone(this.#THREE, this.#camera) : null;
+    drone.cone = this.#scenario ? buildCone(this.#THREE, this.#scenario.camera) : null;
     if (drone.cone) drone.group.add(drone.cone);
   }
 
@@ -229,9 +241,10 @@ export class Stage {
     this.#fog.color.set(sky);
     [this.#fog.near, this.#fog.far] = [1.5 * this.#eye.overview_m, 5 * this.#eye.overview_m];
     this.#scene.fog = isOnboard ? null : this.#fog;
+    const [, , wide, high] = this.#eye.rectangle;
+    this.#mapModel.fit([wide, high]);
     if (!this.#world) return;
     this.#world.userData.ground.set(isOnboard ? GROUND : this.#paint.ground);
-    const [, , wide, high] = this.#eye.rectangle;
     this.#world.traverse((part) => {
       if (part.userData.isHelp) part.visible = !isOnboard;
       part.userData.ribbon?.fit(3, [wide, high]);

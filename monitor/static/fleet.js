@@ -6,6 +6,7 @@
  * @property {object|null} pose
  * @property {object|null} status
  * @property {object|null} chart
+ * @property {object|null} map of its navigator
  * @property {object[]} transitions newest first
  * @property {object[]} recent poses of the last minute
  */
@@ -45,7 +46,7 @@ export class Fleet {
   of(id) {
     let drone = this.#drones.get(id);
     if (!drone) {
-      drone = { id, pose: null, status: null, chart: null, transitions: [], recent: [] };
+      drone = { id, pose: null, status: null, chart: null, map: null, transitions: [], recent: [] };
       this.#drones.set(id, drone);
       this.#show();
       if (this.#chosen === null) this.choose(id);

@@ -1,5 +1,6 @@
 /** The live page: joins the live channel with what is seen. */
 import { Arena } from "./arena.js";
+import { mapIn } from "./arena_map.js";
 import { onBeat } from "./beat.js";
 import { CameraView } from "./camera.js";
 import { stateColour } from "./colours.js";
@@ -107,6 +108,7 @@ function plot(drone) {
 
 function choose(drone) {
   arena.select(drone.id);
+  arena.setMap(drone.map);
   plot(drone);
   statechart.setChart(drone.chart);
   statechart.setTransitions(drone.transitions);
@@ -148,6 +150,11 @@ watchLive({
   },
   detections(message) {
     if (isChosen(message.id)) flight.addDetections(message);
+  },
+  map(message) {
+    const drone = fleet.of(message.id);
+    drone.map = mapIn(message);
+    if (isChosen(message.id)) arena.setMap(drone.map);
   },
   chart(message) {
     const drone = fleet.of(message.id);

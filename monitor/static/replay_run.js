@@ -35,14 +35,12 @@ function countUntil(times, t) {
   return low;
 }
 
-/** The shortest way from one angle to another, as a share of it. */
+/** The attitude between two, which are near each other, after a share of the shortest way. */
 function turned(from, to, share) {
-  const way = Math.atan2(Math.sin(to - from), Math.cos(to - from));
-  return from + share * way;
-}
-
-function yawOf([w, x, y, z]) {
-  return Math.atan2(2 * (w * z + x * y), 1 - 2 * (y * y + z * z));
+  const sign = from.reduce((sum, value, axis) => sum + value * to[axis], 0) < 0 ? -1 : 1;
+  const q = from.map((value, axis) => value + share * (sign * to[axis] - value));
+  const norm = Math.hypot(...q) || 1;
+  return q.map((value) => value / norm);
 }
 
 export class Run {
@@ -57,11 +55,13 @@ export class Run {
     this.crossings = recording.crossings;
     this.transitions = recording.transitions;
     this.detections = recording.detections;
+    this.maps = recording.maps;
     this.result = recording.result;
     this.begin = this.poses[0]?.t ?? 0;
     this.end = this.poses.at(-1)?.t ?? 0;
     this.poseTimes = this.poses.map((pose) => pose.t);
     this.detectionTimes = this.detections.map((each) => each.t);
+    this.mapTimes = this.maps.map((each) => each.t);
     this.transitionTimes = this.transitions.map((each) => each.time_s);
     this.outside = this.#outsideSeconds();
   }
@@ -85,10 +85,7 @@ export class Run {
     if (!after || count === 0) return { ...before, t };
     const share = (t - before.t) / Math.max(1e-6, after.t - before.t);
     const p = before.p.map((value, axis) => value + share * (after.p[axis] - value));
-    const yaw = turned(yawOf(before.q), yawOf(after.q), share);
-    // Level flights have only a yaw; others keep the attitude of the last pose, 50 ms old at most.
-    const isLevel = before.q[1] === 0 && before.q[2] === 0;
-    const q = isLevel ? [Math.cos(yaw / 2), 0, 0, Math.sin(yaw / 2)] : before.q;
+    const q = turned(before.q, after.q, share);
     return { ...before, t, p, q };
   }
 
@@ -122,6 +119,11 @@ export class Run {
     const image = this.imageAt(t);
     const seen = image === null ? last.t : Math.max(last.t, this.images[image]);
     return t - seen <= OLD_IMAGE_S ? last : null;
+  }
+
+  /** What the navigator's map was at a time; null if there was none. */
+  mapAt(t) {
+    return this.maps[countUntil(this.mapTimes, t) - 1] ?? null;
   }
 
   /** The Game Monitor's figures at a time, as the live channel has them; null if nobody judged. */

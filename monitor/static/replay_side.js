@@ -62,6 +62,7 @@ export class Side {
     this.#moveTo(t);
     this.#images.want(run.imageAt(t));
     this.#camera.setDetections(run.detectionsAt(t));
+    this.#arena.setMap(run.mapAt(t));
     this.#figures.set(run.figuresAt(t));
     const [state, seconds] = run.stateAt(t);
     this.#statechart.setState(state, seconds);

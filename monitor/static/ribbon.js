@@ -2,6 +2,9 @@
 
 const STEP_M = 0.02; // points lie no nearer together than this
 
+/** Given in place of a colour: no line goes to this place from the last one. */
+export const GAP = [-1, 0, 0];
+
 /** A line of any width through places, each stretch in a colour of its own; its memory is set aside once. */
 export class Ribbon {
   #array;
@@ -40,7 +43,7 @@ export class Ribbon {
   /**
    * Go on to a place.
    * @param {number[]} p metres
-   * @param {number[]} rgb 0..1
+   * @param {number[]} rgb 0..1, or `GAP`
    */
   add(p, rgb) {
     const array = this.#array;
@@ -111,7 +114,7 @@ void main() {
   place.xy += shift / size * 2.0 * place.w;
   vTint = tint;
   vSide = position.y;
-  gl_Position = place;
+  gl_Position = tint.r < 0.0 ? vec4(2.0, 2.0, 2.0, 1.0) : place; // a gap is drawn outside of the picture
 }`;
 
 const FRAGMENT = `

@@ -1,5 +1,6 @@
 /** The page for an audience: what flies now, what just ended, who is next, who won. It follows by itself. */
 import { Arena } from "./arena.js";
+import { mapIn } from "./arena_map.js";
 import { CameraView } from "./camera.js";
 import { watchContest } from "./contest.js";
 import { make, whenThere } from "./dom.js";
@@ -39,6 +40,7 @@ class StagePage {
     });
     this.#fleet = new Fleet(make("div"), (drone) => {
       arena.select(drone.id);
+      arena.setMap(drone.map);
       this.#flight.choose(drone.id);
     });
     this.#hear(arena, line);
@@ -60,6 +62,11 @@ class StagePage {
       history: (message) => this.#flight.setHistory(message),
       chart: (message) => { this.#fleet.of(message.id).chart = message; },
       pose: ({ drones }) => this.#flight.addPoses(drones),
+      map: (message) => {
+        const drone = this.#fleet.of(message.id);
+        drone.map = mapIn(message);
+        if (this.#fleet.chosen === drone) arena.setMap(drone.map);
+      },
       detections: (message) => {
         if (this.#fleet.chosen?.id === message.id) this.#flight.addDetections(message);
       },

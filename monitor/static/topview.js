@@ -1,4 +1,5 @@
 /** The arena from above, on a plain canvas: for browsers that draw no 3-D. */
+import { drawMap } from "./arena_map.js";
 import { FRAME_COLOURS } from "./colours.js";
 import { make } from "./dom.js";
 
@@ -7,6 +8,7 @@ export class TopView {
   #box;
   #canvas;
   #scenario = null;
+  #map = null;
   #trails = new Map();
   #poses = [];
   #selected = null;
@@ -22,6 +24,11 @@ export class TopView {
 
   setWorld(world) {
     this.#scenario = world?.scenario ?? null;
+    this.#ask();
+  }
+
+  setMap(map) {
+    this.#map = map;
     this.#ask();
   }
 
@@ -85,6 +92,7 @@ export class TopView {
     pen.fillRect(-arena.length_x_m / 2, -arena.width_y_m / 2, arena.length_x_m, arena.width_y_m);
     this.#drawThings(pen);
     for (const trail of this.#trails.values()) drawTrail(pen, trail);
+    if (this.#map) drawMap(pen, this.#map, this.#scenario, 1 / scale);
     for (const pose of this.#poses) this.#drawDrone(pen, pose);
   }
 

@@ -7,6 +7,7 @@ from typing import Annotated, Any
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
+from monitor.vehicle.navigation import NavigationDocument, map_message
 from scenarios.result import FlightResult, first_error
 from wire.dialect import Message
 from wire.finite_json import finite
@@ -79,22 +80,25 @@ class MissionView:
         self._heard_s = -1e9
         self._history: JsonMessage | None = None
         self._detected: JsonMessage | None = None
+        self._map: JsonMessage | None = None
+        self._map_crc = 0  # of its mission
         self.state: MissionState | None = None
         self.result: tuple[int, FlightResult] | None = None
         self.problem = ""
         self.problem_told = False
 
     def take(self, message: Message, now_s: float) -> list[JsonMessage]:
-        """Take a TUNNEL message. Returns messages "detections", "chart" or "transitions" for the pages."""
+        """Take a TUNNEL message. Returns messages "detections", "chart", "transitions" or "map" for pages."""
         payload = bytes(message.payload[: message.payload_length])
         try:
             if message.payload_type == STATE_TYPE:
                 self.state = decode_state(payload)
                 self._heard_s = now_s
-            elif message.payload_type == DETECTIONS_TYPE:
+                return [] if self.state.mission_crc == self._map_crc else self.forget_map()
+            if message.payload_type == DETECTIONS_TYPE:
                 self._detected = self._detections(payload)
                 return [self._detected]
-            elif message.payload_type == DOCUMENT_TYPE:
+            if message.payload_type == DOCUMENT_TYPE:
                 document = self._assembler.take(payload)
                 return [] if document is None else self._read(document)
         except PayloadError as error:
@@ -136,9 +140,16 @@ class MissionView:
         }
 
     def standing(self) -> list[JsonMessage]:
-        """What a new watcher is sent: the chart, the last transitions and the last detections."""
-        messages = (self._chart(), self._history, self._detected)
+        """What a new watcher is sent: the chart, and the last transitions, detections and map."""
+        messages = (self._chart(), self._history, self._detected, self._map)
         return [message for message in messages if message is not None]
+
+    def forget_map(self) -> list[JsonMessage]:
+        """Forget the navigator's map, which belongs to another flight; returns a message "map" without it."""
+        if self._map is None:
+            return []
+        self._map = None
+        return [map_message(self._id, NavigationDocument())]
 
     def _state_name(self, state: MissionState) -> str:
         document = self._document
@@ -159,6 +170,10 @@ class MissionView:
                 transitions = _History.model_validate(document.content).transitions
                 self._history = self._transitions(transitions[-_TRANSITIONS:])
                 return [self._history]
+            if document.kind is DocumentKind.MAP:
+                navigation = NavigationDocument.model_validate(document.content)
+                self._map, self._map_crc = map_message(self._id, navigation), navigation.mission_crc
+                return [self._map]
         except ValidationError as error:
             self.problem = f"{document.kind.name.lower()} document: {first_error(error)}"
             return []

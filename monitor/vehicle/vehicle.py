@@ -211,6 +211,8 @@ class Vehicle:
         if self._telemetry.restarts != self._restarts:
             self._judging.close()
             self.link.forget_sequence()
+            for forgotten in self._mission.forget_map():
+                self._callbacks.publish(forgotten)
             self._reset(now_s)
             self._callbacks.notice("warning", f"drone {self.id} has restarted")
         elif is_newest and number == mavlink.MAVLINK_MSG_ID_HEARTBEAT:

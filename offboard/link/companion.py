@@ -119,6 +119,10 @@ class Companion:
         self._documents[kind] = pieces
         self._unsent[kind] = deque(pieces)
 
+    def is_sending(self, kind: DocumentKind) -> bool:
+        """Whether pieces of a new document of this kind still wait."""
+        return bool(self._unsent.get(kind))
+
     def send_text(self, text: str) -> None:
         """Send a STATUSTEXT of severity INFO, in several messages if it is too long for one."""
         data = text.encode("utf-8", "replace")[: _MAX_TEXT_CHUNKS * _TEXT_BYTES]
@@ -184,8 +188,8 @@ class Companion:
         return source == self._autopilot and not any(message_id)
 
     def _next_unsent(self) -> bytes | None:
-        """A piece not sent yet: of the newest kinds first, as the mission's own document is the longest."""
-        for kind in reversed(DocumentKind):
+        """A piece not sent yet; the mission's own document is the longest, and maps are many."""
+        for kind in (DocumentKind.RESULT, DocumentKind.HISTORY, DocumentKind.MISSION, DocumentKind.MAP):
             if self._unsent.get(kind):
                 return self._unsent[kind].popleft()
         return None

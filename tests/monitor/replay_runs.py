@@ -79,6 +79,7 @@ def a_run(name="first", end_s=END_S, **changes):
             {"t": t, "width": 32, "height": 24, "boxes": {"red": [4, -4, 6, -6, 1.5, 20.0], "green": None}}
             for t in (5.0, 15.0)
         ],
+        "maps": [],
         "transitions": transitions,
         "images": [0.5 * number for number in range(60)],
         "crossings": [{"t": 12.0, "colour": "red"}, {"t": 25.0, "colour": "green"}],

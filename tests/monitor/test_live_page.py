@@ -2,15 +2,28 @@
 
 import asyncio
 import re
+from dataclasses import replace
+from math import inf
 
+import cv2
+import numpy as np
 import pytest
 import pytest_asyncio
 from playwright.async_api import expect
 
+from framerunner.flying.mission_reporter import MissionReporter
+from monitor.vehicle.mission import MissionView
+from offboard.app import Moment
+from offboard.drone import DroneState, VelocityCommand
 from offboard.mission import load_mission, mermaid
+from offboard.navigation.frame_estimate import FrameEstimate
+from offboard.navigation.view import NavigationView
 from scenarios.loader import load_scenario
 from tests.chromium import Complaints
 from tests.monitor.page_server import JPEG, fake_monitor
+from tests.monitor.vehicle.test_mission_view import tunnel
+from vision.types import Detections
+from wire.mission_tunnel import DOCUMENT_TYPE
 
 pytestmark = pytest.mark.asyncio(loop_scope="session")
 MISSION = load_mission("frame_challenge")
@@ -83,10 +96,28 @@ async def fake():
         yield monitor
 
 
-async def visit(browser, fake, path="/", viewport=LAPTOP, *, three=None, **more):
-    """Open a page; `three` is an event that its library for 3-D waits for."""
+WITHOUT_WEBGL = """const context = HTMLCanvasElement.prototype.getContext;
+HTMLCanvasElement.prototype.getContext = function (kind, ...more) {
+  return kind.startsWith("webgl") ? null : context.call(this, kind, ...more);
+};"""
+
+
+async def visit(browser, fake, path="/", viewport=LAPTOP, *, three=None, script="", **more):
+    """Open a page.
+
+    Args:
+        browser: a playwright `Browser`.
+        fake: the monitor.
+        path: of the page.
+        viewport: its size.
+        three: an event that its library for 3-D waits for.
+        script: run before the page's own.
+        more: for the browser's context.
+    """
     context = await browser.new_context(viewport=viewport, **more)
     page = await context.new_page()
+    if script:
+        await page.add_init_script(script)
 
     async def load_three(route):
         await three.wait()
@@ -277,17 +308,7 @@ async def test_a_phone_shows_everything_without_scrolling_sideways(chromium, fak
 
 
 async def test_without_webgl_the_arena_is_shown_from_above(chromium, fake):
-    context = await chromium.new_context(viewport=LAPTOP)
-    page = await context.new_page()
-    await page.add_init_script(
-        """const context = HTMLCanvasElement.prototype.getContext;
-        HTMLCanvasElement.prototype.getContext = function (kind, ...more) {
-          return kind.startsWith("webgl") ? null : context.call(this, kind, ...more);
-        };"""
-    )
-    complaints = Complaints(page)
-    await page.goto(fake.url)
-    await fake.until_watched()
+    page, complaints = await visit(chromium, fake, script=WITHOUT_WEBGL)
     await expect(page.locator(".m-arena-words")).to_contain_text("from above")
     await fake.say("pose", drones=[pose(p=[4.0, 4.0, 1.0])])
     # The drone's dark arrow comes to stand on the floor's gold.
@@ -301,6 +322,90 @@ async def test_without_webgl_the_arena_is_shown_from_above(chromium, fake):
           return false;
         }"""
     )
+    assert complaints == []
+
+
+class Pipe:
+    """In place of a companion: its documents go straight to a monitor's view of the mission."""
+
+    def __init__(self):
+        self.view = MissionView(1)
+        self.told = []
+
+    def __getattr__(self, name):
+        return lambda *what: None
+
+    def send_document(self, kind, pieces):
+        for piece in pieces:
+            self.told += self.view.take(tunnel(DOCUMENT_TYPE, piece), 0.0)
+
+
+def reported_map():
+    """The message that a navigator's view becomes on its way through the app's reporter and the monitor."""
+    red = FrameEstimate("red", (-2.5, 2.5, 1.0), 0.0, (0.4, 0.4, 0.1), 0.1, False, False, 2, 0)
+    other = FrameEstimate("constructor", (0.0, -2.5, 1.0), 1.0, (inf, inf, inf), 0.1, True, False, 1, 0)
+    view = NavigationView((red, other), ((-4.0, 4.0, 1.0), (-1.0, 4.0, 1.0)), MARKUP)
+    pipe = Pipe()
+    reporter = MissionReporter(pipe, MISSION, "", "test-case-1")
+    seen = Moment(DroneState(0, 0.0, 0.0, 1.0, 0.0), VelocityCommand(), Detections(), "red.turning", 0.0)
+    reporter.see(replace(seen, navigation=view))
+    (message,) = (each for each in pipe.told if each["kind"] == "map")
+    return message
+
+
+# Pixels of a colour in the picture of the arena from above, in its upper left quarter.
+COUNT_PIXELS = """(colour) => {
+  const canvas = document.querySelector(".m-topview");
+  const { width, height } = canvas;
+  const pixels = canvas.getContext("2d").getImageData(0, 0, width / 2 - 30, height / 2 - 20).data;
+  let count = 0;
+  for (let index = 0; index < pixels.length; index += 4)
+    if (colour.every((value, channel) => Math.abs(pixels[index + channel] - value) < 12)) count += 1;
+  return count;
+}"""
+PURE_RED, PALE_RED, PATH = [255, 0, 0], [233, 132, 42], [179, 0, 125]
+
+
+async def test_the_navigators_map_is_drawn_from_above_and_can_be_switched_off(chromium, fake):
+    scenario = world()["scenario"] | {"frames": []}
+    fake.welcome = [world(scenario=scenario), chart(), {"kind": "status", "drones": [status()]}]
+    page, complaints = await visit(chromium, fake, script=WITHOUT_WEBGL)
+    await page.wait_for_selector(".m-topview")
+    button, goal = page.get_by_role("button", name="Map"), page.locator(".m-arena-goal")
+    await expect(button).to_be_hidden()
+    message = reported_map()
+    await fake.say(**message)
+    await expect(page.locator(".m-arena")).to_have_attribute("data-mapped", "red constructor")
+    await expect(goal).to_have_text(f"navigator: {MARKUP}")
+    for colour, least in ((PURE_RED, 20), (PALE_RED, 300), (PATH, 30)):
+        await page.wait_for_function(f"(colour) => ({COUNT_PIXELS})(colour) >= {least}", arg=colour)
+    await button.click()
+    await page.wait_for_function(f"(colour) => ({COUNT_PIXELS})(colour) === 0", arg=PATH)
+    await expect(goal).to_be_hidden()
+    await button.click()
+    await expect(goal).to_be_visible()
+    await fake.say(**message | {"goal": "", "frames": [], "path": []})
+    await expect(button).to_be_hidden()
+    assert complaints == []
+
+
+async def test_the_navigators_map_is_drawn_in_three_dimensions(solid_chromium, fake):
+    page, complaints = await visit(solid_chromium, fake)
+    arena = page.locator(".m-arena")
+    await page.wait_for_function("document.querySelector('.m-arena').dataset.frames > 0")
+
+    async def path_pixels():
+        picture = cv2.imdecode(np.frombuffer(await arena.screenshot(), np.uint8), cv2.IMREAD_COLOR)
+        blue, green, red = np.moveaxis(picture.astype(int), 2, 0)
+        return int(np.sum((red - green > 100) & (blue - green > 60)))
+
+    assert await path_pixels() == 0
+    await fake.say(**reported_map())
+    await page.wait_for_function("document.querySelector('.m-arena').dataset.mapped")
+    for _ in range(100):  # pictures that are drawn when the machine has time
+        if await path_pixels() >= 30:
+            break
+    assert await path_pixels() >= 30
     assert complaints == []
 
 

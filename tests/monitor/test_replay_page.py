@@ -73,6 +73,26 @@ async def test_the_slider_moves_all_that_is_shown(monkeypatch, chromium):
         await expect(page.locator(".m-transitions tbody tr")).to_have_count(0)
 
 
+async def test_the_map_of_the_time_is_shown(monkeypatch, chromium):
+    frame = {"p": [1.0, 2.0, 1.5], "yaw": 0.5, "std": [0.2, 0.1, 0.1], "yaw_std": 0.1}
+    frame |= {"certain": False, "ambiguous": False, "views": 2}
+    red, green = ({"colour": colour, **frame} for colour in ("red", "green"))
+    maps = [
+        {"t": 2.0, "goal": "explore", "frames": [red], "path": []},
+        {"t": 8.0, "goal": f"cross red {MARKUP}", "frames": [red, green], "path": [[0, 0, 1], [1, 2, 1.5]]},
+    ]
+    async with opened(monkeypatch, chromium, Library(a_run(maps=maps)), "replay?a=first&t=1") as page:
+        arena, goal = page.locator(".m-arena"), page.locator(".m-arena-goal")
+        await expect(goal).to_be_hidden()
+        await seek(page, 9)
+        await expect(arena).to_have_attribute("data-mapped", "red green")
+        await expect(goal).to_have_text(f"navigator: cross red {MARKUP}")
+        await seek(page, 3)
+        await expect(arena).to_have_attribute("data-mapped", "red")
+        await seek(page, 0)
+        await expect(goal).to_be_hidden()
+
+
 async def test_the_image_of_the_time_is_shown(monkeypatch, chromium):
     shown = """async blue => {
         const image = document.querySelector('.r-camera img');

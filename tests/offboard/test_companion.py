@@ -150,6 +150,20 @@ async def test_a_document_is_sent_at_once_then_again_and_again_two_pieces_a_seco
     assert sorted(repeated) == sorted([*mission, *history])  # each once in a round
 
 
+async def test_maps_wait_for_all_other_documents(pair):
+    companion, forwarder = pair
+    navigation = split_document(DocumentKind.MAP, {"goal": "explore"})[1]
+    mission = split_document(DocumentKind.MISSION, {"source": "".join(map(str, range(900)))})[1]
+    companion.send_document(DocumentKind.MAP, navigation)
+    companion.send_document(DocumentKind.MISSION, mission)
+    for _ in range(len(mission) // module.PIECES_A_BEAT):
+        assert companion.is_sending(DocumentKind.MAP)
+        companion.beat()
+    companion.beat()
+    assert not companion.is_sending(DocumentKind.MAP)
+    assert navigation[0] in payloads(forwarder.received(), 0x8F12)
+
+
 async def test_of_a_document_only_the_newest_version_is_sent(pair):
     companion, forwarder = pair
     old = split_document(DocumentKind.HISTORY, {"transitions": ["".join(map(str, range(900)))]})[1]

@@ -27,7 +27,7 @@ from wire.mission_tunnel import (
     split_document,
 )
 
-MISSION, HISTORY, RESULT = DocumentKind
+MISSION, HISTORY, RESULT = DocumentKind.MISSION, DocumentKind.HISTORY, DocumentKind.RESULT
 TUNNEL_BYTES = 128
 
 numbers = st.floats(width=32, allow_nan=False)
@@ -142,7 +142,10 @@ def test_a_document_is_returned_once(kind, content):
     assert joined(assembler, pieces * 2) == []  # repeated for those who came late
 
 
-@given(st.lists(objects, min_size=3, max_size=3), st.randoms(use_true_random=False))
+@given(
+    st.lists(objects, min_size=len(DocumentKind), max_size=len(DocumentKind)),
+    st.randoms(use_true_random=False),
+)
 def test_pieces_of_several_documents_may_be_mixed_and_repeated(contents, random):
     pieces = [piece for kind, item in zip(DocumentKind, contents, strict=True) for piece in split(kind, item)]
     pieces *= 2
@@ -151,7 +154,7 @@ def test_pieces_of_several_documents_may_be_mixed_and_repeated(contents, random)
     assert {document.kind: document.content for document in documents} == dict(
         zip(DocumentKind, contents, strict=True)
     )
-    assert len(documents) == 3
+    assert len(documents) == len(DocumentKind)
 
 
 def split(kind, content):

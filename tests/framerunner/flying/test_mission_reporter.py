@@ -4,20 +4,23 @@ from __future__ import annotations
 
 import logging
 from dataclasses import replace
-from math import inf
+from math import inf, nan
 
 import numpy as np
 import pytest
 
 from framerunner.flying.mission_reporter import HISTORY, MissionReporter
+from framerunner.flying.navigation_reporter import MAX_FRAMES, MAX_POINTS, navigation_json
 from offboard.app import Moment, fly_mission
 from offboard.drone import DroneState, VelocityCommand
 from offboard.engine import TransitionTaken
 from offboard.mission import load_mission, mermaid
+from offboard.navigation.frame_estimate import FrameEstimate
+from offboard.navigation.view import NavigationView
 from scenarios.result import FlightResult
 from tests.offboard.fakes import START_1, TEST_CASE_1, GeometricPerception, KinematicDrone
 from vision.types import CameraFrame, Detection, Detections
-from wire.mission_tunnel import DocumentAssembler, DocumentKind
+from wire.mission_tunnel import DocumentAssembler, DocumentKind, split_document
 
 MISSION = load_mission("frame_challenge")
 LEAVES = list(MISSION.leaves)
@@ -29,6 +32,7 @@ class Listener:
 
     def __init__(self):
         self.states, self.detections, self.texts, self.documents, self.farewells = [], [], [], [], []
+        self.sending = ()
 
     def send_state(self, state):
         self.states.append(state)
@@ -47,6 +51,9 @@ class Listener:
 
     async def send_finally(self, kind):
         self.farewells.append(kind)
+
+    def is_sending(self, kind):
+        return kind in self.sending
 
     def contents(self, kind):
         return [document.content for document in self.documents if document.kind == kind]
@@ -191,6 +198,70 @@ def test_each_image_s_detections_are_sent_once_with_the_image_s_size():
     assert listener.detections[0].blue == (-inf, inf, -inf, inf, inf, inf)
     reporter.see(moment(5, "landing.stop", detections=Detections()))
     assert len(listener.detections) == 2
+
+
+def estimate(colour="red", position_m=(3.0, 2.0, 2.0), std_m=(0.02, 0.01, 0.03), yaw_rad=0.5):
+    return FrameEstimate(colour, position_m, yaw_rad, std_m, 0.1, False, True, 12, 0)
+
+
+def test_the_navigator_s_map_is_sent_twice_a_second_when_it_has_changed():
+    listener, reporter = make_reporter()
+    first = NavigationView((estimate(),), ((0.0, 0.0, 1.0), (3.0, 2.0, 2.0)), "cross red")
+    second = replace(first, goal="explore")
+    for tick in range(40):
+        reporter.see(moment(tick, navigation=None if tick < 5 else first if tick < 18 else second))
+    sent = listener.contents(DocumentKind.MAP)
+    assert [(each["time_us"] // 50_000, each["goal"]) for each in sent] == [(5, "cross red"), (18, "explore")]
+    (mission,) = (each for each in listener.documents if each.kind == DocumentKind.MISSION)
+    assert sent[0] == {
+        "mission_crc": mission.crc,
+        "time_us": 250_000,
+        "goal": "cross red",
+        "frames": [
+            {
+                **{"colour": "red", "p": [3.0, 2.0, 2.0], "yaw": 0.5, "std": [0.02, 0.01, 0.03]},
+                **{"yaw_std": 0.1, "certain": True, "ambiguous": False, "views": 12},
+            }
+        ],
+        "path": [[0.0, 0.0, 1.0], [3.0, 2.0, 2.0]],
+    }
+    listener.sending = (DocumentKind.MAP,)
+    reporter.see(moment(39, navigation=first))
+    assert len(listener.contents(DocumentKind.MAP)) == 2
+    listener.sending = ()
+    for tick in range(40, 80):  # a map that changes at every tick
+        reporter.see(moment(tick, navigation=replace(first, frames=(estimate(position_m=(tick, 0.0, 1.0)),))))
+    assert [each["time_us"] // 50_000 for each in listener.contents(DocumentKind.MAP)[2:]] == [40, 50, 60, 70]
+
+
+def test_a_large_map_is_thinned_and_unknown_numbers_are_null():
+    listener, reporter = make_reporter()
+    random = np.random.default_rng(1)
+    places = [tuple(place) for place in random.normal(0.0, 3.0, (100, 3))]
+    path = tuple((0.1 * number, 0.0, 1.0) for number in range(100))
+    frames = (estimate(position_m=(nan, 0.0, 0.0)), *(estimate(position_m=place) for place in places))
+    unknown = estimate(std_m=(inf, 0.1, 0.1))
+    reporter.see(moment(0, navigation=NavigationView((unknown, *frames), path, "x" * 200)))
+    (sent,) = listener.contents(DocumentKind.MAP)
+    assert (len(sent["goal"]), sent["frames"][0]["std"]) == (80, None)
+    assert len(sent["frames"]) == MAX_FRAMES
+    assert sent["frames"][1]["p"] == pytest.approx(places[0], abs=0.001)
+    assert len(sent["path"]) == MAX_POINTS
+    assert (sent["path"][0], sent["path"][-1]) == ([0.0, 0.0, 1.0], [9.9, 0.0, 1.0])
+    steps = np.diff([point[0] for point in sent["path"]])
+    assert (steps.min(), steps.max()) == (pytest.approx(0.3), pytest.approx(0.4))
+
+
+def test_a_usual_map_takes_a_few_pieces():
+    random = np.random.default_rng(2)
+    frames = tuple(
+        estimate(colour, tuple(random.normal(0.0, 3.0, 3)), tuple(random.uniform(0.01, 1.0, 3)), 0.1 * number)
+        for number, colour in enumerate(("red", "green", "blue", "yellow", "white"))
+    )
+    path = tuple(tuple(point) for point in np.cumsum(random.normal(0.0, 0.2, (MAX_POINTS, 3)), axis=0))
+    view = NavigationView(frames, path, "look at green")
+    _, pieces = split_document(DocumentKind.MAP, navigation_json(view))
+    assert len(pieces) <= 6  # 1.5 kB a second at most
 
 
 async def test_the_result_is_sent_and_nothing_else_follows_until_it_is_sent():

@@ -1,16 +1,28 @@
 """The process that reads a run: limited in memory and time, and ended with its parent."""
 
+import json
 import subprocess
 import sys
 import threading
 import time
+from dataclasses import replace
+from math import inf
 from pathlib import Path
 
 import pytest
 
 from framerunner.monitoring import run_library
+from framerunner.monitoring.read_run import RECORDING, read_run
 from framerunner.monitoring.run_library import RunFolders
+from framerunner.recording.mcap_writer import FlightRecording
 from monitor.ports import RunError
+from offboard.app import Moment
+from offboard.drone import DroneState, VelocityCommand
+from offboard.mission import load_mission
+from offboard.navigation.frame_estimate import FrameEstimate
+from offboard.navigation.view import NavigationView
+from scenarios.loader import load_scenario
+from vision.types import Detections
 
 GREEDY = """
 from framerunner.monitoring.read_run import limit_resources
@@ -128,3 +140,22 @@ def test_what_could_not_be_read_is_not_read_again_until_it_changes(tmp_path, mon
     with pytest.raises(RunError, match="it is damaged"):
         library.recording("bad")
     assert len(started) == 1
+
+
+def test_the_navigators_map_of_a_recording_is_listed_when_it_changes(tmp_path):
+    frame = FrameEstimate("red", (3.0, 2.0, 2.0), 0.5, (inf, inf, inf), 0.1, True, False, 1, 0)
+    views = [None, NavigationView(goal="explore"), NavigationView((frame,), ((0.0, 0.0, 1.0),), "cross red")]
+    folder, target = tmp_path / "flight", tmp_path / "target"
+    folder.mkdir()
+    target.mkdir()
+    scenario, mission = load_scenario("test-case-1"), load_mission("frame_challenge")
+    with FlightRecording(folder / "flight.mcap", scenario, mission, None) as recording:
+        for tick in range(30):
+            state = DroneState(50_000 * tick, 0.0, 0.0, 1.0, 0.0)
+            moment = Moment(state, VelocityCommand(), Detections(), "a.b", 0.05 * tick)
+            recording.see(replace(moment, navigation=views[tick // 10]))
+    read_run(folder, target)
+    maps = json.loads((target / RECORDING).read_text())["maps"]
+    assert [(each["t"], each["goal"]) for each in maps] == [(0.5, "explore"), (1.0, "cross red")]
+    assert (maps[1]["frames"][0]["p"], maps[1]["frames"][0]["std"]) == ([3.0, 2.0, 2.0], None)
+    assert maps[1]["path"] == [[0.0, 0.0, 1.0]]

@@ -138,6 +138,48 @@ def test_detections_distinguish_not_seen_and_not_known(view):
     }
 
 
+MAPPED = {"colour": "red", "p": [3.0, 2.0, 2.0], "yaw": 0.5, "std": [0.02, 0.01, 0.03], "yaw_std": 0.1}
+MAPPED |= {"certain": True, "ambiguous": False, "views": 12}
+
+
+def map_of(view, **content):
+    """Messages that follow from a MAP document."""
+    _, pieces = documents(DocumentKind.MAP, content)
+    return [message for piece in pieces for message in view.take(piece, 10.0)]
+
+
+def test_the_map_of_another_mission_is_forgotten(view):
+    known = {"goal": "cross red", "frames": [MAPPED], "path": [[0.0, 0.0, 1.0], [3.0, 2.0, 2.0]]}
+    (told,) = map_of(view, mission_crc=view._document_crc, time_us=9_250_000, **known)
+    assert told == {"kind": "map", "id": 1, "t": 9.25, **known}
+    assert view.take(state(view._document_crc), 10.0) == []
+    assert view.standing()[-1] == told
+    (empty,) = view.take(state(crc=1), 10.0)
+    assert empty == {"kind": "map", "id": 1, "t": 0.0, "goal": "", "frames": [], "path": []}
+    assert [message["kind"] for message in view.standing()] == ["chart"]
+
+
+@pytest.mark.parametrize(
+    "content",
+    [
+        {"frames": [{**MAPPED, "p": [1e9, 0, 0]}]},
+        {"frames": [{**MAPPED, "p": [0, None, 0]}]},
+        {"frames": [{**MAPPED, "std": [-1, 0, 0]}]},
+        {"frames": [{**MAPPED, "colour": "x" * 81}]},
+        {"frames": [MAPPED] * 51},
+        {"path": [[0, 0, 0]] * 101},
+        {"path": [[0, 0]]},
+        {"goal": {"a": 1}},
+        {"time_us": -1},
+    ],
+)
+def test_an_invalid_map_is_reported_and_the_last_one_stays(view, content):
+    (told,) = map_of(view, frames=[MAPPED])
+    assert map_of(view, **content) == []
+    assert view.problem.startswith("map document: ")
+    assert view.standing()[-1] == told
+
+
 def test_a_result_is_kept_with_its_crc(view):
     crc, pieces = documents(DocumentKind.RESULT, {"verdict": "clean", "try_time_s": 40.5})
     for piece in pieces:
