@@ -4,17 +4,19 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
-from math import acos, copysign, degrees, hypot, sqrt
+from math import acos, copysign, degrees, hypot
 
 import cv2
 import numpy as np
 import numpy.typing as npt
 
+from vision.bar_edges import FOREIGN, BarEdges, find_edges
+from vision.bar_lines import BarLines, Meeting, fit_lines, meeting
 from vision.colour_regions import OBSTACLE, PRIMARIES, ColourMask, find_colours
 from vision.detector import measure
-from vision.frame_pose import frame_poses
+from vision.frame_model import AXES_CORNERS, OUTER_CORNERS, Floats, ModelPose, Point, Sides, bar_offsets
+from vision.frame_pose import as_seen, find_poses
 from vision.outer_sides import outer_sides
-from vision.outline import BAR_M, FOREIGN, FRAME_HEIGHT_M, FRAME_WIDTH_M, Line, Lines, Sides, fit_lines
 from vision.types import (
     NOT_SEEN,
     Detection,
@@ -122,27 +124,56 @@ class FrameFinder:
         sides = outer_sides(points, width, height)
         if sides is None:
             return None
-        column, row, columns, rows = box = _bounding_box(points)
-        margin = 6 + max(columns, rows) // 4
-        labels = _labels(mask, others, box, margin)
-        left, top = column - margin, row - margin
-        lines = fit_lines(labels, _shifted(sides, -left, -top), self._focal_px, self._spread_px)
-        offset = (left - (width - 1) / 2, top - (height - 1) / 2)
-        corners = [_meeting(lines[k - 1], lines[k]) for k in range(4)]
-        if all(corner is not None for corner in corners):
-            axes = [(c.right_px + offset[0], c.down_px + offset[1]) for c in corners if c is not None]
-            size = max(columns, rows)
-            poses = frame_poses(
-                axes, FRAME_WIDTH_M - BAR_M, FRAME_HEIGHT_M - BAR_M, self._focal_px, 0.6 + 0.02 * size
-            )
+        box = _bounding_box(points)
+        margin = 6 + max(box[2:]) // 4
+        left, top = box[0] - margin, box[1] - margin
+        edges = find_edges(_labels(mask, others, box, margin), _shifted(sides, -left, -top), self._spread_px)
+        origin = ((width - 1) / 2 - left, (height - 1) / 2 - top)
+        lines, meetings, poses = self._fit(edges, origin, max(box[2:]))
+        if not poses:
+            return None
+        corners = _outer_corners(meetings, poses[0], origin, self._focal_px)
+        if not any(corners):
+            return None
+        whole = _is_whole(lines, box, width, height)
+        return box, FrameSighting(mask.colour, corners, whole, tuple(map(as_seen, poses)))
+
+    def _fit(
+        self, edges: list[BarEdges | None], origin: Point, size_px: int
+    ) -> tuple[BarLines, list[Meeting | None], list[ModelPose]]:
+        """The axes of the bars, where they meet (of sides k - 1 and k) and the poses that follow.
+
+        The optical axis is at `origin` of the labelled image.
+        """
+        offsets: Floats | None = None
+        poses: list[ModelPose] = []
+        for _ in range(2):
+            lines = fit_lines(edges, self._focal_px, offsets)
+            meetings = [meeting(lines[k - 1], lines[k]) for k in range(4)]
+            known = [(m.x - origin[0], m.y - origin[1]) for m in meetings if m is not None]
+            if len(known) < 4:
+                break
+            poses = find_poses(known, self._focal_px, 0.6 + 0.02 * size_px)
             if not poses:
-                return None
-            whole = _is_whole(lines, box, width, height)
-            outer = _extrapolated(axes)
-            stds = [(c.std_right_px, c.std_down_px) for c in corners if c is not None]
-            made = [FrameCorner(*point, *std) for point, std in zip(outer, stds, strict=True)]
-            return box, FrameSighting(mask.colour, (made[0], made[1], made[2], made[3]), whole, poses)
-        return None
+                break
+            offsets = self._offsets(edges, poses[0], origin)
+            if offsets is None:
+                break
+        return lines, meetings, poses
+
+    def _offsets(self, edges: list[BarEdges | None], pose: ModelPose, origin: Point) -> Floats | None:
+        """Where the edges of the bars should be beside their axes, as painted."""
+        bars = [bar for bar in edges if bar is not None]
+        if len(bars) < 4:
+            return None
+        spans = np.array([(bar.t[0] - origin[bar.steep], bar.t[-1] - origin[bar.steep]) for bar in bars])
+        steep, inward = tuple(bar.steep for bar in bars), tuple(bar.inward for bar in bars)
+        offsets = bar_offsets(pose, steep, inward, spans, self._focal_px)
+        if offsets is None:
+            return None
+        offsets[:, 0] -= self._spread_px
+        offsets[:, 1] += self._spread_px
+        return offsets
 
 
 def _bounding_box(points: _Contour) -> _Box:
@@ -199,36 +230,24 @@ def _shifted(sides: Sides, dx: float, dy: float) -> Sides:
     return (moved[0], moved[1], moved[2], moved[3])
 
 
-def _meeting(one: Line | None, other: Line | None) -> FrameCorner | None:
-    """Where two lines meet, with the standard deviations that follow from theirs."""
-    if one is None or other is None:
-        return None
-    a, b, c = one.normal_form()
-    d, e, f = other.normal_form()
-    det = a * e - b * d
-    if abs(det) < 0.05:
-        return None
-    x, y = (c * e - b * f) / det, (a * f - c * d) / det
-    var_one, var_other = one.variance(x, y), other.variance(x, y)
-    std_x = sqrt(e * e * var_one + b * b * var_other) / abs(det)
-    std_y = sqrt(d * d * var_one + a * a * var_other) / abs(det)
-    return FrameCorner(x, y, std_x, std_y)
+def _outer_corners(
+    meetings: list[Meeting | None], pose: ModelPose, origin: Point, focal_px: float
+) -> tuple[FrameCorner | None, FrameCorner | None, FrameCorner | None, FrameCorner | None]:
+    """The corners of the outline in the frame's middle plane, from those of the bars' axes."""
+    outer, axes = pose.project(OUTER_CORNERS, focal_px), pose.project(AXES_CORNERS, focal_px)
+    corners: list[FrameCorner | None] = [None] * 4
+    if outer is not None and axes is not None:
+        for k, ((right, down), met) in enumerate(zip((outer - axes).tolist(), meetings, strict=True)):
+            if met is not None:
+                x, y = met.x - origin[0] + right, met.y - origin[1] + down
+                corners[k] = FrameCorner(x, y, met.std_x, met.std_y)
+    return (corners[0], corners[1], corners[2], corners[3])
 
 
-def _extrapolated(axes: Sequence[tuple[float, float]]) -> list[tuple[float, float]]:
-    """The outer corners in the plane of the bars' axes, by the plane's homography."""
-    x, y = 1.0 - BAR_M / FRAME_WIDTH_M, 1.0 - BAR_M / FRAME_HEIGHT_M
-    inner = np.array([(-x, -y), (x, -y), (x, y), (-x, y)], np.float32)
-    matrix = cv2.getPerspectiveTransform(inner, np.array(axes, np.float32))
-    outer = np.array([[-1.0, 1.0, 1.0, -1.0], [-1.0, -1.0, 1.0, 1.0], [1.0, 1.0, 1.0, 1.0]])
-    u, v, w = matrix @ outer
-    return list(zip((u / w).tolist(), (v / w).tolist(), strict=True))
-
-
-def _is_whole(lines: Lines, box: _Box, width: int, height: int) -> bool:
+def _is_whole(lines: BarLines, box: _Box, width: int, height: int) -> bool:
     column, row, columns, rows = box
     inside = column > 0 and row > 0 and column + columns < width and row + rows < height
-    return inside and all(line is not None and line.outer_share > 0.99 for line in lines)
+    return inside and all(line is not None and line.seen > 0.99 for line in lines)
 
 
 def _signed_angle(pose: FramePose) -> float:

@@ -13,71 +13,63 @@ from math import isfinite, sqrt
 
 import cv2
 import numpy as np
-import numpy.typing as npt
 
-from geometry.vectors import Vec3
+from vision.frame_model import AXES_CORNERS, Floats, ModelPose, Point
 from vision.types import FramePose
-
-Floats = npt.NDArray[np.float64]
-Point = tuple[float, float]
 
 _IDENTITY = np.eye(3)
 _NUDGE = np.array([[1e-6, 2e-6], [-2e-6, 1e-6], [2e-6, -1e-6], [1e-6, 1e-6]]).reshape(4, 1, 2)
 
 
-def frame_poses(
-    corners: Sequence[Point], width_m: float, height_m: float, focal_px: float, max_error_px: float
-) -> tuple[FramePose, ...]:
-    """Find the poses of a rectangle.
+def find_poses(axes_corners: Sequence[Point], focal_px: float, max_error_px: float) -> list[ModelPose]:
+    """Find the poses of a frame.
 
     Args:
-        corners: upper left, upper right, lower right, lower left: pixels right of and below the optical axis.
-        width_m: of the rectangle.
-        height_m: of the rectangle.
+        axes_corners: where the axes of its bars meet, upper left, upper right, lower right, lower left:
+            pixels right of and below the optical axis.
         focal_px: focal length.
         max_error_px: poses that explain the corners worse than this (root mean square) are left out.
 
     Returns:
         None, one or two, the better one first.
     """
-    x, y = width_m / 2, height_m / 2
-    # The model's y points down as the image's: the solver's rotation vectors fail near half a turn.
-    model = np.array([[-x, -y, 0.0], [x, -y, 0.0], [x, y, 0.0], [-x, y, 0.0]])
     # In units of the focal length the camera's matrix is the identity.
-    image = np.array(corners).reshape(4, 1, 2) / focal_px
-    poses = _solved(model, image, focal_px, max_error_px)
+    image = np.array(axes_corners).reshape(4, 1, 2) / focal_px
+    poses = _solved(image, focal_px, max_error_px)
     if len(poses) < 2:
         # An image that is symmetric to a few last digits makes the solver divide zero by zero.
-        again = _solved(model, image + _NUDGE, focal_px, max_error_px)
-        poses = max(poses, again, key=len)
-    return tuple(sorted(poses, key=lambda pose: pose.error_px))
+        poses = max(poses, _solved(image + _NUDGE, focal_px, max_error_px), key=len)
+    return sorted(poses, key=lambda pose: pose.error_px)
 
 
-def _solved(model: Floats, image: Floats, focal_px: float, max_error_px: float) -> list[FramePose]:
+def as_seen(pose: ModelPose) -> FramePose:
+    """The pose as others use it, in the camera's axes forward, left, up."""
+    right, down, ahead = pose.rotation[:, 2].tolist()
+    x, y, z = pose.shift_m.tolist()
+    if right * x + down * y + ahead * z > 0.0:  # the normal points to the side from which it is seen
+        right, down, ahead = -right, -down, -ahead
+    return FramePose((z, -x, -y), (ahead, -right, -down), pose.error_px)
+
+
+def _solved(image: Floats, focal_px: float, max_error_px: float) -> list[ModelPose]:
     """The solver's answers that are poses and explain the image."""
+    # The model's y points down as the image's: the solver's rotation vectors fail near half a turn.
     try:
-        turns, shifts = cv2.solvePnPGeneric(model, image, _IDENTITY, None, flags=cv2.SOLVEPNP_IPPE)[1:3]
+        turns, shifts = cv2.solvePnPGeneric(AXES_CORNERS, image, _IDENTITY, None, flags=cv2.SOLVEPNP_IPPE)[
+            1:3
+        ]
     except cv2.error:
         return []
-    poses = (
-        _pose(turn.ravel().tolist(), shift.ravel().tolist(), model, image, focal_px)
-        for turn, shift in zip(turns, shifts, strict=True)
-    )
+    poses = (_pose(turn, shift, image, focal_px) for turn, shift in zip(turns, shifts, strict=True))
     return [pose for pose in poses if pose is not None and pose.error_px <= max_error_px]
 
 
-def _pose(
-    turn: list[float], shift: list[float], model: Floats, image: Floats, focal_px: float
-) -> FramePose | None:
-    if not all(map(isfinite, (*turn, *shift))):
+def _pose(turn: Floats, shift: Floats, image: Floats, focal_px: float) -> ModelPose | None:
+    if not all(map(isfinite, (*turn.ravel().tolist(), *shift.ravel().tolist()))):
         return None
-    rotation, _ = cv2.Rodrigues(np.array(turn))
-    points = model @ rotation.T + np.array(shift)
+    rotation, _ = cv2.Rodrigues(turn)
+    points = AXES_CORNERS @ rotation.T + shift.ravel()
     if points[:, 2].min() <= 0.0 or rotation[1, 1] <= 0.0:  # behind the camera, or upside down
         return None
-    error = points[:, :2] / points[:, 2:] - image[:, 0]
-    right, down, ahead = rotation[:, 2].tolist()
-    if right * shift[0] + down * shift[1] + ahead * shift[2] > 0.0:
-        right, down, ahead = -right, -down, -ahead
-    position: Vec3 = (shift[2], -shift[0], -shift[1])
-    return FramePose(position, (ahead, -right, -down), focal_px * sqrt(float((error * error).sum()) / 4.0))
+    error = (points[:, :2] / points[:, 2:] - image[:, 0]).ravel()
+    return ModelPose(rotation, shift.ravel(), focal_px * sqrt(float(error @ error) / 4.0))

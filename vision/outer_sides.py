@@ -14,7 +14,7 @@ import cv2
 import numpy as np
 import numpy.typing as npt
 
-from vision.outline import Point, Segment, Sides
+from vision.frame_model import Point, Segment, Sides
 
 _MIN_SIZE_PX = 2
 _MAX_ADDED = 0.03  # of the area: less than this is rounding, more is a side

@@ -1,0 +1,183 @@
+"""Where the bars of a frame begin and end across, in the columns and rows of an image that they cross."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from math import ceil, floor, hypot, sqrt
+
+import numpy as np
+import numpy.typing as npt
+
+from vision.frame_model import BAR_M, FRAME_HEIGHT_M, FRAME_WIDTH_M, Floats, Segment, Sides
+
+Labels = npt.NDArray[np.uint8]
+Flags = npt.NDArray[np.bool_]
+
+BACKGROUND, OWN, FOREIGN = 0, 1, 2
+"""Values of pixels: neither, of the region, and what may hide a part of it (or is not in the image)."""
+
+_OUTSIDE_PX = 3  # how far outside a first estimate of a side its outer edge is looked for
+_MAX_SAMPLES = 40  # per side
+_SLACK_PX = 2.5  # a bar may look wider than expected by this much
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class BarEdges:
+    """The edges of one side's bar, pixels of the labelled image.
+
+    Attributes:
+        steep: the side is nearer to a column than to a row: it is measured in every row, else every column.
+        inward: 1 if the opening is on the side of larger columns (rows if not steep), else -1.
+        slope: of the first estimate.
+        t: rows in which it is measured (columns if not steep).
+        outer: columns (rows) of its outer edge there, half-way between pixel centres.
+        inner: of its inner edge.
+        outer_ok: where the outer edge is one, not hidden and not outside the image.
+        inner_ok: the same for the inner edge.
+        half_px: what half its width should be, at every place.
+    """
+
+    steep: bool
+    inward: int
+    slope: float
+    t: Floats
+    outer: Floats
+    inner: Floats
+    outer_ok: Flags
+    inner_ok: Flags
+    half_px: Floats
+
+
+def find_edges(labels: Labels, sides: Sides, spread_px: float) -> list[BarEdges | None]:
+    """Find the edges of all four bars.
+
+    Args:
+        labels: pixels, with a margin around the region in which the widest search ends.
+        sides: first estimates of the outer edges, from pixel centre to pixel centre.
+        spread_px: how much larger than its true outline a region is painted on each side.
+    """
+    half_px = _expected_half_px(sides, spread_px)
+    samples = [
+        None if side is None else _sample(side, *half) for side, half in zip(sides, half_px, strict=True)
+    ]
+    used = [sample for sample in samples if sample is not None]
+    if not used:
+        return [None] * 4
+    stride = labels.strides[0]
+    base = np.concatenate([s.t * stride + s.u if s.steep else s.t + s.u * stride for s in used])
+    step = np.repeat([s.inward * (1 if s.steep else stride) for s in used], [len(s.t) for s in used])
+    half = np.concatenate([s.half_px for s in used])
+    offsets = np.arange(-_OUTSIDE_PX, ceil(2.0 * float(half.max()) + _SLACK_PX) + 2)
+    around = labels.reshape(-1).take(base[:, None] + step[:, None] * offsets, mode="clip")
+    outer, outer_ok, inner, inner_ok = _runs(around, 2.0 * half + _SLACK_PX)
+    found: list[BarEdges | None] = []
+    start = 0
+    for s in samples:
+        if s is None:
+            found.append(None)
+            continue
+        part = slice(start, start + len(s.t))
+        start = part.stop
+        found.append(
+            BarEdges(
+                s.steep,
+                s.inward,
+                s.slope,
+                s.t.astype(np.float64),
+                s.u + s.inward * outer[part],
+                s.u + s.inward * inner[part],
+                outer_ok[part],
+                inner_ok[part],
+                s.half_px,
+            )
+        )
+    return found
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Sample:
+    """Where a side is looked for: columns (rows if steep) and the row (column) of its outer edge there."""
+
+    steep: bool
+    inward: int
+    slope: float
+    t: npt.NDArray[np.int64]
+    u: npt.NDArray[np.int64]
+    half_px: Floats
+
+
+def _expected_half_px(sides: Sides, spread_px: float) -> list[tuple[float, float]]:
+    """Half the widths of the bars at the start and the end of each side, from the size of the outline.
+
+    The upright sides tell the scale at their distance. A square bar that is turned looks wider.
+    """
+    top, right, bottom, left = (None if side is None else _length(side) for side in sides)
+    height_right, height_left = right or left, left or right
+    if height_right is None or height_left is None:  # as if seen from the front
+        width = max(top or 0.0, bottom or 0.0)
+        height_right = height_left = width * FRAME_HEIGHT_M / FRAME_WIDTH_M
+    cosine = 0.7
+    if top is not None and bottom is not None:
+        seen = (top + bottom) / (height_right + height_left) * FRAME_HEIGHT_M / FRAME_WIDTH_M
+        cosine = min(1.0, seen)
+    turned = cosine + sqrt(1.0 - cosine * cosine)
+    share = BAR_M / FRAME_HEIGHT_M / 2.0
+    at_right, at_left = share * max(height_right, 2.0), share * max(height_left, 2.0)
+    level = 1.15  # seen from somewhat above or below
+    return [
+        (level * at_left + spread_px, level * at_right + spread_px),
+        (turned * at_right + spread_px,) * 2,
+        (level * at_right + spread_px, level * at_left + spread_px),
+        (turned * at_left + spread_px,) * 2,
+    ]
+
+
+def _length(side: Segment) -> float:
+    (x0, y0), (x1, y1) = side
+    return hypot(x1 - x0, y1 - y0)
+
+
+def _sample(side: Segment, half_start: float, half_end: float) -> _Sample | None:
+    """The columns or rows of a side that are clear of its neighbours' bars."""
+    (x0, y0), (x1, y1) = side
+    dx, dy = x1 - x0, y1 - y0
+    steep = abs(dy) > abs(dx)
+    # Going round clockwise, the opening is on the right: below the top side, left of the right one.
+    inward = (-1 if dy > 0 else 1) if steep else (1 if dx > 0 else -1)
+    (t0, u0, t1, u1) = (y0, x0, y1, x1) if steep else (x0, y0, x1, y1)
+    if t0 > t1:
+        t0, u0, t1, u1 = t1, u1, t0, u0
+        half_start, half_end = half_end, half_start
+    length = t1 - t0
+    if length < 1.0:
+        return None
+    first = ceil(t0 + min(2.0 * half_start + 0.5, 0.45 * length))
+    last = floor(t1 - min(2.0 * half_end + 0.5, 0.45 * length))
+    if first > last:
+        first = last = round(0.5 * (t0 + t1))
+    t = np.arange(first, last + 1, (last - first) // _MAX_SAMPLES + 1)
+    slope = (u1 - u0) / length
+    share = (t - t0) / length
+    # Across a slanted bar a row or column is longer than the bar is wide.
+    half = np.asarray((half_start + (half_end - half_start) * share) * hypot(1.0, slope), np.float64)
+    return _Sample(steep, inward, slope, t, np.rint(u0 + (u1 - u0) * share).astype(np.int64), half)
+
+
+def _runs(around: Labels, longest: Floats) -> tuple[Floats, Flags, Floats, Flags]:
+    """The run of own pixels that is met first from outside, in each row of samples.
+
+    Returns:
+        Outer edge, whether it is a real edge, inner edge, whether that is real; edges in pixels from the
+        estimate, half-way between pixel centres.
+    """
+    inside = around == OWN
+    rows = np.arange(len(around))
+    first = inside.argmax(axis=1)
+    hit = inside[rows, first] & (first > 0)
+    outer_ok = hit & (around[rows, first - 1] == BACKGROUND)
+    after = ~inside
+    after &= np.arange(around.shape[1]) > first[:, None]
+    end = after.argmax(axis=1)
+    inner_ok = hit & after[rows, end] & (around[rows, end] == BACKGROUND) & (end - first <= longest)
+    shift = -_OUTSIDE_PX - 0.5
+    return first + shift, outer_ok, end + shift, inner_ok

@@ -1,0 +1,107 @@
+"""The frame as a solid: four square bars, and where their edges are beside their axes in an image.
+
+Axes of the model: x to the right and y down as the camera sees the frame, z away from the camera; its origin
+is the centre of the opening. The sides are numbered clockwise: top, right, bottom, left; corner k is where
+side k - 1 and side k meet: upper left, upper right, lower right, lower left.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+Floats = npt.NDArray[np.float64]
+Point = tuple[float, float]
+Segment = tuple[Point, Point]
+Sides = tuple[Segment | None, Segment | None, Segment | None, Segment | None]
+
+FRAME_WIDTH_M, FRAME_HEIGHT_M, BAR_M = 0.42, 0.22, 0.02
+"""Outer width and height, and the edge of the square bars."""
+AXES_WIDTH_M, AXES_HEIGHT_M = FRAME_WIDTH_M - BAR_M, FRAME_HEIGHT_M - BAR_M
+"""Of the rectangle of the bars' axes, which is in the frame's middle plane."""
+
+_NEAREST_M = 0.03  # in front of the camera; nearer bars are not projected
+
+
+def rectangle(width_m: float, height_m: float) -> Floats:
+    """The corners of a rectangle in the middle plane, shape (4, 3)."""
+    x, y = width_m / 2, height_m / 2
+    return np.array([[-x, -y, 0.0], [x, -y, 0.0], [x, y, 0.0], [-x, y, 0.0]])
+
+
+OUTER_CORNERS = rectangle(FRAME_WIDTH_M, FRAME_HEIGHT_M)
+AXES_CORNERS = rectangle(AXES_WIDTH_M, AXES_HEIGHT_M)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class ModelPose:
+    """Where a frame is: a point p of the model is at `rotation @ p + shift_m` from the camera.
+
+    Attributes:
+        rotation: shape (3, 3); camera axes are right, down, ahead.
+        shift_m: shape (3,).
+        error_px: root mean square of the distances of four corners.
+    """
+
+    rotation: Floats
+    shift_m: Floats
+    error_px: float
+
+    def project(self, points_m: Floats, focal_px: float) -> Floats | None:
+        """Points of the model as pixels from the optical axis, shape (n, 2); None if one is too near."""
+        seen = points_m @ self.rotation.T + self.shift_m
+        depth_m = seen[:, 2:]
+        if depth_m.min() < _NEAREST_M:
+            return None
+        flat: Floats = seen[:, :2] * (focal_px / depth_m)
+        return flat
+
+
+def _bar_edges() -> Floats:
+    """Both ends of the axis and of the four edges of every bar, shape (4 sides * 5 * 2, 3)."""
+    half = BAR_M / 2
+    lines = []
+    for side in range(4):
+        start, end = AXES_CORNERS[side], AXES_CORNERS[(side + 1) % 4]
+        across = np.array([[0.0, 1.0, 0.0], [1.0, 0.0, 0.0]][side % 2])
+        away = np.array([0.0, 0.0, 1.0])
+        for a, b in ((0, 0), (-1, -1), (-1, 1), (1, -1), (1, 1)):
+            lines += [point + half * (a * across + b * away) for point in (start, end)]
+    return np.array(lines)
+
+
+_BAR_EDGES = _bar_edges()
+
+
+def bar_offsets(
+    pose: ModelPose, steep: tuple[bool, ...], inward: tuple[int, ...], spans: Floats, focal_px: float
+) -> Floats | None:
+    """How far a bar's outer and inner edge are from its axis in the image.
+
+    Args:
+        pose: of the frame.
+        steep: per side, whether distances are measured along rows, not columns.
+        inward: per side, 1 if the opening is on the side of larger columns (rows), else -1.
+        spans: per side two columns (rows if steep) from the optical axis, shape (4, 2).
+        focal_px: focal length.
+
+    Returns:
+        Pixels towards the opening, shape (4, 2 edges, 2 places), outer edge first; None if the frame is so
+        near that a part of it is beside the camera.
+    """
+    flat = pose.project(_BAR_EDGES, focal_px)
+    if flat is None:
+        return None
+    ends = flat.reshape(4, 5, 2, 2)
+    swap = np.array(steep)[:, None, None]
+    t = np.where(swap, ends[..., 1], ends[..., 0])
+    u = np.where(swap, ends[..., 0], ends[..., 1])
+    run = t[..., 1] - t[..., 0]
+    if np.abs(run).min() < 1e-6:
+        return None
+    slope = (u[..., 1] - u[..., 0]) / run
+    at = u[..., :1] + slope[..., None] * (spans[:, None, :] - t[..., :1])
+    beside = (at[:, 1:] - at[:, :1]) * np.array(inward)[:, None, None]
+    return np.stack([beside.min(axis=1), beside.max(axis=1)], axis=1)
