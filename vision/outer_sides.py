@@ -40,7 +40,7 @@ def outer_sides(points: npt.NDArray[np.int32], width_px: int, height_px: int) ->
         such quadrilateral.
     """
     hull = cv2.convexHull(points)  # clockwise to the eye, as OpenCV's axes have y upwards
-    if len(hull) < 3:
+    if len(hull) < 4:
         return None
     (left, top), (right, bottom) = hull.min(axis=(0, 1)).tolist(), hull.max(axis=(0, 1)).tolist()
     if right - left < _MIN_SIZE_PX or bottom - top < _MIN_SIZE_PX:
