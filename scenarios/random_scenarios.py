@@ -1,59 +1,22 @@
 """Random scenarios: levels, which say from what ranges they are drawn, and the draw by level and seed.
 
-The same level and seed give the same scenario on every machine. Random numbers are taken from named streams:
-a stream depends on the seed and its own name only, so one that is added, left out or drawn from more often
-changes no other.
+The same level and seed give the same scenario on every machine.
 """
 
 from __future__ import annotations
 
-import hashlib
 import itertools
 import math
 from pathlib import Path
-from typing import TYPE_CHECKING, Self
+from typing import Self
 
 from pydantic import Field, model_validator
 
-from scenarios.models import COLOURS, Arena, Base, Frame, Part, Scenario, ScenarioError, Start, refusal
+from scenarios.models import COLOURS, Arena, Base, Frame, Part, Scenario, Start
+from scenarios.random_closeness import Closeness
+from scenarios.random_numbers import MAX_DRAWS, STEPS_PER_UNIT, LevelError, Range, random_stream
+from scenarios.random_obstacles import Obstacles, add_obstacles
 from scenarios.yaml_file import FileKind
-
-if TYPE_CHECKING:
-    from numpy.random import Generator
-
-MAX_SEED = 2**63 - 1  # fits the integers of every file format and database
-MAX_DRAWS = 20_000  # a fifth of a second; level calm needs two draws on average
-STEPS_PER_UNIT = 1000  # what is drawn is a whole number of millimetres or milliradians
-
-
-class LevelError(ScenarioError):
-    """A level or a seed that cannot be used; the message is one line for people."""
-
-
-class Range(Part):
-    """A range from which a number is drawn uniformly, in whole thousandths, both ends included."""
-
-    low: float = Field(ge=-1000, le=1000, description="smallest value")
-    high: float = Field(ge=-1000, le=1000, description="largest value")
-
-    @property
-    def steps(self) -> tuple[int, int]:
-        """Both ends in thousandths."""
-        return (round(self.low * STEPS_PER_UNIT), round(self.high * STEPS_PER_UNIT))
-
-    @model_validator(mode="after")
-    def _has_whole_steps_upwards(self) -> Self:
-        for end, value, steps in zip(("low", "high"), (self.low, self.high), self.steps, strict=True):
-            if value != steps / STEPS_PER_UNIT:
-                raise refusal(value, "is too fine; use at most three decimals", end)
-        if self.low > self.high:
-            raise refusal(self.low, f"must not be above high {self.high}", "low")
-        return self
-
-    def draw(self, stream: Generator) -> int:
-        """Draw a whole number of thousandths, each of the range equally likely."""
-        low, high = self.steps
-        return low + int(stream.random() * (high - low + 1))
 
 
 class Layout(Part):
@@ -80,10 +43,7 @@ class Layout(Part):
         }
         for field, (lowest, highest) in limits.items():
             drawn: Range = getattr(self, field)
-            for end, value in (("low", drawn.low), ("high", drawn.high)):
-                if not lowest <= value <= highest:
-                    message = f"cannot be flown; keep within {lowest:.4g} and {highest:.4g}"
-                    raise refusal(value, message, field, end)
+            drawn.within(lowest, highest, field)
         return self
 
 
@@ -96,6 +56,12 @@ class Level(Part):
     )
     description: str = Field("", description="what is hard about it")
     layout: Layout = Field(description="places and headings of base, start and frames")
+    closeness: Closeness | None = Field(
+        None,
+        description="how near each other and the arena's border frames are; layout.apart_m then counts from "
+        "the base only",
+    )
+    obstacles: Obstacles | None = Field(None, description="what else is in the arena")
 
 
 LEVEL_FILES = FileKind("level", Level, LevelError, folder="levels")
@@ -117,30 +83,6 @@ def load_level(name_or_path: str | Path) -> Level:
     return level
 
 
-def random_stream(seed: int, name: str) -> Generator:
-    """Open a stream of random numbers at its beginning.
-
-    For numbers that must be the same everywhere, draw with `Generator.random()` and calculate in Python:
-    numpy promises the other distributions neither through its versions (NEP 19) nor, to the last bit,
-    through compilers. Generator, seeding and hash are named here because numpy's and Python's defaults may
-    change.
-
-    Args:
-        seed: 0 to `MAX_SEED`.
-        name: what the numbers are for, such as "layout.places".
-
-    Raises:
-        LevelError: the seed is out of range.
-    """
-    from numpy.random import PCG64, Generator, SeedSequence  # noqa: PLC0415 - reading scenarios needs no numpy
-
-    if not 0 <= seed <= MAX_SEED:
-        raise LevelError(f"seed {seed} is out of range; use a whole number from 0 to {MAX_SEED}")
-    digest = hashlib.blake2b(name.encode(), digest_size=16).digest()
-    key = tuple(int.from_bytes(digest[at : at + 4], "little") for at in range(0, len(digest), 4))
-    return Generator(PCG64(SeedSequence(int(seed), spawn_key=key)))
-
-
 def random_scenario(level: Level, seed: int) -> Scenario:
     """Draw a scenario, uniformly over all that the level allows.
 
@@ -157,47 +99,55 @@ def random_scenario(level: Level, seed: int) -> Scenario:
     Raises:
         LevelError: the seed is out of range, or the level's distances leave (nearly) no room.
     """
-    layout = level.layout
-    (base_x_m, base_y_m), *frame_places = _draw_places(level, seed)
-    heights = random_stream(seed, "layout.frame_heights")
-    yaws = random_stream(seed, "layout.frame_yaws")
-    start_yaw_rad = layout.start_yaw_rad.draw(random_stream(seed, "layout.start_yaw")) / STEPS_PER_UNIT
-    return Scenario(
+    yaw_rad = level.layout.start_yaw_rad.draw_value(random_stream(seed, "layout.start_yaw"))
+    base, frames = _draw_layout(level, seed)
+    scenario = Scenario(
         name=f"{level.name}-{seed}",
         description=f"Random scenario of level {level.name}, seed {seed}.",
-        base=Base(x_m=base_x_m, y_m=base_y_m),
-        start=Start(x_m=base_x_m, y_m=base_y_m, yaw_rad=start_yaw_rad),
-        frames=tuple(
-            Frame(
-                colour=colour,
-                x_m=x_m,
-                y_m=y_m,
-                z_m=layout.frame_z_m.draw(heights) / STEPS_PER_UNIT,
-                yaw_rad=layout.frame_yaw_rad.draw(yaws) / STEPS_PER_UNIT,
-            )
-            for colour, (x_m, y_m) in zip(COLOURS, frame_places, strict=True)
-        ),
+        base=base,
+        start=Start(x_m=base.x_m, y_m=base.y_m, yaw_rad=yaw_rad),
+        frames=frames,
     )
+    return scenario if level.obstacles is None else add_obstacles(scenario, level.obstacles, seed)
 
 
-def _draw_places(level: Level, seed: int) -> list[tuple[float, float]]:
-    """Draw x and y of base and frames, metres.
+def _draw_layout(level: Level, seed: int) -> tuple[Base, tuple[Frame, ...]]:
+    """Draw base and frames.
 
     All are drawn again when two are too near: redrawing only the last one would favour some layouts.
     """
-    layout, stream = level.layout, random_stream(seed, "layout.places")
+    layout, closeness = level.layout, level.closeness
+    stream, heights = random_stream(seed, "layout.places"), random_stream(seed, "layout.frame_heights")
+    yaws = random_stream(seed, "layout.frame_yaws")
     count = 1 + len(COLOURS)
     apart_steps_2 = (layout.apart_m * STEPS_PER_UNIT) ** 2
     for _ in range(MAX_DRAWS):
         places = [(layout.x_m.draw(stream), layout.y_m.draw(stream)) for _ in range(count)]
         # Not ">=": places exactly that far apart would be too near when calculated in rounded metres.
-        if all(
-            (x - other_x) ** 2 + (y - other_y) ** 2 > apart_steps_2
-            for (x, y), (other_x, other_y) in itertools.combinations(places, 2)
+        pairs = (
+            itertools.combinations(places, 2)
+            if closeness is None
+            else itertools.product(places[:1], places[1:])
+        )
+        if any(
+            (x - other_x) ** 2 + (y - other_y) ** 2 <= apart_steps_2 for (x, y), (other_x, other_y) in pairs
         ):
-            return [(x / STEPS_PER_UNIT, y / STEPS_PER_UNIT) for x, y in places]
+            continue
+        base_m, *frames_m = [(x / STEPS_PER_UNIT, y / STEPS_PER_UNIT) for x, y in places]
+        centres_m = [(x_m, y_m, layout.frame_z_m.draw_value(heights)) for x_m, y_m in frames_m]
+        if closeness is not None and not closeness.allows(centres_m):
+            continue
+        base = Base(x_m=base_m[0], y_m=base_m[1])
+        frames = tuple(
+            Frame(colour=colour, x_m=x_m, y_m=y_m, z_m=z_m, yaw_rad=layout.frame_yaw_rad.draw_value(yaws))
+            for colour, (x_m, y_m, z_m) in zip(COLOURS, centres_m, strict=True)
+        )
+        if closeness is None or closeness.leaves_ways(base, frames):
+            return base, frames
     room = " × ".join(f"{span.high - span.low:g}" for span in (layout.x_m, layout.y_m))
+    near = "" if closeness is None else " with what closeness demands"
     raise LevelError(
         f"level {level.name}, seed {seed}: {MAX_DRAWS} draws found no room for {count} places "
-        f"{layout.apart_m:g} m apart in {room} m; lower layout.apart_m or widen layout.x_m and layout.y_m"
+        f"{layout.apart_m:g} m apart in {room} m{near}; lower layout.apart_m or widen layout.x_m and "
+        "layout.y_m"
     )

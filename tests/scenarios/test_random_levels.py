@@ -3,11 +3,12 @@ from hypothesis import given
 from hypothesis import strategies as st
 from pydantic import ValidationError
 
-from scenarios.random_scenarios import LEVEL_FILES, Level, LevelError, Range, load_level
+from scenarios.random_numbers import LevelError, Range
+from scenarios.random_scenarios import LEVEL_FILES, Level, load_level
 from scenarios.yaml_file import MAX_BYTES
 from scenarios.yaml_tree import to_yaml
 
-CALM = to_yaml(load_level("calm").model_dump())
+CALM = to_yaml(load_level("calm").model_dump(exclude_unset=True))
 
 
 @pytest.mark.parametrize("name", LEVEL_FILES.names())
@@ -45,7 +46,11 @@ def test_a_level_loads_by_path(tmp_path):
         ("name: a: b", "f.yaml:1:8: not valid YAML: mapping values are not allowed here"),
         (b"name: a\n# \xff", "f.yaml:2: not UTF-8 text; save the file as UTF-8"),
         ("#" * (MAX_BYTES + 1), "f.yaml: 1000001 bytes is too large for a level; 1000000 at most"),
-        (CALM + "wnd: 1\n", "f.yaml:20: wnd is not a known field; known here: name, description, layout"),
+        (
+            CALM + "wnd: 1\n",
+            "f.yaml:20: wnd is not a known field; known here: name, description, layout, closeness, "
+            "obstacles",
+        ),
         (CALM + "  apart: 1\n", "f.yaml:20: layout.apart is not a known field; did you mean apart_m?"),
         (
             CALM + "  near: 1\n",

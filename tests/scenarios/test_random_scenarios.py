@@ -13,7 +13,8 @@ from scipy import stats
 
 from scenarios.loader import dump_yaml, parse_scenario
 from scenarios.models import COLOURS, Arena, Camera, Light
-from scenarios.random_scenarios import MAX_SEED, LevelError, load_level, random_scenario, random_stream
+from scenarios.random_numbers import MAX_SEED, LevelError, random_stream
+from scenarios.random_scenarios import load_level, random_scenario
 
 ROOT = Path(__file__).parents[2]
 CALM = load_level("calm")

@@ -10,7 +10,8 @@ from offboard.mission import load_mission
 from offboard.pilot_file import PilotFile
 from scenarios.loader import load_scenario
 from scenarios.models import ScenarioError
-from scenarios.random_scenarios import LevelError, load_level, random_scenario
+from scenarios.random_numbers import LevelError
+from scenarios.random_scenarios import load_level, random_scenario
 from tests.framerunner.evaluation.flights import write_scenarios
 
 PILOT = "from offboard.pilot import Pilot\n\n\nclass Mine(Pilot):\n    pass\n"

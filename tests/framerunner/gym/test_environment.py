@@ -16,7 +16,7 @@ from errors import SettingError
 from framerunner.gym.environment import FrameChallengeEnv
 from framerunner.gym.flight import CONTACT, CROSSING, FAILURE, LANDING
 from scenarios.models import Scenario, ScenarioError
-from scenarios.random_scenarios import LevelError
+from scenarios.random_numbers import LevelError
 
 UP = np.array([0.0, 0.0, 1.0, 0.0], np.float32)
 STILL = np.zeros(4, np.float32)
