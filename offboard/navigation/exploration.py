@@ -12,9 +12,9 @@ import numpy as np
 from geometry.axes import Pose
 from geometry.vectors import Quaternion, Vec3
 from offboard.navigation.camera_model import CameraModel
-from offboard.navigation.coverage import Coverage
-from offboard.navigation.frame_visibility import HEADINGS, Floats, FrameVisibility, view_qualities
-from offboard.navigation.view_table import YAWS, Doubles, ViewTable
+from offboard.navigation.search.coverage import Coverage
+from offboard.navigation.search.frame_visibility import HEADINGS, Floats, FrameVisibility, view_qualities
+from offboard.navigation.search.view_table import YAWS, Doubles, ViewTable
 from scenarios.models import Arena
 from vision.types import ObstacleEdge
 

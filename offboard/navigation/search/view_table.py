@@ -11,7 +11,7 @@ import numpy.typing as npt
 
 from geometry.vectors import Vec3
 from offboard.navigation.camera_model import CameraModel
-from offboard.navigation.frame_visibility import HEADINGS, Floats, SearchGrid, view_qualities
+from offboard.navigation.search.frame_visibility import HEADINGS, Floats, SearchGrid, view_qualities
 from scenarios.models import Arena
 
 Doubles = npt.NDArray[np.float64]

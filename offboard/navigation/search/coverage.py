@@ -3,15 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from math import hypot, inf, remainder, tau
+from math import hypot, remainder, tau
 from typing import Final
 
 import numpy as np
 
-from geometry.rotations import to_world, yaw_of
+from geometry.rotations import yaw_of
 from geometry.vectors import Quaternion, Vec3
 from offboard.navigation.camera_model import CameraModel, CameraPose
-from offboard.navigation.frame_visibility import (
+from offboard.navigation.search.floor_points import COLUMN_PX, FloorPoints
+from offboard.navigation.search.frame_visibility import (
     BEST_QUALITY,
     HEADINGS,
     Floats,
@@ -27,7 +28,6 @@ _MOVED_M: Final = 0.15  # an image from a pose nearer than this and _TURNED_RAD 
 _TURNED_RAD: Final = 0.12
 _MARGIN_M: Final = 0.12  # beyond a frame at a cell's centre: it may be elsewhere in the cell
 _FADE: Final = 0.9998  # of what has been seen, an image used: what was seen long ago is looked at again
-_COLUMNS: Final = 40  # of the image, when obstacles hide a part of it
 
 
 class Coverage:
@@ -109,26 +109,19 @@ class Coverage:
     ) -> np.ndarray[tuple[int], np.dtype[np.bool_]]:
         """Which places are in front of all obstacles, or in a column of the image without any."""
         camera, m = self._camera, pose.rotation
-        scale = _COLUMNS / (2 * camera.half_width_px)
-        free_m = [inf] * _COLUMNS
-        for edge in edges:
-            column = min(max(int((edge.right_px + camera.half_width_px) * scale), 0), _COLUMNS - 1)
-            free_m[column] = min(free_m[column], self._range_m(pose, edge))
+        ends = FloorPoints.seen_at(
+            camera, pose, [edge.right_px for edge in edges], [edge.down_px for edge in edges]
+        )
+        limits_m = np.full(max(int(2 * camera.half_width_px / COLUMN_PX), 1), np.inf, dtype=np.float32)
+        for edge, range_m in zip(edges, ends.range_m, strict=True):
+            column = int((edge.right_px + camera.half_width_px) / COLUMN_PX)
+            limits_m[min(max(column, 0), limits_m.size - 1)] = 0.0 if edge.cut else range_m
         ahead = dx_m * np.float32(m[0]) + dy_m * np.float32(m[3]) + dz_m * np.float32(m[6])
         left = dx_m * np.float32(m[1]) + dy_m * np.float32(m[4]) + dz_m * np.float32(m[7])
         right_px = -left / ahead * np.float32(camera.focal_px)
-        columns = ((right_px + np.float32(camera.half_width_px)) * np.float32(scale)).astype(np.intp)
-        limits_m = np.array(free_m, dtype=np.float32)
-        np.clip(columns, 0, _COLUMNS - 1, out=columns)
+        columns = ((right_px + np.float32(camera.half_width_px)) / np.float32(COLUMN_PX)).astype(np.intp)
+        np.clip(columns, 0, limits_m.size - 1, out=columns)
         clear: np.ndarray[tuple[int], np.dtype[np.bool_]] = (
             dx_m * dx_m + dy_m * dy_m < limits_m[columns] * limits_m[columns]
         )
         return clear
-
-    def _range_m(self, pose: CameraPose, edge: ObstacleEdge) -> float:
-        """Distance in plan to where an obstacle stands; 0 if that is not known."""
-        focal_px = self._camera.focal_px
-        x, y, z = to_world(pose.rotation, 1.0, -edge.right_px / focal_px, -edge.down_px / focal_px)
-        if edge.cut or z > -1e-3:
-            return 0.0
-        return hypot(x, y) * pose.position_m[2] / -z

@@ -1,0 +1,1 @@
+"""What has been seen of the arena, and what could be seen next."""
