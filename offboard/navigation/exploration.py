@@ -56,15 +56,6 @@ class LineOfSight:
 
 
 @dataclass(frozen=True, slots=True)
-class Obstacle:
-    """A round obstacle from floor to ceiling."""
-
-    x_m: float
-    y_m: float
-    radius_m: float
-
-
-@dataclass(frozen=True, slots=True)
 class _Unseen:
     """What there is to see, by block of the grid."""
 
@@ -115,7 +106,7 @@ class Explorer:
         yaw_rad: float,
         found: Sequence[Vec3] = (),
         hints: Sequence[LineOfSight] = (),
-        obstacles: Sequence[Obstacle] = (),
+        columns_m: Sequence[Vec3] = (),
     ) -> Viewpoint:
         """Choose the view with the largest gain for its time, counting what is seen on the way.
 
@@ -126,7 +117,7 @@ class Explorer:
             yaw_rad: its heading.
             found: centres of the frames that are known; others are less likely close to them.
             hints: frames seen but not located.
-            obstacles: where the drone cannot go.
+            columns_m: obstacles from the floor to the ceiling, as discs in plan: x, y, radius.
 
         Returns:
             The viewpoint. The drone can turn where it is, so there is always one.
@@ -136,7 +127,7 @@ class Explorer:
         here = Pose(position_m, yaw_rad)
         place, yaw = self._table.nearest(position_m, yaw_rad)
         self._visits[place, yaw] += 1.0
-        blocked = [(each.x_m, each.y_m, each.radius_m + _CLEAR_M) for each in obstacles]
+        blocked = [(x, y, radius_m + _CLEAR_M) for x, y, radius_m in columns_m]
         blocked += [(x, y, _CLEAR_M) for x, y, _ in found]
         candidates = [
             each

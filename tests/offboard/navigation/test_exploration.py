@@ -9,7 +9,7 @@ import pytest
 
 from geometry.rotations import quaternion_from_yaw
 from offboard.navigation.camera_model import CameraModel
-from offboard.navigation.exploration import Explorer, LineOfSight, Obstacle, Viewpoint
+from offboard.navigation.exploration import Explorer, LineOfSight, Viewpoint
 from scenarios.models import Arena, Camera, Frame, Scenario
 from scenarios.random_scenarios import load_level, random_scenario
 from vision.types import ObstacleEdge
@@ -128,14 +128,14 @@ def test_a_line_of_sight_is_looked_along_first():
 
 def test_viewpoints_keep_clear_of_obstacles_and_turning_is_always_possible():
     search = Search((), (0.0, 0.0, 1.0), 0.0)
-    post = Obstacle(2.0, 0.0, 1.5)
+    post = (2.0, 0.0, 1.5)
     for _ in range(40):
-        viewpoint = search.explorer.next_viewpoint(search.position_m, search.yaw_rad, obstacles=[post])
+        viewpoint = search.explorer.next_viewpoint(search.position_m, search.yaw_rad, columns_m=[post])
         assert hypot(viewpoint.position_m[0] - 2.0, viewpoint.position_m[1]) >= 1.5
         search.explorer.update(search.position_m, quaternion_from_yaw(search.yaw_rad))
         search.step(viewpoint)
-    everywhere = Obstacle(0.0, 0.0, 20.0)
-    blocked = search.explorer.next_viewpoint(search.position_m, 0.0, obstacles=[everywhere])
+    everywhere = (0.0, 0.0, 20.0)
+    blocked = search.explorer.next_viewpoint(search.position_m, 0.0, columns_m=[everywhere])
     assert blocked.position_m == search.position_m
     assert blocked.yaw_rad != 0.0
 
