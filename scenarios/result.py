@@ -172,6 +172,9 @@ class FlightResult(RefereeReport, _Flown):
         0.0, description="time during which commands were changed to keep the drone in its box"
     )
     judged_by: Text = Field("", description="source of the referee's states: truth or telemetry")
+    response: Text = Field(
+        "", description="how late the simulated vehicle answered, as by --response; empty: not late"
+    )
     state_sha256: str = Field(
         "", max_length=64, description="over the true state of every control tick of a lockstep flight"
     )

@@ -5,12 +5,16 @@ from __future__ import annotations
 import shlex
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import TYPE_CHECKING, Annotated, Literal
 
 from cyclopts import Parameter
 
 from errors import SettingError
 from framerunner.commands import WholeNumber, load_mission_with
+
+if TYPE_CHECKING:
+    from framerunner.evaluation.plan import Plan
+    from offboard.mission import Mission
 
 _COUNT, _SEED = 100, 1
 _Level = Annotated[str | None, Parameter(help="draw scenarios of this level, name or file")]
@@ -21,6 +25,12 @@ _SeedOption = Annotated[
 _Jobs = Annotated[WholeNumber | None, Parameter(help="flights at once; as many as there are cores")]
 _Out = Annotated[
     Path | None, Parameter(help="folder; by default one in `runs/` that the same command finds again")
+]
+_Response = Annotated[
+    str | None,
+    Parameter(
+        help="a vehicle that answers late, lag=0.6,dead-time=0.15,height-wander=0.05 in seconds and metres"
+    ),
 ]
 _Again = Annotated[bool, Parameter(help="fly again what is in the folder already")]
 _Backend = Annotated[
@@ -35,6 +45,7 @@ def evaluate(
     seed: _SeedOption = None,
     mission: Annotated[str, Parameter(help="name or file of the mission")] = "frame_challenge",
     pilot: Annotated[Path | None, Parameter(help="Python file with a subclass of Pilot")] = None,
+    response: _Response = None,
     jobs: _Jobs = None,
     out: _Out = None,
     again: _Again = False,
@@ -55,6 +66,8 @@ def evaluate(
 
         framerunner evaluate --level calm --mission mine.yaml --compare runs/before
 
+        framerunner evaluate --level calm --response lag=0.6,dead-time=0.15
+
         framerunner evaluate my_scenarios/ --out runs/mine
 
         framerunner evaluate test-case-1 test-case-2 calm-17 --jobs 1
@@ -66,16 +79,13 @@ def evaluate(
 
     from joblib import cpu_count
 
+    from framerunner.commands.named_numbers import response_of
     from framerunner.evaluation.backends import Pool
     from framerunner.evaluation.evaluate import EvaluationSettings
     from framerunner.evaluation.evaluate import evaluate as evaluate_all
-    from framerunner.evaluation.plan import plan_files, plan_level
 
-    loaded = load_mission_with(mission, pilot)
-    if level is None:
-        plan = plan_files(scenarios, loaded)
-    else:
-        plan = plan_level(level, _SEED if seed is None else seed, _COUNT if count is None else count, loaded)
+    plan = _plan(scenarios, level, seed, count, load_mission_with(mission, pilot))
+    plan = plan if response is None else plan.answering_late(response_of(response))
     settings = EvaluationSettings(
         plan=plan,
         pool=Pool(backend, cpu_count() if jobs is None else jobs, address),
@@ -87,6 +97,16 @@ def evaluate(
         command=_command(scenarios, given),
     )
     return evaluate_all(settings)
+
+
+def _plan(
+    scenarios: tuple[str, ...], level: str | None, seed: int | None, count: int | None, mission: Mission
+) -> Plan:
+    from framerunner.evaluation.plan import plan_files, plan_level
+
+    if level is None:
+        return plan_files(scenarios, mission)
+    return plan_level(level, _SEED if seed is None else seed, _COUNT if count is None else count, mission)
 
 
 def _check(scenarios: tuple[str, ...], level: str | None, count: int | None, seed: int | None) -> None:

@@ -12,6 +12,8 @@ from errors import SettingError
 from framerunner.commands import WholeNumber, check_range, load_mission_with
 
 if TYPE_CHECKING:
+    from framerunner.flying.plan import FlightPlan
+    from offboard.mission import Mission
     from wire.simulator_api import SimulatorApi
 
 _Drone = Annotated[
@@ -36,6 +38,20 @@ _Video = Annotated[
     bool, Parameter(help="write video.avi also in lockstep; in real time it is always written")
 ]
 _Monitor = Annotated[bool, Parameter(help="open the Game Monitor as well, on http://127.0.0.1:8080/")]
+_DroneLimits = Annotated[
+    str | None,
+    Parameter(
+        help="with --drone, for a mission of class open: what the drone can do in m/s and rad/s, "
+        "forward=2,left=1.5,up=1,yaw-rate=1.5; down=NUMBER if it is not as up"
+    ),
+]
+_Response = Annotated[
+    str | None,
+    Parameter(
+        help="with --lockstep: a vehicle that answers late, lag=0.6,dead-time=0.15,height-wander=0.05 in "
+        "seconds and metres"
+    ),
+]
 _Pilot = Annotated[Path | None, Parameter(help="Python file with primitives of your own; it is executed")]
 
 
@@ -54,6 +70,8 @@ def fly(
     video: _Video = False,
     monitor: _Monitor = False,
     pilot: _Pilot = None,
+    drone_limits: _DroneLimits = None,
+    response: _Response = None,
     out: Annotated[Path, Parameter(help="folder in which this flight's folder is made")] = Path("runs"),
 ) -> int:
     """Fly a mission, show it live, and write result, track, log and video to `runs/<time>-<scenario>/`.
@@ -72,6 +90,8 @@ def fly(
 
         framerunner fly test-case-1 --lockstep --record
 
+        framerunner fly test-case-1 --lockstep --response lag=0.6,dead-time=0.15
+
         framerunner fly --drone udpin://0.0.0.0:14540 --camera 0
 
         framerunner fly --drone udpin://0.0.0.0:14540 --simulator http://10.0.0.2:8100
@@ -84,15 +104,52 @@ def fly(
     _check(drone, camera, speed, instance, lockstep)
     _check_lockstep(seed, monitor, lockstep)
 
-    from framerunner.flying.plan import FlightPlan
     from framerunner.flying.real_time import RealTimeSettings
     from framerunner.flying.run import FlightSettings, fly_once
-    from scenarios.loader import load_scenario
 
-    loaded = load_scenario(scenario)
-    plan = FlightPlan(loaded, load_mission_with(mission, pilot), (seed or 0) if lockstep else None)
+    loaded = load_mission_with(mission, pilot)
+    seed = (seed or 0) if lockstep else None
+    plan = _plan(scenario, loaded, seed, response=response, drone=drone, drone_limits=drone_limits)
     real_time = None if lockstep else RealTimeSettings(drone, camera, api, speed, instance)
     return asyncio.run(fly_once(FlightSettings(plan, real_time, out, record, video, monitor)))
+
+
+def _plan(
+    scenario: str,
+    mission: Mission,
+    seed: int | None,
+    *,
+    response: str | None,
+    drone: str | None,
+    drone_limits: str | None,
+) -> FlightPlan:
+    """The flight that the options describe; a seed is given in lockstep."""
+    from framerunner.commands.named_numbers import limits_of, response_of
+    from framerunner.flying.plan import FlightPlan
+    from scenarios.loader import load_scenario
+
+    if response is not None and seed is None:
+        raise SettingError("--response: is for a simulated vehicle in lockstep; add --lockstep")
+    is_open = mission.mission_class == "open"
+    if drone_limits is not None and (drone is None or not is_open):
+        why = (
+            "a mission of class contest flies by the contest's"
+            if drone
+            else "is for a drone given by --drone"
+        )
+        raise SettingError(f"--drone-limits: {why}; leave it out")
+    if drone is not None and is_open and drone_limits is None:
+        raise SettingError(
+            f"--drone-limits: mission {mission.name} is of class open, so say what the drone can do, such as "
+            "--drone-limits forward=2,left=1.5,up=1,yaw-rate=1.5"
+        )
+    return FlightPlan(
+        load_scenario(scenario),
+        mission,
+        seed,
+        drone_limits=None if drone_limits is None else limits_of(drone_limits),
+        response=None if response is None else response_of(response),
+    )
 
 
 def _simulator_api(url: str | None, drone: str | None) -> SimulatorApi | None:

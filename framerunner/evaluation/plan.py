@@ -6,7 +6,7 @@ import hashlib
 import json
 import re
 from collections.abc import Collection, Iterator, Mapping, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from functools import cached_property
 from importlib import metadata
 from pathlib import Path
@@ -14,6 +14,7 @@ from pathlib import Path
 from errors import SettingError
 from firmware_py.airframe import AirframeError, load_airframe
 from framerunner.flying.plan import FlightPlan
+from framerunner.flying.response import Response
 from offboard.mission import Mission
 from offboard.pilot_file import PilotFile
 from scenarios.loader import load_scenario
@@ -34,6 +35,7 @@ class Identity:
         pilot_sha256: of the contestant's file; empty for a class of the package.
         seeds: of everything random in each flight, in the scenarios' order.
         version: of framerunner.
+        response: how late the vehicle answers; empty: as its autopilot does.
     """
 
     scenarios: Mapping[str, str]
@@ -43,6 +45,7 @@ class Identity:
     pilot_sha256: str
     seeds: tuple[int, ...]
     version: str
+    response: str
 
     @property
     def sha256(self) -> str:
@@ -51,8 +54,8 @@ class Identity:
 
     def difference(self, other: Identity) -> str:
         """The first difference in a few words; empty if there is none."""
-        for what in ("mission", "pilot", "version"):
-            ours, theirs = getattr(self, what), getattr(other, what)
+        for what in ("mission", "pilot", "version", "response"):
+            ours, theirs = getattr(self, what) or "none", getattr(other, what) or "none"
             if ours != theirs:
                 return f"{what} {theirs}, not {ours}"
         if self.mission_sha256 != other.mission_sha256:
@@ -79,6 +82,7 @@ class Plan:
         scenarios: in order; names are unique.
         mission: checked.
         seeds: of everything random in each flight; that of a random scenario is its own.
+        response: how late the vehicle answers; None: as its autopilot does.
     """
 
     title: str
@@ -86,6 +90,7 @@ class Plan:
     scenarios: Sequence[Scenario]
     mission: Mission
     seeds: Sequence[int]
+    response: Response | None = None
 
     def __len__(self) -> int:
         return len(self.scenarios)
@@ -103,6 +108,7 @@ class Plan:
             pilot_sha256=_sha256(pilot.text) if isinstance(pilot, PilotFile) else "",
             seeds=tuple(self.seeds),
             version=metadata.version("framerunner"),
+            response="" if self.response is None else str(self.response),
         )
 
     @property
@@ -110,11 +116,15 @@ class Plan:
         """A folder whose name depends on the identity, so that the same command finds it again."""
         return Path("runs") / f"evaluate-{self.label}-{self.mission.name}-{self.identity.sha256[:6]}"
 
+    def answering_late(self, response: Response) -> Plan:
+        """The same flights by a vehicle that answers late."""
+        return replace(self, title=f"{self.title}, response {response}", response=response)
+
     def tasks(self, done: Collection[str] = ()) -> Iterator[FlightPlan]:
         """Flights that are not yet done, in order."""
         for scenario, seed in zip(self.scenarios, self.seeds, strict=True):
             if scenario.name not in done:
-                yield FlightPlan(scenario, self.mission, seed)
+                yield FlightPlan(scenario, self.mission, seed, response=self.response)
 
 
 def plan_level(level: str, first_seed: int, count: int, mission: Mission) -> Plan:

@@ -118,11 +118,12 @@ def write_report(
     folder.write(REPORT, text)
 
 
-def replay_command(path: Path, mission: str, pilot: str | None, seed: int) -> str:
+def replay_command(path: Path, mission: str, pilot: str | None, seed: int, response: str = "") -> str:
     """The command that flies the scenario of a file again, the same to the last bit."""
     words = ["framerunner", "fly", str(path), "--mission", mission]
     words += ["--pilot", pilot] if pilot else []
     words += ["--seed", str(seed)] if seed else []
+    words += ["--response", response] if response else []
     return shlex.join([*words, "--lockstep"])
 
 
@@ -152,7 +153,7 @@ def _failures(
                 plot = _track_plot(folder, row)
                 done += 1
             file = folder.scenario_file(row.scenario)
-            command = replay_command(file, page.mission, page.pilot, row.seed or 0)
+            command = replay_command(file, page.mission, page.pilot, row.seed or 0, row.response)
             failures.append(Failure(row, command, plot, _traceback(folder, row)))
         groups.append((cause.verdict, cause.cause, failures))
     return groups

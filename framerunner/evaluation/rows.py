@@ -15,7 +15,16 @@ from scenarios.verdict import Verdict
 
 _REAL_TIME_ONLY = ("lift_m", "timing", "wall_time_s", "real_time_factor", "started")
 COLUMNS = tuple(name for name in FlightResult.model_fields if name not in _REAL_TIME_ONLY)
-_COLUMNS_OF_ERRORS = ("scenario", "mission", "seed", "mission_class", "verdict", "reason", "version")
+_COLUMNS_OF_ERRORS = (
+    "scenario",
+    "mission",
+    "seed",
+    "mission_class",
+    "verdict",
+    "reason",
+    "response",
+    "version",
+)
 
 
 class Row(FlightResult):

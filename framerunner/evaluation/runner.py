@@ -234,6 +234,7 @@ def _error_row(plan: FlightPlan, error: BaseException) -> Row:
         mission="" if plan.mission is None else plan.mission.name,
         mission_class="contest" if plan.mission is None else plan.mission.mission_class,
         seed=plan.seed,
+        response="" if plan.response is None else str(plan.response),
         verdict=Verdict.ERROR,
         reason=f"{kind}: {text}" if text else kind,
         ended="error",

@@ -22,7 +22,7 @@ from framerunner.runs.track import Track
 from scenarios.loader import dump_yaml
 from scenarios.models import Scenario
 
-FORMAT = 1
+FORMAT = 2
 IDENTITY, FLIGHTS, LOCK = "evaluation.json", "flights.jsonl", ".lock"
 RESULTS, REPORT = "results.csv", "report.html"
 _FOLDERS = ("scenarios", "tracks", "errors")

@@ -104,6 +104,7 @@ def _result(
         seconds_in_state=track.seconds_in_state(),
         kept_in_box_s=end.kept_in_box_s,
         judged_by=judged_by,
+        response=str(plan.response or ""),
         version=metadata.version("framerunner"),
         **({"lift_m": plan.lift_m} if plan.lift_m else {}),
         **measured,

@@ -14,6 +14,7 @@ from struct import Struct
 from framerunner.flying.fly import FinishedFlight, fly
 from framerunner.flying.lockstep_drone import LockstepDrone, TruthObserver
 from framerunner.flying.plan import FlightPlan
+from framerunner.flying.response import LateResponse
 from offboard.app import Moment, Observer
 from offboard.perception import CAMERA_DEAD_S, CameraLostError
 from scenarios.models import Scenario, TrueState
@@ -77,7 +78,10 @@ class LockstepVehicle:
         self.simulation = Simulation(plan.scenario, plan.airframe)
         self.perception = LockstepPerception(plan.scenario, on_image)
         self.drone = LockstepDrone(
-            self.simulation, plan.start_pose, observers=(*observers, self.perception.follow)
+            self.simulation,
+            plan.start_pose,
+            observers=(*observers, self.perception.follow),
+            response=None if plan.response is None else LateResponse(plan.response, plan.seed or 0),
         )
 
 

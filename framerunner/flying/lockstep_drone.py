@@ -20,6 +20,7 @@ from firmware_py.autopilot import Autopilot
 from firmware_py.offboard_requests import SetpointRefusal, setpoint_from_body_velocity
 from firmware_py.status import CommandResult, FlightMode, LandedState
 from firmware_py.types import CRITICAL
+from framerunner.flying.response import LateResponse
 from geometry.axes import Alignment, Pose
 from geometry.rotations import quaternion_from_euler
 from geometry.vectors import Vec3
@@ -63,6 +64,7 @@ class LockstepDrone:
         start_arena: where the drone stands: x, y, z (metres) and yaw (radians), arena axes.
         observers: called with the true state of every control tick.
         telemetry_delay_us: see `TELEMETRY_DELAY_US`; ValueError if not below the 50 ms between ticks.
+        response: the vehicle answers late; None: as its autopilot does.
     """
 
     def __init__(
@@ -72,6 +74,7 @@ class LockstepDrone:
         *,
         observers: Sequence[TruthObserver] = (),
         telemetry_delay_us: int = TELEMETRY_DELAY_US,
+        response: LateResponse | None = None,
     ) -> None:
         if not 0 <= telemetry_delay_us < TICK_US:
             raise ValueError(f"telemetry_delay_us {telemetry_delay_us}: must be from 0 to below {TICK_US}")
@@ -80,6 +83,7 @@ class LockstepDrone:
         self._start_arena = Pose(start_arena[:3], start_arena[3])
         self._observers = tuple(observers)
         self._delay_us = telemetry_delay_us
+        self._response = response
         self._alignment: Alignment | None = None
         self._heartbeat_us = 0
         self._position_us = POSITION_PHASE_US
@@ -204,21 +208,19 @@ class LockstepDrone:
     def _stop_commanding(self) -> None:
         self._commanding = False
         self._resend_us = _NEVER_US
+        if self._response is not None:
+            self._response.reset()
 
     def _send(self, command: VelocityCommand) -> None:
         self._command = command
         state = self._autopilot.state
         self._resend_us = state.time_us + RESEND_US
-        setpoint = setpoint_from_body_velocity(
-            single((command.forward_m_s, -command.left_m_s, -command.up_m_s)),
-            sent_yaw_rate(-command.yaw_rate_rad_s),
-            state,
-            state.time_us,
-        )
-        if isinstance(setpoint, SetpointRefusal):
-            self._autopilot.say(CRITICAL, setpoint.text)
+        velocity_m_s = single((command.forward_m_s, -command.left_m_s, -command.up_m_s))
+        yaw_rate_rad_s = sent_yaw_rate(-command.yaw_rate_rad_s)
+        if self._response is None:
+            _request(self._autopilot, velocity_m_s, yaw_rate_rad_s)
         else:
-            self._autopilot.accept_setpoint(setpoint)
+            self._response.take(velocity_m_s, yaw_rate_rad_s, state.yaw_rad, state.time_us)
 
     def _advance(self, until_us: int = 0) -> None:
         """Let a control tick pass, and more until a time or until the link sends something by itself."""
@@ -229,6 +231,10 @@ class LockstepDrone:
             truth = simulation.truth
             for observe in observers:
                 observe(truth)
+            if self._response is not None and self._resend_us != _NEVER_US:
+                airborne = self._autopilot.status.landed_state is not LandedState.ON_GROUND
+                late = self._response.step(state.yaw_rad, state.time_us, airborne=airborne)
+                _request(self._autopilot, *late)
             if state.time_us >= until_us or simulation.time_us >= until_us + TICK_US:  # its clock may stand
                 break
         self._exchange(state.time_us)
@@ -290,6 +296,16 @@ class LockstepDrone:
             (state.time_us - self._sent_position_us) * 1e-6,
             alignment.attitude(quaternion_from_euler(roll_rad, pitch_rad, yaw_rad)),
         )
+
+
+def _request(autopilot: Autopilot, velocity_level_m_s: Vec3, yaw_rate_rad_s: float) -> None:
+    """Request a velocity (forward, right, down) and a yaw rate, clockwise."""
+    state = autopilot.state
+    setpoint = setpoint_from_body_velocity(velocity_level_m_s, yaw_rate_rad_s, state, state.time_us)
+    if isinstance(setpoint, SetpointRefusal):
+        autopilot.say(CRITICAL, setpoint.text)
+    else:
+        autopilot.accept_setpoint(setpoint)
 
 
 def _vehicle_texts(autopilot: Autopilot) -> str:

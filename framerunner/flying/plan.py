@@ -7,6 +7,7 @@ from functools import cached_property
 from typing import TYPE_CHECKING, TypeVar
 
 from firmware_py.airframe import Airframe, load_airframe
+from framerunner.flying.response import Response
 from offboard.keep_in_box import Box, flight_box
 from offboard.limits import CONTEST, CommandLimits
 from scenarios.models import Part, Scenario, start_position
@@ -32,6 +33,7 @@ class FlightPlan:
             floor, without a base, measures heights from there, and its app takes that for the base's top.
             Lifted by the base's height, everything is as high above the real floor as the scenario says.
         drone_limits: of a real drone, for a mission of the class `open`; None: those of the airframe.
+        response: how late the simulated vehicle of a lockstep flight answers; None: as its autopilot does.
     """
 
     scenario: Scenario
@@ -39,6 +41,7 @@ class FlightPlan:
     seed: int | None = 0
     lift_m: float = 0.0
     drone_limits: CommandLimits | None = None
+    response: Response | None = None
 
     @property
     def chart(self) -> Mission:

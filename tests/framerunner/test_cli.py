@@ -198,6 +198,31 @@ def test_options_without_a_use_in_lockstep_are_named(refused, given, named):
     assert named in refused("fly", "--lockstep", *given)
 
 
+@pytest.mark.parametrize(
+    ("given", "line"),
+    [
+        ("lagg=0.5", "--response lagg=0.5: unknown name; did you mean 'lag'?"),
+        ("lag=0.5,lag=0.6", "--response: lag is given twice; give it once"),
+        ("lag=quick", "--response lag=quick: write a number, such as lag=0.5"),
+        ("lag", "--response lag=: write a number, such as lag=0.5"),
+        ("lag=0.5,dead-time=9", "--response dead-time 9: must be from 0 to 1"),
+        ("lag=nan", "--response lag nan: must be from 0 to 2"),
+    ],
+)
+def test_a_bad_response_is_refused(refused, given, line):
+    assert refused("fly", "--lockstep", "--response", given) == f"error: {line}"
+
+
+def test_the_limits_of_a_drone_belong_to_a_real_drone_and_the_open_class(refused):
+    drone = ("--drone", "udpin://127.0.0.1:14599", "--camera", "0")
+    limits = ("--drone-limits", "forward=2,left=1.5,up=1,yaw-rate=1")
+    open_ = ("--mission", str(write("open.yaml", "class: open\nextends: frame_challenge\n")))
+    assert "by the contest's; leave it out" in refused("fly", *drone, *limits)
+    assert "is for a drone given by --drone" in refused("fly", *open_, *limits)
+    assert "say what the drone can do" in refused("fly", *drone, *open_)
+    assert "left is missing" in refused("fly", *drone, *open_, "--drone-limits", "forward=2,up=1")
+
+
 def test_a_remote_host_without_address_is_refused(refused):
     line = refused("sim", "--instance", free_instance(), "--ground-remote", "two..dots")
     assert "two..dots" in line

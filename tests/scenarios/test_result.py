@@ -46,6 +46,7 @@ LOCKSTEP = {
     "seconds_in_state": {"turning": 10.5, "crossing": 3.1999999999999997},
     "kept_in_box_s": 0.0,
     "judged_by": "truth",
+    "response": "",
     "state_sha256": "0" * 64,
     "version": "0.1.0",
     "wall_time_s": 1.5,

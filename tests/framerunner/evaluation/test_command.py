@@ -116,6 +116,7 @@ def test_contradicting_options_are_refused(refused):
     assert refused("test-case-1", "--backend", "dask").startswith("--backend dask: needs")
     assert "--backend" in refused("test-case-1", "--backend", "cray")
     assert "hover_more" in refused("test-case-1", "--mission", "hover_more")
+    assert "did you mean 'lag'" in refused("test-case-1", "--response", "lagg=0.5")
     assert "nowhere.py" in refused("test-case-1", "--pilot", "nowhere.py")
     assert refused("test-case-1", "--compare", "nothing").startswith("--compare nothing: holds no evaluation")
     assert not Path("runs").exists()

@@ -109,6 +109,8 @@ def test_the_replay_is_a_command_that_flies():
         "framerunner fly 'runs/my own/scenarios/calm-17.yaml' --mission a.yaml --pilot mine.py "
         "--seed 17 --lockstep"
     )
+    late = replay_command(Path("calm-17.yaml"), "a.yaml", None, 17, "lag=0.5")
+    assert late == "framerunner fly calm-17.yaml --mission a.yaml --seed 17 --response lag=0.5 --lockstep"
     build_app().parse_args(shlex.split(command)[1:], print_error=False, exit_on_error=False)
 
 

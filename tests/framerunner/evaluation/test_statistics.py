@@ -82,7 +82,7 @@ def test_a_mean_difference_has_student_s_interval():
 
 
 def folder(path, digests, *rows):
-    identity = Identity(digests, "m", "", "Pilot", "", tuple(0 for _ in digests), "0.1.0")
+    identity = Identity(digests, "m", "", "Pilot", "", tuple(0 for _ in digests), "0.1.0", "")
     path.mkdir()
     (path / FLIGHTS).write_text("".join(row.to_json() + "\n" for row in rows), encoding="utf-8")
     return EvaluationFolder(path, identity, {row.scenario for row in rows})

@@ -126,7 +126,7 @@ def test_two_evaluations_do_not_write_into_one_folder(tmp_path, plan):
         ('{"format": 99}', "was made by another version"),
         ("{", "evaluation.json cannot be read"),
         ("[]", "evaluation.json cannot be read"),
-        ('{"format": 1}', "evaluation.json cannot be read"),
+        ('{"format": 2}', "evaluation.json cannot be read"),
     ],
 )
 def test_an_identity_that_cannot_be_read_is_refused(tmp_path, plan, content, message):
