@@ -256,4 +256,4 @@ def thinned(track: Track, step_s: float = TRACK_STEP_S) -> Track:
             kept.append(index)
     columns = ([round(column[index], 3) for index in kept] for column in (times, track.x, track.y, track.z))
     time_s, x, y, z = columns
-    return Track(time_s, x, y, z, [states[index] for index in kept])
+    return Track(time_s, x, y, z, [states[index] for index in kept], track.estimates)

@@ -19,12 +19,14 @@ from errors import SettingError, write_advice
 from framerunner.evaluation.plan import Identity
 from framerunner.evaluation.rows import Row
 from framerunner.runs.track import Track
+from offboard.navigation.frame_estimate import FrameEstimate
 from scenarios.loader import dump_yaml
 from scenarios.models import Scenario
 
 FORMAT = 2
 IDENTITY, FLIGHTS, LOCK = "evaluation.json", "flights.jsonl", ".lock"
 RESULTS, REPORT = "results.csv", "report.html"
+_ESTIMATES = TypeAdapter(tuple[FrameEstimate, ...])
 _FOLDERS = ("scenarios", "tracks", "errors")
 _FILES = (IDENTITY, FLIGHTS, RESULTS, REPORT)
 
@@ -241,9 +243,11 @@ def _track_as_dict(track: Track) -> dict[str, Any]:
         "z": track.z,
         "states": states,
         "mission_state": [numbers[state] for state in track.mission_state],
+        "estimates": [asdict(estimate) for estimate in track.estimates],
     }
 
 
 def _track_from_dict(data: dict[str, Any]) -> Track:
     states = [data["states"][number] for number in data["mission_state"]]
-    return Track(data["time_s"], data["x"], data["y"], data["z"], states)
+    estimates = _ESTIMATES.validate_python(data.get("estimates", ()))
+    return Track(data["time_s"], data["x"], data["y"], data["z"], states, estimates)

@@ -15,12 +15,13 @@ from typing import Any, Literal
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
-from matplotlib.patches import Polygon, Rectangle
+from matplotlib.patches import Ellipse, Polygon, Rectangle
 from matplotlib.patheffects import withStroke
 from matplotlib.ticker import MaxNLocator
 
 from framerunner.runs import PlotError, check_plot_format
 from framerunner.runs.track import Track
+from offboard.navigation.frame_estimate import FrameEstimate
 from scenarios.models import Frame, Scenario, start_position
 from scenarios.result import FlightResult
 
@@ -47,6 +48,10 @@ STATE_COLOURS = (
 # With more kinds of states than colours, the colours are used again with another dash.
 DASHES: tuple[_Dash, ...] = ("-", (0, (4, 1.5)), (0, (1, 1)), (0, (4, 1, 1, 1)))
 
+_OTHER_FRAME = "#7a7a7a"  # an estimated one that is no part of the task
+_FRAME_SIZE_M = (0.42, 0.22)  # outer width and height of a frame that the scenario does not have
+_AROUND = 1.35  # an estimate's outline is so much larger: around the true frame where it is right
+_ESTIMATE_DASH = (0, (3, 1.5))
 _INK = "#262626"
 _FAINT = "#6b6b6b"
 _FLOOR = "#faf3dc"
@@ -91,6 +96,7 @@ def draw_track(scenario: Scenario, track: Track, result: FlightResult | None) ->
     times_s = {} if result is None else result.times_s
     _draw_top(top, scenario, {frame.colour: _crossing_label(frame, times_s) for frame in scenario.frames})
     _draw_side(side, scenario)
+    _draw_estimates(top, side, scenario, track.estimates)
     spent_s = track.seconds_in_state()
     styles = {
         kind: (STATE_COLOURS[i % len(STATE_COLOURS)], DASHES[i // len(STATE_COLOURS) % len(DASHES)])
@@ -100,7 +106,7 @@ def draw_track(scenario: Scenario, track: Track, result: FlightResult | None) ->
         _draw_path(axes, view, track, styles)
         _draw_marks(axes, view, track, times_s)
     _set_limits(top, side, scenario, track)
-    _draw_legend(notes, spent_s, styles)
+    _draw_legend(notes, spent_s, styles, has_estimates=bool(track.estimates))
     _write_title(figure, *_headline(scenario, result))
     return figure
 
@@ -196,6 +202,31 @@ def _draw_side(axes: Axes, scenario: Scenario) -> None:
             axes.add_patch(outline)
 
 
+def _draw_estimates(top: Axes, side: Axes, scenario: Scenario, estimates: Sequence[FrameEstimate]) -> None:
+    """Draw frames as the navigator knew them: outlines around the true ones, ellipses of two deviations."""
+    sizes_m: dict[str, tuple[float, float]] = {
+        frame.colour: (frame.outer_width_m, frame.outer_height_m) for frame in scenario.all_frames
+    }
+    for frame in estimates:
+        x, y, z = frame.position_m
+        if not all(map(isfinite, (x, y, z, frame.yaw_rad))):
+            continue
+        colour = FRAME_COLOURS.get(frame.colour, _OTHER_FRAME)
+        width, height = (_AROUND * size for size in sizes_m.get(frame.colour, _FRAME_SIZE_M))
+        style: dict[str, Any] = {"fill": False, "ec": colour, "lw": 0.9, "ls": _ESTIMATE_DASH, "zorder": 7}
+        c, s = cos(frame.yaw_rad), sin(frame.yaw_rad)
+        corners = [(-0.2, -0.5), (0.2, -0.5), (0.2, 0.5), (-0.2, 0.5)]
+        outline = [(x + width * (c * a - s * b), y + width * (s * a + c * b)) for a, b in corners]
+        top.add_patch(Polygon(outline, closed=True, **style))
+        seen_width = width * abs(s) + 0.1 * width * abs(c)
+        side.add_patch(Rectangle((x - seen_width / 2, z - height / 2), seen_width, height, **style))
+        if all(map(isfinite, frame.position_std_m)):
+            std_x, std_y, std_z = frame.position_std_m
+            for axes, at, axis_lengths in ((top, (x, y), (std_x, std_y)), (side, (x, z), (std_x, std_z))):
+                across, up = (4 * std for std in axis_lengths)
+                axes.add_patch(Ellipse(at, across, up, fc=colour, ec="none", alpha=0.18, zorder=2))
+
+
 def _arrow(
     axes: Axes,
     tail: tuple[float, float],
@@ -286,7 +317,7 @@ def _limits(values: Sequence[float], low: float, high: float) -> tuple[float, fl
     )
 
 
-def _draw_legend(axes: Axes, spent_s: Mapping[str, float], styles: _Styles) -> None:
+def _draw_legend(axes: Axes, spent_s: Mapping[str, float], styles: _Styles, *, has_estimates: bool) -> None:
     """Name the kinds of states in order of appearance, with the time spent in each, and the marks."""
     handles = []
     for kind, seconds in spent_s.items():
@@ -298,6 +329,10 @@ def _draw_legend(axes: Axes, spent_s: Mapping[str, float], styles: _Styles) -> N
     crossing = Line2D([], [], ls="", **_CROSSING_MARK, label="crossing")
     end = Line2D([], [], ls="", **_END_MARK, label="end of the path")
     handles += [crossing, end] if spent_s else []
+    if has_estimates:
+        handles.append(
+            Line2D([], [], color=_FAINT, lw=0.9, linestyle=_ESTIMATE_DASH, label="frame as estimated")
+        )
     if not handles:
         axes.text(0, 0.95, "Nothing was recorded.", va="top", fontsize=10, color=_INK)
         return

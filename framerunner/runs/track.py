@@ -1,4 +1,4 @@
-"""Where a drone was during a flight."""
+"""Where a drone was during a flight, and where its navigator believed the frames to be."""
 
 from __future__ import annotations
 
@@ -9,11 +9,12 @@ from math import isfinite
 
 from geometry.vectors import Vec3
 from offboard.app import Moment
+from offboard.navigation.frame_estimate import FrameEstimate
 
 
 @dataclass(frozen=True, slots=True)
 class Track:
-    """Where a drone was; all sequences have the same length.
+    """Where a drone was; all sequences but the last one have the same length.
 
     Attributes:
         time_s: since motors on, not decreasing, shape (n,).
@@ -21,6 +22,7 @@ class Track:
         y: see x.
         z: see x.
         mission_state: the state's id at each sample, such as "red.turning"; "" where there is none.
+        estimates: the frames as the navigator knew them at the end; empty without a navigator.
 
     Raises:
         ValueError: the sequences have different lengths.
@@ -31,6 +33,7 @@ class Track:
     y: Sequence[float] = ()
     z: Sequence[float] = ()
     mission_state: Sequence[str] = ()
+    estimates: Sequence[FrameEstimate] = ()
 
     def __post_init__(self) -> None:
         lengths = {name: len(getattr(self, name)) for name in ("time_s", "x", "y", "z", "mission_state")}
@@ -89,6 +92,7 @@ class TrackRecorder:
         self._y: list[float] = []
         self._z: list[float] = []
         self._mission_state: list[str] = []
+        self._estimates: Sequence[FrameEstimate] = ()
 
     def see(self, moment: Moment) -> None:
         """Add a tick."""
@@ -98,10 +102,12 @@ class TrackRecorder:
         self._y.append(state.y)
         self._z.append(state.z)
         self._mission_state.append(moment.mission_state)
+        if moment.navigation is not None:
+            self._estimates = moment.navigation.frames
 
     def track(self, began_us: int | None) -> Track:
         """Return the track so far; times count from `began_us`, vehicle time, or from the first tick."""
         if began_us is None:
             began_us = self._time_us[0] if self._time_us else 0
         time_s = [(time_us - began_us) / 1e6 for time_us in self._time_us]
-        return Track(time_s, self._x, self._y, self._z, self._mission_state)
+        return Track(time_s, self._x, self._y, self._z, self._mission_state, self._estimates)

@@ -1,6 +1,7 @@
 """The folder of an evaluation: what was kept is read again after kills, damage and full disks."""
 
 import os
+from math import inf
 
 import pytest
 
@@ -9,10 +10,13 @@ from framerunner.evaluation.plan import plan_level
 from framerunner.evaluation.store import FLIGHTS, open_folder, read_folder
 from framerunner.runs.track import Track
 from offboard.mission import load_mission
+from offboard.navigation.frame_estimate import FrameEstimate
 from scenarios.loader import load_scenario
 from tests.framerunner.evaluation.flights import made_row
 
-TRACK = Track([0.0, 0.2], [1.0, 2.0], [3.0, 4.0], [0.5, 0.6], ["red.turning", "red.turning"])
+ESTIMATE = FrameEstimate("red", (3.0, 2.0, 2.0), 0.5, (inf, 0.1, 0.1), 0.1, True, False, 1, 2_900_000)
+STATES = ["red.turning", "red.turning"]
+TRACK = Track([0.0, 0.2], [1.0, 2.0], [3.0, 4.0], [0.5, 0.6], STATES, (ESTIMATE,))
 
 
 @pytest.fixture(scope="module")

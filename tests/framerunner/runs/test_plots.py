@@ -1,13 +1,16 @@
 """Plots are checked by their matplotlib objects, not by their pixels."""
 
-from math import inf, nan
+from dataclasses import replace
+from math import inf, nan, pi
 
 import pytest
 from matplotlib.colors import to_hex
+from matplotlib.patches import Ellipse
 
 from framerunner.runs import PlotError
 from framerunner.runs.plots import STATE_COLOURS, draw_scenario, draw_track, save_figure
 from framerunner.runs.track import Track
+from offboard.navigation.frame_estimate import FrameEstimate
 from scenarios.models import Arena, Base, Frame, Scenario, Start
 from scenarios.result import FlightResult
 
@@ -110,6 +113,26 @@ def test_the_legend_has_the_states_in_order_of_appearance():
         "crossing",
         "end of the path",
     ]
+
+
+def test_estimated_frames_are_drawn_beside_the_true_ones():
+    red = FrameEstimate("red", (3.5, 1.0, 2.0), pi / 2, (0.25, 0.5, 0.1), 0.1, False, True, 9, 0)
+    other = FrameEstimate("constructor", (0.0, 0.0, 1.0), 0.0, (inf, 1.0, 1.0), 0.1, False, False, 1, 0)
+    lost = FrameEstimate("blue", (nan, 0.0, 1.0), 0.0, (1.0, 1.0, 1.0), 0.1, False, False, 1, 0)
+    figure = draw_track(SCENARIO, replace(TRACK, estimates=(red, other, lost)), RESULT)
+    assert legend_entries(figure)[-1] == "frame as estimated"
+    for axes, middle, (across, up), (width, height) in (
+        (figure.axes[0], (3.5, 1.0), (1.0, 2.0), (1.35 * 0.42, 0.4 * 1.35 * 0.42)),
+        (figure.axes[1], (3.5, 2.0), (1.0, 0.4), (1.35 * 0.42, 1.35 * 0.22)),
+    ):
+        (ellipse,) = (patch for patch in axes.patches if isinstance(patch, Ellipse))
+        assert ellipse.center == middle
+        assert (ellipse.width, ellipse.height) == pytest.approx((across, up))  # two deviations each way
+        outlines = [patch for patch in axes.patches if patch.get_linestyle() != "solid"]
+        assert [to_hex(patch.get_edgecolor()) for patch in outlines] == ["#ff0000", "#7a7a7a"]
+        box = outlines[0].get_extents().transformed(axes.transData.inverted())
+        assert (box.width, box.height) == pytest.approx((width, height), abs=0.06)
+        assert ((box.x0 + box.x1) / 2, (box.y0 + box.y1) / 2) == pytest.approx(middle)
 
 
 def test_the_path_is_drawn_where_the_drone_was_in_both_views():

@@ -1,5 +1,6 @@
 """Tracks, the pace and videos of flights."""
 
+from dataclasses import replace
 from threading import Event
 
 import cv2
@@ -10,6 +11,8 @@ from framerunner.runs.recorder import FlightRecorder, RecordingCamera, VideoFile
 from framerunner.runs.track import TrackRecorder
 from offboard.app import Moment
 from offboard.drone import DroneState, VelocityCommand
+from offboard.navigation.frame_estimate import FrameEstimate
+from offboard.navigation.view import NavigationView
 from tests.disk import disk_that_takes
 from vision.types import CameraFrame, Detections
 
@@ -38,6 +41,15 @@ def test_the_track_counts_from_motors_on():
     assert set(track.y) == {2.0} and set(track.z) == {3.0}
     assert track.mission_state == ["take_off.start", "red.turning", "red.crossing"]
     assert recorder.track(None).time_s[0] == 0.0
+
+
+def test_the_track_has_the_frames_as_they_were_last_estimated():
+    recorder = TrackRecorder()
+    frames = [FrameEstimate("red", (x, 0, 1), 0, (1, 1, 1), 1, False, False, 1, 0) for x in (1.0, 2.0)]
+    for tick, known in enumerate(((), frames[:1], frames[1:], None)):
+        view = None if known is None else NavigationView(tuple(known))
+        recorder.see(replace(moment(5_000_000 + 50_000 * tick, "a.b"), navigation=view))
+    assert recorder.track(None).estimates == (frames[1],)
 
 
 def test_the_real_time_factor_is_vehicle_time_by_wall_time(monkeypatch):
