@@ -4,18 +4,16 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
-from collections.abc import AsyncIterator, Callable
+from collections.abc import AsyncIterator
 from typing import Protocol
 
 from errors import UserError
-from vision.detector import detect
-from vision.types import CameraFrame, Detections, Image
+from vision.detectors import Detector, new_detector
+from vision.types import CameraFrame, Detections
 from wire.vehicle_telemetry import MessageOrder
 
 CAMERA_DEAD_S = 1.0
 FIRST_IMAGE_S = 5.0
-
-Detector = Callable[[Image, int | None], Detections]
 
 
 class CameraLostError(UserError):
@@ -54,10 +52,10 @@ class CameraPerception:
         oldest_s: age of the oldest image that was used, seconds.
     """
 
-    def __init__(self, camera: Camera, detector: Detector = detect) -> None:
+    def __init__(self, camera: Camera, detector: Detector | None = None) -> None:
         self.oldest_s = 0.0
         self._camera = camera
-        self._detector = detector
+        self._detector = detector or new_detector("boxes")
         self._detections = Detections()
         self._image_us: int | None = None
         self._order = MessageOrder()

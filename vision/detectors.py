@@ -4,17 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from functools import partial
-from typing import Literal
 
 from vision.detector import detect
 from vision.frame_finder import PAINTED_SPREAD_PX, FrameFinder
-from vision.types import Detections, Image
+from vision.types import Detections, Image, Vision
 
-DetectorKind = Literal["boxes", "frames"]
 Detector = Callable[[Image, int | None], Detections]
 
 
-def new_detector(kind: DetectorKind, *, focal_px: float | None = None, rendered: bool = False) -> Detector:
+def new_detector(kind: Vision, *, focal_px: float | None = None, rendered: bool = False) -> Detector:
     """Make a detector.
 
     Args:

@@ -11,6 +11,7 @@ import hashlib
 from collections.abc import Callable, Sequence
 from struct import Struct
 
+from framerunner.flying.detector import plan_detector
 from framerunner.flying.fly import FinishedFlight, fly
 from framerunner.flying.lockstep_drone import LockstepDrone, TruthObserver
 from framerunner.flying.plan import FlightPlan
@@ -21,7 +22,7 @@ from scenarios.models import Scenario, TrueState
 from scenarios.result import RefereeReport, RefereeSnapshot
 from sitl.camera import CameraFeed
 from sitl.simulation import Simulation
-from vision.detector import detect
+from vision.detectors import Detector, new_detector
 from vision.types import Detections, Image
 
 ImageObserver = Callable[[int, Image], None]
@@ -76,7 +77,8 @@ class LockstepVehicle:
         observers: Sequence[TruthObserver] = (),
     ) -> None:
         self.simulation = Simulation(plan.scenario, plan.airframe)
-        self.perception = LockstepPerception(plan.scenario, on_image)
+        detector = plan_detector(plan, rendered=True)
+        self.perception = LockstepPerception(plan.scenario, on_image, detector)
         self.drone = LockstepDrone(
             self.simulation,
             plan.start_pose,
@@ -107,10 +109,13 @@ class _SimulationJudge:
 class LockstepPerception:
     """The camera's images, each when its latency is over; `follow` is called at every control tick."""
 
-    def __init__(self, scenario: Scenario, on_image: ImageObserver | None = None) -> None:
+    def __init__(
+        self, scenario: Scenario, on_image: ImageObserver | None = None, detector: Detector | None = None
+    ) -> None:
         self.image: Image | None = None  # the latest: BGR, shape (height, width, 3), uint8
         self._feed = CameraFeed(scenario)
         self._on_image = on_image
+        self._detector = detector or new_detector("boxes")
         self._arrived: tuple[int, Image] | None = None
         self._image_us = 0
         self._detections = Detections()
@@ -138,7 +143,7 @@ class LockstepPerception:
         if self._arrived is not None:
             self._image_us, image = self._arrived
             self._arrived = None
-            self._detections = detect(image, self._image_us)
+            self._detections = self._detector(image, self._image_us)
         age_s = (time_us - self._image_us) / 1e6
         if age_s > CAMERA_DEAD_S:
             raise CameraLostError(f"the camera is dead: no image for {age_s:.1f} s")

@@ -18,6 +18,7 @@ from vision.types import CameraFrame
 from wire.simulator_api import SimulatorApi
 
 if TYPE_CHECKING:  # these are imported when a flight begins, as they are slow to import
+    from framerunner.flying.judges import Judge
     from framerunner.flying.mission_reporter import MissionReporter
     from framerunner.flying.simulator_process import SimulatorClock, SitlProcess
     from offboard.link.companion import Companion
@@ -49,6 +50,11 @@ class _Endpoints:
     sitl: SitlProcess | None = None  # the simulator that was started here
     shared_with: str | None = None  # URL of the monitor, if it receives the drone only through this program
 
+    @property
+    def has_camera_of_simulator(self) -> bool:
+        """Whether the camera's images are those of the simulator at `api`, if there is one."""
+        return self.api is not None and self.camera_url == self.api.video_url
+
 
 async def fly_in_real_time(
     plan: FlightPlan, settings: RealTimeSettings, records: RunRecords, monitor_url: str | None
@@ -72,7 +78,6 @@ async def fly_in_real_time(
     from framerunner.flying.judges import choose_judge
     from framerunner.flying.mission_reporter import MissionReporter
     from offboard.link.companion import Companion
-    from offboard.perception import CameraPerception
 
     async with AsyncExitStack() as stack:
         session = await stack.enter_async_context(aiohttp.ClientSession())
@@ -85,7 +90,7 @@ async def fly_in_real_time(
         reporter = MissionReporter(companion, plan.chart, source, plan.scenario.name, plan.start_pose)
         drone = _drone(plan, vehicle, records, stack, companion)
         camera = await _camera(plan, vehicle, records, stack, reporter)
-        perception = CameraPerception(camera)
+        perception = _perception(plan, vehicle, judge, camera)
         clock = None if vehicle.sitl is None else vehicle.sitl.clock
         if clock is not None:
             clock.wait_for_images_of(perception)
@@ -177,6 +182,18 @@ async def _camera(
     camera = RecordingCamera(source, records.folder.video, plan.scenario.camera.rate_hz, keep)
     stack.callback(camera.close)
     return camera
+
+
+def _perception(
+    plan: FlightPlan, vehicle: _Endpoints, judge: Judge, camera: RecordingCamera
+) -> CameraPerception:
+    """What the mission sees through the camera."""
+    from framerunner.flying.detector import plan_detector
+    from framerunner.flying.judges import TruthJudge
+    from offboard.perception import CameraPerception
+
+    rendered = isinstance(judge, TruthJudge) and vehicle.has_camera_of_simulator
+    return CameraPerception(camera, plan_detector(plan, rendered=rendered))
 
 
 def _timing(
