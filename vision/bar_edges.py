@@ -8,7 +8,7 @@ from math import ceil, floor, hypot, sqrt
 import numpy as np
 import numpy.typing as npt
 
-from vision.frame_model import BAR_M, FRAME_HEIGHT_M, FRAME_WIDTH_M, Floats, Segment, Sides
+from vision.frame_model import BAR_M, FRAME_HEIGHT_M, FRAME_WIDTH_M, Floats, Point, Segment, Sides
 
 Labels = npt.NDArray[np.uint8]
 Flags = npt.NDArray[np.bool_]
@@ -57,8 +57,10 @@ def find_edges(labels: Labels, sides: Sides, spread_px: float) -> list[BarEdges 
         spread_px: how much larger than its true outline a region is painted on each side.
     """
     half_px = _expected_half_px(sides, spread_px)
+    corners = [_inner_corner(sides, half_px, k) for k in range(4)]
     samples = [
-        None if side is None else _sample(side, *half) for side, half in zip(sides, half_px, strict=True)
+        None if side is None else _sample(side, half_px[k], corners[k], corners[(k + 1) % 4])
+        for k, side in enumerate(sides)
     ]
     used = [sample for sample in samples if sample is not None]
     if not used:
@@ -137,22 +139,52 @@ def _length(side: Segment) -> float:
     return hypot(x1 - x0, y1 - y0)
 
 
-def _sample(side: Segment, half_start: float, half_end: float) -> _Sample | None:
-    """The columns or rows of a side that are clear of its neighbours' bars."""
+def _inner_corner(sides: Sides, half_px: list[tuple[float, float]], k: int) -> Point:
+    """Where the inner edges of the sides k - 1 and k meet, as seen from where their outer edges do."""
+    before, after = sides[k - 1], sides[k]
+    if before is None or after is None:
+        return (0.0, 0.0)
+    (ax, ay), (bx, by) = _direction(before), _direction(after)
+    sine = max(ax * by - ay * bx, 0.3)
+    one, other = 2.0 * half_px[k - 1][1] / sine, 2.0 * half_px[k][0] / sine
+    return (one * bx - other * ax, one * by - other * ay)
+
+
+def _direction(side: Segment) -> Point:
+    (x0, y0), (x1, y1) = side
+    length = max(hypot(x1 - x0, y1 - y0), 1e-9)
+    return ((x1 - x0) / length, (y1 - y0) / length)
+
+
+def _sample(side: Segment, half_px: tuple[float, float], start: Point, end: Point) -> _Sample | None:
+    """The columns or rows of a side that are clear of its neighbours' bars.
+
+    Args:
+        side: first estimate of its outer edge.
+        half_px: half the bar's width at its start and end.
+        start: of the inner edge, as seen from the start of the outer one.
+        end: the same for the end.
+    """
     (x0, y0), (x1, y1) = side
     dx, dy = x1 - x0, y1 - y0
     steep = abs(dy) > abs(dx)
     # Going round clockwise, the opening is on the right: below the top side, left of the right one.
     inward = (-1 if dy > 0 else 1) if steep else (1 if dx > 0 else -1)
     (t0, u0, t1, u1) = (y0, x0, y1, x1) if steep else (x0, y0, x1, y1)
+    from_start, from_end = abs(start[steep]), abs(end[steep])
+    if (t1 - t0) * start[steep] < 0.0:
+        from_start = 0.0
+    if (t1 - t0) * end[steep] > 0.0:
+        from_end = 0.0
+    half_start, half_end = half_px
     if t0 > t1:
         t0, u0, t1, u1 = t1, u1, t0, u0
-        half_start, half_end = half_end, half_start
+        half_start, half_end, from_start, from_end = half_end, half_start, from_end, from_start
     length = t1 - t0
     if length < 1.0:
         return None
-    first = ceil(t0 + min(2.0 * half_start + 0.5, 0.45 * length))
-    last = floor(t1 - min(2.0 * half_end + 0.5, 0.45 * length))
+    first = ceil(t0 + min(max(from_start, 2.0 * half_start) + 0.5, 0.45 * length))
+    last = floor(t1 - min(max(from_end, 2.0 * half_end) + 0.5, 0.45 * length))
     if first > last:
         first = last = round(0.5 * (t0 + t1))
     t = np.arange(first, last + 1, (last - first) // _MAX_SAMPLES + 1)
