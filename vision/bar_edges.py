@@ -12,6 +12,7 @@ from vision.frame_model import BAR_M, FRAME_HEIGHT_M, FRAME_WIDTH_M, Floats, Poi
 
 Labels = npt.NDArray[np.uint8]
 Flags = npt.NDArray[np.bool_]
+Ints = npt.NDArray[np.intp]
 
 BACKGROUND, OWN, FOREIGN = 0, 1, 2
 """Values of pixels: neither, of the region, and what may hide a part of it (or is not in the image)."""
@@ -23,32 +24,44 @@ _SLACK_PX = 2.5  # a bar may look wider than expected by this much
 
 @dataclass(frozen=True, slots=True, eq=False)
 class BarEdges:
-    """The edges of one side's bar, pixels of the labelled image.
+    """The edges of a frame's bars, pixels of the labelled image; a row for each side.
+
+    A side that is nearer to a column than to a row of the image is steep. It is measured in rows t, the
+    others in columns t. What is measured there counts towards the opening: the column (row if not steep)
+    times `inward`, half-way between pixel centres.
 
     Attributes:
-        steep: the side is nearer to a column than to a row: it is measured in every row, else every column.
-        inward: 1 if the opening is on the side of larger columns (rows if not steep), else -1.
-        slope: of the first estimate.
-        t: rows in which it is measured (columns if not steep).
-        outer: columns (rows) of its outer edge there, half-way between pixel centres.
-        inner: of its inner edge.
+        steep: per side.
+        inward: per side, 1 if the opening is on the side of larger columns (rows), else -1.
+        slope: per side, of the first estimate.
+        t: rows or columns in which it is measured, in order, shape (4, n).
+        used: where there is a measurement; a side has fewer than n, or none.
+        outer: the outer edge.
+        inner: the inner edge.
         outer_ok: where the outer edge is one, not hidden and not outside the image.
         inner_ok: the same for the inner edge.
-        half_px: what half its width should be, at every place.
+        half_px: what half the bar's width should be there.
     """
 
-    steep: bool
-    inward: int
-    slope: float
+    steep: tuple[bool, ...]
+    inward: Floats
+    slope: Floats
     t: Floats
+    used: Flags
     outer: Floats
     inner: Floats
     outer_ok: Flags
     inner_ok: Flags
     half_px: Floats
 
+    @property
+    def spans(self) -> Floats:
+        """The first and the last place of each side, shape (4, 2)."""
+        last = np.maximum(self.used.sum(axis=1) - 1, 0)
+        return np.array([self.t[:, 0], self.t[np.arange(4), last]]).T
 
-def find_edges(labels: Labels, sides: Sides, spread_px: float) -> list[BarEdges | None]:
+
+def find_edges(labels: Labels, sides: Sides, spread_px: float) -> BarEdges:
     """Find the edges of all four bars.
 
     Args:
@@ -58,54 +71,50 @@ def find_edges(labels: Labels, sides: Sides, spread_px: float) -> list[BarEdges 
     """
     half_px = _expected_half_px(sides, spread_px)
     corners = [_inner_corner(sides, half_px, k) for k in range(4)]
-    samples = [
-        None if side is None else _sample(side, half_px[k], corners[k], corners[(k + 1) % 4])
+    plans = [
+        _NOWHERE if side is None else _plan(side, half_px[k], corners[k], corners[(k + 1) % 4])
         for k, side in enumerate(sides)
     ]
-    used = [sample for sample in samples if sample is not None]
-    if not used:
-        return [None] * 4
+    steep = tuple(plan.steep for plan in plans)
+    inward, slope, first, step, count, u_first, half_first, half_slope = np.array(
+        [plan.numbers for plan in plans]
+    ).T[..., None]
+    places = np.arange(int(count.max()))
+    used = places < count
+    t = first + step * places
+    u = np.rint(u_first + slope * (t - first))
+    half = half_first + half_slope * (t - first)
+
     stride = labels.strides[0]
-    base = np.concatenate([s.t * stride + s.u if s.steep else s.t + s.u * stride for s in used])
-    step = np.repeat([s.inward * (1 if s.steep else stride) for s in used], [len(s.t) for s in used])
-    half = np.concatenate([s.half_px for s in used])
+    is_steep = np.array(steep)[:, None]
+    base = np.where(is_steep, t * stride + u, u * stride + t).astype(np.intp)
+    across = np.where(is_steep, inward, inward * stride).astype(np.intp)
     offsets = np.arange(-_OUTSIDE_PX, ceil(2.0 * float(half.max()) + _SLACK_PX) + 2)
-    around = labels.reshape(-1).take(base[:, None] + step[:, None] * offsets, mode="clip")
-    outer, outer_ok, inner, inner_ok = _runs(around, 2.0 * half + _SLACK_PX)
-    found: list[BarEdges | None] = []
-    start = 0
-    for s in samples:
-        if s is None:
-            found.append(None)
-            continue
-        part = slice(start, start + len(s.t))
-        start = part.stop
-        found.append(
-            BarEdges(
-                s.steep,
-                s.inward,
-                s.slope,
-                s.t.astype(np.float64),
-                s.u + s.inward * outer[part],
-                s.u + s.inward * inner[part],
-                outer_ok[part],
-                inner_ok[part],
-                s.half_px,
-            )
-        )
-    return found
+    index = base[..., None] + across[..., None] * offsets
+    around = labels.reshape(-1).take(index, mode="clip").reshape(-1, len(offsets))
+    outer, outer_ok, inner, inner_ok = (
+        run.reshape(t.shape) for run in _runs(around, (2.0 * half + _SLACK_PX).reshape(-1))
+    )
+    from_here = inward * u
+    return BarEdges(
+        steep, inward[:, 0], slope[:, 0], t, used,
+        from_here + outer, from_here + inner, outer_ok & used, inner_ok & used, half,
+    )  # fmt: skip
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class _Sample:
-    """Where a side is looked for: columns (rows if steep) and the row (column) of its outer edge there."""
+@dataclass(frozen=True, slots=True)
+class _Plan:
+    """Where a side is looked for.
+
+    Its numbers: inward, slope, first t, step of t, how many, outer edge at the first t, half the bar's width
+    there and how that changes with t.
+    """
 
     steep: bool
-    inward: int
-    slope: float
-    t: npt.NDArray[np.int64]
-    u: npt.NDArray[np.int64]
-    half_px: Floats
+    numbers: tuple[float, ...]
+
+
+_NOWHERE = _Plan(False, (1.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0))
 
 
 def _expected_half_px(sides: Sides, spread_px: float) -> list[tuple[float, float]]:
@@ -156,7 +165,7 @@ def _direction(side: Segment) -> Point:
     return ((x1 - x0) / length, (y1 - y0) / length)
 
 
-def _sample(side: Segment, half_px: tuple[float, float], start: Point, end: Point) -> _Sample | None:
+def _plan(side: Segment, half_px: tuple[float, float], start: Point, end: Point) -> _Plan:
     """The columns or rows of a side that are clear of its neighbours' bars.
 
     Args:
@@ -169,30 +178,28 @@ def _sample(side: Segment, half_px: tuple[float, float], start: Point, end: Poin
     dx, dy = x1 - x0, y1 - y0
     steep = abs(dy) > abs(dx)
     # Going round clockwise, the opening is on the right: below the top side, left of the right one.
-    inward = (-1 if dy > 0 else 1) if steep else (1 if dx > 0 else -1)
+    inward = (-1.0 if dy > 0 else 1.0) if steep else (1.0 if dx > 0 else -1.0)
     (t0, u0, t1, u1) = (y0, x0, y1, x1) if steep else (x0, y0, x1, y1)
-    from_start, from_end = abs(start[steep]), abs(end[steep])
-    if (t1 - t0) * start[steep] < 0.0:
-        from_start = 0.0
-    if (t1 - t0) * end[steep] > 0.0:
-        from_end = 0.0
+    from_start = max(start[steep] if t1 > t0 else -start[steep], 0.0)
+    from_end = max(-end[steep] if t1 > t0 else end[steep], 0.0)
     half_start, half_end = half_px
     if t0 > t1:
         t0, u0, t1, u1 = t1, u1, t0, u0
         half_start, half_end, from_start, from_end = half_end, half_start, from_end, from_start
     length = t1 - t0
     if length < 1.0:
-        return None
+        return _NOWHERE
     first = ceil(t0 + min(max(from_start, 2.0 * half_start) + 0.5, 0.45 * length))
     last = floor(t1 - min(max(from_end, 2.0 * half_end) + 0.5, 0.45 * length))
     if first > last:
         first = last = round(0.5 * (t0 + t1))
-    t = np.arange(first, last + 1, (last - first) // _MAX_SAMPLES + 1)
+    step = (last - first) // _MAX_SAMPLES + 1
     slope = (u1 - u0) / length
-    share = (t - t0) / length
-    # Across a slanted bar a row or column is longer than the bar is wide.
-    half = np.asarray((half_start + (half_end - half_start) * share) * hypot(1.0, slope), np.float64)
-    return _Sample(steep, inward, slope, t, np.rint(u0 + (u1 - u0) * share).astype(np.int64), half)
+    slant = hypot(1.0, slope)  # across a slanted bar a row or column is longer than the bar is wide
+    growth = (half_end - half_start) / length
+    u_first, half_first = u0 + slope * (first - t0), half_start + growth * (first - t0)
+    count = (last - first) // step + 1
+    return _Plan(steep, (inward, slope, first, step, count, u_first, slant * half_first, slant * growth))
 
 
 def _runs(around: Labels, longest: Floats) -> tuple[Floats, Flags, Floats, Flags]:

@@ -8,13 +8,12 @@ outer edge is seen (the opening is too small in the image, or hidden), half the 
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass, replace
 from math import sqrt
+from typing import NamedTuple
 
 import numpy as np
 
-from vision.bar_edges import BarEdges
+from vision.bar_edges import BarEdges, Flags
 from vision.frame_model import FRAME_HEIGHT_M, FRAME_WIDTH_M, Floats
 
 _QUANTISATION = 1.0 / 12.0  # variance of a rounded number
@@ -23,20 +22,18 @@ _WIDTH_VARIANCE = 0.02  # of half a bar's width where only its outer edge is see
 _FEW_VARIANCE = 0.03  # of a line through one or two points, whose errors do not show
 
 
-@dataclass(frozen=True, slots=True)
-class BarLine:
+class BarLine(NamedTuple):
     """One bar's axis: `at + slope * (t - along)`, the row at column t, or the column at row t if steep."""
 
     steep: bool
-    inward: int
     along: float
     at: float
     slope: float
     var_at: float  # variance of `at`
     var_slope: float
-    half_px: float  # half the bar's width as it is in the image, measured as `at` is
     first: float  # the first t at which it was measured ...
     last: float  # ... and the last one
+    half_px: float  # half the bar's width as it is in the image, measured as `at` is
     seen: float  # share of the places at which its outer edge was found
     open: float  # share of the places at which its inner edge was found
 
@@ -54,8 +51,7 @@ class BarLine:
 BarLines = list[BarLine | None]
 
 
-@dataclass(frozen=True, slots=True)
-class Meeting:
+class Meeting(NamedTuple):
     """Where two lines meet, and the standard deviations of that; pixels."""
 
     x: float
@@ -64,8 +60,8 @@ class Meeting:
     std_y: float
 
 
-def fit_lines(edges: Sequence[BarEdges | None], focal_px: float, offsets: Floats | None = None) -> BarLines:
-    """Fit the axes of a frame's bars.
+def fit_lines(edges: BarEdges, focal_px: float, offsets: Floats | None = None) -> BarLines:
+    """Fit the axes of a frame's bars; None where nothing of a bar is seen.
 
     Args:
         edges: of the bars.
@@ -73,12 +69,80 @@ def fit_lines(edges: Sequence[BarEdges | None], focal_px: float, offsets: Floats
         offsets: what `frame_model.bar_offsets` says of these edges, at the first and last place of each side
             and with the spread of the pixels, if a pose is known; else the edges are taken to be symmetric.
     """
-    lines: BarLines = [
-        None if bar is None else _fitted(bar, None if offsets is None else offsets[k])
-        for k, bar in enumerate(edges)
-    ]
+    both = edges.outer_ok & edges.inner_ok
+    axis, half_px = _axis(edges, both, offsets)
+    usable = edges.outer_ok | edges.inner_ok
+    fit = _least_squares(edges, axis, usable)
+    if bool((fit.residual > 1.0).any()):
+        limit = np.maximum(1.0, 1.7 * np.sqrt(fit.mean_square))[:, None]
+        usable &= fit.residual <= limit
+        fit = _least_squares(edges, axis, usable)
+    numbers = zip(
+        *(values.tolist() for values in fit[:5]),
+        edges.spans.tolist(),
+        half_px.tolist(),
+        both.sum(axis=1).tolist(),
+        edges.outer_ok.sum(axis=1).tolist(),
+        edges.inner_ok.sum(axis=1).tolist(),
+        edges.used.sum(axis=1).tolist(),
+        strict=True,
+    )
+    lines: BarLines = []
+    for k, (count, t, u, slope, square, (first, last), half, boths, outers, inners, all_) in enumerate(
+        numbers
+    ):
+        if count == 0.0:
+            lines.append(None)
+            continue
+        two_edges = 2 * boths > all_
+        variances = _variances(count, last - first, slope, two_edges, square)
+        shares = (outers / all_, inners / all_)
+        lines.append(BarLine(edges.steep[k], t, u, slope, *variances, first, last, half, *shares))
     _balance(lines, focal_px)
     return lines
+
+
+class _Fit(NamedTuple):
+    """Least squares, per side; and the distance of every point from its line."""
+
+    points: Floats  # how many
+    along: Floats
+    at: Floats
+    slope: Floats
+    mean_square: Floats
+    residual: Floats
+
+
+def _axis(edges: BarEdges, both: Flags, offsets: Floats | None) -> tuple[Floats, Floats]:
+    """Where the axis of each bar is by its edges, shape (4, n); half the width of each bar."""
+    if offsets is None:
+        to_outer, to_inner = -edges.half_px, edges.half_px
+    else:
+        spans = edges.spans
+        share = (edges.t - spans[:, :1]) / np.maximum(spans[:, 1:] - spans[:, :1], 1.0)
+        to_outer = offsets[:, 0, :1] + (offsets[:, 0, 1:] - offsets[:, 0, :1]) * share
+        to_inner = offsets[:, 1, :1] + (offsets[:, 1, 1:] - offsets[:, 1, :1]) * share
+    # What the width should be is less sure than what is seen.
+    boths = both.sum(axis=1)
+    half = 0.5 * (to_inner - to_outer)
+    wider = (0.5 * (edges.inner - edges.outer) - half) * both
+    enough = 4 * boths >= np.maximum(edges.used.sum(axis=1), 4)
+    mean_wider = np.where(enough, wider.sum(axis=1) / np.maximum(boths, 1), 0.0)[:, None]
+    by_outer, by_inner = edges.outer - to_outer + mean_wider, edges.inner - to_inner - mean_wider
+    axis = np.where(both, 0.5 * (by_outer + by_inner), np.where(edges.outer_ok, by_outer, by_inner))
+    return edges.inward[:, None] * axis, (half[:, :1] + mean_wider)[:, 0]
+
+
+def _least_squares(edges: BarEdges, axis: Floats, usable: Flags) -> _Fit:
+    count = usable.sum(axis=1).astype(np.float64)
+    some = np.maximum(count, 1.0)
+    along = (edges.t * usable).sum(axis=1) / some
+    at = (axis * usable).sum(axis=1) / some
+    centred = (edges.t - along[:, None]) * usable
+    square = (centred * centred).sum(axis=1)
+    slope = np.where(count >= 3.0, (centred * axis).sum(axis=1) / np.maximum(square, 1e-9), edges.slope)
+    residual = np.abs(axis - at[:, None] - slope[:, None] * centred) * usable
+    return _Fit(count, along, at, slope, (residual * residual).sum(axis=1) / some, residual)
 
 
 def meeting(one: BarLine | None, other: BarLine | None) -> Meeting | None:
@@ -97,74 +161,27 @@ def meeting(one: BarLine | None, other: BarLine | None) -> Meeting | None:
     return Meeting(x, y, std_x, std_y)
 
 
-def _fitted(bar: BarEdges, offsets: Floats | None) -> BarLine | None:
-    outer_ok, inner_ok = bar.outer_ok, bar.inner_ok
-    both = outer_ok & inner_ok
-    usable = outer_ok | inner_ok
-    count, boths, used = len(both), int(both.sum()), int(usable.sum())
-    if used == 0:
-        return None
-    # From here on pixels count towards the opening.
-    outer, inner = bar.inward * bar.outer, bar.inward * bar.inner
-    if offsets is None:
-        to_outer, to_inner = -bar.half_px, bar.half_px
-    else:
-        share = (bar.t - bar.t[0]) / max(float(bar.t[-1] - bar.t[0]), 1.0)
-        to_outer = offsets[0, 0] + (offsets[0, 1] - offsets[0, 0]) * share
-        to_inner = offsets[1, 0] + (offsets[1, 1] - offsets[1, 0]) * share
-    half = 0.5 * (to_inner - to_outer)
-    if boths >= max(1, count // 4):  # what it should be is less sure than what is seen
-        wider = 0.5 * float((inner - outer)[both].mean()) - float(half[both].mean())
-        to_outer, to_inner, half = to_outer - wider, to_inner + wider, half + wider
-    by_outer, by_inner = outer - to_outer, inner - to_inner
-    axis = np.where(both, 0.5 * (by_outer + by_inner), np.where(outer_ok, by_outer, by_inner))
-    t, u = bar.t, bar.inward * axis
-    if used < count:
-        t, u = t[usable], u[usable]
-    fit, residual = _line(t, u, bar.slope)
-    good = residual <= max(1.0, 2.5 * float(np.median(residual)))
-    if not good.all():
-        t, u = t[good], u[good]
-        fit, residual = _line(t, u, bar.slope)
-    edges = 2.0 if 2 * boths > count else 1.0
-    first, last = float(t[0]), float(t[-1])
-    var_at, var_slope = _variances(len(t), last - first, fit[2], edges, float(residual @ residual) / len(t))
-    return BarLine(
-        bar.steep, bar.inward, *fit, var_at, var_slope, float(half.mean()), first, last,
-        float(outer_ok.sum()) / count, float(inner_ok.sum()) / count,
-    )  # fmt: skip
-
-
-def _line(t: Floats, u: Floats, slope: float) -> tuple[tuple[float, float, float], Floats]:
-    """Least squares: mean of t, value there and slope (the given one if there are few points); residuals."""
-    mean, at = float(t.sum()) / len(t), float(u.sum()) / len(t)
-    centred = t - mean
-    if len(t) >= 3:
-        slope = float(centred @ u) / float(centred @ centred)
-    return (mean, at, slope), np.abs(u - at - slope * centred)
-
-
 def _variances(
-    count: int, length: float, slope: float, edges: float, mean_square: float
+    count: float, length: float, slope: float, two_edges: bool, mean_square: float
 ) -> tuple[float, float]:
     """Variances of a fitted line's middle and slope.
 
     The pixels' rounding errors along a line are independent only where the line changes rows: a level line is
-    rounded alike everywhere. On a slanted line the painter also rounds where it begins, which moves all of it.
-    The numbers were fitted to some ten thousand painted bars.
+    rounded alike everywhere. On a slanted line the painter rounds where it begins, too, which moves all of
+    it. The numbers were fitted to some ten thousand painted bars.
     """
     steps = abs(slope) * length
+    edges = 2.0 if two_edges else 1.0
     noise = max(_QUANTISATION / edges, mean_square)
     slanted = slope * slope * _QUANTISATION
-    var_at = noise / min(float(count), 1.0 + 8.0 * steps * steps) + slanted / edges + _LEAST_VARIANCE
-    if edges == 1.0:
+    var_at = noise / min(count, 1.0 + 8.0 * steps * steps) + slanted / edges + _LEAST_VARIANCE
+    if not two_edges:
         var_at += _WIDTH_VARIANCE
-    if count < 3:
+    if count < 3.0:
         var_at += _FEW_VARIANCE
-    lever = max(length, 2.0 if count > 2 else 3.0)
-    independent = min(float(count), 3.5 + 2.0 * steps * steps)
-    var_slope = 12.0 * (noise + 1.5 * slanted) / (independent * lever * lever)
-    return var_at, var_slope
+    lever = max(length, 2.0 if count >= 3.0 else 3.0)
+    independent = min(count, 3.5 + 2.0 * steps * steps)
+    return var_at, 12.0 * (noise + 1.5 * slanted) / (independent * lever * lever)
 
 
 def _balance(lines: BarLines, focal_px: float) -> None:
@@ -182,9 +199,9 @@ def _balance(lines: BarLines, focal_px: float) -> None:
         prior = (2.0 * parted_px / long_px) ** 2
         share = 1.0 / (prior + a.var_slope + b.var_slope)
         gain = (a.slope - b.slope) * share
-        lines[one] = replace(
-            a, slope=a.slope - a.var_slope * gain, var_slope=a.var_slope * (1.0 - a.var_slope * share)
+        lines[one] = a._replace(
+            slope=a.slope - a.var_slope * gain, var_slope=a.var_slope * (1.0 - a.var_slope * share)
         )
-        lines[other] = replace(
-            b, slope=b.slope + b.var_slope * gain, var_slope=b.var_slope * (1.0 - b.var_slope * share)
+        lines[other] = b._replace(
+            slope=b.slope + b.var_slope * gain, var_slope=b.var_slope * (1.0 - b.var_slope * share)
         )

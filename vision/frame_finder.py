@@ -139,7 +139,7 @@ class FrameFinder:
         return box, FrameSighting(mask.colour, corners, whole, tuple(map(as_seen, poses)))
 
     def _fit(
-        self, edges: list[BarEdges | None], origin: Point, size_px: int
+        self, edges: BarEdges, origin: Point, size_px: int
     ) -> tuple[BarLines, list[Meeting | None], list[ModelPose]]:
         """The axes of the bars, where they meet (of sides k - 1 and k) and the poses that follow.
 
@@ -161,14 +161,10 @@ class FrameFinder:
                 break
         return lines, meetings, poses
 
-    def _offsets(self, edges: list[BarEdges | None], pose: ModelPose, origin: Point) -> Floats | None:
+    def _offsets(self, edges: BarEdges, pose: ModelPose, origin: Point) -> Floats | None:
         """Where the edges of the bars should be beside their axes, as painted."""
-        bars = [bar for bar in edges if bar is not None]
-        if len(bars) < 4:
-            return None
-        spans = np.array([(bar.t[0] - origin[bar.steep], bar.t[-1] - origin[bar.steep]) for bar in bars])
-        steep, inward = tuple(bar.steep for bar in bars), tuple(bar.inward for bar in bars)
-        offsets = bar_offsets(pose, steep, inward, spans, self._focal_px)
+        spans = edges.spans - np.array([[origin[steep]] for steep in edges.steep])
+        offsets = bar_offsets(pose, edges.steep, edges.inward, spans, self._focal_px)
         if offsets is None:
             return None
         offsets[:, 0] -= self._spread_px

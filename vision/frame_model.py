@@ -76,7 +76,7 @@ _BAR_EDGES = _bar_edges()
 
 
 def bar_offsets(
-    pose: ModelPose, steep: tuple[bool, ...], inward: tuple[int, ...], spans: Floats, focal_px: float
+    pose: ModelPose, steep: tuple[bool, ...], inward: Floats, spans: Floats, focal_px: float
 ) -> Floats | None:
     """How far a bar's outer and inner edge are from its axis in the image.
 
@@ -103,5 +103,5 @@ def bar_offsets(
         return None
     slope = (u[..., 1] - u[..., 0]) / run
     at = u[..., :1] + slope[..., None] * (spans[:, None, :] - t[..., :1])
-    beside = (at[:, 1:] - at[:, :1]) * np.array(inward)[:, None, None]
+    beside = (at[:, 1:] - at[:, :1]) * inward[:, None, None]
     return np.stack([beside.min(axis=1), beside.max(axis=1)], axis=1)
