@@ -45,7 +45,8 @@ def test_one_of_the_poses_is_right(distance: float, turn: float) -> None:
     best = min(sighting.poses, key=lambda pose: abs(atan2(-pose.normal_flu[1], -pose.normal_flu[0]) + turn))
     assert hypot(*best.position_flu_m) == pytest.approx(distance, rel=0.01 + 0.006 * distance)
     normal = atan2(-best.normal_flu[1], -best.normal_flu[0])
-    assert abs(degrees(normal + turn)) < 1.0 + 3.0 * distance
+    # Seen from the front, a small turn hardly changes the image.
+    assert abs(degrees(normal + turn)) < (1.0 + 2.0 * distance if abs(turn) > 0.3 else 4.0 + 4.0 * distance)
 
 
 @pytest.mark.parametrize("turn", [-1.0, 1.0])  # mirror images: the solver answers NaN to one of them
