@@ -134,9 +134,13 @@ class MavsdkDrone:
         self._watchdog.limits = PATIENT_LIMITS
 
     @property
-    def late_ticks(self) -> int:
-        """Ticks of the flight that this app did not get in time."""
-        return self._ticks.late
+    def ticks_in_flight(self) -> tuple[int, int]:
+        """How many ticks the flight had, and how many of them this app did not get in time."""
+        return self._ticks.in_flight, self._ticks.late
+
+    def vehicle_time_us(self, wall_s: float) -> int | None:
+        """Vehicle time at a monotonic wall time, as telemetry shows it; None before any has arrived."""
+        return self._feed.time_at_us(wall_s)
 
     async def connect(self) -> None:
         """Find the vehicle and subscribe to its telemetry."""

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
-from collections.abc import AsyncIterator
+from collections.abc import AsyncIterator, Callable
 from typing import Protocol
 
 from errors import UserError
@@ -46,7 +46,8 @@ class CameraPerception:
     """Runs the detector on each image as it arrives and keeps the last result.
 
     The age of an image counts vehicle time: from its own time stamp if the source gives one, because an image
-    that waited in a buffer is old; otherwise from the tick after its arrival.
+    that waited in a buffer is old; otherwise from the time that `assume_times` gives it or, without that,
+    from the tick after its arrival.
 
     Attributes:
         oldest_s: age of the oldest image that was used, seconds.
@@ -58,6 +59,8 @@ class CameraPerception:
         self._detector = detector or new_detector("boxes")
         self._detections = Detections()
         self._image_us: int | None = None
+        self._vehicle_time_us: Callable[[float], int | None] = lambda _wall_s: None
+        self._delay_us = 0
         self._order = MessageOrder()
         self._images = 0
         self._images_used = 0
@@ -65,6 +68,16 @@ class CameraPerception:
         self._used_us = 0
         self._ended = ""
         self._task: asyncio.Task[None] | None = None
+
+    def assume_times(self, vehicle_time_us: Callable[[float], int | None], delay_s: float) -> None:
+        """Give images without time stamps the vehicle time at which they arrived, less a fixed delay.
+
+        Args:
+            vehicle_time_us: vehicle time at a monotonic wall time; None if it is not known.
+            delay_s: from exposure to arrival.
+        """
+        self._vehicle_time_us = vehicle_time_us
+        self._delay_us = round(delay_s * 1e6)
 
     async def open(self) -> None:
         """Wait for the first image; raises `CameraLostError` if there is none."""
@@ -112,11 +125,16 @@ class CameraPerception:
             async for frame in self._camera.frames():
                 if frame.time_us is not None and not self._order.is_next(frame.time_us):
                     continue  # a link may swap images, too
-                self._detections = self._detector(frame.image, frame.time_us)
-                self._image_us = frame.time_us
+                time_us = frame.time_us if frame.time_us is not None else self._assumed_us(frame.received_s)
+                self._detections = self._detector(frame.image, time_us)
+                self._image_us = time_us
                 self._images += 1
                 self._arrived.set()
             self._ended = "the camera's stream ended"
         except Exception as error:  # whatever a source raises must end the flight
             self._ended = f"the camera failed: {error or type(error).__name__}"
         self._arrived.set()
+
+    def _assumed_us(self, received_s: float) -> int | None:
+        arrived_us = self._vehicle_time_us(received_s)
+        return None if arrived_us is None else max(0, arrived_us - self._delay_us)

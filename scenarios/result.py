@@ -137,10 +137,13 @@ class Timing(_Record):
     kept_up: Flag = Field(description="nothing was late and the requested speed was reached")
     vehicle_time_waits: Flag = Field(description="the simulator's time waits for the app at each tick")
     speed: Ratio = Field(description="vehicle time per wall time, divided by the requested speed")
-    late_ticks: Count = Field(description="ticks of the mission that were late")
+    ticks: Count = Field(0, description="ticks of the flight, late ones included")
+    late_ticks: Count = Field(description="ticks of the mission that were late: passed over or lost")
+    late_share: Ratio = Field(0.0, description="late_ticks of ticks")
     late_images: Count = Field(description="images received after the tick they were for")
     late_setpoints: Count = Field(description="setpoints received after the tick they were for")
     oldest_image_s: Seconds = Field(description="age of the oldest image that a tick had to use")
+    words: Text = Field("", description="one sentence if the machine did not keep up")
 
 
 class _Flown(_Record):

@@ -20,6 +20,9 @@ _Drone = Annotated[
     str | None, Parameter(help="MAVLink URL of a running drone; without it a simulated one is started")
 ]
 _Camera = Annotated[str | None, Parameter(help="URL, device or folder of its camera; needed with --drone")]
+_CameraDelay = Annotated[
+    float, Parameter(help="with --camera: age in s of an image that arrives without a time stamp")
+]
 _Simulator = Annotated[
     str | None,
     Parameter(
@@ -61,6 +64,7 @@ def fly(
     mission: Annotated[str, Parameter(help="name or file of the mission")] = "frame_challenge",
     drone: _Drone = None,
     camera: _Camera = None,
+    camera_delay: _CameraDelay = 0.1,
     simulator: _Simulator = None,
     speed: Annotated[float, Parameter(help="of the simulated drone: simulated seconds a second")] = 1.0,
     instance: Annotated[WholeNumber, Parameter(help="of the simulated drone: shifts its ports, 0 to 9")] = 0,
@@ -102,6 +106,7 @@ def fly(
     if api is not None and camera is None:
         camera = api.video_url
     _check(drone, camera, speed, instance, lockstep)
+    check_range("--camera-delay", camera_delay, 0.0, 0.5)
     _check_lockstep(seed, monitor, lockstep)
 
     from framerunner.flying.real_time import RealTimeSettings
@@ -110,7 +115,7 @@ def fly(
     loaded = load_mission_with(mission, pilot)
     seed = (seed or 0) if lockstep else None
     plan = _plan(scenario, loaded, seed, response=response, drone=drone, drone_limits=drone_limits)
-    real_time = None if lockstep else RealTimeSettings(drone, camera, api, speed, instance)
+    real_time = None if lockstep else RealTimeSettings(drone, camera, api, speed, instance, camera_delay)
     return asyncio.run(fly_once(FlightSettings(plan, real_time, out, record, video, monitor)))
 
 

@@ -16,7 +16,7 @@ from rich.table import Table
 from framerunner.flying.judges import Judge
 from framerunner.runs.recorder import FlightRecorder
 from offboard.app import Moment
-from scenarios.result import FlightResult, RefereeSnapshot, Timing
+from scenarios.result import FlightResult, RefereeSnapshot
 from vision.types import Detection
 
 _REFRESH_S = 0.2
@@ -192,21 +192,4 @@ def result_lines(result: FlightResult) -> str:
         f"{sentence}\n"
         f"try {result.try_time_s:.1f} s, penalty {result.penalty_s:.1f} s, "
         f"path {result.path_length_m:.1f} m, {landing}, judged by {result.judged_by}{kept}"
-    )
-
-
-def timing_line(timing: Timing | None) -> str:
-    """One line for people if the machine was too slow; empty if it was not, or that is unknown."""
-    if timing is None or timing.kept_up:
-        return ""
-    counts = {"ticks": timing.late_ticks, "images": timing.late_images, "setpoints": timing.late_setpoints}
-    late = ", ".join(f"{count} {what}" for what, count in counts.items() if count)
-    if late:
-        return (
-            f"the machine did not keep up: {late} came late (oldest image {timing.oldest_image_s:.2f} s); "
-            "the flight may differ from one on a free machine"
-        )
-    return (
-        f"the machine did not keep up: vehicle time ran at {timing.speed:.2f} of the requested speed; "
-        "it waited for the app, so the flight is the same as on a free machine"
     )

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 from framerunner.flying.fly import FinishedFlight, fly
 from framerunner.flying.plan import FlightPlan
+from framerunner.flying.timing import flight_timing
 from framerunner.runs.recorder import RecordingCamera, RunRecords
 from framerunner.runs.run_folder import warn
 from offboard.app import MissionEnd
@@ -20,12 +21,10 @@ from wire.simulator_api import SimulatorApi
 if TYPE_CHECKING:  # these are imported when a flight begins, as they are slow to import
     from framerunner.flying.judges import Judge
     from framerunner.flying.mission_reporter import MissionReporter
-    from framerunner.flying.simulator_process import SimulatorClock, SitlProcess
+    from framerunner.flying.simulator_process import SitlProcess
     from offboard.link.companion import Companion
     from offboard.mavsdk_drone import MavsdkDrone
     from offboard.perception import CameraPerception
-
-SLOW_FACTOR = 0.95  # of the requested speed; below, vehicle time had to wait
 
 
 @dataclass(frozen=True, slots=True)
@@ -37,6 +36,7 @@ class RealTimeSettings:
     simulator: SimulatorApi | None = None  # of the running drone, if the user named it
     speed: float = 1.0  # of the simulator that is started: simulated seconds a second
     instance: int = 0  # of the simulator that is started: shifts its ports
+    camera_delay_s: float = 0.1  # age of an image on arrival, for a camera that sends no time stamps
 
 
 @dataclass(frozen=True, slots=True)
@@ -91,6 +91,7 @@ async def fly_in_real_time(
         drone = _drone(plan, vehicle, records, stack, companion)
         camera = await _camera(plan, vehicle, records, stack, reporter)
         perception = _perception(plan, vehicle, judge, camera)
+        perception.assume_times(drone.vehicle_time_us, settings.camera_delay_s)
         clock = None if vehicle.sitl is None else vehicle.sitl.clock
         if clock is not None:
             clock.wait_for_images_of(perception)
@@ -106,9 +107,8 @@ async def fly_in_real_time(
             return outcome
 
         def timing() -> dict[str, Timing]:
-            return {
-                "timing": _timing(drone, perception, clock, records.recorder.real_time_factor, settings.speed)
-            }
+            factor, fused = records.recorder.real_time_factor, plan.chart.vision == "frames"
+            return {"timing": flight_timing(drone, perception, clock, factor, settings.speed, fused=fused)}
 
         observers = (records.see, reporter.see)
         flown = await fly(plan, drone, perception, judge, observers, run=run, measured=timing)
@@ -194,34 +194,3 @@ def _perception(
 
     rendered = isinstance(judge, TruthJudge) and vehicle.has_camera_of_simulator
     return CameraPerception(camera, plan_detector(plan, rendered=rendered))
-
-
-def _timing(
-    drone: MavsdkDrone,
-    perception: CameraPerception,
-    clock: SimulatorClock | None,
-    factor: float | None,
-    speed: float,
-) -> Timing:
-    """What was late in a flight, and so whether the machine was fast enough for the requested speed.
-
-    Args:
-        drone: that was flown.
-        perception: through which it saw.
-        clock: of a simulator whose time waits for this program; None: vehicle time does not wait.
-        factor: vehicle time per wall time; None before two ticks.
-        speed: the requested factor.
-    """
-    late = {
-        "late_ticks": drone.late_ticks,
-        "late_images": 0 if clock is None else clock.images_missed,
-        "late_setpoints": 0 if clock is None else clock.setpoints_missed,
-    }
-    slow = factor is not None and factor < SLOW_FACTOR * speed
-    return Timing(
-        kept_up=not slow and not any(late.values()),
-        vehicle_time_waits=clock is not None,
-        speed=speed if factor is None else factor / speed,
-        **late,
-        oldest_image_s=perception.oldest_s,
-    )

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 from urllib.parse import urlsplit
 
-from framerunner.flying.display import LockstepProgress, result_lines, timing_line
+from framerunner.flying.display import LockstepProgress, result_lines
 from framerunner.flying.fly import FinishedFlight
 from framerunner.flying.plan import FlightPlan
 from framerunner.flying.real_time import RealTimeSettings, fly_in_real_time
@@ -87,7 +87,7 @@ async def _fly_and_judge(settings: FlightSettings, monitor_url: str | None) -> i
         write_outcome(folder, plan.lifted(result.lift_m).layout, flown.track, result)
     finally:
         folder.remove_if_empty()
-    late = timing_line(result.timing)
+    late = "" if result.timing is None else result.timing.words
     lines = [result_lines(result), *([late] if late else []), *left_lines(folder, result)]
     print("\n".join(lines), flush=True)
     if flown.outcome.interrupted:

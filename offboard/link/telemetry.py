@@ -30,6 +30,8 @@ from wire.vehicle_telemetry import MessageOrder
 TICK_US = 50_000
 TICK_LOST_S = 0.5  # wall time; a tick whose telemetry has not arrived by then was lost on the link
 _MAX_LOST_IN_A_ROW = 10
+LAG_GROWTH_S = 2e-5  # with each attitude: 1 ms a second, more than clocks differ
+MAX_JITTER_S = 0.05
 TEXTS_KEPT = 8
 TEXT_AGE_S = 8.0
 WANTED_RATE_HZ = 50.0
@@ -73,6 +75,7 @@ class TelemetryFeed:
         self._attitude_received_s = 0.0
         self._position_received_s = 0.0
         self._heartbeat_received_s = 0.0
+        self._lag_s: float | None = None  # of vehicle time behind wall time
         self._texts: deque[tuple[float, str]] = deque(maxlen=TEXTS_KEPT)
         self._attitude_order = MessageOrder()
         self._position_order = MessageOrder()
@@ -114,6 +117,10 @@ class TelemetryFeed:
                     await self._new_tick.wait()
         return self.tick_number >= number
 
+    def time_at_us(self, wall_s: float) -> int | None:
+        """Vehicle time at a monotonic wall time, as telemetry shows it; None before the first attitude."""
+        return None if self._lag_s is None else round((wall_s - self._lag_s) * 1e6)
+
     def age_s(self) -> float:
         """Wall time since the older of attitude and position was received, seconds."""
         return self._clock() - min(self._attitude_received_s, self._position_received_s)
@@ -151,6 +158,7 @@ class TelemetryFeed:
         self.yaw_ned_rad = radians(euler.yaw_deg)
         self.time_us = time_us
         self._attitude_received_s = self._clock()
+        self._lag_s = _least_lag(self._lag_s, self._attitude_received_s - time_us * 1e-6)
         self.attitudes += 1
         tick = time_us // TICK_US
         if tick != self.tick_number:
@@ -205,6 +213,17 @@ class TelemetryFeed:
             self._loop = None
 
 
+def _least_lag(before_s: float | None, lag_s: float) -> float:
+    """How far vehicle time is behind wall time, by the message that was underway for the shortest time.
+
+    A message that came late makes the lag seem larger, so the smallest counts; but clocks differ in pace, and
+    a simulator may be slow, so it is never far from the newest.
+    """
+    if before_s is None:
+        return lag_s
+    return max(min(before_s + LAG_GROWTH_S, lag_s), lag_s - MAX_JITTER_S)
+
+
 def _number(value: float | None) -> float:
     """JSON cannot express values that are not finite; MAVSDK writes null."""
     return nan if value is None else value
@@ -250,11 +269,13 @@ class TickSource:
 
     Attributes:
         late: ticks that were skipped, or lost on the link, in flight.
+        in_flight: ticks in flight, late ones included.
         waits: vehicle time waits for the app now.
     """
 
     def __init__(self, feed: TelemetryFeed) -> None:
         self.late = 0
+        self.in_flight = 0
         self.waits = False
         self._feed = feed
         self._clock: VehicleClock | None = None
@@ -283,6 +304,7 @@ class TickSource:
             return await self._next_free(timeout_s, in_flight=command is not None)
         for _ in range(_MAX_LOST_IN_A_ROW):
             self._number += 1
+            self.in_flight += command is not None
             await clock.advance(self._number * TICK_US, command)
             if await self._feed.tick(self._number, TICK_LOST_S):
                 return True
@@ -298,7 +320,9 @@ class TickSource:
     async def _next_free(self, timeout_s: float, *, in_flight: bool) -> bool:
         received = await self._feed.next_tick(timeout_s)
         number = self._feed.tick_number
-        if self._last_in_flight is not None and in_flight:
-            self.late += max(0, number - self._last_in_flight - 1)
+        if received and in_flight:
+            passed = 1 if self._last_in_flight is None else max(1, number - self._last_in_flight)
+            self.in_flight += passed
+            self.late += passed - 1
         self._last_in_flight = number if in_flight else None
         return received

@@ -223,6 +223,11 @@ def test_the_limits_of_a_drone_belong_to_a_real_drone_and_the_open_class(refused
     assert "left is missing" in refused("fly", *drone, *open_, "--drone-limits", "forward=2,up=1")
 
 
+def test_a_camera_delay_out_of_range_is_refused(refused):
+    line = refused("fly", "--drone", "udpin://127.0.0.1:14599", "--camera", "0", "--camera-delay", "2")
+    assert line == "error: --camera-delay 2: must be from 0 to 0.5"
+
+
 def test_a_remote_host_without_address_is_refused(refused):
     line = refused("sim", "--instance", free_instance(), "--ground-remote", "two..dots")
     assert "two..dots" in line

@@ -240,6 +240,19 @@ async def test_old_images_from_a_buffer_count_as_old():
     await perception.close()
 
 
+@pytest.mark.parametrize("timed", [True, False])
+async def test_an_image_without_a_time_stamp_gets_that_of_its_arrival_less_a_delay(timed):
+    drone = KinematicDrone(*START_1)
+    drone.time_us = 9_000_000
+    film = Film(drone, 1, "silence", timed)
+    perception = CameraPerception(film, lambda image, time_us: Detections(time_us=time_us))
+    perception.assume_times(lambda wall_s: 7_000_000 + round(wall_s * 1e6), 0.15)
+    await perception.open()
+    assert perception.latest(9_100_000 if timed else 7_100_000).time_us == (9_000_000 if timed else 6_850_000)
+    assert perception.oldest_s == pytest.approx(0.1 if timed else 0.25)
+    await perception.close()
+
+
 async def test_observers_get_the_navigators_map_five_times_a_second(monkeypatch):
     made = []
 

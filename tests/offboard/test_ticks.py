@@ -7,7 +7,7 @@ import pytest
 
 from offboard.drone import VelocityCommand
 from offboard.link import telemetry
-from offboard.link.telemetry import TelemetryFeed, TickSource
+from offboard.link.telemetry import MAX_JITTER_S, TelemetryFeed, TickSource
 
 COMMAND = VelocityCommand(forward_m_s=0.5)
 
@@ -58,7 +58,7 @@ async def test_time_that_waits_gives_every_tick_however_late_it_is_asked_for(fee
         assert await source.next(1.0, COMMAND)
         assert feed.sample.time_us == number * 50_000
     assert clock.granted == [(1_050_000, COMMAND), (1_100_000, COMMAND), (1_150_000, COMMAND)]
-    assert source.late == 0
+    assert (source.in_flight, source.late) == (3, 0)
     source.release()
     assert clock.released
 
@@ -99,6 +99,7 @@ async def test_time_that_does_not_wait_passes_ticks_over_and_counts_them_in_flig
         assert feed.sample.time_us == times_us[-1]
         late.append(source.late)
     assert late == [0, 0, 0, 0, 2]
+    assert source.in_flight == 5
     assert not await source.next(0.01, COMMAND)
 
 
@@ -115,3 +116,17 @@ async def test_a_cancellation_together_with_a_tick_is_not_lost():
         cancelled = waiting.cancel()
         await asyncio.wait({waiting})
         assert waiting.cancelled() == cancelled
+
+
+def test_vehicle_time_at_a_wall_time_is_that_of_the_quickest_message_within_limits():
+    now_s = 100.0
+    feed = TelemetryFeed(lambda: now_s)
+    assert feed.time_at_us(now_s) is None
+    for number in range(100):  # every fifth message waits for 30 ms
+        now_s = 100.0 + 0.02 * number + 0.004 + (0.03 if number % 5 == 4 else 0.0)
+        attitude(feed, 5_000_000 + 20_000 * number)
+    assert feed.time_at_us(102.004) == pytest.approx(7_000_000, abs=200)
+    attitude_us = 5_000_000 + 20_000 * 100
+    now_s = 103.0  # the vehicle's clock stood still, or is slower
+    attitude(feed, attitude_us)
+    assert feed.time_at_us(103.0) == attitude_us + round(MAX_JITTER_S * 1e6)

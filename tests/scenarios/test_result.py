@@ -57,10 +57,13 @@ TIMING = {
     "kept_up": True,
     "vehicle_time_waits": True,
     "speed": 1.0,
+    "ticks": 1993,
     "late_ticks": 0,
+    "late_share": 0.0,
     "late_images": 0,
     "late_setpoints": 0,
     "oldest_image_s": 0.125,
+    "words": "",
 }
 SPECIAL = ("seed", "state_sha256", "landing_error_m")
 REAL_TIME = {name: value for name, value in LOCKSTEP.items() if name not in SPECIAL}
