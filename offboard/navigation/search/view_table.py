@@ -11,7 +11,7 @@ import numpy.typing as npt
 
 from geometry.vectors import Vec3
 from offboard.navigation.camera_model import CameraModel
-from offboard.navigation.search.frame_visibility import HEADINGS, Floats, SearchGrid, view_qualities
+from offboard.navigation.search.frame_visibility import HEADINGS, Bools, Floats, SearchGrid, view_qualities
 from scenarios.models import Arena
 
 Doubles = npt.NDArray[np.float64]
@@ -30,13 +30,15 @@ class ViewTable:
 
     Attributes:
         heights_m: heights of the places.
-        places_m: x, y, z of the places, arena axes, shape (places, 3).
+        places_m: x, y, z of the places, arena axes, shape (places, 3); all heights at one x and y together.
+        grounds_m: x and y of the places, shape (places / heights, 2).
     """
 
     def __init__(self, camera: CameraModel, arena: Arena, blocks: SearchGrid) -> None:
         self.heights_m = _heights_m(arena)
         self._axes_m = (_along(arena.length_x_m), _along(arena.width_y_m), self.heights_m)
         self.places_m = np.array(list(product(*self._axes_m)))
+        self.grounds_m: Floats = self.places_m[:: len(self.heights_m), :2].astype(np.float32)
         x_m, y_m, z_m = blocks.centres()
         dx_m, dy_m, dz_m = (
             centres[None, :] - self.places_m[:, axis, None].astype(np.float32)
@@ -54,6 +56,15 @@ class ViewTable:
         self._first = _counts_below(ordered, [yaw - half_rad for yaw in YAWS])
         self._end = _counts_below(ordered, [yaw + half_rad for yaw in YAWS])
 
+    def place(self, index: int) -> Vec3:
+        """One of the places."""
+        x_m, y_m, z_m = self.places_m[index].tolist()
+        return (x_m, y_m, z_m)
+
+    def nearest_ground(self, position_m: Vec3) -> int:
+        """Index of the x and y nearest to a position."""
+        return self.nearest(position_m, 0.0)[0] // len(self.heights_m)
+
     def nearest(self, position_m: Vec3, yaw_rad: float) -> tuple[int, int]:
         """Index of the view nearest to a pose: of its place and of its heading."""
         place = 0
@@ -62,12 +73,13 @@ class ViewTable:
             place = place * len(axis_m) + distances_m.index(min(distances_m))
         return place, round(yaw_rad / tau * len(YAWS)) % len(YAWS)
 
-    def gains(self, seen: Floats, weights: Floats) -> Doubles:
+    def gains(self, seen: Floats, weights: Floats, clear: Bools | None = None) -> Doubles:
         """How much would be newly seen.
 
         Args:
             seen: quality of the best view so far, shape (HEADINGS, blocks).
             weights: how likely a frame is in each block, shape (blocks,).
+            clear: which blocks, in plan, obstacles leave in sight: shape (grounds, blocks x * blocks y).
 
         Returns:
             Gain of each view, shape (places, `YAWS`).
@@ -78,6 +90,9 @@ class ViewTable:
             np.subtract(self._qualities[heading], seen[heading], out=gain)
             new += np.maximum(gain, np.float32(0.0), out=gain)
         new *= weights
+        if clear is not None:
+            by_height = new.reshape(len(self.grounds_m), len(self.heights_m), clear.shape[1], -1)
+            by_height *= clear[:, None, :, None]
         # Cumulative sums have one order of adding on every processor, so that ties are decided alike.
         sums = np.zeros((new.shape[0], new.shape[1] + 1))
         np.cumsum(np.take(new, self._order), axis=1, out=sums[:, 1:])

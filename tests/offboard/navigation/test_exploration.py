@@ -9,7 +9,8 @@ import pytest
 
 from geometry.rotations import quaternion_from_yaw
 from offboard.navigation.camera_model import CameraModel
-from offboard.navigation.exploration import Explorer, LineOfSight, Viewpoint
+from offboard.navigation.exploration import Explorer, Viewpoint
+from offboard.navigation.search.glimpses import LineOfSight
 from scenarios.models import Arena, Camera, Frame, Scenario
 from scenarios.random_scenarios import load_level, random_scenario
 from vision.types import ObstacleEdge

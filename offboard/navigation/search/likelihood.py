@@ -1,0 +1,82 @@
+"""Where frames are likely, before anything is known of their layout and after."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Final
+
+import numpy as np
+
+from geometry.vectors import Vec3
+from offboard.navigation.search.frame_visibility import HEADINGS, Bools, Floats, SearchGrid
+from offboard.navigation.search.glimpses import LineOfSight
+
+_FLOOR_M, _CEILING_M = 0.3, 3.0  # most frames hang between
+_ELSEWHERE: Final = 0.4  # weight of other heights
+_APART_M: Final = 1.2  # from a frame found to other frames, most likely
+_NEAR_FOUND: Final = 0.25  # weight nearer than that
+_RAY_M: Final = 0.45  # half width of a line of sight at its origin
+_RAY_SLOPE: Final = 0.06  # how much wider it gets
+_RAY_LEFT: Final = 0.1  # share of a line of sight; when less is unseen it attracts less
+
+
+class Likelihood:
+    """Weights of the blocks of a grid. None is ever zero.
+
+    Args:
+        blocks: the grid.
+    """
+
+    def __init__(self, blocks: SearchGrid) -> None:
+        self._x_m, self._y_m, self._z_m = blocks.centres()
+        half_m = blocks.z_m[0]
+        low = np.maximum(self._z_m - half_m, np.float32(_FLOOR_M))
+        high = np.minimum(self._z_m + half_m, np.float32(_CEILING_M))
+        share = np.clip((high - low) / (2 * half_m), np.float32(0.0), np.float32(1.0))
+        self._prior: Floats = np.float32(_ELSEWHERE) + np.float32(1.0 - _ELSEWHERE) * share
+
+    def weights(self, seen: Floats, found: Sequence[Vec3], hints: Sequence[LineOfSight]) -> Floats:
+        """How likely there is a frame in each block, compared with others, before it is looked at.
+
+        A line of sight weighs as much as all the rest of the arena. Its weight is on those of its blocks that
+        are not seen yet.
+
+        Args:
+            seen: quality of the best view so far, shape (HEADINGS, blocks).
+            found: centres of the frames that are known.
+            hints: directions in which there are others.
+        """
+        weights = self._prior.copy()
+        for x, y, _ in found:
+            dx_m, dy_m = self._x_m - np.float32(x), self._y_m - np.float32(y)
+            weights[dx_m * dx_m + dy_m * dy_m < np.float32(_APART_M**2)] *= np.float32(_NEAR_FOUND)
+        if hints:
+            total = _sum(weights)
+            doubt = np.float32(1.0) - seen[0] / np.float32(HEADINGS)
+            for layer in seen[1:]:
+                doubt -= layer / np.float32(HEADINGS)
+            rays = np.zeros_like(weights)
+            for hint in hints:
+                on_ray = self._on_ray(hint)
+                unseen = max(_sum(doubt[on_ray]), _RAY_LEFT * np.count_nonzero(on_ray), _RAY_LEFT)
+                rays[on_ray] = np.maximum(rays[on_ray], np.float32(total / unseen))
+            weights += rays
+        return weights
+
+    def _on_ray(self, hint: LineOfSight) -> Bools:
+        offset = [
+            axis - np.float32(origin)
+            for axis, origin in zip((self._x_m, self._y_m, self._z_m), hint.origin_m, strict=True)
+        ]
+        x, y, z = (np.float32(component) for component in hint.direction)
+        along = offset[0] * x + offset[1] * y + offset[2] * z
+        along = np.clip(along, np.float32(hint.nearest_m), np.float32(hint.farthest_m))
+        dx, dy, dz = offset[0] - along * x, offset[1] - along * y, offset[2] - along * z
+        width = np.float32(_RAY_M) + along * np.float32(_RAY_SLOPE)
+        on_ray: Bools = dx * dx + dy * dy + dz * dz < width * width
+        return on_ray
+
+
+def _sum(values: Floats) -> float:
+    """The sum, added in one order on every processor."""
+    return float(np.cumsum(values, dtype=np.float64)[-1]) if values.size else 0.0
