@@ -16,7 +16,7 @@ from offboard.navigation.search.coverage import Coverage
 from offboard.navigation.search.frame_visibility import Bools, Floats, FrameVisibility, view_qualities
 from offboard.navigation.search.glimpses import LineOfSight
 from offboard.navigation.search.likelihood import Likelihood
-from offboard.navigation.search.obstruction import Obstruction
+from offboard.navigation.search.obstruction import Obstruction, WaysRound
 from offboard.navigation.search.view_table import YAWS, Doubles, ViewTable
 from scenarios.models import Arena
 from vision.types import ObstacleEdge
@@ -105,6 +105,7 @@ class Explorer:
         """
         self._place_obstacles(columns_m)
         here = Pose(position_m, yaw_rad)
+        around = None if self._obstruction is None else self._obstruction.ways_from(position_m)
         seen = self.coverage.blocks()
         unseen = _Unseen(seen, self._likelihood.weights(seen, found, hints))
         self._visits[self._table.nearest(position_m, yaw_rad)] += 1.0
@@ -112,10 +113,10 @@ class Explorer:
         blocked += [(x, y, _CLEAR_M) for x, y, _ in found]
         viewpoints = [
             each
-            for each in (*self._near(here), *self._far(here, unseen))
+            for each in (*self._near(here), *self._far(here, around, unseen))
             if each.position_m == position_m or _is_clear(each, blocked)
         ]
-        ways = self._ways(here, viewpoints)
+        ways = _ways(here, around, viewpoints)
         self._last = ways[int(np.argmax(self._scores(here, ways, unseen)))].viewpoint
         return self._last
 
@@ -138,16 +139,16 @@ class Explorer:
         ]
         return turned if self._last is None else [self._last, *turned]
 
-    def _far(self, here: Pose, unseen: _Unseen) -> list[Viewpoint]:
+    def _far(self, here: Pose, around: WaysRound | None, unseen: _Unseen) -> list[Viewpoint]:
         """The best view from each of the table's best places, roughly."""
         table, obstruction = self._table, self._obstruction
         gains = table.gains(unseen.seen, unseen.weights, None if obstruction is None else obstruction.clear)
         gains /= 1.0 + _USED * self._visits
         dx_m, dy_m, dz_m = (table.places_m[:, axis] - here.position_m[axis] for axis in range(3))
-        if obstruction is None:
+        if around is None:
             level_m = np.sqrt(dx_m * dx_m + dy_m * dy_m)
         else:
-            ground_m = obstruction.distances_m(here.position_m, table.grounds_m[:, 0], table.grounds_m[:, 1])
+            ground_m = around.distances_m(table.grounds_m[:, 0], table.grounds_m[:, 1])
             level_m = np.repeat(ground_m, len(table.heights_m)).astype(np.float64)
         fly_s = _START_S + np.maximum(level_m / SPEED_M_S, np.abs(dz_m) / CLIMB_M_S)
         turn_s = np.array([abs(remainder(yaw - here.yaw_rad, tau)) for yaw in YAWS]) / TURN_RAD_S
@@ -156,20 +157,6 @@ class Explorer:
         best = np.take_along_axis(scores, headings[:, None], axis=1)[:, 0]
         chosen = np.argsort(-best, kind="stable")[:_FAR_PLACES].tolist()
         return [Viewpoint(table.place(index), YAWS[headings[index]]) for index in chosen]
-
-    def _ways(self, here: Pose, viewpoints: Sequence[Viewpoint]) -> list[_Way]:
-        """How to get to viewpoints; those that cannot be reached are left out."""
-        x, y, _ = here.position_m
-        level_m = [hypot(each.position_m[0] - x, each.position_m[1] - y) for each in viewpoints]
-        straight = [True] * len(viewpoints)
-        if self._obstruction is not None:
-            to_x = np.array([each.position_m[0] for each in viewpoints], dtype=np.float32)
-            to_y = np.array([each.position_m[1] for each in viewpoints], dtype=np.float32)
-            around_m = self._obstruction.distances_m(here.position_m, to_x, to_y).tolist()
-            straight = [a <= b + _DETOUR_M for a, b in zip(around_m, level_m, strict=True)]
-            level_m = [b if c else a for a, b, c in zip(around_m, level_m, straight, strict=True)]
-        ways = [_Way(*each) for each in zip(viewpoints, level_m, straight, strict=True)]
-        return [way for way in ways if isfinite(way.level_m)]
 
     def _scores(self, here: Pose, ways: Sequence[_Way], unseen: _Unseen) -> list[float]:
         """Gain of each view and of those on the way to it, for its time."""
@@ -245,6 +232,23 @@ class _Way:
     viewpoint: Viewpoint
     level_m: float  # distance in plan, round obstacles; infinite if there is no way
     straight: bool  # nothing is in the way
+
+
+def _ways(here: Pose, around: WaysRound | None, viewpoints: Sequence[Viewpoint]) -> list[_Way]:
+    """How to get to viewpoints; those that cannot be reached are left out."""
+    x, y, _ = here.position_m
+    level_m = [hypot(each.position_m[0] - x, each.position_m[1] - y) for each in viewpoints]
+    way_m = level_m
+    if around is not None:
+        to_x = np.array([each.position_m[0] for each in viewpoints], dtype=np.float32)
+        to_y = np.array([each.position_m[1] for each in viewpoints], dtype=np.float32)
+        way_m = around.distances_m(to_x, to_y).tolist()
+    ways = []
+    for viewpoint, direct_m, length_m in zip(viewpoints, level_m, way_m, strict=True):
+        straight = length_m <= direct_m + _DETOUR_M
+        if isfinite(length_m):
+            ways.append(_Way(viewpoint, direct_m if straight else length_m, straight))
+    return ways
 
 
 def _fly_s(here: Pose, way: _Way) -> float:

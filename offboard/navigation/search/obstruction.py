@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 from math import hypot
 from typing import Final
 
@@ -14,6 +15,7 @@ from offboard.navigation.search.frame_visibility import Bools, Floats, SearchGri
 _ROOM_M: Final = 0.1  # beside an obstacle, at least, for the drone to pass
 _ONTO_GRID_M: Final = 0.8  # cells nearer than this are entered directly
 _IN_BLOCK_M: Final = 0.5
+_LARGEST: Final = 20_000  # elements of an array that are computed quickest
 _STEPS: Final = ((1, 0), (0, 1), (1, 1), (1, -1))
 _MOST_ROUNDS: Final = 80
 
@@ -62,30 +64,18 @@ class Obstruction:
             self.columns_m, places_m[:, 0:1], places_m[:, 1:2], *self._blocks_m, room_m=0.0, end_m=_IN_BLOCK_M
         )
 
-    def distances_m(self, at_m: Vec3, x_m: Floats, y_m: Floats) -> Floats:
-        """How far it is from a position to others, about; infinite where there is no way."""
+    def ways_from(self, at_m: Vec3) -> WaysRound:
+        """The ways from a position."""
         x, y, _ = at_m
-        here = np.array([x], dtype=np.float32), np.array([y], dtype=np.float32)
         # What the drone is already too near to does not keep it from leaving.
-        columns_m = [each for each in self.columns_m if hypot(x - each[0], y - each[1]) > each[2] + _ROOM_M]
-        field_m = self._field(*here, columns_m)
-        i = np.abs(x_m[:, None] - self._grid.x_m).argmin(axis=1)
-        j = np.abs(y_m[:, None] - self._grid.y_m).argmin(axis=1)
-        dx, dy = x_m - here[0], y_m - here[1]
-        straight_m = np.sqrt(dx * dx + dy * dy)
-        around_m = np.maximum(field_m[i, j], straight_m)
-        distances_m: Floats = np.where(
-            _is_clear(columns_m, *here, x_m, y_m, room_m=_ROOM_M), straight_m, around_m
+        columns_m = tuple(
+            each for each in self.columns_m if hypot(x - each[0], y - each[1]) > each[2] + _ROOM_M
         )
-        return distances_m
-
-    def _field(self, at_x: Floats, at_y: Floats, columns_m: Sequence[Vec3]) -> Floats:
-        """Distances from a position to all cells, along the sides and diagonals of the grid."""
-        x, y = np.meshgrid(self._grid.x_m, self._grid.y_m, indexing="ij")
-        dx, dy = x - at_x, y - at_y
-        near_m = np.sqrt(dx * dx + dy * dy)
-        first = (near_m < np.float32(_ONTO_GRID_M)) & _is_clear(columns_m, at_x, at_y, x, y, room_m=_ROOM_M)
-        field_m: Floats = np.where(first, near_m, np.float32(np.inf))
+        grid = self._grid
+        field_m = np.full((grid.x_m.size, grid.y_m.size), np.inf, dtype=np.float32)
+        dx, dy = grid.x_m[:, None] - np.float32(x), grid.y_m - np.float32(y)
+        i, j = np.nonzero(dx * dx + dy * dy < np.float32(_ONTO_GRID_M**2))
+        field_m[i, j] = WaysRound(at_m, columns_m, grid, field_m).distances_m(grid.x_m[i], grid.y_m[j])
         for _ in range(_MOST_ROUNDS):
             before = field_m.copy()
             for leave, enter, cost_m in self._costs:
@@ -93,7 +83,35 @@ class Obstruction:
                 np.minimum(field_m[leave], field_m[enter] + cost_m, out=field_m[leave])
             if np.array_equal(before, field_m):
                 break
-        return field_m
+        return WaysRound(at_m, columns_m, grid, field_m)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class WaysRound:
+    """The ways from one position.
+
+    Attributes:
+        at_m: the position.
+        columns_m: what is in the way.
+        grid: cells flown through.
+        field_m: distances to them, infinite where there is no way, shape (cells x, cells y).
+    """
+
+    at_m: Vec3
+    columns_m: tuple[Vec3, ...]
+    grid: SearchGrid
+    field_m: Floats
+
+    def distances_m(self, x_m: Floats, y_m: Floats) -> Floats:
+        """How far it is to places, about: exactly if the way is straight; infinite if there is no way."""
+        x, y = (np.array([each], dtype=np.float32) for each in self.at_m[:2])
+        i = np.abs(x_m[:, None] - self.grid.x_m).argmin(axis=1)
+        j = np.abs(y_m[:, None] - self.grid.y_m).argmin(axis=1)
+        straight_m = np.sqrt((x_m - x) * (x_m - x) + (y_m - y) * (y_m - y))
+        around_m = np.maximum(self.field_m[i, j], straight_m)
+        is_straight = _is_clear(self.columns_m, x, y, x_m, y_m, room_m=_ROOM_M)
+        distances_m: Floats = np.where(is_straight, straight_m, around_m)
+        return distances_m
 
 
 def _is_clear(
@@ -110,15 +128,19 @@ def _is_clear(
     along_x, along_y = to_x - from_x, to_y - from_y
     length_2 = np.maximum(along_x * along_x + along_y * along_y, np.float32(1e-6))
     clear = np.ones(length_2.shape, dtype=bool)
-    for x, y, radius_m in columns_m:
-        dx, dy = np.float32(x) - from_x, np.float32(y) - from_y
-        share = np.clip((dx * along_x + dy * along_y) / length_2, np.float32(0.0), np.float32(1.0))
+    columns = np.array(columns_m, dtype=np.float32).reshape(-1, 3)
+    at_once = max(_LARGEST // length_2.size, 1)
+    for first in range(0, len(columns), at_once):
+        x, y, radius = columns[first : first + at_once].T.reshape(3, -1, *(1 for _ in length_2.shape))
+        dx, dy = x - from_x, y - from_y
+        share = (dx * along_x + dy * along_y) / length_2
+        np.clip(share, np.float32(0.0), np.float32(1.0), out=share)
         dx, dy = dx - share * along_x, dy - share * along_y
-        free = dx * dx + dy * dy > np.float32((radius_m + room_m) ** 2)
+        free = dx * dx + dy * dy > (radius + np.float32(room_m)) ** 2
         if end_m > 0.0:
-            dx, dy = np.float32(x) - to_x, np.float32(y) - to_y
+            dx, dy = x - to_x, y - to_y
             free |= dx * dx + dy * dy < np.float32(end_m**2)
-        clear &= free
+        clear &= free.all(axis=0)
     return clear
 
 
