@@ -245,8 +245,8 @@ def _ways(here: Pose, around: WaysRound | None, viewpoints: Sequence[Viewpoint])
         way_m = around.distances_m(to_x, to_y).tolist()
     ways = []
     for viewpoint, direct_m, length_m in zip(viewpoints, level_m, way_m, strict=True):
-        straight = length_m <= direct_m + _DETOUR_M
-        if isfinite(length_m):
+        straight = direct_m == 0.0 or length_m <= direct_m + _DETOUR_M
+        if straight or isfinite(length_m):
             ways.append(_Way(viewpoint, direct_m if straight else length_m, straight))
     return ways
 

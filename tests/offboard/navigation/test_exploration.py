@@ -10,10 +10,10 @@ import pytest
 from geometry.rotations import quaternion_from_yaw
 from offboard.navigation.camera_model import CameraModel
 from offboard.navigation.exploration import Explorer, Viewpoint
-from offboard.navigation.search.glimpses import LineOfSight
+from offboard.navigation.search.glimpses import Glimpses, LineOfSight
 from scenarios.models import Arena, Camera, Frame, Scenario
 from scenarios.random_scenarios import load_level, random_scenario
-from vision.types import ObstacleEdge
+from vision.types import Detection, Detections, ObstacleEdge
 
 CAMERA = CameraModel.of(Camera())
 STEP_S = 0.1  # one image
@@ -159,3 +159,32 @@ def test_searches_repeat_to_the_last_bit():
     second.run(12.0, ("none",))
     assert first.viewpoints == second.viewpoints
     assert first.position_m == second.position_m
+
+
+def test_a_wall_is_not_looked_through_but_flown_round():
+    wall = [(0.0, -4.8 + 0.3 * step, 0.2) for step in range(24)]  # at x = 0, up to y = 2.1
+    explorer = Explorer(CAMERA, Arena())
+    for x in range(-4, 0):
+        for y in range(-4, 5):
+            for yaw in (1.5, 2.3, 3.1, -2.3, -1.5):  # all but eastwards
+                for z in (0.6, 1.5, 2.7):
+                    explorer.update((float(x), float(y), z), quaternion_from_yaw(yaw))
+    open_view = explorer.next_viewpoint((-1.0, -3.0, 1.5), 0.0)
+    walled_view = explorer.next_viewpoint((-1.0, -3.0, 1.5), 0.0, columns_m=wall)
+    assert open_view.position_m[1] < 0.0
+    assert abs(open_view.yaw_rad) < pi / 2
+    assert walled_view.position_m[1] > 1.0
+
+
+def test_a_frame_that_was_glimpsed_draws_a_line_of_sight_until_it_is_known():
+    glimpses = Glimpses(CAMERA)
+    box = Detection(n=20.0, s=9.0, e=-138.0, w=-159.0)  # as high as a frame 3.2 m away
+    level = quaternion_from_yaw(0.0)
+    glimpses.update((0.0, 0.0, 1.0), level, Detections(red=box), known=())
+    [line] = glimpses.lines()
+    assert line.direction == pytest.approx((0.73, 0.68, 0.07), abs=0.01)
+    assert 3.2 < line.farthest_m < 6.0
+    glimpses.update((0.0, 0.0, 1.0), level, Detections(), known=())
+    assert glimpses.lines() == (line,)
+    glimpses.update((0.0, 0.0, 1.0), level, Detections(), known=("red",))
+    assert glimpses.lines() == ()
