@@ -3,21 +3,26 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from math import exp, log1p, pi, tau
+from math import exp, log, log1p, pi, tau
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from offboard.navigation.frame_measurement import Floats, Solution, View, noise_of, predicted
 
+if TYPE_CHECKING:
+    from filterpy.kalman import ExtendedKalmanFilter
+
 # A frame does not move, but the drone's position may drift against it.
-DRIFT_M2_S = 0.004**2
-DRIFT_RAD2_S = 0.003**2
+DRIFT_STD_M = 0.004  # after a second
+DRIFT_STD_RAD = 0.003
 
 # With each view the earlier ones count less: errors of images are not quite independent, and the first views,
 # from far away, were linearised at the worst places (fading memory filter; Simon, "Optimal State Estimation",
 # 2006).
 FADING = 1.07
 
+_DRIFT = np.diag((DRIFT_STD_M**2, DRIFT_STD_M**2, DRIFT_STD_M**2, DRIFT_STD_RAD**2))
 _LINEARISATIONS = 4
 _MOVED = np.array((0.02, 0.02, 0.02, 0.03))  # metres and radians: linearise anew if the state moved more
 
@@ -50,9 +55,7 @@ class FrameFilter:
     """
 
     def __init__(self, solution: Solution) -> None:
-        from filterpy.kalman import ExtendedKalmanFilter  # noqa: PLC0415 - takes half a second, for maps only
-
-        self._ekf = ExtendedKalmanFilter(dim_x=4, dim_z=8)
+        self._ekf = _new_filter()
         self._ekf.x, self._ekf.P = solution.state, solution.covariance
         self.log_weight = solution.log_weight
 
@@ -70,8 +73,7 @@ class FrameFilter:
 
     def predict(self, elapsed_s: float) -> None:
         """Let time pass."""
-        drift = elapsed_s * DRIFT_M2_S
-        self._ekf.Q = np.diag((drift, drift, drift, elapsed_s * DRIFT_RAD2_S))
+        self._ekf.Q = elapsed_s * _DRIFT
         self._ekf.predict()
 
     def trial(self, view: View) -> Update | None:
@@ -96,7 +98,7 @@ class FrameFilter:
             )
             moved, at = ekf.x - at, ekf.x
             distance2 = float(ekf.y @ ekf.SI @ ekf.y)
-            spread = float(np.linalg.slogdet(tau * ekf.S)[1])
+            spread = log(float(np.linalg.det(tau * ekf.S)))
             update = Update(ekf.x, ekf.P, distance2, -0.5 * (distance2 + spread))
             ekf.x, ekf.P = before, covariance
             if (abs(moved) < _MOVED).all():
@@ -119,6 +121,17 @@ class FrameFilter:
         """Use a view."""
         self._ekf.x, self._ekf.P = update.state, FADING * update.covariance
         self.log_weight += update.log_likelihood
+
+
+def load_filters() -> None:
+    """Import filterpy, which takes half a second: before a flight, and only if it has a map."""
+    _new_filter()
+
+
+def _new_filter() -> ExtendedKalmanFilter:
+    from filterpy.kalman import ExtendedKalmanFilter  # noqa: PLC0415 - see `load_filters`
+
+    return ExtendedKalmanFilter(dim_x=4, dim_z=8)
 
 
 def half_turn(yaw_rad: float) -> float:

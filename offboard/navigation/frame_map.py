@@ -9,6 +9,7 @@ from math import cos, hypot, sin
 
 from offboard.navigation.camera_model import CameraModel, CameraPose
 from offboard.navigation.frame_estimate import FrameEstimate
+from offboard.navigation.frame_filter import load_filters
 from offboard.navigation.frame_measurement import (
     HALF_HEIGHT_M,
     HALF_WIDTH_M,
@@ -47,6 +48,7 @@ class FrameMap:
         self._prior = Prior.of(arena)
         self._tracks: list[FrameTrack] = []
         self._time_us = -1
+        load_filters()
 
     def best(self, colour: str) -> FrameEstimate | None:
         """The frame of a colour; the one best known if there are several, None if there is none."""

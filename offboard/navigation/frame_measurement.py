@@ -37,7 +37,8 @@ PIXEL_STD_PX = 0.1  # added to what the finder of frames states: its edges' erro
 # be seen, and within each the measurement is nearly linear.
 YAWS_RAD = (-1.1, -0.66, -0.22, 0.22, 0.66, 1.1)
 YAW_STD_RAD = 0.22
-_STEPS = 15
+_STEPS = 10
+_CONVERGED = 0.03  # decrease of the cost
 _YAW_STEP_RAD = 0.4
 
 
@@ -223,7 +224,7 @@ def _solve(views: list[View], prior: Prior, start: Floats) -> Solution | None:
                 break
             continue
         state, system, damping = state + step, after, damping * 0.1
-        if cost - after[2] < 1e-3:
+        if cost - after[2] < _CONVERGED:
             break
     information, _, cost, residual = system
     covariance = np.asarray(np.linalg.inv(information), np.float64)

@@ -21,13 +21,15 @@ NOVEL_US = 1_000_000  # or this long after the last one
 OUTSIDE_M = 0.5  # a frame farther outside the arena is none
 
 MOST_BELIEF = 20  # images; so many in which it should be seen and is not make a well-known frame forgotten
+PREDICTED_S = 0.3  # a frame does not move, and drifts slowly
 MISFITS = 3  # views in a row that contradict all hypotheses, after which they are made anew
 MISFITS_KEPT = 6
 DOUBTED_MISSES = 3
 
 PRUNED = 9.0  # natural logarithm of a ratio of likelihoods at which a hypothesis is dropped
 AMBIGUOUS = 4.6  # at which it no longer counts
-SAME_YAW_RAD = 0.06  # hypotheses nearer than this are one
+SAME_YAW_RAD = 0.06  # hypotheses nearer than this, or than half their standard deviation, are one
+SAME_M = 0.1
 
 # Certain: 95 % of the errors of position within 1.5 cm, of the yaw within 2 degrees.
 CERTAIN_M = 0.015 / 1.8  # root of the sum of three variances; 1.6 (all alike) to 1.96 (one only) is exact
@@ -62,7 +64,7 @@ class FrameTrack:
         colour: of the frame.
         belief: images that showed it minus images that should have; negative: there is none.
         missed: images in a row that should have shown it.
-        used_us: vehicle time of the last image that was looked at for it.
+        time_us: vehicle time of the last prediction.
         seen_us: of the last image that showed it.
         views: how many were used.
     """
@@ -74,6 +76,7 @@ class FrameTrack:
         self._hypotheses = [FrameFilter(solution) for solution in found]
         self._used = view
         self._misfits: list[View] = []
+        self._prune()
 
     @property
     def state(self) -> Floats:
@@ -91,8 +94,10 @@ class FrameTrack:
         return (self.missed < DOUBTED_MISSES, self.belief, -float(np.trace(self.covariance[:3, :3])))
 
     def predict(self, time_us: int) -> None:
-        """Let time pass."""
+        """Let time pass; little of it is left for later."""
         elapsed_s = (time_us - self.time_us) * 1e-6
+        if elapsed_s < PREDICTED_S:
+            return
         self.time_us = time_us
         for hypothesis in self._hypotheses:
             hypothesis.predict(elapsed_s)
@@ -189,7 +194,7 @@ class FrameTrack:
         kept: list[FrameFilter] = []
         for hypothesis in sorted(self._hypotheses, key=lambda hypothesis: -hypothesis.log_weight):
             far_less = bool(kept) and hypothesis.log_weight < kept[0].log_weight - PRUNED
-            same = next((other for other in kept if _same(hypothesis.state, other.state)), None)
+            same = next((other for other in kept if _same(hypothesis, other)), None)
             if same is not None:
                 same.absorb(hypothesis)
             elif not far_less:
@@ -197,6 +202,9 @@ class FrameTrack:
         self._hypotheses = kept
 
 
-def _same(a: Floats, b: Floats) -> bool:
-    away = (a - b).tolist()
-    return abs(half_turn(away[3])) < SAME_YAW_RAD and hypot(*away[:3]) < 0.1
+def _same(a: FrameFilter, b: FrameFilter) -> bool:
+    away = (a.state - b.state).tolist()
+    vx, vy, vz, v_yaw = (a.covariance + b.covariance).diagonal().tolist()
+    return abs(half_turn(away[3])) < max(SAME_YAW_RAD, 0.5 * sqrt(v_yaw)) and hypot(*away[:3]) < max(
+        SAME_M, 0.5 * sqrt(vx + vy + vz)
+    )
