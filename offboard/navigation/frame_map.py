@@ -29,8 +29,8 @@ SURELY_FOUND_M = 5.0
 SURELY_FOUND_COSINE = 0.5
 SURELY_FOUND_MARGIN_PX = 8.0
 HIDING_MARGIN_PX = 4.0  # what comes nearer than this to an object before it may be hidden
-NEAR_PX = 6.0  # a sighting whose centre is this near to where a frame should be is of that frame,
-NEAR_SHARE = 0.5  # or this share of its width
+NEAR_PX = 8.0  # a sighting whose centre is this near to where a frame should be is of that frame,
+NEAR_SHARE = 0.75  # or this share of its width
 DUPLICATE_M = 0.25  # two frames cannot be nearer to each other
 
 
@@ -72,28 +72,26 @@ class FrameMap:
         for track in self._tracks:
             track.predict(pose.time_us)
         unseen = list(self._tracks)
-        views: list[tuple[str, View]] = []
-        for sighting in detections.frames:
-            view = view_of(sighting, self._camera, pose)
-            if view is not None:
-                views.append((sighting.colour, view))
-        for colour, view in self._match(views, unseen):
-            self._explain(colour, view, unseen)
+        seen = [view_of(sighting, self._camera, pose) for sighting in detections.frames]
+        for view in self._match([view for view in seen if view is not None], unseen):
+            self._explain(view, unseen)
         camera = self._camera.pose(pose.position_m, pose.attitude_arena)
         for track in unseen:
             if self._should_be_seen(track, camera, detections.obstacle_edges):
                 track.miss()
         self._tracks = [
-            track for track in self._tracks if track.belief >= 0 and track.keep_inside(self._arena)
+            track
+            for track in self._tracks
+            if track.is_believed(pose.time_us) and track.keep_inside(self._arena)
         ]
         self._drop_duplicates()
 
-    def _match(self, views: list[tuple[str, View]], unseen: list[FrameTrack]) -> list[tuple[str, View]]:
+    def _match(self, views: list[View], unseen: list[FrameTrack]) -> list[View]:
         """Give views to the frames that they fit best; returns those that fit none."""
         fits: list[tuple[float, int, FrameTrack, Fit]] = []
-        for number, (colour, view) in enumerate(views):
+        for number, view in enumerate(views):
             for track in unseen:
-                if track.colour == colour:
+                if track.colour == view.colour:
                     fit = track.fit(view)
                     if fit.inside:
                         fits.append((fit.distance2, number, track, fit))
@@ -101,24 +99,25 @@ class FrameMap:
         matched: set[int] = set()
         for _, number, track, fit in fits:
             if number not in matched and track in unseen:
-                track.accept(views[number][1], fit)
+                track.accept(views[number], fit)
                 matched.add(number)
                 unseen.remove(track)
         return [view for number, view in enumerate(views) if number not in matched]
 
-    def _explain(self, colour: str, view: View, unseen: list[FrameTrack]) -> None:
+    def _explain(self, view: View, unseen: list[FrameTrack]) -> None:
         """A view that fits no frame contradicts the one that should be seen there, or is of a new one."""
         for track in self._tracks:
-            if track.colour == colour and self._is_near(track, view):
+            if track.colour == view.colour and self._is_near(track, view):
                 if track in unseen:
                     unseen.remove(track)
-                    track.contradict(view, self._prior)
+                    if view.whole:
+                        track.contradict(view, self._prior)
                 return
         if sum(view.seen) < 3:
             return
         found = solutions([view], self._prior)
         if found and found[0].cost <= GATES[sum(view.seen)]:
-            track = FrameTrack(colour, found, view)
+            track = FrameTrack(found, view)
             if track.keep_inside(self._arena):
                 self._tracks.append(track)
 

@@ -31,7 +31,7 @@ _CORNERS_M = (
     (-HALF_WIDTH_M, -HALF_HEIGHT_M),
 )
 
-EDGE_ON = 0.08  # sine of the angle to the frame's plane below which its outline says nothing
+EDGE_ON = 0.2  # sine of the angle to the frame's plane below which its outline says little
 PIXEL_STD_PX = 0.1  # added to what the finder of frames states: its edges' errors are not all independent
 # Angles between a frame's normal and the line of sight, and their deviation: together they cover all that can
 # be seen, and within each the measurement is nearly linear.
@@ -47,6 +47,8 @@ class View:
     """A frame's corners in one image, k of which are seen.
 
     Attributes:
+        colour: of the frame.
+        whole: nothing of it is hidden.
         time_us: vehicle time of the image.
         camera: where it was taken.
         focal_px: focal length.
@@ -56,6 +58,8 @@ class View:
         position_var_m2: variance of each coordinate of the drone's position.
     """
 
+    colour: str
+    whole: bool
     time_us: int
     camera: CameraPose
     focal_px: float
@@ -93,8 +97,17 @@ def view_of(sighting: FrameSighting, model: CameraModel, pose: DronePose) -> Vie
     noise = np.diag(variances) + pose.attitude_std_rad**2 * (turned @ turned.T)
     a, b, c, d = (corner is not None for corner in sighting.corners)
     camera = model.pose(pose.position_m, pose.attitude_arena)
-    variance_m2 = pose.position_std_m**2
-    return View(pose.time_us, camera, model.focal_px, (a, b, c, d), np.array(corners_px), noise, variance_m2)
+    return View(
+        colour=sighting.colour,
+        whole=sighting.whole,
+        time_us=pose.time_us,
+        camera=camera,
+        focal_px=model.focal_px,
+        seen=(a, b, c, d),
+        corners_px=np.array(corners_px),
+        noise_px2=noise,
+        position_var_m2=pose.position_std_m**2,
+    )
 
 
 def _turned(corner: FrameCorner, focal_px: float) -> tuple[tuple[float, float, float], ...]:

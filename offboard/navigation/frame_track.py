@@ -9,7 +9,7 @@ import numpy as np
 
 from offboard.navigation.frame_estimate import FrameEstimate
 from offboard.navigation.frame_filter import FrameFilter, Update, half_turn
-from offboard.navigation.frame_measurement import Floats, Prior, Solution, View, solutions
+from offboard.navigation.frame_measurement import Floats, Prior, Solution, View, predicted, solutions
 from scenarios.models import Arena
 
 # Squares of innovations that one view in a thousand exceeds by chance (chi-squared), by number of corners,
@@ -22,8 +22,11 @@ OUTSIDE_M = 0.5  # a frame farther outside the arena is none
 
 MOST_BELIEF = 20  # images; so many in which it should be seen and is not make a well-known frame forgotten
 PREDICTED_S = 0.3  # a frame does not move, and drifts slowly
-MISFITS = 3  # views in a row that contradict all hypotheses, after which they are made anew
-MISFITS_KEPT = 6
+MISFITS = 3  # views that contradict all hypotheses, after which they are made anew, and one for each
+# four images of belief; of so many, these are used
+MISFITS_USED = 4
+TENTATIVE = 3  # a frame that was seen less often is forgotten
+TENTATIVE_US = 3_000_000  # after this time
 DOUBTED_MISSES = 3
 
 PRUNED = 9.0  # natural logarithm of a ratio of likelihoods at which a hypothesis is dropped
@@ -69,8 +72,8 @@ class FrameTrack:
         views: how many were used.
     """
 
-    def __init__(self, colour: str, found: list[Solution], view: View) -> None:
-        self.colour = colour
+    def __init__(self, found: list[Solution], view: View) -> None:
+        self.colour = view.colour
         self.belief, self.missed, self.views = 1, 0, 1
         self.time_us = self.seen_us = view.time_us
         self._hypotheses = [FrameFilter(solution) for solution in found]
@@ -112,7 +115,7 @@ class FrameTrack:
         """Use a view that fits; one from nearly the same place as the last adds nothing but belief."""
         self._saw(view)
         self._misfits.clear()
-        if not self._is_novel(view):
+        if not _is_moved(view, self._used) and view.time_us - self._used.time_us < NOVEL_US:
             return
         self._used = view
         self.views += 1
@@ -124,21 +127,31 @@ class FrameTrack:
         self._prune()
 
     def contradict(self, view: View, prior: Prior) -> None:
-        """A view of this frame that fits none of its hypotheses; after several, they are made anew."""
-        self._saw(view)
-        self._misfits.append(view)
-        if len(self._misfits) < MISFITS:
+        """A whole view of this frame that fits none of its hypotheses; after several, they are made anew.
+
+        What hides a frame shifts its outline, and from another place shifts it otherwise. So the views must
+        be from several places and agree, more of them for a frame that is well known.
+        """
+        misfits = self._misfits
+        if predicted(self.state, view) is None or (misfits and not _is_moved(view, misfits[-1])):
             return
-        whole = [view for view in self._misfits if sum(view.seen) >= 3]
-        for views in (self._misfits, whole[-1:]):
-            found = solutions(views, prior) if views else []
-            if found and found[0].cost <= sum(GATES[sum(view.seen)] for view in views):
-                self._hypotheses = [FrameFilter(solution) for solution in found]
-                self._prune()
-                self.belief, self.views, self._used = len(views), len(views), view
-                self._misfits.clear()
-                return
-        del self._misfits[:-MISFITS_KEPT]
+        misfits.append(view)
+        if len(misfits) < MISFITS + self.belief // 4:
+            return
+        some = misfits[:: -(-len(misfits) // MISFITS_USED)]
+        found = solutions(some, prior)
+        if not found or found[0].cost > sum(GATES[sum(view.seen)] for view in some):
+            del misfits[: len(misfits) // 2]
+            return
+        self._hypotheses = [FrameFilter(solution) for solution in found]
+        self._prune()
+        self.belief, self.missed, self.views = len(misfits), 0, len(some)
+        self.seen_us, self._used = view.time_us, view
+        misfits.clear()
+
+    def is_believed(self, time_us: int) -> bool:
+        """Whether there is such a frame."""
+        return self.belief >= (TENTATIVE if time_us - self.seen_us > TENTATIVE_US else 0)
 
     def miss(self) -> None:
         """An image should have shown it and did not."""
@@ -181,14 +194,6 @@ class FrameTrack:
         self.missed = 0
         self.belief = min(self.belief + 1, MOST_BELIEF)
 
-    def _is_novel(self, view: View) -> bool:
-        """Whether its errors differ from those of the last view: edges fall on other parts of pixels."""
-        last = self._used
-        if view.seen != last.seen or view.time_us - last.time_us >= NOVEL_US:
-            return True
-        shift = view.corners_px - last.corners_px
-        return bool(shift @ shift >= NOVEL_PX**2 * sum(view.seen))
-
     def _prune(self) -> None:
         """Likeliest first; drop those that are far less likely, or became the same as a likelier one."""
         kept: list[FrameFilter] = []
@@ -208,3 +213,11 @@ def _same(a: FrameFilter, b: FrameFilter) -> bool:
     return abs(half_turn(away[3])) < max(SAME_YAW_RAD, 0.5 * sqrt(v_yaw)) and hypot(*away[:3]) < max(
         SAME_M, 0.5 * sqrt(vx + vy + vz)
     )
+
+
+def _is_moved(view: View, last: View) -> bool:
+    """Whether a view's errors differ from those of an earlier one: edges fall on other parts of pixels."""
+    if view.seen != last.seen:
+        return True
+    shift = view.corners_px - last.corners_px
+    return bool(shift @ shift >= NOVEL_PX**2 * sum(view.seen))

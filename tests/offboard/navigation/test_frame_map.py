@@ -140,3 +140,34 @@ def test_frame_far_outside_the_arena_is_none() -> None:
     for step in range(5):
         flight.look([frame_at(6.5, 0.0, 1.5, 0.0)], (4.0 + 0.1 * step, 0.0, 1.5), 0.0)
     assert flight.map.frames() == ()
+
+
+def test_outline_that_is_partly_hidden_does_not_replace_a_known_frame() -> None:
+    frame = frame_at(0.0, 0.0, 1.5, 0.3)
+    flight = Flight(2)
+    flight.approach(frame, 0.2, 3.0, 1.5)
+    for step in range(20):  # a pole passes before one of its sides
+        hidden_m = 0.2 - 0.005 * step
+        shift_m = hidden_m / 2
+        seen = frame.model_copy(
+            update={
+                "outer_width_m": frame.outer_width_m - hidden_m,
+                "x_m": -shift_m * sin(frame.yaw_rad),
+                "y_m": shift_m * cos(frame.yaw_rad),
+            }
+        )
+        bearing = 0.5 + 0.02 * step
+        flight.look([seen], (1.5 * cos(bearing), 1.5 * sin(bearing), 1.5), bearing + pi)
+    (estimate,) = flight.map.frames()
+    assert errors(estimate, frame)[0] < 0.015
+
+
+def test_frame_seen_once_is_forgotten_and_one_seen_often_is_kept() -> None:
+    glimpse, known = frame_at(2.0, 0.5, 1.5, 0.0), frame_at(2.0, -0.5, 1.5, 0.0, "green")
+    flight = Flight(5)
+    flight.look([glimpse, known], (-1.0, 0.0, 1.5), 0.0)
+    for _ in range(4):
+        flight.look([known], (1.0, -0.5, 1.5), 0.0)
+    for _ in range(60):
+        flight.look([], (-1.0, 0.0, 1.5), pi)
+    assert [estimate.colour for estimate in flight.map.frames()] == ["green"]

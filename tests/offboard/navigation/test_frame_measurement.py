@@ -1,5 +1,6 @@
 """Where the corners of a frame are in an image, and what one image tells of its pose."""
 
+from dataclasses import replace
 from math import pi
 
 import numpy as np
@@ -81,5 +82,5 @@ def test_edge_on_and_from_behind_nothing_is_predicted() -> None:
     seen = view(*PLACES[0])
     for place_m, yaw_rad in ((edge_on, 0.4 - pi / 2), (PLACES[0][0], 0.4)):
         camera = CAMERA.pose(place_m, quaternion_from_euler(0.0, 0.0, yaw_rad))
-        turned = View(0, camera, seen.focal_px, seen.seen, seen.corners_px, seen.noise_px2, 0.0)
+        turned = replace(seen, camera=camera)
         assert predicted(STATE, turned) is None
