@@ -172,6 +172,8 @@ export class Arena {
 
   #makeBar() {
     const bar = make("div", { class: "m-views", role: "toolbar", "aria-label": "views" });
+    // What turns the arena would capture the pointer, and the click would never reach the button.
+    bar.addEventListener("pointerdown", (event) => event.stopPropagation());
     Object.entries(VIEWS).forEach(([view, words], index) => {
       const key = String(index + 1);
       const pressed = String(view === "orbit");

@@ -252,7 +252,7 @@ async def test_a_lost_monitor_is_reported_and_reconnected(chromium, fake):
     await expect(page.locator("#live")).not_to_have_class(re.compile(r"\bm-stale\b"))
 
 
-async def test_keys_change_the_view_and_the_drone_is_drawn(solid_chromium, fake):
+async def test_keys_and_buttons_change_the_view_and_the_drone_is_drawn(solid_chromium, fake):
     page, complaints = await visit(solid_chromium, fake)
     arena = page.locator(".m-arena")
     await expect(arena).to_have_attribute("data-view", "orbit")
@@ -262,6 +262,9 @@ async def test_keys_change_the_view_and_the_drone_is_drawn(solid_chromium, fake)
         button = page.locator(f'.m-views [data-view="{name}"]')
         await expect(button).to_have_attribute("aria-pressed", "true")
     await page.wait_for_function("document.querySelector('.m-arena').dataset.frames > 0")
+    for name in ("follow", "orbit"):
+        await page.locator(f'.m-views [data-view="{name}"]').click()
+        await expect(arena).to_have_attribute("data-view", name)
     before = await frames_drawn(page)
     await fake.say("pose", drones=[pose(), pose(2, p=[0.0, 0.0, 1.0])])
     await page.wait_for_function(f"document.querySelector('.m-arena').dataset.frames > {before}")
