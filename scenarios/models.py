@@ -339,6 +339,13 @@ class Scenario(Part):
         return {field: value for field, value in written.items() if field not in empty}
 
     @property
+    def contents(self) -> str:
+        """What is in the arena, in words: "3 frames", and the obstacles if it has any."""
+        counts = (("decoy", len(self.decoys)), ("pole", len(self.poles)), ("wall", len(self.walls)))
+        others = [f", {count} {name}{'' if count == 1 else 's'}" for name, count in counts if count]
+        return f"{len(self.frames)} frames{''.join(others)}"
+
+    @property
     def all_frames(self) -> tuple[UprightFrame, ...]:
         """Frames and decoys."""
         return (*self.frames, *self.decoys)

@@ -69,7 +69,7 @@ def check(file: Annotated[Path, Parameter(help="YAML file")]) -> int:
     from scenarios.loader import load_scenario
 
     loaded = load_scenario(file)
-    print(f"{file}: good, scenario '{loaded.name}' with {len(loaded.frames)} frames")
+    print(f"{file}: good, scenario '{loaded.name}' with {loaded.contents}")
     return 0
 
 

@@ -33,10 +33,15 @@ RGBA: dict[str, Message] = {
     "green": {"r": 0.0, "g": 0.8, "b": 0.0, "a": 1.0},
     "blue": {"r": 0.0, "g": 0.0, "b": 1.0, "a": 1.0},
 }
+_DECOY_RGBA: dict[str, Message] = {
+    "cyan": {"r": 0.0, "g": 0.8, "b": 0.8, "a": 1.0},
+    "magenta": {"r": 1.0, "g": 0.0, "b": 1.0, "a": 1.0},
+}
 _OTHER = {"r": 0.5, "g": 0.5, "b": 0.5, "a": 1.0}  # a frame that is no part of the task
 _FLOOR = {"r": 0.88, "g": 0.69, "b": 0.22, "a": 0.6}
 _BORDER = {"r": 0.5, "g": 0.5, "b": 0.5, "a": 0.7}
 _BASE = {"r": 0.67, "g": 0.67, "b": 0.67, "a": 1.0}
+_PRISM = {"r": 0.47, "g": 0.27, "b": 0.71, "a": 0.6}  # poles and walls; what is behind them is seen too
 _BODY = {"r": 0.15, "g": 0.15, "b": 0.2, "a": 1.0}
 _NOSE = {"r": 1.0, "g": 0.6, "b": 0.0, "a": 1.0}
 _CLEAR = {"r": 0.0, "g": 0.0, "b": 0.0, "a": 0.0}
@@ -319,7 +324,7 @@ def _dashes(points: list[Vec3]) -> list[Vec3]:
 
 
 def scene(scenario: Scenario, time_us: int) -> Message:
-    """Arena, base and frames, and the drone, which moves with its own axes, from a vehicle time on."""
+    """All that is in the arena, and the drone, which moves with its own axes, from a vehicle time on."""
     arena = scenario.arena
     floor = _cube((0.0, 0.0, -_FLOOR_M / 2), (arena.length_x_m, arena.width_y_m, _FLOOR_M), _FLOOR)
     entities = [
@@ -329,6 +334,12 @@ def scene(scenario: Scenario, time_us: int) -> Message:
     for frame in scenario.frames:
         bars = [_solid(bar, RGBA[frame.colour]) for bar in frame_solids(frame)]
         entities.append(_entity(time_us, f"{frame.colour} frame", ARENA, cubes=bars))
+    obstacles = [
+        _solid(bar, _DECOY_RGBA[decoy.colour]) for decoy in scenario.decoys for bar in frame_solids(decoy)
+    ]
+    obstacles += [_solid(prism, _PRISM) for prism in scenario.prisms]
+    if obstacles:
+        entities.append(_entity(time_us, "obstacles", ARENA, cubes=obstacles))
     length_m, width_m, height_m = load_airframe(scenario.airframe).envelope_m
     body = _cube((0.0, 0.0, 0.0), (length_m, width_m, height_m), _BODY)
     nose = _cube(

@@ -22,14 +22,20 @@ from matplotlib.ticker import MaxNLocator
 from framerunner.runs import PlotError, check_plot_format
 from framerunner.runs.track import Track
 from offboard.navigation.frame_estimate import FrameEstimate
-from scenarios.models import Frame, Scenario, start_position
+from scenarios.models import Frame, Scenario, UprightFrame, start_position
 from scenarios.result import FlightResult
 
 _Dash = Literal["-"] | tuple[float, Sequence[float]]
 _Styles = Mapping[str, tuple[str, _Dash]]
 _View = Callable[[float, float, float], tuple[float, float]]
 
-FRAME_COLOURS = {"red": "#ff0000", "green": "#00ff00", "blue": "#0000ff"}
+FRAME_COLOURS = {
+    "red": "#ff0000",
+    "green": "#00ff00",
+    "blue": "#0000ff",
+    "cyan": "#00ffff",
+    "magenta": "#ff00ff",
+}
 # Paul Tol's "muted" scheme, which colour-blind people can tell apart, and three more.
 STATE_COLOURS = (
     "#332288",
@@ -58,6 +64,7 @@ _FLOOR = "#faf3dc"
 _FLOOR_EDGE = "#d8c68f"
 _GROUND = "#efefef"
 _BASE = "#c9b892"
+_PRISM = "#7846b4"  # poles and walls
 _HALO = [withStroke(linewidth=2.5, foreground="white")]
 _CROSSING_MARK: dict[str, Any] = {"marker": "o", "ms": 5.5, "mfc": "white", "mec": _INK, "mew": 1.3}
 _END_MARK: dict[str, Any] = {"marker": "X", "ms": 8, "mfc": _INK, "mec": "white"}
@@ -72,7 +79,7 @@ def _from_the_side(x: float, y: float, z: float) -> tuple[float, float]:
 
 
 def draw_scenario(scenario: Scenario) -> Figure:
-    """Return a scenario from above and from the side: floor, base, start, and frames with their heights."""
+    """Return a scenario from above and from the side, its frames with their heights."""
     figure, top, side, notes = _new_figure()
     _draw_top(top, scenario, {frame.colour: f"{frame.colour}, {frame.z_m:g} m" for frame in scenario.frames})
     _draw_side(side, scenario)
@@ -80,9 +87,7 @@ def draw_scenario(scenario: Scenario) -> Figure:
         right_m = frame.x_m + frame.outer_width_m * abs(sin(frame.yaw_rad)) / 2
         _label(side, f"{frame.z_m:g} m", (right_m, frame.z_m), (6, 0), va="center", fontsize=8)
     _set_limits(top, side, scenario, Track())
-    _write_title(
-        figure, scenario.name, f"{len(scenario.frames)} frames, try limit {scenario.try_limit_s:g} s"
-    )
+    _write_title(figure, scenario.name, f"{scenario.contents}; try limit {scenario.try_limit_s:g} s")
     _write_numbers(notes, scenario)
     return figure
 
@@ -148,14 +153,21 @@ def _new_figure() -> tuple[Figure, Axes, Axes, Axes]:
 
 
 def _draw_top(axes: Axes, scenario: Scenario, labels: dict[str, str]) -> None:
-    """Draw the arena from above: floor, base, frames with their labels, and start."""
+    """Draw the arena from above: floor, base, obstacles, frames with their labels, and start."""
     arena, base, start = scenario.arena, scenario.base, scenario.start
     corner = (-arena.length_x_m / 2, -arena.width_y_m / 2)
     axes.add_patch(Rectangle(corner, arena.length_x_m, arena.width_y_m, fc=_FLOOR, ec=_FLOOR_EDGE, zorder=0))
     corner = (base.x_m - base.edge_m / 2, base.y_m - base.edge_m / 2)
     axes.add_patch(Rectangle(corner, base.edge_m, base.edge_m, fc=_BASE, ec=_INK, lw=0.6, zorder=1))
+    for prism in scenario.prisms:
+        a, b, _ = prism.half_extents_m
+        corners = [prism.to_arena((x, y, 0.0))[:2] for x, y in ((-a, -b), (a, -b), (a, b), (-a, b))]
+        axes.add_patch(Polygon(corners, closed=True, fc=_PRISM, ec=_INK, lw=0.6, zorder=2))
+    for decoy in scenario.decoys:
+        _draw_frame_from_above(axes, decoy)
     for frame in scenario.frames:
-        _draw_frame_from_above(axes, frame, labels[frame.colour])
+        _draw_frame_from_above(axes, frame)
+        _label_frame_from_above(axes, frame, labels[frame.colour])
     length_m = 0.09 * min(arena.length_x_m, arena.width_y_m)
     _arrow(axes, (start.x_m, start.y_m), start.yaw_rad, length_m, colour=_INK, lw=1.6, zorder=5)
     axes.plot(start.x_m, start.y_m, marker="o", ms=5, color=_INK, zorder=5)
@@ -163,8 +175,8 @@ def _draw_top(axes: Axes, scenario: Scenario, labels: dict[str, str]) -> None:
     _label(axes, "start", below, (0, -4), ha="center", va="top", fontsize=9)
 
 
-def _draw_frame_from_above(axes: Axes, frame: Frame, label: str) -> None:
-    """Draw a frame as a bar and its normal as an arrow, with the label beside the bar's end."""
+def _draw_frame_from_above(axes: Axes, frame: UprightFrame) -> None:
+    """Draw a frame as a bar and its normal as an arrow; a decoy has none."""
     c, s = cos(frame.yaw_rad), sin(frame.yaw_rad)
     colour = FRAME_COLOURS[frame.colour]
     half = frame.outer_width_m / 2
@@ -172,9 +184,15 @@ def _draw_frame_from_above(axes: Axes, frame: Frame, label: str) -> None:
     corners = [(-depth, -half), (depth, -half), (depth, half), (-depth, half)]
     outline = [(frame.x_m + c * a - s * b, frame.y_m + s * a + c * b) for a, b in corners]
     axes.add_patch(Polygon(outline, closed=True, fc=colour, ec=_INK, lw=0.6, zorder=4))
-    _arrow(
-        axes, (frame.x_m, frame.y_m), frame.yaw_rad, 2 * frame.outer_width_m, colour=colour, lw=1.3, zorder=3
-    )
+    if isinstance(frame, Frame):
+        length_m = 2 * frame.outer_width_m
+        _arrow(axes, (frame.x_m, frame.y_m), frame.yaw_rad, length_m, colour=colour, lw=1.3, zorder=3)
+
+
+def _label_frame_from_above(axes: Axes, frame: Frame, label: str) -> None:
+    """Write beside the end of a frame's bar."""
+    c, s = cos(frame.yaw_rad), sin(frame.yaw_rad)
+    half = frame.outer_width_m / 2
     # Of the bar's two ends, the one that points away from the arena's middle has more room.
     outward = 1.0 if -s * frame.x_m + c * frame.y_m >= 0 else -1.0
     right, up = -s * outward, c * outward
@@ -191,7 +209,11 @@ def _draw_side(axes: Axes, scenario: Scenario) -> None:
     axes.axhline(0, color=_INK, lw=1.0, zorder=1)
     corner = (base.x_m - base.edge_m / 2, 0.0)
     axes.add_patch(Rectangle(corner, base.edge_m, base.top_m, fc=_BASE, ec=_INK, lw=0.6, zorder=1))
-    for frame in scenario.frames:
+    for prism in scenario.prisms:
+        across = [x for x, _, _ in prism.corners()]
+        corner, width = (min(across), 0.0), max(across) - min(across)
+        axes.add_patch(Rectangle(corner, width, 2 * prism.half_extents_m[2], fc=_PRISM, alpha=0.3, zorder=1))
+    for frame in scenario.all_frames:
         # Seen along y, a frame's width shrinks with its yaw; never to nothing, its bars have a depth.
         width = frame.outer_width_m * abs(sin(frame.yaw_rad)) + frame.bar_m * abs(cos(frame.yaw_rad))
         corner = (frame.x_m - width / 2, frame.z_m - frame.outer_height_m / 2)

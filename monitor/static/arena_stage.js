@@ -247,6 +247,7 @@ export class Stage {
     this.#world.userData.ground.set(isOnboard ? GROUND : this.#paint.ground);
     this.#world.traverse((part) => {
       if (part.userData.isHelp) part.visible = !isOnboard;
+      if (part.userData.isOnboard) part.visible = isOnboard;
       part.userData.ribbon?.fit(3, [wide, high]);
     });
   }

@@ -1,5 +1,6 @@
-/** What stands still in the arena, made once for each scenario: floor, base, frames, their shadows, the outline. */
+/** What stands still in the arena, made once for each scenario: floor, base, frames, obstacles, shadows, the outline. */
 import { channels, FRAME_COLOURS } from "./colours.js";
+import { allFrames, PRISM, prismsOf } from "./obstacles.js";
 import { Ribbon } from "./ribbon.js";
 
 // Colours as the simulated camera paints them, so that the onboard view looks like its image.
@@ -14,12 +15,13 @@ const DARKEST = 0.3; // no face is painted darker than this share of its colour
 const PURE_SHADE = 0.35; // a frame keeps its colour, with just enough shade to have edges
 const SHADOW = 0.4; // how much of the light is missing there
 const GROUND_M = 120;
+const SEEN_THROUGH = 0.45; // opacity of poles and walls, except in the onboard view: nothing may be lost behind them
 
 /**
  * Make the world.
  * @param {object} THREE
  * @param {object} scenario with all its fields
- * @param {number} lift_m how much higher the frames and the ceiling are
+ * @param {number} lift_m how much higher the frames, the ceiling and the tops of obstacles are
  * @returns {object} a THREE.Group
  */
 export function buildWorld(THREE, scenario, lift_m) {
@@ -30,10 +32,15 @@ export function buildWorld(THREE, scenario, lift_m) {
   floor.rectangle(-half_x, half_x, -half_y, half_y, TATAMI);
   paintMats(floor, arena);
   const solids = new Painter(THREE, light);
-  const boxes = [baseBox(base), ...scenario.frames.flatMap((frame) => frameBars(frame, lift_m))];
+  const boxes = [baseBox(base), ...allFrames(scenario).flatMap((frame) => frameBars(frame, lift_m))];
   for (const box of boxes) {
     solids.box(box);
     shadows.shadow(box);
+  }
+  const prisms = new Painter(THREE, light);
+  for (const prism of prismsOf(scenario, lift_m)) {
+    prisms.box({ ...prism, colour: PRISM });
+    shadows.shadow(prism);
   }
   const mark = 0.35 * base.edge_m;
   solids.rectangle(base.x_m - mark, base.x_m + mark, base.y_m - mark, base.y_m + mark, BASE_MARK, base.top_m + 0.002);
@@ -46,8 +53,13 @@ export function buildWorld(THREE, scenario, lift_m) {
   tatami.renderOrder = -2;
   const shade = shadows.mesh({ transparent: true, opacity: SHADOW, depthWrite: false });
   group.add(ground, tatami, shade, solids.mesh({ side: THREE.DoubleSide }));
+  const massive = prisms.mesh({ side: THREE.DoubleSide });
+  massive.userData.isOnboard = true;
+  const glassy = prisms.mesh({ side: THREE.DoubleSide, transparent: true, opacity: SEEN_THROUGH, depthWrite: false });
+  glassy.userData.isHelp = true;
+  group.add(massive, glassy);
   group.add(outline(THREE, half_x, half_y, arena.height_m + lift_m));
-  for (const frame of scenario.frames) group.add(frameLines(THREE, frame, lift_m));
+  for (const frame of allFrames(scenario)) group.add(frameLines(THREE, frame, lift_m));
   return group;
 }
 

@@ -6,8 +6,8 @@ export const STATE_COLOURS = [
   "#aa4499", "#44aa99", "#000000", "#ddaa33", "#777777", "#882255",
 ];
 
-/** The frames' pure colours. */
-export const FRAME_COLOURS = { red: "#ff0000", green: "#00ff00", blue: "#0000ff" };
+/** The pure colours of frames and decoys. */
+export const FRAME_COLOURS = { red: "#ff0000", green: "#00ff00", blue: "#0000ff", cyan: "#00ffff", magenta: "#ff00ff" };
 
 /**
  * The kind of a state: the last part of its id, "turning" of "red.turning".

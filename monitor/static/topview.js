@@ -2,6 +2,7 @@
 import { drawMap } from "./arena_map.js";
 import { FRAME_COLOURS } from "./colours.js";
 import { make } from "./dom.js";
+import { allFrames, PRISM, prismsOf } from "./obstacles.js";
 
 /** Does what `Stage` does, as far as a plain canvas can. */
 export class TopView {
@@ -98,10 +99,18 @@ export class TopView {
 
   #drawThings(pen) {
     if (!this.#scenario) return;
-    const { base, frames } = this.#scenario;
+    const { base } = this.#scenario;
     pen.fillStyle = "#acaaa8";
     pen.fillRect(base.x_m - base.edge_m / 2, base.y_m - base.edge_m / 2, base.edge_m, base.edge_m);
-    for (const frame of frames) {
+    pen.fillStyle = `rgb(${PRISM.join(" ")})`;
+    for (const { centre, half, yaw } of prismsOf(this.#scenario)) {
+      pen.save();
+      pen.translate(centre[0], centre[1]);
+      pen.rotate(yaw);
+      pen.fillRect(-half[0], -half[1], 2 * half[0], 2 * half[1]);
+      pen.restore();
+    }
+    for (const frame of allFrames(this.#scenario)) {
       pen.save();
       pen.translate(frame.x_m, frame.y_m);
       pen.rotate(frame.yaw_rad);

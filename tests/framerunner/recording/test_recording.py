@@ -243,6 +243,13 @@ def test_boxes_enclose_the_pixels_that_were_seen():
     assert box_edges(detect(image).red, (320, 240)) == (200, 50, 241, 70)
 
 
+def test_the_scene_shows_obstacles():
+    (obstacles,) = (
+        each for each in scene(load_scenario("crowded-17"), 0)["entities"] if each["id"] == "obstacles"
+    )
+    assert len(obstacles["cubes"]) == 2 * 4 + 3 + 2  # bars of decoys, poles, parts of the wall
+
+
 def test_the_scene_shows_each_bar_the_base_and_the_drone():
     scenario = load_scenario("test-case-1")
     entities = {each["id"]: each for each in scene(scenario, 0)["entities"]}

@@ -11,6 +11,7 @@ from framerunner.runs import PlotError
 from framerunner.runs.plots import STATE_COLOURS, draw_scenario, draw_track, save_figure
 from framerunner.runs.track import Track
 from offboard.navigation.frame_estimate import FrameEstimate
+from scenarios.loader import load_scenario
 from scenarios.models import Arena, Base, Frame, Scenario, Start
 from scenarios.result import FlightResult
 
@@ -93,6 +94,15 @@ def test_frames_have_their_true_colours():
     fills = {to_hex(patch.get_facecolor()) for patch in figure.axes[0].patches}
     assert {"#ff0000", "#00ff00"} <= fills
     assert "#0000ff" not in fills
+
+
+def test_obstacles_are_drawn_from_above_and_from_the_side():
+    scenario = load_scenario("crowded-17")
+    figure = draw_scenario(scenario)
+    assert "3 frames, 2 decoys, 3 poles, 1 wall; try limit 180 s" in texts(figure)
+    top, side = ([to_hex(patch.get_facecolor()) for patch in axes.patches] for axes in figure.axes[:2])
+    assert top.count("#7846b4") == side.count("#7846b4") == len(scenario.prisms) == 5
+    assert {"#00ffff", "#ff00ff"} <= set(top)
 
 
 def test_the_plot_of_a_track_shows_verdict_times_and_reason():
