@@ -1,0 +1,46 @@
+"""What the true motion of each airframe never exceeds, by the class of its mission, and the bound from it.
+
+The numbers were found by searching for the command sequences that exceed most, in JSBSim, and are a tenth
+to a fifth above the highest found; docs/bound.md says how. `tests/framerunner/flying/test_envelopes.py` flies
+the worst sequences found and random ones, and fails if any exceeds them.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from math import floor, sqrt
+
+from framerunner.flying.plan import FlightPlan
+from scenarios.bound import Bound, Envelope, Fall, Reach, lower_bound
+
+_FALL = Fall(level_m=0.45, level_per_m=0.8, longest_m=2.6, deepest_m=4.2, rise_m=0.3)
+
+ENVELOPES: Mapping[tuple[str, str], Envelope] = {
+    # +-1 m/s on each axis of the drone, which at a yaw of 45 degrees to its way is sqrt(2) m/s in plan.
+    ("abejorro", "contest"): Envelope(
+        level=Reach(sqrt(2.0), 0.9, 2.75),
+        up=Reach(1.0, 0.6, 2.4),
+        down=Reach(1.0, 0.35, 1.9),
+        total_excess_m=0.5,
+        fall=_FALL,
+    ),
+}
+"""By airframe and class of the mission."""
+
+
+def bound_of(plan: FlightPlan, mission_class: str = "contest") -> Bound | None:
+    """The lower bound of a try of a plan's scenario; about 2 ms.
+
+    Returns:
+        None if it has no frames, or if the airframe's motion was not measured.
+    """
+    envelope = ENVELOPES.get((plan.scenario.airframe, mission_class))
+    if envelope is None or not plan.scenario.frames:
+        return None
+    return lower_bound(plan.layout, plan.start_pose[:3], plan.airframe.envelope_m[2], envelope)
+
+
+def bound_s(plan: FlightPlan, mission_class: str = "contest") -> float | None:
+    """The same in whole milliseconds, rounded down so that it stays a lower bound."""
+    bound = bound_of(plan, mission_class)
+    return None if bound is None else floor(bound.time_s * 1000.0) / 1000.0
