@@ -26,6 +26,7 @@ def build_app() -> App:
     from cyclopts import App, Parameter
 
     from framerunner.commands import (
+        bound,
         camera,
         doctor,
         evaluate,
@@ -52,6 +53,7 @@ def build_app() -> App:
     app.command(camera.camera)
     app.command(doctor.doctor)
     app.command(evaluate.evaluate)
+    app.command(bound.bound)
     app.command(monitor.monitor)
     app.command(replay.replay)
     app.command(film.film)

@@ -10,12 +10,14 @@ from __future__ import annotations
 from collections.abc import Mapping
 from math import floor, sqrt
 
+from errors import UserError
 from framerunner.flying.plan import FlightPlan
 from scenarios.bound import Bound, Envelope, Fall, Reach, lower_bound
+from scenarios.models import MissionClass
 
 _FALL = Fall(level_m=0.45, level_per_m=0.8, longest_m=2.6, deepest_m=4.2, rise_m=0.3)
 
-ENVELOPES: Mapping[tuple[str, str], Envelope] = {
+ENVELOPES: Mapping[tuple[str, MissionClass], Envelope] = {
     # +-1 m/s on each axis of the drone, which at a yaw of 45 degrees to its way is sqrt(2) m/s in plan.
     ("abejorro", "contest"): Envelope(
         level=Reach(sqrt(2.0), 0.9, 2.75),
@@ -24,23 +26,40 @@ ENVELOPES: Mapping[tuple[str, str], Envelope] = {
         total_excess_m=0.5,
         fall=_FALL,
     ),
+    # The airframe's `level_speed_m_s` and its limits of climb and descent.
+    ("abejorro", "open"): Envelope(
+        level=Reach(1.7484, 1.0, 3.1),
+        up=Reach(1.5, 0.8, 3.3),
+        down=Reach(1.0, 0.4, 2.0),
+        total_excess_m=0.7,
+        fall=_FALL,
+    ),
 }
 """By airframe and class of the mission."""
 
 
-def bound_of(plan: FlightPlan, mission_class: str = "contest") -> Bound | None:
-    """The lower bound of a try of a plan's scenario; about 2 ms.
+class EnvelopeError(UserError):
+    """There is no bound, because the motion of the airframe was not measured."""
 
-    Returns:
-        None if it has no frames, or if the airframe's motion was not measured.
+
+def bound_of(plan: FlightPlan, mission_class: MissionClass) -> Bound:
+    """The lower bound of a try of a plan's scenario; takes some milliseconds.
+
+    Raises:
+        EnvelopeError: there is no envelope of this airframe.
+        ScenarioError: the scenario has no frames.
     """
-    envelope = ENVELOPES.get((plan.scenario.airframe, mission_class))
-    if envelope is None or not plan.scenario.frames:
-        return None
+    airframe = plan.scenario.airframe
+    envelope = ENVELOPES.get((airframe, mission_class))
+    if envelope is None:
+        known = ", ".join(sorted({name for name, _ in ENVELOPES}))
+        raise EnvelopeError(f"airframe {airframe}: its motion was not measured, so no bound; use {known}")
     return lower_bound(plan.layout, plan.start_pose[:3], plan.airframe.envelope_m[2], envelope)
 
 
-def bound_s(plan: FlightPlan, mission_class: str = "contest") -> float | None:
-    """The same in whole milliseconds, rounded down so that it stays a lower bound."""
-    bound = bound_of(plan, mission_class)
-    return None if bound is None else floor(bound.time_s * 1000.0) / 1000.0
+def bound_s(plan: FlightPlan, mission_class: MissionClass) -> float | None:
+    """The bound in whole milliseconds, rounded down so that it stays one; None if there is none."""
+    try:
+        return floor(bound_of(plan, mission_class).time_s * 1000.0) / 1000.0
+    except UserError:
+        return None

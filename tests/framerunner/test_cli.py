@@ -26,6 +26,7 @@ COMMANDS = [
     "camera",
     "doctor",
     "film",
+    "bound",
     "monitor",
     *(f"mission {name}" for name in ("list", "show", "check", "new")),
     *(f"scenario {name}" for name in ("list", "show", "check", "schema", "random")),
