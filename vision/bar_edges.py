@@ -9,13 +9,9 @@ import numpy as np
 import numpy.typing as npt
 
 from vision.frame_model import BAR_M, FRAME_HEIGHT_M, FRAME_WIDTH_M, Floats, Point, Segment, Sides
+from vision.patch import BACKGROUND, OWN, Labels, Patch
 
-Labels = npt.NDArray[np.uint8]
 Flags = npt.NDArray[np.bool_]
-Ints = npt.NDArray[np.intp]
-
-BACKGROUND, OWN, FOREIGN = 0, 1, 2
-"""Values of pixels: neither, of the region, and what may hide a part of it (or is not in the image)."""
 
 _OUTSIDE_PX = 3  # how far outside a first estimate of a side its outer edge is looked for
 _MAX_SAMPLES = 40  # per side
@@ -24,7 +20,7 @@ _SLACK_PX = 2.5  # a bar may look wider than expected by this much
 
 @dataclass(frozen=True, slots=True, eq=False)
 class BarEdges:
-    """The edges of a frame's bars, pixels of the labelled image; a row for each side.
+    """The edges of a frame's bars, pixels from the optical axis; a row for each side.
 
     A side that is nearer to a column than to a row of the image is steep. It is measured in rows t, the
     others in columns t. What is measured there counts towards the opening: the column (row if not steep)
@@ -55,36 +51,46 @@ class BarEdges:
     half_px: Floats
 
     @property
+    def forward(self) -> Flags:
+        """Per side, whether t grows going clockwise."""
+        steep = np.array(self.steep)
+        return np.where(steep, self.inward < 0.0, self.inward > 0.0)
+
+    @property
     def spans(self) -> Floats:
         """The first and the last place of each side, shape (4, 2)."""
         last = np.maximum(self.used.sum(axis=1) - 1, 0)
         return np.array([self.t[:, 0], self.t[np.arange(4), last]]).T
 
 
-def find_edges(labels: Labels, sides: Sides, spread_px: float) -> BarEdges:
+Widths = list[tuple[float, float]]
+"""Half the width of each bar's image at the start and the end of its side, across the bar."""
+
+
+def find_edges(patch: Patch, sides: Sides, half_px: Widths) -> BarEdges:
     """Find the edges of all four bars.
 
     Args:
-        labels: pixels, with a margin around the region in which the widest search ends.
-        sides: first estimates of the outer edges, from pixel centre to pixel centre.
-        spread_px: how much larger than its true outline a region is painted on each side.
+        patch: the region.
+        sides: first estimates of the outer edges, pixels from the optical axis, from pixel centre to centre.
+        half_px: what half the widths of the bars should be.
     """
-    half_px = _expected_half_px(sides, spread_px)
     corners = [_inner_corner(sides, half_px, k) for k in range(4)]
     plans = [
-        _NOWHERE if side is None else _plan(side, half_px[k], corners[k], corners[(k + 1) % 4])
+        _NOWHERE if side is None else _plan(side, half_px[k], corners[k], corners[(k + 1) % 4], patch.origin)
         for k, side in enumerate(sides)
     ]
     steep = tuple(plan.steep for plan in plans)
     inward, slope, first, step, count, u_first, half_first, half_slope = np.array(
         [plan.numbers for plan in plans]
     ).T[..., None]
-    places = np.arange(int(count.max()))
+    places = np.arange(max(int(count.max()), 1))
     used = places < count
     t = first + step * places
     u = np.rint(u_first + slope * (t - first))
     half = half_first + half_slope * (t - first)
 
+    labels = patch.labels
     stride = labels.strides[0]
     is_steep = np.array(steep)[:, None]
     base = np.where(is_steep, t * stride + u, u * stride + t).astype(np.intp)
@@ -95,7 +101,9 @@ def find_edges(labels: Labels, sides: Sides, spread_px: float) -> BarEdges:
     outer, outer_ok, inner, inner_ok = (
         run.reshape(t.shape) for run in _runs(around, (2.0 * half + _SLACK_PX).reshape(-1))
     )
-    from_here = inward * u
+    column, row = patch.origin
+    t -= np.where(is_steep, row, column)
+    from_here = inward * (u - np.where(is_steep, column, row))
     return BarEdges(
         steep, inward[:, 0], slope[:, 0], t, used,
         from_here + outer, from_here + inner, outer_ok & used, inner_ok & used, half,
@@ -117,10 +125,14 @@ class _Plan:
 _NOWHERE = _Plan(False, (1.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0))
 
 
-def _expected_half_px(sides: Sides, spread_px: float) -> list[tuple[float, float]]:
-    """Half the widths of the bars at the start and the end of each side, from the size of the outline.
+def expected_widths(sides: Sides, spread_px: float) -> Widths:
+    """What half the widths of the bars should be, by the size of the outline.
 
     The upright sides tell the scale at their distance. A square bar that is turned looks wider.
+
+    Args:
+        sides: first estimates of the outer edges.
+        spread_px: how much larger than its true outline a region is painted on each side.
     """
     top, right, bottom, left = (None if side is None else _length(side) for side in sides)
     height_right, height_left = right or left, left or right
@@ -148,7 +160,7 @@ def _length(side: Segment) -> float:
     return hypot(x1 - x0, y1 - y0)
 
 
-def _inner_corner(sides: Sides, half_px: list[tuple[float, float]], k: int) -> Point:
+def _inner_corner(sides: Sides, half_px: Widths, k: int) -> Point:
     """Where the inner edges of the sides k - 1 and k meet, as seen from where their outer edges do."""
     before, after = sides[k - 1], sides[k]
     if before is None or after is None:
@@ -165,7 +177,7 @@ def _direction(side: Segment) -> Point:
     return ((x1 - x0) / length, (y1 - y0) / length)
 
 
-def _plan(side: Segment, half_px: tuple[float, float], start: Point, end: Point) -> _Plan:
+def _plan(side: Segment, half_px: tuple[float, float], start: Point, end: Point, origin: Point) -> _Plan:
     """The columns or rows of a side that are clear of its neighbours' bars.
 
     Args:
@@ -173,8 +185,10 @@ def _plan(side: Segment, half_px: tuple[float, float], start: Point, end: Point)
         half_px: half the bar's width at its start and end.
         start: of the inner edge, as seen from the start of the outer one.
         end: the same for the end.
+        origin: column and row of the patch where the optical axis is; what is planned is in its pixels.
     """
-    (x0, y0), (x1, y1) = side
+    column, row = origin
+    x0, y0, x1, y1 = side[0][0] + column, side[0][1] + row, side[1][0] + column, side[1][1] + row
     dx, dy = x1 - x0, y1 - y0
     steep = abs(dy) > abs(dx)
     # Going round clockwise, the opening is on the right: below the top side, left of the right one.

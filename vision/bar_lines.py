@@ -18,7 +18,8 @@ from vision.frame_model import FRAME_HEIGHT_M, FRAME_WIDTH_M, Floats
 
 _QUANTISATION = 1.0 / 12.0  # variance of a rounded number
 _LEAST_VARIANCE = 4e-4
-_WIDTH_VARIANCE = 0.02  # of half a bar's width where only its outer edge is seen
+_WIDTH_VARIANCE = 0.02  # of half a bar's width where only its outer edge is seen ...
+_WIDTH_SHARE = 0.06  # ... and its standard deviation as a share of it, in addition
 _FEW_VARIANCE = 0.03  # of a line through one or two points, whose errors do not show
 
 
@@ -26,6 +27,7 @@ class BarLine(NamedTuple):
     """One bar's axis: `at + slope * (t - along)`, the row at column t, or the column at row t if steep."""
 
     steep: bool
+    inward: float  # 1 if the opening is on the side of larger columns (rows if not steep), else -1
     along: float
     at: float
     slope: float
@@ -34,8 +36,9 @@ class BarLine(NamedTuple):
     first: float  # the first t at which it was measured ...
     last: float  # ... and the last one
     half_px: float  # half the bar's width as it is in the image, measured as `at` is
+    points: int  # of the fit
     seen: float  # share of the places at which its outer edge was found
-    open: float  # share of the places at which its inner edge was found
+    open: float  # share of the places at which both edges were found
 
     def normal_form(self) -> tuple[float, float, float]:
         """(a, b, c) of a x + b y = c, where c is measured as `at` is."""
@@ -77,27 +80,22 @@ def fit_lines(edges: BarEdges, focal_px: float, offsets: Floats | None = None) -
         limit = np.maximum(1.0, 1.7 * np.sqrt(fit.mean_square))[:, None]
         usable &= fit.residual <= limit
         fit = _least_squares(edges, axis, usable)
-    numbers = zip(
-        *(values.tolist() for values in fit[:5]),
-        edges.spans.tolist(),
-        half_px.tolist(),
-        both.sum(axis=1).tolist(),
-        edges.outer_ok.sum(axis=1).tolist(),
-        edges.inner_ok.sum(axis=1).tolist(),
-        edges.used.sum(axis=1).tolist(),
-        strict=True,
-    )
+    first = np.where(usable, edges.t, np.inf).min(axis=1)
+    last = np.where(usable, edges.t, -np.inf).max(axis=1)
+    numbers = np.array([*fit[:5], first, last, half_px, *(f.sum(axis=1) for f in (both, edges.outer_ok))])
     lines: BarLines = []
-    for k, (count, t, u, slope, square, (first, last), half, boths, outers, inners, all_) in enumerate(
-        numbers
-    ):
-        if count == 0.0:
+    for k, side in enumerate(numbers.T.tolist()):
+        points, along, at, slope, square, start, end, half, boths, outers = side
+        if points == 0.0:
             lines.append(None)
             continue
-        two_edges = 2 * boths > all_
-        variances = _variances(count, last - first, slope, two_edges, square)
-        shares = (outers / all_, inners / all_)
-        lines.append(BarLine(edges.steep[k], t, u, slope, *variances, first, last, half, *shares))
+        planned = float(edges.used[k].sum())
+        two_edges = 2.0 * boths > points
+        variances = _variances(points, end - start, slope, 0.0 if two_edges else half, square)
+        position = (edges.steep[k], float(edges.inward[k]), along, at, slope)
+        lines.append(
+            BarLine(*position, *variances, start, end, half, int(points), outers / planned, boths / planned)
+        )
     _balance(lines, focal_px)
     return lines
 
@@ -162,21 +160,28 @@ def meeting(one: BarLine | None, other: BarLine | None) -> Meeting | None:
 
 
 def _variances(
-    count: float, length: float, slope: float, two_edges: bool, mean_square: float
+    count: float, length: float, slope: float, guessed_half_px: float, mean_square: float
 ) -> tuple[float, float]:
     """Variances of a fitted line's middle and slope.
 
     The pixels' rounding errors along a line are independent only where the line changes rows: a level line is
     rounded alike everywhere. On a slanted line the painter rounds where it begins, too, which moves all of
     it. The numbers were fitted to some ten thousand painted bars.
+
+    Args:
+        count: points.
+        length: from the first to the last one.
+        slope: of the line.
+        guessed_half_px: half the bar's width if that was added to one edge, 0 if both edges are seen.
+        mean_square: of the points' distances from the line.
     """
     steps = abs(slope) * length
-    edges = 2.0 if two_edges else 1.0
+    edges = 1.0 if guessed_half_px > 0.0 else 2.0
     noise = max(_QUANTISATION / edges, mean_square)
     slanted = slope * slope * _QUANTISATION
     var_at = noise / min(count, 1.0 + 8.0 * steps * steps) + slanted / edges + _LEAST_VARIANCE
-    if not two_edges:
-        var_at += _WIDTH_VARIANCE
+    if guessed_half_px > 0.0:
+        var_at += _WIDTH_VARIANCE + (_WIDTH_SHARE * guessed_half_px) ** 2
     if count < 3.0:
         var_at += _FEW_VARIANCE
     lever = max(length, 2.0 if count >= 3.0 else 3.0)

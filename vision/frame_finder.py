@@ -10,18 +10,15 @@ import cv2
 import numpy as np
 import numpy.typing as npt
 
-from vision.bar_edges import FOREIGN, BarEdges, find_edges
-from vision.bar_lines import BarLines, Meeting, fit_lines, meeting
 from vision.colour_regions import OBSTACLE, PRIMARIES, ColourMask, find_colours
 from vision.detector import measure
-from vision.frame_model import AXES_CORNERS, OUTER_CORNERS, Floats, ModelPose, Point, Sides, bar_offsets
-from vision.frame_pose import as_seen, find_poses
+from vision.frame_fit import fit_frame
 from vision.outer_sides import outer_sides
+from vision.patch import cut_patch
 from vision.types import (
     NOT_SEEN,
     Detection,
     Detections,
-    FrameCorner,
     FramePose,
     FrameSighting,
     Image,
@@ -38,7 +35,6 @@ PAINTED_SPREAD_PX = 0.5
 _OBSTACLE_STEP = 8
 _MIN_FRAGMENT_PX = 3
 _MAX_FRAGMENTS = 12
-_MAX_CORNER_STD_PX = 1.5
 
 
 class FrameFinder:
@@ -125,51 +121,9 @@ class FrameFinder:
         if sides is None:
             return None
         box = _bounding_box(points)
-        margin = 6 + max(box[2:]) // 4
-        left, top = box[0] - margin, box[1] - margin
-        edges = find_edges(_labels(mask, others, box, margin), _shifted(sides, -left, -top), self._spread_px)
-        origin = ((width - 1) / 2 - left, (height - 1) / 2 - top)
-        lines, meetings, poses = self._fit(edges, origin, max(box[2:]))
-        if not poses:
-            return None
-        corners = _outer_corners(meetings, poses[0], origin, self._focal_px)
-        if not any(corners):
-            return None
-        whole = _is_whole(lines, box, width, height)
-        return box, FrameSighting(mask.colour, corners, whole, tuple(map(as_seen, poses)))
-
-    def _fit(
-        self, edges: BarEdges, origin: Point, size_px: int
-    ) -> tuple[BarLines, list[Meeting | None], list[ModelPose]]:
-        """The axes of the bars, where they meet (of sides k - 1 and k) and the poses that follow.
-
-        The optical axis is at `origin` of the labelled image.
-        """
-        offsets: Floats | None = None
-        poses: list[ModelPose] = []
-        for _ in range(2):
-            lines = fit_lines(edges, self._focal_px, offsets)
-            meetings = [meeting(lines[k - 1], lines[k]) for k in range(4)]
-            known = [(m.x - origin[0], m.y - origin[1]) for m in meetings if m is not None]
-            if len(known) < 4:
-                break
-            poses = find_poses(known, self._focal_px, 0.6 + 0.02 * size_px)
-            if not poses:
-                break
-            offsets = self._offsets(edges, poses[0], origin)
-            if offsets is None:
-                break
-        return lines, meetings, poses
-
-    def _offsets(self, edges: BarEdges, pose: ModelPose, origin: Point) -> Floats | None:
-        """Where the edges of the bars should be beside their axes, as painted."""
-        spans = edges.spans - np.array([[origin[steep]] for steep in edges.steep])
-        offsets = bar_offsets(pose, edges.steep, edges.inward, spans, self._focal_px)
-        if offsets is None:
-            return None
-        offsets[:, 0] -= self._spread_px
-        offsets[:, 1] += self._spread_px
-        return offsets
+        patch = cut_patch(mask, others, box)
+        fitted = fit_frame(patch, sides, self._focal_px, self._spread_px)
+        return None if fitted is None else (box, FrameSighting(mask.colour, *fitted))
 
 
 def _bounding_box(points: _Contour) -> _Box:
@@ -200,50 +154,6 @@ def _groups(mask: ColourMask, others: Sequence[ColourMask]) -> list[list[_Contou
         x, y = contour[0, 0]
         groups.setdefault(int(labels[y - row, x - column]), []).append(contour)
     return list(groups.values())
-
-
-def _labels(mask: ColourMask, others: Sequence[ColourMask], box: _Box, margin: int) -> _Plane:
-    """The pixels around a box: of the colour, foreign (also what is outside the image), or background."""
-    height, width = mask.mask.shape
-    column, row, columns, rows = box
-    labels = np.full((rows + 2 * margin, columns + 2 * margin), FOREIGN, np.uint8)
-    x0, y0 = max(column - margin, 0), max(row - margin, 0)
-    x1, y1 = min(column + columns + margin, width), min(row + rows + margin, height)
-    inside = labels[y0 - row + margin : y1 - row + margin, x0 - column + margin : x1 - column + margin]
-    np.bitwise_and(mask.mask[y0:y1, x0:x1], 1, out=inside)
-    for other in others:
-        left, top, wide, high = other.box
-        if left < x1 and top < y1 and left + wide > x0 and top + high > y0:
-            inside |= other.mask[y0:y1, x0:x1] & FOREIGN
-    return labels
-
-
-def _shifted(sides: Sides, dx: float, dy: float) -> Sides:
-    moved = [
-        None if side is None else ((side[0][0] + dx, side[0][1] + dy), (side[1][0] + dx, side[1][1] + dy))
-        for side in sides
-    ]
-    return (moved[0], moved[1], moved[2], moved[3])
-
-
-def _outer_corners(
-    meetings: list[Meeting | None], pose: ModelPose, origin: Point, focal_px: float
-) -> tuple[FrameCorner | None, FrameCorner | None, FrameCorner | None, FrameCorner | None]:
-    """The corners of the outline in the frame's middle plane, from those of the bars' axes."""
-    outer, axes = pose.project(OUTER_CORNERS, focal_px), pose.project(AXES_CORNERS, focal_px)
-    corners: list[FrameCorner | None] = [None] * 4
-    if outer is not None and axes is not None:
-        for k, ((right, down), met) in enumerate(zip((outer - axes).tolist(), meetings, strict=True)):
-            if met is not None:
-                x, y = met.x - origin[0] + right, met.y - origin[1] + down
-                corners[k] = FrameCorner(x, y, met.std_x, met.std_y)
-    return (corners[0], corners[1], corners[2], corners[3])
-
-
-def _is_whole(lines: BarLines, box: _Box, width: int, height: int) -> bool:
-    column, row, columns, rows = box
-    inside = column > 0 and row > 0 and column + columns < width and row + rows < height
-    return inside and all(line is not None and line.seen > 0.99 for line in lines)
 
 
 def _signed_angle(pose: FramePose) -> float:

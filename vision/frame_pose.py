@@ -9,15 +9,22 @@ with numbers that are no pose and still report success, so every answer is proje
 from __future__ import annotations
 
 from collections.abc import Sequence
-from math import isfinite, sqrt
+from math import atan2, cos, hypot, isfinite, pi, sqrt
 
 import cv2
 import numpy as np
 
-from vision.frame_model import AXES_CORNERS, Floats, ModelPose, Point
+from vision.frame_model import AXES_CORNERS, AXES_HEIGHT_M, AXES_WIDTH_M, Floats, ModelPose, Point
 from vision.types import FramePose
 
 _IDENTITY = np.eye(3)
+_NEAREST_M = 0.03
+_MAX_STEPS = 12
+_SMALL_STEP = 1e-4  # metres and radians
+_MAX_DEPTH_ERROR = 0.08  # a pose that is less sure than this, relative to its distance, is left out
+_MAX_TURN_ERROR = 0.25  # the same for its angle about the upright axis, radians
+_MAX_DEVIATIONS = 3.0
+_SAME_COSINE = 0.9995
 _NUDGE = np.array([[1e-6, 2e-6], [-2e-6, 1e-6], [2e-6, -1e-6], [1e-6, 1e-6]]).reshape(4, 1, 2)
 
 
@@ -73,3 +80,96 @@ def _pose(turn: Floats, shift: Floats, image: Floats, focal_px: float) -> ModelP
         return None
     error = (points[:, :2] / points[:, 2:] - image[:, 0]).ravel()
     return ModelPose(rotation, shift.ravel(), focal_px * sqrt(float(error @ error) / 4.0))
+
+
+def poses_of_three(
+    lines: Sequence[tuple[float, float, float] | None],
+    corners: Sequence[Point | None],
+    weights: Sequence[tuple[float, float]],
+    focal_px: float,
+) -> list[ModelPose]:
+    """Find the poses of a frame of which one side is not seen.
+
+    Args:
+        lines: (a, b, c) of a x + b y = c for the axis of each side, pixels from the optical axis; one is
+            None.
+        corners: where the axes meet; two are None.
+        weights: of each line at its first and its second corner, 1/px.
+        focal_px: focal length.
+
+    Returns:
+        None, one or two, those with the smaller turn first. Three lines fix all six numbers of a pose, so no
+        error tells one from the other.
+    """
+    missing = next(k for k, line in enumerate(lines) if line is None)
+    opposite = (missing + 2) % 4
+    one, other = corners[opposite], corners[(opposite + 1) % 4]
+    if one is None or other is None:
+        return []
+    rows = [(k, end) for k in range(4) if k != missing for end in (0, 1)]
+    normals = np.array([lines[k] for k, _ in rows])
+    points = AXES_CORNERS[[(k + end) % 4 for k, end in rows]]
+    scale = np.array([weights[k][end] for k, end in rows])
+    found: list[ModelPose] = []
+    for turn in (-0.8, 0.8):
+        pose = _refined(_first_guess(opposite, one, other, turn, focal_px), points, normals, scale, focal_px)
+        if pose is not None and all(_differ(pose, known) for known in found):
+            found.append(pose)
+    return sorted(found, key=lambda pose: -abs(float(pose.rotation[2, 2])))
+
+
+def _first_guess(side: int, one: Point, other: Point, turn: float, focal_px: float) -> ModelPose:
+    """A pose turned about the upright axis by a given angle that puts one side about where it is seen."""
+    dx, dy = other[0] - one[0], other[1] - one[1]
+    upright = side % 2 == 1
+    length_m = AXES_HEIGHT_M if upright else AXES_WIDTH_M * cos(turn)
+    depth_m = length_m * focal_px / max(hypot(dx, dy), 1.0)
+    # The direction in which this side goes in the model, turned to the one in which it is seen.
+    roll = atan2(dy, dx) - (0.0, pi / 2, pi, -pi / 2)[side]
+    about_y, about_z = np.array([0.0, turn, 0.0]), np.array([0.0, 0.0, roll])
+    rotation = cv2.Rodrigues(about_z)[0] @ cv2.Rodrigues(about_y)[0]
+    middle = np.array([one[0] + other[0], one[1] + other[1], 2.0 * focal_px]) * (0.5 * depth_m / focal_px)
+    model = 0.5 * (AXES_CORNERS[side] + AXES_CORNERS[(side + 1) % 4])
+    return ModelPose(rotation, middle - rotation @ model, 0.0)
+
+
+def _refined(
+    guess: ModelPose, points: Floats, normals: Floats, weights: Floats, focal_px: float
+) -> ModelPose | None:
+    """Gauss and Newton's method on the distances of a model's points from lines; None if it fails."""
+    rotation, shift = guess.rotation, guess.shift_m
+    for _ in range(_MAX_STEPS):
+        turned = points @ rotation.T
+        seen = turned + shift
+        depth = seen[:, 2]
+        if depth.min() <= _NEAREST_M:
+            return None
+        x, y = focal_px * seen[:, 0] / depth, focal_px * seen[:, 1] / depth
+        a, b, c = normals.T
+        error = (a * x + b * y - c) * weights
+        along = (np.array([a * focal_px, b * focal_px, -(a * x + b * y)]) * (weights / depth)).T
+        jacobian = np.hstack([np.cross(turned, along), along])
+        square = jacobian.T @ jacobian
+        try:
+            step = np.linalg.solve(square + 1e-9 * np.diag(np.diag(square)), -jacobian.T @ error)
+        except np.linalg.LinAlgError:
+            return None
+        size = float(np.abs(step).max())
+        if not isfinite(size):
+            return None
+        step *= min(1.0, 0.5 / max(size, 1e-9))
+        rotation, shift = cv2.Rodrigues(step[:3])[0] @ rotation, shift + step[3:]
+        if size < _SMALL_STEP:
+            break
+    else:
+        return None
+    spread = np.sqrt(np.abs(np.diag(np.linalg.pinv(square))))
+    unsure = float(spread[5]) > _MAX_DEPTH_ERROR * float(shift[2]) or float(spread[1]) > _MAX_TURN_ERROR
+    if unsure or rotation[1, 1] <= 0.0 or float(np.abs(error).max()) > _MAX_DEVIATIONS:
+        return None
+    facing = rotation[:, 2] @ shift
+    return ModelPose(rotation, shift, sqrt(float(error @ error) / 4.0)) if facing > 0.0 else None
+
+
+def _differ(one: ModelPose, other: ModelPose) -> bool:
+    return float(one.rotation[:, 2] @ other.rotation[:, 2]) < _SAME_COSINE

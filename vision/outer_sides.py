@@ -36,8 +36,8 @@ def outer_sides(points: npt.NDArray[np.int32], width_px: int, height_px: int) ->
         height_px: of the image.
 
     Returns:
-        Top, right, bottom and left side, clockwise; None for a side that is not seen. None if there is no
-        such quadrilateral.
+        Top, right, bottom and left side, clockwise, pixels from the optical axis in the image's middle; None
+        for a side that is not seen. None if there is no such quadrilateral.
     """
     hull = cv2.convexHull(points)  # clockwise to the eye, as OpenCV's axes have y upwards
     if len(hull) < 4:
@@ -52,7 +52,8 @@ def outer_sides(points: npt.NDArray[np.int32], width_px: int, height_px: int) ->
     else:
         corners = cv2.approxPolyN(hull.astype(np.float32), 4).reshape(-1, 2).tolist()
         segments = [(tuple(corners[i - 1]), tuple(corners[i])) for i in range(len(corners))]
-    return _named(segments)
+    column, row = (width_px - 1) / 2, (height_px - 1) / 2
+    return _named([((x0 - column, y0 - row), (x1 - column, y1 - row)) for (x0, y0), (x1, y1) in segments])
 
 
 def _named(segments: list[Segment]) -> Sides | None:

@@ -1,0 +1,208 @@
+"""One frame in one image: its corners and poses, from the pixels of one region.
+
+The axes of the bars are fitted, a pose follows, from that where the edges of the bars should be beside their
+axes, and with it the axes are fitted again. What cannot be a frame, or a part of one, is refused: along the
+bars' axes there must be nothing but pixels of the region and what may hide it.
+"""
+
+from __future__ import annotations
+
+from math import sqrt
+from typing import NamedTuple
+
+import numpy as np
+
+from vision.bar_edges import BarEdges, Widths, expected_widths, find_edges
+from vision.bar_lines import BarLine, BarLines, Meeting, fit_lines, meeting
+from vision.frame_model import AXES_CORNERS, OUTER_CORNERS, Floats, ModelPose, Sides, bar_offsets
+from vision.frame_pose import as_seen, find_poses, poses_of_three
+from vision.patch import Patch
+from vision.types import FrameCorner, FramePose
+
+Corners = tuple[FrameCorner | None, FrameCorner | None, FrameCorner | None, FrameCorner | None]
+_Meetings = list[Meeting | None]
+
+_MAX_EMPTY = 0.15  # share of a bar where neither the bar nor anything that could hide it is seen
+_MAX_OWN_UNSEEN = 0.4  # share of a bar that seems to be seen although it was not found
+_WHOLE = 0.9  # share of a bar that is seen if nothing hides it; shaded and thin bars may have gaps
+_MAX_CORNER_STD_PX = 2.5
+_TOO_NARROW = 1.2
+_WIDTH_SHARE, _WIDTH_SHARE_STD = 0.75, 0.15  # of half a bar's image that is half of the bar's width
+
+
+class FittedFrame(NamedTuple):
+    """What `vision.types.FrameSighting` tells, without the colour."""
+
+    corners: Corners
+    whole: bool
+    poses: tuple[FramePose, ...]
+
+
+def fit_frame(patch: Patch, sides: Sides, focal_px: float, spread_px: float) -> FittedFrame | None:
+    """Fit a frame to a region; None if the region is no frame and no sure part of one.
+
+    Args:
+        patch: the region.
+        sides: first estimates of its outer edges, pixels from the optical axis, from pixel centre to centre.
+        focal_px: focal length.
+        spread_px: how much larger than its true outline a region is painted on each side.
+    """
+    lines, meetings, poses = _fit(patch, sides, focal_px, spread_px)
+    known = [(met.x, met.y) for met in meetings if met is not None]
+    if len(known) == 4:
+        support = patch.support(known, known[1:] + known[:1])
+        if max(support.empty) <= _MAX_EMPTY:
+            whole = min(support.own) >= _WHOLE
+            corners = _outer_corners(meetings, poses[0], focal_px, whole) if poses else None
+            return None if corners is None else FittedFrame(corners, whole, tuple(map(as_seen, poses)))
+        a, b, c, d = (
+            side if empty <= _MAX_EMPTY else None for side, empty in zip(sides, support.empty, strict=True)
+        )
+        lines, meetings, poses = _fit(patch, (a, b, c, d), focal_px, spread_px)
+    corners = _outer_corners(meetings, poses[0], focal_px, False) if poses else None
+    if corners is None:
+        corners = _corners_without_pose(patch, lines, spread_px)
+    return FittedFrame(corners, False, tuple(map(as_seen, poses))) if any(corners) else None
+
+
+def _fit(
+    patch: Patch, sides: Sides, focal_px: float, spread_px: float
+) -> tuple[BarLines, _Meetings, list[ModelPose]]:
+    """The axes of the sides, where they meet (sides k - 1 and k) and the poses that follow."""
+    edges = find_edges(patch, sides, expected_widths(sides, spread_px))
+    lines, meetings, poses = _lines_and_poses(patch, edges, None, focal_px)
+    for _ in range(2):
+        if not poses:
+            break
+        offsets = bar_offsets(poses[0], edges.steep, edges.inward, edges.spans, focal_px)
+        if offsets is None:
+            break
+        offsets[:, 0] -= spread_px
+        offsets[:, 1] += spread_px
+        wider = _wider(edges, offsets)
+        lines, meetings, poses = _lines_and_poses(patch, edges, offsets, focal_px)
+        if wider is None or not poses:
+            break
+        edges = find_edges(patch, sides, wider)  # a side that is cut looked like one of a smaller frame
+    return lines, meetings, poses
+
+
+def _wider(edges: BarEdges, offsets: Floats) -> Widths | None:
+    """Half the widths of the bars by a pose, if bars that were looked for are too narrow; else None."""
+    half_px = 0.5 * (offsets[:, 1] - offsets[:, 0])
+    used = edges.used.any(axis=1)
+    if not (used & (half_px.max(axis=1) > _TOO_NARROW * edges.half_px.max(axis=1) + 0.5)).any():
+        return None
+    half_px /= np.hypot(1.0, edges.slope)[:, None]
+    forward = edges.forward[:, None]
+    ends = np.where(forward, half_px, half_px[:, ::-1])
+    return [(start, end) for start, end in ends.tolist()]
+
+
+def _lines_and_poses(
+    patch: Patch, edges: BarEdges, offsets: Floats | None, focal_px: float
+) -> tuple[BarLines, _Meetings, list[ModelPose]]:
+    lines = [line if _is_sure(line) else None for line in fit_lines(edges, focal_px, offsets)]
+    meetings = [meeting(lines[k - 1], lines[k]) for k in range(4)]
+    return lines, meetings, _poses(patch, lines, meetings, focal_px)
+
+
+def _is_sure(line: BarLine | None) -> bool:
+    """Whether enough of a side is seen to know where it is."""
+    return line is not None and (line.seen > 0.5 or line.points >= 4)
+
+
+def _poses(patch: Patch, lines: BarLines, meetings: _Meetings, focal_px: float) -> list[ModelPose]:
+    """The poses that explain four or three lines."""
+    known = [met for met in meetings if met is not None]
+    if len(known) == 4:
+        mean_square = sum(met.std_x**2 + met.std_y**2 for met in known) / 4.0
+        limit = 0.4 + 2.0 * sqrt(mean_square)
+        return find_poses([(met.x, met.y) for met in known], focal_px, limit)
+    if len(known) != 2 or sum(line is not None for line in lines) != 3:
+        return []
+    missing = lines.index(None)
+    forms = [None if line is None else line.normal_form() for line in lines]
+    corners = [None if met is None else (met.x, met.y) for met in meetings]
+    weights = [_weights(lines[k], meetings[k], meetings[(k + 1) % 4]) for k in range(4)]
+    poses = poses_of_three(forms, corners, weights, focal_px)
+    return [pose for pose in poses if _explains(patch, pose, missing, focal_px)]
+
+
+def _weights(line: BarLine | None, start: Meeting | None, end: Meeting | None) -> tuple[float, float]:
+    """How exactly a line is known at its ends, 1/px."""
+    if line is None:
+        return (0.0, 0.0)
+    # An end that is not known is about as far from what was measured as the line is long.
+    beyond = line.last - line.first
+    unknown = line.var_at + line.var_slope * beyond * beyond
+    one, other = (unknown if met is None else line.variance(met.x, met.y) for met in (start, end))
+    return (1.0 / sqrt(one), 1.0 / sqrt(other))
+
+
+def _explains(patch: Patch, pose: ModelPose, missing: int, focal_px: float) -> bool:
+    """Whether a pose has the bars where they are seen, and the missing one where it cannot be seen."""
+    corners = pose.project(AXES_CORNERS, focal_px)
+    if corners is None:
+        return False
+    support = patch.support(corners, np.roll(corners, -1, axis=0))
+    return max(support.empty) <= _MAX_EMPTY and support.own[missing] <= _MAX_OWN_UNSEEN
+
+
+def _outer_corners(meetings: _Meetings, pose: ModelPose, focal_px: float, whole: bool) -> Corners | None:
+    """The corners of the outline in the frame's middle plane, from those of the bars' axes."""
+    outer, axes = pose.project(OUTER_CORNERS, focal_px), pose.project(AXES_CORNERS, focal_px)
+    if outer is None or axes is None:
+        return None
+    beyond = (outer - axes).tolist()
+    found = [
+        None if met is None else _corner(met, right, down, whole)
+        for met, (right, down) in zip(meetings, beyond, strict=True)
+    ]
+    return _corners(found) if any(found) else None
+
+
+def _corners_without_pose(patch: Patch, lines: BarLines, spread_px: float) -> Corners:
+    """Corners of the outline if too little of a frame is seen for a pose: where two bars are seen to meet.
+
+    They are half a bar outside the axes. A bar's depth is seen beside its width, how much of it depends on
+    the unknown pose.
+    """
+    found: list[FrameCorner | None] = [None] * 4
+    for k in range(4):
+        before, after = lines[k - 1], lines[k]
+        met = meeting(before, after)
+        if met is None or before is None or after is None:
+            continue
+        bars = (before, after)
+        if min(bar.open for bar in bars) < 0.3 or min(bar.points for bar in bars) < 4:
+            continue
+        middles = [_point(bar) for bar in bars]
+        if min(patch.support([(met.x, met.y)] * 2, middles).own) < _WHOLE:
+            continue
+        outer = meeting(_moved_outward(before, spread_px), _moved_outward(after, spread_px))
+        found[k] = None if outer is None else _corner(outer, 0.0, 0.0, False)
+    return _corners(found)
+
+
+def _point(line: BarLine) -> tuple[float, float]:
+    """The middle of what was measured of a line."""
+    return (line.at, line.along) if line.steep else (line.along, line.at)
+
+
+def _moved_outward(line: BarLine, spread_px: float) -> BarLine:
+    """From the axis of a bar to its outer edge in the frame's middle plane."""
+    half_px = max(line.half_px - spread_px, 0.0)
+    at = line.at - line.inward * _WIDTH_SHARE * half_px
+    return line._replace(at=at, var_at=line.var_at + (_WIDTH_SHARE_STD * half_px) ** 2)
+
+
+def _corner(met: Meeting, right_px: float, down_px: float, whole: bool) -> FrameCorner | None:
+    """A corner as others use it, moved; None if it is not sure and the frame is not seen whole."""
+    if not whole and max(met.std_x, met.std_y) > _MAX_CORNER_STD_PX:
+        return None
+    return FrameCorner(met.x + right_px, met.y + down_px, met.std_x, met.std_y)
+
+
+def _corners(found: list[FrameCorner | None]) -> Corners:
+    return (found[0], found[1], found[2], found[3])

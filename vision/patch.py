@@ -1,0 +1,76 @@
+"""A part of an image in which the pixels of one region are marked, and what else may hide its neighbours."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from vision.colour_regions import ColourMask
+from vision.frame_model import Floats, Point
+
+Labels = npt.NDArray[np.uint8]
+Box = tuple[int, int, int, int]  # column, row, columns, rows
+
+BACKGROUND, OWN, FOREIGN = 0, 1, 2
+"""Values of pixels: neither, of the region, and what may hide a part of it (or is not in the image)."""
+
+_PLACES = (np.arange(16) + 0.5) / 16.0  # along a bar, as shares of its length
+_ACROSS = np.array([[0, 0], [-1, 0], [1, 0], [0, -1], [0, 1]])  # a thin bar may be a pixel beside its axis
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Patch:
+    """A part of an image around a region, with a margin.
+
+    Attributes:
+        labels: its pixels.
+        origin: column and row of it where the optical axis is; whole numbers are pixel centres.
+        reach_px: from the optical axis to the right and to the lower edge of the whole image.
+    """
+
+    labels: Labels
+    origin: Point
+    reach_px: Point
+
+    def support(self, starts: Sequence[Point] | Floats, ends: Sequence[Point] | Floats) -> Support:
+        """Look along straight bars, given by the ends of their axes, pixels from the optical axis."""
+        start = np.asarray(starts, np.float64)[:, None]
+        points = start + (np.asarray(ends, np.float64)[:, None] - start) * _PLACES[:, None]
+        beyond = (np.abs(points) > self.reach_px).any(axis=2)
+        at = np.rint(points + self.origin).astype(np.intp)[:, :, None] + _ACROSS
+        rows, columns = self.labels.shape
+        known = (at >= 0).all(axis=3) & (at[..., 0] < columns) & (at[..., 1] < rows)
+        index = np.where(known, at[..., 1] * columns + at[..., 0], 0)
+        seen = np.where(known, self.labels.reshape(-1)[index], BACKGROUND)
+        own = (seen == OWN).any(axis=2)
+        empty = ~own & ~beyond & ~(seen == FOREIGN).any(axis=2)
+        return Support(own.mean(axis=1).tolist(), empty.mean(axis=1).tolist())
+
+
+@dataclass(frozen=True, slots=True)
+class Support:
+    """What is seen along each bar, shares 0..1 of its length."""
+
+    own: list[float]  # pixels of the region
+    empty: list[float]  # pixels of nothing that could hide it; the rest is hidden or outside the image
+
+
+def cut_patch(mask: ColourMask, others: Sequence[ColourMask], box: Box) -> Patch:
+    """Cut the part of an image around a box, for a region of one colour beside others."""
+    height, width = mask.mask.shape
+    column, row, columns, rows = box
+    margin = 6 + max(columns, rows) // 4  # wider than any bar
+    labels = np.full((rows + 2 * margin, columns + 2 * margin), FOREIGN, np.uint8)
+    x0, y0 = max(column - margin, 0), max(row - margin, 0)
+    x1, y1 = min(column + columns + margin, width), min(row + rows + margin, height)
+    inside = labels[y0 - row + margin : y1 - row + margin, x0 - column + margin : x1 - column + margin]
+    np.bitwise_and(mask.mask[y0:y1, x0:x1], OWN, out=inside)
+    for other in others:
+        left, top, wide, high = other.box
+        if left < x1 and top < y1 and left + wide > x0 and top + high > y0:
+            inside |= other.mask[y0:y1, x0:x1] & FOREIGN
+    origin = ((width - 1) / 2 - column + margin, (height - 1) / 2 - row + margin)
+    return Patch(labels, origin, (width / 2, height / 2))
