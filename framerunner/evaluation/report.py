@@ -107,6 +107,7 @@ def write_report(
     text = environment.get_template("report.html.j2").render(
         page=page,
         identity=folder.identity,
+        is_open=any(row.mission_class == "open" for row in rows),
         summary=page.summary,
         comparison=page.comparison,
         comparison_lines=comparison_lines(page.comparison) if page.comparison else [],

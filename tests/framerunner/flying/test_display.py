@@ -6,11 +6,12 @@ from io import StringIO
 import pytest
 from rich.console import Console
 
-from framerunner.flying.display import FlightDisplay
+from framerunner.flying.display import FlightDisplay, result_lines
 from framerunner.runs.recorder import FlightRecorder
 from offboard.app import Moment
 from offboard.drone import DroneState, VelocityCommand
-from scenarios.result import RefereeSnapshot
+from scenarios.result import FlightResult, RefereeSnapshot
+from scenarios.verdict import Verdict
 from vision.types import Detection, Detections
 
 SEEN = Detection(n=10, s=-10, e=20, w=-20, d=2.345, a=31.0)
@@ -79,6 +80,12 @@ def test_the_table_shows_a_pause(flight):
     see(recorder, 12.3, "red.turning", "POSCTL", paused=True)
     text = rendered(display._table(None))
     assert "paused" in text and "the pilot has the sticks (POSCTL)" in text
+
+
+def test_the_result_says_that_a_flight_was_of_the_class_open():
+    result = FlightResult(verdict=Verdict.CLEAN, reason="clean", judged_by="truth")
+    assert "class" not in result_lines(result)
+    assert "judged by truth, class open" in result_lines(result.model_copy(update={"mission_class": "open"}))
 
 
 async def test_before_the_first_tick_nothing_is_printed(flight, capsys):
