@@ -1,0 +1,209 @@
+"""Follows a planned path by velocity commands.
+
+A command is the path's velocity and acceleration, ahead by the vehicle's delay, plus a share of the drone's
+offset from where the path was when its position was measured. The path's time waits for a drone that falls
+behind, so corners are never cut.
+"""
+
+from __future__ import annotations
+
+from collections import deque
+from dataclasses import dataclass
+from math import cos, hypot, pi, remainder, sin
+
+from geometry.vectors import Vec3
+from offboard.drone import DroneState, VelocityCommand
+from offboard.navigation.goals import Motion
+from offboard.navigation.path import Path
+
+HOLD_S = 0.025  # half the time for which a command holds
+POSITION_GAIN_PER_S = 1.0
+VELOCITY_GAIN = 0.2
+YAW_GAIN_PER_S = 2.0
+INTEGRAL_GAIN_PER_S2 = 0.2
+MAX_INTEGRAL_M_S = 0.15
+INTEGRAL_REACH_M = 0.15  # farther from the path, the integral does not grow
+MAX_CORRECTION_M_S = 0.6
+WAIT_FROM_M = 0.1  # farther from the path, its time goes slower
+WAIT_M = 0.25  # beyond that, it stands still
+_MAX_STEP_S = 0.3
+_HISTORY = 16  # ticks
+_RATE_S = 0.05  # over which the acceleration of the heading is measured
+
+
+@dataclass(frozen=True, slots=True)
+class Response:
+    """How a vehicle's velocity follows commands: after a dead time, with a lag of first order.
+
+    The defaults are the simulated drone's.
+
+    Attributes:
+        turning: its velocity follows in level axes that turn with its heading, so that a turn at speed needs
+            commands ahead; else in axes that do not turn.
+    """
+
+    level_dead_s: float = 0.075
+    level_tilt_s: float = 0.15
+    level_lag_s: float = 0.3
+    climb_dead_s: float = 0.05
+    climb_lag_s: float = 0.05
+    yaw_dead_s: float = 0.05
+    yaw_lag_s: float = 0.05
+    turning: bool = True
+
+
+class PathFollower:
+    """Follows one path after another; call `command` once a tick.
+
+    Args:
+        response: of the vehicle.
+        axis_limit_m_s: of commands, forward, left and up.
+        yaw_rate_limit_rad_s: of commands.
+
+    Attributes:
+        progress_s: time along the path.
+        error_m: the drone's distance from the path when its position was measured.
+    """
+
+    def __init__(
+        self,
+        response: Response | None = None,
+        axis_limit_m_s: float = 1.0,
+        yaw_rate_limit_rad_s: float = 1.0,
+    ) -> None:
+        self.response = response or Response()
+        self.progress_s = 0.0
+        self.error_m = 0.0
+        self._limits = (axis_limit_m_s, yaw_rate_limit_rad_s)
+        self._path: Path | None = None
+        self._last_s: float | None = None
+        self._rate = 1.0  # of the path's time
+        self._integral: list[float] = [0.0, 0.0, 0.0]
+        self._past: deque[tuple[float, Motion]] = deque(maxlen=_HISTORY)
+
+    def reference(self) -> Motion | None:
+        """The path's motion now, to plan the next path from; None before the first command."""
+        if self._path is None:
+            return None
+        motion = self._path.at(self.progress_s)
+        if self._rate == 1.0:
+            return motion
+        velocity, acceleration = _slowed(motion, self._rate)
+        rate = motion.yaw_rate_rad_s * self._rate
+        return Motion(motion.position_m, velocity, motion.yaw_rad, rate, acceleration)
+
+    @property
+    def finished(self) -> bool:
+        """The path's end is reached, by its time."""
+        return self._path is not None and self.progress_s >= self._path.duration_s
+
+    def command(self, path: Path, state: DroneState, now_s: float) -> VelocityCommand:
+        """The command for this tick.
+
+        Args:
+            path: another one than at the last tick starts where the last tick left the path before it: see
+                `reference`.
+            state: of the drone.
+            now_s: vehicle time of the state.
+        """
+        step_s = 0.0 if self._last_s is None else min(max(now_s - self._last_s, 0.0), _MAX_STEP_S)
+        self._last_s = now_s
+        if path is not self._path:
+            self._path, self.progress_s = path, 0.0
+        self.progress_s = min(self.progress_s + self._rate * step_s, path.duration_s)
+        motion = path.at(self.progress_s)
+        self._past.append((now_s, motion))
+        error, slower = self._errors(state, now_s)
+        self.error_m = hypot(*error)
+        self._rate = min(max(1.0 - (self.error_m - WAIT_FROM_M) / WAIT_M, 0.0), 1.0)
+        self._integrate(error, step_s)
+        correction = [
+            POSITION_GAIN_PER_S * e + VELOCITY_GAIN * v + i
+            for e, v, i in zip(error, slower, self._integral, strict=True)
+        ]
+        size = hypot(*correction)
+        scale = MAX_CORRECTION_M_S / size if size > MAX_CORRECTION_M_S else 1.0
+        forward, left = self._level(path, state, scale * correction[0], scale * correction[1])
+        up = self._climb(path) + scale * correction[2]
+        return self._limited(forward, left, up, self._yaw_rate(path, state))
+
+    def _level(self, path: Path, state: DroneState, add_x: float, add_y: float) -> tuple[float, float]:
+        """Speeds forward and to the left: the path's, ahead of time, and a correction in arena axes."""
+        response, rate = self.response, self._rate
+        at_s = self.progress_s + rate * (response.level_dead_s + HOLD_S)
+        ahead, later = path.at(at_s), path.at(at_s + rate * response.level_tilt_s)
+        (vx, vy, _), (ax, ay, _) = _slowed(ahead, rate)[0], _slowed(later, rate)[1]
+        now = self._past[-1][1]
+        if response.turning:
+            yaw = state.yaw + remainder(ahead.yaw_rad - now.yaw_rad, 2 * pi)
+            turn_rate = rate * ahead.yaw_rate_rad_s
+            ax, ay = ax + turn_rate * vy, ay - turn_rate * vx  # as seen from axes that turn
+        else:
+            yaw = state.yaw + rate * now.yaw_rate_rad_s * HOLD_S
+        x, y = vx + response.level_lag_s * ax + add_x, vy + response.level_lag_s * ay + add_y
+        c, s = cos(yaw), sin(yaw)
+        return c * x + s * y, c * y - s * x
+
+    def _climb(self, path: Path) -> float:
+        response, rate = self.response, self._rate
+        ahead = path.at(self.progress_s + rate * (response.climb_dead_s + HOLD_S))
+        velocity, acceleration = _slowed(ahead, rate)
+        return velocity[2] + response.climb_lag_s * acceleration[2]
+
+    def _errors(self, state: DroneState, now_s: float) -> tuple[Vec3, Vec3]:
+        """From the drone to the path: position and velocity, both when the drone's were measured."""
+        at_s = now_s - state.position_age_s
+        later_s, later = self._past[-1]
+        position, velocity = later.position_m, _slowed(later, self._rate)[0]
+        for before_s, before in reversed(self._past):
+            if before_s <= at_s:
+                if later_s > before_s:
+                    share = (at_s - before_s) / (later_s - before_s)
+                    position = _between(before.position_m, later.position_m, share)
+                break
+            later_s, later = before_s, before
+        return _minus(position, (state.x, state.y, state.z)), _minus(velocity, state.velocity_arena_m_s)
+
+    def _integrate(self, error: Vec3, step_s: float) -> None:
+        if self.error_m > INTEGRAL_REACH_M:
+            return
+        for axis in range(3):
+            value = self._integral[axis] + INTEGRAL_GAIN_PER_S2 * error[axis] * step_s
+            self._integral[axis] = min(max(value, -MAX_INTEGRAL_M_S), MAX_INTEGRAL_M_S)
+
+    def _yaw_rate(self, path: Path, state: DroneState) -> float:
+        response, rate = self.response, self._rate
+        at_s = self.progress_s + rate * (response.yaw_dead_s + HOLD_S)
+        ahead, later = path.at(at_s), path.at(at_s + _RATE_S)
+        now = self._past[-1][1]
+        change = (later.yaw_rate_rad_s - ahead.yaw_rate_rad_s) / _RATE_S
+        error = remainder(now.yaw_rad - state.yaw, 2 * pi)
+        return (
+            rate * ahead.yaw_rate_rad_s + rate * rate * response.yaw_lag_s * change + YAW_GAIN_PER_S * error
+        )
+
+    def _limited(self, forward: float, left: float, up: float, yaw_rate: float) -> VelocityCommand:
+        """The command within the limits: an axis at its limit leaves the others as they are."""
+        limit, yaw_limit = self._limits
+        return VelocityCommand(
+            min(max(forward, -limit), limit),
+            min(max(left, -limit), limit),
+            min(max(up, -limit), limit),
+            min(max(yaw_rate, -yaw_limit), yaw_limit),
+        )
+
+
+def _slowed(motion: Motion, rate: float) -> tuple[Vec3, Vec3]:
+    """Velocity and acceleration of a motion whose time goes at a constant rate."""
+    vx, vy, vz = motion.velocity_m_s
+    ax, ay, az = motion.acceleration_m_s2
+    square = rate * rate
+    return (rate * vx, rate * vy, rate * vz), (square * ax, square * ay, square * az)
+
+
+def _between(a: Vec3, b: Vec3, share: float) -> Vec3:
+    return (a[0] + share * (b[0] - a[0]), a[1] + share * (b[1] - a[1]), a[2] + share * (b[2] - a[2]))
+
+
+def _minus(a: Vec3, b: Vec3) -> Vec3:
+    return (a[0] - b[0], a[1] - b[1], a[2] - b[2])

@@ -1,0 +1,165 @@
+"""What to fly: gates and points, how boldly, and between which obstacles."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from math import cos, sin
+
+from geometry.vectors import Vec3
+from scenarios.models import Base
+
+HEADROOM = 0.92
+"""Share of a limit that a path uses; the rest is for corrections."""
+
+
+@dataclass(frozen=True, slots=True)
+class Gate:
+    """A frame, as a goal to cross or as an obstacle.
+
+    Attributes:
+        centre_m: of the opening, arena axes.
+        yaw_rad: heading of its normal.
+        direction: 1 to cross it along its normal only, -1 against it only, 0 from either side.
+    """
+
+    centre_m: Vec3
+    yaw_rad: float
+    direction: int = 0
+
+
+@dataclass(frozen=True, slots=True)
+class Point:
+    """A place to fly to.
+
+    Attributes:
+        position_m: arena axes.
+        yaw_rad: the heading there; None for any.
+        stop: whether to stop there or to fly past; the last goal is always a stop.
+    """
+
+    position_m: Vec3
+    yaw_rad: float | None = None
+    stop: bool = True
+
+
+Goal = Gate | Point
+
+
+@dataclass(frozen=True, slots=True)
+class FrameSize:
+    """Measures of all frames, metres."""
+
+    opening_width_m: float = 0.38
+    opening_height_m: float = 0.18
+    width_m: float = 0.42
+    height_m: float = 0.22
+    thickness_m: float = 0.02
+
+
+@dataclass(frozen=True, slots=True)
+class Obstacles:
+    """All that must not be touched, besides the arena's sides.
+
+    Attributes:
+        frames: all frames known, with those to cross.
+        columns_m: what reaches from the floor to the ceiling, as discs in plan: x, y, radius.
+        base: the cube of take-off and landing.
+        floor_m: height of the floor.
+    """
+
+    frames: tuple[Gate, ...] = ()
+    columns_m: tuple[Vec3, ...] = ()
+    base: Base | None = None
+    floor_m: float = 0.0
+
+
+@dataclass(frozen=True, slots=True)
+class FlightStyle:
+    """How boldly to fly: limits of what is planned, below those of what may be commanded.
+
+    Attributes:
+        axis_speed_m_s: forward and to the left, in level axes turned with the yaw.
+        climb_speed_m_s: up and down.
+        path_speed_m_s: in plan, over both axes.
+        yaw_rate_rad_s: of turns.
+        acceleration_m_s2: along each level axis.
+        climb_acceleration_m_s2: up and down.
+        command_m_s: commands along an axis, which are higher than speeds while the drone accelerates.
+        lag_s: by which the velocity in plan follows commands.
+        climb_lag_s: likewise up and down.
+        crossing_speed_m_s: at most this in an opening.
+        straight_before_m: straight and level flight before an opening.
+        straight_after_m: likewise behind it.
+        smoothing_s: time in which the acceleration changes.
+        look_offset_rad: while a gate is far the heading may differ from its direction by this, so that both
+            level axes are used.
+        look_from_m: nearer than this the heading is towards the gate.
+        bar_margin_m: between the drone's box and other frames, base and columns.
+        side_margin_m: between the drone's centre and the arena's sides and ceiling.
+        floor_margin_m: between the drone's centre and the floor.
+    """
+
+    axis_speed_m_s: float = HEADROOM
+    climb_speed_m_s: float = HEADROOM
+    path_speed_m_s: float = 1.3
+    yaw_rate_rad_s: float = 0.9
+    acceleration_m_s2: float = 1.3
+    climb_acceleration_m_s2: float = 1.3
+    command_m_s: float = 0.98
+    lag_s: float = 0.4
+    climb_lag_s: float = 0.1
+    crossing_speed_m_s: float = 0.8
+    straight_before_m: float = 0.35
+    straight_after_m: float = 0.3
+    smoothing_s: float = 0.2
+    look_offset_rad: float = 0.5
+    look_from_m: float = 1.5
+    bar_margin_m: float = 0.08
+    side_margin_m: float = 0.25
+    floor_margin_m: float = 0.25
+
+    def adapted(self, lag_s: float) -> FlightStyle:
+        """The style for a vehicle that answers late: gentler, the later it answers.
+
+        Args:
+            lag_s: time by which the vehicle's velocity follows commands, dead time included; the simulated
+                drone's is 0.4.
+        """
+        late = min(max(lag_s - self.lag_s, 0.0) / 0.4, 1.0)
+        return replace(
+            self,
+            lag_s=max(self.lag_s, lag_s),
+            climb_lag_s=max(self.climb_lag_s, lag_s * late),
+            acceleration_m_s2=self.acceleration_m_s2 * (1.0 - 0.5 * late),
+            climb_acceleration_m_s2=self.climb_acceleration_m_s2 * (1.0 - 0.5 * late),
+            crossing_speed_m_s=self.crossing_speed_m_s * (1.0 - 0.4 * late),
+            straight_before_m=self.straight_before_m + 0.15 * late,
+            smoothing_s=self.smoothing_s + 0.2 * late,
+            bar_margin_m=self.bar_margin_m + 0.04 * late,
+        )
+
+
+CONTEST = FlightStyle()
+
+
+@dataclass(frozen=True, slots=True)
+class Motion:
+    """A motion at an instant, arena axes."""
+
+    position_m: Vec3
+    velocity_m_s: Vec3 = (0.0, 0.0, 0.0)
+    yaw_rad: float = 0.0
+    yaw_rate_rad_s: float = 0.0
+    acceleration_m_s2: Vec3 = (0.0, 0.0, 0.0)
+
+    def level(self, vector: Vec3) -> Vec3:
+        """A vector of the arena in this motion's level axes: forward, left, up."""
+        c, s = cos(self.yaw_rad), sin(self.yaw_rad)
+        return (c * vector[0] + s * vector[1], c * vector[1] - s * vector[0], vector[2])
+
+
+@dataclass(frozen=True, slots=True)
+class Refusal:
+    """No path was found."""
+
+    reason: str  # one line for people

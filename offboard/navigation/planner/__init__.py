@@ -1,0 +1,1 @@
+"""The parts of `planning.plan`; nothing else imports them."""

@@ -1,0 +1,143 @@
+"""Where the drone's centre must not be: obstacles enlarged by the drone's box and a margin."""
+
+from __future__ import annotations
+
+from math import cos, sin
+
+import numpy as np
+import numpy.typing as npt
+
+from offboard.navigation.goals import FlightStyle, FrameSize, Gate, Obstacles
+from offboard.navigation.planner.legs import Array
+from scenarios.models import Arena
+
+DRONE_RADIUS_M = 0.177  # of its box of 0.25 x 0.25 m in plan, whatever its heading
+DRONE_HALF_HEIGHT_M = 0.0225
+TILTED_M = 0.05  # how much farther down and up its box reaches while it tilts in a turn
+SAME_FRAME_M = 0.4  # a gate and a frame whose centres are nearer are the same
+_FRAME = FrameSize()
+
+_SPARE_M = 0.03  # how much farther than needed a detour passes
+_ROUNDING_M = 1e-6
+
+Mask = npt.NDArray[np.bool_]
+
+
+class Clearance:
+    """Obstacles in a fixed order: boxes (frames, then the base), columns, and the outside of the arena.
+
+    Attributes:
+        low_m: least x, y, z of the drone's centre, shape (3,).
+        high_m: greatest x, y, z.
+        boxes: how many of the obstacles are boxes.
+        base: the index of the base; -1 if there is none.
+    """
+
+    def __init__(self, obstacles: Obstacles, arena: Arena, style: FlightStyle) -> None:
+        margin_m = style.side_margin_m
+        x_m, y_m = arena.length_x_m / 2 - margin_m, arena.width_y_m / 2 - margin_m
+        floor_m = obstacles.floor_m
+        self.low_m: Array = np.array([-x_m, -y_m, floor_m + style.floor_margin_m])
+        self.high_m: Array = np.array([x_m, y_m, floor_m + arena.height_m - margin_m])
+        level_m = DRONE_RADIUS_M + style.bar_margin_m
+        upright_m = DRONE_HALF_HEIGHT_M + TILTED_M + style.bar_margin_m
+        rows = [
+            (
+                *frame.centre_m,
+                cos(frame.yaw_rad),
+                sin(frame.yaw_rad),
+                _FRAME.thickness_m / 2 + level_m,
+                _FRAME.width_m / 2 + level_m,
+                _FRAME.height_m / 2 + upright_m,
+            )
+            for frame in obstacles.frames
+        ]
+        self.base = -1
+        if obstacles.base is not None:
+            base, half_m = obstacles.base, obstacles.base.edge_m / 2 + level_m
+            self.base = len(rows)
+            middle_m = floor_m + base.top_m / 2
+            rows.append((base.x_m, base.y_m, middle_m, 1.0, 0.0, half_m, half_m, base.top_m / 2 + upright_m))
+        self.boxes = len(rows)
+        self._rows: Array = np.array(rows).reshape(-1, 8)
+        self._columns: Array = np.array(obstacles.columns_m).reshape(-1, 3)
+        self._radii_m: Array = self._columns[:, 2] + level_m
+
+    def frame_of(self, gate: Gate) -> int:
+        """The index of a gate among the obstacles; -1 if it is none of them."""
+        frames = self.boxes - (self.base >= 0)
+        if not frames:
+            return -1
+        distances_m = np.linalg.norm(self._rows[:frames, :3] - np.array(gate.centre_m), axis=1)
+        nearest = int(distances_m.argmin())
+        return nearest if distances_m[nearest] < SAME_FRAME_M else -1
+
+    @property
+    def base_top_m(self) -> float:
+        """The least height of the drone's centre over the base, away from take-off and landing."""
+        return float(self._rows[self.base, 2] + self._rows[self.base, 7])
+
+    def on_base(self, point_m: Array) -> bool:
+        """Whether a point is over the base and lower than a flight may pass it."""
+        return self.base >= 0 and bool(self.depths(point_m[None])[0, self.base] > 0.0)
+
+    def depths(self, points_m: Array) -> Array:
+        """How deep points, shape (n, 3), are in the enlarged obstacles, metres, shape (n, obstacles).
+
+        Not above zero where a point is clear.
+        """
+        beyond = np.maximum(self.low_m - points_m, points_m - self.high_m).max(axis=1) - _ROUNDING_M
+        parts = [beyond[:, None]]
+        if len(self._columns):
+            dx = points_m[:, None, 0] - self._columns[:, 0]
+            dy = points_m[:, None, 1] - self._columns[:, 1]
+            parts.insert(0, self._radii_m - np.hypot(dx, dy))
+        if self.boxes:
+            parts.insert(0, (self._rows[:, 5:8] - np.abs(self.offsets(points_m))).min(axis=-1))
+        return np.concatenate(parts, axis=1)
+
+    def offsets(self, points_m: Array) -> Array:
+        """From the boxes' centres to points, in the boxes' axes, shape (n, boxes, 3)."""
+        rows = self._rows
+        offset = points_m[:, None, :] - rows[:, :3]
+        c, s = rows[:, 3], rows[:, 4]
+        return np.stack(
+            (
+                c * offset[..., 0] + s * offset[..., 1],
+                c * offset[..., 1] - s * offset[..., 0],
+                offset[..., 2],
+            ),
+            axis=-1,
+        )
+
+    def ways_round(self, point_m: Array, velocity_m_s: Array, obstacle: int) -> list[tuple[Array, Array]]:
+        """Where to pass an obstacle instead of a point in it, at which velocity; level, but for the sides.
+
+        Args:
+            point_m: inside the obstacle, shape (3,).
+            velocity_m_s: there, shape (3,).
+            obstacle: index of a column of `depths`.
+        """
+        level = np.array([velocity_m_s[0], velocity_m_s[1], 0.0])
+        if obstacle >= self.boxes + len(self._columns):
+            inside = np.clip(point_m, self.low_m + _SPARE_M, self.high_m - _SPARE_M)
+            return [(inside, np.where(inside == point_m, velocity_m_s, 0.0))]
+        if obstacle < self.boxes:
+            row = self._rows[obstacle]
+            offset = self.offsets(point_m[None])[0, obstacle]
+            c, s = row[3], row[4]
+            axes = (np.array([c, s, 0.0]), np.array([-s, c, 0.0]), np.array([0.0, 0.0, 1.0]))
+            moves = [
+                (sign * (row[5 + i] + _SPARE_M) - offset[i]) * axes[i]
+                for i in (2, 1, 0)
+                for sign in (1.0, -1.0)
+            ]
+        else:
+            column = self._columns[obstacle - self.boxes]
+            radius_m = self._radii_m[obstacle - self.boxes] + _SPARE_M
+            across = np.array([-velocity_m_s[1], velocity_m_s[0], 0.0])
+            size = float(np.hypot(across[0], across[1]))
+            across = across / size if size > 1e-3 else np.array([0.0, 1.0, 0.0])
+            centre = np.array([column[0], column[1], point_m[2]])
+            moves = [centre + sign * radius_m * across - point_m for sign in (1.0, -1.0)]
+        return [(point_m + move, level) for move in moves]

@@ -1,0 +1,178 @@
+"""Legs: motions between two states; each axis accelerates evenly, keeps its speed, and does the opposite.
+
+The axes are level ones of one heading. An axis that needs less time than the leg takes accelerates less. The
+duration is the shortest for which no axis exceeds its limits (the closed form of point-mass trajectories, as
+in Foehn, Romero, Scaramuzza, "Time-optimal planning for quadrotor waypoint flight", 2021, section on
+sampling). All functions take many legs at once: arrays of shape (..., 3), with axes forward, left, up.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+Array = npt.NDArray[np.float64]
+State = tuple[Array, Array]
+"""Position and velocity, each of shape (3,)."""
+
+_STRETCHES = np.array([1.02, 1.05, 1.1, 1.16, 1.24, 1.35, 1.5, 1.7, 2.0, 2.5, 3.5, 5.0, 8.0])
+_TOLERANCE = 1.005  # of the acceleration, for rounding
+_SHORTEST_S = 0.02
+_TINY = 1e-9
+
+
+@dataclass(frozen=True, slots=True)
+class LegLimits:
+    """Limits of a leg's axes; arrays of shape (3,) or (..., 3)."""
+
+    speed_m_s: Array
+    acceleration_m_s2: Array
+
+
+def rotate(vectors: Array, cosine: Array | float, sine: Array | float) -> Array:
+    """Vectors of shape (..., 3), turned about the vertical."""
+    x, y = vectors[..., 0], vectors[..., 1]
+    return np.stack((cosine * x - sine * y, sine * x + cosine * y, vectors[..., 2]), axis=-1)
+
+
+def durations(
+    offset_m: Array, before_m_s: Array, after_m_s: Array, limits: LegLimits, least_s: Array
+) -> Array:
+    """The shortest durations of legs, seconds, shape (...).
+
+    Args:
+        offset_m: from start to end.
+        before_m_s: velocity at the start.
+        after_m_s: velocity at the end.
+        limits: of each axis.
+        least_s: legs may not be shorter than this, shape (...).
+    """
+    fastest = _fastest(offset_m, before_m_s, after_m_s, limits)
+    lower = np.maximum(np.maximum(fastest.max(axis=-1), least_s), _SHORTEST_S)
+    ends = (offset_m, before_m_s, after_m_s, _speeds(before_m_s, after_m_s, limits))
+    limit = np.broadcast_to(limits.acceleration_m_s2, offset_m.shape) * _TOLERANCE
+    need = np.abs(_accelerations(*ends, lower[..., None]))
+    late = (need > limit).any(axis=-1)
+    if late.any():  # rare: an axis has no motion of this duration, only shorter and longer ones
+        lower[late] = _stretched(tuple(end[late] for end in ends), lower[late], limit[late])
+    return np.asarray(lower)
+
+
+def _stretched(ends: tuple[Array, ...], lower: Array, limit: Array) -> Array:
+    """The shortest of some longer durations that is possible; the nearest to it if none is."""
+    tried = lower[:, None] * _STRETCHES
+    offset, before, after, cap = (end[:, None, :] for end in ends)
+    need = np.abs(_accelerations(offset, before, after, cap, tried[..., None]))
+    excess = (need / limit[:, None, :]).max(axis=-1)
+    possible = excess <= 1.0
+    first = np.where(possible.any(axis=-1), possible.argmax(axis=-1), excess.argmin(axis=-1))
+    shortest: Array = np.take_along_axis(tried, first[:, None], axis=-1)[:, 0]
+    return shortest
+
+
+def _speeds(before: Array, after: Array, limits: LegLimits) -> Array:
+    """Speed limits, raised where a leg starts or ends faster."""
+    return np.maximum(limits.speed_m_s, np.maximum(np.abs(before), np.abs(after)))
+
+
+def _fastest(offset: Array, before: Array, after: Array, limits: LegLimits) -> Array:
+    """The shortest time of each axis by itself."""
+    a = limits.acceleration_m_s2
+    cap = _speeds(before, after, limits)
+    ramp = 0.5 * (before + after) * np.abs(after - before) / a  # distance of a change of speed without a peak
+    sign = np.where(offset >= ramp, 1.0, -1.0)
+    peak = np.sqrt(np.maximum(0.5 * (before * before + after * after) + sign * a * offset, 0.0))
+    peak = np.minimum(peak, cap)
+    up, down = peak - sign * before, peak - sign * after
+    ramps = 0.5 * (up * (peak + sign * before) + down * (peak + sign * after)) / a
+    cruise = np.maximum(sign * offset - ramps, 0.0)
+    times: Array = (up + down) / a + cruise / np.maximum(peak, _TINY) * (cruise > _TINY)
+    return times
+
+
+def _accelerations(offset: Array, before: Array, after: Array, cap: Array, time: Array) -> Array:
+    """The signed acceleration of the first phase with which each axis takes exactly a time; inf if none does.
+
+    The last phase has its opposite. With two phases, T^2 a^2 - 4 D a - dv^2 = 0, where D is the offset from
+    the mean velocity's; of the two roots, only the one of larger size fits into T.
+    """
+    change = after - before
+    beyond = offset - 0.5 * time * (before + after)
+    sign = np.where(beyond >= 0.0, 1.0, -1.0)
+    a = (2.0 * beyond + sign * np.sqrt(4.0 * beyond * beyond + (time * change) ** 2)) / (time * time)
+    peak = 0.5 * (before + after + a * time)
+    top = np.where(a >= 0.0, cap, -cap)
+    room = np.abs(top) * time - np.where(a >= 0.0, offset, -offset)
+    with_cruise = ((top - before) ** 2 + (top - after) ** 2) / np.maximum(2.0 * room, _TINY)
+    with_cruise = np.where(room > _TINY, with_cruise, np.inf) * np.where(a >= 0.0, 1.0, -1.0)
+    return np.where(np.abs(peak) > cap + _TINY, with_cruise, a)
+
+
+@dataclass(frozen=True, slots=True)
+class Leg:
+    """A motion with phases: acceleration, constant speed, its opposite; axes of one heading.
+
+    Attributes:
+        start_m: arena axes, shape (3,).
+        turn: cosine and sine of the heading.
+        speeds_m_s: at the start, shape (3,).
+        accelerations_m_s2: of the first phase, shape (3,).
+        phases_s: durations of the phases, shape (3 phases, 3 axes).
+        duration_s: of the leg.
+    """
+
+    start_m: Array
+    turn: tuple[float, float]
+    speeds_m_s: Array
+    accelerations_m_s2: Array
+    phases_s: Array
+    duration_s: float
+
+    def at(self, times_s: Array) -> tuple[Array, Array, Array]:
+        """Positions, velocities and accelerations in arena axes at times from 0 on, shapes (n, 3)."""
+        first, second, third = self.phases_s
+        t = times_s[:, None]
+        in_first = np.clip(t, 0.0, first)
+        in_second = np.clip(t - first, 0.0, second)
+        in_third = np.clip(t - first - second, 0.0, third)
+        a, v = self.accelerations_m_s2, self.speeds_m_s
+        cruise = v + a * first
+        moved = (
+            (v + 0.5 * a * in_first) * in_first
+            + cruise * in_second
+            + (cruise - 0.5 * a * in_third) * in_third
+        )
+        velocity = v + a * (in_first - in_third)
+        acceleration = a * ((t < first).astype(float) - (t >= first + second).astype(float))
+        c, s = self.turn
+        return self.start_m + rotate(moved, c, s), rotate(velocity, c, s), rotate(acceleration, c, s)
+
+
+def make_leg(
+    start: State, end: State, heading: tuple[float, float], limits: LegLimits, duration_s: float
+) -> Leg:
+    """The leg between two states that takes a time found by `durations`.
+
+    Args:
+        start: position and velocity, arena axes.
+        end: likewise.
+        heading: cosine and sine of the heading of the leg's axes.
+        limits: of each axis; if the time is too short for them, accelerations exceed them.
+        duration_s: how long it takes.
+    """
+    (start_m, before_m_s), (end_m, after_m_s) = start, end
+    c, s = heading
+    offset, before, after = (rotate(v, c, -s) for v in (end_m - start_m, before_m_s, after_m_s))
+    cap = _speeds(before, after, limits)
+    time = np.full(3, duration_s)
+    a = _accelerations(offset, before, after, cap, time)
+    a = np.where(np.isfinite(a), a, 0.0)
+    size = np.maximum(np.abs(a), _TINY)
+    top = np.clip(0.5 * (before + after + a * time), -cap, cap)
+    moving = np.abs(a) > 1e-7
+    first = np.where(moving, np.abs(top - before) / size, 0.0)
+    third = np.where(moving, np.abs(after - top) / size, 0.0)
+    second = np.maximum(time - first - third, 0.0)
+    return Leg(start_m, heading, before, a, np.stack((first, second, third)), duration_s)

@@ -1,0 +1,282 @@
+"""Makes one path of legs: smooths accelerations, turns the heading, and slows down where a limit needs it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from math import atan2, hypot, isnan, nan, pi, remainder
+
+import numpy as np
+import numpy.typing as npt
+
+from offboard.navigation.goals import FlightStyle, Gate, Goal, Motion
+from offboard.navigation.path import Crossing, Path
+from offboard.navigation.planner.legs import Array, Leg
+
+STEP_S = 0.05
+HOLD_BEFORE_M = 0.28  # before an opening the heading is its normal; smoothing makes it later
+LEFT_M = 0.25  # so far behind an opening the drone has left it: nothing of its box is between the bars
+HOLD_AFTER_M = 0.27  # behind an opening the heading stays until the drone's box has left the bars
+_SLOWDOWN_M_S2 = 0.5  # acceleration along the path for slowing down
+_REVERSAL_RAD = 2.6  # a turn larger than this continues the way it turns already
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Stretch:
+    """A leg and what it leads to.
+
+    Attributes:
+        leg: the motion.
+        goal: the goal at its end, or the gate that it leads through.
+        crosses: it is the straight flight through the gate's opening.
+        yaw_rad: the heading at its end; NaN if it is free.
+        look_m: where to look on the way; None for the heading of the leg's axes.
+    """
+
+    leg: Leg
+    goal: Goal | None
+    crosses: bool
+    yaw_rad: float
+    look_m: Array | None
+
+
+@dataclass(slots=True, eq=False)
+class Samples:
+    """A path sampled every STEP_S, before it is slowed down.
+
+    Attributes:
+        times_s: shape (n,); from minus half the smoothing time on.
+        positions_m: shape (n, 3).
+        velocities_m_s: shape (n, 3).
+        accelerations_m_s2: shape (n, 3).
+        stretches: index of the stretch, shape (n,).
+        begins_s: when each stretch begins.
+    """
+
+    times_s: npt.NDArray[np.floating]
+    positions_m: Array
+    velocities_m_s: Array
+    accelerations_m_s2: Array
+    stretches: npt.NDArray[np.intp]
+    begins_s: list[float]
+
+
+def window(style: FlightStyle) -> tuple[Array, int]:
+    """Weights of the smoothing, trapezoidal over the smoothing time, and half its length in steps."""
+    half = max(round(style.smoothing_s / STEP_S / 2), 1)
+    weights = np.ones(2 * half + 1)
+    weights[0] = weights[-1] = 0.5
+    return weights / weights.sum(), half
+
+
+def run_in(start: Motion, style: FlightStyle) -> tuple[Array, Array]:
+    """Position and velocity from which legs must start so that the smoothed path starts with a motion."""
+    weights, half = window(style)
+    half_s = half * STEP_S
+    spread = float(weights @ (np.arange(-half, half + 1) * STEP_S) ** 2)
+    acceleration = np.array(start.acceleration_m_s2)
+    velocity = np.array(start.velocity_m_s) + acceleration * half_s
+    position = np.array(start.position_m) + velocity * half_s - 0.5 * acceleration * (half_s**2 + spread)
+    return position, velocity
+
+
+def sample(stretches: list[Stretch], start: Motion, style: FlightStyle) -> Samples:
+    """The motion of stretches, smoothed: a moving average keeps the limits, which are convex."""
+    weights, half = window(style)
+    begins = [0.0]
+    for stretch in stretches:
+        begins.append(begins[-1] + stretch.leg.duration_s)
+    count = int(np.ceil(begins[-1] / STEP_S)) + 2 * half + 1
+    raw_s = np.arange(-2 * half, count) * STEP_S  # to count - 1; smoothed: from -half
+    index = np.clip(np.searchsorted(begins, raw_s, side="right") - 1, 0, len(stretches) - 1)
+    position, velocity, acceleration = (np.empty((len(raw_s), 3)) for _ in range(3))
+    for number, stretch in enumerate(stretches):
+        rows = index == number
+        inside = np.minimum(raw_s[rows] - begins[number], stretch.leg.duration_s)
+        position[rows], velocity[rows], acceleration[rows] = stretch.leg.at(np.maximum(inside, 0.0))
+    before = raw_s < 0.0
+    past = raw_s[before][:, None]
+    first, speed = run_in(start, style)
+    rate = np.array(start.acceleration_m_s2)
+    position[before] = first + (speed + 0.5 * rate * past) * past
+    velocity[before] = speed + rate * past
+    acceleration[before] = rate
+    ended = raw_s >= begins[-1]
+    velocity[ended] = acceleration[ended] = 0.0
+    kept = slice(half, len(raw_s) - half)
+    return Samples(
+        raw_s[kept],
+        _average(position, weights),
+        _average(velocity, weights),
+        _average(acceleration, weights),
+        index[kept],
+        begins,
+    )
+
+
+def _average(values: Array, weights: Array) -> Array:
+    n = len(values) - len(weights) + 1
+    total = np.zeros((n, *values.shape[1:]))
+    for i, weight in enumerate(weights.tolist()):
+        total += weight * values[i : i + n]
+    return total
+
+
+def headings(
+    samples: Samples, stretches: list[Stretch], start: Motion, style: FlightStyle
+) -> tuple[Array, Array]:
+    """Continuous heading and its rate at each sample: towards what is looked at, in time for each gate."""
+    weights, half = window(style)
+    wanted, holds = _wanted_headings(samples, stretches, style)
+    step = style.yaw_rate_rad_s * STEP_S
+    yaw = start.yaw_rad + start.yaw_rate_rad_s * half * STEP_S
+    raw = [start.yaw_rad + start.yaw_rate_rad_s * (i - half) * STEP_S for i in range(2 * half)]
+    hold = 0
+    turn = start.yaw_rate_rad_s * STEP_S
+    for i in range(half, len(wanted)):
+        while hold < len(holds) and i > holds[hold][1]:
+            hold += 1
+        turn = _turn(yaw, wanted[i], turn, step)
+        if hold < len(holds):
+            begin, _, angle = holds[hold]
+            spare = max(begin - i - 2, 0) * step
+            if abs(remainder(yaw + turn - angle, 2 * pi)) > spare:
+                turn = min(max(remainder(angle - yaw, 2 * pi), -step), step)
+        yaw += turn
+        raw.append(yaw)
+    raw += [yaw] * half
+    line = np.array(raw)
+    smooth = _average(line[:, None], weights)[:, 0]
+    rates = np.gradient(smooth, STEP_S)
+    smooth, rates = smooth[: len(wanted)], rates[: len(wanted)]
+    rates[0], smooth[0] = start.yaw_rate_rad_s, start.yaw_rad
+    return smooth, rates
+
+
+def _turn(yaw: float, wanted: float, last: float, most: float) -> float:
+    """The turn of one step towards a heading (NaN for any); about half a turn continues the way it turns."""
+    if isnan(wanted):
+        return 0.0
+    turn = remainder(wanted - yaw, 2 * pi)
+    if abs(turn) > _REVERSAL_RAD and turn * last < 0.0:
+        turn = -turn
+    return min(max(turn, -most), most)
+
+
+def _wanted_headings(
+    samples: Samples, stretches: list[Stretch], style: FlightStyle
+) -> tuple[list[float], list[tuple[int, int, float]]]:
+    """The heading to turn to at each sample (NaN for any); where each gate's is kept: first, last, angle."""
+    wanted: list[float] = []
+    positions = samples.positions_m.tolist()
+    for (x, y, _), number in zip(positions, samples.stretches.tolist(), strict=True):
+        stretch = stretches[number]
+        if stretch.crosses:
+            wanted.append(stretch.yaw_rad)
+            continue
+        heading = atan2(stretch.leg.turn[1], stretch.leg.turn[0])
+        if stretch.look_m is None:
+            wanted.append(heading if isnan(stretch.yaw_rad) else stretch.yaw_rad)
+            continue
+        dx, dy = float(stretch.look_m[0]) - x, float(stretch.look_m[1]) - y
+        away = hypot(dx, dy)
+        bearing = atan2(dy, dx)
+        if away > style.look_from_m + 0.3:
+            limit = style.look_offset_rad
+            bearing += min(max(remainder(heading - bearing, 2 * pi), -limit), limit)
+        wanted.append(bearing)
+    holds: list[tuple[int, int, float]] = []
+    for number, stretch in enumerate(stretches):
+        if stretch.crosses and isinstance(stretch.goal, Gate):
+            past = (samples.positions_m - np.array(stretch.goal.centre_m))[:, :2] @ np.array(
+                [np.cos(stretch.yaw_rad), np.sin(stretch.yaw_rad)]
+            )
+            near = (past > -HOLD_BEFORE_M) & (past < HOLD_AFTER_M)
+            inside = np.flatnonzero((samples.stretches == number) & near)
+            if len(inside):
+                holds.append((int(inside[0]), int(inside[-1]), stretch.yaw_rad))
+                for i in range(int(inside[-1]) + 1, len(wanted)):
+                    if samples.stretches[i] != number:
+                        break
+                    wanted[i] = nan
+    if not (isnan(stretches[-1].yaw_rad) or stretches[-1].crosses):
+        last = len(wanted) - 1
+        end = max(int((samples.begins_s[-1] - samples.times_s[0]) / STEP_S), 0)
+        holds.append((min(end, last), last, stretches[-1].yaw_rad))
+    return wanted, holds
+
+
+def slowed(
+    samples: Samples, yaw: Array, yaw_rate: Array, stretches: list[Stretch], style: FlightStyle
+) -> Path:
+    """The path, with time stretched where the speed along an axis would be too high."""
+    share = _shares(samples, yaw, yaw_rate, style)
+    squares = share * share
+    slope = 2.0 * _SLOWDOWN_M_S2 * STEP_S / style.axis_speed_m_s
+    ramp = slope * np.arange(len(squares))
+    squares = np.minimum.accumulate(squares - ramp) + ramp
+    squares = (np.minimum.accumulate((squares - ramp[::-1])[::-1]) + ramp)[::-1]
+    squares[0] = 1.0  # the path starts with the motion given, even if that is too fast
+    share = np.sqrt(squares)
+    steps = STEP_S / (0.5 * (share[:-1] + share[1:]))
+    times = np.concatenate(([0.0], np.cumsum(steps)))
+    change = np.gradient(squares, STEP_S) / 2 if len(squares) > 1 else np.zeros_like(squares)
+    change[0] = 0.0
+    velocities = samples.velocities_m_s * share[:, None]
+    accelerations = samples.accelerations_m_s2 * squares[:, None] + samples.velocities_m_s * change[:, None]
+    knots = np.column_stack((samples.positions_m, velocities, accelerations, yaw, yaw_rate * share))
+    crossings = _crossings(samples, stretches, times)
+    return Path(times.tolist(), knots.tolist(), crossings)
+
+
+def _crossings(samples: Samples, stretches: list[Stretch], times: Array) -> tuple[Crossing, ...]:
+    """When the path crosses and leaves its gates."""
+    crossings: list[Crossing] = []
+    for number, stretch in enumerate(stretches):
+        if not stretch.crosses or not isinstance(stretch.goal, Gate):
+            continue
+        rows = np.flatnonzero(samples.stretches >= number)
+        normal = np.array([np.cos(stretch.yaw_rad), np.sin(stretch.yaw_rad)])
+        past = (samples.positions_m[rows, :2] - np.array(stretch.goal.centre_m)[:2]) @ normal
+        behind = int(np.argmax(past >= 0.0))
+        time_s = (
+            float(times[rows[0]])
+            if behind == 0
+            else float(np.interp(0.0, past[behind - 1 : behind + 1], times[rows[behind - 1 : behind + 1]]))
+        )
+        left = int(np.argmax(past >= LEFT_M))
+        left_s = float(times[rows[left]]) if past[left] >= LEFT_M else float(times[-1])
+        crossings.append(Crossing(stretch.goal, stretch.yaw_rad, time_s, left_s))
+    return tuple(crossings)
+
+
+def _shares(samples: Samples, yaw: Array, yaw_rate: Array, style: FlightStyle) -> Array:
+    """By how much time must be stretched at each sample, as a share of the speed, 0 to 1.
+
+    Along each axis neither the speed nor its command, speed and lag times acceleration, may be too high.
+    """
+    vx, vy, vz = samples.velocities_m_s.T
+    ax, ay, az = samples.accelerations_m_s2.T
+    c, s = np.cos(yaw), np.sin(yaw)
+    forward, left = c * vx + s * vy, c * vy - s * vx
+    excess = np.maximum(np.abs(forward), np.abs(left)) / style.axis_speed_m_s
+    excess = np.maximum(excess, np.abs(vz) / style.climb_speed_m_s)
+    excess = np.maximum(excess, np.hypot(vx, vy) / style.path_speed_m_s)
+    share: Array = 1.0 / np.maximum(excess, 1.0)
+    ahead = c * ax + s * ay + yaw_rate * left
+    aside = c * ay - s * ax - yaw_rate * forward
+    for speed, acceleration, lag_s in (
+        (forward, ahead, style.lag_s),
+        (left, aside, style.lag_s),
+        (vz, az, style.climb_lag_s),
+    ):
+        share = np.minimum(share, _share_of_command(speed, lag_s * acceleration, style.command_m_s))
+    return share
+
+
+def _share_of_command(speed: Array, added: Array, limit: float) -> Array:
+    """The largest share u with |u speed + u^2 added| <= limit."""
+    same = speed * added > 0.0
+    size, more = np.abs(speed), np.maximum(np.abs(added), 1e-6)
+    root = (np.sqrt(size * size + 4.0 * more * limit) - size) / (2.0 * more)
+    share: Array = np.where(same, np.minimum(root, 1.0), 1.0)
+    return share

@@ -1,0 +1,154 @@
+"""Random layouts, known: plans through them, what a plan must obey, and flights in lockstep."""
+
+from __future__ import annotations
+
+import asyncio
+from dataclasses import dataclass
+from math import cos, hypot, sin
+
+import numpy as np
+
+from framerunner.flying.lockstep import LockstepVehicle
+from framerunner.flying.plan import FlightPlan
+from offboard.keep_in_box import KeepInBox
+from offboard.navigation.following import PathFollower
+from offboard.navigation.goals import CONTEST, FlightStyle, Gate, Goal, Motion, Obstacles, Point, Refusal
+from offboard.navigation.path import Path
+from offboard.navigation.planning import plan
+from scenarios.models import COLOURS, Arena, Scenario
+from scenarios.random_scenarios import load_level, random_scenario
+from scenarios.result import RefereeReport
+
+STEP_S = 0.01
+
+
+@dataclass(frozen=True)
+class Layout:
+    """A scenario as the planner sees it, all of it known."""
+
+    scenario: Scenario
+    gates: tuple[Gate, ...]
+
+    @classmethod
+    def random(cls, seed: int, level: str = "calm") -> Layout:
+        """A layout of a level."""
+        return cls.of(random_scenario(load_level(level), seed))
+
+    @classmethod
+    def of(cls, scenario: Scenario) -> Layout:
+        """A scenario's layout."""
+        frames = sorted(scenario.frames, key=lambda frame: COLOURS.index(frame.colour))
+        return cls(scenario, tuple(Gate(frame.position_arena_m, frame.yaw_rad) for frame in frames))
+
+    @property
+    def goals(self) -> list[Goal]:
+        """All gates, then back over the base."""
+        base = self.scenario.base
+        return [*self.gates, Point((base.x_m, base.y_m, 0.6))]
+
+    @property
+    def start(self) -> Motion:
+        """On the base."""
+        start = self.scenario.start
+        return Motion((start.x_m, start.y_m, 0.5325), yaw_rad=start.yaw_rad)
+
+    def plan(
+        self, start: Motion, goals: list[Goal], previous: Path | None = None, style: FlightStyle = CONTEST
+    ) -> Path | Refusal:
+        """A plan with all frames known."""
+        obstacles = Obstacles(self.gates, base=self.scenario.base)
+        arena = self.scenario.arena
+        return plan(start, goals, obstacles=obstacles, arena=arena, style=style, previous=previous)
+
+
+class Sampled:
+    """A path, sampled densely."""
+
+    def __init__(self, path: Path) -> None:
+        motions = [path.at(index * STEP_S) for index in range(int(path.duration_s / STEP_S) + 1)]
+        self.positions = np.array([motion.position_m for motion in motions])
+        self.velocities = np.array([motion.velocity_m_s for motion in motions])
+        self.yaws = np.array([motion.yaw_rad for motion in motions])
+        self.yaw_rates = np.array([motion.yaw_rate_rad_s for motion in motions])
+
+    def level_velocities(self) -> np.ndarray:
+        """In axes turned with the yaw, shape (n, 3)."""
+        c, s = np.cos(self.yaws), np.sin(self.yaws)
+        vx, vy, vz = self.velocities.T
+        return np.stack((c * vx + s * vy, c * vy - s * vx, vz), axis=1)
+
+    def offsets(self, gate: Gate) -> np.ndarray:
+        """From a gate, along and across it and up, shape (n, 3)."""
+        away = self.positions - np.array(gate.centre_m)
+        c, s = cos(gate.yaw_rad), sin(gate.yaw_rad)
+        return np.stack(
+            (c * away[:, 0] + s * away[:, 1], c * away[:, 1] - s * away[:, 0], away[:, 2]), axis=1
+        )
+
+
+def touching(path: Sampled, gate: Gate) -> list[float]:
+    """Times at which the drone's box, with a little room, is where a gate's bars are."""
+    along, across, up = np.abs(path.offsets(gate)).T
+    turn = path.yaws - gate.yaw_rad
+    reach = 0.125 * (np.abs(np.cos(turn)) + np.abs(np.sin(turn)))
+    half_height = 0.0225 + 0.03  # its box reaches higher while it tilts
+    near = along < 0.01 + reach
+    through = (across + reach < 0.19 - 0.02) & (up + half_height < 0.09)
+    beside = (across - reach > 0.21 + 0.02) | (up - half_height > 0.11 + 0.02)
+    return [float(index * STEP_S) for index in np.flatnonzero(near & ~through & ~beside)]
+
+
+def crossed(path: Sampled, gates: tuple[Gate, ...]) -> list[int]:
+    """The gates that a path goes through, in order."""
+    found: list[tuple[int, int]] = []
+    for number, gate in enumerate(gates):
+        along, across, up = path.offsets(gate).T
+        for index in np.flatnonzero(np.diff(np.sign(along)) != 0):
+            if abs(across[index]) < 0.19 and abs(up[index]) < 0.09:
+                found.append((int(index), number))
+    return [number for _, number in sorted(found)]
+
+
+def least_margin(path: Sampled, arena: Arena) -> float:
+    """The least distance from the sides, metres."""
+    x, y, _ = np.abs(path.positions).T
+    return float(min((arena.length_x_m / 2 - x).min(), (arena.width_y_m / 2 - y).min()))
+
+
+def fly(layout: Layout, *, replan_s: float) -> tuple[RefereeReport, float, float]:
+    """Fly a layout in lockstep, planning again all the time.
+
+    Returns:
+        The report, the largest distance from the path, and for how long commands were limited to the box.
+    """
+    flight = FlightPlan(layout.scenario)
+    vehicle = LockstepVehicle(flight)
+    drone, keeper, follower = vehicle.drone, KeepInBox(flight.box), PathFollower()
+    asyncio.run(drone.ready())
+    asyncio.run(drone.motors_on())
+    state = drone.next_state()
+    goals = layout.goals
+    path = layout.plan(Motion((state.x, state.y, state.z), yaw_rad=state.yaw), goals)
+    assert isinstance(path, Path)
+    began_s = planned_s = state.time_us * 1e-6
+    farthest_m = 0.0
+    while not (follower.finished and follower.error_m < 0.05):
+        now_s = state.time_us * 1e-6
+        assert now_s - began_s < 60.0
+        drone.command(keeper.limit(follower.command(path, state, now_s), state))
+        farthest_m = max(farthest_m, follower.error_m)
+        if now_s - planned_s >= replan_s and follower.progress_s < path.duration_s - 1.0:
+            goals = goals[path.gates_left(follower.progress_s) :]
+            planned_s = now_s
+            again = layout.plan(follower.reference(), goals, path)
+            path = path if isinstance(again, Refusal) else again
+        state = drone.next_state()
+    asyncio.run(drone.motors_off())
+    drone.settle()
+    return vehicle.simulation.referee.report(), farthest_m, keeper.limited_us / 1e6
+
+
+def base_distances(path: Sampled, scenario: Scenario) -> np.ndarray:
+    """From the base's centre, in plan, shape (n,)."""
+    base = scenario.base
+    return np.array([hypot(x - base.x_m, y - base.y_m) for x, y, _ in path.positions])

@@ -1,0 +1,90 @@
+"""Plans: continuous, within limits, clear of everything, through the openings in order."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from offboard.navigation.goals import CONTEST, Gate, Motion, Obstacles, Point, Refusal
+from offboard.navigation.path import Path
+from offboard.navigation.planning import plan
+from scenarios.models import Arena
+from tests.offboard.navigation.flown_layouts import (
+    STEP_S,
+    Layout,
+    Sampled,
+    base_distances,
+    crossed,
+    least_margin,
+    touching,
+)
+
+SEEDS = range(200, 212)
+
+
+def planned(seed: int) -> tuple[Layout, Path]:
+    layout = Layout.random(seed)
+    path = layout.plan(layout.start, layout.goals)
+    assert isinstance(path, Path), path
+    return layout, path
+
+
+@pytest.mark.parametrize("seed", SEEDS)
+def test_path_crosses_the_gates_in_order_and_touches_none(seed: int):
+    layout, path = planned(seed)
+    sampled = Sampled(path)
+    assert crossed(sampled, layout.gates) == [0, 1, 2]
+    for gate in layout.gates:
+        assert touching(sampled, gate) == []
+
+
+@pytest.mark.parametrize("seed", SEEDS)
+def test_path_is_continuous_and_within_the_limits(seed: int):
+    layout, path = planned(seed)
+    sampled = Sampled(path)
+    moved = np.diff(sampled.positions, axis=0) / STEP_S
+    mean = (sampled.velocities[1:] + sampled.velocities[:-1]) / 2
+    assert np.abs(moved - mean).max() < 0.02
+    assert np.abs(np.diff(sampled.velocities, axis=0)).max() < 2.5 * STEP_S
+    assert np.abs(sampled.level_velocities()).max() < 0.95
+    assert np.abs(sampled.yaw_rates).max() < 0.95
+    assert least_margin(sampled, layout.scenario.arena) > 0.24
+    assert sampled.positions[:, 2].min() > 0.24
+    away = base_distances(sampled, layout.scenario) > 1.0
+    slowest = -(sampled.positions[:, 2] - 0.15) / 1.1  # the app limits descents near the floor to this
+    assert (sampled.velocities[:, 2] > slowest)[away].all()
+
+
+@pytest.mark.parametrize("seed", SEEDS)
+def test_heading_is_the_gates_normal_while_the_drone_is_in_the_opening(seed: int):
+    _, path = planned(seed)
+    for crossing in path.crossings:
+        ahead = [path.at(crossing.time_s + delay_s).yaw_rad for delay_s in (-0.15, 0.0, 0.12)]
+        assert np.cos(np.array(ahead) - crossing.heading_rad).min() > np.cos(0.1)
+
+
+@pytest.mark.parametrize("seed", [200, 202, 205])
+def test_planning_again_from_the_path_changes_little(seed: int):
+    layout, path = planned(seed)
+    first_s, flown_s, goals = path.duration_s, 0.0, layout.goals
+    while path.duration_s > 1.0:
+        goals = goals[path.gates_left(0.4) :]
+        again = layout.plan(path.at(0.4), goals, path)
+        assert isinstance(again, Path), (flown_s, again)
+        path, flown_s = again, flown_s + 0.4
+        assert flown_s < 2 * first_s
+    assert flown_s + path.duration_s < first_s * 1.25
+
+
+def test_a_gate_is_crossed_only_in_its_direction():
+    gate = Gate((2.0, 0.0, 1.0), 0.0, direction=-1)
+    goals = [gate, Point((0.0, 0.0, 1.0))]
+    path = plan(Motion((-2.0, 0.0, 1.0)), goals, obstacles=Obstacles((gate,)), arena=Arena(), style=CONTEST)
+    assert isinstance(path, Path)
+    assert path.at(path.gate_times_s[0]).velocity_m_s[0] < -0.3
+    assert touching(Sampled(path), gate) == []
+
+
+def test_no_goal_is_refused():
+    path = plan(Motion((0.0, 0.0, 1.0)), [], obstacles=Obstacles(), arena=Arena(), style=CONTEST)
+    assert path == Refusal("there is no goal to fly to")
