@@ -20,7 +20,7 @@ DRIFT_STD_RAD = 0.003
 # With each view the earlier ones count less: errors of images are not quite independent, and the first views,
 # from far away, were linearised at the worst places (fading memory filter; Simon, "Optimal State Estimation",
 # 2006).
-FADING = 1.07
+FADING = 1.05
 
 _DRIFT = np.diag((DRIFT_STD_M**2, DRIFT_STD_M**2, DRIFT_STD_M**2, DRIFT_STD_RAD**2))
 _LINEARISATIONS = 4

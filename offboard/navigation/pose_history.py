@@ -16,9 +16,9 @@ EXTRAPOLATED_US = 100_000  # how far before the first and after the last sample 
 LONGEST_GAP_US = 300_000  # between two samples; what happened in a longer one is not known
 
 # Errors of the pose, for those who weigh what they compute with it.
-POSITION_STD_M = 0.002
-ATTITUDE_STD_RAD = 0.0035
-JITTER_S = 0.003  # of the time stamps: the faster the drone moves and turns, the less exact is its pose
+POSITION_STD_M = 0.001
+ATTITUDE_STD_RAD = 0.0025
+JITTER_S = 0.002  # of the time stamps: the faster the drone moves and turns, the less exact is its pose
 EXTRAPOLATION_STD_M_S2 = 3.0  # acceleration, of which extrapolation knows nothing
 EXTRAPOLATION_STD_RAD_S = 0.2
 
