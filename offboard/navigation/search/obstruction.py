@@ -13,7 +13,7 @@ from geometry.vectors import Vec3
 from offboard.navigation.search.frame_visibility import Bools, Floats, SearchGrid
 
 _ROOM_M: Final = 0.1  # beside an obstacle, at least, for the drone to pass
-_ONTO_GRID_M: Final = 0.8  # cells nearer than this are entered directly
+_ONTO_GRID: Final = 1.6  # cells nearer than this many times their size are entered directly
 _IN_BLOCK_M: Final = 0.5
 _LARGEST: Final = 20_000  # elements of an array that are computed quickest
 _STEPS: Final = ((1, 0), (0, 1), (1, 1), (1, -1))
@@ -74,7 +74,8 @@ class Obstruction:
         grid = self._grid
         field_m = np.full((grid.x_m.size, grid.y_m.size), np.inf, dtype=np.float32)
         dx, dy = grid.x_m[:, None] - np.float32(x), grid.y_m - np.float32(y)
-        i, j = np.nonzero(dx * dx + dy * dy < np.float32(_ONTO_GRID_M**2))
+        near_m = _ONTO_GRID * max(_pitch(grid.x_m), _pitch(grid.y_m))
+        i, j = np.nonzero(dx * dx + dy * dy < np.float32(near_m**2))
         field_m[i, j] = WaysRound(at_m, columns_m, grid, field_m).distances_m(grid.x_m[i], grid.y_m[j])
         for _ in range(_MOST_ROUNDS):
             before = field_m.copy()
@@ -129,7 +130,7 @@ def _is_clear(
     length_2 = np.maximum(along_x * along_x + along_y * along_y, np.float32(1e-6))
     clear = np.ones(length_2.shape, dtype=bool)
     columns = np.array(columns_m, dtype=np.float32).reshape(-1, 3)
-    at_once = max(_LARGEST // length_2.size, 1)
+    at_once = max(_LARGEST // max(length_2.size, 1), 1)
     for first in range(0, len(columns), at_once):
         x, y, radius = columns[first : first + at_once].T.reshape(3, -1, *(1 for _ in length_2.shape))
         dx, dy = x - from_x, y - from_y
