@@ -13,7 +13,7 @@ from __future__ import annotations
 
 from collections import deque
 from collections.abc import Callable, Iterable, Sequence
-from math import dist, hypot, isfinite, tan
+from math import hypot, isfinite, tan
 
 import cv2
 import numpy as np
@@ -68,7 +68,6 @@ class Camera:
         floor = (scene.tatami, *scene.mats, *scene.shadows)
         faces = [*floor, *self._tree.faces]
         self._mesh = Mesh(faces, self._pinhole)
-        self._centres_m = [tuple(face.corners_arena_m.mean(axis=0).tolist()) for face in faces]
         self._floor, self._solid = self._mesh.faces[: len(floor)], self._mesh.faces[len(floor) :]
 
     @property
@@ -85,8 +84,8 @@ class Camera:
             position_arena_m: centre of the drone; the scenario has the camera's place on it.
             attitude_arena: quaternion (w, x, y, z), body FLU to arena; need not have unit length.
             drones: boxes of other drones. They move, so they are not in the tree of faces: each is painted
-                before the first face that is nearer than its centre. That is correct unless it flies closer
-                to a bar or the base than about its own size.
+                where the tree has its centre. That is correct unless it flies closer to a thing than about
+                its own size.
 
         Returns:
             A new image, BGR, shape (height, width, 3), uint8; its rows need not follow each other in memory.
@@ -106,21 +105,22 @@ class Camera:
             _paint(canvas, projection, [face for face in self._floor if seen[face.index]])
             solid, first = self._solid, len(self._floor)
             order = self._tree.back_to_front(eye)
-            faces = [solid[i] for i in order if seen[first + i]]
-            for distance_m, outline in drone_outlines(drones, eye, rotation, self._pinhole) if drones else ():
-                behind = self._count_farther(faces, eye, distance_m)
-                _paint(canvas, projection, faces[:behind])
+            painted = 0
+            for behind, outline in self._place_drones(drones, eye, rotation) if drones else ():
+                _paint(canvas, projection, [solid[i] for i in order[painted:behind] if seen[first + i]])
                 cv2.fillConvexPoly(canvas, outline, DRONE_BGR, cv2.LINE_8, SHIFT)
-                faces = faces[behind:]
-            _paint(canvas, projection, faces)
+                painted = behind
+            _paint(canvas, projection, [solid[i] for i in order[painted:] if seen[first + i]])
         return canvas[_INSIDE]
 
-    def _count_farther(self, faces: Sequence[MeshFace], eye: Vec3, distance_m: float) -> int:
-        """Number of faces, in the order of painting, before the first that is nearer than a distance."""
-        for count, face in enumerate(faces):
-            if dist(eye, self._centres_m[face.index]) < distance_m:
-                return count
-        return len(faces)
+    def _place_drones(
+        self, drones: Sequence[Solid], eye: Vec3, rotation: RotationRows
+    ) -> list[tuple[int, Ints]]:
+        """How many faces are painted before each drone seen, and its outline, in order of painting."""
+        found = drone_outlines(drones, eye, rotation, self._pinhole)
+        places = self._tree.places(eye, np.array([drone.centre_arena_m for drone, _ in found]).reshape(-1, 3))
+        outlines = [outline for _, outline in found]
+        return sorted(zip(places.tolist(), outlines, strict=True), key=lambda each: each[0])
 
     def _eye(self, position: Vec3, rotation: RotationRows) -> Vec3:
         if not all(map(isfinite, position)):

@@ -201,18 +201,17 @@ def clip_half_plane(corners: Sequence[Point], a: float, b: float, c: float) -> l
 
 def drone_outlines(
     drones: Sequence[Solid], eye_arena_m: Vec3, rotation: RotationRows, pinhole: Pinhole
-) -> list[tuple[float, Ints]]:
-    """Distance (m) and outline (sixteenths of a pixel, shape (k, 2)) of each drone seen, the farthest first.
+) -> list[tuple[Solid, Ints]]:
+    """Each drone seen with its outline (sixteenths of a pixel, shape (k, 2)), the farthest first.
 
     Drones that are behind the camera, too far away or so near that they reach the camera are left out. The
     drones are given by their boxes, the pose of the camera as for `Pinhole.matrix`.
     """
     matrix = pinhole.matrix(eye_arena_m, rotation)
     limit = 8.0 * max(pinhole.width_px, pinhole.height_px) * SUBPIXELS
-    seen: list[tuple[float, Ints]] = []
-    for drone in drones:
-        distance_m = dist(eye_arena_m, drone.centre_arena_m)
-        if distance_m > pinhole.far_m:
+    seen: list[tuple[Solid, Ints]] = []
+    for drone in sorted(drones, key=lambda one: -dist(eye_arena_m, one.centre_arena_m)):
+        if dist(eye_arena_m, drone.centre_arena_m) > pinhole.far_m:
             continue
         u, v, depth_m = matrix @ np.array([(*corner, 1.0) for corner in drone.corners()]).T
         if depth_m.min() <= pinhole.near_m:
@@ -220,5 +219,5 @@ def drone_outlines(
         points = np.array([u / depth_m, v / depth_m]).T
         if np.abs(points).max() < limit:
             hull = cv2.convexHull(points.astype(np.float32)).reshape(-1, 2)
-            seen.append((distance_m, np.rint(hull).astype(np.int32)))
-    return sorted(seen, key=lambda one: -one[0])
+            seen.append((drone, np.rint(hull).astype(np.int32)))
+    return seen

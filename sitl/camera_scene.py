@@ -27,6 +27,7 @@ from sitl.solids import frame_solids
 
 Bgr = tuple[int, int, int]
 Floats = npt.NDArray[np.float64]
+Ints = npt.NDArray[np.int64]
 
 FRAME_BGR: dict[str, Bgr] = {"red": (0, 0, 255), "green": (0, 255, 0), "blue": (255, 0, 0)}
 DECOY_BGR: dict[str, Bgr] = {"cyan": (255, 255, 0), "magenta": (255, 0, 255)}
@@ -56,6 +57,7 @@ class Face:
     corners_arena_m: Floats  # shape (k, 3), in order
     normal_arena: Vec3  # unit vector to the side it is seen from
     colour: Bgr  # as painted, shading included
+    name: str  # of its solid; "tatami" or "ground" on the floor
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -64,6 +66,7 @@ class Body:
 
     hull: Solid  # the box around it
     faces: tuple[Face, ...]  # in an order of painting: a later one is never hidden by an earlier one
+    inner: int = 0  # how many of the first faces are around an opening: they hide nothing that is in it
 
 
 @dataclass(frozen=True, slots=True)
@@ -84,7 +87,7 @@ def build_scene(scenario: Scenario) -> Scene:
     shadows = [face for solid in solids for face in _shadow(solid, arena, light)]
     shadows += [face for prism in prisms for face in _long_shadow(prism, arena, light)]
     return Scene(
-        tatami=_on_floor(_rectangle(arena, 0.0, 1.0, 0.0, 1.0), _lit(TATAMI_BGR, _UP, light)),
+        tatami=_on_floor(_rectangle(arena, 0.0, 1.0, 0.0, 1.0), _lit(TATAMI_BGR, _UP, light), "tatami"),
         mats=_mats(arena, light),
         shadows=tuple(shadows),
         bodies=(
@@ -108,10 +111,10 @@ def _lit(colour: Bgr, normal: Vec3, light: Light) -> Bgr:
     return _dim(colour, max(_DARKEST, light.ambient + (1.0 - light.ambient) * max(0.0, facing)))
 
 
-def _on_floor(corners_xy: Sequence[Sequence[float]] | Floats, colour: Bgr) -> Face:
+def _on_floor(corners_xy: Sequence[Sequence[float]] | Floats, colour: Bgr, name: str) -> Face:
     corners = np.zeros((len(corners_xy), 3))
     corners[:, :2] = corners_xy
-    return Face(corners, _UP, colour)
+    return Face(corners, _UP, colour, name)
 
 
 def _rectangle(arena: Arena, x0: float, x1: float, y0: float, y1: float) -> list[tuple[float, float]]:
@@ -127,7 +130,9 @@ def _mats(arena: Arena, light: Light) -> tuple[Face, ...]:
     rows = min(20, max(1, round(arena.length_x_m / _MAT_M)))
     columns = min(20, max(1, round(arena.width_y_m / _MAT_M)))
     return tuple(
-        _on_floor(_rectangle(arena, i / rows, (i + 1) / rows, j / columns, (j + 1) / columns), colour)
+        _on_floor(
+            _rectangle(arena, i / rows, (i + 1) / rows, j / columns, (j + 1) / columns), colour, "tatami"
+        )
         for i in range(rows)
         for j in range(columns)
         if (i + j) % 2
@@ -138,7 +143,9 @@ def _face(box: Solid, local: Sequence[Vec3], normal: Vec3, colour: Bgr, light: L
     """A face given in a box's own axes (metres from its centre)."""
     c, s = box.turn
     turned = (c * normal[0] - s * normal[1], s * normal[0] + c * normal[1], normal[2])
-    return Face(np.array([box.to_arena(point) for point in local]), turned, _lit(colour, turned, light))
+    return Face(
+        np.array([box.to_arena(point) for point in local]), turned, _lit(colour, turned, light), box.name
+    )
 
 
 def _base_body(box: Solid, light: Light) -> Body:
@@ -179,7 +186,7 @@ def _frame_body(frame: UprightFrame, light: Light) -> Body:
     faces += [
         _face(box, _side(outer, axis, sign), _normal(axis, sign), colour, light) for axis, sign in around
     ]
-    return Body(box, tuple(faces))
+    return Body(box, tuple(faces), len(around))
 
 
 def _normal(axis: int, sign: int) -> Vec3:
@@ -210,7 +217,7 @@ def _shadow(solid: Solid, arena: Arena, light: Light) -> list[Face]:
         return []
     x, y = cast.mean(axis=0)
     on_tatami = abs(x) <= arena.length_x_m / 2 and abs(y) <= arena.width_y_m / 2
-    return [_in_shadow(_outline(cast), TATAMI_BGR if on_tatami else GROUND_BGR, light)]
+    return [_in_shadow(_outline(cast), light, on_tatami=on_tatami)]
 
 
 def _long_shadow(solid: Solid, arena: Arena, light: Light) -> list[Face]:
@@ -220,9 +227,9 @@ def _long_shadow(solid: Solid, arena: Arena, light: Light) -> list[Face]:
         return []
     outline = _outline(cast)
     tatami = np.array(_rectangle(arena, 0.0, 1.0, 0.0, 1.0), np.float32)
-    area, on_tatami = cv2.intersectConvexConvex(outline, tatami)
-    faces = [_in_shadow(outline, GROUND_BGR, light)]
-    return [*faces, _in_shadow(on_tatami.reshape(-1, 2), TATAMI_BGR, light)] if area > 0.0 else faces
+    area, inside = cv2.intersectConvexConvex(outline, tatami)
+    faces = [_in_shadow(outline, light, on_tatami=False)]
+    return [*faces, _in_shadow(inside.reshape(-1, 2), light, on_tatami=True)] if area > 0.0 else faces
 
 
 def _cast(solid: Solid, light: Light) -> Floats | None:
@@ -241,8 +248,9 @@ def _outline(points: Floats) -> npt.NDArray[np.float32]:
     return hull
 
 
-def _in_shadow(outline: npt.NDArray[np.float32], colour: Bgr, light: Light) -> Face:
-    return _on_floor(outline.tolist(), _dim(_lit(colour, _UP, light), _SHADOW))
+def _in_shadow(outline: npt.NDArray[np.float32], light: Light, *, on_tatami: bool) -> Face:
+    name, colour = ("tatami", TATAMI_BGR) if on_tatami else ("ground", GROUND_BGR)
+    return _on_floor(outline.tolist(), _dim(_lit(colour, _UP, light), _SHADOW), name)
 
 
 @dataclass(frozen=True, slots=True)
@@ -264,6 +272,7 @@ class PaintTree:
 
     def __init__(self, bodies: Sequence[Body]) -> None:
         self.faces: list[Face] = []
+        self._bodies: dict[int, Body] = {}  # those that are leaves, by the number of their first face
         self._root = self._part_bodies(bodies)
 
     def back_to_front(self, eye_arena_m: Vec3) -> list[int]:
@@ -272,8 +281,41 @@ class PaintTree:
         _walk(self._root, eye_arena_m, order)
         return order
 
+    def places(self, eye_arena_m: Vec3, points_arena_m: Floats) -> Ints:
+        """Where things that are not in the tree belong in the order of painting.
+
+        Args:
+            eye_arena_m: shape (3,).
+            points_arena_m: one of each thing, shape (n, 3).
+
+        Returns:
+            For each how many faces of `back_to_front` are painted before it, shape (n,).
+        """
+        found = np.zeros(len(points_arena_m), np.int64)
+        self._find_places(self._root, np.array(eye_arena_m), points_arena_m, found)
+        return found
+
+    def _find_places(self, tree: _Tree, eye: Floats, points: Floats, found: Ints) -> None:
+        """Add to `found` what is painted before each point in this part of the tree."""
+        if not len(points):
+            return
+        if not isinstance(tree, _Node):
+            if tree:
+                found += _before_body(self._bodies[tree[0]], eye, points)
+            return
+        normal = np.array(tree.normal)
+        is_above = float(normal @ eye) > tree.offset
+        is_near = (points @ normal > tree.offset) == is_above
+        far, near = (tree.behind, tree.before) if is_above else (tree.before, tree.behind)
+        for part, chosen, before in ((far, ~is_near, 0), (near, is_near, _count(far) + len(tree.faces))):
+            inner = np.full(int(chosen.sum()), before, np.int64)
+            self._find_places(part, eye, points[chosen], inner)
+            found[chosen] += inner
+
     def _part_bodies(self, bodies: Sequence[Body]) -> _Tree:
         if len(bodies) < 2:
+            for body in bodies:
+                self._bodies[len(self.faces)] = body
             return self._keep([face for body in bodies for face in body.faces])
         plane = _plane_between(bodies)
         if plane is None:
@@ -318,6 +360,27 @@ def _walk(tree: _Tree, eye: Vec3, order: list[int]) -> None:
         order.extend(tree.faces)
         tree = tree.before if above else tree.behind
     order.extend(tree)
+
+
+def _count(tree: _Tree) -> int:
+    """Number of faces."""
+    count = 0
+    while isinstance(tree, _Node):
+        count += _count(tree.behind) + len(tree.faces)
+        tree = tree.before
+    return count + len(tree)
+
+
+def _before_body(body: Body, eye: Floats, points: Floats) -> Ints:
+    """How many faces of a body are painted before each point: none, those around its opening, or all."""
+    (c, s), half = body.hull.turn, np.array(body.hull.half_extents_m)
+    offsets = np.vstack((eye, points)) - np.array(body.hull.centre_arena_m)
+    offsets = offsets @ np.array(((c, -s, 0.0), (s, c, 0.0), (0.0, 0.0, 1.0)))  # in the hull's own axes
+    beyond = np.where(np.abs(offsets) > half, np.sign(offsets), 0.0)  # which of its sides
+    # Beyond a side that the eye sees, nothing of the body is nearer.
+    is_nearer = (beyond[1:] * beyond[0] > 0.0).any(axis=1)
+    is_within = ~beyond[1:].any(axis=1)
+    return np.where(is_nearer, len(body.faces), np.where(is_within, body.inner, 0))
 
 
 def _plane_between(bodies: Sequence[Body]) -> tuple[Vec3, float] | None:

@@ -1,4 +1,4 @@
-"""The arena in perspective: floor, base, frames, the drone and its trail.
+"""The arena in perspective: floor, base, frames, obstacles, the drone and its trail.
 
 Painted from back to front at twice the size and then reduced, so that edges are smooth and nothing shows
 through the seams between faces.
@@ -7,7 +7,7 @@ through the seams between faces.
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import pairwise
 from math import cos, pi, sin
 
@@ -22,13 +22,14 @@ from framerunner.film.timeline import Floats, Instant, Timeline
 from framerunner.film.viewpoint import Viewpoint
 from framerunner.runs.plots import STATE_COLOURS
 from scenarios.models import Light
-from sitl.camera_scene import Face, PaintTree, build_scene
+from sitl.camera_scene import PaintTree, build_scene
 from vision.types import Image
 
 FINE = 2
 """Painted pixels for each pixel of the result, along each edge."""
 DRONE_SCALE = 1.6
 """The drone is drawn larger than it is: at its own size it is hard to see on a small screen."""
+_SEEN_THROUGH = ("pole", "wall")  # so that the drone is seen behind them
 _SLAB_M = 0.06  # thickness of the floor
 _TRAIL = [style.bgr(text) for text in STATE_COLOURS]
 
@@ -55,15 +56,12 @@ class ArenaView:
         self._size_px = size_px
         scenario = timeline.scenario
         scene = build_scene(scenario.model_copy(update={"light": Light()}))
-        self._floor = [Face(scene.tatami.corners_arena_m, (0.0, 0.0, 1.0), style.TATAMI)]
-        self._floor += [Face(mat.corners_arena_m, mat.normal_arena, style.MAT) for mat in scene.mats]
+        self._floor = [replace(scene.tatami, colour=style.TATAMI)]
+        self._floor += [replace(mat, colour=style.MAT) for mat in scene.mats]
         self._floor += [
-            Face(shadow.corners_arena_m, shadow.normal_arena, style.SHADOW) for shadow in scene.shadows
+            replace(shadow, colour=style.SHADOW) for shadow in scene.shadows if shadow.name == "tatami"
         ]
         self._tree = PaintTree(scene.bodies)
-        faces = self._tree.faces
-        self._centres_m = np.array([face.corners_arena_m.mean(axis=0) for face in faces]).reshape(-1, 3)
-        self._tops_m = np.array([face.corners_arena_m[:, 2].max() for face in faces])
         self._drone = _DroneShape(load_airframe(scenario.airframe), DRONE_SCALE)
         self._slab = _slab(scene.tatami.corners_arena_m)
         self._paper = np.full((FINE * size_px[1], FINE * size_px[0], 3), style.PAPER, np.uint8)
@@ -85,17 +83,18 @@ class ArenaView:
         self._stems(view)
         centre = np.array(instant.position_arena_m)
         self._drop_shadow(view, centre)
-        order = self._tree.back_to_front((float(view.eye_m[0]), float(view.eye_m[1]), float(view.eye_m[2])))
-        self._solids_and_trail(view, order, instant, film_s)
+        self._solids_and_trail(view, instant, film_s)
         return np.asarray(cv2.resize(self._canvas, self._size_px, interpolation=cv2.INTER_AREA), np.uint8)
 
-    def _solids_and_trail(self, view: Viewpoint, order: list[int], instant: Instant, film_s: float) -> None:
-        """Paint the faces, and each piece of the trail before the first face that may hide it."""
+    def _solids_and_trail(self, view: Viewpoint, instant: Instant, film_s: float) -> None:
+        """Paint the faces, and each piece of the trail where it belongs among them."""
         centre = np.array(instant.position_arena_m)
         points = np.concatenate((self._timeline.trail_m[: instant.trail], centre[None]))
         pixels = view.project(points)
-        slots = self._slots(view, order, (points[1:] + points[:-1]) / 2)
-        drone_slot = int(self._slots(view, order, centre[None])[0])
+        eye = (float(view.eye_m[0]), float(view.eye_m[1]), float(view.eye_m[2]))
+        order = self._tree.back_to_front(eye)
+        slots = self._tree.places(eye, (points[1:] + points[:-1]) / 2)
+        drone_slot = int(self._tree.places(eye, centre[None])[0])
         runs = _runs(slots, self._timeline.trail_kind[: len(slots)])
         if runs:  # a light line under the whole trail, so that it stands out from the floor
             self._polyline(pixels[runs[0].first : runs[-1].end + 1], style.WHITE, round(4.2 * self._pen))
@@ -116,20 +115,10 @@ class ArenaView:
         for number in numbers:
             face = self._tree.faces[number]
             if float(np.dot(view.eye_m - face.corners_arena_m[0], face.normal_arena)) > 0.0:
-                self._fill(view, face.corners_arena_m, face.colour)
-
-    def _slots(self, view: Viewpoint, order: list[int], pieces_m: Floats) -> npt.NDArray[np.int64]:
-        """For each piece, how many faces are painted before the first that may hide it.
-
-        A face may hide it if it is nearer and reaches higher than the piece: the eye looks down, so a line of
-        sight is never below the point that it ends at.
-        """
-        face_m = np.linalg.norm(self._centres_m[order] - view.eye_m, axis=1)
-        piece_m = np.linalg.norm(pieces_m - view.eye_m, axis=1)
-        hides = (face_m[None, :] < piece_m[:, None]) & (self._tops_m[order][None, :] > pieces_m[:, 2:])
-        if not order:
-            return np.zeros(len(pieces_m), np.int64)
-        return np.where(hides.any(axis=1), hides.argmax(axis=1), len(order))
+                if face.name in _SEEN_THROUGH:
+                    self._patch(view, _Patch(face.corners_arena_m, face.colour, 0.45))
+                else:
+                    self._fill(view, face.corners_arena_m, face.colour)
 
     def _patch(self, view: Viewpoint, patch: _Patch) -> None:
         outline = view.polygon(patch.corners_m)
@@ -157,7 +146,7 @@ class ArenaView:
 
     def _stems(self, view: Viewpoint) -> None:
         """Thin lines from the frames down to the floor, which show where they are."""
-        for frame in self._timeline.scenario.frames:
+        for frame in self._timeline.scenario.all_frames:
             below_m = frame.z_m - frame.outer_height_m / 2
             self._line(
                 view, np.array([(frame.x_m, frame.y_m, 0.0), (frame.x_m, frame.y_m, below_m)]), style.STEM

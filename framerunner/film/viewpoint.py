@@ -130,10 +130,11 @@ def _smoothed(needed_m: Floats, reach: int) -> Floats:
 
 
 def _always_visible(timeline: Timeline) -> Floats:
-    """Points that must always be in the image: around base and frames, or else the arena's corners."""
+    """Points that must always be in the image: around base, frames and obstacles, or the arena's corners."""
     scenario = timeline.scenario
     points = [(scenario.base.x_m, scenario.base.y_m, z_m) for z_m in (0.0, scenario.base.top_m + 0.3)]
-    for frame in scenario.frames:
+    points += [corner for prism in scenario.prisms for corner in prism.corners()]
+    for frame in scenario.all_frames:
         points += [(frame.x_m, frame.y_m, z_m) for z_m in (0.0, frame.z_m + frame.outer_height_m)]
     if not scenario.frames:
         half_x, half_y = scenario.arena.length_x_m / 2, scenario.arena.width_y_m / 2

@@ -7,6 +7,7 @@ import pytest
 from framerunner.flying.plan import FlightPlan
 from offboard.keep_in_box import flight_box
 from scenarios.loader import load_scenario
+from scenarios.models import Pole
 
 SCENARIO = load_scenario("test-case-1")
 PLAN = FlightPlan(SCENARIO)
@@ -27,6 +28,16 @@ def test_without_a_base_frames_ceiling_and_box_are_higher_but_the_start_is_not()
     assert lifted.box == flight_box(SCENARIO, 0.4) != PLAN.box
     assert lifted.start_pose == PLAN.start_pose
     assert PLAN.layout is SCENARIO
+
+
+def test_without_a_base_obstacles_are_as_much_higher():
+    crowded = load_scenario("crowded-5")
+    low = Pole(x_m=0.0, y_m=4.9, height_m=1.5)
+    crowded = crowded.model_copy(update={"poles": (*crowded.poles, low)})
+    lifted = FlightPlan(crowded).lifted(0.4).layout
+    assert [decoy.z_m for decoy in lifted.decoys] == [decoy.z_m + 0.4 for decoy in crowded.decoys]
+    tops_m = [2 * prism.half_extents_m[2] for prism in lifted.prisms]
+    assert sorted(tops_m) == pytest.approx([1.9, *[4.4] * 5])
 
 
 def test_each_try_has_a_referee_of_its_own():
