@@ -15,7 +15,7 @@ Flags = npt.NDArray[np.bool_]
 
 _OUTSIDE_PX = 3  # how far outside a first estimate of a side its outer edge is looked for
 _MAX_SAMPLES = 40  # per side
-_SLACK_PX = 2.5  # a bar may look wider than expected by this much
+_SLACK_PX, _SLACK_SHARE = 2.5, 0.9  # a bar may look wider than expected by this or this share of its half
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -95,11 +95,12 @@ def find_edges(patch: Patch, sides: Sides, half_px: Widths) -> BarEdges:
     is_steep = np.array(steep)[:, None]
     base = np.where(is_steep, t * stride + u, u * stride + t).astype(np.intp)
     across = np.where(is_steep, inward, inward * stride).astype(np.intp)
-    offsets = np.arange(-_OUTSIDE_PX, ceil(2.0 * float(half.max()) + _SLACK_PX) + 2)
+    slack = np.maximum(_SLACK_PX, _SLACK_SHARE * half)
+    offsets = np.arange(-_OUTSIDE_PX, ceil(float((2.0 * half + slack).max())) + 2)
     index = base[..., None] + across[..., None] * offsets
     around = labels.reshape(-1).take(index, mode="clip").reshape(-1, len(offsets))
     outer, outer_ok, inner, inner_ok = (
-        run.reshape(t.shape) for run in _runs(around, (2.0 * half + _SLACK_PX).reshape(-1))
+        run.reshape(t.shape) for run in _runs(around, (2.0 * half + slack).reshape(-1))
     )
     column, row = patch.origin
     t -= np.where(is_steep, row, column)

@@ -14,7 +14,7 @@ from vision.colour_regions import OBSTACLE, PRIMARIES, ColourMask, find_colours
 from vision.detector import measure
 from vision.frame_fit import fit_frame
 from vision.outer_sides import outer_sides
-from vision.patch import cut_patch
+from vision.patch import Patch, cut_patch
 from vision.types import (
     NOT_SEEN,
     Detection,
@@ -117,13 +117,14 @@ class FrameFinder:
     ) -> tuple[_Box, FrameSighting] | None:
         """The frame that a group of fragments shows, if it is one."""
         height, width = mask.mask.shape
-        sides = outer_sides(points, width, height)
-        if sides is None:
-            return None
         box = _bounding_box(points)
-        patch = cut_patch(mask, others, box)
-        fitted = fit_frame(patch, sides, self._focal_px, self._spread_px)
-        return None if fitted is None else (box, FrameSighting(mask.colour, *fitted))
+        patch: Patch | None = None
+        for sides in outer_sides(points, width, height):
+            patch = patch or cut_patch(mask, others, box)
+            fitted = fit_frame(patch, sides, self._focal_px, self._spread_px)
+            if fitted is not None:
+                return box, FrameSighting(mask.colour, *fitted)
+        return None
 
 
 def _bounding_box(points: _Contour) -> _Box:

@@ -19,6 +19,7 @@ from vision.types import FramePose
 
 _IDENTITY = np.eye(3)
 _NEAREST_M = 0.03
+_MIN_UPRIGHT = 0.6  # cosine of the largest tilt of the camera, about 53 degrees: frames are upright
 _MAX_STEPS = 12
 _SMALL_STEP = 1e-4  # metres and radians
 _MAX_DEPTH_ERROR = 0.08  # a pose that is less sure than this, relative to its distance, is left out
@@ -76,7 +77,7 @@ def _pose(turn: Floats, shift: Floats, image: Floats, focal_px: float) -> ModelP
         return None
     rotation, _ = cv2.Rodrigues(turn)
     points = AXES_CORNERS @ rotation.T + shift.ravel()
-    if points[:, 2].min() <= 0.0 or rotation[1, 1] <= 0.0:  # behind the camera, or upside down
+    if points[:, 2].min() <= 0.0 or rotation[1, 1] < _MIN_UPRIGHT:  # behind the camera, or fallen
         return None
     error = (points[:, :2] / points[:, 2:] - image[:, 0]).ravel()
     return ModelPose(rotation, shift.ravel(), focal_px * sqrt(float(error @ error) / 4.0))
@@ -165,7 +166,7 @@ def _refined(
         return None
     spread = np.sqrt(np.abs(np.diag(np.linalg.pinv(square))))
     unsure = float(spread[5]) > _MAX_DEPTH_ERROR * float(shift[2]) or float(spread[1]) > _MAX_TURN_ERROR
-    if unsure or rotation[1, 1] <= 0.0 or float(np.abs(error).max()) > _MAX_DEVIATIONS:
+    if unsure or rotation[1, 1] < _MIN_UPRIGHT or float(np.abs(error).max()) > _MAX_DEVIATIONS:
         return None
     facing = rotation[:, 2] @ shift
     return ModelPose(rotation, shift, sqrt(float(error @ error) / 4.0)) if facing > 0.0 else None

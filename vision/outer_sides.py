@@ -17,6 +17,7 @@ import numpy.typing as npt
 from vision.frame_model import Point, Segment, Sides
 
 _MIN_SIZE_PX = 2
+_CLEAR = 0.3  # difference in steepness from which on it is clear which sides are upright
 _MAX_ADDED = 0.03  # of the area: less than this is rounding, more is a side
 
 
@@ -27,7 +28,7 @@ class _Edge:
     real: bool  # not along the image's border
 
 
-def outer_sides(points: npt.NDArray[np.int32], width_px: int, height_px: int) -> Sides | None:
+def outer_sides(points: npt.NDArray[np.int32], width_px: int, height_px: int) -> list[Sides]:
     """Find the sides of the quadrilateral around a region.
 
     Args:
@@ -37,38 +38,50 @@ def outer_sides(points: npt.NDArray[np.int32], width_px: int, height_px: int) ->
 
     Returns:
         Top, right, bottom and left side, clockwise, pixels from the optical axis in the image's middle; None
-        for a side that is not seen. None if there is no such quadrilateral.
+        for a side that is not seen. Several answers, the likelier one first, if it is not clear which pair of
+        sides is upright; none if there is no such quadrilateral.
     """
     hull = cv2.convexHull(points)  # clockwise to the eye, as OpenCV's axes have y upwards
     if len(hull) < 4:
-        return None
+        return []
     (left, top), (right, bottom) = hull.min(axis=(0, 1)).tolist(), hull.max(axis=(0, 1)).tolist()
     if right - left < _MIN_SIZE_PX or bottom - top < _MIN_SIZE_PX:
-        return None
+        return []
     cut = left <= 0 or top <= 0 or right >= width_px - 1 or bottom >= height_px - 1
     if cut:
         edges = _reduced(_edges(hull.reshape(-1, 2).tolist(), width_px, height_px))
-        segments = [(edge.start, edge.end) for edge in edges if edge.real]
+        # Begin after a gap, so that neighbours in the list are neighbours.
+        begin = next((i for i, edge in enumerate(edges) if edge.real and not edges[i - 1].real), 0)
+        segments = [(edge.start, edge.end) for edge in edges[begin:] + edges[:begin] if edge.real]
     else:
         corners = cv2.approxPolyN(hull.astype(np.float32), 4).reshape(-1, 2).tolist()
         segments = [(tuple(corners[i - 1]), tuple(corners[i])) for i in range(len(corners))]
     column, row = (width_px - 1) / 2, (height_px - 1) / 2
-    return _named([((x0 - column, y0 - row), (x1 - column, y1 - row)) for (x0, y0), (x1, y1) in segments])
+    moved = [((x0 - column, y0 - row), (x1 - column, y1 - row)) for (x0, y0), (x1, y1) in segments]
+    answers = (_named(moved, upright) for upright in _upright(moved))
+    return [sides for sides in answers if sides is not None]
 
 
-def _named(segments: list[Segment]) -> Sides | None:
-    """Say which side is which: the upright pair is steeper in the image than the level one."""
+def _upright(segments: list[Segment]) -> list[list[bool]]:
+    """Which sides are upright: the steeper ones in the image; the other way round, too, if not clear."""
     if not 2 <= len(segments) <= 4:
-        return None
+        return []
     steepness = [_steepness(segment) for segment in segments]
+    if len(segments) == 2:
+        return [[value > 0.7 for value in steepness]]
     if len(segments) == 4:
-        first_upright = steepness[0] + steepness[2] > steepness[1] + steepness[3]
-        upright = [(i % 2 == 0) == first_upright for i in range(4)]
-    elif len(segments) == 3 and _are_opposite(segments[2], segments[0]):
-        middle_upright = steepness[1] * 2.0 > steepness[0] + steepness[2]
-        upright = [not middle_upright, middle_upright, not middle_upright]
+        excess = (steepness[0] + steepness[2] - steepness[1] - steepness[3]) / 2.0
+        one, other = [True, False, True, False], [False, True, False, True]
     else:
-        upright = [value > 0.7 for value in steepness]
+        excess = (steepness[0] + steepness[2]) / 2.0 - steepness[1]
+        one, other = [True, False, True], [False, True, False]
+    if abs(excess) > _CLEAR:
+        return [one] if excess > 0.0 else [other]
+    return [one, other] if excess > 0.0 else [other, one]
+
+
+def _named(segments: list[Segment], upright: list[bool]) -> Sides | None:
+    """Say which side is which; None if two would be the same."""
     sides: list[Segment | None] = [None, None, None, None]
     for segment, is_upright in zip(segments, upright, strict=True):
         (x0, y0), (x1, y1) = segment
@@ -77,12 +90,6 @@ def _named(segments: list[Segment]) -> Sides | None:
             return None
         sides[index] = segment
     return (sides[0], sides[1], sides[2], sides[3])
-
-
-def _are_opposite(a: Segment, b: Segment) -> bool:
-    (ax0, ay0), (ax1, ay1) = a
-    (bx0, by0), (bx1, by1) = b
-    return (ax1 - ax0) * (bx1 - bx0) + (ay1 - ay0) * (by1 - by0) < 0.0
 
 
 def _steepness(segment: Segment) -> float:
