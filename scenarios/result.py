@@ -174,6 +174,10 @@ class FlightResult(RefereeReport, _Flown):
     kept_in_box_s: Seconds = Field(
         0.0, description="time during which commands were changed to keep the drone in its box"
     )
+    bound_s: Seconds | None = Field(
+        None, description="no try of this scenario and class is shorter, see docs/bound.md; null if not known"
+    )
+    times_bound: Ratio | None = Field(None, description="try time divided by bound_s; null if not completed")
     judged_by: Text = Field("", description="source of the referee's states: truth or telemetry")
     response: Text = Field(
         "", description="how late the simulated vehicle answered, as by --response; empty: not late"

@@ -62,6 +62,7 @@ class Summary:
         landed: clean or completed: the whole task within the time limit.
         verdicts: by verdict, best first; only those that occurred.
         try_time_s: of flights that landed; None if none did.
+        times_bound: the same, each as a multiple of its bound; None if no bound is known.
         offset_m: of crossings, by the frame's colour; only those that were crossed.
         landing_error_m: of flights that landed; None if none did.
         penalised: flights that were outside the arena.
@@ -73,6 +74,7 @@ class Summary:
     landed: Rate
     verdicts: dict[str, Rate]
     try_time_s: Spread | None
+    times_bound: Spread | None
     offset_m: dict[str, Spread]
     landing_error_m: Spread | None
     penalised: Rate
@@ -114,6 +116,7 @@ def summarise(rows: Sequence[Row]) -> Summary:
         landed=wilson(len(landed), len(rows)),
         verdicts={verdict: wilson(counts[verdict], len(rows)) for verdict in Verdict if counts[verdict] > 0},
         try_time_s=spread([row.try_time_s for row in landed]),
+        times_bound=spread([row.times_bound for row in landed if row.times_bound is not None]),
         offset_m={colour: found for colour, found in offsets.items() if found is not None},
         landing_error_m=spread([row.landing_error_m for row in landed if row.landing_error_m is not None]),
         penalised=wilson(sum(row.outside_s > 0.0 for row in flown), len(flown)),

@@ -92,6 +92,8 @@ def print_summary(summary: Summary, title: str) -> None:
 
     spreads = _table("", "10 %", "median", "90 %", "mean")
     spreads.add_row("try time of the landed (s)", *spread_cells(summary.try_time_s, ".1f", "-"))
+    if summary.times_bound is not None:
+        spreads.add_row("the same in multiples of the bound", *spread_cells(summary.times_bound, ".2f", "-"))
     for colour, offset_m in summary.offset_m.items():
         name = f"crossing offset from the centre of {colour} (m)"
         spreads.add_row(name, *spread_cells(offset_m, ".3f", "-"))

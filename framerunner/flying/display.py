@@ -188,9 +188,11 @@ def result_lines(result: FlightResult) -> str:
     verdict, reason = result.verdict, result.reason
     sentence = reason if reason.startswith(verdict) else f"{verdict}: {reason}"
     drone_class = "" if result.mission_class == "contest" else f", class {result.mission_class}"
+    times = f", {result.times_bound:.2f} times the bound" if result.times_bound else ""
     kept = f", kept in its box for {result.kept_in_box_s:.1f} s" if result.kept_in_box_s else ""
     return (
-        f"{sentence}\n"
-        f"try {result.try_time_s:.1f} s, penalty {result.penalty_s:.1f} s, "
+        f"{sentence}
+"
+        f"try {result.try_time_s:.1f} s{times}, penalty {result.penalty_s:.1f} s, "
         f"path {result.path_length_m:.1f} m, {landing}, judged by {result.judged_by}{drone_class}{kept}"
     )

@@ -11,6 +11,7 @@ from dataclasses import dataclass
 from importlib import metadata
 from typing import Any
 
+from framerunner.flying.envelopes import bound_s
 from framerunner.flying.judges import Judge
 from framerunner.flying.plan import FlightPlan
 from framerunner.runs.track import Track, TrackRecorder
@@ -93,6 +94,7 @@ def _result(
     measured: Mapping[str, Any],
 ) -> FlightResult:
     """The contents of `result.json`, but for wall times."""
+    least_s = bound_s(plan, plan.chart.mission_class)
     return FlightResult(
         scenario=plan.scenario.name,
         mission=plan.chart.name,
@@ -103,6 +105,8 @@ def _result(
         ended=end.ended,
         seconds_in_state=track.seconds_in_state(),
         kept_in_box_s=end.kept_in_box_s,
+        bound_s=least_s,
+        times_bound=round(report.try_time_s / least_s, 3) if least_s and report.completed else None,
         judged_by=judged_by,
         response=str(plan.response or ""),
         version=metadata.version("framerunner"),

@@ -413,3 +413,20 @@ def test_the_version_is_printed(capsys):
 def test_help_keeps_text_in_angle_brackets(capsys):
     assert run(["fly", "--help"]) == 0
     assert "runs/<time>-<scenario>/" in capsys.readouterr().out
+
+
+def test_bounds_of_one_scenario_and_of_a_level(capsys, refused):
+    assert run(["bound", "test-case-1"]) == 0
+    lines = capsys.readouterr().out.splitlines()
+    assert lines[0].startswith("test-case-1, class contest: no try is shorter than ")
+    assert [line.split()[0] for line in lines[2:]] == ["start", "red", "green", "blue", "motors"]
+    assert run(["bound", "--level", "calm", "--seeds", "3:5", "--class", "open"]) == 0
+    lines = capsys.readouterr().out.splitlines()
+    assert [line.split()[0] for line in lines] == ["calm-3", "calm-4", "calm-5", "3"]
+    assert "class open: median" in lines[-1]
+    assert "give either a scenario or --level" in refused("bound")
+    assert "give either a scenario or --level" in refused("bound", "calm-1", "--level", "calm")
+    assert "add --level, or leave it out" in refused("bound", "calm-1", "--seeds", "1:2")
+    assert "--seeds: say which, such as 1:300" in refused("bound", "--level", "calm")
+    assert "give the first and the last" in refused("bound", "--level", "calm", "--seeds", "5:3")
+    assert "has no frames" in refused("bound", "empty")

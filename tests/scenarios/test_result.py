@@ -45,6 +45,8 @@ LOCKSTEP = {
     "ended": "finished",
     "seconds_in_state": {"turning": 10.5, "crossing": 3.1999999999999997},
     "kept_in_box_s": 0.0,
+    "bound_s": 12.5,
+    "times_bound": 7.24,
     "judged_by": "truth",
     "response": "",
     "state_sha256": "0" * 64,
@@ -91,9 +93,10 @@ def test_a_result_is_written_as_it_was_read(told):
 
 
 def test_a_result_of_an_older_version_is_read():
-    old = {name: value for name, value in LOCKSTEP.items() if name != "kept_in_box_s"}
+    later = ("kept_in_box_s", "bound_s", "times_bound")
+    old = {name: value for name, value in LOCKSTEP.items() if name not in later}
     result = FlightResult.parse(json.dumps({**old, "forgotten": 1}))
-    assert result.kept_in_box_s == 0.0
+    assert (result.kept_in_box_s, result.bound_s, result.times_bound) == (0.0, None, None)
     assert result.as_json() == old
 
 

@@ -93,6 +93,12 @@ def test_a_page_without_failures_and_one_without_flights(tmp_path):
     assert "class open" not in html
     html, _ = report(tmp_path / "open", [made_row("calm-1", mission_class="open")])
     assert "(class open)" in html
+    assert "times the bound" not in html  # a flight of an older version, without one
+    rows = [
+        made_row(f"calm-{n}", bound_s=20.0, times_bound=times) for n, times in enumerate((2.5, 4.5, 3.25))
+    ]
+    html, _ = report(tmp_path / "bounded", [*rows, made_row("calm-9", "crashed", bound_s=20.0)])
+    assert "3.25 times the bound" in html
     assert drawn == []
     bad = [made_row("calm-1", "error", reason="X", frames_crossed=(), crossing_offsets_m=())]
     html, _ = report(tmp_path / "bad", bad)
