@@ -191,8 +191,7 @@ def result_lines(result: FlightResult) -> str:
     times = f", {result.times_bound:.2f} times the bound" if result.times_bound else ""
     kept = f", kept in its box for {result.kept_in_box_s:.1f} s" if result.kept_in_box_s else ""
     return (
-        f"{sentence}
-"
+        f"{sentence}\n"
         f"try {result.try_time_s:.1f} s{times}, penalty {result.penalty_s:.1f} s, "
         f"path {result.path_length_m:.1f} m, {landing}, judged by {result.judged_by}{drone_class}{kept}"
     )
