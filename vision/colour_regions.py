@@ -26,6 +26,11 @@ MIN_EXCESS = 25
 
 The factor tells pure colours from pale ones in any light.
 """
+HALF_FILLED = 0.45
+"""Beside such a pixel it is enough to exceed the other channels by this share of what that one does.
+
+It is somewhat less than a half: two faces of a bar differ in brightness.
+"""
 MAX_HUE_GAP = 0.4
 """The channels that should be equal may differ by this share of the excess ..."""
 HUE_SLACK = 12
@@ -36,6 +41,9 @@ MIN_VIOLET_EXCESS = 15
 """Obstacles may be darker than frames, as a few wrong pixels of theirs do less harm."""
 MIN_PIXELS = 8
 """A colour with fewer pixels than this is not looked at."""
+
+_LEAST_EXCESS = 12.0
+_BESIDE = np.ones((3, 3), np.uint8)
 
 _Box = tuple[int, int, int, int]
 
@@ -81,15 +89,14 @@ def find_colours(image: Image) -> list[ColourMask]:
 
 def _primary(colour: str, shown: Plane, one: Plane, other: Plane, spare: list[Plane]) -> ColourMask | None:
     """One channel is bright, the other two are dark and equal."""
-    return _confirmed(colour, _excess(shown, cv2.max(one, other, dst=spare[0]), spare[1]), one, other)
+    return _grown(colour, (shown, cv2.max(one, other, dst=spare[0])), one, other, spare[1])
 
 
 def _secondary(
     colour: str, first: Plane, second: Plane, dark: Plane, spare: list[Plane]
 ) -> ColourMask | None:
     """Two channels are bright and equal, the other one is dark."""
-    excess = _excess(cv2.min(first, second, dst=spare[0]), dark, spare[1])
-    return _confirmed(colour, excess, first, second)
+    return _grown(colour, (cv2.min(first, second, dst=spare[0]), dark), first, second, spare[1])
 
 
 def _excess(shown: Plane, pale: Plane, result: Plane) -> Plane:
@@ -99,15 +106,32 @@ def _excess(shown: Plane, pale: Plane, result: Plane) -> Plane:
     return result
 
 
-def _confirmed(colour: str, excess: Plane, one: Plane, other: Plane) -> ColourMask | None:
-    """The mask of one colour, given its excess and the two channels that should be equal."""
-    found = _above(excess, MIN_EXCESS)
+def _grown(
+    colour: str, planes: tuple[Plane, Plane], one: Plane, other: Plane, spare: Plane
+) -> ColourMask | None:
+    """The mask of one colour, given its brightness and that of the others, and the channels that are equal.
+
+    A lens or a compression mixes thin bars and edges with what is behind them. However bright that is, a
+    pixel that the bar fills by half has half the excess of those beside it; so beside pixels that are sure,
+    that is the test.
+    """
+    shown, pale = planes
+    found = _above(_excess(shown, pale, spare), MIN_EXCESS)
     if found is None:
         return None
-    mask, part = found
-    limit = cv2.convertScaleAbs(_crop(excess, part), alpha=MAX_HUE_GAP, beta=HUE_SLACK)
+    sure, (column, row, columns, rows) = found
+    left, top = max(column - 1, 0), max(row - 1, 0)
+    part = (left, top, column + columns + 1 - left, row + rows + 1 - top)
+    excess = cv2.subtract(_crop(shown, part), _crop(pale, part))
+    half = cv2.convertScaleAbs(cv2.dilate(excess, _BESIDE), alpha=HALF_FILLED)
+    filled = cv2.compare(excess, cv2.max(half, _LEAST_EXCESS), cv2.CMP_GT)
+    limit = cv2.convertScaleAbs(excess, alpha=MAX_HUE_GAP, beta=HUE_SLACK)
     same = cv2.compare(cv2.absdiff(_crop(one, part), _crop(other, part)), limit, cv2.CMP_LT)
-    return _kept(colour, mask, part, same)
+    cv2.bitwise_and(filled, cv2.dilate(_crop(sure, part), _BESIDE), dst=filled)
+    cv2.bitwise_or(filled, _crop(sure, part), dst=filled)
+    cv2.bitwise_and(filled, same, dst=filled)
+    _crop(sure, part)[...] = filled
+    return _kept(colour, sure, (*part[:2], filled.shape[1], filled.shape[0]), filled)
 
 
 def _violet(blue: Plane, green: Plane, red: Plane, spare: list[Plane]) -> ColourMask | None:

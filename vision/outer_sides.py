@@ -16,7 +16,7 @@ import numpy.typing as npt
 
 from vision.frame_model import Point, Segment, Sides
 
-_MIN_SIZE_PX = 2
+_MIN_COLUMNS, _MIN_ROWS = 2, 4  # between the centres of the outermost pixels
 _CLEAR = 0.3  # difference in steepness from which on it is clear which sides are upright
 _MAX_ADDED = 0.03  # of the area: less than this is rounding, more is a side
 
@@ -45,7 +45,7 @@ def outer_sides(points: npt.NDArray[np.int32], width_px: int, height_px: int) ->
     if len(hull) < 4:
         return []
     (left, top), (right, bottom) = hull.min(axis=(0, 1)).tolist(), hull.max(axis=(0, 1)).tolist()
-    if right - left < _MIN_SIZE_PX or bottom - top < _MIN_SIZE_PX:
+    if right - left < _MIN_COLUMNS or bottom - top < _MIN_ROWS:
         return []
     cut = left <= 0 or top <= 0 or right >= width_px - 1 or bottom >= height_px - 1
     if cut:
