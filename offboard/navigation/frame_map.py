@@ -28,7 +28,9 @@ from vision.types import Detections, ObstacleEdge
 SURELY_FOUND_M = 5.0
 SURELY_FOUND_COSINE = 0.5
 SURELY_FOUND_MARGIN_PX = 8.0
-HIDING_MARGIN_PX = 4.0  # what comes nearer than this to an object before it may be hidden
+HIDING_MARGIN_PX = 4.0  # what comes nearer than this to a frame before it may be hidden
+OBSTACLE_STEP_PX = 8.0  # likewise to an obstacle, of which every eighth column is known
+BEHIND_M = 0.5  # an obstacle that seems so much farther away than a frame does not hide it
 NEAR_PX = 8.0  # a sighting whose centre is this near to where a frame should be is of that frame,
 NEAR_SHARE = 0.75  # or this share of its width
 DUPLICATE_M = 0.25  # two frames cannot be nearer to each other
@@ -47,6 +49,7 @@ class FrameMap:
         self._arena = arena
         self._prior = Prior.of(arena)
         self._tracks: list[FrameTrack] = []
+        self._largest_m = hypot(arena.length_x_m, arena.width_y_m)
         self._time_us = -1
         load_filters()
 
@@ -179,7 +182,7 @@ class FrameMap:
         camera: CameraPose,
     ) -> bool:
         """Whether an obstacle's column of the image may be before a frame: where it stands says how far."""
-        if not outline[0] - HIDING_MARGIN_PX <= edge.right_px <= outline[2] + HIDING_MARGIN_PX:
+        if not outline[0] - OBSTACLE_STEP_PX <= edge.right_px <= outline[2] + OBSTACLE_STEP_PX:
             return False
         if edge.cut:
             return True
@@ -187,9 +190,11 @@ class FrameMap:
         left, up = -edge.right_px / focal_px, -edge.down_px / focal_px
         sinking = -(m[6] + m[7] * left + m[8] * up)
         if sinking <= 0.0:
-            return False
+            return True
         plan = hypot(m[0] + m[1] * left + m[2] * up, m[3] + m[4] * left + m[5] * up)
-        return camera.position_m[2] / sinking * plan < distance_m
+        away_m = camera.position_m[2] / sinking * plan
+        # Where one thing hides the foot of another, it seems to stand farther away, often outside the arena.
+        return away_m < distance_m + BEHIND_M or away_m > self._largest_m
 
     def _drop_duplicates(self) -> None:
         """Of frames of one colour that cannot both be there, keep the better known."""

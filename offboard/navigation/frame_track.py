@@ -20,14 +20,19 @@ NOVEL_PX = 0.5  # root mean square of the corners' shift from which on a view ha
 NOVEL_US = 1_000_000  # or this long after the last one
 OUTSIDE_M = 0.5  # a frame farther outside the arena is none
 
-MOST_BELIEF = 20  # images; so many in which it should be seen and is not make a well-known frame forgotten
+# Belief: an image that shows a frame adds this much, one that should and does not takes 1.
+SEEN_BELIEF = 2
+MOST_BELIEF = 30
+TENTATIVE_BELIEF = 6  # a frame that is believed less is forgotten
+TENTATIVE_US = 3_000_000  # if it is not seen for so long
+DOUBTED_MISSES = 3  # in a row; then another frame of the colour is preferred
+
 PREDICTED_S = 0.3  # a frame does not move, and drifts slowly
-MISFITS = 3  # views that contradict all hypotheses, after which they are made anew, and one for each
-# four images of belief; of so many, these are used
+
+# Hypotheses are made anew after so many views that contradict them all, and one more for so much belief.
+MISFITS = 3
+MISFITS_PER_BELIEF = 6
 MISFITS_USED = 4
-TENTATIVE = 3  # a frame that was seen less often is forgotten
-TENTATIVE_US = 3_000_000  # after this time
-DOUBTED_MISSES = 3
 
 PRUNED = 9.0  # natural logarithm of a ratio of likelihoods at which a hypothesis is dropped
 AMBIGUOUS = 4.6  # at which it no longer counts
@@ -66,7 +71,7 @@ class FrameTrack:
 
     Attributes:
         colour: of the frame.
-        belief: images that showed it minus images that should have; negative: there is none.
+        belief: twice the images that showed it, minus those that should have; negative: there is none.
         missed: images in a row that should have shown it.
         time_us: vehicle time of the last prediction.
         seen_us: of the last image that showed it.
@@ -75,7 +80,7 @@ class FrameTrack:
 
     def __init__(self, found: list[Solution], view: View) -> None:
         self.colour = view.colour
-        self.belief, self.missed, self.views = 1, 0, 1
+        self.belief, self.missed, self.views = SEEN_BELIEF, 0, 1
         self.time_us = self.seen_us = view.time_us
         self._hypotheses = [FrameFilter(solution) for solution in found]
         self._used = view
@@ -137,7 +142,7 @@ class FrameTrack:
         if predicted(self.state, view) is None or (misfits and not _is_moved(view, misfits[-1])):
             return
         misfits.append(view)
-        if len(misfits) < MISFITS + self.belief // 4:
+        if len(misfits) < MISFITS + self.belief // MISFITS_PER_BELIEF:
             return
         some = misfits[:: -(-len(misfits) // MISFITS_USED)]
         found = solutions(some, prior)
@@ -146,13 +151,13 @@ class FrameTrack:
             return
         self._hypotheses = [FrameFilter(solution) for solution in found]
         self._prune()
-        self.belief, self.missed, self.views = len(misfits), 0, len(some)
+        self.belief, self.missed, self.views = SEEN_BELIEF * len(misfits), 0, len(some)
         self.seen_us, self._used = view.time_us, view
         misfits.clear()
 
     def is_believed(self, time_us: int) -> bool:
         """Whether there is such a frame."""
-        return self.belief >= (TENTATIVE if time_us - self.seen_us > TENTATIVE_US else 0)
+        return self.belief >= (TENTATIVE_BELIEF if time_us - self.seen_us > TENTATIVE_US else 0)
 
     def miss(self) -> None:
         """An image should have shown it and did not."""
@@ -196,7 +201,7 @@ class FrameTrack:
     def _saw(self, view: View) -> None:
         self.seen_us = view.time_us
         self.missed = 0
-        self.belief = min(self.belief + 1, MOST_BELIEF)
+        self.belief = min(self.belief + SEEN_BELIEF, MOST_BELIEF)
 
     def _prune(self) -> None:
         """Likeliest first; drop those that are far less likely, or became the same as a likelier one."""
