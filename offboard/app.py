@@ -14,6 +14,7 @@ from offboard.engine import MissionEngine, MissionRunError, TransitionTaken
 from offboard.keep_in_box import Box, KeepInBox, OutsideBoxError
 from offboard.limits import CONTEST, CommandLimits
 from offboard.mission import Mission
+from offboard.navigation.surroundings import Surroundings
 from offboard.navigation.view import NavigationView
 from offboard.perception import CameraLostError, Perception
 from offboard.pilot import Imu
@@ -78,6 +79,7 @@ async def fly_mission(
     observer: Observer | None = None,
     box: Box | None = None,
     limits: CommandLimits = CONTEST,
+    surroundings: Surroundings | None = None,
 ) -> MissionEnd:
     """Connect, fly the mission, disconnect.
 
@@ -93,13 +95,14 @@ async def fly_mission(
         observer: called at every tick; must be quick.
         box: keeps the drone inside, whatever the mission commands; None: it may fly anywhere.
         limits: of the mission's commands.
+        surroundings: what is known of the arena; a mission with `vision: frames` needs it.
 
     Raises:
         DroneError: the drone cannot be reached or is not ready.
         CameraLostError: the camera gives no image at the start.
     """
     keeper = None if box is None else KeepInBox(box)
-    engine = MissionEngine(mission, limits=limits)
+    engine = MissionEngine(mission, surroundings=surroundings, limits=limits)
     flight = _Flight(drone, perception, engine, limit_s, observer, keeper=keeper)
     try:
         await drone.connect()
@@ -182,7 +185,7 @@ class _Flight:
             return
         detections = self._perception.latest(state.time_us)
         imu = Imu(state.x, state.y, state.z, state.yaw)
-        command = self._kept_in_box(self._engine.tick(imu, detections, state.time_us), state)
+        command = self._kept_in_box(self._engine.tick(imu, detections, state.time_us, state), state)
         motors_on = self._engine.pilot.cmd.on
         switches = motors_on != self._flying
         self._motors_requested = self._motors_requested or motors_on

@@ -12,20 +12,24 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 from math import isfinite
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from errors import UserError
 from offboard.chart.expressions import compile_value, names_in
 from offboard.chart.native import RESUME, TICK
 from offboard.chart.spec import Action, Leaf, Transition
-from offboard.drone import VelocityCommand
+from offboard.drone import DroneState, VelocityCommand
 from offboard.limits import CONTEST, CommandLimits
 from offboard.mission import Mission
+from offboard.navigation.surroundings import Surroundings
 from offboard.navigation.view import NavigationView
 from offboard.pilot import Imu, Pilot, PilotError, velocity_command
 from offboard.pilot_file import PilotFile, in_words, place_in
 from scenarios.models import COLOURS
 from vision.types import Detections
+
+if TYPE_CHECKING:
+    from offboard.navigation.navigator import Navigator
 
 Act = Callable[[Pilot], None]
 
@@ -73,6 +77,7 @@ class MissionEngine:
     Args:
         mission: what to fly.
         pilot: by default a new one of the mission's class.
+        surroundings: what is known of the arena before the flight; a mission with `vision: frames` needs it.
         quiet_ticks: do not send the chart the ticks that change nothing.
         limits: of the commands.
 
@@ -86,8 +91,9 @@ class MissionEngine:
         mission: Mission,
         pilot: Pilot | None = None,
         *,
-        quiet_ticks: bool = True,
         limits: CommandLimits = CONTEST,
+        surroundings: Surroundings | None = None,
+        quiet_ticks: bool = True,
     ) -> None:
         self.state = ""
         self.transition: TransitionTaken | None = None
@@ -99,6 +105,8 @@ class MissionEngine:
             leaf_id: _FastState(leaf, leaf_id in mission.finishes) for leaf_id, leaf in mission.leaves.items()
         }
         self._quiet_ticks = quiet_ticks
+        self._navigator = _new_navigator(mission, surroundings, limits)
+        self.pilot._navigator = self._navigator
         self._chart: Any = None  # a `StateChart`, from the first tick on
         self._present: _FastState | None = None
         self._started_us = 0
@@ -115,10 +123,18 @@ class MissionEngine:
     @property
     def navigation(self) -> NavigationView | None:
         """The map and the plan of the pilot's navigator, made anew at each call; None without a navigator."""
-        return None
+        return None if self._navigator is None else self._navigator.view()
 
-    def tick(self, imu: Imu, cam: Detections, time_us: int) -> VelocityCommand:
+    def tick(
+        self, imu: Imu, cam: Detections, time_us: int, state: DroneState | None = None
+    ) -> VelocityCommand:
         """Run one step of the chart, at this vehicle time. After a pause this continues the mission.
+
+        Args:
+            imu: where the drone is.
+            cam: what the latest image showed.
+            time_us: vehicle time.
+            state: of the drone, from which `imu` is; needed by missions with `vision: frames`.
 
         Returns:
             The velocity to fly from now on, within the limits. `pilot.cmd.on` says whether motors must run.
@@ -136,6 +152,8 @@ class MissionEngine:
         pilot.cam = cam
         self.transition = None
         try:
+            if self._navigator is not None and state is not None:
+                self._navigator.observe(state, cam)
             self._count_unseen(time_us)
             if self._present is None:
                 self._start(time_us)
@@ -227,6 +245,19 @@ class MissionEngine:
     def _error(self, reason: str) -> MissionRunError:
         state = self.state or "not started"
         return MissionRunError(f"mission '{self.mission.name}', state '{state}': {reason}")
+
+
+def _new_navigator(
+    mission: Mission, surroundings: Surroundings | None, limits: CommandLimits
+) -> Navigator | None:
+    """A navigator for a mission that uses the map of frames."""
+    if mission.vision != "frames":
+        return None
+    from offboard.navigation.navigator import Navigator  # noqa: PLC0415 - it imports filterpy: a second
+
+    if surroundings is None:
+        raise MissionRunError(f"mission '{mission.name}': needs the surroundings for its map of frames")
+    return Navigator(surroundings, limits)
 
 
 def _values(when: str, pilot: Pilot) -> tuple[tuple[str, object], ...]:

@@ -11,6 +11,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from math import cos, isfinite, isnan, sin, sqrt
 from types import SimpleNamespace
+from typing import TYPE_CHECKING
 
 from errors import UserError
 from geometry.vectors import Vec3
@@ -20,6 +21,9 @@ from scenarios.models import COLOURS, Colour
 from vision.types import Detection, Detections
 
 FLY_M_S = 1.0  # of `fly_to_goal`: the paper's
+if TYPE_CHECKING:  # it imports filterpy, which takes a second and which not every mission needs
+    from offboard.navigation.navigator import Navigator
+
 LOOK_TURN_PX = 80.0  # horizontal offset that gives 1 rad/s: the paper's gains, for its image of 320 x 240
 LOOK_CLIMB_PX = 120.0  # vertical offset that gives 1 m/s
 
@@ -80,6 +84,7 @@ class Pilot:
         self.seconds_in_state = 0.0
         self.seconds_in_mission = 0.0
         self.seconds_unseen = 0.0
+        self._navigator: Navigator | None = None  # set by the engine if the mission says `vision: frames`
 
     @property
     def frame(self) -> Detection:
@@ -98,6 +103,31 @@ class Pilot:
         x, y, z = self.goal_m
         imu = self.imu
         return sqrt((x - imu.x) ** 2 + (y - imu.y) ** 2 + (z - imu.z) ** 2)
+
+    @property
+    def frame_known(self) -> bool:
+        """The map has the frame of this `colour`, well enough to fly towards it."""
+        return self._map_user.is_known(self.colour)
+
+    @property
+    def frame_certain(self) -> bool:
+        """The map has the frame of this `colour` well enough to fly through it."""
+        return self._map_user.is_certain(self.colour)
+
+    @property
+    def frame_crossed(self) -> bool:
+        """`cross_frame` has flown through the frame of this `colour` and is clear of it."""
+        return self._map_user.has_crossed(self.colour)
+
+    @property
+    def crossing_refused(self) -> bool:
+        """`cross_frame` cannot fly through the frame from here: it was lost, uncertain or missed."""
+        return self._map_user.refused
+
+    @property
+    def path_flown(self) -> bool:
+        """The drone is at the end of the path of `fly_path_to_goal` or `step_back`."""
+        return self._map_user.arrived
 
     def hover(self) -> None:
         """Motors on, all rates zero (the paper's Hover)."""
@@ -130,6 +160,26 @@ class Pilot:
             self.cmd.rot_z = -((frame.e + frame.w) / 2) / LOOK_TURN_PX
             self.cmd.vel_z = ((frame.n + frame.s) / 2) / LOOK_CLIMB_PX
 
+    def explore(self) -> None:
+        """Fly to where the most of the arena that was not seen yet comes into view, and look around."""
+        self._fly(self._map_user.explore())
+
+    def cross_frame(self) -> None:
+        """Fly through the frame of this `colour`, clear of all other frames seen, and on to what comes next.
+
+        The path is planned again whenever the map becomes better. Near the frame the drone waits until the
+        frame is certain.
+        """
+        self._fly(self._map_user.cross(self.colour))
+
+    def step_back(self) -> None:
+        """Fly back from the frame of this `colour`, a little to its side, to look at it again."""
+        self._fly(self._map_user.step_back(self.colour))
+
+    def fly_path_to_goal(self) -> None:
+        """Fly to the goal on a smooth path, clear of all frames seen; see `path_flown`."""
+        self._fly(self._map_user.fly_to(self.goal_m))
+
     def motors_off(self) -> None:
         """Stop the motors at once, in the air too."""
         self.hover()
@@ -141,6 +191,19 @@ class Pilot:
         self.hover()
         self.cmd.on = False
         self.cmd.land = True
+
+    @property
+    def _map_user(self) -> Navigator:
+        if self._navigator is None:
+            raise PilotError("the mission uses the map of frames; add the line 'vision: frames' to its file")
+        return self._navigator
+
+    def _fly(self, command: VelocityCommand) -> None:
+        """Command a velocity with motors on."""
+        cmd = self.cmd
+        cmd.on = True
+        cmd.vel_x, cmd.vel_y, cmd.vel_z = command.forward_m_s, command.left_m_s, command.up_m_s
+        cmd.rot_z = command.yaw_rate_rad_s
 
 
 def velocity_command(cmd: Command, limits: CommandLimits = CONTEST) -> VelocityCommand:

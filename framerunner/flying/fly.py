@@ -73,6 +73,7 @@ async def fly(
         observer=observe,
         box=plan.box,
         limits=plan.command_limits,
+        surroundings=plan.surroundings,
     )
     outcome = await (flight if run is None else run(flight))
     report = await judge.report(

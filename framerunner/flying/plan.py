@@ -10,6 +10,7 @@ from firmware_py.airframe import Airframe, load_airframe
 from framerunner.flying.response import Response
 from offboard.keep_in_box import Box, flight_box
 from offboard.limits import CONTEST, CommandLimits
+from offboard.navigation.surroundings import Surroundings
 from scenarios.models import Part, Scenario, start_position
 from scenarios.referee import Referee
 
@@ -76,6 +77,16 @@ class FlightPlan:
                 "arena": _raised(scenario.arena, "height_m", lift_m),
             }
         )
+
+    @property
+    def surroundings(self) -> Surroundings:
+        """What a navigator knows before the flight: all but the layout."""
+        layout, envelope_m = self.layout, self.airframe.envelope_m
+        if not layout.frames:
+            return Surroundings(layout.arena, layout.base, layout.camera, envelope_m)
+        frame = layout.frames[0]  # all are of one size, which the rules tell
+        size_m = (frame.outer_width_m, frame.outer_height_m)
+        return Surroundings(layout.arena, layout.base, layout.camera, envelope_m, size_m, frame.bar_m)
 
     @property
     def box(self) -> Box:

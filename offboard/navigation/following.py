@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from collections import deque
 from dataclasses import dataclass
-from math import cos, hypot, pi, remainder, sin
+from math import cos, hypot, pi, remainder, sin, sqrt
 
 from geometry.vectors import Vec3
 from offboard.drone import DroneState, VelocityCommand
@@ -26,6 +26,9 @@ INTEGRAL_REACH_M = 0.15  # farther from the path, the integral does not grow
 MAX_CORRECTION_M_S = 0.6
 WAIT_FROM_M = 0.1  # farther from the path, its time goes slower
 WAIT_M = 0.25  # beyond that, it stands still
+AHEAD_FROM_M = 0.04  # farther ahead, the path's time goes faster
+AHEAD_M = 0.4
+MAX_RATE = 1.25
 _MAX_STEP_S = 0.3
 _HISTORY = 16  # ticks
 _RATE_S = 0.05  # over which the acceleration of the heading is measured
@@ -115,7 +118,7 @@ class PathFollower:
         self._past.append((now_s, motion))
         error, slower = self._errors(state, now_s)
         self.error_m = hypot(*error)
-        self._rate = min(max(1.0 - (self.error_m - WAIT_FROM_M) / WAIT_M, 0.0), 1.0)
+        self._rate = _rate_of(error, motion.velocity_m_s)
         self._integrate(error, step_s)
         correction = [
             POSITION_GAIN_PER_S * e + VELOCITY_GAIN * v + i
@@ -191,6 +194,17 @@ class PathFollower:
             min(max(up, -limit), limit),
             min(max(yaw_rate, -yaw_limit), yaw_limit),
         )
+
+
+def _rate_of(error_m: Vec3, velocity_m_s: Vec3) -> float:
+    """How fast the path's time goes: slower while the drone is behind or aside, faster while it is ahead."""
+    speed = hypot(*velocity_m_s)
+    behind_m = sum(e * v for e, v in zip(error_m, velocity_m_s, strict=True)) / speed if speed > 0.05 else 0.0
+    aside_m = sqrt(max(sum(e * e for e in error_m) - behind_m * behind_m, 0.0))
+    late_m = max(behind_m - WAIT_FROM_M, 0.0) + max(aside_m - WAIT_FROM_M, 0.0)
+    if late_m > 0.0:
+        return max(1.0 - late_m / WAIT_M, 0.0)
+    return min(1.0 + max(-behind_m - AHEAD_FROM_M, 0.0) / AHEAD_M, MAX_RATE)
 
 
 def _slowed(motion: Motion, rate: float) -> tuple[Vec3, Vec3]:

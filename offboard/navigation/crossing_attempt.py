@@ -1,0 +1,107 @@
+"""One attempt to fly through a frame: how far it is, and whether it can go on."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from math import cos, dist, hypot, inf, pi, remainder, sin
+
+from geometry.vectors import Vec3
+from offboard.navigation.frame_estimate import FrameEstimate
+from offboard.navigation.path import Crossing
+
+LOOK_AGAIN_M = 1.0  # before the opening; there the drone waits until the frame is certain
+BRAKING_M = 0.5  # before that, where it is decided
+COMMIT_M = 0.3  # before the opening; from there the path is not planned again
+COMMIT_ACROSS_M = 0.06  # if the drone is no farther beside the opening's axis
+SETTLED_M = 0.7  # before the opening; from there it is only if the frame turns out to be elsewhere,
+SETTLED_MOVE_M = 0.02  # by this,
+SETTLED_TURN_RAD = 0.05  # or this
+CLEAR_M = 0.25  # behind the opening
+MAX_CLEARING_S = 3.0
+MAX_LOOK_S = 4.0
+MAX_LOST_S = 1.5
+MAX_UNPLANNED_S = 2.0
+MAX_CROSSING_S = 25.0
+
+
+@dataclass(slots=True)
+class CrossingAttempt:
+    """Positions along the direction of flight are negative before the opening. Times are vehicle time.
+
+    Attributes:
+        colour: of the frame.
+        began_s: when the attempt began.
+        known_s: when the frame was last on the map.
+        planned_s: when there was last a path.
+        passed: the drone has gone through the opening.
+        cleared: and is behind the frame's bars.
+        refused: it cannot go on.
+    """
+
+    colour: str
+    began_s: float
+    known_s: float
+    planned_s: float
+    passed: bool = False
+    cleared: bool = False
+    refused: bool = False
+    _aim: Crossing | None = None  # the opening and the direction as last planned
+    _along_m: float = -inf
+    _across_m: float = 0.0
+    _looking_since_s: float | None = None
+    _passed_s: float = inf
+
+    def aim(self, crossing: Crossing) -> None:
+        """Note which opening the path leads through, and in which direction."""
+        if crossing != self._aim:
+            self._aim, self._along_m = crossing, -inf
+
+    def move(self, position_m: Vec3, opening_m: tuple[float, float], now_s: float) -> None:
+        """Note where the drone is now; `opening_m` are the opening's width and height."""
+        if now_s - self.began_s > MAX_CROSSING_S:
+            self.refused = not self.passed
+        if self._aim is None:
+            return
+        (x, y, z), heading = self._aim.gate.centre_m, self._aim.heading_rad
+        dx, dy, dz = position_m[0] - x, position_m[1] - y, position_m[2] - z
+        along_m = cos(heading) * dx + sin(heading) * dy
+        left_m = cos(heading) * dy - sin(heading) * dx
+        if along_m >= 0.0 > self._along_m > -inf and not self.passed:
+            self.passed = abs(left_m) < opening_m[0] / 2 and abs(dz) < opening_m[1] / 2
+            self.refused = not self.passed
+            self._passed_s = now_s
+        self._along_m, self._across_m = along_m, hypot(left_m, dz)
+        self.cleared = self.passed and (along_m > CLEAR_M or now_s - self._passed_s > MAX_CLEARING_S)
+
+    @property
+    def is_committed(self) -> bool:
+        """The drone is straight before the opening, too near to plan again, or beyond it."""
+        return self.passed or (-COMMIT_M < self._along_m < 0.0 and self._across_m < COMMIT_ACROSS_M)
+
+    def is_settled(self, estimate: FrameEstimate) -> bool:
+        """The drone is near, and the path leads through the opening as it is known now."""
+        if self._aim is None or not estimate.certain or not -SETTLED_M < self._along_m < 0.0:
+            return False
+        gate = self._aim.gate
+        turned_rad = abs(remainder(gate.yaw_rad - estimate.yaw_rad, pi))
+        return dist(gate.centre_m, estimate.position_m) < SETTLED_MOVE_M and turned_rad < SETTLED_TURN_RAD
+
+    def must_look(self, estimate: FrameEstimate, position_m: Vec3, now_s: float) -> bool:
+        """Whether the drone must stop before the frame, because it is near and the frame is not certain."""
+        if estimate.certain or dist(estimate.position_m, position_m) > LOOK_AGAIN_M + BRAKING_M:
+            self._looking_since_s = None
+            return False
+        if self._looking_since_s is None:
+            self._looking_since_s = now_s
+        self.refused = self.refused or now_s - self._looking_since_s > MAX_LOOK_S
+        return True
+
+    def lose(self, now_s: float) -> None:
+        """The frame is not on the map."""
+        self.refused = self.refused or now_s - self.known_s > MAX_LOST_S
+
+    def fly(self, *, planned: bool, now_s: float) -> None:
+        """Note whether there is a path."""
+        if planned:
+            self.planned_s = now_s
+        self.refused = self.refused or now_s - self.planned_s > MAX_UNPLANNED_S

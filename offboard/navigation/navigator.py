@@ -1,0 +1,201 @@
+"""What the primitives of a mission with `vision: frames` call: explore, cross, step back, fly to a point.
+
+Every tick `observe` gives the drone's state and the detections of the latest image; then one of the actions
+returns the velocity to fly. An action keeps its goal and its path as long as it is called at every tick.
+"""
+
+from __future__ import annotations
+
+from math import atan2, cos, dist, hypot, pi, remainder, sin
+
+from geometry.vectors import Vec3
+from offboard.drone import DroneState, VelocityCommand
+from offboard.limits import CONTEST, CommandLimits
+from offboard.navigation.crossing_attempt import LOOK_AGAIN_M, CrossingAttempt
+from offboard.navigation.frame_estimate import FrameEstimate
+from offboard.navigation.goals import FlightStyle, Gate, Goal, Point
+from offboard.navigation.path_flight import STILL, PathFlight, position_now
+from offboard.navigation.surroundings import Surroundings
+from offboard.navigation.view import NavigationView
+from offboard.navigation.world_model import WorldModel
+from scenarios.models import COLOURS
+from vision.types import Detections
+
+GAP_S = 0.3  # an action that was not called for so long begins again
+EXPLORE_S = 0.5  # between two choices of where to look next
+HOME_HEIGHT_M = 0.5  # above the start, on the way home
+AHEAD_STD_M = 0.3  # of a next frame; if it is known less well, it is not planned for yet
+ARRIVED_M = 0.06
+ARRIVED_M_S = 0.15
+LOOK_BACK_M = 1.6
+LOOK_ASIDE_RAD = 0.5
+
+
+class Navigator:
+    """The world model, the path, and the action that is flown. All positions are in arena axes."""
+
+    def __init__(self, surroundings: Surroundings, limits: CommandLimits = CONTEST) -> None:
+        self._surroundings = surroundings
+        width_m, height_m = surroundings.frame_m
+        self._opening_m = (width_m - 2 * surroundings.bar_m, height_m - 2 * surroundings.bar_m)
+        self._style = FlightStyle()
+        self._world = WorldModel(surroundings)
+        self._flight = PathFlight(surroundings.arena, self._style)
+        self._start_m: Vec3 | None = None
+        self._state: DroneState | None = None
+        self._action = ""
+        self._acted_s = -GAP_S
+        self._goal: Point | None = None
+        self._chosen_s = 0.0
+        self._crossing: CrossingAttempt | None = None
+        self._steps_back = 0
+
+    def observe(self, state: DroneState, detections: Detections) -> None:
+        """Add the state of this tick and, if its image is new, what was seen in it."""
+        self._state = state
+        if self._start_m is None:
+            self._start_m = position_now(state)
+        self._world.observe(state, detections)
+
+    def is_known(self, colour: str) -> bool:
+        """The frame is on the map."""
+        return self._world.frame(colour) is not None
+
+    def is_certain(self, colour: str) -> bool:
+        """The frame is known well enough to fly through."""
+        estimate = self._world.frame(colour)
+        return estimate is not None and estimate.certain
+
+    def has_crossed(self, colour: str) -> bool:
+        """`cross` has flown through this frame and is clear of it."""
+        crossing = self._crossing
+        return crossing is not None and crossing.colour == colour and crossing.cleared
+
+    @property
+    def refused(self) -> bool:
+        """`cross` cannot go on."""
+        return self._crossing is not None and self._crossing.refused
+
+    @property
+    def arrived(self) -> bool:
+        """`fly_to` or `step_back` has reached its goal, and the drone is (nearly) at rest."""
+        goal, state = self._goal, self._state
+        if goal is None or state is None:
+            return False
+        near = dist(position_now(state), goal.position_m) < ARRIVED_M
+        return near and hypot(*state.velocity_arena_m_s) < ARRIVED_M_S
+
+    def view(self) -> NavigationView:
+        """The map and the path, for displays."""
+        path = self._flight.path
+        return NavigationView(self._world.frames, () if path is None else tuple(path.points()), self._action)
+
+    def explore(self) -> VelocityCommand:
+        """Fly to the view that shows most of what has not been seen."""
+        state, now_s = self._begin("explore")
+        if self._goal is None or now_s - self._chosen_s >= EXPLORE_S:
+            viewpoint = self._world.next_viewpoint(position_now(state), state.yaw)
+            self._goal, self._chosen_s = Point(viewpoint.position_m, viewpoint.yaw_rad), now_s
+        return self._fly(self._goal)
+
+    def fly_to(self, goal_m: Vec3) -> VelocityCommand:
+        """Fly to a point on a smooth path."""
+        self._begin("fly to goal")
+        if self._goal is None or self._goal.position_m != goal_m:
+            self._goal = Point(goal_m)
+            self._flight.change()
+        return self._fly(self._goal)
+
+    def step_back(self, colour: str) -> VelocityCommand:
+        """Fly back from a frame, to one of its sides, facing it."""
+        state, _ = self._begin(f"step back from {colour}")
+        if self._goal is None:
+            self._goal = self._place_to_look_from(colour, state)
+            self._steps_back += 1
+        return self._fly(self._goal)
+
+    def cross(self, colour: str) -> VelocityCommand:
+        """Fly through a frame as the map has it now, and on towards what comes next."""
+        state, now_s = self._begin(f"cross {colour}")
+        crossing = self._crossing
+        if crossing is None or crossing.colour != colour or crossing.refused:
+            crossing = self._crossing = CrossingAttempt(colour, now_s, now_s, now_s)
+        crossing.move(position_now(state), self._opening_m, now_s)
+        estimate = self._world.frame(colour)
+        if crossing.is_committed or (estimate is not None and crossing.is_settled(estimate)):
+            return self._flight.follow(state)
+        if estimate is None:
+            crossing.lose(now_s)
+            return STILL
+        crossing.known_s = now_s
+        if crossing.must_look(estimate, position_now(state), now_s):
+            return self._fly(_place_before(estimate, state, LOOK_AGAIN_M))
+        command = self._fly(Gate(estimate.position_m, estimate.yaw_rad), *self._goals_after(colour))
+        path = self._flight.path
+        crossing.fly(planned=path is not None, now_s=now_s)
+        if path is not None and path.crossings:
+            crossing.aim(path.crossings[0])
+        return command
+
+    def _begin(self, action: str) -> tuple[DroneState, float]:
+        """Note which action is flown at this tick; a new one, or one after a gap, has no goal yet."""
+        state = self._state
+        if state is None:
+            raise RuntimeError("observe() comes before any action")
+        now_s = state.time_us * 1e-6
+        gap = now_s - self._acted_s > GAP_S
+        if gap:
+            self._flight.stop()
+        if gap or action != self._action:
+            self._action, self._goal = action, None
+            self._flight.change()
+        self._acted_s = now_s
+        return state, now_s
+
+    def _fly(self, *goals: Goal) -> VelocityCommand:
+        assert self._state is not None, "observe() comes before any action"
+        return self._flight.fly(goals, self._world.obstacles(), self._state)
+
+    def _goals_after(self, colour: str) -> list[Goal]:
+        """The next frame, if it is on the map; after the last one, the start."""
+        following = COLOURS[COLOURS.index(colour) + 1 :] if colour in COLOURS else ()
+        if not following:
+            x, y, z = self._start_m or (0.0, 0.0, 0.0)
+            return [Point((x, y, z + HOME_HEIGHT_M))]
+        estimate = self._world.frame(following[0])
+        if estimate is None or estimate.ambiguous or max(estimate.position_std_m) > AHEAD_STD_M:
+            return []
+        return [Gate(estimate.position_m, estimate.yaw_rad)]
+
+    def _place_to_look_from(self, colour: str, state: DroneState) -> Point:
+        """Away from a frame, to its left and its right side in turn; without a frame, back and up."""
+        here = position_now(state)
+        estimate = self._world.frame(colour)
+        if estimate is None:
+            back = (here[0] - cos(state.yaw), here[1] - sin(state.yaw), here[2] + 0.3)
+            return Point(self._inside(back), state.yaw)
+        x, y, z = estimate.position_m
+        bearing = atan2(here[1] - y, here[0] - x)
+        bearing += LOOK_ASIDE_RAD if self._steps_back % 2 else -LOOK_ASIDE_RAD
+        place = self._inside((x + LOOK_BACK_M * cos(bearing), y + LOOK_BACK_M * sin(bearing), z + 0.1))
+        return Point(place, atan2(y - place[1], x - place[0]))
+
+    def _inside(self, place: Vec3) -> Vec3:
+        """The nearest place in which the drone keeps its distance from the arena's sides."""
+        arena, style = self._surroundings.arena, self._style
+        x_m = arena.length_x_m / 2 - style.side_margin_m
+        y_m = arena.width_y_m / 2 - style.side_margin_m
+        x, y, z = place
+        low, high = style.floor_margin_m, arena.height_m - style.side_margin_m
+        return (max(-x_m, min(x_m, x)), max(-y_m, min(y_m, y)), max(low, min(high, z)))
+
+
+def _place_before(estimate: FrameEstimate, state: DroneState, distance_m: float) -> Point:
+    """On a frame's normal, on the drone's side, facing it; if its yaw is not known, on the line to it."""
+    x, y, z = estimate.position_m
+    bearing = atan2(state.y - y, state.x - x)
+    if not estimate.ambiguous:
+        normal = estimate.yaw_rad
+        bearing = normal if cos(bearing - normal) > 0.0 else normal + pi
+    place = (x + distance_m * cos(bearing), y + distance_m * sin(bearing), z)
+    return Point(place, remainder(bearing + pi, 2 * pi))

@@ -1,0 +1,74 @@
+"""What the navigator knows of the arena: frames, obstacles, and what has not been seen yet."""
+
+from __future__ import annotations
+
+from geometry.vectors import Vec3
+from offboard.drone import DroneState
+from offboard.navigation.camera_model import CameraModel
+from offboard.navigation.exploration import Explorer, Viewpoint
+from offboard.navigation.frame_estimate import FrameEstimate
+from offboard.navigation.frame_map import FrameMap
+from offboard.navigation.goals import Gate, Obstacles
+from offboard.navigation.obstacle_map import ObstacleMap
+from offboard.navigation.pose_history import PoseHistory
+from offboard.navigation.search.glimpses import Glimpses
+from offboard.navigation.surroundings import Surroundings
+from scenarios.models import COLOURS
+from vision.types import Detections
+
+
+class WorldModel:
+    """Everything seen so far, in arena axes. Images are used at the drone's pose when they were exposed."""
+
+    def __init__(self, surroundings: Surroundings) -> None:
+        camera = CameraModel.of(surroundings.camera)
+        self._surroundings = surroundings
+        self._history = PoseHistory()
+        self._map = FrameMap(camera, surroundings.arena)
+        self._obstacle_map = ObstacleMap(camera, surroundings.arena)
+        self._glimpses = Glimpses(camera)
+        self._explorer = Explorer(camera, surroundings.arena)
+        self._image_us = -1
+
+    def observe(self, state: DroneState, detections: Detections) -> None:
+        """Add the state of a tick and, if its image is new, what was seen in it."""
+        self._history.add(state)
+        image_us = detections.time_us
+        if image_us is None or image_us <= self._image_us:
+            return
+        pose = self._history.at(image_us)
+        if pose is None:
+            return
+        self._image_us = image_us
+        where = (pose.position_m, pose.attitude_arena)
+        self._map.observe(detections, pose)
+        self._obstacle_map.update(*where, detections.obstacle_edges)
+        self._explorer.update(*where, detections.obstacle_edges)
+        known = [colour for colour in COLOURS if self._map.best(colour) is not None]
+        self._glimpses.update(*where, detections, known)
+
+    def frame(self, colour: str) -> FrameEstimate | None:
+        """The frame of a colour; None if it is not on the map."""
+        return self._map.best(colour)
+
+    @property
+    def frames(self) -> tuple[FrameEstimate, ...]:
+        """All frames on the map."""
+        return self._map.frames()
+
+    def obstacles(self) -> Obstacles:
+        """All that a path must keep clear of; of each colour of the task only the frame known best."""
+        seen = [frame for frame in self._map.frames() if frame.colour not in COLOURS]
+        seen += [best for best in map(self._map.best, COLOURS) if best is not None]
+        frames = tuple(Gate(frame.position_m, frame.yaw_rad) for frame in seen)
+        return Obstacles(frames, self._obstacle_map.columns_m(), self._surroundings.base)
+
+    def next_viewpoint(self, position_m: Vec3, yaw_rad: float) -> Viewpoint:
+        """Where to look next for frames that are not on the map."""
+        return self._explorer.next_viewpoint(
+            position_m,
+            yaw_rad,
+            [frame.position_m for frame in self._map.frames()],
+            self._glimpses.lines(),
+            self._obstacle_map.columns_m(),
+        )
