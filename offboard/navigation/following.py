@@ -25,10 +25,8 @@ MAX_INTEGRAL_M_S = 0.15
 INTEGRAL_REACH_M = 0.15  # farther from the path, the integral does not grow
 MAX_CORRECTION_M_S = 0.6
 WAIT_FROM_M = 0.1  # farther from the path, its time goes slower
+WAIT_ASIDE_M = 0.05  # or aside from it
 WAIT_M = 0.25  # beyond that, it stands still
-AHEAD_FROM_M = 0.04  # farther ahead, the path's time goes faster
-AHEAD_M = 0.4
-MAX_RATE = 1.25
 _MAX_STEP_S = 0.3
 _HISTORY = 16  # ticks
 _RATE_S = 0.05  # over which the acceleration of the heading is measured
@@ -197,14 +195,12 @@ class PathFollower:
 
 
 def _rate_of(error_m: Vec3, velocity_m_s: Vec3) -> float:
-    """How fast the path's time goes: slower while the drone is behind or aside, faster while it is ahead."""
+    """How fast the path's time goes: slower while the drone is behind or aside, not while it is ahead."""
     speed = hypot(*velocity_m_s)
     behind_m = sum(e * v for e, v in zip(error_m, velocity_m_s, strict=True)) / speed if speed > 0.05 else 0.0
     aside_m = sqrt(max(sum(e * e for e in error_m) - behind_m * behind_m, 0.0))
-    late_m = max(behind_m - WAIT_FROM_M, 0.0) + max(aside_m - WAIT_FROM_M, 0.0)
-    if late_m > 0.0:
-        return max(1.0 - late_m / WAIT_M, 0.0)
-    return min(1.0 + max(-behind_m - AHEAD_FROM_M, 0.0) / AHEAD_M, MAX_RATE)
+    late_m = max(behind_m - WAIT_FROM_M, 0.0) + max(aside_m - WAIT_ASIDE_M, 0.0)
+    return max(1.0 - late_m / WAIT_M, 0.0)
 
 
 def _slowed(motion: Motion, rate: float) -> tuple[Vec3, Vec3]:
