@@ -15,8 +15,6 @@ from framerunner.flying.plan import FlightPlan
 from scenarios.bound import Bound, Envelope, Fall, Reach, lower_bound
 from scenarios.models import MissionClass
 
-_FALL = Fall(level_m=0.45, level_per_m=0.8, longest_m=2.6, deepest_m=4.2, rise_m=0.3)
-
 ENVELOPES: Mapping[tuple[str, MissionClass], Envelope] = {
     # +-1 m/s on each axis of the drone, which at a yaw of 45 degrees to its way is sqrt(2) m/s in plan.
     ("abejorro", "contest"): Envelope(
@@ -24,7 +22,7 @@ ENVELOPES: Mapping[tuple[str, MissionClass], Envelope] = {
         up=Reach(1.0, 0.6, 2.4),
         down=Reach(1.0, 0.35, 1.9),
         total_excess_m=0.5,
-        fall=_FALL,
+        fall=Fall(level_m=0.45, level_per_m=0.8, longest_m=2.6, deepest_m=4.2, rise_m=0.3),
     ),
     # The airframe's `level_speed_m_s` and its limits of climb and descent.
     ("abejorro", "open"): Envelope(
@@ -32,7 +30,7 @@ ENVELOPES: Mapping[tuple[str, MissionClass], Envelope] = {
         up=Reach(1.5, 0.8, 3.3),
         down=Reach(1.0, 0.4, 2.0),
         total_excess_m=0.7,
-        fall=_FALL,
+        fall=Fall(level_m=0.55, level_per_m=0.8, longest_m=2.7, deepest_m=4.3, rise_m=0.4),
     ),
 }
 """By airframe and class of the mission."""

@@ -21,6 +21,7 @@ from matplotlib.ticker import MaxNLocator
 
 from framerunner.runs import PlotError, check_plot_format
 from framerunner.runs.track import Track
+from geometry.vectors import Vec3
 from offboard.navigation.frame_estimate import FrameEstimate
 from scenarios.models import Frame, Scenario, UprightFrame, start_position
 from scenarios.result import FlightResult
@@ -113,6 +114,27 @@ def draw_track(scenario: Scenario, track: Track, result: FlightResult | None) ->
     _set_limits(top, side, scenario, track)
     _draw_legend(notes, spent_s, styles, has_estimates=bool(track.estimates))
     _write_title(figure, *_headline(scenario, result))
+    return figure
+
+
+def draw_paths(
+    scenario: Scenario, paths: Mapping[str, Sequence[Vec3]], title: str, subtitle: str = ""
+) -> Figure:
+    """Return paths through a scenario (arena axes) from above and from the side, each by its name."""
+    figure, top, side, notes = _new_figure()
+    _draw_top(top, scenario, {frame.colour: frame.colour for frame in scenario.frames})
+    _draw_side(side, scenario)
+    lines = []
+    for (name, points), colour, dash in zip(paths.items(), STATE_COLOURS, DASHES, strict=False):
+        for axes, view in ((top, _from_above), (side, _from_the_side)):
+            across, up = zip(*(view(*point) for point in points), strict=True)
+            axes.plot(across, up, color=colour, linestyle=dash, lw=1.8, zorder=6)
+            axes.plot(across[-1], up[-1], **_END_MARK, mew=1.0, zorder=7)
+        lines.append(Line2D([], [], color=colour, linestyle=dash, lw=2.4, label=name))
+    end = Line2D([], [], ls="", **_END_MARK, label="motors off")
+    notes.legend(handles=[*lines, end], loc="upper left", fontsize=9, frameon=False, labelcolor=_INK)
+    _set_limits(top, side, scenario, Track())
+    _write_title(figure, title, subtitle)
     return figure
 
 

@@ -416,17 +416,24 @@ def test_help_keeps_text_in_angle_brackets(capsys):
 
 
 def test_bounds_of_one_scenario_and_of_a_level(capsys, refused):
-    assert run(["bound", "test-case-1"]) == 0
+    assert run(["bound", "test-case-1", "--out", "bound.png"]) == 0
     lines = capsys.readouterr().out.splitlines()
     assert lines[0].startswith("test-case-1, class contest: no try is shorter than ")
-    assert [line.split()[0] for line in lines[2:]] == ["start", "red", "green", "blue", "motors"]
+    assert [line.split()[0] for line in lines[2:]] == ["start", "red", "green", "blue", "motors", "possible:"]
+    assert cv2.imread("bound.png").shape[1] > 1000
     assert run(["bound", "--level", "calm", "--seeds", "3:5", "--class", "open"]) == 0
-    lines = capsys.readouterr().out.splitlines()
-    assert [line.split()[0] for line in lines] == ["calm-3", "calm-4", "calm-5", "3"]
-    assert "class open: median" in lines[-1]
+    rows = [line.split() for line in capsys.readouterr().out.splitlines()[1:]]
+    assert [row[0] for row in rows] == ["calm-3", "calm-4", "calm-5", "5", "median,", "95"]
+    for _, bound_s, possible_s, times in rows[:3]:
+        assert float(times) == pytest.approx(float(possible_s) / float(bound_s), abs=0.01)
+        assert float(times) > 1.0
+    middle = sorted(float(row[1]) for row in rows[:3])[1]
+    assert float(rows[4][-3]) == pytest.approx(middle, abs=0.01)
     assert "give either a scenario or --level" in refused("bound")
     assert "give either a scenario or --level" in refused("bound", "calm-1", "--level", "calm")
     assert "add --level, or leave it out" in refused("bound", "calm-1", "--seeds", "1:2")
     assert "--seeds: say which, such as 1:300" in refused("bound", "--level", "calm")
     assert "give the first and the last" in refused("bound", "--level", "calm", "--seeds", "5:3")
+    assert "is for one scenario" in refused("bound", "--level", "calm", "--seeds", "5:6", "--out", "a.png")
     assert "has no frames" in refused("bound", "empty")
+    assert "plot" in refused("bound", "calm-1", "--out", "bound.doc")

@@ -1,0 +1,114 @@
+"""A fast flight that is possible for a pilot who knows the layout, to compare with the bound."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from math import ceil, hypot
+
+from framerunner.flying.plan import FlightPlan
+from geometry.solids import Solid
+from geometry.vectors import Vec3
+from offboard.navigation.goals import FlightStyle, Gate, Motion, Obstacles, Point, Refusal
+from offboard.navigation.path import Path
+from offboard.navigation.planning import plan as plan_path
+from scenarios.bound import ordered_frames
+from scenarios.models import MissionClass
+
+AROUND_S = 1.2
+"""What a try takes besides its path: 1 s until the app knows that the motors are on, the rest at the end."""
+_STOP_ABOVE_M = 0.05  # where the motors stop, above the drone's height on the base
+
+# Bolder than a navigator that must find the frames: both axes at their limits wherever there is room.
+_CONTEST = FlightStyle(
+    axis_speed_m_s=0.95,
+    climb_speed_m_s=0.95,
+    path_speed_m_s=1.33,
+    yaw_rate_rad_s=0.95,
+    acceleration_m_s2=1.6,
+    climb_acceleration_m_s2=1.6,
+    command_m_s=1.0,
+    crossing_speed_m_s=0.92,
+    straight_before_m=0.2,
+    straight_after_m=0.2,
+    smoothing_s=0.15,
+    look_offset_rad=0.785,
+    look_from_m=0.6,
+    bar_margin_m=0.06,
+)
+_OPEN = FlightStyle(
+    axis_speed_m_s=1.4,
+    climb_speed_m_s=0.95,
+    path_speed_m_s=1.4,
+    yaw_rate_rad_s=0.95,
+    acceleration_m_s2=1.6,
+    climb_acceleration_m_s2=1.6,
+    command_m_s=1.7,
+    crossing_speed_m_s=0.92,
+    straight_before_m=0.25,
+    straight_after_m=0.2,
+    smoothing_s=0.15,
+    look_offset_rad=0.785,
+    look_from_m=0.6,
+    bar_margin_m=0.08,
+)
+STYLES: Mapping[MissionClass, FlightStyle] = {"contest": _CONTEST, "open": _OPEN}
+"""How the path is flown, by class; flown in lockstep by `PathFollower`, these are clean."""
+
+
+@dataclass(frozen=True, slots=True)
+class Feasible:
+    """A flight that is possible.
+
+    Attributes:
+        time_s: of the try.
+        points_arena_m: where it leads.
+    """
+
+    time_s: float
+    points_arena_m: tuple[Vec3, ...]
+
+
+def feasible(plan: FlightPlan, mission_class: MissionClass) -> Feasible | str:
+    """A flight that is possible, or why none was found; takes some milliseconds."""
+    path = feasible_path(plan, mission_class)
+    if isinstance(path, Refusal):
+        return path.reason
+    return Feasible(path.duration_s + AROUND_S, tuple(path.points()))
+
+
+def feasible_path(plan: FlightPlan, mission_class: MissionClass) -> Path | Refusal:
+    """The navigator's own plan through all frames and back, with the layout known.
+
+    Returns:
+        The path from standing on the base to where the motors stop just above it, or why there is none.
+    """
+    scenario = plan.layout
+    x_m, y_m, z_m, yaw_rad = plan.start_pose
+    gates = tuple(Gate(frame.position_arena_m, frame.yaw_rad) for frame in ordered_frames(scenario))
+    decoys = tuple(Gate(decoy.position_arena_m, decoy.yaw_rad) for decoy in scenario.decoys)
+    ceiling_m = scenario.arena.height_m
+    solids = [solid for pole in scenario.poles for solid in pole.solids(ceiling_m)]
+    solids += [solid for wall in scenario.walls for solid in wall.solids(ceiling_m)]
+    columns = tuple(disc for solid in solids for disc in _discs(solid))
+    base = scenario.base
+    stop_m = base.top_m + plan.airframe.envelope_m[2] / 2 + _STOP_ABOVE_M
+    return plan_path(
+        Motion((x_m, y_m, z_m), yaw_rad=yaw_rad),
+        [*gates, Point((base.x_m, base.y_m, stop_m))],
+        obstacles=Obstacles((*gates, *decoys), columns, base, plan.lift_m),
+        arena=scenario.arena,
+        style=STYLES[mission_class],
+    )
+
+
+def _discs(solid: Solid) -> list[Vec3]:
+    """A box seen from above as discs along its length that cover it: x, y and radius."""
+    length_m, width_m, _ = (2.0 * half_m for half_m in solid.half_extents_m)
+    count = max(ceil(length_m / width_m), 1)
+    step_m = length_m / count
+    radius_m = hypot(step_m, width_m) / 2
+    x_m, y_m, _ = solid.centre_arena_m
+    c, s = solid.turn
+    places = [(index + 0.5) * step_m - length_m / 2 for index in range(count)]
+    return [(x_m + c * along_m, y_m + s * along_m, radius_m) for along_m in places]
