@@ -13,7 +13,7 @@ from vision.patch import BACKGROUND, OWN, Labels, Patch
 
 Flags = npt.NDArray[np.bool_]
 
-_OUTSIDE_PX = 3  # how far outside a first estimate of a side its outer edge is looked for
+_OUTSIDE_PX, _INSIDE_PX = 3, 2  # how far from a first estimate of a side its outer edge is looked for
 _MAX_SAMPLES = 40  # per side
 _SLACK_PX, _SLACK_SHARE = 2.5, 0.9  # a bar may look wider than expected by this or this share of its half
 
@@ -100,7 +100,7 @@ def find_edges(patch: Patch, sides: Sides, half_px: Widths) -> BarEdges:
     index = base[..., None] + across[..., None] * offsets
     around = labels.reshape(-1).take(index, mode="clip").reshape(-1, len(offsets))
     outer, outer_ok, inner, inner_ok = (
-        run.reshape(t.shape) for run in _runs(around, (2.0 * half + slack).reshape(-1))
+        run.reshape(t.shape) for run in _runs(around, half.reshape(-1), slack.reshape(-1))
     )
     column, row = patch.origin
     t -= np.where(is_steep, row, column)
@@ -217,7 +217,7 @@ def _plan(side: Segment, half_px: tuple[float, float], start: Point, end: Point,
     return _Plan(steep, (inward, slope, first, step, count, u_first, slant * half_first, slant * growth))
 
 
-def _runs(around: Labels, longest: Floats) -> tuple[Floats, Flags, Floats, Flags]:
+def _runs(around: Labels, half: Floats, slack: Floats) -> tuple[Floats, Flags, Floats, Flags]:
     """The run of own pixels that is met first from outside, in each row of samples.
 
     Returns:
@@ -227,11 +227,16 @@ def _runs(around: Labels, longest: Floats) -> tuple[Floats, Flags, Floats, Flags
     inside = around == OWN
     rows = np.arange(len(around))
     first = inside.argmax(axis=1)
-    hit = inside[rows, first] & (first > 0)
-    outer_ok = hit & (around[rows, first - 1] == BACKGROUND)
-    after = ~inside
-    after &= np.arange(around.shape[1]) > first[:, None]
+    places = np.arange(around.shape[1])
+    before = places < first[:, None]
+    # A run that begins farther inside, or behind something else, is another bar: this one is hidden.
+    hit = inside[rows, first] & (first > 0) & (first <= _OUTSIDE_PX + _INSIDE_PX + half / 2)
+    hit &= around[rows, first - 1] == BACKGROUND
+    hit &= ~((around > OWN) & before & (places >= _OUTSIDE_PX - 1)).any(axis=1)
+    after = ~(inside | before)
     end = after.argmax(axis=1)
-    inner_ok = hit & after[rows, end] & (around[rows, end] == BACKGROUND) & (end - first <= longest)
+    inner_ok = (
+        hit & after[rows, end] & (around[rows, end] == BACKGROUND) & (end - first <= 2.0 * half + slack)
+    )
     shift = -_OUTSIDE_PX - 0.5
-    return first + shift, outer_ok, end + shift, inner_ok
+    return first + shift, hit, end + shift, inner_ok

@@ -33,6 +33,8 @@ PAINTED_SPREAD_PX = 0.5
 """How much larger than true the simulator paints on each side: a border is on the nearest pixels."""
 
 _OBSTACLE_STEP = 8
+_MIN_RUN_PX = 3
+_STEEP = 2  # rows a column: steeper edges are the sides of obstacles, which are upright
 _MIN_FRAGMENT_PX = 3
 _MAX_FRAGMENTS = 12
 
@@ -169,17 +171,22 @@ def _obstacle_edges(mask: ColourMask, others: Sequence[ColourMask]) -> tuple[Obs
     """Where the obstacles end below, in every eighth column."""
     height, width = mask.mask.shape
     column, row, columns, rows = mask.box
-    first = -(-column // _OBSTACLE_STEP) * _OBSTACLE_STEP
-    crop = mask.mask[row : row + rows, first : column + columns : _OBSTACLE_STEP] != 0
-    edges = []
-    lowest = row + rows - 1 - crop[::-1].argmax(axis=0)
+    left, right = max(column - 2, 0), min(column + columns + 2, width)
+    crop = mask.mask[row : row + rows, left:right] != 0
+    lowest = np.where(crop.any(axis=0), row + rows - 1 - crop[::-1].argmax(axis=0), -1)
+    # At the slanted side of an obstacle the next column ends much lower.
+    beside = np.full_like(lowest, -1)
+    for away in (1, 2):
+        reach = lowest - _STEEP * away
+        beside[away:] = np.maximum(beside[away:], reach[:-away])
+        beside[:-away] = np.maximum(beside[:-away], reach[away:])
     counts = crop.sum(axis=0)
-    for i, (last, count) in enumerate(zip(lowest.tolist(), counts.tolist(), strict=True)):
-        if count < 3:  # noise
+    edges = []
+    for x in range(-(-column // _OBSTACLE_STEP) * _OBSTACLE_STEP, column + columns, _OBSTACLE_STEP):
+        last = int(lowest[x - left])
+        if counts[x - left] < _MIN_RUN_PX:  # noise
             continue
-        x = first + i * _OBSTACLE_STEP
         hidden = any(other.mask[last + 1 : last + 3, x].any() for other in others)
-        edges.append(
-            ObstacleEdge(x - (width - 1) / 2, last + 0.5 - (height - 1) / 2, last >= height - 1 or hidden)
-        )
+        cut = last >= height - 1 or hidden or bool(beside[x - left] > last)
+        edges.append(ObstacleEdge(x - (width - 1) / 2, last + 0.5 - (height - 1) / 2, cut))
     return tuple(edges)

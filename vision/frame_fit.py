@@ -7,7 +7,7 @@ bars' axes there must be nothing but pixels of the region and what may hide it.
 
 from __future__ import annotations
 
-from math import sqrt
+from math import hypot, sqrt
 from typing import NamedTuple
 
 import numpy as np
@@ -26,6 +26,8 @@ _MAX_EMPTY = 0.15  # share of a bar where neither the bar nor anything that coul
 _MAX_OWN_UNSEEN = 0.4  # share of a bar that seems to be seen although it was not found
 _WHOLE = 0.9  # share of a bar that is seen if nothing hides it; shaded and thin bars may have gaps
 _MAX_CORNER_STD_PX = 2.5
+_EDGE_ON, _OBLIQUE = 0.13, 0.23  # cosines: the bars of a frame that is seen edge-on hide one another
+_CLEAR_PX = 4.5  # a side that is shorter may be a part of a longer one
 _TOO_NARROW = 1.2
 _WIDTH_SHARE, _WIDTH_SHARE_STD = 0.75, 0.15  # of half a bar's image that is half of the bar's width
 
@@ -47,6 +49,22 @@ def fit_frame(patch: Patch, sides: Sides, focal_px: float, spread_px: float) -> 
         focal_px: focal length.
         spread_px: how much larger than its true outline a region is painted on each side.
     """
+    if patch.has_foreign and _least_length(sides) >= _CLEAR_PX:
+        # It may be behind what is beside it, or in front of that: then four whole bars are seen.
+        fitted = _fit_any(patch.in_front(), sides, focal_px, spread_px)
+        if fitted is not None and fitted.whole:
+            return fitted
+    return _fit_any(patch, sides, focal_px, spread_px)
+
+
+def _least_length(sides: Sides) -> float:
+    """Length of the shortest side, pixels; 0 if one is not seen."""
+    return min(
+        0.0 if side is None else hypot(side[1][0] - side[0][0], side[1][1] - side[0][1]) for side in sides
+    )
+
+
+def _fit_any(patch: Patch, sides: Sides, focal_px: float, spread_px: float) -> FittedFrame | None:
     lines, meetings, poses = _fit(patch, sides, focal_px, spread_px)
     known = [(met.x, met.y) for met in meetings if met is not None]
     if len(known) == 4:
@@ -155,11 +173,23 @@ def _outer_corners(meetings: _Meetings, pose: ModelPose, focal_px: float, whole:
     if outer is None or axes is None:
         return None
     beyond = (outer - axes).tolist()
+    facing = _facing(pose)
+    if facing < _EDGE_ON:
+        return None
+    if facing < _OBLIQUE:
+        meetings = [
+            m if m is None else m._replace(std_x=2.0 * m.std_x, std_y=2.0 * m.std_y) for m in meetings
+        ]
     found = [
         None if met is None else _corner(met, right, down, whole)
         for met, (right, down) in zip(meetings, beyond, strict=True)
     ]
     return _corners(found) if any(found) else None
+
+
+def _facing(pose: ModelPose) -> float:
+    """Cosine of the angle between the line of sight and the frame's normal."""
+    return abs(float(pose.rotation[:, 2] @ pose.shift_m)) / float(np.linalg.norm(pose.shift_m))
 
 
 def _corners_without_pose(patch: Patch, lines: BarLines, spread_px: float) -> Corners:

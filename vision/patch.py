@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import numpy.typing as npt
@@ -14,8 +14,8 @@ from vision.frame_model import Floats, Point
 Labels = npt.NDArray[np.uint8]
 Box = tuple[int, int, int, int]  # column, row, columns, rows
 
-BACKGROUND, OWN, FOREIGN = 0, 1, 2
-"""Values of pixels: neither, of the region, and what may hide a part of it (or is not in the image)."""
+BACKGROUND, OWN, FOREIGN, OUTSIDE = 0, 1, 2, 4
+"""Values of pixels: none of the others, of the region, what may hide a part of it, and not in the image."""
 
 _PLACES = (np.arange(16) + 0.5) / 16.0  # along a bar, as shares of its length
 _ACROSS = np.array([[0, 0], [-1, 0], [1, 0], [0, -1], [0, 1]])  # a thin bar may be a pixel beside its axis
@@ -35,6 +35,15 @@ class Patch:
     origin: Point
     reach_px: Point
 
+    @property
+    def has_foreign(self) -> bool:
+        """Whether there is anything that could hide a part of the region."""
+        return bool((self.labels == FOREIGN).any())
+
+    def in_front(self) -> Patch:
+        """The same as if the region were in front of all else."""
+        return replace(self, labels=np.bitwise_and(self.labels, np.uint8(OWN | OUTSIDE)))
+
     def support(self, starts: Sequence[Point] | Floats, ends: Sequence[Point] | Floats) -> Support:
         """Look along straight bars, given by the ends of their axes, pixels from the optical axis."""
         start = np.asarray(starts, np.float64)[:, None]
@@ -46,7 +55,7 @@ class Patch:
         index = np.where(known, at[..., 1] * columns + at[..., 0], 0)
         seen = np.where(known, self.labels.reshape(-1)[index], BACKGROUND)
         own = (seen == OWN).any(axis=2)
-        empty = ~own & ~beyond & ~(seen == FOREIGN).any(axis=2)
+        empty = ~own & ~beyond & ~(seen > OWN).any(axis=2)
         return Support(own.mean(axis=1).tolist(), empty.mean(axis=1).tolist())
 
 
@@ -63,7 +72,7 @@ def cut_patch(mask: ColourMask, others: Sequence[ColourMask], box: Box) -> Patch
     height, width = mask.mask.shape
     column, row, columns, rows = box
     margin = 6 + max(columns, rows) // 4  # wider than any bar
-    labels = np.full((rows + 2 * margin, columns + 2 * margin), FOREIGN, np.uint8)
+    labels = np.full((rows + 2 * margin, columns + 2 * margin), OUTSIDE, np.uint8)
     x0, y0 = max(column - margin, 0), max(row - margin, 0)
     x1, y1 = min(column + columns + margin, width), min(row + rows + margin, height)
     inside = labels[y0 - row + margin : y1 - row + margin, x0 - column + margin : x1 - column + margin]
