@@ -10,6 +10,8 @@ from scenarios.models import Base
 
 HEADROOM = 0.92
 """Share of a limit that a path uses; the rest is for corrections."""
+VIEW_HALF_RAD = 0.66  # half the camera's view, with a margin for tilt
+VIEW_NEAR_M = 0.25  # half a frame's width, with a margin
 
 
 @dataclass(frozen=True, slots=True)
@@ -91,9 +93,8 @@ class FlightStyle:
         straight_before_m: straight and level flight before an opening.
         straight_after_m: likewise behind it.
         smoothing_s: time in which the acceleration changes.
-        look_offset_rad: while a gate is far the heading may differ from its direction by this, so that both
-            level axes are used.
-        look_from_m: nearer than this the heading is towards the gate.
+        look_offset_rad: the heading may differ from a gate's direction by this, so that both level axes are
+            used; less near the gate, which stays in view.
         bar_margin_m: between the drone's box and other frames, base and columns.
         side_margin_m: between the drone's centre and the arena's sides and ceiling.
         floor_margin_m: between the drone's centre and the floor.
@@ -112,8 +113,7 @@ class FlightStyle:
     straight_before_m: float = 0.35
     straight_after_m: float = 0.3
     smoothing_s: float = 0.2
-    look_offset_rad: float = 0.5
-    look_from_m: float = 1.5
+    look_offset_rad: float = 0.6
     bar_margin_m: float = 0.08
     side_margin_m: float = 0.25
     floor_margin_m: float = 0.25
@@ -137,6 +137,10 @@ class FlightStyle:
             smoothing_s=self.smoothing_s + 0.2 * late,
             bar_margin_m=self.bar_margin_m + 0.04 * late,
         )
+
+    def look_limit_rad(self, distance_m: float) -> float:
+        """By how much the heading may differ from a gate's direction, seen from a distance in plan."""
+        return min(max(VIEW_HALF_RAD - VIEW_NEAR_M / max(distance_m, 0.01), 0.0), self.look_offset_rad)
 
 
 CONTEST = FlightStyle()

@@ -25,7 +25,7 @@ LATE_STRAIGHT_M = 0.16  # where it begins at the latest: the drone's box does no
 LATE_ENTRIES_M = (-0.27, -0.2, -LATE_STRAIGHT_M)
 LATE_ACROSS_M = 0.05  # there the drone must be this near the opening's axis
 SWITCH_S = 0.5  # another side than before must be faster by this
-LOOK_LEG_M = 2.0  # shorter legs are flown with the heading along them
+LOOK_REACH_M = 0.5  # shorter legs to a gate are flown with the heading along them
 TURN_SPARE_S = 0.2  # to begin and end a turn
 TURNED_BEFORE_M = 0.25  # before an opening a turn must have ended
 NO_TURN_RAD = 0.1  # a smaller turn takes no time of its own
@@ -292,12 +292,11 @@ def leg_turns(way: Array, yaw_before: Array, yaw_after: Array, *, to_gate: bool,
     reach = np.hypot(way[:, 0], way[:, 1])
     aside = np.where(np.isnan(yaw_before), 0.0, wrap(yaw_before - bearing))
     if to_gate:
-        offset = np.clip(aside, -style.look_offset_rad, style.look_offset_rad)
-        offset = np.where(np.abs(offset) < 0.1, style.look_offset_rad, offset)
-        offset = np.where(reach > LOOK_LEG_M, np.copysign(style.look_offset_rad, offset), 0.0)
+        side = np.where(np.abs(aside) > NO_TURN_RAD, aside, wrap(yaw_after - bearing))
+        offset = np.copysign(style.look_offset_rad, side) * np.clip(reach - LOOK_REACH_M, 0.0, 1.0)
     else:
         quarter = np.floor(aside / (pi / 2)) * (pi / 2) + pi / 4
-        offset = np.where(np.isnan(yaw_after) & (reach > 0.5), quarter, 0.0)
+        offset = np.where(np.isnan(yaw_after), quarter, 0.0)
     turn: Array = np.where(reach > 1e-6, bearing + offset, np.where(np.isnan(yaw_before), 0.0, yaw_before))
     return turn
 

@@ -180,8 +180,8 @@ def _wanted_headings(
         dx, dy = float(stretch.look_m[0]) - x, float(stretch.look_m[1]) - y
         away = hypot(dx, dy)
         bearing = atan2(dy, dx)
-        if away > style.look_from_m + 0.3:
-            limit = style.look_offset_rad
+        limit = style.look_limit_rad(away)
+        if limit > 0.0:
             bearing += min(max(remainder(heading - bearing, 2 * pi), -limit), limit)
         wanted.append(bearing)
     holds: list[tuple[int, int, float]] = []
