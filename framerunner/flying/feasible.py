@@ -33,7 +33,7 @@ _CONTEST = FlightStyle(
     straight_after_m=0.2,
     smoothing_s=0.15,
     look_offset_rad=0.785,
-    look_from_m=0.6,
+    view_half_rad=1.2,
     bar_margin_m=0.06,
 )
 _OPEN = FlightStyle(
@@ -49,7 +49,7 @@ _OPEN = FlightStyle(
     straight_after_m=0.2,
     smoothing_s=0.15,
     look_offset_rad=0.785,
-    look_from_m=0.6,
+    view_half_rad=1.2,
     bar_margin_m=0.08,
 )
 STYLES: Mapping[MissionClass, FlightStyle] = {"contest": _CONTEST, "open": _OPEN}

@@ -10,7 +10,6 @@ from scenarios.models import Base
 
 HEADROOM = 0.92
 """Share of a limit that a path uses; the rest is for corrections."""
-VIEW_HALF_RAD = 0.66  # half the camera's view, with a margin for tilt
 VIEW_NEAR_M = 0.25  # half a frame's width, with a margin
 
 
@@ -95,6 +94,7 @@ class FlightStyle:
         smoothing_s: time in which the acceleration changes.
         look_offset_rad: the heading may differ from a gate's direction by this, so that both level axes are
             used; less near the gate, which stays in view.
+        view_half_rad: half the camera's view, with a margin for tilt.
         bar_margin_m: between the drone's box and other frames, base and columns.
         side_margin_m: between the drone's centre and the arena's sides and ceiling.
         floor_margin_m: between the drone's centre and the floor.
@@ -114,6 +114,7 @@ class FlightStyle:
     straight_after_m: float = 0.3
     smoothing_s: float = 0.2
     look_offset_rad: float = 0.6
+    view_half_rad: float = 0.66
     bar_margin_m: float = 0.08
     side_margin_m: float = 0.25
     floor_margin_m: float = 0.25
@@ -140,7 +141,7 @@ class FlightStyle:
 
     def look_limit_rad(self, distance_m: float) -> float:
         """By how much the heading may differ from a gate's direction, seen from a distance in plan."""
-        return min(max(VIEW_HALF_RAD - VIEW_NEAR_M / max(distance_m, 0.01), 0.0), self.look_offset_rad)
+        return min(max(self.view_half_rad - VIEW_NEAR_M / max(distance_m, 0.01), 0.0), self.look_offset_rad)
 
 
 CONTEST = FlightStyle()

@@ -11,18 +11,23 @@ from itertools import pairwise
 
 import numpy as np
 
-from offboard.navigation.goals import FlightStyle, Gate, Goal, Motion, Obstacles, Point, Refusal
+from offboard.navigation.goals import FlightStyle, Gate, Goal, Motion, Obstacles, Refusal
 from offboard.navigation.path import Path
 from offboard.navigation.planner.clearance import Clearance
+from offboard.navigation.planner.connect import Connector
 from offboard.navigation.planner.detours import LegFinder
 from offboard.navigation.planner.legs import Leg
-from offboard.navigation.planner.route import Pass, RouteFinder
+from offboard.navigation.planner.route import BLOCKED_S, Pass, RouteFinder, place
 from offboard.navigation.planner.timing import Stretch, headings, run_in, sample, slowed
 from scenarios.models import Arena
 
 LIFT_OFF_M_S = 0.5  # when the base is left below
 LIFT_OFF_SPARE_M = 0.02
 STOPPING_M = 0.5  # behind a last gate the drone stops in this distance
+MAX_ROUTES = 6  # for which legs are sought
+SLOWER_S = 0.3  # legs slower than expected by this make another route worth a look
+
+_Legs = list[list[Leg] | None]
 
 
 def plan(
@@ -51,56 +56,89 @@ def plan(
         return Refusal("there is no goal to fly to")
     clearance = Clearance(obstacles, arena, style)
     position, velocity = run_in(start, style)
-    begin = replace(start, position_m=tuple(position.tolist()), velocity_m_s=tuple(velocity.tolist()))
-    crossings = () if previous is None else previous.crossings
-    route, reason = RouteFinder(clearance, style).find(begin, goals, crossings)
-    if not route:
+    (x, y, z), (vx, vy, vz) = position.tolist(), velocity.tolist()
+    begin = replace(start, position_m=(x, y, z), velocity_m_s=(vx, vy, vz))
+    connector = Connector(style, obstacles.floor_m)
+    finder = RouteFinder(clearance, connector, style)
+    reason = finder.prepare(begin, goals, () if previous is None else previous.crossings)
+    if reason:
         return Refusal(reason)
-    if clearance.on_base(route[0].exit_m) and not clearance.on_base(route[1].entry_m):
-        route.insert(1, _lift_off(route[0], clearance))
-    stretches = _stretches(_with_stop(route), LegFinder(clearance, style))
-    if stretches is None:
-        return Refusal("obstacles block the way to the next goal")
+    route, legs = _fastest(finder, LegFinder(clearance, connector, style), clearance)
+    stretches = _stretches(route, legs)
+    if isinstance(stretches, Refusal):
+        return stretches
     samples = sample(stretches, start, style)
     yaw, yaw_rate = headings(samples, stretches, start, style)
     return slowed(samples, yaw, yaw_rate, stretches, style)
 
 
-def _with_stop(route: list[Pass]) -> list[Pass]:
-    """The route with a place to stop behind a last gate."""
-    last = route[-1]
-    if not isinstance(last.goal, Gate):
-        return route
-    speed = float(np.linalg.norm(last.velocity_m_s))
-    place = last.exit_m + last.velocity_m_s / speed * min(STOPPING_M, speed)
-    stop = Point((float(place[0]), float(place[1]), float(place[2])), last.yaw_rad)
-    return [*route, Pass(stop, place, place, np.zeros(3), 0.0, last.yaw_rad, 0.0)]
+def _fastest(finder: RouteFinder, leg_finder: LegFinder, clearance: Clearance) -> tuple[list[Pass], _Legs]:
+    """The fastest route and its legs, which are None where obstacles block all routes.
+
+    Legs are sought only for the route that seems fastest; the time they take corrects what seems so, until
+    the fastest one stays the same (Dellin & Srinivasa, "A unifying formalism for shortest path problems with
+    expensive edge evaluations via lazy best-first search", 2016).
+    """
+    best: tuple[float, list[Pass], _Legs] | None = None
+    for _ in range(MAX_ROUTES):
+        route, ways, expected_s = finder.best()
+        full = _complete(route, clearance)
+        legs = leg_finder.route(full)
+        before = full.index(route[1]) - 1  # a lift-off comes before the first leg
+        times = [BLOCKED_S if found is None else sum(leg.duration_s for leg in found) for found in legs]
+        times[: before + 1] = [sum(times[: before + 1])]
+        total_s = sum(times) + sum(float(one.inner_s[0] + one.costs_s[0]) for one in route)
+        if best is None or total_s < best[0]:
+            best = total_s, full, legs
+        slower = [i for i, expected in enumerate(expected_s) if times[i] > expected + SLOWER_S]
+        for leg in slower:
+            finder.correct(leg, (ways[leg], ways[leg + 1]), min(times[leg], BLOCKED_S))
+        if not slower or sum(expected_s) >= BLOCKED_S:
+            break
+    assert best is not None
+    return best[1:]
 
 
-def _lift_off(start: Pass, clearance: Clearance) -> Pass:
-    """Straight up from the base before anything else."""
-    place = np.array([start.exit_m[0], start.exit_m[1], clearance.base_top_m + LIFT_OFF_SPARE_M])
-    return Pass(None, place, place, np.array([0.0, 0.0, LIFT_OFF_M_S]), 0.0, start.yaw_rad, 0.0)
+def _complete(route: list[Pass], clearance: Clearance) -> list[Pass]:
+    """The route with a lift-off from the base, if it starts there, and a stop behind a last gate."""
+    start, end = route[0], route[-1]
+    passes = list(route)
+    from_m = start.exits.places_m[0]
+    if clearance.on_base(from_m) and not clearance.on_base(route[1].entries.places_m[0]):
+        up = np.array([from_m[0], from_m[1], clearance.base_top_m + LIFT_OFF_SPARE_M])
+        passes.insert(1, place(up, np.array([0.0, 0.0, LIFT_OFF_M_S]), start.yaw_rad))
+    if isinstance(end.goal, Gate):
+        velocity = end.exits.velocities_m_s[0]
+        speed = float(np.linalg.norm(velocity))
+        stop = end.exits.places_m[0] + velocity / speed * min(STOPPING_M, speed)
+        passes.append(place(stop, np.zeros(3), end.yaw_rad))
+    return passes
 
 
-def _stretches(route: list[Pass], finder: LegFinder) -> list[Stretch] | None:
+def _stretches(route: list[Pass], found: _Legs) -> list[Stretch] | Refusal:
     stretches: list[Stretch] = []
-    for before, after in pairwise(route):
-        legs = finder.legs(before, after)
+    gates = 0
+    for (_, after), legs in zip(pairwise(route), found, strict=True):
+        goal = after.goal
         if legs is None:
-            return None
-        gate = after.goal if isinstance(after.goal, Gate) else None
-        look = None if gate is None else np.array(gate.centre_m)
-        stretches += [Stretch(leg, after.goal, False, after.yaw_rad, look) for leg in legs]
-        if gate is not None and not after.inner_s:  # the gate has been entered already
-            stretches[-1] = Stretch(legs[-1], gate, True, after.yaw_rad, None)
-        elif gate is not None:
-            stretches.append(Stretch(_through(after), gate, True, after.yaw_rad, None))
+            what = f"gate {gates + 1}" if isinstance(goal, Gate) else "the next point"
+            return Refusal(f"obstacles block the way to {what}")
+        look = np.array(goal.centre_m) if isinstance(goal, Gate) else None
+        stretches += [Stretch(leg, goal, False, after.yaw_rad, look) for leg in legs]
+        if not isinstance(goal, Gate):
+            continue
+        gates += 1
+        if after.begun:
+            stretches[-1] = Stretch(legs[-1], goal, True, after.yaw_rad, None)
+        else:
+            stretches.append(Stretch(_through(after), goal, True, after.yaw_rad, None))
     return stretches
 
 
 def _through(crossing: Pass) -> Leg:
     """The straight, even flight from a gate's entry to its exit."""
-    still = np.zeros((3, 3))
-    still[1] = crossing.inner_s
-    return Leg(crossing.entry_m, (1.0, 0.0), crossing.velocity_m_s, np.zeros(3), still, crossing.inner_s)
+    duration_s = float(crossing.inner_s[0])
+    phases = np.zeros((3, 3))
+    phases[1] = duration_s
+    entries = crossing.entries
+    return Leg(entries.places_m[0], (1.0, 0.0), entries.velocities_m_s[0], np.zeros(3), phases, duration_s)

@@ -89,12 +89,20 @@ class Clearance:
         beyond = np.maximum(self.low_m - points_m, points_m - self.high_m).max(axis=1) - _ROUNDING_M
         parts = [beyond[:, None]]
         if len(self._columns):
-            dx = points_m[:, None, 0] - self._columns[:, 0]
-            dy = points_m[:, None, 1] - self._columns[:, 1]
-            parts.insert(0, self._radii_m - np.hypot(dx, dy))
+            parts.insert(0, self.column_depths(points_m))
         if self.boxes:
             parts.insert(0, (self._rows[:, 5:8] - np.abs(self.offsets(points_m))).min(axis=-1))
         return np.concatenate(parts, axis=1)
+
+    def column_depths(self, points_m: Array) -> Array:
+        """How deep points are in the enlarged columns, in plan; shapes (n, 2 or 3) and (n, columns)."""
+        dx = points_m[:, None, 0] - self._columns[:, 0]
+        dy = points_m[:, None, 1] - self._columns[:, 1]
+        return np.asarray(self._radii_m - np.hypot(dx, dy))
+
+    def is_column(self, obstacle: int) -> bool:
+        """Whether an index of `depths` is a column's."""
+        return self.boxes <= obstacle < self.boxes + len(self._columns)
 
     def offsets(self, points_m: Array) -> Array:
         """From the boxes' centres to points, in the boxes' axes, shape (n, boxes, 3)."""

@@ -14,8 +14,6 @@ import numpy as np
 import numpy.typing as npt
 
 Array = npt.NDArray[np.float64]
-State = tuple[Array, Array]
-"""Position and velocity, each of shape (3,)."""
 
 _STRETCHES = np.array([1.02, 1.05, 1.1, 1.16, 1.24, 1.35, 1.5, 1.7, 2.0, 2.5, 3.5, 5.0, 8.0])
 _TOLERANCE = 1.005  # of the acceleration, for rounding
@@ -34,30 +32,33 @@ class LegLimits:
 def rotate(vectors: Array, cosine: Array | float, sine: Array | float) -> Array:
     """Vectors of shape (..., 3), turned about the vertical."""
     x, y = vectors[..., 0], vectors[..., 1]
-    return np.stack((cosine * x - sine * y, sine * x + cosine * y, vectors[..., 2]), axis=-1)
+    turned = vectors.copy()
+    turned[..., 0] = cosine * x - sine * y
+    turned[..., 1] = sine * x + cosine * y
+    return turned
 
 
-def durations(
-    offset_m: Array, before_m_s: Array, after_m_s: Array, limits: LegLimits, least_s: Array
-) -> Array:
-    """The shortest durations of legs, seconds, shape (...).
+def solve(offset_m: Array, before_m_s: Array, after_m_s: Array, limits: LegLimits, least_s: Array) -> Motions:
+    """The fastest motions that keep the limits; if none keep them, those that exceed them least.
 
     Args:
-        offset_m: from start to end.
+        offset_m: from start to end, shape (n, 3).
         before_m_s: velocity at the start.
         after_m_s: velocity at the end.
         limits: of each axis.
-        least_s: legs may not be shorter than this, shape (...).
+        least_s: motions may not be shorter than this, shape (n,).
     """
-    fastest = _fastest(offset_m, before_m_s, after_m_s, limits)
-    lower = np.maximum(np.maximum(fastest.max(axis=-1), least_s), _SHORTEST_S)
     ends = (offset_m, before_m_s, after_m_s, _speeds(before_m_s, after_m_s, limits))
-    limit = np.broadcast_to(limits.acceleration_m_s2, offset_m.shape) * _TOLERANCE
-    need = np.abs(_accelerations(*ends, lower[..., None]))
-    late = (need > limit).any(axis=-1)
+    limit = np.broadcast_to(limits.acceleration_m_s2, offset_m.shape)
+    fastest = _fastest(offset_m, before_m_s, after_m_s, limits)
+    times = np.maximum(np.maximum(fastest.max(axis=1), least_s), _SHORTEST_S)
+    a = _accelerations(*ends, times[:, None])
+    late = (np.abs(a) > limit * _TOLERANCE).any(axis=1)
     if late.any():  # rare: an axis has no motion of this duration, only shorter and longer ones
-        lower[late] = _stretched(tuple(end[late] for end in ends), lower[late], limit[late])
-    return np.asarray(lower)
+        times[late] = _stretched(tuple(end[late] for end in ends), times[late], limit[late] * _TOLERANCE)
+        a = _accelerations(*ends, times[:, None])
+    a = np.where(np.isfinite(a), a, 0.0)
+    return Motions(times, before_m_s, after_m_s, a, ends[3], (np.abs(a) / limit).max(axis=1))
 
 
 def _stretched(ends: tuple[Array, ...], lower: Array, limit: Array) -> Array:
@@ -110,7 +111,39 @@ def _accelerations(offset: Array, before: Array, after: Array, cap: Array, time:
     return np.where(np.abs(peak) > cap + _TINY, with_cruise, a)
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, eq=False)
+class Motions:
+    """Motions in axes of their own, many at once.
+
+    Attributes:
+        durations_s: shape (n,).
+        before_m_s: speeds at the start, shape (n, 3).
+        after_m_s: speeds at the end.
+        accelerations_m_s2: of the first phase.
+        caps_m_s: highest speeds.
+        strains: the highest acceleration as a multiple of the limit, shape (n,).
+    """
+
+    durations_s: Array
+    before_m_s: Array
+    after_m_s: Array
+    accelerations_m_s2: Array
+    caps_m_s: Array
+    strains: Array
+
+    def phases_s(self) -> Array:
+        """Durations of the three phases, shape (3, n, 3)."""
+        a, before, after = self.accelerations_m_s2, self.before_m_s, self.after_m_s
+        time = self.durations_s[:, None]
+        top = np.clip(0.5 * (before + after + a * time), -self.caps_m_s, self.caps_m_s)
+        size = np.maximum(np.abs(a), _TINY)
+        moving = np.abs(a) > 1e-7
+        first = np.where(moving, np.abs(top - before) / size, 0.0)
+        third = np.where(moving, np.abs(after - top) / size, 0.0)
+        return np.stack((first, np.maximum(time - first - third, 0.0), third))
+
+
+@dataclass(frozen=True, slots=True, eq=False)
 class Leg:
     """A motion with phases: acceleration, constant speed, its opposite; axes of one heading.
 
@@ -132,47 +165,67 @@ class Leg:
 
     def at(self, times_s: Array) -> tuple[Array, Array, Array]:
         """Positions, velocities and accelerations in arena axes at times from 0 on, shapes (n, 3)."""
-        first, second, third = self.phases_s
+        first, second, _ = self.phases_s
         t = times_s[:, None]
-        in_first = np.clip(t, 0.0, first)
-        in_second = np.clip(t - first, 0.0, second)
-        in_third = np.clip(t - first - second, 0.0, third)
-        a, v = self.accelerations_m_s2, self.speeds_m_s
-        cruise = v + a * first
-        moved = (
-            (v + 0.5 * a * in_first) * in_first
-            + cruise * in_second
-            + (cruise - 0.5 * a * in_third) * in_third
-        )
-        velocity = v + a * (in_first - in_third)
+        a = self.accelerations_m_s2
+        moved, velocity = _moved(t, self.speeds_m_s, a, self.phases_s)
         acceleration = a * ((t < first).astype(float) - (t >= first + second).astype(float))
         c, s = self.turn
         return self.start_m + rotate(moved, c, s), rotate(velocity, c, s), rotate(acceleration, c, s)
 
 
-def make_leg(
-    start: State, end: State, heading: tuple[float, float], limits: LegLimits, duration_s: float
-) -> Leg:
-    """The leg between two states that takes a time found by `durations`.
+@dataclass(frozen=True, slots=True, eq=False)
+class Legs:
+    """Legs, many at once.
 
-    Args:
-        start: position and velocity, arena axes.
-        end: likewise.
-        heading: cosine and sine of the heading of the leg's axes.
-        limits: of each axis; if the time is too short for them, accelerations exceed them.
-        duration_s: how long it takes.
+    Attributes:
+        starts_m: arena axes, shape (n, 3).
+        cosines: of the headings of their axes, shape (n,).
+        sines: of these headings.
+        motions: in these axes.
+        phases_s: of the motions, shape (3, n, 3).
     """
-    (start_m, before_m_s), (end_m, after_m_s) = start, end
-    c, s = heading
-    offset, before, after = (rotate(v, c, -s) for v in (end_m - start_m, before_m_s, after_m_s))
-    cap = _speeds(before, after, limits)
-    time = np.full(3, duration_s)
-    a = _accelerations(offset, before, after, cap, time)
-    a = np.where(np.isfinite(a), a, 0.0)
-    size = np.maximum(np.abs(a), _TINY)
-    top = np.clip(0.5 * (before + after + a * time), -cap, cap)
-    moving = np.abs(a) > 1e-7
-    first = np.where(moving, np.abs(top - before) / size, 0.0)
-    third = np.where(moving, np.abs(after - top) / size, 0.0)
-    second = np.maximum(time - first - third, 0.0)
-    return Leg(start_m, heading, before, a, np.stack((first, second, third)), duration_s)
+
+    starts_m: Array
+    cosines: Array
+    sines: Array
+    motions: Motions
+    phases_s: Array
+
+    def __len__(self) -> int:
+        return len(self.starts_m)
+
+    def __getitem__(self, index: int) -> Leg:
+        """One of them."""
+        motions = self.motions
+        return Leg(
+            self.starts_m[index],
+            (float(self.cosines[index]), float(self.sines[index])),
+            motions.before_m_s[index],
+            motions.accelerations_m_s2[index],
+            self.phases_s[:, index],
+            float(motions.durations_s[index]),
+        )
+
+    def positions(self, shares: Array) -> Array:
+        """Positions at shares of each leg's duration, shape (n, shares, 3)."""
+        motions = self.motions
+        times = motions.durations_s[:, None, None] * shares[None, :, None]
+        each = (motions.before_m_s[:, None], motions.accelerations_m_s2[:, None], self.phases_s[:, :, None])
+        moved, _ = _moved(times, *each)
+        return self.starts_m[:, None] + rotate(moved, self.cosines[:, None], self.sines[:, None])
+
+
+def _moved(times: Array, speeds: Array, a: Array, phases: Array) -> tuple[Array, Array]:
+    """Distances and speeds at times; the shapes fit each other."""
+    first, second, third = phases
+    in_first = np.minimum(times, first)
+    in_second = np.minimum(np.maximum(times - first, 0.0), second)
+    in_third = np.minimum(np.maximum(times - first - second, 0.0), third)
+    cruise = speeds + a * first
+    moved = (
+        (speeds + 0.5 * a * in_first) * in_first
+        + cruise * in_second
+        + (cruise - 0.5 * a * in_third) * in_third
+    )
+    return moved, speeds + a * (in_first - in_third)

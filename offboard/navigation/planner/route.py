@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import pairwise
-from math import cos, hypot, nan, pi, sin
+from math import cos, hypot, nan, pi
 
 import numpy as np
 import numpy.typing as npt
@@ -13,256 +13,266 @@ import numpy.typing as npt
 from offboard.navigation.goals import FlightStyle, Gate, Goal, Motion, Point
 from offboard.navigation.path import Crossing
 from offboard.navigation.planner.clearance import Clearance
-from offboard.navigation.planner.legs import Array, LegLimits, durations, rotate
+from offboard.navigation.planner.connect import Connector, Ends
+from offboard.navigation.planner.legs import Array
 
 SPEED_SHARES = (1.0, 0.7, 0.4)  # of the crossing speed, to choose from
 LEAST_STRAIGHT_M = 0.22  # before and behind an opening: the drone's box is clear of the bars there
+TURNED_BEFORE_M = 0.25  # before an opening a turn must have ended
 COMMITTED_BEFORE_M = 0.9  # from a start nearer before an opening the straight flight may begin later
-LEAVING_M = 0.15
-LEAVING_S = 0.15
-LEAST_CROSSING_M_S = 0.25
 LATE_STRAIGHT_M = 0.16  # where it begins at the latest: the drone's box does not reach the bars yet
 LATE_ENTRIES_M = (-0.27, -0.2, -LATE_STRAIGHT_M)
 LATE_ACROSS_M = 0.05  # there the drone must be this near the opening's axis
+LEAVING_M = 0.15  # so far behind the end of the straight flight it is still continued
+LEAVING_S = 0.15
+LEAST_CROSSING_M_S = 0.25
 SWITCH_S = 0.5  # another side than before must be faster by this
-LOOK_REACH_M = 0.5  # shorter legs to a gate are flown with the heading along them
-TURN_SPARE_S = 0.2  # to begin and end a turn
-TURNED_BEFORE_M = 0.25  # before an opening a turn must have ended
-NO_TURN_RAD = 0.1  # a smaller turn takes no time of its own
+BLOCKED_S = 1e4  # time of a leg that obstacles block
 _ROOM_STEP_M = 0.05
 _ROOM_STEPS = 24
-_DESCENT_GAIN = 1.5
-"""A descent to a height that brakes with this times the height above 0.15 m, per s^2, is nowhere faster than
-the height above 0.15 m over 1.1 s, to which the app limits it: v^2 / 2a <= h for v = (z - 0.15) / 1.1."""
-_FLOOR_M = 0.15
+_SAME_GATE_M = 1.0
 Indices = npt.NDArray[np.intp]
-_Row = tuple[Array, Array, Array, float, float, float, float]
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class States:
-    """Ways in which one goal may be passed; arrays with one row each.
-
-    Attributes:
-        goal: which is passed.
-        entry_m: where its legs end, shape (k, 3).
-        exit_m: where the next legs start, shape (k, 3); from entry to exit the flight is straight and even.
-        velocity_m_s: at both, shape (k, 3).
-        inner_s: time from entry to exit, shape (k,).
-        yaw_rad: the heading there; NaN if it is free, shape (k,).
-        turn_s: time after the entry in which a turn to that heading may still end, shape (k,).
-        cost_s: added to the time, shape (k,).
-    """
-
-    goal: Goal | None
-    entry_m: Array
-    exit_m: Array
-    velocity_m_s: Array
-    inner_s: Array
-    yaw_rad: Array
-    turn_s: Array
-    cost_s: Array
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Pass:
-    """The way in which a goal is passed: one row of `States`."""
+    """A way in which a goal is passed, or several: the arrays have as many rows.
+
+    Attributes:
+        goal: which is passed; None for the start and for a place beside an obstacle.
+        entries: where legs to it end.
+        exits: where legs from it start; from entry to exit the flight is straight and even.
+        inner_s: time from entry to exit, shape (n,).
+        costs_s: added to the time, shape (n,).
+    """
 
     goal: Goal | None
-    entry_m: Array
-    exit_m: Array
-    velocity_m_s: Array
-    inner_s: float
+    entries: Ends
+    exits: Ends
+    inner_s: Array
+    costs_s: Array
+
+    def one(self, index: int) -> Pass:
+        """One of the ways."""
+        row = np.array([index])
+        return Pass(
+            self.goal, self.entries.take(row), self.exits.take(row), self.inner_s[row], self.costs_s[row]
+        )
+
+    @property
+    def begun(self) -> bool:
+        """Whether the start is in this gate's opening already, so that its leg leads through the rest."""
+        return isinstance(self.goal, Gate) and not self.inner_s[0]
+
+    @property
+    def yaw_rad(self) -> float:
+        """The heading of the first way; NaN if it is free."""
+        return float(self.entries.yaws_rad[0])
+
+
+def place(
+    position_m: Array, velocity_m_s: Array, yaw_rad: float, goal: Goal | None = None, turn_s: float = 0.0
+) -> Pass:
+    """A pass at one place with one velocity."""
+    at_gate = np.zeros(1, dtype=bool)
+    ends = Ends(position_m[None], velocity_m_s[None], np.array([yaw_rad]), np.array([turn_s]), at_gate)
+    return Pass(goal, ends, ends, np.zeros(1), np.zeros(1))
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Opening:
+    """A gate, seen from one side."""
+
+    centre_m: Array
+    normal: Array  # in the direction of the crossing
     yaw_rad: float
-    turn_s: float
+    before_m: float  # room before it
+    after_m: float
 
 
 class RouteFinder:
-    """Finds the fastest route, obstacles besides the goals' own surroundings left out.
+    """Finds the fastest route by dynamic programming; obstacles between the goals only as `correct` tells.
 
     Args:
         clearance: the obstacles.
+        connector: makes the legs.
         style: how boldly to fly.
     """
 
-    def __init__(self, clearance: Clearance, style: FlightStyle) -> None:
+    def __init__(self, clearance: Clearance, connector: Connector, style: FlightStyle) -> None:
         self._clearance = clearance
+        self._connector = connector
         self._style = style
-        self._reach_m = np.arange(1, _ROOM_STEPS + 1) * _ROOM_STEP_M
+        self._stages: list[Pass] = []
+        self._leg_s: list[Array] = []
+        self._corrected: set[tuple[int, bool, bool]] = set()
 
-    def find(
-        self, start: Motion, goals: Sequence[Goal], previous: Sequence[Crossing]
-    ) -> tuple[list[Pass], str]:
-        """The ways to pass the start and each goal, or none and the reason."""
-        stages = [_still_or_moving(None, start.position_m, start.velocity_m_s, start.yaw_rad)]
+    def prepare(self, start: Motion, goals: Sequence[Goal], previous: Sequence[Crossing]) -> str:
+        """Collect the ways to pass all goals, and how long legs between them take.
+
+        Returns:
+            Why there is none; empty if there is.
+        """
+        at, speed = np.array(start.position_m), np.array(start.velocity_m_s)
+        self._stages = [place(at, speed, start.yaw_rad)]
+        openings = self._openings([goal for goal in goals if isinstance(goal, Gate)])
         for index, goal in enumerate(goals):
-            last = index == len(goals) - 1
-            if isinstance(goal, Gate):
-                states = self._gate_states(goal, start if index == 0 else None, previous)
-                if not len(states.inner_s):
-                    return [], "a gate has no room before or behind its opening"
-            else:
-                states = self._point_states(goal, stages[-1], None if last else goals[index + 1])
-            stages.append(states)
-        return self._best(stages), ""
-
-    def _best(self, stages: list[States]) -> list[Pass]:
-        """The fastest sequence, by dynamic programming."""
-        costs = stages[0].cost_s
-        chosen: list[Array] = []
-        for before, after in pairwise(stages):
+            following = goals[index + 1] if index + 1 < len(goals) else None
+            if isinstance(goal, Point):
+                self._stages.append(self._past_point(goal, following))
+                continue
+            ways = self._through_gate(goal, openings.pop(0), start if index == 0 else None, previous)
+            if ways is None:
+                return f"goal {index + 1}, a gate, has no room before or behind its opening"
+            self._stages.append(ways)
+        for before, after in pairwise(self._stages):
             m, n = len(before.inner_s), len(after.inner_s)
             rows, columns = np.repeat(np.arange(m), n), np.tile(np.arange(n), m)
-            leg_s = self.leg_times(before, rows, after, columns).reshape(m, n)
-            total = costs[:, None] + leg_s + (after.inner_s + after.cost_s)[None, :]
+            times = self._connector.times(before.exits.take(rows), after.entries.take(columns))
+            self._leg_s.append(times.reshape(m, n))
+        return ""
+
+    def best(self) -> tuple[list[Pass], list[int], list[float]]:
+        """The fastest route, which way it takes at each goal, and how long its legs take."""
+        costs = self._stages[0].costs_s
+        chosen: list[Indices] = []
+        for leg_s, after in zip(self._leg_s, self._stages[1:], strict=True):
+            total = costs[:, None] + leg_s + (after.inner_s + after.costs_s)[None, :]
             chosen.append(total.argmin(axis=0))
             costs = total.min(axis=0)
-        index = int(costs.argmin())
-        route: list[Pass] = []
-        for stage, back in zip(reversed(stages), [*reversed(chosen), None], strict=True):
-            route.append(
-                Pass(
-                    stage.goal,
-                    stage.entry_m[index],
-                    stage.exit_m[index],
-                    stage.velocity_m_s[index],
-                    float(stage.inner_s[index]),
-                    float(stage.yaw_rad[index]),
-                    float(stage.turn_s[index]),
-                )
-            )
-            index = index if back is None else int(back[index])
-        return route[::-1]
+        ways = [int(costs.argmin())]
+        for back in reversed(chosen):
+            ways.append(int(back[ways[-1]]))
+        ways.reverse()
+        route = [stage.one(way) for stage, way in zip(self._stages, ways, strict=True)]
+        times = [float(leg_s[pair]) for leg_s, pair in zip(self._leg_s, pairwise(ways), strict=True)]
+        return route, ways, times
 
-    def leg_times(self, before: States, rows: Indices, after: States, columns: Indices) -> Array:
-        """Durations of the legs between pairs of states, obstacles left out."""
-        start_m, end_m = before.exit_m[rows], after.entry_m[columns]
-        yaw_before, yaw_after = before.yaw_rad[rows], after.yaw_rad[columns]
-        to_gate = isinstance(after.goal, Gate)
-        turn = leg_turns(end_m - start_m, yaw_before, yaw_after, to_gate=to_gate, style=self._style)
-        c, s = np.cos(turn), np.sin(turn)
-        turn_s = turn_times(yaw_before, yaw_after, after.turn_s[columns], self._style)
-        return durations(
-            rotate(end_m - start_m, c, -s),
-            rotate(before.velocity_m_s[rows], c, -s),
-            rotate(after.velocity_m_s[columns], c, -s),
-            leg_limits(start_m, end_m, self._style, self._clearance),
-            turn_s,
-        )
+    def correct(self, leg: int, ways: tuple[int, int], time_s: float) -> None:
+        """Take in how long a leg takes round obstacles, also as a guess for others between the same sides.
 
-    def _gate_states(self, gate: Gate, start: Motion | None, previous: Sequence[Crossing]) -> States:
-        """Both sides at each speed, as far as there is room."""
-        style, clearance = self._style, self._clearance
-        own = clearance.frame_of(gate)
-        rows: list[_Row] = []
-        for sign in (1, -1):
-            if gate.direction == -sign:
-                continue
-            yaw = gate.yaw_rad if sign > 0 else gate.yaw_rad + pi
-            normal = np.array([cos(yaw), sin(yaw), 0.0])
-            centre = np.array(gate.centre_m)
-            before_m, after_m = self._room(centre, -normal, own), self._room(centre, normal, own)
-            if min(before_m, after_m) < LEAST_STRAIGHT_M:
-                continue
-            cost_s = _switch_cost(gate, yaw, previous)
-            straight_m = min(before_m, style.straight_before_m)
-            exit_m = min(after_m, style.straight_after_m)
-            ways = [(-straight_m, speed) for speed in self._speeds(before_m - straight_m, after_m - exit_m)]
+        Args:
+            leg: which leg of the route.
+            ways: the ways at its start and end.
+            time_s: `BLOCKED_S` if it is not possible.
+        """
+        times = self._leg_s[leg]
+        before, after = (self._stages[leg + i] for i in (0, 1))
+        sides = [stage.entries.yaws_rad for stage in (before, after)]
+        same = [np.cos(yaws - yaws[way]) > 0.0 for yaws, way in zip(sides, ways, strict=True)]
+        key = (leg, bool(same[0][0]), bool(same[1][0]))
+        if key not in self._corrected:
+            self._corrected.add(key)
+            extra_s = min(0.9 * (time_s - times[ways]), BLOCKED_S / 2)
+            times[np.ix_(same[0], same[1])] += extra_s
+        times[ways] = time_s
+
+    def _openings(self, gates: list[Gate]) -> list[list[_Opening]]:
+        """Both sides of each gate, as far as there is room and its direction allows."""
+        if not gates:
+            return []
+        yaws = np.array([gate.yaw_rad + turn for gate in gates for turn in (0.0, pi)])
+        normals = np.stack((np.cos(yaws), np.sin(yaws), np.zeros(len(yaws))), axis=1)
+        centres = np.repeat(np.array([gate.centre_m for gate in gates]), 2, axis=0)
+        reach = np.arange(1, _ROOM_STEPS + 1) * _ROOM_STEP_M
+        points = centres[:, None] + reach[:, None] * normals[:, None]
+        low, high = self._clearance.low_m[2], self._clearance.high_m[2]
+        points[..., 2] = np.clip(points[..., 2], low, high)  # a gate beyond is crossed at its own height
+        depths = self._clearance.depths(points.reshape(-1, 3)).reshape(len(gates), 2, _ROOM_STEPS, -1)
+        for index, gate in enumerate(gates):
+            own = self._clearance.frame_of(gate)
+            if own >= 0:
+                depths[index, :, :, own] = -1.0
+        blocked = (depths > 0.0).any(axis=-1)
+        rooms = np.where(blocked.any(axis=-1), blocked.argmax(axis=-1), _ROOM_STEPS) * _ROOM_STEP_M
+        found: list[list[_Opening]] = []
+        for index, gate in enumerate(gates):
+            sides: list[_Opening] = []
+            for side, sign in ((0, 1), (1, -1)):
+                row = 2 * index + side
+                room = float(rooms[index, 1 - side]), float(rooms[index, side])
+                if gate.direction != -sign and min(room) >= LEAST_STRAIGHT_M:
+                    sides.append(_Opening(centres[row], normals[row], float(yaws[row]), *room))
+            found.append(sides)
+        return found
+
+    def _through_gate(
+        self, gate: Gate, openings: list[_Opening], start: Motion | None, previous: Sequence[Crossing]
+    ) -> Pass | None:
+        """Each side at each speed; None if there is no side."""
+        style = self._style
+        rows: list[tuple[Array, Array, Array, tuple[float, float, float, float]]] = []
+        for opening in openings:
+            centre, normal = opening.centre_m, opening.normal
+            cost_s = _switch_cost(gate, opening.yaw_rad, previous)
+            straight_m = min(opening.before_m, style.straight_before_m)
+            exit_m = min(opening.after_m, style.straight_after_m)
+            room_m = min(opening.before_m - straight_m, opening.after_m - exit_m)
+            ways = [(-straight_m, speed) for speed in self._speeds(room_m)]
             if start is not None:
-                exit_m = _leaving_exit(start, centre, normal, exit_m)
-                late = _late_entries(start, centre, normal, exit_m)
+                exit_m = _leaving_exit(start, opening, exit_m)
                 present = float(np.array(start.velocity_m_s) @ normal)
                 speeds = (style.crossing_speed_m_s, max(present, LEAST_CROSSING_M_S))
-                ways += [(entry, speed) for entry in late for speed in speeds]
-            for entry_m, speed in ways:
-                rows.append(
-                    (
-                        centre + entry_m * normal,
-                        centre + exit_m * normal,
-                        speed * normal,
-                        (exit_m - entry_m) / speed,
-                        yaw,
-                        max(-TURNED_BEFORE_M - entry_m, 0.0) / speed,
-                        cost_s,
-                    )
-                )
-        return _states(gate, rows)
+                ways += [(at, speed) for at in _late_entries(start, opening, exit_m) for speed in speeds]
+            for at_m, speed in ways:
+                times = (exit_m - at_m) / speed, max(-TURNED_BEFORE_M - at_m, 0.0) / speed
+                ends = centre + at_m * normal, centre + exit_m * normal, speed * normal
+                rows.append((*ends, (opening.yaw_rad, *times, cost_s)))
+        if not rows:
+            return None
+        entry, leave, velocity, numbers = (np.array(column) for column in zip(*rows, strict=True))
+        yaw, inner_s, turn_s, cost_s = numbers.T
+        at_gates = np.ones(len(rows), dtype=bool)
+        entries = Ends(entry, velocity, yaw, turn_s, at_gates)
+        return Pass(gate, entries, Ends(leave, velocity, yaw, turn_s, at_gates), inner_s, cost_s)
 
-    def _speeds(self, before_m: float, after_m: float) -> list[float]:
+    def _speeds(self, room_m: float) -> list[float]:
         """Speeds to cross a gate with, for which there is room to accelerate before and to brake behind."""
         style = self._style
-        top = max((2.0 * style.acceleration_m_s2 * min(before_m, after_m)) ** 0.5, 0.2)
+        top = max((2.0 * style.acceleration_m_s2 * room_m) ** 0.5, 0.2)
         speeds = [share * style.crossing_speed_m_s for share in SPEED_SHARES]
         return [speed for speed in speeds if speed <= top] or speeds[-1:]
 
-    def _room(self, centre_m: Array, direction: Array, own: int) -> float:
-        """How far from an opening the drone may fly straight, metres; at most 1.2."""
-        points = centre_m + self._reach_m[:, None] * direction
-        points[:, 2] = np.clip(points[:, 2], self._clearance.low_m[2], self._clearance.high_m[2])
-        depths = self._clearance.depths(points)
-        if own >= 0:
-            depths[:, own] = -1.0
-        blocked = (depths > 0.0).any(axis=1)
-        return float(blocked.argmax() if blocked.any() else _ROOM_STEPS) * _ROOM_STEP_M
-
-    def _point_states(self, point: Point, before: States, following: Goal | None) -> States:
+    def _past_point(self, point: Point, following: Goal | None) -> Pass:
         """At rest, or past it towards the next goal at each speed."""
         yaw = nan if point.yaw_rad is None else point.yaw_rad
         position = np.array(point.position_m)
-        rest = (position, position, np.zeros(3), 0.0, yaw, 0.0, 0.0)
         if point.stop or following is None:
-            return _states(point, [rest])
+            return place(position, np.zeros(3), yaw, point)
         target = following.centre_m if isinstance(following, Gate) else following.position_m
         to_next = np.array(target) - position
-        from_last = position - before.exit_m.mean(axis=0)
+        from_last = position - self._stages[-1].exits.places_m.mean(axis=0)
         chord = to_next / (np.linalg.norm(to_next) + 1e-9) + from_last / (np.linalg.norm(from_last) + 1e-9)
         chord[2] = 0.0
-        size = float(np.linalg.norm(chord))
-        if size < 0.2:
-            return _states(point, [rest])
-        speed = self._style.axis_speed_m_s
-        rows = [
-            (position, position, share * speed * chord / size, 0.0, yaw, 9.0, 0.0) for share in SPEED_SHARES
-        ]
-        return _states(point, [*rows, rest])
-
-
-def _still_or_moving(
-    goal: Goal | None, position: Sequence[float], velocity: Sequence[float], yaw: float
-) -> States:
-    at, speed = np.array([position], dtype=float), np.array([velocity], dtype=float)
-    zero = np.zeros(1)
-    return States(goal, at, at, speed, zero, np.array([yaw]), zero, zero)
-
-
-def _states(goal: Goal, rows: list[_Row]) -> States:
-    if not rows:
-        none = np.zeros((0, 3))
-        return States(goal, none, none, none, *([none[:, 0]] * 4))
-    return States(goal, *(np.array(column) for column in zip(*rows, strict=True)))
+        chord *= self._style.axis_speed_m_s / max(float(np.linalg.norm(chord)), 1.0)
+        velocities = np.array([share * chord for share in (*SPEED_SHARES, 0.0)])
+        n = len(velocities)
+        yaws, turns_s = np.full(n, yaw), np.full(n, BLOCKED_S)  # it need not have turned there
+        ends = Ends(np.tile(position, (n, 1)), velocities, yaws, turns_s, np.zeros(n, dtype=bool))
+        return Pass(point, ends, ends, np.zeros(n), np.zeros(n))
 
 
 def _switch_cost(gate: Gate, yaw_rad: float, previous: Sequence[Crossing]) -> float:
     """Time added to the other side than that of the path flown now."""
     for crossing in previous:
         gap_m = np.linalg.norm(np.array(crossing.gate.centre_m) - np.array(gate.centre_m))
-        if gap_m < 1.0:
+        if gap_m < _SAME_GATE_M:
             return SWITCH_S if cos(crossing.heading_rad - yaw_rad) < 0.0 else 0.0
     return 0.0
 
 
-def _leaving_exit(start: Motion, centre: Array, normal: Array, exit_m: float) -> float:
+def _leaving_exit(start: Motion, opening: _Opening, exit_m: float) -> float:
     """Where the straight flight ends; farther for a start that is just leaving, and not to turn back."""
-    along_m = float((np.array(start.position_m) - centre) @ normal)
-    speed = float(np.array(start.velocity_m_s) @ normal)
+    along_m = float((np.array(start.position_m) - opening.centre_m) @ opening.normal)
+    speed = float(np.array(start.velocity_m_s) @ opening.normal)
     leaving = speed > 0.1 and -LATE_STRAIGHT_M < along_m < exit_m + LEAVING_M
     return max(exit_m, along_m + 0.03 + LEAVING_S * speed) if leaving else exit_m
 
 
-def _late_entries(start: Motion, centre: Array, normal: Array, exit_m: float) -> list[float]:
+def _late_entries(start: Motion, opening: _Opening, exit_m: float) -> list[float]:
     """Later entries, as distances behind the opening, for a start that is before or in it already."""
-    offset = np.array(start.position_m) - centre
-    velocity = np.array(start.velocity_m_s)
+    offset = np.array(start.position_m) - opening.centre_m
+    velocity, normal = np.array(start.velocity_m_s), opening.normal
     along_m = float(offset @ normal)
     if not -COMMITTED_BEFORE_M < along_m < exit_m:
         return []
@@ -276,60 +286,3 @@ def _late_entries(start: Motion, centre: Array, normal: Array, exit_m: float) ->
     if beside_m > LATE_ACROSS_M + 0.25 * to_go_m or aside > 0.1 + 0.5 * max(speed, 0.0):
         return []
     return [entry for entry in LATE_ENTRIES_M if entry > along_m + 0.02] or [exit_m]
-
-
-def leg_turns(way: Array, yaw_before: Array, yaw_after: Array, *, to_gate: bool, style: FlightStyle) -> Array:
-    """The headings of legs' axes; where they may differ from the direction, both axes are used.
-
-    Args:
-        way: from start to end, shape (n, 3).
-        yaw_before: the heading at the start, shape (n,), NaN for any.
-        yaw_after: likewise at the end.
-        to_gate: the legs end at a gate, which is looked at.
-        style: how boldly to fly.
-    """
-    bearing = np.arctan2(way[:, 1], way[:, 0])
-    reach = np.hypot(way[:, 0], way[:, 1])
-    aside = np.where(np.isnan(yaw_before), 0.0, wrap(yaw_before - bearing))
-    if to_gate:
-        side = np.where(np.abs(aside) > NO_TURN_RAD, aside, wrap(yaw_after - bearing))
-        offset = np.copysign(style.look_offset_rad, side) * np.clip(reach - LOOK_REACH_M, 0.0, 1.0)
-    else:
-        quarter = np.floor(aside / (pi / 2)) * (pi / 2) + pi / 4
-        offset = np.where(np.isnan(yaw_after), quarter, 0.0)
-    turn: Array = np.where(reach > 1e-6, bearing + offset, np.where(np.isnan(yaw_before), 0.0, yaw_before))
-    return turn
-
-
-def turn_times(yaw_before: Array, yaw_after: Array, later_s: Array, style: FlightStyle) -> Array:
-    """Times that turns need within legs, shape (n,); none where a heading is free or the turn small.
-
-    Args:
-        yaw_before: headings at the start, shape (n,), NaN for any.
-        yaw_after: at the end.
-        later_s: time after the end in which the turn may still end.
-        style: how boldly to fly.
-    """
-    turn = np.abs(wrap(yaw_after - yaw_before))
-    needed: Array = np.where(turn > NO_TURN_RAD, turn / style.yaw_rate_rad_s + TURN_SPARE_S - later_s, 0.0)
-    return np.maximum(needed, 0.0)
-
-
-def leg_limits(start_m: Array, end_m: Array, style: FlightStyle, clearance: Clearance) -> LegLimits:
-    """Limits of legs' axes, arrays of shape (n, 3): descents brake early enough for the app's floor."""
-    n = len(start_m)
-    speed = np.tile([style.axis_speed_m_s, style.axis_speed_m_s, style.climb_speed_m_s], (n, 1))
-    acceleration = np.tile(
-        [style.acceleration_m_s2, style.acceleration_m_s2, style.climb_acceleration_m_s2], (n, 1)
-    )
-    floor_m = clearance.low_m[2] - style.floor_margin_m + _FLOOR_M
-    gentle = np.maximum(_DESCENT_GAIN * (end_m[:, 2] - floor_m), 0.2)
-    down = end_m[:, 2] < start_m[:, 2]
-    acceleration[down, 2] = np.minimum(acceleration[down, 2], gentle[down])
-    return LegLimits(speed, acceleration)
-
-
-def wrap(angle: Array) -> Array:
-    """Angles between -pi and pi."""
-    wrapped: Array = (angle + pi) % (2 * pi) - pi
-    return wrapped

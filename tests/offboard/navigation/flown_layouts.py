@@ -10,6 +10,8 @@ import numpy as np
 
 from framerunner.flying.lockstep import LockstepVehicle
 from framerunner.flying.plan import FlightPlan
+from geometry.solids import Solid
+from geometry.vectors import Vec3
 from offboard.keep_in_box import KeepInBox
 from offboard.navigation.following import PathFollower
 from offboard.navigation.goals import CONTEST, FlightStyle, Gate, Goal, Motion, Obstacles, Point, Refusal
@@ -47,6 +49,11 @@ class Layout:
         return [*self.gates, Point((base.x_m, base.y_m, 0.6))]
 
     @property
+    def columns_m(self) -> tuple[Vec3, ...]:
+        """Discs that cover what stands on the floor."""
+        return tuple(disc for solid in self.scenario.prisms for disc in _discs(solid))
+
+    @property
     def start(self) -> Motion:
         """On the base."""
         start = self.scenario.start
@@ -55,10 +62,24 @@ class Layout:
     def plan(
         self, start: Motion, goals: list[Goal], previous: Path | None = None, style: FlightStyle = CONTEST
     ) -> Path | Refusal:
-        """A plan with all frames known."""
-        obstacles = Obstacles(self.gates, base=self.scenario.base)
+        """A plan with all frames and obstacles known."""
+        decoys = tuple(Gate(decoy.position_arena_m, decoy.yaw_rad) for decoy in self.scenario.decoys)
+        obstacles = Obstacles((*self.gates, *decoys), self.columns_m, self.scenario.base)
         arena = self.scenario.arena
         return plan(start, goals, obstacles=obstacles, arena=arena, style=style, previous=previous)
+
+
+def _discs(solid: Solid) -> list[Vec3]:
+    """Discs along the longer side of an upright box."""
+    x_m, y_m, _ = solid.centre_arena_m
+    c, s = solid.turn
+    along_m, half_m, _ = solid.half_extents_m
+    if along_m < half_m:
+        along_m, half_m, c, s = half_m, along_m, -s, c
+    count = max(int(along_m / 0.08), 1)
+    step_m = 2 * along_m / count
+    places = [(i + 0.5) * step_m - along_m for i in range(count)]
+    return [(x_m + c * at_m, y_m + s * at_m, hypot(half_m, step_m / 2)) for at_m in places]
 
 
 class Sampled:

@@ -76,6 +76,31 @@ def test_planning_again_from_the_path_changes_little(seed: int):
     assert flown_s + path.duration_s < first_s * 1.25
 
 
+@pytest.mark.parametrize(
+    ("level", "seed"), [("crowded", 200), ("crowded", 207), ("tight", 200), ("tight", 206)]
+)
+def test_harder_levels_are_planned_clear_of_everything(level: str, seed: int):
+    layout = Layout.random(seed, level)
+    path = layout.plan(layout.start, layout.goals)
+    assert isinstance(path, Path), path
+    sampled = Sampled(path)
+    assert crossed(sampled, layout.gates) == [0, 1, 2]
+    for gate in layout.gates:
+        assert touching(sampled, gate) == []
+    assert least_margin(sampled, layout.scenario.arena) > 0.24
+    for x_m, y_m, radius_m in layout.columns_m:
+        away_m = np.hypot(sampled.positions[:, 0] - x_m, sampled.positions[:, 1] - y_m)
+        assert away_m.min() > radius_m + 0.22
+
+
+def test_what_cannot_be_reached_is_refused():
+    ring = tuple((1.0 * np.cos(angle), 1.0 * np.sin(angle), 0.2) for angle in np.arange(0.0, 6.3, 0.3))
+    goals = [Point((3.0, 0.0, 1.0))]
+    obstacles = Obstacles(columns_m=ring)
+    path = plan(Motion((0.0, 0.0, 1.0)), goals, obstacles=obstacles, arena=Arena(), style=CONTEST)
+    assert path == Refusal("obstacles block the way to the next point")
+
+
 def test_a_gate_is_crossed_only_in_its_direction():
     gate = Gate((2.0, 0.0, 1.0), 0.0, direction=-1)
     goals = [gate, Point((0.0, 0.0, 1.0))]
