@@ -7,6 +7,7 @@ bars' axes there must be nothing but pixels of the region and what may hide it.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from math import hypot, sqrt
 from typing import NamedTuple
 
@@ -27,6 +28,7 @@ _MAX_OWN_UNSEEN = 0.4  # share of a bar that seems to be seen although it was no
 _WHOLE = 0.9  # share of a bar that is seen if nothing hides it; shaded and thin bars may have gaps
 _MAX_CORNER_STD_PX = 2.5
 _EDGE_ON, _OBLIQUE = 0.13, 0.23  # cosines: the bars of a frame that is seen edge-on hide one another
+_CLEAR_OPEN, _THIN_PX = 0.7, 3.0
 _CLEAR_PX = 4.5  # a side that is shorter may be a part of a longer one
 _TOO_NARROW = 1.2
 _WIDTH_SHARE, _WIDTH_SHARE_STD = 0.75, 0.15  # of half a bar's image that is half of the bar's width
@@ -88,7 +90,9 @@ def _fit(
 ) -> tuple[BarLines, _Meetings, list[ModelPose]]:
     """The axes of the sides, where they meet (sides k - 1 and k) and the poses that follow."""
     edges = find_edges(patch, sides, expected_widths(sides, spread_px))
-    lines, meetings, poses = _lines_and_poses(patch, edges, None, focal_px)
+    lines, meetings, poses = _lines_and_poses(patch, edges, None, (), focal_px)
+    if all(line is not None and line.open > _CLEAR_OPEN and line.half_px < _THIN_PX for line in lines):
+        return lines, meetings, poses  # so far away that the middle of a bar's image is its axis
     for _ in range(2):
         if not poses:
             break
@@ -98,7 +102,7 @@ def _fit(
         offsets[:, 0] -= spread_px
         offsets[:, 1] += spread_px
         wider = _wider(edges, offsets)
-        lines, meetings, poses = _lines_and_poses(patch, edges, offsets, focal_px)
+        lines, meetings, poses = _lines_and_poses(patch, edges, offsets, poses, focal_px)
         if wider is None or not poses:
             break
         edges = find_edges(patch, sides, wider)  # a side that is cut looked like one of a smaller frame
@@ -118,11 +122,11 @@ def _wider(edges: BarEdges, offsets: Floats) -> Widths | None:
 
 
 def _lines_and_poses(
-    patch: Patch, edges: BarEdges, offsets: Floats | None, focal_px: float
+    patch: Patch, edges: BarEdges, offsets: Floats | None, guesses: Sequence[ModelPose], focal_px: float
 ) -> tuple[BarLines, _Meetings, list[ModelPose]]:
     lines = [line if _is_sure(line) else None for line in fit_lines(edges, focal_px, offsets)]
     meetings = [meeting(lines[k - 1], lines[k]) for k in range(4)]
-    return lines, meetings, _poses(patch, lines, meetings, focal_px)
+    return lines, meetings, _poses(patch, lines, meetings, guesses, focal_px)
 
 
 def _is_sure(line: BarLine | None) -> bool:
@@ -130,7 +134,9 @@ def _is_sure(line: BarLine | None) -> bool:
     return line is not None and (line.seen > 0.5 or line.points >= 4)
 
 
-def _poses(patch: Patch, lines: BarLines, meetings: _Meetings, focal_px: float) -> list[ModelPose]:
+def _poses(
+    patch: Patch, lines: BarLines, meetings: _Meetings, guesses: Sequence[ModelPose], focal_px: float
+) -> list[ModelPose]:
     """The poses that explain four or three lines."""
     known = [met for met in meetings if met is not None]
     if len(known) == 4:
@@ -143,7 +149,7 @@ def _poses(patch: Patch, lines: BarLines, meetings: _Meetings, focal_px: float) 
     forms = [None if line is None else line.normal_form() for line in lines]
     corners = [None if met is None else (met.x, met.y) for met in meetings]
     weights = [_weights(lines[k], meetings[k], meetings[(k + 1) % 4]) for k in range(4)]
-    poses = poses_of_three(forms, corners, weights, focal_px)
+    poses = poses_of_three(forms, corners, weights, focal_px, guesses)
     return [pose for pose in poses if _explains(patch, pose, missing, focal_px)]
 
 

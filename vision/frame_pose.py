@@ -21,7 +21,8 @@ _IDENTITY = np.eye(3)
 _NEAREST_M = 0.03
 _MIN_UPRIGHT = 0.6  # cosine of the largest tilt of the camera, about 53 degrees: frames are upright
 _MAX_STEPS = 12
-_SMALL_STEP = 1e-4  # metres and radians
+_DAMPING = 1e-6 * np.eye(6)
+_SMALL_STEP = 1e-3  # metres and radians
 _MAX_DEPTH_ERROR = 0.08  # a pose that is less sure than this, relative to its distance, is left out
 _MAX_TURN_ERROR = 0.25  # the same for its angle about the upright axis, radians
 _MAX_DEVIATIONS = 3.0
@@ -88,6 +89,7 @@ def poses_of_three(
     corners: Sequence[Point | None],
     weights: Sequence[tuple[float, float]],
     focal_px: float,
+    guesses: Sequence[ModelPose] = (),
 ) -> list[ModelPose]:
     """Find the poses of a frame of which one side is not seen.
 
@@ -97,6 +99,7 @@ def poses_of_three(
         corners: where the axes meet; two are None.
         weights: of each line at its first and its second corner, 1/px.
         focal_px: focal length.
+        guesses: poses near to which the answers are, if they are known.
 
     Returns:
         None, one or two, those with the smaller turn first. Three lines fix all six numbers of a pose, so no
@@ -112,8 +115,8 @@ def poses_of_three(
     points = AXES_CORNERS[[(k + end) % 4 for k, end in rows]]
     scale = np.array([weights[k][end] for k, end in rows])
     found: list[ModelPose] = []
-    for turn in (-0.8, 0.8):
-        pose = _refined(_first_guess(opposite, one, other, turn, focal_px), points, normals, scale, focal_px)
+    for guess in guesses or [_first_guess(opposite, one, other, turn, focal_px) for turn in (-0.8, 0.8)]:
+        pose = _refined(guess, points, normals, scale, focal_px)
         if pose is not None and all(_differ(pose, known) for known in found):
             found.append(pose)
     return sorted(found, key=lambda pose: -abs(float(pose.rotation[2, 2])))
@@ -139,20 +142,23 @@ def _refined(
 ) -> ModelPose | None:
     """Gauss and Newton's method on the distances of a model's points from lines; None if it fails."""
     rotation, shift = guess.rotation, guess.shift_m
+    a, b, c = normals.T
     for _ in range(_MAX_STEPS):
         turned = points @ rotation.T
-        seen = turned + shift
-        depth = seen[:, 2]
+        px, py, pz = turned.T
+        x, y, depth = (turned + shift).T
         if depth.min() <= _NEAREST_M:
             return None
-        x, y = focal_px * seen[:, 0] / depth, focal_px * seen[:, 1] / depth
-        a, b, c = normals.T
-        error = (a * x + b * y - c) * weights
-        along = (np.array([a * focal_px, b * focal_px, -(a * x + b * y)]) * (weights / depth)).T
-        jacobian = np.hstack([np.cross(turned, along), along])
-        square = jacobian.T @ jacobian
+        scale = focal_px / depth
+        across = (a * x + b * y) * scale
+        error = (across - c) * weights
+        # How each distance changes with the shift; and with a small turn, by the product with the arm.
+        scale *= weights
+        gx, gy, gz = a * scale, b * scale, -across * weights / depth
+        jacobian = np.array([py * gz - pz * gy, pz * gx - px * gz, px * gy - py * gx, gx, gy, gz])
+        square = jacobian @ jacobian.T
         try:
-            step = np.linalg.solve(square + 1e-9 * np.diag(np.diag(square)), -jacobian.T @ error)
+            step = np.linalg.solve(square + _DAMPING, -(jacobian @ error))
         except np.linalg.LinAlgError:
             return None
         size = float(np.abs(step).max())

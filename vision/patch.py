@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
+import cv2
 import numpy as np
 import numpy.typing as npt
 
@@ -17,8 +18,8 @@ Box = tuple[int, int, int, int]  # column, row, columns, rows
 BACKGROUND, OWN, FOREIGN, OUTSIDE = 0, 1, 2, 4
 """Values of pixels: none of the others, of the region, what may hide a part of it, and not in the image."""
 
-_PLACES = (np.arange(16) + 0.5) / 16.0  # along a bar, as shares of its length
-_ACROSS = np.array([[0, 0], [-1, 0], [1, 0], [0, -1], [0, 1]])  # a thin bar may be a pixel beside its axis
+_PLACES = ((np.arange(16) + 0.5) / 16.0)[:, None]  # along a bar, as shares of its length
+_BESIDE = cv2.getStructuringElement(cv2.MORPH_CROSS, (3, 3))
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -46,17 +47,20 @@ class Patch:
 
     def support(self, starts: Sequence[Point] | Floats, ends: Sequence[Point] | Floats) -> Support:
         """Look along straight bars, given by the ends of their axes, pixels from the optical axis."""
+        # A thin bar may be a pixel beside its axis.
+        own = cv2.dilate(np.bitwise_and(self.labels, np.uint8(OWN)), _BESIDE)
+        near = cv2.dilate(self.labels, _BESIDE)
         start = np.asarray(starts, np.float64)[:, None]
-        points = start + (np.asarray(ends, np.float64)[:, None] - start) * _PLACES[:, None]
+        points = start + (np.asarray(ends, np.float64)[:, None] - start) * _PLACES
         beyond = (np.abs(points) > self.reach_px).any(axis=2)
-        at = np.rint(points + self.origin).astype(np.intp)[:, :, None] + _ACROSS
+        at = np.rint(points + self.origin).astype(np.intp)
+        column, row = at[..., 0], at[..., 1]
         rows, columns = self.labels.shape
-        known = (at >= 0).all(axis=3) & (at[..., 0] < columns) & (at[..., 1] < rows)
-        index = np.where(known, at[..., 1] * columns + at[..., 0], 0)
-        seen = np.where(known, self.labels.reshape(-1)[index], BACKGROUND)
-        own = (seen == OWN).any(axis=2)
-        empty = ~own & ~beyond & ~(seen > OWN).any(axis=2)
-        return Support(own.mean(axis=1).tolist(), empty.mean(axis=1).tolist())
+        known = (column >= 0) & (row >= 0) & (column < columns) & (row < rows)
+        index = np.where(known, row * columns + column, 0)
+        is_own = known & (own.reshape(-1)[index] == OWN)
+        empty = ~(is_own | beyond | (known & (near.reshape(-1)[index] > OWN)))
+        return Support(is_own.mean(axis=1).tolist(), empty.mean(axis=1).tolist())
 
 
 @dataclass(frozen=True, slots=True)
