@@ -152,7 +152,9 @@ class MissionEngine:
         pilot.cam = cam
         self.transition = None
         try:
-            if self._navigator is not None and state is not None:
+            if self._navigator is not None:
+                if state is None:
+                    raise PilotError("its map of frames needs the drone's state; give it to each tick")
                 self._navigator.observe(state, cam)
             self._count_unseen(time_us)
             if self._present is None:
@@ -256,7 +258,10 @@ def _new_navigator(
     from offboard.navigation.navigator import Navigator  # noqa: PLC0415 - it imports filterpy: a second
 
     if surroundings is None:
-        raise MissionRunError(f"mission '{mission.name}': needs the surroundings for its map of frames")
+        raise MissionRunError(
+            f"mission '{mission.name}': its map of frames needs the surroundings; "
+            "give the engine those of a FlightPlan"
+        )
     return Navigator(surroundings, limits)
 
 

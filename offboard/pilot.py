@@ -28,6 +28,15 @@ LOOK_TURN_PX = 80.0  # horizontal offset that gives 1 rad/s: the paper's gains, 
 LOOK_CLIMB_PX = 120.0  # vertical offset that gives 1 m/s
 
 
+NAMES_ON_MAP = frozenset(
+    {
+        *("explore", "cross_frame", "step_back", "fly_path_to_goal"),
+        *("frame_known", "frame_certain", "frame_crossed", "crossing_refused", "path_flown"),
+    }
+)
+"""Members of `Pilot` that need the map of frames: only missions with `vision: frames` can use them."""
+
+
 class PilotError(UserError):
     """A mission computed a command that must not be flown; the message is one line for people."""
 
@@ -195,7 +204,7 @@ class Pilot:
     @property
     def _map_user(self) -> Navigator:
         if self._navigator is None:
-            raise PilotError("the mission uses the map of frames; add the line 'vision: frames' to its file")
+            raise PilotError("it uses the map of frames; add the line 'vision: frames' to the mission's file")
         return self._navigator
 
     def _fly(self, command: VelocityCommand) -> None:

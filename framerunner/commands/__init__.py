@@ -24,6 +24,7 @@ def _whole(_type: Any, tokens: Sequence[Token]) -> int:  # noqa: ANN401 - the li
         raise ValueError(f'"{text}" is not a whole number.') from None
 
 
+DEFAULT_MISSION = "explorer"
 WholeNumber = Annotated[int, Parameter(converter=_whole)]
 
 

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Literal
 from cyclopts import Parameter
 
 from errors import SettingError
-from framerunner.commands import WholeNumber, load_mission_with
+from framerunner.commands import DEFAULT_MISSION, WholeNumber, load_mission_with
 
 if TYPE_CHECKING:
     from framerunner.evaluation.plan import Plan
@@ -43,7 +43,7 @@ def evaluate(
     level: _Level = None,
     count: _CountOption = None,
     seed: _SeedOption = None,
-    mission: Annotated[str, Parameter(help="name or file of the mission")] = "frame_challenge",
+    mission: Annotated[str, Parameter(help="name or file of the mission")] = DEFAULT_MISSION,
     pilot: Annotated[Path | None, Parameter(help="Python file with a subclass of Pilot")] = None,
     response: _Response = None,
     jobs: _Jobs = None,

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 from cyclopts import Parameter
 
 from errors import SettingError
-from framerunner.commands import WholeNumber, check_range, load_mission_with
+from framerunner.commands import DEFAULT_MISSION, WholeNumber, check_range, load_mission_with
 
 if TYPE_CHECKING:
     from framerunner.flying.plan import FlightPlan
@@ -61,7 +61,7 @@ _Pilot = Annotated[Path | None, Parameter(help="Python file with primitives of y
 def fly(
     scenario: Annotated[str, Parameter(help="name or file of the scenario")] = "test-case-1",
     *,
-    mission: Annotated[str, Parameter(help="name or file of the mission")] = "frame_challenge",
+    mission: Annotated[str, Parameter(help="name or file of the mission")] = DEFAULT_MISSION,
     drone: _Drone = None,
     camera: _Camera = None,
     camera_delay: _CameraDelay = 0.1,
@@ -90,7 +90,7 @@ def fly(
 
         framerunner fly test-case-1 --monitor
 
-        framerunner fly my_scenario.yaml --mission soft_landing --speed 2
+        framerunner fly my_scenario.yaml --mission frame_challenge --speed 2
 
         framerunner fly test-case-1 --lockstep --record
 

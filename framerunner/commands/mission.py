@@ -44,7 +44,7 @@ def show(mission: Annotated[str, Parameter(help="name or file")], *, pilot: Pilo
 
     **Examples**
 
-        framerunner mission show frame_challenge
+        framerunner mission show explorer
 
         framerunner mission show my_mission.yaml > my_mission.mmd
 

@@ -2,11 +2,19 @@
 
 from __future__ import annotations
 
-from offboard.chart.expressions import IN_LOCATION, ExpressionError, check_assignment, check_guard
+from collections.abc import Iterator
+
+from offboard.chart.expressions import (
+    IN_LOCATION,
+    ExpressionError,
+    check_assignment,
+    check_guard,
+    names_in,
+)
 from offboard.chart.problems import Place, ProblemList, cut, did_you_mean
 from offboard.chart.spec import Action, Leaf, MissionFile, State, Transition, all_states, leaves
 from offboard.chart.vocabulary import UnknownNameError, Vocabulary
-from offboard.pilot import Pilot
+from offboard.pilot import NAMES_ON_MAP, Pilot
 
 
 def check(mission: MissionFile, pilot_class: type[Pilot], problems: ProblemList) -> None:
@@ -23,6 +31,8 @@ def check(mission: MissionFile, pilot_class: type[Pilot], problems: ProblemList)
     _check_initial(mission.place, "the mission", mission, problems)
     for state in all_states(mission.states):
         _check_shape(state, problems)
+    if not problems.found:
+        _check_vision(mission, pilot_class, problems)
     if not problems.found:
         _check_paths(mission, problems)
 
@@ -97,6 +107,30 @@ def _check_action(action: Action, vocabulary: Vocabulary, problems: ProblemList)
         in_location = error.offset == IN_LOCATION
         place = action.place if in_location else action.expression_place.moved(error.offset)
         problems.add(place, f"'{cut(str(action))}': {error}")
+
+
+def _check_vision(mission: MissionFile, pilot_class: type[Pilot], problems: ProblemList) -> None:
+    """The map is only used by missions that see frames; the first use is reported."""
+    if mission.vision == "frames":
+        return
+    for state in all_states(mission.states):
+        for place, name in _names_used(state):
+            if name in NAMES_ON_MAP and getattr(pilot_class, name) is getattr(Pilot, name):
+                advice = f"add the line 'vision: frames' at the top of {mission.path.name}"
+                problems.add(place, f"'{name}' needs the map of frames; {advice}")
+                return
+
+
+def _names_used(state: State) -> Iterator[tuple[Place, str]]:
+    """Primitives and values of the pilot that a state uses, and where."""
+    for action in (*state.enter, *state.during, *state.exit):
+        if action.name:
+            yield action.place, action.name
+        for name in names_in(action.expression):
+            yield action.expression_place, name
+    for transition in state.transitions:
+        for name in names_in(transition.when):
+            yield transition.when_place, name
 
 
 def _check_paths(mission: MissionFile, problems: ProblemList) -> None:

@@ -8,7 +8,13 @@ from textwrap import dedent
 import pytest
 import yaml
 
+from framerunner.flying.plan import FlightPlan
+from offboard.chart.vocabulary import Vocabulary
+from offboard.engine import MissionEngine, MissionRunError
 from offboard.mission import MissionError, load_mission
+from offboard.pilot import NAMES_ON_MAP, Imu, Pilot, PilotError
+from scenarios.loader import load_scenario
+from vision.types import Detections
 
 GOOD = dedent("""\
     name: little
@@ -179,3 +185,35 @@ def test_an_expression_as_deep_as_may_be_is_checked(tmp_path, sign):
     path.write_text(GOOD.replace("when: frame_seen", f"when: {deep}"), encoding="utf-8")
     with pytest.raises(MissionError, match=r"^m.yaml:22"):
         load_mission(str(path))
+
+
+def test_every_name_that_needs_the_map_is_known_to_the_checker():
+    pilot = Pilot()
+    needed = set()
+    for name in {*Vocabulary(Pilot, {}).primitives, *Vocabulary(Pilot, {}).values}:
+        try:
+            member = getattr(pilot, name)
+            if callable(member):
+                member()
+        except PilotError:
+            needed.add(name)
+    assert needed == NAMES_ON_MAP
+
+
+def test_a_contestants_own_action_of_the_same_name_needs_no_map(tmp_path):
+    class Own(Pilot):
+        def explore(self):
+            self.hover()
+
+    path = tmp_path / "m.yaml"
+    path.write_text(GOOD.replace("- fly_to_goal", "- explore"), encoding="utf-8")
+    assert load_mission(path, Own).vision == "boxes"
+
+
+def test_a_map_without_surroundings_or_state_is_one_line():
+    mission = load_mission("explorer")
+    with pytest.raises(MissionRunError, match="mission 'explorer': its map of frames needs the surr"):
+        MissionEngine(mission)
+    engine = MissionEngine(mission, surroundings=FlightPlan(load_scenario("empty"), mission).surroundings)
+    with pytest.raises(MissionRunError, match="its map of frames needs the drone's state; give it to each"):
+        engine.tick(Imu(), Detections(), 0)

@@ -39,7 +39,7 @@ def test_flights_are_flown_once_counted_and_reported(capsys):
     code, said = evaluate(capsys, "mine", "--jobs", 1)
     assert code == 0, said.err
     (folder,) = Path("runs").iterdir()
-    assert re.fullmatch(r"evaluate-mine-frame_challenge-[0-9a-f]{6}", folder.name)
+    assert re.fullmatch(r"evaluate-mine-explorer-[0-9a-f]{6}", folder.name)
     assert "timed out" in said.out and "100.0 %" in said.out
     assert f"left in {folder}/: report.html, results.csv" in said.out
     assert "3 of 3 flown, 0 clean, 0 completed," in said.err
@@ -90,7 +90,8 @@ def test_two_evaluations_are_compared(capsys):
     write_scenarios(Path("mine"), (1, 2, 3))
     write_scenarios(Path("others"), (2, 3, 4))
     write_scenarios(Path("strange"), (7,))
-    assert evaluate(capsys, "mine", "--jobs", 1, "--out", "before")[0] == 0
+    paper = ["--mission", "frame_challenge", "--out", "before"]
+    assert evaluate(capsys, "mine", "--jobs", 1, *paper)[0] == 0
     options = ["--jobs", 1, "--out", "after", "--mission", "soft_landing"]
     code, said = evaluate(capsys, "others", *options, "--compare", "before")
     assert code == 0, said.err
@@ -127,7 +128,7 @@ def test_a_folder_of_something_else_is_refused(refused, capsys):
     assert evaluate(capsys, "mine", "--jobs", 1, "--out", "here")[0] == 0
     line = refused("mine", "--mission", "soft_landing", "--out", "here")
     assert line == (
-        "--out here: has an evaluation of mission frame_challenge, not soft_landing; "
+        "--out here: has an evaluation of mission explorer, not soft_landing; "
         "choose another, or --again to fly it again"
     )
     assert refused("mine", "--out", "here", "--compare", "here").startswith("--compare here: is this")

@@ -149,12 +149,12 @@ def test_a_lockstep_flight_is_flown_again_and_read_completely(recording, flown):
 
 def test_its_chart_states_and_transitions_belong_together(recording):
     chart, states = recording["chart"], recording["states"]
-    assert chart["name"] == "frame_challenge"
+    assert chart["name"] == "explorer"
     assert chart["mermaid"].startswith("stateDiagram-v2")
     assert chart["states"] == states[: len(chart["states"])]
     assert "extends" in chart["source"] or "states" in chart["source"]
     transitions = recording["transitions"]
-    assert transitions[0]["from"] == "take_off.start"
+    assert transitions[0]["from"] == "take_off"
     assert [each["from"] for each in transitions[1:]] == [each["to"] for each in transitions[:-1]]
     assert any(each["when"] and each["values"] for each in transitions)
     for each in transitions:

@@ -91,7 +91,7 @@ def test_a_lockstep_flight_without_a_recording_is_flown_again(lockstep_folder, c
     before = {path.name for path in lockstep_folder.iterdir()}
     assert run(["replay", str(lockstep_folder), "--fast"]) == 0
     said = capsys.readouterr()
-    assert states_in(said.err)[0] == "take_off.start"
+    assert states_in(said.err)[0] == "take_off"
     assert "timed out" in said.out
     assert {path.name for path in lockstep_folder.iterdir()} == before
     with recorded_flight(lockstep_folder) as flight:
