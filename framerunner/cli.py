@@ -37,6 +37,7 @@ def build_app() -> App:
         replay,
         scenario,
         sim,
+        vision,
     )
 
     app = App(
@@ -59,6 +60,7 @@ def build_app() -> App:
     app.command(film.film)
     app.command(mission.app)
     app.command(scenario.app)
+    app.command(vision.app)
     return app
 
 

@@ -62,10 +62,10 @@ class _VideoImage:
         return self.jpeg
 
 
-def encode_jpeg(image: Image) -> bytes:
+def encode_jpeg(image: Image, quality: int = JPEG_QUALITY) -> bytes:
     """Compress a BGR image; thin coloured bars keep their colour by full chroma resolution and quality 98."""
     chroma = (cv2.IMWRITE_JPEG_SAMPLING_FACTOR, cv2.IMWRITE_JPEG_SAMPLING_FACTOR_444)
-    settings = [cv2.IMWRITE_JPEG_QUALITY, JPEG_QUALITY, *chroma]
+    settings = [cv2.IMWRITE_JPEG_QUALITY, quality, *chroma]
     done, data = cv2.imencode(".jpg", image, settings)
     if not done:
         raise VideoError(f"an image of shape {image.shape} cannot be compressed")

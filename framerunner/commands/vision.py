@@ -1,0 +1,99 @@
+"""`framerunner vision`: how good the detectors are."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+from cyclopts import App, Parameter
+
+from framerunner.commands import WholeNumber, check_range
+
+if TYPE_CHECKING:
+    from framerunner.vision_evaluation.evaluate import VisionSettings
+
+_MAX_IMAGES = 1_000_000
+
+app = App(name="vision", help="Evaluate the detectors on images of known scenes.")
+
+_Level = Annotated[str, Parameter(help="draw scenarios of this level, name or file")]
+_Images = Annotated[WholeNumber, Parameter(help="how many images, five of a scenario")]
+_Seed = Annotated[WholeNumber, Parameter(help="of the first scenario, and of the poses")]
+_Noise = Annotated[float, Parameter(help="standard deviation of noise in every channel, 0 to 100")]
+_Blur = Annotated[float, Parameter(help="standard deviation of a blur, 0 to 10 pixels")]
+_Light = Annotated[float, Parameter(help="factor of brightness, 0.05 to 2")]
+_Jpeg = Annotated[WholeNumber | None, Parameter(help="compress with this quality, 1 to 100")]
+
+
+@app.command
+def evaluate(
+    *,
+    level: _Level = "calm",
+    images: _Images = 300,
+    seed: _Seed = 1,
+    noise: _Noise = 0.0,
+    blur: _Blur = 0.0,
+    light: _Light = 1.0,
+    jpeg: _Jpeg = None,
+    out: Annotated[Path | None, Parameter(help="folder for the report and the picture")] = None,
+) -> int:
+    """Tell how often and how exactly frames are found: by shape, and by the paper's boxes.
+
+    The images are painted from random poses in random scenarios; the same options give the same images.
+    Printed and written are rates of detection, false alarms, errors of distance, bearing and tilt by distance
+    and by angle, and the time an image takes.
+
+    **Examples**
+
+        framerunner vision evaluate --level calm --images 300
+
+        framerunner vision evaluate --level crowded --noise 4 --blur 0.7 --light 0.7 --jpeg 90
+    """
+    from framerunner.vision_evaluation.evaluate import evaluate_vision
+
+    default = Path("runs") / f"vision-{Path(level).stem}-{images}-{seed}"
+    evaluate_vision(_settings(level, images, seed, (noise, blur, light, jpeg), out or default))
+    return 0
+
+
+@app.command
+def dataset(
+    folder: Annotated[Path, Parameter(help="for the images and labels.json")],
+    *,
+    level: _Level = "calm",
+    images: _Images = 300,
+    seed: _Seed = 1,
+    noise: _Noise = 0.0,
+    blur: _Blur = 0.0,
+    light: _Light = 1.0,
+    jpeg: _Jpeg = None,
+) -> int:
+    """Write such images, and what is to be seen in them, for your own detector.
+
+    **Example**
+
+        framerunner vision dataset my_images --level crowded --images 1000
+    """
+    from framerunner.vision_evaluation.evaluate import write_dataset
+
+    write_dataset(_settings(level, images, seed, (noise, blur, light, jpeg), folder))
+    return 0
+
+
+def _settings(
+    level: str, images: int, seed: int, harder: tuple[float, float, float, int | None], out: Path
+) -> VisionSettings:
+    """Check the options."""
+    from framerunner.vision_evaluation.evaluate import VisionSettings
+    from framerunner.vision_evaluation.labelled_images import Disturbance
+    from scenarios.random_numbers import MAX_SEED
+    from scenarios.random_scenarios import load_level
+
+    noise, blur, light, jpeg = harder
+    check_range("--images", images, 1, _MAX_IMAGES)
+    check_range("--seed", seed, 0, MAX_SEED - _MAX_IMAGES)
+    check_range("--noise", noise, 0.0, 100.0)
+    check_range("--blur", blur, 0.0, 10.0)
+    check_range("--light", light, 0.05, 2.0)
+    check_range("--jpeg", jpeg, 1, 100)
+    return VisionSettings(load_level(level), images, seed, Disturbance(noise, blur, light, jpeg), out)

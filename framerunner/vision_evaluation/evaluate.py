@@ -1,0 +1,144 @@
+"""An evaluation of the detectors from the level to the report, and the labelled images as files."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterable, Iterator
+from dataclasses import asdict, dataclass
+from pathlib import Path
+
+import cv2
+from rich.console import Console
+from rich.progress import track
+
+from errors import SettingError
+from framerunner.extras import install_advice, is_installed
+from framerunner.vision_evaluation.labelled_images import Disturbance, LabelledImage, labelled_images
+from framerunner.vision_evaluation.scores import (
+    ANGLES_DEG,
+    DISTANCES_M,
+    KINDS,
+    RATED_ANGLE_DEG,
+    Scores,
+    detect_all,
+    rated,
+    row_of,
+    rows_by,
+)
+from framerunner.vision_evaluation.terminal import print_scores
+from scenarios.random_scenarios import Level
+from wire.finite_json import finite
+
+REPORT, PICTURE, LABELS = "vision.json", "vision.png", "labels.json"
+
+
+@dataclass(frozen=True, slots=True)
+class VisionSettings:
+    """Which images, and the folder for what is written."""
+
+    level: Level
+    images: int
+    seed: int
+    disturbance: Disturbance
+    out: Path
+
+    @property
+    def title(self) -> str:
+        """What the images are, for people."""
+        harder = {name: value for name, value in asdict(self.disturbance).items() if value != _CLEAN[name]}
+        return ", ".join(
+            [f"level {self.level.name}", *(f"{name} {value:g}" for name, value in harder.items())]
+        )
+
+
+_CLEAN = asdict(Disturbance())
+
+
+def evaluate_vision(settings: VisionSettings) -> None:
+    """Paint the images, run both detectors over them, print and write the report.
+
+    Raises:
+        SettingError: the folder cannot be written to.
+    """
+    _make_folder(settings.out)
+    # Blurred images are not painted on the nearest pixels any more, but their bars are as wide.
+    scores, examples = detect_all(_shown(settings), rendered=True)
+    print_scores(scores, settings.title)
+    report = settings.out / REPORT
+    report.write_text(json.dumps(finite(_as_json(settings, scores), 5), indent=1), encoding="utf-8")
+    written = str(report)
+    if is_installed("matplotlib"):
+        from framerunner.vision_evaluation.picture import save_picture
+
+        save_picture(scores, examples, settings.title, settings.out / PICTURE, rendered=True)
+        written += f" and {PICTURE}"
+    else:
+        written += f"; no picture: {install_advice('matplotlib')}"
+    print(f"written to {written}")
+
+
+def write_dataset(settings: VisionSettings) -> None:
+    """Write the images as PNG files, and what is in them as JSON.
+
+    Raises:
+        SettingError: the folder cannot be written to.
+    """
+    _make_folder(settings.out)
+    labels = []
+    for number, labelled in enumerate(_shown(settings)):
+        name = f"{number:06d}.png"
+        if not cv2.imwrite(str(settings.out / name), labelled.image):
+            raise SettingError(f"{settings.out / name}: cannot be written; choose another folder")
+        entry = {
+            "image": name,
+            "scenario": labelled.scenario,
+            "position_arena_m": labelled.position_arena_m,
+            "attitude_arena": labelled.attitude_arena,
+            "focal_px": labelled.focal_px,
+            "frames": [asdict(frame) for frame in labelled.frames],
+        }
+        labels.append(finite(entry, 6))
+    (settings.out / LABELS).write_text(json.dumps(labels, indent=1), encoding="utf-8")
+    print(f"{len(labels)} images and {LABELS} written to {settings.out}")
+
+
+def _shown(settings: VisionSettings) -> Iterator[LabelledImage]:
+    """The images, while a bar on standard error shows how far it is."""
+    images: Iterable[LabelledImage] = labelled_images(
+        settings.level, settings.images, settings.seed, settings.disturbance
+    )
+    console = Console(stderr=True)
+    yield from track(
+        images,
+        "images",
+        total=settings.images,
+        console=console,
+        transient=True,
+        disable=not console.is_terminal,
+    )
+
+
+def _make_folder(path: Path) -> None:
+    try:
+        path.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise SettingError(f"{path}: cannot be a folder ({error.strerror}); choose another") from error
+
+
+def _as_json(settings: VisionSettings, scores: Scores) -> dict[str, object]:
+    samples = rated(scores.samples)
+    near = [s for s in scores.samples if s.angle_deg < RATED_ANGLE_DEG]
+    by_distance = rows_by(near, lambda sample: sample.distance_m, DISTANCES_M)
+    by_angle = rows_by(samples, lambda sample: sample.angle_deg, ANGLES_DEG)
+    total = [row_of(kind, 0.0, 0.0, [s for s in samples if s.kind == kind]) for kind in KINDS]
+    return {
+        "level": settings.level.name,
+        "images": scores.images,
+        "seed": settings.seed,
+        "disturbance": asdict(settings.disturbance),
+        "detectors": [asdict(row) for row in total],
+        "by_distance_m": [asdict(row) for row in by_distance],
+        "by_angle_deg": [asdict(row) for row in by_angle],
+        "false_alarms": scores.false_alarms,
+        "median_ms": {kind: sorted(times)[len(times) // 2] for kind, times in scores.times_ms.items()},
+    }

@@ -1,0 +1,224 @@
+"""Images of known scenes, drawn by level and seed, with what is to be seen in them."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from math import atan2, cos, degrees, pi, radians, sin
+
+import cv2
+import numpy as np
+import numpy.typing as npt
+
+from geometry.rotations import quaternion_from_euler, rotation, rotation_rows
+from geometry.solids import Solid
+from geometry.vectors import Quaternion, Vec3
+from scenarios.models import Scenario, UprightFrame
+from scenarios.random_scenarios import Level, random_scenario
+from sitl.camera import Camera
+from sitl.video import encode_jpeg
+from vision.types import Image
+
+Floats = npt.NDArray[np.float64]
+
+IMAGES_OF_A_SCENE = 5
+_NEAREST_M, _FARTHEST_M = 0.4, 7.0  # of the frame that the camera is turned to
+_MAX_ANGLE_DEG, _MAX_ASIDE_DEG, _MAX_TILT_DEG = 80.0, 38.0, 15.0
+_ANYWHERE = 0.25  # share of the images that are turned anywhere
+_CLEAR_M = 0.35  # of the drone from everything
+_BESIDE_PX = 2.0  # what is nearer to a frame's outline than this may hide a part of it
+_DEPTH_M = 0.05  # nearer than this a frame is not labelled with pixels
+_DRAWS = 1000
+
+
+@dataclass(frozen=True, slots=True)
+class Disturbance:
+    """What makes images harder than painted ones."""
+
+    noise: float = 0.0  # standard deviation of every channel, 0..255
+    blur_px: float = 0.0  # standard deviation of a Gaussian
+    light: float = 1.0  # factor of brightness
+    jpeg: int | None = None  # quality 1..100; None: not compressed
+
+
+@dataclass(frozen=True, slots=True)
+class FrameLabel:
+    """What is true of one frame in one image; camera axes forward, left, up."""
+
+    colour: str
+    distance_m: float  # from the camera to the opening's centre
+    angle_deg: float  # between the line of sight and the frame's normal, 0..90
+    position_flu_m: Vec3
+    normal_flu: Vec3  # on the side from which it is seen
+    corners_px: tuple[tuple[float, float], ...]  # of the middle plane, from the optical axis; none if behind
+    seen: bool  # a part of it may be in the image
+    whole: bool  # all of it is in the image, and nothing is before it
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class LabelledImage:
+    """An image and what is in it."""
+
+    image: Image
+    scenario: str
+    position_arena_m: Vec3
+    attitude_arena: Quaternion
+    focal_px: float
+    frames: tuple[FrameLabel, ...]
+
+
+def labelled_images(level: Level, count: int, seed: int, disturbance: Disturbance) -> Iterator[LabelledImage]:
+    """Paint images from random poses in random scenarios of a level.
+
+    Three of four are turned to one of the frames, from all distances and angles; the others anywhere. The
+    same arguments give the same images.
+    """
+    stream = np.random.Generator(np.random.PCG64(seed))
+    scene: _Scene | None = None
+    for number in range(count):
+        if scene is None or number % IMAGES_OF_A_SCENE == 0:
+            scene = _Scene(random_scenario(level, seed + number // IMAGES_OF_A_SCENE))
+        position, attitude = scene.draw_pose(stream)
+        painted = scene.camera.render(position, attitude)
+        image = _disturbed(painted, disturbance, stream)
+        labels = scene.labels(position, attitude)
+        yield LabelledImage(image, scene.scenario.name, position, attitude, scene.camera.focal_px, labels)
+
+
+class _Scene:
+    """A scenario and its camera."""
+
+    def __init__(self, scenario: Scenario) -> None:
+        self.scenario = scenario
+        self.camera = Camera(scenario)
+        others = [scenario.base.solid, *scenario.prisms]
+        self._solids = [*(frame.hull for frame in scenario.all_frames), *others]
+
+    def draw_pose(self, stream: np.random.Generator) -> tuple[Vec3, Quaternion]:
+        """A pose of the drone inside the arena, clear of everything."""
+        for _ in range(_DRAWS):
+            position, yaw = self._turned_to_a_frame(stream)
+            if stream.random() < _ANYWHERE:
+                yaw = stream.uniform(-pi, pi)
+            if self._is_free(position):
+                break
+        roll, pitch = (radians(stream.uniform(-_MAX_TILT_DEG, _MAX_TILT_DEG)) for _ in range(2))
+        return position, quaternion_from_euler(roll, pitch, yaw)
+
+    def labels(self, position_arena_m: Vec3, attitude: Quaternion) -> tuple[FrameLabel, ...]:
+        """What is true of every frame."""
+        rows = np.array(rotation_rows(rotation(attitude)))
+        eye = np.array(position_arena_m) + rows @ np.array(self.scenario.camera.position_flu_m)
+        outlines = [self._outline(solid, eye, rows) for solid in self._solids]
+        return tuple(
+            self._label(frame, eye, rows, outlines, k) for k, frame in enumerate(self.scenario.all_frames)
+        )
+
+    def _turned_to_a_frame(self, stream: np.random.Generator) -> tuple[Vec3, float]:
+        frames = self.scenario.all_frames
+        frame = frames[int(stream.random() * len(frames))]
+        distance_m = stream.uniform(_NEAREST_M, _FARTHEST_M)
+        around = frame.yaw_rad + radians(stream.uniform(-_MAX_ANGLE_DEG, _MAX_ANGLE_DEG))
+        around += pi * (stream.random() < 0.5)
+        x, y = frame.x_m + distance_m * cos(around), frame.y_m + distance_m * sin(around)
+        z = frame.z_m + distance_m * sin(radians(stream.uniform(-30.0, 30.0)))
+        aside = radians(stream.uniform(-_MAX_ASIDE_DEG, _MAX_ASIDE_DEG))
+        return (x, y, z), atan2(frame.y_m - y, frame.x_m - x) + aside
+
+    def _is_free(self, position: Vec3) -> bool:
+        arena = self.scenario.arena
+        x, y, z = position
+        inside = abs(x) < arena.length_x_m / 2 and abs(y) < arena.width_y_m / 2
+        above = _CLEAR_M < z < arena.height_m - _CLEAR_M
+        return inside and above and not any(solid.is_within(_CLEAR_M, position) for solid in self._solids)
+
+    def _outline(self, solid: Solid, eye: Floats, rows: Floats) -> tuple[Floats | None, float, float]:
+        """Convex outline in pixels (None if it reaches beside the camera), nearest and farthest depth."""
+        points = (np.array(solid.corners()) - eye) @ rows
+        nearest, farthest = float(points[:, 0].min()), float(points[:, 0].max())
+        if nearest < _DEPTH_M:
+            return None, nearest, farthest
+        flat = -self.camera.focal_px * points[:, 1:] / points[:, :1]
+        hull = cv2.convexHull(flat.astype(np.float32)).reshape(-1, 2).astype(np.float64)
+        return hull, nearest, farthest
+
+    def _label(
+        self,
+        frame: UprightFrame,
+        eye: Floats,
+        rows: Floats,
+        outlines: Sequence[tuple[Floats | None, float, float]],
+        own: int,
+    ) -> FrameLabel:
+        centre = np.array(frame.position_arena_m)
+        normal = np.array([cos(frame.yaw_rad), sin(frame.yaw_rad), 0.0])
+        sight = centre - eye
+        if normal @ sight > 0.0:
+            normal = -normal
+        distance_m = float(np.linalg.norm(sight))
+        angle = degrees(np.arccos(min(1.0, float(-normal @ sight) / distance_m)))
+        hull, _, farthest = outlines[own]
+        seen, whole = farthest > 0.0, False
+        corners: tuple[tuple[float, float], ...] = ()
+        if hull is not None:
+            half = np.array([self.scenario.camera.width_px, self.scenario.camera.height_px]) / 2.0
+            seen = bool((hull.max(axis=0) > -half).all() and (hull.min(axis=0) < half).all())
+            inside = bool((np.abs(hull) < half - _BESIDE_PX).all())
+            whole = inside and not any(
+                _covers(outline, hull)
+                for k, outline in enumerate(outlines)
+                if k != own and outline[1] < farthest
+            )
+            corners = self._corners(frame, normal, eye, rows)
+        return FrameLabel(
+            frame.colour,
+            distance_m,
+            angle,
+            _vector(rows.T @ sight),
+            _vector(rows.T @ normal),
+            corners,
+            seen,
+            whole,
+        )
+
+    def _corners(
+        self, frame: UprightFrame, normal: Floats, eye: Floats, rows: Floats
+    ) -> tuple[tuple[float, float], ...]:
+        """Upper left, upper right, lower right and lower left as seen, in the middle plane."""
+        left = np.cross(np.array([0.0, 0.0, 1.0]), -normal) * frame.outer_width_m / 2
+        up = np.array([0.0, 0.0, frame.outer_height_m / 2])
+        centre = np.array(frame.position_arena_m) - eye
+        points = (
+            np.array([centre + left + up, centre - left + up, centre - left - up, centre + left - up]) @ rows
+        )
+        flat = -self.camera.focal_px * points[:, 1:] / points[:, :1]
+        return tuple((right, down) for right, down in flat.tolist())
+
+
+def _covers(other: tuple[Floats | None, float, float], hull: Floats) -> bool:
+    """Whether something may be before a part of a frame."""
+    outline, _, farthest = other
+    if outline is None:
+        return farthest > 0.0  # beside the camera
+    middle = hull.mean(axis=0)
+    reach = hull - middle
+    grown = middle + reach * (1.0 + _BESIDE_PX / np.maximum(np.abs(reach).max(axis=0), 1.0))
+    shared, _ = cv2.intersectConvexConvex(outline.astype(np.float32), grown.astype(np.float32))
+    return bool(shared > 0.0)
+
+
+def _vector(values: Floats) -> Vec3:
+    x, y, z = values.tolist()
+    return (x, y, z)
+
+
+def _disturbed(image: Image, disturbance: Disturbance, stream: np.random.Generator) -> Image:
+    if disturbance.blur_px > 0.0:
+        image = np.asarray(cv2.GaussianBlur(image, (0, 0), disturbance.blur_px), np.uint8)
+    if disturbance.light != 1.0 or disturbance.noise > 0.0:
+        noise = stream.normal(0.0, disturbance.noise, image.shape) if disturbance.noise > 0.0 else 0.0
+        image = np.clip(np.rint(image * disturbance.light + noise), 0, 255).astype(np.uint8)
+    if disturbance.jpeg is not None:
+        data = np.frombuffer(encode_jpeg(image, disturbance.jpeg), np.uint8)
+        image = np.asarray(cv2.imdecode(data, cv2.IMREAD_COLOR), np.uint8)
+    return np.ascontiguousarray(image)

@@ -1,0 +1,118 @@
+"""The picture of an evaluation of the detectors: rates and errors, and images with what was found in them.
+
+Import this late: matplotlib is an extra and takes a second.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from pathlib import Path
+
+import cv2
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from framerunner.runs.plots import save_figure
+from framerunner.vision_evaluation.labelled_images import LabelledImage
+from framerunner.vision_evaluation.scores import (
+    ANGLES_DEG,
+    DISTANCES_M,
+    KINDS,
+    RATED_ANGLE_DEG,
+    Row,
+    Scores,
+    rated,
+    rows_by,
+)
+from vision.detectors import new_detector
+
+_STYLES = {"boxes": ("#ee7733", "--", "boxes (the paper's)"), "frames": ("#332288", "-", "frames")}
+_CURVES: tuple[tuple[str, Callable[[Row], float | None]], ...] = (
+    ("found (%)", lambda row: _percent(row.found)),
+    ("distance error (%), median", lambda row: _percent(row.distance_median)),
+    ("tilt error (°), median", lambda row: row.tilt_median_deg),
+)
+_EXAMPLES = 3
+
+
+def save_picture(
+    scores: Scores, examples: Sequence[LabelledImage], title: str, path: Path, *, rendered: bool
+) -> None:
+    """Draw it to a file.
+
+    Raises:
+        PlotError: the file cannot be written.
+    """
+    figure = Figure(figsize=(12, 9.5), layout="constrained")
+    figure.suptitle(f"{title}: {scores.images} images", fontsize=13)
+    axes = figure.subplots(3, 3)
+    near = [s for s in scores.samples if s.angle_deg < RATED_ANGLE_DEG]
+    by_distance = rows_by(near, lambda sample: sample.distance_m, DISTANCES_M)
+    by_angle = rows_by(rated(scores.samples), lambda sample: sample.angle_deg, ANGLES_DEG)
+    ranges = ((by_distance, "distance (m)"), (by_angle, "angle off the normal (°)"))
+    for row, (rows, label) in zip(axes, ranges, strict=False):
+        for axis, (what, value) in zip(row, _CURVES, strict=True):
+            _draw(axis, rows, what, value)
+            axis.set_xlabel(label)
+            axis.set_ylim(bottom=0)
+        row[0].set_ylim(top=105)
+    axes[0][0].legend(frameon=False, loc="lower left")
+    for axis, example in zip(axes[2], _telling(examples), strict=False):
+        _draw_image(axis, example, rendered=rendered)
+    save_figure(figure, path)
+
+
+def _draw(axes: Axes, rows: Sequence[Row], what: str, value: Callable[[Row], float | None]) -> None:
+    for kind in KINDS:
+        colour, dash, name = _STYLES[kind]
+        points = [
+            ((row.low + row.high) / 2.0, number)
+            for row in rows
+            if row.kind == kind and (number := value(row)) is not None
+        ]
+        axes.plot(
+            *zip(*points, strict=True) if points else ([], []), dash, color=colour, marker="o", label=name
+        )
+    axes.set_title(what, fontsize=10)
+    axes.grid(alpha=0.3)
+    axes.spines[["top", "right"]].set_visible(False)
+
+
+def _percent(share: float | None) -> float | None:
+    return None if share is None else 100.0 * share
+
+
+def _telling(examples: Sequence[LabelledImage]) -> list[LabelledImage]:
+    """The images with the most frames in view, in their order."""
+    best = sorted(examples, key=lambda one: -sum(label.seen for label in one.frames))[:_EXAMPLES]
+    return [one for one in examples if any(one is chosen for chosen in best)]
+
+
+def _draw_image(axes: Axes, labelled: LabelledImage, *, rendered: bool) -> None:
+    """An image, the corners found with three standard deviations, and the poses' centres."""
+    image = labelled.image
+    height, width = image.shape[:2]
+    reach = (-width / 2, width / 2, height / 2, -height / 2)
+    axes.imshow(cv2.cvtColor(image, cv2.COLOR_BGR2RGB), extent=reach, interpolation="nearest")
+    found = new_detector("frames", focal_px=labelled.focal_px, rendered=rendered)(image, None)
+    for sighting in found.frames:
+        for corner in sighting.corners:
+            if corner is not None:
+                spread = (3.0 * corner.std_right_px, 3.0 * corner.std_down_px)
+                axes.errorbar(
+                    corner.right_px, corner.down_px, spread[1], spread[0], color="black", linewidth=0.8
+                )
+        if sighting.poses:
+            ahead, left, up = sighting.poses[0].position_flu_m
+            right, down = -labelled.focal_px * left / ahead, -labelled.focal_px * up / ahead
+            distance_m = float(np.hypot(np.hypot(ahead, left), up))
+            axes.text(right, down, f"{distance_m:.2f} m", fontsize=7, ha="center", va="center")
+    for edge in found.obstacle_edges:
+        if not edge.cut:
+            axes.plot(edge.right_px, edge.down_px, ".", color="white", markersize=4)
+    axes.set_xlim(reach[:2])
+    axes.set_ylim(reach[2:])
+    axes.set_xticks([])
+    axes.set_yticks([])
+    axes.set_title(labelled.scenario, fontsize=10)

@@ -1,0 +1,239 @@
+"""What the detectors made of labelled images, frame by frame and in sum."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass, field
+from itertools import pairwise
+from math import acos, asin, degrees, hypot, inf, isfinite, sqrt
+
+import numpy as np
+
+from framerunner.vision_evaluation.labelled_images import FrameLabel, LabelledImage
+from geometry.vectors import Vec3
+from vision.detectors import Detector, new_detector
+from vision.types import Detection, Detections, FrameSighting, Image, Vision
+
+KINDS: tuple[Vision, ...] = ("boxes", "frames")
+DISTANCES_M = (0.0, 1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0)
+ANGLES_DEG = (0.0, 15.0, 30.0, 45.0, 60.0, 75.0)
+RATED_DISTANCE_M, RATED_ANGLE_DEG = 6.0, 75.0
+"""The detection rate counts frames wholly in view up to here; farther ones are shown apart."""
+
+_SAME_PX = 8.0  # a sighting whose corners are within this of a frame's is of that frame
+_OUTLIER = 4.0  # standard deviations
+_KEPT = 12  # images that are given back
+
+
+@dataclass(frozen=True, slots=True)
+class Sample:
+    """One frame wholly in view, and what one detector said of it; errors are None if it said nothing."""
+
+    kind: Vision
+    distance_m: float
+    angle_deg: float
+    found: bool
+    distance_error: float | None = None  # relative, signed
+    bearing_error_deg: float | None = None  # between the lines of sight
+    tilt_error_deg: float | None = None  # between the normals; of the better of two poses
+    first_is_right: bool | None = None  # whether that was the first
+    deviations: tuple[float, ...] = ()  # errors of the corners by their standard deviations
+
+
+@dataclass(slots=True)
+class Scores:
+    """Everything that was counted."""
+
+    images: int = 0
+    samples: list[Sample] = field(default_factory=list)
+    false_alarms: dict[str, int] = field(default_factory=lambda: dict.fromkeys(KINDS, 0))
+    times_ms: dict[str, list[float]] = field(default_factory=lambda: {kind: [] for kind in KINDS})
+
+    def add(self, labelled: LabelledImage, found: dict[Vision, tuple[Detections, float]]) -> None:
+        """Count one image: what each detector found in it, and how long it took, milliseconds."""
+        self.images += 1
+        for kind, (detections, time_ms) in found.items():
+            self.times_ms[kind].append(time_ms)
+            judge = _boxes if kind == "boxes" else _frames
+            samples, false_alarms = judge(labelled, detections)
+            self.samples += samples
+            self.false_alarms[kind] += false_alarms
+
+
+@dataclass(frozen=True, slots=True)
+class Row:
+    """The errors over a part of the samples; None where there is no number."""
+
+    kind: Vision
+    low: float
+    high: float
+    frames: int
+    found: float | None  # share
+    distance_median: float | None  # relative
+    distance_p95: float | None
+    bearing_median_deg: float | None
+    tilt_median_deg: float | None
+    tilt_p95_deg: float | None
+    first_is_right: float | None  # share of the sightings with two poses
+    deviation_rms: float | None  # of corners, in their standard deviations
+    outliers: float | None  # share of corners farther off than four standard deviations
+
+
+def detect_all(labelled: Iterable[LabelledImage], *, rendered: bool) -> tuple[Scores, list[LabelledImage]]:
+    """Run both detectors over images; also give back the first few of them."""
+    scores = Scores()
+    first: list[LabelledImage] = []
+    detectors: dict[Vision, Detector] = {}
+    for one in labelled:
+        if not detectors:
+            detectors = {k: new_detector(k, focal_px=one.focal_px, rendered=rendered) for k in KINDS}
+            for detector in detectors.values():
+                detector(one.image, None)  # the first call loads code
+        scores.add(one, {kind: _timed(detector, one.image) for kind, detector in detectors.items()})
+        if len(first) < _KEPT:
+            first.append(one)
+    return scores, first
+
+
+def rows_by(samples: Sequence[Sample], key: Callable[[Sample], float], edges: Sequence[float]) -> list[Row]:
+    """The samples of both detectors by ranges of a number."""
+    return [
+        row_of(kind, low, high, [s for s in samples if s.kind == kind and low <= key(s) < high])
+        for kind in KINDS
+        for low, high in pairwise(edges)
+    ]
+
+
+def row_of(kind: Vision, low: float, high: float, samples: Sequence[Sample]) -> Row:
+    """Sum up samples."""
+    distances = [abs(s.distance_error) for s in samples if s.distance_error is not None]
+    bearings = [s.bearing_error_deg for s in samples if s.bearing_error_deg is not None]
+    tilts = [s.tilt_error_deg for s in samples if s.tilt_error_deg is not None]
+    right = [float(s.first_is_right) for s in samples if s.first_is_right is not None]
+    deviations = [number for s in samples for number in s.deviations]
+    return Row(
+        kind,
+        low,
+        high,
+        len(samples),
+        _mean([float(s.found) for s in samples]),
+        _share(distances, 50),
+        _share(distances, 95),
+        _share(bearings, 50),
+        _share(tilts, 50),
+        _share(tilts, 95),
+        _mean(right),
+        sqrt(sum(n * n for n in deviations) / len(deviations)) if deviations else None,
+        _mean([float(abs(n) > _OUTLIER) for n in deviations]),
+    )
+
+
+def rated(samples: Sequence[Sample]) -> list[Sample]:
+    """Those that count for the detection rate."""
+    return [s for s in samples if s.distance_m <= RATED_DISTANCE_M and s.angle_deg < RATED_ANGLE_DEG]
+
+
+def _mean(numbers: Sequence[float]) -> float | None:
+    return sum(numbers) / len(numbers) if numbers else None
+
+
+def _share(numbers: Sequence[float], percent: float) -> float | None:
+    return float(np.percentile(numbers, percent)) if numbers else None
+
+
+def _timed(detector: Detector, image: Image) -> tuple[Detections, float]:
+    begun_s = time.thread_time()
+    detections = detector(image, None)
+    return detections, 1e3 * (time.thread_time() - begun_s)
+
+
+def _frames(labelled: LabelledImage, detections: Detections) -> tuple[list[Sample], int]:
+    """Samples and false alarms of the frame finder."""
+    samples, true_ones = [], set()
+    for label in labelled.frames:
+        sighting = _sighting_of(label, detections.frames)
+        if sighting is not None:
+            true_ones.add(id(sighting))
+        if label.whole:
+            samples.append(_sample_of_sighting(label, sighting))
+    near = {label.colour for label in labelled.frames if label.seen and not label.corners_px}
+    false = [s for s in detections.frames if id(s) not in true_ones and s.colour not in near]
+    return samples, len(false)
+
+
+def _sighting_of(label: FrameLabel, sightings: Sequence[FrameSighting]) -> FrameSighting | None:
+    """The sighting nearest to a frame, if it is of it."""
+    best, best_px = None, _SAME_PX
+    if label.corners_px:
+        for sighting in sightings:
+            if sighting.colour == label.colour:
+                pairs = zip(sighting.corners, label.corners_px, strict=True)
+                off_px = max(
+                    hypot(seen.right_px - x, seen.down_px - y) for seen, (x, y) in pairs if seen is not None
+                )
+                if off_px < best_px:
+                    best, best_px = sighting, off_px
+    return best
+
+
+def _sample_of_sighting(label: FrameLabel, sighting: FrameSighting | None) -> Sample:
+    if sighting is None or not sighting.poses:
+        return Sample("frames", label.distance_m, label.angle_deg, False)
+    tilts = [_angle_deg(pose.normal_flu, label.normal_flu) for pose in sighting.poses]
+    best = tilts.index(min(tilts))
+    pose = sighting.poses[best]
+    deviations: list[float] = []
+    for corner, (right, down) in zip(sighting.corners, label.corners_px, strict=True):
+        if corner is not None:
+            deviations.append((corner.right_px - right) / corner.std_right_px)
+            deviations.append((corner.down_px - down) / corner.std_down_px)
+    return Sample(
+        "frames",
+        label.distance_m,
+        label.angle_deg,
+        True,
+        hypot(*pose.position_flu_m) / label.distance_m - 1.0,
+        _angle_deg(pose.position_flu_m, label.position_flu_m),
+        tilts[best],
+        best == 0 if len(tilts) > 1 else None,
+        tuple(deviations),
+    )
+
+
+def _boxes(labelled: LabelledImage, detections: Detections) -> tuple[list[Sample], int]:
+    """Samples and false alarms of the paper's detector, which sees one box of each colour."""
+    samples, false_alarms = [], 0
+    for colour in ("red", "green", "blue"):
+        box: Detection = getattr(detections, colour)
+        labels = [label for label in labelled.frames if label.colour == colour]
+        if box.seen and not any(label.seen for label in labels):
+            false_alarms += 1
+        samples += [_sample_of_box(label, box, labelled.focal_px) for label in labels if label.whole]
+    return samples, false_alarms
+
+
+def _sample_of_box(label: FrameLabel, box: Detection, focal_px: float) -> Sample:
+    if box.d == inf:
+        return Sample("boxes", label.distance_m, label.angle_deg, False)
+    # Its rows and columns count from the image's middle, up and right.
+    sight = (focal_px, -(box.e + box.w) / 2.0, (box.n + box.s) / 2.0)
+    return Sample(
+        "boxes",
+        label.distance_m,
+        label.angle_deg,
+        True,
+        box.d / label.distance_m - 1.0,
+        _angle_deg(sight, label.position_flu_m),
+        abs(box.a - label.angle_deg) if isfinite(box.a) else None,
+    )
+
+
+def _angle_deg(one: Vec3, other: Vec3) -> float:
+    """Angle between two vectors."""
+    scale = hypot(*one) * hypot(*other)
+    cosine = sum(a * b for a, b in zip(one, other, strict=True)) / scale
+    if cosine < 0.99:
+        return degrees(acos(max(-1.0, cosine)))
+    chord = hypot(*(a / hypot(*one) - b / hypot(*other) for a, b in zip(one, other, strict=True)))
+    return degrees(2.0 * asin(min(1.0, chord / 2.0)))
