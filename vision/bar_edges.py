@@ -15,7 +15,7 @@ Flags = npt.NDArray[np.bool_]
 
 _OUTSIDE_PX, _INSIDE_PX = 3, 2  # how far from a first estimate of a side its outer edge is looked for
 _MAX_SAMPLES = 40  # per side
-_SLACK_PX, _SLACK_SHARE = 2.5, 0.9  # a bar may look wider than expected by this or this share of its half
+_SLACK_PX, _SLACK_SHARE = 2.5, 1.5  # a bar may look wider than expected by this or this share of its half
 
 
 @dataclass(frozen=True, slots=True, eq=False)

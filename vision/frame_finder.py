@@ -12,9 +12,9 @@ import numpy.typing as npt
 
 from vision.colour_regions import OBSTACLE, PRIMARIES, ColourMask, find_colours
 from vision.detector import measure
-from vision.frame_fit import fit_frame
+from vision.frame_fit import FittedFrame, fit_frame
 from vision.outer_sides import outer_sides
-from vision.patch import Patch, cut_patch
+from vision.patch import cut_patch
 from vision.types import (
     NOT_SEEN,
     Detection,
@@ -35,6 +35,7 @@ PAINTED_SPREAD_PX = 0.5
 _OBSTACLE_STEP = 8
 _MIN_RUN_PX = 3
 _STEEP = 2  # rows a column: steeper edges are the sides of obstacles, which are upright
+_CLEARLY = 0.5
 _MIN_FRAGMENT_PX = 3
 _MAX_FRAGMENTS = 12
 
@@ -120,13 +121,23 @@ class FrameFinder:
         """The frame that a group of fragments shows, if it is one."""
         height, width = mask.mask.shape
         box = _bounding_box(points)
-        patch: Patch | None = None
-        for sides in outer_sides(points, width, height):
-            patch = patch or cut_patch(mask, others, box)
-            fitted = fit_frame(patch, sides, self._focal_px, self._spread_px)
-            if fitted is not None:
-                return box, FrameSighting(mask.colour, *fitted)
-        return None
+        candidates = outer_sides(points, width, height)
+        if not candidates:
+            return None
+        patch = cut_patch(mask, others, box)
+        fits = (fit_frame(patch, sides, self._focal_px, self._spread_px) for sides in candidates)
+        best: FittedFrame | None = None
+        for fitted in fits:
+            if best is None or (fitted is not None and _fits_better(fitted, best)):
+                best = fitted
+        return None if best is None else (box, FrameSighting(mask.colour, *best))
+
+
+def _fits_better(one: FittedFrame, other: FittedFrame) -> bool:
+    """Whether a frame is clearly the better one of two that the same region could be."""
+    if one.whole != other.whole or not one.poses or not other.poses:
+        return one.whole > other.whole
+    return one.poses[0].error_px < _CLEARLY * other.poses[0].error_px
 
 
 def _bounding_box(points: _Contour) -> _Box:

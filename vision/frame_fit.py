@@ -28,6 +28,7 @@ _MAX_OWN_UNSEEN = 0.4  # share of a bar that seems to be seen although it was no
 _WHOLE = 0.9  # share of a bar that is seen if nothing hides it; shaded and thin bars may have gaps
 _MAX_CORNER_STD_PX = 2.5
 _EDGE_ON, _OBLIQUE = 0.13, 0.23  # cosines: the bars of a frame that is seen edge-on hide one another
+_ROUGH = 2.5  # before the bars' edges are corrected by a pose, errors may be larger by this factor
 _CLEAR_OPEN, _THIN_PX = 0.7, 3.0
 _CLEAR_PX = 4.5  # a side that is shorter may be a part of a longer one
 _TOO_NARROW = 1.2
@@ -72,6 +73,8 @@ def _fit_any(patch: Patch, sides: Sides, focal_px: float, spread_px: float) -> F
     if len(known) == 4:
         support = patch.support(known, known[1:] + known[:1])
         if max(support.empty) <= _MAX_EMPTY:
+            if patch.is_filled(known):
+                return None
             whole = min(support.own) >= _WHOLE
             corners = _outer_corners(meetings, poses[0], focal_px, whole) if poses else None
             return None if corners is None else FittedFrame(corners, whole, tuple(map(as_seen, poses)))
@@ -81,6 +84,8 @@ def _fit_any(patch: Patch, sides: Sides, focal_px: float, spread_px: float) -> F
         lines, meetings, poses = _fit(patch, (a, b, c, d), focal_px, spread_px)
     corners = _outer_corners(meetings, poses[0], focal_px, False) if poses else None
     if corners is None:
+        if not patch.may_be_cut:
+            return None  # nothing explains why no more is seen of it
         corners = _corners_without_pose(patch, lines, spread_px)
     return FittedFrame(corners, False, tuple(map(as_seen, poses))) if any(corners) else None
 
@@ -92,7 +97,8 @@ def _fit(
     edges = find_edges(patch, sides, expected_widths(sides, spread_px))
     lines, meetings, poses = _lines_and_poses(patch, edges, None, (), focal_px)
     if all(line is not None and line.open > _CLEAR_OPEN and line.half_px < _THIN_PX for line in lines):
-        return lines, meetings, poses  # so far away that the middle of a bar's image is its axis
+        # So far away that the middle of a bar's image is its axis.
+        return lines, meetings, _explaining(poses, meetings)
     for _ in range(2):
         if not poses:
             break
@@ -106,7 +112,18 @@ def _fit(
         if wider is None or not poses:
             break
         edges = find_edges(patch, sides, wider)  # a side that is cut looked like one of a smaller frame
-    return lines, meetings, poses
+    return lines, meetings, _explaining(poses, meetings)
+
+
+def _explaining(poses: list[ModelPose], meetings: _Meetings) -> list[ModelPose]:
+    """The poses that explain four corners as well as these are known; any pose of fewer corners."""
+    limit = _max_error_px(meetings)
+    return [pose for pose in poses if None in meetings or pose.error_px <= limit]
+
+
+def _max_error_px(meetings: _Meetings) -> float:
+    mean_square = sum(met.std_x**2 + met.std_y**2 for met in meetings if met is not None) / 4.0
+    return 0.4 + 2.0 * sqrt(mean_square)
 
 
 def _wider(edges: BarEdges, offsets: Floats) -> Widths | None:
@@ -140,8 +157,7 @@ def _poses(
     """The poses that explain four or three lines."""
     known = [met for met in meetings if met is not None]
     if len(known) == 4:
-        mean_square = sum(met.std_x**2 + met.std_y**2 for met in known) / 4.0
-        limit = 0.4 + 2.0 * sqrt(mean_square)
+        limit = _ROUGH * _max_error_px(meetings)
         return find_poses([(met.x, met.y) for met in known], focal_px, limit)
     if len(known) != 2 or sum(line is not None for line in lines) != 3:
         return []

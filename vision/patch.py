@@ -19,6 +19,8 @@ BACKGROUND, OWN, FOREIGN, OUTSIDE = 0, 1, 2, 4
 """Values of pixels: none of the others, of the region, what may hide a part of it, and not in the image."""
 
 _PLACES = ((np.arange(16) + 0.5) / 16.0)[:, None]  # along a bar, as shares of its length
+_OPENING_PX = 6.0  # between the axes of opposite bars: an opening of this size is seen
+_AROUND = np.ones((5, 5), np.uint8)
 _BESIDE = cv2.getStructuringElement(cv2.MORPH_CROSS, (3, 3))
 
 
@@ -40,6 +42,27 @@ class Patch:
     def has_foreign(self) -> bool:
         """Whether there is anything that could hide a part of the region."""
         return bool((self.labels == FOREIGN).any())
+
+    @property
+    def may_be_cut(self) -> bool:
+        """Whether the region touches something that could hide a part of it, or the end of the image."""
+        around = cv2.dilate(np.bitwise_and(self.labels, np.uint8(OWN)), _AROUND)
+        return bool((around * (self.labels > OWN)).any())
+
+    def is_filled(self, axes_corners: Sequence[Point]) -> bool:
+        """Whether there is no opening between four bars although it is wide enough to be seen.
+
+        Args:
+            axes_corners: where the axes of the bars meet, pixels from the optical axis.
+        """
+        corners = np.asarray(axes_corners, np.float64)
+        middle = corners.mean(axis=0)
+        sides = np.roll(corners, -1, axis=0) - corners
+        if np.abs(sides).max(axis=1).min() < _OPENING_PX:
+            return False
+        points = middle + 0.4 * (corners - middle)
+        at = np.rint(np.vstack([points, middle[None]]) + self.origin).astype(np.intp)
+        return bool((self.labels[at[:, 1], at[:, 0]] == OWN).all())
 
     def in_front(self) -> Patch:
         """The same as if the region were in front of all else."""

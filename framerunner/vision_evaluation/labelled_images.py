@@ -73,14 +73,14 @@ def labelled_images(level: Level, count: int, seed: int, disturbance: Disturbanc
     Three of four are turned to one of the frames, from all distances and angles; the others anywhere. The
     same arguments give the same images.
     """
-    stream = np.random.Generator(np.random.PCG64(seed))
+    poses, noise = (np.random.Generator(np.random.PCG64([seed, use])) for use in range(2))
     scene: _Scene | None = None
     for number in range(count):
         if scene is None or number % IMAGES_OF_A_SCENE == 0:
             scene = _Scene(random_scenario(level, seed + number // IMAGES_OF_A_SCENE))
-        position, attitude = scene.draw_pose(stream)
+        position, attitude = scene.draw_pose(poses)
         painted = scene.camera.render(position, attitude)
-        image = _disturbed(painted, disturbance, stream)
+        image = _disturbed(painted, disturbance, noise)
         labels = scene.labels(position, attitude)
         yield LabelledImage(image, scene.scenario.name, position, attitude, scene.camera.focal_px, labels)
 

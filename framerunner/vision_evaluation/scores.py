@@ -150,16 +150,29 @@ def _timed(detector: Detector, image: Image) -> tuple[Detections, float]:
 
 def _frames(labelled: LabelledImage, detections: Detections) -> tuple[list[Sample], int]:
     """Samples and false alarms of the frame finder."""
-    samples, true_ones = [], set()
+    samples = []
     for label in labelled.frames:
-        sighting = _sighting_of(label, detections.frames)
-        if sighting is not None:
-            true_ones.add(id(sighting))
         if label.whole:
-            samples.append(_sample_of_sighting(label, sighting))
-    near = {label.colour for label in labelled.frames if label.seen and not label.corners_px}
-    false = [s for s in detections.frames if id(s) not in true_ones and s.colour not in near]
-    return samples, len(false)
+            samples.append(_sample_of_sighting(label, _sighting_of(label, detections.frames)))
+    false_alarms = sum(
+        not any(_is_near(sighting, label) for label in labelled.frames) for sighting in detections.frames
+    )
+    return samples, false_alarms
+
+
+def _is_near(sighting: FrameSighting, label: FrameLabel) -> bool:
+    """Whether a sighting is of a frame, however inexact, rather than of nothing."""
+    if not label.seen or sighting.colour != label.colour:
+        return False
+    if not label.corners_px:  # the frame reaches beside the camera
+        return True
+    right, down = zip(*label.corners_px, strict=True)
+    return any(
+        min(right) - _SAME_PX <= corner.right_px <= max(right) + _SAME_PX
+        and min(down) - _SAME_PX <= corner.down_px <= max(down) + _SAME_PX
+        for corner in sighting.corners
+        if corner is not None
+    )
 
 
 def _sighting_of(label: FrameLabel, sightings: Sequence[FrameSighting]) -> FrameSighting | None:

@@ -2,11 +2,13 @@
 
 from math import atan2, cos, degrees, hypot, radians, sin
 
+import cv2
+import numpy as np
 import pytest
 
 from geometry.rotations import quaternion_from_euler
 from geometry.vectors import Quaternion, Vec3
-from scenarios.models import Base, Frame, Scenario
+from scenarios.models import Base, Frame, Pole, Scenario
 from sitl.camera import Camera
 from vision.detectors import new_detector
 from vision.types import Detections, FrameSighting
@@ -62,3 +64,50 @@ def test_the_signed_angle_says_where_to_fly(turn: float) -> None:
 def test_a_frame_behind_is_not_seen() -> None:
     position, _ = look(1.0)
     assert see(position, quaternion_from_euler(0.0, 0.0, FRAME.yaw_rad + radians(180))).frames == ()
+
+
+def test_a_frame_that_the_border_cuts_has_its_sure_corners() -> None:
+    sighting = only(see(*look(0.6, 0.3, aside=-0.75)))
+    assert not sighting.whole
+    upper_left, upper_right, lower_right, lower_left = sighting.corners
+    assert upper_left is lower_left is None
+    assert upper_right is not None
+    assert lower_right is not None
+    assert upper_right.down_px < lower_right.down_px
+
+
+def test_a_frame_behind_another_is_seen_through_it() -> None:
+    blue = Frame(colour="blue", x_m=2, y_m=-0.4, z_m=1.5, yaw_rad=0.3)
+    red = Frame(colour="red", x_m=0.8, y_m=0, z_m=1.5, yaw_rad=0)
+    scenario = Scenario(name="two", frames=(red, blue), base=Base(x_m=4.5, y_m=4.5))
+    image = Camera(scenario).render((-0.08, 0.0, 1.5), (1.0, 0.0, 0.0, 0.0))
+    found = {sighting.colour: sighting for sighting in FIND(image, None).frames}
+    assert found["red"].whole
+    assert not found["blue"].whole
+    corners = found["blue"].corners
+    assert sum(corner is not None for corner in corners) >= 2
+    for corner, (left, up) in zip(corners, ((1, 1), (-1, 1), (-1, -1), (1, -1)), strict=True):
+        ahead, aside = 2.0 - left * 0.21 * sin(0.3), -0.4 + left * 0.21 * cos(0.3)
+        if corner is not None:
+            assert corner.right_px == pytest.approx(-CAMERA.focal_px * aside / ahead, abs=1.0)
+            assert corner.down_px == pytest.approx(-CAMERA.focal_px * 0.11 * up / ahead, abs=1.0)
+
+
+def test_what_looks_like_a_frame_but_is_none_is_refused() -> None:
+    image = np.full((240, 320, 3), 200, np.uint8)
+    cv2.rectangle(image, (60, 60), (140, 102), (0, 0, 255), -1)  # filled
+    cv2.rectangle(image, (200, 60), (240, 180), (0, 255, 0), 6)  # upright
+    cv2.circle(image, (280, 200), 25, (255, 0, 0), 4)
+    cv2.line(image, (20, 200), (90, 220), (0, 0, 255), 3)
+    assert FIND(image, None).frames == ()
+
+
+def test_obstacles_end_where_they_stand() -> None:
+    pole = Pole(x_m=2.0, y_m=0.0, edge_m=0.3)
+    scenario = Scenario(name="pole", frames=(FRAME,), base=Base(x_m=4.5, y_m=4.5), poles=(pole,))
+    image = Camera(scenario).render((-0.08, 0.0, 1.0), (1.0, 0.0, 0.0, 0.0))
+    edges = [edge for edge in FIND(image, None).obstacle_edges if not edge.cut]
+    assert edges
+    for edge in edges:
+        assert abs(edge.right_px) < 160 * 0.15 / 1.85 + 1
+        assert edge.down_px == pytest.approx(160.1 * 1.0 / 1.85, abs=1.0)
