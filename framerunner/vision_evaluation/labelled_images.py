@@ -74,10 +74,10 @@ def labelled_images(level: Level, count: int, seed: int, disturbance: Disturbanc
     same arguments give the same images.
     """
     poses, noise = (np.random.Generator(np.random.PCG64([seed, use])) for use in range(2))
-    scene: _Scene | None = None
+    scene: _LabelledScene | None = None
     for number in range(count):
         if scene is None or number % IMAGES_OF_A_SCENE == 0:
-            scene = _Scene(random_scenario(level, seed + number // IMAGES_OF_A_SCENE))
+            scene = _LabelledScene(random_scenario(level, seed + number // IMAGES_OF_A_SCENE))
         position, attitude = scene.draw_pose(poses)
         painted = scene.camera.render(position, attitude)
         image = _disturbed(painted, disturbance, noise)
@@ -85,7 +85,7 @@ def labelled_images(level: Level, count: int, seed: int, disturbance: Disturbanc
         yield LabelledImage(image, scene.scenario.name, position, attitude, scene.camera.focal_px, labels)
 
 
-class _Scene:
+class _LabelledScene:
     """A scenario and its camera."""
 
     def __init__(self, scenario: Scenario) -> None:

@@ -20,7 +20,7 @@ from framerunner.vision_evaluation.scores import (
     DISTANCES_M,
     KINDS,
     RATED_ANGLE_DEG,
-    Row,
+    ErrorRow,
     Scores,
     rated,
     rows_by,
@@ -28,7 +28,7 @@ from framerunner.vision_evaluation.scores import (
 from vision.detectors import new_detector
 
 _STYLES = {"boxes": ("#ee7733", "--", "boxes (the paper's)"), "frames": ("#332288", "-", "frames")}
-_CURVES: tuple[tuple[str, Callable[[Row], float | None]], ...] = (
+_CURVES: tuple[tuple[str, Callable[[ErrorRow], float | None]], ...] = (
     ("found (%)", lambda row: _percent(row.found)),
     ("distance error (%), median", lambda row: _percent(row.distance_median)),
     ("tilt error (°), median", lambda row: row.tilt_median_deg),
@@ -63,7 +63,7 @@ def save_picture(
     save_figure(figure, path)
 
 
-def _draw(axes: Axes, rows: Sequence[Row], what: str, value: Callable[[Row], float | None]) -> None:
+def _draw(axes: Axes, rows: Sequence[ErrorRow], what: str, value: Callable[[ErrorRow], float | None]) -> None:
     for kind in KINDS:
         colour, dash, name = _STYLES[kind]
         points = [

@@ -62,7 +62,7 @@ class Scores:
 
 
 @dataclass(frozen=True, slots=True)
-class Row:
+class ErrorRow:
     """The errors over a part of the samples; None where there is no number."""
 
     kind: Vision
@@ -96,7 +96,9 @@ def detect_all(labelled: Iterable[LabelledImage], *, rendered: bool) -> tuple[Sc
     return scores, first
 
 
-def rows_by(samples: Sequence[Sample], key: Callable[[Sample], float], edges: Sequence[float]) -> list[Row]:
+def rows_by(
+    samples: Sequence[Sample], key: Callable[[Sample], float], edges: Sequence[float]
+) -> list[ErrorRow]:
     """The samples of both detectors by ranges of a number."""
     return [
         row_of(kind, low, high, [s for s in samples if s.kind == kind and low <= key(s) < high])
@@ -105,14 +107,14 @@ def rows_by(samples: Sequence[Sample], key: Callable[[Sample], float], edges: Se
     ]
 
 
-def row_of(kind: Vision, low: float, high: float, samples: Sequence[Sample]) -> Row:
+def row_of(kind: Vision, low: float, high: float, samples: Sequence[Sample]) -> ErrorRow:
     """Sum up samples."""
     distances = [abs(s.distance_error) for s in samples if s.distance_error is not None]
     bearings = [s.bearing_error_deg for s in samples if s.bearing_error_deg is not None]
     tilts = [s.tilt_error_deg for s in samples if s.tilt_error_deg is not None]
     right = [float(s.first_is_right) for s in samples if s.first_is_right is not None]
     deviations = [number for s in samples for number in s.deviations]
-    return Row(
+    return ErrorRow(
         kind,
         low,
         high,

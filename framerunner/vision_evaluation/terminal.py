@@ -15,7 +15,7 @@ from framerunner.vision_evaluation.scores import (
     KINDS,
     RATED_ANGLE_DEG,
     RATED_DISTANCE_M,
-    Row,
+    ErrorRow,
     Scores,
     rated,
     row_of,
@@ -53,7 +53,7 @@ def print_scores(scores: Scores, title: str) -> None:
         )
 
 
-def _table(title: str, rows: Sequence[tuple[str, Row]]) -> Table:
+def _table(title: str, rows: Sequence[tuple[str, ErrorRow]]) -> Table:
     table = Table(box=box.SIMPLE_HEAD, pad_edge=False)
     table.add_column(title, no_wrap=True)
     for column in ("frames", "found", *_ERRORS):
@@ -64,7 +64,7 @@ def _table(title: str, rows: Sequence[tuple[str, Row]]) -> Table:
     return table
 
 
-def _cells(row: Row) -> list[str]:
+def _cells(row: ErrorRow) -> list[str]:
     return [
         _cell(row.found, 100.0, ".1f", " %"),
         _cell(row.distance_median, 100.0, ".2f", " %"),
