@@ -61,8 +61,11 @@ class Patch:
         if np.abs(sides).max(axis=1).min() < _OPENING_PX:
             return False
         points = middle + 0.4 * (corners - middle)
-        at = np.rint(np.vstack([points, middle[None]]) + self.origin).astype(np.intp)
-        return bool((self.labels[at[:, 1], at[:, 0]] == OWN).all())
+        column, row = np.rint(np.vstack([points, middle]) + self.origin).astype(np.intp).T
+        rows, columns = self.labels.shape
+        if min(column.min(), row.min()) < 0 or column.max() >= columns or row.max() >= rows:
+            return False
+        return bool((self.labels[row, column] == OWN).all())
 
     def in_front(self) -> Patch:
         """The same as if the region were in front of all else."""

@@ -84,9 +84,17 @@ def _percent(share: float | None) -> float | None:
 
 
 def _telling(examples: Sequence[LabelledImage]) -> list[LabelledImage]:
-    """The images with the most frames in view, in their order."""
-    best = sorted(examples, key=lambda one: -sum(label.seen for label in one.frames))[:_EXAMPLES]
-    return [one for one in examples if any(one is chosen for chosen in best)]
+    """The image with the most and largest frames of each of some scenes."""
+    best: dict[str, LabelledImage] = {}
+    for one in examples:
+        if one.scenario not in best or _content(one) > _content(best[one.scenario]):
+            best[one.scenario] = one
+    return sorted(best.values(), key=_content, reverse=True)[:_EXAMPLES]
+
+
+def _content(labelled: LabelledImage) -> float:
+    seen = [label for label in labelled.frames if label.seen and label.corners_px]
+    return sum(1.0 + 1.0 / label.distance_m for label in seen)
 
 
 def _draw_image(axes: Axes, labelled: LabelledImage, *, rendered: bool) -> None:
@@ -101,13 +109,14 @@ def _draw_image(axes: Axes, labelled: LabelledImage, *, rendered: bool) -> None:
             if corner is not None:
                 spread = (3.0 * corner.std_right_px, 3.0 * corner.std_down_px)
                 axes.errorbar(
-                    corner.right_px, corner.down_px, spread[1], spread[0], color="black", linewidth=0.8
+                    corner.right_px, corner.down_px, spread[1], spread[0], color="black", linewidth=1.0
                 )
         if sighting.poses:
             ahead, left, up = sighting.poses[0].position_flu_m
-            right, down = -labelled.focal_px * left / ahead, -labelled.focal_px * up / ahead
+            above = min(corner.down_px for corner in sighting.corners if corner is not None) - 5.0
             distance_m = float(np.hypot(np.hypot(ahead, left), up))
-            axes.text(right, down, f"{distance_m:.2f} m", fontsize=7, ha="center", va="center")
+            right = -labelled.focal_px * left / ahead
+            axes.text(right, above, f"{distance_m:.2f} m", fontsize=8, ha="center", va="bottom")
     for edge in found.obstacle_edges:
         if not edge.cut:
             axes.plot(edge.right_px, edge.down_px, ".", color="white", markersize=4)

@@ -23,7 +23,7 @@ RATED_DISTANCE_M, RATED_ANGLE_DEG = 6.0, 75.0
 
 _SAME_PX = 8.0  # a sighting whose corners are within this of a frame's is of that frame
 _OUTLIER = 4.0  # standard deviations
-_KEPT = 12  # images that are given back
+_KEPT = 60  # images that are given back
 
 
 @dataclass(frozen=True, slots=True)

@@ -111,3 +111,27 @@ def test_obstacles_end_where_they_stand() -> None:
     for edge in edges:
         assert abs(edge.right_px) < 160 * 0.15 / 1.85 + 1
         assert edge.down_px == pytest.approx(160.1 * 1.0 / 1.85, abs=1.0)
+
+
+def test_any_image_gets_an_answer() -> None:
+    stream = np.random.Generator(np.random.PCG64(3))
+    colours = [
+        (0, 0, 255),
+        (0, 255, 0),
+        (255, 0, 0),
+        (255, 255, 0),
+        (255, 0, 255),
+        (180, 70, 120),
+        (0, 0, 90),
+    ]
+    for number in range(120):
+        image = np.full((240, 320, 3), stream.integers(0, 256, 3), np.uint8)
+        for _ in range(int(stream.integers(1, 9))):
+            points = stream.integers(-40, 360, (int(stream.integers(2, 7)), 2)).astype(np.int32)
+            colour, width = colours[int(stream.integers(len(colours)))], int(stream.integers(1, 14))
+            if number % 2:
+                cv2.polylines(image, [points], True, colour, width)
+            else:
+                cv2.fillPoly(image, [points], colour)
+        for sighting in FIND(image, None).frames:
+            assert any(sighting.corners)
