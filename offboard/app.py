@@ -140,6 +140,7 @@ class _Flight:
         self._started_us: int | None = None
         self._now_us = 0
         self._ticks = 0
+        self._sent: VelocityCommand | None = None
         self._paused = False
         self._pauses = 0
         self._remark = ""
@@ -185,7 +186,9 @@ class _Flight:
             return
         detections = self._perception.latest(state.time_us)
         imu = Imu(state.x, state.y, state.z, state.yaw)
-        command = self._kept_in_box(self._engine.tick(imu, detections, state.time_us, state), state)
+        command = self._kept_in_box(
+            self._engine.tick(imu, detections, state.time_us, state, self._sent), state
+        )
         motors_on = self._engine.pilot.cmd.on
         switches = motors_on != self._flying
         self._motors_requested = self._motors_requested or motors_on
@@ -199,6 +202,7 @@ class _Flight:
             await self._stop_motors()
         if self._flying:
             self._drone.command(command)
+        self._sent = command if self._flying else None
         self._ticks += 1
         if not switches:
             self._observe(state, command, detections)
@@ -238,6 +242,7 @@ class _Flight:
             self._remark = ""
             logger.info("paused: the pilot has the sticks (%s)", state.mode)
         self._engine.pause(state.time_us)
+        self._sent = None
         if not state.armed:
             raise DroneError(
                 "the pilot landed and stopped the motors"

@@ -126,7 +126,12 @@ class MissionEngine:
         return None if self._navigator is None else self._navigator.view()
 
     def tick(
-        self, imu: Imu, cam: Detections, time_us: int, state: DroneState | None = None
+        self,
+        imu: Imu,
+        cam: Detections,
+        time_us: int,
+        state: DroneState | None = None,
+        sent: VelocityCommand | None = None,
     ) -> VelocityCommand:
         """Run one step of the chart, at this vehicle time. After a pause this continues the mission.
 
@@ -135,6 +140,7 @@ class MissionEngine:
             cam: what the latest image showed.
             time_us: vehicle time.
             state: of the drone, from which `imu` is; needed by missions with `vision: frames`.
+            sent: the command that it has had since the last tick; None if it had none, or it is not known.
 
         Returns:
             The velocity to fly from now on, within the limits. `pilot.cmd.on` says whether motors must run.
@@ -155,7 +161,7 @@ class MissionEngine:
             if self._navigator is not None:
                 if state is None:
                     raise PilotError("its map of frames needs the drone's state; give it to each tick")
-                self._navigator.observe(state, cam)
+                self._navigator.observe(state, cam, sent)
             self._count_unseen(time_us)
             if self._present is None:
                 self._start(time_us)

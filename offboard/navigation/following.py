@@ -8,18 +8,19 @@ behind, so corners are never cut.
 from __future__ import annotations
 
 from collections import deque
-from dataclasses import dataclass
 from math import cos, hypot, pi, remainder, sin, sqrt
 
 from geometry.vectors import Vec3
 from offboard.drone import DroneState, VelocityCommand
 from offboard.navigation.goals import Motion
 from offboard.navigation.path import Path
+from offboard.response import Prediction, Response
 
 HOLD_S = 0.025  # half the time for which a command holds
 POSITION_GAIN_PER_S = 1.0
 VELOCITY_GAIN = 0.2
 YAW_GAIN_PER_S = 2.0
+BANDWIDTH_PER_S = 1.2  # of the control of a vehicle that answers late
 INTEGRAL_GAIN_PER_S2 = 0.2
 MAX_INTEGRAL_M_S = 0.15
 INTEGRAL_REACH_M = 0.15  # farther from the path, the integral does not grow
@@ -30,27 +31,6 @@ WAIT_M = 0.25  # beyond that, it stands still
 _MAX_STEP_S = 0.3
 _HISTORY = 16  # ticks
 _RATE_S = 0.05  # over which the acceleration of the heading is measured
-
-
-@dataclass(frozen=True, slots=True)
-class Response:
-    """How a vehicle's velocity follows commands: after a dead time, with a lag of first order.
-
-    The defaults are the simulated drone's.
-
-    Attributes:
-        turning: its velocity follows in level axes that turn with its heading, so that a turn at speed needs
-            commands ahead; else in axes that do not turn.
-    """
-
-    level_dead_s: float = 0.075
-    level_tilt_s: float = 0.15
-    level_lag_s: float = 0.3
-    climb_dead_s: float = 0.05
-    climb_lag_s: float = 0.05
-    yaw_dead_s: float = 0.05
-    yaw_lag_s: float = 0.05
-    turning: bool = True
 
 
 class PathFollower:
@@ -98,7 +78,9 @@ class PathFollower:
         """The path's end is reached, by its time."""
         return self._path is not None and self.progress_s >= self._path.duration_s
 
-    def command(self, path: Path, state: DroneState, now_s: float) -> VelocityCommand:
+    def command(
+        self, path: Path, state: DroneState, now_s: float, prediction: Prediction | None = None
+    ) -> VelocityCommand:
         """The command for this tick.
 
         Args:
@@ -106,6 +88,7 @@ class PathFollower:
                 `reference`.
             state: of the drone.
             now_s: vehicle time of the state.
+            prediction: of the motion of a vehicle that answers late.
         """
         step_s = 0.0 if self._last_s is None else min(max(now_s - self._last_s, 0.0), _MAX_STEP_S)
         self._last_s = now_s
@@ -117,6 +100,8 @@ class PathFollower:
         error, slower = self._errors(state, now_s)
         self.error_m = hypot(*error)
         self._rate = _rate_of(error, motion.velocity_m_s)
+        if prediction is not None:
+            return self._command_ahead(path, state, prediction)
         self._integrate(error, step_s)
         correction = [
             POSITION_GAIN_PER_S * e + VELOCITY_GAIN * v + i
@@ -127,6 +112,34 @@ class PathFollower:
         forward, left = self._level(path, state, scale * correction[0], scale * correction[1])
         up = self._climb(path) + scale * correction[2]
         return self._limited(forward, left, up, self._yaw_rate(path, state))
+
+    def _command_ahead(self, path: Path, state: DroneState, prediction: Prediction) -> VelocityCommand:
+        """The command for a vehicle that answers late: corrects the offset from the path that is to come."""
+        response, rate = self.response, self._rate
+        dead_s = (response.level_dead_s, response.level_dead_s, response.climb_dead_s)
+        lag_s = (response.level_lag_s, response.level_lag_s, response.climb_lag_s)
+        correction = [0.0, 0.0, 0.0]
+        position = (state.x, state.y, state.z)
+        for axis in range(3):
+            ahead = path.at(self.progress_s + rate * (dead_s[axis] + HOLD_S))
+            gain, damping = _gains(lag_s[axis])
+            offset = ahead.position_m[axis] - position[axis] - prediction.moved_m[axis]
+            slower = rate * ahead.velocity_m_s[axis] - prediction.velocity_m_s[axis]
+            correction[axis] = gain * offset + damping * slower
+        size = hypot(*correction)
+        scale = MAX_CORRECTION_M_S / size if size > MAX_CORRECTION_M_S else 1.0
+        x, y, z = (scale * c - w for c, w in zip(correction, prediction.disturbance_m_s, strict=True))
+        forward, left = self._level(path, state, x, y)
+        up = self._climb(path) + z
+        at_s = self.progress_s + rate * (response.yaw_dead_s + HOLD_S)
+        ahead, later = path.at(at_s), path.at(at_s + _RATE_S)
+        change = (later.yaw_rate_rad_s - ahead.yaw_rate_rad_s) / _RATE_S
+        gain, damping = _gains(response.yaw_lag_s)
+        wanted = rate * ahead.yaw_rate_rad_s
+        turn = wanted + rate * rate * response.yaw_lag_s * change
+        turn += gain * remainder(ahead.yaw_rad - state.yaw - prediction.turned_rad, 2 * pi)
+        turn += damping * (wanted - prediction.yaw_rate_rad_s)
+        return self._limited(forward, left, up, turn)
 
     def _level(self, path: Path, state: DroneState, add_x: float, add_y: float) -> tuple[float, float]:
         """Speeds forward and to the left: the path's, ahead of time, and a correction in arena axes."""
@@ -192,6 +205,14 @@ class PathFollower:
             min(max(up, -limit), limit),
             min(max(yaw_rate, -yaw_limit), yaw_limit),
         )
+
+
+def _gains(lag_s: float) -> tuple[float, float]:
+    """Gains of position and velocity after the dead time, for a critically damped approach."""
+    slowest_s = 0.5 / BANDWIDTH_PER_S
+    if lag_s < slowest_s:
+        return min(0.25 / lag_s, BANDWIDTH_PER_S), 0.0
+    return lag_s * BANDWIDTH_PER_S**2, 2.0 * lag_s * BANDWIDTH_PER_S - 1.0
 
 
 def _rate_of(error_m: Vec3, velocity_m_s: Vec3) -> float:

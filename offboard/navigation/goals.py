@@ -6,6 +6,7 @@ from dataclasses import dataclass, replace
 from math import cos, sin
 
 from geometry.vectors import Vec3
+from offboard.response import Response
 from scenarios.models import Base
 
 HEADROOM = 0.92
@@ -119,24 +120,25 @@ class FlightStyle:
     side_margin_m: float = 0.25
     floor_margin_m: float = 0.25
 
-    def adapted(self, lag_s: float) -> FlightStyle:
-        """The style for a vehicle that answers late: gentler, the later it answers.
-
-        Args:
-            lag_s: time by which the vehicle's velocity follows commands, dead time included; the simulated
-                drone's is 0.4.
-        """
-        late = min(max(lag_s - self.lag_s, 0.0) / 0.4, 1.0)
+    def adapted(self, response: Response) -> FlightStyle:
+        """The style for a vehicle that answers late: gentler, the later it answers."""
+        late = min(max(response.level_s - 0.5, 0.0) / 0.5, 1.0)
         return replace(
             self,
-            lag_s=max(self.lag_s, lag_s),
-            climb_lag_s=max(self.climb_lag_s, lag_s * late),
-            acceleration_m_s2=self.acceleration_m_s2 * (1.0 - 0.5 * late),
-            climb_acceleration_m_s2=self.climb_acceleration_m_s2 * (1.0 - 0.5 * late),
+            lag_s=response.level_lag_s,
+            climb_lag_s=response.climb_lag_s,
+            path_speed_m_s=self.path_speed_m_s * (1.0 - 0.4 * late),
+            axis_speed_m_s=self.axis_speed_m_s * (1.0 - 0.35 * late),
+            climb_speed_m_s=self.climb_speed_m_s * (1.0 - 0.4 * late),
+            yaw_rate_rad_s=self.yaw_rate_rad_s * (1.0 - 0.4 * late),
+            acceleration_m_s2=self.acceleration_m_s2 * (1.0 - 0.6 * late),
+            climb_acceleration_m_s2=self.climb_acceleration_m_s2 * (1.0 - 0.6 * late),
+            command_m_s=self.command_m_s - 0.25 * late,
             crossing_speed_m_s=self.crossing_speed_m_s * (1.0 - 0.4 * late),
-            straight_before_m=self.straight_before_m + 0.15 * late,
-            smoothing_s=self.smoothing_s + 0.2 * late,
-            bar_margin_m=self.bar_margin_m + 0.04 * late,
+            straight_before_m=self.straight_before_m + 0.25 * late,
+            straight_after_m=self.straight_after_m + 0.1 * late,
+            smoothing_s=self.smoothing_s + 0.3 * late,
+            bar_margin_m=self.bar_margin_m + 0.06 * late,
         )
 
     def look_limit_rad(self, distance_m: float) -> float:

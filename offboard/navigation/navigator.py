@@ -50,8 +50,15 @@ class Navigator:
         self._crossing: CrossingAttempt | None = None
         self._steps_back = 0
 
-    def observe(self, state: DroneState, detections: Detections) -> None:
-        """Add the state of this tick and, if its image is new, what was seen in it."""
+    def observe(self, state: DroneState, detections: Detections, sent: VelocityCommand | None = None) -> None:
+        """Add the state of this tick and, if its image is new, what was seen in it.
+
+        Args:
+            state: of the drone.
+            detections: in the latest image.
+            sent: the command that it has had since the last tick; None if it had none, or it is not known.
+        """
+        self._flight.learn(state, sent)
         self._state = state
         if self._start_m is None:
             self._start_m = position_now(state)

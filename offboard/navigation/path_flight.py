@@ -11,6 +11,7 @@ from offboard.navigation.following import PathFollower
 from offboard.navigation.goals import FlightStyle, Gate, Goal, Motion, Obstacles, Refusal
 from offboard.navigation.path import Path
 from offboard.navigation.planning import plan
+from offboard.response import ResponseEstimate
 from scenarios.models import Arena
 
 STILL = VelocityCommand()
@@ -34,11 +35,21 @@ class PathFlight:
         self.path: Path | None = None
         self.refusal = ""
         self._arena = arena
-        self._style = style
+        self._style = self._usual_style = style
         self._follower = PathFollower()
+        self._response = ResponseEstimate()
         self._planned_for: tuple[tuple[Goal, ...], Obstacles] | None = None
         self._tried_s = -REPLAN_S
         self._refusals = 0
+
+    def learn(self, state: DroneState, sent: VelocityCommand | None) -> None:
+        """How late the vehicle answers, from the command that it had since the last tick; call every tick."""
+        self._response.update(state, sent)
+        response = self._response.response
+        if response != self._follower.response:
+            self._follower.response = response
+            self._style = self._usual_style.adapted(response) if response.late else self._usual_style
+            self._planned_for = None
 
     def stop(self) -> None:
         """Leave the path."""
@@ -65,7 +76,8 @@ class PathFlight:
         """The command for this tick on the present path; without one, to stand still."""
         if self.path is None:
             return STILL
-        return self._follower.command(self.path, state, state.time_us * 1e-6)
+        prediction = self._response.predict() if self._follower.response.late else None
+        return self._follower.command(self.path, state, state.time_us * 1e-6, prediction)
 
     def _plan(self, goals: Sequence[Goal], obstacles: Obstacles, state: DroneState) -> None:
         start = self._follower.reference() if self.path is not None else None

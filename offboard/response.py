@@ -1,0 +1,246 @@
+"""How late a vehicle answers commands: estimated in flight, and what it will do with those it has got.
+
+A vehicle's velocity follows commands after a dead time, with a lag of first order. Many pairs of dead time
+and lag are tried at once: what each predicts for the change of velocity over a second is compared with the
+change that telemetry shows. A change, because a constant difference is wind or drag, not lateness. The same
+filters predict the motion by the commands that are still on their way.
+"""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Callable
+from dataclasses import dataclass
+from math import cos, exp, pi, remainder, sin
+
+import numpy as np
+from numpy.typing import NDArray
+
+from geometry.vectors import Vec3
+from offboard.drone import DroneState, VelocityCommand
+
+Array = NDArray[np.float64]
+
+STEP_S = 0.05
+DEAD_STEPS = (1, 3, 5, 7, 9, 11, 13)
+LAGS_S = (0.05, 0.15, 0.3, 0.45, 0.6, 0.8, 1.0, 1.3)
+TAKE_OFF_STEPS = 30  # after which the thrust is that of flight
+_WINDOW = 20  # steps over which a change of velocity is compared
+_KEPT = max(DEAD_STEPS) + _WINDOW + 1
+_MEMORY_S = 40.0
+_MAX_STEPS = 8  # after a longer gap everything but the estimate begins again
+_EXPECTED = ((3, 2), (1, 0), (1, 0))  # indices of dead time and lag, before there is evidence
+_MIN_ENERGY = (0.3, 0.2, 0.2)  # sums of squared changes (m/s, m/s, rad/s) that are evidence
+_BETTER = 0.7  # share of the present pair's error that another one must reach
+_CLEARLY_BETTER = 0.4  # likewise for axes that turn or do not
+_LATE_S = (0.65, 0.3, 0.3)  # level, climb, yaw: beyond this in all a vehicle answers late
+_DISTURBANCE_S = 0.4  # time constant of the estimate of what commands do not explain
+_LEADS = np.array((0.0, 0.0, 0.7))  # shares by which its change is expected to go on: heights wander slowly
+_X, _Y, _FORWARD, _LEFT, _UP, _TURN = range(6)
+_GROUPS = ((_X, _Y), (_FORWARD, _LEFT), (_UP,), (_TURN,))
+
+
+@dataclass(frozen=True, slots=True)
+class Response:
+    """How a vehicle's velocity follows commands: after a dead time, with a lag of first order.
+
+    The defaults are the simulated drone's.
+
+    Attributes:
+        turning: its velocity follows in level axes that turn with its heading, so that a turn at speed needs
+            commands ahead; else in axes that do not turn.
+        late: so late that the motion must be predicted.
+    """
+
+    level_dead_s: float = 0.075
+    level_tilt_s: float = 0.15
+    level_lag_s: float = 0.3
+    climb_dead_s: float = 0.05
+    climb_lag_s: float = 0.05
+    yaw_dead_s: float = 0.05
+    yaw_lag_s: float = 0.05
+    turning: bool = True
+    late: bool = False
+
+    @property
+    def level_s(self) -> float:
+        """Dead time and lag together, in plan."""
+        return self.level_dead_s + self.level_tilt_s + self.level_lag_s
+
+
+@dataclass(frozen=True, slots=True)
+class Prediction:
+    """What the vehicle will do by the commands that it has got, until the next one has an effect.
+
+    Level, climb and yaw have different dead times, and so different times of prediction.
+
+    Attributes:
+        moved_m: from its present position, arena axes.
+        velocity_m_s: then, arena axes.
+        disturbance_m_s: part of the velocity that commands do not explain.
+        turned_rad: from its present heading.
+        yaw_rate_rad_s: then.
+    """
+
+    moved_m: Vec3
+    velocity_m_s: Vec3
+    disturbance_m_s: Vec3
+    turned_rad: float
+    yaw_rate_rad_s: float
+
+
+class ResponseEstimate:
+    """Estimates the response of the vehicle that is flown; call `update` once a tick.
+
+    Attributes:
+        response: as known now.
+    """
+
+    def __init__(self) -> None:
+        self.response = Response()
+        self._chosen = list(_EXPECTED)
+        self._turning = True
+        shape = (len(DEAD_STEPS), len(LAGS_S), len(_GROUPS))
+        self._errors = np.zeros(shape)
+        self._energies = np.zeros(len(_GROUPS))
+        self._kept = np.array([exp(-STEP_S / lag_s) for lag_s in LAGS_S])[:, None]
+        self._restart()
+
+    def _restart(self) -> None:
+        self._last_s: float | None = None
+        self._yaw = 0.0
+        self._outputs = np.zeros((len(LAGS_S), 6))
+        self._past: deque[Array] = deque(maxlen=_KEPT)
+        self._measured: deque[Array] = deque(maxlen=_WINDOW + 1)
+        self._airborne_steps = 0
+        self._disturbance = np.zeros(3)
+        self._disturbance_rate = np.zeros(3)
+
+    def update(self, state: DroneState, sent: VelocityCommand | None) -> None:
+        """Add a tick.
+
+        Args:
+            state: of the drone now.
+            sent: the command that it has had since the last tick; None if it had none, or it is not known.
+        """
+        now_s = state.time_us * 1e-6
+        if sent is None or self._last_s is None or not 0.0 <= now_s - self._last_s <= _MAX_STEPS * STEP_S:
+            self._restart()
+            self._last_s, self._yaw = now_s, state.yaw
+            return
+        steps = round((now_s - self._last_s) / STEP_S)
+        if steps == 0:
+            return
+        turn_rate = remainder(state.yaw - self._yaw, 2 * pi) / (now_s - self._last_s)
+        self._last_s += steps * STEP_S
+        self._last_s += 0.2 * (now_s - self._last_s)
+        commanded = _in_all_axes(sent, self._yaw)
+        measured = _measured(state, turn_rate)
+        self._yaw = state.yaw
+        for _ in range(steps):
+            self._outputs = commanded + self._kept * (self._outputs - commanded)
+            self._past.append(self._outputs)
+            self._measured.append(measured)
+            self._airborne_steps = 0 if state.landed else self._airborne_steps + 1
+            if self._airborne_steps > TAKE_OFF_STEPS:
+                self._compare()
+        self._choose()
+        self._observe_disturbance(measured, steps)
+
+    def _compare(self) -> None:
+        """Add the errors of all predictions of the change over the window."""
+        if len(self._past) < _KEPT:
+            return
+        change = self._measured[-1] - self._measured[0]
+        fade = 1.0 - STEP_S / _MEMORY_S
+        self._errors *= fade
+        self._energies *= fade
+        squares = np.array(
+            [(self._past[-1 - dead] - self._past[-1 - dead - _WINDOW] - change) ** 2 for dead in DEAD_STEPS]
+        )
+        energy = change * change
+        for number, group in enumerate(_GROUPS):
+            self._errors[:, :, number] += squares[:, :, list(group)].sum(axis=2) * STEP_S
+            self._energies[number] += sum(energy[axis] for axis in group) * STEP_S
+
+    def _choose(self) -> None:
+        """Take pairs, and axes, that explain what was measured clearly better than the present ones."""
+        turns_before, chosen_before = self._turning, list(self._chosen)
+        if self._energies[0] > _MIN_ENERGY[0]:
+            fixed, turning = self._errors[:, :, 0].min(), self._errors[:, :, 1].min()
+            if self._turning:
+                self._turning = bool(fixed >= _BETTER * turning)
+            else:
+                self._turning = bool(turning < _CLEARLY_BETTER * fixed)
+        for channel, group in enumerate((1 if self._turning else 0, 2, 3)):
+            if self._energies[group] < _MIN_ENERGY[channel]:
+                continue
+            errors = self._errors[:, :, group]
+            dead, lag = divmod(int(errors.argmin()), len(LAGS_S))
+            if errors[dead, lag] < _BETTER * errors[self._chosen[channel]]:
+                self._chosen[channel] = (dead, lag)
+        if (self._turning, self._chosen) != (turns_before, chosen_before):
+            self.response = self._as_response()
+
+    def _as_response(self) -> Response:
+        pairs = [(DEAD_STEPS[dead] * STEP_S, LAGS_S[lag]) for dead, lag in self._chosen]
+        if not any(sum(pair) > late_s for pair, late_s in zip(pairs, _LATE_S, strict=True)):
+            return Response()
+        (level_dead, level_lag), (climb_dead, climb_lag), (yaw_dead, yaw_lag) = pairs
+        times = (level_dead, 0.0, level_lag, climb_dead, climb_lag, yaw_dead, yaw_lag)
+        return Response(*times, turning=self._turning, late=True)
+
+    def _observe_disturbance(self, measured: Array, steps: int) -> None:
+        """Filter what the commands do not explain of the velocity now."""
+        model = self._model_velocity(lambda dead: self._past[max(len(self._past) - 1 - dead, 0)])
+        share = 1.0 - exp(-steps * STEP_S / _DISTURBANCE_S)
+        now = measured[[_X, _Y, _UP]] - model
+        before = self._disturbance
+        self._disturbance = before + share * (now - before)
+        rate = (self._disturbance - before) / (steps * STEP_S)
+        self._disturbance_rate += share * (rate - self._disturbance_rate)
+
+    def _model_velocity(self, output: Callable[[int], Array]) -> Array:
+        """In arena axes, of the pairs chosen; `output` gives all filters' by the dead time in steps."""
+        (level_dead, level_lag), (climb_dead, climb_lag), _ = self._chosen
+        level = output(DEAD_STEPS[level_dead])[level_lag]
+        up = output(DEAD_STEPS[climb_dead])[climb_lag][_UP]
+        if not self._turning:
+            return np.array([level[_X], level[_Y], up])
+        c, s = cos(self._yaw), sin(self._yaw)
+        forward, left = level[_FORWARD], level[_LEFT]
+        return np.array([c * forward - s * left, s * forward + c * left, up])
+
+    def predict(self) -> Prediction:
+        """What the vehicle will do by the commands of all ticks so far."""
+        past = list(self._past) or [self._outputs]
+        (level_dead, _), (climb_dead, _), (yaw_dead, yaw_lag) = self._chosen
+        dead_s = np.array([DEAD_STEPS[d] * STEP_S for d in (level_dead, level_dead, climb_dead)])
+        moved = self._model_velocity(lambda dead: np.sum(past[-dead:], axis=0) * STEP_S)
+        moved = moved + dead_s * self._disturbance
+        velocity = self._model_velocity(lambda dead: past[-1]) + self._disturbance
+        turned = sum(float(row[yaw_lag, _TURN]) for row in past[-DEAD_STEPS[yaw_dead] :]) * STEP_S
+        ahead_s = dead_s + np.array(
+            [LAGS_S[p[1]] for p in (self._chosen[0], self._chosen[0], self._chosen[1])]
+        )
+        disturbance = self._disturbance + (ahead_s + _DISTURBANCE_S) * _LEADS * self._disturbance_rate
+        rate = float(past[-1][yaw_lag, _TURN])
+        return Prediction(_vector(moved), _vector(velocity), _vector(disturbance), turned, rate)
+
+
+def _in_all_axes(command: VelocityCommand, yaw_rad: float) -> Array:
+    forward, left = command.forward_m_s, command.left_m_s
+    c, s = cos(yaw_rad), sin(yaw_rad)
+    x, y = c * forward - s * left, s * forward + c * left
+    return np.array([x, y, forward, left, command.up_m_s, command.yaw_rate_rad_s])
+
+
+def _measured(state: DroneState, turn_rate_rad_s: float) -> Array:
+    x, y, up = state.velocity_arena_m_s
+    c, s = cos(state.yaw), sin(state.yaw)
+    return np.array([x, y, c * x + s * y, c * y - s * x, up, turn_rate_rad_s])
+
+
+def _vector(values: Array) -> Vec3:
+    x, y, z = values.tolist()
+    return (x, y, z)

@@ -1,0 +1,98 @@
+"""The response of vehicles that answer late is learnt in flight, and their motion is predicted."""
+
+from collections import deque
+from math import cos, exp, hypot, pi, remainder, sin
+
+import pytest
+
+from offboard.drone import DroneState, VelocityCommand
+from offboard.response import ResponseEstimate
+
+STEP_S = 0.05
+
+
+class Vehicle:
+    """Follows commands after a dead time, with a lag; in axes that turn with its heading, or do not."""
+
+    def __init__(self, dead_s, lag_s, *, turning=False, drift_m_s=0.0):
+        self.lag_s, self.turning, self.drift_m_s = lag_s, turning, drift_m_s
+        self.waiting = deque([(0.0, 0.0, 0.0, 0.0)] * round(dead_s / STEP_S))
+        self.ticks, self.yaw, self.position, self.speeds = 0, 0.3, [0.0, 0.0, 1.0], [0.0] * 4
+
+    @property
+    def state(self):
+        c, s = (cos(self.yaw), sin(self.yaw)) if self.turning else (1.0, 0.0)
+        a, b, up, _ = self.speeds
+        velocity = (c * a - s * b, s * a + c * b, up + self.drift_m_s)
+        time_us = round(self.ticks * STEP_S * 1e6)
+        return DroneState(time_us, *self.position, self.yaw, velocity, landed=False)
+
+    def fly(self, command):
+        c, s = (1.0, 0.0) if self.turning else (cos(self.yaw), sin(self.yaw))
+        forward, left = command.forward_m_s, command.left_m_s
+        self.waiting.append(
+            (c * forward - s * left, s * forward + c * left, command.up_m_s, command.yaw_rate_rad_s)
+        )
+        kept = exp(-STEP_S / self.lag_s)
+        self.speeds = [
+            v + (1.0 - kept) * (u - v) for v, u in zip(self.speeds, self.waiting.popleft(), strict=True)
+        ]
+        self.position = [
+            x + v * STEP_S for x, v in zip(self.position, self.state.velocity_arena_m_s, strict=True)
+        ]
+        self.yaw = remainder(self.yaw + self.speeds[3] * STEP_S, 2 * pi)
+        self.ticks += 1
+
+
+def command_at(time_s):
+    """Starts, stops, turns and climbs, as of a flight."""
+    quarter = int(time_s / 1.5) % 4
+    return VelocityCommand(
+        (0.8, 0.8, 0.0, -0.5)[quarter],
+        (0.0, 0.4, -0.4, 0.0)[quarter],
+        (0.4, 0.0, -0.4, 0.0)[quarter],
+        (0.6, 0.0, -0.8, 0.5)[quarter],
+    )
+
+
+def learn(vehicle, seconds=15.0):
+    estimate, sent = ResponseEstimate(), None
+    for tick in range(round(seconds / STEP_S)):
+        estimate.update(vehicle.state, sent)
+        sent = command_at(tick * STEP_S)
+        vehicle.fly(sent)
+    estimate.update(vehicle.state, sent)
+    return estimate
+
+
+@pytest.mark.parametrize(("dead_s", "lag_s"), [(0.15, 0.6), (0.35, 0.45), (0.55, 0.8)])
+@pytest.mark.parametrize("turning", [False, True])
+def test_dead_time_lag_and_axes_are_learnt(dead_s, lag_s, turning):
+    response = learn(Vehicle(dead_s, lag_s, turning=turning)).response
+    assert response.late
+    assert response.turning is turning
+    for dead, lag in (
+        (response.level_dead_s, response.level_lag_s),
+        (response.climb_dead_s, response.climb_lag_s),
+        (response.yaw_dead_s, response.yaw_lag_s),
+    ):
+        assert (dead, lag) == pytest.approx((dead_s, lag_s), abs=0.001)
+
+
+def test_a_vehicle_that_answers_in_time_is_not_late():
+    estimate = learn(Vehicle(0.05, 0.15, turning=True))
+    assert not estimate.response.late
+
+
+def test_the_motion_by_commands_on_their_way_is_predicted():
+    vehicle = Vehicle(0.35, 0.6, drift_m_s=0.05)
+    estimate = learn(vehicle, 20.0)
+    prediction, before = estimate.predict(), vehicle.position
+    for _ in range(7):
+        vehicle.fly(VelocityCommand())
+    moved = [b - a for a, b in zip(before, vehicle.position, strict=True)]
+    missed = hypot(*(p - m for p, m in zip(prediction.moved_m, moved, strict=True)))
+    assert hypot(*moved) > 0.1
+    assert missed < 0.01
+    assert prediction.velocity_m_s == pytest.approx(vehicle.state.velocity_arena_m_s, abs=0.03)
+    assert prediction.disturbance_m_s[2] == pytest.approx(0.05, abs=0.01)
