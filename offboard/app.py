@@ -185,10 +185,10 @@ class _Flight:
         if self._flying and (self._paused or not state.offboard) and await self._update_pause(state):
             return
         detections = self._perception.latest(state.time_us)
+        images = self._perception.take() if self._engine.has_navigator else ()
         imu = Imu(state.x, state.y, state.z, state.yaw)
-        command = self._kept_in_box(
-            self._engine.tick(imu, detections, state.time_us, state, self._sent), state
-        )
+        command = self._engine.tick(imu, detections, state.time_us, state, images, self._sent)
+        command = self._kept_in_box(command, state)
         motors_on = self._engine.pilot.cmd.on
         switches = motors_on != self._flying
         self._motors_requested = self._motors_requested or motors_on

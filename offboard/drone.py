@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import AsyncIterator
 from dataclasses import dataclass
+from math import isfinite
 from typing import Protocol
 
 from errors import UserError
@@ -33,6 +34,13 @@ class DroneState:
     landed: bool = True  # on the ground or on the base
     position_age_s: float = 0.0  # how much older the position and the velocity are than `time_us`
     attitude_arena: Quaternion = (1.0, 0.0, 0.0, 0.0)  # body FLU to arena, with the heading `yaw`
+    missed: tuple[DroneState, ...] = ()  # at the ticks that were skipped before this one, oldest first
+
+    @property
+    def is_finite(self) -> bool:
+        """Position, velocity and attitude are numbers."""
+        values = (self.x, self.y, self.z, self.yaw, *self.velocity_arena_m_s, *self.attitude_arena)
+        return all(map(isfinite, values))
 
 
 @dataclass(frozen=True, slots=True)

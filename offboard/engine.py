@@ -9,7 +9,7 @@ to the chart; a test shows that both fly alike.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from math import isfinite
 from typing import TYPE_CHECKING, Any
@@ -121,6 +121,11 @@ class MissionEngine:
         return self._present is not None and self._present.finish
 
     @property
+    def has_navigator(self) -> bool:
+        """Whether the mission uses the map of frames."""
+        return self._navigator is not None
+
+    @property
     def navigation(self) -> NavigationView | None:
         """The map and the plan of the pilot's navigator, made anew at each call; None without a navigator."""
         return None if self._navigator is None else self._navigator.view()
@@ -131,6 +136,7 @@ class MissionEngine:
         cam: Detections,
         time_us: int,
         state: DroneState | None = None,
+        images: Sequence[Detections] = (),
         sent: VelocityCommand | None = None,
     ) -> VelocityCommand:
         """Run one step of the chart, at this vehicle time. After a pause this continues the mission.
@@ -140,6 +146,7 @@ class MissionEngine:
             cam: what the latest image showed.
             time_us: vehicle time.
             state: of the drone, from which `imu` is; needed by missions with `vision: frames`.
+            images: what each image since the last tick showed, for the navigator's map.
             sent: the command that it has had since the last tick; None if it had none, or it is not known.
 
         Returns:
@@ -161,7 +168,7 @@ class MissionEngine:
             if self._navigator is not None:
                 if state is None:
                     raise PilotError("its map of frames needs the drone's state; give it to each tick")
-                self._navigator.observe(state, cam, sent)
+                self._navigator.observe(state, images, sent)
             self._count_unseen(time_us)
             if self._present is None:
                 self._start(time_us)

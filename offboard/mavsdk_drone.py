@@ -6,7 +6,6 @@ import asyncio
 import contextlib
 import logging
 from collections.abc import AsyncIterator, Awaitable, Callable
-from math import isfinite
 from pathlib import Path
 from typing import Any, TextIO
 
@@ -24,7 +23,7 @@ from offboard.drone import DroneError, DroneState, VelocityCommand
 from offboard.keep_in_box import Box, confine
 from offboard.link.commands import PendingRequests, SetpointStream
 from offboard.link.companion import Companion
-from offboard.link.telemetry import CHECKS, TelemetryFeed, TickSource, VehicleClock, request_rates
+from offboard.link.telemetry import CHECKS, Sample, TelemetryFeed, TickSource, VehicleClock, request_rates
 from offboard.link.tlog import TlogRecorder
 from offboard.link.tracking import CommandTracker
 from offboard.link.watchdog import PATIENT_LIMITS, Watchdog
@@ -233,7 +232,7 @@ class MavsdkDrone:
                 self._stand_still()
                 received = await self._ticks.next(LINK_LOST_S - STAND_STILL_S, command)
             self._check_alive(received)
-            state = self._state()
+            state = self._newest_state()
             self._check_state(state)
             self._latest = state
             if self._pilot_has_it:
@@ -252,6 +251,7 @@ class MavsdkDrone:
             self._watchdog.stop()
             await self._hold_on_ground()
             raise
+        self._feed.take_samples()  # those until now are of no flight
         self._tracker.reset()
         self._pilot_has_it = False
         self._commanding = True
@@ -382,9 +382,15 @@ class MavsdkDrone:
             self._sent = command
             self._stream.send(command)
 
-    def _state(self) -> DroneState:
+    def _newest_state(self) -> DroneState:
+        """The state at the last tick; it holds those of the ticks that were skipped before it."""
+        sample = self._feed.sample
+        missed = [before for before in self._feed.take_samples() if before.time_us < sample.time_us]
+        return self._state(sample, tuple(map(self._state, missed)))
+
+    def _state(self, sample: Sample, missed: tuple[DroneState, ...] = ()) -> DroneState:
         assert self._alignment is not None, "ready() comes first"
-        feed, sample = self._feed, self._feed.sample
+        feed = self._feed
         pose = self._alignment.pose(Pose(sample.position_ned_m, sample.yaw_ned_rad))
         attitude_ned = quaternion_from_euler(sample.roll_rad, sample.pitch_rad, sample.yaw_ned_rad)
         return DroneState(
@@ -400,6 +406,7 @@ class MavsdkDrone:
             landed=feed.landed,
             position_age_s=max(0.0, (sample.time_us - sample.position_us) * 1e-6),
             attitude_arena=self._alignment.attitude(attitude_ned),
+            missed=missed,
         )
 
     def _check_alive(self, tick_received: bool) -> None:
@@ -420,8 +427,7 @@ class MavsdkDrone:
             raise DroneError(f"link lost: no heartbeat for {heartbeat_age_s:.1f} s")
 
     def _check_state(self, state: DroneState) -> None:
-        values = (state.x, state.y, state.z, state.yaw, *state.velocity_arena_m_s, *state.attitude_arena)
-        if not all(map(isfinite, values)):
+        if not all(one.is_finite for one in (*state.missed, state)):
             raise DroneError("the vehicle's position, velocity or attitude is not finite")
         if not self._commanding or self._pilot_has_it:
             return

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
+from collections import deque
 from collections.abc import AsyncIterator, Callable
 from typing import Protocol
 
@@ -14,6 +15,7 @@ from wire.vehicle_telemetry import MessageOrder
 
 CAMERA_DEAD_S = 1.0
 FIRST_IMAGE_S = 5.0
+IMAGES_KEPT = 16  # until they are taken
 
 
 class CameraLostError(UserError):
@@ -38,6 +40,13 @@ class Perception(Protocol):
         """What the latest image showed; raises `CameraLostError` if it is too old at this vehicle time."""
         ...
 
+    def take(self) -> tuple[Detections, ...]:
+        """What each image since the last call showed, oldest first; of many only the last `IMAGES_KEPT`.
+
+        Call it after `latest`, whose image belongs to them.
+        """
+        ...
+
     async def close(self) -> None:
         """Release the camera."""
 
@@ -58,6 +67,7 @@ class CameraPerception:
         self._camera = camera
         self._detector = detector or new_detector("boxes")
         self._detections = Detections()
+        self._untaken: deque[Detections] = deque(maxlen=IMAGES_KEPT)
         self._image_us: int | None = None
         self._vehicle_time_us: Callable[[float], int | None] = lambda _wall_s: None
         self._delay_us = 0
@@ -100,6 +110,12 @@ class CameraPerception:
             raise CameraLostError(f"the camera is dead: no image for {age_s:.1f} s")
         return self._detections
 
+    def take(self) -> tuple[Detections, ...]:
+        """What each image since the last call showed."""
+        taken = tuple(self._untaken)
+        self._untaken.clear()
+        return taken
+
     async def seen(self, image_us: int, limit_s: float) -> bool:
         """Wait until the image exposed at a vehicle time, or a later one, has been processed.
 
@@ -127,6 +143,7 @@ class CameraPerception:
                     continue  # a link may swap images, too
                 time_us = frame.time_us if frame.time_us is not None else self._assumed_us(frame.received_s)
                 self._detections = self._detector(frame.image, time_us)
+                self._untaken.append(self._detections)
                 self._image_us = time_us
                 self._images += 1
                 self._arrived.set()

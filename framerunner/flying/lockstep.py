@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import asyncio
 import hashlib
+from collections import deque
 from collections.abc import Callable, Sequence
 from struct import Struct
 
@@ -17,7 +18,7 @@ from framerunner.flying.lockstep_drone import LockstepDrone, TruthObserver
 from framerunner.flying.plan import FlightPlan
 from framerunner.flying.response import LateResponse
 from offboard.app import Moment, Observer
-from offboard.perception import CAMERA_DEAD_S, CameraLostError
+from offboard.perception import CAMERA_DEAD_S, IMAGES_KEPT, CameraLostError
 from scenarios.models import Scenario, TrueState
 from scenarios.result import RefereeReport, RefereeSnapshot
 from sitl.camera import CameraFeed
@@ -117,6 +118,7 @@ class LockstepPerception:
         self._on_image = on_image
         self._detector = detector or new_detector("boxes")
         self._arrived: tuple[int, Image] | None = None
+        self._untaken: deque[tuple[int, Image]] = deque(maxlen=IMAGES_KEPT)
         self._image_us = 0
         self._detections = Detections()
 
@@ -127,6 +129,7 @@ class LockstepPerception:
         arrived = self._feed.step(truth)
         if arrived is not None:
             self._arrived = arrived
+            self._untaken.append(arrived)
             self.image = arrived[1]
             if self._on_image is not None:
                 self._on_image(*arrived)
@@ -148,6 +151,15 @@ class LockstepPerception:
         if age_s > CAMERA_DEAD_S:
             raise CameraLostError(f"the camera is dead: no image for {age_s:.1f} s")
         return self._detections
+
+    def take(self) -> tuple[Detections, ...]:
+        """What each image since the last call showed; the detector processes those that `latest` did not."""
+        images = tuple(self._untaken)
+        self._untaken.clear()
+        return tuple(
+            self._detections if time_us == self._image_us else self._detector(image, time_us)
+            for time_us, image in images
+        )
 
     async def close(self) -> None:
         """Nothing to close."""

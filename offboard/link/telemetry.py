@@ -35,6 +35,7 @@ MAX_JITTER_S = 0.05
 TEXTS_KEPT = 8
 TEXT_AGE_S = 8.0
 WANTED_RATE_HZ = 50.0
+SAMPLES_KEPT = 40  # until they are taken: two seconds of ticks
 CHECKS = "pre-arm checks not passed"
 
 
@@ -79,6 +80,7 @@ class TelemetryFeed:
         self._texts: deque[tuple[float, str]] = deque(maxlen=TEXTS_KEPT)
         self._attitude_order = MessageOrder()
         self._position_order = MessageOrder()
+        self._samples: deque[Sample] = deque(maxlen=SAMPLES_KEPT)
         self._loop: asyncio.AbstractEventLoop | None = None
         self._new_tick = asyncio.Event()
 
@@ -107,6 +109,14 @@ class TelemetryFeed:
             return False
         self._new_tick.clear()
         return True
+
+    def take_samples(self) -> list[Sample]:
+        """Those of all ticks since the last call, oldest first; of many only the last `SAMPLES_KEPT`."""
+        samples = []
+        with contextlib.suppress(IndexError):
+            while True:
+                samples.append(self._samples.popleft())
+        return samples
 
     async def tick(self, number: int, timeout_s: float) -> bool:
         """Wait for the tick of this number, or a later one; False after `timeout_s` of wall time."""
@@ -172,6 +182,7 @@ class TelemetryFeed:
                 radians(euler.roll_deg),
                 radians(euler.pitch_deg),
             )
+            self._samples.append(self.sample)
             self._wake()
 
     def _on_position(self, message: Any, _user: object) -> None:  # noqa: ANN401

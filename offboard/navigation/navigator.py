@@ -1,11 +1,12 @@
 """What the primitives of a mission with `vision: frames` call: explore, cross, step back, fly to a point.
 
-Every tick `observe` gives the drone's state and the detections of the latest image; then one of the actions
-returns the velocity to fly. An action keeps its goal and its path as long as it is called at every tick.
+Every tick `observe` gives the drone's state and what was seen in new images; then one of the actions returns
+the velocity to fly. An action keeps its goal and its path as long as it is called at every tick.
 """
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from math import atan2, cos, dist, hypot, pi, remainder, sin
 
 from geometry.vectors import Vec3
@@ -50,19 +51,21 @@ class Navigator:
         self._crossing: CrossingAttempt | None = None
         self._steps_back = 0
 
-    def observe(self, state: DroneState, detections: Detections, sent: VelocityCommand | None = None) -> None:
-        """Add the state of this tick and, if its image is new, what was seen in it.
+    def observe(
+        self, state: DroneState, images: Sequence[Detections], sent: VelocityCommand | None = None
+    ) -> None:
+        """Add the state of this tick and what was seen in the images since the last one.
 
         Args:
             state: of the drone.
-            detections: in the latest image.
+            images: what each of them showed.
             sent: the command that it has had since the last tick; None if it had none, or it is not known.
         """
         self._flight.learn(state, sent)
         self._state = state
         if self._start_m is None:
             self._start_m = position_now(state)
-        self._world.observe(state, detections)
+        self._world.observe(state, images)
 
     def is_known(self, colour: str) -> bool:
         """The frame is on the map."""

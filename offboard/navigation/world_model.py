@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from collections import deque
+from collections.abc import Sequence
+
 from geometry.vectors import Vec3
 from offboard.drone import DroneState
 from offboard.navigation.camera_model import CameraModel
@@ -10,11 +13,13 @@ from offboard.navigation.frame_estimate import FrameEstimate
 from offboard.navigation.frame_map import FrameMap
 from offboard.navigation.goals import Gate, Obstacles
 from offboard.navigation.obstacle_map import ObstacleMap
-from offboard.navigation.pose_history import PoseHistory
+from offboard.navigation.pose_history import DronePose, PoseHistory
 from offboard.navigation.search.glimpses import Glimpses
 from offboard.navigation.surroundings import Surroundings
 from scenarios.models import COLOURS
 from vision.types import Detections
+
+IMAGES_WAITING = 32  # for the drone's pose when they were exposed
 
 
 class WorldModel:
@@ -29,23 +34,35 @@ class WorldModel:
         self._glimpses = Glimpses(camera)
         self._explorer = Explorer(camera, surroundings.arena)
         self._image_us = -1
+        self._waiting: deque[Detections] = deque(maxlen=IMAGES_WAITING)
 
-    def observe(self, state: DroneState, detections: Detections) -> None:
-        """Add the state of a tick and, if its image is new, what was seen in it."""
+    def observe(self, state: DroneState, images: Sequence[Detections]) -> None:
+        """Add the state of a tick and what was seen in the images since the last one.
+
+        Images that are repeated or have no time are ignored. One that is newer than the state waits for the
+        state after it; one from a time of which no states are known is lost.
+        """
+        for earlier in state.missed:
+            self._history.add(earlier)
         self._history.add(state)
-        image_us = detections.time_us
-        if image_us is None or image_us <= self._image_us:
-            return
-        pose = self._history.at(image_us)
-        if pose is None:
-            return
-        self._image_us = image_us
+        for image in images:
+            if image.time_us is not None and image.time_us > self._image_us:
+                self._image_us = image.time_us
+                self._waiting.append(image)
+        waiting = self._waiting
+        while waiting and (image_us := waiting[0].time_us) is not None and image_us <= state.time_us:
+            pose = self._history.at(image_us)
+            image = waiting.popleft()
+            if pose is not None:
+                self._use(image, pose)
+
+    def _use(self, image: Detections, pose: DronePose) -> None:
         where = (pose.position_m, pose.attitude_arena)
-        self._map.observe(detections, pose)
-        self._obstacle_map.update(*where, detections.obstacle_edges)
-        self._explorer.update(*where, detections.obstacle_edges)
+        self._map.observe(image, pose)
+        self._obstacle_map.update(*where, image.obstacle_edges)
+        self._explorer.update(*where, image.obstacle_edges)
         known = [colour for colour in COLOURS if self._map.best(colour) is not None]
-        self._glimpses.update(*where, detections, known)
+        self._glimpses.update(*where, image, known)
 
     def frame(self, colour: str) -> FrameEstimate | None:
         """The frame of a colour; None if it is not on the map."""

@@ -14,7 +14,7 @@ from offboard.drone import DroneError
 from offboard.engine import MissionEngine
 from offboard.mission import load_mission
 from offboard.navigation.view import NavigationView
-from offboard.perception import CameraLostError, CameraPerception
+from offboard.perception import IMAGES_KEPT, CameraLostError, CameraPerception
 from offboard.pilot import Pilot
 from tests.offboard.fakes import START_1, TEST_CASE_1, GeometricPerception, KinematicDrone, NoCamera
 from vision.types import CameraFrame, Detections
@@ -250,6 +250,26 @@ async def test_an_image_without_a_time_stamp_gets_that_of_its_arrival_less_a_del
     await perception.open()
     assert perception.latest(9_100_000 if timed else 7_100_000).time_us == (9_000_000 if timed else 6_850_000)
     assert perception.oldest_s == pytest.approx(0.1 if timed else 0.25)
+    await perception.close()
+
+
+async def test_every_image_since_the_last_call_is_taken_once():
+    drone = KinematicDrone(*START_1)
+    stamps_us = iter(range(drone.time_us, drone.time_us + 10_000, 100))
+    perception = CameraPerception(
+        Film(drone, 40, "silence"), lambda image, time_us: Detections(time_us=next(stamps_us))
+    )
+    await perception.open()
+    taken = perception.take()
+    for _ in range(3):
+        await asyncio.sleep(0)
+    taken += perception.take()
+    assert [one.time_us - drone.time_us for one in taken] == list(range(0, 100 * len(taken), 100))
+    assert taken[-1] == perception.latest(drone.time_us)
+    assert perception.take() == ()
+    for _ in range(60):
+        await asyncio.sleep(0)
+    assert len(perception.take()) == IMAGES_KEPT
     await perception.close()
 
 

@@ -6,7 +6,7 @@ import asyncio
 import json
 from types import SimpleNamespace
 
-from offboard.link.telemetry import TelemetryFeed
+from offboard.link.telemetry import SAMPLES_KEPT, TelemetryFeed
 from wire.vehicle_telemetry import MessageOrder
 
 
@@ -60,4 +60,21 @@ async def test_ticks_and_positions_never_go_back():
     assert (feed.attitudes, feed.positions) == (2, 1)
     plugin.attitude(1_000)  # restarted
     assert feed.sample.time_us == 1_000_000
+    await asyncio.sleep(0)
+
+
+async def test_the_samples_of_all_ticks_are_kept_until_they_are_taken():
+    feed, plugin = TelemetryFeed(), Plugin()
+    feed.subscribe(plugin, plugin)
+    for ms in range(10_000, 10_220, 20):
+        plugin.position(ms - 5, ms / 1000)
+        plugin.attitude(ms)
+    taken = feed.take_samples()
+    assert [sample.time_us // 1000 for sample in taken] == [10_000, 10_060, 10_100, 10_160, 10_200]
+    assert [sample.position_ned_m[0] for sample in taken] == [10.0, 10.06, 10.1, 10.16, 10.2]
+    assert feed.take_samples() == []
+    for ms in range(11_000, 20_000, 50):
+        plugin.attitude(ms)
+    taken = feed.take_samples()
+    assert (len(taken), taken[-1].time_us) == (SAMPLES_KEPT, 19_950_000)
     await asyncio.sleep(0)

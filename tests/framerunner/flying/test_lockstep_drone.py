@@ -156,6 +156,9 @@ def test_a_camera_without_fresh_images_is_lost(simulation):
     for _ in range(50):
         simulation.tick()
         perception.follow(simulation.truth)
-    assert perception.latest(simulation.time_us).time_us == 136_000
+    newest = perception.latest(simulation.time_us)
+    assert newest.time_us == 136_000
+    assert [seen.time_us for seen in perception.take()] == [36_000, 136_000]
+    assert perception.take() == ()
     with pytest.raises(CameraLostError, match=r"no image for 1\.1 s"):
         perception.latest(1_250_000)

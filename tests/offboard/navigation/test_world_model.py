@@ -1,0 +1,98 @@
+"""What the navigator knows, from images and states that come late, in bursts or not at all."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import replace
+from math import dist
+
+import numpy as np
+import pytest
+
+from geometry.rotations import quaternion_from_euler
+from offboard.drone import DroneState
+from offboard.navigation.frame_estimate import FrameEstimate
+from offboard.navigation.surroundings import Surroundings
+from offboard.navigation.world_model import WorldModel
+from scenarios.models import Arena, Base, Camera
+from tests.offboard.navigation.sightings import frame_at, sighting
+from vision.types import Detections
+
+RED = frame_at(2.0, 0.0, 1.0, 0.3)
+TICK_US = 50_000
+TICKS = range(20, 61)  # two seconds of flight
+
+
+def state(time_us: int) -> DroneState:
+    """A drone that flies towards red at 0.6 m/s and swings to the side."""
+    t = time_us * 1e-6
+    place, velocity = (0.6 * (t - 2.0), 0.2 * np.sin(2 * t), 1.0), (0.6, 0.4 * np.cos(2 * t), 0.0)
+    yaw = 0.1 * np.sin(3 * t)
+    attitude = quaternion_from_euler(0.0, 0.0, yaw)
+    return DroneState(time_us, *place, yaw, velocity, attitude_arena=attitude)
+
+
+def image(time_us: int) -> Detections:
+    """What the camera showed when it was exposed, without noise."""
+    exposed = state(time_us)
+    place = (exposed.x, exposed.y, exposed.z)
+    seen = sighting(RED, place, exposed.attitude_arena, np.random.default_rng(0), noise=0.0)
+    return Detections(time_us=time_us, frames=() if seen is None else (seen,))
+
+
+IMAGES_US = range(1_030_000, 2_900_000, 100_000)  # exposed between ticks
+
+
+def red_after(ticks: Iterable[tuple[DroneState, list[Detections]]]) -> FrameEstimate | None:
+    """What is known of red after these ticks."""
+    world = WorldModel(Surroundings(Arena(), Base(x_m=-3.0, y_m=-3.0), Camera(), (0.25, 0.25, 0.1)))
+    for at, images in ticks:
+        world.observe(at, images)
+    return world.frame("red")
+
+
+def on_time(delay_us: int) -> list[tuple[DroneState, list[Detections]]]:
+    """Every tick, with the images that have arrived since the one before: `delay_us` after exposure."""
+    ticks = []
+    for number in TICKS:
+        now_us = number * TICK_US
+        arrived = [us for us in IMAGES_US if now_us - TICK_US < us + delay_us <= now_us]
+        ticks.append((state(now_us), [image(us) for us in arrived]))
+    return ticks
+
+
+def error_m(estimate: FrameEstimate | None) -> float:
+    assert estimate is not None
+    return dist(estimate.position_m, (RED.x_m, RED.y_m, RED.z_m))
+
+
+def test_an_image_that_is_newer_than_the_state_waits_for_its_pose() -> None:
+    newer = red_after(on_time(delay_us=-30_000))
+    assert newer == red_after(on_time(delay_us=60_000))
+    assert error_m(newer) < 0.01
+
+
+@pytest.mark.parametrize("late_us", [200_000, 500_000, 1_400_000])
+def test_after_a_stall_all_images_and_states_are_used(late_us: int) -> None:
+    regular = on_time(delay_us=60_000)
+    first = 10
+    stalled = regular[first : first + late_us // TICK_US]
+    states = [at for at, _ in stalled]
+    late = (replace(states[-1], missed=tuple(states[:-1])), [one for _, images in stalled for one in images])
+    after = red_after([*regular[:first], late, *regular[first + len(stalled) :]])
+    assert after == red_after(regular)
+
+
+def test_images_from_a_time_without_states_are_lost_and_those_after_it_are_used() -> None:
+    regular = on_time(delay_us=60_000)
+    images = [one for _, images in regular[10:20] for one in images]
+    gap = red_after([*regular[:10], (regular[20][0], images), *regular[20:]])
+    assert error_m(gap) < 0.01
+
+
+def test_images_are_used_once_whatever_their_number() -> None:
+    regular = on_time(delay_us=60_000)
+    twice = [(at, [*images, *images]) for at, images in regular]
+    assert red_after(twice) == red_after(regular)
+    flood = [(at, [replace(one, time_us=None) for one in images] * 40) for at, images in regular]
+    assert red_after(flood) is None
