@@ -187,7 +187,7 @@ class _Flight:
         detections = self._perception.latest(state.time_us)
         images = self._perception.take() if self._engine.has_navigator else ()
         imu = Imu(state.x, state.y, state.z, state.yaw)
-        command = self._engine.tick(imu, detections, state.time_us, state, images, self._sent)
+        command = self._engine.tick(imu, detections, state.time_us, state, images=images, sent=self._sent)
         command = self._kept_in_box(command, state)
         motors_on = self._engine.pilot.cmd.on
         switches = motors_on != self._flying

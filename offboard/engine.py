@@ -136,6 +136,7 @@ class MissionEngine:
         cam: Detections,
         time_us: int,
         state: DroneState | None = None,
+        *,
         images: Sequence[Detections] = (),
         sent: VelocityCommand | None = None,
     ) -> VelocityCommand:
