@@ -82,6 +82,7 @@ class Referee:
         self._taken_off = False
         self._crossings: dict[str, tuple[float, Passage]] = {}  # seconds since motors on
         self._contacts: list[str] = []
+        self._contacts_s: list[float] = []  # since motors on
         self._touched_us: dict[str, int] = {}
         self._wrong_order = ""
         self._crash = ""
@@ -164,6 +165,7 @@ class Referee:
             last_us = self._touched_us.get(name)
             if last_us is None or state.time_us - last_us >= CONTACT_GAP_US:
                 self._contacts.append(name)
+                self._contacts_s.append((state.time_us - self._start_us) * 1e-6)
             self._touched_us[name] = state.time_us
 
     def _come_to_rest(self, state: TrueState) -> None:
@@ -270,6 +272,7 @@ class Referee:
             crossing_sides=tuple(passage.side for _, passage in crossings),
             contacts=len(self._contacts),
             contact_frames=facts.contact_frames,
+            contact_times_s=tuple(self._contacts_s),
             outside_s=facts.outside_s,
             try_time_s=facts.try_time_s,
             penalty_s=penalty_s,

@@ -83,6 +83,9 @@ class RefereeReport(_Record):
     contact_frames: tuple[Text, ...] = Field(
         (), max_length=10_000, description="what was touched, in order: a frame's colour, `pole` or `wall`"
     )
+    contact_times_s: tuple[Seconds, ...] = Field(
+        (), max_length=10_000, description="since motors on, one for each of contact_frames"
+    )
     outside_s: Seconds = Field(0.0, description="time outside the arena with motors on")
     try_time_s: Seconds = Field(
         0.0, description="from motors on to motors off, or to the end of the watch; at most the limit"
@@ -166,6 +169,7 @@ class FlightResult(RefereeReport, _Flown):
     `lift_m` where frames were lifted, in real time; recordings have no wall times.
     """
 
+    cause: Text = Field("", description="why the flight was not clean, in one line; empty if it was")
     mission_state: Text = Field("", description="the mission's last state, such as red.turning")
     ended: Ended = Field("", description="how the mission ended; `error` occurs in evaluations only")
     seconds_in_state: dict[Text, Seconds] = Field(

@@ -51,7 +51,7 @@ _MAX_STATES = 14
 
 @dataclass(frozen=True, slots=True)
 class Failure:
-    """What the page shows of a flight that failed; the command flies it again, the plot is a data URI."""
+    """What the page shows of a flight that was not clean: a command flies it again, a plot is a data URI."""
 
     row: Row
     command: str
@@ -129,7 +129,7 @@ def replay_command(path: Path, mission: str, pilot: str | None, seed: int, respo
 
 
 def picked_for_plots(summary: Summary, count: int) -> set[str]:
-    """Names of failures to plot: of every cause in turn, so that rare causes are not left out."""
+    """Names of flights to plot: of every group in turn, so that rare ends are not left out."""
     picked: list[str] = []
     for index in range(max((len(cause.rows) for cause in summary.causes), default=0)):
         picked += [cause.rows[index].scenario for cause in summary.causes if index < len(cause.rows)]
@@ -141,7 +141,7 @@ def picked_for_plots(summary: Summary, count: int) -> set[str]:
 def _failures(
     folder: EvaluationFolder, page: Page, advance: Callable[[int, int], None]
 ) -> list[tuple[str, str, list[Failure]]]:
-    """Verdict, cause and flights, for each cause."""
+    """Verdict, end and flights, for each group of flights that were not clean."""
     picked = picked_for_plots(page.summary, MAX_PLOTS)
     done = 0
     groups = []
@@ -156,7 +156,7 @@ def _failures(
             file = folder.scenario_file(row.scenario)
             command = replay_command(file, page.mission, page.pilot, row.seed or 0, row.response)
             failures.append(Failure(row, command, plot, _traceback(folder, row)))
-        groups.append((cause.verdict, cause.cause, failures))
+        groups.append((cause.verdict, cause.ended_in, failures))
     return groups
 
 

@@ -39,8 +39,8 @@ class Row(FlightResult):
     traceback: str = Field("", exclude=True, repr=False)
 
     @property
-    def cause(self) -> str:
-        """Why a flight ended: the mission's state, or the kind of fault."""
+    def ended_in(self) -> str:
+        """Where a flight ended: the mission's state, or the kind of fault."""
         return self.reason.partition(":")[0] if self.verdict is Verdict.ERROR else self.mission_state
 
     def to_json(self) -> str:

@@ -221,7 +221,7 @@ def fly_task(plan: FlightPlan) -> Row:
         raise
     except BaseException as error:  # a contestant's code may raise anything, SystemExit too
         return _error_row(plan, error)
-    track = None if flown.result.completed else thinned(flown.track)
+    track = None if flown.result.verdict is Verdict.CLEAN else thinned(flown.track)
     return Row(**dict(flown.result), track=track)
 
 

@@ -46,10 +46,10 @@ class Spread:
 
 @dataclass(frozen=True, slots=True)
 class Cause:
-    """Failures that have the verdict and the `Row.cause` in common."""
+    """Flights that were not clean, with the verdict and the `Row.ended_in` in common."""
 
     verdict: str
-    cause: str
+    ended_in: str
     rows: tuple[Row, ...]
 
 
@@ -67,7 +67,7 @@ class Summary:
         landing_error_m: of flights that landed; None if none did.
         penalised: flights that were outside the arena.
         seconds_in_state: mean over all flights without an error, by kind of state, longest first.
-        causes: of failures, most frequent first.
+        causes: of flights that were not clean, failures first, then most frequent first.
     """
 
     flights: int
@@ -144,10 +144,14 @@ def mean_seconds_in_state(rows: Sequence[Row]) -> dict[str, float]:
 
 
 def causes(rows: Iterable[Row]) -> tuple[Cause, ...]:
-    """Failures by verdict and cause, most frequent first."""
+    """Flights that were not clean by verdict and end, failures first, then most frequent first."""
     groups: dict[tuple[str, str], list[Row]] = {}
     for row in rows:
-        if not row.completed:
-            groups.setdefault((row.verdict, row.cause), []).append(row)
-    found = [Cause(verdict, cause, tuple(group)) for (verdict, cause), group in groups.items()]
-    return tuple(sorted(found, key=lambda cause: (-len(cause.rows), cause.verdict, cause.cause)))
+        if row.verdict is not Verdict.CLEAN:
+            groups.setdefault((row.verdict, row.ended_in), []).append(row)
+    found = [Cause(verdict, ended_in, tuple(group)) for (verdict, ended_in), group in groups.items()]
+    return tuple(sorted(found, key=_order))
+
+
+def _order(cause: Cause) -> tuple[bool, int, str, str]:
+    return cause.rows[0].completed, -len(cause.rows), cause.verdict, cause.ended_in

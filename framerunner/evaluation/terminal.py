@@ -18,6 +18,7 @@ from scenarios.verdict import Verdict
 
 _LINE_S = 5.0
 _MAX_NAMES = 8
+_MAX_CAUSES = 20
 
 
 class EvaluationProgress:
@@ -79,7 +80,7 @@ def _duration(seconds: float) -> str:
 
 
 def print_summary(summary: Summary, title: str) -> None:
-    """Print rates, distributions and causes of failures to standard output."""
+    """Print rates, distributions and why flights were not clean to standard output."""
     console = _console()
     rates = _table(title, "flights", "share (95 % interval)")
     for verdict, rate in summary.verdicts.items():
@@ -101,11 +102,18 @@ def print_summary(summary: Summary, title: str) -> None:
     console.print(spreads)
 
     if summary.causes:
-        failures = _table("failures", "in / by", "flights", "such as")
+        failures = _table("not clean", "in / by", "flights", "such as")
         for cause in summary.causes:
             names = [row.scenario for row in cause.rows]
-            failures.add_row(cause.verdict, cause.cause or "-", str(len(names)), _first(names, 3))
+            failures.add_row(cause.verdict, cause.ended_in or "-", str(len(names)), _first(names, 3))
         console.print(failures)
+        rows = [row for cause in summary.causes for row in cause.rows]
+        for row in rows[:_MAX_CAUSES]:
+            line = f"{row.scenario}: {row.cause or row.reason}"
+            console.print(line, markup=False, highlight=False, soft_wrap=True)
+        if len(rows) > _MAX_CAUSES:
+            console.print(f"and {len(rows) - _MAX_CAUSES} more in results.csv, column cause")
+        console.print()
 
 
 def print_comparison(comparison: Comparison) -> None:

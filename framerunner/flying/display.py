@@ -182,7 +182,7 @@ class LockstepProgress:
 
 
 def result_lines(result: FlightResult) -> str:
-    """A result in two lines for people."""
+    """A result in two lines for people, and a third if it was not clean."""
     error_m = result.landing_error_m
     landing = "did not land" if error_m is None else f"landed {100 * error_m:.1f} cm from the base's centre"
     verdict, reason = result.verdict, result.reason
@@ -190,8 +190,10 @@ def result_lines(result: FlightResult) -> str:
     drone_class = "" if result.mission_class == "contest" else f", class {result.mission_class}"
     times = f", {result.times_bound:.2f} times the bound" if result.times_bound else ""
     kept = f", kept in its box for {result.kept_in_box_s:.1f} s" if result.kept_in_box_s else ""
+    cause = f"\ncause: {result.cause}" if result.cause else ""
     return (
         f"{sentence}\n"
         f"try {result.try_time_s:.1f} s{times}, penalty {result.penalty_s:.1f} s, "
-        f"path {result.path_length_m:.1f} m, {landing}, judged by {result.judged_by}{drone_class}{kept}"
+        f"path {result.path_length_m:.1f} m, {landing}, judged by {result.judged_by}"
+        f"{drone_class}{kept}{cause}"
     )

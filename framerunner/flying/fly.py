@@ -11,6 +11,7 @@ from dataclasses import dataclass
 from importlib import metadata
 from typing import Any
 
+from framerunner.flying.cause import CauseWatch, Flown
 from framerunner.flying.envelopes import bound_s
 from framerunner.flying.judges import Judge
 from framerunner.flying.plan import FlightPlan
@@ -59,7 +60,8 @@ async def fly(
         ValueError: the plan has no mission.
     """
     recorder = TrackRecorder()
-    watching = (recorder.see, *observers, judge.see)
+    causes = CauseWatch()
+    watching = (recorder.see, causes.see, *observers, judge.see)
 
     def observe(moment: Moment) -> None:
         for see in watching:
@@ -80,8 +82,10 @@ async def fly(
         outcome.mission_state, None if outcome.ended == "finished" else outcome.reason
     )
     standing = await judge.standing()
-    track = recorder.track(None if standing is None else standing.began_us)
-    result = _result(plan, report, outcome, track, judged_by=judge.source, measured=measured())
+    began_us = None if standing is None else standing.began_us
+    track = recorder.track(began_us)
+    cause = causes.words(Flown(plan.layout, report, outcome, track, began_us))
+    result = _result(plan, report, outcome, track, cause=cause, judged_by=judge.source, measured=measured())
     return FinishedFlight(result, outcome, track)
 
 
@@ -91,6 +95,7 @@ def _result(
     end: MissionEnd,
     track: Track,
     *,
+    cause: str,
     judged_by: str,
     measured: Mapping[str, Any],
 ) -> FlightResult:
@@ -102,6 +107,7 @@ def _result(
         mission_class=plan.chart.mission_class,
         seed=plan.seed,
         **dict(report),
+        cause=cause,
         mission_state=end.mission_state,
         ended=end.ended,
         seconds_in_state=track.seconds_in_state(),

@@ -35,7 +35,7 @@ class CrossingAttempt:
         planned_s: when there was last a path.
         passed: the drone has gone through the opening.
         cleared: and is behind the frame's bars.
-        refused: it cannot go on.
+        refusal: why it cannot go on; empty if it can.
     """
 
     colour: str
@@ -44,7 +44,7 @@ class CrossingAttempt:
     planned_s: float
     passed: bool = False
     cleared: bool = False
-    refused: bool = False
+    refusal: str = ""
     _aim: Crossing | None = None  # the opening and the direction as last planned
     _along_m: float = -inf
     _across_m: float = 0.0
@@ -59,7 +59,7 @@ class CrossingAttempt:
     def move(self, position_m: Vec3, opening_m: tuple[float, float], now_s: float) -> None:
         """Note where the drone is now; `opening_m` are the opening's width and height."""
         if now_s - self.began_s > MAX_CROSSING_S:
-            self.refused = not self.passed
+            self._refuse(f"not through it within {MAX_CROSSING_S:g} s")
         if self._aim is None:
             return
         (x, y, z), heading = self._aim.gate.centre_m, self._aim.heading_rad
@@ -68,10 +68,14 @@ class CrossingAttempt:
         left_m = cos(heading) * dy - sin(heading) * dx
         if along_m >= 0.0 > self._along_m > -inf and not self.passed:
             self.passed = abs(left_m) < opening_m[0] / 2 and abs(dz) < opening_m[1] / 2
-            self.refused = not self.passed
+            self._refuse(f"passed its plane {hypot(left_m, dz):.2f} m from its centre")
             self._passed_s = now_s
         self._along_m, self._across_m = along_m, hypot(left_m, dz)
         self.cleared = self.passed and (along_m > CLEAR_M or now_s - self._passed_s > MAX_CLEARING_S)
+
+    def _refuse(self, why: str) -> None:
+        """Note why the attempt cannot go on; nothing can be refused behind the opening."""
+        self.refusal = "" if self.passed else why
 
     @property
     def is_committed(self) -> bool:
@@ -93,15 +97,18 @@ class CrossingAttempt:
             return False
         if self._looking_since_s is None:
             self._looking_since_s = now_s
-        self.refused = self.refused or now_s - self._looking_since_s > MAX_LOOK_S
+        if not self.refusal and now_s - self._looking_since_s > MAX_LOOK_S:
+            self.refusal = f"still not certain after {MAX_LOOK_S:g} s before it"
         return True
 
     def lose(self, now_s: float) -> None:
         """The frame is not on the map."""
-        self.refused = self.refused or now_s - self.known_s > MAX_LOST_S
+        if not self.refusal and now_s - self.known_s > MAX_LOST_S:
+            self.refusal = "lost from the map"
 
-    def fly(self, *, planned: bool, now_s: float) -> None:
-        """Note whether there is a path."""
-        if planned:
+    def fly(self, *, no_path: str, now_s: float) -> None:
+        """Note whether there is a path; `no_path` says why there is none, and is empty if there is one."""
+        if not no_path:
             self.planned_s = now_s
-        self.refused = self.refused or now_s - self.planned_s > MAX_UNPLANNED_S
+        elif not self.refusal and now_s - self.planned_s > MAX_UNPLANNED_S:
+            self.refusal = f"no path: {no_path}"

@@ -84,7 +84,7 @@ class Navigator:
     @property
     def refused(self) -> bool:
         """`cross` cannot go on."""
-        return self._crossing is not None and self._crossing.refused
+        return self._crossing is not None and bool(self._crossing.refusal)
 
     @property
     def arrived(self) -> bool:
@@ -98,7 +98,12 @@ class Navigator:
     def view(self) -> NavigationView:
         """The map and the path, for displays."""
         path = self._flight.path
-        return NavigationView(self._world.frames, () if path is None else tuple(path.points()), self._action)
+        crossing = self._crossing
+        trouble = "" if path is not None else self._flight.refusal
+        if crossing is not None and crossing.refusal:
+            trouble = f"{crossing.colour}: {crossing.refusal}"
+        points = () if path is None else tuple(path.points())
+        return NavigationView(self._world.frames, points, self._action, trouble)
 
     def explore(self) -> VelocityCommand:
         """Fly to the view that shows most of what has not been seen."""
@@ -128,7 +133,7 @@ class Navigator:
         """Fly through a frame as the map has it now, and on towards what comes next."""
         state, now_s = self._begin(f"cross {colour}")
         crossing = self._crossing
-        if crossing is None or crossing.colour != colour or crossing.refused:
+        if crossing is None or crossing.colour != colour or crossing.refusal:
             crossing = self._crossing = CrossingAttempt(colour, now_s, now_s, now_s)
         crossing.move(position_now(state), self._opening_m, now_s)
         estimate = self._world.frame(colour)
@@ -142,7 +147,8 @@ class Navigator:
             return self._fly(_place_before(estimate, state, LOOK_AGAIN_M))
         command = self._fly(Gate(estimate.position_m, estimate.yaw_rad), *self._goals_after(colour))
         path = self._flight.path
-        crossing.fly(planned=path is not None, now_s=now_s)
+        no_path = "" if path is not None else self._flight.refusal or "none was planned"
+        crossing.fly(no_path=no_path, now_s=now_s)
         if path is not None and path.crossings:
             crossing.aim(path.crossings[0])
         return command

@@ -16,8 +16,10 @@ class NavigationView:
         frames: all frames seen so far.
         path_m: points of the planned path, in order, arena axes; empty without a plan.
         goal: what the navigator does now, a word or a short phrase such as "explore" or "cross red".
+        trouble: why it last could not go on, such as "red: lost from the map"; empty if it can.
     """
 
     frames: tuple[FrameEstimate, ...] = ()
     path_m: tuple[Vec3, ...] = ()
     goal: str = ""
+    trouble: str = ""

@@ -89,7 +89,7 @@ def test_the_page_is_self_contained_and_shows_each_failure(tmp_path):
 
 def test_a_page_without_failures_and_one_without_flights(tmp_path):
     html, drawn = report(tmp_path / "good", [made_row("calm-1")])
-    assert "Why flights failed" not in html
+    assert "Why flights were not clean" not in html
     assert "class open" not in html
     html, _ = report(tmp_path / "open", [made_row("calm-1", mission_class="open")])
     assert "(class open)" in html
@@ -102,7 +102,7 @@ def test_a_page_without_failures_and_one_without_flights(tmp_path):
     assert drawn == []
     bad = [made_row("calm-1", "error", reason="X", frames_crossed=(), crossing_offsets_m=())]
     html, _ = report(tmp_path / "bad", bad)
-    assert "Why flights failed" in html
+    assert "Why flights were not clean" in html
 
 
 def test_the_same_flights_make_the_same_page(tmp_path):

@@ -101,7 +101,7 @@ def test_a_flight_that_ends_its_process_is_found_and_the_others_fly(plan, alone)
 def test_a_flight_alone_may_end_its_process(plan):
     victim = plan.scenarios[0]
     row = fly_alone(FlightPlan(victim, deadly(victim, "os._exit(7)")))
-    assert (row.verdict, row.cause) == ("error", "WorkerDiedError")
+    assert (row.verdict, row.ended_in) == ("error", "WorkerDiedError")
     assert row.reason.endswith("(exit code 7)")
 
 

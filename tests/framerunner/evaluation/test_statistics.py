@@ -52,11 +52,14 @@ def test_a_summary_counts_each_flight_where_it_belongs():
     }
     assert (summary.penalised.count, summary.penalised.total) == (1, 5)
     assert summary.seconds_in_state == {"turning": 10.0, "crossing": 4.0}
-    causes = [(cause.verdict, cause.cause, [row.scenario for row in cause.rows]) for cause in summary.causes]
+    causes = [
+        (cause.verdict, cause.ended_in, [row.scenario for row in cause.rows]) for cause in summary.causes
+    ]
     assert causes == [
         ("timed out", "green.turning", ["c", "e"]),
         ("error", "ValueError", ["f"]),
         ("timed out", "red.turning", ["d"]),
+        ("completed", "landing.stop", ["b"]),
     ]
 
 

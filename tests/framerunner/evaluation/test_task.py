@@ -37,13 +37,13 @@ def test_a_row_has_the_result_s_fields_and_order():
     row = fly_task(flight)
     assert tuple(result.as_json()) == COLUMNS
     assert json.loads(row.to_json()) == result.as_json()
-    assert (row.verdict, row.completed, row.cause) == ("timed out", False, "take_off.set_base")
+    assert (row.verdict, row.completed, row.ended_in) == ("timed out", False, "take_off.set_base")
     assert row.traceback == ""
 
 
 def test_a_row_of_an_older_version_can_be_read():
     told = json.loads(made_row("calm-1").to_json())
-    for name in ("kept_in_box_s", "bound_s", "times_bound"):
+    for name in ("kept_in_box_s", "bound_s", "times_bound", "contact_times_s", "cause"):
         del told[name]
     assert Row.model_validate_json(json.dumps(told)) == made_row("calm-1")
 
@@ -68,7 +68,7 @@ def test_a_fault_of_the_program_is_a_row_with_its_traceback():
     row = fly_task(replace(task(), scenario=short_scenario(1).model_copy(update={"airframe": "nonesuch"})))
     assert (row.scenario, row.verdict, row.ended) == ("calm-1", "error", "error")
     assert row.reason.startswith("AirframeError: ")
-    assert row.cause == "AirframeError"
+    assert row.ended_in == "AirframeError"
     assert "Traceback" in row.traceback and "fly_lockstep" in row.traceback
 
 

@@ -1,0 +1,169 @@
+"""Why a flight was not clean, in one line: what happened, when, where, and what the navigator knew then."""
+
+from __future__ import annotations
+
+from bisect import bisect_right
+from dataclasses import dataclass, replace
+from math import degrees, dist, pi, remainder
+
+from framerunner.runs.track import Track
+from offboard.app import MissionEnd, Moment
+from offboard.navigation.view import NavigationView
+from scenarios.crossing import Boundary
+from scenarios.models import COLOURS, Frame, Scenario
+from scenarios.result import RefereeReport
+from scenarios.verdict import Verdict
+
+SAME_FRAME_M = 1.0  # an estimate of a frame's colour that is farther away is of something else
+
+
+@dataclass(frozen=True, slots=True)
+class Flown:
+    """What is known of a flight that is over.
+
+    Attributes:
+        layout: the frames and obstacles where they truly were.
+        report: of the referee.
+        end: how the mission ended.
+        track: its times count from motors on.
+        began_us: vehicle time of motors on; None if they never were.
+    """
+
+    layout: Scenario
+    report: RefereeReport
+    end: MissionEnd
+    track: Track
+    began_us: int | None
+
+
+class CauseWatch:
+    """Remembers what the navigator knew during a flight."""
+
+    def __init__(self) -> None:
+        self._views: list[tuple[int, NavigationView]] = []  # vehicle time; without paths
+        self._latest: NavigationView | None = None
+
+    def see(self, moment: Moment) -> None:
+        """Take a tick."""
+        view = moment.navigation
+        if view is not None and view is not self._latest:
+            self._latest = view
+            self._views.append((moment.state.time_us, replace(view, path_m=())))
+
+    def words(self, flown: Flown) -> str:
+        """Why the flight was not clean, in one line; empty if it was."""
+        report, track = flown.report, flown.track
+        if report.verdict is Verdict.CLEAN:
+            return ""
+        parts = [self._contact(flown), _outside(flown)]
+        if report.verdict is Verdict.WRONG_ORDER:
+            parts.append(_wrong_order(flown))
+        elif report.verdict is Verdict.CRASHED:
+            parts.append(f"crashed {_at(track, report.try_time_s)}")
+        elif not report.completed:
+            parts.append(_end(flown))
+            parts.append(self._hindrance(flown))
+        return "; ".join(part for part in parts if part)
+
+    def _contact(self, flown: Flown) -> str:
+        """The first contact, and how exact the map was then."""
+        report = flown.report
+        if not report.contact_frames:
+            return ""
+        name, *others = report.contact_frames
+        if not report.contact_times_s:
+            return f"touched {name}"
+        time_s = report.contact_times_s[0]
+        more = (
+            f", then {len(others)} more contacts" if len(others) > 1 else ", then one more" if others else ""
+        )
+        frame = next((frame for frame in flown.layout.frames if frame.colour == name), None)
+        known = "" if frame is None else self._error_of_map(frame, time_s, flown.began_us)
+        return f"touched {name} {_at(flown.track, time_s)}{known}{more}"
+
+    def _error_of_map(self, frame: Frame, time_s: float, began_us: int | None) -> str:
+        """How far the navigator's estimate of a frame was off at a time."""
+        if began_us is None or not self._views:
+            return ""
+        number = bisect_right(self._views, began_us + round(time_s * 1e6), key=lambda seen: seen[0])
+        estimates = self._views[max(number - 1, 0)][1].frames
+        own = [estimate for estimate in estimates if estimate.colour == frame.colour]
+        true_m = frame.position_arena_m
+        nearest = min(own, key=lambda estimate: dist(estimate.position_m, true_m), default=None)
+        if nearest is None or dist(nearest.position_m, true_m) > SAME_FRAME_M:
+            return ", which was not on the map"
+        off_deg = degrees(abs(remainder(nearest.yaw_rad - frame.yaw_rad, pi)))
+        off_cm = 100 * dist(nearest.position_m, true_m)
+        return f", which the map had {off_cm:.1f} cm and {off_deg:.1f}° off"
+
+    def _hindrance(self, flown: Flown) -> str:
+        """What the navigator lacked to cross the next frame or to fly home."""
+        if not self._views:
+            return ""
+        crossed = flown.report.frames_crossed
+        wanted = [frame.colour for frame in flown.layout.frames if frame.colour not in crossed]
+        troubles = [view.trouble for _, view in self._views]
+        began = [now for now, before in zip(troubles, ["", *troubles], strict=False) if now and now != before]
+        last = began[-1] if began else ""
+        times = f" ({len(began)} times in trouble)" if len(began) > 1 else ""
+        words = f"last trouble of the navigator: {last}{times}" if last else ""
+        if not wanted:
+            return words
+        colour = min(wanted, key=COLOURS.index)
+        if not any(seen.colour == colour for _, view in self._views for seen in view.frames):
+            return f"{colour} was never on the map"
+        return words
+
+
+def _outside(flown: Flown) -> str:
+    """Where the drone first left the arena."""
+    if not flown.report.outside_s:
+        return ""
+    track, boundary = flown.track, Boundary(flown.layout.arena)
+    left_s = next(
+        (
+            time_s
+            for time_s, *place_m in zip(track.time_s, track.x, track.y, track.z, strict=True)
+            if boundary.margin((place_m[0], place_m[1], place_m[2])) < 0.0
+        ),
+        None,
+    )
+    where = "" if left_s is None else f", first {_at(track, left_s)}"
+    return f"outside the arena for {flown.report.outside_s:.2f} s{where}"
+
+
+def _wrong_order(flown: Flown) -> str:
+    """The first frame that was crossed too early."""
+    report = flown.report
+    order = [colour for colour in COLOURS if any(frame.colour == colour for frame in flown.layout.frames)]
+    for wanted, colour, time_s in zip(order, report.frames_crossed, report.crossing_times_s, strict=False):
+        if colour != wanted:
+            return f"crossed {colour} before {wanted} {_at(flown.track, time_s)}"
+    return ""
+
+
+def _end(flown: Flown) -> str:
+    """How the mission ended, and where."""
+    end, track = flown.end, flown.track
+    if end.ended == "aborted":
+        return " ".join(end.reason.split())
+    if not len(track):
+        return end.reason
+    state, last_s = track.mission_state[-1], track.time_s[-1]
+    index = len(track) - 1
+    while index > 0 and track.mission_state[index - 1] == state:
+        index -= 1
+    if end.ended == "timed out":
+        return f"in {state} for the last {last_s - track.time_s[index]:.0f} s"
+    return f"the mission ended {_at(track, last_s)}"
+
+
+def _at(track: Track, time_s: float) -> str:
+    """When, in which state and where."""
+    words = f"at {time_s:.1f} s"
+    if not len(track):
+        return words
+    index = min(max(bisect_right(track.time_s, time_s) - 1, 0), len(track) - 1)
+    state = f" in {track.mission_state[index]}" if track.mission_state[index] else ""
+    x, y, z = track.x[index], track.y[index], track.z[index]
+    return f"{words}{state} at ({x:.2f}, {y:.2f}, {z:.2f})"

@@ -1,0 +1,109 @@
+"""The cause of a flight that was not clean: what happened, when, where, and what the navigator knew."""
+
+import pytest
+
+from framerunner.flying.cause import CauseWatch, Flown
+from framerunner.flying.lockstep import fly_lockstep
+from framerunner.flying.plan import FlightPlan
+from framerunner.runs.track import Track
+from offboard.app import MissionEnd, Moment
+from offboard.drone import DroneState, VelocityCommand
+from offboard.mission import load_mission
+from offboard.navigation.frame_estimate import FrameEstimate
+from offboard.navigation.view import NavigationView
+from scenarios.loader import load_scenario
+from scenarios.result import RefereeReport
+from tests.framerunner.evaluation.flights import short_scenario
+from vision.types import Detections
+
+LAYOUT = load_scenario("test-case-1")  # red at (3, 2, 2) with yaw 3
+RED = FrameEstimate("red", (3.03, 2.0, 2.04), 3.1 - 3.14159, (0.1, 0.1, 0.1), 0.1, False, True, 9, 0)
+TRACK = Track(
+    [0.0, 10.0, 20.0, 30.0],
+    [-3.0, 3.0, 5.5, 0.0],
+    [-3.0, 2.0, 0.0, 0.0],
+    [0.5, 2.0, 2.0, 1.0],
+    ["take_off", "red.crossing", "red.crossing", "green.search"],
+)
+BEGAN_US = 1_000_000
+
+
+def words(report, ended="finished", reason="", views=()):
+    watch = CauseWatch()
+    for time_s, view in views:
+        state = DroneState(BEGAN_US + round(time_s * 1e6), 0.0, 0.0, 0.0, 0.0)
+        watch.see(Moment(state, VelocityCommand(), Detections(), "", 1.0, navigation=view))
+    end = MissionEnd(ended, reason, "green.search", 30.0, 600)
+    return watch.words(Flown(LAYOUT, RefereeReport(**report), end, TRACK, BEGAN_US))
+
+
+def touched(*names, **values):
+    times_s = tuple(10.0 + number for number in range(len(names)))
+    facts = {"contacts": len(names), "contact_frames": names, "contact_times_s": times_s}
+    return {"verdict": "completed", **facts, **values}
+
+
+@pytest.mark.parametrize(
+    ("report", "ended", "views", "expected"),
+    [
+        ({"verdict": "clean"}, "finished", (), ""),
+        (touched("pole"), "finished", (), "touched pole at 10.0 s in red.crossing at (3.00, 2.00, 2.00)"),
+        (
+            touched("red", "wall", "wall"),
+            "finished",
+            [(5.0, NavigationView((RED,))), (15.0, NavigationView())],
+            "touched red at 10.0 s in red.crossing at (3.00, 2.00, 2.00), which the map had 5.0 cm and "
+            "5.7° off, then 2 more contacts",
+        ),
+        (
+            touched("red"),
+            "finished",
+            [(5.0, NavigationView())],
+            "touched red at 10.0 s in red.crossing at (3.00, 2.00, 2.00), which was not on the map",
+        ),
+        (
+            {"verdict": "completed", "outside_s": 1.5},
+            "finished",
+            (),
+            "outside the arena for 1.50 s, first at 20.0 s in red.crossing at (5.50, 0.00, 2.00)",
+        ),
+        (
+            {"verdict": "wrong order", "frames_crossed": ("red", "blue"), "crossing_times_s": (9.0, 20.0)},
+            "finished",
+            (),
+            "crossed blue before green at 20.0 s in red.crossing at (5.50, 0.00, 2.00)",
+        ),
+        (
+            {"verdict": "timed out", "frames_crossed": ("red",), "crossing_times_s": (9.0,)},
+            "timed out",
+            [(5.0, NavigationView((RED,)))],
+            "in green.search for the last 0 s; green was never on the map",
+        ),
+        (
+            {"verdict": "timed out"},
+            "timed out",
+            [
+                (5.0, NavigationView((RED,), trouble="red: lost from the map")),
+                (6.0, NavigationView((RED,))),
+                (7.0, NavigationView((RED,), trouble="red: no path: obstacles block the way")),
+            ],
+            "in green.search for the last 0 s; last trouble of the navigator: red: no path: obstacles block "
+            "the way (2 times in trouble)",
+        ),
+        ({"verdict": "aborted"}, "aborted", (), "the camera is lost"),
+        (
+            {"verdict": "crashed", "try_time_s": 20.0},
+            "aborted",
+            (),
+            "crashed at 20.0 s in red.crossing at (5.50, 0.00, 2.00)",
+        ),
+    ],
+)
+def test_the_cause_is_one_line(report, ended, views, expected):
+    assert words(report, ended, "the camera is lost" if ended == "aborted" else "", views) == expected
+
+
+def test_a_result_says_why_it_was_not_clean():
+    flown = fly_lockstep(FlightPlan(short_scenario(1, 3.0), load_mission("explorer")))
+    assert flown.result.cause.startswith("in ")
+    assert "was never on the map" in flown.result.cause or "for the last" in flown.result.cause

@@ -1,0 +1,40 @@
+"""Why an attempt to cross a frame is given up."""
+
+from offboard.navigation.crossing_attempt import CrossingAttempt
+from offboard.navigation.frame_estimate import FrameEstimate
+from offboard.navigation.goals import Gate
+from offboard.navigation.path import Crossing
+
+OPENING_M = (0.38, 0.18)
+UNSURE = FrameEstimate("red", (2.0, 0.0, 1.0), 0.0, (0.1, 0.1, 0.1), 0.1, False, False, 3, 0)
+
+
+def attempt():
+    return CrossingAttempt("red", 0.0, 0.0, 0.0)
+
+
+def test_each_reason_is_said():
+    lost = attempt()
+    lost.lose(1.0)
+    assert lost.refusal == ""
+    lost.lose(2.0)
+    assert lost.refusal == "lost from the map"
+    blocked = attempt()
+    blocked.fly(no_path="obstacles block the way to gate 1", now_s=3.0)
+    assert blocked.refusal == "no path: obstacles block the way to gate 1"
+    unsure = attempt()
+    for now_s in (0.0, 5.0):
+        assert unsure.must_look(UNSURE, (1.0, 0.0, 1.0), now_s)
+    assert unsure.refusal == "still not certain after 4 s before it"
+    slow = attempt()
+    slow.move((0.0, 0.0, 1.0), OPENING_M, 26.0)
+    assert slow.refusal == "not through it within 25 s"
+
+
+def test_a_miss_is_refused_and_a_passage_is_not():
+    for left_m, refusal in ((0.3, "passed its plane 0.30 m from its centre"), (0.05, "")):
+        crossing = attempt()
+        crossing.aim(Crossing(Gate((2.0, 0.0, 1.0), 0.0), 0.0, 1.0, 1.5))
+        for x_m in (1.9, 2.1):
+            crossing.move((x_m, left_m, 1.0), OPENING_M, 1.0)
+        assert (crossing.refusal, crossing.passed) == (refusal, not refusal)
