@@ -195,7 +195,8 @@ def _balance(lines: BarLines, focal_px: float) -> None:
         a, b = lines[one], lines[other]
         if a is None or b is None or a.steep != b.steep:
             continue
-        apart_px = abs(a.at - b.at)
+        between = 0.5 * (a.along - b.along)
+        apart_px = abs(a.at - b.at - (a.slope + b.slope) * between)
         long_px = max(a.last - a.first, b.last - b.first) + 2.0
         # The frame's ends differ in depth by no more than its width (height for the upright bars), and its
         # distance is to the focal length as its size to its image.

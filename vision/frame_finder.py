@@ -35,7 +35,6 @@ PAINTED_SPREAD_PX = 0.5
 _OBSTACLE_STEP = 8
 _MIN_RUN_PX = 3
 _STEEP = 2  # rows a column: steeper edges are the sides of obstacles, which are upright
-_CLEARLY = 0.5
 _MIN_FRAGMENT_PX = 3
 _MAX_FRAGMENTS = 12
 
@@ -128,16 +127,13 @@ class FrameFinder:
         fits = (fit_frame(patch, sides, self._focal_px, self._spread_px) for sides in candidates)
         best: FittedFrame | None = None
         for fitted in fits:
-            if best is None or (fitted is not None and _fits_better(fitted, best)):
+            if fitted is not None and (
+                best is None or (fitted.whole, -fitted.cost) > (best.whole, -best.cost)
+            ):
                 best = fitted
-        return None if best is None else (box, FrameSighting(mask.colour, *best))
-
-
-def _fits_better(one: FittedFrame, other: FittedFrame) -> bool:
-    """Whether a frame is clearly the better one of two that the same region could be."""
-    if one.whole != other.whole or not one.poses or not other.poses:
-        return one.whole > other.whole
-    return one.poses[0].error_px < _CLEARLY * other.poses[0].error_px
+        return (
+            None if best is None else (box, FrameSighting(mask.colour, best.corners, best.whole, best.poses))
+        )
 
 
 def _bounding_box(points: _Contour) -> _Box:
@@ -154,8 +150,10 @@ def _groups(mask: ColourMask, others: Sequence[ColourMask]) -> list[list[_Contou
     )
     outer = [c for c, links in zip(contours, hierarchy[0], strict=True) if links[3] < 0]
     if len(outer) > 1:
-        outer = [c for c in outer if max(_bounding_box(c)[2:]) >= _MIN_FRAGMENT_PX]
-        outer = sorted(outer, key=lambda c: -max(_bounding_box(c)[2:]))[:_MAX_FRAGMENTS]
+        outer = sorted(outer, key=len, reverse=True)[: 2 * _MAX_FRAGMENTS]  # noise has thousands
+        sizes = [max(_bounding_box(c)[2:]) for c in outer]
+        large = [(size, c) for size, c in zip(sizes, outer, strict=True) if size >= _MIN_FRAGMENT_PX]
+        outer = [c for _, c in sorted(large, key=lambda one: -one[0])[:_MAX_FRAGMENTS]]
     if len(outer) < 2:
         return [[c] for c in outer]
     # Parts of one frame are joined by what hides the rest of it, or are so near that noise parted them.

@@ -8,7 +8,7 @@ bars' axes there must be nothing but pixels of the region and what may hide it.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from math import hypot, sqrt
+from math import acos, hypot, inf, sqrt
 from typing import NamedTuple
 
 import numpy as np
@@ -28,6 +28,8 @@ _MAX_OWN_UNSEEN = 0.4  # share of a bar that seems to be seen although it was no
 _WHOLE = 0.9  # share of a bar that is seen if nothing hides it; shaded and thin bars may have gaps
 _MAX_CORNER_STD_PX = 2.5
 _EDGE_ON, _OBLIQUE = 0.13, 0.23  # cosines: the bars of a frame that is seen edge-on hide one another
+_LEAST_ERROR_PX = 0.4  # may be between the corners of a pose and of the lines, besides two deviations
+_TILT_RAD = 0.2  # standard deviation of the camera's tilt, to tell which sides are upright
 _ROUGH = 2.5  # before the bars' edges are corrected by a pose, errors may be larger by this factor
 _CLEAR_OPEN, _THIN_PX = 0.7, 3.0
 _CLEAR_PX = 4.5  # a side that is shorter may be a part of a longer one
@@ -36,11 +38,16 @@ _WIDTH_SHARE, _WIDTH_SHARE_STD = 0.75, 0.15  # of half a bar's image that is hal
 
 
 class FittedFrame(NamedTuple):
-    """What `vision.types.FrameSighting` tells, without the colour."""
+    """What `vision.types.FrameSighting` tells, without the colour; and how likely it is.
+
+    The cost is the sum of squares, in standard deviations, of the corners' distances from the better pose's
+    and of the camera's tilt if that is the pose.
+    """
 
     corners: Corners
     whole: bool
     poses: tuple[FramePose, ...]
+    cost: float
 
 
 def fit_frame(patch: Patch, sides: Sides, focal_px: float, spread_px: float) -> FittedFrame | None:
@@ -77,7 +84,7 @@ def _fit_any(patch: Patch, sides: Sides, focal_px: float, spread_px: float) -> F
                 return None
             whole = min(support.own) >= _WHOLE
             corners = _outer_corners(meetings, poses[0], focal_px, whole) if poses else None
-            return None if corners is None else FittedFrame(corners, whole, tuple(map(as_seen, poses)))
+            return None if corners is None else _fitted(corners, whole, poses, meetings)
         a, b, c, d = (
             side if empty <= _MAX_EMPTY else None for side, empty in zip(sides, support.empty, strict=True)
         )
@@ -87,7 +94,16 @@ def _fit_any(patch: Patch, sides: Sides, focal_px: float, spread_px: float) -> F
         if not patch.may_be_cut:
             return None  # nothing explains why no more is seen of it
         corners = _corners_without_pose(patch, lines, spread_px)
-    return FittedFrame(corners, False, tuple(map(as_seen, poses))) if any(corners) else None
+    return _fitted(corners, False, poses, meetings) if any(corners) else None
+
+
+def _fitted(corners: Corners, whole: bool, poses: list[ModelPose], meetings: _Meetings) -> FittedFrame:
+    deviation_px = 0.5 * (_max_error_px(meetings) - _LEAST_ERROR_PX)
+    costs = [
+        (pose.error_px / max(deviation_px, 0.1)) ** 2 + (acos(min(1.0, pose.rotation[1, 1])) / _TILT_RAD) ** 2
+        for pose in poses
+    ]
+    return FittedFrame(corners, whole, tuple(map(as_seen, poses)), min(costs, default=inf))
 
 
 def _fit(
@@ -123,7 +139,7 @@ def _explaining(poses: list[ModelPose], meetings: _Meetings) -> list[ModelPose]:
 
 def _max_error_px(meetings: _Meetings) -> float:
     mean_square = sum(met.std_x**2 + met.std_y**2 for met in meetings if met is not None) / 4.0
-    return 0.4 + 2.0 * sqrt(mean_square)
+    return _LEAST_ERROR_PX + 2.0 * sqrt(mean_square)
 
 
 def _wider(edges: BarEdges, offsets: Floats) -> Widths | None:
