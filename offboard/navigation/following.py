@@ -28,6 +28,11 @@ MAX_CORRECTION_M_S = 0.6
 WAIT_FROM_M = 0.1  # farther from the path, its time goes slower
 WAIT_ASIDE_M = 0.05  # or aside from it
 WAIT_M = 0.25  # beyond that, it stands still
+GATE_NEAR_S = 2.0  # before a gate; then a drone that answers late must be straight before it
+GATE_TOO_NEAR_S = 0.5  # then it cannot stop any more
+GATE_FROM_M = 0.03  # farther off, the path's time goes slower
+GATE_WAIT_M = 0.06  # beyond that, it stands still
+GATE_TURN_M = 0.15  # by which a turn counts, for each radian
 _MAX_STEP_S = 0.3
 _HISTORY = 16  # ticks
 _RATE_S = 0.05  # over which the acceleration of the heading is measured
@@ -101,6 +106,7 @@ class PathFollower:
         self.error_m = hypot(*error)
         self._rate = _rate_of(error, motion.velocity_m_s)
         if prediction is not None:
+            self._rate = min(self._rate, self._rate_before_gate(path, state, prediction))
             return self._command_ahead(path, state, prediction)
         self._integrate(error, step_s)
         correction = [
@@ -140,6 +146,26 @@ class PathFollower:
         turn += gain * remainder(ahead.yaw_rad - state.yaw - prediction.turned_rad, 2 * pi)
         turn += damping * (wanted - prediction.yaw_rate_rad_s)
         return self._limited(forward, left, up, turn)
+
+    def _rate_before_gate(self, path: Path, state: DroneState, prediction: Prediction) -> float:
+        """How fast the path's time goes: a drone that is not straight before a gate waits until it is."""
+        for crossing in path.crossings:
+            left_s = crossing.time_s - self.progress_s
+            if GATE_TOO_NEAR_S < left_s < GATE_NEAR_S:
+                break
+        else:
+            return 1.0
+        ahead = path.at(self.progress_s + self._rate * self.response.level_dead_s)
+        x, y, z = (
+            to - at - moved
+            for to, at, moved in zip(
+                ahead.position_m, (state.x, state.y, state.z), prediction.moved_m, strict=True
+            )
+        )
+        c, s = cos(crossing.heading_rad), sin(crossing.heading_rad)
+        turn = remainder(ahead.yaw_rad - state.yaw - prediction.turned_rad, 2 * pi)
+        off_m = hypot(c * y - s * x, z) + GATE_TURN_M * abs(turn)
+        return max(1.0 - max(off_m - GATE_FROM_M, 0.0) / GATE_WAIT_M, 0.0)
 
     def _level(self, path: Path, state: DroneState, add_x: float, add_y: float) -> tuple[float, float]:
         """Speeds forward and to the left: the path's, ahead of time, and a correction in arena axes."""

@@ -95,3 +95,12 @@ def test_a_late_flight_repeats_differs_by_seed_and_says_what_it_was():
     assert hashes[3] == hashes[4] == hashes[5] not in hashes[:3]
     assert results[0].response == "lag=0.3,dead-time=0.1,height-wander=0.05"
     assert results[3].response == ""
+
+
+def test_explorer_learns_how_late_the_vehicle_answers_and_stays_clean():
+    response = Response(0.6, 0.15, 0.05)
+    result = fly_lockstep(
+        FlightPlan(load_scenario("calm-5004"), load_mission("explorer"), 5004, response=response)
+    ).result
+    assert result.verdict == "clean"
+    assert max(result.crossing_offsets_m) < 0.05
