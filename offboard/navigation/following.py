@@ -34,6 +34,7 @@ GATE_FROM_M = 0.03  # farther off, the path's time goes slower
 GATE_WAIT_M = 0.06  # beyond that, it stands still
 GATE_TURN_M = 0.15  # by which a turn counts, for each radian
 _MAX_STEP_S = 0.3
+_MOVING_M_S = 0.2
 _HISTORY = 16  # ticks
 _RATE_S = 0.05  # over which the acceleration of the heading is measured
 
@@ -78,6 +79,10 @@ class PathFollower:
         rate = motion.yaw_rate_rad_s * self._rate
         return Motion(motion.position_m, velocity, motion.yaw_rad, rate, acceleration)
 
+    def progress_on(self, path: Path) -> float:
+        """The time along a path; 0 on one that no command was given for yet."""
+        return self.progress_s if path is self._path else 0.0
+
     @property
     def finished(self) -> bool:
         """The path's end is reached, by its time."""
@@ -108,7 +113,7 @@ class PathFollower:
         if prediction is not None:
             self._rate = min(self._rate, self._rate_before_gate(path, state, prediction))
             return self._command_ahead(path, state, prediction)
-        self._integrate(error, step_s)
+        self._integrate(error, motion.velocity_m_s, step_s)
         correction = [
             POSITION_GAIN_PER_S * e + VELOCITY_GAIN * v + i
             for e, v, i in zip(error, slower, self._integral, strict=True)
@@ -204,11 +209,19 @@ class PathFollower:
             later_s, later = before_s, before
         return _minus(position, (state.x, state.y, state.z)), _minus(velocity, state.velocity_arena_m_s)
 
-    def _integrate(self, error: Vec3, step_s: float) -> None:
+    def _integrate(self, error: Vec3, velocity_m_s: Vec3, step_s: float) -> None:
+        """Add up the error, but along the path only what its time waits for.
+
+        A lag or lead of the drone itself is along the path: added up, it would push aside after a turn.
+        """
         if self.error_m > INTEGRAL_REACH_M:
             return
+        speed = hypot(*velocity_m_s)
+        along_m = sum(e * v for e, v in zip(error, velocity_m_s, strict=True)) / max(speed, 1e-6)
+        excused_m = min(max(along_m, -WAIT_FROM_M), WAIT_FROM_M) if speed > _MOVING_M_S else 0.0
         for axis in range(3):
-            value = self._integral[axis] + INTEGRAL_GAIN_PER_S2 * error[axis] * step_s
+            counted_m = error[axis] - excused_m * velocity_m_s[axis] / max(speed, 1e-6)
+            value = self._integral[axis] + INTEGRAL_GAIN_PER_S2 * counted_m * step_s
             self._integral[axis] = min(max(value, -MAX_INTEGRAL_M_S), MAX_INTEGRAL_M_S)
 
     def _yaw_rate(self, path: Path, state: DroneState) -> float:

@@ -147,7 +147,8 @@ class Navigator:
             return self._fly(_place_before(estimate, state, LOOK_AGAIN_M))
         command = self._fly(Gate(estimate.position_m, estimate.yaw_rad), *self._goals_after(colour))
         path = self._flight.path
-        no_path = "" if path is not None else self._flight.refusal or "none was planned"
+        goes_on = path is not None or self._flight.watched is not None
+        no_path = "" if goes_on else self._flight.refusal or "none was planned"
         crossing.fly(no_path=no_path, now_s=now_s)
         if path is not None and path.crossings:
             crossing.aim(path.crossings[0])
@@ -170,7 +171,7 @@ class Navigator:
 
     def _fly(self, *goals: Goal) -> VelocityCommand:
         assert self._state is not None, "observe() comes before any action"
-        return self._flight.fly(goals, self._world.obstacles(), self._state)
+        return self._flight.fly(goals, self._world.obstacles(), self._state, self._world.seen_space)
 
     def _goals_after(self, colour: str) -> list[Goal]:
         """The next frame, if it is on the map; after the last one, the start."""

@@ -49,9 +49,7 @@ class ObstacleMap:
 
     def __init__(self, camera: CameraModel, arena: Arena) -> None:
         self._camera = camera
-        self._cell_m = max(CELL_M, arena.length_x_m / _MOST_CELLS, arena.width_y_m / _MOST_CELLS)
-        self.x_m = _centres(arena.length_x_m, self._cell_m)
-        self.y_m = _centres(arena.width_y_m, self._cell_m)
+        self._cell_m, self.x_m, self.y_m = floor_cells(arena)
         self.changes = 0
         self._log_odds = np.zeros((self.x_m.size, self.y_m.size))
         self._occupied = np.zeros(self._log_odds.shape, dtype=bool)
@@ -148,6 +146,12 @@ class ObstacleMap:
             radius_m = hypot(high[0] - low[0] + 1, high[1] - low[1] + 1) * self._cell_m / 2
             discs.append((x_m, y_m, radius_m))
         return tuple(discs)
+
+
+def floor_cells(arena: Arena) -> tuple[float, Doubles, Doubles]:
+    """The size of the floor's cells, and their centres along x and y, metres."""
+    cell_m = max(CELL_M, arena.length_x_m / _MOST_CELLS, arena.width_y_m / _MOST_CELLS)
+    return cell_m, _centres(arena.length_x_m, cell_m), _centres(arena.width_y_m, cell_m)
 
 
 def _centres(length_m: float, cell_m: float) -> Doubles:

@@ -1,16 +1,21 @@
-"""Flies to goals: plans a path, plans again when the map has changed, and follows it."""
+"""Flies to goals: plans a path, plans again when the map has changed, and follows it.
+
+What stands in the way, or may stand where nothing has been seen yet, stops the drone: it turns to look there,
+and goes on when the way is free.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from math import dist, pi, remainder
+from math import atan2, dist, pi, remainder
 
 from geometry.vectors import Vec3
 from offboard.drone import DroneState, VelocityCommand
 from offboard.navigation.following import PathFollower
 from offboard.navigation.goals import FlightStyle, Gate, Goal, Motion, Obstacles, Refusal
 from offboard.navigation.path import Path
-from offboard.navigation.planning import plan
+from offboard.navigation.planning import obstructed, plan
+from offboard.navigation.seen_space import SeenSpace
 from offboard.response import ResponseEstimate
 from scenarios.models import Arena
 
@@ -21,6 +26,13 @@ MAX_REFUSALS = 3  # in a row, until the drone stops
 SAME_M = 0.004  # between two estimates of the frame that is crossed, for which the path stays as it is
 NEARLY_SAME_M = 0.04  # likewise of the other frames
 SAME_RAD_M = 1.0  # likewise of headings, for each metre
+AHEAD_S = 0.7  # of the path that must be free, beside the vehicle's lag: it is long enough to stop
+AHEAD_STEP_S = 0.1
+WAITING_REPLAN_S = 0.2  # between two attempts to go on
+MAX_LOOK_S = 0.6  # at a place; if it is not seen then, something stands there
+LOOKED_AT_RAD = 0.3
+LOOK_GAIN_PER_S = 2.0
+LOOK_RAD_S = 0.9
 
 
 class PathFlight:
@@ -29,11 +41,13 @@ class PathFlight:
     Attributes:
         path: the one that is flown; None while the drone stands still.
         refusal: why the last planning found none; empty if it did.
+        watched: the place that stopped the drone, which now looks there; None if none did.
     """
 
     def __init__(self, arena: Arena, style: FlightStyle) -> None:
         self.path: Path | None = None
         self.refusal = ""
+        self.watched: Vec3 | None = None
         self._arena = arena
         self._style = self._usual_style = style
         self._follower = PathFollower()
@@ -41,6 +55,7 @@ class PathFlight:
         self._planned_for: tuple[tuple[Goal, ...], Obstacles] | None = None
         self._tried_s = -REPLAN_S
         self._refusals = 0
+        self._watched_s = 0.0  # when the drone began to look there
 
     def learn(self, state: DroneState, sent: VelocityCommand | None) -> None:
         """How late the vehicle answers, from the command that it had since the last tick; call every tick."""
@@ -53,7 +68,7 @@ class PathFlight:
 
     def stop(self) -> None:
         """Leave the path."""
-        self.path = None
+        self.path = self.watched = None
         self.change()
 
     def change(self) -> None:
@@ -61,15 +76,36 @@ class PathFlight:
         self._planned_for = None
         self._tried_s = -REPLAN_S
 
-    def fly(self, goals: Sequence[Goal], obstacles: Obstacles, state: DroneState) -> VelocityCommand:
+    def fly(
+        self, goals: Sequence[Goal], obstacles: Obstacles, state: DroneState, seen: SeenSpace
+    ) -> VelocityCommand:
         """Plan again if that is due and goals or obstacles have changed; the command for this tick."""
         now_s = state.time_us * 1e-6
-        if now_s - self._tried_s >= REPLAN_S:
+        if self.watched is not None and not seen.is_seen(self.watched):
+            turn_rad = _turn_to(self.watched, state)
+            if abs(turn_rad) > LOOKED_AT_RAD:
+                self._watched_s = now_s
+            if now_s - self._watched_s < MAX_LOOK_S:
+                return _look(turn_rad)
+            seen.suspect(self.watched)
+        self.watched = None
+        if now_s - self._tried_s >= (REPLAN_S if self.path is not None else WAITING_REPLAN_S):
             planned_for = (tuple(goals), obstacles)
             off = self._follower.error_m > RESTART_M
             if self.path is None or off or _differ(planned_for, self._planned_for):
                 self._tried_s = now_s
                 self._plan(goals, obstacles, state)
+        ahead = self._ahead()
+        if ahead and self._is_obstructed(ahead, obstacles):
+            self._plan(goals, obstacles, state)
+            ahead = self._ahead()
+            if self._is_obstructed(ahead, obstacles):
+                self.path = None
+        if self.path is not None:
+            self.watched = seen.first_unseen(ahead, position_now(state))
+            if self.watched is not None:
+                self.path, self._watched_s = None, now_s
+                return _look(_turn_to(self.watched, state))
         return self.follow(state)
 
     def follow(self, state: DroneState) -> VelocityCommand:
@@ -95,6 +131,22 @@ class PathFlight:
         self.path, self.refusal, self._refusals = found, "", 0
         self._planned_for = (tuple(goals), obstacles)
 
+    def _ahead(self) -> list[Vec3]:
+        """Where the drone will be on its path soon."""
+        path = self.path
+        if path is None:
+            return []
+        now_s = self._follower.progress_on(path)
+        steps = round((AHEAD_S + self._style.lag_s) / AHEAD_STEP_S)
+        return [path.at(now_s + step * AHEAD_STEP_S).position_m for step in range(steps + 1)]
+
+    def _is_obstructed(self, places_m: list[Vec3], obstacles: Obstacles) -> bool:
+        """Whether an obstacle is where the drone will be; the frames it flies through are none."""
+        if self.path is None:
+            return False
+        gates = [crossing.gate for crossing in self.path.crossings]
+        return obstructed(places_m, gates, obstacles=obstacles, arena=self._arena, style=self._style)
+
     def _find(self, start: Motion, goals: Sequence[Goal], obstacles: Obstacles) -> Path | Refusal:
         arena, style = self._arena, self._style
         return plan(start, goals, obstacles=obstacles, arena=arena, style=style, previous=self.path)
@@ -105,6 +157,16 @@ def position_now(state: DroneState) -> Vec3:
     vx, vy, vz = state.velocity_arena_m_s
     age_s = state.position_age_s
     return (state.x + vx * age_s, state.y + vy * age_s, state.z + vz * age_s)
+
+
+def _turn_to(place_m: Vec3, state: DroneState) -> float:
+    """The turn to the left that makes the drone look at a place, radians."""
+    return remainder(atan2(place_m[1] - state.y, place_m[0] - state.x) - state.yaw, 2 * pi)
+
+
+def _look(turn_rad: float) -> VelocityCommand:
+    """Stop, and turn."""
+    return VelocityCommand(yaw_rate_rad_s=min(max(LOOK_GAIN_PER_S * turn_rad, -LOOK_RAD_S), LOOK_RAD_S))
 
 
 def _differ(a: tuple[Sequence[Goal], Obstacles], b: tuple[Sequence[Goal], Obstacles] | None) -> bool:

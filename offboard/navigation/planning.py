@@ -8,14 +8,16 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import replace
 from itertools import pairwise
+from math import dist
 
 import numpy as np
 
+from geometry.vectors import Vec3
 from offboard.navigation.goals import FlightStyle, Gate, Goal, Motion, Obstacles, Refusal
 from offboard.navigation.path import Path
-from offboard.navigation.planner.clearance import Clearance
+from offboard.navigation.planner.clearance import SAME_FRAME_M, Clearance
 from offboard.navigation.planner.connect import Connector
-from offboard.navigation.planner.detours import LegFinder
+from offboard.navigation.planner.detours import LegFinder, open_ended
 from offboard.navigation.planner.legs import Leg
 from offboard.navigation.planner.route import BLOCKED_S, Pass, RouteFinder, place
 from offboard.navigation.planner.timing import Stretch, headings, run_in, sample, slowed
@@ -24,6 +26,7 @@ from scenarios.models import Arena
 LIFT_OFF_M_S = 0.5  # when the base is left below
 LIFT_OFF_SPARE_M = 0.02
 STOPPING_M = 0.5  # behind a last gate the drone stops in this distance
+USED_MARGIN_M = 0.05  # of the margin to obstacles, while a path is flown
 MAX_ROUTES = 6  # for which legs are sought
 SLOWER_S = 0.3  # legs slower than expected by this make another route worth a look
 
@@ -70,6 +73,33 @@ def plan(
     samples = sample(stretches, start, style)
     yaw, yaw_rate = headings(samples, stretches, start, style)
     return slowed(samples, yaw, yaw_rate, stretches, style)
+
+
+def obstructed(
+    places_m: Sequence[Vec3], gates: Sequence[Gate], *, obstacles: Obstacles, arena: Arena, style: FlightStyle
+) -> bool:
+    """Whether obstacles are in the way of a path that was planned without them, or before they moved.
+
+    What the first place is in does not count where later ones are no deeper, and the base never does.
+
+    Args:
+        places_m: on the path, from the drone on.
+        gates: the frames that the path leads through.
+        obstacles: as they are known now.
+        arena: as for `plan`.
+        style: as for `plan`; of its margin a part may be used up.
+    """
+    others = tuple(
+        frame
+        for frame in obstacles.frames
+        if all(dist(frame.centre_m, gate.centre_m) >= SAME_FRAME_M for gate in gates)
+    )
+    if not others and not obstacles.columns_m:
+        return False
+    nearer = replace(style, bar_margin_m=style.bar_margin_m - USED_MARGIN_M)
+    clearance = Clearance(replace(obstacles, frames=others, base=None), arena, nearer)
+    depths = clearance.depths(np.array(places_m))[:, :-1]
+    return bool((open_ended(depths[None], ends=False) > 0.0).any())
 
 
 def _fastest(finder: RouteFinder, leg_finder: LegFinder, clearance: Clearance) -> tuple[list[Pass], _Legs]:

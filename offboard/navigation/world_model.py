@@ -15,6 +15,7 @@ from offboard.navigation.goals import Gate, Obstacles
 from offboard.navigation.obstacle_map import ObstacleMap
 from offboard.navigation.pose_history import DronePose, PoseHistory
 from offboard.navigation.search.glimpses import Glimpses
+from offboard.navigation.seen_space import SeenSpace
 from offboard.navigation.surroundings import Surroundings
 from scenarios.models import COLOURS
 from vision.types import Detections
@@ -23,7 +24,11 @@ IMAGES_WAITING = 32  # for the drone's pose when they were exposed
 
 
 class WorldModel:
-    """Everything seen so far, in arena axes. Images are used at the drone's pose when they were exposed."""
+    """Everything seen so far, in arena axes. Images are used at the drone's pose when they were exposed.
+
+    Attributes:
+        seen_space: where nothing stands.
+    """
 
     def __init__(self, surroundings: Surroundings) -> None:
         camera = CameraModel.of(surroundings.camera)
@@ -31,6 +36,7 @@ class WorldModel:
         self._history = PoseHistory()
         self._map = FrameMap(camera, surroundings.arena)
         self._obstacle_map = ObstacleMap(camera, surroundings.arena)
+        self.seen_space = SeenSpace(camera, surroundings.arena)
         self._glimpses = Glimpses(camera)
         self._explorer = Explorer(camera, surroundings.arena)
         self._image_us = -1
@@ -60,6 +66,7 @@ class WorldModel:
         where = (pose.position_m, pose.attitude_arena)
         self._map.observe(image, pose)
         self._obstacle_map.update(*where, image.obstacle_edges)
+        self.seen_space.update(*where, image.obstacle_edges, self._obstacle_map.columns_m())
         self._explorer.update(*where, image.obstacle_edges)
         known = [colour for colour in COLOURS if self._map.best(colour) is not None]
         self._glimpses.update(*where, image, known)
@@ -78,7 +85,7 @@ class WorldModel:
         seen = [frame for frame in self._map.frames() if frame.colour not in COLOURS]
         seen += [best for best in map(self._map.best, COLOURS) if best is not None]
         frames = tuple(Gate(frame.position_m, frame.yaw_rad) for frame in seen)
-        return Obstacles(frames, self._obstacle_map.columns_m(), self._surroundings.base)
+        return Obstacles(frames, self._columns_m(), self._surroundings.base)
 
     def next_viewpoint(self, position_m: Vec3, yaw_rad: float) -> Viewpoint:
         """Where to look next for frames that are not on the map."""
@@ -87,5 +94,8 @@ class WorldModel:
             yaw_rad,
             [frame.position_m for frame in self._map.frames()],
             self._glimpses.lines(),
-            self._obstacle_map.columns_m(),
+            self._columns_m(),
         )
+
+    def _columns_m(self) -> tuple[Vec3, ...]:
+        return self._obstacle_map.columns_m() + self.seen_space.suspects_m

@@ -170,14 +170,17 @@ def _turned(before: Pass, after: Pass, share: float) -> float:
     return yaw + share * remainder(after.yaw_rad - yaw, 2 * pi)
 
 
-def open_ended(depths: Array) -> Array:
+def open_ended(depths: Array, *, ends: bool = True) -> Array:
     """Depths of legs' points in obstacles; what they start or end in counts only where they go deeper.
 
     Args:
         depths: shape (legs, points, obstacles); not above zero where a point is clear.
+        ends: what they end in does not count, either.
     """
     inside = depths > 0.0
     leaving = np.logical_and.accumulate(inside, axis=1) & (depths <= depths[:, :1] + _DEEPER_M)
+    if not ends:
+        return np.where(leaving, -1.0, depths)
     entering = np.logical_and.accumulate(inside[:, ::-1], axis=1)[:, ::-1]
     entering &= depths <= depths[:, -1:] + _DEEPER_M
     kept: Array = np.where(leaving | entering, -1.0, depths)

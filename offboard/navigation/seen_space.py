@@ -1,0 +1,175 @@
+"""Which parts of the arena, in plan, were seen to be free: a drone that knows obstacles flies only there."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from math import hypot, remainder, tau
+from typing import Final
+
+import numpy as np
+import numpy.typing as npt
+
+from geometry.rotations import yaw_of
+from geometry.vectors import Quaternion, Vec3
+from offboard.navigation.camera_model import CameraModel, CameraPose
+from offboard.navigation.obstacle_map import floor_cells
+from offboard.navigation.search.floor_points import COLUMN_PX, FloorPoints
+from scenarios.models import Arena
+from vision.types import ObstacleEdge
+
+Bools = npt.NDArray[np.bool_]
+Doubles = npt.NDArray[np.float64]
+
+OWN_RADIUS_M: Final = 0.25  # where the drone is, there is nothing else
+ROOM_M: Final = 0.2  # beside the drone's centre, that must have been seen
+SUSPECT_RADIUS_M: Final = 0.2
+_FARTHEST_M: Final = 6.0  # an obstacle farther away may be too small to be seen
+_MARGIN_M: Final = 0.1  # before an obstacle, beside twice its error
+_EDGE_PX: Final = 4.0  # at the image's sides
+_NEAREST_M: Final = 0.05  # before the camera
+_MOVED_M: Final = 0.05  # an image from a pose nearer than this and _TURNED_RAD to the last one is skipped
+_TURNED_RAD: Final = 0.03
+
+
+class SeenSpace:
+    """Cells of the floor over which nothing stands.
+
+    Obstacles stand on the floor and are higher than the drone flies, so a column of an image that shows none
+    is free as far as one can be seen.
+
+    Args:
+        camera: the drone's camera.
+        arena: what is outside need not be seen.
+
+    Attributes:
+        has_obstacles: an obstacle was seen; until then all is taken to be free.
+        suspects_m: places that were looked at and not seen: obstacles, as discs in plan: x, y, radius.
+    """
+
+    def __init__(self, camera: CameraModel, arena: Arena) -> None:
+        self.has_obstacles = False
+        self.suspects_m: tuple[Vec3, ...] = ()
+        self._camera = camera
+        self._cell_m, self._x_m, self._y_m = floor_cells(arena)
+        self._free: Bools = np.zeros((self._x_m.size, self._y_m.size), dtype=bool)
+        self._last: tuple[Vec3, float] | None = None
+        reach = np.arange(-int(ROOM_M / self._cell_m), int(ROOM_M / self._cell_m) + 1)
+        i, j = (offsets.ravel() for offsets in np.meshgrid(reach, reach, indexing="ij"))
+        order = np.argsort(np.hypot(i, j), kind="stable")
+        self._around = np.stack((i, j), axis=1)[order]
+        self._around_m: Doubles = np.hypot(i, j)[order] * self._cell_m
+
+    def update(
+        self,
+        position_m: Vec3,
+        attitude_arena: Quaternion,
+        edges: tuple[ObstacleEdge, ...],
+        columns_m: Sequence[Vec3] = (),
+    ) -> None:
+        """Take in what an image showed of obstacles, which may be nothing.
+
+        Args:
+            position_m: of the drone's centre when the image was exposed, arena axes.
+            attitude_arena: body FLU to arena.
+            edges: the lower ends of obstacles, in every eighth column of the image that shows one.
+            columns_m: obstacles that are known, as discs in plan: x, y, radius.
+        """
+        self.has_obstacles = self.has_obstacles or bool(edges)
+        if not self._is_new(position_m, yaw_of(attitude_arena)):
+            return
+        pose = self._camera.pose(position_m, attitude_arena)
+        dx, dy = self._x_m[:, None] - pose.position_m[0], self._y_m - pose.position_m[1]
+        m = pose.rotation
+        ahead, left = dx * m[0] + dy * m[3], dx * m[1] + dy * m[4]
+        half_px = self._camera.half_width_px
+        right_px = -left * (self._camera.focal_px / np.maximum(ahead, _NEAREST_M))
+        shown = (ahead > _NEAREST_M) & (np.abs(right_px) < half_px - _EDGE_PX)
+        limits_m = self._limits_m(pose, edges, columns_m)
+        columns = ((np.clip(right_px, -half_px, half_px) + half_px) / COLUMN_PX).astype(np.intp)
+        reach_m = limits_m[np.minimum(columns, limits_m.size - 1)]
+        self._free |= shown & (dx * dx + dy * dy < reach_m * reach_m)
+        dx, dy = self._x_m[:, None] - position_m[0], self._y_m - position_m[1]
+        self._free |= dx * dx + dy * dy < OWN_RADIUS_M**2
+        if self.suspects_m:
+            self.suspects_m = tuple(each for each in self.suspects_m if not self.is_seen(each))
+
+    def is_seen(self, place_m: Vec3) -> bool:
+        """Whether nothing stands at a place."""
+        i, j = (
+            round((at - axis[0]) / self._cell_m)
+            for at, axis in zip(place_m, (self._x_m, self._y_m), strict=False)
+        )
+        return bool(self._free[i, j])
+
+    def suspect(self, place_m: Vec3) -> None:
+        """Take it that something stands at a place, until it is seen that nothing does."""
+        self.suspects_m = (*self.suspects_m, (place_m[0], place_m[1], SUSPECT_RADIUS_M))
+
+    def first_unseen(self, places_m: list[Vec3], from_m: Vec3) -> Vec3 | None:
+        """The first of some places where something may stand; near the drone less room is needed.
+
+        Args:
+            places_m: on a path, in order.
+            from_m: where the drone is.
+        """
+        if not self.has_obstacles or not places_m:
+            return None
+        places = np.array(places_m)[:, :2]
+        room_m = np.minimum(np.hypot(*(places - np.array(from_m[:2])).T) / 2, ROOM_M)
+        low = np.array([self._x_m[0], self._y_m[0]])
+        cells = np.floor((places - low) / self._cell_m + 0.5).astype(np.intp)[:, None] + self._around
+        inside = (cells >= 0).all(axis=-1) & (cells < self._free.shape).all(axis=-1)
+        cells = np.clip(cells, 0, np.array(self._free.shape) - 1)
+        unseen = inside & ~self._free[cells[..., 0], cells[..., 1]] & (self._around_m <= room_m[:, None])
+        for place, cell in np.argwhere(unseen).tolist():
+            i, j = cells[place, cell].tolist()
+            x, y = float(self._x_m[i]), float(self._y_m[j])
+            if all(hypot(x - each[0], y - each[1]) > each[2] for each in self.suspects_m):
+                return (x, y, places_m[place][2])
+        return None
+
+    def _is_new(self, position_m: Vec3, yaw_rad: float) -> bool:
+        if self._last is not None:
+            (x, y, z), last_yaw_rad = self._last
+            moved_m = hypot(position_m[0] - x, position_m[1] - y, position_m[2] - z)
+            if moved_m < _MOVED_M and abs(remainder(yaw_rad - last_yaw_rad, tau)) < _TURNED_RAD:
+                return False
+        self._last = (position_m, yaw_rad)
+        return True
+
+    def _limits_m(
+        self, pose: CameraPose, edges: tuple[ObstacleEdge, ...], columns_m: Sequence[Vec3]
+    ) -> Doubles:
+        """How far each column of the image is free; not farther than the columns beside it.
+
+        An obstacle whose foot is not seen is nearer than the floor there would be: it is the known one, if
+        one is.
+        """
+        half_px = self._camera.half_width_px
+        limits_m = np.full(max(int(2 * half_px / COLUMN_PX), 1), _FARTHEST_M)
+        right_px, down_px = [edge.right_px for edge in edges], [edge.down_px for edge in edges]
+        feet = FloorPoints.seen_at(self._camera, pose, right_px, down_px)
+        known = np.isfinite(feet.range_m)
+        before_m = np.where(known, feet.range_m, 0.0) - 2 * np.where(known, feet.error_m, 0.0) - _MARGIN_M
+        cut = np.array([edge.cut for edge in edges], dtype=bool)
+        before_m = np.where(cut, self._known_m(pose, feet, columns_m), before_m)
+        for edge, end_m in zip(edges, before_m.tolist(), strict=True):
+            column = min(max(int((edge.right_px + half_px) / COLUMN_PX), 0), limits_m.size - 1)
+            limits_m[column] = min(limits_m[column], max(end_m, 0.0))
+        padded = np.pad(limits_m, 1, mode="edge")
+        narrowest: Doubles = np.minimum(np.minimum(padded[:-2], padded[2:]), limits_m)
+        return narrowest
+
+    def _known_m(self, pose: CameraPose, feet: FloorPoints, columns_m: Sequence[Vec3]) -> Doubles:
+        """How far it is to the nearest known obstacle that is not beyond the foot; 0 if there is none."""
+        if not columns_m:
+            return np.zeros(feet.range_m.size)
+        columns: Doubles = np.array(columns_m)
+        x, y, radius = columns.T[:, None]
+        dx, dy = x - pose.position_m[0], y - pose.position_m[1]
+        ux, uy = feet.ux[:, None], feet.uy[:, None]
+        along_m = dx * ux + dy * uy - radius - _MARGIN_M / 2
+        met = (np.abs(dy * ux - dx * uy) < radius) & (along_m > 0.0) & (along_m < feet.range_m[:, None])
+        nearest: Doubles = np.where(met, along_m, np.inf).min(axis=1)
+        free: Doubles = np.where(np.isfinite(nearest), nearest, 0.0)
+        return free

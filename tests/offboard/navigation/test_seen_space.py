@@ -1,0 +1,91 @@
+"""Space that was seen to be free, and flights that stop before space that was not."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from math import atan2, hypot, pi
+
+import pytest
+
+from geometry.rotations import quaternion_from_yaw
+from offboard.drone import DroneState
+from offboard.navigation.camera_model import CameraModel
+from offboard.navigation.goals import CONTEST, Obstacles, Point
+from offboard.navigation.path_flight import PathFlight
+from offboard.navigation.seen_space import SeenSpace
+from scenarios.models import Arena, Camera
+from tests.offboard.navigation.test_obstacle_map import edges_of
+
+CAMERA = CameraModel.of(Camera(position_flu_m=(0.0, 0.0, 0.0)))
+POSTS = [(3.0, 0.0, 0.2)]
+HERE = (0.0, 0.0, 1.0)
+
+
+def seen_from(position_m=HERE, yaw_rad=0.0, posts=POSTS, columns_m=()):
+    seen = SeenSpace(CAMERA, Arena())
+    edges = edges_of(posts, position_m, yaw_rad)
+    seen.update(position_m, quaternion_from_yaw(yaw_rad), edges, columns_m)
+    return seen
+
+
+def test_space_is_seen_before_and_beside_an_obstacle_but_not_behind_it_or_outside_the_view():
+    seen = seen_from()
+    for free in [(0.5, 0.0), (2.3, 0.0), (2.0, 1.5), (4.5, 2.0), (0.0, 0.1)]:
+        assert seen.is_seen((*free, 1.0)), free
+    for unknown in [(3.0, 0.0), (4.0, 0.0), (0.5, 1.0), (-1.0, 0.0), (1.0, -2.0)]:
+        assert not seen.is_seen((*unknown, 1.0)), unknown
+
+
+def test_a_way_must_have_been_seen_once_an_obstacle_was():
+    way = [(0.0, 0.1 * step, 1.0) for step in range(1, 15)]
+    assert seen_from(posts=[]).first_unseen(way, HERE) is None
+    stopped_by = seen_from().first_unseen(way, HERE)
+    assert stopped_by is not None
+    assert 0.1 < hypot(*stopped_by[:2]) < 1.0
+    assert seen_from().first_unseen([(0.1 * step, 0.0, 1.0) for step in range(1, 20)], HERE) is None
+
+
+def test_an_obstacle_whose_foot_is_below_the_image_leaves_free_what_is_before_a_known_one():
+    near = [(1.0, 0.0, 0.2)]
+    assert not seen_from(posts=near).is_seen((0.5, 0.0, 1.0))
+    assert seen_from(posts=near, columns_m=near).is_seen((0.5, 0.0, 1.0))
+    assert not seen_from(posts=near, columns_m=[(2.0, 0.0, 0.2)]).is_seen((0.5, 0.0, 1.0))
+
+
+def test_a_suspect_is_forgotten_when_it_is_seen_to_be_free():
+    seen = seen_from()
+    seen.suspect((0.0, 1.0, 1.0))
+    assert len(seen.suspects_m) == 1
+    seen.update(HERE, quaternion_from_yaw(pi / 2), ())
+    assert seen.suspects_m == ()
+
+
+@pytest.mark.parametrize("goal_m", [(0.0, 2.0, 1.0), (-2.0, 0.5, 1.0), (-1.0, -2.0, 1.0)])
+def test_drone_looks_where_it_will_fly_and_then_flies_there(goal_m):
+    seen, flight = seen_from(), PathFlight(Arena(), CONTEST)
+    state = DroneState(0, *HERE, yaw=0.0)
+    for tick in range(200):
+        command = flight.fly([Point(goal_m)], Obstacles(), state, seen)
+        if command.forward_m_s or command.left_m_s:
+            break
+        yaw_rad = state.yaw + 0.05 * command.yaw_rate_rad_s
+        state = replace(state, time_us=tick * 50_000, yaw=yaw_rad)
+        seen.update(HERE, quaternion_from_yaw(yaw_rad), ())
+    assert abs(state.yaw - atan2(goal_m[1], goal_m[0])) < pi / 4
+    assert flight.path is not None
+
+
+def test_a_path_that_is_obstructed_is_planned_again_at_once():
+    seen, flight = SeenSpace(CAMERA, Arena()), PathFlight(Arena(), CONTEST)
+    state = DroneState(0, *HERE, yaw=0.0)
+    flight.fly([Point((3.0, 0.0, 1.0))], Obstacles(), state, seen)
+    before = flight.path
+    flight.fly(
+        [Point((3.0, 0.0, 1.0))],
+        Obstacles(columns_m=((0.6, 0.0, 0.1),)),
+        replace(state, time_us=50_000),
+        seen,
+    )
+    assert flight.path is not None
+    assert flight.path is not before
+    assert all(hypot(x - 0.6, y) > 0.3 for x, y, _ in flight.path.points())
