@@ -93,8 +93,7 @@ def _telling(examples: Sequence[LabelledImage]) -> list[LabelledImage]:
 
 
 def _content(labelled: LabelledImage) -> float:
-    seen = [label for label in labelled.frames if label.seen and label.corners_px]
-    return sum(1.0 + 1.0 / label.distance_m for label in seen)
+    return sum(1.0 + 1.0 / label.distance_m for label in labelled.frames if label.whole)
 
 
 def _draw_image(axes: Axes, labelled: LabelledImage, *, rendered: bool) -> None:
@@ -111,6 +110,7 @@ def _draw_image(axes: Axes, labelled: LabelledImage, *, rendered: bool) -> None:
                 axes.errorbar(
                     corner.right_px, corner.down_px, spread[1], spread[0], color="black", linewidth=1.0
                 )
+                axes.plot(corner.right_px, corner.down_px, "o", color="white", markersize=6, fillstyle="none")
         if sighting.poses:
             ahead, left, up = sighting.poses[0].position_flu_m
             above = min(corner.down_px for corner in sighting.corners if corner is not None) - 5.0
