@@ -32,7 +32,7 @@ _MAX_STEPS = 8  # after a longer gap everything but the estimate begins again
 _EXPECTED = ((3, 2), (1, 0), (1, 0))  # indices of dead time and lag, before there is evidence
 _MIN_ENERGY = (0.3, 0.2, 0.2)  # sums of squared changes (m/s, m/s, rad/s) that are evidence
 _BETTER = 0.7  # share of the present pair's error that another one must reach
-_CLEARLY_BETTER = 0.4  # likewise for axes that turn or do not
+_CLEARLY_BETTER = 0.5  # likewise for axes that turn: those of vehicles that answer late seldom do
 _LATE_S = (0.65, 0.3, 0.3)  # level, climb, yaw: beyond this in all a vehicle answers late
 _DISTURBANCE_S = 0.4  # time constant of the estimate of what commands do not explain
 _LEADS = np.array((0.0, 0.0, 0.7))  # shares by which its change is expected to go on: heights wander slowly
@@ -168,10 +168,7 @@ class ResponseEstimate:
         turns_before, chosen_before = self._turning, list(self._chosen)
         if self._energies[0] > _MIN_ENERGY[0]:
             fixed, turning = self._errors[:, :, 0].min(), self._errors[:, :, 1].min()
-            if self._turning:
-                self._turning = bool(fixed >= _BETTER * turning)
-            else:
-                self._turning = bool(turning < _CLEARLY_BETTER * fixed)
+            self._turning = bool(turning < (_CLEARLY_BETTER if self._is_late_in(0) else 1.0) * fixed)
         for channel, group in enumerate((1 if self._turning else 0, 2, 3)):
             if self._energies[group] < _MIN_ENERGY[channel]:
                 continue
@@ -181,6 +178,11 @@ class ResponseEstimate:
                 self._chosen[channel] = (dead, lag)
         if (self._turning, self._chosen) != (turns_before, chosen_before):
             self.response = self._as_response()
+
+    def _is_late_in(self, group: int) -> bool:
+        """Whether what explains a group's changes best is late."""
+        dead, lag = divmod(int(self._errors[:, :, group].argmin()), len(LAGS_S))
+        return DEAD_STEPS[dead] * STEP_S + LAGS_S[lag] > _LATE_S[0]
 
     def _as_response(self) -> Response:
         pairs = [(DEAD_STEPS[dead] * STEP_S, LAGS_S[lag]) for dead, lag in self._chosen]
