@@ -227,7 +227,7 @@ def _outer_corners(meetings: _Meetings, pose: ModelPose, focal_px: float, whole:
 
 def _facing(pose: ModelPose) -> float:
     """Cosine of the angle between the line of sight and the frame's normal."""
-    return abs(float(pose.rotation[:, 2] @ pose.shift_m)) / float(np.linalg.norm(pose.shift_m))
+    return abs(float(pose.rotation[:, 2] @ pose.shift_m)) / hypot(*pose.shift_m.tolist())
 
 
 def _corners_without_pose(patch: Patch, lines: BarLines, spread_px: float) -> Corners:

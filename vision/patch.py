@@ -55,17 +55,18 @@ class Patch:
         Args:
             axes_corners: where the axes of the bars meet, pixels from the optical axis.
         """
-        corners = np.asarray(axes_corners, np.float64)
-        middle = corners.mean(axis=0)
-        sides = np.roll(corners, -1, axis=0) - corners
-        if np.abs(sides).max(axis=1).min() < _OPENING_PX:
-            return False
-        points = middle + 0.4 * (corners - middle)
-        column, row = np.rint(np.vstack([points, middle]) + self.origin).astype(np.intp).T
+        middle_x, middle_y = (sum(values) / 4.0 for values in zip(*axes_corners, strict=True))
         rows, columns = self.labels.shape
-        if min(column.min(), row.min()) < 0 or column.max() >= columns or row.max() >= rows:
-            return False
-        return bool((self.labels[row, column] == OWN).all())
+        before_x, before_y = axes_corners[-1]
+        for x, y in axes_corners:
+            if max(abs(x - before_x), abs(y - before_y)) < _OPENING_PX:
+                return False
+            before_x, before_y = x, y
+            column = round(middle_x + 0.4 * (x - middle_x) + self.origin[0])
+            row = round(middle_y + 0.4 * (y - middle_y) + self.origin[1])
+            if not (0 <= column < columns and 0 <= row < rows and self.labels[row, column] == OWN):
+                return False
+        return True
 
     def in_front(self) -> Patch:
         """The same as if the region were in front of all else."""
