@@ -7,6 +7,7 @@ and goes on when the way is free.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from math import atan2, dist, pi, remainder
 
 from geometry.vectors import Vec3
@@ -27,6 +28,7 @@ SAME_M = 0.004  # between two estimates of the frame that is crossed, for which 
 NEARLY_SAME_M = 0.04  # likewise of the other frames
 SAME_RAD_M = 1.0  # likewise of headings, for each metre
 AHEAD_S = 0.7  # of the path that must be free, beside the vehicle's lag: it is long enough to stop
+LOOK_AHEAD_S = 2.0  # likewise; the drone turns in flight to look at what it has not seen there
 AHEAD_STEP_S = 0.1
 WAITING_REPLAN_S = 0.2  # between two attempts to go on
 MAX_LOOK_S = 0.6  # at a place; if it is not seen then, something stands there
@@ -55,6 +57,7 @@ class PathFlight:
         self._planned_for: tuple[tuple[Goal, ...], Obstacles] | None = None
         self._tried_s = -REPLAN_S
         self._refusals = 0
+        self._looks_aside = False  # and not where its path says
         self._watched_s = 0.0  # when the drone began to look there
 
     def learn(self, state: DroneState, sent: VelocityCommand | None) -> None:
@@ -106,7 +109,14 @@ class PathFlight:
             if self.watched is not None:
                 self.path, self._watched_s = None, now_s
                 return _look(_turn_to(self.watched, state))
-        return self.follow(state)
+        command = self.follow(state)
+        self._looks_aside = False
+        if self.path is not None and not isinstance(goals[0], Gate):
+            later = seen.first_unseen(self._ahead(LOOK_AHEAD_S), position_now(state))
+            if later is not None:
+                self._looks_aside = True
+                return replace(command, yaw_rate_rad_s=_look(_turn_to(later, state)).yaw_rate_rad_s)
+        return command
 
     def follow(self, state: DroneState) -> VelocityCommand:
         """The command for this tick on the present path; without one, to stand still."""
@@ -119,6 +129,8 @@ class PathFlight:
         start = self._follower.reference() if self.path is not None else None
         if start is None or self._follower.error_m > RESTART_M:
             start = Motion(position_now(state), state.velocity_arena_m_s, state.yaw)
+        elif self._looks_aside:
+            start = replace(start, yaw_rad=state.yaw, yaw_rate_rad_s=0.0)
         found = self._find(start, goals, obstacles)
         if isinstance(found, Refusal) and len(goals) > 1:
             found = self._find(start, goals[:1], obstacles)
@@ -131,13 +143,13 @@ class PathFlight:
         self.path, self.refusal, self._refusals = found, "", 0
         self._planned_for = (tuple(goals), obstacles)
 
-    def _ahead(self) -> list[Vec3]:
-        """Where the drone will be on its path soon."""
+    def _ahead(self, time_s: float = AHEAD_S) -> list[Vec3]:
+        """Where the drone will be on its path within a time, the vehicle's lag added."""
         path = self.path
         if path is None:
             return []
         now_s = self._follower.progress_on(path)
-        steps = round((AHEAD_S + self._style.lag_s) / AHEAD_STEP_S)
+        steps = round((time_s + self._style.lag_s) / AHEAD_STEP_S)
         return [path.at(now_s + step * AHEAD_STEP_S).position_m for step in range(steps + 1)]
 
     def _is_obstructed(self, places_m: list[Vec3], obstacles: Obstacles) -> bool:
