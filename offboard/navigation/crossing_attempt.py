@@ -7,6 +7,7 @@ from math import cos, dist, hypot, inf, pi, remainder, sin
 
 from geometry.vectors import Vec3
 from offboard.navigation.frame_estimate import FrameEstimate
+from offboard.navigation.goals import Point
 from offboard.navigation.path import Crossing
 
 LOOK_AGAIN_M = 1.0  # before the opening; there the drone waits until the frame is certain
@@ -17,6 +18,7 @@ SETTLED_M = 0.7  # before the opening; from there it is only if the frame turns 
 SETTLED_MOVE_M = 0.02  # by this,
 SETTLED_TURN_RAD = 0.05  # or this
 CLEAR_M = 0.25  # behind the opening
+BEHIND_M = 0.5  # likewise; where a drone goes that was stopped in the opening
 MAX_CLEARING_S = 3.0
 MAX_LOOK_S = 4.0
 MAX_LOST_S = 1.5
@@ -76,6 +78,14 @@ class CrossingAttempt:
     def _refuse(self, why: str) -> None:
         """Note why the attempt cannot go on; nothing can be refused behind the opening."""
         self.refusal = "" if self.passed else why
+
+    @property
+    def behind(self) -> Point | None:
+        """Straight behind the opening; None if no path has led through it yet."""
+        if self._aim is None:
+            return None
+        (x, y, z), heading = self._aim.gate.centre_m, self._aim.heading_rad
+        return Point((x + BEHIND_M * cos(heading), y + BEHIND_M * sin(heading), z), heading)
 
     @property
     def is_committed(self) -> bool:

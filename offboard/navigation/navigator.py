@@ -22,7 +22,7 @@ from offboard.navigation.world_model import WorldModel
 from scenarios.models import COLOURS
 from vision.types import Detections
 
-GAP_S = 0.3  # an action that was not called for so long begins again
+GAP_S = 0.6  # an action that was not called for so long begins again
 EXPLORE_S = 0.5  # between two choices of where to look next
 HOME_HEIGHT_M = 0.5  # above the start, on the way home
 AHEAD_STD_M = 0.3  # of a next frame; if it is known less well, it is not planned for yet
@@ -137,8 +137,12 @@ class Navigator:
             crossing = self._crossing = CrossingAttempt(colour, now_s, now_s, now_s)
         crossing.move(position_now(state), self._opening_m, now_s)
         estimate = self._world.frame(colour)
-        if crossing.is_committed or (estimate is not None and crossing.is_settled(estimate)):
+        if self._flight.path is not None and (
+            crossing.is_committed or (estimate is not None and crossing.is_settled(estimate))
+        ):
             return self._flight.follow(state)
+        if crossing.passed and crossing.behind is not None:  # and stopped within the frame
+            return self._fly(crossing.behind)
         if estimate is None:
             crossing.lose(now_s)
             return STILL
