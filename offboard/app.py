@@ -16,7 +16,7 @@ from offboard.limits import CONTEST, CommandLimits
 from offboard.mission import Mission
 from offboard.navigation.surroundings import Surroundings
 from offboard.navigation.view import NavigationView
-from offboard.perception import CameraLostError, Perception
+from offboard.perception import CameraLostError, CameraSilentError, Perception
 from offboard.pilot import Imu
 from vision.types import Detections
 
@@ -24,6 +24,7 @@ INTERRUPTED = "interrupted"
 MICROSECONDS = 1_000_000
 STILL = VelocityCommand()
 NAVIGATION_US = 200_000  # vehicle time between two views of the navigator's map
+CAMERA_WAIT_US = 4 * MICROSECONDS  # for which a mission with a map hovers when there are no images
 REST_US = 3 * MICROSECONDS  # time to fall onto the base, and for telemetry to show the drone at rest
 
 
@@ -33,7 +34,8 @@ class Moment:
 
     Attributes:
         remark: in a pause, why the mission did not continue when the pilot last gave the drone back;
-            otherwise how the mission's command was changed to keep the drone in its box; empty if it was not.
+            otherwise how the mission's command was changed to keep the drone in its box, or that it hovers
+            because there are no images; empty if it flies as commanded.
         navigation: the navigator's map and plan, renewed five times a second; None without a navigator.
     """
 
@@ -142,6 +144,7 @@ class _Flight:
         self._ticks = 0
         self._sent: VelocityCommand | None = None
         self._paused = False
+        self._silent_us: int | None = None
         self._pauses = 0
         self._remark = ""
         self._navigation: NavigationView | None = None
@@ -184,7 +187,13 @@ class _Flight:
     async def _tick(self, state: DroneState) -> None:
         if self._flying and (self._paused or not state.offboard) and await self._update_pause(state):
             return
-        detections = self._perception.latest(state.time_us)
+        try:
+            detections = self._perception.latest(state.time_us)
+        except CameraSilentError as error:
+            self._hover(state, error)
+            return
+        if self._silent_us is not None:
+            self._silent_us, self._remark = None, ""
         images = self._perception.take() if self._engine.has_navigator else ()
         imu = Imu(state.x, state.y, state.z, state.yaw)
         command = self._engine.tick(imu, detections, state.time_us, state, images=images, sent=self._sent)
@@ -207,11 +216,27 @@ class _Flight:
         if not switches:
             self._observe(state, command, detections)
 
+    def _hover(self, state: DroneState, error: CameraSilentError) -> None:
+        """Let the mission wait for an image, if it can: what is on a map stays known meanwhile."""
+        if not (self._flying and self._engine.has_navigator):
+            raise error
+        if self._silent_us is None:
+            self._silent_us = state.time_us
+            logger.warning("%s; the drone hovers", error)
+        if state.time_us - self._silent_us > CAMERA_WAIT_US:
+            raise error
+        self._remark = f"hovers: no image for {error.age_s:.1f} s"
+        self._engine.pause(state.time_us)
+        self._sent = STILL
+        self._drone.command(STILL)
+        self._ticks += 1
+        self._observe(state, STILL, Detections())
+
     def _observe(self, state: DroneState, command: VelocityCommand, detections: Detections) -> None:
         if self._observer is None:
             return
         engine, flight_time_s, remark = self._engine, self._flight_time_s(), self._remark
-        if not self._paused:
+        if not self._paused and self._silent_us is None:
             remark = "" if self._keeper is None else self._keeper.remark
         what = (state, command, detections, engine.state, flight_time_s, engine.transition)
         self._observer(Moment(*what, self._paused, remark, self._navigation_at(state.time_us)))

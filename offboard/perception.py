@@ -22,6 +22,14 @@ class CameraLostError(UserError):
     """There are no fresh images; the message is one line for people."""
 
 
+class CameraSilentError(CameraLostError):
+    """The latest image is too old, by `age_s`; another one may still come."""
+
+    def __init__(self, age_s: float) -> None:
+        super().__init__(f"the camera is dead: no image for {age_s:.1f} s")
+        self.age_s = age_s
+
+
 class Camera(Protocol):
     """A source of images, such as an open `vision.types.CameraSource`."""
 
@@ -37,7 +45,12 @@ class Perception(Protocol):
         """Wait until there are detections; raises `CameraLostError`."""
 
     def latest(self, time_us: int) -> Detections:
-        """What the latest image showed; raises `CameraLostError` if it is too old at this vehicle time."""
+        """What the latest image showed.
+
+        Raises:
+            CameraSilentError: it is too old at this vehicle time.
+            CameraLostError: no other one will come.
+        """
         ...
 
     def take(self) -> tuple[Detections, ...]:
@@ -107,7 +120,7 @@ class CameraPerception:
         age_s = (time_us - self._used_us) / 1e6
         self.oldest_s = max(self.oldest_s, age_s)
         if age_s > CAMERA_DEAD_S:
-            raise CameraLostError(f"the camera is dead: no image for {age_s:.1f} s")
+            raise CameraSilentError(age_s)
         return self._detections
 
     def take(self) -> tuple[Detections, ...]:

@@ -18,7 +18,7 @@ from framerunner.flying.lockstep_drone import LockstepDrone, TruthObserver
 from framerunner.flying.plan import FlightPlan
 from framerunner.flying.response import LateResponse
 from offboard.app import Moment, Observer
-from offboard.perception import CAMERA_DEAD_S, IMAGES_KEPT, CameraLostError
+from offboard.perception import CAMERA_DEAD_S, IMAGES_KEPT, CameraSilentError
 from scenarios.models import Scenario, TrueState
 from scenarios.result import RefereeReport, RefereeSnapshot
 from sitl.camera import CameraFeed
@@ -141,7 +141,7 @@ class LockstepPerception:
         """What the latest image showed; the detector processes an image only when this is called.
 
         Raises:
-            CameraLostError: the last image is older than a second of vehicle time.
+            CameraSilentError: the last image is older than a second of vehicle time.
         """
         if self._arrived is not None:
             self._image_us, image = self._arrived
@@ -149,7 +149,7 @@ class LockstepPerception:
             self._detections = self._detector(image, self._image_us)
         age_s = (time_us - self._image_us) / 1e6
         if age_s > CAMERA_DEAD_S:
-            raise CameraLostError(f"the camera is dead: no image for {age_s:.1f} s")
+            raise CameraSilentError(age_s)
         return self._detections
 
     def take(self) -> tuple[Detections, ...]:

@@ -1,7 +1,7 @@
 """Two guards against a hung app, whose native MAVLink thread would go on sending the last setpoint.
 
 1. A thread: if the event loop has not run for half a second, it sends a velocity of zero, and the flight
-   continues when the loop runs again; after a second it ends the setpoints and requests hold.
+   continues when the loop runs again; after three seconds it ends the setpoints and requests hold.
 2. A timer that needs no interpreter (`faulthandler`): a hang that holds the GIL stops that thread, too; then
    the process is ended, and without setpoints the vehicle's own offboard-loss failsafe acts.
 
@@ -28,7 +28,7 @@ class HangLimits:
     """Wall seconds for which the event loop may hang."""
 
     stand_s: float = 0.5  # then the vehicle hovers until the loop runs again
-    hang_s: float = 1.0  # then commanding ends
+    hang_s: float = 3.0  # then commanding ends
     locked_s: float = 2.0  # then, with the interpreter's lock held, the process ends
 
 
@@ -63,6 +63,7 @@ class Watchdog:
         self._report = report
         self._beat_s = 0.0
         self._stop = threading.Event()
+        self._arming = threading.Lock()  # of the second guard, which must not be armed after the end
         self._thread: threading.Thread | None = None
         self._task: asyncio.Task[None] | None = None
 
@@ -72,13 +73,15 @@ class Watchdog:
             return
         self._stop.clear()
         self._beat()
+        self._guard_lock()
         self._task = asyncio.create_task(self._keep_beating(), name="watchdog beat")
         self._thread = threading.Thread(target=self._watch, name="watchdog", daemon=True)
         self._thread.start()
 
     def stop(self) -> None:
         """Stop watching."""
-        self._stop.set()
+        with self._arming:
+            self._stop.set()
         if self._task is not None:
             self._task.cancel()
             self._task = None
@@ -93,13 +96,18 @@ class Watchdog:
 
     def _beat(self) -> None:
         self._beat_s = time.monotonic()
-        with contextlib.suppress(OSError, ValueError, RuntimeError):  # no real standard error: guard 1 only
-            file = sys.stderr if self._report is None else self._report
-            faulthandler.dump_traceback_later(self.limits.locked_s, exit=True, file=file)
+
+    def _guard_lock(self) -> None:
+        """Let the process end unless this is called again in time, which needs the interpreter's lock."""
+        with self._arming, contextlib.suppress(OSError, ValueError, RuntimeError):
+            if not self._stop.is_set():
+                file = sys.stderr if self._report is None else self._report  # not real: guard 1 only
+                faulthandler.dump_traceback_later(self.limits.locked_s, exit=True, file=file)
 
     def _watch(self) -> None:
         stopped_at_beat_s = 0.0
         while not self._stop.wait(BEAT_S):
+            self._guard_lock()
             hung_s = time.monotonic() - self._beat_s
             if hung_s > self.limits.stand_s and stopped_at_beat_s != self._beat_s:
                 stopped_at_beat_s = self._beat_s

@@ -30,7 +30,7 @@ APP = dedent("""\
             await anext(ticks)
         print("hanging", flush=True)
         if hang == "free":
-            time.sleep(4)  # the event loop stands still, other threads run
+            time.sleep(6)  # the event loop stands still, other threads run
         else:
             ctypes.PyDLL(None).sleep(20)  # keeps the interpreter's lock: no other thread of Python runs
         try:
@@ -57,9 +57,9 @@ def test_a_hung_loop_is_stopped_and_hold_is_asked_for(vehicle):
     app, hung_s = run_app(vehicle, "free")
     out, _ = app.communicate(timeout=15)
     assert app.returncode == 0
-    assert "this app hung for more than 1." in out
+    assert "this app hung for more than 3." in out
     last_s = max(at for at, *_ in vehicle.setpoints)
-    assert last_s - hung_s < 2.5  # a second, and time for a busy machine
+    assert last_s - hung_s < 4.5  # three seconds, and time for a busy machine
     zero = [0.0, 0.0, 0.0, 0.0]
     flown = [index for index, (_, *velocity) in enumerate(vehicle.setpoints) if velocity != zero]
     assert flown[-1] < len(vehicle.setpoints) - 1  # the last that is flown is to stand still

@@ -78,7 +78,7 @@ def disturbed(instance, busy, viewers):
 def busy_flight(tmp_path_factory):
     """Test case 3, three times as fast as real, on a busy machine with viewers: folder and words."""
     folder, instance = tmp_path_factory.mktemp("flight"), free_instance()
-    options = ("--instance", str(instance), "--speed", "3", "--record")
+    options = ("--mission", "frame_challenge", "--instance", str(instance), "--speed", "3", "--record")
     with disturbed(instance, busy=3, viewers=5), program(folder, "fly", "test-case-3", *options) as flight:
         code = flight.process.wait(300.0)
         assert code == 0, flight.err + flight.out
@@ -91,7 +91,7 @@ def busy_flight(tmp_path_factory):
 def lockstep_flight():
     """The same in lockstep: result, and what was seen at each tick."""
     moments = []
-    plan = FlightPlan(load_scenario("test-case-3"), load_mission("explorer"))
+    plan = FlightPlan(load_scenario("test-case-3"), load_mission("frame_challenge"))
     return fly_lockstep(plan, observers=(moments.append,)).result, moments
 
 
@@ -151,6 +151,27 @@ def test_it_leaves_result_track_log_and_video(busy_flight, lockstep_flight):
         pytest.approx(lockstep.try_time_s, abs=0.01),
         lockstep.crossing_sides,
     )
+
+
+@pytest.mark.alone
+@pytest.mark.parametrize("busy", [0, 4])
+def test_the_explorer_is_quick_enough_for_a_drone_whose_time_does_not_wait(tmp_path, instance, busy):
+    """Late ticks and images cost precision, not the flight."""
+    (tmp_path / "app").mkdir()
+    drone = ("--drone", f"udpin://127.0.0.1:{14540 + instance}")
+    camera = ("--camera", f"http://127.0.0.1:{8100 + instance}/video")
+    arguments = ("fly", "test-case-1", "--mission", "explorer", *drone, *camera)
+    with (
+        disturbed(instance, busy=busy, viewers=0),
+        simulator(tmp_path, instance, "--scenario", "test-case-1"),
+        program(tmp_path / "app", *arguments) as flight,
+    ):
+        assert flight.process.wait(240.0) == 0, flight.err + flight.out
+    (run,) = (tmp_path / "app" / "runs").iterdir()
+    result = json.loads((run / "result.json").read_text(encoding="utf-8"))
+    assert result["verdict"] in ("clean", "completed") if busy else ("clean",), result["reason"]
+    assert result["try_time_s"] < 45.0
+    assert result["timing"]["vehicle_time_waits"] is False
 
 
 def test_a_drone_that_is_somebody_elses_is_not_commanded(tmp_path, instance):

@@ -9,10 +9,13 @@ from random import Random
 import pytest
 
 from framerunner.flying import lockstep
+from framerunner.flying.fly import FinishedFlight
 from framerunner.flying.lockstep import LockstepVehicle, fly_lockstep
 from framerunner.flying.plan import FlightPlan
+from offboard.app import Observer
 from offboard.drone import DroneState, VelocityCommand
 from offboard.mission import load_mission
+from offboard.perception import CAMERA_DEAD_S, CameraSilentError
 from scenarios.loader import load_scenario
 from vision.types import Detections
 
@@ -28,12 +31,14 @@ class Lateness:
         longest_ticks: of a stall.
         images_late_ticks: up to so many ticks later than they arrive images are seen.
         images_lost: share that is never seen.
+        silent_s: vehicle time from and to which no image is seen.
     """
 
     stalls: float = 0.0
     longest_ticks: int = 1
     images_late_ticks: int = 0
     images_lost: float = 0.0
+    silent_s: tuple[float, float] = (0.0, 0.0)
 
 
 class LateDrone:
@@ -75,13 +80,18 @@ class LatePerception:
 
     def latest(self, time_us: int) -> Detections:
         self._perception.latest(time_us)
+        begin_s, end_s = self._late.silent_s
         for image in self._perception.take():
-            if self._random.random() >= self._late.images_lost:
+            silent = begin_s <= time_us / 1e6 < end_s
+            if not silent and self._random.random() >= self._late.images_lost:
                 late_us = 50_000 * self._random.randint(0, self._late.images_late_ticks)
                 self._under_way.append((time_us + late_us, image))
         while self._under_way and self._under_way[0][0] <= time_us:
             self._seen = self._under_way.pop(0)[1]
             self._new.append(self._seen)
+        age_s = (time_us - (self._seen.time_us or time_us)) / 1e6
+        if age_s > CAMERA_DEAD_S:
+            raise CameraSilentError(age_s)
         return self._seen
 
     def take(self) -> tuple[Detections, ...]:
@@ -101,6 +111,14 @@ class LateVehicle(LockstepVehicle):
         self.perception = LatePerception(self.perception, self.late, random)
 
 
+def fly_late(monkeypatch, scenario: str, late: Lateness, *observers: Observer) -> FinishedFlight:
+    """Fly `explorer` with an app that is late."""
+    monkeypatch.setattr(lockstep, "LockstepVehicle", LateVehicle)
+    monkeypatch.setattr(LateVehicle, "late", late, raising=False)
+    plan = FlightPlan(load_scenario(scenario), load_mission("explorer"))
+    return fly_lockstep(plan, observers=observers)
+
+
 @pytest.mark.parametrize(
     ("scenario", "late"),
     [
@@ -111,8 +129,22 @@ class LateVehicle(LockstepVehicle):
     ids=["short stalls", "long stalls", "few images"],
 )
 def test_a_flight_with_late_ticks_and_images_is_completed(monkeypatch, scenario, late):
-    monkeypatch.setattr(lockstep, "LockstepVehicle", LateVehicle)
-    monkeypatch.setattr(LateVehicle, "late", late, raising=False)
-    result = fly_lockstep(FlightPlan(load_scenario(scenario), load_mission("explorer"))).result
+    result = fly_late(monkeypatch, scenario, late).result
     assert result.verdict in ("clean", "completed"), result.reason
     assert result.try_time_s < 60.0
+
+
+def test_a_drone_whose_camera_is_silent_hovers_and_then_flies_on(monkeypatch):
+    moments = []
+    result = fly_late(monkeypatch, "test-case-1", Lateness(silent_s=(14.0, 17.5)), moments.append).result
+    assert result.verdict == "clean", result.reason
+    hovering = [moment for moment in moments if moment.remark]
+    assert {moment.command for moment in hovering} == {VelocityCommand()}
+    assert hovering[0].remark == "hovers: no image for 1.0 s"
+    assert len(hovering) == pytest.approx(20 * 2.5, abs=4)
+
+
+def test_a_camera_that_stays_silent_ends_the_flight_after_five_seconds(monkeypatch):
+    flown = fly_late(monkeypatch, "test-case-1", Lateness(silent_s=(14.0, 99.0)))
+    assert flown.outcome.ended == "aborted"
+    assert flown.outcome.reason.startswith("the camera is dead: no image for 5.")
