@@ -8,7 +8,7 @@ from math import cos, dist, hypot, inf, pi, remainder, sin
 from geometry.vectors import Vec3
 from offboard.navigation.frame_estimate import FrameEstimate
 from offboard.navigation.goals import Point
-from offboard.navigation.path import Crossing
+from offboard.navigation.path import Crossing, Path
 
 LOOK_AGAIN_M = 1.0  # before the opening; there the drone waits until the frame is certain
 BRAKING_M = 0.5  # before that, where it is decided
@@ -78,6 +78,10 @@ class CrossingAttempt:
     def _refuse(self, why: str) -> None:
         """Note why the attempt cannot go on; nothing can be refused behind the opening."""
         self.refusal = "" if self.passed else why
+
+    def is_on(self, path: Path | None) -> bool:
+        """Whether a path leads through the opening: not one to a place before it, to look."""
+        return path is not None and self._aim in path.crossings
 
     @property
     def behind(self) -> Point | None:

@@ -137,9 +137,8 @@ class Navigator:
             crossing = self._crossing = CrossingAttempt(colour, now_s, now_s, now_s)
         crossing.move(position_now(state), self._opening_m, now_s)
         estimate = self._world.frame(colour)
-        if self._flight.path is not None and (
-            crossing.is_committed or (estimate is not None and crossing.is_settled(estimate))
-        ):
+        goes_on = crossing.is_committed or (estimate is not None and crossing.is_settled(estimate))
+        if goes_on and crossing.is_on(self._flight.path):
             return self._flight.follow(state)
         if crossing.passed and crossing.behind is not None:  # and stopped within the frame
             return self._fly(crossing.behind)
@@ -151,8 +150,8 @@ class Navigator:
             return self._fly(_place_before(estimate, state, LOOK_AGAIN_M))
         command = self._fly(Gate(estimate.position_m, estimate.yaw_rad), *self._goals_after(colour))
         path = self._flight.path
-        goes_on = path is not None or self._flight.watched is not None
-        no_path = "" if goes_on else self._flight.refusal or "none was planned"
+        finds_way = path is not None or self._flight.watched is not None
+        no_path = "" if finds_way else self._flight.refusal or "none was planned"
         crossing.fly(no_path=no_path, now_s=now_s)
         if path is not None and path.crossings:
             crossing.aim(path.crossings[0])
