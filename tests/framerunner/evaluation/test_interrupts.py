@@ -47,7 +47,7 @@ def test_a_stopped_evaluation_is_continued_where_it_was(place, jobs, number):
     if number is not signal.SIGKILL:
         assert code == 130
         assert f"interrupted; {kept} of {COUNT} flights are kept in {out}; continue with:" in said
-        command = f"framerunner evaluate short --mission frame_challenge --jobs {jobs} --out {out}"
+        command = f"framerunner evaluate short --mission explorer --jobs {jobs} --out {out}"
         assert said.splitlines()[-1].strip() == command
         assert "Traceback" not in said
     with program(place, *arguments(out, 1)) as running:
