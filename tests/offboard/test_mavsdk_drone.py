@@ -14,6 +14,7 @@ import pytest
 from pymavlink import mavutil
 
 from offboard.drone import DroneError, VelocityCommand
+from offboard.link.watchdog import HangLimits
 from offboard.mavsdk_drone import MavsdkDrone
 from tests.free_ports import free_port
 from tests.offboard.udp_vehicle import POSCTL, UdpVehicle
@@ -208,8 +209,9 @@ async def test_a_link_lost_while_a_pilot_has_it_is_noticed(vehicle):
 
 async def test_an_app_that_hangs_while_a_pilot_has_it_leaves_no_stream_and_asks_for_nothing(vehicle):
     async with taken_by_a_pilot(vehicle) as (drone, ticks, before):
+        drone._watchdog.limits = HangLimits(stand_s=0.5, hang_s=1.0, locked_s=10.0)
         await take(ticks, 5)
-        time.sleep(3.5)  # noqa: ASYNC251 - this is what hanging is
+        time.sleep(1.5)  # noqa: ASYNC251 - this is what hanging is
         assert not fresh_setpoints(vehicle, 0.2)
         error = await until_error(ticks)
         assert error.startswith("this app hung") and error.endswith("its watchdog stopped sending")
