@@ -36,7 +36,6 @@ GATE_TURN_M = 0.15  # by which a turn counts, for each radian
 _MAX_STEP_S = 0.5  # for so long a vehicle flies on by its last command
 _MOVING_M_S = 0.2
 _HISTORY = 16  # ticks
-_RATE_S = 0.05  # over which the acceleration of the heading is measured
 
 
 class PathFollower:
@@ -68,16 +67,23 @@ class PathFollower:
         self._integral: list[float] = [0.0, 0.0, 0.0]
         self._past: deque[tuple[float, Motion]] = deque(maxlen=_HISTORY)
 
+    @property
+    def lead_s(self) -> float:
+        """How far ahead of its time the path is commanded already: another one should begin after that."""
+        return self.response.level_dead_s + HOLD_S
+
     def reference(self) -> Motion | None:
-        """The path's motion now, to plan the next path from; None before the first command."""
-        if self._path is None:
-            return None
-        motion = self._path.at(self.progress_s)
-        if self._rate == 1.0:
-            return motion
-        velocity, acceleration = _slowed(motion, self._rate)
-        rate = motion.yaw_rate_rad_s * self._rate
-        return Motion(motion.position_m, velocity, motion.yaw_rad, rate, acceleration)
+        """The path's motion `lead_s` ahead, to plan the next path from; None before the first command."""
+        return None if self._path is None else self._path.at(self.progress_s + self.lead_s)
+
+    def continued(self, following: Path) -> Path:
+        """What to follow from now on, once a path from the reference has been planned."""
+        path = self._path
+        return (
+            following
+            if path is None
+            else path.then(following, self.progress_s, self.progress_s + self.lead_s)
+        )
 
     def progress_on(self, path: Path) -> float:
         """The time along a path; 0 on one that no command was given for yet."""
@@ -94,8 +100,8 @@ class PathFollower:
         """The command for this tick.
 
         Args:
-            path: another one than at the last tick starts where the last tick left the path before it: see
-                `reference`.
+            path: another one than at the last tick begins with the motion that the last one had then: see
+                `continued`.
             state: of the drone.
             now_s: vehicle time of the state.
             prediction: of the motion of a vehicle that answers late.
@@ -143,8 +149,8 @@ class PathFollower:
         forward, left = self._level(path, state, x, y)
         up = self._climb(path) + z
         at_s = self.progress_s + rate * (response.yaw_dead_s + HOLD_S)
-        ahead, later = path.at(at_s), path.at(at_s + _RATE_S)
-        change = (later.yaw_rate_rad_s - ahead.yaw_rate_rad_s) / _RATE_S
+        ahead = path.at(at_s)
+        change = ahead.yaw_acceleration_rad_s2
         gain, damping = _gains(response.yaw_lag_s)
         wanted = rate * ahead.yaw_rate_rad_s
         turn = wanted + rate * rate * response.yaw_lag_s * change
@@ -227,9 +233,9 @@ class PathFollower:
     def _yaw_rate(self, path: Path, state: DroneState) -> float:
         response, rate = self.response, self._rate
         at_s = self.progress_s + rate * (response.yaw_dead_s + HOLD_S)
-        ahead, later = path.at(at_s), path.at(at_s + _RATE_S)
+        ahead = path.at(at_s)
         now = self._past[-1][1]
-        change = (later.yaw_rate_rad_s - ahead.yaw_rate_rad_s) / _RATE_S
+        change = ahead.yaw_acceleration_rad_s2
         error = remainder(now.yaw_rad - state.yaw, 2 * pi)
         return (
             rate * ahead.yaw_rate_rad_s + rate * rate * response.yaw_lag_s * change + YAW_GAIN_PER_S * error

@@ -93,6 +93,7 @@ class FlightStyle:
         straight_before_m: straight and level flight before an opening.
         straight_after_m: likewise behind it.
         smoothing_s: time in which the acceleration changes.
+        turn_smoothing_s: time in which the yaw rate changes.
         look_offset_rad: the heading may differ from a gate's direction by this, so that both level axes are
             used; less near the gate, which stays in view.
         view_half_rad: half the camera's view, with a margin for tilt.
@@ -114,6 +115,7 @@ class FlightStyle:
     straight_before_m: float = 0.35
     straight_after_m: float = 0.3
     smoothing_s: float = 0.2
+    turn_smoothing_s: float = 0.2
     look_offset_rad: float = 0.6
     view_half_rad: float = 0.66
     bar_margin_m: float = 0.08
@@ -138,6 +140,7 @@ class FlightStyle:
             straight_before_m=self.straight_before_m + 0.25 * late,
             straight_after_m=self.straight_after_m + 0.1 * late,
             smoothing_s=self.smoothing_s + 0.3 * late,
+            turn_smoothing_s=self.turn_smoothing_s + 0.6 * late,
             bar_margin_m=self.bar_margin_m + 0.06 * late,
         )
 
@@ -158,6 +161,7 @@ class Motion:
     yaw_rad: float = 0.0
     yaw_rate_rad_s: float = 0.0
     acceleration_m_s2: Vec3 = (0.0, 0.0, 0.0)
+    yaw_acceleration_rad_s2: float = 0.0
 
     def level(self, vector: Vec3) -> Vec3:
         """A vector of the arena in this motion's level axes: forward, left, up."""

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 from bisect import bisect_right
-from dataclasses import dataclass
-from math import pi, remainder
+from dataclasses import dataclass, replace
+from math import dist, pi, remainder
 
 from geometry.vectors import Vec3
 from offboard.navigation.goals import Gate, Motion
 
+_SHORTEST_S = 0.005  # knots are not nearer to each other than this
+_SAME_GATE_M = 0.3
 _Step = tuple[float, float]
 """Its duration, and the share of it that has passed."""
 
@@ -28,6 +30,10 @@ class Crossing:
     heading_rad: float
     time_s: float
     left_s: float
+
+    def moved(self, by_s: float) -> Crossing:
+        """The same crossing on a path that began earlier by a time."""
+        return replace(self, time_s=self.time_s + by_s, left_s=self.left_s + by_s)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -56,23 +62,55 @@ class Path:
 
     def at(self, time_s: float) -> Motion:
         """The motion at a time since the start; before and after the path, that of its start and end."""
+        x, y, z, vx, vy, vz, ax, ay, az, yaw, rate = self._knot(time_s)
+        turn = self._yaw_acceleration(time_s)
+        return Motion((x, y, z), (vx, vy, vz), remainder(yaw, 2 * pi), rate, (ax, ay, az), turn)
+
+    def _yaw_acceleration(self, time_s: float) -> float:
+        """Between the knots next to a time."""
+        index = min(max(bisect_right(self.times_s, time_s), 1), len(self.times_s) - 1)
+        step_s = self.times_s[index] - self.times_s[index - 1]
+        return (self.knots[index][10] - self.knots[index - 1][10]) / step_s
+
+    def gates_left(self, time_s: float) -> tuple[Gate, ...]:
+        """The gates that have been crossed and left behind at a time: a new plan leaves them out."""
+        return tuple(crossing.gate for crossing in self.crossings if crossing.left_s <= time_s)
+
+    def then(self, following: Path, from_s: float, until_s: float) -> Path:
+        """This path from one time until another, and then another path, which starts with its motion then."""
+        lead_s = until_s - from_s
+        turns = 2 * pi * round((following.knots[0][9] - self._knot(until_s)[9]) / (2 * pi))
+        inner = range(
+            bisect_right(self.times_s, from_s + _SHORTEST_S),
+            bisect_right(self.times_s, until_s - _SHORTEST_S),
+        )
+        kept = [(0.0, self._knot(from_s)), *((self.times_s[i] - from_s, self.knots[i]) for i in inner)]
+        first = [
+            crossing.moved(-from_s) for crossing in self.crossings if from_s <= crossing.time_s < until_s
+        ]
+        later = [crossing.moved(lead_s) for crossing in following.crossings]
+        if first and later and dist(first[-1].gate.centre_m, later[0].gate.centre_m) < _SAME_GATE_M:
+            del later[0]  # it was in the opening when the other path began
+        return Path(
+            [*(time_s for time_s, _ in kept), *(time_s + lead_s for time_s in following.times_s)],
+            [*([*knot[:9], knot[9] + turns, knot[10]] for _, knot in kept), *following.knots],
+            (*first, *later),
+        )
+
+    def _knot(self, time_s: float) -> list[float]:
+        """The numbers of a knot between two knots."""
         times = self.times_s
         time_s = min(max(time_s, 0.0), times[-1])
         index = min(bisect_right(times, time_s), len(times) - 1) - 1
         a, b = self.knots[index], self.knots[index + 1]
         step_s = times[index + 1] - times[index]
-        share = (time_s - times[index]) / step_s
-        step = (step_s, share)
+        step = (step_s, (time_s - times[index]) / step_s)
         x, vx = _cubic(a[0], a[3], b[0], b[3], step)
         y, vy = _cubic(a[1], a[4], b[1], b[4], step)
         z, vz = _cubic(a[2], a[5], b[2], b[5], step)
         yaw, rate = _cubic(a[9], a[10], b[9], b[10], step)
-        ax, ay, az = (a[i] + share * (b[i] - a[i]) for i in (6, 7, 8))
-        return Motion((x, y, z), (vx, vy, vz), remainder(yaw, 2 * pi), rate, (ax, ay, az))
-
-    def gates_left(self, time_s: float) -> int:
-        """How many gates have been crossed and left behind at a time: a new plan leaves them out."""
-        return sum(crossing.left_s <= time_s for crossing in self.crossings)
+        ax, ay, az = (a[i] + step[1] * (b[i] - a[i]) for i in (6, 7, 8))
+        return [x, y, z, vx, vy, vz, ax, ay, az, yaw, rate]
 
     def points(self) -> list[Vec3]:
         """The positions of all knots, for displays."""

@@ -127,7 +127,8 @@ class PathFlight:
 
     def _plan(self, goals: Sequence[Goal], obstacles: Obstacles, state: DroneState) -> None:
         start = self._follower.reference() if self.path is not None else None
-        if start is None or self._follower.error_m > RESTART_M:
+        restarts = start is None or self._follower.error_m > RESTART_M
+        if start is None or restarts:
             start = Motion(position_now(state), state.velocity_arena_m_s, state.yaw)
         elif self._looks_aside:
             start = replace(start, yaw_rad=state.yaw, yaw_rate_rad_s=0.0)
@@ -140,7 +141,8 @@ class PathFlight:
             if self._refusals >= MAX_REFUSALS:
                 self.path = None
             return
-        self.path, self.refusal, self._refusals = found, "", 0
+        self.path = found if restarts else self._follower.continued(found)
+        self.refusal, self._refusals = "", 0
         self._planned_for = (tuple(goals), obstacles)
 
     def _ahead(self, time_s: float = AHEAD_S) -> list[Vec3]:

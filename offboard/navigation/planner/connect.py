@@ -13,7 +13,6 @@ from offboard.navigation.goals import FlightStyle
 from offboard.navigation.planner.legs import Array, LegLimits, Legs, Motions, rotate, solve
 
 LOOK_REACH_M = 0.5  # shorter legs to a gate are flown with the heading along them
-TURN_SPARE_S = 0.2  # to begin and end a turn
 NO_TURN_RAD = 0.1  # a smaller turn takes no time of its own
 DESCENT_GAIN_PER_S2 = 1.5
 """A descent to a height that brakes with this times the height above 0.15 m is nowhere faster than the height
@@ -117,7 +116,7 @@ class Connector:
     def _turn_times(self, yaw_before: Array, ends: Ends) -> Array:
         """Times that turns need within legs; none where a heading is free or the turn small."""
         turn = np.abs(wrap(ends.yaws_rad - yaw_before))
-        needed = turn / self._style.yaw_rate_rad_s + TURN_SPARE_S - ends.turns_s
+        needed = turn / self._style.yaw_rate_rad_s + self._style.turn_smoothing_s - ends.turns_s
         return np.maximum(np.where(turn > NO_TURN_RAD, needed, 0.0), 0.0)
 
     def _limits(self, before_m: Array, after_m: Array) -> LegLimits:

@@ -204,16 +204,24 @@ class RouteFinder:
         rows: list[tuple[Array, Array, Array, tuple[float, float, float, float]]] = []
         for opening in openings:
             centre, normal = opening.centre_m, opening.normal
-            cost_s = _switch_cost(gate, opening.yaw_rad, previous)
+            same_way = _same_way(gate, opening.yaw_rad, previous)
+            cost_s = SWITCH_S if same_way is False else 0.0
             straight_m = min(opening.before_m, style.straight_before_m)
             exit_m = min(opening.after_m, style.straight_after_m)
             room_m = min(opening.before_m - straight_m, opening.after_m - exit_m)
             ways = [(-straight_m, speed) for speed in self._speeds(room_m)]
             if start is not None:
-                exit_m = _leaving_exit(start, opening, exit_m)
-                present = float(np.array(start.velocity_m_s) @ normal)
-                speeds = (style.crossing_speed_m_s, max(present, LEAST_CROSSING_M_S))
-                ways += [(at, speed) for at in _late_entries(start, opening, exit_m) for speed in speeds]
+                if same_way:
+                    exit_m = _leaving_exit(start, opening, exit_m)
+                present = max(float(np.array(start.velocity_m_s) @ normal), LEAST_CROSSING_M_S)
+                for at_m in _late_entries(start, opening, exit_m, begun=bool(same_way)):
+                    begun = at_m >= exit_m
+                    speeds = (
+                        (present,)
+                        if begun
+                        else (style.crossing_speed_m_s, min(present, style.crossing_speed_m_s))
+                    )
+                    ways += [(at_m, speed) for speed in speeds]
             for at_m, speed in ways:
                 times = (exit_m - at_m) / speed, max(-TURNED_BEFORE_M - at_m, 0.0) / speed
                 ends = centre + at_m * normal, centre + exit_m * normal, speed * normal
@@ -252,13 +260,13 @@ class RouteFinder:
         return Pass(point, ends, ends, np.zeros(n), np.zeros(n))
 
 
-def _switch_cost(gate: Gate, yaw_rad: float, previous: Sequence[Crossing]) -> float:
-    """Time added to the other side than that of the path flown now."""
+def _same_way(gate: Gate, yaw_rad: float, previous: Sequence[Crossing]) -> bool | None:
+    """Whether the path flown now crosses a gate in this direction; None if it does not cross it."""
     for crossing in previous:
         gap_m = np.linalg.norm(np.array(crossing.gate.centre_m) - np.array(gate.centre_m))
         if gap_m < _SAME_GATE_M:
-            return SWITCH_S if cos(crossing.heading_rad - yaw_rad) < 0.0 else 0.0
-    return 0.0
+            return cos(crossing.heading_rad - yaw_rad) > 0.0
+    return None
 
 
 def _leaving_exit(start: Motion, opening: _Opening, exit_m: float) -> float:
@@ -269,12 +277,19 @@ def _leaving_exit(start: Motion, opening: _Opening, exit_m: float) -> float:
     return max(exit_m, along_m + 0.03 + LEAVING_S * speed) if leaving else exit_m
 
 
-def _late_entries(start: Motion, opening: _Opening, exit_m: float) -> list[float]:
-    """Later entries, as distances behind the opening, for a start that is before or in it already."""
+def _late_entries(start: Motion, opening: _Opening, exit_m: float, *, begun: bool) -> list[float]:
+    """Later entries, as distances behind the opening, for a start that is before or in it already.
+
+    Args:
+        start: the motion now.
+        opening: the gate from one side.
+        exit_m: where the straight flight ends, behind the opening.
+        begun: the path flown now leads through the opening in this direction.
+    """
     offset = np.array(start.position_m) - opening.centre_m
     velocity, normal = np.array(start.velocity_m_s), opening.normal
     along_m = float(offset @ normal)
-    if not -COMMITTED_BEFORE_M < along_m < exit_m:
+    if not -COMMITTED_BEFORE_M < along_m < (exit_m if begun else 0.0):
         return []
     across_m = hypot(offset[0] - along_m * normal[0], offset[1] - along_m * normal[1])
     beside_m = max(across_m, abs(float(offset[2])))

@@ -15,7 +15,7 @@ from offboard.navigation.planner.legs import Array, Leg
 STEP_S = 0.05
 HOLD_BEFORE_M = 0.28  # before an opening the heading is its normal; smoothing makes it later
 LEFT_M = 0.25  # so far behind an opening the drone has left it: nothing of its box is between the bars
-HOLD_AFTER_M = 0.27  # behind an opening the heading stays until the drone's box has left the bars
+HOLD_BEHIND_M = -0.1  # before the end of the straight flight behind an opening the heading stays
 _SLOWDOWN_M_S2 = 0.5  # acceleration along the path for slowing down
 _REVERSAL_RAD = 2.6  # a turn larger than this continues the way it turns already
 
@@ -60,9 +60,9 @@ class Samples:
     begins_s: list[float]
 
 
-def window(style: FlightStyle) -> tuple[Array, int]:
-    """Weights of the smoothing, trapezoidal over the smoothing time, and half its length in steps."""
-    half = max(round(style.smoothing_s / STEP_S / 2), 1)
+def window(smoothing_s: float) -> tuple[Array, int]:
+    """Weights of a moving average, trapezoidal over a time, and half its length in steps."""
+    half = max(round(smoothing_s / STEP_S / 2), 1)
     weights = np.ones(2 * half + 1)
     weights[0] = weights[-1] = 0.5
     return weights / weights.sum(), half
@@ -70,7 +70,7 @@ def window(style: FlightStyle) -> tuple[Array, int]:
 
 def run_in(start: Motion, style: FlightStyle) -> tuple[Array, Array]:
     """Position and velocity from which legs must start so that the smoothed path starts with a motion."""
-    weights, half = window(style)
+    weights, half = window(style.smoothing_s)
     half_s = half * STEP_S
     spread = float(weights @ (np.arange(-half, half + 1) * STEP_S) ** 2)
     acceleration = np.array(start.acceleration_m_s2)
@@ -81,7 +81,7 @@ def run_in(start: Motion, style: FlightStyle) -> tuple[Array, Array]:
 
 def sample(stretches: list[Stretch], start: Motion, style: FlightStyle) -> Samples:
     """The motion of stretches, smoothed: a moving average keeps the limits, which are convex."""
-    weights, half = window(style)
+    weights, half = window(style.smoothing_s)
     begins = [0.0]
     for stretch in stretches:
         begins.append(begins[-1] + stretch.leg.duration_s)
@@ -125,31 +125,38 @@ def headings(
     samples: Samples, stretches: list[Stretch], start: Motion, style: FlightStyle
 ) -> tuple[Array, Array]:
     """Continuous heading and its rate at each sample: towards what is looked at, in time for each gate."""
-    weights, half = window(style)
+    weights, half = window(style.turn_smoothing_s)
     wanted, holds = _wanted_headings(samples, stretches, style)
     step = style.yaw_rate_rad_s * STEP_S
-    yaw = start.yaw_rad + start.yaw_rate_rad_s * half * STEP_S
-    raw = [start.yaw_rad + start.yaw_rate_rad_s * (i - half) * STEP_S for i in range(2 * half)]
+    raw = _run_in_headings(start, weights)
+    yaw, turn = raw[-1], raw[-1] - raw[-2]
     hold = 0
-    turn = start.yaw_rate_rad_s * STEP_S
     for i in range(half, len(wanted)):
-        while hold < len(holds) and i > holds[hold][1]:
+        while hold < len(holds) and i > holds[hold][1] + half:
             hold += 1
         turn = _turn(yaw, wanted[i], turn, step)
         if hold < len(holds):
             begin, _, angle = holds[hold]
-            spare = max(begin - i - 2, 0) * step
+            spare = max(begin - i - half, 0) * step
             if abs(remainder(yaw + turn - angle, 2 * pi)) > spare:
                 turn = min(max(remainder(angle - yaw, 2 * pi), -step), step)
         yaw += turn
         raw.append(yaw)
     raw += [yaw] * half
-    line = np.array(raw)
-    smooth = _average(line[:, None], weights)[:, 0]
+    smooth = _average(np.array(raw)[:, None], weights)[:, 0]
     rates = np.gradient(smooth, STEP_S)
-    smooth, rates = smooth[: len(wanted)], rates[: len(wanted)]
     rates[0], smooth[0] = start.yaw_rate_rad_s, start.yaw_rad
     return smooth, rates
+
+
+def _run_in_headings(start: Motion, weights: Array) -> list[float]:
+    """Headings at the steps before and after the start for which the smoothed ones start with a motion."""
+    half = len(weights) // 2
+    times = np.arange(-half, half) * STEP_S
+    rate, change = start.yaw_rate_rad_s, start.yaw_acceleration_rad_s2
+    spread = float(weights @ (np.arange(-half, half + 1) * STEP_S) ** 2)
+    headings: list[float] = (start.yaw_rad + rate * times + 0.5 * change * (times**2 - spread)).tolist()
+    return headings
 
 
 def _turn(yaw: float, wanted: float, last: float, most: float) -> float:
@@ -190,7 +197,7 @@ def _wanted_headings(
             past = (samples.positions_m - np.array(stretch.goal.centre_m))[:, :2] @ np.array(
                 [np.cos(stretch.yaw_rad), np.sin(stretch.yaw_rad)]
             )
-            near = (past > -HOLD_BEFORE_M) & (past < HOLD_AFTER_M)
+            near = (past > -HOLD_BEFORE_M) & (past < style.straight_after_m + HOLD_BEHIND_M)
             inside = np.flatnonzero((samples.stretches == number) & near)
             if len(inside):
                 holds.append((int(inside[0]), int(inside[-1]), stretch.yaw_rad))

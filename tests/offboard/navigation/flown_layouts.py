@@ -10,6 +10,7 @@ import numpy as np
 
 from framerunner.flying.lockstep import LockstepVehicle
 from framerunner.flying.plan import FlightPlan
+from framerunner.flying.response import Response
 from geometry.solids import Solid
 from geometry.vectors import Vec3
 from offboard.keep_in_box import KeepInBox
@@ -17,6 +18,7 @@ from offboard.navigation.following import PathFollower
 from offboard.navigation.goals import CONTEST, FlightStyle, Gate, Goal, Motion, Obstacles, Point, Refusal
 from offboard.navigation.path import Path
 from offboard.navigation.planning import plan
+from offboard.response import ResponseEstimate
 from scenarios.models import COLOURS, Arena, Scenario
 from scenarios.random_scenarios import load_level, random_scenario
 from scenarios.result import RefereeReport
@@ -136,15 +138,18 @@ def least_margin(path: Sampled, arena: Arena) -> float:
     return float(min((arena.length_x_m / 2 - x).min(), (arena.width_y_m / 2 - y).min()))
 
 
-def fly(layout: Layout, *, replan_s: float) -> tuple[RefereeReport, float, float]:
+def fly(
+    layout: Layout, *, replan_s: float, response: Response | None = None
+) -> tuple[RefereeReport, float, float]:
     """Fly a layout in lockstep, planning again all the time.
 
     Returns:
         The report, the largest distance from the path, and for how long commands were limited to the box.
     """
-    flight = FlightPlan(layout.scenario)
+    flight = FlightPlan(layout.scenario, response=response)
     vehicle = LockstepVehicle(flight)
-    drone, keeper, follower = vehicle.drone, KeepInBox(flight.box), PathFollower()
+    drone, keeper = vehicle.drone, KeepInBox(flight.box)
+    follower, estimate, sent = PathFollower(), ResponseEstimate(), None
     asyncio.run(drone.ready())
     asyncio.run(drone.motors_on())
     state = drone.next_state()
@@ -155,14 +160,20 @@ def fly(layout: Layout, *, replan_s: float) -> tuple[RefereeReport, float, float
     farthest_m = 0.0
     while not (follower.finished and follower.error_m < 0.05):
         now_s = state.time_us * 1e-6
-        assert now_s - began_s < 60.0
-        drone.command(keeper.limit(follower.command(path, state, now_s), state))
+        assert now_s - began_s < 100.0
+        estimate.update(state, sent)
+        answers = follower.response = estimate.response
+        prediction = estimate.predict() if answers.late else None
+        sent = keeper.limit(follower.command(path, state, now_s, prediction), state)
+        drone.command(sent)
         farthest_m = max(farthest_m, follower.error_m)
         if now_s - planned_s >= replan_s and follower.progress_s < path.duration_s - 1.0:
-            goals = goals[path.gates_left(follower.progress_s) :]
+            left = path.gates_left(follower.progress_s + follower.lead_s)
+            goals = [goal for goal in goals if goal not in left]
             planned_s = now_s
-            again = layout.plan(follower.reference(), goals, path)
-            path = path if isinstance(again, Refusal) else again
+            style = CONTEST.adapted(answers) if answers.late else CONTEST
+            again = layout.plan(follower.reference(), goals, path, style)
+            path = path if isinstance(again, Refusal) else follower.continued(again)
         state = drone.next_state()
     asyncio.run(drone.motors_off())
     drone.settle()
