@@ -22,6 +22,7 @@ TURNED_BEFORE_M = 0.25  # before an opening a turn must have ended
 COMMITTED_BEFORE_M = 0.9  # from a start nearer before an opening the straight flight may begin later
 LATE_STRAIGHT_M = 0.16  # where it begins at the latest: the drone's box does not reach the bars yet
 LATE_ENTRIES_M = (-0.27, -0.2, -LATE_STRAIGHT_M)
+LATE_ROOM_M = 0.08  # to a later entry; nearer, one leg leads from the start through the opening
 LATE_ACROSS_M = 0.05  # there the drone must be this near the opening's axis
 LEAVING_M = 0.15  # so far behind the end of the straight flight it is still continued
 LEAVING_S = 0.15
@@ -215,12 +216,7 @@ class RouteFinder:
                     exit_m = _leaving_exit(start, opening, exit_m)
                 present = max(float(np.array(start.velocity_m_s) @ normal), LEAST_CROSSING_M_S)
                 for at_m in _late_entries(start, opening, exit_m, begun=bool(same_way)):
-                    begun = at_m >= exit_m
-                    speeds = (
-                        (present,)
-                        if begun
-                        else (style.crossing_speed_m_s, min(present, style.crossing_speed_m_s))
-                    )
+                    speeds = (present,) if at_m >= exit_m else (style.crossing_speed_m_s, present)
                     ways += [(at_m, speed) for speed in speeds]
             for at_m, speed in ways:
                 times = (exit_m - at_m) / speed, max(-TURNED_BEFORE_M - at_m, 0.0) / speed
@@ -300,4 +296,7 @@ def _late_entries(start: Motion, opening: _Opening, exit_m: float, *, begun: boo
     to_go_m = -LATE_STRAIGHT_M - along_m
     if beside_m > LATE_ACROSS_M + 0.25 * to_go_m or aside > 0.1 + 0.5 * max(speed, 0.0):
         return []
-    return [entry for entry in LATE_ENTRIES_M if entry > along_m + 0.02] or [exit_m]
+    entries = [entry for entry in LATE_ENTRIES_M if entry > along_m + LATE_ROOM_M]
+    if beside_m < LATE_ACROSS_M and to_go_m < LATE_ROOM_M:
+        entries.append(exit_m)
+    return entries
