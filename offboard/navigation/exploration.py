@@ -12,6 +12,7 @@ import numpy as np
 from geometry.axes import Pose
 from geometry.vectors import Quaternion, Vec3
 from offboard.navigation.camera_model import CameraModel
+from offboard.navigation.goals import FlightStyle
 from offboard.navigation.search.coverage import Coverage
 from offboard.navigation.search.frame_visibility import Bools, Floats, FrameVisibility, view_qualities
 from offboard.navigation.search.glimpses import LineOfSight
@@ -21,9 +22,6 @@ from offboard.navigation.search.view_table import YAWS, Doubles, ViewTable
 from scenarios.models import Arena
 from vision.types import ObstacleEdge
 
-SPEED_M_S: Final = 1.0
-CLIMB_M_S: Final = 0.8
-TURN_RAD_S: Final = 0.9
 _START_S: Final = 0.4  # lost when speeding up
 _TURNS: Final = (0.0, 0.6, -0.6, 1.2, -1.2, 1.8, -1.8, 2.5, -2.5)  # rad, of views from about here
 _OTHER_HEIGHT_M: Final = 0.3  # a height that differs by less is not tried
@@ -35,6 +33,21 @@ _NO_FLIGHT_S: Final = 0.1  # to so near a viewpoint the drone only turns
 _DETOUR_M: Final = 0.1  # a way longer by more than this is not straight
 _USED: Final = 1.0  # how much a view counts for less, each time it was taken
 _CLEAR_M: Final = 0.5  # from a viewpoint to frames found, and to obstacles' surfaces
+
+
+@dataclass(frozen=True, slots=True)
+class Pace:
+    """How fast the drone flies to a viewpoint; the defaults are those of the contest's style."""
+
+    speed_m_s: float = 1.0
+    climb_m_s: float = 0.8
+    turn_rad_s: float = 0.9
+
+    @staticmethod
+    def of(style: FlightStyle) -> Pace:
+        """The pace of a style: speed on the average over all directions of flight."""
+        bolder = style.axis_speed_m_s / FlightStyle().axis_speed_m_s
+        return Pace(bolder * Pace().speed_m_s, Pace().climb_m_s, style.yaw_rate_rad_s)
 
 
 @dataclass(frozen=True, slots=True)
@@ -54,12 +67,14 @@ class Explorer:
     Args:
         camera: the drone's camera.
         arena: where the frames are.
+        pace: of the flight to viewpoints.
 
     Attributes:
         coverage: what has been seen so far.
     """
 
-    def __init__(self, camera: CameraModel, arena: Arena) -> None:
+    def __init__(self, camera: CameraModel, arena: Arena, pace: Pace | None = None) -> None:
+        self._pace = pace or Pace()
         self.coverage = Coverage(camera, arena)
         self._visibility = FrameVisibility(camera)
         self._blocks = self.coverage.grid.blocks()
@@ -150,8 +165,9 @@ class Explorer:
         else:
             ground_m = around.distances_m(table.grounds_m[:, 0], table.grounds_m[:, 1])
             level_m = np.repeat(ground_m, len(table.heights_m)).astype(np.float64)
-        fly_s = _START_S + np.maximum(level_m / SPEED_M_S, np.abs(dz_m) / CLIMB_M_S)
-        turn_s = np.array([abs(remainder(yaw - here.yaw_rad, tau)) for yaw in YAWS]) / TURN_RAD_S
+        pace = self._pace
+        fly_s = _START_S + np.maximum(level_m / pace.speed_m_s, np.abs(dz_m) / pace.climb_m_s)
+        turn_s = np.array([abs(remainder(yaw - here.yaw_rad, tau)) for yaw in YAWS]) / pace.turn_rad_s
         scores = gains / (np.maximum(fly_s[:, None], turn_s) + _START_S)
         headings = np.argmax(scores, axis=1)
         best = np.take_along_axis(scores, headings[:, None], axis=1)[:, 0]
@@ -160,7 +176,7 @@ class Explorer:
 
     def _scores(self, here: Pose, ways: Sequence[_Way], unseen: _Unseen) -> list[float]:
         """Gain of each view and of those on the way to it, for its time."""
-        times_s = [_time_s(here, way) for way in ways]
+        times_s = [_time_s(here, way, self._pace) for way in ways]
         gains = self._gains(here, ways, times_s, unseen)
         scores = []
         for index, way in enumerate(ways):
@@ -177,7 +193,7 @@ class Explorer:
         clear = self._clear(here, ways)
         for sample in range(1, _SAMPLES + 1):
             poses = [
-                _on_the_way(here, way, time_s * sample / _SAMPLES)
+                _on_the_way(here, way, time_s * sample / _SAMPLES, self._pace)
                 for way, time_s in zip(ways, times_s, strict=True)
             ]
             at = np.array([(*each.position_m, cos(each.yaw_rad), sin(each.yaw_rad)) for each in poses])
@@ -251,27 +267,27 @@ def _ways(here: Pose, around: WaysRound | None, viewpoints: Sequence[Viewpoint])
     return ways
 
 
-def _fly_s(here: Pose, way: _Way) -> float:
+def _fly_s(here: Pose, way: _Way, pace: Pace) -> float:
     up_m = abs(way.viewpoint.position_m[2] - here.position_m[2])
-    return max(way.level_m / SPEED_M_S, up_m / CLIMB_M_S)
+    return max(way.level_m / pace.speed_m_s, up_m / pace.climb_m_s)
 
 
-def _time_s(here: Pose, way: _Way) -> float:
+def _time_s(here: Pose, way: _Way, pace: Pace) -> float:
     """Time to get to a viewpoint, turning on the way."""
-    fly_s = _fly_s(here, way)
-    turn_s = abs(remainder(way.viewpoint.yaw_rad - here.yaw_rad, tau)) / TURN_RAD_S
+    fly_s = _fly_s(here, way, pace)
+    turn_s = abs(remainder(way.viewpoint.yaw_rad - here.yaw_rad, tau)) / pace.turn_rad_s
     return max(fly_s + _START_S if fly_s > _NO_FLIGHT_S else 0.0, turn_s)
 
 
-def _on_the_way(here: Pose, way: _Way, time_s: float) -> Pose:
+def _on_the_way(here: Pose, way: _Way, time_s: float, pace: Pace) -> Pose:
     """The pose some time after leaving for a viewpoint; on a way round obstacles, that at its end."""
-    viewpoint, fly_s = way.viewpoint, _fly_s(here, way)
+    viewpoint, fly_s = way.viewpoint, _fly_s(here, way, pace)
     if not way.straight:
         return Pose(viewpoint.position_m, viewpoint.yaw_rad)
     share = min(max(time_s - _START_S, 0.0) / fly_s, 1.0) if fly_s > _NO_FLIGHT_S else 1.0
     x, y, z = (at + share * (to - at) for at, to in zip(here.position_m, viewpoint.position_m, strict=True))
     turn_rad = remainder(viewpoint.yaw_rad - here.yaw_rad, tau)
-    return Pose((x, y, z), here.yaw_rad + copysign(min(abs(turn_rad), TURN_RAD_S * time_s), turn_rad))
+    return Pose((x, y, z), here.yaw_rad + copysign(min(abs(turn_rad), pace.turn_rad_s * time_s), turn_rad))
 
 
 def _is_clear(viewpoint: Viewpoint, blocked: Sequence[tuple[float, float, float]]) -> bool:

@@ -12,6 +12,7 @@ from math import cos, hypot, pi, remainder, sin, sqrt
 
 from geometry.vectors import Vec3
 from offboard.drone import DroneState, VelocityCommand
+from offboard.limits import CONTEST, CommandLimits, clamped
 from offboard.navigation.goals import Motion
 from offboard.navigation.path import Path
 from offboard.response import Prediction, Response
@@ -43,24 +44,18 @@ class PathFollower:
 
     Args:
         response: of the vehicle.
-        axis_limit_m_s: of commands, forward, left and up.
-        yaw_rate_limit_rad_s: of commands.
+        limits: of commands.
 
     Attributes:
         progress_s: time along the path.
         error_m: the drone's distance from the path when its position was measured.
     """
 
-    def __init__(
-        self,
-        response: Response | None = None,
-        axis_limit_m_s: float = 1.0,
-        yaw_rate_limit_rad_s: float = 1.0,
-    ) -> None:
+    def __init__(self, response: Response | None = None, limits: CommandLimits = CONTEST) -> None:
         self.response = response or Response()
         self.progress_s = 0.0
         self.error_m = 0.0
-        self._limits = (axis_limit_m_s, yaw_rate_limit_rad_s)
+        self._limits = limits
         self._path: Path | None = None
         self._last_s: float | None = None
         self._rate = 1.0  # of the path's time
@@ -243,12 +238,11 @@ class PathFollower:
 
     def _limited(self, forward: float, left: float, up: float, yaw_rate: float) -> VelocityCommand:
         """The command within the limits: an axis at its limit leaves the others as they are."""
-        limit, yaw_limit = self._limits
+        limits = self._limits
         return VelocityCommand(
-            min(max(forward, -limit), limit),
-            min(max(left, -limit), limit),
-            min(max(up, -limit), limit),
-            min(max(yaw_rate, -yaw_limit), yaw_limit),
+            *limits.level(forward, left),
+            clamped(up, limits.down_m_s, limits.up_m_s),
+            clamped(yaw_rate, limits.yaw_rate_rad_s, limits.yaw_rate_rad_s),
         )
 
 

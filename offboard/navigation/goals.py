@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from math import cos, sin
+from math import cos, inf, sin
 
 from geometry.vectors import Vec3
+from offboard.limits import CommandLimits
 from offboard.response import Response
 from scenarios.models import Base
 
@@ -86,7 +87,9 @@ class FlightStyle:
         yaw_rate_rad_s: of turns.
         acceleration_m_s2: along each level axis.
         climb_acceleration_m_s2: up and down.
-        command_m_s: commands along an axis, which are higher than speeds while the drone accelerates.
+        command_m_s: commands along a level axis, which are higher than speeds while the drone accelerates.
+        level_command_m_s: in plan, over both axes.
+        climb_command_m_s: up and down.
         lag_s: by which the velocity in plan follows commands.
         climb_lag_s: likewise up and down.
         crossing_speed_m_s: at most this in an opening.
@@ -109,6 +112,8 @@ class FlightStyle:
     acceleration_m_s2: float = 1.3
     climb_acceleration_m_s2: float = 1.3
     command_m_s: float = 0.98
+    level_command_m_s: float = inf
+    climb_command_m_s: float = 0.98
     lag_s: float = 0.4
     climb_lag_s: float = 0.1
     crossing_speed_m_s: float = 0.8
@@ -150,6 +155,56 @@ class FlightStyle:
 
 
 CONTEST = FlightStyle()
+_OPEN = FlightStyle(
+    axis_speed_m_s=1.45,
+    path_speed_m_s=1.45,
+    yaw_rate_rad_s=1.6,
+    acceleration_m_s2=1.6,
+    climb_acceleration_m_s2=1.6,
+    crossing_speed_m_s=0.9,
+    straight_before_m=0.5,
+    smoothing_s=0.3,
+    look_offset_rad=0.5,
+)
+"""For the simulated drone's own limits. It is not flown at them: near its greatest tilt it overshoots."""
+_OPEN_M_S = 1.748  # its level speed
+COMMAND_SHARE = 0.98  # of a limit that planned commands use
+TURN_SHARE = 0.9  # of the limit of the yaw rate
+
+
+def style_of(limits: CommandLimits) -> FlightStyle:
+    """How to fly with a class's limits: as in the contest up to its 1 m/s, from there on bolder.
+
+    A drone that can fly faster than the simulated one is flown as that one.
+    """
+    axis_m_s = min(limits.forward_m_s, limits.left_m_s, limits.level_m_s)
+    climb_m_s = min(limits.up_m_s, limits.down_m_s)
+    share = min(max(axis_m_s - 1.0, 0.0) / (_OPEN_M_S - 1.0), 1.0)
+
+    def between(contest: float, bolder: float) -> float:
+        return contest + share * (bolder - contest)
+
+    usual, bold = CONTEST, _OPEN
+    axis_speed_m_s = between(usual.axis_speed_m_s, bold.axis_speed_m_s)
+    path_speed_m_s = between(usual.path_speed_m_s, bold.path_speed_m_s)
+    yaw_rate_rad_s = between(usual.yaw_rate_rad_s, bold.yaw_rate_rad_s)
+    crossing_speed_m_s = between(usual.crossing_speed_m_s, bold.crossing_speed_m_s)
+    return replace(
+        usual,
+        axis_speed_m_s=min(axis_speed_m_s, HEADROOM * axis_m_s),
+        climb_speed_m_s=min(usual.climb_speed_m_s, HEADROOM * climb_m_s),
+        path_speed_m_s=min(path_speed_m_s, HEADROOM * limits.level_m_s),
+        yaw_rate_rad_s=min(yaw_rate_rad_s, TURN_SHARE * limits.yaw_rate_rad_s),
+        acceleration_m_s2=between(usual.acceleration_m_s2, bold.acceleration_m_s2),
+        climb_acceleration_m_s2=between(usual.climb_acceleration_m_s2, bold.climb_acceleration_m_s2),
+        command_m_s=COMMAND_SHARE * axis_m_s,
+        level_command_m_s=COMMAND_SHARE * limits.level_m_s,
+        climb_command_m_s=COMMAND_SHARE * climb_m_s,
+        crossing_speed_m_s=min(crossing_speed_m_s, HEADROOM * axis_m_s),
+        straight_before_m=between(usual.straight_before_m, bold.straight_before_m),
+        smoothing_s=between(usual.smoothing_s, bold.smoothing_s),
+        look_offset_rad=between(usual.look_offset_rad, bold.look_offset_rad),
+    )
 
 
 @dataclass(frozen=True, slots=True)

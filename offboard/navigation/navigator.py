@@ -14,7 +14,7 @@ from offboard.drone import DroneState, VelocityCommand
 from offboard.limits import CONTEST, CommandLimits
 from offboard.navigation.crossing_attempt import LOOK_AGAIN_M, CrossingAttempt
 from offboard.navigation.frame_estimate import FrameEstimate
-from offboard.navigation.goals import FlightStyle, Gate, Goal, Point
+from offboard.navigation.goals import Gate, Goal, Point, style_of
 from offboard.navigation.path_flight import STILL, PathFlight, position_now
 from offboard.navigation.surroundings import Surroundings
 from offboard.navigation.view import NavigationView
@@ -39,9 +39,9 @@ class Navigator:
         self._surroundings = surroundings
         width_m, height_m = surroundings.frame_m
         self._opening_m = (width_m - 2 * surroundings.bar_m, height_m - 2 * surroundings.bar_m)
-        self._style = FlightStyle()
-        self._world = WorldModel(surroundings)
-        self._flight = PathFlight(surroundings.arena, self._style)
+        self._style = style_of(limits)
+        self._world = WorldModel(surroundings, self._style)
+        self._flight = PathFlight(surroundings.arena, self._style, limits)
         self._start_m: Vec3 | None = None
         self._state: DroneState | None = None
         self._action = ""

@@ -12,6 +12,7 @@ from math import atan2, dist, pi, remainder
 
 from geometry.vectors import Vec3
 from offboard.drone import DroneState, VelocityCommand
+from offboard.limits import CommandLimits
 from offboard.navigation.following import PathFollower
 from offboard.navigation.goals import FlightStyle, Gate, Goal, Motion, Obstacles, Refusal
 from offboard.navigation.path import Path
@@ -46,13 +47,13 @@ class PathFlight:
         watched: the place that stopped the drone, which now looks there; None if none did.
     """
 
-    def __init__(self, arena: Arena, style: FlightStyle) -> None:
+    def __init__(self, arena: Arena, style: FlightStyle, limits: CommandLimits) -> None:
         self.path: Path | None = None
         self.refusal = ""
         self.watched: Vec3 | None = None
         self._arena = arena
         self._style = self._usual_style = style
-        self._follower = PathFollower()
+        self._follower = PathFollower(limits=limits)
         self._response = ResponseEstimate()
         self._planned_for: tuple[tuple[Goal, ...], Obstacles] | None = None
         self._tried_s = -REPLAN_S

@@ -8,10 +8,10 @@ from collections.abc import Sequence
 from geometry.vectors import Vec3
 from offboard.drone import DroneState
 from offboard.navigation.camera_model import CameraModel
-from offboard.navigation.exploration import Explorer, Viewpoint
+from offboard.navigation.exploration import Explorer, Pace, Viewpoint
 from offboard.navigation.frame_estimate import FrameEstimate
 from offboard.navigation.frame_map import FrameMap
-from offboard.navigation.goals import Gate, Obstacles
+from offboard.navigation.goals import FlightStyle, Gate, Obstacles
 from offboard.navigation.obstacle_map import ObstacleMap
 from offboard.navigation.pose_history import DronePose, PoseHistory
 from offboard.navigation.search.glimpses import Glimpses
@@ -30,7 +30,7 @@ class WorldModel:
         seen_space: where nothing stands.
     """
 
-    def __init__(self, surroundings: Surroundings) -> None:
+    def __init__(self, surroundings: Surroundings, style: FlightStyle) -> None:
         camera = CameraModel.of(surroundings.camera)
         self._surroundings = surroundings
         self._history = PoseHistory()
@@ -38,7 +38,7 @@ class WorldModel:
         self._obstacle_map = ObstacleMap(camera, surroundings.arena)
         self.seen_space = SeenSpace(camera, surroundings.arena)
         self._glimpses = Glimpses(camera)
-        self._explorer = Explorer(camera, surroundings.arena)
+        self._explorer = Explorer(camera, surroundings.arena, Pace.of(style))
         self._image_us = -1
         self._waiting: deque[Detections] = deque(maxlen=IMAGES_WAITING)
 

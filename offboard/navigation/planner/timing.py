@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from math import atan2, hypot, isnan, nan, pi, remainder
+from math import atan2, hypot, isfinite, isnan, nan, pi, remainder
 
 import numpy as np
 import numpy.typing as npt
@@ -271,16 +271,24 @@ def _shares(samples: Samples, yaw: Array, yaw_rate: Array, style: FlightStyle) -
     share: Array = 1.0 / np.maximum(excess, 1.0)
     ahead = c * ax + s * ay + yaw_rate * left
     aside = c * ay - s * ax - yaw_rate * forward
-    for speed, acceleration, lag_s in (
-        (forward, ahead, style.lag_s),
-        (left, aside, style.lag_s),
-        (vz, az, style.climb_lag_s),
+    for speed, acceleration, lag_s, command_m_s in (
+        (forward, ahead, style.lag_s, style.command_m_s),
+        (left, aside, style.lag_s, style.command_m_s),
+        (vz, az, style.climb_lag_s, style.climb_command_m_s),
     ):
-        share = np.minimum(share, _share_of_command(speed, lag_s * acceleration, style.command_m_s))
+        share = np.minimum(share, _share_of_command(speed, lag_s * acceleration, command_m_s))
+    if isfinite(style.level_command_m_s):
+        level = np.hypot(forward, left)
+        size = np.maximum(level, 1e-6)
+        along = style.lag_s * (forward * ahead + left * aside) / size
+        across = style.lag_s * (forward * aside - left * ahead) / size
+        least = 0.5 * style.level_command_m_s
+        limit = np.sqrt(np.maximum(style.level_command_m_s**2 - across * across, least * least))
+        share = np.minimum(share, _share_of_command(level, along, limit))
     return share
 
 
-def _share_of_command(speed: Array, added: Array, limit: float) -> Array:
+def _share_of_command(speed: Array, added: Array, limit: Array | float) -> Array:
     """The largest share u with |u speed + u^2 added| <= limit."""
     same = speed * added > 0.0
     size, more = np.abs(speed), np.maximum(np.abs(added), 1e-6)
