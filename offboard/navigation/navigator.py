@@ -7,7 +7,7 @@ the velocity to fly. An action keeps its goal and its path as long as it is call
 from __future__ import annotations
 
 from collections.abc import Sequence
-from math import atan2, cos, dist, hypot, pi, remainder, sin
+from math import atan2, copysign, cos, dist, hypot, inf, pi, remainder, sin
 
 from geometry.vectors import Vec3
 from offboard.drone import DroneState, VelocityCommand
@@ -28,6 +28,7 @@ HOME_HEIGHT_M = 0.5  # above the start, on the way home
 AHEAD_STD_M = 0.3  # of a next frame; if it is known less well, it is not planned for yet
 ARRIVED_M = 0.06
 ARRIVED_M_S = 0.15
+LEAST_LOOK_M = 0.45  # before a frame; if the arena leaves less room, the drone looks from the other side
 LOOK_BACK_M = 1.6
 LOOK_ASIDE_RAD = 0.5
 
@@ -147,7 +148,7 @@ class Navigator:
             return STILL
         crossing.known_s = now_s
         if crossing.must_look(estimate, position_now(state), now_s):
-            return self._fly(_place_before(estimate, state, LOOK_AGAIN_M))
+            return self._fly(self._place_before(estimate, state))
         command = self._fly(Gate(estimate.position_m, estimate.yaw_rad), *self._goals_after(colour))
         path = self._flight.path
         finds_way = path is not None or self._flight.watched is not None
@@ -200,6 +201,33 @@ class Navigator:
         place = self._inside((x + LOOK_BACK_M * cos(bearing), y + LOOK_BACK_M * sin(bearing), z + 0.1))
         return Point(place, atan2(y - place[1], x - place[0]))
 
+    def _place_before(self, estimate: FrameEstimate, state: DroneState) -> Point:
+        """On a frame's normal, facing it; if its yaw is not known, on the line to it.
+
+        On the drone's side, unless the arena leaves room on the other side only.
+        """
+        x, y, z = estimate.position_m
+        bearing = atan2(state.y - y, state.x - x)
+        if not estimate.ambiguous:
+            normal = estimate.yaw_rad
+            bearing = normal if cos(bearing - normal) > 0.0 else normal + pi
+        room_m, other_m = (self._room_m((x, y), direction) for direction in (bearing, bearing + pi))
+        if room_m < LEAST_LOOK_M < other_m:
+            bearing, room_m = bearing + pi, other_m
+        away_m = min(LOOK_AGAIN_M, max(room_m, LEAST_LOOK_M))
+        place = self._inside((x + away_m * cos(bearing), y + away_m * sin(bearing), z))
+        return Point(place, remainder(bearing + pi, 2 * pi))
+
+    def _room_m(self, place_m: tuple[float, float], bearing: float) -> float:
+        """How far it is from a place, in a direction, to where the drone is too near a side of the arena."""
+        arena, margin_m = self._surroundings.arena, self._style.side_margin_m
+        sides_m = (arena.length_x_m / 2 - margin_m, arena.width_y_m / 2 - margin_m)
+        directions = (cos(bearing), sin(bearing))
+        return min(
+            (copysign(side_m, towards) - at_m) / towards if abs(towards) > 1e-6 else inf
+            for at_m, towards, side_m in zip(place_m, directions, sides_m, strict=True)
+        )
+
     def _inside(self, place: Vec3) -> Vec3:
         """The nearest place in which the drone keeps its distance from the arena's sides."""
         arena, style = self._surroundings.arena, self._style
@@ -208,14 +236,3 @@ class Navigator:
         x, y, z = place
         low, high = style.floor_margin_m, arena.height_m - style.side_margin_m
         return (max(-x_m, min(x_m, x)), max(-y_m, min(y_m, y)), max(low, min(high, z)))
-
-
-def _place_before(estimate: FrameEstimate, state: DroneState, distance_m: float) -> Point:
-    """On a frame's normal, on the drone's side, facing it; if its yaw is not known, on the line to it."""
-    x, y, z = estimate.position_m
-    bearing = atan2(state.y - y, state.x - x)
-    if not estimate.ambiguous:
-        normal = estimate.yaw_rad
-        bearing = normal if cos(bearing - normal) > 0.0 else normal + pi
-    place = (x + distance_m * cos(bearing), y + distance_m * sin(bearing), z)
-    return Point(place, remainder(bearing + pi, 2 * pi))

@@ -18,14 +18,15 @@ from offboard.navigation.path import Path
 from offboard.navigation.planner.clearance import SAME_FRAME_M, Clearance
 from offboard.navigation.planner.connect import Connector
 from offboard.navigation.planner.detours import LegFinder, open_ended
-from offboard.navigation.planner.legs import Leg
+from offboard.navigation.planner.legs import Array, Leg
 from offboard.navigation.planner.route import BLOCKED_S, Pass, RouteFinder, place
 from offboard.navigation.planner.timing import Stretch, headings, run_in, sample, slowed
 from scenarios.models import Arena
 
 LIFT_OFF_M_S = 0.5  # when the base is left below
 LIFT_OFF_SPARE_M = 0.02
-STOPPING_M = 0.5  # behind a last gate the drone stops in this distance
+STOPPING_M = 0.5  # behind a last gate the drone stops in this distance,
+STOPPING_SHARES = np.array([1.0, 0.7, 0.5, 0.3, 0.15])  # or in the largest of these shares that is clear
 USED_MARGIN_M = 0.05  # of the margin to obstacles, while a path is flown
 MAX_ROUTES = 6  # for which legs are sought
 SLOWER_S = 0.3  # legs slower than expected by this make another route worth a look
@@ -138,11 +139,18 @@ def _complete(route: list[Pass], clearance: Clearance) -> list[Pass]:
         up = np.array([from_m[0], from_m[1], clearance.base_top_m + LIFT_OFF_SPARE_M])
         passes.insert(1, place(up, np.array([0.0, 0.0, LIFT_OFF_M_S]), start.yaw_rad))
     if isinstance(end.goal, Gate):
-        velocity = end.exits.velocities_m_s[0]
-        speed = float(np.linalg.norm(velocity))
-        stop = end.exits.places_m[0] + velocity / speed * min(STOPPING_M, speed)
-        passes.append(place(stop, np.zeros(3), end.yaw_rad))
+        passes.append(place(_stop_behind(end, clearance), np.zeros(3), end.yaw_rad))
     return passes
+
+
+def _stop_behind(crossing: Pass, clearance: Clearance) -> Array:
+    """Where the drone stops behind a last gate: gently, unless something is behind it."""
+    leave, velocity = crossing.exits.places_m[0], crossing.exits.velocities_m_s[0]
+    speed = float(np.linalg.norm(velocity))
+    stops = leave + STOPPING_SHARES[:, None] * min(STOPPING_M, speed) * velocity / speed
+    clear = clearance.depths(stops).max(axis=1) <= 0.0
+    farthest: Array = stops[int(clear.argmax()) if clear.any() else -1]
+    return farthest
 
 
 def _stretches(route: list[Pass], found: _Legs) -> list[Stretch] | Refusal:

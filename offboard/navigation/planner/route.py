@@ -215,9 +215,10 @@ class RouteFinder:
                 if same_way:
                     exit_m = _leaving_exit(start, opening, exit_m)
                 present = max(float(np.array(start.velocity_m_s) @ normal), LEAST_CROSSING_M_S)
+                top = self._top_speed(opening.after_m - exit_m)
                 for at_m in _late_entries(start, opening, exit_m, begun=bool(same_way)):
                     speeds = (present,) if at_m >= exit_m else (style.crossing_speed_m_s, present)
-                    ways += [(at_m, speed) for speed in speeds]
+                    ways += [(at_m, min(speed, top)) for speed in speeds]
             for at_m, speed in ways:
                 times = (exit_m - at_m) / speed, max(-TURNED_BEFORE_M - at_m, 0.0) / speed
                 ends = centre + at_m * normal, centre + exit_m * normal, speed * normal
@@ -232,10 +233,13 @@ class RouteFinder:
 
     def _speeds(self, room_m: float) -> list[float]:
         """Speeds to cross a gate with, for which there is room to accelerate before and to brake behind."""
-        style = self._style
-        top = max((2.0 * style.acceleration_m_s2 * room_m) ** 0.5, 0.2)
-        speeds = [share * style.crossing_speed_m_s for share in SPEED_SHARES]
+        top = self._top_speed(room_m)
+        speeds = [share * self._style.crossing_speed_m_s for share in SPEED_SHARES]
         return [speed for speed in speeds if speed <= top] or speeds[-1:]
+
+    def _top_speed(self, room_m: float) -> float:
+        """The speed from which there is room to brake."""
+        return max((2.0 * self._style.acceleration_m_s2 * max(room_m, 0.0)) ** 0.5, LEAST_CROSSING_M_S)
 
     def _past_point(self, point: Point, following: Goal | None) -> Pass:
         """At rest, or past it towards the next goal at each speed."""

@@ -110,6 +110,17 @@ def test_a_gate_is_crossed_only_in_its_direction():
     assert touching(Sampled(path), gate) == []
 
 
+@pytest.mark.parametrize("home", [True, False])
+def test_a_drone_before_a_gate_by_a_wall_slows_down_and_stays_in_the_arena(home: bool):
+    gate = Gate((4.4, 0.0, 1.0), 0.0, direction=1)
+    goals = [gate, Point((0.0, 0.0, 1.0))] if home else [gate]
+    start = Motion((3.6, 0.0, 1.0), (0.9, 0.0, 0.0))
+    path = plan(start, goals, obstacles=Obstacles((gate,)), arena=Arena(), style=CONTEST)
+    assert isinstance(path, Path), path
+    assert crossed(Sampled(path), (gate,)) == [0]
+    assert least_margin(Sampled(path), Arena()) > 0.2
+
+
 def test_no_goal_is_refused():
     path = plan(Motion((0.0, 0.0, 1.0)), [], obstacles=Obstacles(), arena=Arena(), style=CONTEST)
     assert path == Refusal("there is no goal to fly to")
