@@ -7,15 +7,15 @@ the velocity to fly. An action keeps its goal and its path as long as it is call
 from __future__ import annotations
 
 from collections.abc import Sequence
-from math import atan2, copysign, cos, dist, hypot, inf, pi, remainder, sin
+from math import dist, hypot
 
 from geometry.vectors import Vec3
 from offboard.drone import DroneState, VelocityCommand
 from offboard.limits import CONTEST, CommandLimits
-from offboard.navigation.crossing_attempt import LOOK_AGAIN_M, CrossingAttempt
-from offboard.navigation.frame_estimate import FrameEstimate
+from offboard.navigation.crossing_attempt import CrossingAttempt
 from offboard.navigation.goals import Gate, Goal, Point, style_of
 from offboard.navigation.path_flight import STILL, PathFlight, position_now
+from offboard.navigation.search.looking_places import LookingPlaces
 from offboard.navigation.surroundings import Surroundings
 from offboard.navigation.view import NavigationView
 from offboard.navigation.world_model import WorldModel
@@ -28,21 +28,18 @@ HOME_HEIGHT_M = 0.5  # above the start, on the way home
 AHEAD_STD_M = 0.3  # of a next frame; if it is known less well, it is not planned for yet
 ARRIVED_M = 0.06
 ARRIVED_M_S = 0.15
-LEAST_LOOK_M = 0.45  # before a frame; if the arena leaves less room, the drone looks from the other side
-LOOK_BACK_M = 1.6
-LOOK_ASIDE_RAD = 0.5
 
 
 class Navigator:
     """The world model, the path, and the action that is flown. All positions are in arena axes."""
 
     def __init__(self, surroundings: Surroundings, limits: CommandLimits = CONTEST) -> None:
-        self._surroundings = surroundings
         width_m, height_m = surroundings.frame_m
         self._opening_m = (width_m - 2 * surroundings.bar_m, height_m - 2 * surroundings.bar_m)
         self._style = style_of(limits)
         self._world = WorldModel(surroundings, self._style)
         self._flight = PathFlight(surroundings.arena, self._style, limits)
+        self._places = LookingPlaces(surroundings.arena, self._style)
         self._start_m: Vec3 | None = None
         self._state: DroneState | None = None
         self._action = ""
@@ -126,7 +123,12 @@ class Navigator:
         """Fly back from a frame, to one of its sides, facing it."""
         state, _ = self._begin(f"step back from {colour}")
         if self._goal is None:
-            self._goal = self._place_to_look_from(colour, state)
+            frame, here_m = self._world.frame(colour), position_now(state)
+            if frame is None:
+                self._goal = self._places.back(here_m, state.yaw)
+            else:
+                side = 1 if self._steps_back % 2 else -1
+                self._goal = self._places.aside(frame, here_m, side, self._world.obstacles())
             self._steps_back += 1
         return self._fly(self._goal)
 
@@ -148,7 +150,7 @@ class Navigator:
             return STILL
         crossing.known_s = now_s
         if crossing.must_look(estimate, position_now(state), now_s):
-            return self._fly(self._place_before(estimate, state))
+            return self._fly(self._places.before(estimate, position_now(state), self._world.obstacles()))
         command = self._fly(Gate(estimate.position_m, estimate.yaw_rad), *self._goals_after(colour))
         path = self._flight.path
         finds_way = path is not None or self._flight.watched is not None
@@ -187,52 +189,3 @@ class Navigator:
         if estimate is None or estimate.ambiguous or max(estimate.position_std_m) > AHEAD_STD_M:
             return []
         return [Gate(estimate.position_m, estimate.yaw_rad)]
-
-    def _place_to_look_from(self, colour: str, state: DroneState) -> Point:
-        """Away from a frame, to its left and its right side in turn; without a frame, back and up."""
-        here = position_now(state)
-        estimate = self._world.frame(colour)
-        if estimate is None:
-            back = (here[0] - cos(state.yaw), here[1] - sin(state.yaw), here[2] + 0.3)
-            return Point(self._inside(back), state.yaw)
-        x, y, z = estimate.position_m
-        bearing = atan2(here[1] - y, here[0] - x)
-        bearing += LOOK_ASIDE_RAD if self._steps_back % 2 else -LOOK_ASIDE_RAD
-        place = self._inside((x + LOOK_BACK_M * cos(bearing), y + LOOK_BACK_M * sin(bearing), z + 0.1))
-        return Point(place, atan2(y - place[1], x - place[0]))
-
-    def _place_before(self, estimate: FrameEstimate, state: DroneState) -> Point:
-        """On a frame's normal, facing it; if its yaw is not known, on the line to it.
-
-        On the drone's side, unless the arena leaves room on the other side only.
-        """
-        x, y, z = estimate.position_m
-        bearing = atan2(state.y - y, state.x - x)
-        if not estimate.ambiguous:
-            normal = estimate.yaw_rad
-            bearing = normal if cos(bearing - normal) > 0.0 else normal + pi
-        room_m, other_m = (self._room_m((x, y), direction) for direction in (bearing, bearing + pi))
-        if room_m < LEAST_LOOK_M < other_m:
-            bearing, room_m = bearing + pi, other_m
-        away_m = min(LOOK_AGAIN_M, max(room_m, LEAST_LOOK_M))
-        place = self._inside((x + away_m * cos(bearing), y + away_m * sin(bearing), z))
-        return Point(place, remainder(bearing + pi, 2 * pi))
-
-    def _room_m(self, place_m: tuple[float, float], bearing: float) -> float:
-        """How far it is from a place, in a direction, to where the drone is too near a side of the arena."""
-        arena, margin_m = self._surroundings.arena, self._style.side_margin_m
-        sides_m = (arena.length_x_m / 2 - margin_m, arena.width_y_m / 2 - margin_m)
-        directions = (cos(bearing), sin(bearing))
-        return min(
-            (copysign(side_m, towards) - at_m) / towards if abs(towards) > 1e-6 else inf
-            for at_m, towards, side_m in zip(place_m, directions, sides_m, strict=True)
-        )
-
-    def _inside(self, place: Vec3) -> Vec3:
-        """The nearest place in which the drone keeps its distance from the arena's sides."""
-        arena, style = self._surroundings.arena, self._style
-        x_m = arena.length_x_m / 2 - style.side_margin_m
-        y_m = arena.width_y_m / 2 - style.side_margin_m
-        x, y, z = place
-        low, high = style.floor_margin_m, arena.height_m - style.side_margin_m
-        return (max(-x_m, min(x_m, x)), max(-y_m, min(y_m, y)), max(low, min(high, z)))
