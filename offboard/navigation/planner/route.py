@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import pairwise
-from math import cos, hypot, nan, pi
+from math import cos, hypot, nan, pi, sqrt
 
 import numpy as np
 import numpy.typing as npt
@@ -239,7 +239,7 @@ class RouteFinder:
 
     def _top_speed(self, room_m: float) -> float:
         """The speed from which there is room to brake."""
-        return max((2.0 * self._style.acceleration_m_s2 * max(room_m, 0.0)) ** 0.5, LEAST_CROSSING_M_S)
+        return max(sqrt(2.0 * self._style.acceleration_m_s2 * max(room_m, 0.0)), LEAST_CROSSING_M_S)
 
     def _past_point(self, point: Point, following: Goal | None) -> Pass:
         """At rest, or past it towards the next goal at each speed."""

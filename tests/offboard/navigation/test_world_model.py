@@ -12,6 +12,7 @@ import pytest
 from geometry.rotations import quaternion_from_euler
 from offboard.drone import DroneState
 from offboard.navigation.frame_estimate import FrameEstimate
+from offboard.navigation.goals import CONTEST
 from offboard.navigation.surroundings import Surroundings
 from offboard.navigation.world_model import WorldModel
 from scenarios.models import Arena, Base, Camera
@@ -45,7 +46,8 @@ IMAGES_US = range(1_030_000, 2_900_000, 100_000)  # exposed between ticks
 
 def red_after(ticks: Iterable[tuple[DroneState, list[Detections]]]) -> FrameEstimate | None:
     """What is known of red after these ticks."""
-    world = WorldModel(Surroundings(Arena(), Base(x_m=-3.0, y_m=-3.0), Camera(), (0.25, 0.25, 0.1)))
+    surroundings = Surroundings(Arena(), Base(x_m=-3.0, y_m=-3.0), Camera(), (0.25, 0.25, 0.1))
+    world = WorldModel(surroundings, CONTEST)
     for at, images in ticks:
         world.observe(at, images)
     return world.frame("red")
