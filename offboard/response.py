@@ -38,6 +38,7 @@ _DISTURBANCE_S = 0.4  # time constant of the estimate of what commands do not ex
 _LEADS = np.array((0.0, 0.0, 0.7))  # shares by which its change is expected to go on: heights wander slowly
 _X, _Y, _FORWARD, _LEFT, _UP, _TURN = range(6)
 _GROUPS = ((_X, _Y), (_FORWARD, _LEFT), (_UP,), (_TURN,))
+_MEMBERS = np.array([[float(axis in group) for group in _GROUPS] for axis in range(6)])
 
 
 @dataclass(frozen=True, slots=True)
@@ -111,6 +112,7 @@ class ResponseEstimate:
         self._yaw = 0.0
         self._outputs = np.zeros((len(LAGS_S), 6))
         self._past: deque[Array] = deque(maxlen=_KEPT)
+        self._changes: deque[Array] = deque(maxlen=max(DEAD_STEPS) + 1)  # of the outputs, over the window
         self._measured: deque[Array] = deque(maxlen=_WINDOW + 1)
         self._airborne_steps = 0
         self._disturbance = np.zeros(3)
@@ -140,6 +142,8 @@ class ResponseEstimate:
         for _ in range(steps):
             self._outputs = commanded + self._kept * (self._outputs - commanded)
             self._past.append(self._outputs)
+            if len(self._past) > _WINDOW:
+                self._changes.append(self._outputs - self._past[-1 - _WINDOW])
             self._measured.append(measured)
             self._airborne_steps = 0 if state.landed else self._airborne_steps + 1
             if self._airborne_steps > TAKE_OFF_STEPS:
@@ -155,34 +159,28 @@ class ResponseEstimate:
         fade = 1.0 - STEP_S / _MEMORY_S
         self._errors *= fade
         self._energies *= fade
-        squares = np.array(
-            [(self._past[-1 - dead] - self._past[-1 - dead - _WINDOW] - change) ** 2 for dead in DEAD_STEPS]
-        )
-        energy = change * change
-        for number, group in enumerate(_GROUPS):
-            self._errors[:, :, number] += squares[:, :, list(group)].sum(axis=2) * STEP_S
-            self._energies[number] += sum(energy[axis] for axis in group) * STEP_S
+        errors = np.array([self._changes[-1 - dead] for dead in DEAD_STEPS]) - change
+        self._errors += ((errors * errors) @ _MEMBERS) * STEP_S
+        self._energies += ((change * change) @ _MEMBERS) * STEP_S
 
     def _choose(self) -> None:
         """Take pairs, and axes, that explain what was measured clearly better than the present ones."""
         turns_before, chosen_before = self._turning, list(self._chosen)
-        if self._energies[0] > _MIN_ENERGY[0]:
-            fixed, turning = self._errors[:, :, 0].min(), self._errors[:, :, 1].min()
-            self._turning = bool(turning < (_CLEARLY_BETTER if self._is_late_in(0) else 1.0) * fixed)
+        errors = self._errors.reshape(-1, len(_GROUPS))
+        least: list[float] = errors.min(axis=0).tolist()
+        best = [divmod(pair, len(LAGS_S)) for pair in errors.argmin(axis=0).tolist()]
+        energies: list[float] = self._energies.tolist()
+        if energies[0] > _MIN_ENERGY[0]:
+            dead, lag = best[0]
+            late = DEAD_STEPS[dead] * STEP_S + LAGS_S[lag] > _LATE_S[0]
+            self._turning = least[1] < (_CLEARLY_BETTER if late else 1.0) * least[0]
         for channel, group in enumerate((1 if self._turning else 0, 2, 3)):
-            if self._energies[group] < _MIN_ENERGY[channel]:
+            if energies[group] < _MIN_ENERGY[channel]:
                 continue
-            errors = self._errors[:, :, group]
-            dead, lag = divmod(int(errors.argmin()), len(LAGS_S))
-            if errors[dead, lag] < _BETTER * errors[self._chosen[channel]]:
-                self._chosen[channel] = (dead, lag)
+            if least[group] < _BETTER * float(self._errors[(*self._chosen[channel], group)]):
+                self._chosen[channel] = best[group]
         if (self._turning, self._chosen) != (turns_before, chosen_before):
             self.response = self._as_response()
-
-    def _is_late_in(self, group: int) -> bool:
-        """Whether what explains a group's changes best is late."""
-        dead, lag = divmod(int(self._errors[:, :, group].argmin()), len(LAGS_S))
-        return DEAD_STEPS[dead] * STEP_S + LAGS_S[lag] > _LATE_S[0]
 
     def _as_response(self) -> Response:
         pairs = [(DEAD_STEPS[dead] * STEP_S, LAGS_S[lag]) for dead, lag in self._chosen]

@@ -49,18 +49,19 @@ class FrameMap:
         self._arena = arena
         self._prior = Prior.of(arena)
         self._tracks: list[FrameTrack] = []
+        self._frames: tuple[FrameEstimate, ...] = ()
+        self._best: dict[str, FrameEstimate] = {}  # by colour
         self._largest_m = hypot(arena.length_x_m, arena.width_y_m)
         self._time_us = -1
         load_filters()
 
     def best(self, colour: str) -> FrameEstimate | None:
         """The frame of a colour; the one best known if there are several, None if there is none."""
-        tracks = [track for track in self._tracks if track.colour == colour]
-        return max(tracks, key=lambda track: track.rank).estimate() if tracks else None
+        return self._best.get(colour)
 
     def frames(self) -> tuple[FrameEstimate, ...]:
         """All frames seen, of every colour, in the order in which they were found."""
-        return tuple(track.estimate() for track in self._tracks)
+        return self._frames
 
     def observe(self, detections: Detections, pose: DronePose) -> None:
         """Use an image; one that is not later than the last is ignored.
@@ -88,6 +89,17 @@ class FrameMap:
             if track.is_believed(pose.time_us) and track.keep_inside(self._arena)
         ]
         self._drop_duplicates()
+        self._estimate()
+
+    def _estimate(self) -> None:
+        """Note what is known of each frame now: it is asked for far more often than images come."""
+        self._frames = tuple(track.estimate() for track in self._tracks)
+        self._best = {}
+        best: dict[str, FrameTrack] = {}
+        for track, estimate in zip(self._tracks, self._frames, strict=True):
+            other = best.get(track.colour)
+            if other is None or track.rank > other.rank:
+                best[track.colour], self._best[track.colour] = track, estimate
 
     def _match(self, views: list[View], unseen: list[FrameTrack]) -> list[View]:
         """Give views to the frames that they fit best; returns those that fit none."""

@@ -53,6 +53,7 @@ class SeenSpace:
         self._cell_m, self._x_m, self._y_m = floor_cells(arena)
         self._free: Bools = np.zeros((self._x_m.size, self._y_m.size), dtype=bool)
         self._last: tuple[Vec3, float] | None = None
+        self._waiting: list[tuple[Vec3, CameraPose, Doubles | None]] = []
         reach = np.arange(-int(ROOM_M / self._cell_m), int(ROOM_M / self._cell_m) + 1)
         i, j = (offsets.ravel() for offsets in np.meshgrid(reach, reach, indexing="ij"))
         order = np.argsort(np.hypot(i, j), kind="stable")
@@ -68,6 +69,8 @@ class SeenSpace:
     ) -> None:
         """Take in what an image showed of obstacles, which may be nothing.
 
+        Which cells that makes free is computed when somebody asks: where there is no obstacle, nobody does.
+
         Args:
             position_m: of the drone's centre when the image was exposed, arena axes.
             attitude_arena: body FLU to arena.
@@ -78,20 +81,33 @@ class SeenSpace:
         if not self._is_new(position_m, yaw_of(attitude_arena)):
             return
         pose = self._camera.pose(position_m, attitude_arena)
+        limits_m = self._limits_m(pose, edges, columns_m) if edges else None
+        self._waiting.append((position_m, pose, limits_m))
+        if self.suspects_m:
+            self.suspects_m = tuple(each for each in self.suspects_m if not self.is_seen(each))
+
+    def _cells(self) -> Bools:
+        """Which cells are free, shape (cells x, cells y)."""
+        for image in self._waiting:
+            self._add(*image)
+        self._waiting.clear()
+        return self._free
+
+    def _add(self, position_m: Vec3, pose: CameraPose, limits_m: Doubles | None) -> None:
+        """Note what an image showed to be free: each of its columns as far as its limit, if it has one."""
         dx, dy = self._x_m[:, None] - pose.position_m[0], self._y_m - pose.position_m[1]
         m = pose.rotation
         ahead, left = dx * m[0] + dy * m[3], dx * m[1] + dy * m[4]
         half_px = self._camera.half_width_px
         right_px = -left * (self._camera.focal_px / np.maximum(ahead, _NEAREST_M))
         shown = (ahead > _NEAREST_M) & (np.abs(right_px) < half_px - _EDGE_PX)
-        limits_m = self._limits_m(pose, edges, columns_m)
-        columns = ((np.clip(right_px, -half_px, half_px) + half_px) / COLUMN_PX).astype(np.intp)
-        reach_m = limits_m[np.minimum(columns, limits_m.size - 1)]
+        reach_m: Doubles | float = _FARTHEST_M
+        if limits_m is not None:
+            columns = ((np.clip(right_px, -half_px, half_px) + half_px) / COLUMN_PX).astype(np.intp)
+            reach_m = limits_m[np.minimum(columns, limits_m.size - 1)]
         self._free |= shown & (dx * dx + dy * dy < reach_m * reach_m)
         dx, dy = self._x_m[:, None] - position_m[0], self._y_m - position_m[1]
         self._free |= dx * dx + dy * dy < OWN_RADIUS_M**2
-        if self.suspects_m:
-            self.suspects_m = tuple(each for each in self.suspects_m if not self.is_seen(each))
 
     def is_seen(self, place_m: Vec3) -> bool:
         """Whether nothing stands at a place."""
@@ -99,7 +115,7 @@ class SeenSpace:
             round((at - axis[0]) / self._cell_m)
             for at, axis in zip(place_m, (self._x_m, self._y_m), strict=False)
         )
-        return bool(self._free[i, j])
+        return bool(self._cells()[i, j])
 
     def suspect(self, place_m: Vec3) -> None:
         """Take it that something stands at a place, until it is seen that nothing does."""
@@ -118,9 +134,10 @@ class SeenSpace:
         room_m = np.minimum(np.hypot(*(places - np.array(from_m[:2])).T) / 2, ROOM_M)
         low = np.array([self._x_m[0], self._y_m[0]])
         cells = np.floor((places - low) / self._cell_m + 0.5).astype(np.intp)[:, None] + self._around
-        inside = (cells >= 0).all(axis=-1) & (cells < self._free.shape).all(axis=-1)
-        cells = np.clip(cells, 0, np.array(self._free.shape) - 1)
-        unseen = inside & ~self._free[cells[..., 0], cells[..., 1]] & (self._around_m <= room_m[:, None])
+        free = self._cells()
+        inside = (cells >= 0).all(axis=-1) & (cells < free.shape).all(axis=-1)
+        cells = np.clip(cells, 0, np.array(free.shape) - 1)
+        unseen = inside & ~free[cells[..., 0], cells[..., 1]] & (self._around_m <= room_m[:, None])
         for place, cell in np.argwhere(unseen).tolist():
             i, j = cells[place, cell].tolist()
             x, y = float(self._x_m[i]), float(self._y_m[j])

@@ -41,6 +41,7 @@ class WorldModel:
         self._explorer = Explorer(camera, surroundings.arena, Pace.of(style))
         self._image_us = -1
         self._waiting: deque[Detections] = deque(maxlen=IMAGES_WAITING)
+        self._frames: tuple[Gate, ...] | None = None  # that a path must keep clear of; None: not made yet
 
     def observe(self, state: DroneState, images: Sequence[Detections]) -> None:
         """Add the state of a tick and what was seen in the images since the last one.
@@ -64,6 +65,7 @@ class WorldModel:
 
     def _use(self, image: Detections, pose: DronePose) -> None:
         where = (pose.position_m, pose.attitude_arena)
+        self._frames = None
         self._map.observe(image, pose)
         self._obstacle_map.update(*where, image.obstacle_edges)
         self.seen_space.update(*where, image.obstacle_edges, self._obstacle_map.columns_m())
@@ -82,10 +84,11 @@ class WorldModel:
 
     def obstacles(self) -> Obstacles:
         """All that a path must keep clear of; of each colour of the task only the frame known best."""
-        seen = [frame for frame in self._map.frames() if frame.colour not in COLOURS]
-        seen += [best for best in map(self._map.best, COLOURS) if best is not None]
-        frames = tuple(Gate(frame.position_m, frame.yaw_rad) for frame in seen)
-        return Obstacles(frames, self._columns_m(), self._surroundings.base)
+        if self._frames is None:
+            seen = [frame for frame in self._map.frames() if frame.colour not in COLOURS]
+            seen += [best for best in map(self._map.best, COLOURS) if best is not None]
+            self._frames = tuple(Gate(frame.position_m, frame.yaw_rad) for frame in seen)
+        return Obstacles(self._frames, self._columns_m(), self._surroundings.base)
 
     def next_viewpoint(self, position_m: Vec3, yaw_rad: float) -> Viewpoint:
         """Where to look next for frames that are not on the map."""

@@ -44,20 +44,29 @@ class Coverage:
         self._centres = self.grid.centres()
         self._seen = np.zeros((HEADINGS, self._centres[0].size), dtype=np.float32)
         self._last: tuple[Vec3, float] | None = None
+        self._waiting: list[tuple[CameraPose, Sequence[ObstacleEdge]]] = []
 
     def update(
         self, position_m: Vec3, attitude_arena: Quaternion, obstacle_edges: Sequence[ObstacleEdge] = ()
     ) -> None:
-        """Take in an image, whatever it showed.
+        """Take in an image, whatever it showed; what it adds is computed when the coverage is asked for.
 
         Args:
             position_m: of the drone's centre when the image was exposed, arena axes.
             attitude_arena: body FLU to arena.
             obstacle_edges: where obstacles stand; nothing behind them counts as seen.
         """
-        if not self._is_new(position_m, yaw_of(attitude_arena)):
-            return
-        pose = self._camera.pose(position_m, attitude_arena)
+        if self._is_new(position_m, yaw_of(attitude_arena)):
+            self._waiting.append((self._camera.pose(position_m, attitude_arena), obstacle_edges))
+
+    def _cells(self) -> Floats:
+        """Quality of the best view, 0 to 1, by heading and cell of the grid: shape (HEADINGS, x, y, z)."""
+        for pose, obstacle_edges in self._waiting:
+            self._add(pose, obstacle_edges)
+        self._waiting.clear()
+        return self._seen.reshape(HEADINGS, *self.grid.shape)
+
+    def _add(self, pose: CameraPose, obstacle_edges: Sequence[ObstacleEdge]) -> None:
         in_view = self._in_view(pose)
         dx_m, dy_m, dz_m = (
             axis[in_view] - np.float32(at) for axis, at in zip(self._centres, pose.position_m, strict=True)
@@ -71,14 +80,13 @@ class Coverage:
 
     def blocks(self) -> Floats:
         """Quality of the best view, 0 to 1, by heading and block of the grid: shape (HEADINGS, blocks)."""
-        means = block_means(self._seen.reshape(HEADINGS, *self.grid.shape))
+        means = block_means(self._cells())
         flat: Floats = means.reshape(HEADINGS, -1)
         return flat
 
     def in_plan(self) -> Floats:
         """Share seen over all heights and headings, 0 to 1, for pictures: shape (cells x, cells y)."""
-        cells = self._seen.reshape(HEADINGS, *self.grid.shape)
-        means: Floats = cells.mean(axis=(0, 3)) / np.float32(BEST_QUALITY)
+        means: Floats = self._cells().mean(axis=(0, 3)) / np.float32(BEST_QUALITY)
         return means
 
     def _is_new(self, position_m: Vec3, yaw_rad: float) -> bool:
