@@ -31,6 +31,7 @@ SAME_RAD_M = 1.0  # likewise of headings, for each metre
 AHEAD_S = 0.7  # of the path that must be free, beside the vehicle's lag: it is long enough to stop
 LOOK_AHEAD_S = 2.0  # likewise; the drone turns in flight to look at what it has not seen there
 AHEAD_STEP_S = 0.1
+CHECK_S = 0.2  # between two checks that a path is free, if neither it nor the obstacles have changed
 WAITING_REPLAN_S = 0.2  # between two attempts to go on
 MAX_LOOK_S = 0.6  # at a place; if it is not seen then, something stands there
 LOOKED_AT_RAD = 0.3
@@ -56,6 +57,8 @@ class PathFlight:
         self._follower = PathFollower(limits=limits)
         self._response = ResponseEstimate()
         self._planned_for: tuple[tuple[Goal, ...], Obstacles] | None = None
+        self._checked: tuple[Path, int, tuple[Vec3, ...]] | None = None  # and which obstacles there were
+        self._checked_s = 0.0
         self._tried_s = -REPLAN_S
         self._refusals = 0
         self._looks_aside = False  # and not where its path says
@@ -99,20 +102,18 @@ class PathFlight:
             if self.path is None or off or _differ(planned_for, self._planned_for):
                 self._tried_s = now_s
                 self._plan(goals, obstacles, state)
-        ahead = self._ahead()
-        if ahead and self._is_obstructed(ahead, obstacles):
+        if self._must_check(obstacles, now_s) and self._is_obstructed(obstacles):
             self._plan(goals, obstacles, state)
-            ahead = self._ahead()
-            if self._is_obstructed(ahead, obstacles):
+            if self._is_obstructed(obstacles):
                 self.path = None
-        if self.path is not None:
-            self.watched = seen.first_unseen(ahead, position_now(state))
+        if self.path is not None and seen.has_obstacles:
+            self.watched = seen.first_unseen(self._ahead(AHEAD_S), position_now(state))
             if self.watched is not None:
                 self.path, self._watched_s = None, now_s
                 return _look(_turn_to(self.watched, state))
         command = self.follow(state)
         self._looks_aside = False
-        if self.path is not None and not isinstance(goals[0], Gate):
+        if self.path is not None and seen.has_obstacles and not isinstance(goals[0], Gate):
             later = seen.first_unseen(self._ahead(LOOK_AHEAD_S), position_now(state))
             if later is not None:
                 self._looks_aside = True
@@ -146,7 +147,7 @@ class PathFlight:
         self.refusal, self._refusals = "", 0
         self._planned_for = (tuple(goals), obstacles)
 
-    def _ahead(self, time_s: float = AHEAD_S) -> list[Vec3]:
+    def _ahead(self, time_s: float) -> list[Vec3]:
         """Where the drone will be on its path within a time, the vehicle's lag added."""
         path = self.path
         if path is None:
@@ -155,11 +156,22 @@ class PathFlight:
         steps = round((time_s + self._style.lag_s) / AHEAD_STEP_S)
         return [path.at(now_s + step * AHEAD_STEP_S).position_m for step in range(steps + 1)]
 
-    def _is_obstructed(self, places_m: list[Vec3], obstacles: Obstacles) -> bool:
+    def _must_check(self, obstacles: Obstacles, now_s: float) -> bool:
+        """Whether it is time to check that the path is free."""
+        if self.path is None:
+            return False
+        what = (self.path, len(obstacles.frames), obstacles.columns_m)
+        if what == self._checked and now_s - self._checked_s < CHECK_S:
+            return False
+        self._checked, self._checked_s = what, now_s
+        return True
+
+    def _is_obstructed(self, obstacles: Obstacles) -> bool:
         """Whether an obstacle is where the drone will be; the frames it flies through are none."""
         if self.path is None:
             return False
         gates = [crossing.gate for crossing in self.path.crossings]
+        places_m = self._ahead(AHEAD_S + CHECK_S)
         return obstructed(places_m, gates, obstacles=obstacles, arena=self._arena, style=self._style)
 
     def _find(self, start: Motion, goals: Sequence[Goal], obstacles: Obstacles) -> Path | Refusal:
