@@ -11,8 +11,7 @@ from offboard.navigation.goals import Gate, Motion
 
 _SHORTEST_S = 0.005  # knots are not nearer to each other than this
 _SAME_GATE_M = 0.3
-_Step = tuple[float, float]
-"""Its duration, and the share of it that has passed."""
+_CUBICS = ((0, 3), (1, 4), (2, 5), (9, 10))  # values of a knot, and their rates
 
 
 @dataclass(frozen=True, slots=True)
@@ -62,15 +61,8 @@ class Path:
 
     def at(self, time_s: float) -> Motion:
         """The motion at a time since the start; before and after the path, that of its start and end."""
-        x, y, z, vx, vy, vz, ax, ay, az, yaw, rate = self._knot(time_s)
-        turn = self._yaw_acceleration(time_s)
+        (x, y, z, vx, vy, vz, ax, ay, az, yaw, rate), turn = self._between(time_s)
         return Motion((x, y, z), (vx, vy, vz), remainder(yaw, 2 * pi), rate, (ax, ay, az), turn)
-
-    def _yaw_acceleration(self, time_s: float) -> float:
-        """Between the knots next to a time."""
-        index = min(max(bisect_right(self.times_s, time_s), 1), len(self.times_s) - 1)
-        step_s = self.times_s[index] - self.times_s[index - 1]
-        return (self.knots[index][10] - self.knots[index - 1][10]) / step_s
 
     def gates_left(self, time_s: float) -> tuple[Gate, ...]:
         """The gates that have been crossed and left behind at a time: a new plan leaves them out."""
@@ -98,30 +90,29 @@ class Path:
         )
 
     def _knot(self, time_s: float) -> list[float]:
-        """The numbers of a knot between two knots."""
+        return self._between(time_s)[0]
+
+    def _between(self, time_s: float) -> tuple[list[float], float]:
+        """The numbers of a knot between two knots (Hermite's cubics), and the acceleration of the yaw."""
         times = self.times_s
         time_s = min(max(time_s, 0.0), times[-1])
         index = min(bisect_right(times, time_s), len(times) - 1) - 1
         a, b = self.knots[index], self.knots[index + 1]
         step_s = times[index + 1] - times[index]
-        step = (step_s, (time_s - times[index]) / step_s)
-        x, vx = _cubic(a[0], a[3], b[0], b[3], step)
-        y, vy = _cubic(a[1], a[4], b[1], b[4], step)
-        z, vz = _cubic(a[2], a[5], b[2], b[5], step)
-        yaw, rate = _cubic(a[9], a[10], b[9], b[10], step)
-        ax, ay, az = (a[i] + step[1] * (b[i] - a[i]) for i in (6, 7, 8))
-        return [x, y, z, vx, vy, vz, ax, ay, az, yaw, rate]
+        u = (time_s - times[index]) / step_s
+        w = 1.0 - u
+        start, start_rate = w * w * (1.0 + 2.0 * u), w * w * u * step_s
+        end, end_rate = u * u * (1.0 + 2.0 * w), -u * u * w * step_s
+        change, from_rate, to_rate = 6.0 * u * w / step_s, w * (w - 2.0 * u), u * (u - 2.0 * w)
+        values, rates = [], []
+        for i, j in _CUBICS:
+            p, v, q, r = a[i], a[j], b[i], b[j]
+            values.append(start * p + start_rate * v + end * q + end_rate * r)
+            rates.append(change * (q - p) + from_rate * v + to_rate * r)
+        accelerations = [a[6] + u * (b[6] - a[6]), a[7] + u * (b[7] - a[7]), a[8] + u * (b[8] - a[8])]
+        knot = [*values[:3], *rates[:3], *accelerations, values[3], rates[3]]
+        return knot, (b[10] - a[10]) / step_s
 
     def points(self) -> list[Vec3]:
         """The positions of all knots, for displays."""
         return [(knot[0], knot[1], knot[2]) for knot in self.knots]
-
-
-def _cubic(start: float, start_rate: float, end: float, end_rate: float, step: _Step) -> tuple[float, float]:
-    """Value and rate of the cubic with given ends (Hermite) within a step."""
-    step_s, u = step
-    w = 1.0 - u
-    first = w * w * ((1.0 + 2.0 * u) * start + u * step_s * start_rate)
-    second = u * u * ((1.0 + 2.0 * w) * end - w * step_s * end_rate)
-    slopes = w * (w - 2.0 * u) * start_rate + u * (u - 2.0 * w) * end_rate
-    return first + second, 6.0 * u * w * (end - start) / step_s + slopes
