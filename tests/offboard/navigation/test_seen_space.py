@@ -9,6 +9,7 @@ import pytest
 
 from geometry.rotations import quaternion_from_yaw
 from offboard.drone import DroneState
+from offboard.limits import CONTEST as CONTEST_LIMITS
 from offboard.navigation.camera_model import CameraModel
 from offboard.navigation.goals import CONTEST, Obstacles, Point
 from offboard.navigation.path_flight import PathFlight
@@ -62,7 +63,7 @@ def test_a_suspect_is_forgotten_when_it_is_seen_to_be_free():
 
 @pytest.mark.parametrize("goal_m", [(0.0, 2.0, 1.0), (-2.0, 0.5, 1.0), (-1.0, -2.0, 1.0)])
 def test_drone_looks_where_it_will_fly_and_then_flies_there(goal_m):
-    seen, flight = seen_from(), PathFlight(Arena(), CONTEST)
+    seen, flight = seen_from(), PathFlight(Arena(), CONTEST, CONTEST_LIMITS)
     state = DroneState(0, *HERE, yaw=0.0)
     for tick in range(200):
         command = flight.fly([Point(goal_m)], Obstacles(), state, seen)
@@ -76,7 +77,7 @@ def test_drone_looks_where_it_will_fly_and_then_flies_there(goal_m):
 
 
 def test_a_path_that_is_obstructed_is_planned_again_at_once():
-    seen, flight = SeenSpace(CAMERA, Arena()), PathFlight(Arena(), CONTEST)
+    seen, flight = SeenSpace(CAMERA, Arena()), PathFlight(Arena(), CONTEST, CONTEST_LIMITS)
     state = DroneState(0, *HERE, yaw=0.0)
     flight.fly([Point((3.0, 0.0, 1.0))], Obstacles(), state, seen)
     before = flight.path
