@@ -31,7 +31,7 @@ _CORNERS_M = (
     (-HALF_WIDTH_M, -HALF_HEIGHT_M),
 )
 
-EDGE_ON = 0.2  # sine of the angle to the frame's plane below which its outline says little
+EDGE_ON = 0.1  # sine of the angle to the frame's plane below which its outline says little
 PIXEL_STD_PX = 0.1  # added to what the finder of frames states: its edges' errors are not all independent
 # Angles between a frame's normal and the line of sight, and their deviation: together they cover all that can
 # be seen, and within each the measurement is nearly linear.

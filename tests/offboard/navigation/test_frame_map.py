@@ -81,6 +81,18 @@ def test_view_from_one_place_does_not_become_certain_by_repetition() -> None:
     assert after.views <= before.views + 1
 
 
+def test_frame_seen_almost_edge_on_is_not_taken_for_its_mirror_image() -> None:
+    frame = frame_at(0.0, 0.0, 1.5, 0.0)
+    for seed in range(10):
+        flight = Flight(seed)
+        for step in range(8):
+            bearing = pi / 2 - radians(9.0 - 0.3 * step)
+            flight.look([frame], (-4.5 * cos(bearing), -4.5 * sin(bearing), 1.5), bearing)
+        estimate = flight.map.best("red")
+        assert estimate is not None
+        assert estimate.ambiguous or errors(estimate, frame)[1] < 4.0 * estimate.yaw_std_rad
+
+
 def test_two_frames_in_line_and_one_partly_seen_are_kept_apart() -> None:
     near, far = frame_at(0.0, 0.1, 1.5, 0.2), frame_at(2.0, -0.2, 1.4, -0.3, "green")
     flight = Flight(3)
