@@ -8,12 +8,13 @@ behind, so corners are never cut.
 from __future__ import annotations
 
 from collections import deque
-from math import cos, hypot, pi, remainder, sin, sqrt
+from math import cos, hypot, pi, remainder, sin
 
 from geometry.vectors import Vec3
 from offboard.drone import DroneState, VelocityCommand
 from offboard.limits import CONTEST, CommandLimits, clamped
 from offboard.navigation.goals import Motion
+from offboard.navigation.late_following import MAX_CORRECTION_M_S, WAIT_FROM_M, LateFollower, rate_of
 from offboard.navigation.path import Path
 from offboard.response import Prediction, Response
 
@@ -21,22 +22,13 @@ HOLD_S = 0.025  # half the time for which a command holds
 POSITION_GAIN_PER_S = 1.0
 VELOCITY_GAIN = 0.2
 YAW_GAIN_PER_S = 2.0
-BANDWIDTH_PER_S = 1.2  # of the control of a vehicle that answers late
 INTEGRAL_GAIN_PER_S2 = 0.2
 MAX_INTEGRAL_M_S = 0.15
 INTEGRAL_REACH_M = 0.15  # farther from the path, the integral does not grow
-MAX_CORRECTION_M_S = 0.6
-WAIT_FROM_M = 0.1  # farther from the path, its time goes slower
-WAIT_ASIDE_M = 0.05  # or aside from it
-WAIT_M = 0.25  # beyond that, it stands still
-GATE_NEAR_S = 3.0  # before a gate; then a drone that answers late must be straight before it
-GATE_TOO_NEAR_S = 1.0  # then it cannot stop any more
-GATE_FROM_M = 0.03  # farther off, the path's time goes slower
-GATE_WAIT_M = 0.06  # beyond that, it stands still
-GATE_TURN_M = 0.15  # by which a turn counts, for each radian
 _MAX_STEP_S = 0.5  # for so long a vehicle flies on by its last command
 _MOVING_M_S = 0.2
 _HISTORY = 16  # ticks
+_SHORTEST_S = 0.005  # of the present path that is kept before the next one
 
 
 class PathFollower:
@@ -57,6 +49,7 @@ class PathFollower:
         self.error_m = 0.0
         self._limits = limits
         self._path: Path | None = None
+        self._late: LateFollower | None = None
         self._last_s: float | None = None
         self._rate = 1.0  # of the path's time
         self._integral: list[float] = [0.0, 0.0, 0.0]
@@ -65,6 +58,8 @@ class PathFollower:
     @property
     def lead_s(self) -> float:
         """How far ahead of its time the path is commanded already: another one should begin after that."""
+        if self._late is not None:
+            return self._late.ahead_s - self.progress_s
         return self.response.level_dead_s + HOLD_S
 
     def reference(self) -> Motion | None:
@@ -73,12 +68,15 @@ class PathFollower:
 
     def continued(self, following: Path) -> Path:
         """What to follow from now on, once a path from the reference has been planned."""
-        path = self._path
-        return (
-            following
-            if path is None
-            else path.then(following, self.progress_s, self.progress_s + self.lead_s)
-        )
+        path, late = self._path, self._late
+        if path is None:
+            return following
+        from_s, lead_s = self.progress_s, self.lead_s
+        joined = following if lead_s < _SHORTEST_S else path.then(following, from_s, from_s + lead_s)
+        if late is not None:
+            late.ahead_s = 0.0 if joined is following else lead_s
+            self._path, self.progress_s = joined, 0.0
+        return joined
 
     def progress_on(self, path: Path) -> float:
         """The time along a path; 0 on one that no command was given for yet."""
@@ -99,10 +97,13 @@ class PathFollower:
                 `continued`.
             state: of the drone.
             now_s: vehicle time of the state.
-            prediction: of the motion of a vehicle that answers late.
+            prediction: of the motion of a vehicle that answers late; None for one that does not.
         """
         step_s = 0.0 if self._last_s is None else min(max(now_s - self._last_s, 0.0), _MAX_STEP_S)
         self._last_s = now_s
+        if prediction is not None:
+            return self._command_late(path, state, prediction, step_s)
+        self._late = None
         if path is not self._path:
             self._path, self.progress_s = path, 0.0
         self.progress_s = min(self.progress_s + self._rate * step_s, path.duration_s)
@@ -110,10 +111,7 @@ class PathFollower:
         self._past.append((now_s, motion))
         error, slower = self._errors(state, now_s)
         self.error_m = hypot(*error)
-        self._rate = _rate_of(error, motion.velocity_m_s)
-        if prediction is not None:
-            self._rate = min(self._rate, self._rate_before_gate(path, state, prediction))
-            return self._command_ahead(path, state, prediction)
+        self._rate = rate_of(error, motion.velocity_m_s)
         self._integrate(error, motion.velocity_m_s, step_s)
         correction = [
             POSITION_GAIN_PER_S * e + VELOCITY_GAIN * v + i
@@ -125,53 +123,22 @@ class PathFollower:
         up = self._climb(path) + scale * correction[2]
         return self._limited(forward, left, up, self._yaw_rate(path, state))
 
-    def _command_ahead(self, path: Path, state: DroneState, prediction: Prediction) -> VelocityCommand:
-        """The command for a vehicle that answers late: corrects the offset from the path that is to come."""
-        response, rate = self.response, self._rate
-        dead_s = (response.level_dead_s, response.level_dead_s, response.climb_dead_s)
-        lag_s = (response.level_lag_s, response.level_lag_s, response.climb_lag_s)
-        correction = [0.0, 0.0, 0.0]
-        position = (state.x, state.y, state.z)
-        for axis in range(3):
-            ahead = path.at(self.progress_s + rate * (dead_s[axis] + HOLD_S))
-            gain, damping = _gains(lag_s[axis])
-            offset = ahead.position_m[axis] - position[axis] - prediction.moved_m[axis]
-            slower = rate * ahead.velocity_m_s[axis] - prediction.velocity_m_s[axis]
-            correction[axis] = gain * offset + damping * slower
-        size = hypot(*correction)
-        scale = MAX_CORRECTION_M_S / size if size > MAX_CORRECTION_M_S else 1.0
-        x, y, z = (scale * c - w for c, w in zip(correction, prediction.disturbance_m_s, strict=True))
-        forward, left = self._level(path, state, x, y)
-        up = self._climb(path) + z
-        at_s = self.progress_s + rate * (response.yaw_dead_s + HOLD_S)
-        ahead = path.at(at_s)
-        change = ahead.yaw_acceleration_rad_s2
-        gain, damping = _gains(response.yaw_lag_s)
-        wanted = rate * ahead.yaw_rate_rad_s
-        turn = wanted + rate * rate * response.yaw_lag_s * change
-        turn += gain * remainder(ahead.yaw_rad - state.yaw - prediction.turned_rad, 2 * pi)
-        turn += damping * (wanted - prediction.yaw_rate_rad_s)
-        return self._limited(forward, left, up, turn)
-
-    def _rate_before_gate(self, path: Path, state: DroneState, prediction: Prediction) -> float:
-        """How fast the path's time goes: a drone that is not straight before a gate waits until it is."""
-        for crossing in path.crossings:
-            left_s = crossing.time_s - self.progress_s
-            if GATE_TOO_NEAR_S < left_s < GATE_NEAR_S:
-                break
-        else:
-            return 1.0
-        ahead = path.at(self.progress_s + self._rate * self.response.level_dead_s)
-        x, y, z = (
-            to - at - moved
-            for to, at, moved in zip(
-                ahead.position_m, (state.x, state.y, state.z), prediction.moved_m, strict=True
-            )
-        )
-        c, s = cos(crossing.heading_rad), sin(crossing.heading_rad)
-        turn = remainder(ahead.yaw_rad - state.yaw - prediction.turned_rad, 2 * pi)
-        off_m = hypot(c * y - s * x, z) + GATE_TURN_M * abs(turn)
-        return max(1.0 - max(off_m - GATE_FROM_M, 0.0) / GATE_WAIT_M, 0.0)
+    def _command_late(
+        self, path: Path, state: DroneState, prediction: Prediction, step_s: float
+    ) -> VelocityCommand:
+        """The command for a vehicle that answers late."""
+        dead_s = self.response.level_dead_s
+        if path is not self._path:
+            self._late = LateFollower(0.0, 0.0)
+        elif self._late is None:
+            self._late = LateFollower(self.progress_s + dead_s, dead_s)
+        self._path, late = path, self._late
+        assert late is not None
+        late.advance(step_s, path)
+        self.progress_s = max(late.before(dead_s)[0], 0.0)
+        command = late.command(path, state, prediction, self.response)
+        self.error_m = late.error_m
+        return self._limited(*command)
 
     def _level(self, path: Path, state: DroneState, add_x: float, add_y: float) -> tuple[float, float]:
         """Speeds forward and to the left: the path's, ahead of time, and a correction in arena axes."""
@@ -180,12 +147,9 @@ class PathFollower:
         ahead, later = path.at(at_s), path.at(at_s + rate * response.level_tilt_s)
         (vx, vy, _), (ax, ay, _) = _slowed(ahead, rate)[0], _slowed(later, rate)[1]
         now = self._past[-1][1]
-        if response.turning:
-            yaw = state.yaw + remainder(ahead.yaw_rad - now.yaw_rad, 2 * pi)
-            turn_rate = rate * ahead.yaw_rate_rad_s
-            ax, ay = ax + turn_rate * vy, ay - turn_rate * vx  # as seen from axes that turn
-        else:
-            yaw = state.yaw + rate * now.yaw_rate_rad_s * HOLD_S
+        yaw = state.yaw + remainder(ahead.yaw_rad - now.yaw_rad, 2 * pi)
+        turn_rate = rate * ahead.yaw_rate_rad_s
+        ax, ay = ax + turn_rate * vy, ay - turn_rate * vx  # as seen from axes that turn
         x, y = vx + response.level_lag_s * ax + add_x, vy + response.level_lag_s * ay + add_y
         c, s = cos(yaw), sin(yaw)
         return c * x + s * y, c * y - s * x
@@ -244,23 +208,6 @@ class PathFollower:
             clamped(up, limits.down_m_s, limits.up_m_s),
             clamped(yaw_rate, limits.yaw_rate_rad_s, limits.yaw_rate_rad_s),
         )
-
-
-def _gains(lag_s: float) -> tuple[float, float]:
-    """Gains of position and velocity after the dead time, for a critically damped approach."""
-    slowest_s = 0.5 / BANDWIDTH_PER_S
-    if lag_s < slowest_s:
-        return min(0.25 / lag_s, BANDWIDTH_PER_S), 0.0
-    return lag_s * BANDWIDTH_PER_S**2, 2.0 * lag_s * BANDWIDTH_PER_S - 1.0
-
-
-def _rate_of(error_m: Vec3, velocity_m_s: Vec3) -> float:
-    """How fast the path's time goes: slower while the drone is behind or aside, not while it is ahead."""
-    speed = hypot(*velocity_m_s)
-    behind_m = sum(e * v for e, v in zip(error_m, velocity_m_s, strict=True)) / speed if speed > 0.05 else 0.0
-    aside_m = sqrt(max(sum(e * e for e in error_m) - behind_m * behind_m, 0.0))
-    late_m = max(behind_m - WAIT_FROM_M, 0.0) + max(aside_m - WAIT_ASIDE_M, 0.0)
-    return max(1.0 - late_m / WAIT_M, 0.0)
 
 
 def _slowed(motion: Motion, rate: float) -> tuple[Vec3, Vec3]:

@@ -131,7 +131,7 @@ class PathFlight:
         start = self._follower.reference() if self.path is not None else None
         restarts = start is None or self._follower.error_m > RESTART_M
         if start is None or restarts:
-            start = Motion(position_now(state), state.velocity_arena_m_s, state.yaw)
+            start = self._own_motion(state)
         elif self._looks_aside:
             start = replace(start, yaw_rad=state.yaw, yaw_rate_rad_s=0.0)
         found = self._find(start, goals, obstacles)
@@ -146,6 +146,16 @@ class PathFlight:
         self.path = found if restarts else self._follower.continued(found)
         self.refusal, self._refusals = "", 0
         self._planned_for = (tuple(goals), obstacles)
+
+    def _own_motion(self, state: DroneState) -> Motion:
+        """The drone's, when the next command is flown."""
+        x, y, z = position_now(state)
+        if not self._follower.response.late:
+            return Motion((x, y, z), state.velocity_arena_m_s, state.yaw)
+        coming = self._response.predict()
+        dx, dy, dz = coming.moved_m
+        yaw_rad = state.yaw + coming.turned_rad
+        return Motion((x + dx, y + dy, z + dz), coming.velocity_m_s, yaw_rad, coming.yaw_rate_rad_s)
 
     def _ahead(self, time_s: float) -> list[Vec3]:
         """Where the drone will be on its path within a time, the vehicle's lag added."""
