@@ -3,7 +3,8 @@
 A vehicle's velocity follows commands after a dead time, with a lag of first order. Many pairs of dead time
 and lag are tried at once: what each predicts for the change of velocity over a second is compared with the
 change that telemetry shows. A change, because a constant difference is wind or drag, not lateness. The same
-filters predict the motion by the commands that are still on their way.
+filters predict the motion by the commands that are still on their way. In plan, a vehicle that answers late
+may have a second lag, see `second_lag.py`.
 """
 
 from __future__ import annotations
@@ -18,6 +19,8 @@ from numpy.typing import NDArray
 
 from geometry.vectors import Vec3
 from offboard.drone import DroneState, VelocityCommand
+from offboard.second_lag import LAG_S as OWN_LAG_S
+from offboard.second_lag import SecondLag
 
 Array = NDArray[np.float64]
 
@@ -51,6 +54,7 @@ class Response:
         turning: its velocity follows in level axes that turn with its heading, so that a turn at speed needs
             commands ahead; else in axes that do not turn.
         late: so late that the motion must be predicted.
+        own_lag_s: a second lag in plan, after the first, in axes that turn; 0 if there is none.
     """
 
     level_dead_s: float = 0.075
@@ -62,11 +66,17 @@ class Response:
     yaw_lag_s: float = 0.05
     turning: bool = True
     late: bool = False
+    own_lag_s: float = 0.0
 
     @property
     def level_s(self) -> float:
-        """Dead time and lag together, in plan."""
-        return self.level_dead_s + self.level_tilt_s + self.level_lag_s
+        """Dead time and lags together, in plan."""
+        return self.level_dead_s + self.level_tilt_s + self.level_lags_s
+
+    @property
+    def level_lags_s(self) -> float:
+        """Both lags together, in plan."""
+        return self.level_lag_s + self.own_lag_s
 
 
 @dataclass(frozen=True, slots=True)
@@ -81,6 +91,7 @@ class Prediction:
         disturbance_m_s: part of the velocity that commands do not explain.
         turned_rad: from its present heading.
         yaw_rate_rad_s: then.
+        acceleration_m_s2: then, in plan, arena axes; zero without a second lag.
     """
 
     moved_m: Vec3
@@ -88,6 +99,7 @@ class Prediction:
     disturbance_m_s: Vec3
     turned_rad: float
     yaw_rate_rad_s: float
+    acceleration_m_s2: tuple[float, float] = (0.0, 0.0)
 
 
 class ResponseEstimate:
@@ -104,6 +116,8 @@ class ResponseEstimate:
         shape = (len(DEAD_STEPS), len(LAGS_S), len(_GROUPS))
         self._errors = np.zeros(shape)
         self._energies = np.zeros(len(_GROUPS))
+        self._second_before: tuple[int, int] | None = None
+        self._second = SecondLag(shape[:2], STEP_S, _WINDOW)
         self._kept = np.array([exp(-STEP_S / lag_s) for lag_s in LAGS_S])[:, None]
         self._restart()
 
@@ -114,6 +128,7 @@ class ResponseEstimate:
         self._past: deque[Array] = deque(maxlen=_KEPT)
         self._changes: deque[Array] = deque(maxlen=max(DEAD_STEPS) + 1)  # of the outputs, over the window
         self._measured: deque[Array] = deque(maxlen=_WINDOW + 1)
+        self._second.restart()
         self._airborne_steps = 0
         self._disturbance = np.zeros(3)
         self._disturbance_rate = np.zeros(3)
@@ -145,6 +160,8 @@ class ResponseEstimate:
             if len(self._past) > _WINDOW:
                 self._changes.append(self._outputs - self._past[-1 - _WINDOW])
             self._measured.append(measured)
+            if self.response.late:
+                self._second.update(self._first_lags(), measured[[_X, _Y]], self._yaw)
             self._airborne_steps = 0 if state.landed else self._airborne_steps + 1
             if self._airborne_steps > TAKE_OFF_STEPS:
                 self._compare()
@@ -160,12 +177,23 @@ class ResponseEstimate:
         self._errors *= fade
         self._energies *= fade
         errors = np.array([self._changes[-1 - dead] for dead in DEAD_STEPS]) - change
-        self._errors += ((errors * errors) @ _MEMBERS) * STEP_S
+        squares = (errors * errors) @ _MEMBERS
+        self._errors += squares * STEP_S
         self._energies += ((change * change) @ _MEMBERS) * STEP_S
+        if self.response.late:
+            one = float(squares[(*self._chosen[0], 1 if self._turning else 0)])
+            self._second.compare(change[[_X, _Y]], one)
+        else:
+            self._second.restart()
+
+    def _first_lags(self) -> Array:
+        """What all pairs make of the commands by now, in axes that do not turn: dead times, lags, x and y."""
+        past = self._past
+        return np.array([past[max(len(past) - 1 - dead, 0)][:, [_X, _Y]] for dead in DEAD_STEPS])
 
     def _choose(self) -> None:
         """Take pairs, and axes, that explain what was measured clearly better than the present ones."""
-        turns_before, chosen_before = self._turning, list(self._chosen)
+        before = (self._turning, self._second_before, *self._chosen)
         errors = self._errors.reshape(-1, len(_GROUPS))
         least: list[float] = errors.min(axis=0).tolist()
         best = [divmod(pair, len(LAGS_S)) for pair in errors.argmin(axis=0).tolist()]
@@ -179,7 +207,8 @@ class ResponseEstimate:
                 continue
             if least[group] < _BETTER * float(self._errors[(*self._chosen[channel], group)]):
                 self._chosen[channel] = best[group]
-        if (self._turning, self._chosen) != (turns_before, chosen_before):
+        self._second_before = self._second.chosen
+        if (self._turning, self._second_before, *self._chosen) != before:
             self.response = self._as_response()
 
     def _as_response(self) -> Response:
@@ -187,12 +216,18 @@ class ResponseEstimate:
         if not any(sum(pair) > late_s for pair, late_s in zip(pairs, _LATE_S, strict=True)):
             return Response()
         (level_dead, level_lag), (climb_dead, climb_lag), (yaw_dead, yaw_lag) = pairs
-        times = (level_dead, 0.0, level_lag, climb_dead, climb_lag, yaw_dead, yaw_lag)
-        return Response(*times, turning=self._turning, late=True)
+        times = (climb_dead, climb_lag, yaw_dead, yaw_lag)
+        if self._second.chosen is not None:
+            dead, lag = self._second.chosen
+            level = (DEAD_STEPS[dead] * STEP_S, 0.0, LAGS_S[lag])
+            return Response(*level, *times, turning=False, late=True, own_lag_s=OWN_LAG_S)
+        return Response(level_dead, 0.0, level_lag, *times, turning=self._turning, late=True)
 
     def _observe_disturbance(self, measured: Array, steps: int) -> None:
         """Filter what the commands do not explain of the velocity now."""
         model = self._model_velocity(lambda dead: self._past[max(len(self._past) - 1 - dead, 0)])
+        if self._second.chosen is not None:
+            model[:2] = self._second.velocity(self._second.chosen)
         share = 1.0 - exp(-steps * STEP_S / _DISTURBANCE_S)
         now = measured[[_X, _Y, _UP]] - model
         before = self._disturbance
@@ -214,18 +249,29 @@ class ResponseEstimate:
     def predict(self) -> Prediction:
         """What the vehicle will do by the commands of all ticks so far."""
         past = list(self._past) or [self._outputs]
-        (level_dead, _), (climb_dead, _), (yaw_dead, yaw_lag) = self._chosen
-        dead_s = np.array([DEAD_STEPS[d] * STEP_S for d in (level_dead, level_dead, climb_dead)])
+        (level_dead, level_lag), (climb_dead, climb_lag), (yaw_dead, yaw_lag) = self._chosen
         moved = self._model_velocity(lambda dead: np.sum(past[-dead:], axis=0) * STEP_S)
+        velocity = self._model_velocity(lambda dead: past[-1])
+        turns = [float(row[yaw_lag, _TURN]) * STEP_S for row in past[-DEAD_STEPS[yaw_dead] :]]
+        acceleration, second, own_lag_s = (0.0, 0.0), self._second.chosen, 0.0
+        if second is not None:
+            level_dead, level_lag = second
+            own_lag_s = OWN_LAG_S
+            commanded = np.array([row[level_lag, [_X, _Y]] for row in past[-DEAD_STEPS[level_dead] :]])
+            all_turns = (turns + [turns[-1]] * len(commanded))[: len(commanded)]
+            moved[:2], velocity[:2], acceleration = self._second.predict(
+                second, commanded, self._yaw, all_turns
+            )
+        dead_s = np.array([DEAD_STEPS[d] * STEP_S for d in (level_dead, level_dead, climb_dead)])
         moved = moved + dead_s * self._disturbance
-        velocity = self._model_velocity(lambda dead: past[-1]) + self._disturbance
-        turned = sum(float(row[yaw_lag, _TURN]) for row in past[-DEAD_STEPS[yaw_dead] :]) * STEP_S
-        ahead_s = dead_s + np.array(
-            [LAGS_S[p[1]] for p in (self._chosen[0], self._chosen[0], self._chosen[1])]
-        )
+        velocity = velocity + self._disturbance
+        lag_s = LAGS_S[level_lag] + own_lag_s
+        ahead_s = dead_s + np.array((lag_s, lag_s, LAGS_S[climb_lag]))
         disturbance = self._disturbance + (ahead_s + _DISTURBANCE_S) * _LEADS * self._disturbance_rate
         rate = float(past[-1][yaw_lag, _TURN])
-        return Prediction(_vector(moved), _vector(velocity), _vector(disturbance), turned, rate)
+        return Prediction(
+            _vector(moved), _vector(velocity), _vector(disturbance), sum(turns), rate, acceleration
+        )
 
 
 def _in_all_axes(command: VelocityCommand, yaw_rad: float) -> Array:

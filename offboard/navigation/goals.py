@@ -132,7 +132,7 @@ class FlightStyle:
         late = min(max(response.level_s - 0.5, 0.0) / 0.5, 1.0)
         return replace(
             self,
-            lag_s=response.level_lag_s,
+            lag_s=response.level_lags_s,
             climb_lag_s=response.climb_lag_s,
             path_speed_m_s=self.path_speed_m_s * (1.0 - 0.4 * late),
             axis_speed_m_s=self.axis_speed_m_s * (1.0 - 0.35 * late),

@@ -17,6 +17,8 @@ from offboard.navigation.path import Path
 from offboard.response import Prediction, Response
 
 BANDWIDTH_PER_S = 1.2  # of the control
+BANDWIDTH_OF_TWO_PER_S = 1.45  # likewise of a vehicle with two lags, at least
+MAX_BANDWIDTH_PER_S = 2.0
 MAX_CORRECTION_M_S = 0.6
 RATE_CHANGE_PER_S = 1.2  # of the path's time: at the speed of crossings, that of a gentle stop
 WAIT_FROM_M = 0.1  # farther from the path, its time goes slower
@@ -28,6 +30,7 @@ GATE_FROM_M = 0.03  # farther off, the path's time goes slower
 GATE_WAIT_M = 0.06  # beyond that, it stands still
 GATE_TURN_M = 0.15  # by which a turn counts, for each radian
 _TICKS = 24
+_SOON_S = 0.1  # after which the change of the velocity is compared
 _Pace = tuple[float, float]
 """How fast the path's time goes, and how fast that changes, 1/s."""
 
@@ -78,19 +81,21 @@ class LateFollower:
         self, path: Path, state: DroneState, prediction: Prediction, response: Response
     ) -> tuple[float, float, float, float]:
         """Speeds forward, to the left and up, and the yaw rate, before their limits."""
-        dead_s, lag_s = response.level_dead_s, response.level_lag_s
+        dead_s = response.level_dead_s
         level = self._reference(path, 0.0)
         climb = self._reference(path, dead_s - response.climb_dead_s)
         turn = self._reference(path, dead_s - response.yaw_dead_s)
         now = (state.x, state.y, state.z)
+        gains = _gains(response.level_lag_s, response.own_lag_s)
         offset, correction = [0.0, 0.0, 0.0], [0.0, 0.0, 0.0]
-        for axis, (wanted, axis_lag_s) in enumerate(
-            ((level, lag_s), (level, lag_s), (climb, response.climb_lag_s))
-        ):
-            gain, damping = _gains(axis_lag_s)
+        for axis, wanted in enumerate((level, level, climb)):
+            gain, damping, ease = gains if axis < 2 else _gains(response.climb_lag_s)
             offset[axis] = wanted.position_m[axis] - now[axis] - prediction.moved_m[axis]
-            slower = wanted.velocity_m_s[axis] - prediction.velocity_m_s[axis]
-            correction[axis] = gain * offset[axis] + damping * slower
+            correction[axis] = gain * offset[axis]
+            correction[axis] += damping * (wanted.velocity_m_s[axis] - prediction.velocity_m_s[axis])
+            if ease:
+                change = wanted.acceleration_m_s2[axis] - prediction.acceleration_m_s2[axis]
+                correction[axis] += ease * change
         yaw_offset = remainder(turn.yaw_rad - state.yaw - prediction.turned_rad, 2 * pi)
         self.error_m = hypot(*offset)
         error = (offset[0], offset[1], offset[2])
@@ -100,19 +105,32 @@ class LateFollower:
         size = hypot(*correction)
         scale = MAX_CORRECTION_M_S / size if size > MAX_CORRECTION_M_S else 1.0
         x, y, z = (scale * c - w for c, w in zip(correction, prediction.disturbance_m_s, strict=True))
-        (vx, vy, _), (ax, ay, _) = level.velocity_m_s, level.acceleration_m_s2
-        if response.turning:
-            yaw = state.yaw + remainder(level.yaw_rad - self._reference(path, dead_s).yaw_rad, 2 * pi)
-            ax, ay = ax + level.yaw_rate_rad_s * vy, ay - level.yaw_rate_rad_s * vx  # in axes that turn
-        else:
-            yaw = state.yaw
-        x, y = x + vx + lag_s * ax, y + vy + lag_s * ay
-        c, s = cos(yaw), sin(yaw)
+        forward, left = self._level(path, level, (x, y), state.yaw, response)
         up = climb.velocity_m_s[2] + response.climb_lag_s * climb.acceleration_m_s2[2] + z
-        gain, damping = _gains(response.yaw_lag_s)
+        gain, damping, _ = _gains(response.yaw_lag_s)
         rate = turn.yaw_rate_rad_s + response.yaw_lag_s * turn.yaw_acceleration_rad_s2
         rate += gain * yaw_offset + damping * (turn.yaw_rate_rad_s - prediction.yaw_rate_rad_s)
-        return c * x + s * y, c * y - s * x, up, rate
+        return forward, left, up, rate
+
+    def _level(
+        self, path: Path, level: Motion, add: tuple[float, float], yaw_rad: float, response: Response
+    ) -> tuple[float, float]:
+        """Speeds forward and to the left: the path's, ahead by the lags, and an addition in arena axes."""
+        vx, vy, _ = level.velocity_m_s
+        ax, ay = _change(level, turning=response.turning)
+        x, y = vx + response.level_lag_s * ax, vy + response.level_lag_s * ay
+        if response.turning:
+            ahead = self._reference(path, response.level_dead_s)
+            yaw_rad += remainder(level.yaw_rad - ahead.yaw_rad, 2 * pi)
+        elif response.own_lag_s > 0.0:
+            now = _change(level, turning=True)
+            soon = _change(self._reference(path, -_SOON_S), turning=True)
+            own_s, first = response.own_lag_s, response.level_lag_s / _SOON_S
+            x += own_s * (now[0] + first * (soon[0] - now[0]))
+            y += own_s * (now[1] + first * (soon[1] - now[1]))
+        x, y = x + add[0], y + add[1]
+        c, s = cos(yaw_rad), sin(yaw_rad)
+        return c * x + s * y, c * y - s * x
 
     def _reference(self, path: Path, before_s: float) -> Motion:
         """The motion that was commanded some time ago, or will be."""
@@ -141,12 +159,27 @@ class LateFollower:
         return 1.0
 
 
-def _gains(lag_s: float) -> tuple[float, float]:
-    """Gains of position and velocity after the dead time, for a critically damped approach."""
+def _change(motion: Motion, *, turning: bool) -> tuple[float, float]:
+    """Change of the velocity in plan, maybe as seen from axes that turn with the heading; arena axes."""
+    ax, ay, _ = motion.acceleration_m_s2
+    if not turning:
+        return ax, ay
+    vx, vy, _ = motion.velocity_m_s
+    return ax + motion.yaw_rate_rad_s * vy, ay - motion.yaw_rate_rad_s * vx
+
+
+def _gains(lag_s: float, second_lag_s: float = 0.0) -> tuple[float, float, float]:
+    """Gains of position, velocity and acceleration after the dead time, for a critically damped approach."""
+    if second_lag_s > 0.0:
+        product_s2, sum_s = lag_s * second_lag_s, lag_s + second_lag_s
+        b = max(BANDWIDTH_OF_TWO_PER_S, sum_s / (3.0 * product_s2))  # gains are not negative
+        if b > MAX_BANDWIDTH_PER_S:
+            return _gains(second_lag_s)  # the first lag is short
+        return product_s2 * b**3, 3.0 * product_s2 * b**2 - 1.0, 3.0 * product_s2 * b - sum_s
     slowest_s = 0.5 / BANDWIDTH_PER_S
     if lag_s < slowest_s:
-        return min(0.25 / lag_s, BANDWIDTH_PER_S), 0.0
-    return lag_s * BANDWIDTH_PER_S**2, 2.0 * lag_s * BANDWIDTH_PER_S - 1.0
+        return min(0.25 / lag_s, BANDWIDTH_PER_S), 0.0, 0.0
+    return lag_s * BANDWIDTH_PER_S**2, 2.0 * lag_s * BANDWIDTH_PER_S - 1.0, 0.0
 
 
 def rate_of(error_m: Vec3, velocity_m_s: Vec3) -> float:
