@@ -13,8 +13,8 @@ from math import cos, hypot, pi, remainder, sin
 from geometry.vectors import Vec3
 from offboard.drone import DroneState, VelocityCommand
 from offboard.limits import CONTEST, CommandLimits, clamped
+from offboard.navigation.control.late_following import MAX_CORRECTION_M_S, WAIT_FROM_M, LateFollower, rate_of
 from offboard.navigation.goals import Motion
-from offboard.navigation.late_following import MAX_CORRECTION_M_S, WAIT_FROM_M, LateFollower, rate_of
 from offboard.navigation.path import Path
 from offboard.response import Prediction, Response
 

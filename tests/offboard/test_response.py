@@ -12,9 +12,13 @@ STEP_S = 0.05
 
 
 class Vehicle:
-    """Follows commands after a dead time, with a lag; in axes that turn with its heading, or do not."""
+    """Follows commands after a dead time, with a lag; in axes that turn with its heading, or do not.
 
-    def __init__(self, dead_s, lag_s, *, turning=False, drift_m_s=0.0):
+    With a lag of its own it follows what comes of that with another lag, in axes that turn.
+    """
+
+    def __init__(self, dead_s, lag_s, *, turning=False, drift_m_s=0.0, own_lag_s=0.0):
+        self.own_lag_s, self.own = own_lag_s, (0.0, 0.0)
         self.lag_s, self.turning, self.drift_m_s = lag_s, turning, drift_m_s
         self.waiting = deque([(0.0, 0.0, 0.0, 0.0)] * round(dead_s / STEP_S))
         self.ticks, self.yaw, self.position, self.speeds = 0, 0.3, [0.0, 0.0, 1.0], [0.0] * 4
@@ -23,7 +27,8 @@ class Vehicle:
     def state(self):
         c, s = (cos(self.yaw), sin(self.yaw)) if self.turning else (1.0, 0.0)
         a, b, up, _ = self.speeds
-        velocity = (c * a - s * b, s * a + c * b, up + self.drift_m_s)
+        x, y = self.own if self.own_lag_s else (c * a - s * b, s * a + c * b)
+        velocity = (x, y, up + self.drift_m_s)
         time_us = round(self.ticks * STEP_S * 1e6)
         return DroneState(time_us, *self.position, self.yaw, velocity, landed=False)
 
@@ -37,11 +42,24 @@ class Vehicle:
         self.speeds = [
             v + (1.0 - kept) * (u - v) for v, u in zip(self.speeds, self.waiting.popleft(), strict=True)
         ]
+        if self.own_lag_s:
+            self._follow_itself()
         self.position = [
             x + v * STEP_S for x, v in zip(self.position, self.state.velocity_arena_m_s, strict=True)
         ]
         self.yaw = remainder(self.yaw + self.speeds[3] * STEP_S, 2 * pi)
         self.ticks += 1
+
+    def _follow_itself(self):
+        """The second lag: a velocity that stays the same turns with the heading."""
+        kept = exp(-STEP_S / self.own_lag_s)
+        turn = self.speeds[3] * STEP_S
+        c, s, (x, y) = cos(turn), sin(turn), self.own
+        x, y = c * x - s * y, s * x + c * y
+        self.own = (
+            self.speeds[0] + kept * (x - self.speeds[0]),
+            self.speeds[1] + kept * (y - self.speeds[1]),
+        )
 
 
 def command_at(time_s):
@@ -84,8 +102,16 @@ def test_a_vehicle_that_answers_in_time_is_not_late():
     assert not estimate.response.late
 
 
-def test_the_motion_by_commands_on_their_way_is_predicted():
-    vehicle = Vehicle(0.35, 0.6, drift_m_s=0.05)
+def test_a_second_lag_is_learnt():
+    response = learn(Vehicle(0.15, 0.6, own_lag_s=0.4), 25.0).response
+    assert response.own_lag_s == 0.4
+    assert response.level_dead_s == pytest.approx(0.15, abs=0.001)
+    assert response.level_lag_s == pytest.approx(0.6, abs=0.001)
+
+
+@pytest.mark.parametrize("own_lag_s", [0.0, 0.4])
+def test_the_motion_by_commands_on_their_way_is_predicted(own_lag_s):
+    vehicle = Vehicle(0.35, 0.6, drift_m_s=0.05, own_lag_s=own_lag_s)
     estimate = learn(vehicle, 20.0)
     prediction, before = estimate.predict(), vehicle.position
     for _ in range(7):
