@@ -8,6 +8,7 @@ behind, so corners are never cut.
 from __future__ import annotations
 
 from collections import deque
+from dataclasses import replace
 from math import cos, hypot, pi, remainder, sin
 
 from geometry.vectors import Vec3
@@ -52,6 +53,8 @@ class PathFollower:
         self._late: LateFollower | None = None
         self._last_s: float | None = None
         self._rate = 1.0  # of the path's time
+        self._slowing_per_s = 0.0  # of that rate
+        self._turn_rad_s: float | None = None  # of the heading, if it is not the path's
         self._integral: list[float] = [0.0, 0.0, 0.0]
         self._past: deque[tuple[float, Motion]] = deque(maxlen=_HISTORY)
 
@@ -65,6 +68,14 @@ class PathFollower:
     def reference(self) -> Motion | None:
         """The path's motion `lead_s` ahead, to plan the next path from; None before the first command."""
         return None if self._path is None else self._path.at(self.progress_s + self.lead_s)
+
+    def braking(self) -> Motion | None:
+        """The motion of a drone that brakes along the path, which has a heading of its own."""
+        if self._path is None:
+            return None
+        motion, rate = self._path.at(self.progress_s), self._rate
+        x, y, z = motion.velocity_m_s
+        return Motion(motion.position_m, (rate * x, rate * y, rate * z))
 
     def continued(self, following: Path) -> Path:
         """What to follow from now on, once a path from the reference has been planned."""
@@ -88,7 +99,14 @@ class PathFollower:
         return self._path is not None and self.progress_s >= self._path.duration_s
 
     def command(
-        self, path: Path, state: DroneState, now_s: float, prediction: Prediction | None = None
+        self,
+        path: Path,
+        state: DroneState,
+        now_s: float,
+        prediction: Prediction | None = None,
+        *,
+        turn_rad_s: float | None = None,
+        brake_m_s2: float = 0.0,
     ) -> VelocityCommand:
         """The command for this tick.
 
@@ -98,11 +116,14 @@ class PathFollower:
             state: of the drone.
             now_s: vehicle time of the state.
             prediction: of the motion of a vehicle that answers late; None for one that does not.
+            turn_rad_s: turn with this rate, not as the path says.
+            brake_m_s2: brake with this, to a stop on the path; 0 to fly on. Vehicles that answer late do not.
         """
         step_s = 0.0 if self._last_s is None else min(max(now_s - self._last_s, 0.0), _MAX_STEP_S)
         self._last_s = now_s
         if prediction is not None:
-            return self._command_late(path, state, prediction, step_s)
+            command = self._command_late(path, state, prediction, step_s)
+            return command if turn_rad_s is None else replace(command, yaw_rate_rad_s=turn_rad_s)
         self._late = None
         if path is not self._path:
             self._path, self.progress_s = path, 0.0
@@ -111,7 +132,13 @@ class PathFollower:
         self._past.append((now_s, motion))
         error, slower = self._errors(state, now_s)
         self.error_m = hypot(*error)
-        self._rate = rate_of(error, motion.velocity_m_s)
+        self._turn_rad_s = turn_rad_s
+        before, self._rate = self._rate, rate_of(error, motion.velocity_m_s)
+        self._slowing_per_s = 0.0
+        if brake_m_s2:
+            self._slowing_per_s = brake_m_s2 / max(hypot(*motion.velocity_m_s), _MOVING_M_S)
+            self._rate = max(min(self._rate, before - self._slowing_per_s * step_s), 0.0)
+            self._slowing_per_s *= self._rate > 0.0
         self._integrate(error, motion.velocity_m_s, step_s)
         correction = [
             POSITION_GAIN_PER_S * e + VELOCITY_GAIN * v + i
@@ -146,9 +173,15 @@ class PathFollower:
         at_s = self.progress_s + rate * (response.level_dead_s + HOLD_S)
         ahead, later = path.at(at_s), path.at(at_s + rate * response.level_tilt_s)
         (vx, vy, _), (ax, ay, _) = _slowed(ahead, rate)[0], _slowed(later, rate)[1]
-        now = self._past[-1][1]
-        yaw = state.yaw + remainder(ahead.yaw_rad - now.yaw_rad, 2 * pi)
-        turn_rate = rate * ahead.yaw_rate_rad_s
+        ax -= self._slowing_per_s * later.velocity_m_s[0]
+        ay -= self._slowing_per_s * later.velocity_m_s[1]
+        now, turn_rate = self._past[-1][1], self._turn_rad_s
+        if turn_rate is None:
+            turn_rate = rate * ahead.yaw_rate_rad_s
+            turned = remainder(ahead.yaw_rad - now.yaw_rad, 2 * pi)
+        else:
+            turned = turn_rate * (response.level_dead_s + HOLD_S)
+        yaw = state.yaw + turned
         ax, ay = ax + turn_rate * vy, ay - turn_rate * vx  # as seen from axes that turn
         x, y = vx + response.level_lag_s * ax + add_x, vy + response.level_lag_s * ay + add_y
         c, s = cos(yaw), sin(yaw)
@@ -190,6 +223,8 @@ class PathFollower:
             self._integral[axis] = min(max(value, -MAX_INTEGRAL_M_S), MAX_INTEGRAL_M_S)
 
     def _yaw_rate(self, path: Path, state: DroneState) -> float:
+        if self._turn_rad_s is not None:
+            return self._turn_rad_s
         response, rate = self.response, self._rate
         at_s = self.progress_s + rate * (response.yaw_dead_s + HOLD_S)
         ahead = path.at(at_s)

@@ -43,7 +43,7 @@ class PathFlight:
     """One path after another, each from the motion that the last one has then.
 
     Attributes:
-        path: the one that is flown; None while the drone stands still.
+        path: the one that is flown; None while the drone stops or stands still.
         refusal: why the last planning found none; empty if it did.
         watched: the place that stopped the drone, which now looks there; None if none did.
     """
@@ -55,6 +55,8 @@ class PathFlight:
         self._arena = arena
         self._style = self._usual_style = style
         self._follower = PathFollower(limits=limits)
+        self._left: Path | None = None  # which the drone stops on
+        self._anew = False  # the path begins with the drone's own motion
         self._response = ResponseEstimate()
         self._planned_for: tuple[tuple[Goal, ...], Obstacles] | None = None
         self._checked: tuple[Path, int, tuple[Vec3, ...]] | None = None  # and which obstacles there were
@@ -75,7 +77,7 @@ class PathFlight:
 
     def stop(self) -> None:
         """Leave the path."""
-        self.path = self.watched = None
+        self.path = self.watched = self._left = None
         self.change()
 
     def change(self) -> None:
@@ -93,7 +95,7 @@ class PathFlight:
             if abs(turn_rad) > LOOKED_AT_RAD:
                 self._watched_s = now_s
             if now_s - self._watched_s < MAX_LOOK_S:
-                return _look(turn_rad)
+                return self._stand(state, _look_rate(turn_rad))
             seen.suspect(self.watched)
         self.watched = None
         if now_s - self._tried_s >= (REPLAN_S if self.path is not None else WAITING_REPLAN_S):
@@ -105,35 +107,63 @@ class PathFlight:
         if self._must_check(obstacles, now_s) and self._is_obstructed(obstacles):
             self._plan(goals, obstacles, state)
             if self._is_obstructed(obstacles):
-                self.path = None
+                self._leave()
         if self.path is not None and seen.has_obstacles:
             self.watched = seen.first_unseen(self._ahead(AHEAD_S), position_now(state))
             if self.watched is not None:
-                self.path, self._watched_s = None, now_s
-                return _look(_turn_to(self.watched, state))
-        command = self.follow(state)
+                self._leave()
+                self._watched_s = now_s
+                return self._stand(state, _look_rate(_turn_to(self.watched, state)))
         self._looks_aside = False
         if self.path is not None and seen.has_obstacles and not isinstance(goals[0], Gate):
             later = seen.first_unseen(self._ahead(LOOK_AHEAD_S), position_now(state))
             if later is not None:
                 self._looks_aside = True
-                return replace(command, yaw_rate_rad_s=_look(_turn_to(later, state)).yaw_rate_rad_s)
-        return command
+                return self.follow(state, _look_rate(_turn_to(later, state)))
+        return self.follow(state)
 
-    def follow(self, state: DroneState) -> VelocityCommand:
-        """The command for this tick on the present path; without one, to stand still."""
+    def follow(self, state: DroneState, turn_rad_s: float | None = None) -> VelocityCommand:
+        """The command for this tick on the present path; without one, to stop.
+
+        Args:
+            state: of the drone.
+            turn_rad_s: turn with this rate, not as the path says.
+        """
         if self.path is None:
-            return STILL
+            return self._stand(state, turn_rad_s or 0.0)
+        self._left, self._anew = None, False
         prediction = self._response.predict() if self._follower.response.late else None
-        return self._follower.command(self.path, state, state.time_us * 1e-6, prediction)
+        now_s = state.time_us * 1e-6
+        return self._follower.command(self.path, state, now_s, prediction, turn_rad_s=turn_rad_s)
+
+    def _leave(self) -> None:
+        """Stop, on the path if it is flown already."""
+        if not self._anew:
+            self._left = None if self._follower.response.late else self.path
+        self.path = None
+
+    def _stand(self, state: DroneState, turn_rad_s: float) -> VelocityCommand:
+        """Stop, and turn."""
+        if self._left is None:
+            return VelocityCommand(yaw_rate_rad_s=turn_rad_s)
+        now_s, brake_m_s2 = state.time_us * 1e-6, self._style.acceleration_m_s2
+        return self._follower.command(self._left, state, now_s, turn_rad_s=turn_rad_s, brake_m_s2=brake_m_s2)
+
+    def _start(self, state: DroneState) -> tuple[Motion, bool]:
+        """The motion to plan from, and whether it begins a path that does not continue the present one."""
+        if self._follower.error_m <= RESTART_M:
+            flies = self.path is not None and not self._anew
+            reference = self._follower.reference() if flies else None
+            if reference is not None:
+                turned = replace(reference, yaw_rad=state.yaw, yaw_rate_rad_s=0.0)
+                return (turned if self._looks_aside else reference), False
+            braking = self._follower.braking() if self._left is not None else None
+            if braking is not None:
+                return replace(braking, yaw_rad=state.yaw), True
+        return self._own_motion(state), True
 
     def _plan(self, goals: Sequence[Goal], obstacles: Obstacles, state: DroneState) -> None:
-        start = self._follower.reference() if self.path is not None else None
-        restarts = start is None or self._follower.error_m > RESTART_M
-        if start is None or restarts:
-            start = self._own_motion(state)
-        elif self._looks_aside:
-            start = replace(start, yaw_rad=state.yaw, yaw_rate_rad_s=0.0)
+        start, restarts = self._start(state)
         found = self._find(start, goals, obstacles)
         if isinstance(found, Refusal) and len(goals) > 1:
             found = self._find(start, goals[:1], obstacles)
@@ -141,9 +171,10 @@ class PathFlight:
             self.refusal = found.reason
             self._refusals += 1
             if self._refusals >= MAX_REFUSALS:
-                self.path = None
+                self._leave()
             return
         self.path = found if restarts else self._follower.continued(found)
+        self._anew = restarts
         self.refusal, self._refusals = "", 0
         self._planned_for = (tuple(goals), obstacles)
 
@@ -201,9 +232,9 @@ def _turn_to(place_m: Vec3, state: DroneState) -> float:
     return remainder(atan2(place_m[1] - state.y, place_m[0] - state.x) - state.yaw, 2 * pi)
 
 
-def _look(turn_rad: float) -> VelocityCommand:
-    """Stop, and turn."""
-    return VelocityCommand(yaw_rate_rad_s=min(max(LOOK_GAIN_PER_S * turn_rad, -LOOK_RAD_S), LOOK_RAD_S))
+def _look_rate(turn_rad: float) -> float:
+    """How fast to turn, to look aside by an angle."""
+    return min(max(LOOK_GAIN_PER_S * turn_rad, -LOOK_RAD_S), LOOK_RAD_S)
 
 
 def _differ(a: tuple[Sequence[Goal], Obstacles], b: tuple[Sequence[Goal], Obstacles] | None) -> bool:

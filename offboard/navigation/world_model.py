@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections import deque
 from collections.abc import Sequence
+from math import hypot
 
 from geometry.vectors import Vec3
 from offboard.drone import DroneState
@@ -13,6 +14,7 @@ from offboard.navigation.frame_estimate import FrameEstimate
 from offboard.navigation.frame_map import FrameMap
 from offboard.navigation.goals import FlightStyle, Gate, Obstacles
 from offboard.navigation.obstacle_map import ObstacleMap
+from offboard.navigation.planner.clearance import DRONE_RADIUS_M
 from offboard.navigation.pose_history import DronePose, PoseHistory
 from offboard.navigation.search.glimpses import Glimpses
 from offboard.navigation.seen_space import SeenSpace
@@ -20,6 +22,7 @@ from offboard.navigation.surroundings import Surroundings
 from scenarios.models import COLOURS
 from vision.types import Detections
 
+START_SPARE_M = 0.02  # by which what is known to be free at the start exceeds what the drone needs
 IMAGES_WAITING = 32  # for the drone's pose when they were exposed
 
 
@@ -39,6 +42,8 @@ class WorldModel:
         self.seen_space = SeenSpace(camera, surroundings.arena)
         self._glimpses = Glimpses(camera)
         self._explorer = Explorer(camera, surroundings.arena, Pace.of(style))
+        self._start_m: Vec3 | None = None
+        self._start_room_m = DRONE_RADIUS_M + style.bar_margin_m + START_SPARE_M
         self._image_us = -1
         self._waiting: deque[Detections] = deque(maxlen=IMAGES_WAITING)
         self._frames: tuple[Gate, ...] | None = None  # that a path must keep clear of; None: not made yet
@@ -49,6 +54,8 @@ class WorldModel:
         Images that are repeated or have no time are ignored. One that is newer than the state waits for the
         state after it; one from a time of which no states are known is lost.
         """
+        if self._start_m is None:
+            self._start_m = (state.x, state.y, state.z)
         for earlier in state.missed:
             self._history.add(earlier)
         self._history.add(state)
@@ -101,4 +108,14 @@ class WorldModel:
         )
 
     def _columns_m(self) -> tuple[Vec3, ...]:
-        return self._obstacle_map.columns_m() + self.seen_space.suspects_m
+        """What stands on the floor; where the drone took off, there is room for it."""
+        columns_m = self._obstacle_map.columns_m() + self.seen_space.suspects_m
+        start_m = self._start_m
+        if start_m is None:
+            return columns_m
+        gaps_m = [hypot(x - start_m[0], y - start_m[1]) - self._start_room_m for x, y, _ in columns_m]
+        return tuple(
+            (x, y, min(radius_m, gap_m))
+            for (x, y, radius_m), gap_m in zip(columns_m, gaps_m, strict=True)
+            if gap_m > 0.0
+        )

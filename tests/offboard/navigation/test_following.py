@@ -2,12 +2,17 @@
 
 from __future__ import annotations
 
+import asyncio
+from math import hypot
+
 import pytest
 
+from framerunner.flying.lockstep import LockstepVehicle
+from framerunner.flying.plan import FlightPlan
 from framerunner.flying.response import Response
 from offboard.drone import DroneState
 from offboard.navigation.following import PathFollower
-from offboard.navigation.goals import CONTEST, Gate, Motion, Obstacles
+from offboard.navigation.goals import CONTEST, Gate, Motion, Obstacles, Point
 from offboard.navigation.path import Path
 from offboard.navigation.planning import plan
 from offboard.response import Prediction
@@ -56,3 +61,33 @@ def test_vehicle_that_was_pushed_aside_before_a_gate_waits_and_goes_on_when_it_i
             break
     assert waited > 20
     assert follower.finished
+
+
+def test_drone_that_brakes_and_turns_stops_on_its_path():
+    drone = LockstepVehicle(FlightPlan(Layout.random(200).scenario)).drone
+    asyncio.run(drone.ready())
+    asyncio.run(drone.motors_on())
+    follower, state = PathFollower(), drone.next_state()
+    towards = -1.0 if state.x > 0.0 else 1.0  # through the arena, above all frames
+    goals = [Point((state.x, state.y, 3.4)), Point((state.x + 4.0 * towards, state.y, 3.4))]
+    start = Motion((state.x, state.y, state.z), yaw_rad=state.yaw)
+    path = plan(start, goals, obstacles=Obstacles(), arena=Arena(), style=CONTEST)
+    assert isinstance(path, Path)
+    side_m, moved_m, began_m, y_m = 0.0, 0.0, state.x, state.y
+    while moved_m < 1.5:
+        drone.command(follower.command(path, state, state.time_us * 1e-6))
+        state = drone.next_state()
+        moved_m = abs(state.x - began_m)
+    fast_m_s = hypot(*state.velocity_arena_m_s)
+    for _ in range(60):
+        now_s = state.time_us * 1e-6
+        drone.command(follower.command(path, state, now_s, turn_rad_s=0.9, brake_m_s2=1.3))
+        state = drone.next_state()
+        side_m = max(side_m, abs(state.y - y_m))
+    assert fast_m_s > 0.7
+    assert hypot(*state.velocity_arena_m_s) < 0.05
+    assert abs(state.x - began_m) - moved_m < 0.7
+    assert side_m < 0.08
+    braking = follower.braking()
+    assert braking is not None
+    assert hypot(*braking.velocity_m_s) < 0.01

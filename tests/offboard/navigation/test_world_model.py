@@ -13,6 +13,7 @@ from geometry.rotations import quaternion_from_euler
 from offboard.drone import DroneState
 from offboard.navigation.frame_estimate import FrameEstimate
 from offboard.navigation.goals import CONTEST
+from offboard.navigation.planner.clearance import DRONE_RADIUS_M
 from offboard.navigation.surroundings import Surroundings
 from offboard.navigation.world_model import WorldModel
 from scenarios.models import Arena, Base, Camera
@@ -98,3 +99,16 @@ def test_images_are_used_once_whatever_their_number() -> None:
     assert red_after(twice) == red_after(regular)
     flood = [(at, [replace(one, time_us=None) for one in images] * 40) for at, images in regular]
     assert red_after(flood) is None
+
+
+def test_what_seems_to_stand_at_the_start_leaves_room_for_the_drone() -> None:
+    surroundings = Surroundings(Arena(), Base(x_m=-3.0, y_m=-3.0), Camera(), (0.25, 0.25, 0.1))
+    world = WorldModel(surroundings, CONTEST)
+    start = state(1_000_000)
+    world.observe(start, [])
+    places_m = [(start.x + 0.1, start.y, 1.0), (start.x + 0.35, start.y, 1.0), (start.x + 3.0, start.y, 1.0)]
+    for place_m in places_m:
+        world.seen_space.suspect(place_m)
+    gaps_m = [dist((start.x, start.y), (x, y)) - radius_m for x, y, radius_m in world.obstacles().columns_m]
+    assert len(gaps_m) == 2
+    assert min(gaps_m) > DRONE_RADIUS_M + CONTEST.bar_margin_m
