@@ -15,7 +15,7 @@ import numpy as np
 
 from vision.bar_edges import BarEdges, Widths, expected_widths, find_edges
 from vision.bar_lines import BarLine, BarLines, Meeting, fit_lines, meeting
-from vision.frame_model import AXES_CORNERS, OUTER_CORNERS, Floats, ModelPose, Sides, bar_offsets
+from vision.frame_model import AXES_CORNERS, OUTER_CORNERS, Floats, ModelPose, Point, Sides, bar_offsets
 from vision.frame_pose import as_seen, find_poses, poses_of_three
 from vision.patch import Patch
 from vision.types import FrameCorner, FramePose
@@ -201,7 +201,8 @@ def _explains(patch: Patch, pose: ModelPose, missing: int, focal_px: float) -> b
     corners = pose.project(AXES_CORNERS, focal_px)
     if corners is None:
         return False
-    support = patch.support(corners, np.roll(corners, -1, axis=0))
+    places: list[Point] = [(x, y) for x, y in corners.tolist()]
+    support = patch.support(places, places[1:] + places[:1])
     return max(support.empty) <= _MAX_EMPTY and support.own[missing] <= _MAX_OWN_UNSEEN
 
 

@@ -1,23 +1,24 @@
 """The pose of a frame from four points of its middle plane.
 
 A rectangle seen from one side has, in general, two poses that explain its image nearly as well as each other:
-tilted to one side or to the other. OpenCV's solver for planes finds both (T. Collins, A. Bartoli,
-"Infinitesimal plane-based pose estimation", International Journal of Computer Vision, 2014). It may answer
-with numbers that are no pose and still report success, so every answer is projected and compared here.
+tilted to one side or to the other. Both follow from how the image of the middle changes with its place on
+the frame (T. Collins, A. Bartoli, "Infinitesimal plane-based pose estimation", International Journal of
+Computer Vision, 2014). OpenCV has a solver for this, too; for a rectangle and in plain numbers it is several
+times quicker, and an image that is symmetric to the last digit is no special case.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from math import atan2, cos, hypot, isfinite, pi, sqrt
+from math import atan2, copysign, cos, hypot, isfinite, pi, sqrt
 
 import cv2
 import numpy as np
 
+from geometry.vectors import Vec3
 from vision.frame_model import AXES_CORNERS, AXES_HEIGHT_M, AXES_WIDTH_M, Floats, ModelPose, Point
 from vision.types import FramePose
 
-_IDENTITY = np.eye(3)
 _NEAREST_M = 0.03
 _MIN_UPRIGHT = 0.6  # cosine of the largest tilt of the camera, about 53 degrees: frames are upright
 _MAX_STEPS = 12
@@ -27,7 +28,10 @@ _MAX_DEPTH_ERROR = 0.08  # a pose that is less sure than this, relative to its d
 _MAX_TURN_ERROR = 0.25  # the same for its angle about the upright axis, radians
 _MAX_DEVIATIONS = 3.0
 _SAME_COSINE = 0.9995
-_NUDGE = np.array([[1e-6, 2e-6], [-2e-6, 1e-6], [2e-6, -1e-6], [1e-6, 1e-6]]).reshape(4, 1, 2)
+_FLAT = 1e-9  # area of an image, in units of the focal length squared, of which no pose is found
+_MODEL = tuple((x, y) for x, y, _ in AXES_CORNERS.tolist())
+
+_Rows = tuple[Vec3, Vec3, Vec3]
 
 
 def find_poses(axes_corners: Sequence[Point], focal_px: float, max_error_px: float) -> list[ModelPose]:
@@ -42,13 +46,10 @@ def find_poses(axes_corners: Sequence[Point], focal_px: float, max_error_px: flo
     Returns:
         None, one or two, the better one first.
     """
-    # In units of the focal length the camera's matrix is the identity.
-    image = np.array(axes_corners).reshape(4, 1, 2) / focal_px
-    poses = _solved(image, focal_px, max_error_px)
-    if len(poses) < 2:
-        # An image that is symmetric to a few last digits makes the solver divide zero by zero.
-        poses = max(poses, _solved(image + _NUDGE, focal_px, max_error_px), key=len)
-    return sorted(poses, key=lambda pose: pose.error_px)
+    image = [(x / focal_px, y / focal_px) for x, y in axes_corners]
+    poses = [_pose(rotation, image, focal_px) for rotation in _rotations(image)]
+    found = [pose for pose in poses if pose is not None and pose.error_px <= max_error_px]
+    return sorted(found, key=lambda pose: pose.error_px)
 
 
 def as_seen(pose: ModelPose) -> FramePose:
@@ -60,28 +61,87 @@ def as_seen(pose: ModelPose) -> FramePose:
     return FramePose((z, -x, -y), (ahead, -right, -down), pose.error_px)
 
 
-def _solved(image: Floats, focal_px: float, max_error_px: float) -> list[ModelPose]:
-    """The solver's answers that are poses and explain the image."""
-    # The model's y points down as the image's: the solver's rotation vectors fail near half a turn.
-    try:
-        turns, shifts = cv2.solvePnPGeneric(AXES_CORNERS, image, _IDENTITY, None, flags=cv2.SOLVEPNP_IPPE)[
-            1:3
-        ]
-    except cv2.error:
+def _rotations(image: list[Point]) -> list[_Rows]:
+    """The two rotations, by rows, with which a small part of the frame's middle looks as it does.
+
+    Args:
+        image: the four corners, in units of the focal length.
+    """
+    # The projective map from the unit square to the image (P. Heckbert, "Fundamentals of texture mapping and
+    # image warping", 1989).
+    (x0, y0), (x1, y1), (x2, y2), (x3, y3) = image
+    ax, ay, bx, by, cx, cy = x1 - x2, y1 - y2, x3 - x2, y3 - y2, x0 - x1 + x2 - x3, y0 - y1 + y2 - y3
+    area = ax * by - bx * ay
+    if abs(area) < _FLAT:
         return []
-    poses = (_pose(turn, shift, image, focal_px) for turn, shift in zip(turns, shifts, strict=True))
-    return [pose for pose in poses if pose is not None and pose.error_px <= max_error_px]
+    g, h = (cx * by - bx * cy) / area, (ax * cy - cx * ay) / area
+    along, down = (x1 - x0 + g * x1, y1 - y0 + g * y1), (x3 - x0 + h * x3, y3 - y0 + h * y3)
+    depth = 1.0 + 0.5 * (g + h)
+    if depth < _FLAT:
+        return []
+    # The image of the middle, and how it changes with the place on the frame, for each metre.
+    p, q = (0.5 * (along[0] + down[0]) + x0) / depth, (0.5 * (along[1] + down[1]) + y0) / depth
+    per_x, per_y = 1.0 / (depth * AXES_WIDTH_M), 1.0 / (depth * AXES_HEIGHT_M)
+    j00, j01 = (along[0] - p * g) * per_x, (down[0] - p * h) * per_y
+    j10, j11 = (along[1] - q * g) * per_x, (down[1] - q * h) * per_y
+    # The same in axes that are turned so that the middle is straight ahead.
+    length = sqrt(p * p + q * q + 1.0)
+    x, y, z = p / length, q / length, 1.0 / length
+    share = 1.0 / (1.0 + z)
+    ahead = ((1.0 - x * x * share, -x * y * share, x), (-x * y * share, 1.0 - y * y * share, y), (-x, -y, z))
+    b00, b01 = ahead[0][0] - p * ahead[2][0], ahead[0][1] - p * ahead[2][1]
+    b10, b11 = ahead[1][0] - q * ahead[2][0], ahead[1][1] - q * ahead[2][1]
+    det = b00 * b11 - b01 * b10
+    a00, a01 = (b11 * j00 - b01 * j10) / det, (b11 * j01 - b01 * j11) / det
+    a10, a11 = (b00 * j10 - b10 * j00) / det, (b00 * j11 - b10 * j01) / det
+    # Its larger singular value is the scale; what is missing to unit columns is their third component.
+    one, other, both = a00 * a00 + a01 * a01, a10 * a10 + a11 * a11, a00 * a10 + a01 * a11
+    scale = sqrt(0.5 * (one + other + hypot(one - other, 2.0 * both)))
+    a00, a01, a10, a11 = a00 / scale, a01 / scale, a10 / scale, a11 / scale
+    c0 = sqrt(max(1.0 - a00 * a00 - a10 * a10, 0.0))
+    c1 = copysign(sqrt(max(1.0 - a01 * a01 - a11 * a11, 0.0)), -(a00 * a01 + a10 * a11))
+    return [_turned(ahead, (a00, a10, sign * c0), (a01, a11, sign * c1)) for sign in (1.0, -1.0)]
 
 
-def _pose(turn: Floats, shift: Floats, image: Floats, focal_px: float) -> ModelPose | None:
-    if not all(map(isfinite, (*turn.ravel().tolist(), *shift.ravel().tolist()))):
+def _turned(turn: _Rows, first: Vec3, second: Vec3) -> _Rows:
+    """A rotation, and before it the one with these first two columns."""
+    (a, b, c), (d, e, f) = first, second
+    third = (b * f - c * e, c * d - a * f, a * e - b * d)
+    x, y, z = (
+        (
+            r[0] * a + r[1] * b + r[2] * c,
+            r[0] * d + r[1] * e + r[2] * f,
+            r[0] * third[0] + r[1] * third[1] + r[2] * third[2],
+        )
+        for r in turn
+    )
+    return (x, y, z)
+
+
+def _pose(rotation: _Rows, image: list[Point], focal_px: float) -> ModelPose | None:
+    """The pose with a rotation: the shift that fits the corners best, by linear least squares."""
+    (r00, r01, _), (r10, r11, _), (r20, r21, _) = rotation
+    if r11 < _MIN_UPRIGHT:
         return None
-    rotation, _ = cv2.Rodrigues(turn)
-    points = AXES_CORNERS @ rotation.T + shift.ravel()
-    if points[:, 2].min() <= 0.0 or rotation[1, 1] < _MIN_UPRIGHT:  # behind the camera, or fallen
-        return None
-    error = (points[:, :2] / points[:, 2:] - image[:, 0]).ravel()
-    return ModelPose(rotation, shift.ravel(), focal_px * sqrt(float(error @ error) / 4.0))
+    points = [(r00 * x + r01 * y, r10 * x + r11 * y, r20 * x + r21 * y) for x, y in _MODEL]
+    # For each corner shift_x - u shift_z = u z - x, and likewise for y.
+    sum_u, sum_v, sum_squares, sum_x, sum_y, sum_z = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
+    for (u, v), (x, y, z) in zip(image, points, strict=True):
+        right, down = u * z - x, v * z - y
+        sum_u, sum_v, sum_squares = sum_u + u, sum_v + v, sum_squares + u * u + v * v
+        sum_x, sum_y, sum_z = sum_x + right, sum_y + down, sum_z + u * right + v * down
+    shift_z = (0.25 * (sum_u * sum_x + sum_v * sum_y) - sum_z) / (
+        sum_squares - 0.25 * (sum_u * sum_u + sum_v * sum_v)
+    )
+    shift_x, shift_y = 0.25 * (sum_x + sum_u * shift_z), 0.25 * (sum_y + sum_v * shift_z)
+    square = 0.0
+    for (u, v), (x, y, z) in zip(image, points, strict=True):
+        depth = z + shift_z
+        if depth <= 0.0:  # behind the camera
+            return None
+        square += ((x + shift_x) / depth - u) ** 2 + ((y + shift_y) / depth - v) ** 2
+    shift = np.array((shift_x, shift_y, shift_z))
+    return ModelPose(np.array(rotation), shift, focal_px * sqrt(square / 4.0))
 
 
 def poses_of_three(

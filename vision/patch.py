@@ -10,7 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from vision.colour_regions import ColourMask
-from vision.frame_model import Floats, Point
+from vision.frame_model import Point
 
 Labels = npt.NDArray[np.uint8]
 Box = tuple[int, int, int, int]  # column, row, columns, rows
@@ -18,7 +18,7 @@ Box = tuple[int, int, int, int]  # column, row, columns, rows
 BACKGROUND, OWN, FOREIGN, OUTSIDE = 0, 1, 2, 4
 """Values of pixels: none of the others, of the region, what may hide a part of it, and not in the image."""
 
-_PLACES = ((np.arange(16) + 0.5) / 16.0)[:, None]  # along a bar, as shares of its length
+_PLACES = tuple((place + 0.5) / 16.0 for place in range(16))  # along a bar, as shares of its length
 _OPENING_PX = 6.0  # between the axes of opposite bars: an opening of this size is seen
 _AROUND = np.ones((5, 5), np.uint8)
 _BESIDE = cv2.getStructuringElement(cv2.MORPH_CROSS, (3, 3))
@@ -72,22 +72,28 @@ class Patch:
         """The same as if the region were in front of all else."""
         return replace(self, labels=np.bitwise_and(self.labels, np.uint8(OWN | OUTSIDE)))
 
-    def support(self, starts: Sequence[Point] | Floats, ends: Sequence[Point] | Floats) -> Support:
+    def support(self, starts: Sequence[Point], ends: Sequence[Point]) -> Support:
         """Look along straight bars, given by the ends of their axes, pixels from the optical axis."""
         # A thin bar may be a pixel beside its axis.
-        own = cv2.dilate(np.bitwise_and(self.labels, np.uint8(OWN)), _BESIDE)
-        near = cv2.dilate(self.labels, _BESIDE)
-        start = np.asarray(starts, np.float64)[:, None]
-        points = start + (np.asarray(ends, np.float64)[:, None] - start) * _PLACES
-        beyond = (np.abs(points) > self.reach_px).any(axis=2)
-        at = np.rint(points + self.origin).astype(np.intp)
-        column, row = at[..., 0], at[..., 1]
+        own = cv2.dilate(np.bitwise_and(self.labels, np.uint8(OWN)), _BESIDE).tobytes()
+        near = cv2.dilate(self.labels, _BESIDE).tobytes()
         rows, columns = self.labels.shape
-        known = (column >= 0) & (row >= 0) & (column < columns) & (row < rows)
-        index = np.where(known, row * columns + column, 0)
-        is_own = known & (own.reshape(-1)[index] == OWN)
-        empty = ~(is_own | beyond | (known & (near.reshape(-1)[index] > OWN)))
-        return Support(is_own.mean(axis=1).tolist(), empty.mean(axis=1).tolist())
+        (reach_x, reach_y), (column, row) = self.reach_px, self.origin
+        owns, empties = [], []
+        for (x0, y0), (x1, y1) in zip(starts, ends, strict=True):
+            seen, empty = 0, 0
+            for place in _PLACES:  # so few that NumPy takes longer
+                x, y = x0 + (x1 - x0) * place, y0 + (y1 - y0) * place
+                i, j = round(x + column), round(y + row)
+                known = 0 <= i < columns and 0 <= j < rows
+                at = j * columns + i
+                if known and own[at]:
+                    seen += 1
+                elif not (abs(x) > reach_x or abs(y) > reach_y or (known and near[at] > OWN)):
+                    empty += 1
+            owns.append(seen / len(_PLACES))
+            empties.append(empty / len(_PLACES))
+        return Support(owns, empties)
 
 
 @dataclass(frozen=True, slots=True)

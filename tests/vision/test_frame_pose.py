@@ -1,0 +1,51 @@
+"""Poses of a frame from its corners, compared with OpenCV's solver."""
+
+from __future__ import annotations
+
+import cv2
+import numpy as np
+import pytest
+
+from vision.frame_model import AXES_CORNERS, ModelPose
+from vision.frame_pose import find_poses
+
+FOCAL_PX = 160.0
+
+
+def seen_at(turns_rad, shift_m):
+    """The corners of a frame that is turned about its upright axis, then about right and ahead, and moved."""
+    about_down, about_right, about_ahead = turns_rad
+    vectors = ([about_right, 0.0, 0.0], [0.0, 0.0, about_ahead], [0.0, about_down, 0.0])
+    first, second, third = (cv2.Rodrigues(np.array(vector))[0] for vector in vectors)
+    corners = ModelPose(first @ second @ third, np.array(shift_m), 0.0).project(AXES_CORNERS, FOCAL_PX)
+    assert corners is not None
+    return corners
+
+
+@pytest.mark.parametrize("noise_px", [0.0, 0.3])
+def test_poses_are_the_upright_ones_of_opencv_with_the_better_one_first(noise_px):
+    random = np.random.default_rng(3)
+    for _ in range(50):
+        shift_m = random.uniform(0.5, 6.0) * np.array([*random.uniform(-0.6, 0.6, 2), 1.0])
+        turns_rad = random.uniform(-1.0, 1.0) * np.array([1.0, 0.3, 0.2])
+        corners = seen_at(turns_rad, shift_m) + noise_px * random.standard_normal((4, 2))
+        camera = np.diag((FOCAL_PX, FOCAL_PX, 1.0))
+        answer = cv2.solvePnPGeneric(AXES_CORNERS, corners, camera, None, flags=cv2.SOLVEPNP_IPPE)
+        rotations = [cv2.Rodrigues(turn)[0] for turn in answer[1]]
+        found = find_poses([(x, y) for x, y in corners.tolist()], FOCAL_PX, 100.0)
+        upright = [at for at, rotation in enumerate(rotations) if rotation[1, 1] > 0.6]
+        assert upright
+        for pose, at in zip(found, upright, strict=True):
+            assert pose.rotation == pytest.approx(rotations[at], abs=1e-5)
+            assert pose.shift_m == pytest.approx(answer[2][at][:, 0], rel=1e-5, abs=1e-5)
+
+
+def test_a_frame_seen_exactly_from_the_front_has_a_pose():
+    poses = find_poses([(-20.0, -10.0), (20.0, -10.0), (20.0, 10.0), (-20.0, 10.0)], FOCAL_PX, 0.1)
+    assert poses
+    assert poses[0].shift_m == pytest.approx([0.0, 0.0, 1.6])
+    assert poses[0].rotation == pytest.approx(np.eye(3))
+
+
+def test_corners_on_a_line_have_no_pose():
+    assert find_poses([(0.0, 0.0), (1.0, 1.0), (2.0, 2.0), (3.0, 3.0)], FOCAL_PX, 100.0) == []
