@@ -18,7 +18,7 @@ from offboard.navigation.search.frame_visibility import Bools, Floats, FrameVisi
 from offboard.navigation.search.glimpses import LineOfSight
 from offboard.navigation.search.likelihood import Likelihood
 from offboard.navigation.search.obstruction import Obstruction, WaysRound
-from offboard.navigation.search.view_table import YAWS, Doubles, ViewTable
+from offboard.navigation.search.view_table import YAWS, Doubles, view_table
 from scenarios.models import Arena
 from vision.types import ObstacleEdge
 
@@ -78,7 +78,7 @@ class Explorer:
         self.coverage = Coverage(camera, arena)
         self._visibility = FrameVisibility(camera)
         self._blocks = self.coverage.grid.blocks()
-        self._table = ViewTable(camera, arena, self._blocks)
+        self._table = view_table(camera, arena)
         self._likelihood = Likelihood(self._blocks)
         self._visits = np.zeros((len(self._table.places_m), len(YAWS)))
         self._last: Viewpoint | None = None

@@ -25,7 +25,8 @@ STILL = VelocityCommand()
 REPLAN_S = 0.4
 RESTART_M = 0.28  # farther from its path, the drone's own motion is planned from
 MAX_REFUSALS = 3  # in a row, until the drone stops
-SAME_M = 0.004  # between two estimates of the frame that is crossed, for which the path stays as it is
+SAME_M = 0.004  # between two estimates of the frame that is crossed, for which the path stays as it is,
+SAME_SHARE = 0.005  # or this share of its distance: there is time to plan again when it is nearer
 NEARLY_SAME_M = 0.04  # likewise of the other frames
 SAME_RAD_M = 1.0  # likewise of headings, for each metre
 AHEAD_S = 0.7  # of the path that must be free, beside the vehicle's lag: it is long enough to stop
@@ -101,7 +102,7 @@ class PathFlight:
         if now_s - self._tried_s >= (REPLAN_S if self.path is not None else WAITING_REPLAN_S):
             planned_for = (tuple(goals), obstacles)
             off = self._follower.error_m > RESTART_M
-            if self.path is None or off or _differ(planned_for, self._planned_for):
+            if self.path is None or off or _differ(planned_for, self._planned_for, position_now(state)):
                 self._tried_s = now_s
                 self._plan(goals, obstacles, state)
         if self._must_check(obstacles, now_s) and self._is_obstructed(obstacles):
@@ -237,15 +238,20 @@ def _look_rate(turn_rad: float) -> float:
     return min(max(LOOK_GAIN_PER_S * turn_rad, -LOOK_RAD_S), LOOK_RAD_S)
 
 
-def _differ(a: tuple[Sequence[Goal], Obstacles], b: tuple[Sequence[Goal], Obstacles] | None) -> bool:
-    """Whether goals or obstacles differ by more than the map's noise."""
+def _differ(
+    a: tuple[Sequence[Goal], Obstacles], b: tuple[Sequence[Goal], Obstacles] | None, from_m: Vec3
+) -> bool:
+    """Whether goals or obstacles differ by more than the map's noise, as seen from a place."""
     if b is None or len(a[0]) != len(b[0]) or len(a[1].frames) != len(b[1].frames):
         return True
     if a[1].columns_m != b[1].columns_m:
         return True
-    near = zip(a[0][:1], b[0][:1], strict=True)
+    first = a[0][0]
+    away_m = dist(first.centre_m if isinstance(first, Gate) else first.position_m, from_m)
+    if _moved(first, b[0][0], max(SAME_M, SAME_SHARE * away_m)):
+        return True
     other = [*zip(a[0][1:], b[0][1:], strict=True), *zip(a[1].frames, b[1].frames, strict=True)]
-    return any(_moved(*pair, SAME_M) for pair in near) or any(_moved(*pair, NEARLY_SAME_M) for pair in other)
+    return any(_moved(*pair, NEARLY_SAME_M) for pair in other)
 
 
 def _moved(a: Goal, b: Goal, same_m: float) -> bool:

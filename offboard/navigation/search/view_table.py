@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import lru_cache
 from itertools import product
 from math import atan, cos, remainder, sin, tau
 from typing import Final
@@ -23,6 +24,13 @@ _WALL_M: Final = 1.0  # from the outermost places to the arena's sides
 _LOW_M, _MIDDLE_M, _BELOW_CEILING_M = 0.6, 1.5, 1.3
 _EDGE_RAD: Final = 0.08  # at the sides of the image, where a frame is cut
 _NEAREST_M: Final = 0.7
+_TABLES_KEPT: Final = 4  # of 5 MB each
+
+
+@lru_cache(_TABLES_KEPT)
+def view_table(camera: CameraModel, arena: Arena) -> ViewTable:
+    """The table of a camera and an arena; it never changes, so that all flights share it."""
+    return ViewTable(camera, arena, SearchGrid.of(arena).blocks())
 
 
 class ViewTable:
