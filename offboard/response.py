@@ -35,6 +35,8 @@ _MAX_STEPS = 8  # after a longer gap everything but the estimate begins again
 _EXPECTED = ((3, 2), (1, 0), (1, 0))  # indices of dead time and lag, before there is evidence
 _MIN_ENERGY = (0.3, 0.2, 0.2)  # sums of squared changes (m/s, m/s, rad/s) that are evidence
 _BETTER = 0.7  # share of the present pair's error that another one must reach
+_LITTLE_ENERGY = 0.03  # is enough where a vehicle is known to be late, and a pair is
+_MUCH_BETTER = 0.3  # by this share
 _CLEARLY_BETTER = 0.5  # likewise for axes that turn: those of vehicles that answer late seldom do
 _LATE_S = (0.65, 0.3, 0.3)  # level, climb, yaw: beyond this in all a vehicle answers late
 _DISTURBANCE_S = 0.4  # time constant of the estimate of what commands do not explain
@@ -198,14 +200,16 @@ class ResponseEstimate:
         least: list[float] = errors.min(axis=0).tolist()
         best = [divmod(pair, len(LAGS_S)) for pair in errors.argmin(axis=0).tolist()]
         energies: list[float] = self._energies.tolist()
-        if energies[0] > _MIN_ENERGY[0]:
+        if energies[0] > (_LITTLE_ENERGY if self.response.late else _MIN_ENERGY[0]):
             dead, lag = best[0]
             late = DEAD_STEPS[dead] * STEP_S + LAGS_S[lag] > _LATE_S[0]
             self._turning = least[1] < (_CLEARLY_BETTER if late else 1.0) * least[0]
         for channel, group in enumerate((1 if self._turning else 0, 2, 3)):
-            if energies[group] < _MIN_ENERGY[channel]:
+            present = float(self._errors[(*self._chosen[channel], group)])
+            little = self.response.late and least[group] < _MUCH_BETTER * present
+            if energies[group] < (_LITTLE_ENERGY if little else _MIN_ENERGY[channel]):
                 continue
-            if least[group] < _BETTER * float(self._errors[(*self._chosen[channel], group)]):
+            if least[group] < _BETTER * present:
                 self._chosen[channel] = best[group]
         self._second_before = self._second.chosen
         if (self._turning, self._second_before, *self._chosen) != before:

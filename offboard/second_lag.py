@@ -19,6 +19,8 @@ LAG_S = 0.4  # of the vehicle's own control: the simulated drone's
 _BETTER = 0.7  # share of the present error that another model must reach
 _MEMORY_S = 40.0
 _MIN_ENERGY = 0.3  # sum of squared changes (m/s) that is evidence
+_LITTLE_ENERGY = 0.03  # likewise where the error becomes
+_MUCH_BETTER = 0.3  # less than this share
 
 
 class SecondLag:
@@ -111,11 +113,11 @@ class SecondLag:
         self._errors = fade * self._errors + squares
         self._error_of_one_lag = fade * self._error_of_one_lag + error_of_one_lag
         self._energy = fade * self._energy + float(change @ change) * self._step_s
-        if self._energy < _MIN_ENERGY:
-            return
         dead, lag = divmod(int(self._errors.argmin()), self._errors.shape[1])
+        least = float(self._errors[dead, lag])
         present = self._error_of_one_lag if self.chosen is None else float(self._errors[self.chosen])
-        if self._errors[dead, lag] < _BETTER * present:
+        enough = _LITTLE_ENERGY if least < _MUCH_BETTER * present else _MIN_ENERGY
+        if self._energy > enough and least < _BETTER * present:
             self.chosen = (dead, lag)
         elif self.chosen is not None and self._error_of_one_lag < _BETTER * present:
             self.chosen = None

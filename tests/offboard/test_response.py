@@ -102,6 +102,18 @@ def test_a_vehicle_that_answers_in_time_is_not_late():
     assert not estimate.response.late
 
 
+def test_slow_flight_shows_the_lag_of_a_vehicle_that_is_known_to_be_late():
+    vehicle, estimate, sent = Vehicle(0.35, 0.6), ResponseEstimate(), None
+    for tick in range(round(7.0 / STEP_S)):
+        estimate.update(vehicle.state, sent)
+        usual = command_at(tick * STEP_S)
+        sent = VelocityCommand(usual.forward_m_s / 5, usual.left_m_s / 5, usual.up_m_s, usual.yaw_rate_rad_s)
+        vehicle.fly(sent)
+    assert estimate.response.late
+    assert (estimate.response.level_dead_s, estimate.response.level_lag_s) == pytest.approx((0.35, 0.6))
+    assert not estimate.response.turning
+
+
 def test_a_second_lag_is_learnt():
     response = learn(Vehicle(0.15, 0.6, own_lag_s=0.4), 25.0).response
     assert response.own_lag_s == 0.4

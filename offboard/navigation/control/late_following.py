@@ -29,6 +29,9 @@ GATE_TOO_NEAR_S = 0.8  # then it cannot stop any more
 GATE_FROM_M = 0.03  # farther off, the path's time goes slower
 GATE_WAIT_M = 0.06  # beyond that, it stands still
 GATE_TURN_M = 0.15  # by which a turn counts, for each radian
+GATE_STEADY_S = (
+    0.2  # likewise a wrong velocity, for each m/s: that of a vehicle whose response is not known yet
+)
 _TICKS = 24
 _SOON_S = 0.1  # after which the change of the velocity is compared
 _Pace = tuple[float, float]
@@ -99,8 +102,10 @@ class LateFollower:
         yaw_offset = remainder(turn.yaw_rad - state.yaw - prediction.turned_rad, 2 * pi)
         self.error_m = hypot(*offset)
         error = (offset[0], offset[1], offset[2])
+        (vx, vy, _), (coming_x, coming_y, _) = level.velocity_m_s, prediction.velocity_m_s
+        unsteady_m = GATE_TURN_M * abs(yaw_offset) + GATE_STEADY_S * hypot(vx - coming_x, vy - coming_y)
         self._wanted_rate = min(
-            rate_of(error, level.velocity_m_s), self._rate_before_gate(path, error, yaw_offset)
+            rate_of(error, level.velocity_m_s), self._rate_before_gate(path, error, unsteady_m)
         )
         size = hypot(*correction)
         scale = MAX_CORRECTION_M_S / size if size > MAX_CORRECTION_M_S else 1.0
@@ -149,12 +154,12 @@ class LateFollower:
             square * motion.yaw_acceleration_rad_s2 + change * motion.yaw_rate_rad_s,
         )
 
-    def _rate_before_gate(self, path: Path, error: Vec3, yaw_offset: float) -> float:
+    def _rate_before_gate(self, path: Path, error: Vec3, unsteady_m: float) -> float:
         """How fast the path's time may go: a drone that is not straight before a gate waits until it is."""
         for crossing in path.crossings:
             if GATE_TOO_NEAR_S < crossing.time_s - self.ahead_s < GATE_NEAR_S:
                 c, s = cos(crossing.heading_rad), sin(crossing.heading_rad)
-                off_m = hypot(c * error[1] - s * error[0], error[2]) + GATE_TURN_M * abs(yaw_offset)
+                off_m = hypot(c * error[1] - s * error[0], error[2]) + unsteady_m
                 return max(1.0 - max(off_m - GATE_FROM_M, 0.0) / GATE_WAIT_M, 0.0)
         return 1.0
 

@@ -44,18 +44,20 @@ def test_vehicle_that_was_pushed_aside_before_a_gate_waits_and_goes_on_when_it_i
     start = Motion((0.0, 0.6, 1.0), yaw_rad=0.6)
     path = plan(start, [gate], obstacles=Obstacles((gate,)), arena=Arena(), style=style)
     assert isinstance(path, Path)
-    follower, at_m, waited = PathFollower(answers), start.position_m, 0
+    follower, at_m, waited, pace = PathFollower(answers), start.position_m, 0, 1.0
     for tick in range(500):
         gate_s = path.crossings[0].time_s - follower.progress_s - follower.lead_s
         pushed_m = 0.2 if 1.5 < gate_s < 2.0 and tick < 200 else 0.0
         state = DroneState(tick * 50_000, at_m[0], at_m[1] + pushed_m, at_m[2], 0.0, (0.0, 0.0, 0.0), False)
         motion = path.at(follower.progress_s + follower.lead_s)
         turned_rad = motion.yaw_rad - state.yaw
-        coming = Prediction((0.0, 0.0, 0.0), motion.velocity_m_s, (0.0, 0.0, 0.0), turned_rad, 0.0)
+        vx, vy, vz = (pace * speed for speed in motion.velocity_m_s)
+        coming = Prediction((0.0, 0.0, 0.0), (vx, vy, vz), (0.0, 0.0, 0.0), turned_rad, 0.0)
         before_s = follower.progress_s + follower.lead_s
         follower.command(path, state, tick * 0.05, coming)
         ahead_s = follower.progress_s + follower.lead_s
-        waited += pushed_m > 0.0 and ahead_s - before_s < 0.005
+        pace = (ahead_s - before_s) / 0.05
+        waited += pushed_m > 0.0 and pace < 0.1
         at_m = path.at(ahead_s).position_m
         if follower.finished:
             break
