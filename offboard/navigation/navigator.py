@@ -153,7 +153,7 @@ class Navigator:
             return self._fly(self._places.before(estimate, position_now(state), self._world.obstacles()))
         command = self._fly(Gate(estimate.position_m, estimate.yaw_rad), *self._goals_after(colour))
         path = self._flight.path
-        finds_way = path is not None or self._flight.watched is not None
+        finds_way = path is not None or self._flight.looks
         no_path = "" if finds_way else self._flight.refusal or "none was planned"
         crossing.fly(no_path=no_path, now_s=now_s)
         if path is not None and path.crossings:
@@ -177,7 +177,8 @@ class Navigator:
 
     def _fly(self, *goals: Goal) -> VelocityCommand:
         assert self._state is not None, "observe() comes before any action"
-        return self._flight.fly(goals, self._world.obstacles(), self._state, self._world.seen_space)
+        world = self._world
+        return self._flight.fly(goals, world.obstacles(), self._state, world.seen_space, world.viewed_space)
 
     def _goals_after(self, colour: str) -> list[Goal]:
         """The next frame, if it is on the map; after the last one, the start."""

@@ -17,6 +17,8 @@ from offboard.navigation.following import PathFollower
 from offboard.navigation.goals import FlightStyle, Gate, Goal, Motion, Obstacles, Refusal
 from offboard.navigation.path import Path
 from offboard.navigation.planning import obstructed, plan
+from offboard.navigation.search.lookout import Lookout
+from offboard.navigation.search.viewed_space import ViewedSpace
 from offboard.navigation.seen_space import SeenSpace
 from offboard.response import ResponseEstimate
 from scenarios.models import Arena
@@ -58,6 +60,7 @@ class PathFlight:
         self._follower = PathFollower(limits=limits)
         self._left: Path | None = None  # which the drone stops on
         self._anew = False  # the path begins with the drone's own motion
+        self._lookout = Lookout(arena, style)
         self._response = ResponseEstimate()
         self._planned_for: tuple[tuple[Goal, ...], Obstacles] | None = None
         self._checked: tuple[Path, int, tuple[Vec3, ...]] | None = None  # and which obstacles there were
@@ -79,7 +82,13 @@ class PathFlight:
     def stop(self) -> None:
         """Leave the path."""
         self.path = self.watched = self._left = None
+        self._lookout.leave()
         self.change()
+
+    @property
+    def looks(self) -> bool:
+        """The drone has left its path to look at a place on it."""
+        return self.watched is not None or self._lookout.active
 
     def change(self) -> None:
         """Plan at the next tick, for other goals."""
@@ -87,9 +96,17 @@ class PathFlight:
         self._tried_s = -REPLAN_S
 
     def fly(
-        self, goals: Sequence[Goal], obstacles: Obstacles, state: DroneState, seen: SeenSpace
+        self,
+        goals: Sequence[Goal],
+        obstacles: Obstacles,
+        state: DroneState,
+        seen: SeenSpace,
+        viewed: ViewedSpace,
     ) -> VelocityCommand:
         """Plan again if that is due and goals or obstacles have changed; the command for this tick."""
+        looking = self._lookout.command(state, viewed)
+        if looking is not None:
+            return looking
         now_s = state.time_us * 1e-6
         if self.watched is not None and not seen.is_seen(self.watched):
             turn_rad = _turn_to(self.watched, state)
@@ -99,16 +116,7 @@ class PathFlight:
                 return self._stand(state, _look_rate(turn_rad))
             seen.suspect(self.watched)
         self.watched = None
-        if now_s - self._tried_s >= (REPLAN_S if self.path is not None else WAITING_REPLAN_S):
-            planned_for = (tuple(goals), obstacles)
-            off = self._follower.error_m > RESTART_M
-            if self.path is None or off or _differ(planned_for, self._planned_for, position_now(state)):
-                self._tried_s = now_s
-                self._plan(goals, obstacles, state)
-        if self._must_check(obstacles, now_s) and self._is_obstructed(obstacles):
-            self._plan(goals, obstacles, state)
-            if self._is_obstructed(obstacles):
-                self._leave()
+        checked = self._plan_if_due(goals, obstacles, state)
         if self.path is not None and seen.has_obstacles:
             self.watched = seen.first_unseen(self._ahead(AHEAD_S), position_now(state))
             if self.watched is not None:
@@ -116,12 +124,32 @@ class PathFlight:
                 self._watched_s = now_s
                 return self._stand(state, _look_rate(_turn_to(self.watched, state)))
         self._looks_aside = False
-        if self.path is not None and seen.has_obstacles and not isinstance(goals[0], Gate):
+        to_gate = isinstance(goals[0], Gate)
+        if checked and to_gate and self._lookout.begin(self._ahead(AHEAD_S + CHECK_S), state, viewed):
+            self.path = self._left = None
+            return self._lookout.command(state, viewed) or STILL
+        if self.path is not None and seen.has_obstacles and not to_gate:
             later = seen.first_unseen(self._ahead(LOOK_AHEAD_S), position_now(state))
             if later is not None:
                 self._looks_aside = True
                 return self.follow(state, _look_rate(_turn_to(later, state)))
         return self.follow(state)
+
+    def _plan_if_due(self, goals: Sequence[Goal], obstacles: Obstacles, state: DroneState) -> bool:
+        """Plan again if goals or obstacles have changed, or stand in the way; whether that was checked."""
+        now_s = state.time_us * 1e-6
+        if now_s - self._tried_s >= (REPLAN_S if self.path is not None else WAITING_REPLAN_S):
+            planned_for = (tuple(goals), obstacles)
+            off = self._follower.error_m > RESTART_M
+            if self.path is None or off or _differ(planned_for, self._planned_for, position_now(state)):
+                self._tried_s = now_s
+                self._plan(goals, obstacles, state)
+        checked = self._must_check(obstacles, now_s)
+        if checked and self._is_obstructed(obstacles):
+            self._plan(goals, obstacles, state)
+            if self._is_obstructed(obstacles):
+                self._leave()
+        return checked
 
     def follow(self, state: DroneState, turn_rad_s: float | None = None) -> VelocityCommand:
         """The command for this tick on the present path; without one, to stop.

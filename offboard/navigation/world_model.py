@@ -17,6 +17,7 @@ from offboard.navigation.obstacle_map import ObstacleMap
 from offboard.navigation.planner.clearance import DRONE_RADIUS_M
 from offboard.navigation.pose_history import DronePose, PoseHistory
 from offboard.navigation.search.glimpses import Glimpses
+from offboard.navigation.search.viewed_space import ViewedSpace
 from offboard.navigation.seen_space import SeenSpace
 from offboard.navigation.surroundings import Surroundings
 from scenarios.models import COLOURS
@@ -31,15 +32,17 @@ class WorldModel:
 
     Attributes:
         seen_space: where nothing stands.
+        viewed_space: where a frame would have been seen.
     """
 
     def __init__(self, surroundings: Surroundings, style: FlightStyle) -> None:
-        camera = CameraModel.of(surroundings.camera)
+        camera = self._camera = CameraModel.of(surroundings.camera)
         self._surroundings = surroundings
         self._history = PoseHistory()
         self._map = FrameMap(camera, surroundings.arena)
         self._obstacle_map = ObstacleMap(camera, surroundings.arena)
         self.seen_space = SeenSpace(camera, surroundings.arena)
+        self.viewed_space = ViewedSpace(camera, surroundings.base)
         self._glimpses = Glimpses(camera)
         self._explorer = Explorer(camera, surroundings.arena, Pace.of(style))
         self._start_m: Vec3 | None = None
@@ -78,6 +81,9 @@ class WorldModel:
         self.seen_space.update(*where, image.obstacle_edges, self._obstacle_map.columns_m())
         self._explorer.update(*where, image.obstacle_edges)
         known = [colour for colour in COLOURS if self._map.best(colour) is not None]
+        self.viewed_space.update(self._camera.pose(*where))
+        others = any(frame.colour not in COLOURS for frame in self._map.frames())
+        self.viewed_space.needed = others or len(known) < len(COLOURS)
         self._glimpses.update(*where, image, known)
 
     def frame(self, colour: str) -> FrameEstimate | None:

@@ -11,15 +11,17 @@ from geometry.rotations import quaternion_from_yaw
 from offboard.drone import DroneState
 from offboard.limits import CONTEST as CONTEST_LIMITS
 from offboard.navigation.camera_model import CameraModel
-from offboard.navigation.goals import CONTEST, Obstacles, Point
+from offboard.navigation.goals import CONTEST, Gate, Obstacles, Point
 from offboard.navigation.path_flight import PathFlight
+from offboard.navigation.search.viewed_space import ViewedSpace
 from offboard.navigation.seen_space import SeenSpace
-from scenarios.models import Arena, Camera
+from scenarios.models import Arena, Base, Camera
 from tests.offboard.navigation.test_obstacle_map import edges_of
 
 CAMERA = CameraModel.of(Camera(position_flu_m=(0.0, 0.0, 0.0)))
 POSTS = [(3.0, 0.0, 0.2)]
 HERE = (0.0, 0.0, 1.0)
+VIEWED = ViewedSpace(CAMERA, Base(x_m=-4.0, y_m=-4.0))  # without a view: nothing is asked of it
 
 
 def seen_from(position_m=HERE, yaw_rad=0.0, posts=POSTS, columns_m=()):
@@ -66,7 +68,7 @@ def test_drone_looks_where_it_will_fly_and_then_flies_there(goal_m):
     seen, flight = seen_from(), PathFlight(Arena(), CONTEST, CONTEST_LIMITS)
     state = DroneState(0, *HERE, yaw=0.0)
     for tick in range(200):
-        command = flight.fly([Point(goal_m)], Obstacles(), state, seen)
+        command = flight.fly([Point(goal_m)], Obstacles(), state, seen, VIEWED)
         if command.forward_m_s or command.left_m_s:
             break
         yaw_rad = state.yaw + 0.05 * command.yaw_rate_rad_s
@@ -79,14 +81,37 @@ def test_drone_looks_where_it_will_fly_and_then_flies_there(goal_m):
 def test_a_path_that_is_obstructed_is_planned_again_at_once():
     seen, flight = SeenSpace(CAMERA, Arena()), PathFlight(Arena(), CONTEST, CONTEST_LIMITS)
     state = DroneState(0, *HERE, yaw=0.0)
-    flight.fly([Point((3.0, 0.0, 1.0))], Obstacles(), state, seen)
+    flight.fly([Point((3.0, 0.0, 1.0))], Obstacles(), state, seen, VIEWED)
     before = flight.path
     flight.fly(
         [Point((3.0, 0.0, 1.0))],
         Obstacles(columns_m=((0.6, 0.0, 0.1),)),
         replace(state, time_us=50_000),
         seen,
+        VIEWED,
     )
     assert flight.path is not None
     assert flight.path is not before
     assert all(hypot(x - 0.6, y) > 0.3 for x, y, _ in flight.path.points())
+
+
+def height_after_a_metre(gate: Gate, *, needed: bool) -> float:
+    """The height of a drone that flies to a gate as it is told, where it is a metre nearer."""
+    seen, viewed = SeenSpace(CAMERA, Arena()), ViewedSpace(CAMERA, Base(x_m=-4.0, y_m=-4.0))
+    flight = PathFlight(Arena(), CONTEST, CONTEST_LIMITS)
+    viewed.needed = needed
+    state = DroneState(0, *HERE, yaw=0.0)
+    for tick in range(200):
+        viewed.update(CAMERA.pose((state.x, state.y, state.z), quaternion_from_yaw(0.0)))
+        command = flight.fly([gate], Obstacles((gate,)), state, seen, viewed)
+        x, z = state.x + 0.05 * command.forward_m_s, state.z + 0.05 * command.up_m_s
+        velocity = (command.forward_m_s, 0.0, command.up_m_s)
+        state = replace(state, time_us=50_000 * tick, x=x, z=z, velocity_arena_m_s=velocity)
+        if x > 1.0:
+            break
+    return state.z
+
+
+def test_before_a_steep_flight_to_a_gate_the_drone_climbs_until_the_way_is_in_view():
+    gate = Gate((3.0, 0.0, 3.0), 0.0)
+    assert height_after_a_metre(gate, needed=True) > height_after_a_metre(gate, needed=False) + 0.3
