@@ -1,6 +1,6 @@
 """Follows a planned path by velocity commands.
 
-A command is the path's velocity and acceleration, ahead by the vehicle's delay, plus a share of the drone's
+A command is what makes the vehicle fly the path's motion, ahead by its delay, plus a share of the drone's
 offset from where the path was when its position was measured. The path's time waits for a drone that falls
 behind, so corners are never cut.
 """
@@ -14,18 +14,23 @@ from math import cos, hypot, pi, remainder, sin
 from geometry.vectors import Vec3
 from offboard.drone import DroneState, VelocityCommand
 from offboard.limits import CONTEST, CommandLimits, clamped
+from offboard.navigation.control.feed_forward import MOTOR_S, SPREAD_S, FeedForward
 from offboard.navigation.control.late_following import MAX_CORRECTION_M_S, WAIT_FROM_M, LateFollower, rate_of
 from offboard.navigation.goals import Motion
 from offboard.navigation.path import Path
 from offboard.response import Prediction, Response
 
 HOLD_S = 0.025  # half the time for which a command holds
+DELAY_S = 0.025  # from a state to the motors, beside
 POSITION_GAIN_PER_S = 1.0
-VELOCITY_GAIN = 0.2
-YAW_GAIN_PER_S = 2.0
+VELOCITY_GAIN = 0.3
+YAW_GAIN_PER_S = 3.0
+MAX_RATE_CHANGE_PER_S = 1.5  # of the path's time
+BRAKE_END_S = 0.25  # in which the last of the speed is braked, so that the drone is not thrown back
 INTEGRAL_GAIN_PER_S2 = 0.2
 MAX_INTEGRAL_M_S = 0.15
 INTEGRAL_REACH_M = 0.15  # farther from the path, the integral does not grow
+_STEADY_S = 0.11  # after a longer step the vehicle's velocity is taken for steady
 _MAX_STEP_S = 0.5  # for so long a vehicle flies on by its last command
 _MOVING_M_S = 0.2
 _HISTORY = 16  # ticks
@@ -53,17 +58,18 @@ class PathFollower:
         self._late: LateFollower | None = None
         self._last_s: float | None = None
         self._rate = 1.0  # of the path's time
-        self._slowing_per_s = 0.0  # of that rate
+        self._rate_change = 0.0  # per second
         self._turn_rad_s: float | None = None  # of the heading, if it is not the path's
         self._integral: list[float] = [0.0, 0.0, 0.0]
         self._past: deque[tuple[float, Motion]] = deque(maxlen=_HISTORY)
+        self._feed_forward = FeedForward()
 
     @property
     def lead_s(self) -> float:
         """How far ahead of its time the path is commanded already: another one should begin after that."""
         if self._late is not None:
             return self._late.ahead_s - self.progress_s
-        return self.response.level_dead_s + HOLD_S
+        return HOLD_S + DELAY_S + MOTOR_S + SPREAD_S
 
     def reference(self) -> Motion | None:
         """The path's motion `lead_s` ahead, to plan the next path from; None before the first command."""
@@ -124,6 +130,8 @@ class PathFollower:
         if prediction is not None:
             command = self._command_late(path, state, prediction, step_s)
             return command if turn_rad_s is None else replace(command, yaw_rate_rad_s=turn_rad_s)
+        if self._late is not None or step_s > _STEADY_S:
+            self._feed_forward.restart()
         self._late = None
         if path is not self._path:
             self._path, self.progress_s = path, 0.0
@@ -133,12 +141,7 @@ class PathFollower:
         error, slower = self._errors(state, now_s)
         self.error_m = hypot(*error)
         self._turn_rad_s = turn_rad_s
-        before, self._rate = self._rate, rate_of(error, motion.velocity_m_s)
-        self._slowing_per_s = 0.0
-        if brake_m_s2:
-            self._slowing_per_s = brake_m_s2 / max(hypot(*motion.velocity_m_s), _MOVING_M_S)
-            self._rate = max(min(self._rate, before - self._slowing_per_s * step_s), 0.0)
-            self._slowing_per_s *= self._rate > 0.0
+        self._change_rate(rate_of(error, motion.velocity_m_s), motion, brake_m_s2, step_s)
         self._integrate(error, motion.velocity_m_s, step_s)
         correction = [
             POSITION_GAIN_PER_S * e + VELOCITY_GAIN * v + i
@@ -146,9 +149,51 @@ class PathFollower:
         ]
         size = hypot(*correction)
         scale = MAX_CORRECTION_M_S / size if size > MAX_CORRECTION_M_S else 1.0
-        forward, left = self._level(path, state, scale * correction[0], scale * correction[1])
-        up = self._climb(path) + scale * correction[2]
-        return self._limited(forward, left, up, self._yaw_rate(path, state))
+        x, y, z = (scale * each for each in correction)
+        return self._command_now(path, state, (x, y, z), step_s)
+
+    def _change_rate(self, rate: float, motion: Motion, brake_m_s2: float, step_s: float) -> None:
+        """Let the path's time go faster or slower, but not suddenly, or brake it to a stop."""
+        before, most = self._rate, MAX_RATE_CHANGE_PER_S * step_s
+        rate = min(max(rate, before - most), before + most)
+        if brake_m_s2:
+            slowing_per_s = brake_m_s2 / max(hypot(*motion.velocity_m_s), _MOVING_M_S)
+            slowing_per_s = min(slowing_per_s, before / BRAKE_END_S)
+            rate = max(min(rate, before - slowing_per_s * step_s), 0.0)
+        self._rate = rate
+        self._rate_change = (rate - before) / step_s if step_s else 0.0
+
+    def _command_now(
+        self, path: Path, state: DroneState, correction_m_s: Vec3, step_s: float
+    ) -> VelocityCommand:
+        """The command for the simulated drone; the correction is in arena axes."""
+        ahead_s = DELAY_S + HOLD_S
+        now, before, soon, later = (
+            self._motion_in(path, state, ahead_s + more_s)
+            for more_s in (0.0, MOTOR_S - SPREAD_S, MOTOR_S, MOTOR_S + SPREAD_S)
+        )
+        velocity, turn = self._feed_forward.command(now, (before, soon, later))
+        off_rad = 0.0
+        if self._turn_rad_s is None:
+            off_rad = remainder(self._past[-1][1].yaw_rad - state.yaw, 2 * pi)
+        else:
+            turn = self._turn_rad_s
+        forward, left, _ = turned(velocity, off_rad)  # in the drone's axes, which are not the path's
+        x, y, z = turned(correction_m_s, off_rad - now.yaw_rad)
+        turn_more = YAW_GAIN_PER_S * off_rad
+        command = self._limited(forward + x, left + y, velocity[2] + z, turn + turn_more)
+        sent = turned((command.forward_m_s - x, command.left_m_s - y, command.up_m_s - z), -off_rad)
+        self._feed_forward.sent(sent, command.yaw_rate_rad_s - turn_more, step_s)
+        return command
+
+    def _motion_in(self, path: Path, state: DroneState, time_s: float) -> Motion:
+        """The motion in a time from now, as its time goes, with the heading that the drone will have."""
+        motion = self._slowed(path.at(self.progress_s + self._rate * time_s))
+        turn_rad_s = self._turn_rad_s
+        if turn_rad_s is None:
+            return motion
+        yaw_rad = state.yaw + turn_rad_s * time_s
+        return replace(motion, yaw_rad=yaw_rad, yaw_rate_rad_s=turn_rad_s, yaw_acceleration_rad_s2=0.0)
 
     def _command_late(
         self, path: Path, state: DroneState, prediction: Prediction, step_s: float
@@ -167,37 +212,11 @@ class PathFollower:
         self.error_m = late.error_m
         return self._limited(*command)
 
-    def _level(self, path: Path, state: DroneState, add_x: float, add_y: float) -> tuple[float, float]:
-        """Speeds forward and to the left: the path's, ahead of time, and a correction in arena axes."""
-        response, rate = self.response, self._rate
-        at_s = self.progress_s + rate * (response.level_dead_s + HOLD_S)
-        ahead, later = path.at(at_s), path.at(at_s + rate * response.level_tilt_s)
-        (vx, vy, _), (ax, ay, _) = _slowed(ahead, rate)[0], _slowed(later, rate)[1]
-        ax -= self._slowing_per_s * later.velocity_m_s[0]
-        ay -= self._slowing_per_s * later.velocity_m_s[1]
-        now, turn_rate = self._past[-1][1], self._turn_rad_s
-        if turn_rate is None:
-            turn_rate = rate * ahead.yaw_rate_rad_s
-            turned = remainder(ahead.yaw_rad - now.yaw_rad, 2 * pi)
-        else:
-            turned = turn_rate * (response.level_dead_s + HOLD_S)
-        yaw = state.yaw + turned
-        ax, ay = ax + turn_rate * vy, ay - turn_rate * vx  # as seen from axes that turn
-        x, y = vx + response.level_lag_s * ax + add_x, vy + response.level_lag_s * ay + add_y
-        c, s = cos(yaw), sin(yaw)
-        return c * x + s * y, c * y - s * x
-
-    def _climb(self, path: Path) -> float:
-        response, rate = self.response, self._rate
-        ahead = path.at(self.progress_s + rate * (response.climb_dead_s + HOLD_S))
-        velocity, acceleration = _slowed(ahead, rate)
-        return velocity[2] + response.climb_lag_s * acceleration[2]
-
     def _errors(self, state: DroneState, now_s: float) -> tuple[Vec3, Vec3]:
         """From the drone to the path: position and velocity, both when the drone's were measured."""
         at_s = now_s - state.position_age_s
         later_s, later = self._past[-1]
-        position, velocity = later.position_m, _slowed(later, self._rate)[0]
+        position, velocity = later.position_m, self._slowed(later).velocity_m_s
         for before_s, before in reversed(self._past):
             if before_s <= at_s:
                 if later_s > before_s:
@@ -222,17 +241,23 @@ class PathFollower:
             value = self._integral[axis] + INTEGRAL_GAIN_PER_S2 * counted_m * step_s
             self._integral[axis] = min(max(value, -MAX_INTEGRAL_M_S), MAX_INTEGRAL_M_S)
 
-    def _yaw_rate(self, path: Path, state: DroneState) -> float:
-        if self._turn_rad_s is not None:
-            return self._turn_rad_s
-        response, rate = self.response, self._rate
-        at_s = self.progress_s + rate * (response.yaw_dead_s + HOLD_S)
-        ahead = path.at(at_s)
-        now = self._past[-1][1]
-        change = ahead.yaw_acceleration_rad_s2
-        error = remainder(now.yaw_rad - state.yaw, 2 * pi)
-        return (
-            rate * ahead.yaw_rate_rad_s + rate * rate * response.yaw_lag_s * change + YAW_GAIN_PER_S * error
+    def _slowed(self, motion: Motion) -> Motion:
+        """A motion of the path, as its time goes now."""
+        rate, change_per_s = self._rate, self._rate_change
+        if rate == 1.0 and change_per_s == 0.0:
+            return motion
+        (vx, vy, vz), (ax, ay, az) = motion.velocity_m_s, motion.acceleration_m_s2
+        square, turn = rate * rate, motion.yaw_rate_rad_s
+        return replace(
+            motion,
+            velocity_m_s=(rate * vx, rate * vy, rate * vz),
+            acceleration_m_s2=(
+                square * ax + change_per_s * vx,
+                square * ay + change_per_s * vy,
+                square * az + change_per_s * vz,
+            ),
+            yaw_rate_rad_s=rate * turn,
+            yaw_acceleration_rad_s2=square * motion.yaw_acceleration_rad_s2 + change_per_s * turn,
         )
 
     def _limited(self, forward: float, left: float, up: float, yaw_rate: float) -> VelocityCommand:
@@ -245,17 +270,15 @@ class PathFollower:
         )
 
 
-def _slowed(motion: Motion, rate: float) -> tuple[Vec3, Vec3]:
-    """Velocity and acceleration of a motion whose time goes at a constant rate."""
-    vx, vy, vz = motion.velocity_m_s
-    ax, ay, az = motion.acceleration_m_s2
-    square = rate * rate
-    return (rate * vx, rate * vy, rate * vz), (square * ax, square * ay, square * az)
-
-
 def _between(a: Vec3, b: Vec3, share: float) -> Vec3:
     return (a[0] + share * (b[0] - a[0]), a[1] + share * (b[1] - a[1]), a[2] + share * (b[2] - a[2]))
 
 
 def _minus(a: Vec3, b: Vec3) -> Vec3:
     return (a[0] - b[0], a[1] - b[1], a[2] - b[2])
+
+
+def turned(vector: Vec3, by_rad: float) -> Vec3:
+    """A vector turned to the left."""
+    c, s = cos(by_rad), sin(by_rad)
+    return (c * vector[0] - s * vector[1], s * vector[0] + c * vector[1], vector[2])

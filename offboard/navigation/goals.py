@@ -156,15 +156,15 @@ class FlightStyle:
 
 CONTEST = FlightStyle()
 _OPEN = FlightStyle(
-    axis_speed_m_s=1.45,
-    path_speed_m_s=1.45,
+    axis_speed_m_s=1.5,
+    path_speed_m_s=1.5,
     yaw_rate_rad_s=1.6,
-    acceleration_m_s2=1.6,
-    climb_acceleration_m_s2=1.6,
-    crossing_speed_m_s=0.9,
+    acceleration_m_s2=2.0,
+    climb_acceleration_m_s2=1.8,
+    crossing_speed_m_s=1.1,
     straight_before_m=0.5,
-    smoothing_s=0.3,
-    look_offset_rad=0.5,
+    smoothing_s=0.4,
+    look_offset_rad=0.0,
 )
 """For the simulated drone's own limits. It is not flown at them: near its greatest tilt it overshoots."""
 _OPEN_M_S = 1.748  # its level speed

@@ -108,6 +108,8 @@ class Connector:
         side = np.where(np.abs(aside) > NO_TURN_RAD, aside, wrap(yaw_after - bearing))
         looking = np.copysign(limit, side) * np.clip(reach - LOOK_REACH_M, 0.0, 1.0)
         quarter = np.floor(aside / (pi / 2)) * (pi / 2) + pi / 4
+        if not limit:
+            quarter = np.round(aside / (pi / 2)) * (pi / 2)
         offset = np.where(ends.at_gates, looking, np.where(np.isnan(yaw_after), quarter, 0.0))
         upright = np.where(np.isnan(yaw_before), 0.0, yaw_before)
         turn: Array = np.where(reach > 1e-6, bearing + offset, upright)

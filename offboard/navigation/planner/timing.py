@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from math import atan2, hypot, isfinite, isnan, nan, pi, remainder
+from math import atan2, hypot, isnan, nan, pi, remainder
 
 import numpy as np
 import numpy.typing as npt
@@ -11,12 +11,11 @@ import numpy.typing as npt
 from offboard.navigation.goals import FlightStyle, Gate, Goal, Motion
 from offboard.navigation.path import Crossing, Path
 from offboard.navigation.planner.legs import Array, Leg
+from offboard.navigation.planner.pace import STEP_S, speed_squares
 
-STEP_S = 0.05
 HOLD_BEFORE_M = 0.28  # before an opening the heading is its normal; smoothing makes it later
 LEFT_M = 0.25  # so far behind an opening the drone has left it: nothing of its box is between the bars
 HOLD_BEHIND_M = -0.1  # before the end of the straight flight behind an opening the heading stays
-_SLOWDOWN_M_S2 = 0.5  # acceleration along the path for slowing down
 _REVERSAL_RAD = 2.6  # a turn larger than this continues the way it turns already
 
 
@@ -216,13 +215,7 @@ def slowed(
     samples: Samples, yaw: Array, yaw_rate: Array, stretches: list[Stretch], style: FlightStyle
 ) -> Path:
     """The path, with time stretched where the speed along an axis would be too high."""
-    share = _shares(samples, yaw, yaw_rate, style)
-    squares = share * share
-    slope = 2.0 * _SLOWDOWN_M_S2 * STEP_S / style.axis_speed_m_s
-    ramp = slope * np.arange(len(squares))
-    squares = np.minimum.accumulate(squares - ramp) + ramp
-    squares = (np.minimum.accumulate((squares - ramp[::-1])[::-1]) + ramp)[::-1]
-    squares[0] = 1.0  # the path starts with the motion given, even if that is too fast
+    squares = speed_squares(samples.velocities_m_s, samples.accelerations_m_s2, yaw, yaw_rate, style)
     share = np.sqrt(squares)
     steps = STEP_S / (0.5 * (share[:-1] + share[1:]))
     times = np.concatenate(([0.0], np.cumsum(steps)))
@@ -254,44 +247,3 @@ def _crossings(samples: Samples, stretches: list[Stretch], times: Array) -> tupl
         left_s = float(times[rows[left]]) if past[left] >= LEFT_M else float(times[-1])
         crossings.append(Crossing(stretch.goal, stretch.yaw_rad, time_s, left_s))
     return tuple(crossings)
-
-
-def _shares(samples: Samples, yaw: Array, yaw_rate: Array, style: FlightStyle) -> Array:
-    """By how much time must be stretched at each sample, as a share of the speed, 0 to 1.
-
-    Along each axis neither the speed nor its command, speed and lag times acceleration, may be too high.
-    """
-    vx, vy, vz = samples.velocities_m_s.T
-    ax, ay, az = samples.accelerations_m_s2.T
-    c, s = np.cos(yaw), np.sin(yaw)
-    forward, left = c * vx + s * vy, c * vy - s * vx
-    excess = np.maximum(np.abs(forward), np.abs(left)) / style.axis_speed_m_s
-    excess = np.maximum(excess, np.abs(vz) / style.climb_speed_m_s)
-    excess = np.maximum(excess, np.hypot(vx, vy) / style.path_speed_m_s)
-    share: Array = 1.0 / np.maximum(excess, 1.0)
-    ahead = c * ax + s * ay + yaw_rate * left
-    aside = c * ay - s * ax - yaw_rate * forward
-    for speed, acceleration, lag_s, command_m_s in (
-        (forward, ahead, style.lag_s, style.command_m_s),
-        (left, aside, style.lag_s, style.command_m_s),
-        (vz, az, style.climb_lag_s, style.climb_command_m_s),
-    ):
-        share = np.minimum(share, _share_of_command(speed, lag_s * acceleration, command_m_s))
-    if isfinite(style.level_command_m_s):
-        level = np.hypot(forward, left)
-        size = np.maximum(level, 1e-6)
-        along = style.lag_s * (forward * ahead + left * aside) / size
-        across = style.lag_s * (forward * aside - left * ahead) / size
-        least = 0.5 * style.level_command_m_s
-        limit = np.sqrt(np.maximum(style.level_command_m_s**2 - across * across, least * least))
-        share = np.minimum(share, _share_of_command(level, along, limit))
-    return share
-
-
-def _share_of_command(speed: Array, added: Array, limit: Array | float) -> Array:
-    """The largest share u with |u speed + u^2 added| <= limit."""
-    same = speed * added > 0.0
-    size, more = np.abs(speed), np.maximum(np.abs(added), 1e-6)
-    root = (np.sqrt(size * size + 4.0 * more * limit) - size) / (2.0 * more)
-    share: Array = np.where(same, np.minimum(root, 1.0), 1.0)
-    return share
