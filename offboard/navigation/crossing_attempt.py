@@ -24,6 +24,7 @@ MAX_LOOK_S = 4.0
 MAX_LOST_S = 1.5
 MAX_UNPLANNED_S = 2.0
 MAX_CROSSING_S = 25.0
+MORE_NEAR_S = 10.0  # for a drone that is near the opening already: it may not be able to stop before it
 
 
 @dataclass(slots=True)
@@ -60,11 +61,14 @@ class CrossingAttempt:
 
     def move(self, position_m: Vec3, opening_m: tuple[float, float], now_s: float) -> None:
         """Note where the drone is now; `opening_m` are the opening's width and height."""
-        if now_s - self.began_s > MAX_CROSSING_S:
+        if self._aim is not None:
+            self._move(self._aim, position_m, opening_m, now_s)
+        more_s = MORE_NEAR_S if -SETTLED_M < self._along_m < 0.0 else 0.0
+        if now_s - self.began_s > MAX_CROSSING_S + more_s:
             self._refuse(f"not through it within {MAX_CROSSING_S:g} s")
-        if self._aim is None:
-            return
-        (x, y, z), heading = self._aim.gate.centre_m, self._aim.heading_rad
+
+    def _move(self, aim: Crossing, position_m: Vec3, opening_m: tuple[float, float], now_s: float) -> None:
+        (x, y, z), heading = aim.gate.centre_m, aim.heading_rad
         dx, dy, dz = position_m[0] - x, position_m[1] - y, position_m[2] - z
         along_m = cos(heading) * dx + sin(heading) * dy
         left_m = cos(heading) * dy - sin(heading) * dx

@@ -29,6 +29,12 @@ def test_each_reason_is_said():
     slow = attempt()
     slow.move((0.0, 0.0, 1.0), OPENING_M, 26.0)
     assert slow.refusal == "not through it within 25 s"
+    near = attempt()
+    near.aim(Crossing(Gate((2.0, 0.0, 1.0), 0.0), 0.0, 1.0, 1.5))
+    near.move((1.5, 0.0, 1.0), OPENING_M, 26.0)
+    assert near.refusal == ""
+    near.move((1.5, 0.0, 1.0), OPENING_M, 36.0)
+    assert near.refusal == "not through it within 25 s"
 
 
 def test_a_miss_is_refused_and_a_passage_is_not():
