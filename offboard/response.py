@@ -178,8 +178,8 @@ class ResponseEstimate:
         fade = 1.0 - STEP_S / _MEMORY_S
         self._errors *= fade
         self._energies *= fade
-        errors = np.array([self._changes[-1 - dead] for dead in DEAD_STEPS]) - change
-        squares = (errors * errors) @ _MEMBERS
+        errors = np.concatenate([self._changes[-1 - dead] for dead in DEAD_STEPS]) - change
+        squares = ((errors * errors) @ _MEMBERS).reshape(self._errors.shape)
         self._errors += squares * STEP_S
         self._energies += ((change * change) @ _MEMBERS) * STEP_S
         if self.response.late:

@@ -232,7 +232,9 @@ def _runs(around: Labels, half: Floats, slack: Floats) -> tuple[Floats, Flags, F
     # A run that begins farther inside, or behind something else, is another bar: this one is hidden.
     hit = inside[rows, first] & (first > 0) & (first <= _OUTSIDE_PX + _INSIDE_PX + half / 2)
     hit &= around[rows, first - 1] == BACKGROUND
-    hit &= ~((around > OWN) & before & (places >= _OUTSIDE_PX - 1)).any(axis=1)
+    other = around > OWN
+    if other.any():
+        hit &= ~(other & before & (places >= _OUTSIDE_PX - 1)).any(axis=1)
     after = ~(inside | before)
     end = after.argmax(axis=1)
     inner_ok = (

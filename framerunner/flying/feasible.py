@@ -74,7 +74,7 @@ def feasible(plan: FlightPlan, mission_class: MissionClass) -> Feasible | str:
     path = feasible_path(plan, mission_class)
     if isinstance(path, Refusal):
         return path.reason
-    return Feasible(path.duration_s + AROUND_S, tuple(path.points()))
+    return Feasible(path.duration_s + AROUND_S, path.points_m)
 
 
 def feasible_path(plan: FlightPlan, mission_class: MissionClass) -> Path | Refusal:

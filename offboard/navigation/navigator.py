@@ -100,7 +100,7 @@ class Navigator:
         trouble = "" if path is not None else self._flight.refusal
         if crossing is not None and crossing.refusal:
             trouble = f"{crossing.colour}: {crossing.refusal}"
-        points = () if path is None else tuple(path.points())
+        points = () if path is None else path.points_m
         return NavigationView(self._world.frames, points, self._action, trouble)
 
     def explore(self) -> VelocityCommand:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from bisect import bisect_right
 from dataclasses import dataclass, replace
+from functools import cached_property
 from math import dist, pi, remainder
 
 from geometry.vectors import Vec3
@@ -35,7 +36,7 @@ class Crossing:
         return replace(self, time_s=self.time_s + by_s, left_s=self.left_s + by_s)
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, eq=False)
 class Path:
     """Motions at knots, with cubic positions and linear accelerations between them.
 
@@ -113,6 +114,7 @@ class Path:
         knot = [*values[:3], *rates[:3], *accelerations, values[3], rates[3]]
         return knot, (b[10] - a[10]) / step_s
 
-    def points(self) -> list[Vec3]:
+    @cached_property
+    def points_m(self) -> tuple[Vec3, ...]:
         """The positions of all knots, for displays."""
-        return [(knot[0], knot[1], knot[2]) for knot in self.knots]
+        return tuple([(knot[0], knot[1], knot[2]) for knot in self.knots])

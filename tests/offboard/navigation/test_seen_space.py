@@ -92,7 +92,7 @@ def test_a_path_that_is_obstructed_is_planned_again_at_once():
     )
     assert flight.path is not None
     assert flight.path is not before
-    assert all(hypot(x - 0.6, y) > 0.3 for x, y, _ in flight.path.points())
+    assert all(hypot(x - 0.6, y) > 0.3 for x, y, _ in flight.path.points_m)
 
 
 def height_after_a_metre(gate: Gate, *, needed: bool) -> float:
