@@ -25,6 +25,8 @@ MAX_LOST_S = 1.5
 MAX_UNPLANNED_S = 2.0
 MAX_CROSSING_S = 25.0
 MORE_NEAR_S = 10.0  # for a drone that is near the opening already: it may not be able to stop before it
+STUCK_M = 0.3  # a drone that is no farther from one place,
+MAX_STUCK_S = 6.0  # for so long, may hang on something that is not on the map
 
 
 @dataclass(slots=True)
@@ -53,6 +55,8 @@ class CrossingAttempt:
     _across_m: float = 0.0
     _looking_since_s: float | None = None
     _passed_s: float = inf
+    _place_m: Vec3 | None = None  # where the drone has been near
+    _there_since_s: float = 0.0
 
     def aim(self, crossing: Crossing) -> None:
         """Note which opening the path leads through, and in which direction."""
@@ -63,9 +67,13 @@ class CrossingAttempt:
         """Note where the drone is now; `opening_m` are the opening's width and height."""
         if self._aim is not None:
             self._move(self._aim, position_m, opening_m, now_s)
-        more_s = MORE_NEAR_S if -SETTLED_M < self._along_m < 0.0 else 0.0
-        if now_s - self.began_s > MAX_CROSSING_S + more_s:
+        near = -SETTLED_M < self._along_m < 0.0
+        if now_s - self.began_s > MAX_CROSSING_S + (MORE_NEAR_S if near else 0.0):
             self._refuse(f"not through it within {MAX_CROSSING_S:g} s")
+        if near or self._place_m is None or dist(self._place_m, position_m) > STUCK_M:
+            self._place_m, self._there_since_s = position_m, now_s
+        elif now_s - self._there_since_s > MAX_STUCK_S:
+            self._refuse(f"stuck for {MAX_STUCK_S:g} s")
 
     def _move(self, aim: Crossing, position_m: Vec3, opening_m: tuple[float, float], now_s: float) -> None:
         (x, y, z), heading = aim.gate.centre_m, aim.heading_rad

@@ -35,6 +35,12 @@ def test_each_reason_is_said():
     assert near.refusal == ""
     near.move((1.5, 0.0, 1.0), OPENING_M, 36.0)
     assert near.refusal == "not through it within 25 s"
+    stuck = attempt()
+    for tick in range(13):
+        stuck.move((0.2 * tick % 0.3, 0.0, 1.0), OPENING_M, 0.5 * tick)
+        assert stuck.refusal == ""
+    stuck.move((0.1, 0.0, 1.0), OPENING_M, 6.5)
+    assert stuck.refusal == "stuck for 6 s"
 
 
 def test_a_miss_is_refused_and_a_passage_is_not():
