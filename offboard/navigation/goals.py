@@ -156,13 +156,14 @@ class FlightStyle:
 
 CONTEST = FlightStyle()
 _OPEN = FlightStyle(
-    axis_speed_m_s=1.5,
-    path_speed_m_s=1.5,
+    axis_speed_m_s=1.4,
+    path_speed_m_s=1.4,
     yaw_rate_rad_s=1.6,
-    acceleration_m_s2=2.0,
-    climb_acceleration_m_s2=1.8,
-    crossing_speed_m_s=1.1,
+    acceleration_m_s2=1.6,
+    climb_acceleration_m_s2=1.3,
+    crossing_speed_m_s=1.0,
     straight_before_m=0.5,
+    straight_after_m=0.45,
     smoothing_s=0.4,
     look_offset_rad=0.0,
 )
@@ -202,6 +203,7 @@ def style_of(limits: CommandLimits) -> FlightStyle:
         climb_command_m_s=COMMAND_SHARE * climb_m_s,
         crossing_speed_m_s=min(crossing_speed_m_s, HEADROOM * axis_m_s),
         straight_before_m=between(usual.straight_before_m, bold.straight_before_m),
+        straight_after_m=between(usual.straight_after_m, bold.straight_after_m),
         smoothing_s=between(usual.smoothing_s, bold.smoothing_s),
         look_offset_rad=between(usual.look_offset_rad, bold.look_offset_rad),
     )
