@@ -197,6 +197,8 @@ class _Flight:
         images = self._perception.take() if self._engine.has_navigator else ()
         imu = Imu(state.x, state.y, state.z, state.yaw)
         command = self._engine.tick(imu, detections, state.time_us, state, images=images, sent=self._sent)
+        if self._engine.has_navigator:
+            self._perception.space_images(self._engine.image_period_s)
         command = self._kept_in_box(command, state)
         motors_on = self._engine.pilot.cmd.on
         switches = motors_on != self._flying

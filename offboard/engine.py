@@ -126,6 +126,11 @@ class MissionEngine:
         return self._navigator is not None
 
     @property
+    def image_period_s(self) -> float:
+        """In which the mission needs one image; 0: it needs all of them."""
+        return 0.0 if self._navigator is None else self._navigator.image_period_s
+
+    @property
     def navigation(self) -> NavigationView | None:
         """The map and the plan of the pilot's navigator, made anew at each call; None without a navigator."""
         return None if self._navigator is None else self._navigator.view()

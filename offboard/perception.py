@@ -45,23 +45,50 @@ class Perception(Protocol):
         """Wait until there are detections; raises `CameraLostError`."""
 
     def latest(self, time_us: int) -> Detections:
-        """What the latest image showed.
+        """What the latest image that was processed showed.
 
         Raises:
-            CameraSilentError: it is too old at this vehicle time.
+            CameraSilentError: the latest image is too old at this vehicle time.
             CameraLostError: no other one will come.
         """
         ...
 
     def take(self) -> tuple[Detections, ...]:
-        """What each image since the last call showed, oldest first; of many only the last `IMAGES_KEPT`.
+        """What each image processed since the last call showed, oldest first.
 
-        Call it after `latest`, whose image belongs to them.
+        Of many only the last `IMAGES_KEPT`. Call it after `latest`, whose image belongs to them.
         """
         ...
 
+    def space_images(self, period_s: float) -> None:
+        """From now on process at most one image in this time, vehicle time; 0: all of them.
+
+        An image that is not processed still shows that the camera is alive.
+        """
+
     async def close(self) -> None:
         """Release the camera."""
+
+
+class ImageChoice:
+    """Which images are processed: no more than one in a period, by their own time stamps.
+
+    Attributes:
+        period_s: of vehicle time; 0: all images.
+    """
+
+    def __init__(self) -> None:
+        self.period_s = 0.0
+        self._chosen_us: int | None = None
+
+    def takes(self, time_us: int | None) -> bool:
+        """Whether to process an image exposed at this vehicle time; one without a time always is."""
+        last_us = self._chosen_us
+        if time_us is not None:
+            if last_us is not None and 0 <= time_us - last_us < self.period_s * 1e6:
+                return False
+            self._chosen_us = time_us
+        return True
 
 
 class CameraPerception:
@@ -81,6 +108,7 @@ class CameraPerception:
         self._detector = detector or new_detector("boxes")
         self._detections = Detections()
         self._untaken: deque[Detections] = deque(maxlen=IMAGES_KEPT)
+        self._choice = ImageChoice()
         self._image_us: int | None = None
         self._vehicle_time_us: Callable[[float], int | None] = lambda _wall_s: None
         self._delay_us = 0
@@ -129,8 +157,12 @@ class CameraPerception:
         self._untaken.clear()
         return taken
 
+    def space_images(self, period_s: float) -> None:
+        """From now on process at most one image in this time, vehicle time; 0: all of them."""
+        self._choice.period_s = period_s
+
     async def seen(self, image_us: int, limit_s: float) -> bool:
-        """Wait until the image exposed at a vehicle time, or a later one, has been processed.
+        """Wait until the image exposed at a vehicle time, or a later one, has been processed or left out.
 
         False if it was not within `limit_s` of wall time, or the camera has failed.
         """
@@ -155,8 +187,9 @@ class CameraPerception:
                 if frame.time_us is not None and not self._order.is_next(frame.time_us):
                     continue  # a link may swap images, too
                 time_us = frame.time_us if frame.time_us is not None else self._assumed_us(frame.received_s)
-                self._detections = self._detector(frame.image, time_us)
-                self._untaken.append(self._detections)
+                if self._choice.takes(time_us):
+                    self._detections = self._detector(frame.image, time_us)
+                    self._untaken.append(self._detections)
                 self._image_us = time_us
                 self._images += 1
                 self._arrived.set()

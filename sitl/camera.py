@@ -13,6 +13,7 @@ from __future__ import annotations
 
 from collections import deque
 from collections.abc import Callable, Iterable, Sequence
+from functools import cached_property
 from math import hypot, isfinite, tan
 
 import cv2
@@ -191,6 +192,28 @@ def _rows(attitude: Quaternion) -> RotationRows:
     return rotation_rows(rotation(normalized(attitude)))
 
 
+class Exposure:
+    """What the camera sees at a time, painted when `image` is first asked for.
+
+    Args:
+        camera: that sees it.
+        truth: pose of the drone then.
+        drones: boxes of other drones then.
+
+    Attributes:
+        time_us: of the exposure, simulated time.
+    """
+
+    def __init__(self, camera: Camera, truth: TrueState, drones: Sequence[Solid]) -> None:
+        self.time_us = truth.time_us
+        self._camera, self._truth, self._drones = camera, truth, drones
+
+    @cached_property
+    def image(self) -> Image:
+        """BGR, shape (height, width, 3), uint8."""
+        return self._camera.render(self._truth.position_arena_m, self._truth.attitude_arena, self._drones)
+
+
 class CameraFeed:
     """Takes images at the camera's rate and returns each after the camera's latency.
 
@@ -214,7 +237,7 @@ class CameraFeed:
         self._latency_us = round(scenario.camera.latency_s * 1e6)
         self._taken = 0
         self.next_us = 0
-        self._waiting: deque[tuple[int, Image]] = deque()  # with their times of exposure
+        self._waiting: deque[Exposure] = deque()
 
     def step(self, truth: TrueState) -> tuple[int, Image] | None:
         """Take the image that is due at this tick, and return the one that arrives.
@@ -225,17 +248,21 @@ class CameraFeed:
         Returns:
             Time of exposure, microseconds, and the image; None if none arrives at this tick.
         """
+        arrived = self.arrival(truth)
+        return None if arrived is None else (arrived.time_us, arrived.image)
+
+    def arrival(self, truth: TrueState) -> Exposure | None:
+        """As `step`, for a user who does not look at every image: those are not painted."""
         if truth.time_us < self.next_us:
             return None
         index = int((truth.time_us - FIRST_EXPOSURE_US) // self._period_us)
         if index >= self._taken:
             self._taken = index + 1
-            image = self._camera.render(truth.position_arena_m, truth.attitude_arena, self._drones())
-            self._waiting.append((truth.time_us, image))
+            self._waiting.append(Exposure(self._camera, truth, self._drones()))
         arrived = None
-        if self._waiting and self._waiting[0][0] + self._latency_us <= truth.time_us:
+        if self._waiting and self._waiting[0].time_us + self._latency_us <= truth.time_us:
             arrived = self._waiting.popleft()
         self.next_us = int(FIRST_EXPOSURE_US + self._taken * self._period_us)
         if self._waiting:
-            self.next_us = min(self.next_us, self._waiting[0][0] + self._latency_us)
+            self.next_us = min(self.next_us, self._waiting[0].time_us + self._latency_us)
         return arrived

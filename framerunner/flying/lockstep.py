@@ -18,10 +18,10 @@ from framerunner.flying.lockstep_drone import LockstepDrone, TruthObserver
 from framerunner.flying.plan import FlightPlan
 from framerunner.flying.response import LateResponse
 from offboard.app import Moment, Observer
-from offboard.perception import CAMERA_DEAD_S, IMAGES_KEPT, CameraSilentError
+from offboard.perception import CAMERA_DEAD_S, IMAGES_KEPT, CameraSilentError, ImageChoice
 from scenarios.models import Scenario, TrueState
 from scenarios.result import RefereeReport, RefereeSnapshot
-from sitl.camera import CameraFeed
+from sitl.camera import CameraFeed, Exposure
 from sitl.simulation import Simulation
 from vision.detectors import Detector, new_detector
 from vision.types import Detections, Image
@@ -113,53 +113,67 @@ class LockstepPerception:
     def __init__(
         self, scenario: Scenario, on_image: ImageObserver | None = None, detector: Detector | None = None
     ) -> None:
-        self.image: Image | None = None  # the latest: BGR, shape (height, width, 3), uint8
         self._feed = CameraFeed(scenario)
         self._on_image = on_image
         self._detector = detector or new_detector("boxes")
-        self._arrived: tuple[int, Image] | None = None
-        self._untaken: deque[tuple[int, Image]] = deque(maxlen=IMAGES_KEPT)
-        self._image_us = 0
+        self._choice = ImageChoice()
+        self._arrived: Exposure | None = None  # the latest, processed or not
+        self._chosen: Exposure | None = None  # the latest to be processed, until it is
+        self._untaken: deque[Exposure] = deque(maxlen=IMAGES_KEPT)
+        self._processed_us = -1
         self._detections = Detections()
+
+    @property
+    def image(self) -> Image | None:
+        """The latest: BGR, shape (height, width, 3), uint8; None before the first."""
+        return None if self._arrived is None else self._arrived.image
 
     def follow(self, truth: TrueState) -> None:
         """Let the camera see the control tick that has just passed."""
         if truth.time_us < self._feed.next_us:
             return
-        arrived = self._feed.step(truth)
-        if arrived is not None:
-            self._arrived = arrived
+        arrived = self._feed.arrival(truth)
+        if arrived is None:
+            return
+        self._arrived = arrived
+        if self._choice.takes(arrived.time_us):
+            self._chosen = arrived
             self._untaken.append(arrived)
-            self.image = arrived[1]
-            if self._on_image is not None:
-                self._on_image(*arrived)
+        if self._on_image is not None:
+            self._on_image(arrived.time_us, arrived.image)
 
     async def open(self) -> None:
         """Nothing to wait for: images arrive while the drone gets ready."""
 
     def latest(self, time_us: int) -> Detections:
-        """What the latest image showed; the detector processes an image only when this is called.
+        """What the latest chosen image showed; the detector processes an image only when this is called.
 
         Raises:
             CameraSilentError: the last image is older than a second of vehicle time.
         """
-        if self._arrived is not None:
-            self._image_us, image = self._arrived
-            self._arrived = None
-            self._detections = self._detector(image, self._image_us)
-        age_s = (time_us - self._image_us) / 1e6
+        if self._chosen is not None:
+            self._detections = self._detector(self._chosen.image, self._chosen.time_us)
+            self._processed_us, self._chosen = self._chosen.time_us, None
+        image_us = 0 if self._arrived is None else self._arrived.time_us
+        age_s = (time_us - image_us) / 1e6
         if age_s > CAMERA_DEAD_S:
             raise CameraSilentError(age_s)
         return self._detections
 
     def take(self) -> tuple[Detections, ...]:
-        """What each image since the last call showed; the detector processes those that `latest` did not."""
+        """What each chosen image since the last call showed; `latest` has processed the last one already."""
         images = tuple(self._untaken)
         self._untaken.clear()
         return tuple(
-            self._detections if time_us == self._image_us else self._detector(image, time_us)
-            for time_us, image in images
+            self._detections
+            if each.time_us == self._processed_us
+            else self._detector(each.image, each.time_us)
+            for each in images
         )
+
+    def space_images(self, period_s: float) -> None:
+        """From now on process at most one image in this time, vehicle time; 0: all of them."""
+        self._choice.period_s = period_s
 
     async def close(self) -> None:
         """Nothing to close."""

@@ -26,6 +26,9 @@ GAP_S = 0.6  # an action that was not called for so long begins again
 EXPLORE_S = 0.5  # between two choices of where to look next
 HOME_HEIGHT_M = 0.5  # above the start, on the way home
 AHEAD_STD_M = 0.3  # of a next frame; if it is known less well, it is not planned for yet
+SPACED_S = 0.15  # in which one image is enough: one from nearly the same place adds little to the map
+SPACED_M_S = 1.5  # up to this speed
+NEAR_GATE_M = 1.5  # nearer to a frame to be crossed that is not certain yet, no image is left out
 ARRIVED_M = 0.06
 ARRIVED_M_S = 0.15
 
@@ -78,6 +81,20 @@ class Navigator:
         """`cross` has flown through this frame and is clear of it."""
         crossing = self._crossing
         return crossing is not None and crossing.colour == colour and crossing.cleared
+
+    @property
+    def image_period_s(self) -> float:
+        """In which one image is enough; 0: all are needed, in fast flight or near what is not certain."""
+        state, crossing = self._state, self._crossing
+        if state is None or hypot(*state.velocity_arena_m_s) > SPACED_M_S or self._flight.looks:
+            return 0.0
+        if crossing is not None and self._action == f"cross {crossing.colour}":
+            estimate = self._world.frame(crossing.colour)
+            if estimate is None:
+                return 0.0
+            if not estimate.certain and dist(estimate.position_m, position_now(state)) < NEAR_GATE_M:
+                return 0.0
+        return SPACED_S
 
     @property
     def refused(self) -> bool:

@@ -253,6 +253,28 @@ async def test_an_image_without_a_time_stamp_gets_that_of_its_arrival_less_a_del
     await perception.close()
 
 
+async def test_images_are_spaced_by_their_own_times():
+    drone = KinematicDrone(*START_1)
+    film = Film(drone, 40, "silence")
+    perception = CameraPerception(film, lambda image, time_us: Detections(time_us=time_us))
+    await perception.open()
+    first_us = drone.time_us
+    perception.take()
+    perception.space_images(0.15)
+    for _ in range(10):
+        drone.time_us += 50_000
+        await asyncio.sleep(0)
+    taken_us = [one.time_us - first_us for one in perception.take()]
+    assert taken_us == [150_000, 300_000, 450_000]
+    assert perception.latest(drone.time_us + 1_000_000).time_us == first_us + 450_000
+    perception.space_images(0.0)
+    for _ in range(3):
+        drone.time_us += 50_000
+        await asyncio.sleep(0)
+    assert len(perception.take()) == 3
+    await perception.close()
+
+
 async def test_every_image_since_the_last_call_is_taken_once():
     drone = KinematicDrone(*START_1)
     stamps_us = iter(range(drone.time_us, drone.time_us + 10_000, 100))

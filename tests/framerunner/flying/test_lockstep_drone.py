@@ -12,6 +12,7 @@ from framerunner.flying.lockstep_drone import TICK_US, LockstepDrone
 from offboard.drone import DroneError, VelocityCommand
 from offboard.perception import CameraLostError
 from scenarios.loader import load_scenario
+from sitl.camera import Camera
 from sitl.simulation import Simulation
 
 START = (1.0, 2.0, 0.5, 0.3)  # not the simulation's own start: the axes must be aligned to this
@@ -148,6 +149,30 @@ async def test_ctrl_c_reaches_a_flight_that_never_waits(drone):
 def test_refuses_a_delay_that_does_not_fit_between_ticks(simulation, delay_us):
     with pytest.raises(ValueError, match=f"telemetry_delay_us {delay_us}"):
         LockstepDrone(simulation, START, telemetry_delay_us=delay_us)
+
+
+def test_images_are_spaced_by_their_times_and_only_those_used_are_painted(simulation, monkeypatch):
+    painted = []
+    render = Camera.render
+    monkeypatch.setattr(Camera, "render", lambda *args: painted.append(1) or render(*args))
+    perception = LockstepPerception(simulation.scenario)
+
+    def after(seconds):
+        for _ in range(round(seconds * 250)):
+            simulation.tick()
+            perception.follow(simulation.truth)
+        perception.latest(simulation.time_us)
+        return [round(seen.time_us, -5) // 100_000 for seen in perception.take()]
+
+    perception.space_images(0.15)
+    assert after(0.7) == [0, 2, 4, 6]
+    perception.space_images(0.0)
+    assert after(0.3) == [7, 8, 9]
+    assert len(painted) == 7
+    perception.space_images(2.0)
+    assert after(1.5) == []  # and the camera is not taken for dead
+    assert perception.image is not None
+    assert len(painted) == 8
 
 
 def test_a_camera_without_fresh_images_is_lost(simulation):
