@@ -28,6 +28,7 @@ STEP_S = 0.05
 DEAD_STEPS = (1, 3, 5, 7, 9, 11, 13)
 LAGS_S = (0.05, 0.15, 0.3, 0.45, 0.6, 0.8, 1.0, 1.3)
 TAKE_OFF_STEPS = 30  # after which the thrust is that of flight
+_COMPARED_STEPS = 2  # between two comparisons, unless the vehicle is known to be late
 _WINDOW = 20  # steps over which a change of velocity is compared
 _KEPT = max(DEAD_STEPS) + _WINDOW + 1
 _MEMORY_S = 40.0
@@ -131,7 +132,7 @@ class ResponseEstimate:
         self._changes: deque[Array] = deque(maxlen=max(DEAD_STEPS) + 1)  # of the outputs, over the window
         self._measured: deque[Array] = deque(maxlen=_WINDOW + 1)
         self._second.restart()
-        self._airborne_steps = 0
+        self._airborne_steps = self._uncompared = 0
         self._disturbance = np.zeros(3)
         self._disturbance_rate = np.zeros(3)
 
@@ -156,6 +157,7 @@ class ResponseEstimate:
         commanded = _in_all_axes(sent, self._yaw)
         measured = _measured(state, turn_rate)
         self._yaw = state.yaw
+        compared = False
         for _ in range(steps):
             self._outputs = commanded + self._kept * (self._outputs - commanded)
             self._past.append(self._outputs)
@@ -166,22 +168,28 @@ class ResponseEstimate:
                 self._second.update(self._first_lags(), measured[[_X, _Y]], self._yaw)
             self._airborne_steps = 0 if state.landed else self._airborne_steps + 1
             if self._airborne_steps > TAKE_OFF_STEPS:
-                self._compare()
-        self._choose()
+                self._uncompared += 1
+                # Windows that begin a step later hardly differ; only of a late vehicle all are needed.
+                if self.response.late or self._uncompared == _COMPARED_STEPS:
+                    self._compare(self._uncompared * STEP_S)
+                    self._uncompared = 0
+                    compared = True
+        if compared:
+            self._choose()
         self._observe_disturbance(measured, steps)
 
-    def _compare(self) -> None:
-        """Add the errors of all predictions of the change over the window."""
+    def _compare(self, period_s: float) -> None:
+        """Add the errors of all predictions of the change over the window, for the time since the last one."""
         if len(self._past) < _KEPT:
             return
         change = self._measured[-1] - self._measured[0]
-        fade = 1.0 - STEP_S / _MEMORY_S
+        fade = 1.0 - period_s / _MEMORY_S
         self._errors *= fade
         self._energies *= fade
         errors = np.concatenate([self._changes[-1 - dead] for dead in DEAD_STEPS]) - change
         squares = ((errors * errors) @ _MEMBERS).reshape(self._errors.shape)
-        self._errors += squares * STEP_S
-        self._energies += ((change * change) @ _MEMBERS) * STEP_S
+        self._errors += squares * period_s
+        self._energies += ((change * change) @ _MEMBERS) * period_s
         if self.response.late:
             one = float(squares[(*self._chosen[0], 1 if self._turning else 0)])
             self._second.compare(change[[_X, _Y]], one)
