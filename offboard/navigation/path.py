@@ -12,7 +12,6 @@ from offboard.navigation.goals import Gate, Motion
 
 _SHORTEST_S = 0.005  # knots are not nearer to each other than this
 _SAME_GATE_M = 0.3
-_CUBICS = ((0, 3), (1, 4), (2, 5), (9, 10))  # values of a knot, and their rates
 
 
 @dataclass(frozen=True, slots=True)
@@ -65,6 +64,18 @@ class Path:
         (x, y, z, vx, vy, vz, ax, ay, az, yaw, rate), turn = self._between(time_s)
         return Motion((x, y, z), (vx, vy, vz), remainder(yaw, 2 * pi), rate, (ax, ay, az), turn)
 
+    def position_at_m(self, time_s: float) -> Vec3:
+        """As `at`, only where to be."""
+        a, b, step_s, u = self._segment(time_s)
+        w = 1.0 - u
+        start, start_rate = w * w * (1.0 + 2.0 * u), w * w * u * step_s
+        end, end_rate = u * u * (1.0 + 2.0 * w), -u * u * w * step_s
+        return (
+            start * a[0] + start_rate * a[3] + end * b[0] + end_rate * b[3],
+            start * a[1] + start_rate * a[4] + end * b[1] + end_rate * b[4],
+            start * a[2] + start_rate * a[5] + end * b[2] + end_rate * b[5],
+        )
+
     def gates_left(self, time_s: float) -> tuple[Gate, ...]:
         """The gates that have been crossed and left behind at a time: a new plan leaves them out."""
         return tuple(crossing.gate for crossing in self.crossings if crossing.left_s <= time_s)
@@ -95,24 +106,35 @@ class Path:
 
     def _between(self, time_s: float) -> tuple[list[float], float]:
         """The numbers of a knot between two knots (Hermite's cubics), and the acceleration of the yaw."""
-        times = self.times_s
-        time_s = min(max(time_s, 0.0), times[-1])
-        index = min(bisect_right(times, time_s), len(times) - 1) - 1
-        a, b = self.knots[index], self.knots[index + 1]
-        step_s = times[index + 1] - times[index]
-        u = (time_s - times[index]) / step_s
+        a, b, step_s, u = self._segment(time_s)
         w = 1.0 - u
         start, start_rate = w * w * (1.0 + 2.0 * u), w * w * u * step_s
         end, end_rate = u * u * (1.0 + 2.0 * w), -u * u * w * step_s
         change, from_rate, to_rate = 6.0 * u * w / step_s, w * (w - 2.0 * u), u * (u - 2.0 * w)
-        values, rates = [], []
-        for i, j in _CUBICS:
-            p, v, q, r = a[i], a[j], b[i], b[j]
-            values.append(start * p + start_rate * v + end * q + end_rate * r)
-            rates.append(change * (q - p) + from_rate * v + to_rate * r)
-        accelerations = [a[6] + u * (b[6] - a[6]), a[7] + u * (b[7] - a[7]), a[8] + u * (b[8] - a[8])]
-        knot = [*values[:3], *rates[:3], *accelerations, values[3], rates[3]]
-        return knot, (b[10] - a[10]) / step_s
+        ax, ay, az, avx, avy, avz, aax, aay, aaz, a_yaw, a_turn = a
+        bx, by, bz, bvx, bvy, bvz, bax, bay, baz, b_yaw, b_turn = b
+        knot = [  # written out: it is made ten times a tick
+            start * ax + start_rate * avx + end * bx + end_rate * bvx,
+            start * ay + start_rate * avy + end * by + end_rate * bvy,
+            start * az + start_rate * avz + end * bz + end_rate * bvz,
+            change * (bx - ax) + from_rate * avx + to_rate * bvx,
+            change * (by - ay) + from_rate * avy + to_rate * bvy,
+            change * (bz - az) + from_rate * avz + to_rate * bvz,
+            aax + u * (bax - aax),
+            aay + u * (bay - aay),
+            aaz + u * (baz - aaz),
+            start * a_yaw + start_rate * a_turn + end * b_yaw + end_rate * b_turn,
+            change * (b_yaw - a_yaw) + from_rate * a_turn + to_rate * b_turn,
+        ]
+        return knot, (b_turn - a_turn) / step_s
+
+    def _segment(self, time_s: float) -> tuple[list[float], list[float], float, float]:
+        """The knots before and after a time, how long it is between them, and the share that is over."""
+        times = self.times_s
+        time_s = min(max(time_s, 0.0), times[-1])
+        index = min(bisect_right(times, time_s), len(times) - 1) - 1
+        step_s = times[index + 1] - times[index]
+        return self.knots[index], self.knots[index + 1], step_s, (time_s - times[index]) / step_s
 
     @cached_property
     def points_m(self) -> tuple[Vec3, ...]:

@@ -224,7 +224,7 @@ class PathFlight:
             return []
         now_s = self._follower.progress_on(path)
         steps = round((time_s + self._style.lag_s) / AHEAD_STEP_S)
-        return [path.at(now_s + step * AHEAD_STEP_S).position_m for step in range(steps + 1)]
+        return [path.position_at_m(now_s + step * AHEAD_STEP_S) for step in range(steps + 1)]
 
     def _must_check(self, obstacles: Obstacles, now_s: float) -> bool:
         """Whether it is time to check that the path is free."""
