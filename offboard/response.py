@@ -179,7 +179,7 @@ class ResponseEstimate:
         self._observe_disturbance(measured, steps)
 
     def _compare(self, period_s: float) -> None:
-        """Add the errors of all predictions of the change over the window, for the time since the last one."""
+        """Add the errors of all predictions of the change over the window; they count for a period."""
         if len(self._past) < _KEPT:
             return
         change = self._measured[-1] - self._measured[0]
