@@ -22,7 +22,7 @@ from offboard.response import Prediction, Response
 
 HOLD_S = 0.025  # half the time for which a command holds
 DELAY_S = 0.025  # from a state to the motors, beside
-POSITION_GAIN_PER_S = 1.0
+POSITION_GAINS_PER_S = (1.0, 1.0, 3.5)  # the vehicle follows a climb sooner than a level speed
 VELOCITY_GAIN = 0.3
 YAW_GAIN_PER_S = 3.0
 MAX_RATE_CHANGE_PER_S = 1.5  # of the path's time
@@ -144,8 +144,8 @@ class PathFollower:
         self._change_rate(rate_of(error, motion.velocity_m_s), motion, brake_m_s2, step_s)
         self._integrate(error, motion.velocity_m_s, step_s)
         correction = [
-            POSITION_GAIN_PER_S * e + VELOCITY_GAIN * v + i
-            for e, v, i in zip(error, slower, self._integral, strict=True)
+            gain * e + VELOCITY_GAIN * v + i
+            for gain, e, v, i in zip(POSITION_GAINS_PER_S, error, slower, self._integral, strict=True)
         ]
         size = hypot(*correction)
         scale = MAX_CORRECTION_M_S / size if size > MAX_CORRECTION_M_S else 1.0

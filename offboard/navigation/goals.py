@@ -93,6 +93,7 @@ class FlightStyle:
         lag_s: by which the velocity in plan follows commands.
         climb_lag_s: likewise up and down.
         crossing_speed_m_s: at most this in an opening.
+        crossing_gain_m_s2: the speed rises at most so fast there, beyond what is planned for the legs.
         straight_before_m: straight and level flight before an opening.
         straight_after_m: likewise behind it.
         smoothing_s: time in which the acceleration changes.
@@ -117,6 +118,7 @@ class FlightStyle:
     lag_s: float = 0.4
     climb_lag_s: float = 0.1
     crossing_speed_m_s: float = 0.8
+    crossing_gain_m_s2: float = inf
     straight_before_m: float = 0.35
     straight_after_m: float = 0.3
     smoothing_s: float = 0.2
@@ -156,14 +158,15 @@ class FlightStyle:
 
 CONTEST = FlightStyle()
 _OPEN = FlightStyle(
-    axis_speed_m_s=1.4,
-    path_speed_m_s=1.4,
+    axis_speed_m_s=1.5,
+    path_speed_m_s=1.5,
     yaw_rate_rad_s=1.6,
     acceleration_m_s2=1.6,
     climb_acceleration_m_s2=1.3,
     crossing_speed_m_s=1.0,
+    crossing_gain_m_s2=0.3,
     straight_before_m=0.5,
-    straight_after_m=0.45,
+    straight_after_m=0.5,
     smoothing_s=0.4,
     look_offset_rad=0.0,
 )
@@ -202,6 +205,7 @@ def style_of(limits: CommandLimits) -> FlightStyle:
         level_command_m_s=COMMAND_SHARE * limits.level_m_s,
         climb_command_m_s=COMMAND_SHARE * climb_m_s,
         crossing_speed_m_s=min(crossing_speed_m_s, HEADROOM * axis_m_s),
+        crossing_gain_m_s2=bold.crossing_gain_m_s2 if share > 0.0 else usual.crossing_gain_m_s2,
         straight_before_m=between(usual.straight_before_m, bold.straight_before_m),
         straight_after_m=between(usual.straight_after_m, bold.straight_after_m),
         smoothing_s=between(usual.smoothing_s, bold.smoothing_s),

@@ -10,6 +10,7 @@ from __future__ import annotations
 from math import inf, isfinite, sqrt
 
 import numpy as np
+import numpy.typing as npt
 
 from offboard.navigation.goals import FlightStyle
 from offboard.navigation.planner.legs import Array
@@ -18,14 +19,22 @@ STEP_S = 0.05
 _LEAST = 0.01  # of the squares
 _MAIN_SHARE = 0.3  # of the speed; an axis with less does not decide how fast the path may get faster
 _SLOW_M_S = 0.05
+_LEAST_ALONG = 0.5  # share of a command in plan that is always left along the path
 
 
 def speed_squares(
-    velocities_m_s: Array, accelerations_m_s2: Array, yaw: Array, yaw_rate: Array, style: FlightStyle
+    velocities_m_s: Array,
+    accelerations_m_s2: Array,
+    yaw: Array,
+    yaw_rate: Array,
+    *,
+    near_bars: npt.NDArray[np.bool_],
+    style: FlightStyle,
 ) -> Array:
     """The squares of the speed's ratio to the planned one, 0 to 1; samples are STEP_S of planned time apart.
 
-    The first one is 1: a path starts with the motion given, even if that is too fast.
+    The first one is 1: a path starts with the motion given, even if that is too fast. Near an opening's bars
+    the ratio does not rise by more than the style allows.
     """
     vx, vy, vz = velocities_m_s.T
     ax, ay, az = accelerations_m_s2.T
@@ -40,27 +49,36 @@ def speed_squares(
     aside = c * ay - s * ax - yaw_rate * forward
     along = (vx * ax + vy * ay) / np.maximum(level, 1e-6)
     limits = [
-        (forward, ahead, style.lag_s, style.command_m_s),
-        (left, aside, style.lag_s, style.command_m_s),
-        (vz, az, style.climb_lag_s, style.climb_command_m_s),
+        (forward, ahead, style.lag_s, np.full(len(level), style.command_m_s)),
+        (left, aside, style.lag_s, np.full(len(level), style.command_m_s)),
+        (vz, az, style.climb_lag_s, np.full(len(level), style.climb_command_m_s)),
     ]
     if isfinite(style.level_command_m_s):
-        limits.append((level, along, style.lag_s, style.level_command_m_s))
+        across = style.lag_s * most * (vx * ay - vy * ax) / np.maximum(level, 1e-6)
+        left_m_s = _beside(across, style.level_command_m_s)
+        limits.append((level, along, style.lag_s, left_m_s))
     speed = np.sqrt(level * level + vz * vz)
-    rows: list[list[tuple[float, float, float]]] = []
+    rows: list[list[tuple[float, float, float, float]]] = []
     for axis_speed, acceleration, lag_s, command_m_s in limits:
         size = np.abs(axis_speed)
         added = np.where(axis_speed < 0.0, -acceleration, acceleration) * lag_s
         main = size > np.maximum(_MAIN_SHARE * speed, _SLOW_M_S)
         most = np.where(main, most, np.minimum(most, _steady(size, added, command_m_s)))
         rates = np.where(main, 2.0 / (lag_s * np.maximum(size, _SLOW_M_S)), inf)
-        rows.append(list(zip(size.tolist(), added.tolist(), rates.tolist(), strict=True)))
-    commands_m_s = [limit[3] for limit in limits]
+        columns = size, added, rates, command_m_s
+        rows.append(list(zip(*(column.tolist() for column in columns), strict=True)))
+    gains = np.where(near_bars, 2.0 * style.crossing_gain_m_s2 / np.maximum(speed, _SLOW_M_S), inf)
     brake = _brakes(velocities_m_s, accelerations_m_s2, speed, style)
-    return np.array(_passes(most.tolist(), rows, commands_m_s, brake))
+    return np.array(_passes(most.tolist(), rows, gains.tolist(), brake))
 
 
-def _steady(size: Array, added: Array, limit: float) -> Array:
+def _beside(across_m_s: Array, command_m_s: float) -> Array:
+    """What of a command in plan is left along the path, beside what a turn of the path needs."""
+    rest: Array = np.sqrt(np.maximum(command_m_s**2 - across_m_s**2, (_LEAST_ALONG * command_m_s) ** 2))
+    return rest
+
+
+def _steady(size: Array, added: Array, limit: Array) -> Array:
     """The largest square x with size sqrt(x) + added x <= limit, at most 1."""
     more = np.maximum(added, 1e-6)
     root = (np.sqrt(size * size + 4.0 * more * limit) - size) / (2.0 * more)
@@ -80,17 +98,17 @@ def _brakes(
 
 def _passes(
     most: list[float],
-    rows: list[list[tuple[float, float, float]]],
-    commands_m_s: list[float],
+    rows: list[list[tuple[float, float, float, float]]],
+    gains: list[float],
     brakes: list[tuple[float, float]],
 ) -> list[float]:
     """Forward as fast as commands allow, back as late as brakes do, which hold from the start too."""
     square = 1.0
     squares = [square]
     for i in range(1, len(most)):
-        root, rise = sqrt(square), inf
-        for command_m_s, row in zip(commands_m_s, rows, strict=True):
-            size, added, rate = row[i - 1]
+        root, rise = sqrt(square), gains[i - 1]
+        for row in rows:
+            size, added, rate, command_m_s = row[i - 1]
             if rate < inf:
                 rise = min(rise, rate * (command_m_s - size * root - added * square))
         square = max(min(square + STEP_S * rise, most[i]), _LEAST)

@@ -27,6 +27,7 @@ LATE_ACROSS_M = 0.05  # there the drone must be this near the opening's axis
 LEAVING_M = 0.15  # so far behind the end of the straight flight it is still continued
 LEAVING_S = 0.15
 LEAST_CROSSING_M_S = 0.25
+PRESENT_SHARE = 1.15  # of the crossing speed; a start that is faster brakes before the opening
 SWITCH_S = 0.5  # another side than before must be faster by this
 BLOCKED_S = 1e4  # time of a leg that obstacles block
 _ROOM_STEP_M = 0.05
@@ -215,9 +216,10 @@ class RouteFinder:
                 if same_way:
                     exit_m = _leaving_exit(start, opening, exit_m)
                 present = max(float(np.array(start.velocity_m_s) @ normal), LEAST_CROSSING_M_S)
+                most = PRESENT_SHARE * style.crossing_speed_m_s
                 top = self._top_speed(opening.after_m - exit_m)
                 for at_m in _late_entries(start, opening, exit_m, begun=bool(same_way)):
-                    speeds = (present,) if at_m >= exit_m else (style.crossing_speed_m_s, present)
+                    speeds = (present,) if at_m >= exit_m else (style.crossing_speed_m_s, min(present, most))
                     ways += [(at_m, min(speed, top)) for speed in speeds]
             for at_m, speed in ways:
                 times = (exit_m - at_m) / speed, max(-TURNED_BEFORE_M - at_m, 0.0) / speed

@@ -215,7 +215,9 @@ def slowed(
     samples: Samples, yaw: Array, yaw_rate: Array, stretches: list[Stretch], style: FlightStyle
 ) -> Path:
     """The path, with time stretched where the speed along an axis would be too high."""
-    squares = speed_squares(samples.velocities_m_s, samples.accelerations_m_s2, yaw, yaw_rate, style)
+    motion = samples.velocities_m_s, samples.accelerations_m_s2
+    near_bars = _near_bars(samples, stretches)
+    squares = speed_squares(*motion, yaw, yaw_rate, near_bars=near_bars, style=style)
     share = np.sqrt(squares)
     steps = STEP_S / (0.5 * (share[:-1] + share[1:]))
     times = np.concatenate(([0.0], np.cumsum(steps)))
@@ -226,6 +228,16 @@ def slowed(
     knots = np.column_stack((samples.positions_m, velocities, accelerations, yaw, yaw_rate * share))
     crossings = _crossings(samples, stretches, times)
     return Path(times.tolist(), knots.tolist(), crossings)
+
+
+def _near_bars(samples: Samples, stretches: list[Stretch]) -> npt.NDArray[np.bool_]:
+    """At which samples the drone's box is about to be between an opening's bars, or is still there."""
+    near = np.zeros(len(samples.times_s), dtype=bool)
+    for number, stretch in enumerate(stretches):
+        if stretch.crosses and isinstance(stretch.goal, Gate):
+            away = np.hypot(*(samples.positions_m - np.array(stretch.goal.centre_m))[:, :2].T)
+            near |= (np.abs(samples.stretches - number) <= 1) & (away < LEFT_M)
+    return near
 
 
 def _crossings(samples: Samples, stretches: list[Stretch], times: Array) -> tuple[Crossing, ...]:

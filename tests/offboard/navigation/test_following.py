@@ -11,8 +11,9 @@ from framerunner.flying.lockstep import LockstepVehicle
 from framerunner.flying.plan import FlightPlan
 from framerunner.flying.response import Response
 from offboard.drone import DroneState
+from offboard.mission import load_mission
 from offboard.navigation.following import PathFollower
-from offboard.navigation.goals import CONTEST, Gate, Motion, Obstacles, Point
+from offboard.navigation.goals import CONTEST, Gate, Motion, Obstacles, Point, style_of
 from offboard.navigation.path import Path
 from offboard.navigation.planning import plan
 from offboard.response import Prediction
@@ -63,6 +64,26 @@ def test_vehicle_that_was_pushed_aside_before_a_gate_waits_and_goes_on_when_it_i
             break
     assert waited > 20
     assert follower.finished
+
+
+def test_height_is_kept_where_a_fast_drone_changes_its_tilt():
+    drone = LockstepVehicle(FlightPlan(Layout.random(200).scenario, load_mission("racer"))).drone
+    asyncio.run(drone.ready())
+    asyncio.run(drone.motors_on())
+    limits = FlightPlan(Layout.random(200).scenario, load_mission("racer")).command_limits
+    follower, state = PathFollower(limits=limits), drone.next_state()
+    towards = -1.0 if state.x > 0.0 else 1.0
+    goals = [Point((state.x, state.y, 2.0)), Point((state.x + 4.0 * towards, state.y, 3.0))]
+    start = Motion((state.x, state.y, state.z), yaw_rad=state.yaw)
+    path = plan(start, goals, obstacles=Obstacles(), arena=Arena(), style=style_of(limits))
+    assert isinstance(path, Path)
+    off_m: list[float] = []
+    while not follower.finished:
+        drone.command(follower.command(path, state, state.time_us * 1e-6))
+        state = drone.next_state()
+        if state.z > 2.05:
+            off_m.append(abs(state.z - path.at(follower.progress_s).position_m[2]))
+    assert max(off_m) < 0.036
 
 
 def test_drone_that_brakes_and_turns_stops_on_its_path():
