@@ -124,6 +124,7 @@ class FlightStyle:
     smoothing_s: float = 0.2
     turn_smoothing_s: float = 0.2
     look_offset_rad: float = 0.6
+    course_offset_rad: float = 0.6
     view_half_rad: float = 0.66
     bar_margin_m: float = 0.08
     side_margin_m: float = 0.25

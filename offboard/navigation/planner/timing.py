@@ -13,6 +13,7 @@ from offboard.navigation.path import Crossing, Path
 from offboard.navigation.planner.legs import Array, Leg
 from offboard.navigation.planner.pace import STEP_S, speed_squares
 
+COURSE_M_S = 0.3  # slower, the drone need not see where it flies
 HOLD_BEFORE_M = 0.28  # before an opening the heading is its normal; smoothing makes it later
 LEFT_M = 0.25  # so far behind an opening the drone has left it: nothing of its box is between the bars
 HOLD_BEHIND_M = -0.1  # before the end of the straight flight behind an opening the heading stays
@@ -168,13 +169,17 @@ def _turn(yaw: float, wanted: float, last: float, most: float) -> float:
     return min(max(turn, -most), most)
 
 
+def _within(angle: float, limit: float) -> float:
+    return min(max(angle, -limit), limit)
+
+
 def _wanted_headings(
     samples: Samples, stretches: list[Stretch], style: FlightStyle
 ) -> tuple[list[float], list[tuple[int, int, float]]]:
     """The heading to turn to at each sample (NaN for any); where each gate's is kept: first, last, angle."""
     wanted: list[float] = []
-    positions = samples.positions_m.tolist()
-    for (x, y, _), number in zip(positions, samples.stretches.tolist(), strict=True):
+    motions = zip(samples.positions_m.tolist(), samples.velocities_m_s.tolist(), strict=True)
+    for ((x, y, _), (vx, vy, _)), number in zip(motions, samples.stretches.tolist(), strict=True):
         stretch = stretches[number]
         if stretch.crosses:
             wanted.append(stretch.yaw_rad)
@@ -186,9 +191,12 @@ def _wanted_headings(
         dx, dy = float(stretch.look_m[0]) - x, float(stretch.look_m[1]) - y
         away = hypot(dx, dy)
         bearing = atan2(dy, dx)
+        if hypot(vx, vy) > COURSE_M_S:
+            course = atan2(vy, vx)
+            heading = course + _within(remainder(heading - course, 2 * pi), style.course_offset_rad)
         limit = style.look_limit_rad(away)
         if limit > 0.0:
-            bearing += min(max(remainder(heading - bearing, 2 * pi), -limit), limit)
+            bearing += _within(remainder(heading - bearing, 2 * pi), limit)
         wanted.append(bearing)
     holds: list[tuple[int, int, float]] = []
     for number, stretch in enumerate(stretches):
