@@ -125,7 +125,7 @@ class PathFlight:
                 return self._stand(state, _look_rate(_turn_to(self.watched, state)))
         self._looks_aside = False
         to_gate = isinstance(goals[0], Gate)
-        if checked and to_gate and self._lookout.begin(self._ahead(AHEAD_S + CHECK_S), state, viewed):
+        if checked and self._lookout.begin(self._ahead(AHEAD_S + CHECK_S), state, viewed):
             self.path = self._left = None
             return self._lookout.command(state, viewed) or STILL
         if self.path is not None and seen.has_obstacles and not to_gate:

@@ -13,6 +13,7 @@ from scenarios.models import Arena
 
 _SLOPE: Final = 0.35  # height above or below, for its distance, at which a place is well in view
 _STEEP_M: Final = 0.2  # by which a place must be above or below that, to stop the drone
+_BESIDE_RAD: Final = 0.8  # likewise, by which it must be beside the camera's axis
 _REACHED_M: Final = 0.1
 _FACED_RAD: Final = 0.3
 _WAIT_S: Final = 0.6  # at that height, for the place to come into view
@@ -50,7 +51,10 @@ class Lookout:
     def begin(self, places_m: list[Vec3], state: DroneState, viewed: ViewedSpace) -> bool:
         """Look at the first of the places on a path that was not in view; false if none is steep."""
         hidden_m = viewed.first_unviewed(places_m, (state.x, state.y, state.z))
-        if hidden_m is None or abs(self._rise_m(hidden_m, state)) < _STEEP_M:
+        if hidden_m is None:
+            return False
+        beside = abs(_turn_rad(hidden_m, state)) > _BESIDE_RAD
+        if not beside and abs(self._rise_m(hidden_m, state)) < _STEEP_M:
             return False
         self._place_m = hidden_m
         self._began_s = self._reached_s = state.time_us * 1e-6
@@ -62,7 +66,7 @@ class Lookout:
         if place_m is None:
             return None
         rise_m, away_m = self._rise_m(place_m, state), hypot(place_m[0] - state.x, place_m[1] - state.y)
-        turn_rad = remainder(atan2(place_m[1] - state.y, place_m[0] - state.x) - state.yaw, tau)
+        turn_rad = _turn_rad(place_m, state)
         if abs(turn_rad) > _FACED_RAD or abs(rise_m) > _REACHED_M:
             self._reached_s = now_s
         gives_up = now_s - self._reached_s > _WAIT_S or now_s - self._began_s > _LONGEST_S
@@ -84,3 +88,8 @@ class Lookout:
         reach_m = _SLOPE * hypot(place_m[0] - state.x, place_m[1] - state.y)
         height_m = min(max(state.z, place_m[2] - reach_m), place_m[2] + reach_m)
         return min(max(height_m, self._low_m), self._high_m) - state.z
+
+
+def _turn_rad(place_m: Vec3, state: DroneState) -> float:
+    """The turn to the left that makes the drone face a place."""
+    return remainder(atan2(place_m[1] - state.y, place_m[0] - state.x) - state.yaw, tau)
