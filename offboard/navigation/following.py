@@ -15,7 +15,14 @@ from geometry.vectors import Vec3
 from offboard.drone import DroneState, VelocityCommand
 from offboard.limits import CONTEST, CommandLimits, clamped
 from offboard.navigation.control.feed_forward import MOTOR_S, SPREAD_S, FeedForward
-from offboard.navigation.control.late_following import MAX_CORRECTION_M_S, WAIT_FROM_M, LateFollower, rate_of
+from offboard.navigation.control.late_following import (
+    GATE_TURN_M,
+    MAX_CORRECTION_M_S,
+    WAIT_FROM_M,
+    LateFollower,
+    rate_before_gate,
+    rate_of,
+)
 from offboard.navigation.goals import Motion
 from offboard.navigation.path import Path
 from offboard.response import Prediction, Response
@@ -25,6 +32,8 @@ DELAY_S = 0.025  # from a state to the motors, beside
 POSITION_GAINS_PER_S = (1.0, 1.0, 3.5)  # the vehicle follows a climb sooner than a level speed
 VELOCITY_GAIN = 0.3
 YAW_GAIN_PER_S = 3.0
+COMING_S = 0.3  # for which a wrong velocity goes on
+GATE_S = (0.4, 1.3)  # before a gate the drone must be straight before it; nearer, it cannot stop any more
 MAX_RATE_CHANGE_PER_S = 1.5  # of the path's time
 BRAKE_END_S = 0.25  # in which the last of the speed is braked, so that the drone is not thrown back
 INTEGRAL_GAIN_PER_S2 = 0.2
@@ -141,7 +150,13 @@ class PathFollower:
         error, slower = self._errors(state, now_s)
         self.error_m = hypot(*error)
         self._turn_rad_s = turn_rad_s
-        self._change_rate(rate_of(error, motion.velocity_m_s), motion, brake_m_s2, step_s)
+        off_rad = remainder(motion.yaw_rad - state.yaw, 2 * pi)
+        x, y, z = (e + COMING_S * v for e, v in zip(error, slower, strict=True))
+        rate = min(
+            rate_of(error, motion.velocity_m_s),
+            rate_before_gate(path, self.progress_s, GATE_S, (x, y, z), GATE_TURN_M * abs(off_rad)),
+        )
+        self._change_rate(rate, motion, brake_m_s2, step_s)
         self._integrate(error, motion.velocity_m_s, step_s)
         correction = [
             gain * e + VELOCITY_GAIN * v + i
@@ -182,8 +197,10 @@ class PathFollower:
         x, y, z = turned(correction_m_s, off_rad - now.yaw_rad)
         turn_more = YAW_GAIN_PER_S * off_rad
         command = self._limited(forward + x, left + y, velocity[2] + z, turn + turn_more)
-        sent = turned((command.forward_m_s - x, command.left_m_s - y, command.up_m_s - z), -off_rad)
-        self._feed_forward.sent(sent, command.yaw_rate_rad_s - turn_more, step_s)
+        # What a limit cuts off because of the correction is not made up for: that would wind up.
+        sent = self._limited(forward, left, velocity[2], turn)
+        sent_m_s = turned((sent.forward_m_s, sent.left_m_s, sent.up_m_s), -off_rad)
+        self._feed_forward.sent(sent_m_s, sent.yaw_rate_rad_s, step_s)
         return command
 
     def _motion_in(self, path: Path, state: DroneState, time_s: float) -> Motion:

@@ -24,8 +24,7 @@ RATE_CHANGE_PER_S = 1.2  # of the path's time: at the speed of crossings, that o
 WAIT_FROM_M = 0.1  # farther from the path, its time goes slower
 WAIT_ASIDE_M = 0.05  # or aside from it
 WAIT_M = 0.25  # beyond that, it stands still
-GATE_NEAR_S = 2.5  # before a gate; then the drone must be straight before it
-GATE_TOO_NEAR_S = 0.8  # then it cannot stop any more
+GATE_S = (0.8, 2.5)  # before a gate the drone must be straight before it; nearer, it cannot stop any more
 GATE_FROM_M = 0.03  # farther off, the path's time goes slower
 GATE_WAIT_M = 0.06  # beyond that, it stands still
 GATE_TURN_M = 0.15  # by which a turn counts, for each radian
@@ -105,7 +104,8 @@ class LateFollower:
         (vx, vy, _), (coming_x, coming_y, _) = level.velocity_m_s, prediction.velocity_m_s
         unsteady_m = GATE_TURN_M * abs(yaw_offset) + GATE_STEADY_S * hypot(vx - coming_x, vy - coming_y)
         self._wanted_rate = min(
-            rate_of(error, level.velocity_m_s), self._rate_before_gate(path, error, unsteady_m)
+            rate_of(error, level.velocity_m_s),
+            rate_before_gate(path, self.ahead_s, GATE_S, error, unsteady_m),
         )
         size = hypot(*correction)
         scale = MAX_CORRECTION_M_S / size if size > MAX_CORRECTION_M_S else 1.0
@@ -154,15 +154,6 @@ class LateFollower:
             square * motion.yaw_acceleration_rad_s2 + change * motion.yaw_rate_rad_s,
         )
 
-    def _rate_before_gate(self, path: Path, error: Vec3, unsteady_m: float) -> float:
-        """How fast the path's time may go: a drone that is not straight before a gate waits until it is."""
-        for crossing in path.crossings:
-            if GATE_TOO_NEAR_S < crossing.time_s - self.ahead_s < GATE_NEAR_S:
-                c, s = cos(crossing.heading_rad), sin(crossing.heading_rad)
-                off_m = hypot(c * error[1] - s * error[0], error[2]) + unsteady_m
-                return max(1.0 - max(off_m - GATE_FROM_M, 0.0) / GATE_WAIT_M, 0.0)
-        return 1.0
-
 
 def _change(motion: Motion, *, turning: bool) -> tuple[float, float]:
     """Change of the velocity in plan, maybe as seen from axes that turn with the heading; arena axes."""
@@ -194,3 +185,23 @@ def rate_of(error_m: Vec3, velocity_m_s: Vec3) -> float:
     aside_m = sqrt(max(sum(e * e for e in error_m) - behind_m * behind_m, 0.0))
     late_m = max(behind_m - WAIT_FROM_M, 0.0) + max(aside_m - WAIT_ASIDE_M, 0.0)
     return max(1.0 - late_m / WAIT_M, 0.0)
+
+
+def rate_before_gate(
+    path: Path, at_s: float, near_s: tuple[float, float], error_m: Vec3, unsteady_m: float
+) -> float:
+    """How fast the path's time may go: a drone that is not straight before a gate waits until it is.
+
+    Args:
+        path: that is followed.
+        at_s: time along it.
+        near_s: least and greatest time before the gate in which the drone waits.
+        error_m: from the drone to the path, arena axes.
+        unsteady_m: what adds to its part across the gate: for a wrong heading or velocity.
+    """
+    for crossing in path.crossings:
+        if near_s[0] < crossing.time_s - at_s < near_s[1]:
+            c, s = cos(crossing.heading_rad), sin(crossing.heading_rad)
+            off_m = hypot(c * error_m[1] - s * error_m[0], error_m[2]) + unsteady_m
+            return max(1.0 - max(off_m - GATE_FROM_M, 0.0) / GATE_WAIT_M, 0.0)
+    return 1.0
