@@ -32,6 +32,7 @@ DELAY_S = 0.025  # from a state to the motors, beside
 POSITION_GAINS_PER_S = (1.0, 1.0, 3.5)  # the vehicle follows a climb sooner than a level speed
 VELOCITY_GAIN = 0.3
 YAW_GAIN_PER_S = 3.0
+GATE_FROM_M = 0.05  # farther from the path across a gate, the drone waits
 COMING_S = 0.3  # for which a wrong velocity goes on
 GATE_S = (0.4, 1.3)  # before a gate the drone must be straight before it; nearer, it cannot stop any more
 MAX_RATE_CHANGE_PER_S = 1.5  # of the path's time
@@ -154,7 +155,9 @@ class PathFollower:
         x, y, z = (e + COMING_S * v for e, v in zip(error, slower, strict=True))
         rate = min(
             rate_of(error, motion.velocity_m_s),
-            rate_before_gate(path, self.progress_s, GATE_S, (x, y, z), GATE_TURN_M * abs(off_rad)),
+            rate_before_gate(
+                path, self.progress_s, GATE_S, (x, y, z), GATE_TURN_M * abs(off_rad), from_m=GATE_FROM_M
+            ),
         )
         self._change_rate(rate, motion, brake_m_s2, step_s)
         self._integrate(error, motion.velocity_m_s, step_s)

@@ -188,7 +188,13 @@ def rate_of(error_m: Vec3, velocity_m_s: Vec3) -> float:
 
 
 def rate_before_gate(
-    path: Path, at_s: float, near_s: tuple[float, float], error_m: Vec3, unsteady_m: float
+    path: Path,
+    at_s: float,
+    near_s: tuple[float, float],
+    error_m: Vec3,
+    unsteady_m: float,
+    *,
+    from_m: float = GATE_FROM_M,
 ) -> float:
     """How fast the path's time may go: a drone that is not straight before a gate waits until it is.
 
@@ -198,10 +204,11 @@ def rate_before_gate(
         near_s: least and greatest time before the gate in which the drone waits.
         error_m: from the drone to the path, arena axes.
         unsteady_m: what adds to its part across the gate: for a wrong heading or velocity.
+        from_m: across the gate; farther off, the path's time goes slower.
     """
     for crossing in path.crossings:
         if near_s[0] < crossing.time_s - at_s < near_s[1]:
             c, s = cos(crossing.heading_rad), sin(crossing.heading_rad)
             off_m = hypot(c * error_m[1] - s * error_m[0], error_m[2]) + unsteady_m
-            return max(1.0 - max(off_m - GATE_FROM_M, 0.0) / GATE_WAIT_M, 0.0)
+            return max(1.0 - max(off_m - from_m, 0.0) / GATE_WAIT_M, 0.0)
     return 1.0
