@@ -8,7 +8,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import replace
 from itertools import pairwise
-from math import dist
+from math import dist, sqrt
 
 import numpy as np
 
@@ -24,6 +24,7 @@ from offboard.navigation.planner.timing import Stretch, headings, run_in, sample
 from scenarios.models import Arena
 
 LIFT_OFF_M_S = 0.5  # when the base is left below
+LIFT_OFF_M_S2 = 0.4  # acceleration to that speed, also of vehicles that answer late
 LIFT_OFF_SPARE_M = 0.02
 STOPPING_M = 0.5  # behind a last gate the drone stops in this distance,
 STOPPING_SHARES = np.array([1.0, 0.7, 0.5, 0.3, 0.15])  # or in the largest of these shares that is clear
@@ -137,7 +138,10 @@ def _complete(route: list[Pass], clearance: Clearance) -> list[Pass]:
     from_m = start.exits.places_m[0]
     if clearance.on_base(from_m) and not clearance.on_base(route[1].entries.places_m[0]):
         up = np.array([from_m[0], from_m[1], clearance.base_top_m + LIFT_OFF_SPARE_M])
-        passes.insert(1, place(up, np.array([0.0, 0.0, LIFT_OFF_M_S]), start.yaw_rad))
+        # A drone that is over the base already has less way to speed up: more would need a run-up downwards.
+        rise_m, climb_m_s = up[2] - from_m[2], max(float(start.exits.velocities_m_s[0, 2]), 0.0)
+        fastest_m_s = sqrt(climb_m_s**2 + 2.0 * LIFT_OFF_M_S2 * max(rise_m, 0.0))
+        passes.insert(1, place(up, np.array([0.0, 0.0, min(LIFT_OFF_M_S, fastest_m_s)]), start.yaw_rad))
     if isinstance(end.goal, Gate):
         passes.append(place(_stop_behind(end, clearance), np.zeros(3), end.yaw_rad))
     return passes

@@ -8,7 +8,7 @@ import pytest
 from offboard.navigation.goals import CONTEST, Gate, Motion, Obstacles, Point, Refusal
 from offboard.navigation.path import Path
 from offboard.navigation.planning import plan
-from scenarios.models import Arena
+from scenarios.models import Arena, Base
 from tests.offboard.navigation.flown_layouts import (
     STEP_S,
     Layout,
@@ -124,3 +124,12 @@ def test_a_drone_before_a_gate_by_a_wall_slows_down_and_stays_in_the_arena(home:
 def test_no_goal_is_refused():
     path = plan(Motion((0.0, 0.0, 1.0)), [], obstacles=Obstacles(), arena=Arena(), style=CONTEST)
     assert path == Refusal("there is no goal to fly to")
+
+
+@pytest.mark.parametrize("height_m", [0.53, 0.58, 0.62, 0.66, 0.7])
+def test_drone_that_hovers_low_over_the_base_finds_a_way_from_it(height_m: float):
+    base = Base(x_m=0.0, y_m=-3.9)
+    start = Motion((-0.02, -4.0, height_m), (0.0, 0.0, 0.0), 2.0)
+    obstacles = Obstacles(base=base)
+    path = plan(start, [Point((0.0, 0.0, 1.5))], obstacles=obstacles, arena=Arena(), style=CONTEST)
+    assert isinstance(path, Path), path
