@@ -13,7 +13,7 @@ from geometry.vectors import Vec3
 from offboard.drone import DroneState, VelocityCommand
 from offboard.limits import CONTEST, CommandLimits
 from offboard.navigation.crossing_attempt import CrossingAttempt
-from offboard.navigation.goals import Gate, Goal, Point, style_of
+from offboard.navigation.goals import Goal, Point, style_of
 from offboard.navigation.path_flight import STILL, PathFlight, position_now
 from offboard.navigation.search.looking_places import LookingPlaces
 from offboard.navigation.surroundings import Surroundings
@@ -168,7 +168,7 @@ class Navigator:
         crossing.known_s = now_s
         if crossing.must_look(estimate, position_now(state), now_s):
             return self._fly(self._places.before(estimate, position_now(state), self._world.obstacles()))
-        command = self._fly(Gate(estimate.position_m, estimate.yaw_rad), *self._goals_after(colour))
+        command = self._fly(self._world.gate_of(estimate), *self._goals_after(colour))
         path = self._flight.path
         finds_way = path is not None or self._flight.looks
         no_path = "" if finds_way else self._flight.refusal or "none was planned"
@@ -206,4 +206,4 @@ class Navigator:
         estimate = self._world.frame(following[0])
         if estimate is None or estimate.ambiguous or max(estimate.position_std_m) > AHEAD_STD_M:
             return []
-        return [Gate(estimate.position_m, estimate.yaw_rad)]
+        return [self._world.gate_of(estimate)]

@@ -95,12 +95,25 @@ class WorldModel:
         """All frames on the map."""
         return self._map.frames()
 
+    def gate_of(self, frame: FrameEstimate) -> Gate:
+        """A frame as a path crosses it: in the arena, also while it seems to be outside, seen from afar."""
+        arena = self._surroundings.arena
+        half_m = self._surroundings.frame_m[1] / 2
+        x_m, y_m = arena.length_x_m / 2, arena.width_y_m / 2
+        x, y, z = frame.position_m
+        inside = (
+            min(max(x, -x_m), x_m),
+            min(max(y, -y_m), y_m),
+            min(max(z, half_m), arena.height_m - half_m),
+        )
+        return Gate(inside, frame.yaw_rad)
+
     def obstacles(self) -> Obstacles:
         """All that a path must keep clear of; of each colour of the task only the frame known best."""
         if self._frames is None:
             seen = [frame for frame in self._map.frames() if frame.colour not in COLOURS]
             seen += [best for best in map(self._map.best, COLOURS) if best is not None]
-            self._frames = tuple(Gate(frame.position_m, frame.yaw_rad) for frame in seen)
+            self._frames = tuple(map(self.gate_of, seen))
         return Obstacles(self._frames, self._columns_m(), self._surroundings.base)
 
     def next_viewpoint(self, position_m: Vec3, yaw_rad: float) -> Viewpoint:

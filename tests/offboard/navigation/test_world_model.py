@@ -112,3 +112,11 @@ def test_what_seems_to_stand_at_the_start_leaves_room_for_the_drone() -> None:
     gaps_m = [dist((start.x, start.y), (x, y)) - radius_m for x, y, radius_m in world.obstacles().columns_m]
     assert len(gaps_m) == 2
     assert min(gaps_m) > DRONE_RADIUS_M + CONTEST.bar_margin_m
+
+
+def test_frame_that_seems_to_be_above_the_ceiling_is_crossed_below_it():
+    surroundings = Surroundings(Arena(), Base(x_m=-3.0, y_m=-3.0), Camera(), (0.25, 0.25, 0.1))
+    frame = FrameEstimate("red", (5.3, 0.0, 4.4), 0.5, (0.5, 0.5, 0.5), 0.1, True, False, 1, 0)
+    gate = WorldModel(surroundings, CONTEST).gate_of(frame)
+    assert gate.centre_m == pytest.approx((5.0, 0.0, 3.89))
+    assert gate.yaw_rad == pytest.approx(0.5)
