@@ -100,6 +100,8 @@ class FlightStyle:
         turn_smoothing_s: time in which the yaw rate changes.
         look_offset_rad: the heading may differ from a gate's direction by this, so that both level axes are
             used; less near the gate, which stays in view.
+        course_offset_rad: on the way to a gate the heading may differ from the course by this, so that the
+            drone sees where it flies.
         view_half_rad: half the camera's view, with a margin for tilt.
         bar_margin_m: between the drone's box and other frames, base and columns.
         side_margin_m: between the drone's centre and the arena's sides and ceiling.

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
-from math import atan2, dist, pi, remainder
+from math import dist, pi, remainder
 
 from geometry.vectors import Vec3
 from offboard.drone import DroneState, VelocityCommand
@@ -17,7 +17,7 @@ from offboard.navigation.following import PathFollower
 from offboard.navigation.goals import FlightStyle, Gate, Goal, Motion, Obstacles, Refusal
 from offboard.navigation.path import Path
 from offboard.navigation.planning import obstructed, plan
-from offboard.navigation.search.lookout import Lookout
+from offboard.navigation.search.lookout import Lookout, turn_to
 from offboard.navigation.search.viewed_space import ViewedSpace
 from offboard.navigation.seen_space import SeenSpace
 from offboard.response import ResponseEstimate
@@ -109,7 +109,7 @@ class PathFlight:
             return looking
         now_s = state.time_us * 1e-6
         if self.watched is not None and not seen.is_seen(self.watched):
-            turn_rad = _turn_to(self.watched, state)
+            turn_rad = turn_to(self.watched, state)
             if abs(turn_rad) > LOOKED_AT_RAD:
                 self._watched_s = now_s
             if now_s - self._watched_s < MAX_LOOK_S:
@@ -122,7 +122,7 @@ class PathFlight:
             if self.watched is not None:
                 self._leave()
                 self._watched_s = now_s
-                return self._stand(state, _look_rate(_turn_to(self.watched, state)))
+                return self._stand(state, _look_rate(turn_to(self.watched, state)))
         self._looks_aside = False
         to_gate = isinstance(goals[0], Gate)
         if checked and self._lookout.begin(self._ahead(AHEAD_S + CHECK_S), state, viewed):
@@ -132,7 +132,7 @@ class PathFlight:
             later = seen.first_unseen(self._ahead(LOOK_AHEAD_S), position_now(state))
             if later is not None:
                 self._looks_aside = True
-                return self.follow(state, _look_rate(_turn_to(later, state)))
+                return self.follow(state, _look_rate(turn_to(later, state)))
         return self.follow(state)
 
     def _plan_if_due(self, goals: Sequence[Goal], obstacles: Obstacles, state: DroneState) -> bool:
@@ -254,11 +254,6 @@ def position_now(state: DroneState) -> Vec3:
     vx, vy, vz = state.velocity_arena_m_s
     age_s = state.position_age_s
     return (state.x + vx * age_s, state.y + vy * age_s, state.z + vz * age_s)
-
-
-def _turn_to(place_m: Vec3, state: DroneState) -> float:
-    """The turn to the left that makes the drone look at a place, radians."""
-    return remainder(atan2(place_m[1] - state.y, place_m[0] - state.x) - state.yaw, 2 * pi)
 
 
 def _look_rate(turn_rad: float) -> float:

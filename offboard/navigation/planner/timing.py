@@ -8,6 +8,7 @@ from math import atan2, hypot, isnan, nan, pi, remainder
 import numpy as np
 import numpy.typing as npt
 
+from offboard.limits import clamped
 from offboard.navigation.goals import FlightStyle, Gate, Goal, Motion
 from offboard.navigation.path import Crossing, Path
 from offboard.navigation.planner.legs import Array, Leg
@@ -169,10 +170,6 @@ def _turn(yaw: float, wanted: float, last: float, most: float) -> float:
     return min(max(turn, -most), most)
 
 
-def _within(angle: float, limit: float) -> float:
-    return min(max(angle, -limit), limit)
-
-
 def _wanted_headings(
     samples: Samples, stretches: list[Stretch], style: FlightStyle
 ) -> tuple[list[float], list[tuple[int, int, float]]]:
@@ -193,10 +190,12 @@ def _wanted_headings(
         bearing = atan2(dy, dx)
         if hypot(vx, vy) > COURSE_M_S:
             course = atan2(vy, vx)
-            heading = course + _within(remainder(heading - course, 2 * pi), style.course_offset_rad)
+            heading = course + clamped(
+                remainder(heading - course, 2 * pi), style.course_offset_rad, style.course_offset_rad
+            )
         limit = style.look_limit_rad(away)
         if limit > 0.0:
-            bearing += _within(remainder(heading - bearing, 2 * pi), limit)
+            bearing += clamped(remainder(heading - bearing, 2 * pi), limit, limit)
         wanted.append(bearing)
     holds: list[tuple[int, int, float]] = []
     for number, stretch in enumerate(stretches):

@@ -53,7 +53,7 @@ class Lookout:
         hidden_m = viewed.first_unviewed(places_m, (state.x, state.y, state.z))
         if hidden_m is None:
             return False
-        beside = abs(_turn_rad(hidden_m, state)) > _BESIDE_RAD
+        beside = abs(turn_to(hidden_m, state)) > _BESIDE_RAD
         if not beside and abs(self._rise_m(hidden_m, state)) < _STEEP_M:
             return False
         self._place_m = hidden_m
@@ -66,7 +66,7 @@ class Lookout:
         if place_m is None:
             return None
         rise_m, away_m = self._rise_m(place_m, state), hypot(place_m[0] - state.x, place_m[1] - state.y)
-        turn_rad = _turn_rad(place_m, state)
+        turn_rad = turn_to(place_m, state)
         if abs(turn_rad) > _FACED_RAD or abs(rise_m) > _REACHED_M:
             self._reached_s = now_s
         gives_up = now_s - self._reached_s > _WAIT_S or now_s - self._began_s > _LONGEST_S
@@ -90,6 +90,6 @@ class Lookout:
         return min(max(height_m, self._low_m), self._high_m) - state.z
 
 
-def _turn_rad(place_m: Vec3, state: DroneState) -> float:
+def turn_to(place_m: Vec3, state: DroneState) -> float:
     """The turn to the left that makes the drone face a place."""
     return remainder(atan2(place_m[1] - state.y, place_m[0] - state.x) - state.yaw, tau)
