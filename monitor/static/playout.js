@@ -55,7 +55,7 @@ export class Playout {
   /** @param {object[]} drones of the message "pose" */
   addPoses(drones) {
     const there = new Set(drones.map((pose) => pose.id));
-    for (const id of this.#tracks.keys()) if (!there.has(id)) this.#tracks.delete(id);
+    for (const id of this.#tracks.keys()) if (!there.has(id)) this.#forget(id);
     for (const pose of drones) this.#addPose(pose);
     this.#ask();
   }
@@ -87,10 +87,13 @@ export class Playout {
   #addPose(pose) {
     const now = performance.now();
     let track = this.#tracks.get(pose.id);
-    if (!track || pose.t < track.newest - RESTART_S) {
+    if (track && pose.t < track.newest - RESTART_S) {
+      this.#forget(pose.id);
+      track = undefined;
+    }
+    if (!track) { // an image that came before the first pose stays
       track = { poses: [], shown: null, newest: -Infinity, heardAt: now };
       this.#tracks.set(pose.id, track);
-      if (pose.id === this.#chosen) this.choose(pose.id);
     }
     if (pose.t > track.newest) {
       track.poses.push(pose);
@@ -99,6 +102,11 @@ export class Playout {
     } else {
       track.poses.splice(-1, 1, { ...pose, t: track.newest }); // whether it is fresh is news, too
     }
+  }
+
+  #forget(id) {
+    this.#tracks.delete(id);
+    if (id === this.#chosen) this.choose(id);
   }
 
   #note(lag_s) {

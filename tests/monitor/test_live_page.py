@@ -486,6 +486,25 @@ async def test_after_a_flight_its_result_and_last_image_stay(chromium, fake):
     assert complaints == []
 
 
+async def test_an_image_that_comes_before_the_first_pose_is_shown(chromium, fake):
+    page, complaints = await visit(chromium, fake)
+    shown = await page.evaluate(
+        """async (pose) => {
+          const { Playout } = await import("/static/playout.js");
+          const shown = [];
+          const playout = new Playout(({ image }) => { if (image) shown.push(image.t); });
+          playout.choose(pose.id);
+          playout.addImage({ t: pose.t, jpeg: new Blob([]) });
+          playout.addPoses([pose]);
+          await new Promise((resolve) => setTimeout(resolve, 1000));
+          return shown;
+        }""",
+        pose(),
+    )
+    assert shown == [10.0]
+    assert complaints == []
+
+
 async def test_a_restarted_monitor_does_not_say_that_a_flight_has_not_begun(chromium, fake):
     """The names of a mission's states are received some seconds after its state."""
     unnamed = status(state="")
