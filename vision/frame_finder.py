@@ -189,13 +189,18 @@ def _obstacle_edges(mask: ColourMask, others: Sequence[ColourMask]) -> tuple[Obs
         reach = lowest - _STEEP * away
         beside[away:] = np.maximum(beside[away:], reach[:-away])
         beside[:-away] = np.maximum(beside[:-away], reach[away:])
-    counts = crop.sum(axis=0)
+    first = -(-column // _OBSTACLE_STEP) * _OBSTACLE_STEP
+    looked_at = slice(first - left, column + columns - left, _OBSTACLE_STEP)
+    found = (values[looked_at].tolist() for values in (crop.sum(axis=0), lowest, beside))
     edges = []
-    for x in range(-(-column // _OBSTACLE_STEP) * _OBSTACLE_STEP, column + columns, _OBSTACLE_STEP):
-        last = int(lowest[x - left])
-        if counts[x - left] < _MIN_RUN_PX:  # noise
+    for index, (count, last, ends_beside) in enumerate(zip(*found, strict=True)):
+        if count < _MIN_RUN_PX:  # noise
             continue
-        hidden = any(other.mask[last + 1 : last + 3, x].any() for other in others)
-        cut = last >= height - 1 or hidden or bool(beside[x - left] > last)
+        x = first + index * _OBSTACLE_STEP
+        cut = (
+            last >= height - 1
+            or ends_beside > last
+            or any(other.mask[last + 1 : last + 3, x].any() for other in others)
+        )
         edges.append(ObstacleEdge(x - (width - 1) / 2, last + 0.5 - (height - 1) / 2, cut))
     return tuple(edges)

@@ -97,6 +97,8 @@ def _rotations(image: list[Point]) -> list[_Rows]:
     # Its larger singular value is the scale; what is missing to unit columns is their third component.
     one, other, both = a00 * a00 + a01 * a01, a10 * a10 + a11 * a11, a00 * a10 + a01 * a11
     scale = sqrt(0.5 * (one + other + hypot(one - other, 2.0 * both)))
+    if scale < _FLAT:  # corners that are one: the map is flat in the middle
+        return []
     a00, a01, a10, a11 = a00 / scale, a01 / scale, a10 / scale, a11 / scale
     c0 = sqrt(max(1.0 - a00 * a00 - a10 * a10, 0.0))
     c1 = copysign(sqrt(max(1.0 - a01 * a01 - a11 * a11, 0.0)), -(a00 * a01 + a10 * a11))

@@ -5,6 +5,8 @@ from __future__ import annotations
 import cv2
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
 from vision.frame_model import AXES_CORNERS, ModelPose
 from vision.frame_pose import find_poses
@@ -49,3 +51,20 @@ def test_a_frame_seen_exactly_from_the_front_has_a_pose():
 
 def test_corners_on_a_line_have_no_pose():
     assert find_poses([(0.0, 0.0), (1.0, 1.0), (2.0, 2.0), (3.0, 3.0)], FOCAL_PX, 100.0) == []
+
+
+PIXELS = st.integers(-4, 4).map(float)
+
+
+@given(st.lists(st.tuples(PIXELS, PIXELS), min_size=4, max_size=4), st.tuples(PIXELS, PIXELS))
+def test_any_corners_have_poses_of_numbers_or_none(corners, away):
+    """Also corners of which two are one, as an outline of few pixels has."""
+    moved = [(x + 20.0 * away[0], y + 20.0 * away[1]) for x, y in corners]
+    for pose in find_poses(moved, FOCAL_PX, 100.0):
+        assert np.isfinite(pose.rotation).all()
+        assert np.isfinite(pose.shift_m).all()
+
+
+def test_four_corners_of_which_two_are_one_have_no_pose():
+    corners = [(-61.0, 1.5), (-60.0, 2.5), (-60.0, 3.5), (-61.0, 1.5)]
+    assert find_poses(corners, FOCAL_PX, 100.0) == []
