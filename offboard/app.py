@@ -206,14 +206,14 @@ class _Flight:
         if switches:  # this takes seconds; observers get the reason before
             self._observe(state, command, detections)
         if motors_on and not self._flying:
-            await self._drone.motors_on()
+            await self._drone.motors_on(confirmed=not self._engine.has_navigator)
             self._flying = True
             self._started_us = None  # counts from the next tick, the first with motors on
         elif self._flying and not motors_on:
             await self._stop_motors()
         if self._flying:
             self._drone.command(command)
-        self._sent = command if self._flying else None
+        self._sent = command if self._flying and not switches else None  # none since the last tick
         self._ticks += 1
         if not switches:
             self._observe(state, command, detections)

@@ -28,7 +28,7 @@ class DroneState:
     z: float  # above the arena's floor, metres
     yaw: float  # radians, -pi..pi
     velocity_arena_m_s: tuple[float, float, float] = (0.0, 0.0, 0.0)
-    armed: bool = False
+    armed: bool = False  # by telemetry or, until that shows it, by the acknowledgement of `motors_on`
     offboard: bool = False  # it follows this app's setpoints
     mode: str = ""  # name of the flight mode, for people
     landed: bool = True  # on the ground or on the base
@@ -77,8 +77,16 @@ class Drone(Protocol):
         """States at 20 Hz of vehicle time."""
         ...
 
-    async def motors_on(self) -> None:
-        """Arm and enter offboard; returns when telemetry shows both."""
+    async def motors_on(self, *, confirmed: bool = True) -> None:
+        """Enter offboard and, when telemetry shows it, arm.
+
+        Telemetry shows arming with the next heartbeat, up to a second later, while the time of a try runs.
+
+        Args:
+            confirmed: return when telemetry shows the vehicle armed, as the flights of the paper's navigator
+                do, which must not change; else when it has acknowledged the request. Then the ticks raise
+                `DroneError` if telemetry does not show it within the same limit.
+        """
 
     async def motors_off(self) -> None:
         """Stop the motors at once, in the air too; returns when telemetry shows it."""

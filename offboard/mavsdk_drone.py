@@ -21,7 +21,7 @@ from geometry.axes import Alignment, Pose
 from geometry.rotations import quaternion_from_euler
 from offboard.drone import DroneError, DroneState, VelocityCommand
 from offboard.keep_in_box import Box, confine
-from offboard.link.commands import PendingRequests, SetpointStream
+from offboard.link.commands import PendingRequests, SetpointStream, synchronous
 from offboard.link.companion import Companion
 from offboard.link.telemetry import CHECKS, Sample, TelemetryFeed, TickSource, VehicleClock, request_rates
 from offboard.link.tlog import TlogRecorder
@@ -171,7 +171,7 @@ class MavsdkDrone:
         self._setpoints = SetpointStream(OffboardAsync(system))
         self._telemetry = TelemetryAsync(system)
         self._direct = MavlinkDirectAsync(system)
-        self._feed.subscribe(_synchronous(self._telemetry), _synchronous(self._direct))
+        self._feed.subscribe(synchronous(self._telemetry), synchronous(self._direct))
 
     async def _open_connections(self, mavsdk: Mavsdk) -> None:
         """To recorder, companion, ground stations and vehicle; MAVSDK forwards between them."""
@@ -239,18 +239,19 @@ class MavsdkDrone:
                 self._send(VelocityCommand())
             yield state
 
-    async def motors_on(self) -> None:
+    async def motors_on(self, *, confirmed: bool = True) -> None:
         """Enter offboard with zero setpoints, then arm: so the motors never run in another mode."""
         await self._stream_before_offboard()
         self._watchdog.start()
         try:
             request = self._stream.request_offboard()
             await self._request("offboard mode", request, lambda: self._feed.mode == "OFFBOARD")
-            await self._request("arming", self._action.arm(), lambda: bool(self._feed.armed))
+            await self._request("arming", self._action.arm(), lambda: bool(self._feed.armed) or not confirmed)
         except BaseException:
             self._watchdog.stop()
             await self._hold_on_ground()
             raise
+        self._feed.arming.acknowledge(self._feed.time_us + round(CONFIRM_S * 1e6))
         self._feed.take_samples()  # those until now are of no flight
         self._tracker.reset()
         self._pilot_has_it = False
@@ -270,6 +271,7 @@ class MavsdkDrone:
     async def motors_off(self) -> None:
         """Stop the motors at once (forced disarm), in the air too."""
         self._commanding = False
+        self._feed.arming.forget()
         await self._request("stopping the motors", self._action.kill(), lambda: self._feed.armed is False)
         self._watchdog.stop()
         with contextlib.suppress(MavsdkError):
@@ -278,15 +280,19 @@ class MavsdkDrone:
     async def land(self) -> None:
         """Let the vehicle land and wait until it has disarmed itself."""
         feed = self._feed
+
+        def armed() -> bool:
+            return feed.arming.is_armed(feed.time_us)
+
         self._commanding = False
         request = self._action.land()
-        await self._request("landing", request, lambda: feed.mode == "LAND" or feed.armed is False)
+        await self._request("landing", request, lambda: feed.mode == "LAND" or not armed())
         self._watchdog.stop()
         limit_us = feed.time_us + int(LAND_LIMIT_S * 1e6)
-        while feed.armed:
+        while armed():
             self._check_alive(await self._ticks.next(LINK_LOST_S))
             # One heartbeat has mode and arming, but MAVSDK passes them on one after the other.
-            if feed.mode != "LAND" and not await self._becomes(lambda: not feed.armed, 0.5):
+            if feed.mode != "LAND" and not await self._becomes(lambda: not armed(), 0.5):
                 raise DroneError(f"landing was interrupted: mode {feed.mode}{feed.recent_texts()}")
             if feed.time_us > limit_us:
                 raise DroneError(f"still not landed after {LAND_LIMIT_S:g} s{feed.recent_texts()}")
@@ -400,7 +406,7 @@ class MavsdkDrone:
             z=pose.position_m[2],
             yaw=pose.yaw_rad,
             velocity_arena_m_s=self._alignment.vector(sample.velocity_ned_m_s),
-            armed=bool(feed.armed),
+            armed=feed.arming.is_armed(sample.time_us),
             offboard=feed.mode == "OFFBOARD",
             mode=feed.mode,
             landed=feed.landed,
@@ -429,11 +435,14 @@ class MavsdkDrone:
     def _check_state(self, state: DroneState) -> None:
         if not all(one.is_finite for one in (*state.missed, state)):
             raise DroneError("the vehicle's position, velocity or attitude is not finite")
+        if self._commanding and self._feed.arming.is_overdue(state.time_us):
+            raise DroneError(self._feed.not_shown("arming", CONFIRM_S))
         if not self._commanding or self._pilot_has_it:
             return
-        if not state.armed:
+        leaves = not state.offboard and state.mode not in PILOT_MODES
+        if not state.armed or (leaves and not self._feed.armed):
             raise DroneError(f"the vehicle was disarmed by others{self._feed.recent_texts()}")
-        if not state.offboard and state.mode not in PILOT_MODES:
+        if leaves:
             texts = self._feed.recent_texts()
             raise DroneError(f"the pilot or a failsafe took over: mode {state.mode}{texts}")
         self._pilot_has_it = not state.offboard
@@ -456,11 +465,7 @@ class MavsdkDrone:
         try:
             await self._until(shown, CONFIRM_S)
         except TimeoutError:
-            armed = "armed" if feed.armed else "disarmed"
-            raise DroneError(
-                f"{what} was acknowledged, but telemetry still shows mode {feed.mode}, {armed} "
-                f"after {CONFIRM_S:g} s{feed.recent_texts()}"
-            ) from None
+            raise DroneError(feed.not_shown(what, CONFIRM_S)) from None
 
     async def _becomes(self, condition: Callable[[], bool], limit_s: float) -> bool:
         with contextlib.suppress(TimeoutError):
@@ -486,12 +491,6 @@ class MavsdkDrone:
                 self._stream.request_hold_blocking()
             else:
                 self._stream.end()
-
-
-def _synchronous(wrapper: Any) -> Any:  # noqa: ANN401 - MAVSDK is untyped
-    """The synchronous object inside one of MAVSDK's asyncio wrappers; they have no public access to it."""
-    inner = getattr(wrapper, "_plugin", None)
-    return wrapper._system if inner is None else inner
 
 
 def _log(level: Any, message: str, _file: object, _line: object) -> bool:  # noqa: ANN401

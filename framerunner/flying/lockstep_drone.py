@@ -24,6 +24,7 @@ from framerunner.flying.response import LateResponse
 from geometry.axes import Alignment, Pose
 from geometry.rotations import quaternion_from_euler
 from geometry.vectors import Vec3
+from offboard.arming import Arming
 from offboard.drone import DroneError, DroneState, VelocityCommand
 from scenarios.models import TrueState
 from sitl.simulation import Simulation
@@ -92,7 +93,7 @@ class LockstepDrone:
         self._velocity_ned_m_s: Vec3 = (0.0, 0.0, 0.0)
         self._tick_us = TICK_US
         self._sample: DroneState | None = None
-        self._armed = False
+        self._arming = Arming()
         self._mode = FlightMode.HOLD
         self._command = VelocityCommand()
         self._commanding = False
@@ -141,17 +142,19 @@ class LockstepDrone:
         vx, vy, vz = state.velocity_arena_m_s
         if not isfinite(state.x + state.y + state.z + state.yaw + vx + vy + vz + sum(state.attitude_arena)):
             raise DroneError("the vehicle's position, velocity or attitude is not finite")
+        if self._commanding and self._arming.is_overdue(state.time_us):
+            raise _not_shown("arming", self._mode, self._arming, self._autopilot)
         if self._commanding and not (state.armed and state.offboard):
             what = (
                 f"the pilot or a failsafe took over: mode {state.mode}"
-                if state.armed
+                if self._arming.shown
                 else "the vehicle was disarmed by others"
             )
             raise DroneError(what + _vehicle_texts(self._autopilot))
         return state
 
-    async def motors_on(self) -> None:
-        """Enter offboard with zero setpoints, then arm; both are confirmed by a heartbeat."""
+    async def motors_on(self, *, confirmed: bool = True) -> None:
+        """Enter offboard with zero setpoints, which a heartbeat confirms, then arm; see `Drone.motors_on`."""
         self._send(VelocityCommand())
         self._pass(STREAM_BEFORE_OFFBOARD_US)
         self._confirm(
@@ -159,21 +162,28 @@ class LockstepDrone:
             self._autopilot.set_mode(FlightMode.OFFBOARD),
             lambda: self._mode is FlightMode.OFFBOARD,
         )
-        self._confirm("arming", self._autopilot.arm(), lambda: self._armed)
+        self._confirm("arming", self._autopilot.arm(), lambda: bool(self._arming.shown) or not confirmed)
+        self._arming.acknowledge(self._autopilot.state.time_us + CONFIRM_LIMIT_US)
         self._commanding = True
 
     async def motors_off(self) -> None:
         """Stop the motors at once (forced disarm), in the air too."""
         self._stop_commanding()
-        self._confirm("stopping the motors", self._autopilot.disarm(force=True), lambda: not self._armed)
+        self._arming.forget()
+        answer = self._autopilot.disarm(force=True)
+        self._confirm("stopping the motors", answer, lambda: self._arming.shown is False)
 
     async def land(self) -> None:
         """Let the vehicle land until it has disarmed itself; DroneError if the landing is aborted."""
+
+        def armed() -> bool:
+            return self._arming.is_armed(self._autopilot.state.time_us)
+
         self._stop_commanding()
         landing = self._autopilot.land()
-        self._confirm("landing", landing, lambda: self._mode is FlightMode.LAND or not self._armed)
-        ended = self._pass(LAND_LIMIT_US, until=lambda: not self._armed or self._mode is not FlightMode.LAND)
-        if self._armed and ended:
+        self._confirm("landing", landing, lambda: self._mode is FlightMode.LAND or not armed())
+        ended = self._pass(LAND_LIMIT_US, until=lambda: not armed() or self._mode is not FlightMode.LAND)
+        if armed() and ended:
             texts = _vehicle_texts(self._autopilot)
             raise DroneError(f"landing was interrupted: mode {self._mode.name}{texts}")
         if not ended:
@@ -245,7 +255,7 @@ class LockstepDrone:
             self._send(self._command)
         if now_us >= self._heartbeat_us:
             self._heartbeat_us += HEARTBEAT_US
-            self._armed = self._autopilot.status.armed
+            self._arming.see_heartbeat(self._autopilot.status.armed)
             self._mode = self._autopilot.status.mode
         if now_us >= self._tick_us:
             self._tick_us += TICK_US
@@ -272,11 +282,7 @@ class LockstepDrone:
             raise DroneError(f"{what} was refused: {answer.name}{_vehicle_texts(self._autopilot)}")
         self._pass(self._delay_us)
         if not self._pass(CONFIRM_LIMIT_US, until=shown):
-            armed = "armed" if self._armed else "disarmed"
-            raise DroneError(
-                f"{what} was acknowledged, but telemetry still shows mode {self._mode.name}, {armed} "
-                f"after {CONFIRM_LIMIT_US / 1e6:g} s{_vehicle_texts(self._autopilot)}"
-            )
+            raise _not_shown(what, self._mode, self._arming, self._autopilot)
 
     def _reported_state(self, alignment: Alignment) -> DroneState:
         """The state as telemetry shows it: heading now, position and mode as of their last messages."""
@@ -289,7 +295,7 @@ class LockstepDrone:
             *pose.position_m,
             pose.yaw_rad,
             alignment.vector(self._velocity_ned_m_s),
-            self._armed,
+            self._arming.is_armed(state.time_us),
             self._mode is FlightMode.OFFBOARD,
             self._mode.name,
             self._autopilot.status.landed_state is LandedState.ON_GROUND,
@@ -306,6 +312,15 @@ def _request(autopilot: Autopilot, velocity_level_m_s: Vec3, yaw_rate_rad_s: flo
         autopilot.say(CRITICAL, setpoint.text)
     else:
         autopilot.accept_setpoint(setpoint)
+
+
+def _not_shown(what: str, mode: FlightMode, arming: Arming, autopilot: Autopilot) -> DroneError:
+    """The error of a request that was acknowledged and had no effect within the limit."""
+    armed = "armed" if arming.shown else "disarmed"
+    return DroneError(
+        f"{what} was acknowledged, but telemetry still shows mode {mode.name}, {armed} "
+        f"after {CONFIRM_LIMIT_US / 1e6:g} s{_vehicle_texts(autopilot)}"
+    )
 
 
 def _vehicle_texts(autopilot: Autopilot) -> str:

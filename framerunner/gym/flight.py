@@ -38,7 +38,7 @@ class SteppedFlight:
         self.ended = ""  # why the drone can no longer be flown; empty while it can
         self.failed_order = False  # a frame was crossed in the wrong order
         run_through(self._drone.ready())
-        run_through(self._drone.motors_on())
+        run_through(self._drone.motors_on(confirmed=False))
         self.state: DroneState = self._drone.next_state()  # by telemetry, as of the present tick
 
     @property

@@ -35,9 +35,8 @@ class SetpointStream:
     def __init__(self, plugin: OffboardAsync) -> None:
         self.ended = False
         self._plugin = plugin
-        # The synchronous plugin inside; there is no public access to it. It stores four numbers (5 us); the
-        # asyncio one takes an executor job (190 us).
-        self._direct: Any = plugin._plugin
+        # It stores four numbers (5 us); the asyncio one takes an executor job (190 us).
+        self._direct: Any = synchronous(plugin)
         self._setpoint = VelocityBodyYawspeed(0.0, 0.0, 0.0, 0.0)
         self._lock = threading.Lock()  # the watchdog's thread uses it, too
 
@@ -97,3 +96,9 @@ class PendingRequests:
         self._pending.discard(future)
         if not future.cancelled():
             future.exception()  # read, so that asyncio does not warn if the wait was cancelled
+
+
+def synchronous(wrapper: Any) -> Any:  # noqa: ANN401 - MAVSDK is untyped
+    """The synchronous object inside one of MAVSDK's asyncio wrappers; they have no public access to it."""
+    inner = getattr(wrapper, "_plugin", None)
+    return wrapper._system if inner is None else inner

@@ -23,6 +23,7 @@ from typing import Any, Protocol
 from mavsdk.asyncio import MavsdkError
 
 from geometry.vectors import Vec3
+from offboard.arming import Arming
 from offboard.drone import VelocityCommand
 from wire.mission_tunnel import TEXT_PREFIX
 from wire.vehicle_telemetry import MessageOrder
@@ -67,7 +68,7 @@ class TelemetryFeed:
         self.position_ned_m: Vec3 = (0.0, 0.0, 0.0)
         self.velocity_ned_m_s: Vec3 = (0.0, 0.0, 0.0)
         self.position_us = 0
-        self.armed: bool | None = None  # from the last heartbeat; None before the first
+        self.arming = Arming()  # with the heartbeats
         self.mode = ""  # name of the flight mode, such as "OFFBOARD"
         self.landed = True  # from EXTENDED_SYS_STATE
         self.health: Any = None  # MAVSDK's; None before the first
@@ -145,6 +146,19 @@ class TelemetryFeed:
         texts = list(dict.fromkeys(text for at, text in list(self._texts) if at >= since))
         return f"; the vehicle says: {' | '.join(texts)}" if texts else ""
 
+    @property
+    def armed(self) -> bool | None:
+        """By the last heartbeat; None if none counts yet."""
+        return self.arming.shown
+
+    def not_shown(self, what: str, limit_s: float) -> str:
+        """The message about a request that was acknowledged and had no effect within a time, seconds."""
+        armed = "armed" if self.armed else "disarmed"
+        return (
+            f"{what} was acknowledged, but telemetry still shows mode {self.mode}, {armed} "
+            f"after {limit_s:g} s{self.recent_texts()}"
+        )
+
     def missing(self) -> list[str]:
         """What has not been received yet, or what prevents arming; empty if the vehicle is ready."""
         health = self.health
@@ -197,7 +211,7 @@ class TelemetryFeed:
         self.positions += 1
 
     def _on_armed(self, armed: bool, _user: object) -> None:
-        self.armed = bool(armed)
+        self.arming.see_heartbeat(bool(armed))
         self._heartbeat_received_s = self._clock()  # MAVSDK calls this with each heartbeat
 
     def _on_mode(self, mode: Any, _user: object) -> None:  # noqa: ANN401

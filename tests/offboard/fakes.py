@@ -55,6 +55,7 @@ class KinematicDrone:
         self.pitch = self.roll = 0.0  # nose down, left side down: it tilts to accelerate and against drag
         self.command_now = VelocityCommand()
         self.armed = False
+        self.confirmed: bool | None = None  # as `motors_on` was last asked
         self.commands: list[VelocityCommand] = []
         self.time_us = 1_000_000
         self.path: list[tuple[float, float, float]] = []
@@ -70,8 +71,9 @@ class KinematicDrone:
     async def ready(self) -> None:
         self.calls.append("ready")
 
-    async def motors_on(self) -> None:
+    async def motors_on(self, *, confirmed: bool = True) -> None:
         self.calls.append("motors_on")
+        self.confirmed = confirmed
         self.armed = True
 
     async def motors_off(self) -> None:

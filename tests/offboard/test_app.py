@@ -9,13 +9,16 @@ from textwrap import dedent
 import numpy as np
 import pytest
 
+from framerunner.flying.plan import FlightPlan
 from offboard.app import fly_mission
 from offboard.drone import DroneError
 from offboard.engine import MissionEngine
 from offboard.mission import load_mission
+from offboard.navigation.navigator import Navigator
 from offboard.navigation.view import NavigationView
 from offboard.perception import IMAGES_KEPT, CameraLostError, CameraPerception
 from offboard.pilot import Pilot
+from scenarios.loader import load_scenario
 from tests.offboard.fakes import START_1, TEST_CASE_1, GeometricPerception, KinematicDrone, NoCamera
 from vision.types import CameraFrame, Detections
 
@@ -79,7 +82,7 @@ async def test_an_error_before_the_flight_is_raised_and_all_is_closed(step, monk
 async def test_motors_on_refused_is_an_outcome_and_holds(monkeypatch):
     drone, perception = starting()
 
-    async def refuse():
+    async def refuse(*, confirmed):
         raise DroneError("arming was refused: COMMAND_DENIED")
 
     monkeypatch.setattr(drone, "motors_on", refuse)
@@ -87,6 +90,39 @@ async def test_motors_on_refused_is_an_outcome_and_holds(monkeypatch):
     assert "COMMAND_DENIED" in outcome.reason
     assert drone.calls[-2:] == ["hold", "close"]
     assert drone.commands == []
+
+
+@pytest.mark.parametrize(
+    ("mission", "confirmed"),
+    [("frame_challenge", True), ("explorer", False), ("explorer_soft_landing", False)],
+)
+async def test_only_missions_without_a_map_wait_until_telemetry_shows_the_motors_on(mission, confirmed):
+    plan = FlightPlan(load_scenario("test-case-1"), load_mission(mission))
+    drone = KinematicDrone(*START_1)
+    sent = []
+    observe = Navigator.observe
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(
+            Navigator,
+            "observe",
+            lambda nav, state, images, given: (sent.append(given), observe(nav, state, images, given)),
+        )
+        outcome = await fly_mission(drone, Blind(), plan.chart, limit_s=0.2, surroundings=plan.surroundings)
+    assert (outcome.ended, outcome.pauses) == ("timed out", 0)
+    assert drone.confirmed is confirmed
+    if not confirmed:  # the first command is given after the first tick, and holds from the second tick on
+        assert sent[:2] == [None, None]
+        assert sent[2] == drone.commands[1]
+
+
+class Blind(NoCamera):
+    """No images, for missions with a map."""
+
+    def take(self) -> tuple[Detections, ...]:
+        return ()
+
+    def space_images(self, period_s: float) -> None:
+        pass
 
 
 class Breaking(Pilot):

@@ -292,6 +292,75 @@ async def test_disarming_by_others_is_noticed(vehicle):
         assert "disarmed by others" in await until_error(ticks)
 
 
+@asynccontextmanager
+async def armed_by_acknowledgement(vehicle):
+    """A drone whose heartbeats say that it is disarmed, while it flies, and its ticks."""
+    vehicle.tells_disarmed = True
+    async with connected(vehicle) as drone:
+        ticks = drone.ticks()
+        await drone.motors_on(confirmed=False)
+        assert vehicle.armed
+        assert drone._feed.mode == "OFFBOARD"  # this is confirmed in any case, before arming
+        drone.command(VelocityCommand(up_m_s=1.0))
+        yield drone, ticks
+
+
+async def test_it_flies_with_the_acknowledgement_of_arming_whatever_older_heartbeats_say(vehicle):
+    async with armed_by_acknowledgement(vehicle) as (drone, ticks):
+        states = await take(ticks, 30)  # 1.5 s with three heartbeats
+        assert not drone._feed.armed
+        assert all(state.armed and state.offboard for state in states)
+        assert states[-1].z > START[2] + 1.0
+        vehicle.tells_disarmed = False
+        await until(ticks, lambda _: drone._feed.armed)
+        await take(ticks, 5)
+        vehicle.armed = False
+        assert "disarmed by others" in await until_error(ticks)
+
+
+async def test_an_arming_that_no_heartbeat_shows_ends_the_flight_after_the_limit(vehicle, monkeypatch):
+    monkeypatch.setattr("offboard.mavsdk_drone.CONFIRM_S", 1.2)
+    async with armed_by_acknowledgement(vehicle) as (_, ticks):
+        before_s = vehicle.time_s
+        assert all(state.armed for state in await take(ticks, 10))
+        error = await until_error(ticks)
+        assert error.startswith("arming was acknowledged, but telemetry still shows mode OFFBOARD, disarmed")
+        assert vehicle.time_s - before_s == pytest.approx(1.2, abs=0.3)
+
+
+async def test_a_heartbeat_after_the_acknowledgement_that_shows_it_disarmed_ends_the_flight(vehicle):
+    async with armed_by_acknowledgement(vehicle) as (_, ticks):
+        vehicle.armed, vehicle.mode = False, (4, 3)
+        assert "disarmed by others" in await until_error(ticks)
+
+
+async def test_a_pilot_who_takes_over_before_a_heartbeat_has_shown_the_arming_has_an_armed_vehicle(vehicle):
+    async with armed_by_acknowledgement(vehicle) as (_, ticks):
+        vehicle.mode = (POSCTL, 0)
+        state = await until(ticks, lambda state: not state.offboard)
+        assert (state.mode, state.armed) == ("POSCTL", True)
+
+
+async def test_before_a_heartbeat_has_shown_the_arming_the_vehicle_lands_until_one_shows_it_disarmed(vehicle):
+    async with armed_by_acknowledgement(vehicle) as (drone, ticks):
+        await take(ticks, 16)
+        landing = asyncio.create_task(drone.land())
+        await drone._until(lambda: drone._feed.mode == "LAND", 3.0)
+        assert not landing.done()
+        vehicle.tells_disarmed = False
+        await landing
+        assert not vehicle.armed
+        assert vehicle.position[2] == 0.0
+
+
+async def test_before_a_heartbeat_has_shown_the_arming_the_motors_can_be_stopped(vehicle):
+    async with armed_by_acknowledgement(vehicle) as (drone, ticks):
+        await take(ticks, 3)
+        await drone.motors_off()
+        assert not vehicle.armed
+        assert not (await anext(ticks)).armed
+
+
 async def test_positions_that_are_not_finite_are_refused(vehicle):
     async with connected(vehicle) as drone:
         ticks = drone.ticks()

@@ -34,6 +34,7 @@ class UdpVehicle(threading.Thread):
         self.ignore_modes = False
         self.mute = False
         self.heartbeats = True
+        self.tells_disarmed = False  # in heartbeats, armed or not
         self.deaf_s = 0.0  # vehicle time until which commands are lost
         self.swap = False  # ten times a second an attitude comes after the next one
         self.setpoints: list[tuple[float, float, float, float, float]] = []  # wall time, vx, vy, vz, yaw rate
@@ -95,9 +96,10 @@ class UdpVehicle(threading.Thread):
     def _tell(self, step: int) -> None:
         now_ms = round(self.time_s * 1000)
         if step % 50 == 1 and self.heartbeats:
-            base = (128 if self.armed else 0) | (1 if self.mode[0] == OFFBOARD else 29)
+            told = self.armed and not self.tells_disarmed
+            base = (128 if told else 0) | (1 if self.mode[0] == OFFBOARD else 29)
             custom = self.mode[0] << 16 | self.mode[1] << 24
-            self._mav.heartbeat_send(2, 12, base, custom, 4 if self.armed else 3)
+            self._mav.heartbeat_send(2, 12, base, custom, 4 if told else 3)
         for stamp_ms in self._stamps(step, now_ms):
             self._mav.attitude_send(stamp_ms, 0, 0, self.yaw, 0, 0, 0)
         if step % 2 == 0:

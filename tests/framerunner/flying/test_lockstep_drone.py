@@ -68,6 +68,84 @@ async def test_motors_run_only_in_offboard_and_a_velocity_holds_until_changed(dr
     assert vz == pytest.approx(0.4, abs=0.02)
 
 
+async def first_tick_after_arming(drone, simulation, *, confirmed=False):
+    """The first state after motors on, and for how long the motors had run then, seconds."""
+    began_us = []
+    tick = simulation.tick
+
+    def noted():
+        tick()
+        if not began_us and simulation.autopilot.status.armed:
+            began_us.append(simulation.time_us)
+
+    simulation.tick = noted
+    await drone.ready()
+    await drone.motors_on(confirmed=confirmed)
+    drone.command(VelocityCommand(up_m_s=1.0))
+    state = await anext(drone.ticks())
+    return state, (state.time_us - began_us[0]) / 1e6
+
+
+@pytest.mark.parametrize(("confirmed", "least_s", "most_s"), [(False, 0.0, 0.06), (True, 0.9, 1.06)])
+async def test_it_flies_with_the_acknowledgement_or_when_a_heartbeat_has_confirmed_it(
+    drone, simulation, confirmed, least_s, most_s
+):
+    state, since_s = await first_tick_after_arming(drone, simulation, confirmed=confirmed)
+    assert least_s <= since_s <= most_s
+    assert state.armed and state.offboard
+    heights_m = [state.z for state in await fly(drone, VelocityCommand(up_m_s=1.0), 15)]
+    assert heights_m[-1] > START[2] + 0.3
+
+
+async def test_until_a_heartbeat_has_shown_it_the_drone_is_armed_and_no_pilot_has_it(drone, simulation):
+    await first_tick_after_arming(drone, simulation)
+    states = await fly(drone, VelocityCommand(up_m_s=0.5), 50)
+    assert all(state.armed and state.offboard for state in states)
+    simulation.autopilot.disarm(force=True)
+    with pytest.raises(DroneError, match="the vehicle was disarmed by others"):
+        await fly(drone, VelocityCommand(), 25)
+
+
+async def test_a_heartbeat_after_the_acknowledgement_that_shows_it_disarmed_ends_the_flight(
+    drone, simulation
+):
+    await first_tick_after_arming(drone, simulation)
+    simulation.autopilot.disarm(force=True)
+    with pytest.raises(DroneError, match=r"the vehicle was disarmed by others; .*Disarmed by external"):
+        await fly(drone, VelocityCommand(), 25)
+
+
+async def test_an_arming_that_no_heartbeat_shows_ends_the_flight_after_the_limit(drone, simulation):
+    see = drone._arming.see_heartbeat
+    drone._arming.see_heartbeat = lambda _: see(False)
+    first, _ = await first_tick_after_arming(drone, simulation)
+    states = await fly(drone, VelocityCommand(), 118)
+    assert all(state.armed and state.offboard for state in states)
+    assert (states[-1].time_us - first.time_us) / 1e6 == pytest.approx(5.9, abs=0.01)
+    told = "arming was acknowledged, but telemetry still shows mode OFFBOARD, disarmed after 6 s; .*Armed"
+    with pytest.raises(DroneError, match=told):
+        await fly(drone, VelocityCommand(), 4)
+
+
+async def test_before_a_heartbeat_has_shown_the_motors_on_they_can_be_stopped(drone, simulation):
+    await first_tick_after_arming(drone, simulation)
+    before_us = simulation.time_us
+    await drone.motors_off()
+    assert not simulation.autopilot.status.armed
+    assert (simulation.time_us - before_us) / 1e6 > 0.5  # a heartbeat has shown it
+    assert not (await anext(drone.ticks())).armed
+
+
+async def test_before_a_heartbeat_has_shown_the_motors_on_the_drone_can_land(drone, simulation):
+    await first_tick_after_arming(drone, simulation)
+    await fly(drone, VelocityCommand(up_m_s=1.0), 14)
+    assert drone._arming.shown is False
+    await drone.land()
+    assert not simulation.autopilot.status.armed
+    drone.settle()
+    assert simulation.referee.settled
+
+
 async def test_motors_off_land_and_hold(drone, simulation):
     assert (await in_the_air(drone))[-1].z > START[2] + 0.5
     await drone.hold()

@@ -21,7 +21,7 @@ def command(tick):
 async def flown_by_a_mission():
     drone = LockstepDrone(Simulation(load_scenario("empty")), START)
     await drone.ready()
-    await drone.motors_on()
+    await drone.motors_on(confirmed=False)
     states = []
     async for state in drone.ticks():
         states.append(state)
@@ -34,7 +34,7 @@ async def flown_by_a_mission():
 def test_its_states_are_those_of_a_mission_s_ticks():
     drone = LockstepDrone(Simulation(load_scenario("empty")), START)
     run_through(drone.ready())
-    run_through(drone.motors_on())
+    run_through(drone.motors_on(confirmed=False))
     states = [drone.next_state()]
     while len(states) < TICKS:
         drone.command(command(len(states)))
