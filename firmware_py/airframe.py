@@ -6,7 +6,7 @@ file in `firmware_py/airframes/`.
 
 from __future__ import annotations
 
-from functools import cached_property
+from functools import cached_property, lru_cache
 from importlib import resources
 from math import cos, inf, sin
 from pathlib import Path
@@ -19,6 +19,8 @@ from errors import UserError
 from geometry.vectors import Vec3
 
 GRAVITY_M_S2 = 9.80665
+
+_AIRFRAMES_KEPT = 8
 
 ParameterName = Annotated[str, StringConstraints(pattern=r"^[A-Z][A-Z0-9_]{0,15}$")]
 """A parameter's name, by the limits of PX4 and MAVLink."""
@@ -130,6 +132,11 @@ class Airframe(_Part):
     )
     envelope_m: Vec3 = Field(description="length, width, height of the box around it, centred on the mass")
 
+    def __hash__(self) -> int:
+        """Without the parameters, which have no hash; what is designed from an airframe is kept by it."""
+        parts = (self.motor, self.rotors, self.drag, self.limits, self.stabiliser)
+        return hash((self.name, self.mass_kg, self.inertia_kg_m2, *parts))
+
     @model_validator(mode="after")
     def _can_fly(self) -> Self:
         if self.hover_speed_rad_s >= self.motor.max_speed_rad_s:
@@ -191,13 +198,19 @@ def load_airframe(name_or_path: str) -> Airframe:
                 f"airframe: no '{name_or_path}'; there are {', '.join(known)}, or give a file"
             )
         text = (folder / f"{name_or_path}.yaml").read_text(encoding="utf-8")
+    return _read(name_or_path, text)
+
+
+@lru_cache(_AIRFRAMES_KEPT)
+def _read(name: str, text: str) -> Airframe:
+    """The airframe that a file's text declares; `name` is for messages."""
     try:
         return Airframe.model_validate(yaml.safe_load(text))
     except yaml.YAMLError as error:
-        raise AirframeError(f"airframe {name_or_path}: not YAML: {str(error).splitlines()[0]}") from error
+        raise AirframeError(f"airframe {name}: not YAML: {str(error).splitlines()[0]}") from error
     except ValidationError as error:
         first = error.errors()[0]
         where = ".".join(str(part) for part in first["loc"]) or "airframe"
         raise AirframeError(
-            f"airframe {name_or_path}: {where}: {first['msg']} (got {first['input']!r:.60})"
+            f"airframe {name}: {where}: {first['msg']} (got {first['input']!r:.60})"
         ) from error

@@ -98,15 +98,12 @@ def euler_from_quaternion(attitude: Quaternion) -> Vec3:
 
 def quaternion_from_euler(roll_rad: float, pitch_rad: float, yaw_rad: float) -> Quaternion:
     """Attitude from Euler angles: the product of the three half-angle quaternions, yaw first."""
-    cr, sr = cos(roll_rad / 2), sin(roll_rad / 2)
-    cp, sp = cos(pitch_rad / 2), sin(pitch_rad / 2)
-    cy, sy = cos(yaw_rad / 2), sin(yaw_rad / 2)
-    return (
-        cr * cp * cy + sr * sp * sy,
-        sr * cp * cy - cr * sp * sy,
-        cr * sp * cy + sr * cp * sy,
-        cr * cp * sy - sr * sp * cy,
-    )
+    half_roll, half_pitch, half_yaw = roll_rad / 2, pitch_rad / 2, yaw_rad / 2
+    cr, sr = cos(half_roll), sin(half_roll)
+    cp, sp = cos(half_pitch), sin(half_pitch)
+    cy, sy = cos(half_yaw), sin(half_yaw)
+    crcp, srsp, srcp, crsp = cr * cp, sr * sp, sr * cp, cr * sp
+    return (crcp * cy + srsp * sy, srcp * cy - crsp * sy, crsp * cy + srcp * sy, crcp * sy - srsp * cy)
 
 
 def quaternion_from_yaw(yaw_rad: float) -> Quaternion:

@@ -23,12 +23,14 @@ class Solid:
 
     def is_within(self, reach_m: float, point_m: Vec3) -> bool:
         """Whether a point (arena axes) is inside the box or nearer to it than a distance."""
-        offset = self.offset(point_m)
-        square = 0.0
-        for along, half in zip(offset, self.half_extents_m, strict=True):
-            beyond = abs(along) - half
-            if beyond > 0.0:
-                square += beyond * beyond
+        x, y, z = self.offset(point_m)
+        a, b, c = self.half_extents_m
+        x, y, z = abs(x) - a, abs(y) - b, abs(z) - c
+        square = x * x if x > 0.0 else 0.0
+        if y > 0.0:
+            square += y * y
+        if z > 0.0:
+            square += z * z
         return square < reach_m * reach_m
 
     def distance_m(self, point_m: Vec3) -> float:

@@ -39,12 +39,17 @@ _BETTER = 0.7  # share of the present pair's error that another one must reach
 _LITTLE_ENERGY = 0.03  # is enough where a vehicle is known to be late, and a pair is
 _MUCH_BETTER = 0.3  # by this share
 _CLEARLY_BETTER = 0.5  # likewise for axes that turn: those of vehicles that answer late seldom do
-_LATE_S = (0.65, 0.3, 0.3)  # level, climb, yaw: beyond this in all a vehicle answers late
+_LATE_S = (0.65, 0.31, 0.31)  # level, climb, yaw: beyond this in all a vehicle answers late
+_LATE_SHARE = 0.4  # of the error of the best pair that is not late: a late one must reach it
+_SURE = 3  # choices in a row after which a vehicle is known to be late
 _DISTURBANCE_S = 0.4  # time constant of the estimate of what commands do not explain
 _LEADS = np.array((0.0, 0.0, 0.7))  # shares by which its change is expected to go on: heights wander slowly
 _X, _Y, _FORWARD, _LEFT, _UP, _TURN = range(6)
 _GROUPS = ((_X, _Y), (_FORWARD, _LEFT), (_UP,), (_TURN,))
 _MEMBERS = np.array([[float(axis in group) for group in _GROUPS] for axis in range(6)])
+
+_TIMES_S = np.array([dead * STEP_S + lag_s for dead in DEAD_STEPS for lag_s in LAGS_S])
+_PROMPT = [limit_s >= _TIMES_S for limit_s in _LATE_S]  # pairs of each channel that are not late
 
 
 @dataclass(frozen=True, slots=True)
@@ -119,6 +124,7 @@ class ResponseEstimate:
         shape = (len(DEAD_STEPS), len(LAGS_S), len(_GROUPS))
         self._errors = np.zeros(shape)
         self._energies = np.zeros(len(_GROUPS))
+        self._late_choices = 0  # in a row
         self._second_before: tuple[int, int] | None = None
         self._second = SecondLag(shape[:2], STEP_S, _WINDOW)
         self._kept = np.array([exp(-STEP_S / lag_s) for lag_s in LAGS_S])[:, None]
@@ -133,8 +139,8 @@ class ResponseEstimate:
         self._measured: deque[Array] = deque(maxlen=_WINDOW + 1)
         self._second.restart()
         self._airborne_steps = self._uncompared = 0
-        self._disturbance = np.zeros(3)
-        self._disturbance_rate = np.zeros(3)
+        self._disturbance = [0.0, 0.0, 0.0]  # arena axes, m/s
+        self._disturbance_rate = [0.0, 0.0, 0.0]
 
     def update(self, state: DroneState, sent: VelocityCommand | None) -> None:
         """Add a tick.
@@ -154,8 +160,9 @@ class ResponseEstimate:
         turn_rate = remainder(state.yaw - self._yaw, 2 * pi) / (now_s - self._last_s)
         self._last_s += steps * STEP_S
         self._last_s += 0.2 * (now_s - self._last_s)
-        commanded = _in_all_axes(sent, self._yaw)
-        measured = _measured(state, turn_rate)
+        commanded = np.array(_in_all_axes(sent, self._yaw))
+        moves = _measured(state, turn_rate)
+        measured = np.array(moves)
         self._yaw = state.yaw
         compared = False
         for _ in range(steps):
@@ -176,7 +183,7 @@ class ResponseEstimate:
                     compared = True
         if compared:
             self._choose()
-        self._observe_disturbance(measured, steps)
+        self._observe_disturbance((moves[_X], moves[_Y], moves[_UP]), steps)
 
     def _compare(self, period_s: float) -> None:
         """Add the errors of all predictions of the change over the window; they count for a period."""
@@ -205,8 +212,9 @@ class ResponseEstimate:
         """Take pairs, and axes, that explain what was measured clearly better than the present ones."""
         before = (self._turning, self._second_before, *self._chosen)
         errors = self._errors.reshape(-1, len(_GROUPS))
-        least: list[float] = errors.min(axis=0).tolist()
-        best = [divmod(pair, len(LAGS_S)) for pair in errors.argmin(axis=0).tolist()]
+        pairs: list[int] = errors.argmin(axis=0).tolist()
+        least = [float(errors[pair, group]) for group, pair in enumerate(pairs)]
+        best = [divmod(pair, len(LAGS_S)) for pair in pairs]
         energies: list[float] = self._energies.tolist()
         if energies[0] > (_LITTLE_ENERGY if self.response.late else _MIN_ENERGY[0]):
             dead, lag = best[0]
@@ -220,13 +228,28 @@ class ResponseEstimate:
             if least[group] < _BETTER * present:
                 self._chosen[channel] = best[group]
         self._second_before = self._second.chosen
-        if (self._turning, self._second_before, *self._chosen) != before:
-            self.response = self._as_response()
+        seems_late = self._seems_late(errors)
+        self._late_choices = self._late_choices + 1 if seems_late else 0
+        is_late = seems_late and (self.response.late or self._late_choices >= _SURE)
+        if is_late != self.response.late or (self._turning, self._second_before, *self._chosen) != before:
+            self.response = self._as_response() if is_late else Response()
+
+    def _seems_late(self, errors: Array) -> bool:
+        """Whether a pair chosen is that of a late vehicle, and no pair that is not late fits nearly as well.
+
+        A drone that is flown at its limits does not follow as a lag would: then many pairs fit about as well.
+        """
+        for channel, group in enumerate((1 if self._turning else 0, 2, 3)):
+            dead, lag = self._chosen[channel]
+            if DEAD_STEPS[dead] * STEP_S + LAGS_S[lag] <= _LATE_S[channel]:
+                continue
+            shorter = float(errors[_PROMPT[channel], group].min())
+            if self.response.late or float(errors[:, group].min()) < _LATE_SHARE * shorter:
+                return True
+        return False
 
     def _as_response(self) -> Response:
         pairs = [(DEAD_STEPS[dead] * STEP_S, LAGS_S[lag]) for dead, lag in self._chosen]
-        if not any(sum(pair) > late_s for pair, late_s in zip(pairs, _LATE_S, strict=True)):
-            return Response()
         (level_dead, level_lag), (climb_dead, climb_lag), (yaw_dead, yaw_lag) = pairs
         times = (climb_dead, climb_lag, yaw_dead, yaw_lag)
         if self._second.chosen is not None:
@@ -235,35 +258,35 @@ class ResponseEstimate:
             return Response(*level, *times, turning=False, late=True, own_lag_s=OWN_LAG_S)
         return Response(level_dead, 0.0, level_lag, *times, turning=self._turning, late=True)
 
-    def _observe_disturbance(self, measured: Array, steps: int) -> None:
+    def _observe_disturbance(self, velocity_m_s: Vec3, steps: int) -> None:
         """Filter what the commands do not explain of the velocity now."""
         model = self._model_velocity(lambda dead: self._past[max(len(self._past) - 1 - dead, 0)])
         if self._second.chosen is not None:
-            model[:2] = self._second.velocity(self._second.chosen)
-        share = 1.0 - exp(-steps * STEP_S / _DISTURBANCE_S)
-        now = measured[[_X, _Y, _UP]] - model
-        before = self._disturbance
-        self._disturbance = before + share * (now - before)
-        rate = (self._disturbance - before) / (steps * STEP_S)
-        self._disturbance_rate += share * (rate - self._disturbance_rate)
+            model = (*self._second.velocity(self._second.chosen), model[2])
+        time_s = steps * STEP_S
+        share = 1.0 - exp(-time_s / _DISTURBANCE_S)
+        for axis, (measured, explained) in enumerate(zip(velocity_m_s, model, strict=True)):
+            before, rate = self._disturbance[axis], self._disturbance_rate[axis]
+            now = before + share * (measured - explained - before)
+            self._disturbance[axis] = now
+            self._disturbance_rate[axis] = rate + share * ((now - before) / time_s - rate)
 
-    def _model_velocity(self, output: Callable[[int], Array]) -> Array:
+    def _model_velocity(self, output: Callable[[int], Array]) -> Vec3:
         """In arena axes, of the pairs chosen; `output` gives all filters' by the dead time in steps."""
         (level_dead, level_lag), (climb_dead, climb_lag), _ = self._chosen
-        level = output(DEAD_STEPS[level_dead])[level_lag]
-        up = output(DEAD_STEPS[climb_dead])[climb_lag][_UP]
+        x, y, forward, left, _, _ = output(DEAD_STEPS[level_dead])[level_lag].tolist()
+        up = float(output(DEAD_STEPS[climb_dead])[climb_lag, _UP])
         if not self._turning:
-            return np.array([level[_X], level[_Y], up])
+            return (x, y, up)
         c, s = cos(self._yaw), sin(self._yaw)
-        forward, left = level[_FORWARD], level[_LEFT]
-        return np.array([c * forward - s * left, s * forward + c * left, up])
+        return (c * forward - s * left, s * forward + c * left, up)
 
     def predict(self) -> Prediction:
         """What the vehicle will do by the commands of all ticks so far."""
         past = list(self._past) or [self._outputs]
         (level_dead, level_lag), (climb_dead, climb_lag), (yaw_dead, yaw_lag) = self._chosen
-        moved = self._model_velocity(lambda dead: np.sum(past[-dead:], axis=0) * STEP_S)
-        velocity = self._model_velocity(lambda dead: past[-1])
+        moved = np.array(self._model_velocity(lambda dead: np.sum(past[-dead:], axis=0) * STEP_S))
+        velocity = np.array(self._model_velocity(lambda dead: past[-1]))
         turns = [float(row[yaw_lag, _TURN]) * STEP_S for row in past[-DEAD_STEPS[yaw_dead] :]]
         acceleration, second, own_lag_s = (0.0, 0.0), self._second.chosen, 0.0
         if second is not None:
@@ -275,28 +298,29 @@ class ResponseEstimate:
                 second, commanded, self._yaw, all_turns
             )
         dead_s = np.array([DEAD_STEPS[d] * STEP_S for d in (level_dead, level_dead, climb_dead)])
-        moved = moved + dead_s * self._disturbance
-        velocity = velocity + self._disturbance
+        present, change = np.array(self._disturbance), np.array(self._disturbance_rate)
+        moved += dead_s * present
+        velocity += present
         lag_s = LAGS_S[level_lag] + own_lag_s
         ahead_s = dead_s + np.array((lag_s, lag_s, LAGS_S[climb_lag]))
-        disturbance = self._disturbance + (ahead_s + _DISTURBANCE_S) * _LEADS * self._disturbance_rate
+        disturbance = present + (ahead_s + _DISTURBANCE_S) * _LEADS * change
         rate = float(past[-1][yaw_lag, _TURN])
         return Prediction(
             _vector(moved), _vector(velocity), _vector(disturbance), sum(turns), rate, acceleration
         )
 
 
-def _in_all_axes(command: VelocityCommand, yaw_rad: float) -> Array:
+def _in_all_axes(command: VelocityCommand, yaw_rad: float) -> tuple[float, ...]:
     forward, left = command.forward_m_s, command.left_m_s
     c, s = cos(yaw_rad), sin(yaw_rad)
     x, y = c * forward - s * left, s * forward + c * left
-    return np.array([x, y, forward, left, command.up_m_s, command.yaw_rate_rad_s])
+    return (x, y, forward, left, command.up_m_s, command.yaw_rate_rad_s)
 
 
-def _measured(state: DroneState, turn_rate_rad_s: float) -> Array:
+def _measured(state: DroneState, turn_rate_rad_s: float) -> tuple[float, ...]:
     x, y, up = state.velocity_arena_m_s
     c, s = cos(state.yaw), sin(state.yaw)
-    return np.array([x, y, c * x + s * y, c * y - s * x, up, turn_rate_rad_s])
+    return (x, y, c * x + s * y, c * y - s * x, up, turn_rate_rad_s)
 
 
 def _vector(values: Array) -> Vec3:

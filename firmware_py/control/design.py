@@ -9,6 +9,7 @@ at small angles, as in Casado & Bermúdez, Electronics 2021, 10, 7, section 3, i
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 import numpy.typing as npt
@@ -17,6 +18,8 @@ from scipy.linalg import expm, solve_discrete_are
 from firmware_py.airframe import GRAVITY_M_S2, Airframe
 
 Array = npt.NDArray[np.float64]
+
+_DESIGNS_KEPT = 8  # a design takes ten milliseconds, and many flights are of one airframe
 
 
 @dataclass(frozen=True, slots=True)
@@ -120,8 +123,12 @@ class Gains:
     poles: npt.NDArray[np.complex128]
 
 
+@lru_cache(_DESIGNS_KEPT)
 def design(airframe: Airframe, period_s: float) -> Gains:
-    """Design the regulator with integrals of all outputs for an airframe and a control period."""
+    """Design the regulator with integrals of all outputs for an airframe and a control period.
+
+    All callers share the arrays, so they must not be changed.
+    """
     a, b = with_integrals(discretise(hover_model(airframe), period_s), period_s)
     q, r = cost_matrices(airframe)
     k = _regulator(a, b, q, r)
@@ -149,6 +156,7 @@ class Bandwidths:
     poles: npt.NDArray[np.complex128]
 
 
+@lru_cache(_DESIGNS_KEPT)
 def design_bandwidths(airframe: Airframe, period_s: float) -> Bandwidths:
     """Design the nested loops of an airframe, as `design` does but without integrals.
 

@@ -44,6 +44,7 @@ class Mixer:
         self._thrust = float(inverse[0, 0])  # symmetric rotors share the thrust evenly
         self._roll_pitch = [(float(r), float(p)) for _, r, p, _ in inverse]
         self._yaw = [float(y) for _, _, _, y in inverse]
+        self._most_yaw = max(map(abs, self._yaw))
         self._maximum = airframe.motor.max_speed_rad_s**2
         self._minimum = (_IDLE_SHARE * airframe.hover_speed_rad_s) ** 2
         self._full = len(self._yaw) * self._maximum
@@ -61,11 +62,10 @@ class Mixer:
         b = base + (r1 * roll_nm + p1 * pitch_nm)
         c = base + (r2 * roll_nm + p2 * pitch_nm)
         d = base + (r3 * roll_nm + p3 * pitch_nm)
-        y0, y1, y2, y3 = y0 * yaw_nm, y1 * yaw_nm, y2 * yaw_nm, y3 * yaw_nm
-        margin = max(y0, y1, y2, y3, -y0, -y1, -y2, -y3)
+        margin = self._most_yaw * abs(yaw_nm)
         if min(a, b, c, d) - margin < self._minimum or max(a, b, c, d) + margin > self._maximum:
             return self._mix_within_limits(thrust_n, roll_nm, pitch_nm, yaw_nm)
-        a, b, c, d = a + y0, b + y1, c + y2, d + y3
+        a, b, c, d = a + y0 * yaw_nm, b + y1 * yaw_nm, c + y2 * yaw_nm, d + y3 * yaw_nm
         return MotorOutput((sqrt(a), sqrt(b), sqrt(c), sqrt(d)), (a + b + c + d) / self._full)
 
     def wrench(self, speeds_rad_s: MotorSpeeds) -> tuple[float, float, float, float]:

@@ -281,13 +281,15 @@ def _time_s(here: Pose, way: _Way, pace: Pace) -> float:
 
 def _on_the_way(here: Pose, way: _Way, time_s: float, pace: Pace) -> Pose:
     """The pose some time after leaving for a viewpoint; on a way round obstacles, that at its end."""
-    viewpoint, fly_s = way.viewpoint, _fly_s(here, way, pace)
+    viewpoint = way.viewpoint
     if not way.straight:
         return Pose(viewpoint.position_m, viewpoint.yaw_rad)
+    fly_s = _fly_s(here, way, pace)
     share = min(max(time_s - _START_S, 0.0) / fly_s, 1.0) if fly_s > _NO_FLIGHT_S else 1.0
-    x, y, z = (at + share * (to - at) for at, to in zip(here.position_m, viewpoint.position_m, strict=True))
+    (x, y, z), (to_x, to_y, to_z) = here.position_m, viewpoint.position_m
+    place_m = (x + share * (to_x - x), y + share * (to_y - y), z + share * (to_z - z))
     turn_rad = remainder(viewpoint.yaw_rad - here.yaw_rad, tau)
-    return Pose((x, y, z), here.yaw_rad + copysign(min(abs(turn_rad), pace.turn_rad_s * time_s), turn_rad))
+    return Pose(place_m, here.yaw_rad + copysign(min(abs(turn_rad), pace.turn_rad_s * time_s), turn_rad))
 
 
 def _is_clear(viewpoint: Viewpoint, blocked: Sequence[tuple[float, float, float]]) -> bool:

@@ -1,6 +1,6 @@
 """Follows a planned path by velocity commands.
 
-A command is what makes the vehicle fly the path's motion, ahead by its delay, plus a share of the drone's
+A command is what makes the vehicle fly, ahead by its delay, the path's motion and one that closes the drone's
 offset from where the path was when its position was measured. The path's time waits for a drone that falls
 behind, so corners are never cut.
 """
@@ -14,32 +14,42 @@ from math import cos, hypot, pi, remainder, sin
 from geometry.vectors import Vec3
 from offboard.drone import DroneState, VelocityCommand
 from offboard.limits import CONTEST, CommandLimits, clamped
-from offboard.navigation.control.feed_forward import MOTOR_S, SPREAD_S, FeedForward
 from offboard.navigation.control.late_following import (
     GATE_TURN_M,
     MAX_CORRECTION_M_S,
-    WAIT_FROM_M,
     LateFollower,
     rate_before_gate,
     rate_of,
 )
+from offboard.navigation.control.loop_inverse import (
+    ANSWER_S,
+    HOLD_S,
+    SPREAD_S,
+    LoopInverse,
+    Own,
+    axes_of,
+    level_of,
+    thrust_of,
+    tilts_of,
+)
+from offboard.navigation.control.own_motion import OwnMotion
 from offboard.navigation.goals import Motion
 from offboard.navigation.path import Path
 from offboard.response import Prediction, Response
 
-HOLD_S = 0.025  # half the time for which a command holds
-DELAY_S = 0.025  # from a state to the motors, beside
-POSITION_GAINS_PER_S = (1.0, 1.0, 3.5)  # the vehicle follows a climb sooner than a level speed
-VELOCITY_GAIN = 0.3
+DELAY_S = 0.005  # from a state to the autopilot: that of the simulated drone's link, over UDP too
+ACTS_S = DELAY_S + HOLD_S  # from a state to the middle of the time for which its command holds
+OFFSET_GAIN_PER_S2 = 10.0  # an offset in plan is closed within half a second, without swinging
+VELOCITY_GAIN_PER_S = 6.0
+MAX_OFFSET_M = 0.3  # a larger one is closed at the speed of this one
+CLIMB_GAIN_PER_S = 3.5  # an offset in height is closed at this rate
+CLIMB_DAMPING_PER_S = 3.0
 YAW_GAIN_PER_S = 3.0
 GATE_FROM_M = 0.05  # farther from the path across a gate, the drone waits
 COMING_S = 0.3  # for which a wrong velocity goes on
 GATE_S = (0.4, 1.3)  # before a gate the drone must be straight before it; nearer, it cannot stop any more
 MAX_RATE_CHANGE_PER_S = 1.5  # of the path's time
 BRAKE_END_S = 0.25  # in which the last of the speed is braked, so that the drone is not thrown back
-INTEGRAL_GAIN_PER_S2 = 0.2
-MAX_INTEGRAL_M_S = 0.15
-INTEGRAL_REACH_M = 0.15  # farther from the path, the integral does not grow
 _STEADY_S = 0.11  # after a longer step the vehicle's velocity is taken for steady
 _MAX_STEP_S = 0.5  # for so long a vehicle flies on by its last command
 _MOVING_M_S = 0.2
@@ -70,16 +80,19 @@ class PathFollower:
         self._rate = 1.0  # of the path's time
         self._rate_change = 0.0  # per second
         self._turn_rad_s: float | None = None  # of the heading, if it is not the path's
-        self._integral: list[float] = [0.0, 0.0, 0.0]
         self._past: deque[tuple[float, Motion]] = deque(maxlen=_HISTORY)
-        self._feed_forward = FeedForward()
+        self._inverse = LoopInverse()
+        self._own = OwnMotion()
+        self._own_s: float | None = None  # vehicle time of the state last taken in
+        self._own_yaw_rad = 0.0
+        self._sent: VelocityCommand | None = None
 
     @property
     def lead_s(self) -> float:
         """How far ahead of its time the path is commanded already: another one should begin after that."""
         if self._late is not None:
             return self._late.ahead_s - self.progress_s
-        return HOLD_S + DELAY_S + MOTOR_S + SPREAD_S
+        return ACTS_S + ANSWER_S + SPREAD_S
 
     def reference(self) -> Motion | None:
         """The path's motion `lead_s` ahead, to plan the next path from; None before the first command."""
@@ -114,6 +127,28 @@ class PathFollower:
         """The path's end is reached, by its time."""
         return self._path is not None and self.progress_s >= self._path.duration_s
 
+    def observe(self, state: DroneState, now_s: float, sent: VelocityCommand | None) -> None:
+        """Take in a state, also while no path is followed; else `command` does it.
+
+        Args:
+            state: of the drone.
+            now_s: vehicle time of the state.
+            sent: the command that the drone has had since the last tick; None if it had none.
+        """
+        before_s, self._own_s = self._own_s, now_s
+        step_s = 0.0 if before_s is None else now_s - before_s
+        up_m_s2 = self._slowed(self._past[-1][1]).acceleration_m_s2[2] if self._past else 0.0
+        self._own.update(state, up_m_s2)
+        turned_rad = remainder(state.yaw - self._own_yaw_rad, 2 * pi)
+        self._own_yaw_rad = state.yaw
+        known = 0.0 < step_s < _MAX_STEP_S
+        turn_rad_s = turned_rad / step_s if known else 0.0
+        axes = axes_of(state.yaw + ACTS_S * turn_rad_s)
+        forward, left, _ = level_of((*self._own.velocity_in(ACTS_S), 0.0), axes)
+        level_sent = None if sent is None or not known else (sent.forward_m_s, sent.left_m_s)
+        own = Own((forward, left), tilts_of(thrust_of(state)), turn_rad_s)
+        self._inverse.observe(own, level_sent, step_s)
+
     def command(
         self,
         path: Path,
@@ -141,8 +176,10 @@ class PathFollower:
             command = self._command_late(path, state, prediction, step_s)
             return command if turn_rad_s is None else replace(command, yaw_rate_rad_s=turn_rad_s)
         if self._late is not None or step_s > _STEADY_S:
-            self._feed_forward.restart()
+            self._inverse.restart()
         self._late = None
+        if self._own_s != now_s:
+            self.observe(state, now_s, self._sent)
         if path is not self._path:
             self._path, self.progress_s = path, 0.0
         self.progress_s = min(self.progress_s + self._rate * step_s, path.duration_s)
@@ -160,15 +197,8 @@ class PathFollower:
             ),
         )
         self._change_rate(rate, motion, brake_m_s2, step_s)
-        self._integrate(error, motion.velocity_m_s, step_s)
-        correction = [
-            gain * e + VELOCITY_GAIN * v + i
-            for gain, e, v, i in zip(POSITION_GAINS_PER_S, error, slower, self._integral, strict=True)
-        ]
-        size = hypot(*correction)
-        scale = MAX_CORRECTION_M_S / size if size > MAX_CORRECTION_M_S else 1.0
-        x, y, z = (scale * each for each in correction)
-        return self._command_now(path, state, (x, y, z), step_s)
+        self._sent = self._command_now(path, state, (error, slower), step_s)
+        return self._sent
 
     def _change_rate(self, rate: float, motion: Motion, brake_m_s2: float, step_s: float) -> None:
         """Let the path's time go faster or slower, but not suddenly, or brake it to a stop."""
@@ -182,29 +212,46 @@ class PathFollower:
         self._rate_change = (rate - before) / step_s if step_s else 0.0
 
     def _command_now(
-        self, path: Path, state: DroneState, correction_m_s: Vec3, step_s: float
+        self, path: Path, state: DroneState, errors: tuple[Vec3, Vec3], step_s: float
     ) -> VelocityCommand:
-        """The command for the simulated drone; the correction is in arena axes."""
-        ahead_s = DELAY_S + HOLD_S
+        """The command for the simulated drone; the errors are of position and velocity, arena axes."""
         now, before, soon, later = (
-            self._motion_in(path, state, ahead_s + more_s)
-            for more_s in (0.0, MOTOR_S - SPREAD_S, MOTOR_S, MOTOR_S + SPREAD_S)
+            self._motion_in(path, state, ACTS_S + more_s)
+            for more_s in (0.0, ANSWER_S - SPREAD_S, ANSWER_S, ANSWER_S + SPREAD_S)
         )
-        velocity, turn = self._feed_forward.command(now, (before, soon, later))
         off_rad = 0.0
         if self._turn_rad_s is None:
             off_rad = remainder(self._past[-1][1].yaw_rad - state.yaw, 2 * pi)
-        else:
+        closing = self._closing(now, errors, state.position_age_s + ACTS_S)
+        (forward, left, up), turn = self._inverse.command(now, (before, soon, later), closing, off_rad)
+        if self._turn_rad_s is not None:
             turn = self._turn_rad_s
-        forward, left, _ = turned(velocity, off_rad)  # in the drone's axes, which are not the path's
-        x, y, z = turned(correction_m_s, off_rad - now.yaw_rad)
-        turn_more = YAW_GAIN_PER_S * off_rad
-        command = self._limited(forward + x, left + y, velocity[2] + z, turn + turn_more)
-        # What a limit cuts off because of the correction is not made up for: that would wind up.
-        sent = self._limited(forward, left, velocity[2], turn)
-        sent_m_s = turned((sent.forward_m_s, sent.left_m_s, sent.up_m_s), -off_rad)
-        self._feed_forward.sent(sent_m_s, sent.yaw_rate_rad_s, step_s)
+        command = self._limited(forward, left, up, turn + YAW_GAIN_PER_S * off_rad)
+        turn_sent = self._limited(0.0, 0.0, 0.0, turn).yaw_rate_rad_s
+        self._inverse.sent(command.up_m_s, turn_sent, step_s)
         return command
+
+    def _closing(self, now: Motion, errors: tuple[Vec3, Vec3], ahead_s: float) -> tuple[Vec3, Vec3]:
+        """Velocity and acceleration that the drone has, and should have, beside those of its path.
+
+        Args:
+            now: the path's motion when the command acts.
+            errors: from the drone to the path when its position was measured.
+            ahead_s: time between both.
+        """
+        (ex, ey, ez), (sx, sy, sz) = errors
+        has = self._own.velocity_in(ACTS_S)
+        slower = [v - own for v, own in zip(now.velocity_m_s, has, strict=False)]
+        offset = [e + 0.5 * ahead_s * (s + v) for e, s, v in zip((ex, ey), (sx, sy), slower, strict=True)]
+        size_m = hypot(*offset)
+        gain = OFFSET_GAIN_PER_S2 * (MAX_OFFSET_M / size_m if size_m > MAX_OFFSET_M else 1.0)
+        ax, ay = (
+            gain * e + VELOCITY_GAIN_PER_S * v - pushed
+            for e, v, pushed in zip(offset, slower, self._own.disturbance_m_s2, strict=True)
+        )
+        climb = min(max(CLIMB_GAIN_PER_S * ez, -MAX_CORRECTION_M_S), MAX_CORRECTION_M_S)
+        az = CLIMB_GAIN_PER_S * sz + CLIMB_DAMPING_PER_S * (sz + climb)
+        return (-slower[0], -slower[1], climb), (ax, ay, az)
 
     def _motion_in(self, path: Path, state: DroneState, time_s: float) -> Motion:
         """The motion in a time from now, as its time goes, with the heading that the drone will have."""
@@ -245,21 +292,6 @@ class PathFollower:
                 break
             later_s, later = before_s, before
         return _minus(position, (state.x, state.y, state.z)), _minus(velocity, state.velocity_arena_m_s)
-
-    def _integrate(self, error: Vec3, velocity_m_s: Vec3, step_s: float) -> None:
-        """Add up the error, but along the path only what its time waits for.
-
-        A lag or lead of the drone itself is along the path: added up, it would push aside after a turn.
-        """
-        if self.error_m > INTEGRAL_REACH_M:
-            return
-        speed = hypot(*velocity_m_s)
-        along_m = sum(e * v for e, v in zip(error, velocity_m_s, strict=True)) / max(speed, 1e-6)
-        excused_m = min(max(along_m, -WAIT_FROM_M), WAIT_FROM_M) if speed > _MOVING_M_S else 0.0
-        for axis in range(3):
-            counted_m = error[axis] - excused_m * velocity_m_s[axis] / max(speed, 1e-6)
-            value = self._integral[axis] + INTEGRAL_GAIN_PER_S2 * counted_m * step_s
-            self._integral[axis] = min(max(value, -MAX_INTEGRAL_M_S), MAX_INTEGRAL_M_S)
 
     def _slowed(self, motion: Motion) -> Motion:
         """A motion of the path, as its time goes now."""

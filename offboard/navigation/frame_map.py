@@ -33,7 +33,8 @@ OBSTACLE_STEP_PX = 8.0  # likewise to an obstacle, of which every eighth column 
 BEHIND_M = 0.5  # an obstacle that seems so much farther away than a frame does not hide it
 NEAR_PX = 8.0  # a sighting whose centre is this near to where a frame should be is of that frame,
 NEAR_SHARE = 0.75  # or this share of its width
-DUPLICATE_M = 0.25  # two frames cannot be nearer to each other
+DUPLICATE_M = 0.25  # two frames cannot be nearer to each other,
+DUPLICATE_CERTAIN_M = 0.6  # nor as near as this to a certain one: what seemed to be there was seen badly
 
 
 class FrameMap:
@@ -236,4 +237,7 @@ def _are_one(a: FrameTrack, b: FrameTrack) -> bool:
     if a.colour != b.colour:
         return False
     x, y, z, _ = (a.state - b.state).tolist()
-    return hypot(x, y, z) < DUPLICATE_M
+    away_m = hypot(x, y, z)
+    if away_m >= DUPLICATE_CERTAIN_M:
+        return False
+    return away_m < DUPLICATE_M or any(one.estimate().certain and not one.is_doubted for one in (a, b))

@@ -98,9 +98,15 @@ class FrameTrack:
         return self._hypotheses[0].covariance
 
     @property
-    def rank(self) -> tuple[bool, int, float]:
+    def is_doubted(self) -> bool:
+        """Several images in a row should have shown it."""
+        return self.missed >= DOUBTED_MISSES
+
+    @property
+    def rank(self) -> tuple[bool, bool, int, float]:
         """The larger, the better is it known: to choose among frames of a colour."""
-        return (self.missed < DOUBTED_MISSES, self.belief, -float(np.trace(self.covariance[:3, :3])))
+        variance_m2 = float(np.trace(self.covariance[:3, :3]))
+        return (not self.is_doubted, self.estimate().certain, self.belief, -variance_m2)
 
     def predict(self, time_us: int) -> None:
         """Let time pass; little of it is left for later."""

@@ -24,13 +24,17 @@ from offboard.response import ResponseEstimate
 from scenarios.models import Arena
 
 STILL = VelocityCommand()
-REPLAN_S = 0.4
 RESTART_M = 0.28  # farther from its path, the drone's own motion is planned from
+HELD_OFF_M = 0.1  # a drone that is so far from its path, and
+HELD_M = 0.08  # not farther than this from one place
+HELD_S = 1.0  # for so long, is held by something: it plans from where it is
 MAX_REFUSALS = 3  # in a row, until the drone stops
 SAME_M = 0.004  # between two estimates of the frame that is crossed, for which the path stays as it is,
 SAME_SHARE = 0.005  # or this share of its distance: there is time to plan again when it is nearer
 NEARLY_SAME_M = 0.04  # likewise of the other frames
 SAME_RAD_M = 1.0  # likewise of headings, for each metre
+STILL_GOOD_M = 0.02  # an estimate that has moved less lets a path through it be kept, if another one is later
+LATER_S = 0.5  # by this
 AHEAD_S = 0.7  # of the path that must be free, beside the vehicle's lag: it is long enough to stop
 LOOK_AHEAD_S = 2.0  # likewise; the drone turns in flight to look at what it has not seen there
 AHEAD_STEP_S = 0.1
@@ -65,8 +69,11 @@ class PathFlight:
         self._planned_for: tuple[tuple[Goal, ...], Obstacles] | None = None
         self._checked: tuple[Path, int, tuple[Vec3, ...]] | None = None  # and which obstacles there were
         self._checked_s = 0.0
-        self._tried_s = -REPLAN_S
+        self._tried_s = -style.replan_s
         self._refusals = 0
+        self._free_m: Vec3 = (0.0, 0.0, 0.0)  # where the drone was last on its path, or moved
+        self._free_s = 0.0
+        self._is_held = False
         self._looks_aside = False  # and not where its path says
         self._watched_s = 0.0  # when the drone began to look there
 
@@ -74,6 +81,8 @@ class PathFlight:
         """How late the vehicle answers, from the command that it had since the last tick; call every tick."""
         self._response.update(state, sent)
         response = self._response.response
+        if not response.late:
+            self._follower.observe(state, state.time_us * 1e-6, sent)
         if response != self._follower.response:
             self._follower.response = response
             self._style = self._usual_style.adapted(response) if response.late else self._usual_style
@@ -93,7 +102,7 @@ class PathFlight:
     def change(self) -> None:
         """Plan at the next tick, for other goals."""
         self._planned_for = None
-        self._tried_s = -REPLAN_S
+        self._tried_s = -self._style.replan_s
 
     def fly(
         self,
@@ -104,6 +113,7 @@ class PathFlight:
         viewed: ViewedSpace,
     ) -> VelocityCommand:
         """Plan again if that is due and goals or obstacles have changed; the command for this tick."""
+        self._check_held(state)
         looking = self._lookout.command(state, viewed)
         if looking is not None:
             return looking
@@ -125,7 +135,11 @@ class PathFlight:
                 return self._stand(state, _look_rate(turn_to(self.watched, state)))
         self._looks_aside = False
         to_gate = isinstance(goals[0], Gate)
-        if checked and self._lookout.begin(self._ahead(AHEAD_S + CHECK_S), state, viewed):
+        if (
+            checked
+            and self._style.looks_ahead
+            and self._lookout.begin(self._ahead(AHEAD_S + CHECK_S), state, viewed)
+        ):
             self.path = self._left = None
             return self._lookout.command(state, viewed) or STILL
         if self.path is not None and seen.has_obstacles and not to_gate:
@@ -138,9 +152,9 @@ class PathFlight:
     def _plan_if_due(self, goals: Sequence[Goal], obstacles: Obstacles, state: DroneState) -> bool:
         """Plan again if goals or obstacles have changed, or stand in the way; whether that was checked."""
         now_s = state.time_us * 1e-6
-        if now_s - self._tried_s >= (REPLAN_S if self.path is not None else WAITING_REPLAN_S):
+        if now_s - self._tried_s >= (self._style.replan_s if self.path is not None else WAITING_REPLAN_S):
             planned_for = (tuple(goals), obstacles)
-            off = self._follower.error_m > RESTART_M
+            off = self._is_held or self._follower.error_m > RESTART_M
             if self.path is None or off or _differ(planned_for, self._planned_for, position_now(state)):
                 self._tried_s = now_s
                 self._plan(goals, obstacles, state)
@@ -178,9 +192,17 @@ class PathFlight:
         now_s, brake_m_s2 = state.time_us * 1e-6, self._style.acceleration_m_s2
         return self._follower.command(self._left, state, now_s, turn_rad_s=turn_rad_s, brake_m_s2=brake_m_s2)
 
+    def _check_held(self, state: DroneState) -> None:
+        """Note whether something holds the drone, such as a bar: it is off its path and does not move."""
+        here_m, now_s = position_now(state), state.time_us * 1e-6
+        moves = dist(here_m, self._free_m) > HELD_M
+        if moves or self.path is None or self._follower.error_m < HELD_OFF_M:
+            self._free_m, self._free_s = here_m, now_s
+        self._is_held = now_s - self._free_s > HELD_S
+
     def _start(self, state: DroneState) -> tuple[Motion, bool]:
         """The motion to plan from, and whether it begins a path that does not continue the present one."""
-        if self._follower.error_m <= RESTART_M:
+        if self._follower.error_m <= RESTART_M and not self._is_held:
             flies = self.path is not None and not self._anew
             reference = self._follower.reference() if flies else None
             if reference is not None:
@@ -193,6 +215,8 @@ class PathFlight:
 
     def _plan(self, goals: Sequence[Goal], obstacles: Obstacles, state: DroneState) -> None:
         start, restarts = self._start(state)
+        if self._is_held:
+            self._free_s = state.time_us * 1e-6
         found = self._find(start, goals, obstacles)
         if isinstance(found, Refusal) and len(goals) > 1:
             found = self._find(start, goals[:1], obstacles)
@@ -202,10 +226,24 @@ class PathFlight:
             if self._refusals >= MAX_REFUSALS:
                 self._leave()
             return
+        self.refusal, self._refusals = "", 0
+        if not restarts and self._delays(found, obstacles):
+            return
         self.path = found if restarts else self._follower.continued(found)
         self._anew = restarts
-        self.refusal, self._refusals = "", 0
         self._planned_for = (tuple(goals), obstacles)
+
+    def _delays(self, found: Path, obstacles: Obstacles) -> bool:
+        """Whether a new path is much later at the next gate than the present one, which is as good still."""
+        path = self.path
+        if path is None or self._is_obstructed(obstacles):
+            return False
+        now_s = self._follower.progress_on(path)
+        coming = next((crossing for crossing in path.crossings if crossing.time_s > now_s), None)
+        if coming is None or not found.crossings:
+            return False
+        later_s = found.crossings[0].time_s + self._follower.lead_s - (coming.time_s - now_s)
+        return later_s > LATER_S and not _moved(found.crossings[0].gate, coming.gate, STILL_GOOD_M)
 
     def _own_motion(self, state: DroneState) -> Motion:
         """The drone's, when the next command is flown."""

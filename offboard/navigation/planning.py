@@ -8,14 +8,14 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import replace
 from itertools import pairwise
-from math import dist, sqrt
+from math import dist, hypot, sqrt
 
 import numpy as np
 
 from geometry.vectors import Vec3
 from offboard.navigation.goals import FlightStyle, Gate, Goal, Motion, Obstacles, Refusal
 from offboard.navigation.path import Path
-from offboard.navigation.planner.clearance import SAME_FRAME_M, Clearance
+from offboard.navigation.planner.clearance import DRONE_RADIUS_M, SAME_FRAME_M, Clearance, frame_reach_m
 from offboard.navigation.planner.connect import Connector
 from offboard.navigation.planner.detours import LegFinder, open_ended
 from offboard.navigation.planner.legs import Array, Leg
@@ -26,6 +26,7 @@ from scenarios.models import Arena
 LIFT_OFF_M_S = 0.5  # when the base is left below
 LIFT_OFF_M_S2 = 0.4  # acceleration to that speed, also of vehicles that answer late
 LIFT_OFF_SPARE_M = 0.02
+LEAVE_OPENING_M_S = 0.3  # of a drone that was stopped in a frame's opening
 STOPPING_M = 0.5  # behind a last gate the drone stops in this distance,
 STOPPING_SHARES = np.array([1.0, 0.7, 0.5, 0.3, 0.15])  # or in the largest of these shares that is clear
 USED_MARGIN_M = 0.05  # of the margin to obstacles, while a path is flown
@@ -91,17 +92,36 @@ def obstructed(
         arena: as for `plan`.
         style: as for `plan`; of its margin a part may be used up.
     """
+    near = _near(places_m, obstacles, style)
     others = tuple(
         frame
-        for frame in obstacles.frames
+        for frame in near.frames
         if all(dist(frame.centre_m, gate.centre_m) >= SAME_FRAME_M for gate in gates)
     )
-    if not others and not obstacles.columns_m:
+    if not others and not near.columns_m:
         return False
     nearer = replace(style, bar_margin_m=style.bar_margin_m - USED_MARGIN_M)
-    clearance = Clearance(replace(obstacles, frames=others, base=None), arena, nearer)
+    clearance = Clearance(replace(near, frames=others, base=None), arena, nearer)
     depths = clearance.depths(np.array(places_m))[:, :-1]
     return bool((open_ended(depths[None], ends=False) > 0.0).any())
+
+
+def _near(places_m: Sequence[Vec3], obstacles: Obstacles, style: FlightStyle) -> Obstacles:
+    """The frames and columns that may be in the way of some of these places, and perhaps some more."""
+    first = places_m[0]
+    span_m = max(dist(first, place_m) for place_m in places_m)
+    frame_m = span_m + frame_reach_m(style)
+    column_m = span_m + DRONE_RADIUS_M + style.bar_margin_m
+    x, y, _ = first
+    return replace(
+        obstacles,
+        frames=tuple(frame for frame in obstacles.frames if dist(first, frame.centre_m) < frame_m),
+        columns_m=tuple(
+            column
+            for column in obstacles.columns_m
+            if hypot(column[0] - x, column[1] - y) < column_m + column[2]
+        ),
+    )
 
 
 def _fastest(finder: RouteFinder, leg_finder: LegFinder, clearance: Clearance) -> tuple[list[Pass], _Legs]:
@@ -116,7 +136,7 @@ def _fastest(finder: RouteFinder, leg_finder: LegFinder, clearance: Clearance) -
         route, ways, expected_s = finder.best()
         full = _complete(route, clearance)
         legs = leg_finder.route(full)
-        before = full.index(route[1]) - 1  # a lift-off comes before the first leg
+        before = full.index(route[1]) - 1  # a way out may come before the first leg
         times = [BLOCKED_S if found is None else sum(leg.duration_s for leg in found) for found in legs]
         times[: before + 1] = [sum(times[: before + 1])]
         total_s = sum(times) + sum(float(one.inner_s[0] + one.costs_s[0]) for one in route)
@@ -132,7 +152,7 @@ def _fastest(finder: RouteFinder, leg_finder: LegFinder, clearance: Clearance) -
 
 
 def _complete(route: list[Pass], clearance: Clearance) -> list[Pass]:
-    """The route with a lift-off from the base, if it starts there, and a stop behind a last gate."""
+    """The route with a way out of the base or opening that it starts in, and a stop behind a last gate."""
     start, end = route[0], route[-1]
     passes = list(route)
     from_m = start.exits.places_m[0]
@@ -142,6 +162,12 @@ def _complete(route: list[Pass], clearance: Clearance) -> list[Pass]:
         rise_m, climb_m_s = up[2] - from_m[2], max(float(start.exits.velocities_m_s[0, 2]), 0.0)
         fastest_m_s = sqrt(climb_m_s**2 + 2.0 * LIFT_OFF_M_S2 * max(rise_m, 0.0))
         passes.insert(1, place(up, np.array([0.0, 0.0, min(LIFT_OFF_M_S, fastest_m_s)]), start.yaw_rad))
+    elif not route[1].begun:
+        out = clearance.way_out(from_m, route[1].entries.places_m[0])
+        if out is not None:
+            at, direction = out
+            speed = max(float(start.exits.velocities_m_s[0] @ direction), LEAVE_OPENING_M_S)
+            passes.insert(1, place(at, speed * direction, start.yaw_rad))
     if isinstance(end.goal, Gate):
         passes.append(place(_stop_behind(end, clearance), np.zeros(3), end.yaw_rad))
     return passes

@@ -2,19 +2,22 @@
 
 from __future__ import annotations
 
-from math import cos, sin
+from math import cos, hypot, sin
 
 import numpy as np
 import numpy.typing as npt
 
+from geometry.vectors import Vec3
 from offboard.navigation.goals import FlightStyle, FrameSize, Gate, Obstacles
 from offboard.navigation.planner.legs import Array
 from scenarios.models import Arena
 
 DRONE_RADIUS_M = 0.177  # of its box of 0.25 x 0.25 m in plan, whatever its heading
+DRONE_HALF_LENGTH_M = 0.125
 DRONE_HALF_HEIGHT_M = 0.0225
 TILTED_M = 0.05  # how much farther down and up its box reaches while it tilts in a turn
 SAME_FRAME_M = 0.4  # a gate and a frame whose centres are nearer are the same
+MIDDLE_M = 0.01  # a drone that is nearer to an opening's middle plane may leave it on either side
 _FRAME = FrameSize()
 
 _SPARE_M = 0.03  # how much farther than needed a detour passes
@@ -41,23 +44,16 @@ class Clearance:
         self.high_m: Array = np.array([x_m, y_m, floor_m + arena.height_m - margin_m])
         level_m = DRONE_RADIUS_M + style.bar_margin_m
         upright_m = DRONE_HALF_HEIGHT_M + TILTED_M + style.bar_margin_m
+        half_m = _frame_half_m(style)
         rows = [
-            (
-                *frame.centre_m,
-                cos(frame.yaw_rad),
-                sin(frame.yaw_rad),
-                _FRAME.thickness_m / 2 + level_m,
-                _FRAME.width_m / 2 + level_m,
-                _FRAME.height_m / 2 + upright_m,
-            )
-            for frame in obstacles.frames
+            (*frame.centre_m, cos(frame.yaw_rad), sin(frame.yaw_rad), *half_m) for frame in obstacles.frames
         ]
         self.base = -1
         if obstacles.base is not None:
-            base, half_m = obstacles.base, obstacles.base.edge_m / 2 + level_m
+            base, side_m = obstacles.base, obstacles.base.edge_m / 2 + level_m
             self.base = len(rows)
             middle_m = floor_m + base.top_m / 2
-            rows.append((base.x_m, base.y_m, middle_m, 1.0, 0.0, half_m, half_m, base.top_m / 2 + upright_m))
+            rows.append((base.x_m, base.y_m, middle_m, 1.0, 0.0, side_m, side_m, base.top_m / 2 + upright_m))
         self.boxes = len(rows)
         self._rows: Array = np.array(rows).reshape(-1, 8)
         self._columns: Array = np.array(obstacles.columns_m).reshape(-1, 3)
@@ -118,6 +114,26 @@ class Clearance:
             axis=-1,
         )
 
+    def way_out(self, point_m: Array, next_m: Array) -> tuple[Array, Array] | None:
+        """Straight out of a frame's opening, for a drone within it: where to, and the direction; else None.
+
+        Args:
+            point_m: shape (3,); the side on which it is.
+            next_m: the place to go to afterwards: its side, from the middle of the opening, shape (3,).
+        """
+        frames = self.boxes - (self.base >= 0)
+        offsets = self.offsets(point_m[None])[0, :frames]
+        half_m = (DRONE_HALF_LENGTH_M + _FRAME.thickness_m / 2, _FRAME.width_m / 2, _FRAME.height_m / 2)
+        inside = (np.abs(offsets) < half_m).all(axis=1)
+        if not inside.any():
+            return None
+        frame = int(inside.argmax())
+        row, along_m = self._rows[frame], float(offsets[frame, 0])
+        normal = np.array([row[3], row[4], 0.0])
+        side = along_m if abs(along_m) > MIDDLE_M else float((next_m - row[:3]) @ normal)
+        out = normal if side > 0.0 else -normal
+        return row[:3] + (row[5] + _SPARE_M) * out, out
+
     def ways_round(self, point_m: Array, velocity_m_s: Array, obstacle: int) -> list[tuple[Array, Array]]:
         """Where to pass an obstacle instead of a point in it, at which velocity; level, but for the sides.
 
@@ -149,3 +165,19 @@ class Clearance:
             centre = np.array([column[0], column[1], point_m[2]])
             moves = [centre + sign * radius_m * across - point_m for sign in (1.0, -1.0)]
         return [(point_m + move, level) for move in moves]
+
+
+def frame_reach_m(style: FlightStyle) -> float:
+    """How far from its centre an enlarged frame reaches."""
+    return hypot(*_frame_half_m(style))
+
+
+def _frame_half_m(style: FlightStyle) -> Vec3:
+    """Half the size of an enlarged frame: thickness, width and height."""
+    level_m = DRONE_RADIUS_M + style.bar_margin_m
+    upright_m = DRONE_HALF_HEIGHT_M + TILTED_M + style.bar_margin_m
+    return (
+        _FRAME.thickness_m / 2 + level_m,
+        _FRAME.width_m / 2 + level_m,
+        _FRAME.height_m / 2 + upright_m,
+    )

@@ -89,7 +89,10 @@ class LegFinder:
             passed = self._through_passages(before, after, depth)
             if passed is not None:
                 return passed
-        for _, way in sorted(later, key=lambda entry: entry[0])[:_TRIED]:
+        tried = [way for _, way in sorted(later, key=lambda entry: entry[0])[:_TRIED]]
+        if depth == MAX_DEPTH:  # beside the start, before it is too near to pass in one curve
+            tried += self._ways(before, after, leg, 0.0, obstacle)
+        for way in tried:
             found = self._chain([before, way, after], depth - 1)
             if found is not None:
                 return found

@@ -54,7 +54,7 @@ def speed_squares(
         (vz, az, style.climb_lag_s, np.full(len(level), style.climb_command_m_s)),
     ]
     if isfinite(style.level_command_m_s):
-        across = style.lag_s * most * (vx * ay - vy * ax) / np.maximum(level, 1e-6)
+        across = style.lag_s * most * (forward * aside - left * ahead) / np.maximum(level, 1e-6)
         left_m_s = _beside(across, style.level_command_m_s)
         limits.append((level, along, style.lag_s, left_m_s))
     speed = np.sqrt(level * level + vz * vz)

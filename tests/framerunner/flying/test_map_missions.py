@@ -1,7 +1,13 @@
 """The missions with a map, each in a whole flight of a layout."""
 
-from framerunner.flying.lockstep import fly_lockstep
+import asyncio
+
+import pytest
+
+from framerunner.flying.lockstep import LockstepVehicle, fly_lockstep
 from framerunner.flying.plan import FlightPlan
+from framerunner.flying.response import Response
+from offboard.app import fly_mission
 from offboard.mission import load_mission
 from scenarios.loader import load_scenario
 
@@ -10,3 +16,36 @@ def test_explorer_with_a_soft_landing_comes_down_on_the_base_without_falling():
     flown = fly_lockstep(FlightPlan(load_scenario("calm-17"), load_mission("explorer_soft_landing")))
     assert flown.result.verdict == "clean"
     assert flown.outcome.mission_state == "landing.touch_down"
+
+
+@pytest.mark.parametrize(
+    ("mission", "airframe", "response", "least_s", "most_s"),
+    [
+        ("explorer", "abejorro", None, 0.1, 0.5),
+        ("explorer_soft_landing", "abejorro", None, 0.1, 0.5),
+        ("racer", "abejorro", None, 0.1, 0.5),
+        ("explorer", "abejorro", Response(0.6, 0.15, 0.05), 0.3, 1.0),
+        ("explorer", "x500", None, 1.0, 3.2),  # its motors idle for a second, and then ramp up
+        ("frame_challenge", "abejorro", None, 1.0, 2.0),  # waits for the next heartbeat
+    ],
+)
+def test_the_drone_takes_off_at_once_but_for_the_paper_s_navigator(
+    mission, airframe, response, least_s, most_s
+):
+    changed = {"airframe": airframe, "try_limit_s": 4.0}
+    scenario = load_scenario("test-case-2").model_copy(update=changed)
+    plan = FlightPlan(scenario, load_mission(mission), response=response)
+    risen_s = []
+
+    def watch(truth):
+        if truth.position_arena_m[2] > plan.start_pose[2] + 0.1:
+            risen_s.append(vehicle.simulation.referee.try_time_s)
+
+    vehicle = LockstepVehicle(plan, observers=(watch,))
+    surroundings = plan.surroundings
+    flight = fly_mission(
+        vehicle.drone, vehicle.perception, plan.chart, limit_s=3.5, surroundings=surroundings
+    )
+    outcome = asyncio.run(flight)
+    assert (outcome.ended, outcome.pauses) == ("timed out", 0)
+    assert least_s < risen_s[0] < most_s

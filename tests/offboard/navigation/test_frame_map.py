@@ -147,6 +147,21 @@ def test_wrong_start_is_corrected_by_the_images() -> None:
     assert yaw_rad < radians(2.0)
 
 
+def test_certain_frame_replaces_one_that_was_seen_badly_beside_it() -> None:
+    truth, wrong = frame_at(0.0, 0.0, 1.5, 0.5), frame_at(0.3, -0.3, 1.3, 0.5)
+    flight = Flight(1)
+    for step in range(30):
+        flight.look([wrong], (-4.0, -1.0 + 0.01 * step, 1.4), 0.2)
+    believed = flight.map.best("red")
+    assert believed is not None
+    assert not believed.certain
+    flight.approach(truth, pi, 2.0, 1.0)
+    flight.look([], (-1.0, 0.0, 1.5), 0.5)  # an image that should show it
+    (estimate,) = flight.map.frames()
+    assert estimate.certain
+    assert errors(estimate, truth)[0] < 0.015
+
+
 def test_frame_far_outside_the_arena_is_none() -> None:
     flight = Flight()
     for step in range(5):

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from geometry.vectors import Vec3
 from offboard.navigation.goals import CONTEST, Gate, Motion, Obstacles, Point, Refusal
 from offboard.navigation.path import Path
 from offboard.navigation.planning import plan
@@ -133,3 +134,36 @@ def test_drone_that_hovers_low_over_the_base_finds_a_way_from_it(height_m: float
     obstacles = Obstacles(base=base)
     path = plan(start, [Point((0.0, 0.0, 1.5))], obstacles=obstacles, arena=Arena(), style=CONTEST)
     assert isinstance(path, Path), path
+
+
+@pytest.mark.parametrize(
+    ("start", "goal_m", "frames"),
+    [
+        (
+            Motion((-0.88, -1.598, 0.3592), yaw_rad=-0.139),
+            (3.787, -4.488, 0.8),
+            (Gate((-0.5365, -1.9318, 0.4932), 0.0675), Gate((-1.4264, -1.5211, 0.3593), -0.1406)),
+        ),
+        (
+            Motion((-1.9962, -4.3373, 0.6695), yaw_rad=2.98),
+            (-2.0, -3.0, 0.6),
+            (Gate((-1.6539, -3.7981, 0.6779), 1.0825),),
+        ),
+    ],
+    ids=["close before a low frame", "between a frame and a wall"],
+)
+def test_a_drone_in_a_narrow_place_moves_aside_first(start: Motion, goal_m: Vec3, frames: tuple[Gate, ...]):
+    path = plan(start, [Point(goal_m)], obstacles=Obstacles(frames), arena=Arena(), style=CONTEST)
+    assert isinstance(path, Path), path
+    assert [touching(Sampled(path), frame) for frame in frames] == [[] for _ in frames]
+    assert least_margin(Sampled(path), Arena()) > 0.2
+
+
+@pytest.mark.parametrize("along_m", [-0.07, 0.0, 0.04])
+@pytest.mark.parametrize("goal_m", [(0.3, 0.2, 3.0), (0.0, 3.0, 1.5), (-3.0, 0.0, 1.5)])
+def test_a_drone_that_was_stopped_in_an_opening_leaves_it_along_the_normal(along_m: float, goal_m: Vec3):
+    gate = Gate((0.0, 0.0, 1.5), 0.0)
+    start = Motion((along_m, 0.01, 1.51))
+    path = plan(start, [Point(goal_m)], obstacles=Obstacles((gate,)), arena=Arena(), style=CONTEST)
+    assert isinstance(path, Path), path
+    assert touching(Sampled(path), gate) == []

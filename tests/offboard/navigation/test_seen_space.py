@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from math import atan2, hypot, pi
+from math import atan2, dist, hypot, pi
 
 import pytest
 
@@ -93,6 +93,18 @@ def test_a_path_that_is_obstructed_is_planned_again_at_once():
     assert flight.path is not None
     assert flight.path is not before
     assert all(hypot(x - 0.6, y) > 0.3 for x, y, _ in flight.path.points_m)
+
+
+def test_a_drone_that_is_held_near_its_path_plans_from_where_it_is():
+    seen, flight = SeenSpace(CAMERA, Arena()), PathFlight(Arena(), CONTEST, CONTEST_LIMITS)
+    paths = []
+    for tick in range(100):
+        state = DroneState(50_000 * tick, *HERE, yaw=0.0)
+        flight.fly([Point((0.2, 0.0, 1.0))], Obstacles(), state, seen, VIEWED)
+        if flight.path is not None and flight.path not in paths:
+            paths.append(flight.path)
+    assert 2 <= len(paths) <= 5  # not at every tick, either
+    assert all(dist(path.at(0.0).position_m, HERE) < 0.02 for path in paths)
 
 
 def height_after_a_metre(gate: Gate, *, needed: bool) -> float:
