@@ -77,7 +77,8 @@ class ChildProcess:
         if process.stdin is not None:
             process.stdin.close()
         try:
-            await asyncio.wait_for(process.wait(), _GRACE_S)
+            async with asyncio.timeout(_GRACE_S):
+                await process.wait()
         except TimeoutError:
             with contextlib.suppress(ProcessLookupError):
                 process.kill()
@@ -155,10 +156,13 @@ class MonitorProcess(ChildProcess):
 
     async def opened(self) -> None:
         """Wait until its pages are served, for 20 s at most; SettingError with its last line if it ends."""
-        opening = asyncio.wait_for(self._open.wait(), _MONITOR_START_S)
         with contextlib.suppress(TimeoutError):
-            await self.guard(asyncio.create_task(opening))
+            await self.guard(asyncio.create_task(self._opening()))
         self._watching = asyncio.create_task(self._warn_of_its_end())
+
+    async def _opening(self) -> None:
+        async with asyncio.timeout(_MONITOR_START_S):
+            await self._open.wait()
 
     async def __aexit__(self, *problem: object) -> None:
         """Stop it."""

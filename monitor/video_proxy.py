@@ -191,7 +191,8 @@ async def _image(video: DroneVideo, address: str) -> Response:
     """The newest image."""
     async with aclosing(video.images(address)) as images:
         try:
-            newest = await asyncio.wait_for(anext(images), FIRST_IMAGE_S)
+            async with asyncio.timeout(FIRST_IMAGE_S):
+                newest = await anext(images)
         except (TimeoutError, StopAsyncIteration):
             return PlainTextResponse("no image came\n", 503, {"Retry-After": "1"})
     headers = {"Cache-Control": "no-store"}

@@ -134,7 +134,8 @@ class CameraPerception:
         """Wait for the first image; raises `CameraLostError` if there is none."""
         self._task = asyncio.create_task(self._watch(), name="camera")
         with contextlib.suppress(TimeoutError):
-            await asyncio.wait_for(self._arrived.wait(), FIRST_IMAGE_S)
+            async with asyncio.timeout(FIRST_IMAGE_S):
+                await self._arrived.wait()
         if not self._images:
             raise CameraLostError(self._ended or f"the camera gave no image within {FIRST_IMAGE_S:g} s")
 

@@ -82,7 +82,8 @@ class SimulatorClock:
         """Wait until the simulator reports that it is up; SettingError if it does not."""
         self._reader, self._writer = await asyncio.open_connection(sock=self._channel)
         try:
-            line = await asyncio.wait_for(self._reader.readline(), START_S)
+            async with asyncio.timeout(START_S):
+                line = await self._reader.readline()
         except TimeoutError:
             raise SettingError(f"the simulator did not start within {START_S:g} s") from None
         if not line:  # it has ended; `guard` reports its last line
@@ -122,7 +123,8 @@ class SimulatorClock:
         assert self._writer is not None
         try:
             self._writer.write(grant.line())
-            line = await asyncio.wait_for(self._reader.readline(), ANSWER_S)
+            async with asyncio.timeout(ANSWER_S):
+                line = await self._reader.readline()
         except TimeoutError:
             raise DroneError(f"the simulator did not answer for {ANSWER_S:g} s") from None
         except OSError:

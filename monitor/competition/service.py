@@ -81,7 +81,8 @@ class CompetitionService:
         """The contest as last read; waits for the database to be opened. Raises `DatabaseError`."""
         if self._board is None:
             with suppress(TimeoutError):
-                await asyncio.wait_for(self._opened.wait(), _ANSWER_S)
+                async with asyncio.timeout(_ANSWER_S):
+                    await self._opened.wait()
         if self._board is None:
             raise DatabaseError("the contest's database is still being opened; try again in a moment")
         return self._board
@@ -186,7 +187,8 @@ class CompetitionService:
             return await self.read(work)
         doing = asyncio.get_running_loop().run_in_executor(self._worker, work, store)
         try:
-            return await asyncio.wait_for(asyncio.shield(doing), _ANSWER_S)
+            async with asyncio.timeout(_ANSWER_S):
+                return await asyncio.shield(doing)
         except TimeoutError as error:
             message = f"the database has not answered for {_ANSWER_S:.0f} s; check later what was kept"
             raise DatabaseError(message) from error

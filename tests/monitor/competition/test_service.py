@@ -66,6 +66,24 @@ async def test_requests_wait_until_the_database_is_open_but_not_for_ever(url, mo
     assert service.running == () and service.messages()[0]["version"] == 0
 
 
+@pytest.mark.parametrize("steps", range(6))
+async def test_a_cancellation_is_kept_also_when_an_answer_comes_at_the_same_time(url, steps):
+    async with serving(url) as service:
+        may_answer, answered = threading.Event(), threading.Event()
+        reading = asyncio.create_task(service.read(lambda _: may_answer.wait(10.0)))
+        await asyncio.sleep(0.05)
+        service._worker.submit(answered.set)
+        may_answer.set()
+        answered.wait(10.0)  # the event loop has the answer now, and has not begun to handle it
+        for _ in range(steps):
+            await asyncio.sleep(0.0)
+        if reading.cancel():
+            with pytest.raises(asyncio.CancelledError):
+                await reading
+        else:
+            assert await reading
+
+
 async def test_listeners_get_only_what_is_committed(url):
     async with serving(url) as service:
         seen = []
