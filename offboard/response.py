@@ -39,8 +39,9 @@ _BETTER = 0.7  # share of the present pair's error that another one must reach
 _LITTLE_ENERGY = 0.03  # is enough where a vehicle is known to be late, and a pair is
 _MUCH_BETTER = 0.3  # by this share
 _CLEARLY_BETTER = 0.5  # likewise for axes that turn: those of vehicles that answer late seldom do
-_LATE_S = (0.65, 0.31, 0.31)  # level, climb, yaw: beyond this in all a vehicle answers late
+_LATE_S = (0.65, 0.36, 0.31)  # level, climb, yaw: beyond this in all a vehicle answers late
 _LATE_SHARE = 0.4  # of the error of the best pair that is not late: a late one must reach it
+_UNEXPLAINED = 0.06  # share of the changes that this best pair must leave unexplained
 _SURE = 3  # choices in a row after which a vehicle is known to be late
 _DISTURBANCE_S = 0.4  # time constant of the estimate of what commands do not explain
 _LEADS = np.array((0.0, 0.0, 0.7))  # shares by which its change is expected to go on: heights wander slowly
@@ -243,8 +244,9 @@ class ResponseEstimate:
             dead, lag = self._chosen[channel]
             if DEAD_STEPS[dead] * STEP_S + LAGS_S[lag] <= _LATE_S[channel]:
                 continue
-            shorter = float(errors[_PROMPT[channel], group].min())
-            if self.response.late or float(errors[:, group].min()) < _LATE_SHARE * shorter:
+            shorter = float(errors[_PROMPT[channel]][:, (0, 1) if channel == 0 else group].min())
+            unexplained = shorter > _UNEXPLAINED * float(self._energies[group])
+            if self.response.late or (unexplained and float(errors[:, group].min()) < _LATE_SHARE * shorter):
                 return True
         return False
 

@@ -48,6 +48,8 @@ YAW_GAIN_PER_S = 3.0
 GATE_FROM_M = 0.05  # farther from the path across a gate, the drone waits
 COMING_S = 0.3  # for which a wrong velocity goes on
 GATE_S = (0.4, 1.3)  # before a gate the drone must be straight before it; nearer, it cannot stop any more
+IN_GATE_S = (-0.3, 0.4)  # to a gate; in this time a drone
+IN_GATE_M_S2 = 0.4  # does not speed up by more than this to fly as fast as planned
 MAX_RATE_CHANGE_PER_S = 1.5  # of the path's time
 BRAKE_END_S = 0.25  # in which the last of the speed is braked, so that the drone is not thrown back
 _STEADY_S = 0.11  # after a longer step the vehicle's velocity is taken for steady
@@ -118,6 +120,12 @@ class PathFollower:
             self._path, self.progress_s = joined, 0.0
         return joined
 
+    def begin(self, now_s: float) -> None:
+        """The next path begins now, with the drone's own motion: it does not continue the present one."""
+        self._last_s = now_s
+        self._rate, self._rate_change = 1.0, 0.0
+        self._past.clear()
+
     def progress_on(self, path: Path) -> float:
         """The time along a path; 0 on one that no command was given for yet."""
         return self.progress_s if path is self._path else 0.0
@@ -175,11 +183,11 @@ class PathFollower:
         if prediction is not None:
             command = self._command_late(path, state, prediction, step_s)
             return command if turn_rad_s is None else replace(command, yaw_rate_rad_s=turn_rad_s)
-        if self._late is not None or step_s > _STEADY_S:
-            self._inverse.restart()
-        self._late = None
         if self._own_s != now_s:
             self.observe(state, now_s, self._sent)
+        if self._late is not None or step_s > _STEADY_S:
+            self._inverse.restart(in_plan=self._late is not None)
+        self._late = None
         if path is not self._path:
             self._path, self.progress_s = path, 0.0
         self.progress_s = min(self.progress_s + self._rate * step_s, path.duration_s)
@@ -196,14 +204,24 @@ class PathFollower:
                 path, self.progress_s, GATE_S, (x, y, z), GATE_TURN_M * abs(off_rad), from_m=GATE_FROM_M
             ),
         )
-        self._change_rate(rate, motion, brake_m_s2, step_s)
+        self._change_rate(rate, motion, brake_m_s2, step_s, self._is_in_gate(path))
         self._sent = self._command_now(path, state, (error, slower), step_s)
         return self._sent
 
-    def _change_rate(self, rate: float, motion: Motion, brake_m_s2: float, step_s: float) -> None:
+    def _is_in_gate(self, path: Path) -> bool:
+        """Whether a gate is so near that a drone that speeds up would be tilted in it."""
+        first_s, last_s = IN_GATE_S
+        return any(first_s < crossing.time_s - self.progress_s < last_s for crossing in path.crossings)
+
+    def _change_rate(
+        self, rate: float, motion: Motion, brake_m_s2: float, step_s: float, in_gate: bool
+    ) -> None:
         """Let the path's time go faster or slower, but not suddenly, or brake it to a stop."""
         before, most = self._rate, MAX_RATE_CHANGE_PER_S * step_s
-        rate = min(max(rate, before - most), before + most)
+        faster = most
+        if in_gate:
+            faster = min(most, IN_GATE_M_S2 * step_s / max(hypot(*motion.velocity_m_s), _MOVING_M_S))
+        rate = min(max(rate, before - most), before + faster)
         if brake_m_s2:
             slowing_per_s = brake_m_s2 / max(hypot(*motion.velocity_m_s), _MOVING_M_S)
             slowing_per_s = min(slowing_per_s, before / BRAKE_END_S)

@@ -229,6 +229,8 @@ class PathFlight:
         self.refusal, self._refusals = "", 0
         if not restarts and self._delays(found, obstacles):
             return
+        if restarts:
+            self._follower.begin(state.time_us * 1e-6)
         self.path = found if restarts else self._follower.continued(found)
         self._anew = restarts
         self._planned_for = (tuple(goals), obstacles)

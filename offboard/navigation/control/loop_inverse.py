@@ -172,9 +172,11 @@ class LoopInverse:
         )
         return x, y
 
-    def restart(self) -> None:
-        """Forget the past: the drone's climb and turn are steady."""
+    def restart(self, *, in_plan: bool = True) -> None:
+        """Forget the past: the drone's climb and turn are steady, and its velocity in plan if so said."""
         self._others = None
+        if in_plan and self._own is not None:
+            self._tilts = [_steady(TILT, speed) for speed in self._own.level_m_s]
 
     def sent(self, up_m_s: float, turn_rad_s: float, step_s: float) -> None:
         """Note what was commanded, until the next call."""

@@ -66,6 +66,28 @@ def test_vehicle_that_was_pushed_aside_before_a_gate_waits_and_goes_on_when_it_i
     assert follower.finished
 
 
+@pytest.mark.parametrize(("from_m", "least_m_s2", "most_m_s2"), [(1.4, 0.9, 1.6), (0.25, 0.2, 0.45)])
+def test_a_drone_that_has_waited_hardly_speeds_up_in_a_gate(
+    from_m: float, least_m_s2: float, most_m_s2: float
+):
+    """Speeding up tilts the drone, whose box then does not fit through the opening."""
+    gate = Gate((2.0, 0.0, 1.0), 0.0)
+    path = plan(Motion((0.0, 0.0, 1.0)), [gate], obstacles=Obstacles((gate,)), arena=Arena(), style=CONTEST)
+    assert isinstance(path, Path)
+    follower, held, rises_m_s2, rate = PathFollower(), 0, [], 1.0
+    for tick in range(80):
+        motion, before_s = path.at(follower.progress_s), follower.progress_s
+        x, y, z = motion.position_m
+        held += x > gate.centre_m[0] - from_m
+        behind_m = 0.4 if 0 < held < 8 else 0.0  # the path's time waits for it
+        state = DroneState(tick * 50_000, x - behind_m, y, z, 0.0, motion.velocity_m_s, landed=False)
+        follower.command(path, state, tick * 0.05)
+        was, rate = rate, (follower.progress_s - before_s) / 0.05
+        if held > 9 and abs(x - gate.centre_m[0]) < from_m:
+            rises_m_s2.append((rate - was) / 0.05 * hypot(*motion.velocity_m_s))
+    assert least_m_s2 < max(rises_m_s2) < most_m_s2
+
+
 def test_height_is_kept_where_a_fast_drone_changes_its_tilt():
     drone = LockstepVehicle(FlightPlan(Layout.random(200).scenario, load_mission("racer"))).drone
     asyncio.run(drone.ready())

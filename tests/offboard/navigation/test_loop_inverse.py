@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from math import hypot
+
 import pytest
 
 from firmware_py.airframe import load_airframe
@@ -64,6 +66,17 @@ def test_a_tilt_is_asked_for_whatever_the_loop_has_added_up(known: bool):
     demand += tilt.integral_gain * (added_up + HOLD_S * velocity_m_s)
     assert added_up == pytest.approx(0.4)
     assert demand == pytest.approx(0.0, abs=0.005)
+
+
+def test_what_was_added_up_before_another_control_flew_the_drone_is_forgotten():
+    inverse, still = LoopInverse(), Motion((0.0, 0.0, 1.0))
+    for _ in range(40):
+        inverse.observe(Own((0.0, 0.0), (0.0, 0.0), 0.0), (2.0, -1.0), TICK_S)
+    wound_up, _ = inverse.command(still, (still, still, still), (ZERO3, ZERO3), 0.0)
+    inverse.restart()
+    begun_again, _ = inverse.command(still, (still, still, still), (ZERO3, ZERO3), 0.0)
+    assert hypot(*wound_up[:2]) > 1.0
+    assert begun_again == pytest.approx(ZERO3, abs=1e-6)
 
 
 def test_a_disturbance_is_learnt_from_velocities_that_tilt_and_drag_do_not_explain():

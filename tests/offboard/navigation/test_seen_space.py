@@ -107,6 +107,19 @@ def test_a_drone_that_is_held_near_its_path_plans_from_where_it_is():
     assert all(dist(path.at(0.0).position_m, HERE) < 0.02 for path in paths)
 
 
+def test_a_path_after_a_pause_begins_at_its_start():
+    seen, flight = SeenSpace(CAMERA, Arena()), PathFlight(Arena(), CONTEST, CONTEST_LIMITS)
+    goals, state = [Point((2.0, 0.0, 1.0))], DroneState(0, *HERE, yaw=0.0)
+    for tick in range(10):
+        flight.fly(goals, Obstacles(), replace(state, time_us=50_000 * tick), seen, VIEWED)
+    flight.stop()
+    flight.fly(goals, Obstacles(), replace(state, time_us=1_500_000), seen, VIEWED)
+    assert flight.path is not None
+    assert flight._follower.progress_on(flight.path) == 0.0
+    flight.fly(goals, Obstacles(), replace(state, time_us=1_550_000), seen, VIEWED)
+    assert flight._follower.progress_on(flight.path) == pytest.approx(0.05)
+
+
 def height_after_a_metre(gate: Gate, *, needed: bool) -> float:
     """The height of a drone that flies to a gate as it is told, where it is a metre nearer."""
     seen, viewed = SeenSpace(CAMERA, Arena()), ViewedSpace(CAMERA, Base(x_m=-4.0, y_m=-4.0))
