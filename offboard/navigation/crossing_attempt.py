@@ -41,6 +41,7 @@ class CrossingAttempt:
         passed: the drone has gone through the opening.
         cleared: and is behind the frame's bars.
         refusal: why it cannot go on; empty if it can.
+        after: where to look from behind the opening, if what comes next is not known; None if not chosen yet.
     """
 
     colour: str
@@ -50,6 +51,7 @@ class CrossingAttempt:
     passed: bool = False
     cleared: bool = False
     refusal: str = ""
+    after: Point | None = None
     _aim: Crossing | None = None  # the opening and the direction as last planned
     _along_m: float = -inf
     _across_m: float = 0.0
@@ -115,6 +117,11 @@ class CrossingAttempt:
         gate = self._aim.gate
         turned_rad = abs(remainder(gate.yaw_rad - estimate.yaw_rad, pi))
         return dist(gate.centre_m, estimate.position_m) < SETTLED_MOVE_M and turned_rad < SETTLED_TURN_RAD
+
+    @property
+    def looks(self) -> bool:
+        """The drone stops before the frame, see `must_look`."""
+        return self._looking_since_s is not None
 
     def must_look(self, estimate: FrameEstimate, position_m: Vec3, now_s: float) -> bool:
         """Whether the drone must stop before the frame, because it is near and the frame is not certain."""

@@ -32,6 +32,7 @@ _KEEP: Final = 1.15  # the last choice counts for more, so that the drone does n
 _NO_FLIGHT_S: Final = 0.1  # to so near a viewpoint the drone only turns
 _DETOUR_M: Final = 0.1  # a way longer by more than this is not straight
 _USED: Final = 1.0  # how much a view counts for less, each time it was taken
+_REFUSED: Final = 3.0  # visits for which a place counts that could not be reached
 _CLEAR_M: Final = 0.5  # from a viewpoint to frames found, and to obstacles' surfaces
 
 
@@ -118,12 +119,31 @@ class Explorer:
         Returns:
             The viewpoint. The drone can turn where it is, so there is always one.
         """
+        self._visits[self._table.nearest(position_m, yaw_rad)] += 1.0
+        self._last = self.best_viewpoint(position_m, yaw_rad, found, hints, columns_m)
+        return self._last
+
+    def refuse(self) -> None:
+        """No way was found to the viewpoint chosen last: it counts as looked at from, in all directions."""
+        if self._last is not None:
+            place, _ = self._table.nearest(self._last.position_m, self._last.yaw_rad)
+            self._visits[place] += _REFUSED
+            self._last = None
+
+    def best_viewpoint(
+        self,
+        position_m: Vec3,
+        yaw_rad: float,
+        found: Sequence[Vec3] = (),
+        hints: Sequence[LineOfSight] = (),
+        columns_m: Sequence[Vec3] = (),
+    ) -> Viewpoint:
+        """As `next_viewpoint`, for a drone that will be somewhere else: nothing is chosen yet."""
         self._place_obstacles(columns_m)
         here = Pose(position_m, yaw_rad)
         around = None if self._obstruction is None else self._obstruction.ways_from(position_m)
         seen = self.coverage.blocks()
         unseen = _Unseen(seen, self._likelihood.weights(seen, found, hints))
-        self._visits[self._table.nearest(position_m, yaw_rad)] += 1.0
         blocked = [(x, y, radius_m + _CLEAR_M) for x, y, radius_m in columns_m]
         blocked += [(x, y, _CLEAR_M) for x, y, _ in found]
         viewpoints = [
@@ -132,8 +152,7 @@ class Explorer:
             if each.position_m == position_m or _is_clear(each, blocked)
         ]
         ways = _ways(here, around, viewpoints)
-        self._last = ways[int(np.argmax(self._scores(here, ways, unseen)))].viewpoint
-        return self._last
+        return ways[int(np.argmax(self._scores(here, ways, unseen)))].viewpoint
 
     def _place_obstacles(self, columns_m: Sequence[Vec3]) -> None:
         if not columns_m:

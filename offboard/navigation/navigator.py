@@ -29,6 +29,7 @@ AHEAD_STD_M = 0.3  # of a next frame; if it is known less well, it is not planne
 SPACED_S = 0.15  # in which one image is enough: one from nearly the same place adds little to the map
 SPACED_M_S = 1.5  # up to this speed
 NEAR_GATE_M = 1.5  # nearer to a frame to be crossed that is not certain yet, no image is left out
+SEARCH_AFTER_M = 2.0  # from behind a frame to the drone, when it is chosen where to look from there
 ARRIVED_M = 0.06
 ARRIVED_M_S = 0.15
 
@@ -124,6 +125,8 @@ class Navigator:
         """Fly to the view that shows most of what has not been seen."""
         state, now_s = self._begin("explore")
         if self._goal is None or now_s - self._chosen_s >= EXPLORE_S:
+            if self._goal is not None and self._flight.path is None and self._flight.refusal:
+                self._world.refuse_viewpoint()
             viewpoint = self._world.next_viewpoint(position_now(state), state.yaw)
             self._goal, self._chosen_s = Point(viewpoint.position_m, viewpoint.yaw_rad), now_s
         return self._fly(self._goal)
@@ -166,7 +169,10 @@ class Navigator:
             crossing.lose(now_s)
             return STILL
         crossing.known_s = now_s
-        if crossing.must_look(estimate, position_now(state), now_s):
+        looked = crossing.looks
+        if crossing.must_look(estimate, position_now(state), now_s) != looked:
+            self._flight.change()
+        if crossing.looks:
             return self._fly(self._places.before(estimate, position_now(state), self._world.obstacles()))
         command = self._fly(self._world.gate_of(estimate), *self._goals_after(colour))
         path = self._flight.path
@@ -205,5 +211,17 @@ class Navigator:
             return [Point((x, y, z + HOME_HEIGHT_M))]
         estimate = self._world.frame(following[0])
         if estimate is None or estimate.ambiguous or max(estimate.position_std_m) > AHEAD_STD_M:
-            return []
+            return self._search_after()
         return [self._world.gate_of(estimate)]
+
+    def _search_after(self) -> list[Goal]:
+        """Where to look from behind the frame that is crossed, once the drone is near it."""
+        assert self._state is not None, "observe() comes before any action"
+        crossing, here_m = self._crossing, position_now(self._state)
+        behind = None if crossing is None else crossing.behind
+        if crossing is None or behind is None or dist(behind.position_m, here_m) > SEARCH_AFTER_M:
+            return []
+        if crossing.after is None:
+            viewpoint = self._world.viewpoint_from(behind.position_m, behind.yaw_rad or 0.0)
+            crossing.after = Point(viewpoint.position_m, viewpoint.yaw_rad)
+        return [crossing.after]

@@ -118,6 +118,16 @@ def test_the_drone_turns_at_once_and_away_from_what_it_saw():
     assert hypot(*first.position_m[:2]) < 3.0
 
 
+def test_a_viewpoint_that_cannot_be_reached_is_followed_by_others():
+    explorer, here_m = Explorer(CAMERA, Arena()), (-4.0, -4.0, 0.5)
+    explorer.update(here_m, quaternion_from_yaw(0.0))
+    places = []
+    for _ in range(40):
+        places.append(explorer.next_viewpoint(here_m, 0.0).position_m)
+        explorer.refuse()
+    assert len({tuple(round(value) for value in place) for place in places}) > 10
+
+
 def test_a_line_of_sight_is_looked_along_first():
     explorer = Explorer(CAMERA, Arena())
     explorer.update((0.0, 0.0, 1.0), quaternion_from_yaw(0.0))

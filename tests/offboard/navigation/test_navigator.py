@@ -1,0 +1,49 @@
+"""What the navigator does with a goal, and when it needs every image."""
+
+from dataclasses import replace
+
+from framerunner.flying.plan import FlightPlan
+from offboard.drone import DroneState
+from offboard.mission import load_mission
+from offboard.navigation import path_flight
+from offboard.navigation.goals import Refusal
+from offboard.navigation.navigator import Navigator
+from scenarios.random_scenarios import load_level, random_scenario
+
+STATE = DroneState(0, 0.0, 0.0, 1.0, 0.0, (0.5, 0.0, 0.0), armed=True, offboard=True)
+
+
+def test_images_are_left_out_only_in_slow_flight_to_what_is_known():
+    plan = FlightPlan(random_scenario(load_level("calm"), 1), load_mission("explorer"))
+    navigator = Navigator(plan.surroundings, plan.command_limits)
+    assert navigator.image_period_s == 0.0
+    navigator.observe(STATE, ())
+    navigator.explore()
+    assert 0.1 < navigator.image_period_s < 0.2
+    navigator.observe(replace(STATE, time_us=50_000, velocity_arena_m_s=(1.2, 1.2, 0.0)), ())
+    assert navigator.image_period_s == 0.0
+    navigator.observe(replace(STATE, time_us=100_000), ())
+    assert navigator.image_period_s > 0.0
+    navigator.cross("red")  # which is not on the map
+    assert navigator.image_period_s == 0.0
+
+
+def test_a_drone_that_finds_no_way_to_a_viewpoint_looks_elsewhere(monkeypatch):
+    """No way is found to anywhere that is higher than the drone, nor to the east of it."""
+    plan = FlightPlan(random_scenario(load_level("calm"), 1), load_mission("explorer"))
+    navigator = Navigator(plan.surroundings, plan.command_limits)
+    find, asked = path_flight.plan, []
+
+    def refusing(start, goals, **more):
+        x, _, z = goals[0].position_m
+        asked.append(goals[0])
+        return Refusal("something is in the way") if x > -0.1 or z > 1.1 else find(start, goals, **more)
+
+    monkeypatch.setattr(path_flight, "plan", refusing)
+    for tick in range(20 * 20):
+        navigator.observe(replace(STATE, time_us=50_000 * tick, velocity_arena_m_s=(0.0, 0.0, 0.0)), ())
+        navigator.explore()
+        if navigator.view().path_m:
+            break
+    assert navigator.view().path_m
+    assert len(set(asked)) > 3
