@@ -1,6 +1,7 @@
 """The missions with a map, each in a whole flight of a layout."""
 
 import asyncio
+from math import cos, hypot, sin
 
 import pytest
 
@@ -9,6 +10,7 @@ from framerunner.flying.plan import FlightPlan
 from framerunner.flying.response import Response
 from offboard.app import fly_mission
 from offboard.mission import load_mission
+from offboard.response import ResponseEstimate
 from scenarios.loader import load_scenario
 
 
@@ -49,3 +51,43 @@ def test_the_drone_takes_off_at_once_but_for_the_paper_s_navigator(
     outcome = asyncio.run(flight)
     assert (outcome.ended, outcome.pauses) == ("timed out", 0)
     assert least_s < risen_s[0] < most_s
+
+
+@pytest.mark.parametrize("name", ["calm-21004", "calm-21036"])
+def test_a_drone_that_is_flown_at_its_limits_is_not_taken_for_a_late_one(name):
+    """Layouts of racer in which it was: it then braked and swung for seconds."""
+    plan = FlightPlan(load_scenario(name), load_mission("racer"))
+    vehicle, late_s = LockstepVehicle(plan), []
+    with pytest.MonkeyPatch.context() as patch:
+        choose = ResponseEstimate._choose
+
+        def noting(estimate):
+            choose(estimate)
+            late_s.extend([vehicle.simulation.referee.try_time_s] if estimate.response.late else [])
+
+        patch.setattr(ResponseEstimate, "_choose", noting)
+        flight = fly_mission(
+            vehicle.drone,
+            vehicle.perception,
+            plan.chart,
+            limit_s=5.0,
+            limits=plan.command_limits,
+            surroundings=plan.surroundings,
+        )
+        asyncio.run(flight)
+    assert late_s == []
+
+
+def test_a_path_leads_on_from_a_frame_to_where_the_search_for_the_next_begins():
+    plan = FlightPlan(load_scenario("calm-20037"), load_mission("racer"))
+    red = next(frame for frame in plan.layout.frames if frame.colour == "red")
+    ends_m = []
+
+    def see(moment):
+        if moment.mission_state == "red.crossing" and moment.navigation.path_m:
+            ends_m.append(moment.navigation.path_m[-1])
+
+    fly_lockstep(plan, observers=(see,))
+    x, y, z = (end - at for end, at in zip(ends_m[-1], red.position_arena_m, strict=True))
+    across_m = hypot(cos(red.yaw_rad) * y - sin(red.yaw_rad) * x, z)
+    assert across_m > 0.3  # it does not only end straight behind
