@@ -18,7 +18,6 @@ from vision.types import Image
 Plane = npt.NDArray[np.uint8]
 
 PRIMARIES = ("red", "green", "blue")
-SECONDARIES = ("cyan", "magenta")
 OBSTACLE = "violet"
 
 MIN_EXCESS = 25

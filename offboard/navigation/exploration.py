@@ -104,6 +104,8 @@ class Explorer:
         found: Sequence[Vec3] = (),
         hints: Sequence[LineOfSight] = (),
         columns_m: Sequence[Vec3] = (),
+        *,
+        from_here: bool = True,
     ) -> Viewpoint:
         """Choose the view with the largest gain for its time, counting what is seen on the way.
 
@@ -115,30 +117,13 @@ class Explorer:
             found: centres of the frames that are known; others are less likely close to them.
             hints: directions in which frames were seen that are not known; they are looked at first.
             columns_m: obstacles from the floor to the ceiling, as discs in plan: x, y, radius.
+            from_here: the drone flies from there, so the choice is remembered; False: it only will be there.
 
         Returns:
             The viewpoint. The drone can turn where it is, so there is always one.
         """
-        self._visits[self._table.nearest(position_m, yaw_rad)] += 1.0
-        self._last = self.best_viewpoint(position_m, yaw_rad, found, hints, columns_m)
-        return self._last
-
-    def refuse(self) -> None:
-        """No way was found to the viewpoint chosen last: it counts as looked at from, in all directions."""
-        if self._last is not None:
-            place, _ = self._table.nearest(self._last.position_m, self._last.yaw_rad)
-            self._visits[place] += _REFUSED
-            self._last = None
-
-    def best_viewpoint(
-        self,
-        position_m: Vec3,
-        yaw_rad: float,
-        found: Sequence[Vec3] = (),
-        hints: Sequence[LineOfSight] = (),
-        columns_m: Sequence[Vec3] = (),
-    ) -> Viewpoint:
-        """As `next_viewpoint`, for a drone that will be somewhere else: nothing is chosen yet."""
+        if from_here:
+            self._visits[self._table.nearest(position_m, yaw_rad)] += 1.0
         self._place_obstacles(columns_m)
         here = Pose(position_m, yaw_rad)
         around = None if self._obstruction is None else self._obstruction.ways_from(position_m)
@@ -152,7 +137,17 @@ class Explorer:
             if each.position_m == position_m or _is_clear(each, blocked)
         ]
         ways = _ways(here, around, viewpoints)
-        return ways[int(np.argmax(self._scores(here, ways, unseen)))].viewpoint
+        viewpoint = ways[int(np.argmax(self._scores(here, ways, unseen)))].viewpoint
+        if from_here:
+            self._last = viewpoint
+        return viewpoint
+
+    def refuse(self) -> None:
+        """No way was found to the viewpoint chosen last: it counts as looked at from, in all directions."""
+        if self._last is not None:
+            place, _ = self._table.nearest(self._last.position_m, self._last.yaw_rad)
+            self._visits[place] += _REFUSED
+            self._last = None
 
     def _place_obstacles(self, columns_m: Sequence[Vec3]) -> None:
         if not columns_m:

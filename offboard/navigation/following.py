@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from collections import deque
 from dataclasses import replace
-from math import cos, hypot, pi, remainder, sin
+from math import hypot, pi, remainder
 
 from geometry.vectors import Vec3
 from offboard.drone import DroneState, VelocityCommand
@@ -346,9 +346,3 @@ def _between(a: Vec3, b: Vec3, share: float) -> Vec3:
 
 def _minus(a: Vec3, b: Vec3) -> Vec3:
     return (a[0] - b[0], a[1] - b[1], a[2] - b[2])
-
-
-def turned(vector: Vec3, by_rad: float) -> Vec3:
-    """A vector turned to the left."""
-    c, s = cos(by_rad), sin(by_rad)
-    return (c * vector[0] - s * vector[1], s * vector[0] + c * vector[1], vector[2])

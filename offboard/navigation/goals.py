@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from math import cos, inf, sin
+from math import inf
 
 from geometry.vectors import Vec3
 from offboard.limits import CommandLimits
@@ -241,11 +241,6 @@ class Motion:
     yaw_rate_rad_s: float = 0.0
     acceleration_m_s2: Vec3 = (0.0, 0.0, 0.0)
     yaw_acceleration_rad_s2: float = 0.0
-
-    def level(self, vector: Vec3) -> Vec3:
-        """A vector of the arena in this motion's level axes: forward, left, up."""
-        c, s = cos(self.yaw_rad), sin(self.yaw_rad)
-        return (c * vector[0] + s * vector[1], c * vector[1] - s * vector[0], vector[2])
 
 
 @dataclass(frozen=True, slots=True)

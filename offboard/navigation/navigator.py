@@ -222,6 +222,6 @@ class Navigator:
         if crossing is None or behind is None or dist(behind.position_m, here_m) > SEARCH_AFTER_M:
             return []
         if crossing.after is None:
-            viewpoint = self._world.viewpoint_from(behind.position_m, behind.yaw_rad or 0.0)
+            viewpoint = self._world.next_viewpoint(behind.position_m, behind.yaw_rad or 0.0, from_here=False)
             crossing.after = Point(viewpoint.position_m, viewpoint.yaw_rad)
         return [crossing.after]

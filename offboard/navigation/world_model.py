@@ -16,7 +16,7 @@ from offboard.navigation.goals import FlightStyle, Gate, Obstacles
 from offboard.navigation.obstacle_map import ObstacleMap
 from offboard.navigation.planner.clearance import DRONE_RADIUS_M
 from offboard.navigation.pose_history import DronePose, PoseHistory
-from offboard.navigation.search.glimpses import Glimpses, LineOfSight
+from offboard.navigation.search.glimpses import Glimpses
 from offboard.navigation.search.viewed_space import ViewedSpace
 from offboard.navigation.seen_space import SeenSpace
 from offboard.navigation.surroundings import Surroundings
@@ -116,22 +116,20 @@ class WorldModel:
             self._frames = tuple(map(self.gate_of, seen))
         return Obstacles(self._frames, self._columns_m(), self._surroundings.base)
 
-    def next_viewpoint(self, position_m: Vec3, yaw_rad: float) -> Viewpoint:
-        """Where to look next for frames that are not on the map."""
-        return self._explorer.next_viewpoint(position_m, yaw_rad, *self._known())
+    def next_viewpoint(self, position_m: Vec3, yaw_rad: float, *, from_here: bool = True) -> Viewpoint:
+        """Where to look next for frames that are not on the map; see `Explorer.next_viewpoint`."""
+        return self._explorer.next_viewpoint(
+            position_m,
+            yaw_rad,
+            [frame.position_m for frame in self._map.frames()],
+            self._glimpses.lines(),
+            self._columns_m(),
+            from_here=from_here,
+        )
 
     def refuse_viewpoint(self) -> None:
         """No way was found to the viewpoint chosen last."""
         self._explorer.refuse()
-
-    def viewpoint_from(self, position_m: Vec3, yaw_rad: float) -> Viewpoint:
-        """Where a drone that comes to a place would look next."""
-        return self._explorer.best_viewpoint(position_m, yaw_rad, *self._known())
-
-    def _known(self) -> tuple[list[Vec3], Sequence[LineOfSight], tuple[Vec3, ...]]:
-        """Frames found, lines on which others were seen, and columns."""
-        found_m = [frame.position_m for frame in self._map.frames()]
-        return found_m, self._glimpses.lines(), self._columns_m()
 
     def _columns_m(self) -> tuple[Vec3, ...]:
         """What stands on the floor; where the drone took off, there is room for it."""
