@@ -10,8 +10,6 @@ from offboard.navigation.frame_estimate import FrameEstimate
 from offboard.navigation.goals import Point
 from offboard.navigation.path import Crossing, Path
 
-LOOK_AGAIN_M = 1.0  # before the opening; there the drone waits until the frame is certain
-BRAKING_M = 0.5  # before that, where it is decided
 COMMIT_M = 0.3  # before the opening; from there the path is not planned again
 COMMIT_ACROSS_M = 0.06  # if the drone is no farther beside the opening's axis
 SETTLED_M = 0.7  # before the opening; from there it is only if the frame turns out to be elsewhere,
@@ -123,9 +121,16 @@ class CrossingAttempt:
         """The drone stops before the frame, see `must_look`."""
         return self._looking_since_s is not None
 
-    def must_look(self, estimate: FrameEstimate, position_m: Vec3, now_s: float) -> bool:
-        """Whether the drone must stop before the frame, because it is near and the frame is not certain."""
-        if estimate.certain or dist(estimate.position_m, position_m) > LOOK_AGAIN_M + BRAKING_M:
+    def must_look(self, estimate: FrameEstimate, distance_m: float, near_m: float, now_s: float) -> bool:
+        """Whether the drone must stop before the frame, because it is near and the frame is not certain.
+
+        Args:
+            estimate: of the frame.
+            distance_m: from it to the drone.
+            near_m: nearer to it, the drone must stop.
+            now_s: vehicle time.
+        """
+        if estimate.certain or distance_m > near_m:
             self._looking_since_s = None
             return False
         if self._looking_since_s is None:

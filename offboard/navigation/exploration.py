@@ -23,6 +23,7 @@ from scenarios.models import Arena
 from vision.types import ObstacleEdge
 
 _START_S: Final = 0.4  # lost when speeding up
+_PATH_SHARE: Final = 0.9  # of the highest speed of a path: what it is flown with at most, on the average
 _TURNS: Final = (0.0, 0.6, -0.6, 1.2, -1.2, 1.8, -1.8, 2.5, -2.5)  # rad, of views from about here
 _OTHER_HEIGHT_M: Final = 0.3  # a height that differs by less is not tried
 _FAR_PLACES: Final = 14  # places of the table that are looked at closely
@@ -48,7 +49,8 @@ class Pace:
     def of(style: FlightStyle) -> Pace:
         """The pace of a style: speed on the average over all directions of flight."""
         bolder = style.axis_speed_m_s / FlightStyle().axis_speed_m_s
-        return Pace(bolder * Pace().speed_m_s, Pace().climb_m_s, style.yaw_rate_rad_s)
+        speed_m_s = min(bolder * Pace().speed_m_s, _PATH_SHARE * style.path_speed_m_s)
+        return Pace(speed_m_s, Pace().climb_m_s, style.yaw_rate_rad_s)
 
 
 @dataclass(frozen=True, slots=True)

@@ -12,9 +12,11 @@ from scenarios.models import Base
 
 HEADROOM = 0.92
 """Share of a limit that a path uses; the rest is for corrections."""
-BOLD_HEADROOM = 0.955
+BOLD_HEADROOM = 0.98
 """Likewise of level speed in class open: where it counts, in openings, the drone flies more slowly."""
 VIEW_NEAR_M = 0.25  # half a frame's width, with a margin
+LOOK_AGAIN_M = 1.0
+LOOK_BRAKING_M = 0.5
 
 
 @dataclass(frozen=True, slots=True)
@@ -109,6 +111,8 @@ class FlightStyle:
         side_margin_m: between the drone's centre and the arena's sides and ceiling.
         floor_margin_m: between the drone's centre and the floor.
         replan_s: between two plans.
+        look_again_m: before a gate; there the drone waits until it knows the frame well enough.
+        look_braking_m: before that; there it is decided.
         looks_ahead: places on the way that no image has shown are looked at before the drone flies there.
     """
 
@@ -136,6 +140,8 @@ class FlightStyle:
     side_margin_m: float = 0.25
     floor_margin_m: float = 0.25
     replan_s: float = 0.4
+    look_again_m: float = LOOK_AGAIN_M
+    look_braking_m: float = LOOK_BRAKING_M
     looks_ahead: bool = True
 
     def adapted(self, response: Response) -> FlightStyle:
@@ -158,6 +164,8 @@ class FlightStyle:
             smoothing_s=self.smoothing_s + 0.3 * late,
             turn_smoothing_s=self.turn_smoothing_s + 0.6 * late,
             bar_margin_m=self.bar_margin_m + 0.06 * late,
+            look_again_m=self.look_again_m + (LOOK_AGAIN_M - self.look_again_m) * late,
+            look_braking_m=self.look_braking_m + (LOOK_BRAKING_M - self.look_braking_m) * late,
         )
 
     def look_limit_rad(self, distance_m: float) -> float:
@@ -167,18 +175,20 @@ class FlightStyle:
 
 CONTEST = FlightStyle()
 _OPEN = FlightStyle(
-    axis_speed_m_s=1.66,
-    path_speed_m_s=1.66,
-    yaw_rate_rad_s=1.8,
+    axis_speed_m_s=1.7,
+    path_speed_m_s=1.7,
+    yaw_rate_rad_s=1.9,
     acceleration_m_s2=2.5,
     climb_acceleration_m_s2=2.0,
     crossing_speed_m_s=1.3,
     crossing_gain_m_s2=0.3,
-    straight_before_m=0.27,
-    straight_after_m=0.25,
+    straight_before_m=0.24,
+    straight_after_m=0.2,
     smoothing_s=0.3,
     look_offset_rad=0.0,
     replan_s=0.25,
+    look_again_m=0.7,
+    look_braking_m=0.45,
     looks_ahead=False,
 )
 """For the simulated drone's own limits: at them nothing would be left to correct with.
@@ -188,7 +198,8 @@ from a frame there.
 """
 _OPEN_M_S = 1.748  # its level speed
 COMMAND_SHARE = 0.98  # of a limit that planned commands use
-TURN_SHARE = 0.9  # of the limit of the yaw rate
+BOLD_COMMAND_SHARE = 0.995  # likewise in plan in class open
+TURN_SHARE = 0.95  # of the limit of the yaw rate
 
 
 def style_of(limits: CommandLimits) -> FlightStyle:
@@ -203,6 +214,7 @@ def style_of(limits: CommandLimits) -> FlightStyle:
     def between(contest: float, bolder: float) -> float:
         return contest + share * (bolder - contest)
 
+    command_share = between(COMMAND_SHARE, BOLD_COMMAND_SHARE)
     usual, bold = CONTEST, _OPEN
     axis_speed_m_s = between(usual.axis_speed_m_s, bold.axis_speed_m_s)
     path_speed_m_s = between(usual.path_speed_m_s, bold.path_speed_m_s)
@@ -217,8 +229,8 @@ def style_of(limits: CommandLimits) -> FlightStyle:
         yaw_rate_rad_s=min(yaw_rate_rad_s, TURN_SHARE * limits.yaw_rate_rad_s),
         acceleration_m_s2=between(usual.acceleration_m_s2, bold.acceleration_m_s2),
         climb_acceleration_m_s2=between(usual.climb_acceleration_m_s2, bold.climb_acceleration_m_s2),
-        command_m_s=COMMAND_SHARE * axis_m_s,
-        level_command_m_s=COMMAND_SHARE * limits.level_m_s,
+        command_m_s=command_share * axis_m_s,
+        level_command_m_s=command_share * limits.level_m_s,
         climb_command_m_s=COMMAND_SHARE * climb_m_s,
         crossing_speed_m_s=min(crossing_speed_m_s, HEADROOM * axis_m_s),
         crossing_gain_m_s2=bold.crossing_gain_m_s2 if share > 0.0 else usual.crossing_gain_m_s2,
@@ -227,6 +239,8 @@ def style_of(limits: CommandLimits) -> FlightStyle:
         smoothing_s=between(usual.smoothing_s, bold.smoothing_s),
         look_offset_rad=between(usual.look_offset_rad, bold.look_offset_rad),
         replan_s=between(usual.replan_s, bold.replan_s),
+        look_again_m=between(usual.look_again_m, bold.look_again_m),
+        look_braking_m=between(usual.look_braking_m, bold.look_braking_m),
         looks_ahead=share < 1.0,
     )
 

@@ -170,7 +170,9 @@ class Navigator:
             return STILL
         crossing.known_s = now_s
         looked = crossing.looks
-        if crossing.must_look(estimate, position_now(state), now_s) != looked:
+        distance_m = dist(estimate.position_m, position_now(state))
+        near_m = self._style.look_again_m + self._style.look_braking_m
+        if crossing.must_look(estimate, distance_m, near_m, now_s) != looked:
             self._flight.change()
         if crossing.looks:
             return self._fly(self._places.before(estimate, position_now(state), self._world.obstacles()))

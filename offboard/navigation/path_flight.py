@@ -6,15 +6,16 @@ and goes on when the way is free.
 
 from __future__ import annotations
 
+from collections import deque
 from collections.abc import Sequence
 from dataclasses import replace
-from math import dist, pi, remainder
+from math import atan2, dist, pi, remainder
 
 from geometry.vectors import Vec3
 from offboard.drone import DroneState, VelocityCommand
 from offboard.limits import CommandLimits
 from offboard.navigation.following import PathFollower
-from offboard.navigation.goals import FlightStyle, Gate, Goal, Motion, Obstacles, Refusal
+from offboard.navigation.goals import FlightStyle, Gate, Goal, Motion, Obstacles, Point, Refusal
 from offboard.navigation.path import Path
 from offboard.navigation.planning import obstructed, plan
 from offboard.navigation.search.lookout import Lookout, turn_to
@@ -28,6 +29,10 @@ RESTART_M = 0.28  # farther from its path, the drone's own motion is planned fro
 HELD_OFF_M = 0.1  # a drone that is so far from its path, and
 HELD_M = 0.08  # not farther than this from one place
 HELD_S = 1.0  # for so long, is held by something: it plans from where it is
+STUCK_S = 3.0  # at one place, and off its path at times: it flies back the way it came, to see what it is
+BACK_M = 0.8  # by this
+BACK_STEP_M = 0.1  # between two places of this way
+MAX_BACK_S = 3.0
 MAX_REFUSALS = 3  # in a row, until the drone stops
 SAME_M = 0.004  # between two estimates of the frame that is crossed, for which the path stays as it is,
 SAME_SHARE = 0.005  # or this share of its distance: there is time to plan again when it is nearer
@@ -74,6 +79,12 @@ class PathFlight:
         self._free_m: Vec3 = (0.0, 0.0, 0.0)  # where the drone was last on its path, or moved
         self._free_s = 0.0
         self._is_held = False
+        self._stuck_m: Vec3 = (0.0, 0.0, 0.0)  # where the drone is
+        self._stuck_s = 0.0  # since when it has been near there, with a path to fly
+        self._is_pushed = False  # and has been off its path
+        self._way: deque[Vec3] = deque(maxlen=round(BACK_M / BACK_STEP_M))  # that the drone came
+        self._back: Point | None = None  # to which it flies instead of to its goals
+        self._back_s = 0.0  # since when
         self._looks_aside = False  # and not where its path says
         self._watched_s = 0.0  # when the drone began to look there
 
@@ -114,6 +125,8 @@ class PathFlight:
     ) -> VelocityCommand:
         """Plan again if that is due and goals or obstacles have changed; the command for this tick."""
         self._check_held(state)
+        back = self._way_back(state)
+        goals = goals if back is None else [back]
         looking = self._lookout.command(state, viewed)
         if looking is not None:
             return looking
@@ -199,6 +212,26 @@ class PathFlight:
         if moves or self.path is None or self._follower.error_m < HELD_OFF_M:
             self._free_m, self._free_s = here_m, now_s
         self._is_held = now_s - self._free_s > HELD_S
+        if not self._way or dist(here_m, self._way[-1]) > BACK_STEP_M:
+            self._way.append(here_m)
+        if self.path is None or dist(here_m, self._stuck_m) > BACK_STEP_M:
+            self._stuck_m, self._stuck_s, self._is_pushed = here_m, now_s, False
+        self._is_pushed = self._is_pushed or self._follower.error_m > HELD_OFF_M
+
+    def _way_back(self, state: DroneState) -> Point | None:
+        """Where a drone flies that something holds: back the way it came, facing what it may be."""
+        here_m, now_s = position_now(state), state.time_us * 1e-6
+        if self._back is not None:
+            arrived = dist(here_m, self._back.position_m) < BACK_STEP_M
+            if arrived or now_s - self._back_s > MAX_BACK_S:
+                self._back = None
+                self.change()
+        elif self.path is not None and self._is_pushed and now_s - self._stuck_s > STUCK_S:
+            (x, y, _), place_m = here_m, self._way[0]
+            self._back = Point(place_m, atan2(y - place_m[1], x - place_m[0]))
+            self._back_s = self._stuck_s = now_s
+            self.change()
+        return self._back
 
     def _start(self, state: DroneState) -> tuple[Motion, bool]:
         """The motion to plan from, and whether it begins a path that does not continue the present one."""

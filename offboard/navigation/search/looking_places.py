@@ -44,7 +44,8 @@ class LookingPlaces:
         if not frame.ambiguous:
             normal = frame.yaw_rad
             bearing = normal if cos(bearing - normal) > 0.0 else normal + pi
-        places = [(away_m, bearing + aside) for aside, away_m in product(BEFORE_ASIDE_RAD, BEFORE_M)]
+        before_m = [away_m for away_m in BEFORE_M if away_m <= self._style.look_again_m]
+        places = [(away_m, bearing + aside) for aside, away_m in product(BEFORE_ASIDE_RAD, before_m)]
         return self._facing(frame, places, 0.0, obstacles)
 
     def aside(self, frame: FrameEstimate, here_m: Vec3, side: int, obstacles: Obstacles) -> Point:

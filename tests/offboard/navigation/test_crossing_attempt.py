@@ -23,8 +23,9 @@ def test_each_reason_is_said():
     blocked.fly(no_path="obstacles block the way to gate 1", now_s=3.0)
     assert blocked.refusal == "no path: obstacles block the way to gate 1"
     unsure = attempt()
-    for now_s in (0.0, 5.0):
-        assert unsure.must_look(UNSURE, (1.0, 0.0, 1.0), now_s)
+    assert not unsure.must_look(UNSURE, 1.6, 1.5, 0.0)
+    for now_s in (1.0, 6.0):
+        assert unsure.must_look(UNSURE, 1.4, 1.5, now_s)
     assert unsure.refusal == "still not certain after 4 s before it"
     slow = attempt()
     slow.move((0.0, 0.0, 1.0), OPENING_M, 26.0)

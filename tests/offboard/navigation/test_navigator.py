@@ -1,6 +1,7 @@
 """What the navigator does with a goal, and when it needs every image."""
 
 from dataclasses import replace
+from math import cos, sin
 
 from framerunner.flying.plan import FlightPlan
 from offboard.drone import DroneState
@@ -47,3 +48,32 @@ def test_a_drone_that_finds_no_way_to_a_viewpoint_looks_elsewhere(monkeypatch):
             break
     assert navigator.view().path_m
     assert len(set(asked)) > 3
+
+
+def test_a_drone_that_something_unseen_holds_flies_back_the_way_it_came():
+    """It is led through what it cannot pass until it sees that from a distance."""
+    plan = FlightPlan(random_scenario(load_level("calm"), 1), load_mission("explorer"))
+    navigator = Navigator(plan.surroundings, plan.command_limits)
+    state, wall_x_m, stopped, least_x_m = STATE, 1.0, False, 9.0
+    for tick in range(1, 20 * 9):
+        navigator.observe(state, ())
+        command = navigator.fly_to((3.0, 0.0, 1.0))
+        level = (
+            cos(state.yaw) * command.forward_m_s - sin(state.yaw) * command.left_m_s,
+            sin(state.yaw) * command.forward_m_s + cos(state.yaw) * command.left_m_s,
+        )
+        x_m = min(state.x + 0.05 * level[0], wall_x_m)
+        velocity_m_s = ((x_m - state.x) / 0.05, level[1], command.up_m_s)
+        state = replace(
+            state,
+            time_us=50_000 * tick,
+            x=x_m,
+            y=state.y + 0.05 * level[1],
+            z=state.z + 0.05 * command.up_m_s,
+            yaw=state.yaw + 0.05 * command.yaw_rate_rad_s,
+            velocity_arena_m_s=velocity_m_s,
+        )
+        stopped = stopped or x_m == wall_x_m
+        least_x_m = min(least_x_m, x_m) if stopped else 9.0
+    assert stopped
+    assert least_x_m < wall_x_m - 0.5
