@@ -20,7 +20,8 @@ AROUND_S = 0.1
 _STOP_ABOVE_M = 0.05  # where the motors stop, above the drone's height on the base
 
 # Chosen so that such paths are flown clean in lockstep in both classes, see docs/bound.md.
-_ACCELERATION_M_S2 = 2.0  # in the class `open` more is followed less exactly
+_ACCELERATION_M_S2 = 2.0  # in the class `open` more is followed less exactly,
+_LEVEL_M_S, _TURN_RAD_S, _COMMAND_SHARE = 1.66, 1.8, 0.98  # likewise; the share is of the limits in plan
 _STRAIGHT_M = 0.2  # before and behind an opening: nearer to it, a drone that turns touched bars
 
 
@@ -73,8 +74,14 @@ def feasible_path(plan: FlightPlan, mission_class: MissionClass) -> Path | Refus
 def _style(plan: FlightPlan, mission_class: MissionClass) -> FlightStyle:
     """The navigator's own, changed for a pilot who knows where the frames are and need not see them."""
     limits = CONTEST if mission_class == "contest" else airframe_limits(plan.airframe)
+    usual = style_of(limits)
     return replace(
-        style_of(limits),
+        usual,
+        axis_speed_m_s=min(usual.axis_speed_m_s, _LEVEL_M_S),
+        path_speed_m_s=min(usual.path_speed_m_s, _LEVEL_M_S),
+        yaw_rate_rad_s=min(usual.yaw_rate_rad_s, _TURN_RAD_S),
+        command_m_s=min(usual.command_m_s, _COMMAND_SHARE * limits.forward_m_s),
+        level_command_m_s=min(usual.level_command_m_s, _COMMAND_SHARE * limits.level_m_s),
         acceleration_m_s2=_ACCELERATION_M_S2,
         straight_before_m=_STRAIGHT_M,
         straight_after_m=_STRAIGHT_M,
