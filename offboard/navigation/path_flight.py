@@ -228,6 +228,8 @@ class PathFlight:
                 self.change()
         elif self.path is not None and self._is_pushed and now_s - self._stuck_s > STUCK_S:
             (x, y, _), place_m = here_m, self._way[0]
+            if dist(here_m, place_m) < BACK_STEP_M:  # it has not come from anywhere
+                return None
             self._back = Point(place_m, atan2(y - place_m[1], x - place_m[0]))
             self._back_s = self._stuck_s = now_s
             self.change()
