@@ -101,7 +101,8 @@ class PathFlight:
 
     def stop(self) -> None:
         """Leave the path."""
-        self.path = self.watched = self._left = None
+        self.path = self.watched = self._left = self._back = None
+        self._way.clear()
         self._lookout.leave()
         self.change()
 
