@@ -5,7 +5,7 @@ from __future__ import annotations
 import asyncio
 import json
 import struct
-from contextlib import asynccontextmanager
+from contextlib import asynccontextmanager, suppress
 from pathlib import Path
 
 import cv2
@@ -20,6 +20,7 @@ from monitor.pages.shell import HEAD, header_html, style_links
 STATIC = Path(monitor.__file__).parent / "static"
 ELEMENTS = Path(nicegui.__file__).parent / "elements"
 JPEG = cv2.imencode(".jpg", np.full((240, 320, 3), (56, 176, 226), np.uint8))[1].tobytes()
+REPEAT_S = 1.0  # a page takes a monitor that says nothing for four seconds for lost
 PAGES = {"/": ("live", "live.js"), "/chart": ("chart", "chart.js"), "/stage": ("stage", "stage.js")}
 
 
@@ -30,7 +31,7 @@ NO_CONTEST = {
 
 
 class FakeMonitor:
-    """Serves pages, and sends messages to all viewers.
+    """Serves pages, sends messages to all viewers, and repeats the last status and poses, as a monitor does.
 
     Attributes:
         welcome: messages each new watcher gets first.
@@ -48,6 +49,8 @@ class FakeMonitor:
         self._cameras: list[web.StreamResponse] = []
         self._contest_watchers: set[web.WebSocketResponse] = set()
         self._watchers: set[web.WebSocketResponse] = set()
+        self._last: dict[str, dict] = {}
+        self._repeating: asyncio.Task | None = None
         self._port = 0
         self._runner: web.AppRunner | None = None
 
@@ -70,9 +73,11 @@ class FakeMonitor:
         await site.start()
         self._port = site._server.sockets[0].getsockname()[1]
         self.url = f"http://127.0.0.1:{self._port}"
+        self._repeating = asyncio.create_task(self._repeat())
 
     async def stop(self):
         """Stop like a killed monitor: all connections end."""
+        self._repeating.cancel()
         for watcher in [*self._watchers, *self._contest_watchers]:
             await watcher.close()
         self._ended.set()
@@ -80,9 +85,25 @@ class FakeMonitor:
 
     async def say(self, kind, **fields):
         """Send a message to all viewers."""
-        text = json.dumps({"kind": kind, **fields})
+        message = {"kind": kind, **fields}
+        self._last[kind] = message
+        await self._send(message)
+
+    async def _repeat(self):
+        while True:
+            await asyncio.sleep(REPEAT_S)
+            said = {message["kind"]: message for message in self.welcome} | self._last
+            there = [drone["id"] for drone in said.get("status", {"drones": ()})["drones"]]
+            poses = [pose for pose in said.get("pose", {"drones": ()})["drones"] if pose["id"] in there]
+            if "status" in said:
+                await self._send(said["status"])
+            if poses:
+                await self._send({"kind": "pose", "drones": poses})
+
+    async def _send(self, message):
         for watcher in list(self._watchers):
-            await watcher.send_str(text)
+            with suppress(ConnectionError):  # a page that is leaving
+                await watcher.send_str(json.dumps(message))
 
     async def until_watched(self):
         """Wait for a page."""
