@@ -6,14 +6,14 @@ and goes on when the way is free.
 
 from __future__ import annotations
 
-from collections import deque
 from collections.abc import Sequence
 from dataclasses import replace
-from math import atan2, dist, pi, remainder
+from math import dist, pi, remainder
 
 from geometry.vectors import Vec3
 from offboard.drone import DroneState, VelocityCommand
 from offboard.limits import CommandLimits
+from offboard.navigation.control.hindrance import Hindrance
 from offboard.navigation.following import PathFollower
 from offboard.navigation.goals import FlightStyle, Gate, Goal, Motion, Obstacles, Point, Refusal
 from offboard.navigation.path import Path
@@ -26,13 +26,6 @@ from scenarios.models import Arena
 
 STILL = VelocityCommand()
 RESTART_M = 0.28  # farther from its path, the drone's own motion is planned from
-HELD_OFF_M = 0.1  # a drone that is so far from its path, and
-HELD_M = 0.08  # not farther than this from one place
-HELD_S = 1.0  # for so long, is held by something: it plans from where it is
-STUCK_S = 3.0  # at one place, and off its path at times: it flies back the way it came, to see what it is
-BACK_M = 0.8  # by this
-BACK_STEP_M = 0.1  # between two places of this way
-MAX_BACK_S = 3.0
 MAX_REFUSALS = 3  # in a row, until the drone stops
 SAME_M = 0.004  # between two estimates of the frame that is crossed, for which the path stays as it is,
 SAME_SHARE = 0.005  # or this share of its distance: there is time to plan again when it is nearer
@@ -76,15 +69,8 @@ class PathFlight:
         self._checked_s = 0.0
         self._tried_s = -style.replan_s
         self._refusals = 0
-        self._free_m: Vec3 = (0.0, 0.0, 0.0)  # where the drone was last on its path, or moved
-        self._free_s = 0.0
-        self._is_held = False
-        self._stuck_m: Vec3 = (0.0, 0.0, 0.0)  # where the drone is
-        self._stuck_s = 0.0  # since when it has been near there, with a path to fly
-        self._is_pushed = False  # and has been off its path
-        self._way: deque[Vec3] = deque(maxlen=round(BACK_M / BACK_STEP_M))  # that the drone came
+        self._hindrance = Hindrance()
         self._back: Point | None = None  # to which it flies instead of to its goals
-        self._back_s = 0.0  # since when
         self._looks_aside = False  # and not where its path says
         self._watched_s = 0.0  # when the drone began to look there
 
@@ -102,7 +88,7 @@ class PathFlight:
     def stop(self) -> None:
         """Leave the path."""
         self.path = self.watched = self._left = self._back = None
-        self._way.clear()
+        self._hindrance.leave()
         self._lookout.leave()
         self.change()
 
@@ -125,9 +111,7 @@ class PathFlight:
         viewed: ViewedSpace,
     ) -> VelocityCommand:
         """Plan again if that is due and goals or obstacles have changed; the command for this tick."""
-        self._check_held(state)
-        back = self._way_back(state)
-        goals = goals if back is None else [back]
+        goals = self._goals_now(goals, state)
         looking = self._lookout.command(state, viewed)
         if looking is not None:
             return looking
@@ -168,7 +152,7 @@ class PathFlight:
         now_s = state.time_us * 1e-6
         if now_s - self._tried_s >= (self._style.replan_s if self.path is not None else WAITING_REPLAN_S):
             planned_for = (tuple(goals), obstacles)
-            off = self._is_held or self._follower.error_m > RESTART_M
+            off = self._hindrance.is_held or self._follower.error_m > RESTART_M
             if self.path is None or off or _differ(planned_for, self._planned_for, position_now(state)):
                 self._tried_s = now_s
                 self._plan(goals, obstacles, state)
@@ -206,39 +190,20 @@ class PathFlight:
         now_s, brake_m_s2 = state.time_us * 1e-6, self._style.acceleration_m_s2
         return self._follower.command(self._left, state, now_s, turn_rad_s=turn_rad_s, brake_m_s2=brake_m_s2)
 
-    def _check_held(self, state: DroneState) -> None:
-        """Note whether something holds the drone, such as a bar: it is off its path and does not move."""
+    def _goals_now(self, goals: Sequence[Goal], state: DroneState) -> Sequence[Goal]:
+        """The goals, or for a drone that something holds a place on the way that it came."""
         here_m, now_s = position_now(state), state.time_us * 1e-6
-        moves = dist(here_m, self._free_m) > HELD_M
-        if moves or self.path is None or self._follower.error_m < HELD_OFF_M:
-            self._free_m, self._free_s = here_m, now_s
-        self._is_held = now_s - self._free_s > HELD_S
-        if not self._way or dist(here_m, self._way[-1]) > BACK_STEP_M:
-            self._way.append(here_m)
-        if self.path is None or dist(here_m, self._stuck_m) > BACK_STEP_M:
-            self._stuck_m, self._stuck_s, self._is_pushed = here_m, now_s, False
-        self._is_pushed = self._is_pushed or self._follower.error_m > HELD_OFF_M
-
-    def _way_back(self, state: DroneState) -> Point | None:
-        """Where a drone flies that something holds: back the way it came, facing what it may be."""
-        here_m, now_s = position_now(state), state.time_us * 1e-6
-        if self._back is not None:
-            arrived = dist(here_m, self._back.position_m) < BACK_STEP_M
-            if arrived or now_s - self._back_s > MAX_BACK_S:
-                self._back = None
-                self.change()
-        elif self.path is not None and self._is_pushed and now_s - self._stuck_s > STUCK_S:
-            (x, y, _), place_m = here_m, self._way[0]
-            if dist(here_m, place_m) < BACK_STEP_M:  # it has not come from anywhere
-                return None
-            self._back = Point(place_m, atan2(y - place_m[1], x - place_m[0]))
-            self._back_s = self._stuck_s = now_s
+        has_path = self.path is not None
+        self._hindrance.observe(here_m, now_s, self._follower.error_m, has_path=has_path)
+        back = self._hindrance.way_back(here_m, now_s, has_path=has_path)
+        if back != self._back:
+            self._back = back
             self.change()
-        return self._back
+        return goals if back is None else [back]
 
     def _start(self, state: DroneState) -> tuple[Motion, bool]:
         """The motion to plan from, and whether it begins a path that does not continue the present one."""
-        if self._follower.error_m <= RESTART_M and not self._is_held:
+        if self._follower.error_m <= RESTART_M and not self._hindrance.is_held:
             flies = self.path is not None and not self._anew
             reference = self._follower.reference() if flies else None
             if reference is not None:
@@ -251,8 +216,7 @@ class PathFlight:
 
     def _plan(self, goals: Sequence[Goal], obstacles: Obstacles, state: DroneState) -> None:
         start, restarts = self._start(state)
-        if self._is_held:
-            self._free_s = state.time_us * 1e-6
+        self._hindrance.planned(state.time_us * 1e-6)
         found = self._find(start, goals, obstacles)
         if isinstance(found, Refusal) and len(goals) > 1:
             found = self._find(start, goals[:1], obstacles)
