@@ -84,8 +84,10 @@ class FakeMonitor:
         await self._runner.cleanup()
 
     async def say(self, kind, **fields):
-        """Send a message to all viewers."""
+        """Send a message to all viewers; with a status, poses said before are not repeated any more."""
         message = {"kind": kind, **fields}
+        if kind == "status":
+            self._last.pop("pose", None)
         self._last[kind] = message
         await self._send(message)
 
@@ -93,12 +95,9 @@ class FakeMonitor:
         while True:
             await asyncio.sleep(REPEAT_S)
             said = {message["kind"]: message for message in self.welcome} | self._last
-            there = [drone["id"] for drone in said.get("status", {"drones": ()})["drones"]]
-            poses = [pose for pose in said.get("pose", {"drones": ()})["drones"] if pose["id"] in there]
-            if "status" in said:
-                await self._send(said["status"])
-            if poses:
-                await self._send({"kind": "pose", "drones": poses})
+            for kind in ("status", "pose"):
+                if kind in said:
+                    await self._send(said[kind])
 
     async def _send(self, message):
         for watcher in list(self._watchers):
