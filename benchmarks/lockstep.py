@@ -1,6 +1,6 @@
 """What a flight in lockstep costs, part by part, as ratios measured in one run on one core.
 
-    python -m benchmarks.lockstep [SCENARIO] [--json]
+    python -m benchmarks.lockstep [SCENARIO] [--mission NAME] [--json]
 
 Absolute times differ from machine to machine and from minute to minute; the ratios to one `run()` of JSBSim
 with this drone's model, measured beside them, do not. Processor time is counted, so that other programs on
@@ -9,6 +9,7 @@ the machine have little effect.
 
 from __future__ import annotations
 
+import argparse
 import json
 import os
 import sys
@@ -22,17 +23,17 @@ os.environ.update(SINGLE_THREADS)  # before NumPy is imported
 import cv2
 
 from firmware_py.status import FlightMode
+from framerunner.flying.detector import plan_detector
 from framerunner.flying.lockstep import fly_lockstep
 from framerunner.flying.plan import FlightPlan
 from geometry.rotations import quaternion_from_yaw
 from offboard.app import Moment
-from offboard.mission import load_mission
+from offboard.mission import MissionError, load_mission
 from scenarios.loader import load_scenario
-from scenarios.models import Scenario
+from scenarios.models import Scenario, ScenarioError
 from sitl.camera import Camera
 from sitl.simulation import Simulation
 from sitl.world import PHYSICS_RATE_HZ, STEPS_PER_CONTROL
-from vision.detector import detect
 from vision.types import Image
 
 REPEATS = 5
@@ -44,7 +45,10 @@ class Parts:
     """What the parts of a flight cost: processor time, seconds."""
 
     scenario: str
-    image_rate_hz: float
+    mission: str
+    vision: str  # what the mission has found in images: boxes, or frames for its map
+    image_rate_hz: float  # the camera's
+    images_per_s: float  # painted and searched: a mission with a map leaves out those that it does not need
     simulated_s: float  # length of the whole flight
     raw_s: float  # one `run()` of JSBSim with this drone's model
     step_s: float  # one step of physics with autopilot, referee and the rest of a control tick
@@ -56,10 +60,19 @@ class Parts:
 
 def main() -> None:
     """Measure and print."""
-    words = sys.argv[1:]
-    scenario = load_scenario(next((word for word in words if word != "--json"), "test-case-1"))
-    parts = measure(scenario)
-    if "--json" in words:
+    parser = argparse.ArgumentParser(
+        prog="python -m benchmarks.lockstep", description=__doc__.partition("\n")[0]
+    )
+    parser.add_argument("scenario", nargs="?", default="test-case-1", metavar="SCENARIO", help="name or file")
+    parser.add_argument("--mission", default="frame_challenge", metavar="NAME", help="name or file")
+    parser.add_argument("--json", action="store_true", help="print what was measured as one line")
+    options = parser.parse_args()
+    try:
+        plan = FlightPlan(load_scenario(options.scenario), load_mission(options.mission))
+    except (ScenarioError, MissionError) as error:
+        parser.error(str(error))
+    parts = measure(plan)
+    if options.json:
         print(json.dumps(asdict(parts)))
         return
     from rich.console import Console
@@ -67,28 +80,44 @@ def main() -> None:
     from benchmarks.report import part_rows, show_parts
 
     flight = (
-        f"{parts.scenario}, {parts.simulated_s:.1f} s of flight, camera {parts.image_rate_hz:g} Hz, one core"
+        f"{parts.scenario}, {parts.mission}, {parts.simulated_s:.1f} s of flight, "
+        f"camera {parts.image_rate_hz:g} Hz, {parts.images_per_s:.1f} images a second used, one core"
     )
     by_wall = f"{parts.simulated_s / parts.flight_wall_s:.0f} x real time by the wall clock"
     console = Console(width=None if sys.stdout.isatty() else 130)
     show_parts(console, part_rows(asdict(parts), PHYSICS_RATE_HZ), f"{flight}; {by_wall}")
 
 
-def measure(scenario: Scenario) -> Parts:
+def measure(plan: FlightPlan) -> Parts:
     """Measure all parts, one after another."""
     pin_to_one_core()
     cv2.setNumThreads(1)
+    scenario = plan.scenario
     simulation = hovering(scenario)
     raw_s = best(simulation.world.dynamics.run, 20_000)
     step_s = best(simulation.tick, 5_000) / STEPS_PER_CONTROL
     images: list[Image] = []
     poses: list[Pose] = []
-    flight_s, wall_s, simulated_s = fly(scenario, images, poses)
+    searched, flight_s, wall_s, simulated_s = fly(plan, images, poses)
     camera = Camera(scenario)
     render_s = best(lambda: [camera.render(*pose) for pose in poses], 1) / len(poses)
-    detect_s = best(lambda: [detect(image) for image in images], 1) / len(images)
-    rate_hz = scenario.camera.rate_hz
-    return Parts(scenario.name, rate_hz, simulated_s, raw_s, step_s, render_s, detect_s, flight_s, wall_s)
+    detect = plan_detector(plan, rendered=True)
+    detect_s = best(lambda: [detect(image, 0) for image in images], 1) / len(images)
+    mission = plan.chart
+    return Parts(
+        scenario.name,
+        mission.name,
+        mission.vision,
+        scenario.camera.rate_hz,
+        searched / simulated_s,
+        simulated_s,
+        raw_s,
+        step_s,
+        render_s,
+        detect_s,
+        flight_s,
+        wall_s,
+    )
 
 
 def hovering(scenario: Scenario) -> Simulation:
@@ -103,17 +132,20 @@ def hovering(scenario: Scenario) -> Simulation:
     return simulation
 
 
-def fly(scenario: Scenario, images: list[Image], poses: list[Pose]) -> tuple[float, float, float]:
-    """Fly the challenge; processor, wall and simulated time, seconds. The first flight warms up."""
-    plan = FlightPlan(scenario, load_mission("frame_challenge"))
+def fly(plan: FlightPlan, images: list[Image], poses: list[Pose]) -> tuple[int, float, float, float]:
+    """Fly the plan; how many images were searched; processor, wall and simulated time, seconds.
+
+    The first flight warms up. It takes all images of the camera, the others only those that are searched.
+    """
     moments: list[Moment] = []
     fly_lockstep(plan, observers=(moments.append,), on_image=lambda _time_us, image: images.append(image))
     for moment in moments[:: max(1, len(moments) // 500)]:
         state = moment.state
         poses.append(((state.x, state.y, state.z), quaternion_from_yaw(state.yaw)))
     simulated_s = moments[-1].state.time_us / 1e6
+    searched = len({moment.detections.time_us for moment in moments})
     timed = [timed_flight(plan) for _ in range(REPEATS)]
-    return min(cpu_s for cpu_s, _ in timed), min(wall_s for _, wall_s in timed), simulated_s
+    return searched, min(cpu_s for cpu_s, _ in timed), min(wall_s for _, wall_s in timed), simulated_s
 
 
 def timed_flight(plan: FlightPlan) -> tuple[float, float]:

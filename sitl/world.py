@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from math import dist, hypot
+from math import dist, hypot, sqrt
 
 from firmware_py.airframe import Airframe
 from firmware_py.types import MotorSpeeds, Sensors
@@ -20,6 +20,7 @@ CONTROL_PERIOD_US = 1_000_000 * STEPS_PER_CONTROL // PHYSICS_RATE_HZ
 _SETTLING_STEPS = PHYSICS_RATE_HZ  # one second, to stand at rest before time starts
 _MIN_MARGIN_M = 0.05  # how much nearer the drone may come within one control period (12 m/s)
 _SPEED_MARGIN = 1.25  # of the airframe's maximum speed
+_MAX_ACCELERATION_M_S2 = 100.0  # more than any airframe's own; a touch may be harder, but adds no speed
 _MAX_FAR_TICKS = 250  # the longest time for which distant solids are not checked
 
 
@@ -168,11 +169,19 @@ class World:
             nearest_m = min(nearest_m, gap_m)
             if gap_m < reach:
                 near += (prism,)
-        self._far_ticks = min(int((nearest_m - reach) / self._margin_m), _MAX_FAR_TICKS)
+        self._far_ticks = self._ticks_to(nearest_m - reach)
         if self._neighbours:
             self._far_ticks = 0
             near += self._neighbours
         return (*near, *self._base.solids) if base_gap_m < reach and not above_base else near
+
+    def _ticks_to(self, distance_m: float) -> int:
+        """How many control ticks it takes at least to come so far, from the present speed."""
+        if distance_m <= 0.0:
+            return 0
+        speed_m_s, most = hypot(*self.dynamics.velocity_ned_m_s()), _MAX_ACCELERATION_M_S2
+        time_s = (sqrt(speed_m_s * speed_m_s + 2.0 * most * distance_m) - speed_m_s) / most
+        return min(int(time_s * 1e6 / CONTROL_PERIOD_US), _MAX_FAR_TICKS)
 
     def _push_from(self, near: tuple[Solid, ...]) -> None:
         """Apply a spring, a damper and friction at each touch (penalty method)."""

@@ -119,7 +119,8 @@ def test_parts_add_up_to_the_whole_flight():
         "detect_s": 100e-6,
         "flight_s": 1.6,
         "simulated_s": 100.0,
-        "image_rate_hz": 10.0,
+        "images_per_s": 10.0,
+        "vision": "boxes",
     }
     rows = {row.name: row for row in part_rows(parts, 500.0)}
     whole = rows.pop("the whole challenge, a step")
