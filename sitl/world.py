@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from math import dist, hypot, sqrt
 
-from firmware_py.airframe import Airframe
+from firmware_py.airframe import GRAVITY_M_S2, Airframe
 from firmware_py.types import MotorSpeeds, Sensors
 from geometry.axes import flip_quaternion, flip_vector, flip_yaw
 from geometry.rotations import rotation, rotation_rows, to_body, to_world, yaw_of
@@ -20,7 +20,7 @@ CONTROL_PERIOD_US = 1_000_000 * STEPS_PER_CONTROL // PHYSICS_RATE_HZ
 _SETTLING_STEPS = PHYSICS_RATE_HZ  # one second, to stand at rest before time starts
 _MIN_MARGIN_M = 0.05  # how much nearer the drone may come within one control period (12 m/s)
 _SPEED_MARGIN = 1.25  # of the airframe's maximum speed
-_MAX_ACCELERATION_M_S2 = 100.0  # more than any airframe's own; a touch may be harder, but adds no speed
+_ACCELERATION_MARGIN = 2.0  # over full thrust and gravity together; a touch may be harder, but adds no speed
 _MAX_FAR_TICKS = 250  # the longest time for which distant solids are not checked
 
 
@@ -46,6 +46,8 @@ class World:
         fastest_m_s = _SPEED_MARGIN * airframe.limits.speed_horizontal_m_s
         self._margin_m = max(_MIN_MARGIN_M, fastest_m_s * CONTROL_PERIOD_US / 1e6)
         self._reach_m = self.radius_m + self._margin_m
+        full_thrust_m_s2 = airframe.full_thrust_n / airframe.mass_kg
+        self._acceleration_m_s2 = _ACCELERATION_MARGIN * (full_thrust_m_s2 + GRAVITY_M_S2)
         self._base_top_m = scenario.base.top_m
         self._base_level_m = scenario.base.top_m - self._half_m[2]  # a centre on the base is higher than this
         self._groups = [_Group(frame.position_arena_m, frame_solids(frame)) for frame in scenario.all_frames]
@@ -179,7 +181,7 @@ class World:
         """How many control ticks it takes at least to come so far, from the present speed."""
         if distance_m <= 0.0:
             return 0
-        speed_m_s, most = hypot(*self.dynamics.velocity_ned_m_s()), _MAX_ACCELERATION_M_S2
+        speed_m_s, most = hypot(*self.dynamics.velocity_ned_m_s()), self._acceleration_m_s2
         time_s = (sqrt(speed_m_s * speed_m_s + 2.0 * most * distance_m) - speed_m_s) / most
         return min(int(time_s * 1e6 / CONTROL_PERIOD_US), _MAX_FAR_TICKS)
 
