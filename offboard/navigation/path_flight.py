@@ -13,9 +13,9 @@ from math import dist, pi, remainder
 from geometry.vectors import Vec3
 from offboard.drone import DroneState, VelocityCommand
 from offboard.limits import CommandLimits
-from offboard.navigation.control.hindrance import Hindrance
+from offboard.navigation.control.stuck_detector import StuckDetector
 from offboard.navigation.following import PathFollower
-from offboard.navigation.goals import FlightStyle, Gate, Goal, Motion, Obstacles, Point, Refusal
+from offboard.navigation.goals import FlightStyle, Gate, Goal, Motion, Obstacles, Refusal
 from offboard.navigation.path import Path
 from offboard.navigation.planning import obstructed, plan
 from offboard.navigation.search.lookout import Lookout, turn_to
@@ -69,8 +69,7 @@ class PathFlight:
         self._checked_s = 0.0
         self._tried_s = -style.replan_s
         self._refusals = 0
-        self._hindrance = Hindrance()
-        self._back: Point | None = None  # to which it flies instead of to its goals
+        self._stuck = StuckDetector()
         self._looks_aside = False  # and not where its path says
         self._watched_s = 0.0  # when the drone began to look there
 
@@ -87,8 +86,8 @@ class PathFlight:
 
     def stop(self) -> None:
         """Leave the path."""
-        self.path = self.watched = self._left = self._back = None
-        self._hindrance.leave()
+        self.path = self.watched = self._left = None
+        self._stuck.forget()
         self._lookout.leave()
         self.change()
 
@@ -152,7 +151,7 @@ class PathFlight:
         now_s = state.time_us * 1e-6
         if now_s - self._tried_s >= (self._style.replan_s if self.path is not None else WAITING_REPLAN_S):
             planned_for = (tuple(goals), obstacles)
-            off = self._hindrance.is_held or self._follower.error_m > RESTART_M
+            off = self._stuck.is_held or self._follower.error_m > RESTART_M
             if self.path is None or off or _differ(planned_for, self._planned_for, position_now(state)):
                 self._tried_s = now_s
                 self._plan(goals, obstacles, state)
@@ -192,18 +191,17 @@ class PathFlight:
 
     def _goals_now(self, goals: Sequence[Goal], state: DroneState) -> Sequence[Goal]:
         """The goals, or for a drone that something holds a place on the way that it came."""
-        here_m, now_s = position_now(state), state.time_us * 1e-6
-        has_path = self.path is not None
-        self._hindrance.observe(here_m, now_s, self._follower.error_m, has_path=has_path)
-        back = self._hindrance.way_back(here_m, now_s, has_path=has_path)
-        if back != self._back:
-            self._back = back
+        back, now_s = self._stuck.back, state.time_us * 1e-6
+        self._stuck.observe(
+            position_now(state), now_s, self._follower.error_m, has_path=self.path is not None
+        )
+        if self._stuck.back is not back:
             self.change()
-        return goals if back is None else [back]
+        return goals if self._stuck.back is None else [self._stuck.back]
 
     def _start(self, state: DroneState) -> tuple[Motion, bool]:
         """The motion to plan from, and whether it begins a path that does not continue the present one."""
-        if self._follower.error_m <= RESTART_M and not self._hindrance.is_held:
+        if self._follower.error_m <= RESTART_M and not self._stuck.is_held:
             flies = self.path is not None and not self._anew
             reference = self._follower.reference() if flies else None
             if reference is not None:
@@ -216,7 +214,7 @@ class PathFlight:
 
     def _plan(self, goals: Sequence[Goal], obstacles: Obstacles, state: DroneState) -> None:
         start, restarts = self._start(state)
-        self._hindrance.planned(state.time_us * 1e-6)
+        self._stuck.planned(state.time_us * 1e-6)
         found = self._find(start, goals, obstacles)
         if isinstance(found, Refusal) and len(goals) > 1:
             found = self._find(start, goals[:1], obstacles)

@@ -1,4 +1,4 @@
-"""Notices that something holds the drone, such as a bar that it touches, and knows the way that it came."""
+"""Detects a drone that is stuck, held by a bar for example, and remembers the way that it came."""
 
 from __future__ import annotations
 
@@ -17,23 +17,24 @@ STEP_M = 0.1  # between two places of this way
 MAX_BACK_S = 3.0
 
 
-class Hindrance:
-    """Compares where the drone is with where its path is.
+class StuckDetector:
+    """Compares where the drone is with where its path is; call `observe` every tick.
 
     Attributes:
         is_held: it is off its path and does not move; a path must be planned from where it is.
+        back: where to fly instead of to the goals: back the way it came, facing what holds it; None: nowhere.
     """
 
     def __init__(self) -> None:
         self.is_held = False
+        self.back: Point | None = None
+        self._back_s = 0.0  # since when it flies back
         self._free_m: Vec3 = (0.0, 0.0, 0.0)  # where the drone was last on its path, or moved
         self._free_s = 0.0
         self._near_m: Vec3 = (0.0, 0.0, 0.0)  # where the drone is
         self._near_s = 0.0  # since when it has been near there, with a path to fly
         self._was_off = False  # and has been off its path
         self._way: deque[Vec3] = deque(maxlen=round(BACK_M / STEP_M))  # that the drone came
-        self._back: Point | None = None
-        self._back_s = 0.0  # since when it flies back
 
     def observe(self, here_m: Vec3, now_s: float, off_path_m: float, *, has_path: bool) -> None:
         """Take a tick.
@@ -44,8 +45,7 @@ class Hindrance:
             off_path_m: how far from its path.
             has_path: it has one to fly.
         """
-        is_off = off_path_m >= OFF_PATH_M
-        if not has_path or not is_off or dist(here_m, self._free_m) > HELD_M:
+        if not has_path or off_path_m < OFF_PATH_M or dist(here_m, self._free_m) > HELD_M:
             self._free_m, self._free_s = here_m, now_s
         self.is_held = now_s - self._free_s > HELD_S
         if not self._way or dist(here_m, self._way[-1]) > STEP_M:
@@ -53,26 +53,26 @@ class Hindrance:
         if not has_path or dist(here_m, self._near_m) > STEP_M:
             self._near_m, self._near_s, self._was_off = here_m, now_s, False
         self._was_off = self._was_off or off_path_m > OFF_PATH_M
-
-    def way_back(self, here_m: Vec3, now_s: float, *, has_path: bool) -> Point | None:
-        """Where to fly instead of to the goals: back the way it came, facing what holds it; None: nowhere."""
-        if self._back is not None:
-            arrived = dist(here_m, self._back.position_m) < STEP_M
+        if self.back is not None:
+            arrived = dist(here_m, self.back.position_m) < STEP_M
             if arrived or now_s - self._back_s > MAX_BACK_S:
-                self._back = None
+                self.back = None
         elif has_path and self._was_off and now_s - self._near_s > STUCK_S:
-            (x, y, _), place_m = here_m, self._way[0]
-            if dist(here_m, place_m) > STEP_M:  # else it has not come from anywhere
-                self._back = Point(place_m, atan2(y - place_m[1], x - place_m[0]))
-                self._back_s = self._near_s = now_s
-        return self._back
+            self._turn_back(here_m, now_s)
+
+    def _turn_back(self, here_m: Vec3, now_s: float) -> None:
+        """Fly back, if the drone has come from anywhere."""
+        (x, y, _), place_m = here_m, self._way[0]
+        if dist(here_m, place_m) > STEP_M:
+            self.back = Point(place_m, atan2(y - place_m[1], x - place_m[0]))
+            self._back_s = self._near_s = now_s
 
     def planned(self, now_s: float) -> None:
         """A path was planned from where the drone is held; it has time to fly it."""
         if self.is_held:
             self._free_s = now_s
 
-    def leave(self) -> None:
+    def forget(self) -> None:
         """Forget the way: the drone has other goals."""
-        self._back = None
+        self.back = None
         self._way.clear()
