@@ -29,6 +29,7 @@ MissionClass = Literal["contest", "open"]
 DecoyColour = Literal["cyan", "magenta"]
 DECOY_COLOURS: tuple[DecoyColour, ...] = ("cyan", "magenta")
 
+_OFTEN_UNUSED = ("decoys", "poles", "walls", "sensors")
 _SHORTEST_M = 0.001  # of a part of a wall; a doorway may end where the wall does
 START_CLEAR_M = 0.3  # from the start's centre to a pole or wall: more than half of any airframe
 
@@ -286,6 +287,7 @@ class Scenario(Part):
     try_limit_s: float = Field(180.0, gt=0, le=36000, description="longest try, motors on to motors off")
     airframe: str = Field("abejorro", description="name of the drone to fly")
     origin: Origin = Field(Origin(), description="where on Earth the arena is")
+    sensors: str = Field("ideal", description="name of the drone's sensor suite, or a file of one")
 
     @model_validator(mode="after")
     def _one_frame_a_colour(self) -> Self:
@@ -332,11 +334,12 @@ class Scenario(Part):
         return self
 
     @model_serializer(mode="wrap")
-    def _without_empty_obstacles(self, write: SerializerFunctionWrapHandler) -> dict[str, Any]:
-        """Leave out kinds of obstacles that it has not: evaluations compare scenarios by what is written."""
+    def _without_unused_parts(self, write: SerializerFunctionWrapHandler) -> dict[str, Any]:
+        """Leave out what most scenarios do not use: evaluations compare scenarios by what is written."""
         written: dict[str, Any] = write(self)
-        empty = [field for field in ("decoys", "poles", "walls") if not getattr(self, field)]
-        return {field: value for field, value in written.items() if field not in empty}
+        fields = type(self).model_fields
+        unused = [name for name in _OFTEN_UNUSED if getattr(self, name) == fields[name].default]
+        return {field: value for field, value in written.items() if field not in unused}
 
     @property
     def contents(self) -> str:
