@@ -1,0 +1,1 @@
+"""Estimation of the vehicle's state from its sensors."""

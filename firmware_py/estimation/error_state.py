@@ -1,0 +1,160 @@
+"""The covariance of the error state, and its prediction and correction: a Kalman filter on small errors.
+
+The error of attitude is a rotation vector about the axes of NED (R = exp(d) R_estimated), so that the error
+of the heading is one of its components. Prediction and correction follow J. Solà, "Quaternion kinematics for
+the error-state Kalman filter", 2017 (arXiv 1711.02508), section 7, with global angular errors. numpy does the
+algebra; measurements are fused one number after the other, which needs no inverse.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from math import exp, inf
+
+import numpy as np
+import numpy.typing as npt
+
+from geometry.rotations import Rotation
+from geometry.vectors import Vec3
+
+Matrix = npt.NDArray[np.float64]
+
+ATTITUDE, VELOCITY, POSITION, GYRO_BIAS, ACCEL_BIAS = 0, 3, 6, 9, 12
+INERTIAL_STATES = 15
+
+
+@dataclass(frozen=True, slots=True)
+class Drift:
+    """A state of its own for a slowly changing error of a sensor.
+
+    Attributes:
+        noise_density: of the white noise that drives it, unit/s per root of Hz; 0: a constant.
+        time_constant_s: of its return to zero; infinite: a random walk, else a first-order Gauss-Markov
+            process, whose variance without measurements is noise_density^2 time_constant_s / 2.
+    """
+
+    noise_density: float = 0.0
+    time_constant_s: float = inf
+
+    def over(self, period_s: float) -> tuple[float, float]:
+        """What is left of it after a time, as a share, and the variance added meanwhile."""
+        kept = exp(-period_s / self.time_constant_s)
+        if kept == 1.0:
+            return (1.0, self.noise_density**2 * period_s)
+        return (kept, self.noise_density**2 * self.time_constant_s / 2.0 * (1.0 - kept * kept))
+
+
+class ErrorCovariance:
+    """Covariance `p` of the error state, shape (n, n).
+
+    Args:
+        drifts: the states behind the fifteen inertial ones.
+
+    Attributes:
+        p: the covariance, updated in place.
+        error: the errors found by the corrections since `take_error`, shape (n,).
+    """
+
+    def __init__(self, drifts: tuple[Drift, ...] = ()) -> None:
+        self.size = size = INERTIAL_STATES + len(drifts)
+        self.p: Matrix = np.zeros((size, size))
+        self.error: Matrix = np.zeros(size)
+        self._drifts = drifts
+        self._f: Matrix = np.eye(size)
+        self._work: Matrix = np.zeros((size, size))
+        self._diagonal = np.arange(size)
+        self._noise: Matrix = np.zeros(size)
+
+    def set_variance(self, index: int, *variances: float) -> None:
+        """Make states independent of all others, with these variances."""
+        for at, variance in enumerate(variances, start=index):
+            self.p[at, :] = 0.0
+            self.p[:, at] = 0.0
+            self.p[at, at] = variance
+
+    def predict(
+        self,
+        m: Rotation,
+        push_ned_m_s: Vec3,
+        period_s: float,
+        *,
+        turn_variance_rad2: float,
+        push_variance_m2_s2: float,
+        gyro_bias_variance: float,
+        accel_bias_variance: float,
+    ) -> None:
+        """Advance by an interval of some hundredths of a second.
+
+        Args:
+            m: attitude in the interval's middle.
+            push_ned_m_s: change of velocity by the specific force, shape (3,).
+            period_s: length of the interval.
+            turn_variance_rad2: by the gyroscope's white noise, per axis.
+            push_variance_m2_s2: by the accelerometer's white noise, per axis.
+            gyro_bias_variance: by which the biases' variance grows, (rad/s)^2.
+            accel_bias_variance: by which the biases' variance grows, (m/s^2)^2.
+        """
+        f, p, noise = self._f, self.p, self._noise
+        n, e, d = push_ned_m_s
+        half_s = 0.5 * period_s
+        tilt = f[3:6, 0:3]  # -[push]x: a tilt turns the specific force
+        tilt[0, 1], tilt[0, 2], tilt[1, 2] = d, -e, n
+        tilt[1, 0], tilt[2, 0], tilt[2, 1] = -d, e, -n
+        np.multiply(tilt, half_s, out=f[6:9, 0:3])
+        f[6, 3] = f[7, 4] = f[8, 5] = period_s
+        turn = np.array(m).reshape(3, 3)
+        turn *= -period_s
+        f[0:3, 9:12] = turn
+        f[3:6, 12:15] = turn
+        np.multiply(turn, half_s, out=f[6:9, 12:15])
+        noise[0:3] = turn_variance_rad2
+        noise[3:6] = push_variance_m2_s2
+        noise[9:12] = gyro_bias_variance
+        noise[12:15] = accel_bias_variance
+        for index, drift in enumerate(self._drifts, start=INERTIAL_STATES):
+            f[index, index], noise[index] = drift.over(period_s)
+        np.dot(f, p, out=self._work)
+        np.dot(self._work, f.T, out=p)
+        p[self._diagonal, self._diagonal] += noise
+
+    def innovation_variance(self, row: Matrix, variance: float) -> float:
+        """Variance of an innovation: H P H' + R for the row H, shape (n,)."""
+        return float(row @ self.p @ row) + variance
+
+    def fuse(self, row: Matrix, innovation: float, variance: float) -> float:
+        """Correct by one measured number.
+
+        Args:
+            row: derivatives of the measured number by the error state, shape (n,).
+            innovation: measured minus predicted by the nominal state.
+            variance: of the measurement.
+
+        Returns:
+            The normalised innovation squared; over the numbers of one measurement, these add up to its NIS.
+        """
+        gain: Matrix = self.p @ row
+        return self._correct(gain, float(gain @ row), float(row @ self.error), innovation, variance)
+
+    def fuse_state(self, index: int, innovation: float, variance: float) -> float:
+        """Correct by a measurement of one state; see `fuse`."""
+        gain: Matrix = self.p[index].copy()
+        return self._correct(gain, float(gain[index]), float(self.error[index]), innovation, variance)
+
+    def _correct(self, gain: Matrix, own: float, known: float, innovation: float, variance: float) -> float:
+        total = own + variance
+        left = innovation - known  # what earlier numbers have not explained yet
+        scaled = gain / total
+        self.error += scaled * left
+        self.p -= scaled[:, None] * gain
+        return left * left / total
+
+    def take_error(self) -> list[float]:
+        """The errors found since the last call; they are then zero, as the nominal state has them."""
+        found: list[float] = self.error.tolist()
+        self.error[:] = 0.0
+        return found
+
+    def symmetrise(self) -> None:
+        """Remove what rounding has made unsymmetrical."""
+        np.add(self.p, self.p.T, out=self._work)
+        np.multiply(self._work, 0.5, out=self.p)

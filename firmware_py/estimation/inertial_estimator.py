@@ -1,0 +1,227 @@
+"""The vehicle state from honest sensors: an error-state Kalman filter that runs a little behind the present.
+
+Measurements arrive later than they were true, each by its own delay. So the filter's state is that of some
+hundredths of a second ago, where all of them can be fused in their order; from there the state of the present
+is integrated from the IMU's samples since (as PX4's EKF2 with its delayed time horizon and output predictor).
+"""
+
+from __future__ import annotations
+
+from heapq import heappop, heappush
+from math import atan2, isfinite, sqrt
+
+from firmware_py.estimation.aid import NEVER_US
+from firmware_py.estimation.aiding import Aiding, Sample
+from firmware_py.estimation.alignment import Alignment
+from firmware_py.estimation.error_state import ATTITUDE, INERTIAL_STATES, POSITION, VELOCITY
+from firmware_py.estimation.output import OutputPredictor
+from firmware_py.estimation.settings import EstimatorSettings
+from firmware_py.measurements import ExternalPose, ImuSample, MagnetometerSample, Readings
+from firmware_py.types import GeodeticPoint, VehicleState
+from geometry.rotations import euler_from_quaternion, yaw_of
+from geometry.vectors import Vec3
+
+_MAX_WAITING = 64
+_STAND_PERIOD_US = 100_000
+_NOISE_TICKS = 4
+_NEW_SHARE = 0.016  # of a new sample of the noise in its mean: one second
+_SECOND_DIFFERENCE = 1.0 / 18.0  # of white noise in three axes: its square is six variances each
+
+
+class InertialEstimator:
+    """Estimates the state from `Readings` and external poses.
+
+    Args:
+        settings: of the filter.
+        field_ned_gauss: Earth's magnetic field here, shape (3,).
+        origin: where on Earth the frame of external poses is; None: GPS gives the local frame's origin.
+
+    Attributes:
+        state: the estimate of the present, updated in place.
+        aiding: the filter and its measurements.
+        stands: set by the owner: the vehicle is disarmed on the ground.
+        late: measurements that came too late to be fused.
+    """
+
+    def __init__(
+        self, settings: EstimatorSettings, field_ned_gauss: Vec3, origin: GeodeticPoint | None
+    ) -> None:
+        self.state = VehicleState()
+        self.aiding = Aiding(settings, field_ned_gauss, origin)
+        self.stands = True
+        self.late = 0
+        self._settings = settings
+        self._field = field_ned_gauss
+        self._alignment: Alignment | None = Alignment()
+        self._output = OutputPredictor()
+        self._waiting: list[tuple[int, int, Sample]] = []
+        self._arrivals = 0
+        self._resets = 0
+        self._stood_us = NEVER_US
+        self._ticks = 0
+        noise = settings.noise
+        self._floor = (noise.gyro_density**2, noise.accel_density**2)  # times the sampling rate
+        self._vibration = (0.0, 0.0)
+
+    @property
+    def origin(self) -> GeodeticPoint | None:
+        """Where on Earth the local frame's origin is; None before it is known."""
+        return self.aiding.origin if self._alignment is None else None
+
+    @property
+    def has_position(self) -> bool:
+        """Whether the horizontal position is measured, or was until a short while ago."""
+        fused_us = self.aiding.horizontal.fused_us
+        return fused_us != NEVER_US and self.state.time_us - fused_us <= self._settings.no_aid_us
+
+    def take_external_pose(self, pose: ExternalPose) -> None:
+        """Take a pose from outside; it is fused at the time at which it was true."""
+        numbers = (*pose.position_ned_m, *pose.position_variance_m2, *(pose.attitude or ()))
+        if not self._settings.external or not all(map(isfinite, numbers)):
+            return
+        if self._alignment is not None:
+            if pose.attitude is not None:
+                self._alignment.heading_rad = yaw_of(pose.attitude)
+            return
+        self._queue(pose)
+
+    def update(self, readings: Readings) -> bool:
+        """Take what the sensors deliver in one control tick.
+
+        Returns:
+            Whether there is an estimate of this tick: the filter is aligned and the IMU has delivered.
+        """
+        imu = readings.imu
+        if imu is None or not _is_usable(imu, self.state.time_us):
+            return False
+        if self._alignment is not None:
+            self._align(imu, readings.magnetometer)
+            return False
+        if readings.magnetometer is not None:
+            self._queue(readings.magnetometer)
+        if readings.barometer is not None:
+            self._queue(readings.barometer)
+        if readings.gps is not None:
+            self._queue(readings.gps)
+        rate, force = imu.angular_rate_frd_rad_s, imu.specific_force_frd_m_s2
+        self._output.add((imu.time_us, imu.period_us / 1e6, rate, force), self.aiding.filter)
+        self._ticks += 1
+        if self._ticks % _NOISE_TICKS == 0:
+            self._measure_noise()
+        self._advance_filter(imu.time_us)
+        self._publish(imu)
+        return True
+
+    def position_variance_m2(self) -> Vec3:
+        """Variances of north, east and down."""
+        return self._variances(POSITION)
+
+    def velocity_variance_m2_s2(self) -> Vec3:
+        """Variances of the velocity north, east and down."""
+        return self._variances(VELOCITY)
+
+    def attitude_variance_rad2(self) -> Vec3:
+        """Variances of the attitude's error about north, east and down."""
+        return self._variances(ATTITUDE)
+
+    @property
+    def vibration(self) -> tuple[float, float]:
+        """Standard deviations of the IMU's noise: rad/s and m/s^2, per axis and sample."""
+        return (sqrt(self._vibration[0]), sqrt(self._vibration[1]))
+
+    def _variances(self, index: int) -> Vec3:
+        p = self.aiding.filter.covariance.p
+        return (float(p[index, index]), float(p[index + 1, index + 1]), float(p[index + 2, index + 2]))
+
+    def _queue(self, sample: Sample) -> None:
+        """Keep a measurement until the filter reaches its time."""
+        if sample.time_us < self.aiding.filter.time_us - 100_000 or len(self._waiting) >= _MAX_WAITING:
+            self.late += 1
+            return
+        self._arrivals += 1
+        heappush(self._waiting, (sample.time_us, self._arrivals, sample))
+
+    def _align(self, imu: ImuSample, magnetometer: MagnetometerSample | None) -> None:
+        alignment = self._alignment
+        assert alignment is not None
+        if not alignment.take(imu):
+            return
+        if magnetometer is not None and self._settings.magnetometer_sigma_gauss is not None:
+            ahead, right = alignment.level(magnetometer.field_frd_gauss)
+            alignment.heading_rad = atan2(self._field[1], self._field[0]) - atan2(right, ahead)
+        if alignment.heading_rad is None:
+            return
+        into = self.aiding.filter
+        alignment.start(into, self._settings.noise, alignment.heading_rad)
+        hard_iron = self._settings.hard_iron_sigma_gauss**2
+        if self._settings.magnetometer_sigma_gauss is not None:
+            into.covariance.set_variance(INERTIAL_STATES, hard_iron, hard_iron, hard_iron)
+        into.start(imu.time_us)
+        self._output.repeat(into)
+        self._alignment = None
+        self._publish(imu)
+
+    def _measure_noise(self) -> None:
+        """Estimate the IMU's white noise from second differences, which slow motion hardly changes."""
+        recent = self._output.recent
+        if len(recent) < 3:
+            return
+        (_, _, (p2, q2, r2), (x2, y2, z2)) = recent[-3]
+        (_, _, (p1, q1, r1), (x1, y1, z1)) = recent[-2]
+        (_, period_s, (p, q, r), (x, y, z)) = recent[-1]
+        p, q, r = p - 2.0 * p1 + p2, q - 2.0 * q1 + q2, r - 2.0 * r1 + r2
+        x, y, z = x - 2.0 * x1 + x2, y - 2.0 * y1 + y2, z - 2.0 * z1 + z2
+        turn, push = self._vibration
+        turn += _NEW_SHARE * ((p * p + q * q + r * r) * _SECOND_DIFFERENCE - turn)
+        push += _NEW_SHARE * ((x * x + y * y + z * z) * _SECOND_DIFFERENCE - push)
+        self._vibration = (turn, push)
+        gyro, accel = self._floor
+        self.aiding.filter.white_noise = (max(turn, gyro / period_s), max(push, accel / period_s))
+
+    def _advance_filter(self, now_us: int) -> None:
+        """Let the filter follow at its distance, and carry its corrections to the present."""
+        recent, waiting, into = self._output.recent, self._waiting, self.aiding.filter
+        while recent and recent[0][0] <= now_us - self._settings.delay_us:
+            time_us, period_s, rate, force = recent.popleft()
+            into.add(time_us, period_s, rate, force)
+            due_us = time_us + int(period_s * 5e5)
+            while waiting and waiting[0][0] <= due_us:
+                self._correct(self.aiding.fuse(heappop(waiting)[2]))
+            if self.stands and self._is_unaided(time_us):
+                self._stood_us = time_us
+                self._correct(self.aiding.stand())
+
+    def _correct(self, error: list[float]) -> None:
+        into, resets = self.aiding.filter, self.aiding.resets
+        if resets == self._resets:
+            self._output.correct(error, into)
+        else:
+            self._resets = resets
+            self._output.repeat(into)
+
+    def _is_unaided(self, now_us: int) -> bool:
+        """Whether standing still is the only knowledge of the position, and due to be used."""
+        if now_us - self._stood_us < _STAND_PERIOD_US:
+            return False
+        return now_us - self.aiding.horizontal.fused_us > self._settings.no_aid_us
+
+    def _publish(self, imu: ImuSample) -> None:
+        state, output, into = self.state, self._output.state, self.aiding.filter
+        state.time_us = imu.time_us
+        state.position_ned_m = output.position_ned_m
+        state.velocity_ned_m_s = output.velocity_ned_m_s
+        state.attitude = output.attitude
+        state.roll_rad, state.pitch_rad, state.yaw_rad = euler_from_quaternion(output.attitude)
+        p, q, r = imu.angular_rate_frd_rad_s
+        bp, bq, br = into.gyro_bias_frd_rad_s
+        state.angular_rate_frd_rad_s = (p - bp, q - bq, r - br)
+        x, y, z = imu.specific_force_frd_m_s2
+        bx, by, bz = into.accel_bias_frd_m_s2
+        state.specific_force_frd_m_s2 = (x - bx, y - by, z - bz)
+
+
+def _is_usable(imu: ImuSample, last_us: int) -> bool:
+    """Whether a sample is finite and newer than the last."""
+    p, q, r = imu.angular_rate_frd_rad_s
+    x, y, z = imu.specific_force_frd_m_s2
+    return imu.time_us > last_us and imu.period_us > 0 and isfinite(p + q + r + x + y + z)

@@ -1,0 +1,78 @@
+"""What the estimator assumes about its sensors."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+
+@dataclass(frozen=True, slots=True)
+class InertialNoise:
+    """The IMU.
+
+    Attributes:
+        gyro_density: white noise of the gyroscope, rad/s per root of Hz.
+        accel_density: white noise of the accelerometer, m/s^2 per root of Hz. Vibration is measured.
+        gyro_bias_walk: noise that drives the gyroscope's bias, rad/s per root of s.
+        accel_bias_walk: noise that drives the accelerometer's bias, m/s^2 per root of s.
+        gyro_bias_sigma_rad_s: of the bias at boot.
+        accel_bias_sigma_m_s2: of the bias at boot.
+    """
+
+    gyro_density: float = 1.0e-4
+    accel_density: float = 2.0e-3
+    gyro_bias_walk: float = 2.0e-5
+    accel_bias_walk: float = 3.0e-4
+    gyro_bias_sigma_rad_s: float = 0.01
+    accel_bias_sigma_m_s2: float = 0.1
+
+
+@dataclass(frozen=True, slots=True)
+class SlowError:
+    """A slow error of a sensor.
+
+    Attributes:
+        sigma: at boot.
+        noise_density: that drives it, unit per root of s.
+        time_constant_s: of its return to zero; infinite: none.
+    """
+
+    sigma: float
+    noise_density: float
+    time_constant_s: float = float("inf")
+
+
+@dataclass(frozen=True, slots=True)
+class EstimatorSettings:
+    """What the estimator assumes, and which measurements it fuses.
+
+    Attributes:
+        noise: of the IMU.
+        delay_us: by which measurements may arrive late; the filter runs so much behind.
+        no_aid_us: how long the position is usable without a measurement (PX4: EKF2_NOAID_TOUT).
+        gate: innovations beyond so many standard deviations are rejected.
+        reset_us: measurements rejected for so long are taken for right.
+        external: poses from outside are fused.
+        external_angle_sigma_rad: at least, of headings from outside.
+        gps: GPS is fused.
+        gps_sigma_m: white noise of GPS positions, horizontal and vertical.
+        gps_drift: slow errors of GPS positions, horizontal and vertical.
+        magnetometer_sigma_gauss: white noise; None: not fused.
+        hard_iron_sigma_gauss: constant error of the magnetometer.
+        barometer_sigma_m: white noise; None: not fused.
+        barometer_drift: slow error of the barometer.
+    """
+
+    noise: InertialNoise = field(default_factory=InertialNoise)
+    delay_us: int = 48_000
+    no_aid_us: int = 5_000_000
+    gate: float = 5.0
+    reset_us: int = 1_000_000
+    external: bool = True
+    external_angle_sigma_rad: float = 0.002
+    gps: bool = False
+    gps_sigma_m: tuple[float, float] = (0.3, 0.5)
+    gps_drift: tuple[SlowError, SlowError] = (SlowError(1.0, 0.1, 200.0), SlowError(1.5, 0.15, 200.0))
+    magnetometer_sigma_gauss: float | None = None
+    hard_iron_sigma_gauss: float = 0.02
+    barometer_sigma_m: float | None = 0.2
+    barometer_drift: SlowError = SlowError(0.5, 0.03)
