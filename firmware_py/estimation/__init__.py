@@ -1,0 +1,1 @@
+"""The estimate of the vehicle's state from measurements."""
