@@ -56,7 +56,8 @@ class FileKind(Generic[Model]):
     name: str  # "scenario" or the like, for messages
     model: type[Model]
     error: type[UserError]
-    folder: str  # of this package, with the files that are installed with it
+    folder: str  # of the package, with the files that are installed with it
+    package: str = "scenarios"
 
     def names(self) -> list[str]:
         """Names of the installed files, sorted."""
@@ -108,7 +109,7 @@ class FileKind(Generic[Model]):
             raise self.error(f"{source}:{tree.line(path)}: {words}{more}") from None
 
     def _folder(self) -> Traversable:
-        return resources.files("scenarios") / self.folder
+        return resources.files(self.package) / self.folder
 
     def _read(self, path: Path, known: list[str]) -> bytes:
         """Read a file that may be anything, but never more than is allowed."""

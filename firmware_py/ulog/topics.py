@@ -10,8 +10,9 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from math import atan2, hypot, nan
 
+from firmware_py.atmosphere import pressure_hpa, temperature_k
 from firmware_py.autopilot import Autopilot
-from firmware_py.mavlink.telemetry.sensing import earth_field_frd_gauss, pressure_hpa, temperature_k
+from firmware_py.mavlink.telemetry.sensing import earth_field_frd_gauss
 from firmware_py.setpoints import AttitudeSetpoint, BodyRateSetpoint
 from firmware_py.status import NAVIGATION_STATES, LandedState
 from firmware_py.types import GeodeticPoint

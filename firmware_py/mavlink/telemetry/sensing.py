@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from math import atan2, degrees, hypot
 
+from firmware_py.atmosphere import pressure_hpa, temperature_k
 from firmware_py.autopilot import Autopilot
 from firmware_py.mavlink.telemetry.streams import AutopilotSource
 from geometry.rotations import rotation, to_body
@@ -12,25 +13,11 @@ from wire.dialect import Message, boot_ms, degrees_e7, mavlink, millimetres, who
 
 # North, east, down at PX4's simulated home (Zurich), gauss; World Magnetic Model 2025, two digits.
 EARTH_FIELD_NED_GAUSS: Vec3 = (0.22, 0.013, 0.43)
-_SEA_LEVEL_HPA = 1013.25
-_SEA_LEVEL_K = 288.15
-_LAPSE_K_M = 0.0065
-_EXPONENT = 5.25588  # g M / (R L)
 _MILLI_G = 1000.0 / 9.80665  # of 1 m/s²
 _RANGE_M = 100.0
 _MIN_DOWN = 0.01
 _UNKNOWN_8, _UNKNOWN_16 = 0xFF, 0xFFFF
 _IMU_FIELDS = 0b1_1011_1111_1111  # all but differential pressure
-
-
-def temperature_k(altitude_m: float) -> float:
-    """Air temperature of the International Standard Atmosphere, below 11 km (ISO 2533)."""
-    return _SEA_LEVEL_K - _LAPSE_K_M * min(max(altitude_m, -5000.0), 11000.0)
-
-
-def pressure_hpa(altitude_m: float) -> float:
-    """Static pressure of the International Standard Atmosphere, below 11 km: p0 (T / T0)^5.256 (ISO 2533)."""
-    return float(_SEA_LEVEL_HPA * (temperature_k(altitude_m) / _SEA_LEVEL_K) ** _EXPONENT)
 
 
 def earth_field_frd_gauss(attitude: Quaternion) -> Vec3:

@@ -3,13 +3,9 @@ from math import cos, inf, nan, pi, sin
 
 import pytest
 
+from firmware_py.atmosphere import pressure_hpa, temperature_k
 from firmware_py.mavlink.node import MavlinkNode
-from firmware_py.mavlink.telemetry.sensing import (
-    EARTH_FIELD_NED_GAUSS,
-    earth_field_frd_gauss,
-    pressure_hpa,
-    temperature_k,
-)
+from firmware_py.mavlink.telemetry.sensing import EARTH_FIELD_NED_GAUSS, earth_field_frd_gauss
 from firmware_py.mavlink.telemetry.streams import GROUND, ONBOARD
 from firmware_py.setpoints import AttitudeSetpoint, TrajectorySetpoint
 from firmware_py.status import FlightMode, LandedState, VehicleStatus

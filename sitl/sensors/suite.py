@@ -1,0 +1,117 @@
+"""Sensor suites: the files that declare them, and all sensors of a drone together."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from errors import UserError
+from firmware_py.airframe import Airframe
+from firmware_py.measurements import ExternalPose, Readings
+from firmware_py.types import GeodeticPoint
+from scenarios.models import Origin
+from scenarios.yaml_file import FileKind
+from sitl.sensors.battery_monitor import BatteryMonitor
+from sitl.sensors.environment import Barometer, Gps, Magnetometer
+from sitl.sensors.ground import OpticalFlow, RangeFinder
+from sitl.sensors.imu import Imu
+from sitl.sensors.motion_capture import MotionCapture
+from sitl.sensors.specs import SuiteSpec
+from sitl.sensors.truth import TrueMotion
+
+
+class SuiteError(UserError):
+    """A sensor suite that cannot be used; the message is one line for people."""
+
+
+_FILES = FileKind("suite", SuiteSpec, SuiteError, folder="suites", package="sitl.sensors")
+
+
+def list_suites() -> list[str]:
+    """Names of the suites that are installed with the package, sorted."""
+    return _FILES.names()
+
+
+def load_suite(name_or_path: str | Path) -> SuiteSpec:
+    """Load an installed suite or any YAML file.
+
+    Args:
+        name_or_path: a name of `list_suites`, or a path: it has a directory or ends in .yaml or .yml.
+
+    Raises:
+        SuiteError: there is no such suite, or the file is not a valid one; the message names line, field,
+            value and what to do.
+    """
+    suite = _FILES.load(name_or_path)
+    if suite is None:
+        raise _FILES.unknown(str(name_or_path))
+    return suite
+
+
+class SensorSuite:
+    """All sensors of a drone. An ideal suite has no models, and delivers the battery's values only.
+
+    Each sensor draws from its own streams of random numbers, so a suite with one sensor less gives the same
+    samples of all others.
+
+    Args:
+        spec: which sensors there are, and their figures.
+        airframe: of the drone.
+        origin: where on Earth the scenario is.
+        seed: of all random numbers, 0 to `scenarios.random_numbers.MAX_SEED`.
+    """
+
+    __slots__ = (
+        "_barometer",
+        "_battery",
+        "_external_pose",
+        "_gps",
+        "_imu",
+        "_magnetometer",
+        "_motion_capture",
+        "_optical_flow",
+        "_range_finder",
+    )
+
+    def __init__(
+        self, spec: SuiteSpec, airframe: Airframe, origin: GeodeticPoint | Origin, seed: int
+    ) -> None:
+        place = GeodeticPoint(origin.latitude_deg, origin.longitude_deg, origin.altitude_m)
+        self._imu = Imu(spec.imu, airframe, seed) if spec.imu else None
+        self._magnetometer = Magnetometer(spec.magnetometer, place, seed) if spec.magnetometer else None
+        self._barometer = Barometer(spec.barometer, place, seed) if spec.barometer else None
+        self._gps = Gps(spec.gps, place, seed) if spec.gps else None
+        self._range_finder = RangeFinder(spec.range_finder, seed) if spec.range_finder else None
+        self._optical_flow = OpticalFlow(spec.optical_flow, seed) if spec.optical_flow else None
+        self._motion_capture = MotionCapture(spec.external_pose, seed) if spec.external_pose else None
+        self._battery = BatteryMonitor(spec.battery, seed) if spec.battery else None
+        self._external_pose: ExternalPose | None = None
+
+    def read(self, motion: TrueMotion, battery_voltage_v: float, battery_current_a: float) -> Readings:
+        """Measure once in each control tick.
+
+        Args:
+            motion: of this tick.
+            battery_voltage_v: the true one.
+            battery_current_a: the true one.
+
+        Returns:
+            What has arrived in this tick, without the pose of motion capture: see `external_pose`.
+        """
+        if self._battery is not None:
+            battery_voltage_v, battery_current_a = self._battery.measure(battery_voltage_v, battery_current_a)
+        self._external_pose = self._motion_capture.sample(motion) if self._motion_capture else None
+        return Readings(
+            motion.time_us,
+            self._imu.sample(motion) if self._imu else None,
+            self._magnetometer.sample(motion) if self._magnetometer else None,
+            self._barometer.sample(motion) if self._barometer else None,
+            self._gps.sample(motion) if self._gps else None,
+            self._range_finder.sample(motion) if self._range_finder else None,
+            self._optical_flow.sample(motion) if self._optical_flow else None,
+            battery_voltage_v,
+            battery_current_a,
+        )
+
+    def external_pose(self) -> ExternalPose | None:
+        """The newest pose of motion capture that has arrived in the tick of the last `read`, or None."""
+        return self._external_pose
