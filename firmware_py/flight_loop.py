@@ -14,11 +14,13 @@ from firmware_py.battery import BatteryMonitor
 from firmware_py.commander import NOT_CHECKED, Commander, Observation, SlowChecks
 from firmware_py.commander_table import Event, Row, State
 from firmware_py.commands import ControlCommand
-from firmware_py.estimator import Estimator
+from firmware_py.estimation.ideal_estimator import IdealEstimator
+from firmware_py.estimation.interface import StateEstimator
 from firmware_py.geodesy import GeoReference
 from firmware_py.ground_contact import LandDetector, LiftOff
 from firmware_py.guidance.modes import Guidance
 from firmware_py.guidance.orbit import Orbit
+from firmware_py.measurements import Readings
 from firmware_py.missions.flight import LegKind
 from firmware_py.missions.store import MissionStore
 from firmware_py.navigator import Navigator
@@ -75,12 +77,13 @@ class FlightLoop:
         origin: where on Earth the sensors' positions are measured from.
         parameters: shared with the MAVLink services; by default the airframe's defaults.
         control_period_s: time between calls of `step`.
+        estimator: for the sensors that there are; None: for ideal ones.
         stabiliser: replaces the airframe's own, for tests.
 
     Attributes:
         airframe: what flies.
         parameters: a change takes effect at the next tick.
-        estimator: has the local frame's origin.
+        estimator: of the vehicle's state.
         state: the estimate of the vehicle, updated in place.
         status: arming, mode, home and others, updated in place.
         output: of the last step.
@@ -97,12 +100,13 @@ class FlightLoop:
         parameters: Parameters | None = None,
         control_period_s: float = 0.004,
         *,
+        estimator: StateEstimator | None = None,
         stabiliser: Stabiliser | None = None,
     ) -> None:
         """Boot, disarmed; see the class for the arguments."""
         self.airframe = airframe
         self.parameters = parameters if parameters is not None else Parameters(defaults=airframe.parameters)
-        self.estimator = Estimator()
+        self.estimator: StateEstimator = IdealEstimator(origin) if estimator is None else estimator
         self.state = self.estimator.state
         self.status = VehicleStatus()
         self.output = MotorOutput((0.0,) * len(airframe.rotors))
@@ -111,7 +115,7 @@ class FlightLoop:
         self.setpoints = SetpointQueue()
         self._battery = BatteryMonitor(airframe, self.parameters)
         self.battery = self._battery.state
-        self._geo = GeoReference(origin)
+        self._geo = GeoReference()
         self._commander = Commander()
         self._guidance = Guidance(airframe, self.parameters, control_period_s)
         self._navigator = Navigator(self.missions, self.parameters)
@@ -141,7 +145,7 @@ class FlightLoop:
             self._stabiliser = Stabiliser(self.airframe, self._period_us / 1e6)
             self._parameters_version = -1  # sets its limits at the next tick
 
-    def step(self, sensors: Sensors) -> MotorSpeeds:
+    def step(self, sensors: Sensors | Readings) -> MotorSpeeds:
         """Fly one control tick.
 
         Args:
@@ -200,7 +204,7 @@ class FlightLoop:
         status.origin, status.home, status.home_ned_m = geo.origin, geo.home, geo.home_ned_m
         self._guidance.set_home(geo.home_ned_m)
 
-    def _observe(self, sensors: Sensors, usable: bool) -> Observation:
+    def _observe(self, sensors: Sensors | Readings, usable: bool) -> Observation:
         state, detector, now_us = self.state, self._land_detector, self._now_us
         if not usable:
             self._now_us = now_us = now_us + self._period_us
@@ -261,6 +265,7 @@ class FlightLoop:
         if before is State.DISARMED:
             self._leave_disarmed()
         self._motors_stopped = row.target in _STOPPED_STATES
+        self.estimator.stands = row.target is State.DISARMED
         if self._motors_stopped:
             self.output = MotorOutput((0.0,) * len(self.airframe.rotors))
             self._lift_off.rest()
@@ -329,8 +334,9 @@ class FlightLoop:
             self._follow(self._commander.handle(ended))
 
     def _fix_origin(self) -> None:
-        if self.estimator.origin_ned_m is not None:
-            self._geo.fix_origin(self.estimator.origin_ned_m)
+        origin = self.estimator.origin
+        if origin is not None:
+            self._geo.fix_origin(origin)
             self._geo.set_home_at(self.state.position_ned_m)
             self._publish_places()
 
@@ -343,7 +349,7 @@ class FlightLoop:
         if not self._motors_stopped:
             self.say(INFO, "Landing detected" if landed else "Takeoff detected")
 
-    def _check(self, sensors: Sensors) -> SlowChecks:
+    def _check(self, sensors: Sensors | Readings) -> SlowChecks:
         """Check battery, fence and mission."""
         self._checks_due_us = self._now_us + _CHECK_PERIOD_US
         battery, navigator = self._battery, self._navigator

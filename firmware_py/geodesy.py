@@ -73,19 +73,15 @@ class LocalProjection:
 class GeoReference:
     """Where on Earth the local frame and home are.
 
-    Args:
-        sensor_origin: where on Earth the sensors' positions are measured from.
-
     Attributes:
         projection: of the local frame; None before its origin is known.
         home: None before the origin is known.
         home_ned_m: the same in the local frame, shape (3,).
     """
 
-    __slots__ = ("_sensor_projection", "home", "home_ned_m", "projection")
+    __slots__ = ("home", "home_ned_m", "projection")
 
-    def __init__(self, sensor_origin: GeodeticPoint) -> None:
-        self._sensor_projection = LocalProjection(sensor_origin)
+    def __init__(self) -> None:
         self.projection: LocalProjection | None = None
         self.home: GeodeticPoint | None = None
         self.home_ned_m: Vec3 = ZERO3
@@ -95,9 +91,9 @@ class GeoReference:
         """Where on Earth the local frame's origin is; None before it is known."""
         return None if self.projection is None else self.projection.origin
 
-    def fix_origin(self, origin_ned_m: Vec3) -> None:
-        """Set the local frame's origin, given in the sensors' frame, shape (3,)."""
-        self.projection = LocalProjection(self._sensor_projection.to_geodetic(origin_ned_m))
+    def fix_origin(self, origin: GeodeticPoint) -> None:
+        """Set where the local frame's origin is."""
+        self.projection = LocalProjection(origin)
 
     def move_origin(self, point: GeodeticPoint) -> bool:
         """Set where on Earth the local frame's origin is; False before there is one, or if not on Earth."""

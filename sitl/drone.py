@@ -11,7 +11,6 @@ from typing import TYPE_CHECKING
 
 from firmware_py.mavlink.camera.model import CameraModel, VideoEncoding, VideoStream
 from firmware_py.mavlink.node import MavlinkNode, NodeOptions
-from geometry.axes import flip_vector
 from geometry.solids import Solid
 from scenarios.result import LocalFrame, Standing
 from sitl.drone_files import PictureAlbum, flight_recorder
@@ -203,12 +202,12 @@ class ServedDrone:
         """`/referee.json?state=…&ended=…`: how the try stands, and the report if it ended now."""
         simulation = self.simulation
         referee = simulation.referee
-        origin = simulation.autopilot.estimator.origin_ned_m  # None until the estimator sets it
+        origin_arena_m = simulation.local_origin_arena_m
         standing = Standing(
             scenario=simulation.scenario.name,
             source="truth",
             time_us=simulation.time_us,
-            local_frame=None if origin is None else LocalFrame(origin_arena_m=flip_vector(origin)),
+            local_frame=None if origin_arena_m is None else LocalFrame(origin_arena_m=origin_arena_m),
             snapshot=referee.snapshot(),
             report=referee.report(query.get("state", ""), query.get("ended")),
         )

@@ -11,10 +11,20 @@ from math import nan
 
 from firmware_py.airframe import Airframe, load_airframe
 from firmware_py.autopilot import Autopilot
+from firmware_py.estimation.earth_field import earth_field_ned_gauss
+from firmware_py.estimation.inertial_estimator import InertialEstimator
+from firmware_py.geodesy import LocalProjection
+from firmware_py.measurements import ExternalPose, Readings
 from firmware_py.types import GeodeticPoint, Sensors
-from scenarios.models import Scenario
+from geometry.axes import flip_vector
+from geometry.vectors import ZERO3, Vec3
+from scenarios.models import Scenario, ground_height
 from scenarios.referee import Referee
 from sitl.battery import Battery
+from sitl.sensors.assumptions import estimator_settings
+from sitl.sensors.specs import SuiteSpec
+from sitl.sensors.suite import SensorSuite, load_suite
+from sitl.sensors.truth import MotionTracker
 from sitl.world import CONTROL_PERIOD_US, World
 
 _BATTERY_PERIOD_US = 100_000
@@ -74,12 +84,56 @@ class Failures:
         return sensors
 
 
+class _Sensing:
+    """The sensors of a suite, in a world."""
+
+    def __init__(self, suite: SuiteSpec, world: World, origin: GeodeticPoint, seed: int) -> None:
+        airframe = world.airframe
+        self._world = world
+        self._suite = SensorSuite(suite, airframe, origin, seed)
+        self._tracker = MotionTracker(CONTROL_PERIOD_US, airframe.motor.max_speed_rad_s)
+
+    def read(self, true: Sensors) -> tuple[Readings, ExternalPose | None]:
+        """What the sensors deliver in the tick of a true state."""
+        world = self._world
+        x_m, y_m, _ = world.position_arena_m
+        motion = self._tracker.update(
+            true.time_us,
+            true.position_ned_m,
+            true.velocity_ned_m_s,
+            true.attitude,
+            motor_speeds_rad_s=world.dynamics.motor_speeds_rad_s(),
+            ground_z_m=ground_height(world.scenario, x_m, y_m),
+        )
+        readings = self._suite.read(motion, true.battery_voltage_v, true.battery_current_a)
+        return readings, self._suite.external_pose()
+
+
+def new_estimator(suite: SuiteSpec, origin: GeodeticPoint) -> InertialEstimator:
+    """An estimator that is set up for a suite.
+
+    Args:
+        suite: not an ideal one.
+        origin: where on Earth the frame of motion capture is; with GPS the estimator finds out itself.
+    """
+    field_ned_gauss = ZERO3
+    if suite.magnetometer is not None:
+        field_ned_gauss = earth_field_ned_gauss(origin.latitude_deg, origin.longitude_deg, origin.altitude_m)
+    return InertialEstimator(
+        estimator_settings(suite), field_ned_gauss, None if suite.gps is not None else origin
+    )
+
+
 class Simulation:
     """One drone in one scenario.
 
     Args:
         scenario: the simulated one.
         airframe: the drone; by default the one that the scenario names.
+        seed: of all random numbers.
+
+    Raises:
+        SuiteError: the scenario's sensor suite cannot be used.
 
     Attributes:
         world: the physics.
@@ -90,15 +144,19 @@ class Simulation:
         truth: the true state now.
     """
 
-    def __init__(self, scenario: Scenario, airframe: Airframe | None = None) -> None:
+    def __init__(self, scenario: Scenario, airframe: Airframe | None = None, seed: int = 0) -> None:
         self.scenario = scenario
         airframe = airframe or load_airframe(scenario.airframe)
-        origin = scenario.origin
         self.world = World(scenario, airframe)
+        origin = scenario.origin
+        place = GeodeticPoint(origin.latitude_deg, origin.longitude_deg, origin.altitude_m)
+        suite = load_suite(scenario.sensors)
+        self._sensing = None if suite.ideal else _Sensing(suite, self.world, place, seed)
         self.autopilot = Autopilot(
             airframe,
-            GeodeticPoint(origin.latitude_deg, origin.longitude_deg, origin.altitude_m),
+            place,
             control_period_s=CONTROL_PERIOD_US / 1e6,
+            estimator=None if suite.ideal else new_estimator(suite, place),
         )
         self.referee = Referee(scenario, airframe.envelope_m)
         self.failures = Failures(self.world)
@@ -113,6 +171,15 @@ class Simulation:
         """Simulated time, microseconds since the drone was switched on."""
         return self.world.time_us
 
+    @property
+    def local_origin_arena_m(self) -> Vec3 | None:
+        """Where the autopilot's local frame has its origin, arena axes; None before it is known."""
+        origin, place = self.autopilot.estimator.origin, self.scenario.origin
+        if origin is None:
+            return None
+        arena = GeodeticPoint(place.latitude_deg, place.longitude_deg, place.altitude_m)
+        return flip_vector(LocalProjection(arena).to_local(origin))
+
     def tick(self) -> None:
         """Advance by one control period: sense, control, move, judge."""
         falsify = self.failures.falsify
@@ -122,7 +189,13 @@ class Simulation:
         sensors.battery_voltage_v, sensors.battery_current_a = self.battery.voltage_v, self.battery.current_a
         if falsify is not None:
             sensors = falsify(sensors)
-        motors = self.autopilot.step(sensors)
+        if self._sensing is None:
+            motors = self.autopilot.step(sensors)
+        else:
+            readings, pose = self._sensing.read(sensors)
+            if pose is not None:
+                self.autopilot.take_external_pose(pose)
+            motors = self.autopilot.step(readings)
         self.world.step(motors)
         self._sensors = self.world.sensors()
         armed = self.autopilot.status.armed

@@ -26,13 +26,14 @@ class Aid:
         nis: normalised innovation squared of the last one that was fused.
     """
 
-    __slots__ = ("_gate", "_reset_us", "arrived_us", "fused_us", "name", "nis", "numbers", "ratio")
+    __slots__ = ("_gate", "_open", "_reset_us", "arrived_us", "fused_us", "name", "nis", "numbers", "ratio")
 
     def __init__(self, name: str, numbers: int, gate: float, reset_us: int) -> None:
         self.name = name
         self.numbers = numbers
         self._gate = gate
         self._reset_us = reset_us
+        self._open = False
         self.fused_us = NEVER_US
         self.arrived_us = NEVER_US
         self.ratio = 0.0
@@ -89,15 +90,19 @@ class Aid:
         """Whether measurements come but have been rejected for so long that the estimate must be wrong."""
         return self.fused_us != NEVER_US and self.ratio > 1.0 and now_us - self.fused_us > self._reset_us
 
-    def was_reset(self, now_us: int) -> None:
-        """Note that the estimate was set to a measurement."""
-        self.fused_us = self.arrived_us = now_us
-        self.ratio = 0.0
+    def is_needed(self, now_us: int) -> bool:
+        """Whether the estimate must be set to the next measurement: it is the first, or is overdue."""
+        return self.fused_us == NEVER_US or self.is_overdue(now_us)
+
+    def accept_any(self) -> None:
+        """Let the next measurement pass the gate: the estimate has been set to it."""
+        self._open = True
 
     def _passes(self, square: float, now_us: int) -> bool:
         self.arrived_us = now_us
         self.ratio = (square**0.5) / self._gate
-        return self.ratio <= 1.0  # false for NaN too
+        is_open, self._open = self._open, False
+        return self.ratio <= 1.0 or is_open  # false for NaN too
 
     def _fused(self, nis: float, into: NavigationFilter) -> None:
         self.nis = nis

@@ -7,7 +7,7 @@ difference, less than a control tick, is bridged with the estimated velocity.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from math import cos, inf, isfinite, pi, remainder, sin, tan
+from math import cos, isfinite, pi, remainder, sin, tan
 
 import numpy as np
 
@@ -31,12 +31,15 @@ from firmware_py.measurements import (
     MagnetometerSample,
 )
 from firmware_py.types import GeodeticPoint
-from geometry.rotations import euler_from_quaternion, rotation, to_body
-from geometry.vectors import Vec3
+from geometry.rotations import Rotation, euler_from_quaternion, rotation, to_body, to_world, yaw_of
+from geometry.vectors import ZERO3, Vec3
 
 _GPS_SETTLING_US = 1_000_000  # of good solutions before the first is used
 _MAX_GPS_ACCURACY_M = (3.0, 5.0)  # horizontal and vertical; PX4: EKF2_REQ_EPH, EKF2_REQ_EPV
 _MAX_GPS_SPEED_ACCURACY_M_S = 0.5  # PX4: EKF2_REQ_SACC
+_MAX_PITCH_RAD = 1.3
+_UNKNOWN_M2 = 1e4
+_UNKNOWN_RAD2 = 1.0
 _MIN_SATELLITES = 6  # PX4: EKF2_REQ_NSATS
 
 Sample = ExternalPose | GpsSample | MagnetometerSample | BarometerSample
@@ -46,6 +49,8 @@ Sample = ExternalPose | GpsSample | MagnetometerSample | BarometerSample
 class _Layout:
     """Indices of the slow errors in the error state; -1: not estimated."""
 
+    offset: int = -1
+    turn: int = -1
     hard_iron: int = -1
     barometer: int = -1
     gps: int = -1
@@ -78,6 +83,7 @@ class Aiding:
         self._field = field_ned_gauss
         self._layout, drifts = _layout(settings)
         self.filter = NavigationFilter(settings.noise, drifts)
+        self._know_constants()
         gate, reset_us = settings.gate, settings.reset_us
         self.horizontal = Aid("horizontal position", 2, gate, reset_us)
         self.vertical = Aid("height", 1, gate, reset_us)
@@ -104,6 +110,17 @@ class Aiding:
             self.barometer,
         )
 
+    def _know_constants(self) -> None:
+        """What is known of constant errors at boot."""
+        settings, layout, covariance = self._settings, self._layout, self.filter.covariance
+        for index, count, sigma in (
+            (layout.offset, 3, settings.external_offset_sigma_m),
+            (layout.turn, 1, settings.external_turn_sigma_rad),
+            (layout.hard_iron, 3, settings.hard_iron_sigma_gauss),
+        ):
+            if index >= 0:
+                covariance.set_variance(index, *[sigma * sigma] * count)
+
     def fuse(self, sample: Sample) -> list[float]:
         """Correct the filter by a measurement of its time; return the errors found, shape (n,)."""
         self.filter.predict()
@@ -128,45 +145,68 @@ class Aiding:
         return self.filter.correct()
 
     def _fuse_pose(self, pose: ExternalPose) -> None:
-        into, settings = self.filter, self._settings
-        state = into.state
+        into = self.filter
         late_s = (pose.time_us - into.time_us) / 1e6
-        vn, ve, vd = state.velocity_ned_m_s
-        pn, pe, pd = state.position_ned_m
+        vn, ve, vd = into.state.velocity_ned_m_s
         n, e, d = pose.position_ned_m
-        position = (n - vn * late_s, e - ve * late_s, d - vd * late_s)
+        m = rotation(into.state.attitude)
+        on, oe, od = self._offset_ned_m(m)
+        position = (n - vn * late_s - on, e - ve * late_s - oe, d - vd * late_s - od)
         variance = pose.position_variance_m2
-        first = self.horizontal.fused_us == NEVER_US
-        if first or self.horizontal.is_overdue(into.time_us):
-            self._set_position(position, variance, axes=2)
-        elif not self.horizontal.fuse_states(
-            into, POSITION, (position[0] - pn, position[1] - pe), variance[:2]
-        ):
-            return  # its height and heading are not believed either
-        if first or self.vertical.is_overdue(into.time_us):
-            self._set_height(position[2], variance[2])
-        else:
-            self.vertical.fuse_states(into, POSITION + 2, (position[2] - pd,), variance[2:])
+        for aid, axes in ((self.horizontal, (0, 1)), (self.vertical, (2,))):
+            if aid.is_needed(into.time_us):
+                self._move(axes, position)
+                aid.accept_any()
+            if not self._fuse_position(aid, axes, position, variance, m):
+                return  # what else the pose says is not believed either
         if pose.attitude is not None:
-            self._fuse_heading(
-                euler_from_quaternion(pose.attitude)[2],
-                max(pose.attitude_variance_rad2[2], settings.external_angle_sigma_rad**2),
-            )
+            self._fuse_heading(yaw_of(pose.attitude), pose.attitude_variance_rad2[2])
+
+    def _offset_ned_m(self, m: Rotation) -> Vec3:
+        """Estimated place of the markers from the centre of mass."""
+        index = self._layout.offset
+        if index < 0:
+            return ZERO3
+        x, y, z = self.filter.drifts[index - INERTIAL_STATES : index - INERTIAL_STATES + 3]
+        return to_world(m, x, y, z)
+
+    def _fuse_position(
+        self, aid: Aid, axes: tuple[int, ...], position: Vec3, variance: Vec3, m: Rotation
+    ) -> bool:
+        """Correct by coordinates of the markers, less their estimated offset; its error counts, too."""
+        into, index = self.filter, self._layout.offset
+        own = into.state.position_ned_m
+        innovations = tuple([position[axis] - own[axis] for axis in axes])
+        variances = tuple([variance[axis] for axis in axes])
+        if index < 0:
+            return aid.fuse_states(into, POSITION + axes[0], innovations, variances)
+        rows = []
+        for axis in axes:
+            row: Matrix = np.zeros(into.covariance.size)
+            row[POSITION + axis] = 1.0
+            row[index : index + 3] = m[3 * axis : 3 * axis + 3]
+            rows.append(row)
+        return aid.fuse_rows(into, tuple(rows), innovations, variances)
 
     def _fuse_heading(self, yaw_rad: float, variance: float) -> None:
         """Correct by a heading: its change by the error of attitude is (cos y tan p, sin y tan p, 1)."""
-        into, row = self.filter, self._row
+        into, row, index = self.filter, self._row, self._layout.turn
         _, pitch_rad, estimated_rad = euler_from_quaternion(into.state.attitude)
-        if abs(pitch_rad) > 1.3:
+        if abs(pitch_rad) > _MAX_PITCH_RAD:
             return  # there is no heading
         slope = tan(pitch_rad)
         row[:] = 0.0
         row[ATTITUDE : ATTITUDE + 3] = (cos(estimated_rad) * slope, sin(estimated_rad) * slope, 1.0)
-        innovation = remainder(yaw_rad - estimated_rad, 2.0 * pi)
+        innovation = yaw_rad - estimated_rad
+        if index >= 0:
+            row[index] = 1.0
+            innovation -= into.drifts[index - INERTIAL_STATES]
+        innovation = remainder(innovation, 2.0 * pi)
         if self.heading.is_overdue(into.time_us):
-            self._turn(innovation, variance)
-        else:
-            self.heading.fuse_rows(into, (row,), (innovation,), (variance,))
+            self._turn(innovation)
+            innovation = 0.0
+            self.heading.accept_any()
+        self.heading.fuse_rows(into, (row,), (innovation,), (variance,))
 
     def _fuse_barometer(self, sample: BarometerSample) -> None:
         sigma_m = self._settings.barometer_sigma_m
@@ -177,7 +217,6 @@ class Aiding:
         height_m = -into.state.position_ned_m[2]
         if self.barometer.fused_us == NEVER_US:
             self._barometer_zero_m = altitude_m - height_m
-            self.barometer.was_reset(into.time_us)
             into.covariance.set_variance(index, self._settings.barometer_drift.sigma**2)
         row = self._row
         row[:] = 0.0
@@ -244,8 +283,8 @@ class Aiding:
         if self.velocity.is_overdue(into.time_us):
             state.velocity_ned_m_s = sample.velocity_ned_m_s
             into.covariance.set_variance(VELOCITY, variance, variance, variance)
-            self.velocity.was_reset(into.time_us)
-            return
+            self.velocity.accept_any()
+            self.resets += 1
         innovations = tuple(
             measured - own
             for measured, own in zip(sample.velocity_ned_m_s, state.velocity_ned_m_s, strict=True)
@@ -257,12 +296,9 @@ class Aiding:
         into, settings, first_index = self.filter, self._settings, self._layout.gps
         level, upright = settings.gps_sigma_m
         for aid, axes, sigma in ((self.horizontal, (0, 1), level), (self.vertical, (2,), upright)):
-            if aid.fused_us == NEVER_US or aid.is_overdue(into.time_us):
-                for axis in axes:
-                    self._start_at_gps(axis, position[axis], sigma)
-                aid.was_reset(into.time_us)
-                self.resets += 1
-                continue
+            if aid.is_needed(into.time_us):
+                self._move(axes, position)
+                aid.accept_any()
             rows, innovations = [], []
             for axis in axes:
                 row: Matrix = np.zeros(into.covariance.size)
@@ -272,50 +308,38 @@ class Aiding:
                 innovations.append(position[axis] - into.state.position_ned_m[axis] - drift)
             aid.fuse_rows(into, tuple(rows), tuple(innovations), (sigma * sigma,) * len(axes))
 
-    def _start_at_gps(self, axis: int, measured_m: float, sigma_m: float) -> None:
-        """Set a coordinate to a measured one, whose slow error is then an error of the coordinate."""
-        into, index = self.filter, self._layout.gps + axis
-        slow = self._settings.gps_drift[0 if axis < 2 else 1].sigma ** 2
-        into.drifts[index - INERTIAL_STATES] = 0.0
-        place = list(into.state.position_ned_m)
-        place[axis] = measured_m
-        into.state.position_ned_m = (place[0], place[1], place[2])
-        covariance = into.covariance
-        covariance.set_variance(POSITION + axis, slow + sigma_m * sigma_m)
-        covariance.set_variance(index, slow)
-        covariance.p[POSITION + axis, index] = covariance.p[index, POSITION + axis] = -slow
-
-    def _set_position(self, position: Vec3, variance: Vec3, *, axes: int) -> None:
+    def _move(self, axes: tuple[int, ...], position: Vec3) -> None:
+        """Set coordinates to measured ones, and forget what was known of them; fusing them follows."""
         into = self.filter
-        place = (*position[:axes], *into.state.position_ned_m[axes:])
+        place = list(into.state.position_ned_m)
+        for axis in axes:
+            place[axis] = position[axis]
+            into.covariance.set_variance(POSITION + axis, _UNKNOWN_M2)
         into.state.position_ned_m = (place[0], place[1], place[2])
-        into.covariance.set_variance(POSITION, *variance[:axes])
-        self.horizontal.was_reset(into.time_us)
+        if 2 in axes:
+            self.barometer.fused_us = NEVER_US  # its zero moves with the height
         self.resets += 1
 
-    def _set_height(self, down_m: float, variance: float) -> None:
-        into = self.filter
-        n, e, _ = into.state.position_ned_m
-        into.state.position_ned_m = (n, e, down_m)
-        into.covariance.set_variance(POSITION + 2, variance)
-        self.vertical.was_reset(into.time_us)
-        self.barometer.fused_us = NEVER_US  # its zero moves with the height
-
-    def _turn(self, angle_rad: float, variance: float) -> None:
+    def _turn(self, angle_rad: float) -> None:
         """Turn the heading, and forget what was known of it."""
         into = self.filter
-        into.state.correct((0.0, 0.0, angle_rad), (0.0, 0.0, 0.0), (0.0, 0.0, 0.0))
-        into.covariance.set_variance(ATTITUDE + 2, variance)
-        self.heading.was_reset(into.time_us)
+        into.state.correct((0.0, 0.0, angle_rad), ZERO3, ZERO3)
+        into.covariance.set_variance(ATTITUDE + 2, _UNKNOWN_RAD2)
         self.resets += 1
 
 
 def _layout(settings: EstimatorSettings) -> tuple[_Layout, tuple[Drift, ...]]:
     """The slow errors that are estimated, and where in the error state they are."""
     layout, drifts = _Layout(), list[Drift]()
+    if settings.external and settings.external_offset_sigma_m > 0.0:
+        layout.offset = INERTIAL_STATES
+        drifts += [Drift()] * 3
+    if settings.external and settings.external_turn_sigma_rad > 0.0:
+        layout.turn = INERTIAL_STATES + len(drifts)
+        drifts.append(Drift())
     if settings.magnetometer_sigma_gauss is not None:
         layout.hard_iron = INERTIAL_STATES + len(drifts)
-        drifts += [Drift(0.0, inf)] * 3
+        drifts += [Drift()] * 3
     if settings.barometer_sigma_m is not None:
         layout.barometer = INERTIAL_STATES + len(drifts)
         slow = settings.barometer_drift

@@ -6,7 +6,7 @@ from math import atan2, cos, sin, sqrt
 
 import numpy as np
 
-from firmware_py.estimation.error_state import ACCEL_BIAS, ATTITUDE, GYRO_BIAS, VELOCITY
+from firmware_py.estimation.error_state import ACCEL_BIAS, ATTITUDE, GYRO_BIAS, POSITION, VELOCITY
 from firmware_py.estimation.navigation_filter import NavigationFilter
 from firmware_py.estimation.settings import InertialNoise
 from firmware_py.estimation.strapdown import GRAVITY_M_S2
@@ -19,6 +19,7 @@ _MAX_RATE_RAD_S = 0.3
 _MAX_FORCE_DIFFERENCE_M_S2 = 1.0  # from standard gravity
 _HEADING_SIGMA_RAD = 0.3
 _VELOCITY_SIGMA_M_S = 0.05
+_POSITION_SIGMA_M = 100.0
 
 
 class Alignment:
@@ -80,6 +81,7 @@ class Alignment:
         accel = noise.accel_bias_sigma_m_s2**2
         covariance.set_variance(ACCEL_BIAS, accel, accel, accel)
         covariance.set_variance(VELOCITY, *(_VELOCITY_SIGMA_M_S**2,) * 3)
+        covariance.set_variance(POSITION, *(_POSITION_SIGMA_M**2,) * 3)
         m = np.array(rotation(state.attitude)).reshape(3, 3)
         tilt = np.array([m[1], -m[0], np.zeros(3)]) / GRAVITY_M_S2
         p = covariance.p

@@ -13,11 +13,11 @@ from math import atan2, isfinite, sqrt
 from firmware_py.estimation.aid import NEVER_US
 from firmware_py.estimation.aiding import Aiding, Sample
 from firmware_py.estimation.alignment import Alignment
-from firmware_py.estimation.error_state import ATTITUDE, INERTIAL_STATES, POSITION, VELOCITY
+from firmware_py.estimation.error_state import ATTITUDE, POSITION, VELOCITY
 from firmware_py.estimation.output import OutputPredictor
 from firmware_py.estimation.settings import EstimatorSettings
 from firmware_py.measurements import ExternalPose, ImuSample, MagnetometerSample, Readings
-from firmware_py.types import GeodeticPoint, VehicleState
+from firmware_py.types import GeodeticPoint, Sensors, VehicleState
 from geometry.rotations import euler_from_quaternion, yaw_of
 from geometry.vectors import Vec3
 
@@ -85,24 +85,26 @@ class InertialEstimator:
             return
         self._queue(pose)
 
-    def update(self, readings: Readings) -> bool:
+    def update(self, sensors: Sensors | Readings) -> bool:
         """Take what the sensors deliver in one control tick.
 
         Returns:
             Whether there is an estimate of this tick: the filter is aligned and the IMU has delivered.
         """
-        imu = readings.imu
+        if type(sensors) is not Readings:
+            raise TypeError("this estimator needs Readings; ideal Sensors need an IdealEstimator")
+        imu = sensors.imu
         if imu is None or not _is_usable(imu, self.state.time_us):
             return False
         if self._alignment is not None:
-            self._align(imu, readings.magnetometer)
+            self._align(imu, sensors.magnetometer)
             return False
-        if readings.magnetometer is not None:
-            self._queue(readings.magnetometer)
-        if readings.barometer is not None:
-            self._queue(readings.barometer)
-        if readings.gps is not None:
-            self._queue(readings.gps)
+        if sensors.magnetometer is not None:
+            self._queue(sensors.magnetometer)
+        if sensors.barometer is not None:
+            self._queue(sensors.barometer)
+        if sensors.gps is not None:
+            self._queue(sensors.gps)
         rate, force = imu.angular_rate_frd_rad_s, imu.specific_force_frd_m_s2
         self._output.add((imu.time_us, imu.period_us / 1e6, rate, force), self.aiding.filter)
         self._ticks += 1
@@ -153,9 +155,6 @@ class InertialEstimator:
             return
         into = self.aiding.filter
         alignment.start(into, self._settings.noise, alignment.heading_rad)
-        hard_iron = self._settings.hard_iron_sigma_gauss**2
-        if self._settings.magnetometer_sigma_gauss is not None:
-            into.covariance.set_variance(INERTIAL_STATES, hard_iron, hard_iron, hard_iron)
         into.start(imu.time_us)
         self._output.repeat(into)
         self._alignment = None

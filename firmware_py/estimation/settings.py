@@ -52,7 +52,9 @@ class EstimatorSettings:
         gate: innovations beyond so many standard deviations are rejected.
         reset_us: measurements rejected for so long are taken for right.
         external: poses from outside are fused.
-        external_angle_sigma_rad: at least, of headings from outside.
+        external_offset_sigma_m: of the place on the vehicle whose position is measured, from its centre of
+            mass, per axis; 0: it is the centre.
+        external_turn_sigma_rad: of a constant error of headings from outside; 0: there is none.
         gps: GPS is fused.
         gps_sigma_m: white noise of GPS positions, horizontal and vertical.
         gps_drift: slow errors of GPS positions, horizontal and vertical.
@@ -68,7 +70,8 @@ class EstimatorSettings:
     gate: float = 5.0
     reset_us: int = 1_000_000
     external: bool = True
-    external_angle_sigma_rad: float = 0.002
+    external_offset_sigma_m: float = 0.0
+    external_turn_sigma_rad: float = 0.0
     gps: bool = False
     gps_sigma_m: tuple[float, float] = (0.3, 0.5)
     gps_drift: tuple[SlowError, SlowError] = (SlowError(1.0, 0.1, 200.0), SlowError(1.5, 0.15, 200.0))

@@ -80,7 +80,7 @@ class LockstepVehicle:
         *,
         observers: Sequence[TruthObserver] = (),
     ) -> None:
-        self.simulation = Simulation(plan.scenario, plan.airframe)
+        self.simulation = Simulation(plan.scenario, plan.airframe, plan.seed or 0)
         detector = plan_detector(plan, rendered=True)
         self.perception = LockstepPerception(plan.scenario, on_image, detector)
         self.drone = LockstepDrone(

@@ -41,8 +41,8 @@ class MotionCapture:
         self._misalignment = _small_turn(
             normal_vector(seed, "sensors.external_pose.misalignment", spec.marker_misalignment_rad)
         )
-        self._position_variance_m2 = _equal(spec.position_noise_m**2 + spec.marker_offset_m**2)
-        self._attitude_variance_rad2 = _equal(spec.attitude_noise_rad**2 + spec.marker_misalignment_rad**2)
+        self._position_variance_m2 = _equal(spec.position_noise_m**2)
+        self._attitude_variance_rad2 = _equal(spec.attitude_noise_rad**2)
 
     def sample(self, motion: TrueMotion) -> ExternalPose | None:
         """Measure, if a pose is due; the newest pose that has arrived in this tick."""

@@ -22,7 +22,6 @@ from firmware_py.mavlink.camera.model import CameraModel, VideoEncoding, VideoSt
 from firmware_py.mavlink.node import MavlinkNode, NodeOptions
 from firmware_py.mavlink.telemetry.streams import GROUND, ONBOARD
 from framerunner.flying.plan import FlightPlan
-from geometry.axes import flip_vector
 from monitor.ports import Equipment
 from scenarios.loader import list_scenarios, load_scenario
 from scenarios.models import Scenario, TrueState
@@ -111,13 +110,13 @@ class SimulatedDrone:
     def referee_answer(self) -> dict[str, object]:
         """The content of the simulator's `/referee.json`."""
         simulation = self.simulation
-        referee, origin_ned_m = simulation.referee, simulation.autopilot.estimator.origin_ned_m
+        referee, origin_arena_m = simulation.referee, simulation.local_origin_arena_m
         return {
             "scenario": simulation.scenario.name,
             "source": "truth",
             "lift_m": 0.0,
             "time_us": simulation.time_us,
-            "local_frame": origin_ned_m and {"origin_arena_m": flip_vector(origin_ned_m), "yaw_rad": 0.0},
+            "local_frame": origin_arena_m and {"origin_arena_m": origin_arena_m, "yaw_rad": 0.0},
             "snapshot": asdict(referee.snapshot()),
             "report": referee.report().as_json(),
         }

@@ -78,10 +78,10 @@ async def test_north_is_x_without_any_source_of_placement(link):
         await watched.until_ready(link)
         with link.lock:
             pose, truth = watched.pose(), link.drones[0].simulation.truth
-            origin_ned_m = link.drones[0].simulation.autopilot.estimator.origin_ned_m
+            origin_arena_m = link.drones[0].simulation.local_origin_arena_m
         x, y, z = truth.position_arena_m
         assert pose["p"] == pytest.approx(
-            [x - origin_ned_m[0], y + origin_ned_m[1], z + origin_ned_m[2]], abs=0.01
+            [x - origin_arena_m[0], y - origin_arena_m[1], z - origin_arena_m[2]], abs=0.01
         )
         assert watched.fleet.welcome()[0] == {
             "kind": "world",

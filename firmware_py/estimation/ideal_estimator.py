@@ -5,7 +5,9 @@ from __future__ import annotations
 from dataclasses import replace
 from math import isfinite, isnan
 
-from firmware_py.types import Sensors, VehicleState
+from firmware_py.geodesy import LocalProjection
+from firmware_py.measurements import ExternalPose, Readings
+from firmware_py.types import GeodeticPoint, Sensors, VehicleState
 from geometry.rotations import euler_from_quaternion, rotation, to_world
 from geometry.vectors import Vec3
 
@@ -13,28 +15,46 @@ _MAX_GAP_S = 0.1  # between samples, for dead reckoning
 _NORM_TOLERANCE = 0.05  # of the attitude quaternion's squared length; more than rounding, so it is a fault
 
 
-class Estimator:
+class IdealEstimator:
     """Estimates the vehicle state; positions are relative to the first usable sample (PX4's local frame).
+
+    Args:
+        sensor_origin: where on Earth the sensors' positions are measured from.
 
     Attributes:
         state: the estimate, updated in place; it keeps its last value while samples are unusable.
         origin_ned_m: the local frame's origin in the sensors' frame, shape (3,); None before a first sample.
         has_position: whether the last sample had a horizontal position; else it is dead reckoning.
+        stands: not used.
     """
 
-    __slots__ = ("has_position", "origin_ned_m", "state")
+    __slots__ = ("_sensor_origin", "has_position", "origin_ned_m", "stands", "state")
 
-    def __init__(self) -> None:
+    def __init__(self, sensor_origin: GeodeticPoint) -> None:
         self.state = VehicleState()
         self.origin_ned_m: Vec3 | None = None
         self.has_position = False
+        self.stands = True
+        self._sensor_origin = sensor_origin
 
-    def update(self, sensors: Sensors) -> bool:
+    @property
+    def origin(self) -> GeodeticPoint | None:
+        """Where on Earth the local frame's origin is; None before a first sample."""
+        if self.origin_ned_m is None:
+            return None
+        return LocalProjection(self._sensor_origin).to_geodetic(self.origin_ned_m)
+
+    def take_external_pose(self, pose: ExternalPose) -> None:
+        """Ignore a pose from outside: ideal sensors know theirs."""
+
+    def update(self, sensors: Sensors | Readings) -> bool:
         """Take one sample.
 
         Returns:
             Whether it was usable: finite, the attitude a unit quaternion, and newer than the last.
         """
+        if type(sensors) is not Sensors:
+            raise TypeError("ideal sensors deliver Sensors; Readings need an InertialEstimator")
         state = self.state
         origin = self.origin_ned_m
         if not _is_usable(sensors):
