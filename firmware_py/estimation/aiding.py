@@ -117,8 +117,10 @@ class Aiding:
             (layout.offset, 3, settings.external_offset_sigma_m),
             (layout.turn, 1, settings.external_turn_sigma_rad),
             (layout.hard_iron, 3, settings.hard_iron_sigma_gauss),
+            (layout.gps, 2, settings.gps_drift[0].sigma),
+            (layout.gps + 2, 1, settings.gps_drift[1].sigma),
         ):
-            if index >= 0:
+            if index >= INERTIAL_STATES:
                 covariance.set_variance(index, *[sigma * sigma] * count)
 
     def fuse(self, sample: Sample) -> list[float]:
@@ -217,7 +219,8 @@ class Aiding:
         height_m = -into.state.position_ned_m[2]
         if self.barometer.fused_us == NEVER_US:
             self._barometer_zero_m = altitude_m - height_m
-            into.covariance.set_variance(index, self._settings.barometer_drift.sigma**2)
+            into.drifts[index - INERTIAL_STATES] = 0.0
+            into.covariance.set_variance(index, _UNKNOWN_M2)  # fusing relates it to the height
         row = self._row
         row[:] = 0.0
         row[POSITION + 2], row[index] = -1.0, 1.0

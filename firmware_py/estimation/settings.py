@@ -31,7 +31,7 @@ class SlowError:
     """A slow error of a sensor.
 
     Attributes:
-        sigma: at boot.
+        sigma: at boot; not used of the barometer, whose first measurement is the height then.
         noise_density: that drives it, unit per root of s.
         time_constant_s: of its return to zero; infinite: none.
     """
