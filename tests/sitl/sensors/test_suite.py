@@ -141,3 +141,10 @@ def test_an_own_file_can_be_loaded(tmp_path):
     path = tmp_path / "mine.yaml"
     path.write_text("name: mine\nideal: true\n")
     assert load_suite(str(path)).name == "mine"
+
+
+def test_the_suite_of_the_documentation_can_be_loaded(tmp_path):
+    text = (Path(__file__).parents[3] / "docs" / "sensors.md").read_text(encoding="utf-8")
+    path = tmp_path / "mine.yaml"
+    path.write_text(text.partition("```yaml\n")[2].partition("```")[0])
+    assert load_suite(path).range_finder.max_distance_m == 12.0
