@@ -38,7 +38,7 @@ class GaussMarkov:
     """First-order Gauss-Markov process: a slow error with zero mean and exponential autocorrelation.
 
     Its autocorrelation is sigma^2 exp(-|t| / time constant), for any steps (Gelb, "Applied Optimal
-    Estimation", 1974, section 3.8). It begins in its steady state.
+    Estimation", MIT Press, 1974). It begins in its steady state.
 
     Args:
         seed: of all random numbers.

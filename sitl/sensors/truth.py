@@ -120,7 +120,7 @@ def _turn(before: Quaternion, after: Quaternion) -> tuple[Vec3, Quaternion]:
 
     Returns:
         Its rotation vector in body axes, rad, and the attitude halfway. The first is the logarithm of
-        before^-1 after (Diebel 2006, equation 247), the second their normalised sum.
+        before^-1 after (Diebel 2006), the second their normalised sum.
     """
     aw, ax, ay, az = before
     bw, bx, by, bz = after
