@@ -31,7 +31,7 @@ from firmware_py.measurements import (
     MagnetometerSample,
 )
 from firmware_py.types import GeodeticPoint
-from geometry.rotations import Rotation, euler_from_quaternion, rotation, to_body, to_world, yaw_of
+from geometry.rotations import Rotation, euler_from_quaternion, rotation, to_body, yaw_of
 from geometry.vectors import ZERO3, Vec3
 
 _GPS_SETTLING_US = 1_000_000  # of good solutions before the first is used
@@ -47,10 +47,15 @@ Sample = ExternalPose | GpsSample | MagnetometerSample | BarometerSample
 
 @dataclass(slots=True)
 class _Layout:
-    """Indices of the slow errors in the error state; -1: not estimated."""
+    """Indices of the slow errors in the error state; -1: there is none.
+
+    Place and turn of markers are only considered: in flight, what little a filter could learn of them comes
+    from the vehicle's own reactions to noise.
+    """
 
     offset: int = -1
     turn: int = -1
+    considered: int = 0
     hard_iron: int = -1
     barometer: int = -1
     gps: int = -1
@@ -82,7 +87,7 @@ class Aiding:
         self._settings = settings
         self._field = field_ned_gauss
         self._layout, drifts = _layout(settings)
-        self.filter = NavigationFilter(settings.noise, drifts)
+        self.filter = NavigationFilter(settings.noise, drifts, self._layout.considered)
         self._know_constants()
         gate, reset_us = settings.gate, settings.reset_us
         self.horizontal = Aid("horizontal position", 2, gate, reset_us)
@@ -152,8 +157,7 @@ class Aiding:
         vn, ve, vd = into.state.velocity_ned_m_s
         n, e, d = pose.position_ned_m
         m = rotation(into.state.attitude)
-        on, oe, od = self._offset_ned_m(m)
-        position = (n - vn * late_s - on, e - ve * late_s - oe, d - vd * late_s - od)
+        position = (n - vn * late_s, e - ve * late_s, d - vd * late_s)
         variance = pose.position_variance_m2
         for aid, axes in ((self.horizontal, (0, 1)), (self.vertical, (2,))):
             if aid.is_needed(into.time_us):
@@ -164,18 +168,10 @@ class Aiding:
         if pose.attitude is not None:
             self._fuse_heading(yaw_of(pose.attitude), pose.attitude_variance_rad2[2])
 
-    def _offset_ned_m(self, m: Rotation) -> Vec3:
-        """Estimated place of the markers from the centre of mass."""
-        index = self._layout.offset
-        if index < 0:
-            return ZERO3
-        x, y, z = self.filter.drifts[index - INERTIAL_STATES : index - INERTIAL_STATES + 3]
-        return to_world(m, x, y, z)
-
     def _fuse_position(
         self, aid: Aid, axes: tuple[int, ...], position: Vec3, variance: Vec3, m: Rotation
     ) -> bool:
-        """Correct by coordinates of the markers, less their estimated offset; its error counts, too."""
+        """Correct by coordinates of the markers, whose place on the vehicle is not known exactly."""
         into, index = self.filter, self._layout.offset
         own = into.state.position_ned_m
         innovations = tuple([position[axis] - own[axis] for axis in axes])
@@ -199,11 +195,9 @@ class Aiding:
         slope = tan(pitch_rad)
         row[:] = 0.0
         row[ATTITUDE : ATTITUDE + 3] = (cos(estimated_rad) * slope, sin(estimated_rad) * slope, 1.0)
-        innovation = yaw_rad - estimated_rad
+        innovation = remainder(yaw_rad - estimated_rad, 2.0 * pi)
         if index >= 0:
             row[index] = 1.0
-            innovation -= into.drifts[index - INERTIAL_STATES]
-        innovation = remainder(innovation, 2.0 * pi)
         if self.heading.is_overdue(into.time_us):
             self._turn(innovation)
             innovation = 0.0
@@ -340,6 +334,7 @@ def _layout(settings: EstimatorSettings) -> tuple[_Layout, tuple[Drift, ...]]:
     if settings.external and settings.external_turn_sigma_rad > 0.0:
         layout.turn = INERTIAL_STATES + len(drifts)
         drifts.append(Drift())
+    layout.considered = len(drifts)
     if settings.magnetometer_sigma_gauss is not None:
         layout.hard_iron = INERTIAL_STATES + len(drifts)
         drifts += [Drift()] * 3

@@ -49,17 +49,20 @@ class ErrorCovariance:
 
     Args:
         drifts: the states behind the fifteen inertial ones.
+        considered: so many of them, the first, are not estimated: their uncertainty counts, but measurements
+            do not change them (Schmidt-Kalman filter; Gelb, "Applied Optimal Estimation", 1974, section 7.2).
 
     Attributes:
         p: the covariance, updated in place.
         error: the errors found by the corrections since `take_error`, shape (n,).
     """
 
-    def __init__(self, drifts: tuple[Drift, ...] = ()) -> None:
+    def __init__(self, drifts: tuple[Drift, ...] = (), considered: int = 0) -> None:
         self.size = size = INERTIAL_STATES + len(drifts)
         self.p: Matrix = np.zeros((size, size))
         self.error: Matrix = np.zeros(size)
         self._drifts = drifts
+        self._considered = slice(INERTIAL_STATES, INERTIAL_STATES + considered) if considered else None
         self._f: Matrix = np.eye(size)
         self._work: Matrix = np.zeros((size, size))
         self._diagonal = np.arange(size)
@@ -144,8 +147,15 @@ class ErrorCovariance:
         total = own + variance
         left = innovation - known  # what earlier numbers have not explained yet
         scaled = gain / total
+        p, considered = self.p, self._considered
+        if considered is None:
+            p -= scaled[:, None] * gain
+        else:
+            kept = p[considered, considered].copy()
+            p -= scaled[:, None] * gain
+            p[considered, considered] = kept
+            scaled[considered] = 0.0
         self.error += scaled * left
-        self.p -= scaled[:, None] * gain
         return left * left / total
 
     def take_error(self) -> list[float]:

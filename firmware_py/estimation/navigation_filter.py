@@ -30,7 +30,8 @@ class NavigationFilter:
 
     Args:
         noise: of the IMU.
-        drifts: slow errors that are estimated too.
+        drifts: slow errors of other sensors.
+        considered: so many of them, the first, are not estimated; see `ErrorCovariance`.
 
     Attributes:
         time_us: of the state.
@@ -42,13 +43,13 @@ class NavigationFilter:
         white_noise: variances of the white noise in a sample of the IMU: (rad/s)^2 and (m/s^2)^2.
     """
 
-    def __init__(self, noise: InertialNoise, drifts: tuple[Drift, ...] = ()) -> None:
+    def __init__(self, noise: InertialNoise, drifts: tuple[Drift, ...] = (), considered: int = 0) -> None:
         self.time_us = 0
         self.state = NavigationState()
         self.gyro_bias_frd_rad_s: Vec3 = ZERO3
         self.accel_bias_frd_m_s2: Vec3 = ZERO3
         self.drifts = [0.0] * len(drifts)
-        self.covariance = ErrorCovariance(drifts)
+        self.covariance = ErrorCovariance(drifts, considered)
         self.white_noise = (0.0, 0.0)
         self._noise = noise
         self._kinds = drifts
