@@ -19,7 +19,7 @@ _MAX_RATE_RAD_S = 0.3
 _MAX_FORCE_DIFFERENCE_M_S2 = 1.0  # from standard gravity
 _HEADING_SIGMA_RAD = 0.3
 _VELOCITY_SIGMA_M_S = 0.05
-_POSITION_SIGMA_M = 100.0
+_POSITION_SIGMA_M = 0.001  # it starts in the local frame's origin
 
 
 class Alignment:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 from math import isfinite, isnan
 
+from firmware_py.estimation.report import EstimatorReport
 from firmware_py.geodesy import LocalProjection
 from firmware_py.measurements import ExternalPose, Readings
 from firmware_py.types import GeodeticPoint, Sensors, VehicleState
@@ -43,6 +44,16 @@ class IdealEstimator:
         if self.origin_ned_m is None:
             return None
         return LocalProjection(self._sensor_origin).to_geodetic(self.origin_ned_m)
+
+    def report(self) -> EstimatorReport:
+        """The condition now: all that is known, without error."""
+        known = self.origin_ned_m is not None
+        return EstimatorReport(
+            has_attitude=known,
+            has_velocity=known and self.has_position,
+            has_position=known and self.has_position,
+            has_height=known,
+        )
 
     def take_external_pose(self, pose: ExternalPose) -> None:
         """Ignore a pose from outside: ideal sensors know theirs."""

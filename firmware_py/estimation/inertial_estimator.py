@@ -10,18 +10,23 @@ from __future__ import annotations
 from heapq import heappop, heappush
 from math import atan2, isfinite, sqrt
 
-from firmware_py.estimation.aid import NEVER_US
-from firmware_py.estimation.aiding import Aiding, Sample
+from firmware_py.estimation.aiding.aid import NEVER_US
+from firmware_py.estimation.aiding.all import Aiding, Sample
 from firmware_py.estimation.alignment import Alignment
 from firmware_py.estimation.error_state import ATTITUDE, POSITION, VELOCITY
 from firmware_py.estimation.output import OutputPredictor
+from firmware_py.estimation.report import IMU, EstimatorReport, Sensor
 from firmware_py.estimation.settings import EstimatorSettings
-from firmware_py.measurements import ExternalPose, ImuSample, MagnetometerSample, Readings
+from firmware_py.estimation.watch import watch_sensors
+from firmware_py.measurements import ExternalPose, ImuSample, Readings
 from firmware_py.types import GeodeticPoint, Sensors, VehicleState
 from geometry.rotations import euler_from_quaternion, yaw_of
 from geometry.vectors import Vec3
 
 _MAX_WAITING = 64
+_MAX_LATE_US = 100_000
+_MAX_GAP_US = 100_000  # between samples of the IMU
+_RELIED_ON_US = 1_000_000
 _STAND_PERIOD_US = 100_000
 _NOISE_TICKS = 4
 _NEW_SHARE = 0.016  # of a new sample of the noise in its mean: one second
@@ -41,6 +46,7 @@ class InertialEstimator:
         aiding: the filter and its measurements.
         stands: set by the owner: the vehicle is disarmed on the ground.
         late: measurements that came too late to be fused.
+        latest: the newest sample of each sensor.
     """
 
     def __init__(
@@ -57,7 +63,9 @@ class InertialEstimator:
         self._waiting: list[tuple[int, int, Sample]] = []
         self._arrivals = 0
         self._resets = 0
-        self._stood_us = NEVER_US
+        self.latest = Readings(0)
+        self._watches = watch_sensors(settings)
+        self._now_us = self._imu_us = 0
         self._ticks = 0
         noise = settings.noise
         self._floor = (noise.gyro_density**2, noise.accel_density**2)  # times the sampling rate
@@ -71,19 +79,19 @@ class InertialEstimator:
     @property
     def has_position(self) -> bool:
         """Whether the horizontal position is measured, or was until a short while ago."""
-        fused_us = self.aiding.horizontal.fused_us
-        return fused_us != NEVER_US and self.state.time_us - fused_us <= self._settings.no_aid_us
+        return self._is_recent(self.aiding.position_us)
 
     def take_external_pose(self, pose: ExternalPose) -> None:
         """Take a pose from outside; it is fused at the time at which it was true."""
         numbers = (*pose.position_ned_m, *pose.position_variance_m2, *(pose.attitude or ()))
         if not self._settings.external or not all(map(isfinite, numbers)):
             return
-        if self._alignment is not None:
-            if pose.attitude is not None:
-                self._alignment.heading_rad = yaw_of(pose.attitude)
+        if not self._watches.note(Sensor.EXTERNAL_POSE, pose.position_ned_m, self._now_us):
             return
-        self._queue(pose)
+        if self._alignment is None:
+            self._queue(pose)
+        elif pose.attitude is not None:
+            self._alignment.heading_rad = yaw_of(pose.attitude)
 
     def update(self, sensors: Sensors | Readings) -> bool:
         """Take what the sensors deliver in one control tick.
@@ -93,20 +101,20 @@ class InertialEstimator:
         """
         if type(sensors) is not Readings:
             raise TypeError("this estimator needs Readings; ideal Sensors need an IdealEstimator")
+        self._now_us = sensors.time_us
+        self._take_slow(sensors)
         imu = sensors.imu
-        if imu is None or not _is_usable(imu, self.state.time_us):
+        if imu is None or not _is_usable(imu, self._imu_us) or not self._watches.note_imu(imu):
             return False
+        self.latest.imu = imu
+        since_us, self._imu_us = imu.time_us - self._imu_us, imu.time_us
         if self._alignment is not None:
-            self._align(imu, sensors.magnetometer)
+            self._align(imu)
             return False
-        if sensors.magnetometer is not None:
-            self._queue(sensors.magnetometer)
-        if sensors.barometer is not None:
-            self._queue(sensors.barometer)
-        if sensors.gps is not None:
-            self._queue(sensors.gps)
+        # After lost samples, the next one stands for all of them.
+        period_us = since_us if since_us < _MAX_GAP_US else imu.period_us
         rate, force = imu.angular_rate_frd_rad_s, imu.specific_force_frd_m_s2
-        self._output.add((imu.time_us, imu.period_us / 1e6, rate, force), self.aiding.filter)
+        self._output.add((imu.time_us, period_us / 1e6, rate, force), self.aiding.target.filter)
         self._ticks += 1
         if self._ticks % _NOISE_TICKS == 0:
             self._measure_noise()
@@ -114,37 +122,91 @@ class InertialEstimator:
         self._publish(imu)
         return True
 
-    def position_variance_m2(self) -> Vec3:
-        """Variances of north, east and down."""
-        return self._variances(POSITION)
+    def report(self) -> EstimatorReport:
+        """The condition now."""
+        aiding, watches, now_us = self.aiding, self._watches, self._now_us
+        healthy = watches.healthy(now_us)
+        relied_on = aiding.relied_on(now_us - _RELIED_ON_US)
+        known = self._alignment is None
+        return EstimatorReport(
+            ideal=False,
+            present=watches.present,
+            healthy=healthy,
+            relied_on=relied_on | IMU if known else frozenset(),
+            has_attitude=known,
+            has_velocity=known and self._is_recent(aiding.velocity_us),
+            has_position=known and self.has_position,
+            has_height=known and self._is_recent(aiding.height_us),
+            position_variance_m2=self._position_variance_m2(),
+            velocity_variance_m2_s2=self._variances(VELOCITY),
+            attitude_variance_rad2=self._variances(ATTITUDE),
+            ratios=aiding.ratios(),
+            height_above_ground_m=aiding.height_above_ground_m(),
+            vibration_rad_s=sqrt(self._vibration[0]),
+            vibration_m_s2=sqrt(self._vibration[1]),
+            gyro_bias_frd_rad_s=aiding.target.filter.gyro_bias_frd_rad_s,
+            accel_bias_frd_m_s2=aiding.target.filter.accel_bias_frd_m_s2,
+            resets=aiding.target.resets,
+            latest=self.latest,
+            problem=watches.problem(now_us) or ("" if known else "not aligned: keep it still"),
+        )
 
-    def velocity_variance_m2_s2(self) -> Vec3:
-        """Variances of the velocity north, east and down."""
-        return self._variances(VELOCITY)
-
-    def attitude_variance_rad2(self) -> Vec3:
-        """Variances of the attitude's error about north, east and down."""
-        return self._variances(ATTITUDE)
-
-    @property
-    def vibration(self) -> tuple[float, float]:
-        """Standard deviations of the IMU's noise: rad/s and m/s^2, per axis and sample."""
-        return (sqrt(self._vibration[0]), sqrt(self._vibration[1]))
+    def _is_recent(self, fused_us: int) -> bool:
+        return fused_us != NEVER_US and self._now_us - fused_us <= self._settings.no_aid_us
 
     def _variances(self, index: int) -> Vec3:
-        p = self.aiding.filter.covariance.p
+        p = self.aiding.target.filter.covariance.p
         return (float(p[index, index]), float(p[index + 1, index + 1]), float(p[index + 2, index + 2]))
+
+    def _position_variance_m2(self) -> Vec3:
+        """Variances of the position on Earth, or in the frame of external poses."""
+        north, east, down = self._variances(POSITION)
+        if not self._settings.gps:
+            return (north, east, down)
+        level, upright = self._settings.gps_drift
+        return (north + level.sigma**2, east + level.sigma**2, down + upright.sigma**2)
+
+    def _take_slow(self, sensors: Readings) -> None:
+        """Keep and queue what the slower sensors deliver."""
+        latest, watches, now_us = self.latest, self._watches, self._now_us
+        latest.time_us = now_us
+        if (field := sensors.magnetometer) is not None:
+            latest.magnetometer = field
+            if watches.note(Sensor.MAGNETOMETER, field.field_frd_gauss, now_us):
+                self._queue(field)
+        if (pressure := sensors.barometer) is not None:
+            latest.barometer = pressure
+            if watches.note(Sensor.BAROMETER, pressure.pressure_pa, now_us):
+                self._queue(pressure)
+        if (fix := sensors.gps) is not None:
+            latest.gps = fix
+            value = (fix.latitude_deg, fix.longitude_deg, fix.altitude_m, fix.velocity_ned_m_s)
+            if watches.note(Sensor.GPS, value, now_us):
+                self._queue(fix)
+        if (distance := sensors.range_finder) is not None:
+            latest.range_finder = distance
+            if watches.note(Sensor.RANGE_FINDER, distance.distance_m, now_us):
+                self._queue(distance)
+        if (flow := sensors.optical_flow) is not None:
+            latest.optical_flow = flow
+            if watches.note(Sensor.OPTICAL_FLOW, flow.gyro_rad, now_us):
+                self._queue(flow)
 
     def _queue(self, sample: Sample) -> None:
         """Keep a measurement until the filter reaches its time."""
-        if sample.time_us < self.aiding.filter.time_us - 100_000 or len(self._waiting) >= _MAX_WAITING:
+        if self._alignment is not None:
+            return
+        if (
+            sample.time_us < self.aiding.target.filter.time_us - _MAX_LATE_US
+            or len(self._waiting) >= _MAX_WAITING
+        ):
             self.late += 1
             return
         self._arrivals += 1
         heappush(self._waiting, (sample.time_us, self._arrivals, sample))
 
-    def _align(self, imu: ImuSample, magnetometer: MagnetometerSample | None) -> None:
-        alignment = self._alignment
+    def _align(self, imu: ImuSample) -> None:
+        alignment, magnetometer = self._alignment, self.latest.magnetometer
         assert alignment is not None
         if not alignment.take(imu):
             return
@@ -153,7 +215,7 @@ class InertialEstimator:
             alignment.heading_rad = atan2(self._field[1], self._field[0]) - atan2(right, ahead)
         if alignment.heading_rad is None:
             return
-        into = self.aiding.filter
+        into = self.aiding.target.filter
         alignment.start(into, self._settings.noise, alignment.heading_rad)
         into.start(imu.time_us)
         self._output.repeat(into)
@@ -175,11 +237,11 @@ class InertialEstimator:
         push += _NEW_SHARE * ((x * x + y * y + z * z) * _SECOND_DIFFERENCE - push)
         self._vibration = (turn, push)
         gyro, accel = self._floor
-        self.aiding.filter.white_noise = (max(turn, gyro / period_s), max(push, accel / period_s))
+        self.aiding.target.filter.white_noise = (max(turn, gyro / period_s), max(push, accel / period_s))
 
     def _advance_filter(self, now_us: int) -> None:
         """Let the filter follow at its distance, and carry its corrections to the present."""
-        recent, waiting, into = self._output.recent, self._waiting, self.aiding.filter
+        recent, waiting, into = self._output.recent, self._waiting, self.aiding.target.filter
         while recent and recent[0][0] <= now_us - self._settings.delay_us:
             time_us, period_s, rate, force = recent.popleft()
             into.add(time_us, period_s, rate, force)
@@ -187,11 +249,10 @@ class InertialEstimator:
             while waiting and waiting[0][0] <= due_us:
                 self._correct(self.aiding.fuse(heappop(waiting)[2]))
             if self.stands and self._is_unaided(time_us):
-                self._stood_us = time_us
                 self._correct(self.aiding.stand())
 
     def _correct(self, error: list[float]) -> None:
-        into, resets = self.aiding.filter, self.aiding.resets
+        into, resets = self.aiding.target.filter, self.aiding.target.resets
         if resets == self._resets:
             self._output.correct(error, into)
         else:
@@ -199,13 +260,11 @@ class InertialEstimator:
             self._output.repeat(into)
 
     def _is_unaided(self, now_us: int) -> bool:
-        """Whether standing still is the only knowledge of the position, and due to be used."""
-        if now_us - self._stood_us < _STAND_PERIOD_US:
-            return False
-        return now_us - self.aiding.horizontal.fused_us > self._settings.no_aid_us
+        """Whether nothing but standing still tells the velocity, and that is due to be used."""
+        return now_us - self.aiding.velocity_us > _STAND_PERIOD_US
 
     def _publish(self, imu: ImuSample) -> None:
-        state, output, into = self.state, self._output.state, self.aiding.filter
+        state, output, into = self.state, self._output.state, self.aiding.target.filter
         state.time_us = imu.time_us
         state.position_ned_m = output.position_ned_m
         state.velocity_ned_m_s = output.velocity_ned_m_s

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import Protocol
 
+from firmware_py.estimation.report import EstimatorReport
 from firmware_py.measurements import ExternalPose, Readings
 from firmware_py.types import GeodeticPoint, Sensors, VehicleState
 
@@ -26,6 +27,9 @@ class StateEstimator(Protocol):
     @property
     def origin(self) -> GeodeticPoint | None:
         """Where on Earth the local frame's origin is; None before it is known."""
+
+    def report(self) -> EstimatorReport:
+        """The condition now."""
 
     def update(self, sensors: Sensors | Readings) -> bool:
         """Take one tick's sensors; return whether they give an estimate of this tick."""

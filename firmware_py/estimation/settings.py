@@ -31,14 +31,12 @@ class SlowError:
     """A slow error of a sensor.
 
     Attributes:
-        sigma: at boot; not used of the barometer, whose first measurement is the height then.
-        noise_density: that drives it, unit per root of s.
-        time_constant_s: of its return to zero; infinite: none.
+        sigma: of its size.
+        noise_density: of the noise that drives it, unit per root of s.
     """
 
     sigma: float
     noise_density: float
-    time_constant_s: float = float("inf")
 
 
 @dataclass(frozen=True, slots=True)
@@ -57,11 +55,14 @@ class EstimatorSettings:
         external_turn_sigma_rad: of a constant error of headings from outside; 0: there is none.
         gps: GPS is fused.
         gps_sigma_m: white noise of GPS positions, horizontal and vertical.
-        gps_drift: slow errors of GPS positions, horizontal and vertical.
+        gps_drift: slow errors of GPS positions, horizontal and vertical; `sigma` is that of a single one.
         magnetometer_sigma_gauss: white noise; None: not fused.
         hard_iron_sigma_gauss: constant error of the magnetometer.
         barometer_sigma_m: white noise; None: not fused.
         barometer_drift: slow error of the barometer.
+        range_sigma_m: white noise of the range finder; None: not fused.
+        ground_walk: noise that drives the height of the ground below, m per root of m flown over it.
+        flow_sigma_rad_s: white noise of optical flow; None: not fused.
     """
 
     noise: InertialNoise = field(default_factory=InertialNoise)
@@ -74,8 +75,11 @@ class EstimatorSettings:
     external_turn_sigma_rad: float = 0.0
     gps: bool = False
     gps_sigma_m: tuple[float, float] = (0.3, 0.5)
-    gps_drift: tuple[SlowError, SlowError] = (SlowError(1.0, 0.1, 200.0), SlowError(1.5, 0.15, 200.0))
+    gps_drift: tuple[SlowError, SlowError] = (SlowError(1.0, 0.1), SlowError(1.5, 0.15))
     magnetometer_sigma_gauss: float | None = None
     hard_iron_sigma_gauss: float = 0.02
     barometer_sigma_m: float | None = 0.2
     barometer_drift: SlowError = SlowError(0.5, 0.03)
+    range_sigma_m: float | None = None
+    ground_walk: float = 0.05
+    flow_sigma_rad_s: float | None = None

@@ -55,11 +55,11 @@ def estimator_settings(spec: SuiteSpec) -> EstimatorSettings:
             else 0.0
         ),
         barometer_sigma_m=barometer.noise_pa / _PA_PER_M if barometer else None,
-        barometer_drift=SlowError(
-            barometer.noise_pa / _PA_PER_M, _walk(barometer.drift_pa / _PA_PER_M, barometer.drift_time_s)
-        )
+        barometer_drift=_slow(barometer.drift_pa / _PA_PER_M, barometer.drift_time_s)
         if barometer
         else chosen.barometer_drift,
+        range_sigma_m=spec.range_finder.noise_m if spec.range_finder else None,
+        flow_sigma_rad_s=spec.optical_flow.noise_rad_s if spec.optical_flow else None,
     )
 
 
@@ -69,4 +69,4 @@ def _walk(sigma: float, time_constant_s: float) -> float:
 
 
 def _slow(sigma: float, time_constant_s: float) -> SlowError:
-    return SlowError(sigma, _walk(sigma, time_constant_s), time_constant_s)
+    return SlowError(sigma, _walk(sigma, time_constant_s))

@@ -3,16 +3,17 @@ from math import inf, nan
 
 import pytest
 
-from firmware_py.estimator import Estimator
-from firmware_py.types import Sensors
+from firmware_py.estimation.ideal_estimator import IdealEstimator
+from firmware_py.types import GeodeticPoint, Sensors
 
+ORIGIN = GeodeticPoint(47.397742, 8.545594, 489.0)
 REST = Sensors(
     4000, (1.0, 2.0, -3.0), (0.0, 0.0, 0.0), (1.0, 0.0, 0.0, 0.0), (0.0, 0.0, 0.0), (0.0, 0.0, -9.8)
 )
 
 
 def test_positions_are_relative_to_the_first_sample():
-    estimator = Estimator()
+    estimator = IdealEstimator(ORIGIN)
     assert estimator.update(REST)
     assert estimator.origin_ned_m == (1.0, 2.0, -3.0)
     assert estimator.update(replace(REST, time_us=8000, position_ned_m=(2.0, 2.5, -4.0)))
@@ -33,7 +34,7 @@ def test_positions_are_relative_to_the_first_sample():
 )
 def test_a_value_that_is_not_finite_makes_the_sample_unusable(field, length, bad):
     for place in range(length):
-        estimator = Estimator()
+        estimator = IdealEstimator(ORIGIN)
         assert estimator.update(REST)
         values = list(getattr(REST, field))
         values[place] = bad
@@ -42,11 +43,11 @@ def test_a_value_that_is_not_finite_makes_the_sample_unusable(field, length, bad
 
 
 def test_opposite_infinities_do_not_cancel():
-    assert not Estimator().update(replace(REST, position_ned_m=(inf, -inf, 0.0)))
+    assert not IdealEstimator(ORIGIN).update(replace(REST, position_ned_m=(inf, -inf, 0.0)))
 
 
 def test_a_sample_must_be_newer_than_the_last():
-    estimator = Estimator()
+    estimator = IdealEstimator(ORIGIN)
     assert estimator.update(REST)
     assert not estimator.update(REST)
     assert not estimator.update(replace(REST, time_us=3999))
@@ -54,5 +55,5 @@ def test_a_sample_must_be_newer_than_the_last():
 
 
 def test_an_attitude_that_is_not_a_rotation_is_unusable():
-    assert not Estimator().update(replace(REST, attitude=(0.0, 0.0, 0.0, 0.0)))
-    assert not Estimator().update(replace(REST, attitude=(2.0, 0.0, 0.0, 0.0)))
+    assert not IdealEstimator(ORIGIN).update(replace(REST, attitude=(0.0, 0.0, 0.0, 0.0)))
+    assert not IdealEstimator(ORIGIN).update(replace(REST, attitude=(2.0, 0.0, 0.0, 0.0)))

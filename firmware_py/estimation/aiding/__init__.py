@@ -1,0 +1,1 @@
+"""Measurements that aid the inertial filter: a module for each kind of sensor."""

@@ -1,0 +1,112 @@
+"""What all kinds of aiding work on: the filter, where its slow errors are, and jumps of its state."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from firmware_py.estimation.error_state import ATTITUDE, INERTIAL_STATES, POSITION, Drift, Matrix
+from firmware_py.estimation.navigation_filter import NavigationFilter
+from firmware_py.estimation.settings import EstimatorSettings
+from geometry.vectors import ZERO3, Vec3
+
+UNKNOWN_M2 = 1e4
+"""Variance of a coordinate of which nothing is known; fusing a measurement follows."""
+_UNKNOWN_RAD2 = 1.0
+_CONSTANT = Drift()
+
+
+@dataclass(slots=True)
+class Layout:
+    """Indices of the slow errors in the error state; -1: there is none.
+
+    Place and turn of markers are only considered: in flight, what little a filter could learn of them comes
+    from the vehicle's own reactions to noise.
+    """
+
+    offset: int = -1
+    turn: int = -1
+    hard_iron: int = -1
+    barometer: int = -1
+    gps: int = -1
+    ground: int = -1
+
+
+class Target:
+    """The filter that is aided.
+
+    Args:
+        settings: which slow errors there are.
+
+    Attributes:
+        filter: nominal state and covariance.
+        layout: indices of the slow errors.
+        resets: counts jumps of the state.
+        height_resets: counts jumps of the height.
+    """
+
+    def __init__(self, settings: EstimatorSettings) -> None:
+        self.layout = layout = Layout()
+        drifts: list[Drift] = []
+        sigmas: list[float] = []
+
+        def add(count: int, sigma: float, drift: Drift = _CONSTANT) -> int:
+            index = INERTIAL_STATES + len(drifts)
+            drifts.extend([drift] * count)
+            sigmas.extend([sigma] * count)
+            return index
+
+        if settings.external and settings.external_offset_sigma_m > 0.0:
+            layout.offset = add(3, settings.external_offset_sigma_m)
+        if settings.external and settings.external_turn_sigma_rad > 0.0:
+            layout.turn = add(1, settings.external_turn_sigma_rad)
+        considered = len(drifts)
+        if settings.magnetometer_sigma_gauss is not None:
+            layout.hard_iron = add(3, settings.hard_iron_sigma_gauss)
+        if settings.barometer_sigma_m is not None:
+            slow = settings.barometer_drift
+            layout.barometer = add(1, 0.0, Drift(slow.noise_density))
+        if settings.gps:
+            level, upright = settings.gps_drift
+            layout.gps = add(2, 0.0, Drift(level.noise_density))
+            add(1, 0.0, Drift(upright.noise_density))
+        if settings.range_sigma_m is not None or settings.flow_sigma_rad_s is not None:
+            layout.ground = add(1, 0.0)
+        self.filter = NavigationFilter(settings.noise, tuple(drifts), considered)
+        for index, sigma in enumerate(sigmas, start=INERTIAL_STATES):
+            self.filter.covariance.set_variance(index, sigma * sigma)
+        self.resets = 0
+        self.height_resets = 0
+
+    def row(self) -> Matrix:
+        """Derivatives of a measured number by the error state, all zero, shape (n,)."""
+        return np.zeros(self.filter.covariance.size)
+
+    def drift(self, index: int) -> float:
+        """The estimated slow error at an index of the error state."""
+        return self.filter.drifts[index - INERTIAL_STATES]
+
+    def set_drift(self, index: int, value: float, variance: float) -> None:
+        """Set a slow error, and how well it is known."""
+        self.filter.drifts[index - INERTIAL_STATES] = value
+        self.filter.covariance.set_variance(index, variance)
+
+    def move(self, axes: tuple[int, ...], position: Vec3) -> None:
+        """Set coordinates to measured ones, and forget what was known of them; fusing them follows."""
+        into = self.filter
+        place = list(into.state.position_ned_m)
+        for axis in axes:
+            place[axis] = position[axis]
+            into.covariance.set_variance(POSITION + axis, UNKNOWN_M2)
+        into.state.position_ned_m = (place[0], place[1], place[2])
+        self.resets += 1
+        if 2 in axes:
+            self.height_resets += 1
+
+    def turn(self, angle_rad: float) -> None:
+        """Turn the heading, and forget what was known of it; fusing it follows."""
+        into = self.filter
+        into.state.correct((0.0, 0.0, angle_rad), ZERO3, ZERO3)
+        into.covariance.set_variance(ATTITUDE + 2, _UNKNOWN_RAD2)
+        self.resets += 1

@@ -1,0 +1,89 @@
+"""What the estimator tells of itself and of its sensors, for telemetry, logs and the checks before arming."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from enum import Enum
+from math import nan
+
+from firmware_py.measurements import Readings
+from geometry.vectors import NAN3, Vec3
+
+
+class Sensor(Enum):
+    """A kind of sensor, by its name for people."""
+
+    GYROSCOPE = "gyroscope"
+    ACCELEROMETER = "accelerometer"
+    MAGNETOMETER = "magnetometer"
+    BAROMETER = "barometer"
+    GPS = "GPS"
+    EXTERNAL_POSE = "external pose"
+    RANGE_FINDER = "range finder"
+    OPTICAL_FLOW = "optical flow"
+
+
+IMU = frozenset({Sensor.GYROSCOPE, Sensor.ACCELEROMETER})
+
+
+@dataclass(frozen=True, slots=True)
+class Ratios:
+    """Innovations of the last measurements, as shares of what the gate lets pass; above 1: rejected.
+
+    Zero: none yet, or no such measurement.
+    """
+
+    velocity: float = 0.0
+    position_horizontal: float = 0.0
+    position_vertical: float = 0.0
+    heading: float = 0.0
+    height_above_ground: float = 0.0
+
+
+@dataclass(frozen=True, slots=True)
+class EstimatorReport:
+    """The estimator's condition in one tick.
+
+    Attributes:
+        ideal: the sensors are ideal; variances are then NaN, and `latest` is empty.
+        present: sensors that the vehicle has.
+        healthy: of those, the ones that deliver what can be used.
+        relied_on: of those, the ones whose measurements are fused now.
+        has_attitude: the attitude is known.
+        has_velocity: the horizontal velocity is known.
+        has_position: the horizontal position is known.
+        has_height: the height is known.
+        position_variance_m2: of north, east and down, shape (3,).
+        velocity_variance_m2_s2: of north, east and down, shape (3,).
+        attitude_variance_rad2: about north, east and down, shape (3,).
+        ratios: of the innovations.
+        height_above_ground_m: by range finder; NaN: not measured.
+        vibration_rad_s: standard deviation of the gyroscope's noise, per axis and sample.
+        vibration_m_s2: standard deviation of the accelerometer's noise.
+        gyro_bias_frd_rad_s: estimated, shape (3,).
+        accel_bias_frd_m_s2: estimated, shape (3,).
+        resets: counts jumps of the estimate.
+        latest: the newest sample of each sensor.
+        problem: why the vehicle should not be armed, in words; empty: nothing is wrong.
+    """
+
+    ideal: bool = True
+    present: frozenset[Sensor] = frozenset()
+    healthy: frozenset[Sensor] = frozenset()
+    relied_on: frozenset[Sensor] = frozenset()
+    has_attitude: bool = False
+    has_velocity: bool = False
+    has_position: bool = False
+    has_height: bool = False
+    position_variance_m2: Vec3 = NAN3
+    velocity_variance_m2_s2: Vec3 = NAN3
+    attitude_variance_rad2: Vec3 = NAN3
+    ratios: Ratios = Ratios()
+    height_above_ground_m: float = nan
+    vibration_rad_s: float = 0.0
+    vibration_m_s2: float = 0.0
+    gyro_bias_frd_rad_s: Vec3 = (0.0, 0.0, 0.0)
+    accel_bias_frd_m_s2: Vec3 = (0.0, 0.0, 0.0)
+    resets: int = 0
+    latest: Readings = field(default_factory=lambda: Readings(0))
+    problem: str = ""
