@@ -7,7 +7,6 @@ from math import isinf, isnan, nan
 from firmware_py.commander_table import BY_HAND, MODE_EVENT, Event, State
 from firmware_py.flight_loop import FlightLoop
 from firmware_py.guidance.orbit import Orbit
-from firmware_py.measurements import ExternalPose
 from firmware_py.missions.flight import IssuedCommand
 from firmware_py.setpoints import Setpoint
 from firmware_py.status import CommandResult, FlightMode
@@ -144,10 +143,6 @@ class Autopilot(FlightLoop):
         moved = max(abs(sticks.forward), abs(sticks.right), abs(sticks.yaw)) > threshold
         if moved and self.parameters.integer("COM_RC_OVERRIDE") & bit:
             self._handle(Event.PILOT_TAKES_OVER)
-
-    def take_external_pose(self, pose: ExternalPose) -> None:
-        """Take a pose of motion capture or visual odometry."""
-        self.estimator.take_external_pose(pose)
 
     def ground_station_heard(self) -> None:
         """Note a ground station's heartbeat."""

@@ -194,7 +194,7 @@ class Simulation:
         else:
             readings, pose = self._sensing.read(sensors)
             if pose is not None:
-                self.autopilot.take_external_pose(pose)
+                self.autopilot.estimator.take_external_pose(pose)
             motors = self.autopilot.step(readings)
         self.world.step(motors)
         self._sensors = self.world.sensors()
