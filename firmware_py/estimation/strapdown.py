@@ -3,7 +3,7 @@
 Scalar code, as it runs several times in a control tick. Integrated as in D. H. Titterton & J. L. Weston,
 "Strapdown Inertial Navigation Technology", 2nd edition, 2004, chapter 11: the attitude by the quaternion of
 the rotation vector, with the coning correction; the velocity with the rotation during the interval taken to
-first order (sculling); the position by the trapezoidal rule.
+second order (sculling); the position by the trapezoidal rule.
 """
 
 from __future__ import annotations
@@ -136,10 +136,11 @@ class Increments:
         dx, dy, dz = 0.5 * p * period_s, 0.5 * q * period_s, 0.5 * r * period_s
         mx, my, mz = tx + dx, ty + dy, tz + dz  # turn to the sample's middle
         vx, vy, vz = self.push_frd_m_s
+        cx, cy, cz = my * z - mz * y, mz * x - mx * z, mx * y - my * x
         self.push_frd_m_s = (
-            vx + (x + my * z - mz * y) * period_s,
-            vy + (y + mz * x - mx * z) * period_s,
-            vz + (z + mx * y - my * x) * period_s,
+            vx + (x + cx + 0.5 * (my * cz - mz * cy)) * period_s,
+            vy + (y + cy + 0.5 * (mz * cx - mx * cz)) * period_s,
+            vz + (z + cz + 0.5 * (mx * cy - my * cx)) * period_s,
         )
         self.turn_frd_rad = (
             mx + dx + ty * dz - tz * dy,

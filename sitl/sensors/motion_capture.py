@@ -14,7 +14,7 @@ class MotionCapture:
     """The pose of the drone's markers in the arena's NED frame, late, with white noise.
 
     The markers' middle and axes differ from the drone's by a constant error. The variances that it reports
-    are those of noise and constant error together.
+    are those of the noise.
 
     Args:
         spec: figures of the errors.
