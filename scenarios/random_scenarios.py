@@ -12,7 +12,8 @@ from typing import Self
 
 from pydantic import Field, model_validator
 
-from scenarios.models import COLOURS, Arena, Base, Frame, Part, Scenario, Start
+from scenarios.models import COLOURS, Arena, Base, Frame, Scenario, Start
+from scenarios.part import Part
 from scenarios.random_closeness import Closeness
 from scenarios.random_numbers import MAX_DRAWS, STEPS_PER_UNIT, LevelError, Range, random_stream
 from scenarios.random_obstacles import Obstacles, add_obstacles

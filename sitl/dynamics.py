@@ -127,6 +127,7 @@ class Dynamics:
         self._commands = list(self._motors)
         self._speeds = tuple(getter(_SPEED.format(index)) for index in rotors)
         self._touch = tuple(setter(name) for name in (*_TOUCH_FORCES, *_TOUCH_MOMENTS))
+        self._air = tuple(setter(f"atmosphere/gust-{axis}-fps") for axis in ("north", "east", "down"))
         self._ground = setter("position/terrain-elevation-asl-ft")
         self._corners = tuple(getter(f"contact/unit[{index}]/WOW") for index in range(8))
 
@@ -153,6 +154,14 @@ class Dynamics:
         """Set the force and moment of contacts, in body axes; they hold until the next call."""
         for setter, value in zip(self._touch, (*force_frd_n, *moment_frd_nm), strict=True):
             setter(value)
+
+    def set_air_velocity(self, velocity_ned_m_s: Vec3) -> None:
+        """Set the air's velocity over ground, m/s; it holds until the next call, and is zero at first.
+
+        JSBSim's own turbulence is not used: its low-altitude model takes heights above sea level.
+        """
+        for setter, value in zip(self._air, velocity_ned_m_s, strict=True):
+            setter(value * _FEET_PER_METRE)
 
     def set_ground_height(self, height_m: float) -> None:
         """Set the height of the ground below, metres above the floor."""

@@ -80,6 +80,7 @@ class Simulation:
     Args:
         scenario: the simulated one.
         airframe: the drone; by default the one that the scenario names.
+        seed: of everything random.
 
     Attributes:
         world: the physics.
@@ -90,11 +91,11 @@ class Simulation:
         truth: the true state now.
     """
 
-    def __init__(self, scenario: Scenario, airframe: Airframe | None = None) -> None:
+    def __init__(self, scenario: Scenario, airframe: Airframe | None = None, seed: int = 0) -> None:
         self.scenario = scenario
         airframe = airframe or load_airframe(scenario.airframe)
         origin = scenario.origin
-        self.world = World(scenario, airframe)
+        self.world = World(scenario, airframe, seed)
         self.autopilot = Autopilot(
             airframe,
             GeodeticPoint(origin.latitude_deg, origin.longitude_deg, origin.altitude_m),

@@ -89,6 +89,7 @@ def sim(
     count: Annotated[
         WholeNumber, Parameter(help="how many drones fly side by side; they have the next instances' ports")
     ] = 1,
+    seed: Annotated[WholeNumber, Parameter(help="of everything random, such as turbulence")] = 0,
     connections: Connections | None = None,
     onboard: Onboard | None = None,
     monitor: Annotated[
@@ -124,6 +125,7 @@ def sim(
     check_range("--speed", speed, 0.01, 1000)
     check_range("--instance", instance, 0, 9)
     check_range("--count", count, 1, _MAX_COUNT)
+    check_range("--seed", seed, 0, 2**63 - 1)
     chosen = connections or Connections()
     watcher = _monitor(chosen.video_port, count) if monitor else None
     if watcher is not None:
@@ -133,7 +135,7 @@ def sim(
     from scenarios.loader import load_scenario
     from sitl.server import SimulatorServer
 
-    simulations = _simulations(load_scenario(scenario), count)
+    simulations = _simulations(load_scenario(scenario), count, seed)
     server = SimulatorServer(simulations, settings, notice=say, grants=_grants(time_grants))
     asyncio.run(_run(server, watcher, lifeline=lifeline))
     return 0
@@ -193,19 +195,19 @@ def _settings(
     return settings
 
 
-def _simulations(scenario: Scenario, count: int) -> list[Simulation]:
+def _simulations(scenario: Scenario, count: int, seed: int) -> list[Simulation]:
     from firmware_py.airframe import load_airframe
     from sitl.fleet import side_by_side
     from sitl.simulation import Simulation
 
     if count == 1:
-        return [Simulation(scenario)]
+        return [Simulation(scenario, seed=seed)]
     airframe = load_airframe(scenario.airframe)
     try:
         scenarios = side_by_side(scenario, count, max(airframe.envelope_m[:2]))
     except ValueError as error:
         raise SettingError(f"--count {count}: {error}") from error
-    return [Simulation(one, airframe) for one in scenarios]
+    return [Simulation(one, airframe, seed) for one in scenarios]
 
 
 def _read_key(path: Path | None) -> SigningKey | None:

@@ -49,7 +49,7 @@ def fly_lockstep(
 async def lockstep_flight(
     plan: FlightPlan, *, observers: Sequence[Observer] = (), on_image: ImageObserver | None = None
 ) -> FinishedFlight:
-    """Fly a plan as fast as the machine can; its seed is recorded, nothing is random yet.
+    """Fly a plan as fast as the machine can; its seed is of wind and of what else is random.
 
     Raises:
         DroneError: the drone does not get ready.
@@ -80,7 +80,7 @@ class LockstepVehicle:
         *,
         observers: Sequence[TruthObserver] = (),
     ) -> None:
-        self.simulation = Simulation(plan.scenario, plan.airframe)
+        self.simulation = Simulation(plan.scenario, plan.airframe, plan.seed or 0)
         detector = plan_detector(plan, rendered=True)
         self.perception = LockstepPerception(plan.scenario, on_image, detector)
         self.drone = LockstepDrone(
