@@ -51,7 +51,12 @@ class Wind(Part):
 
     @model_validator(mode="after")
     def _gusts_fit_their_period(self) -> Self:
-        if self.gust_s >= self.gust_period_s:
-            message = f"leaves no time between gusts; use less than gust_period_s {self.gust_period_s:g}"
-            raise refusal(self.gust_s, message, "gust_s")
+        check_gusts(self.gust_s, self.gust_period_s)
         return self
+
+
+def check_gusts(gust_s: float, gust_period_s: float) -> None:
+    """Refuse gusts that are as long as the time from one to the next, or longer."""
+    if gust_s >= gust_period_s:
+        message = f"leaves no time between gusts; use less than gust_period_s {gust_period_s:g}"
+        raise refusal(gust_s, message, "gust_s")

@@ -125,7 +125,6 @@ def sim(
     check_range("--speed", speed, 0.01, 1000)
     check_range("--instance", instance, 0, 9)
     check_range("--count", count, 1, _MAX_COUNT)
-    check_range("--seed", seed, 0, 2**63 - 1)
     chosen = connections or Connections()
     watcher = _monitor(chosen.video_port, count) if monitor else None
     if watcher is not None:
@@ -200,6 +199,7 @@ def _simulations(scenario: Scenario, count: int, seed: int) -> list[Simulation]:
     from sitl.fleet import side_by_side
     from sitl.simulation import Simulation
 
+    check_range("--seed", seed, 0, 2**63 - 1)
     if count == 1:
         return [Simulation(scenario, seed=seed)]
     airframe = load_airframe(scenario.airframe)
