@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from functools import cached_property, lru_cache
 from importlib import resources
-from math import cos, inf, sin
+from math import cos, inf, sin, sqrt
 from pathlib import Path
 from typing import Annotated, Literal, Self
 
@@ -61,6 +61,17 @@ class Drag(_Part):
 
     force_n_s2_m2: Vec3 = Field((0.0, 0.0, 0.0), description="N/(m/s)^2: forward, right, down")
     moment_nm_s2: Vec3 = Field((0.0, 0.0, 0.0), description="N m/(rad/s)^2: roll, pitch, yaw")
+
+
+class AirEffects(_Part):
+    """Effects of the air on the rotors; by default none."""
+
+    rotor_drag_n_s2_m_rad: float = Field(
+        0.0,
+        ge=0,
+        description="drag of each rotor in its plane, N per m/s of air and rad/s of the rotor: F = -c w v",
+    )
+    ground_effect: bool = Field(False, description="thrust increases near base and floor")
 
 
 class Contact(_Part):
@@ -123,6 +134,7 @@ class Airframe(_Part):
     rotors: tuple[Rotor, ...] = Field(min_length=4)
     motor: Motor
     drag: Drag = Drag()
+    air: AirEffects = AirEffects()
     contact: Contact = Contact()
     limits: Limits = Limits()
     battery: Battery = Battery()
@@ -134,7 +146,7 @@ class Airframe(_Part):
 
     def __hash__(self) -> int:
         """Without the parameters, which have no hash; what is designed from an airframe is kept by it."""
-        parts = (self.motor, self.rotors, self.drag, self.limits, self.stabiliser)
+        parts = (self.motor, self.rotors, self.drag, self.air, self.limits, self.stabiliser)
         return hash((self.name, self.mass_kg, self.inertia_kg_m2, *parts))
 
     @model_validator(mode="after")
@@ -161,7 +173,10 @@ class Airframe(_Part):
 
         Along the flight and upwards, with drag in body axes and tilt t, forces are in balance:
         T sin t = v^2 (k1 cos^3 t + k3 sin^3 t) and T cos t = m g + v^2 sin t cos t (k3 sin t - k1 cos t).
+        With drag of n rotors it is solved along the body: m g sin t = k1 s^2 + n c w s, s = v cos t.
         """
+        if self.air.rotor_drag_n_s2_m_rad > 0.0:
+            return min(self._level_speed_with_rotor_drag(), self.limits.speed_horizontal_m_s)
         drag_forward, _, drag_down = self.drag.force_n_s2_m2
         sine, cosine = sin(self.limits.tilt_rad), cos(self.limits.tilt_rad)
         along = drag_forward * cosine**3 + drag_down * sine**3
@@ -169,6 +184,22 @@ class Airframe(_Part):
         drag = along * cosine - down * sine
         fastest_m_s = (self.weight_n * sine / drag) ** 0.5 if drag > 0.0 else inf
         return min(fastest_m_s, self.limits.speed_horizontal_m_s)
+
+    def _level_speed_with_rotor_drag(self) -> float:
+        """`level_speed_m_s` without its limit; thrust and rotor speed w by T = m g cos t + k3 (v sin t)^2."""
+        drag_forward, _, drag_down = self.drag.force_n_s2_m2
+        sine, cosine, rotors = sin(self.limits.tilt_rad), cos(self.limits.tilt_rad), len(self.rotors)
+        pull_n, through_n, speed_m_s = self.weight_n * sine, 0.0, 0.0
+        for _ in range(
+            20
+        ):  # of a fixed-point iteration; the rotors' speed depends little on that of the drone
+            thrust_n = self.weight_n * cosine + through_n
+            rotor_rad_s = sqrt(thrust_n / (rotors * self.motor.thrust_n_s2))
+            linear = rotors * self.air.rotor_drag_n_s2_m_rad * rotor_rad_s
+            root = sqrt(linear * linear + 4.0 * drag_forward * pull_n)
+            speed_m_s = 2.0 * pull_n / (linear + root) / cosine
+            through_n = drag_down * (speed_m_s * sine) ** 2
+        return speed_m_s
 
     @cached_property
     def hover_speed_rad_s(self) -> float:

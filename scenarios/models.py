@@ -8,19 +8,13 @@ from dataclasses import dataclass
 from math import atan2, cos, hypot, sin, sqrt
 from typing import Annotated, Any, Literal, Self
 
-from pydantic import (
-    BaseModel,
-    ConfigDict,
-    Field,
-    SerializerFunctionWrapHandler,
-    model_serializer,
-    model_validator,
-)
-from pydantic_core import PydanticCustomError
+from pydantic import Field, SerializerFunctionWrapHandler, model_serializer, model_validator
 
 from errors import UserError
 from geometry.solids import Solid
 from geometry.vectors import Quaternion, Vec3
+from scenarios.air import Wind
+from scenarios.part import Part, refusal
 
 Colour = Literal["red", "green", "blue"]
 COLOURS: tuple[Colour, ...] = ("red", "green", "blue")
@@ -29,7 +23,7 @@ MissionClass = Literal["contest", "open"]
 DecoyColour = Literal["cyan", "magenta"]
 DECOY_COLOURS: tuple[DecoyColour, ...] = ("cyan", "magenta")
 
-_OFTEN_UNUSED = ("decoys", "poles", "walls", "sensors")
+_OFTEN_UNUSED = ("decoys", "poles", "walls", "sensors", "wind")
 _SHORTEST_M = 0.001  # of a part of a wall; a doorway may end where the wall does
 START_CLEAR_M = 0.3  # from the start's centre to a pole or wall: more than half of any airframe
 
@@ -39,30 +33,6 @@ Radians = Annotated[float, Field(ge=-6.3, le=6.3, allow_inf_nan=False)]
 
 class ScenarioError(UserError):
     """A scenario that cannot be used; the message is one line for people."""
-
-
-def refusal(value: float | str, message: str, *at: str | int) -> PydanticCustomError:
-    """Make a validation error that has the path of the bad value, so that a file's line can be named.
-
-    Args:
-        value: the bad value, which may be a default.
-        message: what is wrong and how to correct it; one line that continues after the value.
-        *at: keys and indices from the validated part to the value.
-    """
-    context = {"field": field_path(at), "value": value, "message": message, "at": at}
-    return PydanticCustomError("refused", "{field} {value} {message}", context)
-
-
-def field_path(at: tuple[str | int, ...]) -> str:
-    """Write keys and indices as one text: ("frames", 1, "x_m") is "frames[1].x_m"."""
-    text = "".join(f"[{step}]" if isinstance(step, int) else f".{step}" for step in at)
-    return text.removeprefix(".")
-
-
-class Part(BaseModel):
-    """Base of all scenario parts: frozen, finite numbers, and an unknown field is an error."""
-
-    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
 
 
 class Arena(Part):
@@ -288,6 +258,7 @@ class Scenario(Part):
     airframe: str = Field("abejorro", description="name of the drone to fly")
     origin: Origin = Field(Origin(), description="where on Earth the arena is")
     sensors: str = Field("ideal", description="name of the drone's sensor suite, or a file of one")
+    wind: Wind = Field(Wind(), description="how the air moves; by default it is still")
 
     @model_validator(mode="after")
     def _one_frame_a_colour(self) -> Self:

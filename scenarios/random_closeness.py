@@ -10,7 +10,8 @@ from pydantic import Field
 
 from geometry.solids import Solid
 from geometry.vectors import Vec3
-from scenarios.models import Arena, Base, Frame, Part
+from scenarios.models import Arena, Base, Frame
+from scenarios.part import Part
 
 _STEP_M = 0.05  # between the points of a way that are checked
 

@@ -11,7 +11,8 @@ from typing import TYPE_CHECKING, Self
 
 from pydantic import Field, model_validator
 
-from scenarios.models import Part, ScenarioError, refusal
+from scenarios.models import ScenarioError
+from scenarios.part import Part, refusal
 
 if TYPE_CHECKING:
     from numpy.random import Generator

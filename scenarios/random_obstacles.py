@@ -16,11 +16,11 @@ from scenarios.models import (
     Arena,
     Decoy,
     Doorway,
-    Part,
     Pole,
     Scenario,
     Wall,
 )
+from scenarios.part import Part
 from scenarios.random_numbers import MAX_DRAWS, LevelError, Range, random_stream
 
 if TYPE_CHECKING:

@@ -12,7 +12,10 @@ from typing import Self
 
 from pydantic import Field, model_validator
 
-from scenarios.models import COLOURS, Arena, Base, Frame, Part, Scenario, Start
+from scenarios.air import Wind
+from scenarios.models import COLOURS, Arena, Base, Frame, Scenario, Start
+from scenarios.part import Part
+from scenarios.random_air import RandomWind
 from scenarios.random_closeness import Closeness
 from scenarios.random_numbers import MAX_DRAWS, STEPS_PER_UNIT, LevelError, Range, random_stream
 from scenarios.random_obstacles import Obstacles, add_obstacles
@@ -62,6 +65,9 @@ class Level(Part):
         "the base only",
     )
     obstacles: Obstacles | None = Field(None, description="what else is in the arena")
+    wind: RandomWind | None = Field(None, description="how the air moves; by default it is still")
+    airframe: str | None = Field(None, description="name of the drone to fly; by default the challenge's")
+    sensors: str | None = Field(None, description="name of the drone's sensor suite, or a file of one")
 
 
 LEVEL_FILES = FileKind("level", Level, LevelError, folder="levels")
@@ -107,6 +113,8 @@ def random_scenario(level: Level, seed: int) -> Scenario:
         base=base,
         start=Start(x_m=base.x_m, y_m=base.y_m, yaw_rad=yaw_rad),
         frames=frames,
+        wind=Wind() if level.wind is None else level.wind.draw(seed),
+        **{name: value for name in ("airframe", "sensors") if (value := getattr(level, name)) is not None},
     )
     return scenario if level.obstacles is None else add_obstacles(scenario, level.obstacles, seed)
 

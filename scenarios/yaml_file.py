@@ -19,7 +19,7 @@ from pydantic import BaseModel, ValidationError
 from pydantic_core import ErrorDetails
 
 from errors import UserError
-from scenarios.models import field_path
+from scenarios.part import field_path
 from scenarios.yaml_tree import Path as FieldPath
 from scenarios.yaml_tree import YamlError, YamlTree, parse_yaml
 

@@ -27,6 +27,8 @@ _COMMAND = "fcs/motor{}/command-rad_s"
 _SPEED = "fcs/motor{}/speed-rad_s"
 _TOUCH_FORCES = ("fcs/touch/force-x-n", "fcs/touch/force-y-n", "fcs/touch/force-z-n")
 _TOUCH_MOMENTS = ("fcs/touch/moment-roll-nm", "fcs/touch/moment-pitch-nm", "fcs/touch/moment-yaw-nm")
+_HEIGHT_FT = "position/h-agl-ft"
+_GROUND_EFFECT = "fcs/ground-effect-factor"
 _UNITS: dict[str, Vec3] = {"x": (1.0, 0.0, 0.0), "y": (0.0, 1.0, 0.0), "z": (0.0, 0.0, 1.0)}
 _AIR_VELOCITY_FPS = ("velocities/u-aero-fps", "velocities/v-aero-fps", "velocities/w-aero-fps")
 _RATE_RAD_S = ("velocities/p-aero-rad_sec", "velocities/q-aero-rad_sec", "velocities/r-aero-rad_sec")
@@ -127,6 +129,7 @@ class Dynamics:
         self._commands = list(self._motors)
         self._speeds = tuple(getter(_SPEED.format(index)) for index in rotors)
         self._touch = tuple(setter(name) for name in (*_TOUCH_FORCES, *_TOUCH_MOMENTS))
+        self._air = tuple(setter(f"atmosphere/gust-{axis}-fps") for axis in ("north", "east", "down"))
         self._ground = setter("position/terrain-elevation-asl-ft")
         self._corners = tuple(getter(f"contact/unit[{index}]/WOW") for index in range(8))
 
@@ -153,6 +156,14 @@ class Dynamics:
         """Set the force and moment of contacts, in body axes; they hold until the next call."""
         for setter, value in zip(self._touch, (*force_frd_n, *moment_frd_nm), strict=True):
             setter(value)
+
+    def set_air_velocity(self, velocity_ned_m_s: Vec3) -> None:
+        """Set the air's velocity over ground, m/s; it holds until the next call, and is zero at first.
+
+        JSBSim's own turbulence is not used: its low-altitude model takes heights above sea level.
+        """
+        for setter, value in zip(self._air, velocity_ned_m_s, strict=True):
+            setter(value * _FEET_PER_METRE)
 
     def set_ground_height(self, height_m: float) -> None:
         """Set the height of the ground below, metres above the floor."""
@@ -270,7 +281,24 @@ def _motors(airframe: Airframe) -> str:
         f"{gain}<output>{_SPEED.format(index)}</output></{tag}>"
         for index in rotors
     )
-    return f'{properties}<channel name="motors">{filters}</channel>'
+    ground_effect = _ground_effect(airframe) if airframe.air.ground_effect else ""
+    return f'{properties}<channel name="motors">{filters}{ground_effect}</channel>'
+
+
+def _ground_effect(airframe: Airframe) -> str:
+    """The factor by which thrust increases near the ground: T / T_free = 1 / (1 - (R / 4z)^2).
+
+    Source: Cheeseman & Bennett, "The Effect of the Ground on a Helicopter Rotor in Forward Flight", 1955.
+    z is the rotors' mean height over base or floor for a level drone, and counts as at least R / 2, where
+    the factor is 4/3: at R / 4 the formula has no value.
+    """
+    radius_m, rotors = airframe.motor.radius_m, airframe.rotors
+    above_centre_m = -sum(rotor.position_frd_m[2] for rotor in rotors) / len(rotors)
+    height = f"<sum>{_product(_METRES_PER_FOOT, _HEIGHT_FT)}<value>{above_centre_m}</value></sum>"
+    bounded = f"<max>{height}<value>{radius_m / 2}</value></max>"
+    ratio = f"<pow><quotient><value>{radius_m / 4}</value>{bounded}</quotient><value>2</value></pow>"
+    factor = f"<quotient><value>1</value><difference><value>1</value>{ratio}</difference></quotient>"
+    return f'<fcs_function name="{_GROUND_EFFECT}"><function>{factor}</function></fcs_function>'
 
 
 def _product(factor: float, *properties: str, magnitude_of: str | None = None) -> str:
@@ -288,14 +316,18 @@ def _reaction(tag: str, name: str, direction: Vec3, content: str) -> str:
 
 
 def _external_reactions(airframe: Airframe) -> str:
-    """Each rotor's thrust; forces and moments of drag, touch and the rotors' torques on the body's axes."""
+    """Each rotor's thrust and drag; forces and moments of the body's drag, touch and the rotors' torques."""
     motor, drag = airframe.motor, airframe.drag
     reactions, torques = "", ""
     for index, rotor in enumerate(airframe.rotors):
         speed, (forward, right, down) = _SPEED.format(index), rotor.position_frd_m
-        thrust = _product(motor.thrust_n_s2 * _POUNDS_PER_NEWTON, speed, speed)
-        content = f"<function>{thrust}</function>{_location((-forward, right, -down))}"
+        factors = (speed, speed, _GROUND_EFFECT) if airframe.air.ground_effect else (speed, speed)
+        thrust = _product(motor.thrust_n_s2 * _POUNDS_PER_NEWTON, *factors)
+        hub = _location((-forward, right, -down))
+        content = f"<function>{thrust}</function>{hub}"
         reactions += _reaction("force", f"rotor{index}", (0.0, 0.0, -1.0), content)
+        if airframe.air.rotor_drag_n_s2_m_rad > 0.0:
+            reactions += _rotor_drag(airframe, index, speed, hub)
         torques += _product(rotor.yaw_sign * motor.torque_nm_s2 * _POUND_FEET_PER_NEWTON_METRE, speed, speed)
     for axis, (letter, unit) in enumerate(_UNITS.items()):
         speed, factor = _AIR_VELOCITY_FPS[axis], -drag.force_n_s2_m2[axis] * _POUNDS_PER_NEWTON
@@ -310,4 +342,18 @@ def _external_reactions(airframe: Airframe) -> str:
         total += torques if letter == "z" else ""
         content = f"<function><sum>{total}</sum></function>"
         reactions += _reaction("moment", f"body-moment-{letter}", unit, content)
+    return reactions
+
+
+def _rotor_drag(airframe: Airframe, index: int, speed: str, hub: str) -> str:
+    """A rotor's drag in its plane, F = -c w v, linear in the velocity of the air (H-force).
+
+    Source: Mahony, Kumar & Corke, "Multirotor Aerial Vehicles", IEEE Robotics & Automation Magazine, 2012.
+    The velocity is that of the drone's centre: what the body's rotation adds at the hub is left out.
+    """
+    factor = -airframe.air.rotor_drag_n_s2_m_rad * _POUNDS_PER_NEWTON * _METRES_PER_FOOT
+    reactions = ""
+    for velocity, letter in zip(_AIR_VELOCITY_FPS[:2], "xy", strict=True):
+        content = f"<function>{_product(factor, speed, velocity)}</function>{hub}"
+        reactions += _reaction("force", f"rotor{index}-drag-{letter}", _UNITS[letter], content)
     return reactions

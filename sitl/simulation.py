@@ -130,7 +130,7 @@ class Simulation:
     Args:
         scenario: the simulated one.
         airframe: the drone; by default the one that the scenario names.
-        seed: of all random numbers.
+        seed: of everything random.
 
     Raises:
         SuiteError: the scenario's sensor suite cannot be used.
@@ -147,7 +147,7 @@ class Simulation:
     def __init__(self, scenario: Scenario, airframe: Airframe | None = None, seed: int = 0) -> None:
         self.scenario = scenario
         airframe = airframe or load_airframe(scenario.airframe)
-        self.world = World(scenario, airframe)
+        self.world = World(scenario, airframe, seed)
         origin = scenario.origin
         place = GeodeticPoint(origin.latitude_deg, origin.longitude_deg, origin.altitude_m)
         suite = load_suite(scenario.sensors)

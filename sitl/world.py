@@ -1,4 +1,4 @@
-"""The simulated world: one drone, ground, base, frames and obstacles, advanced in fixed steps of time."""
+"""The simulated world: one drone, ground, base, frames, obstacles and wind, advanced in fixed steps."""
 
 from __future__ import annotations
 
@@ -11,6 +11,7 @@ from geometry.rotations import rotation, rotation_rows, to_body, to_world, yaw_o
 from geometry.solids import Solid
 from geometry.vectors import ZERO3, Vec3
 from scenarios.models import Scenario, TrueState, is_over_base, start_position
+from sitl.air.wind import SimulatedWind
 from sitl.dynamics import Dynamics
 from sitl.solids import frame_solids, touch
 
@@ -27,6 +28,11 @@ _MAX_FAR_TICKS = 250  # the longest time for which distant solids are not checke
 class World:
     """Everything that moves or can be touched in a scenario.
 
+    Args:
+        scenario: to be simulated.
+        airframe: of the drone.
+        seed: of everything random.
+
     Attributes:
         scenario: the simulated one.
         airframe: of the drone.
@@ -36,18 +42,21 @@ class World:
         radius_m: of the sphere around the drone.
     """
 
-    def __init__(self, scenario: Scenario, airframe: Airframe) -> None:
+    def __init__(self, scenario: Scenario, airframe: Airframe, seed: int = 0) -> None:
         self.scenario = scenario
         self.airframe = airframe
         self.time_us = 0
         self._half_m: Vec3 = tuple(extent / 2 for extent in airframe.envelope_m)  # type: ignore[assignment]
         self._neighbours: tuple[Solid, ...] = ()
         self.radius_m = hypot(*self._half_m)
-        fastest_m_s = _SPEED_MARGIN * airframe.limits.speed_horizontal_m_s
+        wind = scenario.wind
+        self._wind = SimulatedWind(wind, seed, CONTROL_PERIOD_US / 1e6) if wind.blows else None
+        fastest_m_s = _SPEED_MARGIN * airframe.limits.speed_horizontal_m_s + wind.highest_m_s
         self._margin_m = max(_MIN_MARGIN_M, fastest_m_s * CONTROL_PERIOD_US / 1e6)
         self._reach_m = self.radius_m + self._margin_m
         full_thrust_m_s2 = airframe.full_thrust_n / airframe.mass_kg
-        self._acceleration_m_s2 = _ACCELERATION_MARGIN * (full_thrust_m_s2 + GRAVITY_M_S2)
+        wind_m_s2 = max(airframe.drag.force_n_s2_m2) * wind.highest_m_s**2 / airframe.mass_kg
+        self._acceleration_m_s2 = _ACCELERATION_MARGIN * (full_thrust_m_s2 + GRAVITY_M_S2 + wind_m_s2)
         self._base_top_m = scenario.base.top_m
         self._base_level_m = scenario.base.top_m - self._half_m[2]  # a centre on the base is higher than this
         self._groups = [_Group(frame.position_arena_m, frame_solids(frame)) for frame in scenario.all_frames]
@@ -78,6 +87,8 @@ class World:
         """Advance by one control period with these motor commands (rad/s, the airframe's order)."""
         dynamics = self.dynamics
         dynamics.command_motors(motor_speeds_rad_s)
+        if self._wind is not None:
+            dynamics.set_air_velocity(self._wind.step(dynamics.velocity_ned_m_s))
         run = dynamics.run
         if self._far_ticks > 0:
             self._far_ticks -= 1

@@ -280,6 +280,8 @@ class VectorLaw:
         if level > room:
             ahead, aside, level = ahead * room / level, aside * room / level, room
         length = sqrt(level * level + up * up)
+        if length == 0.0:  # free fall, if MPC_THR_MIN is 0: upright, as no thrust has a direction
+            return (0.0, *self._turn_to(state, (0.0, 0.0, 1.0), m, yaw_rate_rad_s))
         down_level = (-ahead / length, -aside / length, up / length)
         return (self._thrust(up, m), *self._turn_to(state, down_level, m, yaw_rate_rad_s))
 

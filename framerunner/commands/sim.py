@@ -89,6 +89,7 @@ def sim(
     count: Annotated[
         WholeNumber, Parameter(help="how many drones fly side by side; they have the next instances' ports")
     ] = 1,
+    seed: Annotated[WholeNumber, Parameter(help="of everything random, such as turbulence")] = 0,
     connections: Connections | None = None,
     onboard: Onboard | None = None,
     monitor: Annotated[
@@ -133,7 +134,7 @@ def sim(
     from scenarios.loader import load_scenario
     from sitl.server import SimulatorServer
 
-    simulations = _simulations(load_scenario(scenario), count)
+    simulations = _simulations(load_scenario(scenario), count, seed)
     server = SimulatorServer(simulations, settings, notice=say, grants=_grants(time_grants))
     asyncio.run(_run(server, watcher, lifeline=lifeline))
     return 0
@@ -193,19 +194,20 @@ def _settings(
     return settings
 
 
-def _simulations(scenario: Scenario, count: int) -> list[Simulation]:
+def _simulations(scenario: Scenario, count: int, seed: int) -> list[Simulation]:
     from firmware_py.airframe import load_airframe
     from sitl.fleet import side_by_side
     from sitl.simulation import Simulation
 
+    check_range("--seed", seed, 0, 2**63 - 1)
     if count == 1:
-        return [Simulation(scenario)]
+        return [Simulation(scenario, seed=seed)]
     airframe = load_airframe(scenario.airframe)
     try:
         scenarios = side_by_side(scenario, count, max(airframe.envelope_m[:2]))
     except ValueError as error:
         raise SettingError(f"--count {count}: {error}") from error
-    return [Simulation(one, airframe) for one in scenarios]
+    return [Simulation(one, airframe, seed) for one in scenarios]
 
 
 def _read_key(path: Path | None) -> SigningKey | None:

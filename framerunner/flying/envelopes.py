@@ -37,14 +37,14 @@ ENVELOPES: Mapping[tuple[str, MissionClass], Envelope] = {
 
 
 class EnvelopeError(UserError):
-    """There is no bound, because the motion of the airframe was not measured."""
+    """There is no bound: of this airframe, or of flights in wind, no motion was measured."""
 
 
 def bound_of(plan: FlightPlan, mission_class: MissionClass) -> Bound:
     """The lower bound of a try of a plan's scenario; takes some milliseconds.
 
     Raises:
-        EnvelopeError: there is no envelope of this airframe.
+        EnvelopeError: there is no envelope of this airframe, or the scenario has wind.
         ScenarioError: the scenario has no frames.
     """
     airframe = plan.scenario.airframe
@@ -52,6 +52,10 @@ def bound_of(plan: FlightPlan, mission_class: MissionClass) -> Bound:
     if envelope is None:
         known = ", ".join(sorted({name for name, _ in ENVELOPES}))
         raise EnvelopeError(f"airframe {airframe}: its motion was not measured, so no bound; use {known}")
+    if plan.scenario.wind.blows:
+        raise EnvelopeError(
+            f"{plan.scenario.name}: wind pushes a drone beyond its limits, so no bound; leave wind out"
+        )
     return lower_bound(plan.layout, plan.start_pose[:3], plan.airframe.envelope_m[2], envelope)
 
 

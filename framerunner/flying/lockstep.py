@@ -49,7 +49,7 @@ def fly_lockstep(
 async def lockstep_flight(
     plan: FlightPlan, *, observers: Sequence[Observer] = (), on_image: ImageObserver | None = None
 ) -> FinishedFlight:
-    """Fly a plan as fast as the machine can; its seed is recorded, nothing is random yet.
+    """Fly a plan as fast as the machine can; its seed is of wind and of what else is random.
 
     Raises:
         DroneError: the drone does not get ready.

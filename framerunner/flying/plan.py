@@ -11,7 +11,8 @@ from framerunner.flying.response import Response
 from offboard.keep_in_box import Box, flight_box
 from offboard.limits import CONTEST, CommandLimits
 from offboard.navigation.surroundings import Surroundings
-from scenarios.models import Part, Scenario, start_position
+from scenarios.models import Scenario, start_position
+from scenarios.part import Part
 from scenarios.referee import Referee
 
 if TYPE_CHECKING:  # it imports the statechart library, which the virtual camera does not need

@@ -132,7 +132,7 @@ async def _vehicle(
     # The simulator reads the scenario that was checked here, even if the user's file changes.
     scenario_file, links = str(records.folder.scenario), () if monitor_url is None else (monitor_url,)
     sitl = await stack.enter_async_context(
-        SitlProcess(scenario_file, settings.speed, settings.instance, links)
+        SitlProcess(scenario_file, settings.speed, settings.instance, links, plan.seed or 0)
     )
     camera = plan.scenario.camera
     size_px = (camera.width_px, camera.height_px)

@@ -32,11 +32,16 @@ class SitlProcess(ChildProcess):
     """`framerunner sim` as a child process, with its options."""
 
     def __init__(
-        self, scenario: str, speed: float = 1.0, instance: int = 0, links: tuple[str, ...] = ()
+        self,
+        scenario: str,
+        speed: float = 1.0,
+        instance: int = 0,
+        links: tuple[str, ...] = (),
+        seed: int = 0,
     ) -> None:
         here, there = socket.socketpair()
         arguments = [
-            *("sim", "--lifeline", "--scenario", scenario),
+            *("sim", "--lifeline", "--scenario", scenario, "--seed", str(seed)),
             *("--speed", f"{speed:g}", "--instance", str(instance), "--video-rtp", "off"),
             *("--time-grants", str(there.fileno())),
             *(word for link in links for word in ("--link", link)),

@@ -93,7 +93,9 @@ class FrameChallengeEnv(gymnasium.Env[Observation, Action]):
         """
         super().reset(seed=seed)
         self._flying = self._choose(options or {})
-        self._flight = SteppedFlight(FlightPlan(self._flying))
+        # Drawn only where it has an effect, so that all other episodes stay as they are.
+        flight_seed = int(self.np_random.random() * _SEEDS) if self._flying.wind.blows else 0
+        self._flight = SteppedFlight(FlightPlan(self._flying, seed=flight_seed))
         return self._observe(self._flight), self._info(self._flight)
 
     def step(self, action: Action) -> tuple[Observation, float, bool, bool, dict[str, Any]]:

@@ -6,7 +6,7 @@ from typing import Annotated, Self
 
 from pydantic import Field, model_validator
 
-from scenarios.models import Part, refusal
+from scenarios.part import Part, refusal
 
 Sigma = Annotated[float, Field(ge=0, le=1e6)]
 """A standard deviation; 0: no such error."""

@@ -72,9 +72,11 @@ class Flight:
         texts: what the autopilot told.
     """
 
-    def __init__(self, airframe: str = "x500", **parameters: float) -> None:
+    def __init__(
+        self, airframe: str = "x500", *, scenario: Scenario | None = None, seed: int = 0, **parameters: float
+    ) -> None:
         body = load_airframe(airframe)
-        self.world = World(Scenario(name="field"), body)
+        self.world = World(scenario or Scenario(name="field"), body, seed)
         self.autopilot = Autopilot(body, ORIGIN, Parameters(parameters, defaults=body.parameters))
         self.setpoint: Setpoint | None = None
         self.sticks: ManualInput | None = None

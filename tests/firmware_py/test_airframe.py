@@ -10,7 +10,7 @@ def declared(name, **changes):
     return load_airframe(name).model_dump(mode="json") | changes
 
 
-@pytest.mark.parametrize("name", ["abejorro", "x500"])
+@pytest.mark.parametrize("name", ["abejorro", "racer-3in", "x500"])
 def test_an_airframe_written_and_read_is_the_same(name, tmp_path):
     path = tmp_path / "copy.yaml"
     path.write_text(yaml.safe_dump(declared(name)))

@@ -12,6 +12,7 @@ from framerunner.cli import run
 from framerunner.flying.lockstep import fly_lockstep
 from framerunner.flying.plan import FlightPlan
 from offboard.mission import load_mission
+from scenarios.air import Wind
 from scenarios.loader import load_scenario
 from tests.framerunner import reference_flights
 
@@ -160,3 +161,11 @@ def test_the_command_writes_what_a_flight_in_real_time_writes(tmp_path, capsys, 
 def test_lockstep_refuses_options_of_real_time(options, capsys):
     assert run(["fly", "empty", "--lockstep", *options]) == 2
     assert "--lockstep" in capsys.readouterr().err
+
+
+def test_a_windy_flight_repeats_with_its_seed_and_not_with_another():
+    wind = Wind(speed_m_s=0.5, turbulence_m_s=0.2, gust_m_s=0.5, gust_period_s=3.0)
+    scenario = short("test-case-1", 5.0).model_copy(update={"wind": wind})
+    mission = load_mission("frame_challenge")
+    hashes = [fly_lockstep(FlightPlan(scenario, mission, seed)).result.state_sha256 for seed in (3, 3, 4)]
+    assert hashes[0] == hashes[1] != hashes[2]

@@ -87,3 +87,8 @@ def test_a_bad_line_of_the_parameter_file(tmp_path, capsys, text, complaint):
     (line,) = capsys.readouterr().err.splitlines()
     assert line == f"error: {path}: {complaint}"
     assert path.read_text() == text
+
+
+@pytest.mark.parametrize("seed", ["-1", "0.5", str(2**63)])
+def test_a_bad_seed(refused, seed):
+    assert "--seed" in refused("--seed", seed)

@@ -6,11 +6,11 @@ from scenarios.models import (
     Frame,
     Scenario,
     Start,
-    field_path,
     ground_height,
     is_over_base,
     start_position,
 )
+from scenarios.part import field_path
 
 
 def test_the_opening_excludes_the_bars():

@@ -47,9 +47,9 @@ def test_a_level_loads_by_path(tmp_path):
         (b"name: a\n# \xff", "f.yaml:2: not UTF-8 text; save the file as UTF-8"),
         ("#" * (MAX_BYTES + 1), "f.yaml: 1000001 bytes is too large for a level; 1000000 at most"),
         (
-            CALM + "wnd: 1\n",
-            "f.yaml:20: wnd is not a known field; known here: name, description, layout, closeness, "
-            "obstacles",
+            CALM + "fog: 1\n",
+            "f.yaml:20: fog is not a known field; known here: name, description, layout, closeness, "
+            "obstacles, wind, airframe, sensors",
         ),
         (CALM + "  apart: 1\n", "f.yaml:20: layout.apart is not a known field; did you mean apart_m?"),
         (

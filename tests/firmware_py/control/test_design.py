@@ -141,7 +141,7 @@ def test_a_scaled_airframe_has_the_same_poles(airframe, scale):
     )
 
 
-@pytest.fixture(scope="module", params=["abejorro", "x500"])
+@pytest.fixture(scope="module", params=["abejorro", "racer-3in", "x500"])
 def any_airframe(request):
     return load_airframe(request.param)
 
@@ -176,7 +176,9 @@ def roll_loop(airframe, lag_s):
     return hold * motor * feedback * plant
 
 
-@pytest.mark.parametrize(("name", "least_deg"), [("abejorro", 20.0), ("x500", 40.0)])  # its drag not counted
+@pytest.mark.parametrize(
+    ("name", "least_deg"), [("abejorro", 20.0), ("racer-3in", 20.0), ("x500", 40.0)]
+)  # its drag not counted
 def test_nested_loops_keep_a_margin_with_lag_and_sampling(name, least_deg):
     airframe = load_airframe(name)
     loop = roll_loop(airframe, airframe.motor.time_constant_s)

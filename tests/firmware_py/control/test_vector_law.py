@@ -183,3 +183,12 @@ def test_while_held_it_learns_and_forgets_nothing():
     assert observer.d == before
     observer.reset()
     assert observer.d == (0.0, 0.0, 0.0)
+
+
+def test_a_descent_faster_than_a_fall_keeps_it_upright():
+    """Without a least thrust, MPC_THR_MIN 0, the desired thrust is zero and has no direction."""
+    hover = Hover(X500, height_m=60.0)
+    hover.fly(1.0, VelocityCommand((3.0, 0.0, 0.0)))
+    falling = hover.fly(0.5, VelocityCommand((0.0, 0.0, 8.0)))
+    assert min(sample.output.throttle for sample in falling) < 0.05
+    assert falling[-1].tilt_rad < 0.1

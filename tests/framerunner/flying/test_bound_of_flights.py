@@ -6,6 +6,7 @@ from framerunner.evaluation.runner import fly_task
 from framerunner.flying.envelopes import EnvelopeError, bound_of, bound_s
 from framerunner.flying.plan import FlightPlan
 from offboard.mission import load_mission
+from scenarios.air import Wind
 from scenarios.loader import load_scenario
 from scenarios.models import Frame, Scenario, ScenarioError
 from tests.framerunner import reference_flights
@@ -40,7 +41,7 @@ def test_frames_lifted_for_a_drone_without_a_base_are_bounded_where_they_are():
     assert all(abs(z_m - lifted_m) <= 0.09 + 1e-9 for z_m, lifted_m in zip(heights_m, frames, strict=True))
 
 
-def test_without_frames_or_a_measured_airframe_there_is_no_bound():
+def test_without_frames_or_a_measured_airframe_or_in_wind_there_is_no_bound():
     empty = FlightPlan(load_scenario("empty"))
     frame = Frame(colour="red", x_m=2, y_m=0, z_m=1, yaw_rad=0)
     other = FlightPlan(Scenario(name="other", airframe="x500", frames=(frame,)))
@@ -48,4 +49,7 @@ def test_without_frames_or_a_measured_airframe_there_is_no_bound():
         bound_of(empty, "contest")
     with pytest.raises(EnvelopeError, match="airframe x500: its motion was not measured, so no bound; use"):
         bound_of(other, "contest")
-    assert bound_s(empty, "contest") is bound_s(other, "contest") is None
+    windy = FlightPlan(Scenario(name="windy", frames=(frame,), wind=Wind(gust_m_s=1.0)))
+    with pytest.raises(EnvelopeError, match="windy: wind pushes a drone beyond its limits, so no bound"):
+        bound_of(windy, "contest")
+    assert all(bound_s(plan, "contest") is None for plan in (empty, other, windy))

@@ -124,6 +124,19 @@ def test_same_seed_and_actions_give_the_same_episode():
         assert all(np.array_equal(one[name], other[name]) for name in one)
 
 
+def test_each_episode_in_one_windy_scenario_has_another_wind():
+    env = make(scenario=scenario(frame("red", 2.0), wind={"turbulence_m_s": 0.3, "gust_m_s": 1.0}))
+
+    def place(**reset):
+        episode = Episode(env, **reset)
+        for _ in range(30):
+            episode.step(UP)
+        return episode.observation["imu"].tolist()
+
+    first, second = place(seed=1), place()
+    assert place(seed=1) == first != second
+
+
 def test_each_episode_has_another_scenario_of_the_level():
     env = make()
     names = [env.reset(seed=1)[1]["scenario"], *(env.reset()[1]["scenario"] for _ in range(2))]

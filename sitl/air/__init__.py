@@ -1,0 +1,1 @@
+"""The moving air of the simulated world."""
