@@ -51,17 +51,27 @@ class ErrorCovariance:
         drifts: the states behind the fifteen inertial ones.
         considered: so many of them, the first, are not estimated: their uncertainty counts, but measurements
             do not change them (Schmidt-Kalman filter; Gelb, "Applied Optimal Estimation", 1974, section 7.2).
+        gyro_scale: index of the first of three errors of the gyroscope's scale factors; -1: there are none.
+        accel_scale: the same of the accelerometer.
 
     Attributes:
         p: the covariance, updated in place.
         error: the errors found by the corrections since `take_error`, shape (n,).
     """
 
-    def __init__(self, drifts: tuple[Drift, ...] = (), considered: int = 0) -> None:
+    def __init__(
+        self,
+        drifts: tuple[Drift, ...] = (),
+        considered: int = 0,
+        *,
+        gyro_scale: int = -1,
+        accel_scale: int = -1,
+    ) -> None:
         self.size = size = INERTIAL_STATES + len(drifts)
         self.p: Matrix = np.zeros((size, size))
         self.error: Matrix = np.zeros(size)
         self._drifts = drifts
+        self._gyro_scale, self._accel_scale = gyro_scale, accel_scale
         self._considered = slice(INERTIAL_STATES, INERTIAL_STATES + considered) if considered else None
         self._f: Matrix = np.eye(size)
         self._work: Matrix = np.zeros((size, size))
@@ -81,6 +91,8 @@ class ErrorCovariance:
         push_ned_m_s: Vec3,
         period_s: float,
         *,
+        turn_frd_rad: Vec3,
+        push_frd_m_s: Vec3,
         turn_variance_rad2: float,
         push_variance_m2_s2: float,
         gyro_bias_variance: float,
@@ -92,6 +104,8 @@ class ErrorCovariance:
             m: attitude in the interval's middle.
             push_ned_m_s: change of velocity by the specific force, shape (3,).
             period_s: length of the interval.
+            turn_frd_rad: rotation vector, shape (3,).
+            push_frd_m_s: change of velocity by the specific force in body axes, shape (3,).
             turn_variance_rad2: by the gyroscope's white noise, per axis.
             push_variance_m2_s2: by the accelerometer's white noise, per axis.
             gyro_bias_variance: by which the biases' variance grows, (rad/s)^2.
@@ -110,6 +124,13 @@ class ErrorCovariance:
         f[0:3, 9:12] = turn
         f[3:6, 12:15] = turn
         np.multiply(turn, half_s, out=f[6:9, 12:15])
+        rate_hz = 1.0 / period_s
+        if (at := self._gyro_scale) >= 0:
+            p_turn, q_turn, r_turn = turn_frd_rad
+            f[0:3, at : at + 3] = turn * (p_turn * rate_hz, q_turn * rate_hz, r_turn * rate_hz)
+        if (at := self._accel_scale) >= 0:
+            x, y, z = push_frd_m_s
+            f[3:6, at : at + 3] = turn * (x * rate_hz, y * rate_hz, z * rate_hz)
         noise[0:3] = turn_variance_rad2
         noise[3:6] = push_variance_m2_s2
         noise[9:12] = gyro_bias_variance

@@ -30,8 +30,10 @@ class NavigationFilter:
 
     Args:
         noise: of the IMU.
-        drifts: slow errors of other sensors.
+        drifts: errors of scale factors, and slow errors of other sensors.
         considered: so many of them, the first, are not estimated; see `ErrorCovariance`.
+        gyro_scale: see `ErrorCovariance`.
+        accel_scale: see `ErrorCovariance`.
 
     Attributes:
         time_us: of the state.
@@ -43,13 +45,21 @@ class NavigationFilter:
         white_noise: variances of the white noise in a sample of the IMU: (rad/s)^2 and (m/s^2)^2.
     """
 
-    def __init__(self, noise: InertialNoise, drifts: tuple[Drift, ...] = (), considered: int = 0) -> None:
+    def __init__(
+        self,
+        noise: InertialNoise,
+        drifts: tuple[Drift, ...] = (),
+        considered: int = 0,
+        *,
+        gyro_scale: int = -1,
+        accel_scale: int = -1,
+    ) -> None:
         self.time_us = 0
         self.state = NavigationState()
         self.gyro_bias_frd_rad_s: Vec3 = ZERO3
         self.accel_bias_frd_m_s2: Vec3 = ZERO3
         self.drifts = [0.0] * len(drifts)
-        self.covariance = ErrorCovariance(drifts, considered)
+        self.covariance = ErrorCovariance(drifts, considered, gyro_scale=gyro_scale, accel_scale=accel_scale)
         self.white_noise = (0.0, 0.0)
         self._noise = noise
         self._kinds = drifts
@@ -88,18 +98,18 @@ class NavigationFilter:
         tx, ty, tz = total.turn_frd_rad
         x, y, z = self.accel_bias_frd_m_s2
         vx, vy, vz = total.push_frd_m_s
-        push = self.state.integrate(
-            (tx - p * period_s, ty - q * period_s, tz - r * period_s),
-            (vx - x * period_s, vy - y * period_s, vz - z * period_s),
-            period_s,
-        )
+        turn_frd = (tx - p * period_s, ty - q * period_s, tz - r * period_s)
+        push_frd = (vx - x * period_s, vy - y * period_s, vz - z * period_s)
+        push_ned = self.state.integrate(turn_frd, push_frd, period_s)
         noise = self._noise
         turn_variance, push_variance = self.white_noise
         sample_s2 = period_s * period_s / self._samples  # sum of the squared periods of equal samples
         self.covariance.predict(
             rotation(self.state.attitude),
-            push,
+            push_ned,
             period_s,
+            turn_frd_rad=turn_frd,
+            push_frd_m_s=push_frd,
             turn_variance_rad2=turn_variance * sample_s2,
             push_variance_m2_s2=push_variance * sample_s2,
             gyro_bias_variance=noise.gyro_bias_walk**2 * period_s,

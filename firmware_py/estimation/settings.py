@@ -16,6 +16,8 @@ class InertialNoise:
         accel_bias_walk: noise that drives the accelerometer's bias, m/s^2 per root of s.
         gyro_bias_sigma_rad_s: of the bias at boot.
         accel_bias_sigma_m_s2: of the bias at boot.
+        gyro_scale_sigma: of the error of the gyroscope's scale factors.
+        accel_scale_sigma: of the error of the accelerometer's scale factors.
     """
 
     gyro_density: float = 1.0e-4
@@ -24,6 +26,8 @@ class InertialNoise:
     accel_bias_walk: float = 3.0e-4
     gyro_bias_sigma_rad_s: float = 0.01
     accel_bias_sigma_m_s2: float = 0.1
+    gyro_scale_sigma: float = 0.0
+    accel_scale_sigma: float = 0.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -58,6 +62,7 @@ class EstimatorSettings:
         gps_drift: slow errors of GPS positions, horizontal and vertical; `sigma` is that of a single one.
         magnetometer_sigma_gauss: white noise; None: not fused.
         hard_iron_sigma_gauss: constant error of the magnetometer.
+        magnetometer_scale_sigma: of the error of the magnetometer's scale factors.
         barometer_sigma_m: white noise; None: not fused.
         barometer_drift: slow error of the barometer.
         range_sigma_m: white noise of the range finder; None: not fused.
@@ -78,6 +83,7 @@ class EstimatorSettings:
     gps_drift: tuple[SlowError, SlowError] = (SlowError(1.0, 0.1), SlowError(1.5, 0.15))
     magnetometer_sigma_gauss: float | None = None
     hard_iron_sigma_gauss: float = 0.02
+    magnetometer_scale_sigma: float = 0.0
     barometer_sigma_m: float | None = 0.2
     barometer_drift: SlowError = SlowError(0.5, 0.03)
     range_sigma_m: float | None = None

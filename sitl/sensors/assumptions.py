@@ -11,7 +11,6 @@ from sitl.sensors.specs import SuiteSpec
 _PA_PER_M = 12.0  # of altitude near the ground: density times gravity
 _DELAY_RESERVE_S = 0.012  # a measurement arrives at a tick, and some ticks may be lost
 _MIN_DELAY_S = 0.02
-_FIELD_GAUSS = 0.4  # per axis, of Earth's 0.5
 
 
 def estimator_settings(spec: SuiteSpec) -> EstimatorSettings:
@@ -29,7 +28,9 @@ def estimator_settings(spec: SuiteSpec) -> EstimatorSettings:
         _walk(gyro.bias_drift_rad_s, gyro.bias_drift_time_s),
         _walk(accel.bias_drift_m_s2, accel.bias_drift_time_s),
         sqrt(gyro.turn_on_bias_rad_s**2 + gyro.bias_drift_rad_s**2),
-        sqrt(accel.turn_on_bias_m_s2**2 + accel.bias_drift_m_s2**2 + (9.8 * accel.scale_error) ** 2),
+        sqrt(accel.turn_on_bias_m_s2**2 + accel.bias_drift_m_s2**2),
+        gyro.scale_error,
+        accel.scale_error,
     )
     gps, pose, magnetometer, barometer = spec.gps, spec.external_pose, spec.magnetometer, spec.barometer
     delays_s = [part.delay_s for part in (gps, pose) if part is not None]
@@ -49,11 +50,8 @@ def estimator_settings(spec: SuiteSpec) -> EstimatorSettings:
         if gps
         else chosen.gps_drift,
         magnetometer_sigma_gauss=magnetometer.noise_gauss if magnetometer else None,
-        hard_iron_sigma_gauss=(
-            sqrt(magnetometer.hard_iron_gauss**2 + (_FIELD_GAUSS * magnetometer.scale_error) ** 2)
-            if magnetometer
-            else 0.0
-        ),
+        hard_iron_sigma_gauss=magnetometer.hard_iron_gauss if magnetometer else 0.0,
+        magnetometer_scale_sigma=magnetometer.scale_error if magnetometer else 0.0,
         barometer_sigma_m=barometer.noise_pa / _PA_PER_M if barometer else None,
         barometer_drift=_slow(barometer.drift_pa / _PA_PER_M, barometer.drift_time_s)
         if barometer

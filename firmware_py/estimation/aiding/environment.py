@@ -71,7 +71,7 @@ class MagnetometerAiding:
 
     def fuse(self, sample: MagnetometerSample) -> None:
         """Correct by the field in body axes, R' m + hard iron; an error t of attitude adds R' (m x t)."""
-        target, index = self._target, self._target.layout.hard_iron
+        target, index, scale = self._target, self._target.layout.hard_iron, self._target.layout.field_scale
         into = target.filter
         m = rotation(into.state.attitude)
         n, e, d = self._earth
@@ -82,6 +82,8 @@ class MagnetometerAiding:
             x, y, z = m[axis], m[axis + 3], m[axis + 6]  # the body's axis in the world
             row[ATTITUDE : ATTITUDE + 3] = (y * d - z * e, z * n - x * d, x * e - y * n)
             row[index + axis] = 1.0
+            if scale >= 0:
+                row[scale + axis] = predicted[axis]
             innovations.append(sample.field_frd_gauss[axis] - predicted[axis] - target.drift(index + axis))
             rows.append(row)
         self.field.fuse_rows(into, tuple(rows), tuple(innovations), (self._variance,) * 3)

@@ -21,12 +21,15 @@ _CONSTANT = Drift()
 class Layout:
     """Indices of the slow errors in the error state; -1: there is none.
 
-    Place and turn of markers are only considered: in flight, what little a filter could learn of them comes
-    from the vehicle's own reactions to noise.
+    Place and turn of markers, and scale factors, are only considered: in flight, what little a filter could
+    learn of them comes from the vehicle's own reactions to noise.
     """
 
     offset: int = -1
     turn: int = -1
+    gyro_scale: int = -1
+    accel_scale: int = -1
+    field_scale: int = -1
     hard_iron: int = -1
     barometer: int = -1
     gps: int = -1
@@ -61,6 +64,12 @@ class Target:
             layout.offset = add(3, settings.external_offset_sigma_m)
         if settings.external and settings.external_turn_sigma_rad > 0.0:
             layout.turn = add(1, settings.external_turn_sigma_rad)
+        if settings.noise.gyro_scale_sigma > 0.0:
+            layout.gyro_scale = add(3, settings.noise.gyro_scale_sigma)
+        if settings.noise.accel_scale_sigma > 0.0:
+            layout.accel_scale = add(3, settings.noise.accel_scale_sigma)
+        if settings.magnetometer_sigma_gauss is not None and settings.magnetometer_scale_sigma > 0.0:
+            layout.field_scale = add(3, settings.magnetometer_scale_sigma)
         considered = len(drifts)
         if settings.magnetometer_sigma_gauss is not None:
             layout.hard_iron = add(3, settings.hard_iron_sigma_gauss)
@@ -73,7 +82,13 @@ class Target:
             add(1, 0.0, Drift(upright.noise_density))
         if settings.range_sigma_m is not None or settings.flow_sigma_rad_s is not None:
             layout.ground = add(1, 0.0)
-        self.filter = NavigationFilter(settings.noise, tuple(drifts), considered)
+        self.filter = NavigationFilter(
+            settings.noise,
+            tuple(drifts),
+            considered,
+            gyro_scale=layout.gyro_scale,
+            accel_scale=layout.accel_scale,
+        )
         for index, sigma in enumerate(sigmas, start=INERTIAL_STATES):
             self.filter.covariance.set_variance(index, sigma * sigma)
         self.resets = 0

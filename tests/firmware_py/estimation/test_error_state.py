@@ -66,6 +66,8 @@ def test_each_prediction_and_correction_equals_filterpys():
             rotation(attitude),
             push,
             PERIOD_S,
+            turn_frd_rad=(0.0, 0.0, 0.0),
+            push_frd_m_s=push,
             turn_variance_rad2=TURN,
             push_variance_m2_s2=PUSH,
             gyro_bias_variance=GYRO,
