@@ -70,7 +70,11 @@ class ErrorCovariance:
         self.size = size = INERTIAL_STATES + len(drifts)
         self.p: Matrix = np.zeros((size, size))
         self.error: Matrix = np.zeros(size)
-        self._drifts = drifts
+        self._drifting = [
+            (index, drift)
+            for index, drift in enumerate(drifts, start=INERTIAL_STATES)
+            if drift.noise_density > 0.0
+        ]
         self._gyro_scale, self._accel_scale = gyro_scale, accel_scale
         self._considered = slice(INERTIAL_STATES, INERTIAL_STATES + considered) if considered else None
         self._f: Matrix = np.eye(size)
@@ -135,29 +139,33 @@ class ErrorCovariance:
         noise[3:6] = push_variance_m2_s2
         noise[9:12] = gyro_bias_variance
         noise[12:15] = accel_bias_variance
-        for index, drift in enumerate(self._drifts, start=INERTIAL_STATES):
+        for index, drift in self._drifting:
             f[index, index], noise[index] = drift.over(period_s)
         np.dot(f, p, out=self._work)
         np.dot(self._work, f.T, out=p)
         p[self._diagonal, self._diagonal] += noise
 
-    def innovation_variance(self, row: Matrix, variance: float) -> float:
-        """Variance of an innovation: H P H' + R for the row H, shape (n,)."""
-        return float(row @ self.p @ row) + variance
+    def related(self, row: Matrix) -> tuple[Matrix, float]:
+        """P H', shape (n,), and H P H' of a measured number with the derivatives H, shape (n,)."""
+        related: Matrix = self.p @ row
+        return related, float(related @ row)
 
-    def fuse(self, row: Matrix, innovation: float, variance: float) -> float:
+    def fuse(
+        self, row: Matrix, innovation: float, variance: float, related: tuple[Matrix, float] | None = None
+    ) -> float:
         """Correct by one measured number.
 
         Args:
             row: derivatives of the measured number by the error state, shape (n,).
             innovation: measured minus predicted by the nominal state.
             variance: of the measurement.
+            related: what `related` has given for the row, if nothing has been fused since.
 
         Returns:
             The normalised innovation squared; over the numbers of one measurement, these add up to its NIS.
         """
-        gain: Matrix = self.p @ row
-        return self._correct(gain, float(gain @ row), float(row @ self.error), innovation, variance)
+        gain, own = related or self.related(row)
+        return self._correct(gain, own, float(row @ self.error), innovation, variance)
 
     def fuse_state(self, index: int, innovation: float, variance: float) -> float:
         """Correct by a measurement of one state; see `fuse`."""

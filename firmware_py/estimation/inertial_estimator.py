@@ -247,7 +247,9 @@ class InertialEstimator:
             into.add(time_us, period_s, rate, force)
             due_us = time_us + int(period_s * 5e5)
             while waiting and waiting[0][0] <= due_us:
-                self._correct(self.aiding.fuse(heappop(waiting)[2]))
+                sample = heappop(waiting)[2]
+                if not self.aiding.is_redundant(sample):
+                    self._correct(self.aiding.fuse(sample))
             if self.stands and self._is_unaided(time_us):
                 self._correct(self.aiding.stand())
 

@@ -6,6 +6,8 @@ covers some hundredths of a second.
 
 from __future__ import annotations
 
+from math import isfinite
+
 from firmware_py.estimation.error_state import (
     ACCEL_BIAS,
     ATTITUDE,
@@ -62,7 +64,7 @@ class NavigationFilter:
         self.covariance = ErrorCovariance(drifts, considered, gyro_scale=gyro_scale, accel_scale=accel_scale)
         self.white_noise = (0.0, 0.0)
         self._noise = noise
-        self._kinds = drifts
+        self._returning = [(i, kind) for i, kind in enumerate(drifts) if isfinite(kind.time_constant_s)]
         self._sum = Increments()
         self._summed_us = 0
         self._samples = 0
@@ -115,7 +117,7 @@ class NavigationFilter:
             gyro_bias_variance=noise.gyro_bias_walk**2 * period_s,
             accel_bias_variance=noise.accel_bias_walk**2 * period_s,
         )
-        for index, kind in enumerate(self._kinds):
+        for index, kind in self._returning:
             self.drifts[index] *= kind.over(period_s)[0]
         total.clear()
         self._samples = 0

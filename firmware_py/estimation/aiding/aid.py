@@ -75,13 +75,17 @@ class Aid:
     ) -> bool:
         """Fuse measured numbers by their derivatives, each of shape (n,); see `fuse_states`."""
         covariance = into.covariance
-        worst = 0.0
-        for row, innovation, variance in zip(rows, innovations, variances, strict=True):
-            worst = max(worst, innovation * innovation / covariance.innovation_variance(row, variance))
+        related = [covariance.related(row) for row in rows]
+        worst = max(
+            [
+                innovation * innovation / (own + variance)
+                for (_, own), innovation, variance in zip(related, innovations, variances, strict=True)
+            ]
+        )
         if not self._passes(worst, into.time_us):
             return False
-        nis = 0.0
-        for row, innovation, variance in zip(rows, innovations, variances, strict=True):
+        nis = covariance.fuse(rows[0], innovations[0], variances[0], related[0])
+        for row, innovation, variance in zip(rows[1:], innovations[1:], variances[1:], strict=True):
             nis += covariance.fuse(row, innovation, variance)
         self._fused(nis, into)
         return True

@@ -28,6 +28,7 @@ Sample = ExternalPose | GpsSample | MagnetometerSample | BarometerSample | Range
 
 _STANDING_VELOCITY_M2_S2 = 0.01
 _STANDING_PLACE_M2 = 0.25
+_REDUNDANT_US = 200_000
 
 
 class Aiding:
@@ -107,6 +108,22 @@ class Aiding:
             position_vertical=max(pose.vertical.ratio, gps.vertical.ratio, self._barometer.height.ratio),
             heading=max(pose.heading.ratio, self._magnetometer.field.ratio),
             height_above_ground=self._ground.height.ratio,
+        )
+
+    def is_redundant(self, sample: Sample) -> bool:
+        """Whether a pressure or range would tell next to nothing: the height is known to millimetres.
+
+        A few a second are enough then to know their slow errors, when the better source fails.
+        """
+        if type(sample) is BarometerSample:
+            aid = self._barometer.height
+        elif type(sample) is RangeSample:
+            aid = self._ground.height
+        else:
+            return False
+        return (
+            sample.time_us - self._pose.vertical.fused_us < _REDUNDANT_US
+            and sample.time_us - aid.fused_us < _REDUNDANT_US
         )
 
     def fuse(self, sample: Sample) -> list[float]:
