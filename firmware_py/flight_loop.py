@@ -6,7 +6,7 @@ It reads no clock: its time is that of the sensors' samples.
 from __future__ import annotations
 
 from collections import deque
-from math import cos, isnan, nan, radians
+from math import cos, isfinite, isnan, nan, radians
 from typing import TYPE_CHECKING
 
 from firmware_py.airframe import Airframe
@@ -28,6 +28,7 @@ from firmware_py.offboard_requests import SetpointQueue
 from firmware_py.parameters import Parameters
 from firmware_py.status import CommandResult, LandedState, VehicleStatus
 from firmware_py.types import (
+    CRITICAL,
     INFO,
     WARNING,
     FlightRecord,
@@ -127,7 +128,7 @@ class FlightLoop:
         self._now_us = 0  # advances also while samples are unusable
         self._checks = NOT_CHECKED
         self._checks_due_us = self._ready_due_us = 0
-        self._motors_stopped = True
+        self._motors_stopped = self._output_finite = True
         self._state_entered = State.DISARMED
         self._state_shown: State | None = None
         self._airborne = LandedState.IN_AIR
@@ -157,7 +158,8 @@ class FlightLoop:
         """
         if self.parameters.version != self._parameters_version:
             self._configure()
-        usable = self.estimator.update(sensors)
+        usable = self.estimator.update(sensors) and self._output_finite
+        self._output_finite = True
         seen = self._observe(sensors, usable)
         commander = self._commander
         row = commander.tick(seen)
@@ -167,8 +169,11 @@ class FlightLoop:
             self._advance_mission()
         self._refresh_status()
         if usable and not self._motors_stopped:
-            command = self._guidance.step(self.state)
-            self.output = self._actuate(command, seen.landed)
+            output = self._actuate(self._guidance.step(self.state), seen.landed)
+            if isfinite(sum(output.speeds_rad_s)):
+                self.output = output
+            else:  # it never reaches a motor; the next tick counts as one without a usable sample
+                self._output_finite = False
         return self.output.speeds_rad_s
 
     def _handle(
@@ -261,6 +266,8 @@ class FlightLoop:
             self.say(row.severity, row.text)
         if row.target is None:
             return
+        if row.severity == CRITICAL:
+            self.flight.failsafes += ((self._now_us, row.text),)
         before, self._state_entered = self._state_entered, row.target
         if before is State.DISARMED:
             self._leave_disarmed()
@@ -282,6 +289,7 @@ class FlightLoop:
         self._lift_off.arm(self._now_us)
         self.flight.armed_us = self._now_us
         self.flight.takeoff_us = self.flight.landed_us = 0
+        self.flight.failsafes = ()
         self.flight.number += 1
 
     def _enter(self, target: State, before: State, event: Event) -> None:

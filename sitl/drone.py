@@ -78,7 +78,7 @@ class ServedDrone:
                 log_text=self._recorder.hear_text,
                 camera=model if settings.camera else None,
                 captures=self._album,
-                failures=simulation.failures,
+                failures=simulation.faults,
             ),
         )
         self._notice = notice
