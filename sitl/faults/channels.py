@@ -65,7 +65,6 @@ def _add_to_fix(sample: GpsSample, by: Numbers) -> GpsSample:
         latitude_deg=sample.latitude_deg + by[0] / _METRES_PER_DEGREE,
         longitude_deg=sample.longitude_deg
         + by[1] / (_METRES_PER_DEGREE * max(cos(radians(sample.latitude_deg)), 1e-6)),
-        altitude_m=sample.altitude_m + by[2],
     )
 
 
@@ -99,7 +98,7 @@ CHANNELS: dict[FaultPart, Channel] = {
         _unscaled,
         _with_time,
     ),
-    FaultPart.GPS: Channel(3, _add_to_fix, _unscaled, _with_time),
+    FaultPart.GPS: Channel(2, _add_to_fix, _unscaled, _with_time),
     FaultPart.RANGE_FINDER: Channel(
         1,
         lambda sample, by: RangeSample(sample.time_us, sample.distance_m + by[0]),
