@@ -27,6 +27,7 @@ from wire.transports.urls import is_loopback
 
 if TYPE_CHECKING:
     from sitl.camera import CameraFeed
+    from sitl.faults.images import FaultyFeed
     from sitl.rtp import RtpSender
     from sitl.video import VideoServer
 
@@ -83,7 +84,7 @@ class ServedDrone:
         )
         self._notice = notice
         self._hub = LinkHub(self.node, self._warn)
-        self._camera: CameraFeed | None = None
+        self._camera: CameraFeed | FaultyFeed | None = None
         self._video: VideoServer | None = None
         self._rtp: RtpSender | None = None
         self._image_us = -1
@@ -113,10 +114,10 @@ class ServedDrone:
         """
         for module in ("sitl.camera", "aiohttp.web", "sitl.video"):
             await asyncio.to_thread(import_module, module)
-        from sitl.camera import CameraFeed
+        from sitl.faults.images import new_feed
         from sitl.video import VideoServer
 
-        scenario = self.simulation.scenario
+        simulation, scenario = self.simulation, self.simulation.scenario
         video = VideoServer(
             self._settings.bind, self._settings.http_port, options="--instance (sim also: --video-port)"
         )
@@ -130,7 +131,7 @@ class ServedDrone:
             video.add_text("/video.sdp", "application/sdp", self._rtp.description())
         self._video = video
         await video.start()
-        self._camera = CameraFeed(scenario, others)
+        self._camera = new_feed(scenario, simulation.faults, simulation.seed, others)
 
     def _warn(self, line: str) -> None:
         """Show a line at the terminal and at ground stations."""

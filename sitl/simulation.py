@@ -80,6 +80,8 @@ class Simulation:
         FaultError: a fault of the scenario is one of a part that the drone does not have.
 
     Attributes:
+        scenario: as given.
+        seed: as given.
         world: the physics.
         autopilot: fed with the world's sensors; its motor speeds drive the world.
         faults: declared in the scenario and injected over MAVLink.
@@ -89,7 +91,7 @@ class Simulation:
     """
 
     def __init__(self, scenario: Scenario, airframe: Airframe | None = None, seed: int = 0) -> None:
-        self.scenario = scenario
+        self.scenario, self.seed = scenario, seed
         airframe = airframe or load_airframe(scenario.airframe)
         self.world = World(scenario, airframe, seed)
         origin = scenario.origin

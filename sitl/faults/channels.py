@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from math import cos, radians
-from typing import Any
+from typing import Any, Generic, TypeVar
 
 from firmware_py.measurements import (
     BarometerSample,
@@ -19,11 +19,15 @@ from geometry.vectors import Vec3
 from scenarios.faults.declaration import FaultPart
 
 Numbers = tuple[float, ...]
+T = TypeVar("T")
+Timed = TypeVar(
+    "Timed", MagnetometerSample, BarometerSample, GpsSample, RangeSample, FlowSample, ExternalPose
+)
 _METRES_PER_DEGREE = 111_320.0  # of latitude; a fault needs no more digits
 
 
 @dataclass(frozen=True, slots=True)
-class Channel:
+class Channel(Generic[T]):
     """The samples of one sensor.
 
     Attributes:
@@ -34,9 +38,9 @@ class Channel:
     """
 
     width: int
-    add: Callable[[Any, Numbers], Any]
-    scale: Callable[[Any, float], Any]
-    freeze: Callable[[Any, Any], Any]
+    add: Callable[[T, Numbers], T]
+    scale: Callable[[T, float], T]
+    freeze: Callable[[T, T], T]
 
 
 def _add_vector(sample: Vec3, by: Numbers) -> Vec3:
@@ -47,15 +51,15 @@ def _scale_vector(sample: Vec3, factor: float) -> Vec3:
     return (sample[0] * factor, sample[1] * factor, sample[2] * factor)
 
 
-def _first(sample: Any, _now: Any) -> Any:
+def _first(sample: T, _now: T) -> T:
     return sample
 
 
-def _with_time(sample: Any, now: Any) -> Any:
+def _with_time(sample: Timed, now: Timed) -> Timed:
     return replace(sample, time_us=now.time_us)
 
 
-def _unscaled(sample: Any, _factor: float) -> Any:
+def _unscaled(sample: T, _factor: float) -> T:
     return sample
 
 
@@ -79,9 +83,9 @@ def _scale_flow(sample: FlowSample, factor: float) -> FlowSample:
     return replace(sample, flow_rad=(sample.flow_rad[0] * factor, sample.flow_rad[1] * factor))
 
 
-_VECTOR = Channel(3, _add_vector, _scale_vector, _first)
+_VECTOR: Channel[Vec3] = Channel(3, _add_vector, _scale_vector, _first)
 
-CHANNELS: dict[FaultPart, Channel] = {
+CHANNELS: dict[FaultPart, Channel[Any]] = {
     FaultPart.GYROSCOPE: _VECTOR,
     FaultPart.ACCELEROMETER: _VECTOR,
     FaultPart.MAGNETOMETER: Channel(
@@ -119,7 +123,9 @@ CHANNELS: dict[FaultPart, Channel] = {
         _first,
     ),
 }
-"""Of each sensor. Gyroscope, accelerometer and battery monitor have vectors, the others samples with times."""
+"""Of each sensor. Gyroscope, accelerometer and battery monitor deliver tuples, the others samples."""
 
-IDEAL_POSITION = Channel(3, lambda sample, by: (_add_vector(sample[0], by), sample[1]), _unscaled, _first)
+IDEAL_POSITION: Channel[tuple[Vec3, Vec3]] = Channel(
+    3, lambda sample, by: (_add_vector(sample[0], by), sample[1]), _unscaled, _first
+)
 """Position and velocity of ideal sensors."""

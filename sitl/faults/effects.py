@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
-from typing import Any, TypeVar
+from collections.abc import Callable
+from typing import Generic, TypeVar
 
 from scenarios.faults.declaration import Fault, FaultKind
 from scenarios.random_numbers import random_stream
@@ -11,11 +11,11 @@ from sitl.faults.channels import Channel
 from sitl.sensors.noise import Delay, normal_numbers
 
 T = TypeVar("T")
-Effect = Callable[[int, Any], Any]
+Effect = Callable[[int, T | None], T | None]
 """From vehicle time in microseconds and what the sensor delivers (None: nothing) to what arrives."""
 
 
-def new_effect(fault: Fault, channel: Channel, seed: int) -> Effect:
+def new_effect(fault: Fault, channel: Channel[T], seed: int) -> Effect[T]:
     """The effect of a fault from now on.
 
     Args:
@@ -24,36 +24,49 @@ def new_effect(fault: Fault, channel: Channel, seed: int) -> Effect:
         seed: of the flight; noise and losses have streams of their own.
     """
     name, size = f"faults.{fault.part}.{fault.kind}", fault.amount
-    if fault.kind is FaultKind.OFF:
-        return _off
-    if fault.kind is FaultKind.STUCK:
-        return _Stuck(channel)
-    if fault.kind is FaultKind.WRONG:
-        by = (size,) * channel.width
-        return lambda _now_us, sample: None if sample is None else channel.add(sample, by)
-    if fault.kind is FaultKind.SCALED:
-        return lambda _now_us, sample: None if sample is None else channel.scale(sample, size)
-    if fault.kind is FaultKind.NOISY:
-        return _Noisy(channel, size, normal_numbers(seed, name, channel.width))
-    if fault.kind is FaultKind.DELAYED:
-        return _Delayed(size)
-    if fault.kind is FaultKind.LOSSY:
-        return Lossy(size, seed, name)
-    raise ValueError(f"{fault.kind} is no fault of samples")
+    by = (size,) * channel.width
+    match fault.kind:
+        case FaultKind.OFF:
+            effect: Effect[T] = _off
+        case FaultKind.STUCK:
+            effect = _Stuck(channel)
+        case FaultKind.WRONG:
+            effect = _each(lambda sample: channel.add(sample, by))
+        case FaultKind.SCALED:
+            effect = _each(lambda sample: channel.scale(sample, size))
+        case FaultKind.NOISY:
+            numbers = normal_numbers(seed, name, channel.width)
+            effect = _each(lambda sample: channel.add(sample, _times(size, next(numbers))))
+        case FaultKind.DELAYED:
+            late: _Delayed[T] = _Delayed(size)
+            effect = late
+        case FaultKind.LOSSY:
+            effect = Lossy(size, seed, name)
+        case _:
+            raise ValueError(f"{fault.kind} is no fault of samples")
+    return effect
 
 
-def _off(_now_us: int, _sample: Any) -> None:
+def _off(_now_us: int, _sample: T | None) -> T | None:
     return None
 
 
-class _Stuck:
+def _each(change: Callable[[T], T]) -> Effect[T]:
+    return lambda _now_us, sample: None if sample is None else change(sample)
+
+
+def _times(sigma: float, numbers: list[float]) -> tuple[float, ...]:
+    return tuple([sigma * number for number in numbers])
+
+
+class _Stuck(Generic[T]):
     """Repeats the first sample, with the time of each new one."""
 
-    def __init__(self, channel: Channel) -> None:
+    def __init__(self, channel: Channel[T]) -> None:
         self._channel = channel
-        self._first: Any = None
+        self._first: T | None = None
 
-    def __call__(self, _now_us: int, sample: Any) -> Any:
+    def __call__(self, _now_us: int, sample: T | None) -> T | None:
         if sample is None:
             return None
         if self._first is None:
@@ -61,26 +74,13 @@ class _Stuck:
         return self._channel.freeze(self._first, sample)
 
 
-class _Noisy:
-    """Adds white noise."""
-
-    def __init__(self, channel: Channel, sigma: float, numbers: Iterator[list[float]]) -> None:
-        self._channel, self._sigma, self._numbers = channel, sigma, numbers
-
-    def __call__(self, _now_us: int, sample: Any) -> Any:
-        if sample is None:
-            return None
-        sigma = self._sigma
-        return self._channel.add(sample, tuple([sigma * number for number in next(self._numbers)]))
-
-
-class _Delayed:
+class _Delayed(Generic[T]):
     """Delivers each sample later; its time stays that at which it was true."""
 
     def __init__(self, delay_s: float) -> None:
-        self._delay: Delay[Any] = Delay(delay_s)
+        self._delay: Delay[T] = Delay(delay_s)
 
-    def __call__(self, now_us: int, sample: Any) -> Any:
+    def __call__(self, now_us: int, sample: T | None) -> T | None:
         if sample is not None:
             self._delay.send(now_us, sample)
         return self._delay.newest(now_us)

@@ -2,18 +2,37 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from functools import cached_property
 
 import numpy as np
 
-from scenarios.faults.declaration import Fault, FaultKind
-from scenarios.models import TrueState
+from geometry.solids import Solid
+from scenarios.faults.declaration import Fault, FaultKind, FaultPart
+from scenarios.models import Scenario, TrueState
 from sitl.camera import CameraFeed, Exposure, Image
 from sitl.faults.effects import Lossy
+from sitl.faults.faults import Faults
 from sitl.sensors.noise import Delay
 
 Change = Callable[[int, Exposure | None], Exposure | None]
+
+
+def new_feed(
+    scenario: Scenario, faults: Faults, seed: int, drones: Callable[[], Sequence[Solid]] = tuple
+) -> CameraFeed | FaultyFeed:
+    """The camera's feed; one with faults only if the scenario declares some of the camera.
+
+    Args:
+        scenario: camera settings and what is to be seen.
+        faults: of the drone.
+        seed: of the flight.
+        drones: see `CameraFeed`.
+    """
+    feed = CameraFeed(scenario, drones)
+    if not any(fault.part is FaultPart.CAMERA for fault in scenario.faults):
+        return feed
+    return FaultyFeed(feed, lambda: faults.camera, seed)
 
 
 class FaultyFeed:
@@ -86,7 +105,7 @@ def _blacken(_now_us: int, exposure: Exposure | None) -> Exposure | None:
 
 
 class _Frozen:
-    """The first image again and again, with the time of each new one: the sensor hangs, its driver does not."""
+    """The first image again and again, with new times: the sensor hangs, its driver does not."""
 
     def __init__(self) -> None:
         self._first: Exposure | None = None

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 from math import nan
-from typing import Any
+from typing import Any, TypeVar
 
 from firmware_py.measurements import ExternalPose, ImuSample, Readings
 from firmware_py.types import Sensors
@@ -13,6 +13,7 @@ from scenarios.faults.declaration import Fault, FaultPart
 from sitl.faults.channels import CHANNELS, IDEAL_POSITION
 from sitl.faults.effects import Effect, new_effect
 
+T = TypeVar("T")
 _SAMPLES = (  # with the field of `Readings`
     (FaultPart.MAGNETOMETER, "magnetometer"),
     (FaultPart.BAROMETER, "barometer"),
@@ -35,7 +36,7 @@ class SensorFaults:
 
     def __init__(self, seed: int, *, ideal: bool) -> None:
         self._seed, self._ideal = seed, ideal
-        self._effects: dict[FaultPart, dict[Fault, Effect]] = {}
+        self._effects: dict[FaultPart, dict[Fault, Effect[Any]]] = {}
 
     @property
     def active(self) -> bool:
@@ -109,7 +110,7 @@ class SensorFaults:
     def _battery(self, now_us: int, measured: tuple[float, float]) -> tuple[float, float]:
         return self._pass(FaultPart.BATTERY_MONITOR, now_us, measured) or (0.0, 0.0)
 
-    def _pass(self, part: FaultPart, now_us: int, sample: Any) -> Any:
+    def _pass(self, part: FaultPart, now_us: int, sample: T | None) -> T | None:
         for effect in self._effects.get(part, {}).values():
             sample = effect(now_us, sample)
         return sample
