@@ -158,9 +158,8 @@ class FlightLoop:
         """
         if self.parameters.version != self._parameters_version:
             self._configure()
-        usable = self.estimator.update(sensors) and self._output_finite
-        self._output_finite = True
-        seen = self._observe(sensors, usable)
+        usable = self.estimator.update(sensors)
+        seen = self._observe(sensors, usable and self._output_finite)
         commander = self._commander
         row = commander.tick(seen)
         if row is not None:
@@ -170,10 +169,10 @@ class FlightLoop:
         self._refresh_status()
         if usable and not self._motors_stopped:
             output = self._actuate(self._guidance.step(self.state), seen.landed)
-            if isfinite(sum(output.speeds_rad_s)):
+            # One that is not finite never reaches a motor; it counts as a tick without a usable sample.
+            self._output_finite = isfinite(sum(output.speeds_rad_s))
+            if self._output_finite:
                 self.output = output
-            else:  # it never reaches a motor; the next tick counts as one without a usable sample
-                self._output_finite = False
         return self.output.speeds_rad_s
 
     def _handle(
@@ -225,6 +224,7 @@ class FlightLoop:
                 lifting=self._lift_off.ticks > 0,
                 command_down_m_s=self._guidance.command_down_m_s,
                 throttle=self.output.throttle,
+                has_position=self.estimator.has_position,
             )
             if landed is not before:
                 self._change_ground_contact(landed)
@@ -275,6 +275,7 @@ class FlightLoop:
         self.estimator.stands = row.target is State.DISARMED
         if self._motors_stopped:
             self.output = MotorOutput((0.0,) * len(self.airframe.rotors))
+            self._output_finite = True
             self._lift_off.rest()
         self._navigator.observe(self.state, self._geo, landed=self._land_detector.landed)
         if row.target is State.OFFBOARD:
