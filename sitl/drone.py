@@ -211,6 +211,7 @@ class ServedDrone:
             local_frame=None if origin_arena_m is None else LocalFrame(origin_arena_m=origin_arena_m),
             snapshot=referee.snapshot(),
             report=referee.report(query.get("state", ""), query.get("ended")),
+            faults=simulation.fault_facts(),
         )
         return standing.model_dump(mode="json")
 

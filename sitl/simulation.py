@@ -16,6 +16,7 @@ from geometry.axes import flip_vector
 from geometry.vectors import ZERO3, Vec3
 from scenarios.models import Scenario, ground_height
 from scenarios.referee import Referee
+from scenarios.result import BegunFault, FailsafeText, FaultFacts
 from sitl.battery import Battery
 from sitl.faults.faults import Faults
 from sitl.sensors.assumptions import estimator_settings
@@ -125,6 +126,18 @@ class Simulation:
             return None
         arena = GeodeticPoint(place.latitude_deg, place.longitude_deg, place.altitude_m)
         return flip_vector(LocalProjection(arena).to_local(origin))
+
+    def fault_facts(self) -> FaultFacts:
+        """The faults of the present or last try, and the autopilot's failsafes."""
+        return FaultFacts(
+            begun=tuple(
+                BegunFault(fault=str(each.fault), began_us=each.time_us, ended_us=each.ended_us)
+                for each in self.faults.begun
+            ),
+            failsafes=tuple(
+                FailsafeText(time_us=time_us, text=text) for time_us, text in self.autopilot.flight.failsafes
+            ),
+        )
 
     def tick(self) -> None:
         """Advance by one control period: sense, control, move, judge."""

@@ -23,7 +23,7 @@ from framerunner.flying.response import LateResponse
 from offboard.app import Moment, Observer
 from offboard.perception import CAMERA_DEAD_S, IMAGES_KEPT, CameraSilentError, ImageChoice
 from scenarios.models import Scenario, TrueState
-from scenarios.result import RefereeReport, RefereeSnapshot
+from scenarios.result import FaultFacts, RefereeReport, RefereeSnapshot
 from sitl.camera import CameraFeed, Exposure
 from sitl.faults.images import FaultyFeed, new_feed
 from sitl.simulation import Simulation
@@ -110,6 +110,9 @@ class _SimulationJudge:
     async def report(self, mission_state: str, ended: str | None) -> RefereeReport:
         self._vehicle.drone.settle()
         return self._vehicle.simulation.referee.report(mission_state, ended)
+
+    async def faults(self) -> FaultFacts:
+        return self._vehicle.simulation.fault_facts()
 
 
 class LockstepPerception:

@@ -223,8 +223,13 @@ class LockstepDrone:
         self._stop_commanding()
 
     def settle(self) -> None:
-        """Let the drone come to rest, if its motors are off, so that the referee can judge."""
+        """Let the drone come to rest, if its motors are off, so that the referee can judge.
+
+        With a fault, a failsafe first ends the flight.
+        """
         simulation, status = self._simulation, self._autopilot.status
+        if simulation.faults.begun and status.failsafe:
+            self._pass(LAND_LIMIT_US, until=lambda: simulation.referee.over or not status.armed)
         self._pass(SETTLE_LIMIT_US, until=lambda: simulation.referee.settled or status.armed)
 
     def _stop_commanding(self) -> None:

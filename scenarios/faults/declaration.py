@@ -137,8 +137,8 @@ class Fault(Part):
     disarmed, and comes again in the next try.
     """
 
-    part: FaultPart = Field(description="what fails")
-    kind: FaultKind = Field(description="how it fails")
+    part: FaultPart = Field(strict=False, description="what fails")
+    kind: FaultKind = Field(strict=False, description="how it fails")
     at_s: float = Field(0.0, ge=0, le=MAX_TIME_S, description="when it begins: seconds after arming")
     for_s: float | None = Field(None, gt=0, le=MAX_TIME_S, description="how long; without it, until the end")
     size: float | None = Field(None, description="how much; each kind has a default")

@@ -1,4 +1,4 @@
-"""How flights with faults end: the table that docs/faults.md shows, tests fly and evaluations compare with."""
+"""How flights with faults end: docs/faults.md shows this table, tests fly it, evaluations compare with it."""
 
 from __future__ import annotations
 
@@ -57,6 +57,9 @@ _INDOORS, _OUTDOORS, _FLOW, _RACER = (
     ("flow", "x500"),
     ("mocap", "racer-3in"),
 )
+_After = tuple[float | None, str]
+"""Time-out in seconds, and status text."""
+_NONE: _After = (None, "")
 _SENSORS_LOST = "Sensors lost: flight terminated"
 _TUMBLED = "Attitude failure: flight terminated"
 _POSITION_LOST = "Failsafe activated: position lost, descending"
@@ -74,24 +77,24 @@ def _row(
     flown: tuple[str, str],
     notices: str,
     end: FaultEnd = FaultEnd.FLIES_ON,
-    within_s: float | None = None,
-    reaction: str = "",
+    *,
+    after: _After = _NONE,
 ) -> FaultRow:
     what, _, lasts = text.partition(" for ")
     fault = parse_fault(f"{what} at 0 s" + (f" for {lasts}" if lasts else ""))
-    return FaultRow(fault, *flown, notices, within_s, reaction, end)
+    return FaultRow(fault, *flown, notices, *after, end)
 
 
 def _imu(text: str, flown: tuple[str, str], notices: str, within_s: float) -> FaultRow:
-    return _row(text, flown, notices, FaultEnd.TERMINATES, within_s, _SENSORS_LOST)
+    return _row(text, flown, notices, FaultEnd.TERMINATES, after=(within_s, _SENSORS_LOST))
 
 
 def _lost(text: str, flown: tuple[str, str], within_s: float, why: str = _NO_AID) -> FaultRow:
-    return _row(text, flown, why, FaultEnd.LANDS, within_s, _POSITION_LOST)
+    return _row(text, flown, why, FaultEnd.LANDS, after=(within_s, _POSITION_LOST))
 
 
 def _app(text: str, notices: str, within_s: float, reaction: str) -> FaultRow:
-    return _row(text, _INDOORS, notices, FaultEnd.APP_ENDS, within_s, reaction)
+    return _row(text, _INDOORS, notices, FaultEnd.APP_ENDS, after=(within_s, reaction))
 
 
 TABLE: tuple[FaultRow, ...] = (
@@ -144,8 +147,7 @@ TABLE: tuple[FaultRow, ...] = (
         _INDOORS,
         "no voltage: nearly empty",
         FaultEnd.LANDS,
-        0.2,
-        _BATTERY_EMPTY,
+        after=(0.2, _BATTERY_EMPTY),
     ),
     _row("battery_monitor stuck", _INDOORS, "nothing"),
     _row("battery sag 0.05", _INDOORS, "a lower charge"),
@@ -154,11 +156,10 @@ TABLE: tuple[FaultRow, ...] = (
         _INDOORS,
         "a voltage of less than BAT_EMERGEN_THR",
         FaultEnd.LANDS,
-        0.2,
-        _BATTERY_EMPTY,
+        after=(0.2, _BATTERY_EMPTY),
     ),
-    _row("motor off", _INDOORS, _TILT, FaultEnd.TERMINATES, 0.7, _TUMBLED),
-    _row("motor off", _OUTDOORS, _TILT, FaultEnd.TERMINATES, 0.7, _TUMBLED),
+    _row("motor off", _INDOORS, _TILT, FaultEnd.TERMINATES, after=(0.7, _TUMBLED)),
+    _row("motor off", _OUTDOORS, _TILT, FaultEnd.TERMINATES, after=(0.7, _TUMBLED)),
     _row("motor weak 0.2", _INDOORS, "a moment, which the stabiliser compensates"),
     _row("motor weak 0.2", _OUTDOORS, "a moment, which the stabiliser compensates"),
     _app("camera off", "no image: after 1 s it hovers, after 5 s it ends", 5.0, "the camera is dead"),

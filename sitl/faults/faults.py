@@ -77,6 +77,7 @@ class Faults:
         self._all_sensors = SensorFaults(seed, ideal=suite.ideal)
         self._scheduled: list[tuple[int, int, Fault]] = []  # when, 0 to begin or 1 to end; latest first
         self._active: list[Fault] = []
+        self._armed_us: int | None = None
         self.next_us = _NEVER_US
         self.sensors: SensorFaults | None = None
         self.link: LinkFault | None = None
@@ -92,6 +93,7 @@ class Faults:
 
     def armed(self, now_us: int) -> None:
         """A try begins: schedule what is declared."""
+        self._armed_us = now_us
         self.begun = [BegunFault(fault, now_us) for fault in self._active]  # those injected before
         self._scheduled = []
         for fault in self._declared:
@@ -104,6 +106,7 @@ class Faults:
 
     def disarmed(self, now_us: int) -> None:
         """The try is over: what was declared ends; what was injected over MAVLink stays."""
+        self._armed_us = None
         self._scheduled = []
         self.next_us = _NEVER_US
         for fault in self._declared:
@@ -148,9 +151,15 @@ class Faults:
         if not begun or len(begun) < len(faults):
             return None
         for fault in begun:
-            self._end(fault, now_us)
-            self._begin(fault, now_us)
+            for same in self.active:
+                if (same.part, same.kind, same.number) == (fault.part, fault.kind, fault.number):
+                    self._end(same, now_us)
+            self._begin(fault.model_copy(update={"at_s": self._flown_s(now_us)}), now_us)
         return ", ".join(str(fault).partition(" at ")[0] for fault in begun)
+
+    def _flown_s(self, now_us: int) -> float:
+        """Seconds since arming; 0 while disarmed."""
+        return 0.0 if self._armed_us is None else round((now_us - self._armed_us) / 1e6, 3)
 
     def _set_next(self) -> None:
         self.next_us = self._scheduled[-1][0] if self._scheduled else _NEVER_US

@@ -40,7 +40,7 @@ def hover(
     scenario="open-field",
     **changes,
 ):
-    """Take off, hover, let the fault come, and fly on for a time or until the motors are off and it is at rest."""
+    """Take off, hover, let the fault come, and fly on for a time, or until the drone is disarmed at rest."""
     faults = () if fault is None else (fault.model_copy(update={"at_s": FAULT_AT_S}),)
     changed = {"sensors": sensors, "airframe": airframe, "faults": faults, "try_limit_s": 600.0, **changes}
     simulation = Simulation(load_scenario(scenario).model_copy(update=changed), seed=seed)
