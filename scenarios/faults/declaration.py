@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from enum import StrEnum
-from typing import Self
+from typing import Annotated, Self
 
-from pydantic import Field, model_validator
+from pydantic import BeforeValidator, Field, model_validator
 
 from scenarios.part import Part, refusal
 
@@ -128,6 +128,17 @@ SIZES: dict[FaultPart, dict[FaultKind, FaultSize | None]] = {
 """The kinds of faults of each part, and what their size means; None: it has no size."""
 
 MAX_TIME_S = 36_000.0
+_PARTS, _KINDS = frozenset(FaultPart), frozenset(FaultKind)
+
+
+def _part(value: object) -> object:
+    """A part by its name, also where files are read strictly."""
+    return FaultPart(value) if isinstance(value, str) and value in _PARTS else value
+
+
+def _kind(value: object) -> object:
+    """A kind by its name, also where files are read strictly."""
+    return FaultKind(value) if isinstance(value, str) and value in _KINDS else value
 
 
 class Fault(Part):
@@ -137,8 +148,8 @@ class Fault(Part):
     disarmed, and comes again in the next try.
     """
 
-    part: FaultPart = Field(strict=False, description="what fails")
-    kind: FaultKind = Field(strict=False, description="how it fails")
+    part: Annotated[FaultPart, BeforeValidator(_part)] = Field(description="what fails")
+    kind: Annotated[FaultKind, BeforeValidator(_kind)] = Field(description="how it fails")
     at_s: float = Field(0.0, ge=0, le=MAX_TIME_S, description="when it begins: seconds after arming")
     for_s: float | None = Field(None, gt=0, le=MAX_TIME_S, description="how long; without it, until the end")
     size: float | None = Field(None, description="how much; each kind has a default")
