@@ -82,7 +82,7 @@ class ServedDrone:
                 failures=simulation.faults,
             ),
         )
-        self._notice = notice
+        self._notice = simulation.faults.notice = notice
         self._hub = LinkHub(self.node, self._warn)
         self._camera: CameraFeed | FaultyFeed | None = None
         self._video: VideoServer | None = None

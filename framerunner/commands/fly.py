@@ -3,13 +3,21 @@
 from __future__ import annotations
 
 import asyncio
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 from cyclopts import Parameter
 
 from errors import SettingError
-from framerunner.commands import DEFAULT_MISSION, WholeNumber, check_range, load_mission_with
+from framerunner.commands import (
+    DEFAULT_MISSION,
+    Faults,
+    WholeNumber,
+    check_range,
+    load_mission_with,
+    with_faults,
+)
 
 if TYPE_CHECKING:
     from framerunner.flying.plan import FlightPlan
@@ -70,6 +78,7 @@ def fly(
     instance: Annotated[WholeNumber, Parameter(help="of the simulated drone: shifts its ports, 0 to 9")] = 0,
     lockstep: _Lockstep = False,
     seed: _Seed = None,
+    fault: Faults = (),
     record: _Record = False,
     video: _Video = False,
     monitor: _Monitor = False,
@@ -94,6 +103,8 @@ def fly(
 
         framerunner fly test-case-1 --lockstep --record
 
+        framerunner fly calm-1 --lockstep --fault "motor 1 weak 0.2 at 8 s"
+
         framerunner fly test-case-1 --lockstep --response lag=0.6,dead-time=0.15
 
         framerunner fly --drone udpin://0.0.0.0:14540 --camera 0
@@ -115,6 +126,9 @@ def fly(
     loaded = load_mission_with(mission, pilot)
     seed = (seed or 0) if lockstep else None
     plan = _plan(scenario, loaded, seed, response=response, drone=drone, drone_limits=drone_limits)
+    if fault and drone is not None:
+        raise SettingError("--fault: is for a simulated drone that is started; leave it out with --drone")
+    plan = replace(plan, scenario=with_faults(plan.scenario, fault))
     real_time = None if lockstep else RealTimeSettings(drone, camera, api, speed, instance, camera_delay)
     return asyncio.run(fly_once(FlightSettings(plan, real_time, out, record, video, monitor)))
 

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Annotated
 from cyclopts import Parameter
 
 from errors import SettingError
-from framerunner.commands import WholeNumber, check_range, say
+from framerunner.commands import Faults, WholeNumber, check_range, say, with_faults
 from framerunner.extras import install_advice, is_installed
 
 if TYPE_CHECKING:
@@ -90,6 +90,7 @@ def sim(
         WholeNumber, Parameter(help="how many drones fly side by side; they have the next instances' ports")
     ] = 1,
     seed: Annotated[WholeNumber, Parameter(help="of everything random, such as turbulence")] = 0,
+    fault: Faults = (),
     connections: Connections | None = None,
     onboard: Onboard | None = None,
     monitor: Annotated[
@@ -114,6 +115,8 @@ def sim(
 
         framerunner sim --ground-remote 192.168.1.20
 
+        framerunner sim --fault "gps off at 12 s for 5 s" --fault "motor 2 weak 0.3 at 30 s"
+
         framerunner sim --count 4 --video-rtp off
 
         framerunner sim --storage drone-files --parameters drone.params
@@ -134,7 +137,7 @@ def sim(
     from scenarios.loader import load_scenario
     from sitl.server import SimulatorServer
 
-    simulations = _simulations(load_scenario(scenario), count, seed)
+    simulations = _simulations(with_faults(load_scenario(scenario), fault), count, seed)
     server = SimulatorServer(simulations, settings, notice=say, grants=_grants(time_grants))
     asyncio.run(_run(server, watcher, lifeline=lifeline))
     return 0

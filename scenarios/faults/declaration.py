@@ -128,17 +128,20 @@ SIZES: dict[FaultPart, dict[FaultKind, FaultSize | None]] = {
 """The kinds of faults of each part, and what their size means; None: it has no size."""
 
 MAX_TIME_S = 36_000.0
-_PARTS, _KINDS = frozenset(FaultPart), frozenset(FaultKind)
 
 
-def _part(value: object) -> object:
-    """A part by its name, also where files are read strictly."""
-    return FaultPart(value) if isinstance(value, str) and value in _PARTS else value
+def _named(value: object, names: type[FaultPart] | type[FaultKind]) -> object:
+    """A part or kind by its name, also where files are read strictly."""
+    if not isinstance(value, str):
+        return value
+    try:
+        return names(value)
+    except ValueError:
+        raise refusal(value, f"is not known; use one of {', '.join(names)}") from None
 
 
-def _kind(value: object) -> object:
-    """A kind by its name, also where files are read strictly."""
-    return FaultKind(value) if isinstance(value, str) and value in _KINDS else value
+_PartName = Annotated[FaultPart, BeforeValidator(lambda value: _named(value, FaultPart))]
+_KindName = Annotated[FaultKind, BeforeValidator(lambda value: _named(value, FaultKind))]
 
 
 class Fault(Part):
@@ -148,8 +151,8 @@ class Fault(Part):
     disarmed, and comes again in the next try.
     """
 
-    part: Annotated[FaultPart, BeforeValidator(_part)] = Field(description="what fails")
-    kind: Annotated[FaultKind, BeforeValidator(_kind)] = Field(description="how it fails")
+    part: _PartName = Field(description="what fails")
+    kind: _KindName = Field(description="how it fails")
     at_s: float = Field(0.0, ge=0, le=MAX_TIME_S, description="when it begins: seconds after arming")
     for_s: float | None = Field(None, gt=0, le=MAX_TIME_S, description="how long; without it, until the end")
     size: float | None = Field(None, description="how much; each kind has a default")

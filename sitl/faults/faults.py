@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 
 from scenarios.faults.declaration import Fault, FaultKind, FaultPart
@@ -61,6 +61,7 @@ class Faults:
         link: the active fault of the link; None: there is none.
         camera: active faults of the camera.
         begun: of the present or last try, oldest first.
+        notice: called with a line for people when a fault begins or ends.
     """
 
     def __init__(
@@ -83,6 +84,7 @@ class Faults:
         self.link: LinkFault | None = None
         self.camera: tuple[Fault, ...] = ()
         self.begun: list[BegunFault] = []
+        self.notice: Callable[[str], None] = lambda line: None
         for fault in self._declared:
             self._check(fault)
 
@@ -183,6 +185,7 @@ class Faults:
 
     def _begin(self, fault: Fault, now_us: int) -> None:
         self._active.append(fault)
+        self.notice(f"fault begins: {fault}")
         self.begun.append(BegunFault(fault, now_us))
         if fault.part is FaultPart.MOTOR:
             self._apply_motors()
@@ -194,6 +197,7 @@ class Faults:
         if fault not in self._active:
             return
         self._active.remove(fault)
+        self.notice(f"fault ends: {fault}")
         self.begun = [
             BegunFault(each.fault, each.time_us, now_us)
             if each.fault == fault and each.ended_us is None
