@@ -83,7 +83,7 @@ class ServedDrone:
             ),
         )
         self._notice = simulation.faults.notice = notice
-        self._hub = LinkHub(self.node, self._warn)
+        self._hub = LinkHub(self.node, self._warn, lambda: simulation.faults.link)
         self._camera: CameraFeed | FaultyFeed | None = None
         self._video: VideoServer | None = None
         self._rtp: RtpSender | None = None

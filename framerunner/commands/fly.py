@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import asyncio
-from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -89,9 +88,8 @@ def fly(
 ) -> int:
     """Fly a mission, show it live, and write result, track, log and video to `runs/<time>-<scenario>/`.
 
-    In lockstep there is no log, and a video only with --video.
-
-    Exit code 0: completed, 1: flown but not completed, 2: bad input.
+    In lockstep there is no log, and a video only with --video. Exit code 0: completed, 1: flown but not
+    completed, 2: bad input.
 
     **Examples**
 
@@ -102,8 +100,6 @@ def fly(
         framerunner fly my_scenario.yaml --mission frame_challenge --speed 2
 
         framerunner fly test-case-1 --lockstep --record
-
-        framerunner fly calm-1 --lockstep --fault "motor 1 weak 0.2 at 8 s"
 
         framerunner fly test-case-1 --lockstep --response lag=0.6,dead-time=0.15
 
@@ -125,10 +121,7 @@ def fly(
 
     loaded = load_mission_with(mission, pilot)
     seed = (seed or 0) if lockstep else None
-    plan = _plan(scenario, loaded, seed, response=response, drone=drone, drone_limits=drone_limits)
-    if fault and drone is not None:
-        raise SettingError("--fault: is for a simulated drone that is started; leave it out with --drone")
-    plan = replace(plan, scenario=with_faults(plan.scenario, fault))
+    plan = _plan(scenario, loaded, seed, fault, response=response, drone=drone, drone_limits=drone_limits)
     real_time = None if lockstep else RealTimeSettings(drone, camera, api, speed, instance, camera_delay)
     return asyncio.run(fly_once(FlightSettings(plan, real_time, out, record, video, monitor)))
 
@@ -137,6 +130,7 @@ def _plan(
     scenario: str,
     mission: Mission,
     seed: int | None,
+    fault: tuple[str, ...],
     *,
     response: str | None,
     drone: str | None,
@@ -162,8 +156,17 @@ def _plan(
             f"--drone-limits: mission {mission.name} is of class open, so say what the drone can do, such as "
             "--drone-limits forward=2,left=1.5,up=1,yaw-rate=1.5"
         )
+    if fault and drone is not None:
+        raise SettingError("--fault: is for a simulated drone that is started; leave it out with --drone")
+    flown = with_faults(load_scenario(scenario), fault)
+    failing = next((each for each in flown.faults if each.part == "link"), None)
+    if failing is not None and seed is None and drone is None:
+        raise SettingError(
+            f"fault `{failing}`: vehicle time waits for the app at each packet, so none can be late or lost; "
+            "add --lockstep, or start framerunner sim and fly it with --drone"
+        )
     return FlightPlan(
-        load_scenario(scenario),
+        flown,
         mission,
         seed,
         drone_limits=None if drone_limits is None else limits_of(drone_limits),

@@ -16,7 +16,6 @@ from framerunner.extras import install_advice, is_installed
 
 if TYPE_CHECKING:
     from framerunner.child_process import MonitorProcess
-    from scenarios.models import Scenario
     from sitl.server import SimulatorServer
     from sitl.server_settings import ServerSettings
     from sitl.simulation import Simulation
@@ -115,8 +114,6 @@ def sim(
 
         framerunner sim --ground-remote 192.168.1.20
 
-        framerunner sim --fault "gps off at 12 s for 5 s" --fault "motor 2 weak 0.3 at 30 s"
-
         framerunner sim --count 4 --video-rtp off
 
         framerunner sim --storage drone-files --parameters drone.params
@@ -134,10 +131,9 @@ def sim(
         chosen = replace(chosen, link=(*chosen.link, watcher.link))
     settings = _settings(chosen, onboard or Onboard(), speed, instance, count)
 
-    from scenarios.loader import load_scenario
     from sitl.server import SimulatorServer
 
-    simulations = _simulations(with_faults(load_scenario(scenario), fault), count, seed)
+    simulations = _simulations(scenario, fault, count, seed)
     server = SimulatorServer(simulations, settings, notice=say, grants=_grants(time_grants))
     asyncio.run(_run(server, watcher, lifeline=lifeline))
     return 0
@@ -197,12 +193,14 @@ def _settings(
     return settings
 
 
-def _simulations(scenario: Scenario, count: int, seed: int) -> list[Simulation]:
+def _simulations(name: str, fault: tuple[str, ...], count: int, seed: int) -> list[Simulation]:
     from firmware_py.airframe import load_airframe
+    from scenarios.loader import load_scenario
     from sitl.fleet import side_by_side
     from sitl.simulation import Simulation
 
     check_range("--seed", seed, 0, 2**63 - 1)
+    scenario = with_faults(load_scenario(name), fault)
     if count == 1:
         return [Simulation(scenario, seed=seed)]
     airframe = load_airframe(scenario.airframe)

@@ -13,7 +13,6 @@ from __future__ import annotations
 
 import asyncio
 from collections.abc import AsyncIterator, Callable, Sequence
-from dataclasses import dataclass
 from math import degrees, isfinite, pi, radians
 from struct import Struct
 
@@ -21,6 +20,7 @@ from firmware_py.autopilot import Autopilot
 from firmware_py.offboard_requests import SetpointRefusal, setpoint_from_body_velocity
 from firmware_py.status import CommandResult, FlightMode, LandedState
 from firmware_py.types import CRITICAL
+from framerunner.flying.faulty_link import FaultyLink
 from framerunner.flying.response import LateResponse
 from geometry.axes import Alignment, Pose
 from geometry.rotations import quaternion_from_euler
@@ -28,7 +28,6 @@ from geometry.vectors import Vec3
 from offboard.arming import Arming
 from offboard.drone import DroneError, DroneState, VelocityCommand
 from scenarios.models import TrueState
-from sitl.faults.link import LinkFault, Way
 from sitl.simulation import Simulation
 
 TICK_US = 50_000
@@ -53,15 +52,6 @@ _ONE = Struct("<f")
 _THREE = Struct("<3f")
 
 TruthObserver = Callable[[TrueState], None]
-
-
-@dataclass(frozen=True, slots=True)
-class _FaultyLink:
-    """Setpoints up and states down a link with a fault."""
-
-    fault: LinkFault
-    up: Way[tuple[Vec3, float]]
-    down: Way[DroneState]
 
 
 class LockstepDrone:
@@ -109,7 +99,7 @@ class LockstepDrone:
         self._command = VelocityCommand()
         self._commanding = False
         self._resend_us = _NEVER_US
-        self._link: _FaultyLink | None = None
+        self._link = FaultyLink(simulation)
 
     async def connect(self) -> None:
         """Nothing to find."""
@@ -244,8 +234,8 @@ class LockstepDrone:
         self._resend_us = state.time_us + RESEND_US
         velocity_m_s = single((command.forward_m_s, -command.left_m_s, -command.up_m_s))
         yaw_rate_rad_s = sent_yaw_rate(-command.yaw_rate_rad_s)
-        if self._simulation.faults.link is not None:
-            self._faulty_link().up.send(self._simulation.time_us, (velocity_m_s, yaw_rate_rad_s))
+        if self._link.active:
+            self._link.send((velocity_m_s, yaw_rate_rad_s))
         elif self._response is None:
             _request(self._autopilot, velocity_m_s, yaw_rate_rad_s)
         else:
@@ -254,6 +244,7 @@ class LockstepDrone:
     def _advance(self, until_us: int = 0) -> None:
         """Let a control tick pass, and more until a time or until the link sends something by itself."""
         simulation, observers, state = self._simulation, self._observers, self._autopilot.state
+        link = self._link
         until_us = min(until_us, self._resend_us, self._heartbeat_us, self._tick_us, self._position_us)
         while True:
             simulation.tick()
@@ -264,10 +255,8 @@ class LockstepDrone:
                 airborne = self._autopilot.status.landed_state is not LandedState.ON_GROUND
                 late = self._response.step(state.yaw_rad, state.time_us, airborne=airborne)
                 _request(self._autopilot, *late)
-            if simulation.faults.link is not None:
-                arrived = self._faulty_link().up.newest(simulation.time_us)
-                if arrived is not None:
-                    _request(self._autopilot, *arrived)
+            if link.active and (arrived := link.arrived()) is not None:
+                _request(self._autopilot, *arrived)
             if state.time_us >= until_us or simulation.time_us >= until_us + TICK_US:  # its clock may stand
                 break
         self._exchange(state.time_us)
@@ -283,31 +272,15 @@ class LockstepDrone:
         if now_us >= self._tick_us:
             self._tick_us += TICK_US
             if self._alignment is not None:
-                self._sample = self._received(self._reported_state(self._alignment))
+                state = self._reported_state(self._alignment)
+                self._sample = self._link.receive(state) if self._link.active else state
         if now_us >= self._position_us:
             self._position_us += POSITION_US
-            fault = self._simulation.faults.link
-            if fault is not None and fault.loses():
+            if self._link.loses():
                 return
             self._position_ned_m = single(self._autopilot.state.position_ned_m)
             self._velocity_ned_m_s = single(self._autopilot.state.velocity_ned_m_s)
             self._sent_position_us = now_us
-
-    def _received(self, state: DroneState) -> DroneState | None:
-        """What arrives of a state that is sent; None: nothing."""
-        if self._simulation.faults.link is None:
-            return state
-        link = self._faulty_link()
-        link.down.send(self._simulation.time_us, state)
-        return link.down.newest(self._simulation.time_us)
-
-    def _faulty_link(self) -> _FaultyLink:
-        """Both directions of the link with its active fault."""
-        fault, link = self._simulation.faults.link, self._link
-        assert fault is not None
-        if link is None or link.fault is not fault:
-            link = self._link = _FaultyLink(fault, fault.new_way(), fault.new_way())
-        return link
 
     def _pass(self, limit_us: int, until: Callable[[], bool] = lambda: False) -> bool:
         """Let time pass until a condition holds; False if it does not within the limit."""

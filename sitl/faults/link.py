@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from typing import Generic, TypeVar
 
 from scenarios.faults.declaration import Fault, FaultKind
@@ -53,6 +53,10 @@ class Way(Generic[T]):
         """Send a packet, which may be lost."""
         if not self._loses():
             self._delay.send(now_us, packet)
+
+    def all(self, now_us: int) -> Iterator[T]:
+        """All packets that have arrived since the last call, oldest first."""
+        return self._delay.all(now_us)
 
     def newest(self, now_us: int) -> T | None:
         """The newest packet that has arrived since the last call."""
