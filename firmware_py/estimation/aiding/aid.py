@@ -162,6 +162,7 @@ class Aid:
     def accept_any(self) -> None:
         """Let the next measurement pass the gate: the estimate has been set to it."""
         self._open = True
+        self._last_us = NEVER_US  # innovations before and after are not compared
 
     def _passes(self, square: float, now_us: int) -> bool:
         self.arrived_us = now_us
