@@ -9,7 +9,7 @@ NEVER_US = -(10**15)
 _RESETS_FORGOTTEN_US = 10_000_000
 _NOISE_SHARE = 0.1  # of a new sample in the mean square of the noise
 _SECOND_DIFFERENCE = 1.0 / 6.0  # of white noise: its mean square is six variances
-_MUCH_NOISE = 4.0  # times the variance that was reported: then the measured one counts
+_MUCH_NOISE = 9.0  # times the variance that was reported: then the measured one counts
 _PAUSE_US = 500_000  # innovations before and after are not compared
 
 
