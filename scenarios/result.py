@@ -188,8 +188,7 @@ class FlightResult(RefereeReport, _Flown):
     """The result of a flight, as `result.json` has it.
 
     A field that was never set is not written: `state_sha256` is set in lockstep flights; `timing`, and
-    `lift_m` where frames were lifted, in real time; `faults` and what belongs to them if there were some;
-    recordings have no wall times.
+    `lift_m` where frames were lifted, in real time; recordings have no wall times.
     """
 
     cause: Text = Field("", description="why the flight was not clean, in one line; empty if it was")
@@ -318,10 +317,6 @@ def _is_formula(text: str) -> bool:
 
 
 _OPTIONAL = (
-    "faults",
-    "fault_reaction",
-    "fault_expected",
-    "fault_outcome",
     "state_sha256",
     "lift_m",
     "timing",

@@ -86,10 +86,9 @@ async def fly(
     began_us = None if standing is None else standing.began_us
     track = recorder.track(began_us)
     cause = causes.words(Flown(plan.layout, report, outcome, track, began_us))
-    result = _result(plan, report, outcome, track, cause=cause, judged_by=judge.source, measured=measured())
-    failed = fault_fields(await judge.faults(), result, plan.scenario.sensors)
-    if failed:
-        result = result.model_copy(update=failed)
+    failed = fault_fields(await judge.faults(), report, plan.scenario.sensors)
+    more = {**failed, **measured()}
+    result = _result(plan, report, outcome, track, cause=cause, judged_by=judge.source, measured=more)
     return FinishedFlight(result, outcome, track)
 
 
