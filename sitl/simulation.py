@@ -150,6 +150,7 @@ class Simulation:
         self.world = World(scenario, airframe, seed)
         origin = scenario.origin
         place = GeodeticPoint(origin.latitude_deg, origin.longitude_deg, origin.altitude_m)
+        self._place = place
         suite = load_suite(scenario.sensors)
         self._sensing = None if suite.ideal else _Sensing(suite, self.world, place, seed)
         self.autopilot = Autopilot(
@@ -179,6 +180,11 @@ class Simulation:
             return None
         arena = GeodeticPoint(place.latitude_deg, place.longitude_deg, place.altitude_m)
         return flip_vector(LocalProjection(arena).to_local(origin))
+
+    def true_state(self) -> tuple[Sensors, GeodeticPoint]:
+        """The true state, positions from the scenario's origin, and its place on Earth."""
+        place = LocalProjection(self._place).to_geodetic(self._sensors.position_ned_m)
+        return self._sensors, place
 
     def tick(self) -> None:
         """Advance by one control period: sense, control, move, judge."""

@@ -25,7 +25,13 @@ from firmware_py.mavlink.parameters import ExtendedParameterService, ParameterSe
 from firmware_py.mavlink.service import Handler, Service, merged
 from firmware_py.mavlink.telemetry.condition import CONDITION, esc_info
 from firmware_py.mavlink.telemetry.connection import ConnectionService
-from firmware_py.mavlink.telemetry.motion import MOTION, HomeAndOriginService
+from firmware_py.mavlink.telemetry.health import HEALTH
+from firmware_py.mavlink.telemetry.motion import (
+    MOTION,
+    HomeAndOriginService,
+    Truth,
+    hil_state_quaternion,
+)
 from firmware_py.mavlink.telemetry.sensing import SENSORS
 from firmware_py.mavlink.telemetry.status_texts import StatusTextService
 from firmware_py.mavlink.telemetry.streams import AutopilotSource, AutopilotTelemetry, StreamService
@@ -53,6 +59,7 @@ class NodeOptions:
     camera: CameraModel | None = None
     captures: CaptureSink | None = None  # takes and keeps pictures; by default they are only counted
     failures: FailureSink | None = None  # breaks parts on purpose
+    truth: Truth | None = None  # the true state, of a simulated vehicle whose sensors have errors
 
 
 def _services(autopilot: Autopilot, exchange: Exchange, options: NodeOptions) -> tuple[Service, ...]:
@@ -67,10 +74,13 @@ def _services(autopilot: Autopilot, exchange: Exchange, options: NodeOptions) ->
         files = ExtraFiles(autopilot.parameters)
     events = EventService(autopilot, exchange)
     mission = MissionExecution(autopilot, exchange, camera)
-    clocked: dict[int, AutopilotSource] = {
-        mavlink.MAVLINK_MSG_ID_ESC_INFO: lambda autopilot: esc_info(autopilot, exchange.time_us)
+    others: dict[int, AutopilotSource] = {
+        mavlink.MAVLINK_MSG_ID_ESC_INFO: lambda autopilot: esc_info(autopilot, exchange.time_us),
+        mavlink.MAVLINK_MSG_ID_HIL_STATE_QUATERNION: lambda autopilot: hil_state_quaternion(
+            autopilot, options.truth
+        ),
     }
-    state_messages = merged((MOTION, SENSORS, CONDITION, clocked))
+    state_messages = merged((MOTION, SENSORS, CONDITION, HEALTH, others))
     services: tuple[Service, ...] = (
         HomeAndOriginService(autopilot, exchange),
         StatusTextService(autopilot, exchange, events.send_text, options.log_text),
