@@ -15,13 +15,14 @@ from firmware_py.estimation.earth_field import earth_field_ned_gauss
 from firmware_py.estimation.inertial_estimator import InertialEstimator
 from firmware_py.geodesy import LocalProjection
 from firmware_py.measurements import ExternalPose, Readings
+from firmware_py.parameters import Parameters
 from firmware_py.types import GeodeticPoint, Sensors
 from geometry.axes import flip_vector
 from geometry.vectors import ZERO3, Vec3
 from scenarios.models import Scenario, ground_height
 from scenarios.referee import Referee
 from sitl.battery import Battery
-from sitl.sensors.assumptions import estimator_settings
+from sitl.sensors.assumptions import estimator_settings, parameter_defaults
 from sitl.sensors.specs import SuiteSpec
 from sitl.sensors.suite import SensorSuite, load_suite
 from sitl.sensors.truth import MotionTracker
@@ -156,6 +157,7 @@ class Simulation:
         self.autopilot = Autopilot(
             airframe,
             place,
+            Parameters(defaults={**airframe.parameters, **parameter_defaults(suite)}),
             control_period_s=CONTROL_PERIOD_US / 1e6,
             estimator=None if suite.ideal else new_estimator(suite, place),
         )

@@ -11,6 +11,7 @@ from firmware_py.mavlink.camera.model import CAMERA_COMPONENT_ID, CameraModel, C
 from firmware_py.mavlink.commands.flight import FlightCommands
 from firmware_py.mavlink.commands.maintenance import FailureSink, MaintenanceCommands
 from firmware_py.mavlink.commands.protocol import CommandService
+from firmware_py.mavlink.external_pose import ExternalPoseService
 from firmware_py.mavlink.ground_station.events import EventService
 from firmware_py.mavlink.ground_station.file_transfer import FileTransferService
 from firmware_py.mavlink.ground_station.log_transfer import LogTransferService
@@ -35,6 +36,7 @@ from firmware_py.mavlink.telemetry.motion import (
 from firmware_py.mavlink.telemetry.sensing import SENSORS
 from firmware_py.mavlink.telemetry.status_texts import StatusTextService
 from firmware_py.mavlink.telemetry.streams import AutopilotSource, AutopilotTelemetry, StreamService
+from firmware_py.mavlink.time_sync import Clocks
 from firmware_py.storage import Storage
 from firmware_py.types import StatusText
 from wire.dialect import AUTOPILOT_COMPONENT_ID, BROADCAST, Message, mavlink
@@ -73,6 +75,7 @@ def _services(autopilot: Autopilot, exchange: Exchange, options: NodeOptions) ->
     if files is None:
         files = ExtraFiles(autopilot.parameters)
     events = EventService(autopilot, exchange)
+    clocks = Clocks()
     mission = MissionExecution(autopilot, exchange, camera)
     others: dict[int, AutopilotSource] = {
         mavlink.MAVLINK_MSG_ID_ESC_INFO: lambda autopilot: esc_info(autopilot, exchange.time_us),
@@ -94,7 +97,8 @@ def _services(autopilot: Autopilot, exchange: Exchange, options: NodeOptions) ->
         *((ShellService(autopilot, exchange),) if options.shell else ()),
         *((camera,) if camera is not None else ()),
         # The others have no `update`.
-        ConnectionService(autopilot, exchange),
+        ConnectionService(autopilot, exchange, clocks),
+        ExternalPoseService(autopilot, exchange, clocks),
         AutopilotTelemetry(autopilot, state_messages),
         OffboardService(autopilot, exchange),
         ManualControlService(autopilot, exchange),

@@ -9,11 +9,19 @@ from typing import TYPE_CHECKING, Annotated
 from cyclopts import Parameter
 
 from errors import SettingError
-from framerunner.commands import DEFAULT_MISSION, WholeNumber, check_range, load_mission_with
+from framerunner.commands import (
+    DEFAULT_MISSION,
+    Sensors,
+    WholeNumber,
+    check_range,
+    load_mission_with,
+    with_sensors,
+)
 
 if TYPE_CHECKING:
     from framerunner.flying.plan import FlightPlan
     from offboard.mission import Mission
+    from scenarios.models import Scenario
     from wire.simulator_api import SimulatorApi
 
 _Drone = Annotated[
@@ -70,6 +78,7 @@ def fly(
     instance: Annotated[WholeNumber, Parameter(help="of the simulated drone: shifts its ports, 0 to 9")] = 0,
     lockstep: _Lockstep = False,
     seed: _Seed = None,
+    sensors: Sensors = None,
     record: _Record = False,
     video: _Video = False,
     monitor: _Monitor = False,
@@ -94,6 +103,8 @@ def fly(
 
         framerunner fly test-case-1 --lockstep --record
 
+        framerunner fly test-case-1 --lockstep --sensors mocap
+
         framerunner fly test-case-1 --lockstep --response lag=0.6,dead-time=0.15
 
         framerunner fly --drone udpin://0.0.0.0:14540 --camera 0
@@ -111,16 +122,20 @@ def fly(
 
     from framerunner.flying.real_time import RealTimeSettings
     from framerunner.flying.run import FlightSettings, fly_once
+    from scenarios.loader import load_scenario
 
     loaded = load_mission_with(mission, pilot)
     seed = (seed or 0) if lockstep else None
-    plan = _plan(scenario, loaded, seed, response=response, drone=drone, drone_limits=drone_limits)
+    if sensors is not None and drone is not None:
+        raise SettingError("--sensors: are those of a simulated drone; leave it out with --drone")
+    flown = with_sensors(load_scenario(scenario), sensors)
+    plan = _plan(flown, loaded, seed, response=response, drone=drone, drone_limits=drone_limits)
     real_time = None if lockstep else RealTimeSettings(drone, camera, api, speed, instance, camera_delay)
     return asyncio.run(fly_once(FlightSettings(plan, real_time, out, record, video, monitor)))
 
 
 def _plan(
-    scenario: str,
+    scenario: Scenario,
     mission: Mission,
     seed: int | None,
     *,
@@ -131,7 +146,6 @@ def _plan(
     """The flight that the options describe; a seed is given in lockstep."""
     from framerunner.commands.named_numbers import limits_of, response_of
     from framerunner.flying.plan import FlightPlan
-    from scenarios.loader import load_scenario
 
     if response is not None and seed is None:
         raise SettingError("--response: is for a simulated vehicle in lockstep; add --lockstep")
@@ -149,7 +163,7 @@ def _plan(
             "--drone-limits forward=2,left=1.5,up=1,yaw-rate=1.5"
         )
     return FlightPlan(
-        load_scenario(scenario),
+        scenario,
         mission,
         seed,
         drone_limits=None if drone_limits is None else limits_of(drone_limits),

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Annotated
 from cyclopts import Parameter
 
 from errors import SettingError
-from framerunner.commands import WholeNumber, check_range, say
+from framerunner.commands import Sensors, WholeNumber, check_range, say, with_sensors
 from framerunner.extras import install_advice, is_installed
 
 if TYPE_CHECKING:
@@ -90,6 +90,7 @@ def sim(
         WholeNumber, Parameter(help="how many drones fly side by side; they have the next instances' ports")
     ] = 1,
     seed: Annotated[WholeNumber, Parameter(help="of everything random, such as turbulence")] = 0,
+    sensors: Sensors = None,
     connections: Connections | None = None,
     onboard: Onboard | None = None,
     monitor: Annotated[
@@ -111,6 +112,8 @@ def sim(
         framerunner sim --scenario test-case-1 --speed 2
 
         framerunner sim --scenario test-case-1 --monitor
+
+        framerunner sim --sensors outdoor
 
         framerunner sim --ground-remote 192.168.1.20
 
@@ -134,7 +137,7 @@ def sim(
     from scenarios.loader import load_scenario
     from sitl.server import SimulatorServer
 
-    simulations = _simulations(load_scenario(scenario), count, seed)
+    simulations = _simulations(with_sensors(load_scenario(scenario), sensors), count, seed)
     server = SimulatorServer(simulations, settings, notice=say, grants=_grants(time_grants))
     asyncio.run(_run(server, watcher, lifeline=lifeline))
     return 0

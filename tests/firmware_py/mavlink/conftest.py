@@ -44,10 +44,7 @@ class FakeAutopilot:
 
     @property
     def estimator(self):
-        return SimpleNamespace(report=lambda: self.report)
-
-    def take_external_pose(self, pose):
-        self.poses.append(pose)
+        return SimpleNamespace(report=lambda: self.report, take_external_pose=self.poses.append)
 
     def _called(self, *call):
         self.calls.append(call)
