@@ -159,7 +159,7 @@ class Simulation:
             place,
             Parameters(defaults={**airframe.parameters, **parameter_defaults(suite)}),
             control_period_s=CONTROL_PERIOD_US / 1e6,
-            estimator=None if suite.ideal else new_estimator(suite, place),
+            estimator=None if suite.ideal else new_estimator(suite, self._frame_place(suite, place)),
         )
         self.referee = Referee(scenario, airframe.envelope_m)
         self.failures = Failures(self.world)
@@ -168,6 +168,13 @@ class Simulation:
         self._sensors = self.world.sensors()
         self.truth = self.world.truth(self._sensors, motors_on=False)
         self.referee.update(self.truth)
+
+    def _frame_place(self, suite: SuiteSpec, place: GeodeticPoint) -> GeodeticPoint:
+        """Where the frame of motion capture is: at the scenario's origin or, received, at the start."""
+        pose = suite.external_pose
+        if pose is None or pose.source == "simulated":
+            return place
+        return LocalProjection(place).to_geodetic(self.world.sensors().position_ned_m)
 
     @property
     def time_us(self) -> int:

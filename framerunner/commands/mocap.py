@@ -1,0 +1,90 @@
+"""`framerunner mocap`: poses of a motion capture for any MAVLink vehicle."""
+
+from __future__ import annotations
+
+from contextlib import closing
+from typing import Annotated, Literal
+
+from cyclopts import Parameter
+
+from framerunner.commands import check_range
+
+
+def mocap(
+    source: Annotated[
+        str, Parameter(help="where poses come from: udpin://HOST:PORT, a .csv or .jsonl file, or sitl")
+    ],
+    *,
+    drone: Annotated[str, Parameter(help="MAVLink URL of the drone")] = "udpin://0.0.0.0:14540",
+    frame: Annotated[
+        Literal["flu", "ned", "enu", "yup"],
+        Parameter(help="axes of room and body, for poses that do not name theirs"),
+    ] = "flu",
+    forward: Annotated[
+        float,
+        Parameter(help="degrees from the tracked body's x axis to the drone's forward, counter-clockwise"),
+    ] = 0.0,
+    body: Annotated[str | None, Parameter(help="name of the tracked body; without it all poses are")] = None,
+    rate: Annotated[float, Parameter(help="poses a second that are sent at most")] = 50.0,
+    delay: Annotated[
+        float, Parameter(help="milliseconds by which poses are older than they seem here")
+    ] = 0.0,
+    position_sigma: Annotated[float, Parameter(help="standard deviation of positions, m")] = 0.005,
+    attitude_sigma: Annotated[float, Parameter(help="standard deviation of attitudes, rad")] = 0.01,
+    velocity_sigma: Annotated[
+        float, Parameter(help="standard deviation of velocities, m/s, if the source has them")
+    ] = 0.05,
+    seconds: Annotated[float | None, Parameter(help="stop after this time; without it at Ctrl-C")] = None,
+) -> int:
+    """Send a motion capture's poses to a drone as MAVLink ODOMETRY, and check that it uses them.
+
+    While it runs, one line says each second how many poses are sent, whether the drone's estimator uses them,
+    how far they are from the drone's own estimate, and, once the drone has been turned, whether the axes are
+    right and how old the poses are. At the end a report says what is missing and what to do. Nothing is set
+    in the drone except the rates of this link's messages. When the source stops, nothing is sent: an old pose
+    is never repeated.
+
+    `sitl` is the true pose that a simulated drone sends on the same link (HIL_STATE_QUATERNION): `framerunner
+    sim --sensors external`, or PX4's SIH on its display link.
+
+    Exit code 0: the drone uses the poses and nothing is wrong, 1: something is missing, 2: bad input.
+
+    **Examples**
+
+        framerunner mocap udpin://0.0.0.0:9870 --drone serial:///dev/ttyUSB0:921600
+
+        framerunner mocap udpin://0.0.0.0:9870 --frame yup --body drone
+
+        framerunner mocap poses.csv --drone udpin://0.0.0.0:14550
+
+        framerunner mocap sitl --drone udpin://127.0.0.1:19410
+    """
+    check_range("--rate", rate, 1.0, 250.0)
+    check_range("--delay", delay, 0.0, 500.0)
+    check_range("--forward", forward, -360.0, 360.0)
+    check_range("--position-sigma", position_sigma, 0.0, 10.0)
+    check_range("--attitude-sigma", attitude_sigma, 0.0, 3.0)
+    check_range("--velocity-sigma", velocity_sigma, 0.0, 10.0)
+    check_range("--seconds", seconds, 1.0, 1e6)
+
+    from rich.console import Console
+
+    from framerunner.mocap.poses import Axes
+    from framerunner.mocap.run import run_session
+    from framerunner.mocap.session import COMPONENT_ID, SYSTEM_ID, SendSettings
+    from framerunner.mocap.sources import open_source
+    from wire.transports.vehicle_link import VehicleLink
+
+    settings = SendSettings(
+        rate_hz=rate,
+        forward_deg=forward,
+        delay_s=delay / 1000.0,
+        position_sigma_m=position_sigma,
+        attitude_sigma_rad=attitude_sigma,
+        velocity_sigma_m_s=velocity_sigma,
+    )
+    with closing(open_source(source, Axes(frame), body)) as poses:
+        link = VehicleLink(drone, system_id=SYSTEM_ID, component_id=COMPONENT_ID)
+        with closing(link):
+            fine = run_session(link, poses, settings, seconds, Console(highlight=False))
+    return 0 if fine else 1

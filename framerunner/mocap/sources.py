@@ -1,0 +1,217 @@
+"""Where poses come from: a file, a UDP stream, or the truth of a simulator."""
+
+from __future__ import annotations
+
+from collections import deque
+from dataclasses import dataclass
+from math import cos, isnan, radians
+from pathlib import Path
+from random import Random
+from typing import Protocol
+
+from framerunner.mocap.poses import Axes, Pose, PoseError, parse_line, read_poses
+from geometry.rotations import multiply, normalized
+from wire.dialect import Message, mavlink
+from wire.transports.sockets import bind_udp
+from wire.transports.urls import UrlRules, parse_url
+
+_METRES = 111_319.5e-7  # a unit of latitude, 1e-7 degrees
+_OFFSET_SPAN_S = 10.0
+_JUMP_S = 1.0
+_STREAM = UrlRules("bad source '{}'", "udpin://0.0.0.0:9870, poses.csv, sitl")
+
+
+@dataclass(frozen=True, slots=True)
+class TimedPose:
+    """A pose and when it was taken, in seconds of this program's clock."""
+
+    pose: Pose
+    taken_s: float
+    vehicle_time_us: int | None = None  # if the source gives it in vehicle time
+
+
+class PoseSource(Protocol):
+    """Delivers poses as they come.
+
+    Attributes:
+        label: what it is, for people.
+        ended: it will deliver nothing more.
+        fault: what was wrong with data that it received last; empty: nothing was.
+        faults: how often that happened.
+        needs_truth: it is made from the vehicle's HIL_STATE_QUATERNION.
+    """
+
+    label: str
+    ended: bool
+    fault: str
+    faults: int
+    needs_truth: bool
+
+    def poll(self, now_s: float) -> list[TimedPose]:
+        """The poses that have come since the last call, oldest first."""
+
+    def take(self, message: Message, now_s: float) -> None:
+        """Take a message of the vehicle, of which a source may be made."""
+
+    def close(self) -> None:
+        """Close it."""
+
+
+class SourceClock:
+    """Converts a source's time stamps into this program's time.
+
+    The smallest difference between arrival and time stamp within ten seconds stands for a way without queues,
+    whose length cannot be measured from here: a pose counts as taken when it would have arrived by it. What
+    remains is the constant delay of the motion capture.
+    """
+
+    def __init__(self) -> None:
+        self._least: deque[tuple[float, float]] = deque()  # arrival and difference, differences rising
+
+    def taken_s(self, stamp_s: float, now_s: float) -> float:
+        """When a pose was taken; without a time stamp (NaN) it is when it arrives."""
+        if isnan(stamp_s):
+            return now_s
+        difference_s = now_s - stamp_s
+        if self._least and abs(difference_s - self._least[0][1]) > _JUMP_S:
+            self._least.clear()  # the source has been started again
+        while self._least and self._least[-1][1] >= difference_s:
+            self._least.pop()
+        self._least.append((now_s, difference_s))
+        while self._least[0][0] < now_s - _OFFSET_SPAN_S:
+            self._least.popleft()
+        return stamp_s + self._least[0][1]
+
+
+class FileSource:
+    """Plays a file of poses in real time, once.
+
+    Raises:
+        PoseError: the file cannot be used.
+    """
+
+    def __init__(self, path: Path, axes: Axes, name: str | None) -> None:
+        self.label = str(path)
+        self.ended, self.fault, self.faults, self.needs_truth = False, "", 0, False
+        self._poses = deque(read_poses(path, axes, name))
+        self._began_s: float | None = None
+        self._first_s = self._poses[0].time_s
+
+    def poll(self, now_s: float) -> list[TimedPose]:
+        """Those whose time has come."""
+        if self._began_s is None:
+            self._began_s = now_s
+        due = []
+        while self._poses:
+            taken_s = self._began_s + self._poses[0].time_s - self._first_s
+            if taken_s > now_s:
+                break
+            due.append(TimedPose(self._poses.popleft(), taken_s))
+        self.ended = not self._poses
+        return due
+
+    def take(self, message: Message, now_s: float) -> None:
+        """Not needed."""
+
+    def close(self) -> None:
+        """Nothing is open."""
+
+
+class UdpSource:
+    """Lines of JSON in UDP datagrams.
+
+    Raises:
+        LinkError: the address cannot be listened on.
+    """
+
+    def __init__(self, url: str, axes: Axes, name: str | None) -> None:
+        parsed = parse_url(url, _STREAM)
+        self._socket = bind_udp(parsed.place, "choose another port")
+        self._axes, self._name = axes, name
+        self._clock = SourceClock()
+        self.label = parsed.text
+        self.ended, self.fault, self.faults, self.needs_truth = False, "", 0, False
+
+    def poll(self, now_s: float) -> list[TimedPose]:
+        """Those that have arrived; a line that is no pose is counted."""
+        found = []
+        while data := self._socket.read():
+            for line in data.splitlines():
+                if not line.strip():
+                    continue
+                try:
+                    pose = parse_line(line, self._axes, self._name)
+                except PoseError as error:
+                    self.fault, self.faults = str(error), self.faults + 1
+                    continue
+                if pose is not None:
+                    found.append(TimedPose(pose, self._clock.taken_s(pose.time_s, now_s)))
+        return found
+
+    def take(self, message: Message, now_s: float) -> None:
+        """Not needed."""
+
+    def close(self) -> None:
+        """Close the socket."""
+        self._socket.close()
+
+
+class SitlSource:
+    """The true state that a simulated vehicle sends on its link as HIL_STATE_QUATERNION.
+
+    Its origin is where the vehicle is first heard. White noise is added, as a motion capture has it: the
+    message has latitudes in steps of 1 cm, and an estimator takes a pose that never changes for a fault.
+
+    Args:
+        position_noise_m: standard deviation of each axis.
+        attitude_noise_rad: standard deviation about each axis.
+    """
+
+    def __init__(self, position_noise_m: float = 0.002, attitude_noise_rad: float = 0.003) -> None:
+        self._noise = (position_noise_m, attitude_noise_rad)
+        self._random = Random(1)
+        self.label = "the simulator's truth"
+        self.ended, self.fault, self.faults, self.needs_truth = False, "", 0, True
+        self._origin: tuple[int, int, int] | None = None
+        self._taken: list[TimedPose] = []
+
+    def take(self, message: Message, now_s: float) -> None:
+        """Take HIL_STATE_QUATERNION."""
+        if message.get_msgId() != mavlink.MAVLINK_MSG_ID_HIL_STATE_QUATERNION:
+            return
+        if self._origin is None:
+            self._origin = (message.lat, message.lon, message.alt)
+        latitude, longitude, altitude = self._origin
+        position = (
+            (message.lat - latitude) * _METRES,
+            (message.lon - longitude) * _METRES * cos(radians(latitude * 1e-7)),
+            (altitude - message.alt) / 1000.0,
+        )
+        sigma_m, sigma_rad = self._noise
+        north_m, east_m, down_m = (value + self._random.gauss(0.0, sigma_m) for value in position)
+        half = [self._random.gauss(0.0, sigma_rad / 2.0) for _ in range(3)]
+        velocity = (message.vx / 100.0, message.vy / 100.0, message.vz / 100.0)
+        w, x, y, z = message.attitude_quaternion
+        attitude = normalized(multiply((w, x, y, z), (1.0, half[0], half[1], half[2])))
+        pose = Pose(message.time_usec / 1e6, (north_m, east_m, down_m), attitude, velocity)
+        self._taken.append(TimedPose(pose, now_s, message.time_usec))
+
+    def poll(self, now_s: float) -> list[TimedPose]:
+        """Those that have come."""
+        taken, self._taken = self._taken, []
+        return taken
+
+    def close(self) -> None:
+        """Nothing is open."""
+
+
+def open_source(text: str, axes: Axes, name: str | None) -> PoseSource:
+    """A source by its name: `sitl`, a udpin:// address, or a file.
+
+    Raises:
+        PoseError: a file cannot be used.
+        LinkError: an address cannot be used.
+    """
+    if text == "sitl":
+        return SitlSource()
+    return UdpSource(text, axes, name) if "://" in text else FileSource(Path(text), axes, name)
