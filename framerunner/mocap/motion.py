@@ -238,7 +238,7 @@ def _pose_rates(sent: list[SentPose]) -> Array:
 
 def _smoothed(values: Array) -> Array:
     """Means over the time between the poses of a rate, so that both are alike."""
-    kernel = np.ones(6) / 6.0
+    kernel = np.ones(7) / 7.0  # an odd number, so that nothing is shifted
     return np.column_stack([np.convolve(values[:, axis], kernel, "same") for axis in range(3)])
 
 
