@@ -194,7 +194,8 @@ class SitlSource:
         w, x, y, z = message.attitude_quaternion
         attitude = normalized(multiply((w, x, y, z), (1.0, half[0], half[1], half[2])))
         pose = Pose(message.time_usec / 1e6, (north_m, east_m, down_m), attitude, velocity)
-        self._taken.append(TimedPose(pose, now_s, message.time_usec))
+        # PX4 leaves the time out.
+        self._taken.append(TimedPose(pose, now_s, message.time_usec or None))
 
     def poll(self, now_s: float) -> list[TimedPose]:
         """Those that have come."""

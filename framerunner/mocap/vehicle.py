@@ -9,7 +9,6 @@ from framerunner.doctor.listen import Record
 from wire.dialect import (
     AUTOPILOT_COMPONENT_ID,
     Message,
-    command_long,
     companion_heartbeat,
     mavlink,
     request_rate,
@@ -23,10 +22,16 @@ _HEARTBEAT_S = 1.0
 _REQUEST_S = 1.0
 _PARAMETER_S = 0.05
 _TIMESYNC_S = 0.2
-_SYNC_HZ, _SLOW_SYNC_HZ = 50.0, 10.0
 _CONVERGED = 500  # answers after which PX4 converts time stamps
 _KEPT = 30  # round trips
-_WANTED_HZ = {"ATTITUDE": 50.0, "LOCAL_POSITION_NED": 30.0, "ESTIMATOR_STATUS": 2.0, "SYS_STATUS": 2.0}
+_WANTED_HZ = {
+    "ATTITUDE": 50.0,
+    "LOCAL_POSITION_NED": 30.0,
+    "ESTIMATOR_STATUS": 2.0,
+    "SYS_STATUS": 2.0,
+    # PX4's filter estimates the drift per answer, so this rate must stay the same.
+    "TIMESYNC": 20.0,
+}
 _LOW = 0.6  # share of the wanted rate
 
 
@@ -57,7 +62,6 @@ class Vehicle:
         self._due_s = {"heartbeat": 0.0, "rates": 0.5, "timesync": 0.0, "parameter": 0.0}
         self._counted: dict[str, int] = {}
         self._counted_s = 0.0
-        self._sync_hz = 0.0
 
     @property
     def found(self) -> bool:
@@ -136,15 +140,6 @@ class Vehicle:
             if received_hz < _LOW * wanted_hz:
                 yield request_rate(system_id, getattr(mavlink, f"MAVLINK_MSG_ID_{name}"), wanted_hz)
         self._counted, self._counted_s = dict(counts), now_s
-        sync_hz = _SLOW_SYNC_HZ if self.converts_stamps else _SYNC_HZ
-        if sync_hz != self._sync_hz or not counts.get("TIMESYNC"):
-            self._sync_hz = sync_hz
-            yield command_long(
-                system_id,
-                mavlink.MAV_CMD_SET_MESSAGE_INTERVAL,
-                mavlink.MAVLINK_MSG_ID_TIMESYNC,
-                1e6 / sync_hz,
-            )
 
 
 def nanoseconds(now_s: float) -> int:
