@@ -21,7 +21,6 @@ from framerunner.commands import (
 if TYPE_CHECKING:
     from framerunner.flying.plan import FlightPlan
     from offboard.mission import Mission
-    from scenarios.models import Scenario
     from wire.simulator_api import SimulatorApi
 
 _Drone = Annotated[
@@ -101,9 +100,7 @@ def fly(
 
         framerunner fly my_scenario.yaml --mission frame_challenge --speed 2
 
-        framerunner fly test-case-1 --lockstep --record
-
-        framerunner fly test-case-1 --lockstep --sensors mocap
+        framerunner fly test-case-1 --lockstep --record --sensors mocap
 
         framerunner fly test-case-1 --lockstep --response lag=0.6,dead-time=0.15
 
@@ -114,28 +111,24 @@ def fly(
         framerunner fly --drone serial:///dev/ttyUSB0:57600 --camera rtsp://10.0.0.2/1
     """
     api = _simulator_api(simulator, drone)
-    if api is not None and camera is None:
-        camera = api.video_url
+    camera = api.video_url if api is not None and camera is None else camera
     _check(drone, camera, speed, instance, lockstep)
     check_range("--camera-delay", camera_delay, 0.0, 0.5)
     _check_lockstep(seed, monitor, lockstep)
 
     from framerunner.flying.real_time import RealTimeSettings
     from framerunner.flying.run import FlightSettings, fly_once
-    from scenarios.loader import load_scenario
 
     loaded = load_mission_with(mission, pilot)
     seed = (seed or 0) if lockstep else None
-    if sensors is not None and drone is not None:
-        raise SettingError("--sensors: are those of a simulated drone; leave it out with --drone")
-    flown = with_sensors(load_scenario(scenario), sensors)
-    plan = _plan(flown, loaded, seed, response=response, drone=drone, drone_limits=drone_limits)
+    plan = _plan(scenario, sensors, loaded, seed, response=response, drone=drone, drone_limits=drone_limits)
     real_time = None if lockstep else RealTimeSettings(drone, camera, api, speed, instance, camera_delay)
     return asyncio.run(fly_once(FlightSettings(plan, real_time, out, record, video, monitor)))
 
 
 def _plan(
-    scenario: Scenario,
+    scenario: str,
+    sensors: str | None,
     mission: Mission,
     seed: int | None,
     *,
@@ -146,6 +139,10 @@ def _plan(
     """The flight that the options describe; a seed is given in lockstep."""
     from framerunner.commands.named_numbers import limits_of, response_of
     from framerunner.flying.plan import FlightPlan
+    from scenarios.loader import load_scenario
+
+    if sensors is not None and drone is not None:
+        raise SettingError("--sensors: are those of a simulated drone; leave it out with --drone")
 
     if response is not None and seed is None:
         raise SettingError("--response: is for a simulated vehicle in lockstep; add --lockstep")
@@ -163,7 +160,7 @@ def _plan(
             "--drone-limits forward=2,left=1.5,up=1,yaw-rate=1.5"
         )
     return FlightPlan(
-        scenario,
+        with_sensors(load_scenario(scenario), sensors),
         mission,
         seed,
         drone_limits=None if drone_limits is None else limits_of(drone_limits),

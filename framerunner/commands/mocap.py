@@ -3,11 +3,29 @@
 from __future__ import annotations
 
 from contextlib import closing
-from typing import Annotated, Literal
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Annotated, Literal
 
 from cyclopts import Parameter
 
 from framerunner.commands import check_range
+
+if TYPE_CHECKING:
+    from framerunner.mocap.session import SendSettings
+
+
+@Parameter(name="*")
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Sending:
+    """How poses are sent."""
+
+    rate: Annotated[float, Parameter(help="poses a second that are sent at most")] = 50.0
+    delay: Annotated[float, Parameter(help="milliseconds by which poses are older than they seem here")] = 0.0
+    position_sigma: Annotated[float, Parameter(help="standard deviation of positions, m")] = 0.005
+    attitude_sigma: Annotated[float, Parameter(help="standard deviation of attitudes, rad")] = 0.01
+    velocity_sigma: Annotated[
+        float, Parameter(help="standard deviation of velocities, m/s, if the source has them")
+    ] = 0.05
 
 
 def mocap(
@@ -25,15 +43,7 @@ def mocap(
         Parameter(help="degrees from the tracked body's x axis to the drone's forward, counter-clockwise"),
     ] = 0.0,
     body: Annotated[str | None, Parameter(help="name of the tracked body; without it all poses are")] = None,
-    rate: Annotated[float, Parameter(help="poses a second that are sent at most")] = 50.0,
-    delay: Annotated[
-        float, Parameter(help="milliseconds by which poses are older than they seem here")
-    ] = 0.0,
-    position_sigma: Annotated[float, Parameter(help="standard deviation of positions, m")] = 0.005,
-    attitude_sigma: Annotated[float, Parameter(help="standard deviation of attitudes, rad")] = 0.01,
-    velocity_sigma: Annotated[
-        float, Parameter(help="standard deviation of velocities, m/s, if the source has them")
-    ] = 0.05,
+    sending: Sending | None = None,
     seconds: Annotated[float | None, Parameter(help="stop after this time; without it at Ctrl-C")] = None,
 ) -> int:
     """Send a motion capture's poses to a drone as MAVLink ODOMETRY, and check that it uses them.
@@ -59,32 +69,49 @@ def mocap(
 
         framerunner mocap sitl --drone udpin://127.0.0.1:19410
     """
-    check_range("--rate", rate, 1.0, 250.0)
-    check_range("--delay", delay, 0.0, 500.0)
     check_range("--forward", forward, -360.0, 360.0)
-    check_range("--position-sigma", position_sigma, 0.0, 10.0)
-    check_range("--attitude-sigma", attitude_sigma, 0.0, 3.0)
-    check_range("--velocity-sigma", velocity_sigma, 0.0, 10.0)
     check_range("--seconds", seconds, 1.0, 1e6)
+    return _send(source, drone, (frame, body), _settings(sending or Sending(), forward), seconds)
 
+
+def _settings(sending: Sending, forward: float) -> SendSettings:
+    check_range("--rate", sending.rate, 1.0, 250.0)
+    check_range("--delay", sending.delay, 0.0, 500.0)
+    check_range("--position-sigma", sending.position_sigma, 0.0, 10.0)
+    check_range("--attitude-sigma", sending.attitude_sigma, 0.0, 3.0)
+    check_range("--velocity-sigma", sending.velocity_sigma, 0.0, 10.0)
+
+    from framerunner.mocap.session import SendSettings
+
+    return SendSettings(
+        rate_hz=sending.rate,
+        forward_deg=forward,
+        delay_s=sending.delay / 1000.0,
+        position_sigma_m=sending.position_sigma,
+        attitude_sigma_rad=sending.attitude_sigma,
+        velocity_sigma_m_s=sending.velocity_sigma,
+    )
+
+
+def _send(
+    source: str,
+    drone: str,
+    frame_and_body: tuple[str, str | None],
+    settings: SendSettings,
+    seconds: float | None,
+) -> int:
     from rich.console import Console
 
     from framerunner.mocap.poses import Axes
     from framerunner.mocap.run import run_session
-    from framerunner.mocap.session import COMPONENT_ID, SYSTEM_ID, SendSettings
+    from framerunner.mocap.session import COMPONENT_ID, SYSTEM_ID
     from framerunner.mocap.sources import open_source
     from wire.transports.vehicle_link import VehicleLink
 
-    settings = SendSettings(
-        rate_hz=rate,
-        forward_deg=forward,
-        delay_s=delay / 1000.0,
-        position_sigma_m=position_sigma,
-        attitude_sigma_rad=attitude_sigma,
-        velocity_sigma_m_s=velocity_sigma,
-    )
-    with closing(open_source(source, Axes(frame), body)) as poses:
-        link = VehicleLink(drone, system_id=SYSTEM_ID, component_id=COMPONENT_ID)
-        with closing(link):
-            fine = run_session(link, poses, settings, seconds, Console(highlight=False))
+    frame, body = frame_and_body
+    with (
+        closing(open_source(source, Axes(frame), body)) as poses,
+        closing(VehicleLink(drone, system_id=SYSTEM_ID, component_id=COMPONENT_ID)) as link,
+    ):
+        fine = run_session(link, poses, settings, seconds, Console(highlight=False))
     return 0 if fine else 1

@@ -39,6 +39,7 @@ class Onboard:
         Path | None,
         Parameter(help="file of changed parameters (.params), read at start and saved when one changes"),
     ] = None
+    sensors: Sensors = None
     shell: Annotated[bool, Parameter(help="answer MAVLink's shell (SERIAL_CONTROL), for the drone only")] = (
         False
     )
@@ -90,7 +91,6 @@ def sim(
         WholeNumber, Parameter(help="how many drones fly side by side; they have the next instances' ports")
     ] = 1,
     seed: Annotated[WholeNumber, Parameter(help="of everything random, such as turbulence")] = 0,
-    sensors: Sensors = None,
     connections: Connections | None = None,
     onboard: Onboard | None = None,
     monitor: Annotated[
@@ -109,11 +109,9 @@ def sim(
 
         framerunner sim
 
-        framerunner sim --scenario test-case-1 --speed 2
+        framerunner sim --scenario test-case-1 --speed 2 --sensors mocap
 
         framerunner sim --scenario test-case-1 --monitor
-
-        framerunner sim --sensors outdoor
 
         framerunner sim --ground-remote 192.168.1.20
 
@@ -128,16 +126,16 @@ def sim(
     check_range("--speed", speed, 0.01, 1000)
     check_range("--instance", instance, 0, 9)
     check_range("--count", count, 1, _MAX_COUNT)
-    chosen = connections or Connections()
+    chosen, onboard = connections or Connections(), onboard or Onboard()
     watcher = _monitor(chosen.video_port, count) if monitor else None
     if watcher is not None:
         chosen = replace(chosen, link=(*chosen.link, watcher.link))
-    settings = _settings(chosen, onboard or Onboard(), speed, instance, count)
+    settings = _settings(chosen, onboard, speed, instance, count)
 
     from scenarios.loader import load_scenario
     from sitl.server import SimulatorServer
 
-    simulations = _simulations(with_sensors(load_scenario(scenario), sensors), count, seed)
+    simulations = _simulations(with_sensors(load_scenario(scenario), onboard.sensors), count, seed)
     server = SimulatorServer(simulations, settings, notice=say, grants=_grants(time_grants))
     asyncio.run(_run(server, watcher, lifeline=lifeline))
     return 0

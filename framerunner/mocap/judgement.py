@@ -9,7 +9,7 @@ from math import isfinite, isnan
 
 from framerunner.doctor.checks import Finding, Level
 from framerunner.doctor.listen import Record
-from framerunner.mocap.motion import Comparison
+from framerunner.mocap.motion import PoseComparison
 from wire.dialect import mavlink
 
 MIN_RATE_HZ = 30.0
@@ -45,7 +45,7 @@ class Facts:
     """
 
     record: Record
-    comparison: Comparison
+    comparison: PoseComparison
     sent: int = 0
     rate_hz: float = 0.0
     longest_gap_s: float = 0.0

@@ -43,7 +43,7 @@ class SentPose:
 
 
 @dataclass(frozen=True, slots=True)
-class Comparison:
+class PoseComparison:
     """Poses against the vehicle's reports; NaN or None: it cannot be told yet.
 
     Attributes:
@@ -81,12 +81,12 @@ class MotionCheck:
 
     def compare(
         self, telemetry: VehicleTelemetry, rates_rad_s: Sequence[tuple[int, float, float, float]]
-    ) -> Comparison:
+    ) -> PoseComparison:
         """Compare with the vehicle's attitude and position, and with its body rates by vehicle time."""
         distance_m, heading_deg, tilt_deg = self._offsets(telemetry)
         moves, delay_s, correlation, axes = _rates(list(self._sent), rates_rad_s)
         track = "" if axes else self._track(telemetry)
-        return Comparison(distance_m, heading_deg, tilt_deg, moves, delay_s, correlation, axes, track)
+        return PoseComparison(distance_m, heading_deg, tilt_deg, moves, delay_s, correlation, axes, track)
 
     def _pairs(self, telemetry: VehicleTelemetry) -> list[tuple[SentPose, VehiclePose]]:
         """Poses of the last seconds with the vehicle's of the same time, oldest first."""

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from collections import deque
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from math import nan
 from typing import Protocol
 
-from framerunner.mocap.motion import Comparison, MotionCheck, SentPose, body_velocity
+from framerunner.mocap.motion import MotionCheck, PoseComparison, SentPose, body_velocity
 from framerunner.mocap.poses import Pose, with_forward
 from framerunner.mocap.sources import PoseSource, TimedPose
 from framerunner.mocap.vehicle import Vehicle
@@ -80,6 +80,7 @@ class MocapSession:
         self.longest_gap_s = 0.0
         self.silent = False
         self._motion = MotionCheck()
+        self._in_motion = PoseComparison()
         self._recent: deque[float] = deque()  # when poses were sent
         self._newest_s = -1e9  # when the last pose that was sent was taken
         self._heard_s = 0.0  # when a pose has come
@@ -171,10 +172,21 @@ class MocapSession:
             recent.popleft()
         return len(recent) / _RATE_SPAN_S
 
-    def compare(self) -> Comparison:
-        """The poses against what the vehicle reports."""
+    def compare(self) -> PoseComparison:
+        """The poses against what the vehicle reports now; of axes and delay, what was last seen in motion."""
         rates: Sequence[tuple[int, float, float, float]] = list(self.vehicle.rates_rad_s)
-        return self._motion.compare(self.vehicle.record.telemetry, rates)
+        found = self._motion.compare(self.vehicle.record.telemetry, rates)
+        if found.moves:
+            self._in_motion = found
+        seen = self._in_motion
+        return replace(
+            found,
+            moves=seen.moves,
+            delay_s=seen.delay_s,
+            correlation=seen.correlation,
+            axes=seen.axes,
+            track=found.track or seen.track,
+        )
 
 
 def _covariance(first: float, second: float) -> list[float]:

@@ -12,7 +12,7 @@ from firmware_py.status import FlightMode
 from framerunner.doctor.checks import Level
 from framerunner.doctor.listen import Record
 from framerunner.mocap.judgement import Facts, is_fused, judge, line
-from framerunner.mocap.motion import Comparison
+from framerunner.mocap.motion import PoseComparison
 from framerunner.mocap.poses import Pose
 from framerunner.mocap.session import COMPONENT_ID, SYSTEM_ID, MocapSession, SendSettings
 from framerunner.mocap.sources import SitlSource, TimedPose
@@ -215,7 +215,7 @@ def recorded(flags, *, parameters=None, autopilot=mavlink.MAV_AUTOPILOT_PX4):
 
 RELATIVE = mavlink.ESTIMATOR_PRED_POS_HORIZ_REL
 GLOBAL = mavlink.ESTIMATOR_PRED_POS_HORIZ_ABS
-RIGHT = Comparison(0.01, 0.2, 0.3, moves=True, delay_s=0.0, correlation=0.95)
+RIGHT = PoseComparison(0.01, 0.2, 0.3, moves=True, delay_s=0.0, correlation=0.95)
 
 
 @pytest.mark.parametrize(
