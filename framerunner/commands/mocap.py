@@ -30,7 +30,11 @@ class Sending:
 
 def mocap(
     source: Annotated[
-        str, Parameter(help="where poses come from: udpin://HOST:PORT, a .csv or .jsonl file, or sitl")
+        str,
+        Parameter(
+            help="where poses come from: udpin://HOST:PORT, optitrack://HOST, vicon://HOST, qualisys://HOST, "
+            "vrpn://HOST, a .csv or .jsonl file, or sitl"
+        ),
     ],
     *,
     drone: Annotated[str, Parameter(help="MAVLink URL of the drone")] = "udpin://0.0.0.0:14540",
@@ -42,7 +46,9 @@ def mocap(
         float,
         Parameter(help="degrees from the tracked body's x axis to the drone's forward, counter-clockwise"),
     ] = 0.0,
-    body: Annotated[str | None, Parameter(help="name of the tracked body; without it all poses are")] = None,
+    body: Annotated[
+        str | None, Parameter(help="name of the tracked body; by default the first that comes")
+    ] = None,
     sending: Sending | None = None,
     seconds: Annotated[float | None, Parameter(help="stop after this time; without it at Ctrl-C")] = None,
 ) -> int:
@@ -63,7 +69,7 @@ def mocap(
 
         framerunner mocap udpin://0.0.0.0:9870 --drone serial:///dev/ttyUSB0:921600
 
-        framerunner mocap udpin://0.0.0.0:9870 --frame yup --body drone
+        framerunner mocap optitrack://192.168.1.5 --frame yup --body drone
 
         framerunner mocap poses.csv --drone udpin://0.0.0.0:14550
 

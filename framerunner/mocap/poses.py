@@ -143,17 +143,16 @@ def with_forward(pose: Pose, turn_deg: float) -> Pose:
     return replace(pose, attitude=multiply(pose.attitude, (cos(half), 0.0, 0.0, sin(half))))
 
 
-def parse_line(line: str | bytes, axes: Axes, name: str | None) -> Pose | None:
-    """The pose in a line of JSON; None if it is of another body than the one that is named.
+def parse_line(line: str | bytes) -> PoseRecord:
+    """The record in a line of JSON.
 
     Raises:
         PoseError: it is none.
     """
     try:
-        record = PoseRecord.model_validate_json(line)
+        return PoseRecord.model_validate_json(line)
     except ValidationError as error:
         raise PoseError(_words(error)) from None
-    return record.pose(axes) if name is None or record.name == name else None
 
 
 def read_poses(path: Path, axes: Axes, name: str | None) -> list[Pose]:

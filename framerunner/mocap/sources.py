@@ -1,24 +1,30 @@
-"""Where poses come from: a file, a UDP stream, or the truth of a simulator."""
+"""Where poses come from: a file, a UDP stream, a motion capture server, or the truth of a simulator."""
 
 from __future__ import annotations
 
+import socket
+import sys
 from collections import deque
 from dataclasses import dataclass
 from math import cos, isnan, radians
 from pathlib import Path
 from random import Random
+from subprocess import DEVNULL, PIPE, Popen, TimeoutExpired
 from typing import Protocol
 
+from framerunner.extras import install_advice, is_installed
+from framerunner.mocap.capture import KINDS
 from framerunner.mocap.poses import Axes, Pose, PoseError, parse_line, read_poses
 from geometry.rotations import multiply, normalized
 from wire.dialect import Message, mavlink
-from wire.transports.sockets import bind_udp
+from wire.transports.sockets import UdpSocket, bind_udp
 from wire.transports.urls import UrlRules, parse_url
 
 _METRES = 111_319.5e-7  # a unit of latitude, 1e-7 degrees
 _OFFSET_SPAN_S = 10.0
 _JUMP_S = 1.0
-_STREAM = UrlRules("bad source '{}'", "udpin://0.0.0.0:9870, poses.csv, sitl")
+_END_S = 2.0
+_STREAM = UrlRules("bad source '{}'", "udpin://0.0.0.0:9870, poses.csv, sitl, optitrack://192.168.1.5")
 
 
 @dataclass(frozen=True, slots=True)
@@ -120,16 +126,18 @@ class FileSource:
 class UdpSource:
     """Lines of JSON in UDP datagrams.
 
-    Raises:
-        LinkError: the address cannot be listened on.
+    Args:
+        receiver: the socket on which they come.
+        label: of the source, for people.
+        axes: of records that name none.
+        name: of the tracked body; None: the first that comes.
     """
 
-    def __init__(self, url: str, axes: Axes, name: str | None) -> None:
-        parsed = parse_url(url, _STREAM)
-        self._socket = bind_udp(parsed.place, "choose another port")
-        self._axes, self._name = axes, name
+    def __init__(self, receiver: UdpSocket, label: str, axes: Axes, name: str | None) -> None:
+        self._socket, self._axes, self._name = receiver, axes, name
+        self._any_name = name is None
         self._clock = SourceClock()
-        self.label = parsed.text
+        self.label = label
         self.ended, self.fault, self.faults, self.needs_truth = False, "", 0, False
 
     def poll(self, now_s: float) -> list[TimedPose]:
@@ -140,13 +148,20 @@ class UdpSource:
                 if not line.strip():
                     continue
                 try:
-                    pose = parse_line(line, self._axes, self._name)
+                    record = parse_line(line)
+                    if self._is_wanted(record.name):
+                        pose = record.pose(self._axes)
+                        found.append(TimedPose(pose, self._clock.taken_s(pose.time_s, now_s)))
                 except PoseError as error:
                     self.fault, self.faults = str(error), self.faults + 1
-                    continue
-                if pose is not None:
-                    found.append(TimedPose(pose, self._clock.taken_s(pose.time_s, now_s)))
         return found
+
+    def _is_wanted(self, name: str | None) -> bool:
+        if self._any_name and self._name is None:
+            self._name = name
+        if self._any_name and name != self._name:
+            raise PoseError(f"name: {name} is tracked as well as {self._name}; choose one with --body")
+        return self._any_name or name == self._name
 
     def take(self, message: Message, now_s: float) -> None:
         """Not needed."""
@@ -154,6 +169,57 @@ class UdpSource:
     def close(self) -> None:
         """Close the socket."""
         self._socket.close()
+
+
+class ServerSource(UdpSource):
+    """A motion capture server, through the program `framerunner.mocap.capture`.
+
+    Args:
+        kind: one of `KINDS`.
+        host: of the server.
+        axes: of room and body.
+        name: of the tracked body; None: the first that comes.
+
+    Raises:
+        PoseError: the library is not installed.
+    """
+
+    def __init__(self, kind: str, host: str, axes: Axes, name: str | None) -> None:
+        if not is_installed("motioncapture"):
+            raise PoseError(f"{kind}://{host}: {install_advice('motioncapture')}")
+        opened = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
+        opened.bind(("127.0.0.1", 0))
+        port = opened.getsockname()[1]
+        super().__init__(UdpSocket(opened), f"{kind}://{host}", axes, name)
+        self._program = Popen(
+            [sys.executable, "-m", "framerunner.mocap.capture", kind, host, str(port)],
+            stdin=PIPE,
+            stdout=DEVNULL,
+            stderr=PIPE,
+            text=True,
+        )
+
+    def poll(self, now_s: float) -> list[TimedPose]:
+        """Those that have arrived.
+
+        Raises:
+            PoseError: the program has ended; the message is its last line.
+        """
+        if self._program.poll() is not None:
+            lines = (self._program.stderr.read() if self._program.stderr else "").strip().splitlines()
+            raise PoseError(lines[-1] if lines else f"{self.label}: its client has ended")
+        return super().poll(now_s)
+
+    def close(self) -> None:
+        """End the program."""
+        if self._program.stdin is not None:
+            self._program.stdin.close()
+        try:
+            self._program.wait(_END_S)
+        except TimeoutExpired:
+            self._program.kill()
+            self._program.wait()
+        super().close()
 
 
 class SitlSource:
@@ -207,7 +273,7 @@ class SitlSource:
 
 
 def open_source(text: str, axes: Axes, name: str | None) -> PoseSource:
-    """A source by its name: `sitl`, a udpin:// address, or a file.
+    """A source by its name: `sitl`, a udpin:// address, a server of `KINDS`, or a file.
 
     Raises:
         PoseError: a file cannot be used.
@@ -215,4 +281,12 @@ def open_source(text: str, axes: Axes, name: str | None) -> PoseSource:
     """
     if text == "sitl":
         return SitlSource()
-    return UdpSource(text, axes, name) if "://" in text else FileSource(Path(text), axes, name)
+    scheme, separator, address = text.partition("://")
+    if not separator:
+        return FileSource(Path(text), axes, name)
+    if scheme in KINDS and address:
+        return ServerSource(scheme, address, axes, name)
+    parsed = parse_url(text, _STREAM)
+    if parsed.scheme != "udpin":
+        raise PoseError(f"{text}: a stream of poses comes by UDP, such as udpin://0.0.0.0:{parsed.number}")
+    return UdpSource(bind_udp(parsed.place, "choose another port"), parsed.text, axes, name)

@@ -1,15 +1,19 @@
 """Poses as files and streams give them, their axes, and when they were taken."""
 
 import json
+import os
 import socket
+import time
 from math import nan, radians
 
 import pytest
 
 from framerunner.mocap.poses import Axes, Pose, PoseError, in_ned, parse_line, read_poses, with_forward
-from framerunner.mocap.sources import FileSource, SitlSource, SourceClock, UdpSource
+from framerunner.mocap.sources import FileSource, SitlSource, SourceClock, UdpSource, open_source
 from geometry.rotations import euler_from_quaternion, quaternion_from_euler, rotation, to_world
 from wire.dialect import mavlink
+from wire.transports.sockets import UdpSocket
+from wire.transports.urls import LinkError
 
 LEVEL = (1.0, 0.0, 0.0, 0.0)
 CSV = "time_s,x,y,z,qw,qx,qy,qz\n0.0,1,2,3,1,0,0,0\n0.5,1,2,4,1,0,0,0\n"
@@ -58,11 +62,9 @@ def test_the_forward_axis_of_a_body_can_be_turned():
 
 
 def test_lines_of_a_stream():
-    pose = parse_line(line(vx=1, vy=2, vz=3, more="is ignored"), Axes.FLU, None)
+    pose = parse_line(line(vx=1, vy=2, vz=3, more="is ignored")).pose(Axes.FLU)
     assert (pose.position_ned_m, pose.velocity_ned_m_s) == ((1.0, -2.0, -3.0), (1.0, -2.0, -3.0))
-    assert parse_line(line(frame="ned"), Axes.FLU, None).position_ned_m == (1.0, 2.0, 3.0)
-    assert parse_line(line(name="other"), Axes.FLU, "drone") is None
-    assert parse_line(line(name="drone"), Axes.FLU, "drone") is not None
+    assert parse_line(line(frame="ned")).pose(Axes.FLU).position_ned_m == (1.0, 2.0, 3.0)
 
 
 @pytest.mark.parametrize(
@@ -77,7 +79,7 @@ def test_lines_of_a_stream():
 )
 def test_a_line_that_is_no_pose(text, words):
     with pytest.raises(PoseError) as refused:
-        parse_line(text, Axes.FLU, None)
+        parse_line(text).pose(Axes.FLU)
     assert str(refused.value).startswith(words)
 
 
@@ -125,18 +127,96 @@ def test_jitter_of_arrival_is_removed_from_time_stamps():
     assert clock.taken_s(nan, 7.0) == 7.0
 
 
-def test_a_udp_stream():
-    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as free:
-        free.bind(("127.0.0.1", 0))
-        port = free.getsockname()[1]
-    source = UdpSource(f"udpin://127.0.0.1:{port}", Axes.FLU, None)
+def received(name, *lines):
+    """What a source of a UDP stream makes of lines, and itself."""
+    opened = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
+    opened.bind(("127.0.0.1", 0))
+    source = UdpSource(UdpSocket(opened), "here", Axes.FLU, name)
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as sender:
-        sender.sendto(f"{line()}\nnonsense\n{line(time_s=1.02)}\n".encode(), ("127.0.0.1", port))
+        sender.sendto("\n".join(lines).encode(), opened.getsockname())
     found = source.poll(3.0)
     source.close()
-    assert [each.taken_s for each in found] == pytest.approx([3.0, 3.0])
+    return [each.pose.position_ned_m[0] for each in found], source
+
+
+def test_a_udp_stream():
+    found, source = received(None, line(x=1), "nonsense", line(x=2, time_s=1.02))
+    assert found == [1.0, 2.0]
     assert source.faults == 1
     assert source.fault.startswith("line: Invalid JSON")
+
+
+def test_one_body_is_followed():
+    lines = (line(x=1, name="a"), line(x=2, name="b"), line(x=3, name="a"))
+    found, source = received("b", *lines)
+    assert (found, source.faults) == ([2.0], 0)
+    found, source = received(None, *lines)
+    assert found == [1.0, 3.0]
+    assert source.fault == "name: b is tracked as well as a; choose one with --body"
+
+
+SERVER = """
+import time
+
+
+class Turn:
+    w, x, y, z = 1.0, 0.0, 0.0, 0.0
+
+
+class Body:
+    name, position, rotation = "drone", (1.0, 2.0, 3.0), Turn
+
+
+class Server:
+    rigidBodies = {"drone": Body}
+
+    def waitForNextFrame(self):
+        time.sleep(0.01)
+
+
+def connect(kind, options):
+    if options["hostname"] == "nowhere":
+        raise RuntimeError("cannot connect")
+    assert (kind, options) == ("optitrack", {"hostname": "10.0.0.5"})
+    return Server()
+"""
+
+
+@pytest.fixture
+def library(tmp_path, monkeypatch):
+    """A stand-in for the library `motioncapture`, whose API this is (version 1.1)."""
+    (tmp_path / "motioncapture.py").write_text(SERVER)
+    monkeypatch.syspath_prepend(tmp_path)
+    monkeypatch.setenv("PYTHONPATH", f"{tmp_path}{os.pathsep}{os.getcwd()}")
+
+
+def polled(source, limit_s=20.0):
+    end_s = time.monotonic() + limit_s
+    try:
+        while time.monotonic() < end_s:
+            if found := source.poll(time.monotonic()):
+                return found
+            time.sleep(0.01)
+        return []
+    finally:
+        source.close()
+
+
+def test_a_motion_capture_server(library):
+    found = polled(open_source("optitrack://10.0.0.5", Axes.YUP, "drone"))
+    assert found[0].pose.position_ned_m == (1.0, 3.0, -2.0)
+
+
+def test_a_server_that_cannot_be_reached_ends_in_one_line(library):
+    with pytest.raises(PoseError, match=r"^vicon://nowhere: cannot connect$"):
+        polled(open_source("vicon://nowhere", Axes.FLU, None))
+
+
+def test_a_source_that_is_none():
+    with pytest.raises(LinkError, match=r"^bad source 'ftp://x': .*optitrack://"):
+        open_source("ftp://x", Axes.FLU, None)
+    with pytest.raises(PoseError, match="a stream of poses comes by UDP"):
+        open_source("tcpin://127.0.0.1:9870", Axes.FLU, None)
 
 
 def test_a_simulators_truth():
