@@ -80,6 +80,8 @@ def is_fused(facts: Facts) -> bool | None:
 def line(facts: Facts) -> str:
     """The state in one line."""
     comparison = facts.comparison
+    if facts.sent == 0:
+        return "no pose yet"
     fused = {True: "fused", False: "NOT fused", None: "no ESTIMATOR_STATUS yet"}[is_fused(facts)]
     parts = [f"{facts.sent} poses, {facts.rate_hz:.0f} Hz", fused]
     if isfinite(comparison.distance_m):
