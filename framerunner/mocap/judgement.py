@@ -142,7 +142,9 @@ def _fused(facts: Facts) -> Iterator[Finding]:
         yield _good("fused", "the vehicle uses the poses")
     ratio = f"innovation ratio up to {facts.worst_ratio:.2f}"
     if facts.worst_ratio > 1.0:
-        yield _missing("innovation", f"{ratio}: it rejected poses", "see axes and delay")
+        recovered = fused and facts.comparison.distance_m <= NEAR_M
+        level = Level.NOTE if recovered else Level.MISSING
+        yield Finding(level, "innovation", f"{ratio}: it rejected poses", "see gaps, axes and delay")
     elif fused:
         yield _good("innovation", ratio)
     reference = record.parameters.get("EKF2_HGT_REF")

@@ -244,6 +244,11 @@ def test_whether_px4_uses_the_poses(flags, control, distance_m, expected):
         ({"comparison": replace(RIGHT, distance_m=0.3)}, "position", "section 7.3"),
         ({"comparison": replace(RIGHT, correlation=0.2)}, "axes", "rigid"),
         ({"sent": 0}, "poses", "tracked"),
+        (
+            {"worst_ratio": 2.0, "comparison": replace(RIGHT, distance_m=0.4)},
+            "innovation",
+            "see gaps, axes and delay",
+        ),
     ],
 )
 def test_what_is_missing_and_what_to_do(changes, subject, advice):
