@@ -6,6 +6,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 from enum import Enum
 
+from firmware_py.estimation.report import NO_FIX
 from firmware_py.status import FlightMode
 
 NEVER_US = -(10**15)
@@ -167,8 +168,8 @@ def unsettled(now: Situation) -> bool:
 
 
 def estimator_fails(now: Situation) -> bool:
-    """A sensor fails, or the estimator does not know what every flight needs."""
-    return now.problem != ""
+    """A sensor fails, or the estimator does not know what a flight in the intended mode needs."""
+    return now.problem != "" and (now.problem != NO_FIX or now.intended not in POSITIONLESS)
 
 
 def tipped_over(now: Situation) -> bool:

@@ -462,7 +462,10 @@ def test_arming_is_denied_in_the_words_of_the_estimators_condition():
     assert commander.refusal == "Arming denied: barometer is stuck"
     row = commander.handle(Event.ARM)
     assert (row.result, row.text) == (NO, "Arming denied: barometer is stuck")
-    commander.situation.problem = ""
+    commander.situation.problem = "GPS fix too low"
+    assert commander.refusal == "Arming denied: GPS fix too low"
+    commander.situation.intended = FlightMode.STABILIZED  # needs no position
+    commander.situation.manual_us = commander.situation.now_us
     assert commander.refusal == ""
 
 

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 
 from firmware_py.autopilot import Autopilot
 from firmware_py.commander_guards import UNARMABLE
-from firmware_py.estimation.report import NO_HEIGHT, EstimatorReport, Sensor
+from firmware_py.estimation.report import NO_FIX, NO_HEIGHT, EstimatorReport, Sensor
 from firmware_py.mavlink.ground_station.event_definitions import (
     ALL_MODES,
     ARMING_SUMMARY,
@@ -55,6 +55,7 @@ _LOW_BATTERY = 2  # MAV_BATTERY_CHARGE_STATE_LOW
 
 # The part that a reason is about, by a word in it, and whether it prevents the chosen mode only.
 _SUBJECTS: tuple[tuple[str, Part, bool], ...] = (
+    (NO_FIX.lower(), Part.GPS, True),
     *((sensor.value.lower(), part, False) for sensor, part in _SENSOR_PARTS.items()),
     ("imu ", Part.ACCEL, False),
     (NO_HEIGHT, Part.LOCAL_POSITION_ESTIMATE, False),
