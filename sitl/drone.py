@@ -80,6 +80,7 @@ class ServedDrone:
                 camera=model if settings.camera else None,
                 captures=self._album,
                 failures=simulation.faults,
+                truth=simulation.true_state,
             ),
         )
         self._notice = simulation.faults.notice = notice

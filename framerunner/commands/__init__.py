@@ -30,6 +30,22 @@ MAX_FAULTS = 20  # as many as a scenario file may have
 WholeNumber = Annotated[int, Parameter(converter=_whole)]
 
 
+Sensors = Annotated[
+    str | None,
+    Parameter(help="the drone's sensor suite instead of the scenario's: ideal, mocap, outdoor, …, or a file"),
+]
+
+
+def with_sensors(scenario: Scenario, sensors: str | None) -> Scenario:
+    """A scenario with another sensor suite, which must exist; None: its own."""
+    if sensors is None:
+        return scenario
+    from sitl.sensors.suite import load_suite
+
+    load_suite(sensors)
+    return scenario.model_copy(update={"sensors": sensors})
+
+
 def check_range(option: str, value: float | None, low: float, high: float) -> None:
     """Raise SettingError for a number outside low to high, or not a number; None is an option not given."""
     if value is not None and not low <= value <= high:

@@ -12,15 +12,18 @@ from errors import SettingError
 from framerunner.commands import (
     DEFAULT_MISSION,
     Faults,
+    Sensors,
     WholeNumber,
     check_range,
     load_mission_with,
     with_faults,
+    with_sensors,
 )
 
 if TYPE_CHECKING:
     from framerunner.flying.plan import FlightPlan
     from offboard.mission import Mission
+    from scenarios.models import Scenario
     from wire.simulator_api import SimulatorApi
 
 _Drone = Annotated[
@@ -77,6 +80,7 @@ def fly(
     instance: Annotated[WholeNumber, Parameter(help="of the simulated drone: shifts its ports, 0 to 9")] = 0,
     lockstep: _Lockstep = False,
     seed: _Seed = None,
+    sensors: Sensors = None,
     fault: Faults = (),
     record: _Record = False,
     video: _Video = False,
@@ -99,7 +103,7 @@ def fly(
 
         framerunner fly my_scenario.yaml --mission frame_challenge --speed 2
 
-        framerunner fly test-case-1 --lockstep --record
+        framerunner fly test-case-1 --lockstep --record --sensors mocap
 
         framerunner fly test-case-1 --lockstep --response lag=0.6,dead-time=0.15
 
@@ -110,8 +114,7 @@ def fly(
         framerunner fly --drone serial:///dev/ttyUSB0:57600 --camera rtsp://10.0.0.2/1
     """
     api = _simulator_api(simulator, drone)
-    if api is not None and camera is None:
-        camera = api.video_url
+    camera = api.video_url if api is not None and camera is None else camera
     _check(drone, camera, speed, instance, lockstep)
     check_range("--camera-delay", camera_delay, 0.0, 0.5)
     _check_lockstep(seed, monitor, lockstep)
@@ -121,16 +124,36 @@ def fly(
 
     loaded = load_mission_with(mission, pilot)
     seed = (seed or 0) if lockstep else None
-    plan = _plan(scenario, loaded, seed, fault, response=response, drone=drone, drone_limits=drone_limits)
+    chosen = _scenario(scenario, sensors, fault, starts=drone is None, lockstep=lockstep)
+    plan = _plan(chosen, loaded, seed, response=response, drone=drone, drone_limits=drone_limits)
     real_time = None if lockstep else RealTimeSettings(drone, camera, api, speed, instance, camera_delay)
     return asyncio.run(fly_once(FlightSettings(plan, real_time, out, record, video, monitor)))
 
 
+def _scenario(
+    name: str, sensors: str | None, fault: tuple[str, ...], *, starts: bool, lockstep: bool
+) -> Scenario:
+    """The scenario that the options describe; `starts`: a simulated drone is started."""
+    from scenarios.loader import load_scenario
+
+    if sensors is not None and not starts:
+        raise SettingError("--sensors: are those of a simulated drone; leave it out with --drone")
+    if fault and not starts:
+        raise SettingError("--fault: is for a simulated drone that is started; leave it out with --drone")
+    scenario = with_faults(with_sensors(load_scenario(name), sensors), fault)
+    failing = next((each for each in scenario.faults if each.part == "link"), None)
+    if failing is not None and starts and not lockstep:
+        raise SettingError(
+            f"fault `{failing}`: vehicle time waits for the app at each packet, so none can be late or lost; "
+            "add --lockstep, or start framerunner sim and fly it with --drone"
+        )
+    return scenario
+
+
 def _plan(
-    scenario: str,
+    scenario: Scenario,
     mission: Mission,
     seed: int | None,
-    fault: tuple[str, ...],
     *,
     response: str | None,
     drone: str | None,
@@ -139,7 +162,6 @@ def _plan(
     """The flight that the options describe; a seed is given in lockstep."""
     from framerunner.commands.named_numbers import limits_of, response_of
     from framerunner.flying.plan import FlightPlan
-    from scenarios.loader import load_scenario
 
     if response is not None and seed is None:
         raise SettingError("--response: is for a simulated vehicle in lockstep; add --lockstep")
@@ -156,17 +178,8 @@ def _plan(
             f"--drone-limits: mission {mission.name} is of class open, so say what the drone can do, such as "
             "--drone-limits forward=2,left=1.5,up=1,yaw-rate=1.5"
         )
-    if fault and drone is not None:
-        raise SettingError("--fault: is for a simulated drone that is started; leave it out with --drone")
-    flown = with_faults(load_scenario(scenario), fault)
-    failing = next((each for each in flown.faults if each.part == "link"), None)
-    if failing is not None and seed is None and drone is None:
-        raise SettingError(
-            f"fault `{failing}`: vehicle time waits for the app at each packet, so none can be late or lost; "
-            "add --lockstep, or start framerunner sim and fly it with --drone"
-        )
     return FlightPlan(
-        flown,
+        scenario,
         mission,
         seed,
         drone_limits=None if drone_limits is None else limits_of(drone_limits),
