@@ -115,15 +115,14 @@ def fly(
     """
     api = _simulator_api(simulator, drone)
     camera = api.video_url if api is not None and camera is None else camera
-    _check(drone, camera, speed, instance, lockstep)
     check_range("--camera-delay", camera_delay, 0.0, 0.5)
-    _check_lockstep(seed, monitor, lockstep)
+    _check(drone, camera, speed, instance, lockstep)
+    seed = _checked_seed(seed, monitor, lockstep)
 
     from framerunner.flying.real_time import RealTimeSettings
     from framerunner.flying.run import FlightSettings, fly_once
 
     loaded = load_mission_with(mission, pilot)
-    seed = (seed or 0) if lockstep else None
     chosen = _scenario(scenario, sensors, fault, starts=drone is None, lockstep=lockstep)
     plan = _plan(chosen, loaded, seed, response=response, drone=drone, drone_limits=drone_limits)
     real_time = None if lockstep else RealTimeSettings(drone, camera, api, speed, instance, camera_delay)
@@ -218,14 +217,16 @@ def _check(drone: str | None, camera: str | None, speed: float, instance: int, l
     check_range("--instance", instance, 0, 9)
 
 
-def _check_lockstep(seed: int | None, monitor: bool, lockstep: bool) -> None:
+def _checked_seed(seed: int | None, monitor: bool, lockstep: bool) -> int | None:
+    """The seed of a flight in lockstep; None in real time."""
     if monitor and lockstep:
         raise SettingError("--monitor: shows flights in real time; leave it out with --lockstep")
     if seed is None:
-        return
+        return 0 if lockstep else None
     if not lockstep:
         raise SettingError(
             f"--seed {seed}: only a flight in lockstep repeats; add --lockstep or leave it out"
         )
     if not 0 <= seed < 2**63:
         raise SettingError(f"--seed {seed}: must be from 0 to {2**63 - 1}")
+    return seed

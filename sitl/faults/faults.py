@@ -171,6 +171,9 @@ class Faults:
             return True
         if self._suite.ideal:
             return part in IDEAL_PARTS
+        pose = self._suite.external_pose
+        if part is FaultPart.EXTERNAL_POSE and pose is not None and pose.source != "simulated":
+            return False  # its poses come over MAVLink
         field = _SENSORS.get(part)
         return field is None or getattr(self._suite, field) is not None
 

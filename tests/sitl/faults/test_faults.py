@@ -60,6 +60,11 @@ def test_a_part_that_the_drone_does_not_have_cannot_fail(fault, words):
     assert "\n" not in str(caught.value)
 
 
+def test_poses_that_come_over_mavlink_cannot_fail_here():
+    with pytest.raises(FaultError, match="the sensors external have no external_pose"):
+        simulation("external pose off at 1 s", sensors="external")
+
+
 def thrust_shares(simulated):
     """Speed of each motor over that of the fastest, after it was commanded to turn fast."""
     simulated.world.dynamics.command_motors((1000.0, 1000.0, 1000.0, 1000.0))
