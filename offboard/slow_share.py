@@ -3,8 +3,8 @@
 A velocity loop with a proportional and an integral part, such as PX4's, makes such a vehicle where there is
 drag: the proportional part balances drag at a share of the commanded velocity, and only the integral makes up
 the rest. After a leg the integral is still there, and pushes the vehicle on. With gains P and I and drag d,
-all by mass, the share is about P / (P + d), and the rest follows with a time constant of about (P + d) / I. For
-PX4's default gains (1.8 and 0.4) and a drag of 0.3 to 1 1/s the share is 0.86 to 0.64, the time 5 to 7 s.
+all by mass, the share is about P / (P + d), and the rest follows with a time constant of about (P + d) / I.
+For PX4's default gains (1.8 and 0.4) and a drag of 0.3 to 1 1/s the share is 0.86 to 0.64, the time 5 to 7 s.
 """
 
 from __future__ import annotations
