@@ -20,9 +20,11 @@ SLOW_S = 6.0  # time constant of the rest
 _MIN_SHARE = 0.5
 _SHARE_STEP = 0.05  # of shares that are told apart
 _MAX_SHARE = 0.9  # with more, nothing but one lag is needed
-_BETTER = 0.7  # share of the other models' error, or of the present pair's, that a pair must reach
+_BETTER_THAN_OTHERS = 0.9  # share of the other models' error that a pair must reach
+_WORSE_THAN_OTHERS = 1.2  # likewise, with which it is left
+_BETTER = 0.7  # share of the present pair's error that another one must reach
 _MEMORY_S = 40.0
-_MIN_ENERGY = 0.3  # sum of squared changes (m/s) that is evidence
+_MIN_ENERGY = 0.2  # sum of squared changes (m/s) that is evidence
 
 
 class SlowShare:
@@ -112,8 +114,8 @@ class SlowShare:
         best = divmod(int(errors.argmin()), errors.shape[1])
         least = float(errors[best])
         chosen = self.chosen
-        if chosen is None or errors[chosen] > others:
-            chosen = best if least < _BETTER * others else None
+        if chosen is None or errors[chosen] > _WORSE_THAN_OTHERS * others:
+            chosen = best if least < _BETTER_THAN_OTHERS * others else None
         elif least < _BETTER * errors[chosen]:
             chosen = best
         if chosen is not None and shares[chosen] > _MAX_SHARE:
