@@ -131,7 +131,7 @@ class ResponseEstimate:
         self._errors = np.zeros(shape)
         self._energies = np.zeros(len(_GROUPS))
         self._late_choices = 0  # in a row
-        self._before: tuple[object, ...] = (None, None, 1.0)  # what was chosen of the other models
+        self._others_before: tuple[object, ...] = (None, None, 1.0)  # what was chosen of the other models
         self._second = SecondLag(shape[:2], STEP_S, _WINDOW)
         self._slow = SlowShare(shape[:2], STEP_S, _WINDOW)
         self._kept = np.array([exp(-STEP_S / lag_s) for lag_s in LAGS_S])[:, None]
@@ -222,7 +222,7 @@ class ResponseEstimate:
 
     def _choose(self) -> None:
         """Take pairs, and axes, that explain what was measured clearly better than the present ones."""
-        before = (self._turning, self._before, *self._chosen)
+        before = (self._turning, self._others_before, *self._chosen)
         errors = self._errors.reshape(-1, len(_GROUPS))
         pairs: list[int] = errors.argmin(axis=0).tolist()
         least = [float(errors[pair, group]) for group, pair in enumerate(pairs)]
@@ -239,11 +239,11 @@ class ResponseEstimate:
                 continue
             if least[group] < _BETTER * present:
                 self._chosen[channel] = best[group]
-        self._before = (self._second.chosen, self._slow.chosen, self._slow.share)
+        self._others_before = (self._second.chosen, self._slow.chosen, self._slow.share)
         seems_late = self._seems_late(errors)
         self._late_choices = self._late_choices + 1 if seems_late else 0
         is_late = seems_late and (self.response.late or self._late_choices >= _SURE)
-        if is_late != self.response.late or (self._turning, self._before, *self._chosen) != before:
+        if is_late != self.response.late or (self._turning, self._others_before, *self._chosen) != before:
             self.response = self._as_response() if is_late else Response()
 
     def _seems_late(self, errors: Array) -> bool:
@@ -315,6 +315,7 @@ class ResponseEstimate:
         if self._slow.chosen is not None:
             level_dead, level_lag = self._slow.chosen
             rest = self._slow.rest_in(LAGS_S[level_lag])
+            # The sum above contains the slow part once, as if for a second.
             moved[:2] += (DEAD_STEPS[level_dead] * STEP_S - 1.0) * self._slow.rest_m_s
         elif second is not None:
             level_dead, level_lag = second

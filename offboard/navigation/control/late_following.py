@@ -19,9 +19,7 @@ from offboard.response import Prediction, Response
 BANDWIDTH_PER_S = 1.2  # of the control
 BANDWIDTH_OF_TWO_PER_S = 1.45  # likewise of a vehicle with two lags, at least
 MAX_BANDWIDTH_PER_S = 2.0
-BANDWIDTH_OF_SHARE_PER_S = (
-    1.8  # in plan, of a vehicle whose slow part is known: nothing else disturbs it much
-)
+BANDWIDTH_OF_SHARE_PER_S = 1.8  # in plan, of a vehicle whose slow part is known: less disturbs it
 MAX_CORRECTION_M_S = 0.6
 RATE_CHANGE_PER_S = 1.2  # of the path's time: at the speed of crossings, that of a gentle stop
 WAIT_FROM_M = 0.1  # farther from the path, its time goes slower
