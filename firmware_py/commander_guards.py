@@ -182,6 +182,11 @@ def sensors_lost(now: Situation) -> bool:
     return now.now_us - now.usable_us > _SENSORS_LOST_US
 
 
+def sensors_lost_on_ground(now: Situation) -> bool:
+    """The same, on the ground."""
+    return now.landed and sensors_lost(now)
+
+
 def tumbled(now: Situation) -> bool:
     """The attitude has failed for the time set."""
     return now.choices.tumbling_ends and now.now_us - now.upright_us > now.timeouts.tumble_us

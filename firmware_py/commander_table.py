@@ -182,7 +182,8 @@ BY_HAND = _at(State.MANUAL, State.STABILIZED, State.ACRO, State.ALTITUDE, State.
 _BLIND = _at(State.MANUAL, State.STABILIZED, State.ACRO, State.ALTITUDE)  # no position needed
 
 _HARD_FAILURES = (
-    _stop(_FLYING, when.sensors_lost, "Sensors lost: motors stopped", severity=CRITICAL),
+    _stop(_FLYING, when.sensors_lost_on_ground, "Sensors lost: motors stopped", severity=CRITICAL),
+    _tick(_FLYING, when.sensors_lost, State.TERMINATED, "Sensors lost: flight terminated", severity=CRITICAL),
     _tick(_FLYING, when.tumbled, State.TERMINATED, "Attitude failure: flight terminated", severity=CRITICAL),
     _stop(_ARMED, when.landed_after_flight, "Disarmed by landing"),
     _stop(_LANDING, when.landing_done, "Disarmed by landing"),

@@ -120,7 +120,7 @@ class InertialEstimator:
             self._measure_noise()
         self._advance_filter(imu.time_us)
         self._publish(imu)
-        return True
+        return _is_finite(self.state)
 
     def report(self) -> EstimatorReport:
         """The condition now."""
@@ -189,11 +189,15 @@ class InertialEstimator:
         latest.time_us = now_us
         if (field := sensors.magnetometer) is not None:
             latest.magnetometer = field
-            if watches.note(Sensor.MAGNETOMETER, field.field_frd_gauss, now_us):
+            if isfinite(sum(field.field_frd_gauss)) and watches.note(
+                Sensor.MAGNETOMETER, field.field_frd_gauss, now_us
+            ):
                 self._queue(field)
         if (pressure := sensors.barometer) is not None:
             latest.barometer = pressure
-            if watches.note(Sensor.BAROMETER, pressure.pressure_pa, now_us):
+            if isfinite(pressure.pressure_pa) and watches.note(
+                Sensor.BAROMETER, pressure.pressure_pa, now_us
+            ):
                 self._queue(pressure)
         if (fix := sensors.gps) is not None:
             latest.gps = fix
@@ -208,7 +212,9 @@ class InertialEstimator:
                 self._queue(distance)
         if (flow := sensors.optical_flow) is not None:
             latest.optical_flow = flow
-            if watches.note(Sensor.OPTICAL_FLOW, flow.gyro_rad, now_us):
+            if isfinite(sum(flow.flow_rad) + sum(flow.gyro_rad)) and watches.note(
+                Sensor.OPTICAL_FLOW, flow.gyro_rad, now_us
+            ):
                 self._queue(flow)
 
     def _queue(self, sample: Sample) -> None:
@@ -304,3 +310,12 @@ def _is_usable(imu: ImuSample, last_us: int) -> bool:
     p, q, r = imu.angular_rate_frd_rad_s
     x, y, z = imu.specific_force_frd_m_s2
     return imu.time_us > last_us and imu.period_us > 0 and isfinite(p + q + r + x + y + z)
+
+
+def _is_finite(state: VehicleState) -> bool:
+    """Whether every number of the estimate is finite; a sum is only if all its terms are."""
+    px, py, pz = state.position_ned_m
+    vx, vy, vz = state.velocity_ned_m_s
+    w, x, y, z = state.attitude
+    p, q, r = state.angular_rate_frd_rad_s
+    return isfinite(px + py + pz + vx + vy + vz + w + x + y + z + p + q + r)

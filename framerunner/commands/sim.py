@@ -11,12 +11,11 @@ from typing import TYPE_CHECKING, Annotated
 from cyclopts import Parameter
 
 from errors import SettingError
-from framerunner.commands import Sensors, WholeNumber, check_range, say, with_sensors
+from framerunner.commands import Faults, Sensors, WholeNumber, check_range, say, with_faults, with_sensors
 from framerunner.extras import install_advice, is_installed
 
 if TYPE_CHECKING:
     from framerunner.child_process import MonitorProcess
-    from scenarios.models import Scenario
     from sitl.server import SimulatorServer
     from sitl.server_settings import ServerSettings
     from sitl.simulation import Simulation
@@ -91,6 +90,7 @@ def sim(
         WholeNumber, Parameter(help="how many drones fly side by side; they have the next instances' ports")
     ] = 1,
     seed: Annotated[WholeNumber, Parameter(help="of everything random, such as turbulence")] = 0,
+    fault: Faults = (),
     connections: Connections | None = None,
     onboard: Onboard | None = None,
     monitor: Annotated[
@@ -132,10 +132,9 @@ def sim(
         chosen = replace(chosen, link=(*chosen.link, watcher.link))
     settings = _settings(chosen, onboard, speed, instance, count)
 
-    from scenarios.loader import load_scenario
     from sitl.server import SimulatorServer
 
-    simulations = _simulations(with_sensors(load_scenario(scenario), onboard.sensors), count, seed)
+    simulations = _simulations(scenario, onboard.sensors, fault, count=count, seed=seed)
     server = SimulatorServer(simulations, settings, notice=say, grants=_grants(time_grants))
     asyncio.run(_run(server, watcher, lifeline=lifeline))
     return 0
@@ -195,12 +194,16 @@ def _settings(
     return settings
 
 
-def _simulations(scenario: Scenario, count: int, seed: int) -> list[Simulation]:
+def _simulations(
+    name: str, sensors: str | None, fault: tuple[str, ...], *, count: int, seed: int
+) -> list[Simulation]:
     from firmware_py.airframe import load_airframe
+    from scenarios.loader import load_scenario
     from sitl.fleet import side_by_side
     from sitl.simulation import Simulation
 
     check_range("--seed", seed, 0, 2**63 - 1)
+    scenario = with_faults(with_sensors(load_scenario(name), sensors), fault)
     if count == 1:
         return [Simulation(scenario, seed=seed)]
     airframe = load_airframe(scenario.airframe)

@@ -339,11 +339,10 @@ def test_in_the_air_only_force_or_a_hard_failure_stops_the_motors(state):
         row = first_match(RULES[state, event], now)
         if row is None or row.target is not State.DISARMED:
             continue
-        hopeless = event is Event.TICK and when.sensors_lost(now)
         chosen = row.cause is not None and now.choices.reaction(row.cause) is Reaction.DISARM
         terminated = state is State.TERMINATED and event is Event.DISARM
         # "never flown" in the air cannot be: the commander sets `flown` with `landed` false.
-        assert event is Event.FORCE_DISARM or hopeless or chosen or terminated or not now.flown
+        assert event is Event.FORCE_DISARM or chosen or terminated or not now.flown
 
 
 @pytest.mark.parametrize("state", sorted(ARMED - {State.TERMINATED}, key=lambda state: state.value))
@@ -352,7 +351,7 @@ def test_failsafes_come_first(state):
         row = first_match(RULES[state, Event.TICK], now)
         if when.sensors_lost(now):
             assert row is not None
-            assert row.target is State.DISARMED
+            assert row.target is (State.DISARMED if now.landed else State.TERMINATED)
         elif when.tumbled(now):
             assert row is not None
             assert row.target is State.TERMINATED
@@ -371,7 +370,13 @@ def test_offboard_is_entered_only_with_setpoints(state):
 @pytest.mark.parametrize(
     ("state", "change", "target", "text"),
     [
-        (State.HOLD, {"usable_us": NOW - 300_001}, State.DISARMED, "Sensors lost: motors stopped"),
+        (State.HOLD, {"usable_us": NOW - 300_001}, State.TERMINATED, "Sensors lost: flight terminated"),
+        (
+            State.HOLD,
+            {"usable_us": NOW - 300_001, "landed": True},
+            State.DISARMED,
+            "Sensors lost: motors stopped",
+        ),
         (State.HOLD, {"usable_us": NOW - 300_000}, None, ""),
         (
             State.LAND,
