@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from math import isfinite
 
 from firmware_py.airframe import Airframe
 from firmware_py.parameters import Parameters
@@ -74,7 +75,9 @@ class BatteryMonitor:
         return self.state.remaining >= self._min_charge_to_arm
 
     def update(self, time_us: int, voltage_v: float, current_a: float) -> None:
-        """Take a measurement of the terminal voltage and the current."""
+        """Take a measurement of the terminal voltage and the current; one that is not finite is ignored."""
+        if not isfinite(voltage_v + current_a):
+            return
         state, settings = self.state, self._settings
         period_s = (time_us - self._time_us) / 1e6 if self._started else 0.0
         self._started, self._time_us = True, time_us

@@ -6,6 +6,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 from enum import Enum
 
+from firmware_py.estimation.report import NO_FIX
 from firmware_py.status import FlightMode
 
 NEVER_US = -(10**15)
@@ -117,6 +118,7 @@ class Situation:
         battery_arms: the charge is enough to arm.
         battery_at_arming: the warning at arming; only a worse one counts.
         fence_breached: outside the geofence.
+        problem: why the estimator's condition prevents arming, in words; empty: it does not.
         has_mission: there is a mission that can be flown.
         entered_us: when the present state was entered.
         armed_us: when the vehicle was armed.
@@ -145,6 +147,7 @@ class Situation:
     battery_arms: bool = True
     battery_at_arming: int = 1
     fence_breached: bool = False
+    problem: str = ""
     has_mission: bool = False
     entered_us: int = 0
     armed_us: int = 0
@@ -164,6 +167,11 @@ def unsettled(now: Situation) -> bool:
     return now.now_us - now.unusable_us < _SETTLE_US
 
 
+def estimator_fails(now: Situation) -> bool:
+    """A sensor fails, or the estimator does not know what a flight in the intended mode needs."""
+    return now.problem != "" and (now.problem != NO_FIX or now.intended not in POSITIONLESS)
+
+
 def tipped_over(now: Situation) -> bool:
     """The attitude is beyond the limits of the failure detector."""
     return now.upright_us < now.now_us
@@ -172,6 +180,11 @@ def tipped_over(now: Situation) -> bool:
 def sensors_lost(now: Situation) -> bool:
     """No usable sample for too long."""
     return now.now_us - now.usable_us > _SENSORS_LOST_US
+
+
+def sensors_lost_on_ground(now: Situation) -> bool:
+    """The same, on the ground."""
+    return now.landed and sensors_lost(now)
 
 
 def tumbled(now: Situation) -> bool:

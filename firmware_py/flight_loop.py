@@ -6,7 +6,7 @@ It reads no clock: its time is that of the sensors' samples.
 from __future__ import annotations
 
 from collections import deque
-from math import cos, isnan, nan, radians
+from math import cos, isfinite, isnan, nan, radians
 from typing import TYPE_CHECKING
 
 from firmware_py.airframe import Airframe
@@ -28,6 +28,7 @@ from firmware_py.offboard_requests import SetpointQueue
 from firmware_py.parameters import Parameters
 from firmware_py.status import CommandResult, LandedState, VehicleStatus
 from firmware_py.types import (
+    CRITICAL,
     INFO,
     WARNING,
     FlightRecord,
@@ -108,6 +109,7 @@ class FlightLoop:
         self.parameters = parameters if parameters is not None else Parameters(defaults=airframe.parameters)
         self.estimator: StateEstimator = IdealEstimator(origin) if estimator is None else estimator
         self.state = self.estimator.state
+        self._senses = not self.estimator.report().ideal
         self.status = VehicleStatus()
         self.output = MotorOutput((0.0,) * len(airframe.rotors))
         self.flight = FlightRecord()
@@ -127,7 +129,7 @@ class FlightLoop:
         self._now_us = 0  # advances also while samples are unusable
         self._checks = NOT_CHECKED
         self._checks_due_us = self._ready_due_us = 0
-        self._motors_stopped = True
+        self._motors_stopped = self._output_finite = True
         self._state_entered = State.DISARMED
         self._state_shown: State | None = None
         self._airborne = LandedState.IN_AIR
@@ -158,7 +160,7 @@ class FlightLoop:
         if self.parameters.version != self._parameters_version:
             self._configure()
         usable = self.estimator.update(sensors)
-        seen = self._observe(sensors, usable)
+        seen = self._observe(sensors, usable and self._output_finite)
         commander = self._commander
         row = commander.tick(seen)
         if row is not None:
@@ -167,8 +169,11 @@ class FlightLoop:
             self._advance_mission()
         self._refresh_status()
         if usable and not self._motors_stopped:
-            command = self._guidance.step(self.state)
-            self.output = self._actuate(command, seen.landed)
+            output = self._actuate(self._guidance.step(self.state), seen.landed)
+            # One that is not finite never reaches a motor; it counts as a tick without a usable sample.
+            self._output_finite = isfinite(sum(output.speeds_rad_s))
+            if self._output_finite:
+                self.output = output
         return self.output.speeds_rad_s
 
     def _handle(
@@ -220,6 +225,7 @@ class FlightLoop:
                 lifting=self._lift_off.ticks > 0,
                 command_down_m_s=self._guidance.command_down_m_s,
                 throttle=self.output.throttle,
+                has_position=self.estimator.has_position,
             )
             if landed is not before:
                 self._change_ground_contact(landed)
@@ -261,6 +267,8 @@ class FlightLoop:
             self.say(row.severity, row.text)
         if row.target is None:
             return
+        if row.severity == CRITICAL:
+            self.flight.failsafes += ((self._now_us, row.text),)
         before, self._state_entered = self._state_entered, row.target
         if before is State.DISARMED:
             self._leave_disarmed()
@@ -268,6 +276,7 @@ class FlightLoop:
         self.estimator.stands = row.target is State.DISARMED
         if self._motors_stopped:
             self.output = MotorOutput((0.0,) * len(self.airframe.rotors))
+            self._output_finite = True
             self._lift_off.rest()
         self._navigator.observe(self.state, self._geo, landed=self._land_detector.landed)
         if row.target is State.OFFBOARD:
@@ -282,6 +291,7 @@ class FlightLoop:
         self._lift_off.arm(self._now_us)
         self.flight.armed_us = self._now_us
         self.flight.takeoff_us = self.flight.landed_us = 0
+        self.flight.failsafes = ()
         self.flight.number += 1
 
     def _enter(self, target: State, before: State, event: Event) -> None:
@@ -364,6 +374,7 @@ class FlightLoop:
             battery.can_arm,
             self.missions.valid,
             breach is not None,
+            "" if self.status.armed or not self._senses else self.estimator.report().problem,
         )
 
     def _configure(self) -> None:

@@ -77,7 +77,14 @@ class LandDetector:
         self.turning_rad_s = radians(value("LNDMC_ROT_MAX"))
 
     def update(
-        self, state: VehicleState, *, armed: bool, lifting: bool, command_down_m_s: float, throttle: float
+        self,
+        state: VehicleState,
+        *,
+        armed: bool,
+        lifting: bool,
+        command_down_m_s: float,
+        throttle: float,
+        has_position: bool = True,
     ) -> bool:
         """Take one tick; return whether the vehicle is on the ground.
 
@@ -87,13 +94,14 @@ class LandDetector:
             lifting: a lift-off has begun.
             command_down_m_s: commanded vertical velocity, positive down.
             throttle: mean of (rotor speed / maximum)^2, 0..1.
+            has_position: the horizontal velocity is known; without a position it drifts, also on the ground.
         """
         if self.landed:
             self._watch_for_air(state, lifting)
         elif armed and command_down_m_s <= _DESCENT_COMMAND_M_S:
             self._last_not_ground_us = state.time_us
         else:
-            self._watch_for_ground(state, armed, command_down_m_s, throttle)
+            self._watch_for_ground(state, armed, command_down_m_s, throttle, has_position)
         return self.landed
 
     def _watch_for_air(self, state: VehicleState, lifting: bool) -> None:
@@ -112,13 +120,18 @@ class LandDetector:
             self._last_not_ground_us = state.time_us
 
     def _watch_for_ground(
-        self, state: VehicleState, armed: bool, command_down_m_s: float, throttle: float
+        self,
+        state: VehicleState,
+        armed: bool,
+        command_down_m_s: float,
+        throttle: float,
+        has_position: bool,
     ) -> None:
         north_m_s, east_m_s, down_m_s = state.velocity_ned_m_s
         roll_rad_s, pitch_rad_s, _ = state.angular_rate_frd_rad_s
         is_ground = (
             abs(down_m_s) < self.vertical_m_s
-            and hypot(north_m_s, east_m_s) < self.level_m_s
+            and (hypot(north_m_s, east_m_s) < self.level_m_s or not has_position)
             and hypot(roll_rad_s, pitch_rad_s) < self.turning_rad_s
             and (
                 not armed

@@ -110,12 +110,14 @@ class FlightRecord:
         takeoff_us: of take-off.
         landed_us: of landing.
         number: counts armings from 1; 0 before the first.
+        failsafes: status texts of the failsafes that changed the state, each with its time; oldest first.
     """
 
     armed_us: int = 0
     takeoff_us: int = 0
     landed_us: int = 0
     number: int = 0
+    failsafes: tuple[tuple[int, str], ...] = ()
 
 
 @dataclass(frozen=True, slots=True)

@@ -14,6 +14,7 @@ from errors import UserError
 from geometry.solids import Solid
 from geometry.vectors import Quaternion, Vec3
 from scenarios.air import Wind
+from scenarios.faults.declaration import Fault
 from scenarios.part import Part, refusal
 
 Colour = Literal["red", "green", "blue"]
@@ -23,7 +24,7 @@ MissionClass = Literal["contest", "open"]
 DecoyColour = Literal["cyan", "magenta"]
 DECOY_COLOURS: tuple[DecoyColour, ...] = ("cyan", "magenta")
 
-_OFTEN_UNUSED = ("decoys", "poles", "walls", "sensors", "wind")
+_OFTEN_UNUSED = ("decoys", "poles", "walls", "sensors", "wind", "faults")
 _SHORTEST_M = 0.001  # of a part of a wall; a doorway may end where the wall does
 START_CLEAR_M = 0.3  # from the start's centre to a pole or wall: more than half of any airframe
 
@@ -259,6 +260,7 @@ class Scenario(Part):
     origin: Origin = Field(Origin(), description="where on Earth the arena is")
     sensors: str = Field("ideal", description="name of the drone's sensor suite, or a file of one")
     wind: Wind = Field(Wind(), description="how the air moves; by default it is still")
+    faults: tuple[Fault, ...] = Field((), max_length=20, description="what fails, and when")
 
     @model_validator(mode="after")
     def _one_frame_a_colour(self) -> Self:

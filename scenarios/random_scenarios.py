@@ -13,6 +13,7 @@ from typing import Self
 from pydantic import Field, model_validator
 
 from scenarios.air import Wind
+from scenarios.faults.random import RandomFault
 from scenarios.models import COLOURS, Arena, Base, Frame, Scenario, Start
 from scenarios.part import Part
 from scenarios.random_air import RandomWind
@@ -66,6 +67,7 @@ class Level(Part):
     )
     obstacles: Obstacles | None = Field(None, description="what else is in the arena")
     wind: RandomWind | None = Field(None, description="how the air moves; by default it is still")
+    faults: RandomFault | None = Field(None, description="what fails; by default nothing")
     airframe: str | None = Field(None, description="name of the drone to fly; by default the challenge's")
     sensors: str | None = Field(None, description="name of the drone's sensor suite, or a file of one")
 
@@ -114,6 +116,7 @@ def random_scenario(level: Level, seed: int) -> Scenario:
         start=Start(x_m=base.x_m, y_m=base.y_m, yaw_rad=yaw_rad),
         frames=frames,
         wind=Wind() if level.wind is None else level.wind.draw(seed),
+        faults=() if level.faults is None else (level.faults.draw(seed),),
         **{name: value for name in ("airframe", "sensors") if (value := getattr(level, name)) is not None},
     )
     return scenario if level.obstacles is None else add_obstacles(scenario, level.obstacles, seed)

@@ -149,6 +149,28 @@ class Timing(_Record):
     words: Text = Field("", description="one sentence if the machine did not keep up")
 
 
+class BegunFault(_Record):
+    """A fault that has begun in a try."""
+
+    fault: Text  # in one line, with its time since arming
+    began_us: int  # vehicle time
+    ended_us: int | None = None  # None: it is active
+
+
+class FailsafeText(_Record):
+    """A failsafe of the autopilot that changed what it flies."""
+
+    time_us: int  # vehicle time
+    text: Text  # its status text
+
+
+class FaultFacts(_Record):
+    """The faults of a try, and the autopilot's failsafes; oldest first."""
+
+    begun: tuple[BegunFault, ...] = Field((), max_length=1000)
+    failsafes: tuple[FailsafeText, ...] = Field((), max_length=1000)
+
+
 class _Flown(_Record):
     """What was flown; the first fields of a result."""
 
@@ -185,6 +207,18 @@ class FlightResult(RefereeReport, _Flown):
     judged_by: Text = Field("", description="source of the referee's states: truth or telemetry")
     response: Text = Field(
         "", description="how late the simulated vehicle answered, as by --response; empty: not late"
+    )
+    faults: tuple[Text, ...] = Field(
+        (), max_length=1000, description="faults that began, each as in --fault; its time counts from arming"
+    )
+    fault_reaction: Text = Field(
+        "", description="the first failsafe after the first fault, and how long after it; empty: none"
+    )
+    fault_expected: Text = Field(
+        "", description="how docs/faults.md says that such a flight ends; empty: it has no row for it"
+    )
+    fault_outcome: Literal["as expected", "not as expected", ""] = Field(
+        "", description="whether it ended so; empty: nothing was expected"
     )
     state_sha256: str = Field(
         "", max_length=64, description="over the true state of every control tick of a lockstep flight"
@@ -240,6 +274,7 @@ class Standing(_Record):
     local_frame: LocalFrame | None = None  # None while it is unknown
     snapshot: RefereeSnapshot
     report: RefereeReport  # what the try would be worth if it ended now
+    faults: FaultFacts = FaultFacts()
 
     @property
     def ended(self) -> bool:
@@ -281,7 +316,14 @@ def _is_formula(text: str) -> bool:
     return False
 
 
-_OPTIONAL = ("state_sha256", "lift_m", "timing", "wall_time_s", "real_time_factor", "started")
+_OPTIONAL = (
+    "state_sha256",
+    "lift_m",
+    "timing",
+    "wall_time_s",
+    "real_time_factor",
+    "started",
+)
 
 
 class _SchemaWithoutTitles(GenerateJsonSchema):

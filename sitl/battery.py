@@ -25,9 +25,10 @@ class Battery:
         voltage_v: at its terminals.
         current_a: drawn now.
         charge: share of the full charge, 0..1.
+        sag: share of the voltage that is lost by a fault, 0..1.
     """
 
-    __slots__ = ("_airframe", "_parameters", "_values", "_version", "charge", "current_a", "voltage_v")
+    __slots__ = ("_airframe", "_parameters", "_values", "_version", "charge", "current_a", "sag", "voltage_v")
 
     def __init__(self, airframe: Airframe, parameters: Parameters) -> None:
         self._airframe = airframe
@@ -35,7 +36,7 @@ class Battery:
         self._version = -1
         self._values = (0.0, 0.0, 0.0, 0.0)
         self.charge = 1.0
-        self.current_a = 0.0
+        self.current_a = self.sag = 0.0
         self.voltage_v = 0.0
         self.step(0.0, (), armed=False)
 
@@ -48,7 +49,7 @@ class Battery:
         rest_v = battery.cells * (empty_v + self.charge * (charged_v - empty_v))
         power_w = motor.torque_nm_s2 * sum([abs(speed) ** 3 for speed in motor_speeds_rad_s])
         self.current_a = battery.electronics_a + power_w / (battery.efficiency * rest_v)
-        self.voltage_v = rest_v - battery.resistance_ohm * self.current_a
+        self.voltage_v = (rest_v - battery.resistance_ohm * self.current_a) * (1.0 - self.sag)
         if drain_s > 0.0:
             used = period_s / drain_s if armed else 0.0
         else:

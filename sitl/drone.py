@@ -27,6 +27,7 @@ from wire.transports.urls import is_loopback
 
 if TYPE_CHECKING:
     from sitl.camera import CameraFeed
+    from sitl.faults.images import FaultyFeed
     from sitl.rtp import RtpSender
     from sitl.video import VideoServer
 
@@ -78,12 +79,13 @@ class ServedDrone:
                 log_text=self._recorder.hear_text,
                 camera=model if settings.camera else None,
                 captures=self._album,
-                failures=simulation.failures,
+                failures=simulation.faults,
+                truth=simulation.true_state,
             ),
         )
-        self._notice = notice
-        self._hub = LinkHub(self.node, self._warn)
-        self._camera: CameraFeed | None = None
+        self._notice = simulation.faults.notice = notice
+        self._hub = LinkHub(self.node, self._warn, lambda: simulation.faults.link)
+        self._camera: CameraFeed | FaultyFeed | None = None
         self._video: VideoServer | None = None
         self._rtp: RtpSender | None = None
         self._image_us = -1
@@ -113,10 +115,10 @@ class ServedDrone:
         """
         for module in ("sitl.camera", "aiohttp.web", "sitl.video"):
             await asyncio.to_thread(import_module, module)
-        from sitl.camera import CameraFeed
+        from sitl.faults.images import new_feed
         from sitl.video import VideoServer
 
-        scenario = self.simulation.scenario
+        simulation, scenario = self.simulation, self.simulation.scenario
         video = VideoServer(
             self._settings.bind, self._settings.http_port, options="--instance (sim also: --video-port)"
         )
@@ -130,7 +132,7 @@ class ServedDrone:
             video.add_text("/video.sdp", "application/sdp", self._rtp.description())
         self._video = video
         await video.start()
-        self._camera = CameraFeed(scenario, others)
+        self._camera = new_feed(scenario, simulation.faults, simulation.seed, others)
 
     def _warn(self, line: str) -> None:
         """Show a line at the terminal and at ground stations."""
@@ -210,6 +212,7 @@ class ServedDrone:
             local_frame=None if origin_arena_m is None else LocalFrame(origin_arena_m=origin_arena_m),
             snapshot=referee.snapshot(),
             report=referee.report(query.get("state", ""), query.get("ended")),
+            faults=simulation.fault_facts(),
         )
         return standing.model_dump(mode="json")
 

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import tempfile
 from collections.abc import Callable
-from math import degrees, pi
+from math import degrees, pi, sqrt
 from pathlib import Path
 
 import jsbsim
@@ -146,6 +146,12 @@ class Dynamics:
         if not stuck:
             self._motors[index](0.0)
         self._commands[index] = _ignore
+
+    def weaken_motor(self, index: int, lost: float) -> None:
+        """Make a motor lose a share of its thrust, 0..1; it turns slower than commanded."""
+        motor, share = self._motors[index], sqrt(1.0 - lost)
+        self._commands[index] = lambda speed_rad_s: motor(share * speed_rad_s)
+        self._commanded = ()
 
     def repair_motor(self, index: int) -> None:
         """Make a motor follow its commands again."""

@@ -4,10 +4,12 @@ from __future__ import annotations
 
 import time
 from collections import deque
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from dataclasses import replace
 
 from firmware_py.mavlink.node import MavlinkNode
+from firmware_py.mavlink.telemetry.streams import ONBOARD
+from sitl.faults.link import LinkFault, Way
 from sitl.links import (
     Joined,
     Receive,
@@ -37,11 +39,18 @@ class LinkHub:
     Args:
         node: has no links yet.
         notice: called with lines for people.
+        fault: called for the active fault of the link to the app, if it has one.
     """
 
-    def __init__(self, node: MavlinkNode, notice: Callable[[str], None] = lambda line: None) -> None:
+    def __init__(
+        self,
+        node: MavlinkNode,
+        notice: Callable[[str], None] = lambda line: None,
+        fault: Callable[[], LinkFault | None] = lambda: None,
+    ) -> None:
         self._node = node
         self._input = LinkInput(node, notice)
+        self._faulty = _FaultyLink(fault)
         self._carriers: dict[str, UdpLink | StreamLink] = {}
         self._opened: list[UdpLink | StreamLinks] = []
         self._joined = 0
@@ -79,13 +88,23 @@ class LinkHub:
 
     def update(self, time_us: int) -> None:
         """Process waiting input, then send what is due at a vehicle time."""
+        faulty = self._faulty
+        if faulty.update(time_us):
+            for data in faulty.arrived_up():
+                self._input.take(ONBOARD.name, data)
+            for data in faulty.arrived_down():
+                self._carriers[ONBOARD.name].send(data)
         self._input.work()
         self._node.update(time_us)
         self._flush()
 
     def _flush(self) -> None:
+        faulty = self._faulty
         for name, data in self._node.take_output():
-            self._carriers[name].send(data)
+            if faulty.active and name == ONBOARD.name:
+                faulty.send_down(data)
+            else:
+                self._carriers[name].send(data)
 
     def close(self) -> None:
         """Close all links."""
@@ -105,6 +124,9 @@ class LinkHub:
 
     def _receiver(self, name: str) -> Receive:
         def receive(data: bytes) -> None:
+            if self._faulty.active and name == ONBOARD.name:
+                self._faulty.send_up(data)
+                return
             self._input.take(name, data)
             self._flush()  # answers do not wait for the next tick
 
@@ -125,6 +147,54 @@ class LinkHub:
             if known is carrier:
                 self._node.remove_link(name)
                 del self._carriers[name]
+
+
+class _FaultyLink:
+    """Datagrams to and from the app while that link has a fault.
+
+    Args:
+        fault: called for the active one.
+    """
+
+    def __init__(self, fault: Callable[[], LinkFault | None]) -> None:
+        self._fault = fault
+        self._now_us = 0
+        self._known: LinkFault | None = None
+        self._up: Way[bytes] | None = None
+        self._down: Way[bytes] | None = None
+
+    @property
+    def active(self) -> bool:
+        """Whether the link has a fault, as of the last update."""
+        return self._known is not None
+
+    def update(self, now_us: int) -> bool:
+        """Look for the fault at a vehicle time; return whether there is one."""
+        self._now_us = now_us
+        fault = self._fault()
+        if fault is not self._known:
+            self._known = fault
+            self._up = None if fault is None else fault.new_way()
+            self._down = None if fault is None else fault.new_way()
+        return fault is not None
+
+    def send_up(self, data: bytes) -> None:
+        """Take a datagram from the app."""
+        if self._up is not None:
+            self._up.send(self._now_us, data)
+
+    def send_down(self, data: bytes) -> None:
+        """Take a datagram to the app."""
+        if self._down is not None:
+            self._down.send(self._now_us, data)
+
+    def arrived_up(self) -> Iterable[bytes]:
+        """Datagrams that have reached the vehicle now."""
+        return () if self._up is None else self._up.all(self._now_us)
+
+    def arrived_down(self) -> Iterable[bytes]:
+        """Datagrams that reach the app now."""
+        return () if self._down is None else self._down.all(self._now_us)
 
 
 class LinkInput:

@@ -7,7 +7,7 @@ Real sensors are noisy, so a value that is the same to the last bit again and ag
 from __future__ import annotations
 
 from firmware_py.estimation.aiding.aid import NEVER_US
-from firmware_py.estimation.report import IMU, Sensor
+from firmware_py.estimation.report import IMU, Sensor, silent, stuck
 from firmware_py.estimation.settings import EstimatorSettings
 from firmware_py.measurements import ImuSample
 
@@ -73,7 +73,8 @@ class SensorWatches:
 
     def __init__(self, watches: dict[Sensor, SensorWatch]) -> None:
         self._watches = watches
-        self._imu = SensorWatch(_IMU_TIMEOUT_US, _IMU_TIMEOUT_US)
+        self._gyroscope = SensorWatch(_IMU_TIMEOUT_US, _IMU_TIMEOUT_US)
+        self._accelerometer = SensorWatch(_IMU_TIMEOUT_US, _IMU_TIMEOUT_US)
         self.present = IMU | frozenset(watches)
 
     def note(self, sensor: Sensor, value: object, now_us: int) -> bool:
@@ -82,22 +83,26 @@ class SensorWatches:
         return watch is not None and watch.note(value, now_us)
 
     def note_imu(self, imu: ImuSample) -> bool:
-        """Note a sample of the IMU."""
-        return self._imu.note((imu.angular_rate_frd_rad_s, imu.specific_force_frd_m_s2), imu.time_us)
+        """Note a sample of the IMU; return whether it may be used: neither part of it has hung."""
+        turns = self._gyroscope.note(imu.angular_rate_frd_rad_s, imu.time_us)
+        return self._accelerometer.note(imu.specific_force_frd_m_s2, imu.time_us) and turns
 
     def healthy(self, now_us: int) -> frozenset[Sensor]:
         """Sensors that deliver."""
         slow = frozenset(sensor for sensor, watch in self._watches.items() if watch.delivers(now_us))
-        return slow | IMU if self._imu.delivers(now_us) else slow
+        if self._gyroscope.delivers(now_us):
+            slow |= {Sensor.GYROSCOPE}
+        return slow | {Sensor.ACCELEROMETER} if self._accelerometer.delivers(now_us) else slow
 
     def problem(self, now_us: int) -> str:
         """What is wrong, in words; empty: nothing."""
-        named = [("IMU", self._imu), *((sensor.value, watch) for sensor, watch in self._watches.items())]
+        imu = [(Sensor.GYROSCOPE, self._gyroscope), (Sensor.ACCELEROMETER, self._accelerometer)]
+        named = [(sensor.value, watch) for sensor, watch in (*imu, *self._watches.items())]
         for name, watch in named:
             if watch.is_stuck(now_us):
-                return f"{name} is stuck"
+                return stuck(name)
             if not watch.delivers(now_us):
-                return f"{name} delivers nothing"
+                return silent(name)
         return ""
 
 

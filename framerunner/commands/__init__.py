@@ -13,6 +13,7 @@ from errors import SettingError
 
 if TYPE_CHECKING:
     from offboard.mission import Mission
+    from scenarios.models import Scenario
 
 
 def _whole(_type: Any, tokens: Sequence[Token]) -> int:  # noqa: ANN401 - the library's signature
@@ -25,7 +26,24 @@ def _whole(_type: Any, tokens: Sequence[Token]) -> int:  # noqa: ANN401 - the li
 
 
 DEFAULT_MISSION = "explorer"
+MAX_FAULTS = 20  # as many as a scenario file may have
 WholeNumber = Annotated[int, Parameter(converter=_whole)]
+
+
+Sensors = Annotated[
+    str | None,
+    Parameter(help="the drone's sensor suite instead of the scenario's: ideal, mocap, outdoor, …, or a file"),
+]
+
+
+def with_sensors(scenario: Scenario, sensors: str | None) -> Scenario:
+    """A scenario with another sensor suite, which must exist; None: its own."""
+    if sensors is None:
+        return scenario
+    from sitl.sensors.suite import load_suite
+
+    load_suite(sensors)
+    return scenario.model_copy(update={"sensors": sensors})
 
 
 def check_range(option: str, value: float | None, low: float, high: float) -> None:
@@ -33,6 +51,30 @@ def check_range(option: str, value: float | None, low: float, high: float) -> No
     if value is not None and not low <= value <= high:
         given, lowest, highest = (f"{n:g}" if isinstance(n, float) else n for n in (value, low, high))
         raise SettingError(f"{option} {given}: must be from {lowest} to {highest}")
+
+
+Faults = Annotated[
+    tuple[str, ...],
+    Parameter(
+        negative="",
+        help="what fails, such as `gps off at 12 s for 5 s`, in seconds after arming; may be repeated",
+    ),
+]
+"""Faults in one line each; see `scenarios.faults.parse`."""
+
+
+def with_faults(scenario: Scenario, fault: tuple[str, ...]) -> Scenario:
+    """A scenario with more faults.
+
+    Raises:
+        FaultError: one cannot be understood, or there are too many.
+    """
+    from scenarios.faults.parse import FaultError, parse_fault
+
+    faults = (*scenario.faults, *map(parse_fault, fault))
+    if len(faults) > MAX_FAULTS:
+        raise FaultError(f"--fault: a scenario has at most {MAX_FAULTS} faults, not {len(faults)}")
+    return scenario.model_copy(update={"faults": faults}) if fault else scenario
 
 
 def load_mission_with(mission: str | Path, pilot: Path | None) -> Mission:

@@ -9,11 +9,21 @@ from typing import TYPE_CHECKING, Annotated
 from cyclopts import Parameter
 
 from errors import SettingError
-from framerunner.commands import DEFAULT_MISSION, WholeNumber, check_range, load_mission_with
+from framerunner.commands import (
+    DEFAULT_MISSION,
+    Faults,
+    Sensors,
+    WholeNumber,
+    check_range,
+    load_mission_with,
+    with_faults,
+    with_sensors,
+)
 
 if TYPE_CHECKING:
     from framerunner.flying.plan import FlightPlan
     from offboard.mission import Mission
+    from scenarios.models import Scenario
     from wire.simulator_api import SimulatorApi
 
 _Drone = Annotated[
@@ -70,6 +80,8 @@ def fly(
     instance: Annotated[WholeNumber, Parameter(help="of the simulated drone: shifts its ports, 0 to 9")] = 0,
     lockstep: _Lockstep = False,
     seed: _Seed = None,
+    sensors: Sensors = None,
+    fault: Faults = (),
     record: _Record = False,
     video: _Video = False,
     monitor: _Monitor = False,
@@ -80,9 +92,8 @@ def fly(
 ) -> int:
     """Fly a mission, show it live, and write result, track, log and video to `runs/<time>-<scenario>/`.
 
-    In lockstep there is no log, and a video only with --video.
-
-    Exit code 0: completed, 1: flown but not completed, 2: bad input.
+    In lockstep there is no log, and a video only with --video. Exit code 0: completed, 1: flown but not
+    completed, 2: bad input.
 
     **Examples**
 
@@ -92,7 +103,7 @@ def fly(
 
         framerunner fly my_scenario.yaml --mission frame_challenge --speed 2
 
-        framerunner fly test-case-1 --lockstep --record
+        framerunner fly test-case-1 --lockstep --record --sensors mocap
 
         framerunner fly test-case-1 --lockstep --response lag=0.6,dead-time=0.15
 
@@ -103,24 +114,43 @@ def fly(
         framerunner fly --drone serial:///dev/ttyUSB0:57600 --camera rtsp://10.0.0.2/1
     """
     api = _simulator_api(simulator, drone)
-    if api is not None and camera is None:
-        camera = api.video_url
-    _check(drone, camera, speed, instance, lockstep)
+    camera = api.video_url if api is not None and camera is None else camera
     check_range("--camera-delay", camera_delay, 0.0, 0.5)
-    _check_lockstep(seed, monitor, lockstep)
+    _check(drone, camera, speed, instance, lockstep)
+    seed = _checked_seed(seed, monitor, lockstep)
 
     from framerunner.flying.real_time import RealTimeSettings
     from framerunner.flying.run import FlightSettings, fly_once
 
     loaded = load_mission_with(mission, pilot)
-    seed = (seed or 0) if lockstep else None
-    plan = _plan(scenario, loaded, seed, response=response, drone=drone, drone_limits=drone_limits)
+    chosen = _scenario(scenario, sensors, fault, starts=drone is None, lockstep=lockstep)
+    plan = _plan(chosen, loaded, seed, response=response, drone=drone, drone_limits=drone_limits)
     real_time = None if lockstep else RealTimeSettings(drone, camera, api, speed, instance, camera_delay)
     return asyncio.run(fly_once(FlightSettings(plan, real_time, out, record, video, monitor)))
 
 
+def _scenario(
+    name: str, sensors: str | None, fault: tuple[str, ...], *, starts: bool, lockstep: bool
+) -> Scenario:
+    """The scenario that the options describe; `starts`: a simulated drone is started."""
+    from scenarios.loader import load_scenario
+
+    if sensors is not None and not starts:
+        raise SettingError("--sensors: are those of a simulated drone; leave it out with --drone")
+    if fault and not starts:
+        raise SettingError("--fault: is for a simulated drone that is started; leave it out with --drone")
+    scenario = with_faults(with_sensors(load_scenario(name), sensors), fault)
+    failing = next((each for each in scenario.faults if each.part == "link"), None)
+    if failing is not None and starts and not lockstep:
+        raise SettingError(
+            f"fault `{failing}`: vehicle time waits for the app at each packet, so none can be late or lost; "
+            "add --lockstep, or start framerunner sim and fly it with --drone"
+        )
+    return scenario
+
+
 def _plan(
-    scenario: str,
+    scenario: Scenario,
     mission: Mission,
     seed: int | None,
     *,
@@ -131,7 +161,6 @@ def _plan(
     """The flight that the options describe; a seed is given in lockstep."""
     from framerunner.commands.named_numbers import limits_of, response_of
     from framerunner.flying.plan import FlightPlan
-    from scenarios.loader import load_scenario
 
     if response is not None and seed is None:
         raise SettingError("--response: is for a simulated vehicle in lockstep; add --lockstep")
@@ -149,7 +178,7 @@ def _plan(
             "--drone-limits forward=2,left=1.5,up=1,yaw-rate=1.5"
         )
     return FlightPlan(
-        load_scenario(scenario),
+        scenario,
         mission,
         seed,
         drone_limits=None if drone_limits is None else limits_of(drone_limits),
@@ -188,14 +217,16 @@ def _check(drone: str | None, camera: str | None, speed: float, instance: int, l
     check_range("--instance", instance, 0, 9)
 
 
-def _check_lockstep(seed: int | None, monitor: bool, lockstep: bool) -> None:
+def _checked_seed(seed: int | None, monitor: bool, lockstep: bool) -> int | None:
+    """The seed of a flight in lockstep; None in real time."""
     if monitor and lockstep:
         raise SettingError("--monitor: shows flights in real time; leave it out with --lockstep")
     if seed is None:
-        return
+        return 0 if lockstep else None
     if not lockstep:
         raise SettingError(
             f"--seed {seed}: only a flight in lockstep repeats; add --lockstep or leave it out"
         )
     if not 0 <= seed < 2**63:
         raise SettingError(f"--seed {seed}: must be from 0 to {2**63 - 1}")
+    return seed

@@ -11,12 +11,11 @@ from typing import TYPE_CHECKING, Annotated
 from cyclopts import Parameter
 
 from errors import SettingError
-from framerunner.commands import WholeNumber, check_range, say
+from framerunner.commands import Faults, Sensors, WholeNumber, check_range, say, with_faults, with_sensors
 from framerunner.extras import install_advice, is_installed
 
 if TYPE_CHECKING:
     from framerunner.child_process import MonitorProcess
-    from scenarios.models import Scenario
     from sitl.server import SimulatorServer
     from sitl.server_settings import ServerSettings
     from sitl.simulation import Simulation
@@ -39,6 +38,7 @@ class Onboard:
         Path | None,
         Parameter(help="file of changed parameters (.params), read at start and saved when one changes"),
     ] = None
+    sensors: Sensors = None
     shell: Annotated[bool, Parameter(help="answer MAVLink's shell (SERIAL_CONTROL), for the drone only")] = (
         False
     )
@@ -90,6 +90,7 @@ def sim(
         WholeNumber, Parameter(help="how many drones fly side by side; they have the next instances' ports")
     ] = 1,
     seed: Annotated[WholeNumber, Parameter(help="of everything random, such as turbulence")] = 0,
+    fault: Faults = (),
     connections: Connections | None = None,
     onboard: Onboard | None = None,
     monitor: Annotated[
@@ -108,7 +109,7 @@ def sim(
 
         framerunner sim
 
-        framerunner sim --scenario test-case-1 --speed 2
+        framerunner sim --scenario test-case-1 --speed 2 --sensors mocap
 
         framerunner sim --scenario test-case-1 --monitor
 
@@ -125,16 +126,15 @@ def sim(
     check_range("--speed", speed, 0.01, 1000)
     check_range("--instance", instance, 0, 9)
     check_range("--count", count, 1, _MAX_COUNT)
-    chosen = connections or Connections()
+    chosen, onboard = connections or Connections(), onboard or Onboard()
     watcher = _monitor(chosen.video_port, count) if monitor else None
     if watcher is not None:
         chosen = replace(chosen, link=(*chosen.link, watcher.link))
-    settings = _settings(chosen, onboard or Onboard(), speed, instance, count)
+    settings = _settings(chosen, onboard, speed, instance, count)
 
-    from scenarios.loader import load_scenario
     from sitl.server import SimulatorServer
 
-    simulations = _simulations(load_scenario(scenario), count, seed)
+    simulations = _simulations(scenario, onboard.sensors, fault, count=count, seed=seed)
     server = SimulatorServer(simulations, settings, notice=say, grants=_grants(time_grants))
     asyncio.run(_run(server, watcher, lifeline=lifeline))
     return 0
@@ -194,12 +194,16 @@ def _settings(
     return settings
 
 
-def _simulations(scenario: Scenario, count: int, seed: int) -> list[Simulation]:
+def _simulations(
+    name: str, sensors: str | None, fault: tuple[str, ...], *, count: int, seed: int
+) -> list[Simulation]:
     from firmware_py.airframe import load_airframe
+    from scenarios.loader import load_scenario
     from sitl.fleet import side_by_side
     from sitl.simulation import Simulation
 
     check_range("--seed", seed, 0, 2**63 - 1)
+    scenario = with_faults(with_sensors(load_scenario(name), sensors), fault)
     if count == 1:
         return [Simulation(scenario, seed=seed)]
     airframe = load_airframe(scenario.airframe)

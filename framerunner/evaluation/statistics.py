@@ -68,6 +68,8 @@ class Summary:
         penalised: flights that were outside the arena.
         seconds_in_state: mean over all flights without an error, by kind of state, longest first.
         causes: of flights that were not clean, failures first, then most frequent first.
+        faults_as_expected: of flights with a fault that the fault table has, those that ended as it says;
+            None if there were none.
     """
 
     flights: int
@@ -80,6 +82,7 @@ class Summary:
     penalised: Rate
     seconds_in_state: dict[str, float]
     causes: tuple[Cause, ...]
+    faults_as_expected: Rate | None = None
 
 
 def wilson(count: int, total: int) -> Rate:
@@ -122,7 +125,13 @@ def summarise(rows: Sequence[Row]) -> Summary:
         penalised=wilson(sum(row.outside_s > 0.0 for row in flown), len(flown)),
         seconds_in_state=mean_seconds_in_state(flown),
         causes=causes(rows),
+        faults_as_expected=_faults_as_expected(flown),
     )
+
+
+def _faults_as_expected(rows: Sequence[Row]) -> Rate | None:
+    judged = [row.fault_outcome == "as expected" for row in rows if row.fault_outcome]
+    return wilson(sum(judged), len(judged)) if judged else None
 
 
 def crossing_offsets_m(rows: Iterable[Row], colour: str) -> list[float]:

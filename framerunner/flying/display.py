@@ -181,8 +181,18 @@ class LockstepProgress:
         self._status.update(text)
 
 
+def _faults_in_words(result: FlightResult) -> str:
+    """The faults of a flight, and what came of them."""
+    parts = [", ".join(result.faults)]
+    if result.fault_reaction:
+        parts.append(result.fault_reaction)
+    if result.fault_outcome:
+        parts.append(f"{result.fault_outcome} ({result.fault_expected})")
+    return "; ".join(parts)
+
+
 def result_lines(result: FlightResult) -> str:
-    """A result in two lines for people, and a third if it was not clean."""
+    """A result in two lines for people, one more if it was not clean, and one if something failed."""
     error_m = result.landing_error_m
     landing = "did not land" if error_m is None else f"landed {100 * error_m:.1f} cm from the base's centre"
     verdict, reason = result.verdict, result.reason
@@ -191,9 +201,10 @@ def result_lines(result: FlightResult) -> str:
     times = f", {result.times_bound:.2f} times the bound" if result.times_bound else ""
     kept = f", kept in its box for {result.kept_in_box_s:.1f} s" if result.kept_in_box_s else ""
     cause = f"\ncause: {result.cause}" if result.cause else ""
+    faults = f"\nfaults: {_faults_in_words(result)}" if result.faults else ""
     return (
         f"{sentence}\n"
         f"try {result.try_time_s:.1f} s{times}, penalty {result.penalty_s:.1f} s, "
         f"path {result.path_length_m:.1f} m, {landing}, judged by {result.judged_by}"
-        f"{drone_class}{kept}{cause}"
+        f"{drone_class}{kept}{cause}{faults}"
     )

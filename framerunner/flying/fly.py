@@ -19,6 +19,7 @@ from framerunner.runs.track import Track, TrackRecorder
 from offboard.app import MissionEnd, Moment, Observer, fly_mission
 from offboard.drone import Drone
 from offboard.perception import Perception
+from scenarios.faults.outcome import fault_fields
 from scenarios.result import FlightResult, RefereeReport
 
 Run = Callable[[Coroutine[Any, Any, MissionEnd]], Awaitable[MissionEnd]]
@@ -85,7 +86,9 @@ async def fly(
     began_us = None if standing is None else standing.began_us
     track = recorder.track(began_us)
     cause = causes.words(Flown(plan.layout, report, outcome, track, began_us))
-    result = _result(plan, report, outcome, track, cause=cause, judged_by=judge.source, measured=measured())
+    failed = fault_fields(await judge.faults(), report, plan.scenario.sensors)
+    more = {**failed, **measured()}
+    result = _result(plan, report, outcome, track, cause=cause, judged_by=judge.source, measured=more)
     return FinishedFlight(result, outcome, track)
 
 

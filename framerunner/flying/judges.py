@@ -13,7 +13,7 @@ from framerunner.flying.plan import FlightPlan
 from offboard.app import Moment
 from scenarios.models import TrueState
 from scenarios.referee import Referee
-from scenarios.result import RefereeReport, RefereeSnapshot, Standing
+from scenarios.result import FaultFacts, RefereeReport, RefereeSnapshot, Standing
 from wire.simulator_api import SimulatorApi
 
 if TYPE_CHECKING:  # a flight in lockstep needs no HTTP
@@ -40,6 +40,10 @@ class Judge(Protocol):
 
     async def report(self, mission_state: str, ended: str | None) -> RefereeReport:
         """Return the report, when the drone has come to rest."""
+        ...
+
+    async def faults(self) -> FaultFacts:
+        """What failed in the flight; nothing if that is unknown."""
         ...
 
 
@@ -80,6 +84,11 @@ class TruthJudge:
             self.source = self._substitute.source
             return await self._substitute.report(mission_state, ended)
         return answer.report
+
+    async def faults(self) -> FaultFacts:
+        """As the simulator tells; nothing without a valid answer."""
+        answer = await ask_referee(self._api, self._session)
+        return FaultFacts() if answer is None else answer.faults
 
     async def _settle(self, *, motors_stopped: bool) -> None:
         """Wait until the referee sees the drone at rest, for 5 s of vehicle time at most.
@@ -131,6 +140,10 @@ class TelemetryJudge:
     async def report(self, mission_state: str, ended: str | None) -> RefereeReport:
         """Judge what was seen so far."""
         return self._referee.report(mission_state, ended)
+
+    async def faults(self) -> FaultFacts:
+        """Telemetry does not tell."""
+        return FaultFacts()
 
 
 async def ask_referee(

@@ -23,8 +23,9 @@ from framerunner.flying.response import LateResponse
 from offboard.app import Moment, Observer
 from offboard.perception import CAMERA_DEAD_S, IMAGES_KEPT, CameraSilentError, ImageChoice
 from scenarios.models import Scenario, TrueState
-from scenarios.result import RefereeReport, RefereeSnapshot
+from scenarios.result import FaultFacts, RefereeReport, RefereeSnapshot
 from sitl.camera import CameraFeed, Exposure
+from sitl.faults.images import FaultyFeed, new_feed
 from sitl.simulation import Simulation
 from vision.detectors import Detector, new_detector
 from vision.types import Detections, Image
@@ -82,7 +83,8 @@ class LockstepVehicle:
     ) -> None:
         self.simulation = Simulation(plan.scenario, plan.airframe, plan.seed or 0)
         detector = plan_detector(plan, rendered=True)
-        self.perception = LockstepPerception(plan.scenario, on_image, detector)
+        feed = new_feed(plan.scenario, self.simulation.faults, plan.seed or 0)
+        self.perception = LockstepPerception(plan.scenario, on_image, detector, feed)
         self.drone = LockstepDrone(
             self.simulation,
             plan.start_pose,
@@ -109,14 +111,21 @@ class _SimulationJudge:
         self._vehicle.drone.settle()
         return self._vehicle.simulation.referee.report(mission_state, ended)
 
+    async def faults(self) -> FaultFacts:
+        return self._vehicle.simulation.fault_facts()
+
 
 class LockstepPerception:
     """The camera's images, each when its latency is over; `follow` is called at every control tick."""
 
     def __init__(
-        self, scenario: Scenario, on_image: ImageObserver | None = None, detector: Detector | None = None
+        self,
+        scenario: Scenario,
+        on_image: ImageObserver | None = None,
+        detector: Detector | None = None,
+        feed: CameraFeed | FaultyFeed | None = None,
     ) -> None:
-        self._feed = CameraFeed(scenario)
+        self._feed = feed or CameraFeed(scenario)
         self._on_image = on_image
         self._detector = detector or new_detector("boxes")
         self._choice = ImageChoice()

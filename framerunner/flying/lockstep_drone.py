@@ -20,6 +20,7 @@ from firmware_py.autopilot import Autopilot
 from firmware_py.offboard_requests import SetpointRefusal, setpoint_from_body_velocity
 from firmware_py.status import CommandResult, FlightMode, LandedState
 from firmware_py.types import CRITICAL
+from framerunner.flying.faulty_link import FaultyLink
 from framerunner.flying.response import LateResponse
 from geometry.axes import Alignment, Pose
 from geometry.rotations import quaternion_from_euler
@@ -98,6 +99,7 @@ class LockstepDrone:
         self._command = VelocityCommand()
         self._commanding = False
         self._resend_us = _NEVER_US
+        self._link = FaultyLink(simulation)
 
     async def connect(self) -> None:
         """Nothing to find."""
@@ -211,8 +213,13 @@ class LockstepDrone:
         self._stop_commanding()
 
     def settle(self) -> None:
-        """Let the drone come to rest, if its motors are off, so that the referee can judge."""
+        """Let the drone come to rest, if its motors are off, so that the referee can judge.
+
+        With a fault, a failsafe first ends the flight.
+        """
         simulation, status = self._simulation, self._autopilot.status
+        if simulation.faults.begun and status.failsafe:
+            self._pass(LAND_LIMIT_US, until=lambda: simulation.referee.over or not status.armed)
         self._pass(SETTLE_LIMIT_US, until=lambda: simulation.referee.settled or status.armed)
 
     def _stop_commanding(self) -> None:
@@ -227,7 +234,9 @@ class LockstepDrone:
         self._resend_us = state.time_us + RESEND_US
         velocity_m_s = single((command.forward_m_s, -command.left_m_s, -command.up_m_s))
         yaw_rate_rad_s = sent_yaw_rate(-command.yaw_rate_rad_s)
-        if self._response is None:
+        if self._link.active:
+            self._link.send((velocity_m_s, yaw_rate_rad_s))
+        elif self._response is None:
             _request(self._autopilot, velocity_m_s, yaw_rate_rad_s)
         else:
             self._response.take(velocity_m_s, yaw_rate_rad_s, state.yaw_rad, state.time_us)
@@ -235,6 +244,7 @@ class LockstepDrone:
     def _advance(self, until_us: int = 0) -> None:
         """Let a control tick pass, and more until a time or until the link sends something by itself."""
         simulation, observers, state = self._simulation, self._observers, self._autopilot.state
+        link = self._link
         until_us = min(until_us, self._resend_us, self._heartbeat_us, self._tick_us, self._position_us)
         while True:
             simulation.tick()
@@ -245,6 +255,8 @@ class LockstepDrone:
                 airborne = self._autopilot.status.landed_state is not LandedState.ON_GROUND
                 late = self._response.step(state.yaw_rad, state.time_us, airborne=airborne)
                 _request(self._autopilot, *late)
+            if link.active and (arrived := link.arrived()) is not None:
+                _request(self._autopilot, *arrived)
             if state.time_us >= until_us or simulation.time_us >= until_us + TICK_US:  # its clock may stand
                 break
         self._exchange(state.time_us)
@@ -260,9 +272,12 @@ class LockstepDrone:
         if now_us >= self._tick_us:
             self._tick_us += TICK_US
             if self._alignment is not None:
-                self._sample = self._reported_state(self._alignment)
+                state = self._reported_state(self._alignment)
+                self._sample = self._link.receive(state) if self._link.active else state
         if now_us >= self._position_us:
             self._position_us += POSITION_US
+            if self._link.loses():
+                return
             self._position_ned_m = single(self._autopilot.state.position_ned_m)
             self._velocity_ned_m_s = single(self._autopilot.state.velocity_ned_m_s)
             self._sent_position_us = now_us

@@ -12,6 +12,7 @@ export class Figures {
   #chips = {};
   #next;
   #warning;
+  #faults;
   #verdict;
   #reason;
   #source;
@@ -19,6 +20,7 @@ export class Figures {
   /** @param {HTMLElement} element an empty box */
   constructor(element) {
     this.#warning = make("p", { class: "m-warning", role: "alert" });
+    this.#faults = make("p", { class: "m-faults", "data-figure": "faults" });
     this.#bar = make("span");
     this.#limit = make("p", { class: "m-limit" });
     this.#next = make("p", { class: "m-next", "data-figure": "next_colour" });
@@ -29,6 +31,7 @@ export class Figures {
     this.#root = make(
       "div", { class: "m-figures" },
       this.#warning,
+      this.#faults,
       this.#number("try_time_s", "try time", "s", "m-first"),
       make("div", { class: "m-bar", "aria-hidden": "true" }, this.#bar),
       this.#limit,
@@ -58,6 +61,7 @@ export class Figures {
     this.#setTime(figures);
     this.#setCrossings(figures);
     this.#setOutcome(figures, status);
+    this.#setFaults(figures);
     const warnings = [];
     if (figures?.inside === false && figures.motors_on) warnings.push("outside the arena: every second costs one more");
     if (figures?.time_over) warnings.push(`time over: the limit of ${figures.limit_s} s has passed`);
@@ -110,6 +114,15 @@ export class Figures {
     const next = figures?.next_colour ?? null;
     setAttribute(this.#next, "data-value", next);
     setText(this.#next, !figures ? "" : next ? `next frame: ${next}` : `all frames crossed${figures.over ? "" : ", back to the base"}`);
+  }
+
+  /** What has failed on purpose, and the autopilot's failsafe. */
+  #setFaults(figures) {
+    const faults = figures?.faults ?? [];
+    const words = faults.map(({ fault, active }) => `fault: ${fault}${active ? "" : " (over)"}`);
+    if (words.length && figures.failsafe) words.push(figures.failsafe);
+    setText(this.#faults, words.join("; "));
+    this.#faults.hidden = words.length === 0;
   }
 
   #setOutcome(figures, status) {

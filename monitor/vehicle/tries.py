@@ -11,7 +11,7 @@ from monitor.ports import Equipment
 from monitor.vehicle.referees import RefereeChannel, TelemetryReferee
 from monitor.vehicle.track import Placement, Source
 from scenarios.models import Scenario, TrueState
-from scenarios.result import FlightResult, RefereeReport, Standing
+from scenarios.result import FaultFacts, FlightResult, RefereeReport, Standing
 from wire.vehicle_telemetry import VehicleTelemetry
 
 _PUBLISH_EVERY_S = 1.0
@@ -22,6 +22,7 @@ _SIMILAR_S = 2.5  # between two referees: heartbeats, which show when motors are
 _KNOWN_RESULTS = 64
 _OWN_REFEREE_WAIT_S = 5.0  # within which a vehicle has to show a referee of its own
 _FRESH_S = 1.0
+_MAX_FAULTS = 20  # shown
 _BOOT_TIME_WAIT_S = 3.0  # within which a vehicle has to send its boot time
 
 JsonMessage = dict[str, Any]
@@ -352,6 +353,19 @@ def _of_standing(standing: Standing) -> JsonMessage:
         "verdict": report.verdict if standing.ended else "",
         "reason": report.reason if standing.ended else "",
         "source": standing.source,
+        **_of_faults(standing.faults),
+    }
+
+
+def _of_faults(facts: FaultFacts) -> JsonMessage:
+    """What has failed, newest last, and the last failsafe; empty if nothing has."""
+    if not facts.begun:
+        return {}
+    return {
+        "faults": [
+            {"fault": each.fault, "active": each.ended_us is None} for each in facts.begun[-_MAX_FAULTS:]
+        ],
+        "failsafe": facts.failsafes[-1].text if facts.failsafes else "",
     }
 
 

@@ -112,6 +112,11 @@ class Delay(Generic[Sample]):
         """Send a sample that is true now."""
         self._waiting.append((time_us + self._delay_us, sample))
 
+    def all(self, time_us: int) -> Iterator[Sample]:
+        """The samples that have arrived since the call before, oldest first."""
+        while self._waiting and self._waiting[0][0] <= time_us:
+            yield self._waiting.popleft()[1]
+
     def newest(self, time_us: int) -> Sample | None:
         """The newest of the samples that have arrived since the call before; None: there is none."""
         arrived = None

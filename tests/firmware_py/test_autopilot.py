@@ -422,7 +422,8 @@ def test_lost_sensors_are_bridged_and_then_stop_the_motors(fault):
             sensors = replace(sensors, time_us=sensors.time_us + 4000, velocity_ned_m_s=bad_velocity)
         speeds = flight.autopilot.step(sensors)
         assert speeds == (before if tick < 75 else OFF)
-    assert flight.autopilot.take_texts()[0].text == "Sensors lost: motors stopped"
+    assert flight.autopilot.take_texts()[0].text == "Sensors lost: flight terminated"
+    assert flight.status.mode is FlightMode.TERMINATION
 
 
 def test_texts_that_are_not_taken_are_limited():

@@ -118,6 +118,7 @@ def situations():
     ]
     found += [
         replace(STANDING, battery_arms=False),
+        replace(STANDING, problem="barometer is stuck"),
         replace(STANDING, entered_us=LONG_AGO, follow_up=Reaction.LAND),
         replace(STANDING, choices=CHOICES[1]),
         replace(FLYING, target_reached=True, choices=Choices(mission_after_takeoff=True)),
@@ -338,11 +339,10 @@ def test_in_the_air_only_force_or_a_hard_failure_stops_the_motors(state):
         row = first_match(RULES[state, event], now)
         if row is None or row.target is not State.DISARMED:
             continue
-        hopeless = event is Event.TICK and when.sensors_lost(now)
         chosen = row.cause is not None and now.choices.reaction(row.cause) is Reaction.DISARM
         terminated = state is State.TERMINATED and event is Event.DISARM
         # "never flown" in the air cannot be: the commander sets `flown` with `landed` false.
-        assert event is Event.FORCE_DISARM or hopeless or chosen or terminated or not now.flown
+        assert event is Event.FORCE_DISARM or chosen or terminated or not now.flown
 
 
 @pytest.mark.parametrize("state", sorted(ARMED - {State.TERMINATED}, key=lambda state: state.value))
@@ -351,7 +351,7 @@ def test_failsafes_come_first(state):
         row = first_match(RULES[state, Event.TICK], now)
         if when.sensors_lost(now):
             assert row is not None
-            assert row.target is State.DISARMED
+            assert row.target is (State.DISARMED if now.landed else State.TERMINATED)
         elif when.tumbled(now):
             assert row is not None
             assert row.target is State.TERMINATED
@@ -370,7 +370,13 @@ def test_offboard_is_entered_only_with_setpoints(state):
 @pytest.mark.parametrize(
     ("state", "change", "target", "text"),
     [
-        (State.HOLD, {"usable_us": NOW - 300_001}, State.DISARMED, "Sensors lost: motors stopped"),
+        (State.HOLD, {"usable_us": NOW - 300_001}, State.TERMINATED, "Sensors lost: flight terminated"),
+        (
+            State.HOLD,
+            {"usable_us": NOW - 300_001, "landed": True},
+            State.DISARMED,
+            "Sensors lost: motors stopped",
+        ),
         (State.HOLD, {"usable_us": NOW - 300_000}, None, ""),
         (
             State.LAND,
@@ -453,6 +459,19 @@ def test_why_arming_is_denied(change, text):
     row = first_match(RULES[State.DISARMED, Event.ARM], replace(STANDING, **change))
     assert row is not None
     assert (row.result, row.text) == (NO, text)
+
+
+def test_arming_is_denied_in_the_words_of_the_estimators_condition():
+    commander = Commander()
+    commander.situation = replace(STANDING, problem="barometer is stuck")
+    assert commander.refusal == "Arming denied: barometer is stuck"
+    row = commander.handle(Event.ARM)
+    assert (row.result, row.text) == (NO, "Arming denied: barometer is stuck")
+    commander.situation.problem = "GPS fix too low"
+    assert commander.refusal == "Arming denied: GPS fix too low"
+    commander.situation.intended = FlightMode.STABILIZED  # needs no position
+    commander.situation.manual_us = commander.situation.now_us
+    assert commander.refusal == ""
 
 
 def test_disarming_on_the_ground():

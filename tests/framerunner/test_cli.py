@@ -224,6 +224,19 @@ def test_the_limits_of_a_drone_belong_to_a_real_drone_and_the_open_class(refused
     assert "left is missing" in refused("fly", *drone, *open_, "--drone-limits", "forward=2,up=1")
 
 
+@pytest.mark.parametrize(
+    ("given", "words"),
+    [
+        (["--lockstep", "--fault", "gps off"], "write PART [NUMBER] KIND [SIZE] at SECONDS"),
+        (["--lockstep", *["--fault", "camera black at 3 s"] * 21], "at most 20 faults, not 21"),
+        (["--fault", "link off at 3 s"], "add --lockstep"),
+        (["--drone", "udpin://127.0.0.1:14599", "--camera", "0", "--fault", "gps off at 3"], "with --drone"),
+    ],
+)
+def test_a_fault_that_cannot_be_flown_is_refused(refused, given, words):
+    assert words in refused("fly", *given)
+
+
 def test_a_camera_delay_out_of_range_is_refused(refused):
     line = refused("fly", "--drone", "udpin://127.0.0.1:14599", "--camera", "0", "--camera-delay", "2")
     assert line == "error: --camera-delay 2: must be from 0 to 0.5"

@@ -92,3 +92,15 @@ def test_a_bad_line_of_the_parameter_file(tmp_path, capsys, text, complaint):
 @pytest.mark.parametrize("seed", ["-1", "0.5", str(2**63)])
 def test_a_bad_seed(refused, seed):
     assert "--seed" in refused("--seed", seed)
+
+
+@pytest.mark.parametrize(
+    ("fault", "said"),
+    [
+        ("gps of at 3 s", "write PART [NUMBER] KIND [SIZE] at SECONDS"),
+        ("barometer off at 3 s", "the sensors ideal have no barometer"),
+        ("motor 5 off at 3 s", "the drone has 4 motors"),
+    ],
+)
+def test_a_bad_fault(refused, fault, said):
+    assert said in refused("--fault", fault)

@@ -169,6 +169,12 @@ async def test_figures_are_those_that_were_sent(chromium, fake):
     await expect(figure(page, "verdict")).to_have_text("under way")
     await expect(page.locator(".m-warning")).to_be_hidden()
     await expect(page.locator(".m-strip")).to_contain_text("87 %, 11.8 V")
+    await expect(figure(page, "faults")).to_be_hidden()
+
+    faults = [{"fault": "gps off at 3 s", "active": False}, {"fault": "motor 1 <b>off</b>", "active": True}]
+    await fake.say("status", drones=[status(figures=FIGURES | {"faults": faults, "failsafe": "Landing"})])
+    told = "fault: gps off at 3 s (over); fault: motor 1 <b>off</b>; Landing"
+    await expect(figure(page, "faults")).to_have_text(told)
 
     outside = FIGURES | {"inside": False, "time_over": True, "try_time_s": 181.0}
     await fake.say("status", drones=[status(figures=outside)])

@@ -117,7 +117,7 @@ def test_a_file_loads_by_path(tmp_path):
 def test_schema_describes_every_field():
     schema = json_schema()
     assert schema["required"] == ["name"]
-    objects = [schema, *schema["$defs"].values()]
+    objects = [schema, *(each for each in schema["$defs"].values() if each["type"] == "object")]
     fields = [field for part in objects for field in part["properties"].values()]
     assert len(fields) > 30
     assert all(field.get("description") for field in fields)

@@ -1,8 +1,5 @@
 """One served drone, advanced by hand."""
 
-from dataclasses import replace
-from math import nan
-
 from scenarios.loader import load_scenario
 from sitl.drone import ServedDrone
 from sitl.server_settings import ServerSettings
@@ -15,7 +12,7 @@ def test_it_goes_on_speaking_while_its_sensors_say_nothing_usable(monkeypatch):
     times_us = []
     monkeypatch.setattr(drone.node, "update", times_us.append)
     drone.tick()
-    simulation.failures.falsify = lambda sensors: replace(sensors, position_ned_m=(nan, nan, nan))
+    assert simulation.faults.inject(0, 1, 0) == "gyroscope off"
     for _ in range(3):
         drone.tick()
     assert times_us == [0, 4000, 8000, 12000]

@@ -1,18 +1,11 @@
-"""World, autopilot and referee in one simulation, and the failures injected into it."""
-
-from math import isnan
-from types import SimpleNamespace
+"""World, autopilot and referee in one simulation."""
 
 import pytest
 
 from firmware_py.status import CommandResult, FlightMode
-from firmware_py.types import Sensors
 from scenarios.loader import load_scenario
-from sitl.simulation import Failures, Simulation
+from sitl.simulation import Simulation
 from sitl.world import CONTROL_PERIOD_US
-
-GPS, BATTERY, MOTOR = 4, 100, 101
-OK, OFF, STUCK, GARBAGE = 0, 1, 2, 3
 
 
 @pytest.fixture
@@ -95,73 +88,3 @@ def test_two_runs_are_equal_to_the_last_bit():
         truth = simulation.truth
         ends.append((truth.position_arena_m, truth.velocity_arena_m_s, truth.attitude_arena))
     assert ends[0] == ends[1]
-
-
-class FourMotors:
-    """In place of the world: the state of each of its motors."""
-
-    airframe = SimpleNamespace(rotors=(None,) * 4)
-
-    def __init__(self):
-        self.dynamics = self
-        self.states = ["works"] * 4
-
-    def fail_motor(self, index, *, stuck=False):
-        self.states[index] = "stuck" if stuck else "off"
-
-    def repair_motor(self, index):
-        self.states[index] = "works"
-
-
-@pytest.fixture
-def motors():
-    return FourMotors()
-
-
-@pytest.fixture
-def failures(motors):
-    return Failures(motors)
-
-
-def sample():
-    return Sensors(1000, (1.0, 2.0, 3.0), (0.1, 0.2, 0.3), (1.0, 0.0, 0.0, 0.0), (0.0,) * 3, (0.0, 0.0, -9.8))
-
-
-def test_a_motor_stops_sticks_and_works_again(failures, motors):
-    assert failures.inject(MOTOR, OFF, 2)
-    assert failures.inject(MOTOR, STUCK, 4)
-    assert motors.states == ["works", "off", "works", "stuck"]
-    assert failures.inject(MOTOR, OK, 0)
-    assert motors.states == ["works"] * 4
-    assert failures.falsify is None
-
-
-@pytest.mark.parametrize(
-    "what",
-    [(MOTOR, OFF, 5), (MOTOR, GARBAGE, 1), (GPS, STUCK, 0), (BATTERY, OFF, 2), (0, OFF, 0), (999, OK, 0)],
-)
-def test_an_unsupported_failure_changes_nothing(failures, motors, what):
-    assert not failures.inject(*what)
-    assert motors.states == ["works"] * 4
-    assert failures.falsify is None
-
-
-def test_without_gps_there_is_no_position_until_it_works_again(failures):
-    truth = sample()
-    assert failures.inject(GPS, OFF, 0)
-    falsified = failures.falsify(truth)
-    assert all(map(isnan, falsified.position_ned_m[:2] + falsified.velocity_ned_m_s[:2]))
-    assert falsified.position_ned_m[2] == truth.position_ned_m[2]  # the barometer's
-    assert falsified.attitude == truth.attitude
-    assert truth.position_ned_m == (1.0, 2.0, 3.0)  # the world's sample is not changed
-    assert failures.inject(GPS, OK, 0)
-    assert failures.falsify is None
-
-
-def test_a_failed_battery_has_no_voltage(failures):
-    assert failures.inject(BATTERY, OFF, 1)
-    assert failures.inject(GPS, OFF, 1)
-    assert failures.inject(GPS, OK, 1)
-    falsified = failures.falsify(sample())
-    assert falsified.battery_voltage_v == 0.0
-    assert falsified.position_ned_m == (1.0, 2.0, 3.0)

@@ -5,7 +5,7 @@ from __future__ import annotations
 from math import cos, pi, remainder, sin, tan
 
 from firmware_py.estimation.aiding.aid import Aid
-from firmware_py.estimation.aiding.target import Target
+from firmware_py.estimation.aiding.target import MAX_RESETS, Target
 from firmware_py.estimation.error_state import ATTITUDE, POSITION
 from firmware_py.estimation.settings import EstimatorSettings
 from firmware_py.measurements import ExternalPose
@@ -31,9 +31,9 @@ class PoseAiding:
     def __init__(self, target: Target, settings: EstimatorSettings) -> None:
         self._target = target
         gate, reset_us = settings.gate, settings.reset_us
-        self.horizontal = Aid("external position", 2, gate, reset_us)
-        self.vertical = Aid("external height", 1, gate, reset_us)
-        self.heading = Aid("external heading", 1, gate, reset_us)
+        self.horizontal = Aid("external position", 2, gate, reset_us, MAX_RESETS)
+        self.vertical = Aid("external height", 1, gate, reset_us, MAX_RESETS)
+        self.heading = Aid("external heading", 1, gate, reset_us, MAX_RESETS)
         self._resets: int | None = None
 
     def fuse(self, pose: ExternalPose) -> None:
@@ -47,7 +47,10 @@ class PoseAiding:
         position = (n - vn * late_s, e - ve * late_s, d - vd * late_s)
         m = rotation(into.state.attitude)
         for aid, axes in ((self.horizontal, (0, 1)), (self.vertical, (2,))):
-            if jumped or aid.is_needed(into.time_us):
+            overdue = aid.is_overdue(into.time_us)
+            if overdue and not jumped:
+                self._target.doubt()
+            if jumped or overdue or aid.is_needed(into.time_us):
                 self._target.move(axes, position)
                 aid.accept_any()
             if not self._fuse_position(aid, axes, position, pose.position_variance_m2, m):
@@ -62,7 +65,8 @@ class PoseAiding:
         target, index = self._target, self._target.layout.offset
         own = target.filter.state.position_ned_m
         innovations = tuple([position[axis] - own[axis] for axis in axes])
-        variances = tuple([variance[axis] for axis in axes])
+        least = aid.variance(innovations, max([variance[axis] for axis in axes]), target.filter.time_us)
+        variances = tuple([max(variance[axis], least) for axis in axes])
         if index < 0:
             return aid.fuse_states(target.filter, POSITION + axes[0], innovations, variances)
         rows = []

@@ -10,7 +10,7 @@ from __future__ import annotations
 from math import isfinite
 
 from firmware_py.estimation.aiding.aid import NEVER_US, Aid
-from firmware_py.estimation.aiding.target import Target
+from firmware_py.estimation.aiding.target import MAX_RESETS, Target
 from firmware_py.estimation.error_state import POSITION, VELOCITY
 from firmware_py.estimation.settings import EstimatorSettings
 from firmware_py.geodesy import LocalProjection
@@ -43,9 +43,9 @@ class GpsAiding:
         self._target = target
         self._sigma_m = settings.gps_sigma_m
         gate, reset_us = settings.gate, settings.reset_us
-        self.horizontal = Aid("GPS position", 2, gate, reset_us)
-        self.vertical = Aid("GPS height", 1, gate, reset_us)
-        self.velocity = Aid("GPS velocity", 3, gate, reset_us)
+        self.horizontal = Aid("GPS position", 2, gate, reset_us, MAX_RESETS)
+        self.vertical = Aid("GPS height", 1, gate, reset_us, MAX_RESETS)
+        self.velocity = Aid("GPS velocity", 3, gate, reset_us, MAX_RESETS)
         self.origin = origin
         self._projection: LocalProjection | None = None
         self._good_us = NEVER_US
@@ -79,6 +79,7 @@ class GpsAiding:
     def _fuse_velocity(self, sample: GpsSample) -> None:
         into, variance = self._target.filter, sample.speed_accuracy_m_s**2
         if self.velocity.is_overdue(into.time_us):
+            self._target.doubt()
             into.state.velocity_ned_m_s = sample.velocity_ned_m_s
             into.covariance.set_variance(VELOCITY, variance, variance, variance)
             self.velocity.accept_any()
@@ -95,6 +96,7 @@ class GpsAiding:
         level_m, upright_m = self._sigma_m
         for aid, axes, sigma_m in ((self.horizontal, (0, 1), level_m), (self.vertical, (2,), upright_m)):
             if aid.is_overdue(into.time_us):
+                target.doubt()
                 target.move(axes, position)
                 aid.accept_any()
             rows, innovations = [], []
@@ -104,7 +106,8 @@ class GpsAiding:
                 rows.append(row)
                 known_m = into.state.position_ned_m[axis] + target.drift(index + axis)
                 innovations.append(position[axis] - known_m)
-            aid.fuse_rows(into, tuple(rows), tuple(innovations), (sigma_m * sigma_m,) * len(axes))
+            variance_m2 = aid.variance(tuple(innovations), sigma_m * sigma_m, into.time_us)
+            aid.fuse_rows(into, tuple(rows), tuple(innovations), (variance_m2,) * len(axes))
 
 
 def _is_good(sample: GpsSample) -> bool:

@@ -6,14 +6,26 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from firmware_py.estimation.error_state import ATTITUDE, INERTIAL_STATES, POSITION, Drift, Matrix
+from firmware_py.estimation.error_state import (
+    ACCEL_BIAS,
+    ATTITUDE,
+    GYRO_BIAS,
+    INERTIAL_STATES,
+    POSITION,
+    VELOCITY,
+    Drift,
+    Matrix,
+)
 from firmware_py.estimation.navigation_filter import NavigationFilter
 from firmware_py.estimation.settings import EstimatorSettings
 from geometry.vectors import ZERO3, Vec3
 
+MAX_RESETS = 2
+"""So often within 10 s an estimate is set to a source's measurements that do not fit."""
 UNKNOWN_M2 = 1e4
 """Variance of a coordinate of which nothing is known; fusing a measurement follows."""
 _UNKNOWN_RAD2 = 1.0
+_DOUBT = ((ATTITUDE, 0.1), (VELOCITY, 1.0), (GYRO_BIAS, 0.1), (ACCEL_BIAS, 0.5))
 _CONSTANT = Drift()
 
 
@@ -118,6 +130,17 @@ class Target:
         self.resets += 1
         if 2 in axes:
             self.height_resets += 1
+
+    def doubt(self) -> None:
+        """Take attitude, velocity and biases for less certain: measurements do not fit the estimate.
+
+        A position that was reset alone would drift away again if the cause is, say, a gyroscope whose bias
+        has jumped.
+        """
+        p = self.filter.covariance.p
+        for index, sigma in _DOUBT:
+            for at in range(index, index + 3):
+                p[at, at] += sigma * sigma
 
     def turn(self, angle_rad: float) -> None:
         """Turn the heading, and forget what was known of it; fusing it follows."""

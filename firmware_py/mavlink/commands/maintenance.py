@@ -22,7 +22,7 @@ _INFO, _WARNING = mavlink.MAV_SEVERITY_INFO, mavlink.MAV_SEVERITY_WARNING
 class FailureSink(Protocol):
     """What can break parts of the vehicle: its simulation."""
 
-    def inject(self, unit: int, kind: int, instance: int) -> bool:
+    def inject(self, unit: int, kind: int, instance: int) -> str | None:
         """Break a part, or repair it.
 
         Args:
@@ -31,7 +31,7 @@ class FailureSink(Protocol):
             instance: counts from 1; 0: all of that unit.
 
         Returns:
-            False if it cannot be done; then nothing has changed.
+            What is done, in words; None if it cannot be done, and nothing has changed.
         """
 
 
@@ -96,10 +96,12 @@ class MaintenanceCommands(Service):
             return CommandResult.DENIED
         unit, kind, instance = command.params[:3]
         numbers = [_rounded(unit), _rounded(kind), _rounded(instance) if isfinite(instance) else 0]
-        if min(numbers) < 0 or self._failures is None or not self._failures.inject(*numbers):
+        if min(numbers) < 0 or self._failures is None:
             return CommandResult.UNSUPPORTED
-        what = "repaired" if numbers[1] == mavlink.FAILURE_TYPE_OK else f"failure {numbers[1]}"
-        autopilot.say(_WARNING, f"Injected: unit {numbers[0]}.{numbers[2]} {what}")
+        done = self._failures.inject(*numbers)
+        if done is None:
+            return CommandResult.UNSUPPORTED
+        autopilot.say(_WARNING, f"Injected failure: {done}")
         return CommandResult.ACCEPTED
 
 

@@ -5,7 +5,15 @@ from dataclasses import replace
 import pytest
 
 from monitor.vehicle.tries import TryWatch, figures
-from scenarios.result import FlightResult, RefereeReport, RefereeSnapshot, Standing
+from scenarios.result import (
+    BegunFault,
+    FailsafeText,
+    FaultFacts,
+    FlightResult,
+    RefereeReport,
+    RefereeSnapshot,
+    Standing,
+)
 
 FLYING = RefereeSnapshot(5_000_000, 10.0, 0.0, ("red",), "green", 0, True, True, False, False)
 REPORT = RefereeReport(verdict="aborted", reason="still flying", try_time_s=10.0, crossing_times_s=(4.0,))
@@ -201,6 +209,22 @@ def test_figures_of_a_try_that_is_flown():
         "limit_s": 180.0,
         "time_over": False,
     }
+
+
+def test_figures_tell_what_has_failed():
+    facts = FaultFacts(
+        begun=(
+            BegunFault(fault="gps off at 3 s for 1 s", began_us=8_000_000, ended_us=9_000_000),
+            BegunFault(fault="motor 1 off at 5 s", began_us=10_000_000),
+        ),
+        failsafes=(FailsafeText(time_us=10_600_000, text="Attitude failure: flight terminated"),),
+    )
+    told = figures(standing().model_copy(update={"faults": facts}), None, 180.0)
+    assert told["faults"] == [
+        {"fault": "gps off at 3 s for 1 s", "active": False},
+        {"fault": "motor 1 off at 5 s", "active": True},
+    ]
+    assert told["failsafe"] == "Attitude failure: flight terminated"
 
 
 def test_time_is_over_at_the_limit():

@@ -20,9 +20,9 @@ class Breaker:
 
     def inject(self, unit, kind, instance):
         if unit != 101:
-            return False
+            return None
         self.injected.append((unit, kind, instance))
-        return True
+        return f"motor {instance} off"
 
 
 def inject_failure(autopilot, breaker, *numbers):
@@ -41,7 +41,7 @@ def test_it_is_denied_until_a_parameter_allows_it(autopilot, breaker):
     autopilot.parameters.set("SYS_FAILURE_EN", 1)
     assert inject_failure(autopilot, breaker, 101, 1, 1) is ACCEPTED
     assert breaker.injected == [(101, 1, 1)]
-    assert [text.text for text in autopilot.texts] == ["Injected: unit 101.1 failure 1"]
+    assert [text.text for text in autopilot.texts] == ["Injected failure: motor 1 off"]
 
 
 def test_repairing_and_all_of_a_unit(autopilot, breaker):

@@ -1,0 +1,238 @@
+"""All faults of one simulated drone: those declared for its flight, and those injected over MAVLink."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass
+
+from scenarios.faults.declaration import Fault, FaultKind, FaultPart
+from scenarios.faults.parse import FaultError
+from sitl.battery import Battery
+from sitl.faults.injection import fault_of, part_of
+from sitl.faults.link import LinkFault
+from sitl.faults.sensors import IDEAL_PARTS, SensorFaults
+from sitl.sensors.specs import SuiteSpec
+from sitl.world import World
+
+_NEVER_US = 1 << 62
+_SENSORS = {
+    FaultPart.MAGNETOMETER: "magnetometer",
+    FaultPart.BAROMETER: "barometer",
+    FaultPart.GPS: "gps",
+    FaultPart.RANGE_FINDER: "range_finder",
+    FaultPart.OPTICAL_FLOW: "optical_flow",
+    FaultPart.EXTERNAL_POSE: "external_pose",
+}
+"""Sensors that a suite may lack, by their fields."""
+_OTHERS = frozenset({FaultPart.BATTERY, FaultPart.MOTOR, FaultPart.CAMERA, FaultPart.LINK})
+
+
+@dataclass(frozen=True, slots=True)
+class BegunFault:
+    """A fault that has begun.
+
+    Attributes:
+        fault: as declared or injected.
+        time_us: when it began, vehicle time.
+        ended_us: when it ended; None: it is active.
+    """
+
+    fault: Fault
+    time_us: int
+    ended_us: int | None = None
+
+
+class Faults:
+    """Starts and ends faults; the simulation applies those of sensors in each tick.
+
+    Args:
+        declared: for each try, with times that count from arming.
+        suite: the drone's sensors.
+        world: whose motors fail, and whose time counts.
+        battery: that sags.
+        seed: of the flight.
+
+    Raises:
+        FaultError: the drone has no such part.
+
+    Attributes:
+        next_us: before this time `update` need not be called.
+        sensors: active faults of sensors; None: there are none.
+        link: the active fault of the link; None: there is none.
+        camera: active faults of the camera.
+        begun: of the present or last try, oldest first.
+        notice: called with a line for people when a fault begins or ends.
+    """
+
+    def __init__(
+        self,
+        declared: Iterable[Fault],
+        suite: SuiteSpec,
+        world: World,
+        battery: Battery,
+        seed: int,
+    ) -> None:
+        self._declared = tuple(declared)
+        self._suite, self._world, self._battery, self._seed = suite, world, battery, seed
+        self._rotors = len(world.airframe.rotors)
+        self._all_sensors = SensorFaults(seed, ideal=suite.ideal)
+        self._scheduled: list[tuple[int, int, Fault]] = []  # when, 0 to begin or 1 to end; latest first
+        self._active: list[Fault] = []
+        self._armed_us: int | None = None
+        self.next_us = _NEVER_US
+        self.sensors: SensorFaults | None = None
+        self.link: LinkFault | None = None
+        self.camera: tuple[Fault, ...] = ()
+        self.begun: list[BegunFault] = []
+        self.notice: Callable[[str], None] = lambda line: None
+        for fault in self._declared:
+            self._check(fault)
+
+    @property
+    def active(self) -> tuple[Fault, ...]:
+        """Faults that act now, oldest first."""
+        return tuple(self._active)
+
+    def armed(self, now_us: int) -> None:
+        """A try begins: schedule what is declared."""
+        self._armed_us = now_us
+        self.begun = [BegunFault(fault, now_us) for fault in self._active]  # those injected before
+        self._scheduled = []
+        for fault in self._declared:
+            begin_us = now_us + round(fault.at_s * 1e6)
+            self._scheduled.append((begin_us, 0, fault))
+            if fault.for_s is not None:
+                self._scheduled.append((begin_us + round(fault.for_s * 1e6), 1, fault))
+        self._scheduled.sort(key=lambda event: event[:2], reverse=True)
+        self._set_next()
+
+    def disarmed(self, now_us: int) -> None:
+        """The try is over: what was declared ends; what was injected over MAVLink stays."""
+        self._armed_us = None
+        self._scheduled = []
+        self.next_us = _NEVER_US
+        for fault in self._declared:
+            self._end(fault, now_us)
+
+    def update(self, now_us: int) -> None:
+        """Begin and end what is due."""
+        while self._scheduled and self._scheduled[-1][0] <= now_us:
+            _, ends, fault = self._scheduled.pop()
+            if ends:
+                self._end(fault, now_us)
+            else:
+                self._begin(fault, now_us)
+        self._set_next()
+
+    def inject(self, unit: int, kind: int, instance: int) -> str | None:
+        """Inject a failure by MAVLink's numbers, or repair a unit.
+
+        Args:
+            unit: FAILURE_UNIT.
+            kind: FAILURE_TYPE; 0 repairs.
+            instance: of the unit, from 1; 0: all.
+
+        Returns:
+            What is done, in words; None: that cannot be done, and nothing has changed.
+        """
+        part, now_us = part_of(unit), self._world.time_us
+        if part is None or not self._has(part):
+            return None
+        numbers: list[int | None] = [None]
+        if part is FaultPart.MOTOR:
+            numbers = [number for number in range(1, self._rotors + 1) if instance in (0, number)]
+        elif instance > 1:
+            return None
+        if kind == 0:
+            for fault in self.active:
+                if fault.part is part and (part is not FaultPart.MOTOR or (fault.number or 1) in numbers):
+                    self._end(fault, now_us)
+            return f"{part.value.replace('_', ' ')} repaired" if numbers else None
+        faults = [fault_of(unit, kind, number) for number in numbers]
+        begun = [fault for fault in faults if fault is not None]
+        if not begun or len(begun) < len(faults):
+            return None
+        for fault in begun:
+            for same in self.active:
+                if (same.part, same.kind, same.number) == (fault.part, fault.kind, fault.number):
+                    self._end(same, now_us)
+            self._begin(fault.model_copy(update={"at_s": self._flown_s(now_us)}), now_us)
+        return ", ".join(str(fault).partition(" at ")[0] for fault in begun)
+
+    def _flown_s(self, now_us: int) -> float:
+        """Seconds since arming; 0 while disarmed."""
+        return 0.0 if self._armed_us is None else round((now_us - self._armed_us) / 1e6, 3)
+
+    def _set_next(self) -> None:
+        self.next_us = self._scheduled[-1][0] if self._scheduled else _NEVER_US
+
+    def _has(self, part: FaultPart) -> bool:
+        if part in _OTHERS:
+            return True
+        if self._suite.ideal:
+            return part in IDEAL_PARTS
+        pose = self._suite.external_pose
+        if part is FaultPart.EXTERNAL_POSE and pose is not None and pose.source != "simulated":
+            return False  # its poses come over MAVLink
+        field = _SENSORS.get(part)
+        return field is None or getattr(self._suite, field) is not None
+
+    def _check(self, fault: Fault) -> None:
+        """Refuse a fault of a part that the drone does not have."""
+        if not self._has(fault.part):
+            raise FaultError(
+                f"fault `{fault}`: the sensors {self._suite.name} have no {fault.part}; leave it out"
+            )
+        if fault.number is not None and fault.number > self._rotors:
+            raise FaultError(f"fault `{fault}`: the drone has {self._rotors} motors; use 1 to {self._rotors}")
+
+    def _begin(self, fault: Fault, now_us: int) -> None:
+        self._active.append(fault)
+        self.notice(f"fault begins: {fault}")
+        self.begun.append(BegunFault(fault, now_us))
+        if fault.part is FaultPart.MOTOR:
+            self._apply_motors()
+        elif fault.part not in _OTHERS:
+            self._all_sensors.begin(fault)
+        self._apply_others()
+
+    def _end(self, fault: Fault, now_us: int) -> None:
+        if fault not in self._active:
+            return
+        self._active.remove(fault)
+        self.notice(f"fault ends: {fault}")
+        self.begun = [
+            BegunFault(each.fault, each.time_us, now_us)
+            if each.fault == fault and each.ended_us is None
+            else each
+            for each in self.begun
+        ]
+        if fault.part is FaultPart.MOTOR:
+            self._apply_motors()
+        elif fault.part not in _OTHERS:
+            self._all_sensors.end(fault)
+        self._apply_others()
+
+    def _apply_others(self) -> None:
+        self.sensors = self._all_sensors if self._all_sensors.active else None
+        self.camera = tuple(fault for fault in self._active if fault.part is FaultPart.CAMERA)
+        links = [fault for fault in self._active if fault.part is FaultPart.LINK]
+        if not links:
+            self.link = None
+        elif self.link is None or self.link.fault is not links[-1]:
+            self.link = LinkFault(links[-1], self._seed)
+        sags = [fault.amount for fault in self._active if fault.part is FaultPart.BATTERY]
+        self._battery.sag = max(sags, default=0.0)
+
+    def _apply_motors(self) -> None:
+        """Of several faults of one motor the last counts."""
+        dynamics = self._world.dynamics
+        states = {fault.number or 1: fault for fault in self._active if fault.part is FaultPart.MOTOR}
+        for number in range(1, self._rotors + 1):
+            state = states.get(number)
+            if state is None:
+                dynamics.repair_motor(number - 1)
+            elif state.kind is FaultKind.WEAK:
+                dynamics.weaken_motor(number - 1, state.amount)
+            else:
+                dynamics.fail_motor(number - 1, stuck=state.kind is FaultKind.STUCK)

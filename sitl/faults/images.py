@@ -1,0 +1,127 @@
+"""Faults of the camera: changes the images that a feed delivers."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from functools import cached_property
+
+import numpy as np
+
+from geometry.solids import Solid
+from scenarios.faults.declaration import Fault, FaultKind, FaultPart
+from scenarios.models import Scenario, TrueState
+from sitl.camera import CameraFeed, Exposure, Image
+from sitl.faults.effects import Lossy
+from sitl.faults.faults import Faults
+from sitl.sensors.noise import Delay
+
+Change = Callable[[int, Exposure | None], Exposure | None]
+
+
+def new_feed(
+    scenario: Scenario, faults: Faults, seed: int, drones: Callable[[], Sequence[Solid]] = tuple
+) -> CameraFeed | FaultyFeed:
+    """The camera's feed; one with faults only if the scenario declares some of the camera.
+
+    Args:
+        scenario: camera settings and what is to be seen.
+        faults: of the drone.
+        seed: of the flight.
+        drones: see `CameraFeed`.
+    """
+    feed = CameraFeed(scenario, drones)
+    if not any(fault.part is FaultPart.CAMERA for fault in scenario.faults):
+        return feed
+    return FaultyFeed(feed, lambda: faults.camera, seed)
+
+
+class FaultyFeed:
+    """A camera feed with the faults that are active; it has the interface of `CameraFeed`.
+
+    Args:
+        feed: without faults.
+        active: called at each image for the faults of the camera.
+        seed: of the flight.
+    """
+
+    def __init__(self, feed: CameraFeed, active: Callable[[], tuple[Fault, ...]], seed: int) -> None:
+        self._feed, self._active, self._seed = feed, active, seed
+        self._changes: dict[Fault, Change] = {}
+
+    @property
+    def next_us(self) -> int:
+        """Before this time there is nothing to do."""
+        return 0 if self._active() or self._changes else self._feed.next_us
+
+    def step(self, truth: TrueState) -> tuple[int, Image] | None:
+        """See `CameraFeed.step`."""
+        arrived = self.arrival(truth)
+        return None if arrived is None else (arrived.time_us, arrived.image)
+
+    def arrival(self, truth: TrueState) -> Exposure | None:
+        """See `CameraFeed.arrival`."""
+        active = self._active()
+        if active != tuple(self._changes):
+            kept = self._changes
+            self._changes = {fault: kept.get(fault) or _new_change(fault, self._seed) for fault in active}
+        exposure = self._feed.arrival(truth)
+        for change in self._changes.values():
+            exposure = change(truth.time_us, exposure)
+        return exposure
+
+
+def _new_change(fault: Fault, seed: int) -> Change:
+    """What a fault does from now on; late images that have not arrived at its end are lost."""
+    if fault.kind is FaultKind.OFF:
+        return lambda _now_us, _exposure: None
+    if fault.kind is FaultKind.STUCK:
+        return _Frozen()
+    if fault.kind is FaultKind.BLACK:
+        return _blacken
+    if fault.kind is FaultKind.DELAYED:
+        return _Late(fault.amount)
+    if fault.kind is FaultKind.LOSSY:
+        return Lossy(fault.amount, seed, f"faults.{fault.part}.{fault.kind}")
+    raise ValueError(f"{fault.kind} is no fault of a camera")
+
+
+class _Changed(Exposure):
+    """An exposure whose image is made by a function when it is first asked for."""
+
+    def __init__(self, time_us: int, make: Callable[[], Image]) -> None:
+        self.time_us = time_us
+        self._make = make
+
+    @cached_property
+    def image(self) -> Image:
+        """BGR, shape (height, width, 3), uint8."""
+        return self._make()
+
+
+def _blacken(_now_us: int, exposure: Exposure | None) -> Exposure | None:
+    if exposure is None:
+        return None
+    return _Changed(exposure.time_us, lambda: np.zeros_like(exposure.image))
+
+
+class _Frozen:
+    """The first image again and again, with new times: the sensor hangs, its driver does not."""
+
+    def __init__(self) -> None:
+        self._first: Exposure | None = None
+
+    def __call__(self, _now_us: int, exposure: Exposure | None) -> Exposure | None:
+        if exposure is None:
+            return None
+        first = self._first = self._first or exposure
+        return _Changed(exposure.time_us, lambda: first.image)
+
+
+class _Late:
+    def __init__(self, delay_s: float) -> None:
+        self._delay: Delay[Exposure] = Delay(delay_s)
+
+    def __call__(self, now_us: int, exposure: Exposure | None) -> Exposure | None:
+        if exposure is not None:
+            self._delay.send(now_us, exposure)
+        return self._delay.newest(now_us)

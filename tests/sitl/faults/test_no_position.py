@@ -1,0 +1,34 @@
+"""30 s without GPS or motion capture end in a controlled landing."""
+
+import pytest
+
+from scenarios.air import Wind
+from scenarios.faults.parse import parse_fault
+from tests.sitl.faults.hovering import hover
+
+LOST = "Failsafe activated: position lost, descending"
+
+
+@pytest.mark.parametrize("seed", [1, 2, 3])
+@pytest.mark.parametrize(
+    ("fault", "sensors", "airframe", "scenario", "wind_m_s"),
+    [
+        ("external_pose off at 0 s for 30 s", "mocap", "abejorro", "empty", 0.0),
+        ("external_pose off at 0 s for 30 s", "mocap", "racer-3in", "empty", 2.0),
+        ("gps off at 0 s for 30 s", "outdoor", "x500", "open-field", 0.0),
+        ("gps off at 0 s for 30 s", "outdoor", "x500", "open-field", 5.0),
+    ],
+)
+def test_30_s_without_a_position_end_in_a_controlled_landing(
+    fault, sensors, airframe, scenario, wind_m_s, seed
+):
+    wind = Wind(speed_m_s=wind_m_s, turbulence_m_s=0.2 * wind_m_s)
+    seen = hover(parse_fault(fault), sensors, airframe, scenario=scenario, wind=wind, seed=seed, after_s=30.0)
+    assert [text for _, text in seen.failsafes] == [LOST]
+    assert 5.0 < seen.failsafes[0][0] <= 6.0
+    assert not seen.armed
+    assert seen.at_rest
+    assert seen.finite
+    assert seen.tilt_deg < 30.0
+    assert seen.touchdown_m_s < 1.5
+    assert seen.moved_m < 8.0
