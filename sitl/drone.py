@@ -130,7 +130,7 @@ class ServedDrone:
             video.add_text("/video.sdp", "application/sdp", self._rtp.description())
         self._video = video
         await video.start()
-        self._camera = CameraFeed(scenario, others)
+        self._camera = CameraFeed(scenario, others, self.simulation.seed)
 
     def _warn(self, line: str) -> None:
         """Show a line at the terminal and at ground stations."""

@@ -136,6 +136,7 @@ class Simulation:
         SuiteError: the scenario's sensor suite cannot be used.
 
     Attributes:
+        seed: as given.
         world: the physics.
         autopilot: fed with the world's sensors; its motor speeds drive the world.
         failures: injected ones.
@@ -145,7 +146,7 @@ class Simulation:
     """
 
     def __init__(self, scenario: Scenario, airframe: Airframe | None = None, seed: int = 0) -> None:
-        self.scenario = scenario
+        self.scenario, self.seed = scenario, seed
         airframe = airframe or load_airframe(scenario.airframe)
         self.world = World(scenario, airframe, seed)
         origin = scenario.origin

@@ -82,7 +82,7 @@ class LockstepVehicle:
     ) -> None:
         self.simulation = Simulation(plan.scenario, plan.airframe, plan.seed or 0)
         detector = plan_detector(plan, rendered=True)
-        self.perception = LockstepPerception(plan.scenario, on_image, detector)
+        self.perception = LockstepPerception(plan.scenario, on_image, detector, plan.seed or 0)
         self.drone = LockstepDrone(
             self.simulation,
             plan.start_pose,
@@ -111,12 +111,19 @@ class _SimulationJudge:
 
 
 class LockstepPerception:
-    """The camera's images, each when its latency is over; `follow` is called at every control tick."""
+    """The camera's images, each when its latency is over; `follow` is called at every control tick.
+
+    The seed is of the camera's noise.
+    """
 
     def __init__(
-        self, scenario: Scenario, on_image: ImageObserver | None = None, detector: Detector | None = None
+        self,
+        scenario: Scenario,
+        on_image: ImageObserver | None = None,
+        detector: Detector | None = None,
+        seed: int = 0,
     ) -> None:
-        self._feed = CameraFeed(scenario)
+        self._feed = CameraFeed(scenario, seed=seed)
         self._on_image = on_image
         self._detector = detector or new_detector("boxes")
         self._choice = ImageChoice()
