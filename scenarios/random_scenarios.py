@@ -13,7 +13,8 @@ from typing import Self
 from pydantic import Field, model_validator
 
 from scenarios.air import Wind
-from scenarios.models import COLOURS, Arena, Base, Frame, Scenario, Start
+from scenarios.imaging.random_imaging import RandomClutter, RandomEffects, RandomLight
+from scenarios.models import COLOURS, Arena, Base, Camera, Frame, Light, Scenario, Start
 from scenarios.part import Part
 from scenarios.random_air import RandomWind
 from scenarios.random_closeness import Closeness
@@ -66,6 +67,13 @@ class Level(Part):
     )
     obstacles: Obstacles | None = Field(None, description="what else is in the arena")
     wind: RandomWind | None = Field(None, description="how the air moves; by default it is still")
+    camera: RandomEffects | None = Field(
+        None, description="what the camera does to images; by default they are ideal"
+    )
+    light: RandomLight | None = Field(None, description="where light comes from; by default the challenge's")
+    clutter: RandomClutter | None = Field(
+        None, description="a hall around the arena with things on walls and floor"
+    )
     airframe: str | None = Field(None, description="name of the drone to fly; by default the challenge's")
     sensors: str | None = Field(None, description="name of the drone's sensor suite, or a file of one")
 
@@ -114,6 +122,10 @@ def random_scenario(level: Level, seed: int) -> Scenario:
         start=Start(x_m=base.x_m, y_m=base.y_m, yaw_rad=yaw_rad),
         frames=frames,
         wind=Wind() if level.wind is None else level.wind.draw(seed),
+        camera=Camera(effects=None if level.camera is None else level.camera.draw(seed)),
+        light=Light() if level.light is None else level.light.draw(seed),
+        hall=None if level.clutter is None else level.clutter.hall,
+        patches=() if level.clutter is None else level.clutter.draw(seed),
         **{name: value for name in ("airframe", "sensors") if (value := getattr(level, name)) is not None},
     )
     return scenario if level.obstacles is None else add_obstacles(scenario, level.obstacles, seed)

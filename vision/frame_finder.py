@@ -13,6 +13,7 @@ import numpy.typing as npt
 from vision.colour_regions import OBSTACLE, PRIMARIES, ColourMask, find_colours
 from vision.detector import measure
 from vision.frame_fit import FittedFrame, fit_frame
+from vision.lens import Lens, straight_box
 from vision.outer_sides import outer_sides
 from vision.patch import cut_patch
 from vision.types import (
@@ -32,6 +33,9 @@ _Box = tuple[int, int, int, int]
 PAINTED_SPREAD_PX = 0.5
 """How much larger than true the simulator paints on each side: a border is on the nearest pixels."""
 
+SMOOTH_SPREAD_PX = 0.25
+"""The same with camera effects, which are painted at twice the resolution."""
+
 _OBSTACLE_STEP = 8
 _MIN_RUN_PX = 3
 _STEEP = 2  # rows a column: steeper edges are the sides of obstacles, which are upright
@@ -46,11 +50,14 @@ class FrameFinder:
         focal_px: focal length of the camera; its optical axis is in the middle of the image.
         spread_px: how much larger than true a region looks on each side: `PAINTED_SPREAD_PX` for images of
             the simulator, 0 for those of a real camera.
+        lens: of a camera that is not ideal; it has the same focal length. What is found is then in pixels of
+            an ideal camera.
     """
 
-    def __init__(self, focal_px: float, spread_px: float = 0.0) -> None:
+    def __init__(self, focal_px: float, spread_px: float = 0.0, lens: Lens | None = None) -> None:
         self._focal_px = focal_px
         self._spread_px = spread_px
+        self._lens = lens
 
     def find(self, image: Image, time_us: int | None = None) -> Detections:
         """Find all frames and obstacles.
@@ -65,7 +72,10 @@ class FrameFinder:
 
         Raises:
             ValueError: the image is not of that shape and type.
+            CalibrationError: it has another size than those with which the camera was calibrated.
         """
+        if self._lens is not None:
+            self._lens.check_size(image.shape[1], image.shape[0])
         masks = find_colours(image)
         if not masks:
             return Detections(time_us=time_us)
@@ -76,6 +86,8 @@ class FrameFinder:
             others = [other for other in masks if other is not mask]
             if mask.colour == OBSTACLE:
                 edges = _obstacle_edges(mask, others)
+                if self._lens is not None:
+                    edges = _straight_edges(edges, self._lens)
                 continue
             found, box = self._find_colour(mask, others)
             sightings += found
@@ -110,6 +122,8 @@ class FrameFinder:
             box[1] + 1, box[1] + box[3], box[0] + 1, box[0] + box[2],
             width_px=width, height_px=height, focal_px=self._focal_px,
         )  # fmt: skip
+        if self._lens is not None:
+            numbers = straight_box(numbers, self._lens)
         if largest.poses:
             numbers = replace(numbers, signed_a=_signed_angle(largest.poses[0]))
         return [sighting for _, sighting in found], numbers
@@ -120,10 +134,10 @@ class FrameFinder:
         """The frame that a group of fragments shows, if it is one."""
         height, width = mask.mask.shape
         box = _bounding_box(points)
-        candidates = outer_sides(points, width, height)
+        candidates = outer_sides(points, width, height, self._lens)
         if not candidates:
             return None
-        patch = cut_patch(mask, others, box)
+        patch = cut_patch(mask, others, box, self._lens)
         fits = (fit_frame(patch, sides, self._focal_px, self._spread_px) for sides in candidates)
         best: FittedFrame | None = None
         for fitted in fits:
@@ -204,3 +218,12 @@ def _obstacle_edges(mask: ColourMask, others: Sequence[ColourMask]) -> tuple[Obs
         )
         edges.append(ObstacleEdge(x - (width - 1) / 2, last + 0.5 - (height - 1) / 2, cut))
     return tuple(edges)
+
+
+def _straight_edges(edges: Sequence[ObstacleEdge], lens: Lens) -> tuple[ObstacleEdge, ...]:
+    """Obstacle edges as an ideal camera would see them."""
+    places = lens.ideal(np.array([(edge.right_px, edge.down_px) for edge in edges]).reshape(-1, 2))
+    return tuple(
+        replace(edge, right_px=right, down_px=down)
+        for edge, (right, down) in zip(edges, places.tolist(), strict=True)
+    )

@@ -85,11 +85,8 @@ class CameraEffects(Part):
     read_noise: float = Field(
         0.0, ge=0, le=20, description="standard deviation of noise in the dark, before the gain, of 255"
     )
-    full_well_e: float | None = Field(
-        None,
-        ge=200,
-        le=1e6,
-        description="electrons of a white pixel, for shot noise; without it there is none",
+    shot_noise: float = Field(
+        0.0, ge=0, le=20, description="standard deviation of shot noise at white, before the gain, of 255"
     )
     gain: Literal["auto", "fixed"] = Field("fixed", description="whether brightness is regulated")
     fixed_gain: float = Field(1.0, ge=0.2, le=20, description="factor of brightness if it is fixed")

@@ -48,7 +48,7 @@ class SensorChain:
         shape = (camera.height_px, camera.width_px, 3)
         self._light = _light_map(shape, effects)
         self._noise = None
-        if effects.read_noise > 0.0 or effects.full_well_e is not None:
+        if effects.read_noise > 0.0 or effects.shot_noise > 0.0:
             self._noise = _Noise(effects, shape, seed)
         self._fixed: Image | None = None
         if effects.gain == "fixed" and effects.white_balance == "fixed":
@@ -130,7 +130,7 @@ class _Noise:
 
 def _stabilising(effects: CameraEffects) -> _Tables:
     read = effects.read_noise
-    shot = 0.0 if effects.full_well_e is None else 255.0 / effects.full_well_e
+    shot = effects.shot_noise**2 / 255.0
     stable = _LEVELS / read if shot == 0.0 else 2.0 / shot * (np.sqrt(shot * _LEVELS + read * read) - read)
     step = min(_FINEST, _SIGNAL / stable[-1])
     forward = np.rint(step * stable).astype(np.uint8)

@@ -58,11 +58,11 @@ def test_edges_are_smooth():
 
 @pytest.mark.parametrize("level", [10, 60, 200])
 def test_noise_is_that_of_reading_and_of_electrons(level):
-    effects = CameraEffects(read_noise=2.0, full_well_e=4000.0)
+    effects = CameraEffects(read_noise=2.0, shot_noise=4.0)
     chain = SensorChain(Camera(effects=effects), seed=5)
     image = chain.develop(np.full((240, 320, 3), level, np.uint8), 1_000_000).astype(float)
     assert image.mean() == pytest.approx(level, abs=0.7)
-    assert image.std() == pytest.approx(sqrt(2.0**2 + level * 255.0 / 4000.0), rel=0.06)
+    assert image.std() == pytest.approx(sqrt(2.0**2 + level * 4.0**2 / 255.0), rel=0.06)
     assert abs(np.corrcoef(image[:, 1:, 0].ravel(), image[:, :-1, 0].ravel())[0, 1]) < 0.02
 
 
