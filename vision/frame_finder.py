@@ -41,6 +41,7 @@ _MIN_RUN_PX = 3
 _STEEP = 2  # rows a column: steeper edges are the sides of obstacles, which are upright
 _MIN_FRAGMENT_PX = 3
 _MAX_FRAGMENTS = 12
+_SHEET_PX, _SHEET_SHARE = 5.0, 0.9
 
 
 class FrameFinder:
@@ -134,6 +135,8 @@ class FrameFinder:
         """The frame that a group of fragments shows, if it is one."""
         height, width = mask.mask.shape
         box = _bounding_box(points)
+        if _is_filled(mask, points, box):
+            return None
         candidates = outer_sides(points, width, height, self._lens)
         if not candidates:
             return None
@@ -148,6 +151,26 @@ class FrameFinder:
         return (
             None if best is None else (box, FrameSighting(mask.colour, best.corners, best.whole, best.poses))
         )
+
+
+def _is_filled(mask: ColourMask, points: _Contour, box: _Box) -> bool:
+    """Whether a region wholly inside the image is a sheet, so large that a frame's opening would show."""
+    column, row, columns, rows = box
+    height, width = mask.mask.shape
+    if (
+        min(columns, rows) < _SHEET_PX
+        or column == 0
+        or row == 0
+        or column + columns == width
+        or row + rows == height
+    ):
+        return False
+    hull = cv2.convexHull(points)
+    area, around = cv2.contourArea(hull), cv2.arcLength(hull, True)
+    if area < _SHEET_PX * 0.5 * around:  # mean width of a long rectangle
+        return False
+    pixels = cv2.countNonZero(mask.mask[row : row + rows, column : column + columns])
+    return pixels > _SHEET_SHARE * (area + 0.5 * around + 1.0)  # Pick's theorem
 
 
 def _bounding_box(points: _Contour) -> _Box:

@@ -34,6 +34,11 @@ _ROUGH = 2.5  # before the bars' edges are corrected by a pose, errors may be la
 _CLEAR_OPEN, _THIN_PX = 0.7, 3.0
 _CLEAR_PX = 4.5  # a side that is shorter may be a part of a longer one
 _TOO_NARROW = 1.2
+_OPEN_SIDE = 0.5  # share of a bar at which its inner edge is seen, too
+# Sides of frames, pixels: from here on some of an opening is seen, at least at two bars, and how wide bars are.
+_OPENING_SEEN_PX, _OPENING_CLEAR_PX, _BARS_SEEN_PX = 4.0, 9.0, 6.0
+_TOO_THIN = (0.3, 0.2)  # half a bar's width may be smaller than expected by so much and this share of it
+_TOO_WIDE = (1.3, 0.1)  # or larger: frames that are seen past their edges and blurred ones look so
 _WIDTH_SHARE, _WIDTH_SHARE_STD = 0.75, 0.15  # of half a bar's image that is half of the bar's width
 
 
@@ -78,6 +83,8 @@ def _fit_any(patch: Patch, sides: Sides, focal_px: float, spread_px: float) -> F
     lines, meetings, poses = _fit(patch, sides, focal_px, spread_px)
     known = [(met.x, met.y) for met in meetings if met is not None]
     if len(known) == 4:
+        if poses and not _has_bars(lines, known, poses[0], focal_px, spread_px):
+            return None
         support = patch.support(known, known[1:] + known[:1])
         if max(support.empty) <= _MAX_EMPTY:
             if patch.is_filled(known):
@@ -95,6 +102,36 @@ def _fit_any(patch: Patch, sides: Sides, focal_px: float, spread_px: float) -> F
             return None  # nothing explains why no more is seen of it
         corners = _corners_without_pose(patch, lines, spread_px)
     return _fitted(corners, False, poses, meetings) if any(corners) else None
+
+
+def _has_bars(
+    lines: BarLines, axes_corners: Sequence[Point], pose: ModelPose, focal_px: float, spread_px: float
+) -> bool:
+    """Whether there is an opening where it is large enough to be seen, and the bars are as wide as a frame's.
+
+    Posters and drawn rectangles are not. The limits let through all frames of some thousand images, rendered
+    with and without noise and blur.
+    """
+    known = [line for line in lines if line is not None]
+    following = (*axes_corners[1:], axes_corners[0])
+    size_px = min(hypot(x1 - x0, y1 - y0) for (x0, y0), (x1, y1) in zip(axes_corners, following, strict=True))
+    clear = [k for k, line in enumerate(known) if line.open > _OPEN_SIDE]
+    if len(known) < 4 or size_px < _OPENING_SEEN_PX:
+        return True
+    if len(clear) < (1 if size_px < _OPENING_CLEAR_PX else 2):
+        return False
+    if size_px < _BARS_SEEN_PX:
+        return True
+    spans = np.array([(line.first, line.last) for line in known])
+    inward = np.array([line.inward for line in known])
+    offsets = bar_offsets(pose, tuple(line.steep for line in known), inward, spans, focal_px)
+    if offsets is None:
+        return True
+    half_px = 0.5 * (offsets[:, 1] - offsets[:, 0]).mean(axis=1)[clear] + spread_px
+    wider_px = float(np.mean([known[k].half_px for k in clear]) - half_px.mean())
+    expected_px = float(half_px.mean())
+    most_px, least_px = (limit + share * expected_px for limit, share in (_TOO_WIDE, _TOO_THIN))
+    return -least_px <= wider_px <= most_px
 
 
 def _fitted(corners: Corners, whole: bool, poses: list[ModelPose], meetings: _Meetings) -> FittedFrame:
