@@ -8,8 +8,8 @@ from math import ceil, floor, hypot, sqrt
 import numpy as np
 import numpy.typing as npt
 
+from vision.calibration.lens import Lens
 from vision.frame_model import BAR_M, FRAME_HEIGHT_M, FRAME_WIDTH_M, Floats, Point, Segment, Sides
-from vision.lens import Lens
 from vision.patch import BACKGROUND, OWN, Labels, Patch
 
 Flags = npt.NDArray[np.bool_]

@@ -5,10 +5,10 @@ from __future__ import annotations
 from collections.abc import Callable
 from functools import partial
 
-from vision.calibration import Calibration
+from vision.calibration.lens import Lens
+from vision.calibration.model import Calibration
 from vision.detector import detect
 from vision.frame_finder import PAINTED_SPREAD_PX, SMOOTH_SPREAD_PX, FrameFinder
-from vision.lens import Lens
 from vision.types import Detections, Image, Vision
 
 Detector = Callable[[Image, int | None], Detections]

@@ -10,10 +10,10 @@ import cv2
 import numpy as np
 import numpy.typing as npt
 
+from vision.calibration.lens import Lens, straight_box
 from vision.colour_regions import OBSTACLE, PRIMARIES, ColourMask, find_colours
 from vision.detector import measure
 from vision.frame_fit import FittedFrame, fit_frame
-from vision.lens import Lens, straight_box
 from vision.outer_sides import outer_sides
 from vision.patch import cut_patch
 from vision.types import (

@@ -35,7 +35,7 @@ _CLEAR_OPEN, _THIN_PX = 0.7, 3.0
 _CLEAR_PX = 4.5  # a side that is shorter may be a part of a longer one
 _TOO_NARROW = 1.2
 _OPEN_SIDE = 0.5  # share of a bar at which its inner edge is seen, too
-# Sides of frames, pixels: from here on some of an opening is seen, at least at two bars, and how wide bars are.
+# Sides of frames, pixels: from here on some of an opening is seen, at two bars at least, and bars' widths.
 _OPENING_SEEN_PX, _OPENING_CLEAR_PX, _BARS_SEEN_PX = 4.0, 9.0, 6.0
 _TOO_THIN = (0.3, 0.2)  # half a bar's width may be smaller than expected by so much and this share of it
 _TOO_WIDE = (1.3, 0.1)  # or larger: frames that are seen past their edges and blurred ones look so

@@ -14,8 +14,8 @@ import cv2
 import numpy as np
 import numpy.typing as npt
 
+from vision.calibration.lens import Lens
 from vision.frame_model import Point, Segment, Sides
-from vision.lens import Lens
 
 _MIN_COLUMNS, _MIN_ROWS = 2, 4  # between the centres of the outermost pixels
 _CLEAR = 0.3  # difference in steepness from which on it is clear which sides are upright

@@ -9,9 +9,9 @@ import cv2
 import numpy as np
 import numpy.typing as npt
 
+from vision.calibration.lens import Lens
 from vision.colour_regions import ColourMask
 from vision.frame_model import Point
-from vision.lens import Lens
 
 Labels = npt.NDArray[np.uint8]
 Box = tuple[int, int, int, int]  # column, row, columns, rows

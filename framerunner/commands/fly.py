@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -14,6 +15,7 @@ from framerunner.commands import DEFAULT_MISSION, WholeNumber, check_range, load
 if TYPE_CHECKING:
     from framerunner.flying.plan import FlightPlan
     from offboard.mission import Mission
+    from vision.calibration.model import Calibration
     from wire.simulator_api import SimulatorApi
 
 _Drone = Annotated[
@@ -22,6 +24,10 @@ _Drone = Annotated[
 _Camera = Annotated[str | None, Parameter(help="URL, device or folder of its camera; needed with --drone")]
 _CameraDelay = Annotated[
     float, Parameter(help="with --camera: age in s of an image that arrives without a time stamp")
+]
+_Calibration = Annotated[
+    Path | None,
+    Parameter(help="with --drone: its camera's calibration, a file of `framerunner camera calibrate`"),
 ]
 _Simulator = Annotated[
     str | None,
@@ -65,6 +71,7 @@ def fly(
     drone: _Drone = None,
     camera: _Camera = None,
     camera_delay: _CameraDelay = 0.1,
+    calibration: _Calibration = None,
     simulator: _Simulator = None,
     speed: Annotated[float, Parameter(help="of the simulated drone: simulated seconds a second")] = 1.0,
     instance: Annotated[WholeNumber, Parameter(help="of the simulated drone: shifts its ports, 0 to 9")] = 0,
@@ -101,6 +108,8 @@ def fly(
         framerunner fly --drone udpin://0.0.0.0:14540 --simulator http://10.0.0.2:8100
 
         framerunner fly --drone serial:///dev/ttyUSB0:57600 --camera rtsp://10.0.0.2/1
+
+        framerunner fly --drone udpin://0.0.0.0:14540 --camera 0 --calibration camera.yaml
     """
     api = _simulator_api(simulator, drone)
     if api is not None and camera is None:
@@ -115,8 +124,24 @@ def fly(
     loaded = load_mission_with(mission, pilot)
     seed = (seed or 0) if lockstep else None
     plan = _plan(scenario, loaded, seed, response=response, drone=drone, drone_limits=drone_limits)
+    if calibration is not None:
+        plan = replace(plan, calibration=_calibration(calibration, drone, loaded))
     real_time = None if lockstep else RealTimeSettings(drone, camera, api, speed, instance, camera_delay)
     return asyncio.run(fly_once(FlightSettings(plan, real_time, out, record, video, monitor)))
+
+
+def _calibration(path: Path, drone: str | None, mission: Mission) -> Calibration:
+    """The calibration of a real drone's camera."""
+    from framerunner.camera_calibration.calibration_file import load_calibration
+
+    if drone is None:
+        raise SettingError("--calibration: a simulated drone's camera is known; leave it out or give --drone")
+    if mission.vision == "boxes":
+        raise SettingError(
+            f"--calibration: mission {mission.name} sees boxes, whose formulas know no lens; leave it out "
+            "or fly one with vision: frames"
+        )
+    return load_calibration(path)
 
 
 def _plan(

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from framerunner.flying.plan import FlightPlan
 from scenarios.models import Camera
-from vision.calibration import Calibration
+from vision.calibration.model import Calibration
 from vision.detectors import Detector, new_detector
 
 

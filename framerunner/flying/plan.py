@@ -14,7 +14,7 @@ from offboard.navigation.surroundings import Surroundings
 from scenarios.models import Camera, Scenario, start_position
 from scenarios.part import Part
 from scenarios.referee import Referee
-from vision.calibration import Calibration
+from vision.calibration.model import Calibration
 
 if TYPE_CHECKING:  # it imports the statechart library, which the virtual camera does not need
     from offboard.mission import Mission

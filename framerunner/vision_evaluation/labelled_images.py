@@ -18,8 +18,8 @@ from scenarios.models import Scenario, UprightFrame
 from scenarios.random_scenarios import Level, random_scenario
 from sitl.camera import STILL, Camera, Motion
 from sitl.video import encode_jpeg
-from vision.calibration import Calibration
-from vision.lens import Lens
+from vision.calibration.lens import Lens
+from vision.calibration.model import Calibration
 from vision.types import Image
 
 Floats = npt.NDArray[np.float64]

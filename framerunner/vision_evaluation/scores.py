@@ -12,7 +12,7 @@ import numpy as np
 
 from framerunner.vision_evaluation.labelled_images import FrameLabel, LabelledImage
 from geometry.vectors import Vec3
-from vision.calibration import Calibration
+from vision.calibration.model import Calibration
 from vision.detectors import Detector, new_detector
 from vision.types import Detection, Detections, FrameSighting, Image, Vision
 

@@ -13,7 +13,7 @@ import numpy as np
 import numpy.typing as npt
 
 from geometry.lens import distorted, rays_of_pixels
-from vision.calibration import Calibration, CalibrationError
+from vision.calibration.model import Calibration, CalibrationError
 from vision.types import Detection
 
 Floats = npt.NDArray[np.float64]
