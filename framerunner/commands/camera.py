@@ -14,8 +14,8 @@ from framerunner.commands import WholeNumber, check_range, say
 if TYPE_CHECKING:
     from vision.calibration.board import Board
 
-app = App(name="camera", help="The arena's camera image for any drone; calibration of a real camera.")
-calibration = App(name="calibrate", help="Calibrate a camera with a board that you print.")
+app = App(name="camera")
+calibration = App(name="calibrate")
 app.command(calibration)
 
 _Columns = Annotated[WholeNumber, Parameter(help="squares of the board from left to right, 4 to 20")]

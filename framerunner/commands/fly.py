@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import asyncio
-from dataclasses import replace
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -108,12 +108,9 @@ def fly(
         framerunner fly --drone udpin://0.0.0.0:14540 --simulator http://10.0.0.2:8100
 
         framerunner fly --drone serial:///dev/ttyUSB0:57600 --camera rtsp://10.0.0.2/1
-
-        framerunner fly --drone udpin://0.0.0.0:14540 --camera 0 --calibration camera.yaml
     """
     api = _simulator_api(simulator, drone)
-    if api is not None and camera is None:
-        camera = api.video_url
+    camera = api.video_url if api is not None and camera is None else camera
     _check(drone, camera, speed, instance, lockstep)
     check_range("--camera-delay", camera_delay, 0.0, 0.5)
     _check_lockstep(seed, monitor, lockstep)
@@ -122,18 +119,18 @@ def fly(
     from framerunner.flying.run import FlightSettings, fly_once
 
     loaded = load_mission_with(mission, pilot)
-    seed = (seed or 0) if lockstep else None
-    plan = _plan(scenario, loaded, seed, response=response, drone=drone, drone_limits=drone_limits)
-    if calibration is not None:
-        plan = replace(plan, calibration=_calibration(calibration, drone, loaded))
+    given = _PlanOptions(response, drone, drone_limits, calibration)
+    plan = _plan(scenario, loaded, (seed or 0) if lockstep else None, given)
     real_time = None if lockstep else RealTimeSettings(drone, camera, api, speed, instance, camera_delay)
     return asyncio.run(fly_once(FlightSettings(plan, real_time, out, record, video, monitor)))
 
 
-def _calibration(path: Path, drone: str | None, mission: Mission) -> Calibration:
-    """The calibration of a real drone's camera."""
+def _calibration(path: Path | None, drone: str | None, mission: Mission) -> Calibration | None:
+    """The calibration of a real drone's camera, if one is given."""
     from framerunner.camera_calibration.calibration_file import load_calibration
 
+    if path is None:
+        return None
     if drone is None:
         raise SettingError("--calibration: a simulated drone's camera is known; leave it out or give --drone")
     if mission.vision == "boxes":
@@ -144,20 +141,23 @@ def _calibration(path: Path, drone: str | None, mission: Mission) -> Calibration
     return load_calibration(path)
 
 
-def _plan(
-    scenario: str,
-    mission: Mission,
-    seed: int | None,
-    *,
-    response: str | None,
-    drone: str | None,
-    drone_limits: str | None,
-) -> FlightPlan:
+@dataclass(frozen=True)
+class _PlanOptions:
+    """Options that belong to a plan, as given."""
+
+    response: str | None
+    drone: str | None
+    drone_limits: str | None
+    calibration: Path | None
+
+
+def _plan(scenario: str, mission: Mission, seed: int | None, options: _PlanOptions) -> FlightPlan:
     """The flight that the options describe; a seed is given in lockstep."""
     from framerunner.commands.named_numbers import limits_of, response_of
     from framerunner.flying.plan import FlightPlan
     from scenarios.loader import load_scenario
 
+    response, drone, drone_limits = options.response, options.drone, options.drone_limits
     if response is not None and seed is None:
         raise SettingError("--response: is for a simulated vehicle in lockstep; add --lockstep")
     is_open = mission.mission_class == "open"
@@ -179,6 +179,7 @@ def _plan(
         seed,
         drone_limits=None if drone_limits is None else limits_of(drone_limits),
         response=None if response is None else response_of(response),
+        calibration=_calibration(options.calibration, drone, mission),
     )
 
 

@@ -175,7 +175,7 @@ def test_images_of_another_size_than_calibrated_are_refused():
         new_detector("frames", calibration=calibration)(np.zeros((240, 320, 3), np.uint8), None)
 
 
-@pytest.mark.parametrize("border_m", [None, 0.05, 0.009])
+@pytest.mark.parametrize("border_m", [None, 0.14, 0.012])
 def test_sheets_and_drawn_rectangles_are_no_frames(border_m):
     poster = Patch(
         surface="front", colour="red", across_m=0.0, up_m=1.2, width_m=1.2, height_m=0.6, border_m=border_m
