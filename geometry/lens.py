@@ -6,6 +6,7 @@ OpenCV has both, too; the inverse under different names and with different accur
 from __future__ import annotations
 
 from functools import lru_cache
+from typing import TypeVar
 
 import numpy as np
 import numpy.typing as npt
@@ -14,16 +15,17 @@ Floats = npt.NDArray[np.float64]
 Coefficients = tuple[float, float, float, float, float]
 """k1, k2, p1, p2, k3."""
 
+Number = TypeVar("Number", float, Floats)
 NO_DISTORTION: Coefficients = (0.0, 0.0, 0.0, 0.0, 0.0)
 _COARSE_PX = 8
 _EXACT = 1e-12
 
 
-def distorted(x: float, y: float, lens: Coefficients) -> tuple[float, float]:
-    """Where a ray is seen.
+def distorted(x: Number, y: Number, lens: Coefficients) -> tuple[Number, Number]:
+    """Where a ray is seen, or many.
 
     Args:
-        x: right of the optical axis, over the depth.
+        x: right of the optical axis, over the depth; a number or an array.
         y: below it, over the depth.
         lens: its coefficients.
 

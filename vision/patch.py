@@ -84,13 +84,12 @@ class Patch:
         near = cv2.dilate(self.labels, _BESIDE).tobytes()
         rows, columns = self.labels.shape
         (reach_x, reach_y), (column, row) = self.reach_px, self.origin
-        owns, empties, lens = [], [], self.lens
+        owns, empties = [], []
         for (x0, y0), (x1, y1) in zip(starts, ends, strict=True):
             seen, empty = 0, 0
-            for place in _PLACES:  # so few that NumPy takes longer
-                x, y = x0 + (x1 - x0) * place, y0 + (y1 - y0) * place
-                if lens is not None:
-                    x, y = lens.seen(x, y)
+            # So few that NumPy takes longer.
+            along = [(x0 + (x1 - x0) * place, y0 + (y1 - y0) * place) for place in _PLACES]
+            for x, y in along if self.lens is None else self.lens.all_seen(np.array(along)).tolist():
                 i, j = round(x + column), round(y + row)
                 known = 0 <= i < columns and 0 <= j < rows
                 at = j * columns + i

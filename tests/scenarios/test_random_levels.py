@@ -49,7 +49,7 @@ def test_a_level_loads_by_path(tmp_path):
         (
             CALM + "fog: 1\n",
             "f.yaml:20: fog is not a known field; known here: name, description, layout, closeness, "
-            "obstacles, wind, airframe, sensors",
+            "obstacles, wind, camera, light, clutter, airframe, sensors",
         ),
         (CALM + "  apart: 1\n", "f.yaml:20: layout.apart is not a known field; did you mean apart_m?"),
         (
@@ -114,12 +114,12 @@ def test_wrong_values_in_known_fields_give_one_line(fields):
 @pytest.mark.parametrize(
     ("name", "message"),
     [
-        ("clam", 'unknown level "clam"; did you mean calm? Known: calm'),
-        ("Calm", 'unknown level "Calm"; did you mean calm? Known: calm'),
-        ("zzz", 'unknown level "zzz"; Known: calm'),
-        ("", 'unknown level ""; Known: calm'),
+        ("clam", 'unknown level "clam"; did you mean calm? Known: breeze, calm'),
+        ("Calm", 'unknown level "Calm"; did you mean calm? Known: breeze, calm'),
+        ("zzz", 'unknown level "zzz"; Known: breeze, calm'),
+        ("", 'unknown level ""; Known: breeze, calm'),
         ("a\nb", 'unknown level "a\\nb"; '),
-        ("nowhere.yaml", "nowhere.yaml: no such file; give a path or one of: calm"),
+        ("nowhere.yaml", "nowhere.yaml: no such file; give a path or one of: breeze, calm"),
         ("bad\0.yaml", "bad?.yaml: cannot be read:"),
         ("/", "/: is a directory; give a level file"),
     ],

@@ -71,6 +71,13 @@ class Lens:
         fx, fy = self._focals_px
         return (x * fx + self._axis_from_middle[0], y * fy + self._axis_from_middle[1])
 
+    def all_seen(self, places: Floats) -> Floats:
+        """As `seen`, for many places, shape (..., 2)."""
+        rays = places / self.focal_px
+        x, y = distorted(rays[..., 0], rays[..., 1], self._coefficients)
+        (fx, fy), (right, down) = self._focals_px, self._axis_from_middle
+        return np.stack([x * fx + right, y * fy + down], axis=-1)
+
 
 def straight_box(box: Detection, lens: Lens) -> Detection:
     """The paper's numbers of a box as an ideal camera would see it: each side where its middle is.
