@@ -11,6 +11,7 @@ from framerunner.flying.response import Response
 from offboard.keep_in_box import Box, flight_box
 from offboard.limits import CONTEST, CommandLimits
 from offboard.navigation.surroundings import Surroundings
+from scenarios.imaging.effects import CameraEffects
 from scenarios.models import Camera, Scenario, start_position
 from scenarios.part import Part
 from scenarios.referee import Referee
@@ -94,7 +95,7 @@ class FlightPlan:
 
     @property
     def camera(self) -> Camera:
-        """The camera as the navigator knows it: the scenario's, with size and focal length as calibrated."""
+        """The camera as the navigator knows it: the scenario's, or what its calibration says of it."""
         camera, calibration = self.scenario.camera, self.calibration
         if calibration is None:
             return camera
@@ -103,6 +104,7 @@ class FlightPlan:
                 "width_px": calibration.width_px,
                 "height_px": calibration.height_px,
                 "horizontal_fov_rad": calibration.horizontal_fov_rad,
+                "effects": CameraEffects(readout_s=calibration.readout_s),
             }
         )
 

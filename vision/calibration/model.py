@@ -32,6 +32,9 @@ class Calibration(BaseModel):
     distortion: tuple[Coefficient, Coefficient, Coefficient, Coefficient, Coefficient] = Field(
         (0.0,) * 5, description="k1, k2, p1, p2, k3"
     )
+    readout_s: float = Field(
+        0.0, ge=0, le=0.1, description="of a rolling shutter, from the first to the last row; 0 if not known"
+    )
     rms_px: float | None = Field(
         None, ge=0, description="root mean square of what is left of the corners' errors"
     )
