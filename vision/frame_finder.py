@@ -14,8 +14,9 @@ from vision.calibration.lens import Lens, straight_box
 from vision.colour_regions import OBSTACLE, PRIMARIES, ColourMask, find_colours
 from vision.detector import measure
 from vision.frame_fit import FittedFrame, fit_frame
-from vision.outer_sides import outer_sides
-from vision.patch import cut_patch
+from vision.frame_model import Sides
+from vision.outer_sides import outer_sides, sides_by_opening
+from vision.patch import Patch, cut_patch
 from vision.types import (
     NOT_SEEN,
     Detection,
@@ -42,6 +43,7 @@ _STEEP = 2  # rows a column: steeper edges are the sides of obstacles, which are
 _MIN_FRAGMENT_PX = 3
 _MAX_FRAGMENTS = 12
 _SHEET_PX, _SHEET_SHARE = 5.0, 0.9
+_OPENING_PX = 12  # a region smaller than this is not looked at for an opening
 
 
 class FrameFinder:
@@ -141,16 +143,24 @@ class FrameFinder:
         if not candidates:
             return None
         patch = cut_patch(mask, others, box, self._lens)
-        fits = (fit_frame(patch, sides, self._focal_px, self._spread_px) for sides in candidates)
+        best = self._best_fit(patch, candidates)
+        if best is None and min(box[2:]) >= _OPENING_PX:
+            # Something of its colour behind it may spoil its outline, but not that of its opening.
+            best = self._best_fit(patch, sides_by_opening(mask.mask, box, self._lens))
+        return (
+            None if best is None else (box, FrameSighting(mask.colour, best.corners, best.whole, best.poses))
+        )
+
+    def _best_fit(self, patch: Patch, candidates: Sequence[Sides]) -> FittedFrame | None:
+        """The likeliest frame of several first estimates."""
         best: FittedFrame | None = None
-        for fitted in fits:
+        for sides in candidates:
+            fitted = fit_frame(patch, sides, self._focal_px, self._spread_px)
             if fitted is not None and (
                 best is None or (fitted.whole, -fitted.cost) > (best.whole, -best.cost)
             ):
                 best = fitted
-        return (
-            None if best is None else (box, FrameSighting(mask.colour, best.corners, best.whole, best.poses))
-        )
+        return best
 
 
 def _is_filled(mask: ColourMask, points: _Contour, box: _Box) -> bool:

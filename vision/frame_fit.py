@@ -15,7 +15,18 @@ import numpy as np
 
 from vision.bar_edges import BarEdges, Widths, expected_widths, find_edges
 from vision.bar_lines import BarLine, BarLines, Meeting, fit_lines, meeting
-from vision.frame_model import AXES_CORNERS, OUTER_CORNERS, Floats, ModelPose, Point, Sides, bar_offsets
+from vision.calibration.lens import Lens
+from vision.frame_model import (
+    AXES_CORNERS,
+    FRAME_HEIGHT_M,
+    FRAME_WIDTH_M,
+    OUTER_CORNERS,
+    Floats,
+    ModelPose,
+    Point,
+    Sides,
+    bar_offsets,
+)
 from vision.frame_pose import as_seen, find_poses, poses_of_three
 from vision.patch import Patch
 from vision.types import FrameCorner, FramePose
@@ -39,6 +50,7 @@ _OPEN_SIDE = 0.5  # share of a bar at which its inner edge is seen, too
 _OPENING_SEEN_PX, _OPENING_CLEAR_PX, _BARS_SEEN_PX = 4.0, 9.0, 6.0
 _TOO_THIN = (0.3, 0.2)  # half a bar's width may be smaller than expected by so much and this share of it
 _TOO_WIDE = (1.3, 0.1)  # or larger: frames that are seen past their edges and blurred ones look so
+_TURNING_RAD_S, _FLYING_M_S = 0.5, 0.5  # standard deviations of a camera's motion while a frame is read out
 _WIDTH_SHARE, _WIDTH_SHARE_STD = 0.75, 0.15  # of half a bar's image that is half of the bar's width
 
 
@@ -196,7 +208,26 @@ def _lines_and_poses(
 ) -> tuple[BarLines, _Meetings, list[ModelPose]]:
     lines = [line if _is_sure(line) else None for line in fit_lines(edges, focal_px, offsets)]
     meetings = [meeting(lines[k - 1], lines[k]) for k in range(4)]
+    if patch.lens is not None and patch.lens.readout_s > 0.0:
+        meetings = _sheared(meetings, patch.lens)
     return lines, meetings, _poses(patch, lines, meetings, guesses, focal_px)
+
+
+def _sheared(meetings: _Meetings, lens: Lens) -> _Meetings:
+    """Where lines meet, with what a rolling shutter may shear from the first to the last row of a frame."""
+    known = [met for met in meetings if met is not None]
+    if len(known) < 2:
+        return meetings
+    rights, downs = [met.x for met in known], [met.y for met in known]
+    rows = max(downs) - min(downs)
+    width_px = max(max(rights) - min(rights), rows * FRAME_WIDTH_M / FRAME_HEIGHT_M)
+    # Turning moves all of it alike; flying moves what is near, and widens it.
+    nearer_px = _FLYING_M_S * width_px * width_px / (2.0 * FRAME_WIDTH_M * lens.focal_px)
+    px = lens.readout_s * rows / lens.size_px[1] * (_TURNING_RAD_S * lens.focal_px + nearer_px)
+    return [
+        None if met is None else met._replace(std_x=hypot(met.std_x, px), std_y=hypot(met.std_y, px))
+        for met in meetings
+    ]
 
 
 def _is_sure(line: BarLine | None) -> bool:

@@ -15,7 +15,8 @@ import numpy as np
 import numpy.typing as npt
 
 from vision.calibration.lens import Lens
-from vision.frame_model import Point, Segment, Sides
+from vision.frame_model import BAR_M, FRAME_HEIGHT_M, FRAME_WIDTH_M, Point, Segment, Sides
+from vision.patch import Box
 
 _MIN_COLUMNS, _MIN_ROWS = 2, 4  # between the centres of the outermost pixels
 _CLEAR = 0.3  # difference in steepness from which on it is clear which sides are upright
@@ -72,6 +73,49 @@ def outer_sides(
     moved = [((x0 - column, y0 - row), (x1 - column, y1 - row)) for (x0, y0), (x1, y1) in segments]
     answers = (_named(moved, upright) for upright in _upright(moved))
     return [sides for sides in answers if sides is not None]
+
+
+def sides_by_opening(mask: npt.NDArray[np.uint8], box: Box, lens: Lens | None = None) -> list[Sides]:
+    """First estimates of a frame's outer edges by its opening, the largest hole of a region.
+
+    Args:
+        mask: pixels of its colour, of the whole image.
+        box: column, row, columns and rows around the region.
+        lens: of a camera that is not ideal.
+    """
+    column, row, columns, rows = box
+    crop = mask[row : row + rows, column : column + columns]
+    contours, hierarchy = cv2.findContours(
+        crop, cv2.RETR_CCOMP, cv2.CHAIN_APPROX_SIMPLE, offset=(column, row)
+    )
+    if hierarchy is None:
+        return []
+    holes = [hole for hole, links in zip(contours, hierarchy[0], strict=True) if links[3] >= 0]
+    if not holes:
+        return []
+    hole = np.asarray(max(holes, key=cv2.contourArea), np.int32)
+    height, width = mask.shape
+    return [
+        _around(sides)
+        for sides in outer_sides(hole, width, height, lens)
+        if all(side is not None for side in sides)
+    ]
+
+
+def _around(opening: Sides) -> Sides:
+    """The outer edges around an opening: its corners, moved by a bar's width along both its sides."""
+    corners = [side[0] for side in opening if side is not None]
+    across, down = (2.0 * BAR_M / (size_m - 2.0 * BAR_M) for size_m in (FRAME_WIDTH_M, FRAME_HEIGHT_M))
+    moved: list[Point] = []
+    for k, (x, y) in enumerate(corners):
+        # Corner k is where side k - 1 ends and side k begins; 0 and 2 of the sides are the long ones.
+        (bx, by), (nx, ny) = corners[k - 1], corners[(k + 1) % 4]
+        back, on = (down, across) if k % 2 == 0 else (across, down)
+        moved.append(
+            (x + 0.5 * (back * (x - bx) + on * (x - nx)), y + 0.5 * (back * (y - by) + on * (y - ny)))
+        )
+    a, b, c, d = moved
+    return ((a, b), (b, c), (c, d), (d, a))
 
 
 def _upright(segments: list[Segment]) -> list[list[bool]]:

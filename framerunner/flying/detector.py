@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from framerunner.flying.plan import FlightPlan
+from scenarios.imaging.effects import CameraEffects
 from scenarios.models import Camera
 from vision.calibration.model import Calibration
 from vision.detectors import Detector, new_detector
@@ -27,5 +28,6 @@ def plan_detector(plan: FlightPlan, *, rendered: bool) -> Detector:
 
 def true_calibration(camera: Camera) -> Calibration:
     """The calibration of a scenario's simulated camera, without error."""
-    lens = (0.0,) * 5 if camera.effects is None else camera.effects.lens.coefficients
-    return Calibration.ideal(camera.width_px, camera.height_px, camera.focal_px, lens)
+    effects = camera.effects or CameraEffects()
+    ideal = Calibration.ideal(camera.width_px, camera.height_px, camera.focal_px, effects.lens.coefficients)
+    return ideal.model_copy(update={"readout_s": effects.readout_s})

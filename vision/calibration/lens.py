@@ -28,11 +28,13 @@ class Lens:
     Attributes:
         size_px: columns and rows of these images.
         focal_px: of the ideal camera.
+        readout_s: of its rolling shutter; 0: it has none.
     """
 
     def __init__(self, calibration: Calibration) -> None:
         self.size_px = (calibration.width_px, calibration.height_px)
         self.focal_px = calibration.fx_px
+        self.readout_s = calibration.readout_s
         self._focals_px = (calibration.fx_px, calibration.fy_px)
         self._coefficients = calibration.distortion
         width, height = self.size_px

@@ -57,10 +57,10 @@ class Calibration(BaseModel):
 
     @property
     def is_ideal(self) -> bool:
-        """Whether pixels need no correction."""
+        """Whether pixels need no correction, and all are exposed at once."""
         ideal = self.ideal(self.width_px, self.height_px, self.fx_px)
-        mine = (self.fy_px, self.cx_px, self.cy_px, self.distortion)
-        return mine == (ideal.fy_px, ideal.cx_px, ideal.cy_px, ideal.distortion)
+        mine = (self.fy_px, self.cx_px, self.cy_px, self.distortion, self.readout_s)
+        return mine == (ideal.fy_px, ideal.cx_px, ideal.cy_px, ideal.distortion, ideal.readout_s)
 
     @property
     def horizontal_fov_rad(self) -> float:
