@@ -20,6 +20,7 @@ from vision.patch import Box
 
 _MIN_COLUMNS, _MIN_ROWS = 2, 4  # between the centres of the outermost pixels
 _CLEAR = 0.3  # difference in steepness from which on it is clear which sides are upright
+_LARGE_HOLE = 0.03  # of the box around a region: smaller ones are no part of an opening
 _MAX_ADDED = 0.03  # of the area: less than this is rounding, more is a side
 
 
@@ -76,7 +77,7 @@ def outer_sides(
 
 
 def sides_by_opening(mask: npt.NDArray[np.uint8], box: Box, lens: Lens | None = None) -> list[Sides]:
-    """First estimates of a frame's outer edges by its opening, the largest hole of a region.
+    """First estimates of a frame's outer edges by its opening: the holes of a region together.
 
     Args:
         mask: pixels of its colour, of the whole image.
@@ -91,9 +92,10 @@ def sides_by_opening(mask: npt.NDArray[np.uint8], box: Box, lens: Lens | None = 
     if hierarchy is None:
         return []
     holes = [hole for hole, links in zip(contours, hierarchy[0], strict=True) if links[3] >= 0]
-    if not holes:
+    large = [hole for hole in holes if cv2.contourArea(hole) > _LARGE_HOLE * columns * rows]
+    if not large:
         return []
-    hole = np.asarray(max(holes, key=cv2.contourArea), np.int32)
+    hole = np.concatenate(large).astype(np.int32)
     height, width = mask.shape
     return [
         _around(sides)

@@ -183,3 +183,14 @@ def test_sheets_and_drawn_rectangles_are_no_frames(border_m):
     scenario = Scenario(name="poster", hall=Hall(), patches=[poster])
     image = Camera(scenario).render((3.5, 0.0, 1.2), (1.0, 0.0, 0.0, 0.0))
     assert not [sighting for sighting in FIND(image, None).frames if sighting.poses]
+
+
+@pytest.mark.parametrize("up_m", [1.3, 1.05])
+def test_a_frame_before_a_poster_of_its_colour_is_found(up_m):
+    frame = Frame(colour="red", x_m=2.0, y_m=0.0, z_m=1.2, yaw_rad=0.2)
+    poster = Patch(surface="front", colour="red", across_m=0.3, up_m=up_m, width_m=0.3, height_m=1.2)
+    camera = ScenarioCamera(position_flu_m=(0.0, 0.0, 0.0))
+    scenario = Scenario(name="poster", frames=[frame], camera=camera, hall=Hall(), patches=[poster])
+    image = Camera(scenario).render((0.9, 0.0, 1.2), (1.0, 0.0, 0.0, 0.0))
+    whole = [sighting for sighting in FIND(image, None).frames if sighting.whole and sighting.poses]
+    assert whole[0].poses[0].position_flu_m == pytest.approx((1.1, 0.0, 0.0), abs=0.03)
