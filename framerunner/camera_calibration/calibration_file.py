@@ -9,8 +9,10 @@ import yaml
 from errors import SettingError, write_advice
 from scenarios.yaml_file import FileKind
 from vision.calibration.model import Calibration, CalibrationError
+from wire.finite_json import finite
 
 _FILES = FileKind("calibration", Calibration, CalibrationError, folder="")
+_DECIMALS = 6
 _HEAD = """\
 # A camera's calibration, by OpenCV's conventions: pixels, whole numbers at pixel centres;
 # distortion: k1, k2, p1, p2, k3.
@@ -33,7 +35,7 @@ def save_calibration(calibration: Calibration, path: Path) -> None:
     Raises:
         SettingError: it cannot be written.
     """
-    content = calibration.model_dump(mode="json", exclude_none=True)
+    content = finite(calibration.model_dump(mode="json", exclude_none=True), _DECIMALS)
     text = _HEAD + yaml.safe_dump(content, sort_keys=False, default_flow_style=None)
     try:
         path.write_text(text, encoding="utf-8")
