@@ -108,6 +108,7 @@ class FlightLoop:
         self.parameters = parameters if parameters is not None else Parameters(defaults=airframe.parameters)
         self.estimator: StateEstimator = IdealEstimator(origin) if estimator is None else estimator
         self.state = self.estimator.state
+        self._senses = not self.estimator.report().ideal
         self.status = VehicleStatus()
         self.output = MotorOutput((0.0,) * len(airframe.rotors))
         self.flight = FlightRecord()
@@ -364,6 +365,7 @@ class FlightLoop:
             battery.can_arm,
             self.missions.valid,
             breach is not None,
+            "" if self.status.armed or not self._senses else self.estimator.report().problem,
         )
 
     def _configure(self) -> None:

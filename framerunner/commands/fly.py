@@ -10,7 +10,14 @@ from typing import TYPE_CHECKING, Annotated
 from cyclopts import Parameter
 
 from errors import SettingError
-from framerunner.commands import DEFAULT_MISSION, WholeNumber, check_range, load_mission_with
+from framerunner.commands import (
+    DEFAULT_MISSION,
+    Sensors,
+    WholeNumber,
+    check_range,
+    load_mission_with,
+    with_sensors,
+)
 
 if TYPE_CHECKING:
     from framerunner.flying.plan import FlightPlan
@@ -77,6 +84,7 @@ def fly(
     instance: Annotated[WholeNumber, Parameter(help="of the simulated drone: shifts its ports, 0 to 9")] = 0,
     lockstep: _Lockstep = False,
     seed: _Seed = None,
+    sensors: Sensors = None,
     record: _Record = False,
     video: _Video = False,
     monitor: _Monitor = False,
@@ -99,7 +107,7 @@ def fly(
 
         framerunner fly my_scenario.yaml --mission frame_challenge --speed 2
 
-        framerunner fly test-case-1 --lockstep --record
+        framerunner fly test-case-1 --lockstep --record --sensors mocap
 
         framerunner fly test-case-1 --lockstep --response lag=0.6,dead-time=0.15
 
@@ -119,7 +127,7 @@ def fly(
     from framerunner.flying.run import FlightSettings, fly_once
 
     loaded = load_mission_with(mission, pilot)
-    given = _PlanOptions(response, drone, drone_limits, calibration)
+    given = _PlanOptions(sensors, response, drone, drone_limits, calibration)
     plan = _plan(scenario, loaded, (seed or 0) if lockstep else None, given)
     real_time = None if lockstep else RealTimeSettings(drone, camera, api, speed, instance, camera_delay)
     return asyncio.run(fly_once(FlightSettings(plan, real_time, out, record, video, monitor)))
@@ -145,6 +153,7 @@ def _calibration(path: Path | None, drone: str | None, mission: Mission) -> Cali
 class _PlanOptions:
     """Options that belong to a plan, as given."""
 
+    sensors: str | None
     response: str | None
     drone: str | None
     drone_limits: str | None
@@ -157,7 +166,14 @@ def _plan(scenario: str, mission: Mission, seed: int | None, options: _PlanOptio
     from framerunner.flying.plan import FlightPlan
     from scenarios.loader import load_scenario
 
-    response, drone, drone_limits = options.response, options.drone, options.drone_limits
+    sensors, response, drone, drone_limits = (
+        options.sensors,
+        options.response,
+        options.drone,
+        options.drone_limits,
+    )
+    if sensors is not None and drone is not None:
+        raise SettingError("--sensors: are those of a simulated drone; leave it out with --drone")
     if response is not None and seed is None:
         raise SettingError("--response: is for a simulated vehicle in lockstep; add --lockstep")
     is_open = mission.mission_class == "open"
@@ -174,7 +190,7 @@ def _plan(scenario: str, mission: Mission, seed: int | None, options: _PlanOptio
             "--drone-limits forward=2,left=1.5,up=1,yaw-rate=1.5"
         )
     return FlightPlan(
-        load_scenario(scenario),
+        with_sensors(load_scenario(scenario), sensors),
         mission,
         seed,
         drone_limits=None if drone_limits is None else limits_of(drone_limits),
