@@ -119,8 +119,7 @@ def fly(
     """
     api = _simulator_api(simulator, drone)
     camera = api.video_url if api is not None and camera is None else camera
-    _check(drone, camera, speed, instance, lockstep)
-    check_range("--camera-delay", camera_delay, 0.0, 0.5)
+    _check(drone, camera, camera_delay, speed, instance, lockstep=lockstep)
     _check_lockstep(seed, monitor, lockstep)
 
     from framerunner.flying.real_time import RealTimeSettings
@@ -212,8 +211,10 @@ def _simulator_api(url: str | None, drone: str | None) -> SimulatorApi | None:
         raise SettingError(f"--simulator {error}") from None
 
 
-def _check(drone: str | None, camera: str | None, speed: float, instance: int, lockstep: bool) -> None:
-    """Refuse options that do not go together."""
+def _check(
+    drone: str | None, camera: str | None, camera_delay: float, speed: float, instance: int, *, lockstep: bool
+) -> None:
+    """Refuse options that do not go together, and numbers out of range."""
     if drone is not None and camera is None:
         raise SettingError("--camera: a drone given by --drone needs the URL of its camera too")
     if drone is None and camera is not None:
@@ -226,6 +227,7 @@ def _check(drone: str | None, camera: str | None, speed: float, instance: int, l
         raise SettingError(
             f"--lockstep: flies a simulated drone in this process; leave out {' and '.join(given)}"
         )
+    check_range("--camera-delay", camera_delay, 0.0, 0.5)
     check_range("--speed", speed, 0.01, 100)
     check_range("--instance", instance, 0, 9)
 
