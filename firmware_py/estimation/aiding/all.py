@@ -26,7 +26,7 @@ from geometry.vectors import Vec3
 
 Sample = ExternalPose | GpsSample | MagnetometerSample | BarometerSample | RangeSample | FlowSample
 
-_STANDING_VELOCITY_M2_S2 = 0.01
+_STANDING_VELOCITY_M2_S2 = 0.01**2
 _STANDING_PLACE_M2 = 0.25
 _REDUNDANT_US = 200_000
 

@@ -85,9 +85,14 @@ class GroundAiding:
         measured = (about_right * along_m, -about_forward * along_m)  # forward and right, m/s
         known = to_body(m, *into.state.velocity_ned_m_s)
         rows, innovations = [], []
+        scale, bias = target.layout.flow_scale, target.layout.flow_gyro
         for axis in (0, 1):
             row = target.row()
             row[VELOCITY : VELOCITY + 3] = (m[axis], m[axis + 3], m[axis + 6])
+            if scale >= 0:  # of the flow, which the turn is part of
+                row[scale] = sample.flow_rad[1 - axis] / period_s * (along_m if axis == 0 else -along_m)
+            if bias >= 0:  # a turn about right measured too large: forward too slow
+                row[bias + 1 - axis] = -along_m if axis == 0 else along_m
             rows.append(row)
             innovations.append(measured[axis] - known[axis])
         sigma_m_s = self._flow_sigma_rad_s * along_m
