@@ -89,7 +89,7 @@ class EstimatorSettings:
     barometer_sigma_pa: float | None = 2.5
     barometer_drift: SlowError = SlowError(0.5, 0.03)
     range_sigma_m: float | None = None
-    ground_walk: float = 0.01
+    ground_walk: float = 0.02
     flow_sigma_rad_s: float | None = None
     flow_scale_sigma: float = 0.0
     flow_gyro_bias_sigma_rad_s: float = 0.0
