@@ -30,7 +30,9 @@ _RELIED_ON_US = 1_000_000
 _STAND_PERIOD_US = 100_000
 _NOISE_TICKS = 4
 _NEW_SHARE = 0.016  # of a new sample of the noise in its mean: one second
-_QUICK_SHARE = 0.25  # the same in a mean over some hundredths of a second, which shows that motors have started
+_QUICK_SHARE = (
+    0.25  # the same in a mean over some hundredths of a second, which shows that motors have started
+)
 _CHANGE = 3.0  # quick means that differ from the slow ones by this factor are taken for right
 _SECOND_DIFFERENCE = 1.0 / 18.0  # of white noise in three axes: its square is six variances each
 

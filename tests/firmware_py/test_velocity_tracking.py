@@ -72,6 +72,5 @@ def rms(errors):
 def test_follows_recorded_set_points_at_least_as_closely_as_px4(suite):
     _, wanted, px4 = recorded()
     ours = replayed(suite)
-    print(suite, dict(zip(AXES, zip(rms(ours - wanted).round(3), rms(px4 - wanted).round(3)), strict=True)))
     for axis, our_rms, px4_rms in zip(AXES, rms(ours - wanted), rms(px4 - wanted), strict=True):
         assert our_rms <= px4_rms, axis

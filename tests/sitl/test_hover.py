@@ -1,4 +1,4 @@
-"""Drones on honest sensors hold their place, and follow velocities in wind; `benchmarks.hover` measures more of it."""
+"""Drones on honest sensors hold their place, and follow velocities in wind; see also `benchmarks.hover`."""
 
 import numpy as np
 import pytest
@@ -19,7 +19,7 @@ def test_outdoors_it_drifts_slowly_with_gps():
 
 @pytest.mark.parametrize(
     ("suite", "airframe", "limit_m_s"),
-    [("ideal", "x500", 0.01), ("outdoor", "x500", 0.05), ("mocap", "racer-3in", 0.01)],
+    [("ideal", "x500", 0.01), ("outdoor", "x500", 0.05), ("mocap", "racer-3in", 0.03)],
 )
 def test_wind_of_five_metres_a_second_leaves_no_steady_error_of_velocity(suite, airframe, limit_m_s):
     assert follow_velocity(suite, airframe, seed=11, seconds=20.0, wind_m_s=5.0) < limit_m_s
