@@ -157,16 +157,18 @@ class _Flight:
         except (DroneError, CameraLostError, MissionRunError, OutsideBoxError) as error:
             return await self._stop("aborted", str(error))
         except asyncio.CancelledError:
-            task = asyncio.current_task()
-            if task is not None:
-                task.uncancel()  # the outcome reports it
+            _uncancel()  # the outcome reports it
             return await self._stop("aborted", INTERRUPTED)
         except BaseException:
             await self._stop("aborted", "unexpected error")
             raise
         if timed_out:
             return await self._stop("timed out", f"not finished within {self._limit_us / MICROSECONDS:g} s")
-        await self._observe_rest()
+        try:
+            await self._observe_rest()
+        except asyncio.CancelledError:  # what was flown is not lost; the motors are off already
+            _uncancel()
+            return self._outcome("aborted", INTERRUPTED)
         return self._outcome("finished", "")
 
     async def _fly(self) -> bool:
@@ -363,6 +365,12 @@ def _why_not_continued(state: DroneState) -> str:
     if not all(map(isfinite, (state.x, state.y, state.z, state.yaw))):
         return "its position is not finite"
     return ""
+
+
+def _uncancel() -> None:
+    task = asyncio.current_task()
+    if task is not None:
+        task.uncancel()
 
 
 async def _close(ticks: AsyncIterator[DroneState]) -> None:

@@ -360,9 +360,13 @@ def test_sigterm_is_not_lost_where_python_drops_exceptions():
     assert (done.stdout, done.stderr, done.returncode) == ("stopped\n", "", 0)
 
 
+# It lasts until its time limit of 180 s, so it is not over when the signal comes.
+LONG_FLIGHT = ("fly", "round-1", "--mission", "frame_challenge", "--lockstep")
+
+
 @pytest.mark.parametrize("seconds", [0.1, 0.4, 0.8, 1.6])
 def test_sigterm_while_a_flight_starts_ends_it_without_a_traceback(tmp_path, seconds):
-    program = [sys.executable, "-m", "framerunner", "fly", "round-1", "--lockstep"]
+    program = [sys.executable, "-m", "framerunner", *LONG_FLIGHT]
     environment = {**os.environ, "PYTHONPATH": str(ROOT)}
     with subprocess.Popen(
         program, cwd=tmp_path, env=environment, stderr=subprocess.PIPE, text=True
@@ -378,7 +382,7 @@ def test_sigterm_while_a_flight_starts_ends_it_without_a_traceback(tmp_path, sec
 
 def test_sigterm_ends_a_flight_in_order_where_ctrl_c_is_ignored(tmp_path):
     """As in the background of a script."""
-    script = f'trap "" INT; exec "{sys.executable}" -m framerunner fly round-1 --lockstep'
+    script = f'trap "" INT; exec "{sys.executable}" -m framerunner {" ".join(LONG_FLIGHT)}'
     environment = {**os.environ, "PYTHONPATH": str(ROOT)}
     with subprocess.Popen(
         ["sh", "-c", script], cwd=tmp_path, env=environment, stderr=subprocess.PIPE

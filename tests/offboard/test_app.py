@@ -166,6 +166,19 @@ async def test_ctrl_c_holds_and_is_told():
     assert drone.calls[-2:] == ["hold", "close"]
 
 
+async def test_ctrl_c_after_motors_off_loses_no_result():
+    drone, perception = starting()
+
+    def stop(moment):
+        if drone.calls[-1] == "motors_off":
+            task.cancel()
+
+    task = asyncio.create_task(fly_mission(yielding(drone), perception, MISSION, observer=stop))
+    outcome = await task
+    assert outcome.interrupted
+    assert drone.calls[-2:] == ["motors_off", "close"]
+
+
 async def test_an_observer_s_fault_still_holds_and_is_raised():
     drone, perception = starting()
     with pytest.raises(KeyError):
