@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from math import nan
 from typing import NamedTuple
 
@@ -12,10 +12,12 @@ from firmware_py.commander_guards import (
     Reaction,
     Situation,
     Timeouts,
+    estimator_fails,
     next_cause,
     setpoint_lost,
 )
 from firmware_py.commander_table import (
+    ARMING_DENIED,
     CAUSE_EVENT,
     FLOWN_MODE,
     RULES,
@@ -77,12 +79,13 @@ _TERMINATION_OFF = 121_212
 
 @dataclass(frozen=True, slots=True)
 class SlowChecks:
-    """Conditions that are checked ten times a second; see `Situation`."""
+    """Conditions that are checked ten times a second (`problem` while disarmed); see `Situation`."""
 
     battery_warning: int = 1
     battery_arms: bool = True
     has_mission: bool = False
     fence_breached: bool = False
+    problem: str = ""
 
 
 NOT_CHECKED = SlowChecks()
@@ -156,7 +159,9 @@ class Commander:
     def refusal(self) -> str:
         """Why the vehicle cannot be armed now; empty if it can."""
         row = first_match(RULES[State.DISARMED, Event.ARM], self.situation)
-        return "" if row is None or row.result is CommandResult.ACCEPTED else row.text
+        if row is None or row.result is CommandResult.ACCEPTED:
+            return ""
+        return self._in_words(row)
 
     def tick(self, seen: Observation) -> Row | None:
         """Update the situation and apply the table once.
@@ -207,6 +212,7 @@ class Commander:
         now.battery_arms = checks.battery_arms
         now.has_mission = checks.has_mission
         now.fence_breached = checks.fence_breached
+        now.problem = checks.problem
 
     def _check(self, now_us: int) -> Row | None:
         self._check_us = now_us + _CHECK_PERIOD_US
@@ -223,7 +229,11 @@ class Commander:
         if row is None:  # the table has an answer to every command; a test sweeps it
             raise LookupError(f"commander: no rule for {event.value} in {self.state.value}")
         self._follow(row)
-        return row
+        return replace(row, text=self._in_words(row)) if row.guard is estimator_fails else row
+
+    def _in_words(self, row: Row) -> str:
+        """A row's text; that of the estimator's condition is in the situation."""
+        return f"{ARMING_DENIED}{self.situation.problem}" if row.guard is estimator_fails else row.text
 
     def remember(self, takeoff_altitude_m: float | None, orbit: Orbit | None) -> None:
         """Keep the arguments of a command; None: unchanged."""

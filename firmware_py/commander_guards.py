@@ -6,6 +6,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 from enum import Enum
 
+from firmware_py.estimation.report import NO_FIX
 from firmware_py.status import FlightMode
 
 NEVER_US = -(10**15)
@@ -117,6 +118,7 @@ class Situation:
         battery_arms: the charge is enough to arm.
         battery_at_arming: the warning at arming; only a worse one counts.
         fence_breached: outside the geofence.
+        problem: why the estimator's condition prevents arming, in words; empty: it does not.
         has_mission: there is a mission that can be flown.
         entered_us: when the present state was entered.
         armed_us: when the vehicle was armed.
@@ -145,6 +147,7 @@ class Situation:
     battery_arms: bool = True
     battery_at_arming: int = 1
     fence_breached: bool = False
+    problem: str = ""
     has_mission: bool = False
     entered_us: int = 0
     armed_us: int = 0
@@ -162,6 +165,11 @@ Guard = Callable[[Situation], bool]
 def unsettled(now: Situation) -> bool:
     """Samples have not been usable for long enough."""
     return now.now_us - now.unusable_us < _SETTLE_US
+
+
+def estimator_fails(now: Situation) -> bool:
+    """A sensor fails, or the estimator does not know what a flight in the intended mode needs."""
+    return now.problem != "" and (now.problem != NO_FIX or now.intended not in POSITIONLESS)
 
 
 def tipped_over(now: Situation) -> bool:

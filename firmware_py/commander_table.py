@@ -335,20 +335,26 @@ _PROGRESS = (
     Row(frozenset(State), Event.PILOT_TAKES_OVER),
 )
 
-_DENIED = "Arming denied: "
+ARMING_DENIED = "Arming denied: "
+"""Before the reason."""
 _ARMED_TEXT = "Armed by external command"
 _DISARMED_TEXT = "Disarmed by external command"
 
 _ARMING = (
-    _refuse(_OFF, Event.ARM, when.unsettled, _DENIED + "Resolve system health failures first"),
-    _refuse(_OFF, Event.ARM, when.tipped_over, _DENIED + "vehicle is tipped over"),
-    _refuse(_OFF, Event.ARM, when.position_missing, _DENIED + "no position estimate"),
-    _refuse(_OFF, Event.ARM, when.battery_too_low, _DENIED + "low battery"),
-    _refuse(_OFF, Event.ARM, when.ground_station_absent, _DENIED + "no connection to the ground station"),
-    _refuse(_OFF, Event.ARM, when.intends_unarmable, _DENIED + "not in this mode"),
-    _refuse(_OFF, Event.ARM, when.intends_offboard_without_setpoints, _DENIED + "no offboard setpoints"),
-    _refuse(_OFF, Event.ARM, when.intends_manual_without_input, _DENIED + "no manual control input"),
-    _refuse(_OFF, Event.ARM, when.intends_missing_mission, _DENIED + "no valid mission"),
+    _refuse(_OFF, Event.ARM, when.estimator_fails, ARMING_DENIED + "the estimator is not ready"),
+    _refuse(_OFF, Event.ARM, when.unsettled, ARMING_DENIED + "Resolve system health failures first"),
+    _refuse(_OFF, Event.ARM, when.tipped_over, ARMING_DENIED + "vehicle is tipped over"),
+    _refuse(_OFF, Event.ARM, when.position_missing, ARMING_DENIED + "no position estimate"),
+    _refuse(_OFF, Event.ARM, when.battery_too_low, ARMING_DENIED + "low battery"),
+    _refuse(
+        _OFF, Event.ARM, when.ground_station_absent, ARMING_DENIED + "no connection to the ground station"
+    ),
+    _refuse(_OFF, Event.ARM, when.intends_unarmable, ARMING_DENIED + "not in this mode"),
+    _refuse(
+        _OFF, Event.ARM, when.intends_offboard_without_setpoints, ARMING_DENIED + "no offboard setpoints"
+    ),
+    _refuse(_OFF, Event.ARM, when.intends_manual_without_input, ARMING_DENIED + "no manual control input"),
+    _refuse(_OFF, Event.ARM, when.intends_missing_mission, ARMING_DENIED + "no valid mission"),
     *(
         Row(_OFF, Event.ARM, when.intends(mode), state, text=_ARMED_TEXT)
         for state, mode in FLOWN_MODE.items()

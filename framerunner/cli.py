@@ -33,6 +33,7 @@ def build_app() -> App:
         film,
         fly,
         mission,
+        mocap,
         monitor,
         replay,
         scenario,
@@ -52,6 +53,7 @@ def build_app() -> App:
     app.command(sim.sim)
     app.command(fly.fly)
     app.command(camera.camera)
+    app.command(mocap.mocap)
     app.command(doctor.doctor)
     app.command(evaluate.evaluate)
     app.command(bound.bound)

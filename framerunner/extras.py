@@ -9,6 +9,7 @@ _EXTRAS = {
     "fastapi": "monitor",
     "ifaddr": "monitor",
     "matplotlib": "plots",
+    "motioncapture": "mocap",
     "multipart": "monitor",
     "nicegui": "monitor",
     "PIL": "video",

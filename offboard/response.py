@@ -21,6 +21,7 @@ from geometry.vectors import Vec3
 from offboard.drone import DroneState, VelocityCommand
 from offboard.second_lag import LAG_S as OWN_LAG_S
 from offboard.second_lag import SecondLag
+from offboard.slow_share import SlowShare
 
 Array = NDArray[np.float64]
 
@@ -64,6 +65,7 @@ class Response:
             commands ahead; else in axes that do not turn.
         late: so late that the motion must be predicted.
         own_lag_s: a second lag in plan, after the first, in axes that turn; 0 if there is none.
+        share: of a command in plan that the velocity follows so; it follows the rest only slowly.
     """
 
     level_dead_s: float = 0.075
@@ -76,11 +78,12 @@ class Response:
     turning: bool = True
     late: bool = False
     own_lag_s: float = 0.0
+    share: float = 1.0
 
     @property
     def level_s(self) -> float:
-        """Dead time and lags together, in plan."""
-        return self.level_dead_s + self.level_tilt_s + self.level_lags_s
+        """Dead time and lags together, in plan; longer where only a share of a command is followed soon."""
+        return self.level_dead_s + self.level_tilt_s + self.level_lags_s / self.share
 
     @property
     def level_lags_s(self) -> float:
@@ -101,6 +104,7 @@ class Prediction:
         turned_rad: from its present heading.
         yaw_rate_rad_s: then.
         acceleration_m_s2: then, in plan, arena axes; zero without a second lag.
+        slow_m_s: part of the velocity in plan that follows commands only slowly, a lag later; arena axes.
     """
 
     moved_m: Vec3
@@ -109,6 +113,7 @@ class Prediction:
     turned_rad: float
     yaw_rate_rad_s: float
     acceleration_m_s2: tuple[float, float] = (0.0, 0.0)
+    slow_m_s: tuple[float, float] = (0.0, 0.0)
 
 
 class ResponseEstimate:
@@ -126,8 +131,9 @@ class ResponseEstimate:
         self._errors = np.zeros(shape)
         self._energies = np.zeros(len(_GROUPS))
         self._late_choices = 0  # in a row
-        self._second_before: tuple[int, int] | None = None
+        self._others_before: tuple[object, ...] = (None, None, 1.0)  # what was chosen of the other models
         self._second = SecondLag(shape[:2], STEP_S, _WINDOW)
+        self._slow = SlowShare(shape[:2], STEP_S, _WINDOW)
         self._kept = np.array([exp(-STEP_S / lag_s) for lag_s in LAGS_S])[:, None]
         self._restart()
 
@@ -139,6 +145,7 @@ class ResponseEstimate:
         self._changes: deque[Array] = deque(maxlen=max(DEAD_STEPS) + 1)  # of the outputs, over the window
         self._measured: deque[Array] = deque(maxlen=_WINDOW + 1)
         self._second.restart()
+        self._slow.restart()
         self._airborne_steps = self._uncompared = 0
         self._disturbance = [0.0, 0.0, 0.0]  # arena axes, m/s
         self._disturbance_rate = [0.0, 0.0, 0.0]
@@ -174,6 +181,7 @@ class ResponseEstimate:
             self._measured.append(measured)
             if self.response.late:
                 self._second.update(self._first_lags(), measured[[_X, _Y]], self._yaw)
+                self._slow.update(commanded[[_X, _Y]], measured[[_X, _Y]])
             self._airborne_steps = 0 if state.landed else self._airborne_steps + 1
             if self._airborne_steps > TAKE_OFF_STEPS:
                 self._uncompared += 1
@@ -201,8 +209,11 @@ class ResponseEstimate:
         if self.response.late:
             one = float(squares[(*self._chosen[0], 1 if self._turning else 0)])
             self._second.compare(change[[_X, _Y]], one)
+            changes = np.array([self._changes[-1 - dead][:, [_X, _Y]] for dead in DEAD_STEPS])
+            self._slow.compare(changes, change[[_X, _Y]], self._second.least_error)
         else:
             self._second.restart()
+            self._slow.restart()
 
     def _first_lags(self) -> Array:
         """What all pairs make of the commands by now, in axes that do not turn: dead times, lags, x and y."""
@@ -211,7 +222,7 @@ class ResponseEstimate:
 
     def _choose(self) -> None:
         """Take pairs, and axes, that explain what was measured clearly better than the present ones."""
-        before = (self._turning, self._second_before, *self._chosen)
+        before = (self._turning, self._others_before, *self._chosen)
         errors = self._errors.reshape(-1, len(_GROUPS))
         pairs: list[int] = errors.argmin(axis=0).tolist()
         least = [float(errors[pair, group]) for group, pair in enumerate(pairs)]
@@ -228,11 +239,11 @@ class ResponseEstimate:
                 continue
             if least[group] < _BETTER * present:
                 self._chosen[channel] = best[group]
-        self._second_before = self._second.chosen
+        self._others_before = (self._second.chosen, self._slow.chosen, self._slow.share)
         seems_late = self._seems_late(errors)
         self._late_choices = self._late_choices + 1 if seems_late else 0
         is_late = seems_late and (self.response.late or self._late_choices >= _SURE)
-        if is_late != self.response.late or (self._turning, self._second_before, *self._chosen) != before:
+        if is_late != self.response.late or (self._turning, self._others_before, *self._chosen) != before:
             self.response = self._as_response() if is_late else Response()
 
     def _seems_late(self, errors: Array) -> bool:
@@ -254,6 +265,10 @@ class ResponseEstimate:
         pairs = [(DEAD_STEPS[dead] * STEP_S, LAGS_S[lag]) for dead, lag in self._chosen]
         (level_dead, level_lag), (climb_dead, climb_lag), (yaw_dead, yaw_lag) = pairs
         times = (climb_dead, climb_lag, yaw_dead, yaw_lag)
+        if self._slow.chosen is not None:
+            dead, lag = self._slow.chosen
+            level = (DEAD_STEPS[dead] * STEP_S, 0.0, LAGS_S[lag])
+            return Response(*level, *times, turning=False, late=True, share=self._slow.share)
         if self._second.chosen is not None:
             dead, lag = self._second.chosen
             level = (DEAD_STEPS[dead] * STEP_S, 0.0, LAGS_S[lag])
@@ -263,7 +278,7 @@ class ResponseEstimate:
     def _observe_disturbance(self, velocity_m_s: Vec3, steps: int) -> None:
         """Filter what the commands do not explain of the velocity now."""
         model = self._model_velocity(lambda dead: self._past[max(len(self._past) - 1 - dead, 0)])
-        if self._second.chosen is not None:
+        if self._second.chosen is not None and self._slow.chosen is None:
             model = (*self._second.velocity(self._second.chosen), model[2])
         time_s = steps * STEP_S
         share = 1.0 - exp(-time_s / _DISTURBANCE_S)
@@ -276,8 +291,14 @@ class ResponseEstimate:
     def _model_velocity(self, output: Callable[[int], Array]) -> Vec3:
         """In arena axes, of the pairs chosen; `output` gives all filters' by the dead time in steps."""
         (level_dead, level_lag), (climb_dead, climb_lag), _ = self._chosen
+        slow = self._slow
+        if slow.chosen is not None:
+            level_dead, level_lag = slow.chosen
         x, y, forward, left, _, _ = output(DEAD_STEPS[level_dead])[level_lag].tolist()
         up = float(output(DEAD_STEPS[climb_dead])[climb_lag, _UP])
+        if slow.chosen is not None:
+            rest_x, rest_y = slow.rest_m_s
+            return (slow.share * x + rest_x, slow.share * y + rest_y, up)
         if not self._turning:
             return (x, y, up)
         c, s = cos(self._yaw), sin(self._yaw)
@@ -290,8 +311,13 @@ class ResponseEstimate:
         moved = np.array(self._model_velocity(lambda dead: np.sum(past[-dead:], axis=0) * STEP_S))
         velocity = np.array(self._model_velocity(lambda dead: past[-1]))
         turns = [float(row[yaw_lag, _TURN]) * STEP_S for row in past[-DEAD_STEPS[yaw_dead] :]]
-        acceleration, second, own_lag_s = (0.0, 0.0), self._second.chosen, 0.0
-        if second is not None:
+        acceleration, rest, second, own_lag_s = (0.0, 0.0), (0.0, 0.0), self._second.chosen, 0.0
+        if self._slow.chosen is not None:
+            level_dead, level_lag = self._slow.chosen
+            rest = self._slow.rest_in(LAGS_S[level_lag])
+            # The sum above contains the slow part once, as if for a second.
+            moved[:2] += (DEAD_STEPS[level_dead] * STEP_S - 1.0) * self._slow.rest_m_s
+        elif second is not None:
             level_dead, level_lag = second
             own_lag_s = OWN_LAG_S
             commanded = np.array([row[level_lag, [_X, _Y]] for row in past[-DEAD_STEPS[level_dead] :]])
@@ -308,7 +334,7 @@ class ResponseEstimate:
         disturbance = present + (ahead_s + _DISTURBANCE_S) * _LEADS * change
         rate = float(past[-1][yaw_lag, _TURN])
         return Prediction(
-            _vector(moved), _vector(velocity), _vector(disturbance), sum(turns), rate, acceleration
+            _vector(moved), _vector(velocity), _vector(disturbance), sum(turns), rate, acceleration, rest
         )
 
 

@@ -45,6 +45,11 @@ class SecondLag:
         self._velocities: Array = np.zeros((*shape, 2))  # in axes that turn
         self._past: deque[Array] = deque(maxlen=window + 1)
 
+    @property
+    def least_error(self) -> float:
+        """Squared, of the pair that is best; with that of one lag it fades."""
+        return float(self._errors.min())
+
     def restart(self) -> None:
         """Forget all motion, but not what was learnt."""
         self._past.clear()

@@ -79,6 +79,7 @@ class ServedDrone:
                 camera=model if settings.camera else None,
                 captures=self._album,
                 failures=simulation.failures,
+                truth=simulation.true_state,
             ),
         )
         self._notice = notice

@@ -15,13 +15,14 @@ from firmware_py.estimation.earth_field import earth_field_ned_gauss
 from firmware_py.estimation.inertial_estimator import InertialEstimator
 from firmware_py.geodesy import LocalProjection
 from firmware_py.measurements import ExternalPose, Readings
+from firmware_py.parameters import Parameters
 from firmware_py.types import GeodeticPoint, Sensors
 from geometry.axes import flip_vector
 from geometry.vectors import ZERO3, Vec3
 from scenarios.models import Scenario, ground_height
 from scenarios.referee import Referee
 from sitl.battery import Battery
-from sitl.sensors.assumptions import estimator_settings
+from sitl.sensors.assumptions import estimator_settings, parameter_defaults
 from sitl.sensors.specs import SuiteSpec
 from sitl.sensors.suite import SensorSuite, load_suite
 from sitl.sensors.truth import MotionTracker
@@ -150,13 +151,15 @@ class Simulation:
         self.world = World(scenario, airframe, seed)
         origin = scenario.origin
         place = GeodeticPoint(origin.latitude_deg, origin.longitude_deg, origin.altitude_m)
+        self._place = place
         suite = load_suite(scenario.sensors)
         self._sensing = None if suite.ideal else _Sensing(suite, self.world, place, seed)
         self.autopilot = Autopilot(
             airframe,
             place,
+            Parameters(defaults={**airframe.parameters, **parameter_defaults(suite)}),
             control_period_s=CONTROL_PERIOD_US / 1e6,
-            estimator=None if suite.ideal else new_estimator(suite, place),
+            estimator=None if suite.ideal else new_estimator(suite, self._frame_place(suite, place)),
         )
         self.referee = Referee(scenario, airframe.envelope_m)
         self.failures = Failures(self.world)
@@ -165,6 +168,13 @@ class Simulation:
         self._sensors = self.world.sensors()
         self.truth = self.world.truth(self._sensors, motors_on=False)
         self.referee.update(self.truth)
+
+    def _frame_place(self, suite: SuiteSpec, place: GeodeticPoint) -> GeodeticPoint:
+        """Where the frame of motion capture is: at the scenario's origin or, received, at the start."""
+        pose = suite.external_pose
+        if pose is None or pose.source == "simulated":
+            return place
+        return LocalProjection(place).to_geodetic(self.world.sensors().position_ned_m)
 
     @property
     def time_us(self) -> int:
@@ -179,6 +189,11 @@ class Simulation:
             return None
         arena = GeodeticPoint(place.latitude_deg, place.longitude_deg, place.altitude_m)
         return flip_vector(LocalProjection(arena).to_local(origin))
+
+    def true_state(self) -> tuple[Sensors, GeodeticPoint]:
+        """The true state, positions from the scenario's origin, and its place on Earth."""
+        place = LocalProjection(self._place).to_geodetic(self._sensors.position_ned_m)
+        return self._sensors, place
 
     def tick(self) -> None:
         """Advance by one control period: sense, control, move, judge."""

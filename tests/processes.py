@@ -138,8 +138,14 @@ def program(folder: Path, *arguments: str, **options: object) -> Iterator[Progra
 
 @contextmanager
 def simulator(folder: Path, instance: int, *options: str) -> Iterator[Program]:
-    """`framerunner sim`, with all its ports open; its ground link goes to a port of its own."""
+    """`framerunner sim`, with all its ports open; its ground link goes to a port of its own.
+
+    The environment variable `FRAMERUNNER_TEST_SENSORS` gives its drone a sensor suite.
+    """
     ground = ("--ground-remote", f"127.0.0.1:{14550 + instance}")
+    suite = os.environ.get("FRAMERUNNER_TEST_SENSORS")
+    if suite is not None:
+        options = (*options, "--sensors", suite)
     with program(folder, "sim", "--instance", str(instance), *ground, *options) as running:
         running.wait_for("Ctrl-C stops", 60.0)
         yield running

@@ -15,10 +15,10 @@ from firmware_py.estimation.aiding.all import Aiding, Sample
 from firmware_py.estimation.alignment import Alignment, is_still
 from firmware_py.estimation.error_state import ATTITUDE, POSITION, VELOCITY
 from firmware_py.estimation.output import OutputPredictor
-from firmware_py.estimation.report import IMU, EstimatorReport, Sensor
+from firmware_py.estimation.report import IMU, NO_FIX, NO_HEIGHT, NOT_ALIGNED, EstimatorReport, Sensor
 from firmware_py.estimation.settings import EstimatorSettings
 from firmware_py.estimation.watch import watch_sensors
-from firmware_py.measurements import ExternalPose, ImuSample, Readings
+from firmware_py.measurements import ExternalPose, FixType, ImuSample, Readings
 from firmware_py.types import GeodeticPoint, Sensors, VehicleState
 from geometry.rotations import euler_from_quaternion, yaw_of
 from geometry.vectors import Vec3
@@ -130,8 +130,11 @@ class InertialEstimator:
         """The condition now."""
         aiding, watches, now_us = self.aiding, self._watches, self._now_us
         healthy = watches.healthy(now_us)
+        if self._has_no_fix():
+            healthy -= {Sensor.GPS}
         relied_on = aiding.relied_on(now_us - _RELIED_ON_US)
         known = self._alignment is None
+        has_height = known and self._is_recent(aiding.height_us)
         return EstimatorReport(
             ideal=False,
             present=watches.present,
@@ -140,7 +143,7 @@ class InertialEstimator:
             has_attitude=known,
             has_velocity=known and self._is_recent(aiding.velocity_us),
             has_position=known and self.has_position,
-            has_height=known and self._is_recent(aiding.height_us),
+            has_height=has_height,
             position_variance_m2=self._position_variance_m2(),
             velocity_variance_m2_s2=self._variances(VELOCITY),
             attitude_variance_rad2=self._variances(ATTITUDE),
@@ -152,8 +155,22 @@ class InertialEstimator:
             accel_bias_frd_m_s2=aiding.target.filter.accel_bias_frd_m_s2,
             resets=aiding.target.resets,
             latest=self.latest,
-            problem=watches.problem(now_us) or ("" if known else "not aligned: keep it still"),
+            problem=self._problem(known=known, has_height=has_height),
         )
+
+    def _problem(self, *, known: bool, has_height: bool) -> str:
+        problem = self._watches.problem(self._now_us)
+        if problem:
+            return problem
+        if self._has_no_fix():
+            return NO_FIX
+        if not known:
+            return NOT_ALIGNED
+        return "" if has_height else NO_HEIGHT
+
+    def _has_no_fix(self) -> bool:
+        """Whether the receiver delivers, but has no position yet, or no longer."""
+        return self.latest.gps is not None and self.latest.gps.fix_type < FixType.FIX_3D
 
     def _is_recent(self, fused_us: int) -> bool:
         return fused_us != NEVER_US and self._now_us - fused_us <= self._settings.no_aid_us
@@ -184,7 +201,9 @@ class InertialEstimator:
                 self._queue(pressure)
         if (fix := sensors.gps) is not None:
             latest.gps = fix
-            value = (fix.latitude_deg, fix.longitude_deg, fix.altitude_m, fix.velocity_ned_m_s)
+            value: object = (fix.latitude_deg, fix.longitude_deg, fix.altitude_m, fix.velocity_ned_m_s)
+            if fix.fix_type < FixType.FIX_3D:
+                value = fix.time_us  # it has not hung
             if watches.note(Sensor.GPS, value, now_us):
                 self._queue(fix)
         if (distance := sensors.range_finder) is not None:

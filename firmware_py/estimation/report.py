@@ -25,6 +25,30 @@ class Sensor(Enum):
 
 IMU = frozenset({Sensor.GYROSCOPE, Sensor.ACCELEROMETER})
 
+NOT_ALIGNED = "attitude is not known yet: keep the vehicle still"
+NO_HEIGHT = "no height estimate"
+NO_FIX = "GPS fix too low"
+
+
+def stuck(name: str) -> str:
+    """A sensor delivers always the same."""
+    return f"{name} is stuck"
+
+
+def silent(name: str) -> str:
+    """A sensor delivers nothing."""
+    return f"no valid data from {name}"
+
+
+_NAMES = ("IMU", *(sensor.value for sensor in Sensor if sensor not in IMU))
+PROBLEMS = (
+    NOT_ALIGNED,
+    NO_HEIGHT,
+    NO_FIX,
+    *(words(name) for name in _NAMES for words in (stuck, silent)),
+)
+"""What `EstimatorReport.problem` can say."""
+
 
 @dataclass(frozen=True, slots=True)
 class Ratios:

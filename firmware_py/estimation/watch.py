@@ -7,7 +7,7 @@ Real sensors are noisy, so a value that is the same to the last bit again and ag
 from __future__ import annotations
 
 from firmware_py.estimation.aiding.aid import NEVER_US
-from firmware_py.estimation.report import IMU, Sensor
+from firmware_py.estimation.report import IMU, Sensor, silent, stuck
 from firmware_py.estimation.settings import EstimatorSettings
 from firmware_py.measurements import ImuSample
 
@@ -95,9 +95,9 @@ class SensorWatches:
         named = [("IMU", self._imu), *((sensor.value, watch) for sensor, watch in self._watches.items())]
         for name, watch in named:
             if watch.is_stuck(now_us):
-                return f"{name} is stuck"
+                return stuck(name)
             if not watch.delivers(now_us):
-                return f"{name} delivers nothing"
+                return silent(name)
         return ""
 
 

@@ -11,6 +11,7 @@ from firmware_py.mavlink.camera.model import CAMERA_COMPONENT_ID, CameraModel, C
 from firmware_py.mavlink.commands.flight import FlightCommands
 from firmware_py.mavlink.commands.maintenance import FailureSink, MaintenanceCommands
 from firmware_py.mavlink.commands.protocol import CommandService
+from firmware_py.mavlink.external_pose import ExternalPoseService
 from firmware_py.mavlink.ground_station.events import EventService
 from firmware_py.mavlink.ground_station.file_transfer import FileTransferService
 from firmware_py.mavlink.ground_station.log_transfer import LogTransferService
@@ -25,10 +26,17 @@ from firmware_py.mavlink.parameters import ExtendedParameterService, ParameterSe
 from firmware_py.mavlink.service import Handler, Service, merged
 from firmware_py.mavlink.telemetry.condition import CONDITION, esc_info
 from firmware_py.mavlink.telemetry.connection import ConnectionService
-from firmware_py.mavlink.telemetry.motion import MOTION, HomeAndOriginService
+from firmware_py.mavlink.telemetry.health import HEALTH
+from firmware_py.mavlink.telemetry.motion import (
+    MOTION,
+    HomeAndOriginService,
+    Truth,
+    hil_state_quaternion,
+)
 from firmware_py.mavlink.telemetry.sensing import SENSORS
 from firmware_py.mavlink.telemetry.status_texts import StatusTextService
 from firmware_py.mavlink.telemetry.streams import AutopilotSource, AutopilotTelemetry, StreamService
+from firmware_py.mavlink.time_sync import Clocks
 from firmware_py.storage import Storage
 from firmware_py.types import StatusText
 from wire.dialect import AUTOPILOT_COMPONENT_ID, BROADCAST, Message, mavlink
@@ -53,6 +61,7 @@ class NodeOptions:
     camera: CameraModel | None = None
     captures: CaptureSink | None = None  # takes and keeps pictures; by default they are only counted
     failures: FailureSink | None = None  # breaks parts on purpose
+    truth: Truth | None = None  # the true state, of a simulated vehicle whose sensors have errors
 
 
 def _services(autopilot: Autopilot, exchange: Exchange, options: NodeOptions) -> tuple[Service, ...]:
@@ -66,11 +75,15 @@ def _services(autopilot: Autopilot, exchange: Exchange, options: NodeOptions) ->
     if files is None:
         files = ExtraFiles(autopilot.parameters)
     events = EventService(autopilot, exchange)
+    clocks = Clocks()
     mission = MissionExecution(autopilot, exchange, camera)
-    clocked: dict[int, AutopilotSource] = {
-        mavlink.MAVLINK_MSG_ID_ESC_INFO: lambda autopilot: esc_info(autopilot, exchange.time_us)
+    others: dict[int, AutopilotSource] = {
+        mavlink.MAVLINK_MSG_ID_ESC_INFO: lambda autopilot: esc_info(autopilot, exchange.time_us),
+        mavlink.MAVLINK_MSG_ID_HIL_STATE_QUATERNION: lambda autopilot: hil_state_quaternion(
+            autopilot, options.truth
+        ),
     }
-    state_messages = merged((MOTION, SENSORS, CONDITION, clocked))
+    state_messages = merged((MOTION, SENSORS, CONDITION, HEALTH, others))
     services: tuple[Service, ...] = (
         HomeAndOriginService(autopilot, exchange),
         StatusTextService(autopilot, exchange, events.send_text, options.log_text),
@@ -84,7 +97,8 @@ def _services(autopilot: Autopilot, exchange: Exchange, options: NodeOptions) ->
         *((ShellService(autopilot, exchange),) if options.shell else ()),
         *((camera,) if camera is not None else ()),
         # The others have no `update`.
-        ConnectionService(autopilot, exchange),
+        ConnectionService(autopilot, exchange, clocks),
+        ExternalPoseService(autopilot, exchange, clocks),
         AutopilotTelemetry(autopilot, state_messages),
         OffboardService(autopilot, exchange),
         ManualControlService(autopilot, exchange),

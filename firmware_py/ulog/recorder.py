@@ -151,7 +151,8 @@ class UlogRecorder:
 
     def _sample(self, autopilot: Autopilot, time_us: int) -> Sample:
         unix_us = self._boot_unix_us + time_us if self._boot_unix_us else 0
-        return Sample(autopilot, time_us, unix_us, autopilot.global_position())
+        report = autopilot.estimator.report()
+        return Sample(autopilot, time_us, unix_us, autopilot.global_position(), report)
 
     def _log_due(self, autopilot: Autopilot, time_us: int) -> None:
         sample = self._sample(autopilot, time_us)

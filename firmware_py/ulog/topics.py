@@ -8,14 +8,17 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from math import atan2, hypot, nan
+from math import atan2, hypot, isfinite, nan
 
 from firmware_py.atmosphere import pressure_hpa, temperature_k
 from firmware_py.autopilot import Autopilot
+from firmware_py.estimation.report import EstimatorReport
+from firmware_py.mavlink.telemetry.health import solution_flags
 from firmware_py.mavlink.telemetry.sensing import earth_field_frd_gauss
 from firmware_py.setpoints import AttitudeSetpoint, BodyRateSetpoint
 from firmware_py.status import NAVIGATION_STATES, LandedState
 from firmware_py.types import GeodeticPoint
+from firmware_py.ulog import measured
 from firmware_py.ulog.messages import Topic
 
 Values = tuple[float, ...]
@@ -44,12 +47,14 @@ class Sample:
         time_us: vehicle time.
         unix_us: the same since 1970; 0: not known.
         place: position on Earth; None: not known.
+        report: of the estimator.
     """
 
     autopilot: Autopilot
     time_us: int
     unix_us: int
     place: GeodeticPoint | None
+    report: EstimatorReport
 
 
 Collector = Callable[[Sample], Values | None]
@@ -80,7 +85,9 @@ def _angular_velocity(sample: Sample) -> Values:
     return (sample.time_us, sample.time_us, *sample.autopilot.state.angular_rate_frd_rad_s)
 
 
-def _sensor_combined(sample: Sample) -> Values:
+def _sensor_combined(sample: Sample) -> Values | None:
+    if not sample.report.ideal:
+        return measured.sensor_combined(sample.report, sample.time_us)
     state = sample.autopilot.state
     turning, pulling = state.angular_rate_frd_rad_s, state.specific_force_frd_m_s2
     return (sample.time_us, *turning, 4000, 0, *pulling, 4000, 0, 0, 0, 0)
@@ -126,10 +133,23 @@ def _local_position(sample: Sample) -> Values | None:
         state.velocity_ned_m_s[2],
         state.yaw_rad,
         origin.altitude_m,
-        nan,
-        0.0,
-        0.0,
-        *(True, True, True, True, True, True, True, False, False),
+        *_local_quality(sample.report),
+    )
+
+
+def _local_quality(report: EstimatorReport) -> Values:
+    """Height above ground, accuracies and validity."""
+    if report.ideal:
+        return (nan, 0.0, 0.0, *(True, True, True, True, True, True, True, False, False))
+    horizontal_m, vertical_m = measured.accuracies_and_ratios(report)[:2]
+    place, height, speed = report.has_position, report.has_height, report.has_velocity
+    above_ground_m = report.height_above_ground_m
+    return (
+        above_ground_m,
+        horizontal_m,
+        vertical_m,
+        *(place, height, speed, height, report.has_attitude, place, height),
+        *(isfinite(above_ground_m), not place),
     )
 
 
@@ -167,7 +187,9 @@ def _global_position(sample: Sample) -> Values | None:
 
 
 def _gps(sample: Sample) -> Values | None:
-    """With the accuracies of GPS_RAW_INT, which are PX4's simulated ones."""
+    """Ideal: with the accuracies of GPS_RAW_INT, which are PX4's simulated ones."""
+    if not sample.report.ideal:
+        return measured.gps(sample.report, sample.time_us, sample.unix_us)
     place = sample.place
     if place is None:
         return None
@@ -199,6 +221,8 @@ def _gps(sample: Sample) -> Values | None:
 
 
 def _air_data(sample: Sample) -> Values | None:
+    if not sample.report.ideal:
+        return measured.air_data(sample.report, sample.time_us)
     place = sample.place
     if place is None:
         return None
@@ -216,7 +240,9 @@ def _air_data(sample: Sample) -> Values | None:
     )
 
 
-def _magnetometer(sample: Sample) -> Values:
+def _magnetometer(sample: Sample) -> Values | None:
+    if not sample.report.ideal:
+        return measured.magnetometer(sample.report, sample.time_us)
     field_gauss = earth_field_frd_gauss(sample.autopilot.state.attitude)
     return (sample.time_us, sample.time_us, *field_gauss)
 
@@ -267,14 +293,23 @@ def _vehicle_status(sample: Sample) -> Values:
 
 def _estimator_status(sample: Sample) -> Values:
     flying = sample.autopilot.status.landed_state is not LandedState.ON_GROUND
+    report = sample.report
+    mode, solution = _ESTIMATOR_MODE, _SOLUTION_GOOD
+    quality: Values = (0.0,) * 6
+    if not report.ideal:
+        mode = measured.control_mode_flags(report)
+        solution = solution_flags(sample.autopilot, report)
+        quality = measured.accuracies_and_ratios(report)
     return (
         sample.time_us,
         sample.time_us,
-        _ESTIMATOR_MODE | (_ESTIMATOR_IN_AIR if flying else 0),
+        mode | (_ESTIMATOR_IN_AIR if flying else 0),
         0,
-        *[0.0] * 11,
+        *(0.0, 0.0, 0.0),
+        *quality,
+        *(0.0, 0.0),
         0,
-        _SOLUTION_GOOD,
+        solution,
         0,
         0,
     )

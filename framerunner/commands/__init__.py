@@ -13,6 +13,7 @@ from errors import SettingError
 
 if TYPE_CHECKING:
     from offboard.mission import Mission
+    from scenarios.models import Scenario
 
 
 def _whole(_type: Any, tokens: Sequence[Token]) -> int:  # noqa: ANN401 - the library's signature
@@ -26,6 +27,22 @@ def _whole(_type: Any, tokens: Sequence[Token]) -> int:  # noqa: ANN401 - the li
 
 DEFAULT_MISSION = "explorer"
 WholeNumber = Annotated[int, Parameter(converter=_whole)]
+
+
+Sensors = Annotated[
+    str | None,
+    Parameter(help="the drone's sensor suite instead of the scenario's: ideal, mocap, outdoor, …, or a file"),
+]
+
+
+def with_sensors(scenario: Scenario, sensors: str | None) -> Scenario:
+    """A scenario with another sensor suite, which must exist; None: its own."""
+    if sensors is None:
+        return scenario
+    from sitl.sensors.suite import load_suite
+
+    load_suite(sensors)
+    return scenario.model_copy(update={"sensors": sensors})
 
 
 def check_range(option: str, value: float | None, low: float, high: float) -> None:

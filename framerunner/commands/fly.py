@@ -9,7 +9,14 @@ from typing import TYPE_CHECKING, Annotated
 from cyclopts import Parameter
 
 from errors import SettingError
-from framerunner.commands import DEFAULT_MISSION, WholeNumber, check_range, load_mission_with
+from framerunner.commands import (
+    DEFAULT_MISSION,
+    Sensors,
+    WholeNumber,
+    check_range,
+    load_mission_with,
+    with_sensors,
+)
 
 if TYPE_CHECKING:
     from framerunner.flying.plan import FlightPlan
@@ -70,6 +77,7 @@ def fly(
     instance: Annotated[WholeNumber, Parameter(help="of the simulated drone: shifts its ports, 0 to 9")] = 0,
     lockstep: _Lockstep = False,
     seed: _Seed = None,
+    sensors: Sensors = None,
     record: _Record = False,
     video: _Video = False,
     monitor: _Monitor = False,
@@ -92,7 +100,7 @@ def fly(
 
         framerunner fly my_scenario.yaml --mission frame_challenge --speed 2
 
-        framerunner fly test-case-1 --lockstep --record
+        framerunner fly test-case-1 --lockstep --record --sensors mocap
 
         framerunner fly test-case-1 --lockstep --response lag=0.6,dead-time=0.15
 
@@ -103,8 +111,7 @@ def fly(
         framerunner fly --drone serial:///dev/ttyUSB0:57600 --camera rtsp://10.0.0.2/1
     """
     api = _simulator_api(simulator, drone)
-    if api is not None and camera is None:
-        camera = api.video_url
+    camera = api.video_url if api is not None and camera is None else camera
     _check(drone, camera, speed, instance, lockstep)
     check_range("--camera-delay", camera_delay, 0.0, 0.5)
     _check_lockstep(seed, monitor, lockstep)
@@ -114,13 +121,14 @@ def fly(
 
     loaded = load_mission_with(mission, pilot)
     seed = (seed or 0) if lockstep else None
-    plan = _plan(scenario, loaded, seed, response=response, drone=drone, drone_limits=drone_limits)
+    plan = _plan(scenario, sensors, loaded, seed, response=response, drone=drone, drone_limits=drone_limits)
     real_time = None if lockstep else RealTimeSettings(drone, camera, api, speed, instance, camera_delay)
     return asyncio.run(fly_once(FlightSettings(plan, real_time, out, record, video, monitor)))
 
 
 def _plan(
     scenario: str,
+    sensors: str | None,
     mission: Mission,
     seed: int | None,
     *,
@@ -132,6 +140,9 @@ def _plan(
     from framerunner.commands.named_numbers import limits_of, response_of
     from framerunner.flying.plan import FlightPlan
     from scenarios.loader import load_scenario
+
+    if sensors is not None and drone is not None:
+        raise SettingError("--sensors: are those of a simulated drone; leave it out with --drone")
 
     if response is not None and seed is None:
         raise SettingError("--response: is for a simulated vehicle in lockstep; add --lockstep")
@@ -149,7 +160,7 @@ def _plan(
             "--drone-limits forward=2,left=1.5,up=1,yaw-rate=1.5"
         )
     return FlightPlan(
-        load_scenario(scenario),
+        with_sensors(load_scenario(scenario), sensors),
         mission,
         seed,
         drone_limits=None if drone_limits is None else limits_of(drone_limits),

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Annotated
 from cyclopts import Parameter
 
 from errors import SettingError
-from framerunner.commands import WholeNumber, check_range, say
+from framerunner.commands import Sensors, WholeNumber, check_range, say, with_sensors
 from framerunner.extras import install_advice, is_installed
 
 if TYPE_CHECKING:
@@ -39,6 +39,7 @@ class Onboard:
         Path | None,
         Parameter(help="file of changed parameters (.params), read at start and saved when one changes"),
     ] = None
+    sensors: Sensors = None
     shell: Annotated[bool, Parameter(help="answer MAVLink's shell (SERIAL_CONTROL), for the drone only")] = (
         False
     )
@@ -108,7 +109,7 @@ def sim(
 
         framerunner sim
 
-        framerunner sim --scenario test-case-1 --speed 2
+        framerunner sim --scenario test-case-1 --speed 2 --sensors mocap
 
         framerunner sim --scenario test-case-1 --monitor
 
@@ -125,16 +126,16 @@ def sim(
     check_range("--speed", speed, 0.01, 1000)
     check_range("--instance", instance, 0, 9)
     check_range("--count", count, 1, _MAX_COUNT)
-    chosen = connections or Connections()
+    chosen, onboard = connections or Connections(), onboard or Onboard()
     watcher = _monitor(chosen.video_port, count) if monitor else None
     if watcher is not None:
         chosen = replace(chosen, link=(*chosen.link, watcher.link))
-    settings = _settings(chosen, onboard or Onboard(), speed, instance, count)
+    settings = _settings(chosen, onboard, speed, instance, count)
 
     from scenarios.loader import load_scenario
     from sitl.server import SimulatorServer
 
-    simulations = _simulations(load_scenario(scenario), count, seed)
+    simulations = _simulations(with_sensors(load_scenario(scenario), onboard.sensors), count, seed)
     server = SimulatorServer(simulations, settings, notice=say, grants=_grants(time_grants))
     asyncio.run(_run(server, watcher, lifeline=lifeline))
     return 0

@@ -34,6 +34,17 @@ _SLOW_ESTIMATOR = (
     ("EKF2_TAU_POS", 0.15, "s"),
     ("EKF2_TAU_VEL", 0.15, "s"),
 )
+_MEASURING = (
+    mavlink.MAV_SYS_STATUS_SENSOR_3D_GYRO
+    | mavlink.MAV_SYS_STATUS_SENSOR_3D_ACCEL
+    | mavlink.MAV_SYS_STATUS_SENSOR_3D_MAG
+    | mavlink.MAV_SYS_STATUS_SENSOR_ABSOLUTE_PRESSURE
+    | mavlink.MAV_SYS_STATUS_SENSOR_GPS
+    | mavlink.MAV_SYS_STATUS_SENSOR_OPTICAL_FLOW
+    | mavlink.MAV_SYS_STATUS_SENSOR_VISION_POSITION
+    | mavlink.MAV_SYS_STATUS_SENSOR_LASER_POSITION
+)
+HIGH_RATIO = 0.5  # of an innovation to what its gate lets pass; PX4 does not arm above it
 _ATTITUDES = ("ATTITUDE", "ATTITUDE_QUATERNION")
 _MULTICOPTERS = (
     mavlink.MAV_TYPE_QUADROTOR,
@@ -152,6 +163,56 @@ def _health(record: Record) -> Findings:
         yield _note("health", f"unhealthy: {unhealthy_names}", "correct it before flying")
     else:
         yield _good("pre-arm checks", "passed")
+
+
+def _names(bits: int) -> str:
+    return ", ".join(name for bit, name in _SENSORS.items() if bits & bit)
+
+
+def _sensors(record: Record) -> Findings:
+    """What the estimator relies on: PX4 enables what is there, the simulated drone what it uses."""
+    status = record.latest.get("SYS_STATUS")
+    if status is None:
+        return
+    present = status.onboard_control_sensors_present & _MEASURING
+    used = present & status.onboard_control_sensors_enabled & status.onboard_control_sensors_health
+    failing = present & ~status.onboard_control_sensors_health
+    idle = present & ~used & ~failing
+    words = [f"the estimator relies on {_names(used)}" if used else "the estimator relies on no sensor"]
+    words += [f"not on {_names(idle)}"] if idle else []
+    words += [f"{_names(failing)} {'fails' if failing.bit_count() == 1 else 'fail'}"] if failing else []
+    advice = "correct what fails before flying" if failing else ""
+    yield Finding(Level.NOTE if failing else Level.GOOD, "sensors", "; ".join(words), advice)
+
+
+def _innovations(record: Record) -> Findings:
+    """Whether the measurements agree with the estimate."""
+    status = record.latest.get("ESTIMATOR_STATUS")
+    if status is None:
+        return
+    if not status.flags & mavlink.ESTIMATOR_ATTITUDE:
+        yield _missing("estimator", "it does not know its attitude", "keep the drone still for some seconds")
+        return
+    if status.flags & mavlink.ESTIMATOR_ACCEL_ERROR:
+        yield _missing("estimator", "its accelerometer measures wrongly", "calibrate it, damp vibration")
+    ratios = {
+        "velocity": status.vel_ratio,
+        "position": status.pos_horiz_ratio,
+        "height": status.pos_vert_ratio,
+        "heading": status.mag_ratio,
+        "height above ground": status.hagl_ratio,
+    }
+    high = {name: ratio for name, ratio in ratios.items() if ratio > HIGH_RATIO}
+    words = ", ".join(f"{name} {ratio:.2f}" for name, ratio in high.items())
+    if any(ratio > 1.0 for ratio in high.values()):
+        yield _missing(
+            "innovations", f"it rejects measurements: {words}", "correct the sensor or its settings"
+        )
+    elif high:
+        yield _note("innovations", f"measurements hardly agree: {words}", "wait, or correct the sensor")
+    else:
+        largest = max((ratio for ratio in ratios.values() if isfinite(ratio)), default=0.0)
+        yield _good("innovations", f"measurements agree, largest ratio {largest:.2f}")
 
 
 def _offboard(record: Record) -> Findings:
@@ -283,13 +344,14 @@ def _position(record: Record) -> Findings:
     if int(record.parameters.get("EKF2_EV_CTRL", 0)) & _EV_POSITION:
         advice = (
             "EKF2_EV_CTRL requests vision, but none is used: send ODOMETRY with estimator type VISION (not "
-            f"MOCAP), or VISION_POSITION_ESTIMATE, at 50 Hz: {_GUIDE}"
+            f"MOCAP) at 50 Hz, as `framerunner mocap` does: {_GUIDE}"
         )
     if not status.flags & mavlink.ESTIMATOR_PRED_POS_HORIZ_REL:
         yield _missing("position", "no sensor measures the drone's position", advice)
         return
     sources = ["GPS"] if status.flags & mavlink.ESTIMATOR_PRED_POS_HORIZ_ABS else []
     sources += ["vision"] if _vision_in_use(record, status) else []
+    sources += ["optical flow"] if _uses(record, mavlink.MAV_SYS_STATUS_SENSOR_OPTICAL_FLOW) else []
     source = " and ".join(sources) or "optical flow or another relative sensor"
     accuracy_m = status.pos_horiz_accuracy
     if accuracy_m <= ACCURATE_M:
@@ -361,9 +423,19 @@ def _still(record: Record) -> Findings:
 
 def _vision_in_use(record: Record, status: Message) -> bool:
     """Whether the position is from external vision, as far as flags and accuracy show."""
+    if _uses(record, mavlink.MAV_SYS_STATUS_SENSOR_VISION_POSITION):
+        return True
     asked = int(record.parameters.get("EKF2_EV_CTRL", 0)) & _EV_POSITION
     aided = status.flags & mavlink.ESTIMATOR_PRED_POS_HORIZ_REL
     return bool(asked and aided and status.pos_horiz_accuracy <= ACCURATE_M)
+
+
+def _uses(record: Record, sensor: int) -> bool:
+    """Whether the drone reports that it relies on a sensor of which PX4 reports nothing."""
+    status = record.latest.get("SYS_STATUS")
+    if status is None:
+        return False
+    return bool(status.onboard_control_sensors_enabled & status.onboard_control_sensors_health & sensor)
 
 
 def _height_source(record: Record, status: Message, requested: str) -> str:
@@ -373,7 +445,8 @@ def _height_source(record: Record, status: Message, requested: str) -> str:
         "barometer": True,
         "GPS": bool(status.flags & mavlink.ESTIMATOR_PRED_POS_HORIZ_ABS),
         "range finder": bool(parameters.get("EKF2_RNG_CTRL", 1.0)) and "DISTANCE_SENSOR" in record.counts,
-        "vision": _vision_in_use(record, status) and bool(int(parameters["EKF2_EV_CTRL"]) & _EV_HEIGHT),
+        "vision": _vision_in_use(record, status)
+        and bool(int(parameters.get("EKF2_EV_CTRL", 0)) & _EV_HEIGHT),
     }
     return requested if present.get(requested) else "barometer"
 
@@ -382,6 +455,8 @@ _CHECKS: tuple[Callable[[Record], Findings], ...] = (
     _autopilot,
     _armed,
     _health,
+    _sensors,
+    _innovations,
     _offboard,
     _streams,
     _link,

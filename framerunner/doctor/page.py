@@ -45,11 +45,7 @@ def _page(url: str, record: Record, findings: list[Finding]) -> Iterator[Rendera
         facts.add_row(name, escape(value))
     yield facts
     yield ""
-    found = Table(show_header=False, box=None, pad_edge=False)
-    for finding in findings:
-        advice = f"[dim]{escape(finding.advice)}[/]"
-        found.add_row(_MARKS[finding.level], escape(finding.subject), escape(finding.text), advice)
-    yield found
+    yield findings_table(findings)
     yield ""
     yield Columns([_streams(record), _parameters(record)], padding=(0, 4))
     if record.texts:
@@ -64,6 +60,15 @@ def _page(url: str, record: Record, findings: list[Finding]) -> Iterator[Rendera
         count = sum(finding.level is Level.MISSING for finding in findings)
         things = "one thing is" if count == 1 else f"{count} things are"
         yield Text(f"It cannot fly the challenge yet: {things} missing.", style="bold red")
+
+
+def findings_table(findings: list[Finding]) -> Table:
+    """A row for each finding: how much it matters, its subject, what is the case, what to do."""
+    found = Table(show_header=False, box=None, pad_edge=False)
+    for finding in findings:
+        advice = f"[dim]{escape(finding.advice)}[/]"
+        found.add_row(_MARKS[finding.level], escape(finding.subject), escape(finding.text), advice)
+    return found
 
 
 def _facts(record: Record) -> Iterator[tuple[str, str]]:

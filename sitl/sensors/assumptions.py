@@ -63,6 +63,13 @@ def estimator_settings(spec: SuiteSpec) -> EstimatorSettings:
     )
 
 
+def parameter_defaults(spec: SuiteSpec) -> dict[str, float]:
+    """The parameters that a vehicle with this suite has by default, as those of an airframe's file."""
+    if spec.external_pose is None or spec.external_pose.source != "mavlink":
+        return {}
+    return {"EKF2_EV_CTRL": 15, "EKF2_EVP_NOISE": 0.01, "EKF2_EVA_NOISE": 0.02}
+
+
 def _walk(sigma: float, time_constant_s: float) -> float:
     """Density of the noise that drives a first-order Gauss-Markov process."""
     return sigma * sqrt(2.0 / time_constant_s)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Self
+from typing import Annotated, Literal, Self
 
 from pydantic import Field, model_validator
 
@@ -129,8 +129,14 @@ class OpticalFlowSpec(Part):
 
 
 class ExternalPoseSpec(Part):
-    """A motion capture system: position and attitude, no velocity."""
+    """A motion capture system: position and attitude, no velocity.
 
+    With the source `mavlink` the figures are what the estimator assumes of the poses that it receives.
+    """
+
+    source: Literal["simulated", "mavlink"] = Field(
+        "simulated", description="whether poses are simulated here, or received as MAVLink ODOMETRY"
+    )
     rate_hz: Rate = Field(description="poses a second that are sent to the drone")
     delay_s: DelayTime = Field(description="from when a pose is true to its arrival")
     position_noise_m: Sigma = Field(description="white noise, 1 sigma of each axis")

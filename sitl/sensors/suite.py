@@ -82,7 +82,9 @@ class SensorSuite:
         self._gps = Gps(spec.gps, place, seed) if spec.gps else None
         self._range_finder = RangeFinder(spec.range_finder, seed) if spec.range_finder else None
         self._optical_flow = OpticalFlow(spec.optical_flow, seed) if spec.optical_flow else None
-        self._motion_capture = MotionCapture(spec.external_pose, seed) if spec.external_pose else None
+        pose = spec.external_pose
+        simulated = pose is not None and pose.source == "simulated"
+        self._motion_capture = MotionCapture(pose, seed) if pose is not None and simulated else None
         self._battery = BatteryMonitor(spec.battery, seed) if spec.battery else None
         self._external_pose: ExternalPose | None = None
 

@@ -118,6 +118,7 @@ def situations():
     ]
     found += [
         replace(STANDING, battery_arms=False),
+        replace(STANDING, problem="barometer is stuck"),
         replace(STANDING, entered_us=LONG_AGO, follow_up=Reaction.LAND),
         replace(STANDING, choices=CHOICES[1]),
         replace(FLYING, target_reached=True, choices=Choices(mission_after_takeoff=True)),
@@ -453,6 +454,19 @@ def test_why_arming_is_denied(change, text):
     row = first_match(RULES[State.DISARMED, Event.ARM], replace(STANDING, **change))
     assert row is not None
     assert (row.result, row.text) == (NO, text)
+
+
+def test_arming_is_denied_in_the_words_of_the_estimators_condition():
+    commander = Commander()
+    commander.situation = replace(STANDING, problem="barometer is stuck")
+    assert commander.refusal == "Arming denied: barometer is stuck"
+    row = commander.handle(Event.ARM)
+    assert (row.result, row.text) == (NO, "Arming denied: barometer is stuck")
+    commander.situation.problem = "GPS fix too low"
+    assert commander.refusal == "Arming denied: GPS fix too low"
+    commander.situation.intended = FlightMode.STABILIZED  # needs no position
+    commander.situation.manual_us = commander.situation.now_us
+    assert commander.refusal == ""
 
 
 def test_disarming_on_the_ground():

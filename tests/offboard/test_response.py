@@ -1,6 +1,7 @@
 """The response of vehicles that answer late is learnt in flight, and their motion is predicted."""
 
 from collections import deque
+from dataclasses import replace
 from math import cos, exp, hypot, pi, remainder, sin
 
 import pytest
@@ -62,6 +63,29 @@ class Vehicle:
         )
 
 
+class PiVehicle(Vehicle):
+    """In plan a velocity loop with PX4's proportional and integral gains against drag, in arena axes."""
+
+    def __init__(self, dead_s, drag_per_s):
+        super().__init__(dead_s, 0.4)
+        self.drag_per_s = drag_per_s
+        self.plan, self.integral_m_s2 = [0.0, 0.0], [0.0, 0.0]
+
+    @property
+    def state(self):
+        return replace(super().state, velocity_arena_m_s=(*self.plan, self.speeds[2]))
+
+    def fly(self, command):
+        coming = self.waiting[0][:2]
+        for axis, wanted in enumerate(coming):
+            for _ in range(10):
+                off = wanted - self.plan[axis]
+                self.integral_m_s2[axis] += 0.4 * off * STEP_S / 10
+                change = 1.8 * off + self.integral_m_s2[axis] - self.drag_per_s * self.plan[axis]
+                self.plan[axis] += change * STEP_S / 10
+        super().fly(command)
+
+
 def command_at(time_s):
     """Starts, stops, turns and climbs, as of a flight."""
     quarter = int(time_s / 1.5) % 4
@@ -119,6 +143,37 @@ def test_a_second_lag_is_learnt():
     assert response.own_lag_s == 0.4
     assert response.level_dead_s == pytest.approx(0.15, abs=0.001)
     assert response.level_lag_s == pytest.approx(0.6, abs=0.001)
+
+
+@pytest.mark.parametrize(("drag_per_s", "share"), [(1.0, 0.64), (0.4, 0.82)])
+def test_the_share_that_a_velocity_loop_against_drag_follows_soon_is_learnt(drag_per_s, share):
+    response = learn(PiVehicle(0.25, drag_per_s), 30.0).response
+    assert response.share == pytest.approx(share, abs=0.06)
+    assert response.level_dead_s + response.level_lag_s == pytest.approx(0.25 + share / 1.8, abs=0.1)
+
+
+@pytest.mark.parametrize("own_lag_s", [0.0, 0.4])
+def test_a_vehicle_that_follows_all_of_a_command_has_no_share(own_lag_s):
+    assert learn(Vehicle(0.35, 0.6, own_lag_s=own_lag_s), 30.0).response.share == 1.0
+
+
+def test_what_a_leg_leaves_in_the_integral_is_predicted():
+    vehicle, sent = PiVehicle(0.35, 1.0), VelocityCommand(0.0, 0.8)
+    estimate = learn(vehicle, 25.0)
+    for _ in range(80):
+        vehicle.fly(sent)
+        estimate.update(vehicle.state, sent)
+    for _ in range(20):
+        vehicle.fly(VelocityCommand())
+        estimate.update(vehicle.state, VelocityCommand())
+    prediction, before = estimate.predict(), vehicle.position
+    left = prediction.slow_m_s[1] * cos(vehicle.yaw) - prediction.slow_m_s[0] * sin(vehicle.yaw)
+    assert left > 0.06
+    assert hypot(*prediction.disturbance_m_s[:2]) < 0.05
+    for _ in range(7):
+        vehicle.fly(VelocityCommand())
+    moved = [b - a for a, b in zip(before, vehicle.position, strict=True)]
+    assert prediction.moved_m == pytest.approx(moved, abs=0.01)
 
 
 @pytest.mark.parametrize("own_lag_s", [0.0, 0.4])

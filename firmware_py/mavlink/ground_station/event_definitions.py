@@ -15,7 +15,8 @@ from enum import IntFlag
 from struct import pack
 from typing import Literal
 
-from firmware_py.commander_table import TABLE, Event
+from firmware_py.commander_table import ARMING_DENIED, TABLE, Event
+from firmware_py.estimation.report import PROBLEMS
 from firmware_py.status import NAVIGATION_STATES, CommandResult, FlightMode
 
 COMPONENT = 1  # the upper eight bits of every id: the autopilot
@@ -90,6 +91,9 @@ class Part(IntFlag):
     NONE = 1 << 0
     ABSOLUTE_PRESSURE = 1 << 1
     GPS = 1 << 3
+    OPTICAL_FLOW = 1 << 4
+    VISION_POSITION = 1 << 5
+    DISTANCE_SENSOR = 1 << 6
     REMOTE_CONTROL = 1 << 7
     BATTERY = 1 << 11
     COMMUNICATION_LINKS = 1 << 12
@@ -158,7 +162,6 @@ def navigation_mode_groups() -> dict[str, object]:
 
 
 _MAX_MESSAGE = 120  # libevents' limit
-_REFUSAL = "Arming denied: "
 
 MODE_CHANGED = EventKind("mode_changed", "Mode: {1}", arguments=(("flight_mode_t", "mode"),))
 
@@ -221,22 +224,26 @@ def _message(text: str) -> str:
 
 def _check(refusal: str) -> EventKind:
     """The event of a refusal, without its first words, as reports show it below a heading."""
-    reason = refusal.removeprefix(_REFUSAL)
+    reason = refusal.removeprefix(ARMING_DENIED)
     message = _message(reason[:1].upper() + reason[1:])
     return EventKind(f"check_{_slug(refusal)}", message, "arming_check", _CHECK_ARGUMENTS)
 
 
+_REFUSALS = (
+    *(
+        row.text
+        for row in TABLE
+        if row.event is Event.ARM and row.text and row.result is not CommandResult.ACCEPTED
+    ),
+    *(f"{ARMING_DENIED}{problem}" for problem in PROBLEMS),
+)
 # Events by their texts.
 TEXTS: dict[str, EventKind] = {
     text: EventKind(f"says_{_slug(text)}", _message(text))
-    for text in (*(row.text for row in TABLE if row.text), *_PLAIN)
+    for text in (*(row.text for row in TABLE if row.text), *_REFUSALS, *_PLAIN)
 }
 # Events of the arming report, by the text that refuses to arm.
-CHECKS: dict[str, EventKind] = {
-    row.text: _check(row.text)
-    for row in TABLE
-    if row.event is Event.ARM and row.text and row.result is not CommandResult.ACCEPTED
-}
+CHECKS: dict[str, EventKind] = {text: _check(text) for text in _REFUSALS}
 
 
 def event_of(text: str) -> tuple[EventKind, tuple[float, ...]] | None:

@@ -12,6 +12,7 @@ from dataclasses import dataclass
 
 from firmware_py.autopilot import Autopilot
 from firmware_py.commander_guards import UNARMABLE
+from firmware_py.estimation.report import NO_FIX, NO_HEIGHT, EstimatorReport, Sensor
 from firmware_py.mavlink.ground_station.event_definitions import (
     ALL_MODES,
     ARMING_SUMMARY,
@@ -38,12 +39,26 @@ _SEQUENCE_PERIOD_US = 3_000_000
 _HEALTH_PERIOD_US = 100_000  # between assessments
 _REPORT_GAP_US = 2_000_000  # between unrequested reports
 _UNARMABLE = sum(1 << MODE_GROUPS[mode] for mode in UNARMABLE)
+_SENSOR_PARTS = {
+    Sensor.GYROSCOPE: Part.GYRO,
+    Sensor.ACCELEROMETER: Part.ACCEL,
+    Sensor.MAGNETOMETER: Part.MAGNETOMETER,
+    Sensor.BAROMETER: Part.ABSOLUTE_PRESSURE,
+    Sensor.GPS: Part.GPS,
+    Sensor.EXTERNAL_POSE: Part.VISION_POSITION,
+    Sensor.RANGE_FINDER: Part.DISTANCE_SENSOR,
+    Sensor.OPTICAL_FLOW: Part.OPTICAL_FLOW,
+}
 _ALWAYS_THERE = Part.GYRO | Part.ACCEL | Part.MAGNETOMETER | Part.ABSOLUTE_PRESSURE | Part.ATTITUDE_ESTIMATE
 _PLACED = Part.GPS | Part.LOCAL_POSITION_ESTIMATE | Part.GLOBAL_POSITION_ESTIMATE
 _LOW_BATTERY = 2  # MAV_BATTERY_CHARGE_STATE_LOW
 
 # The part that a reason is about, by a word in it, and whether it prevents the chosen mode only.
 _SUBJECTS: tuple[tuple[str, Part, bool], ...] = (
+    (NO_FIX.lower(), Part.GPS, True),
+    *((sensor.value.lower(), part, False) for sensor, part in _SENSOR_PARTS.items()),
+    ("imu ", Part.ACCEL, False),
+    (NO_HEIGHT, Part.LOCAL_POSITION_ESTIMATE, False),
     ("battery", Part.BATTERY, False),
     ("ground station", Part.COMMUNICATION_LINKS, False),
     ("side", Part.ATTITUDE_ESTIMATE, False),
@@ -79,16 +94,37 @@ class HealthReport:
 
 def assess(autopilot: Autopilot) -> HealthReport:
     """The present report."""
-    status = autopilot.status
-    present, failing = _ALWAYS_THERE, Part(0)
-    if status.origin is not None:
-        present |= _PLACED
+    status, report = autopilot.status, autopilot.estimator.report()
+    if report.ideal:
+        present, failing = _ALWAYS_THERE, Part(0)
+        if status.origin is not None:
+            present |= _PLACED
+        else:
+            failing |= Part.LOCAL_POSITION_ESTIMATE
     else:
-        failing |= Part.LOCAL_POSITION_ESTIMATE
+        present, failing = _parts(report)
+        if status.origin is not None:
+            present |= Part.GLOBAL_POSITION_ESTIMATE
     present |= Part.BATTERY
     warning = Part.BATTERY if autopilot.battery.warning >= _LOW_BATTERY else Part(0)
     check = None if status.ready else _check(status.not_ready, status.intended_mode)
     return HealthReport(present, failing, warning, check)
+
+
+def _parts(report: EstimatorReport) -> tuple[Part, Part]:
+    """Parts that an estimator with these sensors has, and those of them that fail."""
+    present = Part.ATTITUDE_ESTIMATE | Part.LOCAL_POSITION_ESTIMATE
+    failing = Part(0)
+    for sensor in report.present:
+        part = _SENSOR_PARTS[sensor]
+        present |= part
+        if sensor not in report.healthy:
+            failing |= part
+    if not report.has_attitude:
+        failing |= Part.ATTITUDE_ESTIMATE
+    if not report.has_position:
+        failing |= Part.LOCAL_POSITION_ESTIMATE
+    return present, failing
 
 
 def _check(reason: str, intended: FlightMode) -> Check:

@@ -1,38 +1,15 @@
-"""Telemetry of the vehicle's condition: health, landed state, battery, mode, flight times, motors.
+"""Telemetry of the vehicle's condition: landed state, battery, mode, flight times, motors.
 
-Differences from PX4: innovation ratios and vibration are 0, because the state is exact, and so is the load,
-because the autopilot reads no clock. Motor speeds are the commanded ones; they are not measured.
+Difference from PX4: motor speeds are the commanded ones; they are not measured.
 """
 
 from __future__ import annotations
 
-from math import ceil, isfinite
-
 from firmware_py.autopilot import Autopilot
 from firmware_py.mavlink.telemetry.streams import AutopilotSource
-from firmware_py.status import LandedState
 from firmware_py.types import MotorSpeeds
 from wire.dialect import Message, boot_ms, mavlink, whole
 
-_POSITION = mavlink.MAV_SYS_STATUS_SENSOR_GPS | mavlink.MAV_SYS_STATUS_SENSOR_XY_POSITION_CONTROL
-_PRESENT = (
-    mavlink.MAV_SYS_STATUS_SENSOR_3D_GYRO
-    | mavlink.MAV_SYS_STATUS_SENSOR_3D_ACCEL
-    | mavlink.MAV_SYS_STATUS_SENSOR_3D_MAG
-    | mavlink.MAV_SYS_STATUS_SENSOR_ABSOLUTE_PRESSURE
-    | mavlink.MAV_SYS_STATUS_SENSOR_BATTERY
-    | _POSITION
-)
-# PX4 reports a part without faults as healthy even if it is absent, except for a remote control.
-_HEALTHY = (
-    _PRESENT
-    | mavlink.MAV_SYS_STATUS_SENSOR_DIFFERENTIAL_PRESSURE
-    | mavlink.MAV_SYS_STATUS_SENSOR_ATTITUDE_STABILIZATION
-    | mavlink.MAV_SYS_STATUS_SENSOR_MOTOR_OUTPUTS
-    | mavlink.MAV_SYS_STATUS_AHRS
-    | mavlink.MAV_SYS_STATUS_LOGGING
-)
-_CHECKED = _HEALTHY | mavlink.MAV_SYS_STATUS_SENSOR_RC_RECEIVER
 _UNKNOWN_16 = 0xFFFF
 _TEMPERATURE_UNKNOWN = 0x7FFF
 _PWM_DISARMED_US, _PWM_LOW_US, _PWM_SPAN_US = 900, 1000, 1000
@@ -40,31 +17,6 @@ _SERVOS = 16
 _OUTPUTS = 32
 _BATCH = 4  # motors in one ESC message
 _RPM = 60.0 / 6.283185307179586  # of 1 rad/s
-
-
-def sys_status(autopilot: Autopilot) -> Message:
-    """SYS_STATUS: the health bits that clients wait for, voltage, current and remaining charge."""
-    status, battery = autopilot.status, autopilot.battery
-    missing = 0 if status.origin is not None else _POSITION
-    present = _PRESENT & ~missing
-    if status.armed and autopilot.parameters.value("SDLOG_MODE") >= 0:
-        present |= mavlink.MAV_SYS_STATUS_LOGGING
-    healthy = _HEALTHY & ~missing
-    if battery.warning > mavlink.MAV_BATTERY_CHARGE_STATE_OK:
-        healthy &= ~mavlink.MAV_SYS_STATUS_SENSOR_BATTERY
-    if status.ready:
-        healthy |= mavlink.MAV_SYS_STATUS_PREARM_CHECK
-    return mavlink.MAVLink_sys_status_message(
-        present,
-        present | _CHECKED & ~healthy,
-        healthy,
-        0,
-        whole(battery.voltage_v * 1e3, 16, signed=False),
-        whole(battery.current_a * 100, 16),
-        min(100, whole(ceil(battery.remaining * 100) if isfinite(battery.remaining) else -1, 8)),
-        *[0] * 8,
-        mavlink.MAV_SYS_STATUS_RECOVERY_SYSTEM,
-    )
 
 
 def extended_sys_state(autopilot: Autopilot) -> Message:
@@ -98,32 +50,6 @@ def current_mode(autopilot: Autopilot) -> Message:
     return mavlink.MAVLink_current_mode_message(
         mode.value.standard, mode.custom_mode, status.intended_mode.custom_mode
     )
-
-
-def estimator_status(autopilot: Autopilot) -> Message:
-    """ESTIMATOR_STATUS: PX4's flags, 895 in flight and 959 on the ground."""
-    status = autopilot.status
-    flags = mavlink.ESTIMATOR_ATTITUDE
-    if status.origin is not None:
-        flags |= (
-            mavlink.ESTIMATOR_VELOCITY_HORIZ
-            | mavlink.ESTIMATOR_VELOCITY_VERT
-            | mavlink.ESTIMATOR_POS_HORIZ_REL
-            | mavlink.ESTIMATOR_POS_HORIZ_ABS
-            | mavlink.ESTIMATOR_POS_VERT_ABS
-            | mavlink.ESTIMATOR_PRED_POS_HORIZ_REL
-            | mavlink.ESTIMATOR_PRED_POS_HORIZ_ABS
-        )
-    if status.landed_state is LandedState.ON_GROUND:
-        flags |= mavlink.ESTIMATOR_CONST_POS_MODE
-    elif status.origin is not None:
-        flags |= mavlink.ESTIMATOR_POS_VERT_AGL
-    return mavlink.MAVLink_estimator_status_message(autopilot.state.time_us, flags, *[0.0] * 8)
-
-
-def vibration(autopilot: Autopilot) -> Message:
-    """VIBRATION: none."""
-    return mavlink.MAVLink_vibration_message(autopilot.state.time_us, 0.0, 0.0, 0.0, 0, 0, 0)
 
 
 def flight_information(autopilot: Autopilot) -> Message:
@@ -204,10 +130,7 @@ CONDITION: dict[int, AutopilotSource] = {
     mavlink.MAVLINK_MSG_ID_BATTERY_STATUS: battery_status,
     mavlink.MAVLINK_MSG_ID_CURRENT_MODE: current_mode,
     mavlink.MAVLINK_MSG_ID_ESC_STATUS: esc_status,
-    mavlink.MAVLINK_MSG_ID_ESTIMATOR_STATUS: estimator_status,
     mavlink.MAVLINK_MSG_ID_EXTENDED_SYS_STATE: extended_sys_state,
     mavlink.MAVLINK_MSG_ID_FLIGHT_INFORMATION: flight_information,
     mavlink.MAVLINK_MSG_ID_SERVO_OUTPUT_RAW: servo_output_raw,
-    mavlink.MAVLINK_MSG_ID_SYS_STATUS: sys_status,
-    mavlink.MAVLINK_MSG_ID_VIBRATION: vibration,
 }

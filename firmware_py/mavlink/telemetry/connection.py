@@ -12,6 +12,7 @@ from __future__ import annotations
 
 from firmware_py.autopilot import Autopilot
 from firmware_py.mavlink.service import Service
+from firmware_py.mavlink.time_sync import Clocks
 from firmware_py.status import NAVIGATION_STATES, FlightMode, VehicleStatus
 from wire.dialect import BROADCAST, Message, boot_ms, mavlink
 from wire.exchange import Exchange
@@ -103,13 +104,14 @@ def _available_mode(number: int, mode: FlightMode) -> Message:
 class ConnectionService(Service):
     """Sends what the vehicle is and its state, notes ground stations, and answers about time and signing."""
 
-    def __init__(self, autopilot: Autopilot, exchange: Exchange) -> None:
+    def __init__(self, autopilot: Autopilot, exchange: Exchange, clocks: Clocks) -> None:
         self._autopilot = autopilot
         self._exchange = exchange
+        self._clocks = clocks
         self.handlers = {
             mavlink.MAVLINK_MSG_ID_HEARTBEAT: self._receive_heartbeat,
             mavlink.MAVLINK_MSG_ID_SYSTEM_TIME: self._receive_date,
-            mavlink.MAVLINK_MSG_ID_TIMESYNC: self._answer_timesync,
+            mavlink.MAVLINK_MSG_ID_TIMESYNC: self._take_timesync,
             mavlink.MAVLINK_MSG_ID_PING: self._answer_ping,
             mavlink.MAVLINK_MSG_ID_SETUP_SIGNING: self._set_up_signing,
         }
@@ -154,10 +156,13 @@ class ConnectionService(Service):
         """TIMESYNC with our time in nanoseconds."""
         return mavlink.MAVLink_timesync_message(0, self._exchange.time_us * 1000)
 
-    def _answer_timesync(self, link: Link, message: Message) -> None:
+    def _take_timesync(self, link: Link, message: Message) -> None:
+        """Answer a request; an answer tells the other system's clock."""
+        now_us = self._exchange.time_us
         if message.tc1 == 0:
-            answer = mavlink.MAVLink_timesync_message(self._exchange.time_us * 1000, message.ts1)
-            self._exchange.send(link, answer)
+            self._exchange.send(link, mavlink.MAVLink_timesync_message(now_us * 1000, message.ts1))
+        elif message.tc1 > 0:
+            self._clocks.on(link.profile.name).take(now_us, message.tc1, message.ts1)
 
     def _ping_request(self) -> Message:
         """PING to everyone; its number is the second of vehicle time."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Sequence
 from math import degrees, hypot, isfinite, isnan, nan
 
 from firmware_py.autopilot import Autopilot
@@ -10,13 +11,15 @@ from firmware_py.mavlink.service import Service
 from firmware_py.mavlink.telemetry.streams import AutopilotSource
 from firmware_py.setpoints import AttitudeSetpoint, BodyRateSetpoint, TrajectorySetpoint
 from firmware_py.status import FlightMode
-from firmware_py.types import GeodeticPoint
+from firmware_py.types import GeodeticPoint, Sensors, VehicleState
+from geometry.rotations import rotation
 from geometry.vectors import NAN3, Quaternion
 from wire.dialect import Message, boot_ms, degrees_e7, mavlink, millimetres, whole
 from wire.exchange import Exchange
 from wire.link import Link
 
 _COVARIANCE_UNKNOWN = [nan] + [0.0] * 20
+_DIAGONAL = (0, 6, 11, 15, 18, 20)  # of a symmetric matrix of 6 rows, in the rows of its upper triangle
 _MILLI_G = 1000.0 / 9.80665  # of 1 m/s²
 _GLOBAL_MODES = frozenset(
     {
@@ -36,6 +39,9 @@ _RATES_IGNORED = (
     | mavlink.ATTITUDE_TARGET_TYPEMASK_BODY_YAW_RATE_IGNORE
 )
 _NO_ESTIMATE = -1
+
+Truth = Callable[[], tuple[Sensors, GeodeticPoint]]
+"""The true state of a simulated vehicle, and its place on Earth."""
 
 
 def attitude(autopilot: Autopilot) -> Message:
@@ -117,10 +123,21 @@ def altitude(autopilot: Autopilot) -> Message | None:
 
 
 def odometry(autopilot: Autopilot) -> Message | None:
-    """ODOMETRY; velocity in the local frame, as in PX4."""
+    """ODOMETRY; velocity in the local frame, variances of position, attitude and velocity, as in PX4."""
     state = autopilot.state
     if autopilot.status.origin is None:
         return None
+    report = autopilot.estimator.report()
+    pose_covariance = velocity_covariance = _COVARIANCE_UNKNOWN
+    if not report.ideal:
+        m = rotation(state.attitude)
+        squared = [component * component for component in m]
+        about_body = [
+            sum(squared[3 * row + column] * report.attitude_variance_rad2[row] for row in range(3))
+            for column in range(3)
+        ]
+        pose_covariance = _covariance((*report.position_variance_m2, *about_body))
+        velocity_covariance = _covariance(report.velocity_variance_m2_s2)
     return mavlink.MAVLink_odometry_message(
         state.time_us,
         mavlink.MAV_FRAME_LOCAL_NED,
@@ -129,17 +146,31 @@ def odometry(autopilot: Autopilot) -> Message | None:
         state.attitude,
         *state.velocity_ned_m_s,
         *state.angular_rate_frd_rad_s,
-        _COVARIANCE_UNKNOWN,
-        _COVARIANCE_UNKNOWN,
-        0,
+        pose_covariance,
+        velocity_covariance,
+        report.resets & 0xFF,
         mavlink.MAV_ESTIMATOR_TYPE_AUTOPILOT,
         0,
     )
 
 
-def hil_state_quaternion(autopilot: Autopilot) -> Message | None:
-    """HIL_STATE_QUATERNION: the true state, which is the estimate, as the sensors are exact."""
-    state, place = autopilot.state, autopilot.global_position()
+def _covariance(variances: Sequence[float]) -> list[float]:
+    """A covariance matrix of which only variances are known, as in PX4."""
+    entries = [nan] * 21
+    for index, variance in zip(_DIAGONAL, variances, strict=False):
+        entries[index] = variance
+    return entries
+
+
+def hil_state_quaternion(autopilot: Autopilot, truth: Truth | None) -> Message | None:
+    """HIL_STATE_QUATERNION: the true state. Of ideal sensors that is the estimate."""
+    state: VehicleState | Sensors
+    if autopilot.estimator.report().ideal:
+        state, place = autopilot.state, autopilot.global_position()
+    elif truth is not None:
+        state, place = truth()
+    else:
+        return None
     if place is None:
         return None
     return mavlink.MAVLink_hil_state_quaternion_message(
@@ -261,7 +292,6 @@ MOTION: dict[int, AutopilotSource] = {
     mavlink.MAVLINK_MSG_ID_ATTITUDE_QUATERNION: attitude_quaternion,
     mavlink.MAVLINK_MSG_ID_ATTITUDE_TARGET: attitude_target,
     mavlink.MAVLINK_MSG_ID_GLOBAL_POSITION_INT: global_position_int,
-    mavlink.MAVLINK_MSG_ID_HIL_STATE_QUATERNION: hil_state_quaternion,
     mavlink.MAVLINK_MSG_ID_LOCAL_POSITION_NED: local_position_ned,
     mavlink.MAVLINK_MSG_ID_ODOMETRY: odometry,
     mavlink.MAVLINK_MSG_ID_POSITION_TARGET_GLOBAL_INT: position_target_global_int,

@@ -1,4 +1,8 @@
-"""Telemetry of sensors, which are exact: pressure and magnetic field are computed from the state."""
+"""Telemetry of sensors.
+
+Ideal sensors have no samples: what they would measure, such as pressure and magnetic field, is computed from
+the state. For others see `measured.py`.
+"""
 
 from __future__ import annotations
 
@@ -6,6 +10,8 @@ from math import atan2, degrees, hypot, nan
 
 from firmware_py.atmosphere import pressure_hpa, temperature_k
 from firmware_py.autopilot import Autopilot
+from firmware_py.estimation.report import Sensor
+from firmware_py.mavlink.telemetry import measured
 from firmware_py.mavlink.telemetry.streams import AutopilotSource
 from geometry.rotations import rotation, to_body
 from geometry.vectors import Quaternion, Vec3
@@ -25,8 +31,11 @@ def earth_field_frd_gauss(attitude: Quaternion) -> Vec3:
     return to_body(rotation(attitude), *EARTH_FIELD_NED_GAUSS)
 
 
-def highres_imu(autopilot: Autopilot) -> Message:
+def highres_imu(autopilot: Autopilot) -> Message | None:
     """HIGHRES_IMU."""
+    report = autopilot.estimator.report()
+    if not report.ideal:
+        return measured.highres_imu(report)
     state, place = autopilot.state, autopilot.global_position()
     altitude_m = place.altitude_m if place else 0.0
     return mavlink.MAVLink_highres_imu_message(
@@ -42,8 +51,11 @@ def highres_imu(autopilot: Autopilot) -> Message:
     )
 
 
-def scaled_imu(autopilot: Autopilot) -> Message:
+def scaled_imu(autopilot: Autopilot) -> Message | None:
     """SCALED_IMU: thousandths of g, rad/s and gauss, hundredths of a degree (0 would be unknown)."""
+    report = autopilot.estimator.report()
+    if not report.ideal:
+        return measured.scaled_imu(report)
     state, place = autopilot.state, autopilot.global_position()
     field_gauss = earth_field_frd_gauss(state.attitude)
     celsius = temperature_k(place.altitude_m if place else 0.0) - 273.15
@@ -61,6 +73,9 @@ def distance_sensor(autopilot: Autopilot) -> Message | None:
 
     PX4's simulation computes it from the state too. Out of range, or pointing up, it is 0, as in PX4.
     """
+    report = autopilot.estimator.report()
+    if not report.ideal:
+        return measured.distance_sensor(report)
     state = autopilot.state
     if autopilot.status.origin is None:
         return None
@@ -83,13 +98,18 @@ def distance_sensor(autopilot: Autopilot) -> Message | None:
 
 def gnss_integrity(autopilot: Autopilot) -> Message | None:
     """GNSS_INTEGRITY: jamming and spoofing are not monitored."""
-    if autopilot.status.origin is None:
+    report = autopilot.estimator.report()
+    has_gps = report.ideal or Sensor.GPS in report.present
+    if autopilot.status.origin is None or not has_gps:
         return None
     return mavlink.MAVLink_gnss_integrity_message(*[0] * 6, *[_UNKNOWN_16] * 2, *[_UNKNOWN_8] * 4)
 
 
 def scaled_pressure(autopilot: Autopilot) -> Message | None:
     """SCALED_PRESSURE."""
+    report = autopilot.estimator.report()
+    if not report.ideal:
+        return measured.scaled_pressure(report)
     place = autopilot.global_position()
     if place is None:
         return None
@@ -101,8 +121,17 @@ def scaled_pressure(autopilot: Autopilot) -> Message | None:
     )
 
 
-def gps_raw_int(autopilot: Autopilot) -> Message:
+def optical_flow_rad(autopilot: Autopilot) -> Message | None:
+    """OPTICAL_FLOW_RAD; ideal sensors have none."""
+    report = autopilot.estimator.report()
+    return None if report.ideal else measured.optical_flow_rad(report)
+
+
+def gps_raw_int(autopilot: Autopilot) -> Message | None:
     """GPS_RAW_INT: a 3D fix with the values of PX4's simulation, or no fix yet."""
+    report = autopilot.estimator.report()
+    if not report.ideal:
+        return measured.gps_raw_int(report)
     state, place = autopilot.state, autopilot.global_position()
     if place is None:
         return mavlink.MAVLink_gps_raw_int_message(
@@ -152,6 +181,7 @@ SENSORS: dict[int, AutopilotSource] = {
     mavlink.MAVLINK_MSG_ID_GNSS_INTEGRITY: gnss_integrity,
     mavlink.MAVLINK_MSG_ID_GPS_RAW_INT: gps_raw_int,
     mavlink.MAVLINK_MSG_ID_HIGHRES_IMU: highres_imu,
+    mavlink.MAVLINK_MSG_ID_OPTICAL_FLOW_RAD: optical_flow_rad,
     mavlink.MAVLINK_MSG_ID_SCALED_IMU: scaled_imu,
     mavlink.MAVLINK_MSG_ID_SCALED_PRESSURE: scaled_pressure,
     mavlink.MAVLINK_MSG_ID_WIND_COV: wind_cov,

@@ -19,6 +19,7 @@ from offboard.response import Prediction, Response
 BANDWIDTH_PER_S = 1.2  # of the control
 BANDWIDTH_OF_TWO_PER_S = 1.45  # likewise of a vehicle with two lags, at least
 MAX_BANDWIDTH_PER_S = 2.0
+BANDWIDTH_OF_SHARE_PER_S = 1.8  # in plan, of a vehicle whose slow part is known: less disturbs it
 MAX_CORRECTION_M_S = 0.6
 RATE_CHANGE_PER_S = 1.2  # of the path's time: at the speed of crossings, that of a gentle stop
 WAIT_FROM_M = 0.1  # farther from the path, its time goes slower
@@ -88,7 +89,8 @@ class LateFollower:
         climb = self._reference(path, dead_s - response.climb_dead_s)
         turn = self._reference(path, dead_s - response.yaw_dead_s)
         now = (state.x, state.y, state.z)
-        gains = _gains(response.level_lag_s, response.own_lag_s)
+        bandwidth_per_s = BANDWIDTH_PER_S if response.share == 1.0 else BANDWIDTH_OF_SHARE_PER_S
+        gains = _gains(response.level_lag_s, response.own_lag_s, bandwidth_per_s)
         offset, correction = [0.0, 0.0, 0.0], [0.0, 0.0, 0.0]
         for axis, wanted in enumerate((level, level, climb)):
             gain, damping, ease = gains if axis < 2 else _gains(response.climb_lag_s)
@@ -110,7 +112,9 @@ class LateFollower:
         size = hypot(*correction)
         scale = MAX_CORRECTION_M_S / size if size > MAX_CORRECTION_M_S else 1.0
         x, y, z = (scale * c - w for c, w in zip(correction, prediction.disturbance_m_s, strict=True))
+        x, y = x - prediction.slow_m_s[0], y - prediction.slow_m_s[1]
         forward, left = self._level(path, level, (x, y), state.yaw, response)
+        forward, left = forward / response.share, left / response.share
         up = climb.velocity_m_s[2] + response.climb_lag_s * climb.acceleration_m_s2[2] + z
         gain, damping, _ = _gains(response.yaw_lag_s)
         rate = turn.yaw_rate_rad_s + response.yaw_lag_s * turn.yaw_acceleration_rad_s2
@@ -164,7 +168,9 @@ def _change(motion: Motion, *, turning: bool) -> tuple[float, float]:
     return ax + motion.yaw_rate_rad_s * vy, ay - motion.yaw_rate_rad_s * vx
 
 
-def _gains(lag_s: float, second_lag_s: float = 0.0) -> tuple[float, float, float]:
+def _gains(
+    lag_s: float, second_lag_s: float = 0.0, bandwidth_per_s: float = BANDWIDTH_PER_S
+) -> tuple[float, float, float]:
     """Gains of position, velocity and acceleration after the dead time, for a critically damped approach."""
     if second_lag_s > 0.0:
         product_s2, sum_s = lag_s * second_lag_s, lag_s + second_lag_s
@@ -172,10 +178,10 @@ def _gains(lag_s: float, second_lag_s: float = 0.0) -> tuple[float, float, float
         if b > MAX_BANDWIDTH_PER_S:
             return _gains(second_lag_s)  # the first lag is short
         return product_s2 * b**3, 3.0 * product_s2 * b**2 - 1.0, 3.0 * product_s2 * b - sum_s
-    slowest_s = 0.5 / BANDWIDTH_PER_S
+    slowest_s = 0.5 / bandwidth_per_s
     if lag_s < slowest_s:
-        return min(0.25 / lag_s, BANDWIDTH_PER_S), 0.0, 0.0
-    return lag_s * BANDWIDTH_PER_S**2, 2.0 * lag_s * BANDWIDTH_PER_S - 1.0, 0.0
+        return min(0.25 / lag_s, bandwidth_per_s), 0.0, 0.0
+    return lag_s * bandwidth_per_s**2, 2.0 * lag_s * bandwidth_per_s - 1.0, 0.0
 
 
 def rate_of(error_m: Vec3, velocity_m_s: Vec3) -> float:

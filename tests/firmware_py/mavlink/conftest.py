@@ -1,9 +1,11 @@
 from dataclasses import dataclass, field
 from math import nan
+from types import SimpleNamespace
 
 import pytest
 
 from firmware_py.airframe import Airframe, load_airframe
+from firmware_py.estimation.report import EstimatorReport
 from firmware_py.geodesy import LocalProjection, is_on_earth
 from firmware_py.mavlink.node import MavlinkNode, NodeOptions
 from firmware_py.mavlink.telemetry.streams import GROUND, ONBOARD
@@ -38,6 +40,12 @@ class FakeAutopilot:
     setpoints: list = field(default_factory=list)
     texts: list[StatusText] = field(default_factory=list)
     ground_station_heard_count: int = 0
+    report: EstimatorReport = field(default_factory=EstimatorReport)
+    poses: list = field(default_factory=list)
+
+    @property
+    def estimator(self):
+        return SimpleNamespace(report=lambda: self.report, take_external_pose=self.poses.append)
 
     def _called(self, *call):
         self.calls.append(call)

@@ -14,7 +14,9 @@ from firmware_py.parameters import Parameters
 from firmware_py.status import CommandResult
 from firmware_py.types import GeodeticPoint, StatusText
 from firmware_py.ulog import UlogRecorder
+from scenarios.loader import load_scenario
 from scenarios.models import Scenario
+from sitl.simulation import Simulation
 from sitl.storage import MemoryStorage, StorageLimits
 from sitl.world import World
 
@@ -262,3 +264,29 @@ def test_nothing_is_written_when_logging_is_off():
 def test_nothing_is_written_on_the_ground():
     flight = Flight().run(1.0)
     assert flight.storage.entries(()) == []
+
+
+def test_with_sensors_the_samples_and_the_estimators_condition_are_logged():
+    scenario = load_scenario("open-field").model_copy(update={"sensors": "outdoor"})
+    simulation = Simulation(scenario, seed=4)
+    storage = MemoryStorage(now=lambda: 0)
+    recorder = UlogRecorder(storage, lambda time_us: PATH, boot_unix_us=BOOT_US)
+    while simulation.time_us < 13_000_000:
+        simulation.tick()
+        recorder.update(simulation.autopilot)
+        if simulation.time_us == 8_000_000:
+            simulation.autopilot.takeoff()
+            simulation.autopilot.arm()
+    recorder.finish(simulation.autopilot)
+    log = ULog(BytesIO(storage.read(PATH, 0, 1 << 30)))
+    status = log.get_dataset("estimator_status").data
+    assert set(status["control_mode_flags"][-2:] & 0x17) == {0x17}  # aligned, GPS, compass
+    assert 0.5 < status["pos_horiz_accuracy"][-1] < 3.0
+    assert status["pos_test_ratio"].max() > 0.0
+    fix = log.get_dataset("vehicle_gps_position").data
+    assert (fix["timestamp_sample"] < fix["timestamp"]).all()  # it arrives late
+    assert 0.5 < fix["eph"][-1] < 2.0
+    place = log.get_dataset("vehicle_local_position").data
+    assert place["eph"][-1] == pytest.approx(status["pos_horiz_accuracy"][-1], rel=0.1)
+    assert place["xy_valid"].all()
+    assert np.std(log.get_dataset("sensor_combined").data["accelerometer_m_s2[0]"]) > 0.1  # vibration

@@ -275,3 +275,63 @@ def test_offboard_must_be_among_the_modes_if_they_are_listed():
     assert missing(record) == {"offboard"}
     record.modes[6 << 16] = "Offboard"
     assert missing(record) == set()
+
+
+GYRO_ACCEL_BARO, GPS_BIT, VISION_BIT = 0x1 | 0x2 | 0x8, 0x20, 0x80
+
+
+def sensors(present, enabled, health):
+    return mavlink.MAVLink_sys_status_message(
+        present, enabled, health | 0x10000000, 0, 16200, -1, 80, 0, 0, 0, 0, 0, 0
+    )
+
+
+def test_which_sensors_the_estimator_relies_on():
+    record, everything = healthy(), GYRO_ACCEL_BARO | GPS_BIT | VISION_BIT
+    put(record, sensors(everything, everything & ~GPS_BIT, everything))
+    finding = finding_of(record, "sensors")
+    assert finding.level is Level.GOOD
+    assert finding.text == (
+        "the estimator relies on gyroscope, accelerometer, barometer, vision position; not on GPS"
+    )
+    put(record, sensors(everything, everything, everything & ~0x8))
+    finding = finding_of(record, "sensors")
+    assert finding.level is Level.NOTE
+    assert finding.text.endswith("; barometer fails")
+
+
+def test_a_drone_that_relies_on_external_poses_has_its_position_by_vision():
+    record = healthy(EKF2_EV_CTRL=0.0)
+    put(
+        record,
+        sensors(GYRO_ACCEL_BARO | VISION_BIT, GYRO_ACCEL_BARO | VISION_BIT, GYRO_ACCEL_BARO | VISION_BIT),
+    )
+    assert finding_of(record, "position").text.startswith("by vision")
+
+
+@pytest.mark.parametrize(
+    ("ratios", "level", "words"),
+    [
+        ((0.1, 0.2, 0.3, 0.0, 0.0), Level.GOOD, "largest ratio 0.30"),
+        ((0.1, 0.7, 0.3, 0.0, 0.0), Level.NOTE, "position 0.70"),
+        ((0.1, 0.7, 0.3, 1.4, 0.0), Level.MISSING, "position 0.70, heading 1.40"),
+        ((float("nan"), 0.2, 0.0, 0.0, 0.0), Level.GOOD, "largest ratio 0.20"),
+    ],
+)
+def test_how_well_measurements_agree(ratios, level, words):
+    record = healthy()
+    velocity, position, height, heading, above_ground = ratios
+    put(
+        record,
+        mavlink.MAVLink_estimator_status_message(
+            0, 431, velocity, position, height, heading, above_ground, 0, 0.01, 0.01
+        ),
+    )
+    assert finding_of(record, "innovations").level is level
+    assert words in finding_of(record, "innovations").text
+
+
+def test_an_estimator_that_is_not_aligned_is_named():
+    record = healthy()
+    put(record, estimator_status(flags=128))
+    assert "estimator" in missing(record)

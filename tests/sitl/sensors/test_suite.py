@@ -46,6 +46,7 @@ def test_the_installed_suites_have_their_sensors():
     assert sensors == {
         "ideal": set(),
         "mocap": common | {"external_pose"},
+        "external": common | {"external_pose"},
         "outdoor": common | {"magnetometer", "gps"},
         "flow": common | {"magnetometer", "optical_flow"},
     }
@@ -133,7 +134,9 @@ def test_a_bad_file_is_refused_in_one_line_that_names_the_field(tmp_path, monkey
 
 
 def test_an_unknown_name_is_refused_with_the_one_that_was_meant():
-    with pytest.raises(SuiteError, match=r'unknown suite "outdor"; did you mean outdoor\? Known: flow'):
+    with pytest.raises(
+        SuiteError, match=r'unknown suite "outdor"; did you mean outdoor\? Known: external, flow'
+    ):
         load_suite("outdor")
 
 

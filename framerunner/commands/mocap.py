@@ -1,0 +1,123 @@
+"""`framerunner mocap`: poses of a motion capture for any MAVLink vehicle."""
+
+from __future__ import annotations
+
+from contextlib import closing
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Annotated, Literal
+
+from cyclopts import Parameter
+
+from framerunner.commands import check_range
+
+if TYPE_CHECKING:
+    from framerunner.mocap.session import SendSettings
+
+
+@Parameter(name="*")
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Sending:
+    """How poses are sent."""
+
+    rate: Annotated[float, Parameter(help="poses a second that are sent at most")] = 50.0
+    delay: Annotated[float, Parameter(help="milliseconds by which poses are older than they seem here")] = 0.0
+    position_sigma: Annotated[float, Parameter(help="standard deviation of positions, m")] = 0.005
+    attitude_sigma: Annotated[float, Parameter(help="standard deviation of attitudes, rad")] = 0.01
+    velocity_sigma: Annotated[
+        float, Parameter(help="standard deviation of velocities, m/s, if the source has them")
+    ] = 0.05
+
+
+def mocap(
+    source: Annotated[
+        str,
+        Parameter(
+            help="where poses come from: udpin://HOST:PORT, optitrack://HOST, vicon://HOST, qualisys://HOST, "
+            "vrpn://HOST, a .csv or .jsonl file, or sitl"
+        ),
+    ],
+    *,
+    drone: Annotated[str, Parameter(help="MAVLink URL of the drone")] = "udpin://0.0.0.0:14540",
+    frame: Annotated[
+        Literal["flu", "ned", "enu", "yup"],
+        Parameter(help="axes of room and body, for poses that do not name theirs"),
+    ] = "flu",
+    forward: Annotated[
+        float,
+        Parameter(help="degrees from the tracked body's x axis to the drone's forward, counter-clockwise"),
+    ] = 0.0,
+    body: Annotated[
+        str | None, Parameter(help="name of the tracked body; by default the first that comes")
+    ] = None,
+    sending: Sending | None = None,
+    seconds: Annotated[float | None, Parameter(help="stop after this time; without it at Ctrl-C")] = None,
+) -> int:
+    """Send a motion capture's poses to a drone as MAVLink ODOMETRY, and check that it uses them.
+
+    While it runs, one line says each second how many poses are sent, whether the drone's estimator uses them,
+    how far they are from the drone's own estimate, and, once the drone has been turned, whether the axes are
+    right and how old the poses are. At the end a report says what is missing and what to do. Nothing is set
+    in the drone except the rates of this link's messages. When the source stops, nothing is sent: an old pose
+    is never repeated.
+
+    `sitl` is the true pose that a simulated drone sends on the same link (HIL_STATE_QUATERNION): `framerunner
+    sim --sensors external`, or PX4's SIH on its display link.
+
+    Exit code 0: the drone uses the poses and nothing is wrong, 1: something is missing, 2: bad input.
+
+    **Examples**
+
+        framerunner mocap udpin://0.0.0.0:9870 --drone serial:///dev/ttyUSB0:921600
+
+        framerunner mocap optitrack://192.168.1.5 --frame yup --body drone
+
+        framerunner mocap poses.csv --drone udpin://0.0.0.0:14550
+
+        framerunner mocap sitl --drone udpin://127.0.0.1:19410
+    """
+    check_range("--forward", forward, -360.0, 360.0)
+    check_range("--seconds", seconds, 1.0, 1e6)
+    return _send(source, drone, (frame, body), _settings(sending or Sending(), forward), seconds)
+
+
+def _settings(sending: Sending, forward: float) -> SendSettings:
+    check_range("--rate", sending.rate, 1.0, 250.0)
+    check_range("--delay", sending.delay, 0.0, 500.0)
+    check_range("--position-sigma", sending.position_sigma, 0.0, 10.0)
+    check_range("--attitude-sigma", sending.attitude_sigma, 0.0, 3.0)
+    check_range("--velocity-sigma", sending.velocity_sigma, 0.0, 10.0)
+
+    from framerunner.mocap.session import SendSettings
+
+    return SendSettings(
+        rate_hz=sending.rate,
+        forward_deg=forward,
+        delay_s=sending.delay / 1000.0,
+        position_sigma_m=sending.position_sigma,
+        attitude_sigma_rad=sending.attitude_sigma,
+        velocity_sigma_m_s=sending.velocity_sigma,
+    )
+
+
+def _send(
+    source: str,
+    drone: str,
+    frame_and_body: tuple[str, str | None],
+    settings: SendSettings,
+    seconds: float | None,
+) -> int:
+    from rich.console import Console
+
+    from framerunner.mocap.poses import Axes
+    from framerunner.mocap.run import run_session
+    from framerunner.mocap.session import COMPONENT_ID, SYSTEM_ID
+    from framerunner.mocap.sources import open_source
+    from wire.transports.vehicle_link import VehicleLink
+
+    frame, body = frame_and_body
+    with (
+        closing(open_source(source, Axes(frame), body)) as poses,
+        closing(VehicleLink(drone, system_id=SYSTEM_ID, component_id=COMPONENT_ID)) as link,
+    ):
+        fine = run_session(link, poses, settings, seconds, Console(highlight=False))
+    return 0 if fine else 1

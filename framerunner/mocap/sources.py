@@ -1,0 +1,292 @@
+"""Where poses come from: a file, a UDP stream, a motion capture server, or the truth of a simulator."""
+
+from __future__ import annotations
+
+import socket
+import sys
+from collections import deque
+from dataclasses import dataclass
+from math import cos, isnan, radians
+from pathlib import Path
+from random import Random
+from subprocess import DEVNULL, PIPE, Popen, TimeoutExpired
+from typing import Protocol
+
+from framerunner.extras import install_advice, is_installed
+from framerunner.mocap.capture import KINDS
+from framerunner.mocap.poses import Axes, Pose, PoseError, parse_line, read_poses
+from geometry.rotations import multiply, normalized
+from wire.dialect import Message, mavlink
+from wire.transports.sockets import UdpSocket, bind_udp
+from wire.transports.urls import UrlRules, parse_url
+
+_METRES = 111_319.5e-7  # a unit of latitude, 1e-7 degrees
+_OFFSET_SPAN_S = 10.0
+_JUMP_S = 1.0
+_END_S = 2.0
+_STREAM = UrlRules("bad source '{}'", "udpin://0.0.0.0:9870, poses.csv, sitl, optitrack://192.168.1.5")
+
+
+@dataclass(frozen=True, slots=True)
+class TimedPose:
+    """A pose and when it was taken, in seconds of this program's clock."""
+
+    pose: Pose
+    taken_s: float
+    vehicle_time_us: int | None = None  # if the source gives it in vehicle time
+
+
+class PoseSource(Protocol):
+    """Delivers poses as they come.
+
+    Attributes:
+        label: what it is, for people.
+        ended: it will deliver nothing more.
+        fault: what was wrong with data that it received last; empty: nothing was.
+        faults: how often that happened.
+        needs_truth: it is made from the vehicle's HIL_STATE_QUATERNION.
+    """
+
+    label: str
+    ended: bool
+    fault: str
+    faults: int
+    needs_truth: bool
+
+    def poll(self, now_s: float) -> list[TimedPose]:
+        """The poses that have come since the last call, oldest first."""
+
+    def take(self, message: Message, now_s: float) -> None:
+        """Take a message of the vehicle, of which a source may be made."""
+
+    def close(self) -> None:
+        """Close it."""
+
+
+class SourceClock:
+    """Converts a source's time stamps into this program's time.
+
+    The smallest difference between arrival and time stamp within ten seconds stands for a way without queues,
+    whose length cannot be measured from here: a pose counts as taken when it would have arrived by it. What
+    remains is the constant delay of the motion capture.
+    """
+
+    def __init__(self) -> None:
+        self._least: deque[tuple[float, float]] = deque()  # arrival and difference, differences rising
+
+    def taken_s(self, stamp_s: float, now_s: float) -> float:
+        """When a pose was taken; without a time stamp (NaN) it is when it arrives."""
+        if isnan(stamp_s):
+            return now_s
+        difference_s = now_s - stamp_s
+        if self._least and abs(difference_s - self._least[0][1]) > _JUMP_S:
+            self._least.clear()  # the source has been started again
+        while self._least and self._least[-1][1] >= difference_s:
+            self._least.pop()
+        self._least.append((now_s, difference_s))
+        while self._least[0][0] < now_s - _OFFSET_SPAN_S:
+            self._least.popleft()
+        return stamp_s + self._least[0][1]
+
+
+class FileSource:
+    """Plays a file of poses in real time, once.
+
+    Raises:
+        PoseError: the file cannot be used.
+    """
+
+    def __init__(self, path: Path, axes: Axes, name: str | None) -> None:
+        self.label = str(path)
+        self.ended, self.fault, self.faults, self.needs_truth = False, "", 0, False
+        self._poses = deque(read_poses(path, axes, name))
+        self._began_s: float | None = None
+        self._first_s = self._poses[0].time_s
+
+    def poll(self, now_s: float) -> list[TimedPose]:
+        """Those whose time has come."""
+        if self._began_s is None:
+            self._began_s = now_s
+        due = []
+        while self._poses:
+            taken_s = self._began_s + self._poses[0].time_s - self._first_s
+            if taken_s > now_s:
+                break
+            due.append(TimedPose(self._poses.popleft(), taken_s))
+        self.ended = not self._poses
+        return due
+
+    def take(self, message: Message, now_s: float) -> None:
+        """Not needed."""
+
+    def close(self) -> None:
+        """Nothing is open."""
+
+
+class UdpSource:
+    """Lines of JSON in UDP datagrams.
+
+    Args:
+        receiver: the socket on which they come.
+        label: of the source, for people.
+        axes: of records that name none.
+        name: of the tracked body; None: the first that comes.
+    """
+
+    def __init__(self, receiver: UdpSocket, label: str, axes: Axes, name: str | None) -> None:
+        self._socket, self._axes, self._name = receiver, axes, name
+        self._any_name = name is None
+        self._clock = SourceClock()
+        self.label = label
+        self.ended, self.fault, self.faults, self.needs_truth = False, "", 0, False
+
+    def poll(self, now_s: float) -> list[TimedPose]:
+        """Those that have arrived; a line that is no pose is counted."""
+        found = []
+        while data := self._socket.read():
+            for line in data.splitlines():
+                if not line.strip():
+                    continue
+                try:
+                    record = parse_line(line)
+                    if self._is_wanted(record.name):
+                        pose = record.pose(self._axes)
+                        found.append(TimedPose(pose, self._clock.taken_s(pose.time_s, now_s)))
+                except PoseError as error:
+                    self.fault, self.faults = str(error), self.faults + 1
+        return found
+
+    def _is_wanted(self, name: str | None) -> bool:
+        if self._any_name and self._name is None:
+            self._name = name
+        if self._any_name and name != self._name:
+            raise PoseError(f"name: {name} is tracked as well as {self._name}; choose one with --body")
+        return self._any_name or name == self._name
+
+    def take(self, message: Message, now_s: float) -> None:
+        """Not needed."""
+
+    def close(self) -> None:
+        """Close the socket."""
+        self._socket.close()
+
+
+class ServerSource(UdpSource):
+    """A motion capture server, through the program `framerunner.mocap.capture`.
+
+    Args:
+        kind: one of `KINDS`.
+        host: of the server.
+        axes: of room and body.
+        name: of the tracked body; None: the first that comes.
+
+    Raises:
+        PoseError: the library is not installed.
+    """
+
+    def __init__(self, kind: str, host: str, axes: Axes, name: str | None) -> None:
+        if not is_installed("motioncapture"):
+            raise PoseError(f"{kind}://{host}: {install_advice('motioncapture')}")
+        opened = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
+        opened.bind(("127.0.0.1", 0))
+        port = opened.getsockname()[1]
+        super().__init__(UdpSocket(opened), f"{kind}://{host}", axes, name)
+        self._program = Popen(
+            [sys.executable, "-m", "framerunner.mocap.capture", kind, host, str(port)],
+            stdin=PIPE,
+            stdout=DEVNULL,
+            stderr=PIPE,
+            text=True,
+        )
+
+    def poll(self, now_s: float) -> list[TimedPose]:
+        """Those that have arrived.
+
+        Raises:
+            PoseError: the program has ended; the message is its last line.
+        """
+        if self._program.poll() is not None:
+            lines = (self._program.stderr.read() if self._program.stderr else "").strip().splitlines()
+            raise PoseError(lines[-1] if lines else f"{self.label}: its client has ended")
+        return super().poll(now_s)
+
+    def close(self) -> None:
+        """End the program."""
+        if self._program.stdin is not None:
+            self._program.stdin.close()
+        try:
+            self._program.wait(_END_S)
+        except TimeoutExpired:
+            self._program.kill()
+            self._program.wait()
+        super().close()
+
+
+class SitlSource:
+    """The true state that a simulated vehicle sends on its link as HIL_STATE_QUATERNION.
+
+    Its origin is where the vehicle is first heard. White noise is added, as a motion capture has it: the
+    message has latitudes in steps of 1 cm, and an estimator takes a pose that never changes for a fault.
+
+    Args:
+        position_noise_m: standard deviation of each axis.
+        attitude_noise_rad: standard deviation about each axis.
+    """
+
+    def __init__(self, position_noise_m: float = 0.002, attitude_noise_rad: float = 0.003) -> None:
+        self._noise = (position_noise_m, attitude_noise_rad)
+        self._random = Random(1)
+        self.label = "the simulator's truth"
+        self.ended, self.fault, self.faults, self.needs_truth = False, "", 0, True
+        self._origin: tuple[int, int, int] | None = None
+        self._taken: list[TimedPose] = []
+
+    def take(self, message: Message, now_s: float) -> None:
+        """Take HIL_STATE_QUATERNION."""
+        if message.get_msgId() != mavlink.MAVLINK_MSG_ID_HIL_STATE_QUATERNION:
+            return
+        if self._origin is None:
+            self._origin = (message.lat, message.lon, message.alt)
+        latitude, longitude, altitude = self._origin
+        position = (
+            (message.lat - latitude) * _METRES,
+            (message.lon - longitude) * _METRES * cos(radians(latitude * 1e-7)),
+            (altitude - message.alt) / 1000.0,
+        )
+        sigma_m, sigma_rad = self._noise
+        north_m, east_m, down_m = (value + self._random.gauss(0.0, sigma_m) for value in position)
+        half = [self._random.gauss(0.0, sigma_rad / 2.0) for _ in range(3)]
+        velocity = (message.vx / 100.0, message.vy / 100.0, message.vz / 100.0)
+        w, x, y, z = message.attitude_quaternion
+        attitude = normalized(multiply((w, x, y, z), (1.0, half[0], half[1], half[2])))
+        pose = Pose(message.time_usec / 1e6, (north_m, east_m, down_m), attitude, velocity)
+        # PX4 leaves the time out.
+        self._taken.append(TimedPose(pose, now_s, message.time_usec or None))
+
+    def poll(self, now_s: float) -> list[TimedPose]:
+        """Those that have come."""
+        taken, self._taken = self._taken, []
+        return taken
+
+    def close(self) -> None:
+        """Nothing is open."""
+
+
+def open_source(text: str, axes: Axes, name: str | None) -> PoseSource:
+    """A source by its name: `sitl`, a udpin:// address, a server of `KINDS`, or a file.
+
+    Raises:
+        PoseError: a file cannot be used.
+        LinkError: an address cannot be used.
+    """
+    if text == "sitl":
+        return SitlSource()
+    scheme, separator, address = text.partition("://")
+    if not separator:
+        return FileSource(Path(text), axes, name)
+    if scheme in KINDS and address:
+        return ServerSource(scheme, address, axes, name)
+    parsed = parse_url(text, _STREAM)
+    if parsed.scheme != "udpin":
+        raise PoseError(f"{text}: a stream of poses comes by UDP, such as udpin://0.0.0.0:{parsed.number}")
+    return UdpSource(bind_udp(parsed.place, "choose another port"), parsed.text, axes, name)
