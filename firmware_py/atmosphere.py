@@ -27,3 +27,9 @@ def pressure_altitude_m(static_pressure_pa: float) -> float:
     """Altitude above mean sea level with this static pressure, which must be above zero."""
     share = static_pressure_pa / (100.0 * _SEA_LEVEL_HPA)
     return float(_SEA_LEVEL_K / _LAPSE_K_M * (1.0 - share ** (1.0 / _EXPONENT)))
+
+
+def metres_per_pascal(static_pressure_pa: float) -> float:
+    """How much higher it is where the pressure is lower by a pascal: 1 / (density times gravity)."""
+    altitude_m = pressure_altitude_m(static_pressure_pa)
+    return temperature_k(altitude_m) / (_LAPSE_K_M * _EXPONENT * static_pressure_pa)

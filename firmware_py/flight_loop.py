@@ -16,6 +16,7 @@ from firmware_py.commander_table import Event, Row, State
 from firmware_py.commands import ControlCommand
 from firmware_py.estimation.ideal_estimator import IdealEstimator
 from firmware_py.estimation.interface import StateEstimator
+from firmware_py.estimation.wind import WindEstimator
 from firmware_py.geodesy import GeoReference
 from firmware_py.ground_contact import LandDetector, LiftOff
 from firmware_py.guidance.modes import Guidance
@@ -86,6 +87,7 @@ class FlightLoop:
         parameters: a change takes effect at the next tick.
         estimator: of the vehicle's state.
         state: the estimate of the vehicle, updated in place.
+        wind: estimates the wind; None with ideal sensors.
         status: arming, mode, home and others, updated in place.
         output: of the last step.
         battery: its state, updated in place.
@@ -110,6 +112,7 @@ class FlightLoop:
         self.estimator: StateEstimator = IdealEstimator(origin) if estimator is None else estimator
         self.state = self.estimator.state
         self._senses = not self.estimator.report().ideal
+        self.wind = WindEstimator(airframe, control_period_s) if self._senses else None
         self.status = VehicleStatus()
         self.output = MotorOutput((0.0,) * len(airframe.rotors))
         self.flight = FlightRecord()
@@ -161,6 +164,8 @@ class FlightLoop:
             self._configure()
         usable = self.estimator.update(sensors)
         seen = self._observe(sensors, usable and self._output_finite)
+        if self.wind is not None and usable:
+            self.wind.step(self.state, flying=not seen.landed)
         commander = self._commander
         row = commander.tick(seen)
         if row is not None:

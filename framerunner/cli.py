@@ -52,7 +52,7 @@ def build_app() -> App:
     )
     app.command(sim.sim)
     app.command(fly.fly)
-    app.command(camera.camera)
+    app.command(camera.app)
     app.command(mocap.mocap)
     app.command(doctor.doctor)
     app.command(evaluate.evaluate)

@@ -3,18 +3,20 @@
 from __future__ import annotations
 
 import itertools
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from math import atan2, cos, hypot, sin, sqrt
+from math import atan2, cos, hypot, sin, sqrt, tan
 from typing import Annotated, Any, Literal, Self
 
 from pydantic import Field, SerializerFunctionWrapHandler, model_serializer, model_validator
 
 from errors import UserError
 from geometry.solids import Solid
-from geometry.vectors import Quaternion, Vec3
+from geometry.vectors import ZERO3, Quaternion, Vec3
 from scenarios.air import Wind
 from scenarios.faults.declaration import Fault
+from scenarios.imaging.clutter import Hall, Patch
+from scenarios.imaging.effects import CameraEffects
 from scenarios.part import Part, refusal
 
 Colour = Literal["red", "green", "blue"]
@@ -24,7 +26,7 @@ MissionClass = Literal["contest", "open"]
 DecoyColour = Literal["cyan", "magenta"]
 DECOY_COLOURS: tuple[DecoyColour, ...] = ("cyan", "magenta")
 
-_OFTEN_UNUSED = ("decoys", "poles", "walls", "sensors", "wind", "faults")
+_OFTEN_UNUSED = ("decoys", "poles", "walls", "sensors", "wind", "faults", "hall", "patches")
 _SHORTEST_M = 0.001  # of a part of a wall; a doorway may end where the wall does
 START_CLEAR_M = 0.3  # from the start's centre to a pole or wall: more than half of any airframe
 
@@ -208,12 +210,29 @@ class Camera(Part):
     position_flu_m: Vec3 = Field((0.08, 0.0, 0.0), description="in body axes forward, left, up")
     near_m: float = Field(0.01, gt=0, description="nothing nearer is drawn")
     far_m: float = Field(20.0, gt=0, description="nothing farther is drawn")
+    effects: CameraEffects | None = Field(
+        None, description="what a real camera does to images; by default they are ideal"
+    )
+
+    @property
+    def focal_px(self) -> float:
+        """Focal length, pixels."""
+        return self.width_px / 2 / tan(self.horizontal_fov_rad / 2)
 
     @model_validator(mode="after")
     def _sees_something(self) -> Self:
         if self.near_m >= self.far_m:
             raise refusal(self.near_m, f"must be below far_m {self.far_m}", "near_m")
+        lens = None if self.effects is None else self.effects.lens
+        half = (self.width_px / 2 / self.focal_px, self.height_px / 2 / self.focal_px)
+        if lens is not None and not lens.sees_up_to(*half):
+            message = "folds the image's corners; bring k1, k2 and k3 nearer to 0 or make the view narrower"
+            raise refusal(lens.k1, message, "effects", "lens", "k1")
         return self
+
+    @model_serializer(mode="wrap")
+    def _without_unused_effects(self, write: SerializerFunctionWrapHandler) -> dict[str, Any]:
+        return _without_defaults(self, write(self), ("effects",))
 
 
 class Light(Part):
@@ -221,6 +240,15 @@ class Light(Part):
 
     sun_direction_arena: Vec3 = Field((-0.5, 0.1, -0.9), description="direction of its light; any length")
     ambient: float = Field(0.5, ge=0, le=1, description="brightness of surfaces in shadow")
+    turn_rad_s: float = Field(
+        0.0, ge=-1, le=1, description="how fast the direction turns about the upright axis, counter-clockwise"
+    )
+
+    def after(self, time_s: float) -> Light:
+        """The light at a time of the flight, without its turning."""
+        x, y, z = self.sun_direction_arena
+        c, s = cos(self.turn_rad_s * time_s), sin(self.turn_rad_s * time_s)
+        return Light(sun_direction_arena=(c * x - s * y, s * x + c * y, z), ambient=self.ambient)
 
     @model_validator(mode="after")
     def _sun_has_direction(self) -> Self:
@@ -229,6 +257,17 @@ class Light(Part):
                 "[0, 0, 0]", "has no direction; one number must differ from 0", "sun_direction_arena"
             )
         return self
+
+    @model_serializer(mode="wrap")
+    def _without_turn(self, write: SerializerFunctionWrapHandler) -> dict[str, Any]:
+        return _without_defaults(self, write(self), ("turn_rad_s",))
+
+
+def _without_defaults(part: Part, written: dict[str, Any], names: Sequence[str]) -> dict[str, Any]:
+    """What is written of a part, less those of the named fields that have their defaults."""
+    fields = type(part).model_fields
+    unused = [name for name in names if getattr(part, name) == fields[name].default]
+    return {field: value for field, value in written.items() if field not in unused}
 
 
 class Origin(Part):
@@ -255,6 +294,8 @@ class Scenario(Part):
     walls: tuple[Wall, ...] = Field((), description="obstacles that stand on the floor")
     camera: Camera = Field(Camera(), description="the drone's camera")
     light: Light = Field(Light(), description="sun and sky")
+    hall: Hall | None = Field(None, description="walls around the arena that are only seen")
+    patches: tuple[Patch, ...] = Field((), description="flat things on the floor and on the hall's walls")
     try_limit_s: float = Field(180.0, gt=0, le=36000, description="longest try, motors on to motors off")
     airframe: str = Field("abejorro", description="name of the drone to fly")
     origin: Origin = Field(Origin(), description="where on Earth the arena is")
@@ -289,6 +330,15 @@ class Scenario(Part):
         return self
 
     @model_validator(mode="after")
+    def _patches_have_walls(self) -> Self:
+        if self.hall is None:
+            for index, patch in enumerate(self.patches):
+                if patch.surface != "floor":
+                    message = "is a wall of the hall, and there is none; add hall: {} or put it on the floor"
+                    raise refusal(patch.surface, message, "patches", index, "surface")
+        return self
+
+    @model_validator(mode="after")
     def _start_and_base_are_free(self) -> Self:
         base_m = self.base.edge_m / 2 * sqrt(2.0)  # a circle around it: the message can say how far is enough
         clear = (
@@ -309,10 +359,7 @@ class Scenario(Part):
     @model_serializer(mode="wrap")
     def _without_unused_parts(self, write: SerializerFunctionWrapHandler) -> dict[str, Any]:
         """Leave out what most scenarios do not use: evaluations compare scenarios by what is written."""
-        written: dict[str, Any] = write(self)
-        fields = type(self).model_fields
-        unused = [name for name in _OFTEN_UNUSED if getattr(self, name) == fields[name].default]
-        return {field: value for field, value in written.items() if field not in unused}
+        return _without_defaults(self, write(self), _OFTEN_UNUSED)
 
     @property
     def contents(self) -> str:
@@ -351,6 +398,7 @@ class TrueState:
     attitude_arena: Quaternion  # unit quaternion (w, x, y, z), body FLU to arena
     motors_on: bool
     contacts: tuple[str, ...] = ()  # what it touches: colours of frames, "pole", "wall", "base" or "floor"
+    rate_frd_rad_s: Vec3 = ZERO3  # angular velocity, body axes forward, right, down; 0 if not known
 
 
 def is_over_base(base: Base, x_m: float, y_m: float) -> bool:

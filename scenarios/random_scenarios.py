@@ -14,7 +14,8 @@ from pydantic import Field, model_validator
 
 from scenarios.air import Wind
 from scenarios.faults.random import RandomFault
-from scenarios.models import COLOURS, Arena, Base, Frame, Scenario, Start
+from scenarios.imaging.random_imaging import RandomClutter, RandomEffects, RandomLight
+from scenarios.models import COLOURS, Arena, Base, Camera, Frame, Light, Scenario, Start
 from scenarios.part import Part
 from scenarios.random_air import RandomWind
 from scenarios.random_closeness import Closeness
@@ -68,6 +69,13 @@ class Level(Part):
     obstacles: Obstacles | None = Field(None, description="what else is in the arena")
     wind: RandomWind | None = Field(None, description="how the air moves; by default it is still")
     faults: RandomFault | None = Field(None, description="what fails; by default nothing")
+    camera: RandomEffects | None = Field(
+        None, description="what the camera does to images; by default they are ideal"
+    )
+    light: RandomLight | None = Field(None, description="where light comes from; by default the challenge's")
+    clutter: RandomClutter | None = Field(
+        None, description="a hall around the arena with things on walls and floor"
+    )
     airframe: str | None = Field(None, description="name of the drone to fly; by default the challenge's")
     sensors: str | None = Field(None, description="name of the drone's sensor suite, or a file of one")
 
@@ -117,6 +125,10 @@ def random_scenario(level: Level, seed: int) -> Scenario:
         frames=frames,
         wind=Wind() if level.wind is None else level.wind.draw(seed),
         faults=() if level.faults is None else (level.faults.draw(seed),),
+        camera=Camera(effects=None if level.camera is None else level.camera.draw(seed)),
+        light=Light() if level.light is None else level.light.draw(seed),
+        hall=None if level.clutter is None else level.clutter.hall,
+        patches=() if level.clutter is None else level.clutter.draw(seed),
         **{name: value for name in ("airframe", "sensors") if (value := getattr(level, name)) is not None},
     )
     return scenario if level.obstacles is None else add_obstacles(scenario, level.obstacles, seed)

@@ -82,6 +82,10 @@ class FileKind(Generic[Model]):
         entry = self._folder() / f"{text}.yaml"
         return self.parse(entry.read_bytes(), entry.name)
 
+    def load_path(self, path: Path) -> Model:
+        """Load a file that is not installed."""
+        return self.parse(self._read(path, []), _shorten(str(path)))
+
     def unknown(self, name: str, nearest: Sequence[str] = (), others: str = "") -> UserError:
         """Make the error for a name that `load` does not find.
 
@@ -125,7 +129,8 @@ class FileKind(Generic[Model]):
             with path.open("rb") as file:
                 return file.read(MAX_BYTES + 1)
         except FileNotFoundError:
-            raise error(f"{name}: no such file; give a path or one of: {', '.join(known)}") from None
+            others = f" or one of: {', '.join(known)}" if known else ""
+            raise error(f"{name}: no such file; give a path{others}") from None
         except (OSError, ValueError) as failure:
             reason = failure.strerror if isinstance(failure, OSError) else str(failure)
             raise error(f"{name}: cannot be read: {reason}") from None

@@ -30,6 +30,7 @@ SHIFT = 4  # OpenCV's argument: corners are given in sixteenths of a pixel
 SUBPIXELS = float(1 << SHIFT)
 _BITS = 2.0 ** np.arange(10)
 _CUT_BITS = 0b00111101  # beyond the near plane or the window
+_MOST_ROLLED = 2.0  # heights of the canvas: what is farther above or below it moves with this row
 _FARTHEST = 2.0**24  # sixteenths of a pixel, well within OpenCV's whole numbers of 32 bits
 
 
@@ -94,13 +95,23 @@ class Mesh:
         self._window = (-_FARTHEST, -8.0 * pinhole.height_px * SUBPIXELS, _FARTHEST, _FARTHEST)
         self._borders = _borders(pinhole, self._window)
 
-    def project(self, eye_arena_m: Vec3, rotation: RotationRows) -> Projection:
-        """Project all faces; the arguments are those of `Pinhole.matrix`."""
+    def project(self, eye_arena_m: Vec3, rotation: RotationRows, drift: Floats | None = None) -> Projection:
+        """Project all faces.
+
+        Args:
+            eye_arena_m: as for `Pinhole.matrix`.
+            rotation: as for `Pinhole.matrix`.
+            drift: with a rolling shutter, the change of that matrix while as many rows are read out as the
+                canvas has: every corner is where it is when its own row is read. Between corners, edges are
+                straight.
+        """
         matrix = self._borders @ self._pinhole.matrix(eye_arena_m, rotation)
         near_m = self._pinhole.near_m
         matrix[3, 3] -= near_m
         matrix[4, 3] += self._pinhole.far_m
         projected = matrix @ self._corners
+        if drift is not None:
+            projected = self._rolled(projected, self._borders @ drift @ self._corners)
         # Ten borders are ten bits of one number a corner.
         outside = (_BITS @ (projected[3:] < 0.0)).astype(np.uint16)
         hidden = np.bitwise_and.reduceat(outside, self._starts)
@@ -111,6 +122,20 @@ class Mesh:
         np.minimum(flat, _FARTHEST, out=flat)
         pixels = np.rint(flat, out=flat).T.astype(np.int32, order="C")
         return Projection(projected, pixels, seen.tobytes(), crossing.tolist(), near_m, self._window)
+
+    def _rolled(self, projected: Floats, drift: Floats) -> Floats:
+        """What is projected, each corner at the time at which its row is read out.
+
+        Its row depends on that time; two steps find it, as within a read-out little moves.
+        """
+        near_m, height_px = self._pinhole.near_m, self._pinhole.height_px
+        middle_px = self._pinhole.centre_px[1]
+        at = projected
+        for _ in range(2):
+            rows = at[1] / (np.maximum(at[2], near_m) * SUBPIXELS)
+            share = np.clip((rows - middle_px) / height_px, -_MOST_ROLLED, _MOST_ROLLED)
+            at = projected + share * drift
+        return at
 
 
 @dataclass(frozen=True, slots=True)

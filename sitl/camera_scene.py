@@ -1,7 +1,7 @@
 """The scenario as flat, shaded polygons, made once, and the order in which they are painted for any eye.
 
-Neither the light nor anything in the arena moves, so every face has one colour (Lambert's law with ambient
-light) and every shadow on the floor is a fixed polygon.
+Nothing in the arena moves, so in one light every face has one colour (Lambert's law with ambient light) and
+every shadow on the floor is a fixed polygon.
 
 The order is that of a tree of planes: what lies on the eye's side of a plane may hide what lies beyond it and
 never the reverse (Fuchs, Kedem, Naylor, "On visible surface generation by a priori tree structures", 1980).
@@ -79,15 +79,16 @@ class Scene:
     bodies: tuple[Body, ...]  # base, frames, decoys, poles and walls
 
 
-def build_scene(scenario: Scenario) -> Scene:
-    """Make the faces that the camera paints."""
-    light, arena, base = scenario.light, scenario.arena, scenario.base.solid
+def build_scene(scenario: Scenario, light: Light | None = None) -> Scene:
+    """Make the faces that the camera paints, in the scenario's light or another."""
+    arena, base = scenario.arena, scenario.base.solid
+    light = light or scenario.light
     frames, prisms = scenario.all_frames, scenario.prisms
     solids = [base, *(bar for frame in frames for bar in _overlapping_bars(frame))]
     shadows = [face for solid in solids for face in _shadow(solid, arena, light)]
     shadows += [face for prism in prisms for face in _long_shadow(prism, arena, light)]
     return Scene(
-        tatami=_on_floor(_rectangle(arena, 0.0, 1.0, 0.0, 1.0), _lit(TATAMI_BGR, _UP, light), "tatami"),
+        tatami=_on_floor(_rectangle(arena, 0.0, 1.0, 0.0, 1.0), lit(TATAMI_BGR, _UP, light), "tatami"),
         mats=_mats(arena, light),
         shadows=tuple(shadows),
         bodies=(
@@ -103,7 +104,7 @@ def _dim(colour: Bgr, share: float) -> Bgr:
     return (blue, green, red)
 
 
-def _lit(colour: Bgr, normal: Vec3, light: Light) -> Bgr:
+def lit(colour: Bgr, normal: Vec3, light: Light) -> Bgr:
     """The colour of a face: ambient light and the sun by Lambert's law, no darker than `_DARKEST`."""
     x, y, z = light.sun_direction_arena
     length = hypot(x, y, z)
@@ -126,7 +127,7 @@ def _rectangle(arena: Arena, x0: float, x1: float, y0: float, y1: float) -> list
 
 def _mats(arena: Arena, light: Light) -> tuple[Face, ...]:
     """Every second mat as on a chessboard; at most 20 by 20 mats, so that a huge arena stays cheap."""
-    colour = _lit(TATAMI_MAT_BGR, _UP, light)
+    colour = lit(TATAMI_MAT_BGR, _UP, light)
     rows = min(20, max(1, round(arena.length_x_m / _MAT_M)))
     columns = min(20, max(1, round(arena.width_y_m / _MAT_M)))
     return tuple(
@@ -144,7 +145,7 @@ def _face(box: Solid, local: Sequence[Vec3], normal: Vec3, colour: Bgr, light: L
     c, s = box.turn
     turned = (c * normal[0] - s * normal[1], s * normal[0] + c * normal[1], normal[2])
     return Face(
-        np.array([box.to_arena(point) for point in local]), turned, _lit(colour, turned, light), box.name
+        np.array([box.to_arena(point) for point in local]), turned, lit(colour, turned, light), box.name
     )
 
 
@@ -250,7 +251,7 @@ def _outline(points: Floats) -> npt.NDArray[np.float32]:
 
 def _in_shadow(outline: npt.NDArray[np.float32], light: Light, *, on_tatami: bool) -> Face:
     name, colour = ("tatami", TATAMI_BGR) if on_tatami else ("ground", GROUND_BGR)
-    return _on_floor(outline.tolist(), _dim(_lit(colour, _UP, light), _SHADOW), name)
+    return _on_floor(outline.tolist(), _dim(lit(colour, _UP, light), _SHADOW), name)
 
 
 @dataclass(frozen=True, slots=True)

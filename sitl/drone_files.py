@@ -12,7 +12,7 @@ from firmware_py.ulog import UlogRecorder
 from sitl.storage import MEBIBYTE, FolderStorage, MemoryStorage
 
 if TYPE_CHECKING:
-    from sitl.camera import Image
+    from sitl.optics.painter import Image
 
 
 def _utc(unix_us: int, form: str) -> str:

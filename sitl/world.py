@@ -130,6 +130,7 @@ class World:
             flip_quaternion(sensors.attitude),
             motors_on,
             contacts,
+            sensors.angular_rate_frd_rad_s,
         )
 
     def box(self, name: str) -> Solid:

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from math import ceil, floor, hypot, sqrt
 
 import numpy as np
 import numpy.typing as npt
 
+from vision.calibration.lens import Lens
 from vision.frame_model import BAR_M, FRAME_HEIGHT_M, FRAME_WIDTH_M, Floats, Point, Segment, Sides
 from vision.patch import BACKGROUND, OWN, Labels, Patch
 
@@ -74,7 +75,14 @@ def find_edges(patch: Patch, sides: Sides, half_px: Widths) -> BarEdges:
         patch: the region.
         sides: first estimates of the outer edges, pixels from the optical axis, from pixel centre to centre.
         half_px: what half the widths of the bars should be.
+
+    Returns:
+        The edges, for an ideal camera.
     """
+    lens = patch.lens
+    bows: list[float] = [0.0] * 4
+    if lens is not None:
+        sides, bows = _as_seen(sides, lens)
     corners = [_inner_corner(sides, half_px, k) for k in range(4)]
     plans = [
         _NOWHERE if side is None else _plan(side, half_px[k], corners[k], corners[(k + 1) % 4], patch.origin)
@@ -87,7 +95,10 @@ def find_edges(patch: Patch, sides: Sides, half_px: Widths) -> BarEdges:
     places = np.arange(max(int(count.max()), 1))
     used = places < count
     t = first + step * places
-    u = np.rint(u_first + slope * (t - first))
+    u = u_first + slope * (t - first)
+    if lens is not None:
+        u += _bow(t, sides, bows, patch.origin, steep)
+    u = np.rint(u)
     half = half_first + half_slope * (t - first)
 
     labels = patch.labels
@@ -105,10 +116,61 @@ def find_edges(patch: Patch, sides: Sides, half_px: Widths) -> BarEdges:
     column, row = patch.origin
     t -= np.where(is_steep, row, column)
     from_here = inward * (u - np.where(is_steep, column, row))
-    return BarEdges(
+    edges = BarEdges(
         steep, inward[:, 0], slope[:, 0], t, used,
         from_here + outer, from_here + inner, outer_ok & used, inner_ok & used, half,
     )  # fmt: skip
+    return edges if lens is None else _straightened(edges, lens)
+
+
+def _as_seen(sides: Sides, lens: Lens) -> tuple[Sides, list[float]]:
+    """The chords of sides in the image, and how far the middle of each is from its chord: columns or rows."""
+    chords: list[Segment | None] = []
+    bows = []
+    for side in sides:
+        if side is None:
+            chords.append(None)
+            bows.append(0.0)
+            continue
+        (x0, y0), (x1, y1) = side
+        start, end = lens.seen(x0, y0), lens.seen(x1, y1)
+        x, y = lens.seen(0.5 * (x0 + x1), 0.5 * (y0 + y1))
+        dx, dy = end[0] - start[0], end[1] - start[1]
+        # Where the chord is in the row (if it is steep) or column of the middle.
+        if abs(dy) > abs(dx):
+            bows.append(x - start[0] - dx * (y - start[1]) / dy)
+        else:
+            bows.append(y - start[1] - dy * (x - start[0]) / dx if dx else 0.0)
+        chords.append((start, end))
+    return (chords[0], chords[1], chords[2], chords[3]), bows
+
+
+def _bow(t: Floats, sides: Sides, bows: list[float], origin: Point, steep: tuple[bool, ...]) -> Floats:
+    """How far each place of a side is from its chord, by a parabola, shape (4, n)."""
+    spans = []
+    for side, is_steep in zip(sides, steep, strict=True):
+        ends = ((0.0, 0.0), (1.0, 1.0)) if side is None else side
+        start, end = ends[0][is_steep] + origin[is_steep], ends[1][is_steep] + origin[is_steep]
+        spans.append((start, end - start or 1.0))
+    begin, length = np.array(spans).T[..., None]
+    share = (t - begin) / length
+    bow: Floats = 4.0 * np.array(bows)[:, None] * share * (1.0 - share)
+    return bow
+
+
+def _straightened(edges: BarEdges, lens: Lens) -> BarEdges:
+    """The edges as an ideal camera would see them."""
+    steep, inward = np.array(edges.steep)[:, None], edges.inward[:, None]
+    both = np.stack([edges.outer, edges.inner, edges.outer + 2.0 * edges.half_px]) * inward
+    t = np.broadcast_to(edges.t, both.shape)
+    straight = lens.ideal(np.stack([np.where(steep, both, t), np.where(steep, t, both)], axis=-1))
+    along = np.where(steep, straight[..., 1], straight[..., 0])
+    across = np.where(steep, straight[..., 0], straight[..., 1])
+    # Both edges in one column (or row) again: where the outer one is, if it is seen.
+    t = np.where(edges.outer_ok, along[0], along[1])
+    across += edges.slope[:, None] * (t - along)
+    outer, inner, beside = across * inward
+    return replace(edges, t=t, outer=outer, inner=inner, half_px=0.5 * (beside - outer))
 
 
 @dataclass(frozen=True, slots=True)

@@ -10,11 +10,13 @@ import cv2
 import numpy as np
 import numpy.typing as npt
 
+from vision.calibration.lens import Lens, straight_box
 from vision.colour_regions import OBSTACLE, PRIMARIES, ColourMask, find_colours
 from vision.detector import measure
 from vision.frame_fit import FittedFrame, fit_frame
-from vision.outer_sides import outer_sides
-from vision.patch import cut_patch
+from vision.frame_model import Sides
+from vision.outer_sides import outer_sides, sides_by_opening
+from vision.patch import Patch, cut_patch
 from vision.types import (
     NOT_SEEN,
     Detection,
@@ -32,11 +34,16 @@ _Box = tuple[int, int, int, int]
 PAINTED_SPREAD_PX = 0.5
 """How much larger than true the simulator paints on each side: a border is on the nearest pixels."""
 
+SMOOTH_SPREAD_PX = 0.25
+"""The same with camera effects, which are painted at twice the resolution."""
+
 _OBSTACLE_STEP = 8
 _MIN_RUN_PX = 3
 _STEEP = 2  # rows a column: steeper edges are the sides of obstacles, which are upright
 _MIN_FRAGMENT_PX = 3
 _MAX_FRAGMENTS = 12
+_SHEET_PX, _SHEET_SHARE = 5.0, 0.9
+_OPENING_PX = 12  # a region smaller than this is not looked at for an opening
 
 
 class FrameFinder:
@@ -46,11 +53,14 @@ class FrameFinder:
         focal_px: focal length of the camera; its optical axis is in the middle of the image.
         spread_px: how much larger than true a region looks on each side: `PAINTED_SPREAD_PX` for images of
             the simulator, 0 for those of a real camera.
+        lens: of a camera that is not ideal; it has the same focal length. What is found is then in pixels of
+            an ideal camera.
     """
 
-    def __init__(self, focal_px: float, spread_px: float = 0.0) -> None:
+    def __init__(self, focal_px: float, spread_px: float = 0.0, lens: Lens | None = None) -> None:
         self._focal_px = focal_px
         self._spread_px = spread_px
+        self._lens = lens
 
     def find(self, image: Image, time_us: int | None = None) -> Detections:
         """Find all frames and obstacles.
@@ -65,7 +75,10 @@ class FrameFinder:
 
         Raises:
             ValueError: the image is not of that shape and type.
+            CalibrationError: it has another size than those with which the camera was calibrated.
         """
+        if self._lens is not None:
+            self._lens.check_size(image.shape[1], image.shape[0])
         masks = find_colours(image)
         if not masks:
             return Detections(time_us=time_us)
@@ -76,6 +89,8 @@ class FrameFinder:
             others = [other for other in masks if other is not mask]
             if mask.colour == OBSTACLE:
                 edges = _obstacle_edges(mask, others)
+                if self._lens is not None:
+                    edges = _straight_edges(edges, self._lens)
                 continue
             found, box = self._find_colour(mask, others)
             sightings += found
@@ -110,6 +125,8 @@ class FrameFinder:
             box[1] + 1, box[1] + box[3], box[0] + 1, box[0] + box[2],
             width_px=width, height_px=height, focal_px=self._focal_px,
         )  # fmt: skip
+        if self._lens is not None:
+            numbers = straight_box(numbers, self._lens)
         if largest.poses:
             numbers = replace(numbers, signed_a=_signed_angle(largest.poses[0]))
         return [sighting for _, sighting in found], numbers
@@ -120,20 +137,50 @@ class FrameFinder:
         """The frame that a group of fragments shows, if it is one."""
         height, width = mask.mask.shape
         box = _bounding_box(points)
-        candidates = outer_sides(points, width, height)
+        if _is_filled(mask, points, box):
+            return None
+        candidates = outer_sides(points, width, height, self._lens)
         if not candidates:
             return None
-        patch = cut_patch(mask, others, box)
-        fits = (fit_frame(patch, sides, self._focal_px, self._spread_px) for sides in candidates)
+        patch = cut_patch(mask, others, box, self._lens)
+        best = self._best_fit(patch, candidates)
+        if best is None and min(box[2:]) >= _OPENING_PX:
+            # Something of its colour behind it may spoil its outline, but not that of its opening.
+            best = self._best_fit(patch, sides_by_opening(mask.mask, box, self._lens))
+        return (
+            None if best is None else (box, FrameSighting(mask.colour, best.corners, best.whole, best.poses))
+        )
+
+    def _best_fit(self, patch: Patch, candidates: Sequence[Sides]) -> FittedFrame | None:
+        """The likeliest frame of several first estimates."""
         best: FittedFrame | None = None
-        for fitted in fits:
+        for sides in candidates:
+            fitted = fit_frame(patch, sides, self._focal_px, self._spread_px)
             if fitted is not None and (
                 best is None or (fitted.whole, -fitted.cost) > (best.whole, -best.cost)
             ):
                 best = fitted
-        return (
-            None if best is None else (box, FrameSighting(mask.colour, best.corners, best.whole, best.poses))
-        )
+        return best
+
+
+def _is_filled(mask: ColourMask, points: _Contour, box: _Box) -> bool:
+    """Whether a region wholly inside the image is a sheet, so large that a frame's opening would show."""
+    column, row, columns, rows = box
+    height, width = mask.mask.shape
+    if (
+        min(columns, rows) < _SHEET_PX
+        or column == 0
+        or row == 0
+        or column + columns == width
+        or row + rows == height
+    ):
+        return False
+    hull = cv2.convexHull(points)
+    area, around = cv2.contourArea(hull), cv2.arcLength(hull, True)
+    if area < _SHEET_PX * 0.5 * around:  # mean width of a long rectangle
+        return False
+    pixels = cv2.countNonZero(mask.mask[row : row + rows, column : column + columns])
+    return pixels > _SHEET_SHARE * (area + 0.5 * around + 1.0)  # Pick's theorem
 
 
 def _bounding_box(points: _Contour) -> _Box:
@@ -204,3 +251,12 @@ def _obstacle_edges(mask: ColourMask, others: Sequence[ColourMask]) -> tuple[Obs
         )
         edges.append(ObstacleEdge(x - (width - 1) / 2, last + 0.5 - (height - 1) / 2, cut))
     return tuple(edges)
+
+
+def _straight_edges(edges: Sequence[ObstacleEdge], lens: Lens) -> tuple[ObstacleEdge, ...]:
+    """Obstacle edges as an ideal camera would see them."""
+    places = lens.ideal(np.array([(edge.right_px, edge.down_px) for edge in edges]).reshape(-1, 2))
+    return tuple(
+        replace(edge, right_px=right, down_px=down)
+        for edge, (right, down) in zip(edges, places.tolist(), strict=True)
+    )

@@ -15,7 +15,18 @@ import numpy as np
 
 from vision.bar_edges import BarEdges, Widths, expected_widths, find_edges
 from vision.bar_lines import BarLine, BarLines, Meeting, fit_lines, meeting
-from vision.frame_model import AXES_CORNERS, OUTER_CORNERS, Floats, ModelPose, Point, Sides, bar_offsets
+from vision.calibration.lens import Lens
+from vision.frame_model import (
+    AXES_CORNERS,
+    FRAME_HEIGHT_M,
+    FRAME_WIDTH_M,
+    OUTER_CORNERS,
+    Floats,
+    ModelPose,
+    Point,
+    Sides,
+    bar_offsets,
+)
 from vision.frame_pose import as_seen, find_poses, poses_of_three
 from vision.patch import Patch
 from vision.types import FrameCorner, FramePose
@@ -34,6 +45,12 @@ _ROUGH = 2.5  # before the bars' edges are corrected by a pose, errors may be la
 _CLEAR_OPEN, _THIN_PX = 0.7, 3.0
 _CLEAR_PX = 4.5  # a side that is shorter may be a part of a longer one
 _TOO_NARROW = 1.2
+_OPEN_SIDE = 0.5  # share of a bar at which its inner edge is seen, too
+# Sides of frames, pixels: from here on some of an opening is seen, at two bars at least, and bars' widths.
+_OPENING_SEEN_PX, _OPENING_CLEAR_PX, _BARS_SEEN_PX = 4.0, 9.0, 6.0
+_TOO_THIN = (0.3, 0.2)  # half a bar's width may be smaller than expected by so much and this share of it
+_TOO_WIDE = (1.3, 0.1)  # or larger: frames that are seen past their edges and blurred ones look so
+_TURNING_RAD_S, _FLYING_M_S = 0.5, 0.5  # standard deviations of a camera's motion while a frame is read out
 _WIDTH_SHARE, _WIDTH_SHARE_STD = 0.75, 0.15  # of half a bar's image that is half of the bar's width
 
 
@@ -78,6 +95,8 @@ def _fit_any(patch: Patch, sides: Sides, focal_px: float, spread_px: float) -> F
     lines, meetings, poses = _fit(patch, sides, focal_px, spread_px)
     known = [(met.x, met.y) for met in meetings if met is not None]
     if len(known) == 4:
+        if poses and not _has_bars(lines, known, poses[0], focal_px, spread_px):
+            return None
         support = patch.support(known, known[1:] + known[:1])
         if max(support.empty) <= _MAX_EMPTY:
             if patch.is_filled(known):
@@ -95,6 +114,36 @@ def _fit_any(patch: Patch, sides: Sides, focal_px: float, spread_px: float) -> F
             return None  # nothing explains why no more is seen of it
         corners = _corners_without_pose(patch, lines, spread_px)
     return _fitted(corners, False, poses, meetings) if any(corners) else None
+
+
+def _has_bars(
+    lines: BarLines, axes_corners: Sequence[Point], pose: ModelPose, focal_px: float, spread_px: float
+) -> bool:
+    """Whether there is an opening where it is large enough to be seen, and the bars are as wide as a frame's.
+
+    Posters and drawn rectangles are not. The limits let through all frames of some thousand images, rendered
+    with and without noise and blur.
+    """
+    known = [line for line in lines if line is not None]
+    following = (*axes_corners[1:], axes_corners[0])
+    size_px = min(hypot(x1 - x0, y1 - y0) for (x0, y0), (x1, y1) in zip(axes_corners, following, strict=True))
+    clear = [k for k, line in enumerate(known) if line.open > _OPEN_SIDE]
+    if len(known) < 4 or size_px < _OPENING_SEEN_PX:
+        return True
+    if len(clear) < (1 if size_px < _OPENING_CLEAR_PX else 2):
+        return False
+    if size_px < _BARS_SEEN_PX:
+        return True
+    spans = np.array([(line.first, line.last) for line in known])
+    inward = np.array([line.inward for line in known])
+    offsets = bar_offsets(pose, tuple(line.steep for line in known), inward, spans, focal_px)
+    if offsets is None:
+        return True
+    half_px = 0.5 * (offsets[:, 1] - offsets[:, 0]).mean(axis=1)[clear] + spread_px
+    wider_px = float(np.mean([known[k].half_px for k in clear]) - half_px.mean())
+    expected_px = float(half_px.mean())
+    most_px, least_px = (limit + share * expected_px for limit, share in (_TOO_WIDE, _TOO_THIN))
+    return -least_px <= wider_px <= most_px
 
 
 def _fitted(corners: Corners, whole: bool, poses: list[ModelPose], meetings: _Meetings) -> FittedFrame:
@@ -159,7 +208,26 @@ def _lines_and_poses(
 ) -> tuple[BarLines, _Meetings, list[ModelPose]]:
     lines = [line if _is_sure(line) else None for line in fit_lines(edges, focal_px, offsets)]
     meetings = [meeting(lines[k - 1], lines[k]) for k in range(4)]
+    if patch.lens is not None and patch.lens.readout_s > 0.0:
+        meetings = _sheared(meetings, patch.lens)
     return lines, meetings, _poses(patch, lines, meetings, guesses, focal_px)
+
+
+def _sheared(meetings: _Meetings, lens: Lens) -> _Meetings:
+    """Where lines meet, with what a rolling shutter may shear from the first to the last row of a frame."""
+    known = [met for met in meetings if met is not None]
+    if len(known) < 2:
+        return meetings
+    rights, downs = [met.x for met in known], [met.y for met in known]
+    rows = max(downs) - min(downs)
+    width_px = max(max(rights) - min(rights), rows * FRAME_WIDTH_M / FRAME_HEIGHT_M)
+    # Turning moves all of it alike; flying moves what is near, and widens it.
+    nearer_px = _FLYING_M_S * width_px * width_px / (2.0 * FRAME_WIDTH_M * lens.focal_px)
+    px = lens.readout_s * rows / lens.size_px[1] * (_TURNING_RAD_S * lens.focal_px + nearer_px)
+    return [
+        None if met is None else met._replace(std_x=hypot(met.std_x, px), std_y=hypot(met.std_y, px))
+        for met in meetings
+    ]
 
 
 def _is_sure(line: BarLine | None) -> bool:

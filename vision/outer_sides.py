@@ -14,10 +14,13 @@ import cv2
 import numpy as np
 import numpy.typing as npt
 
-from vision.frame_model import Point, Segment, Sides
+from vision.calibration.lens import Lens
+from vision.frame_model import BAR_M, FRAME_HEIGHT_M, FRAME_WIDTH_M, Point, Segment, Sides
+from vision.patch import Box
 
 _MIN_COLUMNS, _MIN_ROWS = 2, 4  # between the centres of the outermost pixels
 _CLEAR = 0.3  # difference in steepness from which on it is clear which sides are upright
+_LARGE_HOLE = 0.03  # of the box around a region: smaller ones are no part of an opening
 _MAX_ADDED = 0.03  # of the area: less than this is rounding, more is a side
 
 
@@ -28,38 +31,93 @@ class _Edge:
     real: bool  # not along the image's border
 
 
-def outer_sides(points: npt.NDArray[np.int32], width_px: int, height_px: int) -> list[Sides]:
+def outer_sides(
+    points: npt.NDArray[np.int32], width_px: int, height_px: int, lens: Lens | None = None
+) -> list[Sides]:
     """Find the sides of the quadrilateral around a region.
 
     Args:
         points: pixels on its outline, shape (n, 1, 2), columns and rows of the image.
         width_px: of the image.
         height_px: of the image.
+        lens: of a camera that is not ideal.
 
     Returns:
         Top, right, bottom and left side, clockwise, pixels from the optical axis in the image's middle; None
         for a side that is not seen. Several answers, the likelier one first, if it is not clear which pair of
         sides is upright; none if there is no such quadrilateral.
     """
-    hull = cv2.convexHull(points)  # clockwise to the eye, as OpenCV's axes have y upwards
+    column, row = (width_px - 1) / 2, (height_px - 1) / 2
+    # Clockwise to the eye, as OpenCV's axes have y upwards.
+    if lens is None:
+        hull = seen = cv2.convexHull(points)
+    else:
+        middle = np.array([column, row])
+        straight = (lens.ideal(points - middle) + middle).astype(np.float32)
+        index = cv2.convexHull(straight, returnPoints=False)
+        hull, seen = (each[index.ravel()] for each in (straight, points))
     if len(hull) < 4:
         return []
-    (left, top), (right, bottom) = hull.min(axis=(0, 1)).tolist(), hull.max(axis=(0, 1)).tolist()
+    (left, top), (right, bottom) = seen.min(axis=(0, 1)).tolist(), seen.max(axis=(0, 1)).tolist()
     if right - left < _MIN_COLUMNS or bottom - top < _MIN_ROWS:
         return []
     cut = left <= 0 or top <= 0 or right >= width_px - 1 or bottom >= height_px - 1
     if cut:
-        edges = _reduced(_edges(hull.reshape(-1, 2).tolist(), width_px, height_px))
+        places, pixels = hull.reshape(-1, 2).tolist(), seen.reshape(-1, 2).tolist()
+        edges = _reduced(_edges(places, pixels, width_px, height_px))
         # Begin after a gap, so that neighbours in the list are neighbours.
         begin = next((i for i, edge in enumerate(edges) if edge.real and not edges[i - 1].real), 0)
         segments = [(edge.start, edge.end) for edge in edges[begin:] + edges[:begin] if edge.real]
     else:
         corners = cv2.approxPolyN(hull.astype(np.float32), 4).reshape(-1, 2).tolist()
         segments = [(tuple(corners[i - 1]), tuple(corners[i])) for i in range(len(corners))]
-    column, row = (width_px - 1) / 2, (height_px - 1) / 2
     moved = [((x0 - column, y0 - row), (x1 - column, y1 - row)) for (x0, y0), (x1, y1) in segments]
     answers = (_named(moved, upright) for upright in _upright(moved))
     return [sides for sides in answers if sides is not None]
+
+
+def sides_by_opening(mask: npt.NDArray[np.uint8], box: Box, lens: Lens | None = None) -> list[Sides]:
+    """First estimates of a frame's outer edges by its opening: the holes of a region together.
+
+    Args:
+        mask: pixels of its colour, of the whole image.
+        box: column, row, columns and rows around the region.
+        lens: of a camera that is not ideal.
+    """
+    column, row, columns, rows = box
+    crop = mask[row : row + rows, column : column + columns]
+    contours, hierarchy = cv2.findContours(
+        crop, cv2.RETR_CCOMP, cv2.CHAIN_APPROX_SIMPLE, offset=(column, row)
+    )
+    if hierarchy is None:
+        return []
+    holes = [hole for hole, links in zip(contours, hierarchy[0], strict=True) if links[3] >= 0]
+    large = [hole for hole in holes if cv2.contourArea(hole) > _LARGE_HOLE * columns * rows]
+    if not large:
+        return []
+    hole = np.concatenate(large).astype(np.int32)
+    height, width = mask.shape
+    return [
+        _around(sides)
+        for sides in outer_sides(hole, width, height, lens)
+        if all(side is not None for side in sides)
+    ]
+
+
+def _around(opening: Sides) -> Sides:
+    """The outer edges around an opening: its corners, moved by a bar's width along both its sides."""
+    corners = [side[0] for side in opening if side is not None]
+    across, down = (2.0 * BAR_M / (size_m - 2.0 * BAR_M) for size_m in (FRAME_WIDTH_M, FRAME_HEIGHT_M))
+    moved: list[Point] = []
+    for k, (x, y) in enumerate(corners):
+        # Corner k is where side k - 1 ends and side k begins; 0 and 2 of the sides are the long ones.
+        (bx, by), (nx, ny) = corners[k - 1], corners[(k + 1) % 4]
+        back, on = (down, across) if k % 2 == 0 else (across, down)
+        moved.append(
+            (x + 0.5 * (back * (x - bx) + on * (x - nx)), y + 0.5 * (back * (y - by) + on * (y - ny)))
+        )
+    a, b, c, d = moved
+    return ((a, b), (b, c), (c, d), (d, a))
 
 
 def _upright(segments: list[Segment]) -> list[list[bool]]:
@@ -98,13 +156,14 @@ def _steepness(segment: Segment) -> float:
     return abs(y1 - y0) / max(hypot(x1 - x0, y1 - y0), 1e-9)
 
 
-def _edges(hull: list[list[int]], width_px: int, height_px: int) -> list[_Edge]:
-    """The edges of a hull; those along one border of the image in one piece."""
+def _edges(places: list[list[float]], pixels: list[list[int]], width_px: int, height_px: int) -> list[_Edge]:
+    """The edges of a hull; those whose pixels are along one border of the image are not real."""
     edges: list[_Edge] = []
-    for i, (x1, y1) in enumerate(hull):
-        x0, y0 = hull[i - 1]
+    for i, (x1, y1) in enumerate(pixels):
+        x0, y0 = pixels[i - 1]
         border = (x0 == x1 and x0 in (0, width_px - 1)) or (y0 == y1 and y0 in (0, height_px - 1))
-        edges.append(_Edge((float(x0), float(y0)), (float(x1), float(y1)), not border))
+        (start_x, start_y), (end_x, end_y) = places[i - 1], places[i]
+        edges.append(_Edge((float(start_x), float(start_y)), (float(end_x), float(end_y)), not border))
     return edges
 
 

@@ -9,6 +9,7 @@ import cv2
 import numpy as np
 import numpy.typing as npt
 
+from vision.calibration.lens import Lens
 from vision.colour_regions import ColourMask
 from vision.frame_model import Point
 
@@ -32,11 +33,13 @@ class Patch:
         labels: its pixels.
         origin: column and row of it where the optical axis is; whole numbers are pixel centres.
         reach_px: from the optical axis to the right and to the lower edge of the whole image.
+        lens: of a camera that is not ideal: then `origin` and `reach_px` are from the image's middle.
     """
 
     labels: Labels
     origin: Point
     reach_px: Point
+    lens: Lens | None = None
 
     @property
     def has_foreign(self) -> bool:
@@ -62,8 +65,10 @@ class Patch:
             if max(abs(x - before_x), abs(y - before_y)) < _OPENING_PX:
                 return False
             before_x, before_y = x, y
-            column = round(middle_x + 0.4 * (x - middle_x) + self.origin[0])
-            row = round(middle_y + 0.4 * (y - middle_y) + self.origin[1])
+            inside_x, inside_y = middle_x + 0.4 * (x - middle_x), middle_y + 0.4 * (y - middle_y)
+            if self.lens is not None:
+                inside_x, inside_y = self.lens.seen(inside_x, inside_y)
+            column, row = round(inside_x + self.origin[0]), round(inside_y + self.origin[1])
             if not (0 <= column < columns and 0 <= row < rows and self.labels[row, column] == OWN):
                 return False
         return True
@@ -82,8 +87,9 @@ class Patch:
         owns, empties = [], []
         for (x0, y0), (x1, y1) in zip(starts, ends, strict=True):
             seen, empty = 0, 0
-            for place in _PLACES:  # so few that NumPy takes longer
-                x, y = x0 + (x1 - x0) * place, y0 + (y1 - y0) * place
+            # So few that NumPy takes longer.
+            along = [(x0 + (x1 - x0) * place, y0 + (y1 - y0) * place) for place in _PLACES]
+            for x, y in along if self.lens is None else self.lens.all_seen(np.array(along)).tolist():
                 i, j = round(x + column), round(y + row)
                 known = 0 <= i < columns and 0 <= j < rows
                 at = j * columns + i
@@ -104,7 +110,7 @@ class Support:
     empty: list[float]  # pixels of nothing that could hide it; the rest is hidden or outside the image
 
 
-def cut_patch(mask: ColourMask, others: Sequence[ColourMask], box: Box) -> Patch:
+def cut_patch(mask: ColourMask, others: Sequence[ColourMask], box: Box, lens: Lens | None = None) -> Patch:
     """Cut the part of an image around a box, for a region of one colour beside others."""
     height, width = mask.mask.shape
     column, row, columns, rows = box
@@ -119,4 +125,4 @@ def cut_patch(mask: ColourMask, others: Sequence[ColourMask], box: Box) -> Patch
         if left < x1 and top < y1 and left + wide > x0 and top + high > y0:
             inside |= other.mask[y0:y1, x0:x1] & FOREIGN
     origin = ((width - 1) / 2 - column + margin, (height - 1) / 2 - row + margin)
-    return Patch(labels, origin, (width / 2, height / 2))
+    return Patch(labels, origin, (width / 2, height / 2), lens)

@@ -22,6 +22,15 @@ _VELOCITY_SIGMA_M_S = 0.05
 _POSITION_SIGMA_M = 0.001  # it starts in the local frame's origin
 
 
+def is_still(imu: ImuSample) -> bool:
+    """Whether a sample may be one of a vehicle at rest: it hardly turns, and feels gravity only."""
+    p, q, r = imu.angular_rate_frd_rad_s
+    if max(abs(p), abs(q), abs(r)) > _MAX_RATE_RAD_S:
+        return False
+    x, y, z = imu.specific_force_frd_m_s2
+    return abs(sqrt(x * x + y * y + z * z) - GRAVITY_M_S2) <= _MAX_FORCE_DIFFERENCE_M_S2
+
+
 class Alignment:
     """Averages the IMU, and the heading from whatever measures it, until both are known.
 
@@ -41,12 +50,11 @@ class Alignment:
 
     def take(self, imu: ImuSample) -> bool:
         """Take a sample; return whether there are enough."""
-        p, q, r = imu.angular_rate_frd_rad_s
-        x, y, z = imu.specific_force_frd_m_s2
-        moves = max(abs(p), abs(q), abs(r)) > _MAX_RATE_RAD_S
-        if moves or abs(sqrt(x * x + y * y + z * z) - GRAVITY_M_S2) > _MAX_FORCE_DIFFERENCE_M_S2:
+        if not is_still(imu):
             self.forget()
             return False
+        p, q, r = imu.angular_rate_frd_rad_s
+        x, y, z = imu.specific_force_frd_m_s2
         self._count += 1
         self._rate = (self._rate[0] + p, self._rate[1] + q, self._rate[2] + r)
         self._force = (self._force[0] + x, self._force[1] + y, self._force[2] + z)

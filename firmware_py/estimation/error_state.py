@@ -77,7 +77,8 @@ class ErrorCovariance:
         ]
         self._gyro_scale, self._accel_scale = gyro_scale, accel_scale
         self._considered = slice(INERTIAL_STATES, INERTIAL_STATES + considered) if considered else None
-        self._f: Matrix = np.eye(size)
+        self._g: Matrix = np.zeros((GYRO_BIAS, size))  # F less the identity: only the first states change
+        self._rows: Matrix = np.zeros((GYRO_BIAS, size))
         self._work: Matrix = np.zeros((size, size))
         self._diagonal = np.arange(size)
         self._noise: Matrix = np.zeros(size)
@@ -115,34 +116,38 @@ class ErrorCovariance:
             gyro_bias_variance: by which the biases' variance grows, (rad/s)^2.
             accel_bias_variance: by which the biases' variance grows, (m/s^2)^2.
         """
-        f, p, noise = self._f, self.p, self._noise
+        g, p, noise = self._g, self.p, self._noise
         n, e, d = push_ned_m_s
         half_s = 0.5 * period_s
-        tilt = f[3:6, 0:3]  # -[push]x: a tilt turns the specific force
+        tilt = g[3:6, 0:3]  # -[push]x: a tilt turns the specific force
         tilt[0, 1], tilt[0, 2], tilt[1, 2] = d, -e, n
         tilt[1, 0], tilt[2, 0], tilt[2, 1] = -d, e, -n
-        np.multiply(tilt, half_s, out=f[6:9, 0:3])
-        f[6, 3] = f[7, 4] = f[8, 5] = period_s
+        np.multiply(tilt, half_s, out=g[6:9, 0:3])
+        g[6, 3] = g[7, 4] = g[8, 5] = period_s
         turn = np.array(m).reshape(3, 3)
         turn *= -period_s
-        f[0:3, 9:12] = turn
-        f[3:6, 12:15] = turn
-        np.multiply(turn, half_s, out=f[6:9, 12:15])
+        g[0:3, 9:12] = turn
+        g[3:6, 12:15] = turn
+        np.multiply(turn, half_s, out=g[6:9, 12:15])
         rate_hz = 1.0 / period_s
         if (at := self._gyro_scale) >= 0:
             p_turn, q_turn, r_turn = turn_frd_rad
-            f[0:3, at : at + 3] = turn * (p_turn * rate_hz, q_turn * rate_hz, r_turn * rate_hz)
+            g[0:3, at : at + 3] = turn * (p_turn * rate_hz, q_turn * rate_hz, r_turn * rate_hz)
         if (at := self._accel_scale) >= 0:
             x, y, z = push_frd_m_s
-            f[3:6, at : at + 3] = turn * (x * rate_hz, y * rate_hz, z * rate_hz)
+            g[3:6, at : at + 3] = turn * (x * rate_hz, y * rate_hz, z * rate_hz)
         noise[0:3] = turn_variance_rad2
         noise[3:6] = push_variance_m2_s2
         noise[9:12] = gyro_bias_variance
         noise[12:15] = accel_bias_variance
         for index, drift in self._drifting:
-            f[index, index], noise[index] = drift.over(period_s)
-        np.dot(f, p, out=self._work)
-        np.dot(self._work, f.T, out=p)
+            kept, noise[index] = drift.over(period_s)
+            if kept != 1.0:
+                p[index] *= kept
+                p[:, index] *= kept
+        np.dot(g, p, out=self._rows)
+        p[:GYRO_BIAS] += self._rows
+        p[:, :GYRO_BIAS] += np.dot(p, g.T)
         p[self._diagonal, self._diagonal] += noise
 
     def related(self, row: Matrix) -> tuple[Matrix, float]:

@@ -12,7 +12,7 @@ from math import atan2, isfinite, sqrt
 
 from firmware_py.estimation.aiding.aid import NEVER_US
 from firmware_py.estimation.aiding.all import Aiding, Sample
-from firmware_py.estimation.alignment import Alignment
+from firmware_py.estimation.alignment import Alignment, is_still
 from firmware_py.estimation.error_state import ATTITUDE, POSITION, VELOCITY
 from firmware_py.estimation.output import OutputPredictor
 from firmware_py.estimation.report import IMU, NO_FIX, NO_HEIGHT, NOT_ALIGNED, EstimatorReport, Sensor
@@ -30,6 +30,10 @@ _RELIED_ON_US = 1_000_000
 _STAND_PERIOD_US = 100_000
 _NOISE_TICKS = 4
 _NEW_SHARE = 0.016  # of a new sample of the noise in its mean: one second
+_QUICK_SHARE = (
+    0.25  # the same in a mean over some hundredths of a second, which shows that motors have started
+)
+_CHANGE = 3.0  # quick means that differ from the slow ones by this factor are taken for right
 _SECOND_DIFFERENCE = 1.0 / 18.0  # of white noise in three axes: its square is six variances each
 
 
@@ -69,7 +73,7 @@ class InertialEstimator:
         self._ticks = 0
         noise = settings.noise
         self._floor = (noise.gyro_density**2, noise.accel_density**2)  # times the sampling rate
-        self._vibration = (0.0, 0.0)
+        self._vibration = self._quick = (0.0, 0.0)  # mean squares of the IMU's noise
 
     @property
     def origin(self) -> GeodeticPoint | None:
@@ -118,7 +122,7 @@ class InertialEstimator:
         self._ticks += 1
         if self._ticks % _NOISE_TICKS == 0:
             self._measure_noise()
-        self._advance_filter(imu.time_us)
+        self._advance_filter(imu)
         self._publish(imu)
         return _is_finite(self.state)
 
@@ -257,17 +261,28 @@ class InertialEstimator:
         (_, period_s, (p, q, r), (x, y, z)) = recent[-1]
         p, q, r = p - 2.0 * p1 + p2, q - 2.0 * q1 + q2, r - 2.0 * r1 + r2
         x, y, z = x - 2.0 * x1 + x2, y - 2.0 * y1 + y2, z - 2.0 * z1 + z2
-        turn, push = self._vibration
-        turn += _NEW_SHARE * ((p * p + q * q + r * r) * _SECOND_DIFFERENCE - turn)
-        push += _NEW_SHARE * ((x * x + y * y + z * z) * _SECOND_DIFFERENCE - push)
+        new_turn = (p * p + q * q + r * r) * _SECOND_DIFFERENCE
+        new_push = (x * x + y * y + z * z) * _SECOND_DIFFERENCE
+        (turn, push), (quick_turn, quick_push) = self._vibration, self._quick
+        quick_turn += _QUICK_SHARE * (new_turn - quick_turn)
+        quick_push += _QUICK_SHARE * (new_push - quick_push)
+        self._quick = (quick_turn, quick_push)
+        if turn < quick_turn * _CHANGE and quick_turn < turn * _CHANGE:
+            turn += _NEW_SHARE * (new_turn - turn)
+        else:
+            turn = quick_turn
+        if push < quick_push * _CHANGE and quick_push < push * _CHANGE:
+            push += _NEW_SHARE * (new_push - push)
+        else:
+            push = quick_push
         self._vibration = (turn, push)
         gyro, accel = self._floor
         self.aiding.target.filter.white_noise = (max(turn, gyro / period_s), max(push, accel / period_s))
 
-    def _advance_filter(self, now_us: int) -> None:
+    def _advance_filter(self, imu: ImuSample) -> None:
         """Let the filter follow at its distance, and carry its corrections to the present."""
         recent, waiting, into = self._output.recent, self._waiting, self.aiding.target.filter
-        while recent and recent[0][0] <= now_us - self._settings.delay_us:
+        while recent and recent[0][0] <= imu.time_us - self._settings.delay_us:
             time_us, period_s, rate, force = recent.popleft()
             into.add(time_us, period_s, rate, force)
             due_us = time_us + int(period_s * 5e5)
@@ -275,7 +290,7 @@ class InertialEstimator:
                 sample = heappop(waiting)[2]
                 if not self.aiding.is_redundant(sample):
                     self._correct(self.aiding.fuse(sample))
-            if self.stands and self._is_unaided(time_us):
+            if self.stands and self._is_unaided(time_us) and is_still(imu):
                 self._correct(self.aiding.stand())
 
     def _correct(self, error: list[float]) -> None:

@@ -63,11 +63,13 @@ class EstimatorSettings:
         magnetometer_sigma_gauss: white noise; None: not fused.
         hard_iron_sigma_gauss: constant error of the magnetometer.
         magnetometer_scale_sigma: of the error of the magnetometer's scale factors.
-        barometer_sigma_m: white noise; None: not fused.
+        barometer_sigma_pa: white noise; None: not fused.
         barometer_drift: slow error of the barometer.
         range_sigma_m: white noise of the range finder; None: not fused.
         ground_walk: noise that drives the height of the ground below, m per root of m flown over it.
         flow_sigma_rad_s: white noise of optical flow; None: not fused.
+        flow_scale_sigma: of the error of the flow's scale.
+        flow_gyro_bias_sigma_rad_s: of the bias of the flow sensor's own gyroscope.
     """
 
     noise: InertialNoise = field(default_factory=InertialNoise)
@@ -84,8 +86,10 @@ class EstimatorSettings:
     magnetometer_sigma_gauss: float | None = None
     hard_iron_sigma_gauss: float = 0.02
     magnetometer_scale_sigma: float = 0.0
-    barometer_sigma_m: float | None = 0.2
+    barometer_sigma_pa: float | None = 2.5
     barometer_drift: SlowError = SlowError(0.5, 0.03)
     range_sigma_m: float | None = None
-    ground_walk: float = 0.05
+    ground_walk: float = 0.02
     flow_sigma_rad_s: float | None = None
+    flow_scale_sigma: float = 0.0
+    flow_gyro_bias_sigma_rad_s: float = 0.0

@@ -110,7 +110,7 @@ def watch_sensors(settings: EstimatorSettings) -> SensorWatches:
     """Watches for the sensors that an estimator is set up for."""
     sensors = {
         Sensor.MAGNETOMETER: settings.magnetometer_sigma_gauss is not None,
-        Sensor.BAROMETER: settings.barometer_sigma_m is not None,
+        Sensor.BAROMETER: settings.barometer_sigma_pa is not None,
         Sensor.GPS: settings.gps,
         Sensor.EXTERNAL_POSE: settings.external,
         Sensor.RANGE_FINDER: settings.range_sigma_m is not None,

@@ -1,15 +1,30 @@
-"""`framerunner camera`: the arena's camera image for any drone that reports its pose."""
+"""`framerunner camera`: the arena's image for any drone that reports its pose; calibration of cameras."""
 
 from __future__ import annotations
 
 import asyncio
-from typing import Annotated
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
 
-from cyclopts import Parameter
+from cyclopts import App, Parameter
 
+from errors import SettingError
 from framerunner.commands import WholeNumber, check_range, say
 
+if TYPE_CHECKING:
+    from vision.calibration.board import Board
 
+app = App(name="camera")
+calibration = App(name="calibrate")
+app.command(calibration)
+
+_Columns = Annotated[WholeNumber, Parameter(help="squares of the board from left to right, 4 to 20")]
+_Rows = Annotated[WholeNumber, Parameter(help="squares of the board from top to bottom, 3 to 20")]
+_Square = Annotated[float, Parameter(help="edge of a square, mm")]
+_Marker = Annotated[float, Parameter(help="edge of a marker, mm")]
+
+
+@app.default
 def camera(
     *,
     drone: Annotated[
@@ -55,3 +70,76 @@ def camera(
     virtual = VirtualCamera(loaded, level=level, base=not no_base)
     asyncio.run(CameraServer(virtual, link, VideoServer(bind, port), say).run())
     return 0
+
+
+@calibration.command
+def board(
+    *,
+    out: Annotated[Path, Parameter(help="file to be written, PNG")] = Path("board.png"),
+    columns: _Columns = 8,
+    rows: _Rows = 5,
+    square: _Square = 30.0,
+    marker: _Marker = 22.0,
+) -> int:
+    """Write the board, to be printed.
+
+    Print it at 100 %, without fitting to the page, and glue it to something flat and stiff.
+
+    **Example**
+
+        framerunner camera calibrate board --out board.png
+    """
+    from framerunner.camera_calibration.calibrate import write_board
+
+    write_board(_board(columns, rows, square, marker), out)
+    return 0
+
+
+@calibration.default
+def calibrate(
+    sources: Annotated[
+        list[str], Parameter(help="images, folders of images, a video, or the URL or device of a camera")
+    ],
+    /,
+    *,
+    out: Annotated[Path, Parameter(help="file to be written, YAML")] = Path("camera.yaml"),
+    views: Annotated[WholeNumber, Parameter(help="how many different views to take from a camera")] = 20,
+    columns: _Columns = 8,
+    rows: _Rows = 5,
+    square: _Square = 30.0,
+    marker: _Marker = 22.0,
+) -> int:
+    """Find focal length, optical axis and lens distortion from images of the board.
+
+    Show the board near and far, in the middle and in the corners of the image, tilted by 20 to 45 degrees to
+    all sides; hold it still for each image, and let zoom and focus be as in flight. Printed are each view's
+    error and what part of the image was covered.
+
+    **Examples**
+
+        framerunner camera calibrate photos/ --out camera.yaml
+
+        framerunner camera calibrate rtsp://10.0.0.2/1 --views 25
+    """
+    check_range("--views", views, 8, 60)
+
+    from framerunner.camera_calibration.calibrate import calibrate as run
+
+    run(_board(columns, rows, square, marker), sources, views, out, say)
+    return 0
+
+
+def _board(columns: int, rows: int, square: float, marker: float) -> Board:
+    """Check the options."""
+    from vision.calibration.board import Board
+
+    check_range("--columns", columns, 4, 20)
+    check_range("--rows", rows, 3, 20)
+    check_range("--square", square, 5.0, 500.0)
+    if not 0.4 * square <= marker <= 0.9 * square:
+        raise SettingError(
+            f"--marker {marker:g}: must be from {0.4 * square:g} to {0.9 * square:g}, 0.4 to 0.9 of --square"
+        )
+    if columns * rows > 200:
+        raise SettingError(f"--columns {columns} --rows {rows}: more than 200 squares; use fewer")
+    return Board(columns, rows, square, marker)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -24,6 +25,7 @@ if TYPE_CHECKING:
     from framerunner.flying.plan import FlightPlan
     from offboard.mission import Mission
     from scenarios.models import Scenario
+    from vision.calibration.model import Calibration
     from wire.simulator_api import SimulatorApi
 
 _Drone = Annotated[
@@ -32,6 +34,10 @@ _Drone = Annotated[
 _Camera = Annotated[str | None, Parameter(help="URL, device or folder of its camera; needed with --drone")]
 _CameraDelay = Annotated[
     float, Parameter(help="with --camera: age in s of an image that arrives without a time stamp")
+]
+_Calibration = Annotated[
+    Path | None,
+    Parameter(help="with --drone: its camera's calibration, a file of `framerunner camera calibrate`"),
 ]
 _Simulator = Annotated[
     str | None,
@@ -75,6 +81,7 @@ def fly(
     drone: _Drone = None,
     camera: _Camera = None,
     camera_delay: _CameraDelay = 0.1,
+    calibration: _Calibration = None,
     simulator: _Simulator = None,
     speed: Annotated[float, Parameter(help="of the simulated drone: simulated seconds a second")] = 1.0,
     instance: Annotated[WholeNumber, Parameter(help="of the simulated drone: shifts its ports, 0 to 9")] = 0,
@@ -116,7 +123,7 @@ def fly(
     api = _simulator_api(simulator, drone)
     camera = api.video_url if api is not None and camera is None else camera
     check_range("--camera-delay", camera_delay, 0.0, 0.5)
-    _check(drone, camera, speed, instance, lockstep)
+    _check(drone, camera, speed, instance, lockstep=lockstep)
     seed = _checked_seed(seed, monitor, lockstep)
 
     from framerunner.flying.real_time import RealTimeSettings
@@ -125,6 +132,8 @@ def fly(
     loaded = load_mission_with(mission, pilot)
     chosen = _scenario(scenario, sensors, fault, starts=drone is None, lockstep=lockstep)
     plan = _plan(chosen, loaded, seed, response=response, drone=drone, drone_limits=drone_limits)
+    if (lens := _calibration(calibration, drone, loaded)) is not None:
+        plan = replace(plan, calibration=lens)
     real_time = None if lockstep else RealTimeSettings(drone, camera, api, speed, instance, camera_delay)
     return asyncio.run(fly_once(FlightSettings(plan, real_time, out, record, video, monitor)))
 
@@ -147,6 +156,22 @@ def _scenario(
             "add --lockstep, or start framerunner sim and fly it with --drone"
         )
     return scenario
+
+
+def _calibration(path: Path | None, drone: str | None, mission: Mission) -> Calibration | None:
+    """The calibration of a real drone's camera, if one is given."""
+    from framerunner.camera_calibration.calibration_file import load_calibration
+
+    if path is None:
+        return None
+    if drone is None:
+        raise SettingError("--calibration: a simulated drone's camera is known; leave it out or give --drone")
+    if mission.vision == "boxes":
+        raise SettingError(
+            f"--calibration: mission {mission.name} sees boxes, whose formulas know no lens; leave it out "
+            "or fly one with vision: frames"
+        )
+    return load_calibration(path)
 
 
 def _plan(
@@ -199,7 +224,7 @@ def _simulator_api(url: str | None, drone: str | None) -> SimulatorApi | None:
         raise SettingError(f"--simulator {error}") from None
 
 
-def _check(drone: str | None, camera: str | None, speed: float, instance: int, lockstep: bool) -> None:
+def _check(drone: str | None, camera: str | None, speed: float, instance: int, *, lockstep: bool) -> None:
     """Refuse options that do not go together."""
     if drone is not None and camera is None:
         raise SettingError("--camera: a drone given by --drone needs the URL of its camera too")

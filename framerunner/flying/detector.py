@@ -1,9 +1,11 @@
-"""The detector with which a plan's mission sees."""
+"""The detector with which a plan's mission sees, and the calibration of its camera."""
 
 from __future__ import annotations
 
 from framerunner.flying.plan import FlightPlan
-from offboard.navigation.camera_model import CameraModel
+from scenarios.imaging.effects import CameraEffects
+from scenarios.models import Camera
+from vision.calibration.model import Calibration
 from vision.detectors import Detector, new_detector
 
 
@@ -11,10 +13,21 @@ def plan_detector(plan: FlightPlan, *, rendered: bool) -> Detector:
     """Make the detector of a plan; without a mission, the paper's.
 
     Args:
-        plan: its scenario has the camera.
+        plan: its scenario has the camera, and it may have a calibration.
         rendered: the images are the simulator's, not a real camera's.
     """
     if plan.mission is None or plan.mission.vision == "boxes":
         return new_detector("boxes")  # with the paper's focal length
-    focal_px = CameraModel.of(plan.scenario.camera).focal_px
-    return new_detector(plan.mission.vision, focal_px=focal_px, rendered=rendered)
+    return new_detector(
+        plan.mission.vision,
+        calibration=plan.calibration or true_calibration(plan.scenario.camera),
+        rendered=rendered,
+        smooth=plan.scenario.camera.effects is not None,
+    )
+
+
+def true_calibration(camera: Camera) -> Calibration:
+    """The calibration of a scenario's simulated camera, without error."""
+    effects = camera.effects or CameraEffects()
+    ideal = Calibration.ideal(camera.width_px, camera.height_px, camera.focal_px, effects.lens.coefficients)
+    return ideal.model_copy(update={"readout_s": effects.readout_s})

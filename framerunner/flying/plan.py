@@ -11,9 +11,11 @@ from framerunner.flying.response import Response
 from offboard.keep_in_box import Box, flight_box
 from offboard.limits import CONTEST, CommandLimits
 from offboard.navigation.surroundings import Surroundings
-from scenarios.models import Scenario, start_position
+from scenarios.imaging.effects import CameraEffects
+from scenarios.models import Camera, Scenario, start_position
 from scenarios.part import Part
 from scenarios.referee import Referee
+from vision.calibration.model import Calibration
 
 if TYPE_CHECKING:  # it imports the statechart library, which the virtual camera does not need
     from offboard.mission import Mission
@@ -36,6 +38,7 @@ class FlightPlan:
             Lifted by the base's height, everything is as high above the real floor as the scenario says.
         drone_limits: of a real drone, for a mission of the class `open`; None: those of the airframe.
         response: how late the simulated vehicle of a lockstep flight answers; None: as its autopilot does.
+        calibration: of a real camera; None: it is the scenario's.
     """
 
     scenario: Scenario
@@ -44,6 +47,7 @@ class FlightPlan:
     lift_m: float = 0.0
     drone_limits: CommandLimits | None = None
     response: Response | None = None
+    calibration: Calibration | None = None
 
     @property
     def chart(self) -> Mission:
@@ -82,12 +86,27 @@ class FlightPlan:
     @property
     def surroundings(self) -> Surroundings:
         """What a navigator knows before the flight: all but the layout."""
-        layout, envelope_m = self.layout, self.airframe.envelope_m
+        layout, envelope_m, camera = self.layout, self.airframe.envelope_m, self.camera
         if not layout.frames:
-            return Surroundings(layout.arena, layout.base, layout.camera, envelope_m)
+            return Surroundings(layout.arena, layout.base, camera, envelope_m)
         frame = layout.frames[0]  # all are of one size, which the rules tell
         size_m = (frame.outer_width_m, frame.outer_height_m)
-        return Surroundings(layout.arena, layout.base, layout.camera, envelope_m, size_m, frame.bar_m)
+        return Surroundings(layout.arena, layout.base, camera, envelope_m, size_m, frame.bar_m)
+
+    @property
+    def camera(self) -> Camera:
+        """The camera as the navigator knows it: the scenario's, or what its calibration says of it."""
+        camera, calibration = self.scenario.camera, self.calibration
+        if calibration is None:
+            return camera
+        return camera.model_copy(
+            update={
+                "width_px": calibration.width_px,
+                "height_px": calibration.height_px,
+                "horizontal_fov_rad": calibration.horizontal_fov_rad,
+                "effects": CameraEffects(readout_s=calibration.readout_s),
+            }
+        )
 
     @property
     def box(self) -> Box:

@@ -18,6 +18,7 @@ from offboard.app import Moment
 from offboard.drone import DroneState
 from offboard.navigation.frame_estimate import FrameEstimate
 from offboard.navigation.view import NavigationView
+from scenarios.imaging.effects import Lens
 from scenarios.models import COLOURS, Arena, Scenario
 from sitl.solids import frame_solids
 from vision.intrinsics import camera_matrix
@@ -356,8 +357,9 @@ def camera_transform(scenario: Scenario, time_us: int) -> Message:
 
 
 def calibration(scenario: Scenario, time_us: int) -> Message:
-    """The ideal pinhole camera of the scenario."""
+    """The camera of the scenario: a pinhole camera and the distortion of its lens."""
     camera = scenario.camera
+    lens = Lens() if camera.effects is None else camera.effects.lens
     matrix = camera_matrix(camera.width_px, camera.height_px, camera.horizontal_fov_rad).tolist()
     return {
         "timestamp": time_of(time_us),
@@ -365,7 +367,7 @@ def calibration(scenario: Scenario, time_us: int) -> Message:
         "width": camera.width_px,
         "height": camera.height_px,
         "distortion_model": "plumb_bob",
-        "D": [0.0] * 5,
+        "D": list(lens.coefficients),
         "K": [value for row in matrix for value in row],
         "R": [1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0],
         "P": [value for row in matrix for value in (*row, 0.0)],

@@ -15,7 +15,8 @@ from geometry.rotations import quaternion_from_yaw, yaw_of
 from geometry.vectors import Quaternion, Vec3
 from scenarios.models import Scenario, TrueState
 from scenarios.result import LocalFrame, Standing
-from sitl.camera import FIRST_EXPOSURE_US, Camera, Image
+from sitl.camera import FIRST_EXPOSURE_US, Camera, Motion
+from sitl.optics.painter import Image
 from wire.dialect import Message, mavlink
 from wire.vehicle_telemetry import AHEAD_US, VehiclePose, VehicleTelemetry
 
@@ -155,7 +156,8 @@ class VirtualCamera:
             return None
         self._next = index + 1
         attitude = quaternion_from_yaw(yaw_of(where.attitude_arena)) if self._level else where.attitude_arena
-        return exposure_us, self._camera.render(where.position_arena_m, attitude)
+        motion = Motion(exposure_us, where.velocity_arena_m_s)
+        return exposure_us, self._camera.render(where.position_arena_m, attitude, motion=motion)
 
     def standing(self, state: str = "", ended: str | None = None) -> Standing:
         """How the try stands, for `/referee.json`; `ended` is why the flight was aborted, if it was."""

@@ -95,6 +95,7 @@ def write_dataset(settings: VisionSettings) -> None:
             "position_arena_m": labelled.position_arena_m,
             "attitude_arena": labelled.attitude_arena,
             "focal_px": labelled.focal_px,
+            "distortion": labelled.calibration.distortion,
             "frames": [asdict(frame) for frame in labelled.frames],
         }
         labels.append(finite(entry, 6))

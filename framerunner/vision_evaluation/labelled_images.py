@@ -10,13 +10,16 @@ import cv2
 import numpy as np
 import numpy.typing as npt
 
+from framerunner.flying.detector import true_calibration
 from geometry.rotations import quaternion_from_euler, rotation, rotation_rows
 from geometry.solids import Solid
 from geometry.vectors import Quaternion, Vec3
 from scenarios.models import Scenario, UprightFrame
 from scenarios.random_scenarios import Level, random_scenario
-from sitl.camera import Camera
+from sitl.camera import STILL, Camera, Motion
 from sitl.video import encode_jpeg
+from vision.calibration.lens import Lens
+from vision.calibration.model import Calibration
 from vision.types import Image
 
 Floats = npt.NDArray[np.float64]
@@ -29,6 +32,9 @@ _CLEAR_M = 0.35  # of the drone from everything
 _BESIDE_PX = 2.0  # what is nearer to a frame's outline than this may hide a part of it
 _DEPTH_M = 0.05  # nearer than this a frame is not labelled with pixels
 _DRAWS = 1000
+_LAST_S = 120.0  # of the flight
+_MAX_SPEED_M_S = 0.8
+_RATES_RAD_S = (0.2, 0.2, 0.4)  # standard deviations of roll, pitch and yaw
 
 
 @dataclass(frozen=True, slots=True)
@@ -50,7 +56,8 @@ class FrameLabel:
     angle_deg: float  # between the line of sight and the frame's normal, 0..90
     position_flu_m: Vec3
     normal_flu: Vec3  # on the side from which it is seen
-    corners_px: tuple[tuple[float, float], ...]  # of the middle plane, from the optical axis; none if behind
+    corners_px: tuple[tuple[float, float], ...]
+    """Of the middle plane, from the optical axis, as an ideal camera sees them; none if behind."""
     seen: bool  # a part of it may be in the image
     whole: bool  # all of it is in the image, and nothing is before it
 
@@ -63,34 +70,47 @@ class LabelledImage:
     scenario: str
     position_arena_m: Vec3
     attitude_arena: Quaternion
-    focal_px: float
+    calibration: Calibration
     frames: tuple[FrameLabel, ...]
+    smooth: bool = False  # painted with camera effects
+
+    @property
+    def focal_px(self) -> float:
+        """Focal length of the camera."""
+        return self.calibration.fx_px
 
 
 def labelled_images(level: Level, count: int, seed: int, disturbance: Disturbance) -> Iterator[LabelledImage]:
     """Paint images from random poses in random scenarios of a level.
 
     Three of four are turned to one of the frames, from all distances and angles; the others anywhere. The
-    same arguments give the same images.
+    same arguments give the same images. With a level's camera effects, the drone flies and turns.
     """
-    poses, noise = (np.random.Generator(np.random.PCG64([seed, use])) for use in range(2))
+    poses, noise, motions = (np.random.Generator(np.random.PCG64([seed, use])) for use in range(3))
     scene: _LabelledScene | None = None
     for number in range(count):
         if scene is None or number % IMAGES_OF_A_SCENE == 0:
-            scene = _LabelledScene(random_scenario(level, seed + number // IMAGES_OF_A_SCENE))
+            drawn = seed + number // IMAGES_OF_A_SCENE
+            scene = _LabelledScene(random_scenario(level, drawn), drawn)
         position, attitude = scene.draw_pose(poses)
-        painted = scene.camera.render(position, attitude)
+        motion = scene.draw_motion(motions)
+        painted = scene.camera.render(position, attitude, motion=motion)
         image = _disturbed(painted, disturbance, noise)
         labels = scene.labels(position, attitude)
-        yield LabelledImage(image, scene.scenario.name, position, attitude, scene.camera.focal_px, labels)
+        yield LabelledImage(
+            image, scene.scenario.name, position, attitude, scene.calibration, labels, scene.smooth
+        )
 
 
 class _LabelledScene:
     """A scenario and its camera."""
 
-    def __init__(self, scenario: Scenario) -> None:
+    def __init__(self, scenario: Scenario, seed: int) -> None:
         self.scenario = scenario
-        self.camera = Camera(scenario)
+        self.camera = Camera(scenario, seed)
+        self.calibration = true_calibration(scenario.camera)
+        self.smooth = scenario.camera.effects is not None
+        self._lens = None if self.calibration.is_ideal else Lens(self.calibration)
         others = [scenario.base.solid, *scenario.prisms]
         self._solids = [*(frame.hull for frame in scenario.all_frames), *others]
 
@@ -104,6 +124,15 @@ class _LabelledScene:
                 break
         roll, pitch = (radians(stream.uniform(-_MAX_TILT_DEG, _MAX_TILT_DEG)) for _ in range(2))
         return position, quaternion_from_euler(roll, pitch, yaw)
+
+    def draw_motion(self, stream: np.random.Generator) -> Motion:
+        """When the image is taken, and how the drone moves then: as in a contest flight."""
+        if not self.smooth:
+            return STILL
+        time_us = int(stream.uniform(0.0, _LAST_S) * 1e6)
+        vx, vy, vz = (float(value) for value in stream.uniform(-_MAX_SPEED_M_S, _MAX_SPEED_M_S, 3))
+        roll, pitch, yaw = (float(value) for value in stream.normal(0.0, 1.0, 3) * np.array(_RATES_RAD_S))
+        return Motion(time_us, (vx, vy, vz), (roll, pitch, yaw))
 
     def labels(self, position_arena_m: Vec3, attitude: Quaternion) -> tuple[FrameLabel, ...]:
         """What is true of every frame."""
@@ -162,8 +191,11 @@ class _LabelledScene:
         corners: tuple[tuple[float, float], ...] = ()
         if hull is not None:
             half = np.array([self.scenario.camera.width_px, self.scenario.camera.height_px]) / 2.0
-            seen = bool((hull.max(axis=0) > -half).all() and (hull.min(axis=0) < half).all())
-            inside = bool((np.abs(hull) < half - _BESIDE_PX).all())
+            places = hull
+            if self._lens is not None:
+                places = np.array([self._lens.seen(x, y) for x, y in hull.tolist()])
+            seen = bool((places.max(axis=0) > -half).all() and (places.min(axis=0) < half).all())
+            inside = bool((np.abs(places) < half - _BESIDE_PX).all())
             whole = inside and not any(
                 _covers(outline, hull)
                 for k, outline in enumerate(outlines)

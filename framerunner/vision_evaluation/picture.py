@@ -22,10 +22,10 @@ from framerunner.vision_evaluation.scores import (
     RATED_ANGLE_DEG,
     ErrorRow,
     Scores,
+    detector_of,
     rated,
     rows_by,
 )
-from vision.detectors import new_detector
 
 _STYLES = {"boxes": ("#ee7733", "--", "boxes (the paper's)"), "frames": ("#332288", "-", "frames")}
 _CURVES: tuple[tuple[str, Callable[[ErrorRow], float | None]], ...] = (
@@ -102,7 +102,7 @@ def _draw_image(axes: Axes, labelled: LabelledImage, *, rendered: bool) -> None:
     height, width = image.shape[:2]
     reach = (-width / 2, width / 2, height / 2, -height / 2)
     axes.imshow(cv2.cvtColor(image, cv2.COLOR_BGR2RGB), extent=reach, interpolation="nearest")
-    found = new_detector("frames", focal_px=labelled.focal_px, rendered=rendered)(image, None)
+    found = detector_of(labelled, "frames", rendered=rendered)(image, None)
     for sighting in found.frames:
         for corner in sighting.corners:
             if corner is not None:

@@ -12,6 +12,7 @@ import numpy as np
 
 from framerunner.vision_evaluation.labelled_images import FrameLabel, LabelledImage
 from geometry.vectors import Vec3
+from vision.calibration.model import Calibration
 from vision.detectors import Detector, new_detector
 from vision.types import Detection, Detections, FrameSighting, Image, Vision
 
@@ -85,15 +86,22 @@ def detect_all(labelled: Iterable[LabelledImage], *, rendered: bool) -> tuple[Sc
     scores = Scores()
     first: list[LabelledImage] = []
     detectors: dict[Vision, Detector] = {}
+    calibration: Calibration | None = None
     for one in labelled:
-        if not detectors:
-            detectors = {k: new_detector(k, focal_px=one.focal_px, rendered=rendered) for k in KINDS}
+        if calibration != one.calibration:
+            calibration = one.calibration
+            detectors = {k: detector_of(one, k, rendered=rendered) for k in KINDS}
             for detector in detectors.values():
                 detector(one.image, None)  # the first call loads code
         scores.add(one, {kind: _timed(detector, one.image) for kind, detector in detectors.items()})
         if len(first) < _KEPT:
             first.append(one)
     return scores, first
+
+
+def detector_of(labelled: LabelledImage, kind: Vision, *, rendered: bool) -> Detector:
+    """The detector for the camera of an image."""
+    return new_detector(kind, calibration=labelled.calibration, rendered=rendered, smooth=labelled.smooth)
 
 
 def rows_by(

@@ -22,19 +22,27 @@ class CameraModel:
         half_width_px: from the optical axis to the image's left and right edges.
         half_height_px: to its upper and lower edges.
         position_flu_m: of the camera on the drone: forward, left, up.
+        readout_s: of a rolling shutter, from the first to the last row; an image's time is the middle.
     """
 
     focal_px: float
     half_width_px: float
     half_height_px: float
     position_flu_m: Vec3
+    readout_s: float = 0.0
 
     @classmethod
     def of(cls, camera: Camera) -> Self:
         """The model of a scenario's camera."""
         half_width_px = camera.width_px / 2
         focal_px = half_width_px / tan(camera.horizontal_fov_rad / 2)
-        return cls(focal_px, half_width_px, camera.height_px / 2, camera.position_flu_m)
+        readout_s = 0.0 if camera.effects is None else camera.effects.readout_s
+        return cls(focal_px, half_width_px, camera.height_px / 2, camera.position_flu_m, readout_s)
+
+    def read_after_s(self, down_px: float) -> float:
+        """How long after the time of an image a row is read out; before it if negative."""
+        share = down_px / (2.0 * self.half_height_px)
+        return self.readout_s * max(-0.5, min(0.5, share))
 
     def pose(self, drone_m: Vec3, attitude_arena: Quaternion) -> CameraPose:
         """The camera's pose with the drone's centre and attitude (body FLU to arena)."""

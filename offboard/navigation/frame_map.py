@@ -5,6 +5,7 @@ How it works is in docs/navigation.md.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from math import cos, hypot, sin
 
 from offboard.navigation.camera_model import CameraModel, CameraPose
@@ -64,12 +65,15 @@ class FrameMap:
         """All frames seen, of every colour, in the order in which they were found."""
         return self._frames
 
-    def observe(self, detections: Detections, pose: DronePose) -> None:
+    def observe(
+        self, detections: Detections, pose: DronePose, poses: Sequence[DronePose] | None = None
+    ) -> None:
         """Use an image; one that is not later than the last is ignored.
 
         Args:
             detections: the frames in it.
             pose: of the drone when it was exposed.
+            poses: with a rolling shutter, of the drone when the rows of each frame were read out.
         """
         if pose.time_us <= self._time_us:
             return
@@ -77,7 +81,10 @@ class FrameMap:
         for track in self._tracks:
             track.predict(pose.time_us)
         unseen = list(self._tracks)
-        seen = [view_of(sighting, self._camera, pose) for sighting in detections.frames]
+        if poses is None:
+            poses = [pose] * len(detections.frames)
+        sightings = zip(detections.frames, poses, strict=True)
+        seen = [view_of(sighting, self._camera, at) for sighting, at in sightings]
         for view in self._match([view for view in seen if view is not None], unseen):
             self._explain(view, unseen)
         camera = self._camera.pose(pose.position_m, pose.attitude_arena)

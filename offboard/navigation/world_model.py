@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections import deque
 from collections.abc import Sequence
+from dataclasses import replace
 from math import hypot
 
 from geometry.vectors import Vec3
@@ -67,7 +68,8 @@ class WorldModel:
                 self._image_us = image.time_us
                 self._waiting.append(image)
         waiting = self._waiting
-        while waiting and (image_us := waiting[0].time_us) is not None and image_us <= state.time_us:
+        read_us = state.time_us - round(0.5e6 * self._camera.readout_s)  # images are read out by now
+        while waiting and (image_us := waiting[0].time_us) is not None and image_us <= read_us:
             pose = self._history.at(image_us)
             image = waiting.popleft()
             if pose is not None:
@@ -76,7 +78,7 @@ class WorldModel:
     def _use(self, image: Detections, pose: DronePose) -> None:
         where = (pose.position_m, pose.attitude_arena)
         self._frames = None
-        self._map.observe(image, pose)
+        self._map.observe(image, pose, self._poses_of_rows(image, pose))
         self._obstacle_map.update(*where, image.obstacle_edges)
         self.seen_space.update(*where, image.obstacle_edges, self._obstacle_map.columns_m())
         self._explorer.update(*where, image.obstacle_edges)
@@ -85,6 +87,18 @@ class WorldModel:
         others = any(frame.colour not in COLOURS for frame in self._map.frames())
         self.viewed_space.needed = others or len(known) < len(COLOURS)
         self._glimpses.update(*where, image, known)
+
+    def _poses_of_rows(self, image: Detections, pose: DronePose) -> list[DronePose] | None:
+        """With a rolling shutter, the drone's pose when each frame's middle row was read out."""
+        if self._camera.readout_s == 0.0:
+            return None
+        poses = []
+        for sighting in image.frames:
+            rows = [corner.down_px for corner in sighting.corners if corner is not None]
+            after_s = self._camera.read_after_s(sum(rows) / len(rows)) if rows else 0.0
+            at = self._history.at(pose.time_us + round(1e6 * after_s))
+            poses.append(pose if at is None else replace(at, time_us=pose.time_us))
+        return poses
 
     def frame(self, colour: str) -> FrameEstimate | None:
         """The frame of a colour; None if it is not on the map."""

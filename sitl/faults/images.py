@@ -10,9 +10,10 @@ import numpy as np
 from geometry.solids import Solid
 from scenarios.faults.declaration import Fault, FaultKind, FaultPart
 from scenarios.models import Scenario, TrueState
-from sitl.camera import CameraFeed, Exposure, Image
+from sitl.camera import CameraFeed, Exposure
 from sitl.faults.effects import Lossy
 from sitl.faults.faults import Faults
+from sitl.optics.painter import Image
 from sitl.sensors.noise import Delay
 
 Change = Callable[[int, Exposure | None], Exposure | None]
@@ -29,7 +30,7 @@ def new_feed(
         seed: of the flight.
         drones: see `CameraFeed`.
     """
-    feed = CameraFeed(scenario, drones)
+    feed = CameraFeed(scenario, drones, seed)
     if not any(fault.part is FaultPart.CAMERA for fault in scenario.faults):
         return feed
     return FaultyFeed(feed, lambda: faults.camera, seed)

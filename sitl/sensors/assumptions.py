@@ -52,12 +52,14 @@ def estimator_settings(spec: SuiteSpec) -> EstimatorSettings:
         magnetometer_sigma_gauss=magnetometer.noise_gauss if magnetometer else None,
         hard_iron_sigma_gauss=magnetometer.hard_iron_gauss if magnetometer else 0.0,
         magnetometer_scale_sigma=magnetometer.scale_error if magnetometer else 0.0,
-        barometer_sigma_m=barometer.noise_pa / _PA_PER_M if barometer else None,
+        barometer_sigma_pa=barometer.noise_pa if barometer else None,
         barometer_drift=_slow(barometer.drift_pa / _PA_PER_M, barometer.drift_time_s)
         if barometer
         else chosen.barometer_drift,
         range_sigma_m=spec.range_finder.noise_m if spec.range_finder else None,
         flow_sigma_rad_s=spec.optical_flow.noise_rad_s if spec.optical_flow else None,
+        flow_scale_sigma=spec.optical_flow.scale_error if spec.optical_flow else 0.0,
+        flow_gyro_bias_sigma_rad_s=spec.optical_flow.gyro_bias_rad_s if spec.optical_flow else 0.0,
     )
 
 

@@ -85,3 +85,13 @@ def test_a_level_refuses_wind_that_cannot_be():
         LEVEL_FILES.parse(CALM + "wind:\n  speed_m_s: {low: 0.0, high: 30.0}\n", "f.yaml")
     with pytest.raises(LevelError, match=r"wind\.gust_s 5\.0 leaves no time between gusts"):
         LEVEL_FILES.parse(CALM + "wind: {gust_s: 5.0, gust_period_s: 4.0}\n", "f.yaml")
+
+
+@pytest.mark.parametrize("level", ["breeze", "gusts"])
+def test_windy_levels_have_the_layouts_of_calm_and_wind_of_their_own(level):
+    windy, calm = (random_scenario(load_level(name), 17) for name in (level, "calm"))
+    assert (windy.frames, windy.base, windy.start) == (calm.frames, calm.base, calm.start)
+    assert (windy.airframe, windy.sensors) == ("racer-3in", "mocap")
+    assert 2.0 <= windy.wind.speed_m_s <= 3.0
+    assert windy.wind.turbulence_m_s >= 0.4
+    assert (windy.wind.gust_m_s > 0.0) is (level == "gusts")

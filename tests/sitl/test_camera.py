@@ -11,9 +11,9 @@ from geometry.solids import Solid
 from geometry.vectors import Quaternion, Vec3
 from scenarios.models import Arena, Base, Camera, Decoy, Doorway, Frame, Light, Pole, Scenario, Wall
 from sitl.camera import Camera as PaintedCamera
-from sitl.camera import Image
 from sitl.camera_projection import SUBPIXELS, Mesh, Pinhole
 from sitl.camera_scene import GROUND_BGR, SKY_BGR, build_scene
+from sitl.optics.painter import Image
 from sitl.solids import frame_solids
 from sitl.video import encode_jpeg
 from vision.detector import detect

@@ -8,8 +8,12 @@ import pytest
 
 from geometry.rotations import quaternion_from_euler
 from geometry.vectors import Quaternion, Vec3
+from scenarios.imaging.clutter import Hall, Patch
+from scenarios.imaging.effects import CameraEffects, Lens
 from scenarios.models import Base, Frame, Pole, Scenario
+from scenarios.models import Camera as ScenarioCamera
 from sitl.camera import Camera
+from vision.calibration.model import Calibration, CalibrationError
 from vision.detectors import new_detector
 from vision.types import Detections, FrameSighting
 
@@ -135,3 +139,58 @@ def test_any_image_gets_an_answer() -> None:
                 cv2.fillPoly(image, [points], colour)
         for sighting in FIND(image, None).frames:
             assert any(sighting.corners)
+
+
+BARREL = Lens(k1=-0.25, k2=0.07, p1=0.001, p2=-0.001)
+
+
+@pytest.mark.parametrize(
+    ("distance_m", "aside_deg", "angle_deg"), [(0.5, 0, 10), (0.8, 25, 30), (2.0, 35, 20)]
+)
+def test_a_calibrated_camera_gives_corners_and_poses_of_an_ideal_one(distance_m, aside_deg, angle_deg):
+    aside, angle = np.radians((aside_deg, angle_deg))
+    x, y = distance_m * np.cos(aside), distance_m * np.sin(aside)
+    frame = Frame(colour="red", x_m=x, y_m=y, z_m=1.2, yaw_rad=float(aside + angle))
+    camera = ScenarioCamera(position_flu_m=(0.0, 0.0, 0.0), effects=CameraEffects(lens=BARREL))
+    image = Camera(Scenario(name="lens", frames=[frame], camera=camera)).render(
+        (0.0, 0.0, 1.2), (1.0, 0.0, 0.0, 0.0)
+    )
+    calibration = Calibration.ideal(320, 240, camera.focal_px, BARREL.coefficients)
+    find = new_detector("frames", calibration=calibration, rendered=True, smooth=True)
+    (sighting,) = find(image, None).frames
+    assert sighting.poses[0].position_flu_m == pytest.approx((x, y, 0.0), abs=0.015 * distance_m)
+    ideal = new_detector("frames", focal_px=camera.focal_px, rendered=True, smooth=True)
+    blind = ideal(image, None).frames
+    if distance_m < 1.0:  # without the calibration it is no frame, or elsewhere
+        assert (
+            not blind
+            or not blind[0].poses
+            or blind[0].poses[0].position_flu_m != pytest.approx((x, y, 0.0), abs=0.015 * distance_m)
+        )
+
+
+def test_images_of_another_size_than_calibrated_are_refused():
+    calibration = Calibration.ideal(640, 480, 300.0, BARREL.coefficients)
+    with pytest.raises(CalibrationError, match="images have 320 x 240 pixels, but the calibration is of 640"):
+        new_detector("frames", calibration=calibration)(np.zeros((240, 320, 3), np.uint8), None)
+
+
+@pytest.mark.parametrize("border_m", [None, 0.14, 0.012])
+def test_sheets_and_drawn_rectangles_are_no_frames(border_m):
+    poster = Patch(
+        surface="front", colour="red", across_m=0.0, up_m=1.2, width_m=1.2, height_m=0.6, border_m=border_m
+    )
+    scenario = Scenario(name="poster", hall=Hall(), patches=[poster])
+    image = Camera(scenario).render((3.5, 0.0, 1.2), (1.0, 0.0, 0.0, 0.0))
+    assert not [sighting for sighting in FIND(image, None).frames if sighting.poses]
+
+
+@pytest.mark.parametrize("up_m", [1.3, 1.05])
+def test_a_frame_before_a_poster_of_its_colour_is_found(up_m):
+    frame = Frame(colour="red", x_m=2.0, y_m=0.0, z_m=1.2, yaw_rad=0.2)
+    poster = Patch(surface="front", colour="red", across_m=0.3, up_m=up_m, width_m=0.3, height_m=1.2)
+    camera = ScenarioCamera(position_flu_m=(0.0, 0.0, 0.0))
+    scenario = Scenario(name="poster", frames=[frame], camera=camera, hall=Hall(), patches=[poster])
+    image = Camera(scenario).render((0.9, 0.0, 1.2), (1.0, 0.0, 0.0, 0.0))
+    whole = [sighting for sighting in FIND(image, None).frames if sighting.whole and sighting.poses]
+    assert whole[0].poses[0].position_flu_m == pytest.approx((1.1, 0.0, 0.0), abs=0.03)

@@ -26,7 +26,7 @@ from geometry.vectors import Vec3
 
 Sample = ExternalPose | GpsSample | MagnetometerSample | BarometerSample | RangeSample | FlowSample
 
-_STANDING_VELOCITY_M2_S2 = 0.01
+_STANDING_VELOCITY_M2_S2 = 0.01**2
 _STANDING_PLACE_M2 = 0.25
 _REDUNDANT_US = 200_000
 
@@ -42,6 +42,7 @@ class Aiding:
     Attributes:
         target: the filter, and counts of its jumps.
         aids: of all kinds, by sensor.
+        ground: aiding by sensors that look at the ground.
     """
 
     def __init__(
@@ -52,7 +53,7 @@ class Aiding:
         self._gps = GpsAiding(self.target, settings, origin)
         self._barometer = BarometerAiding(self.target, settings)
         self._magnetometer = MagnetometerAiding(self.target, settings, field_ned_gauss)
-        self._ground = GroundAiding(self.target, settings)
+        self.ground = GroundAiding(self.target, settings)
         self._has_position_sensor = settings.external or settings.gps
         self._stood_us = NEVER_US
         pose, gps = self._pose, self._gps
@@ -61,8 +62,8 @@ class Aiding:
             Sensor.GPS: (gps.horizontal, gps.vertical, gps.velocity),
             Sensor.BAROMETER: (self._barometer.height,),
             Sensor.MAGNETOMETER: (self._magnetometer.field,),
-            Sensor.RANGE_FINDER: (self._ground.height,),
-            Sensor.OPTICAL_FLOW: (self._ground.flow,),
+            Sensor.RANGE_FINDER: (self.ground.height,),
+            Sensor.OPTICAL_FLOW: (self.ground.flow,),
         }
 
     @property
@@ -75,12 +76,12 @@ class Aiding:
         """When the horizontal position was measured last; without such a sensor, its velocity."""
         if self._has_position_sensor:
             return max(self._pose.horizontal.fused_us, self._gps.horizontal.fused_us)
-        return max(self._ground.flow.fused_us, self._stood_us)
+        return max(self.ground.flow.fused_us, self._stood_us)
 
     @property
     def velocity_us(self) -> int:
         """When something was measured last that keeps the horizontal velocity from drifting."""
-        ground = self._ground.flow.fused_us
+        ground = self.ground.flow.fused_us
         return max(self.position_us, self._gps.velocity.fused_us, ground, self._stood_us)
 
     @property
@@ -91,7 +92,7 @@ class Aiding:
 
     def height_above_ground_m(self) -> float:
         """By range finder; NaN: not measured."""
-        return self._ground.height_above_ground_m() if self.target.layout.ground >= 0 else nan
+        return self.ground.height_above_ground_m() if self.target.layout.ground >= 0 else nan
 
     def relied_on(self, since_us: int) -> frozenset[Sensor]:
         """Sensors of which something has been fused since a time."""
@@ -103,11 +104,11 @@ class Aiding:
         """Of the last innovations."""
         pose, gps = self._pose, self._gps
         return Ratios(
-            velocity=max(gps.velocity.ratio, self._ground.flow.ratio),
+            velocity=max(gps.velocity.ratio, self.ground.flow.ratio),
             position_horizontal=max(pose.horizontal.ratio, gps.horizontal.ratio),
             position_vertical=max(pose.vertical.ratio, gps.vertical.ratio, self._barometer.height.ratio),
             heading=max(pose.heading.ratio, self._magnetometer.field.ratio),
-            height_above_ground=self._ground.height.ratio,
+            height_above_ground=self.ground.height.ratio,
         )
 
     def is_redundant(self, sample: Sample) -> bool:
@@ -118,7 +119,7 @@ class Aiding:
         if type(sample) is BarometerSample:
             aid = self._barometer.height
         elif type(sample) is RangeSample:
-            aid = self._ground.height
+            aid = self.ground.height
         else:
             return False
         return (
@@ -137,11 +138,12 @@ class Aiding:
         elif type(sample) is MagnetometerSample:
             self._magnetometer.fuse(sample)
         elif type(sample) is RangeSample:
-            self._ground.fuse_range(sample)
+            self.ground.fuse_range(sample)
         elif type(sample) is FlowSample:
-            self._ground.fuse_flow(sample)
+            self.ground.fuse_flow(sample)
         elif type(sample) is GpsSample:
             self._gps.fuse(sample)
+        self.ground.move_if_due()
         return into.correct()
 
     def stand(self) -> list[float]:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from math import isfinite
 
-from firmware_py.atmosphere import pressure_altitude_m
+from firmware_py.atmosphere import metres_per_pascal, pressure_altitude_m
 from firmware_py.estimation.aiding.aid import Aid
 from firmware_py.estimation.aiding.target import UNKNOWN_M2, Target
 from firmware_py.estimation.error_state import ATTITUDE, POSITION
@@ -27,7 +27,7 @@ class BarometerAiding:
 
     def __init__(self, target: Target, settings: EstimatorSettings) -> None:
         self._target = target
-        self._variance_m2 = (settings.barometer_sigma_m or 0.0) ** 2
+        self._variance_pa2 = (settings.barometer_sigma_pa or 0.0) ** 2
         self.height = Aid("pressure altitude", 1, settings.gate, settings.reset_us)
         self._zero_m = 0.0  # pressure altitude where the height is 0
         self._height_resets = -1
@@ -48,7 +48,8 @@ class BarometerAiding:
         row = target.row()
         row[POSITION + 2], row[index] = -1.0, 1.0
         predicted_m = height_m + target.drift(index) + self._zero_m
-        aid.fuse_rows(into, (row,), (altitude_m - predicted_m,), (self._variance_m2,))
+        variance_m2 = self._variance_pa2 * metres_per_pascal(sample.pressure_pa) ** 2
+        aid.fuse_rows(into, (row,), (altitude_m - predicted_m,), (variance_m2,))
 
 
 class MagnetometerAiding:

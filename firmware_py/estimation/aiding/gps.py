@@ -10,7 +10,7 @@ from __future__ import annotations
 from math import isfinite
 
 from firmware_py.estimation.aiding.aid import NEVER_US, Aid
-from firmware_py.estimation.aiding.target import MAX_RESETS, Target
+from firmware_py.estimation.aiding.target import MAX_RESETS, UNKNOWN_M2, Target
 from firmware_py.estimation.error_state import POSITION, VELOCITY
 from firmware_py.estimation.settings import EstimatorSettings
 from firmware_py.geodesy import LocalProjection
@@ -63,6 +63,8 @@ class GpsAiding:
         into = self._target.filter
         if self._projection is None:
             self._projection = self._projection_at(place, into.state.position_ned_m)
+            for axis in range(3):  # of the first solution, white noise counts as part of the slow error
+                self._target.set_drift(self._target.layout.gps + axis, 0.0, UNKNOWN_M2)
         late_s = (sample.time_us - into.time_us) / 1e6
         vn, ve, vd = into.state.velocity_ned_m_s
         n, e, d = self._projection.to_local(place)

@@ -17,6 +17,7 @@ from firmware_py.measurements import FlowSample, RangeSample
 from geometry.rotations import rotation, to_body
 
 _MIN_DOWN = 0.7  # cosine of the largest tilt at which the ground is measured
+_MOVE_US = 200_000
 _STEP_US = 100_000  # ranges that do not fit for so long: the ground has changed
 _MIN_FLOW_QUALITY = 50
 _MIN_DISTANCE_M = 0.05
@@ -32,16 +33,17 @@ class GroundAiding:
     Attributes:
         height: of ranges.
         flow: of optical flow.
+        walk: noise that drives the height of the ground, m per root of m flown over it.
     """
 
     def __init__(self, target: Target, settings: EstimatorSettings) -> None:
         self._target = target
         self._range_variance_m2 = (settings.range_sigma_m or 0.0) ** 2
         self._flow_sigma_rad_s = settings.flow_sigma_rad_s or 0.0
-        self._walk = settings.ground_walk
+        self.walk = settings.ground_walk
         self.height = Aid("range", 1, settings.gate, _STEP_US)
         self.flow = Aid("optical flow", 2, settings.gate, settings.reset_us)
-        self._ranged_us = NEVER_US
+        self._moved_us = NEVER_US
 
     def height_above_ground_m(self) -> float:
         """The estimated height above ground; NaN: no range yet."""
@@ -57,7 +59,7 @@ class GroundAiding:
         if not isfinite(sample.distance_m) or m[8] < _MIN_DOWN:
             return
         height_m = -into.state.position_ned_m[2]
-        self._let_ground_change()
+        self.move()
         measured_m = sample.distance_m * m[8]  # vertical
         if aid.is_needed(into.time_us):
             target.set_drift(index, height_m - measured_m, UNKNOWN_M2)
@@ -85,23 +87,33 @@ class GroundAiding:
         measured = (about_right * along_m, -about_forward * along_m)  # forward and right, m/s
         known = to_body(m, *into.state.velocity_ned_m_s)
         rows, innovations = [], []
+        scale, bias = target.layout.flow_scale, target.layout.flow_gyro
         for axis in (0, 1):
             row = target.row()
             row[VELOCITY : VELOCITY + 3] = (m[axis], m[axis + 3], m[axis + 6])
+            lever_m = along_m if axis == 0 else -along_m
+            if scale >= 0:  # of the whole flow, which the turn is part of
+                row[scale] = known[axis] + lever_m * sample.gyro_rad[1 - axis] / period_s
+            if bias >= 0:  # a turn about right measured too large: forward too slow
+                row[bias + 1 - axis] = -lever_m
             rows.append(row)
             innovations.append(measured[axis] - known[axis])
         sigma_m_s = self._flow_sigma_rad_s * along_m
         variance = sigma_m_s * sigma_m_s
         self.flow.fuse_rows(into, tuple(rows), tuple(innovations), (variance, variance))
 
+    def move(self) -> None:
+        """Let the ground's variance grow with the way flown over it since the last call."""
+        into, index = self._target.filter, self._target.layout.ground
+        period_s = (into.time_us - self._moved_us) / 1e6 if self._moved_us != NEVER_US else 0.0
+        self._moved_us = into.time_us
+        north, east, _ = into.state.velocity_ned_m_s
+        into.covariance.p[index, index] += self.walk * self.walk * hypot(north, east) * period_s
+
+    def move_if_due(self) -> None:
+        """The same a few times a second, also while there are no ranges."""
+        if self._target.layout.ground >= 0 and self._target.filter.time_us - self._moved_us > _MOVE_US:
+            self.move()
+
     def _ground_m(self) -> float:
         return self._target.drift(self._target.layout.ground)
-
-    def _let_ground_change(self) -> None:
-        """Let the ground's variance grow with the way flown over it since the last range."""
-        into, index = self._target.filter, self._target.layout.ground
-        period_s = (into.time_us - self._ranged_us) / 1e6 if self._ranged_us != NEVER_US else 0.0
-        self._ranged_us = into.time_us
-        north, east, _ = into.state.velocity_ned_m_s
-        way_m = hypot(north, east) * min(period_s, 1.0)
-        into.covariance.p[index, index] += self._walk * self._walk * way_m

@@ -42,6 +42,8 @@ class Layout:
     gyro_scale: int = -1
     accel_scale: int = -1
     field_scale: int = -1
+    flow_scale: int = -1
+    flow_gyro: int = -1
     hard_iron: int = -1
     barometer: int = -1
     gps: int = -1
@@ -82,10 +84,14 @@ class Target:
             layout.accel_scale = add(3, settings.noise.accel_scale_sigma)
         if settings.magnetometer_sigma_gauss is not None and settings.magnetometer_scale_sigma > 0.0:
             layout.field_scale = add(3, settings.magnetometer_scale_sigma)
+        if settings.flow_sigma_rad_s is not None and settings.flow_scale_sigma > 0.0:
+            layout.flow_scale = add(1, settings.flow_scale_sigma)
+        if settings.flow_sigma_rad_s is not None and settings.flow_gyro_bias_sigma_rad_s > 0.0:
+            layout.flow_gyro = add(2, settings.flow_gyro_bias_sigma_rad_s)
         considered = len(drifts)
         if settings.magnetometer_sigma_gauss is not None:
             layout.hard_iron = add(3, settings.hard_iron_sigma_gauss)
-        if settings.barometer_sigma_m is not None:
+        if settings.barometer_sigma_pa is not None:
             slow = settings.barometer_drift
             layout.barometer = add(1, 0.0, Drift(slow.noise_density))
         if settings.gps:

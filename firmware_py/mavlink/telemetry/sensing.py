@@ -6,7 +6,7 @@ the state. For others see `measured.py`.
 
 from __future__ import annotations
 
-from math import atan2, degrees, hypot
+from math import atan2, degrees, hypot, nan
 
 from firmware_py.atmosphere import pressure_hpa, temperature_k
 from firmware_py.autopilot import Autopilot
@@ -157,6 +157,25 @@ def gps_raw_int(autopilot: Autopilot) -> Message | None:
     )
 
 
+def wind_cov(autopilot: Autopilot) -> Message | None:
+    """WIND_COV: the air's velocity, as estimated by drag; the vertical one is not known."""
+    found = autopilot.wind.estimate if autopilot.wind is not None else None
+    if found is None:
+        return None
+    north_m_s, east_m_s = found.velocity_ned_m_s
+    return mavlink.MAVLink_wind_cov_message(
+        autopilot.state.time_us,
+        north_m_s,
+        east_m_s,
+        nan,
+        found.sigma_m_s**2,
+        nan,
+        nan,
+        nan,
+        nan,
+    )
+
+
 SENSORS: dict[int, AutopilotSource] = {
     mavlink.MAVLINK_MSG_ID_DISTANCE_SENSOR: distance_sensor,
     mavlink.MAVLINK_MSG_ID_GNSS_INTEGRITY: gnss_integrity,
@@ -165,4 +184,5 @@ SENSORS: dict[int, AutopilotSource] = {
     mavlink.MAVLINK_MSG_ID_OPTICAL_FLOW_RAD: optical_flow_rad,
     mavlink.MAVLINK_MSG_ID_SCALED_IMU: scaled_imu,
     mavlink.MAVLINK_MSG_ID_SCALED_PRESSURE: scaled_pressure,
+    mavlink.MAVLINK_MSG_ID_WIND_COV: wind_cov,
 }

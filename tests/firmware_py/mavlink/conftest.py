@@ -33,6 +33,7 @@ class FakeAutopilot:
     battery: BatteryState = field(default_factory=BatteryState)
     flight: FlightRecord = field(default_factory=FlightRecord)
     missions: MissionStore = field(default_factory=MissionStore)
+    wind: None = None
     place: GeodeticPoint | None = HOME
     result: CommandResult = CommandResult.ACCEPTED
     calls: list[tuple] = field(default_factory=list)

@@ -1,9 +1,11 @@
 from itertools import pairwise
 from math import cos, inf, nan, pi, sin
+from types import SimpleNamespace
 
 import pytest
 
 from firmware_py.atmosphere import pressure_hpa, temperature_k
+from firmware_py.estimation.wind import WindEstimate
 from firmware_py.mavlink.node import MavlinkNode
 from firmware_py.mavlink.telemetry.sensing import EARTH_FIELD_NED_GAUSS, earth_field_frd_gauss
 from firmware_py.mavlink.telemetry.streams import GROUND, ONBOARD
@@ -290,6 +292,7 @@ def test_field_turns_into_the_body():
 def test_every_source_names_its_own_message(autopilot, peer):
     autopilot.status.armed = True
     autopilot.status.setpoint = TrajectorySetpoint(0, position_ned_m=(0.0, 0.0, -1.0))
+    autopilot.wind = SimpleNamespace(estimate=WindEstimate((2.0, -1.0), 0.3, 2.2))
     peer.send(mavlink.MAVLink_rc_channels_override_message(1, 1, *[1500] * 8))
     made = {
         message_id: source().get_msgId()

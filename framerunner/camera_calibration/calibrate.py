@@ -1,0 +1,79 @@
+"""From images of the board to a calibration file, with a report for people."""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import Callable, Sequence
+from pathlib import Path
+
+from rich import box
+from rich.console import Console
+from rich.table import Table
+
+from errors import SettingError, write_advice
+from framerunner.camera_calibration.calibration_file import save_calibration
+from framerunner.camera_calibration.collect import Collection, collect
+from vision.calibration.board import Board, CalibrationReport
+
+_SHADES = " ░▒▓█"
+_WELL_COVERED = 12  # corners in a cell
+
+
+def write_board(board: Board, path: Path) -> None:
+    """Write the board as a PNG file.
+
+    Raises:
+        SettingError: it cannot be written.
+    """
+    try:
+        path.write_bytes(board.page())
+    except OSError as error:
+        raise SettingError(
+            f"--out {path}: cannot be written to ({error.strerror}); {write_advice(error)}"
+        ) from error
+    print(f"{board.text}; print {path} at 100 %, measure it, and glue it to something flat")
+
+
+def calibrate(
+    board: Board, sources: Sequence[str], wanted: int, out: Path, say: Callable[[str], None]
+) -> None:
+    """Calibrate a camera, print how good it is, and write the file.
+
+    Raises:
+        CalibrationError: the images do not tell enough.
+        CameraError: a source cannot be opened or has failed.
+        SettingError: the file cannot be written.
+    """
+    collection = asyncio.run(collect(board, sources, wanted, say))
+    say(
+        f"{collection.images} images: {len(collection.views)} different views; {collection.similar} like "
+        f"another one, {collection.without_board} without the board or with too little of it"
+    )
+    report = board.calibrate(collection.views)
+    _show(report, collection)
+    save_calibration(report.calibration, out)
+    print(f"written to {out}; use it with `framerunner fly --calibration {out}`")
+
+
+def _show(report: CalibrationReport, collection: Collection) -> None:
+    console = Console(highlight=False)
+    found = report.calibration
+    table = Table(box=box.SIMPLE_HEAD, pad_edge=False)
+    table.add_column("view", no_wrap=True)
+    table.add_column("corners", justify="right")
+    table.add_column("error (px)", justify="right")
+    for view, (name, error_px) in zip(collection.views, report.errors_px, strict=True):
+        table.add_row(name, str(len(view.ids)), f"{error_px:.2f}")
+    console.print(table)
+    k1, k2, p1, p2, k3 = found.distortion
+    lines = (
+        f"focal length {found.fx_px:.2f} and {found.fy_px:.2f} px (± {report.focal_std_px:.2f}), "
+        f"optical axis at {found.cx_px:.2f}, {found.cy_px:.2f}",
+        f"distortion k1 {k1:.4f}, k2 {k2:.4f}, p1 {p1:.5f}, p2 {p2:.5f}, k3 {k3:.4f}",
+        f"error {found.rms_px:.3f} px RMS; {100 * report.coverage:.0f} % of the image covered:",
+    )
+    for line in lines:
+        console.print(line, markup=False)
+    for row in report.cells.tolist():
+        shades = (_SHADES[min(4, -(-4 * count // _WELL_COVERED))] for count in row)
+        console.print("  " + "".join(2 * shade for shade in shades), markup=False)

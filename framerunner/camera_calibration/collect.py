@@ -1,0 +1,94 @@
+"""Views of the calibration board from files, folders, videos and cameras."""
+
+from __future__ import annotations
+
+from collections.abc import AsyncIterator, Callable, Sequence
+from contextlib import AsyncExitStack
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import cv2
+
+from vision.calibration.board import MIN_COVERAGE, SAME_VIEW, Board, View, coverage_of
+from vision.calibration.model import CalibrationError
+from vision.sources import IMAGE_SUFFIXES, open_source
+from vision.types import Image
+
+MAX_VIEWS = 60
+
+
+@dataclass(slots=True)
+class Collection:
+    """Views that differ, and what was left out."""
+
+    views: list[View] = field(default_factory=list)
+    images: int = 0
+    without_board: int = 0
+    similar: int = 0
+
+    def add(self, board: Board, image: Image, name: str) -> bool:
+        """Look at an image; whether it is a new view."""
+        self.images += 1
+        view = board.find(image, name)
+        if view is None:
+            self.without_board += 1
+            return False
+        if any(view.distance(other) < SAME_VIEW for other in self.views):
+            self.similar += 1
+            return False
+        self.views.append(view)
+        return True
+
+
+async def collect(
+    board: Board, sources: Sequence[str], wanted: int, say: Callable[[str], None]
+) -> Collection:
+    """Look for the board in images until there are as many different views as wanted, or no more images.
+
+    Args:
+        board: that is looked for.
+        sources: image files, folders, videos, devices or URLs, one after another.
+        wanted: number of views from a camera or video; of files and folders all are used.
+        say: called with lines for people.
+
+    Raises:
+        CalibrationError: an image file cannot be read.
+        CameraError: a camera cannot be opened or has failed.
+    """
+    collection = Collection()
+    for source in sources:
+        live = _is_live(source)
+        async for name, image in _images(source):
+            new = collection.add(board, image, name)
+            views = len(collection.views)
+            if new and live:
+                seen = 100 * coverage_of(collection.views)
+                say(f"view {views} of {wanted}, {seen:.0f} % of the image covered; move and tilt the board")
+            enough = views >= wanted and coverage_of(collection.views) >= MIN_COVERAGE
+            if (live and enough) or views >= MAX_VIEWS:
+                break
+    return collection
+
+
+def _is_live(source: str) -> bool:
+    """Whether a source has more images than are needed: a camera or a video."""
+    return not (Path(source).is_dir() or _is_image(source))
+
+
+def _is_image(source: str) -> bool:
+    return source.lower().endswith(tuple(IMAGE_SUFFIXES)) and "://" not in source
+
+
+async def _images(source: str) -> AsyncIterator[tuple[str, Image]]:
+    if _is_image(source):
+        image = cv2.imread(source, cv2.IMREAD_COLOR)
+        if image is None:
+            raise CalibrationError(f"{source}: not an image that can be read; give PNG or JPEG files")
+        yield Path(source).name, image
+        return
+    async with AsyncExitStack() as stack:
+        camera = await stack.enter_async_context(open_source(source))
+        number = 0
+        async for frame in camera.frames():
+            yield f"image {number}", frame.image
+            number += 1

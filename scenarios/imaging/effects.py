@@ -1,0 +1,101 @@
+"""The camera's optics and electronics: lens, exposure, sensor and colour."""
+
+from __future__ import annotations
+
+from math import hypot
+from typing import Annotated, Literal
+
+from pydantic import Field
+
+from scenarios.part import Part
+
+MAX_K, MAX_P = 1.0, 0.1
+_LENS_STEPS = 400
+_MAX_TANGENT = 6.0  # of the angle between the optical axis and the image's corner
+
+Gain = Annotated[float, Field(ge=0.2, le=5.0)]
+
+
+class Lens(Part):
+    """Lens distortion: the Brown-Conrady model with the coefficients of OpenCV.
+
+    A ray at (x, y) = (right, down) / ahead, with r² = x² + y², is seen at
+
+        x (1 + k1 r² + k2 r⁴ + k3 r⁶) + 2 p1 x y + p2 (r² + 2 x²),
+        y (1 + k1 r² + k2 r⁴ + k3 r⁶) + p1 (r² + 2 y²) + 2 p2 x y
+
+    times the focal length (D. Brown, "Close-range camera calibration", Photogrammetric Engineering, 1971).
+    """
+
+    k1: float = Field(0.0, ge=-MAX_K, le=MAX_K, description="radial; negative: barrel distortion")
+    k2: float = Field(0.0, ge=-MAX_K, le=MAX_K, description="radial")
+    p1: float = Field(0.0, ge=-MAX_P, le=MAX_P, description="tangential")
+    p2: float = Field(0.0, ge=-MAX_P, le=MAX_P, description="tangential")
+    k3: float = Field(0.0, ge=-MAX_K, le=MAX_K, description="radial")
+
+    @property
+    def coefficients(self) -> tuple[float, float, float, float, float]:
+        """In OpenCV's order."""
+        return (self.k1, self.k2, self.p1, self.p2, self.k3)
+
+    @property
+    def distorts(self) -> bool:
+        """Whether it is not an ideal lens."""
+        return any(self.coefficients)
+
+    def sees_up_to(self, width: float, height: float) -> bool:
+        """Whether every place of an image belongs to one ray.
+
+        Args:
+            width: of half the image, in focal lengths.
+            height: the same.
+        """
+        corner = 1.1 * hypot(width, height)
+        before = 0.0
+        for step in range(1, _LENS_STEPS + 1):
+            r = _MAX_TANGENT * step / _LENS_STEPS
+            square = r * r
+            seen = r * (1.0 + square * (self.k1 + square * (self.k2 + square * self.k3)))
+            if seen >= corner:
+                return True
+            if seen <= before:
+                return False
+            before = seen
+        return False
+
+
+class CameraEffects(Part):
+    """What a real camera does to an image; the numbers here are those of a camera without errors.
+
+    Brightness is linear, without a gamma curve: the painted colours are what a sensor with the gain 1 sees.
+    """
+
+    lens: Lens = Field(Lens(), description="distortion")
+    exposure_s: float = Field(
+        0.0, ge=0, le=0.05, description="time of exposure, in which motion blurs the image"
+    )
+    readout_s: float = Field(
+        0.0, ge=0, le=0.05, description="from the first to the last row; 0: all rows at once (global shutter)"
+    )
+    vignetting: float = Field(0.0, ge=0, le=0.9, description="share of the light lost in the image's corners")
+    illumination: float = Field(
+        1.0, ge=0.02, le=1, description="light that reaches the sensor; the painted colours have 1"
+    )
+    light_rgb: tuple[Gain, Gain, Gain] = Field((1.0, 1.0, 1.0), description="colour of that light")
+    read_noise: float = Field(
+        0.0, ge=0, le=20, description="standard deviation of noise in the dark, before the gain, of 255"
+    )
+    shot_noise: float = Field(
+        0.0, ge=0, le=20, description="standard deviation of shot noise at white, before the gain, of 255"
+    )
+    gain: Literal["auto", "fixed"] = Field("fixed", description="whether brightness is regulated")
+    fixed_gain: float = Field(1.0, ge=0.2, le=20, description="factor of brightness if it is fixed")
+    auto_mean: float = Field(100.0, ge=10, le=200, description="mean brightness if it is regulated, of 255")
+    max_gain: float = Field(8.0, ge=1, le=50, description="largest factor if it is regulated")
+    white_balance: Literal["auto", "fixed"] = Field(
+        "fixed", description="auto: the channels' means are drawn together, as if the scene were grey"
+    )
+    balance_rgb: tuple[Gain, Gain, Gain] = Field(
+        (1.0, 1.0, 1.0), description="factors of the channels if it is fixed"
+    )
+    auto_balance: float = Field(0.5, ge=0, le=1, description="how far they are drawn together if it is auto")

@@ -1,0 +1,68 @@
+"""The calibration of a camera, as a file holds it."""
+
+from __future__ import annotations
+
+from math import atan
+from typing import Annotated, Literal, Self
+
+from pydantic import BaseModel, ConfigDict, Field
+
+from errors import UserError
+from geometry.lens import Coefficients
+
+Coefficient = Annotated[float, Field(ge=-100, le=100)]
+
+
+class CalibrationError(UserError):
+    """A calibration that cannot be made or used; the message is one line for people."""
+
+
+class Calibration(BaseModel):
+    """Camera matrix and lens distortion, by OpenCV's conventions: whole numbers are pixel centres."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
+
+    model: Literal["brown-conrady"] = Field("brown-conrady", description="of the lens distortion")
+    width_px: int = Field(ge=16, le=16384, description="columns of the images")
+    height_px: int = Field(ge=16, le=16384, description="rows of the images")
+    fx_px: float = Field(gt=1, le=1e5, description="focal length in columns")
+    fy_px: float = Field(gt=1, le=1e5, description="focal length in rows")
+    cx_px: float = Field(ge=0, le=16384, description="column of the optical axis")
+    cy_px: float = Field(ge=0, le=16384, description="row of the optical axis")
+    distortion: tuple[Coefficient, Coefficient, Coefficient, Coefficient, Coefficient] = Field(
+        (0.0,) * 5, description="k1, k2, p1, p2, k3"
+    )
+    readout_s: float = Field(
+        0.0, ge=0, le=0.1, description="of a rolling shutter, from the first to the last row; 0 if not known"
+    )
+    rms_px: float | None = Field(
+        None, ge=0, description="root mean square of what is left of the corners' errors"
+    )
+    images: int | None = Field(None, ge=1, description="how many images it was made from")
+
+    @classmethod
+    def ideal(
+        cls, width_px: int, height_px: int, focal_px: float, distortion: Coefficients = (0.0,) * 5
+    ) -> Self:
+        """A camera with square pixels and the optical axis in the image's middle."""
+        return cls(
+            width_px=width_px,
+            height_px=height_px,
+            fx_px=focal_px,
+            fy_px=focal_px,
+            cx_px=(width_px - 1) / 2,
+            cy_px=(height_px - 1) / 2,
+            distortion=distortion,
+        )
+
+    @property
+    def is_ideal(self) -> bool:
+        """Whether pixels need no correction, and all are exposed at once."""
+        ideal = self.ideal(self.width_px, self.height_px, self.fx_px)
+        mine = (self.fy_px, self.cx_px, self.cy_px, self.distortion, self.readout_s)
+        return mine == (ideal.fy_px, ideal.cx_px, ideal.cy_px, ideal.distortion, ideal.readout_s)
+
+    @property
+    def horizontal_fov_rad(self) -> float:
+        """Angle of view over the width, of a camera without distortion with this focal length."""
+        return 2.0 * atan(self.width_px / 2.0 / self.fx_px)
