@@ -51,6 +51,7 @@ GATE_S = (0.4, 1.3)  # before a gate the drone must be straight before it; neare
 IN_GATE_S = (-0.3, 0.4)  # to a gate; in this time a drone
 IN_GATE_M_S2 = 0.4  # does not speed up by more than this to fly as fast as planned
 MAX_RATE_CHANGE_PER_S = 1.5  # of the path's time
+RATE_S = 0.12  # time constant of its rate; what is wanted depends on the present rate, and would swing without
 BRAKE_END_S = 0.25  # in which the last of the speed is braked, so that the drone is not thrown back
 _STEADY_S = 0.11  # after a longer step the vehicle's velocity is taken for steady
 _MAX_STEP_S = 0.5  # for so long a vehicle flies on by its last command
@@ -221,6 +222,7 @@ class PathFollower:
         faster = most
         if in_gate:
             faster = min(most, IN_GATE_M_S2 * step_s / max(hypot(*motion.velocity_m_s), _MOVING_M_S))
+        rate = before + (rate - before) * step_s / (step_s + RATE_S)
         rate = min(max(rate, before - most), before + faster)
         if brake_m_s2:
             slowing_per_s = brake_m_s2 / max(hypot(*motion.velocity_m_s), _MOVING_M_S)

@@ -15,6 +15,8 @@ HEADROOM = 0.92
 BOLD_HEADROOM = 0.98
 """Likewise of level speed in class open: where it counts, in openings, the drone flies more slowly."""
 VIEW_NEAR_M = 0.25  # half a frame's width, with a margin
+PRESENT_SHARE = 1.15
+"""Of the crossing speed: a drone that is faster at the start of a path brakes to this before an opening."""
 LOOK_AGAIN_M = 1.0
 LOOK_BRAKING_M = 0.5
 
@@ -113,6 +115,8 @@ class FlightStyle:
         replan_s: between two plans.
         look_again_m: before a gate; there the drone waits until it knows the frame well enough.
         look_braking_m: before that; there it is decided.
+        arrived_m: a goal is reached this near to it,
+        arrived_m_s: and at most this fast.
         looks_ahead: places on the way that no image has shown are looked at before the drone flies there.
     """
 
@@ -142,6 +146,8 @@ class FlightStyle:
     replan_s: float = 0.4
     look_again_m: float = LOOK_AGAIN_M
     look_braking_m: float = LOOK_BRAKING_M
+    arrived_m: float = 0.06
+    arrived_m_s: float = 0.15
     looks_ahead: bool = True
 
     def adapted(self, response: Response) -> FlightStyle:
@@ -183,12 +189,14 @@ _OPEN = FlightStyle(
     crossing_speed_m_s=1.3,
     crossing_gain_m_s2=0.3,
     straight_before_m=0.24,
-    straight_after_m=0.2,
+    straight_after_m=0.27,
     smoothing_s=0.3,
     look_offset_rad=0.0,
     replan_s=0.25,
     look_again_m=0.7,
     look_braking_m=0.45,
+    arrived_m=0.1,
+    arrived_m_s=0.5,
     looks_ahead=False,
 )
 """For the simulated drone's own limits: at them nothing would be left to correct with.
@@ -241,6 +249,8 @@ def style_of(limits: CommandLimits) -> FlightStyle:
         replan_s=between(usual.replan_s, bold.replan_s),
         look_again_m=between(usual.look_again_m, bold.look_again_m),
         look_braking_m=between(usual.look_braking_m, bold.look_braking_m),
+        arrived_m=between(usual.arrived_m, bold.arrived_m),
+        arrived_m_s=between(usual.arrived_m_s, bold.arrived_m_s),
         looks_ahead=share < 1.0,
     )
 

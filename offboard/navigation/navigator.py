@@ -30,8 +30,6 @@ SPACED_S = 0.15  # in which one image is enough: one from nearly the same place 
 SPACED_M_S = 1.5  # up to this speed
 NEAR_GATE_M = 1.5  # nearer to a frame to be crossed that is not certain yet, no image is left out
 SEARCH_AFTER_M = 2.0  # from behind a frame to the drone, when it is chosen where to look from there
-ARRIVED_M = 0.06
-ARRIVED_M_S = 0.15
 
 
 class Navigator:
@@ -108,8 +106,8 @@ class Navigator:
         goal, state = self._goal, self._state
         if goal is None or state is None:
             return False
-        near = dist(position_now(state), goal.position_m) < ARRIVED_M
-        return near and hypot(*state.velocity_arena_m_s) < ARRIVED_M_S
+        near = dist(position_now(state), goal.position_m) < self._style.arrived_m
+        return near and hypot(*state.velocity_arena_m_s) < self._style.arrived_m_s
 
     def view(self) -> NavigationView:
         """The map and the path, for displays."""

@@ -12,7 +12,7 @@ from math import inf, isfinite, sqrt
 import numpy as np
 import numpy.typing as npt
 
-from offboard.navigation.goals import FlightStyle
+from offboard.navigation.goals import PRESENT_SHARE, FlightStyle
 from offboard.navigation.planner.legs import Array
 
 STEP_S = 0.05
@@ -44,6 +44,8 @@ def speed_squares(
     excess = np.maximum(np.abs(forward), np.abs(left)) / style.axis_speed_m_s
     excess = np.maximum(excess, np.abs(vz) / style.climb_speed_m_s)
     excess = np.maximum(excess, level / style.path_speed_m_s)
+    crossing = level / (PRESENT_SHARE * style.crossing_speed_m_s)
+    excess = np.where(near_bars, np.maximum(excess, crossing), excess)
     most = 1.0 / np.maximum(excess, 1.0) ** 2
     ahead = c * ax + s * ay + yaw_rate * left
     aside = c * ay - s * ax - yaw_rate * forward

@@ -10,7 +10,7 @@ from math import cos, hypot, nan, pi, sqrt
 import numpy as np
 import numpy.typing as npt
 
-from offboard.navigation.goals import FlightStyle, Gate, Goal, Motion, Point
+from offboard.navigation.goals import PRESENT_SHARE, FlightStyle, Gate, Goal, Motion, Point
 from offboard.navigation.path import Crossing
 from offboard.navigation.planner.clearance import Clearance
 from offboard.navigation.planner.connect import Connector, Ends
@@ -27,7 +27,6 @@ LATE_ACROSS_M = 0.05  # there the drone must be this near the opening's axis
 LEAVING_M = 0.15  # so far behind the end of the straight flight it is still continued
 LEAVING_S = 0.15
 LEAST_CROSSING_M_S = 0.25
-PRESENT_SHARE = 1.15  # of the crossing speed; a start that is faster brakes before the opening
 SWITCH_S = 0.5  # another side than before must be faster by this
 BLOCKED_S = 1e4  # time of a leg that obstacles block
 _ROOM_STEP_M = 0.05
