@@ -66,5 +66,5 @@ def _random(name: str) -> Scenario:
     if re.fullmatch(r"[0-9]{1,19}", seed):
         near_levels = difflib.get_close_matches(level.lower(), levels, n=1, cutoff=0.5)
         nearest = [f"{each}-{int(seed)}" for each in near_levels]
-    random = " or ".join(f"{each}-<seed>" for each in levels)
-    raise _FILES.unknown(name, nearest, f"; a random one is {random}")
+    of_levels = f"; a random one is LEVEL-SEED with a level of {', '.join(levels)}"
+    raise _FILES.unknown(name, nearest, of_levels)

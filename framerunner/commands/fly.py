@@ -25,7 +25,6 @@ if TYPE_CHECKING:
     from framerunner.flying.plan import FlightPlan
     from offboard.mission import Mission
     from scenarios.models import Scenario
-    from vision.calibration.model import Calibration
     from wire.simulator_api import SimulatorApi
 
 _Drone = Annotated[
@@ -114,8 +113,6 @@ def fly(
 
         framerunner fly test-case-1 --lockstep --response lag=0.6,dead-time=0.15
 
-        framerunner fly --drone udpin://0.0.0.0:14540 --camera 0
-
         framerunner fly --drone udpin://0.0.0.0:14540 --simulator http://10.0.0.2:8100
 
         framerunner fly --drone serial:///dev/ttyUSB0:57600 --camera rtsp://10.0.0.2/1
@@ -132,8 +129,7 @@ def fly(
     loaded = load_mission_with(mission, pilot)
     chosen = _scenario(scenario, sensors, fault, starts=drone is None, lockstep=lockstep)
     plan = _plan(chosen, loaded, seed, response=response, drone=drone, drone_limits=drone_limits)
-    if (lens := _calibration(calibration, drone, loaded)) is not None:
-        plan = replace(plan, calibration=lens)
+    plan = _calibrated(plan, calibration, drone)
     real_time = None if lockstep else RealTimeSettings(drone, camera, api, speed, instance, camera_delay)
     return asyncio.run(fly_once(FlightSettings(plan, real_time, out, record, video, monitor)))
 
@@ -158,20 +154,20 @@ def _scenario(
     return scenario
 
 
-def _calibration(path: Path | None, drone: str | None, mission: Mission) -> Calibration | None:
-    """The calibration of a real drone's camera, if one is given."""
+def _calibrated(plan: FlightPlan, path: Path | None, drone: str | None) -> FlightPlan:
+    """The plan with the calibration of a real drone's camera, if one is given."""
+    if path is None:
+        return plan
     from framerunner.camera_calibration.calibration_file import load_calibration
 
-    if path is None:
-        return None
     if drone is None:
         raise SettingError("--calibration: a simulated drone's camera is known; leave it out or give --drone")
-    if mission.vision == "boxes":
+    if plan.chart.vision == "boxes":
         raise SettingError(
-            f"--calibration: mission {mission.name} sees boxes, whose formulas know no lens; leave it out "
+            f"--calibration: mission {plan.chart.name} sees boxes, whose formulas know no lens; leave it out "
             "or fly one with vision: frames"
         )
-    return load_calibration(path)
+    return replace(plan, calibration=load_calibration(path))
 
 
 def _plan(
