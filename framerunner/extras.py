@@ -11,7 +11,6 @@ _EXTRAS = {
     "matplotlib": "plots",
     "motioncapture": "mocap",
     "multipart": "monitor",
-    "nicegui": "monitor",
     "PIL": "video",
     "segno": "monitor",
     "sqlalchemy": "monitor",

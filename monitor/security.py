@@ -16,18 +16,13 @@ from wire.transports.urls import is_loopback
 
 _FORWARDED = ("x-forwarded-for", "x-real-ip", "forwarded")
 _SAFE_METHODS = ("GET", "HEAD", "OPTIONS")
-# NiceGUI compiles templates in the browser and starts its pages by inline scripts.
 CONTENT_POLICY = "; ".join(
     (
-        "default-src 'self'",
-        "script-src 'self' 'unsafe-inline' 'unsafe-eval'",
-        "style-src 'self' 'unsafe-inline'",
+        "default-src 'none'",
+        "script-src 'self'",
+        "style-src 'self'",
         "img-src 'self' data: blob:",
-        "font-src 'self' data:",
-        "media-src 'self' blob:",
-        "worker-src 'self' blob:",
         "connect-src 'self'",
-        "object-src 'none'",
         "base-uri 'none'",
         "form-action 'self'",
         "frame-ancestors 'none'",

@@ -1,32 +1,27 @@
-"""The monitor's web application: request checks, files, the routes of `MODULES`, and NiceGUI."""
+"""The monitor's web application: request checks, files, and the routes of `MODULES`."""
 
 from __future__ import annotations
 
 import asyncio
 import contextlib
-import logging
-import re
 import socket
 from collections.abc import Callable, Coroutine, Iterator
 from dataclasses import dataclass, field
 from functools import partial
 from importlib import import_module
 from ipaddress import ip_address, ip_network
-from pathlib import Path
+from secrets import token_urlsafe
 from typing import Any, cast
 
-import nicegui
 import uvicorn
 from fastapi import FastAPI
-from nicegui import Client, core, ui
-from starlette.responses import Response
-from starlette.staticfiles import StaticFiles
-from starlette.types import ASGIApp, Scope
+from starlette.types import ASGIApp
 from uvicorn.middleware.proxy_headers import ProxyHeadersMiddleware
 
 from monitor.access import Access, SessionFile, session_path
 from monitor.connections import Connections, Gate
 from monitor.fleet import Fleet
+from monitor.pages.static_files import StaticBundles
 from monitor.ports import Equipment
 from monitor.security import Guard
 from monitor.settings import BACKLOG, MonitorSettings
@@ -41,16 +36,12 @@ MODULES = (
     "monitor.replay_api",
     "monitor.competition.api",
     "monitor.competition.stage",
+    "monitor.pages.shell",
     "monitor.pages.login",
     "monitor.pages.table",
     "monitor.pages.join",
 )
 
-_STATIC = Path(__file__).parent / "static"
-_ELEMENTS = Path(nicegui.__file__).parent / "elements"
-_LIBRARIES = {"three": "scene", "echart": "echart", "mermaid": "mermaid"}
-_HASHED = re.compile(r"-[\w-]{8}\.js$")  # the bundler names a file by its content
-_RECONNECT_S = 10.0
 _END_S = 1
 _MAX_MESSAGE_BYTES = 1 << 17  # of a WebSocket; pages send some hundred bytes
 
@@ -66,6 +57,7 @@ class Monitor:
         access: log-ins and permissions.
         place: IP address and TCP port that it listens on.
         web: for HTTP routes and WebSockets.
+        instance: differs from one start of the monitor to the next.
         jobs: run from start to end of the monitor; `register` may append to them.
     """
 
@@ -75,6 +67,7 @@ class Monitor:
     access: Access
     place: tuple[str, int]
     web: FastAPI
+    instance: str = field(default_factory=lambda: token_urlsafe(9))
     jobs: list[Job] = field(default_factory=list)
 
     def at_end(self, close: Callable[[], None]) -> None:
@@ -87,16 +80,6 @@ class Monitor:
                 close()
 
         self.jobs.append(wait)
-
-
-class _Files(StaticFiles):
-    """Files that a browser revalidates each time, except a library's that are named by their content."""
-
-    async def get_response(self, path: str, scope: Scope) -> Response:
-        response = await super().get_response(path, scope)
-        is_hashed = self.directory != _STATIC and _HASHED.search(path) is not None
-        response.headers["Cache-Control"] = "public, max-age=31536000, immutable" if is_hashed else "no-cache"
-        return response
 
 
 class _Server(uvicorn.Server):
@@ -133,10 +116,9 @@ def assemble(
     web = FastAPI(title="framerunner", docs_url=None, redoc_url=None, openapi_url=None)
     web.add_middleware(Guard, local_only=local_only, limits=settings.limits)
     monitor = Monitor(settings, equipment, Fleet(equipment), access, place, web)
-    _add_static_files(web)
+    web.mount("/static", StaticBundles())
     for name in MODULES:
         import_module(name).register(monitor)
-    _add_nicegui(web)
     return monitor
 
 
@@ -165,28 +147,3 @@ def make_server(web: ASGIApp, settings: MonitorSettings, started: Callable[[], N
         ws_per_message_deflate=False,  # it would compress the same pose for each viewer again
     )
     return _Server(config, started)
-
-
-def _add_static_files(web: FastAPI) -> None:
-    """Serve the monitor's own files and the libraries that come with NiceGUI."""
-    web.mount("/static", _Files(directory=_STATIC))
-    for name, element in _LIBRARIES.items():
-        web.mount(f"/lib/{name}", _Files(directory=_ELEMENTS / element / "dist"))
-
-
-def _add_nicegui(web: FastAPI) -> None:
-    """Mount NiceGUI's pages after all other routes. Its application is global, so it is reset first."""
-    core.app.middleware_stack = None
-    core.app.user_middleware.clear()
-    core.app._shutdown_handlers.clear()
-    Client.instances.clear()  # of pages that were opened before; browsers load them again
-    logging.getLogger("nicegui").setLevel(logging.ERROR)  # it warns of every address that does not exist
-    ui.run_with(
-        web,
-        title="framerunner",
-        dark=None,
-        language="en-US",
-        reconnect_timeout=_RECONNECT_S,
-        gzip_middleware_factory=None,  # takes more time than it saves in a local network
-        show_welcome_message=False,
-    )

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import asyncio
 import os
 import shutil
 from collections.abc import AsyncIterator
@@ -9,7 +10,7 @@ from contextlib import asynccontextmanager
 from pathlib import Path
 
 import pytest
-from playwright.async_api import Browser, Page, async_playwright
+from playwright.async_api import Browser, Error, Page, async_playwright
 
 POLITE = Path(__file__).with_name("polite_browser.sh")
 NAMES = ("chromium", "chromium-browser", "google-chrome")
@@ -50,6 +51,22 @@ async def chromium(*, solid: bool = False) -> AsyncIterator[Browser]:
             yield browser
         finally:
             await browser.close()
+
+
+async def until(page: Page, expression: str, *, arg: object = None, timeout_s: float = 30.0) -> None:
+    """Wait until an expression or function is true in a page.
+
+    Playwright's `wait_for_function` evaluates a text in the page each time, which our pages' policy forbids.
+    """
+    async with asyncio.timeout(timeout_s):
+        while True:
+            try:
+                if await page.evaluate(expression, arg):
+                    return
+            except Error as error:
+                if "context was destroyed" not in str(error):  # the page is loaded again
+                    raise
+            await asyncio.sleep(0.03)
 
 
 class Complaints(list):

@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-from html import escape
 from typing import TYPE_CHECKING, Annotated
 
 from fastapi import Form, Request
 from fastapi.responses import RedirectResponse, Response
 
 from monitor.access import MAX_NAME_LENGTH, SESSION_S, LoginRefusedError
-from monitor.pages.shell import html_page
+from monitor.pages.shell import render
 
 if TYPE_CHECKING:
     from monitor.server import Monitor
@@ -22,10 +21,24 @@ def register(monitor: Monitor) -> None:
     access = monitor.access
 
     def page(request: Request, token: str, name: str = "", problem: str = "", status: int = 200) -> Response:
-        alert = f'<p class="problem" role="alert">{escape(problem)}</p>' if problem else ""
-        content = f"<h1>Judges log in</h1>{alert}{_form(access.needs_password, token, name)}"
+        values = {
+            "needs_password": access.needs_password,
+            "token": token,
+            "name": name,
+            "problem": problem,
+            "max_name_length": MAX_NAME_LENGTH,
+        }
         visitor = access.visitor(request)
-        return html_page(visitor, "/login", "Log in", content, classes="narrow", status=status)
+        return render(
+            "login.html.j2",
+            visitor,
+            monitor.instance,
+            title="Log in",
+            here="/login",
+            classes="narrow",
+            status=status,
+            values=values,
+        )
 
     @monitor.web.get("/login")
     async def show(request: Request, token: str = "") -> Response:
@@ -69,26 +82,3 @@ def register(monitor: Monitor) -> None:
 def _is_encrypted(request: Request) -> bool:
     """Whether the request came by TLS, as a trusted proxy reports."""
     return request.url.scheme == "https"
-
-
-def _form(needs_password: bool, token: str, name: str) -> str:
-    if needs_password:
-        secret = (
-            '<label for="secret">Password</label>'
-            '<input id="secret" name="secret" type="password" autocomplete="current-password" required>'
-        )
-    elif token:
-        secret = f'<input name="secret" type="hidden" value="{escape(token)}">'
-    else:
-        return (
-            "<p>Judges log in by a one-time link. The newest one stands on the console of the machine "
-            "that runs the monitor. Watching needs no log-in.</p>"
-        )
-    return (
-        '<p>Watching needs no log-in.</p><form class="login" method="post" action="/login">'
-        '<label for="name">Who are you?</label>'
-        f'<input id="name" name="name" value="{escape(name)}" autocomplete="name" required '
-        f'maxlength="{MAX_NAME_LENGTH}" aria-describedby="why">'
-        '<p class="hint" id="why">Your name is kept with what you change.</p>'
-        f'{secret}<button type="submit">Log in</button></form>'
-    )

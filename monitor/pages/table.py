@@ -1,4 +1,4 @@
-"""The pages that JavaScript draws in the browser: an entry each in `PAGES`."""
+"""The pages that scripts fill in the browser: an entry each in `PAGES`."""
 
 from __future__ import annotations
 
@@ -6,10 +6,10 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from nicegui import ui
 from starlette.requests import Request
+from starlette.responses import HTMLResponse
 
-from monitor.pages.shell import shell, style_links, use_module
+from monitor.pages.shell import render
 from monitor.urls import is_for_others
 
 if TYPE_CHECKING:
@@ -26,52 +26,43 @@ class Page:
     Attributes:
         path: as FastAPI writes it.
         title: for the browser's tab; parameters of the path may stand in it, in braces.
-        root: id of the element that the module fills.
-        module: file below `/static/`.
-        styles: names of style sheets below `/static/`, applied after the shell's.
-        data: what the module gets, as `use_module` takes it.
+        entry: folder of `web/src/` whose script and style sheet it has; also the id of the element that the
+            script fills.
+        data: what `pageData()` of `lib/page_data.js` returns to the script; values that JSON has.
         here: the path that is marked in the navigation; None: `path`; "": the page has no header.
-        classes: CSS classes of the root element.
-        dark: whether it is dark; None: as the browser is set.
+        root_classes: CSS classes of the element.
+        template: its file in `templates/`; one of its own extends `script.html.j2`.
     """
 
     path: str
     title: str
-    root: str
-    module: str
-    styles: tuple[str, ...]
+    entry: str
     data: Data = lambda _monitor, _request, _visitor: {}
     here: str | None = None
-    classes: str = ""
-    dark: bool | None = None
+    root_classes: str = ""
+    template: str = "script.html.j2"
 
 
 PAGES = (
-    Page("/", "Live", "live", "live.js", ("monitor",)),
-    Page("/chart", "Statechart", "chart", "chart.js", ("monitor",)),
+    Page("/", "Live", "live"),
+    Page("/chart", "Statechart", "chart"),
     Page(
         "/pilot",
         "Pilot",
         "pilot",
-        "pilot.js",
-        ("monitor", "pilot"),
         lambda _monitor, _request, visitor: {"mayFly": visitor.may_fly},
-        classes="pilot",
+        root_classes="pilot",
     ),
     Page(
         "/competition",
         "Competition",
         "competition",
-        "competition.js",
-        ("competition",),
         lambda _monitor, _request, visitor: {"judge": visitor.may_judge},
     ),
     Page(
         "/competition/try/{try_id:int}",
         "Try {try_id}",
         "try",
-        "competition_try.js",
-        ("competition",),
         lambda _, request, visitor: {"judge": visitor.may_judge, "attempt": request.path_params["try_id"]},
         here="/competition",
     ),
@@ -79,17 +70,13 @@ PAGES = (
         "/ranking",
         "Ranking",
         "ranking",
-        "competition_ranking.js",
-        ("competition",),
         lambda monitor, _request, _visitor: {"join": is_for_others(monitor.place[0])},
     ),
-    Page("/stage", "Stage", "stage", "stage.js", ("monitor", "stage"), here="", dark=True),
+    Page("/stage", "Stage", "stage", here=""),
     Page(
         "/replay",
         "Replay",
         "replay",
-        "replay.js",
-        ("monitor", "replay"),
         lambda monitor, _request, _visitor: {"hasRuns": monitor.equipment.runs is not None},
     ),
 )
@@ -98,14 +85,29 @@ PAGES = (
 def register(monitor: Monitor) -> None:
     """Add the pages."""
     for page in PAGES:
-        _add(monitor, page)
+        add_page(monitor, page)
 
 
-def _add(monitor: Monitor, page: Page) -> None:
-    @ui.page(page.path, dark=page.dark)
-    def show(request: Request) -> None:
-        here = page.path if page.here is None else page.here
-        with shell(monitor, request, page.title.format(**request.path_params), here) as visitor:
-            ui.add_head_html(style_links(*page.styles))
-            ui.element("div").props(f"id={page.root}").classes(page.classes)
-        use_module(page.module, **page.data(monitor, request, visitor))
+def add_page(monitor: Monitor, page: Page) -> None:
+    """Add one page to the monitor's web application."""
+
+    @monitor.web.get(page.path)
+    async def show(request: Request) -> HTMLResponse:
+        visitor = monitor.access.visitor(request)
+        title = page.title.format(**request.path_params)
+        return render_page(page, visitor, monitor.instance, title, page.data(monitor, request, visitor))
+
+
+def render_page(
+    page: Page, visitor: Visitor, instance: str, title: str, data: dict[str, object]
+) -> HTMLResponse:
+    """The page's HTML, which its script fills."""
+    return render(
+        page.template,
+        visitor,
+        instance,
+        title=title,
+        here=page.path if page.here is None else page.here,
+        style=page.entry,
+        values={"entry": page.entry, "root": page.entry, "root_classes": page.root_classes, "data": data},
+    )

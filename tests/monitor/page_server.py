@@ -9,19 +9,18 @@ from contextlib import asynccontextmanager, suppress
 from pathlib import Path
 
 import cv2
-import nicegui
 import numpy as np
 from aiohttp import WSMsgType, web
 
-import monitor
 from monitor.access import Visitor
-from monitor.pages.shell import HEAD, header_html, style_links
+from monitor.pages.static_files import STATIC
+from monitor.pages.table import PAGES, render_page
+from monitor.security import CONTENT_POLICY
 
-STATIC = Path(monitor.__file__).parent / "static"
-ELEMENTS = Path(nicegui.__file__).parent / "elements"
+SOURCES = Path(__file__).parents[2] / "web" / "src"
+SERVED = {page.path: page for page in PAGES if page.path in ("/", "/chart", "/stage")}
 JPEG = cv2.imencode(".jpg", np.full((240, 320, 3), (56, 176, 226), np.uint8))[1].tobytes()
 REPEAT_S = 1.0  # a page takes a monitor that says nothing for four seconds for lost
-PAGES = {"/": ("live", "live.js"), "/chart": ("chart", "chart.js"), "/stage": ("stage", "stage.js")}
 
 
 NO_CONTEST = {
@@ -58,15 +57,14 @@ class FakeMonitor:
         """Listen; a second time at the same port as before."""
         app = web.Application()
         self._ended.clear()
-        for path in PAGES:
+        for path in SERVED:
             app.router.add_get(path, self._page)
         app.router.add_get("/ws/live", self._watch)
         app.router.add_get("/video/{id}/frames", self._frames)
         app.router.add_get("/api/competition/stage", self._stage)
         app.router.add_get("/ws/competition", self._contest)
         app.router.add_static("/static", STATIC)
-        for name, element in (("three", "scene"), ("mermaid", "mermaid")):
-            app.router.add_static(f"/lib/{name}", ELEMENTS / element / "dist")
+        app.router.add_static("/sources", SOURCES)  # for tests of single modules
         self._runner = web.AppRunner(app, shutdown_timeout=0.1)
         await self._runner.setup()
         site = web.TCPSite(self._runner, "127.0.0.1", self._port, reuse_address=True)
@@ -110,17 +108,10 @@ class FakeMonitor:
             await self._somebody.wait()
 
     async def _page(self, request):
-        name, module = PAGES[request.path]
-        is_bare = name == "stage"
-        header = "" if is_bare else header_html(Visitor("", may_judge=False, may_fly=False), request.path)
-        style = style_links("monitor", "stage") if is_bare else style_links("monitor")
-        return web.Response(
-            content_type="text/html",
-            text=f'<!doctype html><html lang="en"><head><meta name="viewport" content="width=device-width">'
-            f'<link rel="icon" href="data:,">{HEAD}{style}</head><body>{header}'
-            f'<script type="application/json" data-module="/static/{module}">{{}}</script>'
-            f'<main class="page" id="main"><div id="{name}"></div></main></body></html>',
-        )
+        page = SERVED[request.path]
+        html = render_page(page, Visitor("", may_judge=False, may_fly=False), "fake", page.title, {})
+        headers = {"Content-Security-Policy": CONTENT_POLICY}
+        return web.Response(body=html.body, content_type="text/html", charset="utf-8", headers=headers)
 
     async def _watch(self, request):
         watcher = web.WebSocketResponse()

@@ -1,20 +1,17 @@
-"""A page in the monitor's frame, with a module and with data that contains markup."""
+"""A page in the monitor's frame, with data that contains markup."""
 
 from fastapi import Request, Response
-from nicegui import ui
 
-from monitor.pages.shell import shell, use_module
+from monitor.pages.table import Page, add_page
 
 EVIL = "</script><script>window.broken = true</script>"
 
 
 def register(monitor):
-    @ui.page("/")
-    def home(request: Request):
-        with shell(monitor, request, "Sample", "/") as visitor:
-            ui.label(f"may judge: {visitor.may_judge}")
-            ui.label(EVIL)
-        use_module("camera.js", text=EVIL)
+    def data(_monitor, _request, visitor):
+        return {"text": EVIL, "judge": visitor.may_judge}
+
+    add_page(monitor, Page("/", "Sample", "shell", data))
 
     @monitor.web.post("/judges-only")
     async def judges_only(request: Request):

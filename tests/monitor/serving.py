@@ -79,7 +79,7 @@ async def serving(monkeypatch, *modules, bind="127.0.0.1", port=0, password=None
         fleets.append(StubFleet(equipment))
         return fleets[-1]
 
-    own = ("monitor.live_channel", "monitor.video_proxy", "monitor.pages.login")
+    own = ("monitor.live_channel", "monitor.video_proxy", "monitor.pages.shell", "monitor.pages.login")
     monkeypatch.setattr("monitor.server.MODULES", (*own, *modules))
     monkeypatch.setattr("monitor.server.Fleet", make_fleet)
     lines: list[str] = []

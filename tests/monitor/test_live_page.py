@@ -19,7 +19,7 @@ from offboard.mission import load_mission, mermaid
 from offboard.navigation.frame_estimate import FrameEstimate
 from offboard.navigation.view import NavigationView
 from scenarios.loader import load_scenario
-from tests.chromium import Complaints
+from tests.chromium import Complaints, until
 from tests.monitor.page_server import JPEG, fake_monitor
 from tests.monitor.vehicle.test_mission_view import tunnel
 from vision.types import Detections
@@ -124,7 +124,7 @@ async def visit(browser, fake, path="/", viewport=LAPTOP, *, three=None, script=
         await route.continue_()
 
     if three is not None:
-        await page.route("**/lib/three/index.js", load_three)
+        await page.route("**/static/chunks/scene-*.js", load_three)
     page.set_default_timeout(PATIENCE_MS)
     complaints = Complaints(page)
     await page.goto(fake.url + path)
@@ -147,8 +147,8 @@ async def frames_drawn(page):
 async def test_the_library_for_diagrams_is_loaded_before_a_mission_is_received(chromium, fake):
     fake.welcome = [world()]
     page, complaints = await visit(chromium, fake)
-    await page.wait_for_function(
-        "performance.getEntriesByType('resource').some((each) => /stateDiagram/.test(each.name))"
+    await until(
+        page, "performance.getEntriesByType('resource').some((each) => /stateDiagram/.test(each.name))"
     )
     assert complaints == []
 
@@ -267,13 +267,13 @@ async def test_keys_and_buttons_change_the_view_and_the_drone_is_drawn(solid_chr
         await expect(arena).to_have_attribute("data-view", name)
         button = page.locator(f'.m-views [data-view="{name}"]')
         await expect(button).to_have_attribute("aria-pressed", "true")
-    await page.wait_for_function("document.querySelector('.m-arena').dataset.frames > 0")
+    await until(page, "document.querySelector('.m-arena').dataset.frames > 0")
     for name in ("follow", "orbit"):
         await page.locator(f'.m-views [data-view="{name}"]').click()
         await expect(arena).to_have_attribute("data-view", name)
     before = await frames_drawn(page)
     await fake.say("pose", drones=[pose(), pose(2, p=[0.0, 0.0, 1.0])])
-    await page.wait_for_function(f"document.querySelector('.m-arena').dataset.frames > {before}")
+    await until(page, f"document.querySelector('.m-arena').dataset.frames > {before}")
     await expect(page.locator(".m-arena-legend")).to_have_text("turning")
     await expect(page.locator(".m-arena-labels span")).to_have_text(["1", "2"])
     # Motors that come on again begin a new try, and its trail has colours of its own.
@@ -321,7 +321,8 @@ async def test_without_webgl_the_arena_is_shown_from_above(chromium, fake):
     await expect(page.locator(".m-arena-words")).to_contain_text("from above")
     await fake.say("pose", drones=[pose(p=[4.0, 4.0, 1.0])])
     # The drone's dark arrow comes to stand on the floor's gold.
-    await page.wait_for_function(
+    await until(
+        page,
         """() => {
           const canvas = document.querySelector(".m-topview");
           const {width, height} = canvas;
@@ -329,7 +330,7 @@ async def test_without_webgl_the_arena_is_shown_from_above(chromium, fake):
           for (let index = 0; index < pixels.length; index += 4)
             if (pixels[index + 3] === 255 && pixels[index] === 28 && pixels[index + 1] === 39) return true;
           return false;
-        }"""
+        }""",
     )
     assert complaints == []
 
@@ -387,9 +388,9 @@ async def test_the_navigators_map_is_drawn_from_above_and_can_be_switched_off(ch
     await expect(page.locator(".m-arena")).to_have_attribute("data-mapped", "red constructor")
     await expect(goal).to_have_text(f"navigator: {MARKUP}")
     for colour, least in ((PURE_RED, 20), (PALE_RED, 300), (PATH, 30)):
-        await page.wait_for_function(f"(colour) => ({COUNT_PIXELS})(colour) >= {least}", arg=colour)
+        await until(page, f"(colour) => ({COUNT_PIXELS})(colour) >= {least}", arg=colour)
     await button.click()
-    await page.wait_for_function(f"(colour) => ({COUNT_PIXELS})(colour) === 0", arg=PATH)
+    await until(page, f"(colour) => ({COUNT_PIXELS})(colour) === 0", arg=PATH)
     await expect(goal).to_be_hidden()
     await button.click()
     await expect(goal).to_be_visible()
@@ -401,7 +402,7 @@ async def test_the_navigators_map_is_drawn_from_above_and_can_be_switched_off(ch
 async def test_the_navigators_map_is_drawn_in_three_dimensions(solid_chromium, fake):
     page, complaints = await visit(solid_chromium, fake)
     arena = page.locator(".m-arena")
-    await page.wait_for_function("document.querySelector('.m-arena').dataset.frames > 0")
+    await until(page, "document.querySelector('.m-arena').dataset.frames > 0")
 
     async def path_pixels():
         picture = cv2.imdecode(np.frombuffer(await arena.screenshot(), np.uint8), cv2.IMREAD_COLOR)
@@ -410,7 +411,7 @@ async def test_the_navigators_map_is_drawn_in_three_dimensions(solid_chromium, f
 
     assert await path_pixels() == 0
     await fake.say(**reported_map())
-    await page.wait_for_function("document.querySelector('.m-arena').dataset.mapped")
+    await until(page, "document.querySelector('.m-arena').dataset.mapped")
     for _ in range(100):  # pictures that are drawn when the machine has time
         if await path_pixels() >= 30:
             break
@@ -443,7 +444,7 @@ async def test_camera_boxes_and_arena_are_of_one_moment(chromium, fake):
             seen = {"red": BOX, "green": None, "blue": None}
             await fake.say("detections", id=1, t=round(t - 0.2, 3), width=320, height=240, boxes=seen)
         await asyncio.sleep(0.05)
-    await page.wait_for_function("Number(document.querySelector('.m-camera').dataset.time) >= 12.69")
+    await until(page, "Number(document.querySelector('.m-camera').dataset.time) >= 12.69")
     moments = [each for each in await page.evaluate("window.moments") if each[0] > 10.5]
     assert len(moments) >= 4
     assert {boxes for _, boxes, _ in moments} == {f"{image:.6g}" for image, _, _ in moments}
@@ -496,7 +497,7 @@ async def test_an_image_that_comes_before_the_first_pose_is_shown(chromium, fake
     page, complaints = await visit(chromium, fake)
     shown = await page.evaluate(
         """async (pose) => {
-          const { Playout } = await import("/static/playout.js");
+          const { Playout } = await import("/sources/lib/flight/playout.js");
           const shown = [];
           const playout = new Playout(({ image }) => { if (image) shown.push(image.t); });
           playout.choose(pose.id);
@@ -529,11 +530,11 @@ async def test_all_of_it_fits_a_large_screen_with_the_team(chromium, fake, viewp
     await expect(page.locator(".m-team-name")).to_have_text(MARKUP)
     page_size = "[document.documentElement.scrollWidth, document.documentElement.scrollHeight]"
     wait = f"String({page_size}) === String([innerWidth, innerHeight])"
-    await page.wait_for_function(wait)
+    await until(page, wait)
     before = await page.locator(".m-camera").bounding_box()
     await fake.say("status", drones=[status(video=True)])
     await expect(page.locator("#live")).to_have_class(re.compile(r"\bm-flying\b"))
-    await page.wait_for_function(wait)
+    await until(page, wait)
     during = await page.locator(".m-camera").bounding_box()
     assert during["width"] > 1.1 * before["width"]
     assert during["width"] > 0.35 * viewport["width"]

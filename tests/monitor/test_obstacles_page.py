@@ -5,6 +5,7 @@ import numpy as np
 import pytest
 
 from scenarios.loader import load_scenario
+from tests.chromium import until
 from tests.monitor.test_live_page import WITHOUT_WEBGL, chart, fake, status, visit, world
 
 __all__ = ["fake"]
@@ -25,7 +26,7 @@ async def test_obstacles_are_drawn_from_above(chromium, fake):
     page, complaints = await visit(chromium, fake, script=WITHOUT_WEBGL)
     await page.wait_for_selector(".m-topview")
     for colour, least in (([120, 70, 180], 100), ([0, 255, 255], 10), ([255, 0, 255], 10)):
-        await page.wait_for_function(f"(colour) => ({COUNT_PIXELS})(colour) >= {least}", arg=colour)
+        await until(page, f"(colour) => ({COUNT_PIXELS})(colour) >= {least}", arg=colour)
     assert complaints == []
 
 
@@ -33,7 +34,7 @@ async def test_obstacles_are_drawn_in_three_dimensions(solid_chromium, fake):
     fake.welcome[0] = world(scenario=CROWDED)
     page, complaints = await visit(solid_chromium, fake)
     arena = page.locator(".m-arena")
-    await page.wait_for_function("document.querySelector('.m-arena').dataset.frames > 0")
+    await until(page, "document.querySelector('.m-arena').dataset.frames > 0")
 
     async def violet_pixels():
         picture = cv2.imdecode(np.frombuffer(await arena.screenshot(), np.uint8), cv2.IMREAD_COLOR)

@@ -11,7 +11,7 @@ from monitor.access import Access, Visitor
 from monitor.pilot_seat import NEUTRAL
 from monitor.ports import Equipment
 from monitor.vehicle.commands import Sticks
-from tests.chromium import Complaints
+from tests.chromium import Complaints, until
 from tests.monitor.pilot_fakes import MISSION, FakeFleet
 from tests.monitor.pilot_server import served
 
@@ -57,7 +57,7 @@ class Pilot:
     async def open(self, url):
         await self.page.goto(f"{url}pilot")
         await self.page.wait_for_selector(".p-state strong:not(:empty)")
-        await self.page.wait_for_function("document.querySelector('.p-orders button')")
+        await until(self.page, "document.querySelector('.p-orders button')")
 
     async def take(self):
         await self.page.get_by_role("button", name="Take sticks").click()
@@ -194,7 +194,7 @@ async def test_two_fingers_hold_two_sticks_which_spring_back(monitor):
 async def test_all_controls_are_visible_without_scrolling(monitor, viewport):
     pilot = await monitor(viewport)
     await pilot.take()
-    await pilot.page.wait_for_function("document.scrollingElement.scrollWidth <= innerWidth")
+    await until(pilot.page, "document.scrollingElement.scrollWidth <= innerWidth")
     for selector in (".p-state", ".p-left", ".p-right", ".p-orders", ".p-middle .stop", ".p-figures"):
         box = await pilot.page.locator(selector).first.bounding_box()
         assert box["y"] >= 0 and box["y"] + box["height"] <= viewport["height"] + 1, selector
@@ -253,9 +253,7 @@ async def test_escape_gives_back_to_the_mission_that_waits(monitor):
     await pilot.page.keyboard.press("Escape")
     await pilot.says("the mission frame_challenge goes on")
     pilot.fleet.status[1]["mission"] = MISSION | {"paused": False}
-    await pilot.page.wait_for_function(
-        "document.querySelector('.p-who').textContent === 'Automaticmission red.turning'"
-    )
+    await until(pilot.page, "document.querySelector('.p-who').textContent === 'Automaticmission red.turning'")
 
 
 async def test_stopping_the_motors_requires_confirmation(monitor):
@@ -334,6 +332,6 @@ async def test_texts_of_drones_and_names_are_escaped(monitor):
     pilot.fleet.refuse["arm"] = evil
     await pilot.page.get_by_role("button", name="Arm", exact=True).click()
     await pilot.says(evil)
-    await pilot.page.wait_for_function(f"document.querySelector('.p-who').textContent.includes({evil!r})")
+    await until(pilot.page, f"document.querySelector('.p-who').textContent.includes({evil!r})")
     assert await pilot.page.locator("img[src=x]").count() == 0
     assert pilot.complaints == []

@@ -8,7 +8,7 @@ import pytest
 from playwright.async_api import expect
 
 from monitor.ports import RunInfo
-from tests.chromium import Complaints
+from tests.chromium import Complaints, until
 from tests.monitor.replay_runs import END_S, MARKUP, Library, a_run, info_of, serving_runs
 
 pytestmark = pytest.mark.asyncio(loop_scope="session")
@@ -38,7 +38,7 @@ async def seek(page, t):
         "(slider, t) => { slider.value = t; slider.dispatchEvent(new Event('input', { bubbles: true })); }",
         str(t),
     )
-    await page.wait_for_function("t => Number(document.querySelector('.r-time').dataset.value) === t", arg=t)
+    await until(page, "t => Number(document.querySelector('.r-time').dataset.value) === t", arg=t)
 
 
 def figure(page, name, side=0):
@@ -104,7 +104,7 @@ async def test_the_image_of_the_time_is_shown(monkeypatch, chromium):
     async with opened(monkeypatch, chromium, Library(a_run()), "replay?a=first&t=10.2") as page:
         for t, number in ((10.2, 20), (27.5, 55), (3.3, 6)):
             await seek(page, t)
-            await page.wait_for_function(shown, arg=4 * number)
+            await until(page, shown, arg=4 * number)
         await seek(page, -1)
         await expect(page.locator(".m-camera-words")).to_have_text("before the first image")
 
@@ -118,27 +118,27 @@ async def test_it_plays_pauses_steps_and_ends_by_keyboard(monkeypatch, chromium)
         await page.locator("#main").focus()
         await page.keyboard.press("Space")
         await expect(bar).to_have_attribute("data-playing", "true")
-        await page.wait_for_function(f"{time} > 8")
+        await until(page, f"{time} > 8")
         await page.keyboard.press("Space")
         await expect(bar).to_have_attribute("data-playing", "false")
         stood = await page.evaluate(time)
         await page.keyboard.press(".")
-        await page.wait_for_function(f"t => Math.abs({time} - t - 0.1) < 0.002", arg=stood)
+        await until(page, f"t => Math.abs({time} - t - 0.1) < 0.002", arg=stood)
         await page.keyboard.press(",")
-        await page.wait_for_function(f"t => Math.abs({time} - t) < 0.002", arg=stood)
+        await until(page, f"t => Math.abs({time} - t) < 0.002", arg=stood)
         await page.locator(".r-slider").focus()
         await page.keyboard.press("Home")
-        await page.wait_for_function(f"{time} === -1")
+        await until(page, f"{time} === -1")
         await page.keyboard.press("PageUp")
         await page.keyboard.press("ArrowRight")
-        await page.wait_for_function(f"Math.abs({time} - 4.1) < 0.002")
+        await until(page, f"Math.abs({time} - 4.1) < 0.002")
         await page.keyboard.press("-")
         assert await page.locator(".r-buttons select").input_value() == "8"
         await page.keyboard.press("End")
-        await page.wait_for_function(f"{time} === {END_S}")
+        await until(page, f"{time} === {END_S}")
         await page.keyboard.press("Space")  # from the end it begins again
-        await page.wait_for_function(f"{time} < 30")
-        await page.wait_for_function(f"{time} === {END_S}")
+        await until(page, f"{time} < 30")
+        await until(page, f"{time} === {END_S}")
         await expect(bar).to_have_attribute("data-playing", "false")
 
 
@@ -193,7 +193,7 @@ async def test_on_a_phone_two_flights_are_stacked_and_fit(monkeypatch, chromium)
 async def test_the_address_is_a_link_to_the_present_view(monkeypatch, chromium):
     async with opened(monkeypatch, chromium, Library(a_run()), "replay?a=first") as page:
         await seek(page, 21.5)
-        await page.wait_for_function("location.search === '?a=first&t=21.5'")
+        await until(page, "location.search === '?a=first&t=21.5'")
         await page.reload()
         await expect(page.locator(".r-side")).to_have_attribute("data-state", "green.turning")
         await expect(page.locator(".r-time")).to_have_text("21.5 s")

@@ -3,6 +3,7 @@
 import pytest
 import pytest_asyncio
 
+from tests.chromium import until
 from tests.monitor.competition.harness import contest, event
 from tests.monitor.competition.test_pages import faults, open_page, text_of
 
@@ -20,7 +21,8 @@ async def running(tmp_path, monkeypatch):
 
 
 async def until_text(page, selector, words):
-    await page.wait_for_function(
+    await until(
+        page,
         "([selector, words]) => [...document.querySelectorAll(selector)]"
         ".map((each) => each.textContent).join(' ') === words",
         arg=[selector, words],

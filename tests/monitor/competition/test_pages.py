@@ -5,7 +5,7 @@ import asyncio
 import pytest
 import pytest_asyncio
 
-from tests.chromium import Complaints
+from tests.chromium import Complaints, until
 from tests.monitor.competition.harness import PASSWORD, contest, event
 
 pytestmark = pytest.mark.asyncio(loop_scope="session")
@@ -72,7 +72,7 @@ async def test_a_judge_corrects_and_the_ranking_in_another_window_follows_within
     await running.fly("a", first, time_s=40.0)
     await running.fly("b", second, time_s=45.0)
     ranking = await open_page(chromium, running, "ranking", size=(1920, 1080))
-    await ranking.wait_for_function("document.querySelectorAll('.ranking tbody tr').length === 2")
+    await until(ranking, "document.querySelectorAll('.ranking tbody tr').length === 2")
     names = "[...document.querySelectorAll('.ranking .name')].map((name) => name.textContent).join()"
     assert await ranking.evaluate(names) == "Falken,Adler"
     assert "760.00" in await text_of(ranking, f"[data-team='{first}']")
@@ -88,7 +88,7 @@ async def test_a_judge_corrects_and_the_ranking_in_another_window_follows_within
     saved_ms = await judge.evaluate(
         "() => { document.querySelector('form.judge').requestSubmit(); return Date.now(); }"
     )
-    await ranking.wait_for_function("window.changedAt !== null")
+    await until(ranking, "window.changedAt !== null")
     assert await ranking.evaluate("window.changedAt") - saved_ms < 1000
     assert "790.00" in await text_of(ranking, f"[data-team='{first}']")
     assert await ranking.evaluate("window.moved") == ["TR", "TR"]  # they glide to their places
@@ -152,14 +152,14 @@ async def test_a_whole_contest_by_hand(running, chromium):
     await page.wait_for_selector(".teams .members")
     await page.fill("#team-name", "FALKEN")
     await page.press("#team-name", "Enter")
-    await page.wait_for_function("document.querySelector('.line').textContent.includes('taken')")
+    await until(page, "document.querySelector('.line').textContent.includes('taken')")
 
     await page.click("summary:has-text('Draw scenarios')")
     await page.fill("#draw-other", "calm-17")
     await page.press("#draw-other", "Enter")
     await page.fill("#draw-count", "5")
     await page.click("button:has-text('Draw')")
-    await page.wait_for_function("document.querySelectorAll('.drawn li').length === 5")
+    await until(page, "document.querySelectorAll('.drawn li').length === 5")
     drawn = await page.evaluate(
         "[...document.querySelectorAll('.drawn strong')].map((each) => each.textContent)"
     )
@@ -172,15 +172,15 @@ async def test_a_whole_contest_by_hand(running, chromium):
     await page.wait_for_selector(".flight.called")
     running.fleet.tell(event("began", "k", drawn[0], time_s=0.0))
     running.fleet.tell(event("running", "k", drawn[0], time_s=12.0, crossed=("red",)))
-    await page.wait_for_function("document.querySelector('.flight .clock')?.textContent === '12.0'")
+    await until(page, "document.querySelector('.flight .clock')?.textContent === '12.0'")
     running.fleet.tell(event("ended", "k", drawn[0], time_s=44.44))
-    await page.wait_for_function("document.querySelector('.tries .number')?.textContent === '44.44'")
+    await until(page, "document.querySelector('.tries .number')?.textContent === '44.44'")
     assert "Nobody is called" in await page.inner_text(".now")
 
     await page.click("summary:has-text('Change the rule')")
     await page.select_option("#rule-counting", "last")
     await page.click("button:has-text('Set')")
-    await page.wait_for_function("document.body.innerText.includes('the last counts')")
+    await until(page, "document.body.innerText.includes('the last counts')")
     assert (await running.get("ranking"))[1]["rule"]["who"] == "Ada"
     assert [each for each in faults(page) if "422" not in each] == []
 
@@ -200,7 +200,7 @@ async def test_an_answer_that_a_message_overtook_shows_no_older_time(running, ch
     running.fleet.tell(event("began", "k", time_s=0.0))
     await asyncio.wait_for(asked.wait(), 30.0)
     running.fleet.tell(event("running", "k", time_s=12.0))
-    await page.wait_for_function("document.querySelector('.flight .clock')?.textContent === '12.0'")
+    await until(page, "document.querySelector('.flight .clock')?.textContent === '12.0'")
     answered.set()
     await page.wait_for_selector(".tries tr[data-state='running']")
     assert await page.inner_text(".flight .clock") == "12.0"
@@ -217,7 +217,7 @@ async def test_a_form_that_another_judge_saved_meanwhile_is_refused(running, chr
     await page.evaluate("document.querySelector('form.judge').requestSubmit()")
     await page.wait_for_selector(".line:has-text('Another judge')")
     await page.click("button:has-text('Show the new state')")
-    await page.wait_for_function("document.getElementById('contacts').value === '4'")
+    await until(page, "document.getElementById('contacts').value === '4'")
     await page.fill("#penalty", "9")
     await page.evaluate("document.querySelector('form.judge').requestSubmit()")
     await page.wait_for_selector(".line:has-text('Saved')")
@@ -250,12 +250,12 @@ async def test_crossings_and_completion_by_hand(running, chromium):
     await page.wait_for_selector(".line:has-text('Saved')")
     await page.select_option("#try-team", str(team))
     await page.click("button:has-text('Set')")
-    await page.wait_for_function("document.querySelectorAll('.history .by').length === 2")
+    await until(page, "document.querySelectorAll('.history .by').length === 2")
     ranking = (await running.get("ranking"))[1]["ranking"]["rows"][0]
     assert ranking["cells"][0]["counted_s"] == 50.0
     page.on("dialog", lambda dialog: dialog.accept())
     await page.click("button:has-text('As the referee says')")
-    await page.wait_for_function("document.querySelectorAll('.history .by').length === 3")
+    await until(page, "document.querySelectorAll('.history .by').length === 3")
     assert (await running.get("tries/1"))[1]["try"]["result"]["counted_s"] == 240.0
 
 
@@ -266,9 +266,9 @@ async def test_the_clock_of_a_try_runs_until_its_result_stands_there(running, ch
     await page.wait_for_selector(".flight.called:has-text('Falken')")
     running.fleet.tell(event("began", "k", time_s=3.0))
     await page.wait_for_selector("[data-team][data-flying]")
-    await page.wait_for_function("Number(document.querySelector('.clock').textContent) > 3.5")
+    await until(page, "Number(document.querySelector('.clock').textContent) > 3.5")
     running.fleet.tell(event("ended", "k", time_s=60.0))
-    await page.wait_for_function("document.querySelector('.ranking .time').textContent === '60.00'")
+    await until(page, "document.querySelector('.ranking .time').textContent === '60.00'")
     assert await page.locator(".clock").count() == 0
 
 

@@ -1,0 +1,1 @@
+function n(){let t=document.getElementById("page-data");return t?JSON.parse(t.textContent??"{}"):{}}function o(t){let e=document.getElementById(t);if(!e)throw new Error(`the page has no element #${t}`);return e}export{n as a,o as b};

@@ -1,0 +1,149 @@
+/** The scenarios of a round, drawn at random, and the rule by which tries are added up. */
+
+import { send } from "../lib/contest/channel.js";
+import { moment, nameOf } from "../lib/contest/words.js";
+import { make, setText } from "../lib/dom.js";
+
+const NAME = /^[a-z0-9][a-z0-9_-]{0,79}$/;
+
+export class Draw {
+  #desk;
+  #drawn = make("div", { class: "drawn" });
+  #pool = make("div", { class: "pool" });
+  #count = make("input", { id: "draw-count", type: "number", min: "1", max: "10", inputmode: "numeric" });
+  #other = make("input", { id: "draw-other", maxlength: "80", autocomplete: "off", spellcheck: "false" });
+  #flown = false;
+  #known = null;
+
+  /** @param {{judge: boolean, attempt: function(function(): Promise<void>): Promise<boolean>}} desk */
+  constructor(desk) {
+    this.#desk = desk;
+    this.element = make("section", { class: "panel", "aria-labelledby": "draw-title" },
+      make("h2", { id: "draw-title" }, "Scenarios of the round"), this.#drawn);
+    if (desk.judge) this.element.append(this.#form());
+  }
+
+  #form() {
+    const add = make("button", { type: "button" }, "Add");
+    add.addEventListener("click", () => this.#add());
+    this.#other.addEventListener("keydown", (event) => {
+      if (event.key !== "Enter") return;
+      event.preventDefault();
+      this.#add();
+    });
+    const form = make("form", { class: "fields" },
+      make("fieldset", {}, make("legend", {}, "Draw from"), this.#pool),
+      make("label", { for: "draw-other" }, "Another one, such as calm-17 (a random layout)"),
+      make("div", { class: "buttons" }, this.#other, add),
+      make("label", { for: "draw-count" }, "How many"), this.#count,
+      make("div", { class: "buttons" }, make("button", { type: "submit", class: "main" }, "Draw")));
+    form.addEventListener("submit", (event) => {
+      event.preventDefault();
+      this.#draw();
+    });
+    return make("details", {}, make("summary", {}, "Draw scenarios"), form);
+  }
+
+  #add() {
+    const name = this.#other.value.trim();
+    if (!NAME.test(name)) {
+      this.#desk.say(`scenario "${name}" is no name; use small letters, digits, - and _`);
+      return;
+    }
+    this.#tick(name, true);
+    this.#other.value = "";
+  }
+
+  #tick(name, checked) {
+    const box = make("input", { type: "checkbox", value: name });
+    box.checked = checked;
+    this.#pool.append(make("label", { class: "tick" }, box, name));
+  }
+
+  #draw() {
+    const ticked = [...this.#pool.querySelectorAll("input:checked")].map((box) => box.value);
+    const question = "Tries were flown in this round. Draw for the next round? The tries stay in theirs.";
+    if (this.#flown && !confirm(question)) return;
+    this.#desk.attempt(() => send("draw", { pool: ticked, count: Number(this.#count.value) }));
+  }
+
+  /** @param {object} board @param {string[]} scenarios that can be drawn */
+  show(board, scenarios) {
+    const draw = board.draws.find((each) => each.round === board.round);
+    this.#flown = board.round > 0 && board.tries.some((each) => each.round === board.round);
+    if (draw === undefined) {
+      this.#drawn.replaceChildren(make("p", { class: "hint" },
+        "Nothing has been drawn yet. Until then the first scenarios that are flown make the round."));
+    } else {
+      const items = draw.scenarios.map((name, index) =>
+        make("li", {}, make("strong", {}, name), make("code", {}, draw.commands[index])));
+      this.#drawn.replaceChildren(
+        make("p", { class: "hint" }, `Round ${draw.round}, drawn by `, nameOf(draw.who),
+          ` at ${moment(draw.at)} from ${draw.pool.length}.`),
+        make("ol", {}, ...items));
+    }
+    if (this.#known === null && this.#desk.judge) {
+      for (const name of scenarios) this.#tick(name, true);
+      this.#count.value = String(board.rule.scenarios);
+      this.#known = scenarios;
+    }
+  }
+}
+
+export class Rule {
+  #desk;
+  #words = make("p");
+  #set = make("p", { class: "hint" });
+  #fields = {};
+  #shown = "";
+
+  /** @param {{judge: boolean, attempt: function(function(): Promise<void>): Promise<boolean>}} desk */
+  constructor(desk) {
+    this.#desk = desk;
+    this.element = make("section", { class: "panel", "aria-labelledby": "rule-title" },
+      make("h2", { id: "rule-title" }, "Rule"), this.#words, this.#set);
+    if (desk.judge) this.element.append(this.#form());
+  }
+
+  #form() {
+    const number = (id, label, least, step) => {
+      const input = make("input", { id, type: "number", min: least, step, required: true, inputmode: "decimal" });
+      this.#fields[id] = input;
+      return [make("label", { for: id }, label), input];
+    };
+    const counting = make("select", { id: "rule-counting" },
+      make("option", { value: "best" }, "the best"), make("option", { value: "last" }, "the last"));
+    this.#fields["rule-counting"] = counting;
+    const form = make("form", { class: "fields" },
+      ...number("rule-limit", "A try not completed counts, seconds", "1", "any"),
+      ...number("rule-missing", "And for each frame missing, seconds", "0", "any"),
+      ...number("rule-scenarios", "Scenarios of a round", "1", "1"),
+      make("label", { for: "rule-counting" }, "Of several tries counts"), counting,
+      make("div", { class: "buttons" }, make("button", { type: "submit", class: "main" }, "Set")));
+    form.addEventListener("submit", (event) => {
+      event.preventDefault();
+      this.#desk.attempt(() => send("settings", {
+        limit_s: Number(this.#fields["rule-limit"].value),
+        missing_frame_s: Number(this.#fields["rule-missing"].value),
+        scenarios: Number(this.#fields["rule-scenarios"].value),
+        counting: counting.value,
+      }));
+    });
+    return make("details", {}, make("summary", {}, "Change the rule"), form);
+  }
+
+  /** @param {object} board */
+  show(board) {
+    const rule = board.rule;
+    setText(this.#words, `Sum of try time and penalty over ${rule.scenarios} scenarios. A try that is not completed `
+      + `counts ${rule.limit_s} s and ${rule.missing_frame_s} s for each frame missing; a scenario not flown counts `
+      + `as if all were. Of several tries the ${rule.counting} counts.`);
+    this.#set.replaceChildren(...(rule.at === null ? [] : ["Set by ", nameOf(rule.who), ` at ${moment(rule.at)}.`]));
+    if (!this.#desk.judge || this.#shown === JSON.stringify(rule)) return; // somebody may be typing
+    this.#shown = JSON.stringify(rule);
+    this.#fields["rule-limit"].value = rule.limit_s;
+    this.#fields["rule-missing"].value = rule.missing_frame_s;
+    this.#fields["rule-scenarios"].value = rule.scenarios;
+    this.#fields["rule-counting"].value = rule.counting;
+  }
+}

@@ -1,0 +1,93 @@
+/** What a mission's navigator knows, drawn in the arena: frames as it estimates them, and the path that it plans. */
+import { FRAME_COLOURS } from "../colours.js";
+
+/**
+ * @typedef {object} MappedFrame as in the live channel's message "map"
+ * @property {string} colour
+ * @property {number[]} p centre, metres, arena axes
+ * @property {number} yaw of its normal
+ * @property {number[]|null} std standard deviations along x, y, z, metres; null: not known
+ * @property {boolean} certain known well enough to fly through
+ */
+
+/**
+ * @typedef {object} NavigationMap
+ * @property {string} goal what the navigator does
+ * @property {MappedFrame[]} frames
+ * @property {number[][]} path
+ */
+
+export const SIGMAS = 2; // how many standard deviations an ellipse reaches
+export const PATH_COLOUR = "#b3007d";
+const OTHER_COLOUR = "#7a7a7a"; // of a frame that is no part of the task
+const OUTER_M = [0.42, 0.22]; // width and height of a frame that the scenario does not have
+const AROUND = 1.35; // an outline is drawn so much larger, around the frame where the estimate is right
+export const NORMAL_M = 0.3; // how far the line along its normal goes, to each side
+const [LEAST_M, MOST_M] = [0.005, 4]; // half axes of an ellipsoid
+
+/** The map of a message "map"; null if it is empty, which it is where there is no navigator. */
+export function mapIn(message) {
+  return message.frames.length > 0 || message.path.length > 0 || message.goal !== "" ? message : null;
+}
+
+/** The colour in which a frame is drawn. @param {string} colour */
+export function colourOf(colour) {
+  return Object.hasOwn(FRAME_COLOURS, colour) ? FRAME_COLOURS[colour] : OTHER_COLOUR;
+}
+
+/**
+ * Half the width and the height of a frame's outline, metres.
+ * @param {MappedFrame} frame
+ * @param {object|null} scenario
+ */
+export function halfSizeOf(frame, scenario) {
+  const known = scenario?.frames.find((each) => each.colour === frame.colour);
+  const [width, height] = known ? [known.outer_width_m, known.outer_height_m] : OUTER_M;
+  return [(AROUND * width) / 2, (height + (AROUND - 1) * width) / 2];
+}
+
+/** Half axes of the ellipsoid of a frame's place along x, y, z, metres; null if not known. */
+export function halfAxesOf({ std }) {
+  return std ? std.map((sigma) => Math.min(MOST_M, Math.max(LEAST_M, SIGMAS * sigma))) : null;
+}
+
+/**
+ * Draw a map from above.
+ * @param {CanvasRenderingContext2D} pen its units are metres, x to the right and y up
+ * @param {NavigationMap} map
+ * @param {object|null} scenario
+ * @param {number} pixel_m the size of a pixel
+ */
+export function drawMap(pen, map, scenario, pixel_m) {
+  pen.save();
+  for (const frame of map.frames) {
+    const [wide] = halfSizeOf(frame, scenario);
+    const axes = halfAxesOf(frame);
+    pen.strokeStyle = pen.fillStyle = colourOf(frame.colour);
+    pen.lineWidth = 2 * pixel_m;
+    pen.save();
+    pen.translate(frame.p[0], frame.p[1]);
+    if (axes) {
+      pen.globalAlpha = 0.25;
+      pen.beginPath();
+      pen.ellipse(0, 0, axes[0], axes[1], 0, 0, 2 * Math.PI);
+      pen.fill();
+      pen.globalAlpha = 1;
+    }
+    pen.rotate(frame.yaw);
+    pen.setLineDash(frame.certain ? [] : [4 * pixel_m, 3 * pixel_m]);
+    pen.strokeRect(-0.1, -wide, 0.2, 2 * wide);
+    pen.setLineDash([]);
+    pen.beginPath();
+    pen.moveTo(-NORMAL_M, 0);
+    pen.lineTo(NORMAL_M, 0);
+    pen.stroke();
+    pen.restore();
+  }
+  pen.strokeStyle = PATH_COLOUR;
+  pen.lineWidth = 1.5 * pixel_m;
+  pen.beginPath();
+  for (const [x, y] of map.path) pen.lineTo(x, y);
+  pen.stroke();
+  pen.restore();
+}

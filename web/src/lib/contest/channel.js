@@ -1,0 +1,102 @@
+/** How the contest's pages exchange data with the monitor: requests, judges' changes, and a WebSocket that reports changes. */
+import { ReconnectingSocket } from "../reconnecting_socket.js";
+
+/** Tries that are being flown, as the WebSocket sent them last, and how many times it did. */
+const latest = { running: [], messages: 0 };
+
+/**
+ * Request something. The tries of an answer are replaced by those that the WebSocket sent while it was under way.
+ * @param {string} path below /api/competition/
+ * @returns {Promise<object>} throws an Error with one line for people
+ */
+export async function ask(path) {
+  const before = latest.messages;
+  const given = await answer(await reach(fetch(`/api/competition/${path}`, { cache: "no-store" })));
+  if (latest.messages !== before && given.running !== undefined) given.running = latest.running;
+  return given;
+}
+
+/**
+ * Have something done; only judges may.
+ * @param {string} path below /api/competition/
+ * @param {object} form
+ * @returns {Promise<object>} throws an Error with one line for people; its `status` is that of HTTP
+ */
+export async function send(path, form) {
+  return answer(await reach(fetch(`/api/competition/${path}`, {
+    method: "POST",
+    headers: { "Content-Type": "application/json" },
+    body: JSON.stringify(form),
+  })));
+}
+
+async function reach(fetching) {
+  try {
+    return await fetching;
+  } catch {
+    throw new Error("the monitor does not answer");
+  }
+}
+
+async function answer(response) {
+  if (response.ok) return response.json();
+  const text = await response.text();
+  const error = new Error(detailOf(text) ?? `the monitor answers ${response.status}`);
+  error.status = response.status;
+  throw error;
+}
+
+function detailOf(text) {
+  try {
+    const detail = JSON.parse(text).detail;
+    return typeof detail === "string" ? detail : null;
+  } catch {
+    return text.length < 200 ? text.trim() || null : null;
+  }
+}
+
+/**
+ * Hear of changes, for as long as the page lives; a lost connection is opened again.
+ * @param {{changed: function(any): void, running: function(any[]): void, link: function(boolean): void}} hear
+ *   changed: something is other than before, also after each new connection; link: whether there is a connection
+ */
+export function watch(hear) {
+  return new ReconnectingSocket("/ws/competition", {
+    message: (message) => {
+      if (message.kind === "changed") hear.changed(message);
+      else if (message.kind === "running") {
+        latest.running = message.tries;
+        latest.messages += 1;
+        hear.running(message.tries);
+      }
+    },
+    state: (state) => hear.link(state === "open"),
+  });
+}
+
+/**
+ * Makes one call at a time of a function that asks, and one more if it was wanted meanwhile.
+ * @param {function(): Promise<void>} work
+ * @param {function(Error): void} fail
+ * @returns {function(): Promise<void>} done when what was wanted by then was asked for
+ */
+export function oneAtATime(work, fail) {
+  let going = null;
+  let again = false;
+  const run = async () => {
+    while (again) {
+      again = false;
+      try {
+        await work();
+      } catch (error) {
+        fail(error);
+      }
+    }
+    going = null;
+  };
+  return () => {
+    again = true;
+    going ??= run();
+    return going;
+  };
+}

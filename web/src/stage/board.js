@@ -1,0 +1,70 @@
+/** What the audience's page shows between flights: who is next, the ranking, and at the end the podium. */
+import { isWaiting } from "../lib/contest/now.js";
+import { nameOf } from "../lib/contest/words.js";
+import { make, number } from "../lib/dom.js";
+
+const MOST_ROWS = 8;
+const PLACES = 3;
+
+/** Who is next beside the ranking. */
+export class StageRanking {
+  #next = make("div", { class: "s-next" });
+  #rows = make("ol", { class: "s-rows" });
+  #shown = null;
+
+  constructor() {
+    this.element = make("section", { class: "s-board" }, this.#next, this.#rows);
+  }
+
+  /** @param {object|null} stage as `/api/competition/stage` answers */
+  show(stage) {
+    const told = JSON.stringify([stage?.called, stage?.queue, stage?.last, stage?.ranking]);
+    if (told === this.#shown) return;
+    this.#shown = told;
+    const called = isWaiting(stage?.called ?? null) ? stage.called : null;
+    const first = stage?.queue.teams[0] ?? null;
+    const words = called || first
+      ? [
+        make("p", { class: "s-label" }, called ? "Called" : "Next"),
+        make("p", { class: "s-called" }, nameOf((called ?? first).team_name)),
+        make("p", { class: "s-where" }, called?.scenario ?? ""),
+      ]
+      : [make("p", { class: "s-called" }, "No try is running")];
+    if (called && first) words.push(make("p", { class: "s-before" }, "Next: ", nameOf(first.team_name)));
+    const last = stage?.last;
+    if (last) {
+      const worth = last.completed ? `${number(last.total_s)} s` : "not completed";
+      words.push(make("p", { class: "s-before" }, "Last: ", nameOf(last.team_name || "without a team"), ` · ${worth}`));
+    }
+    this.#next.replaceChildren(...words);
+    const rows = stage?.ranking?.rows ?? [];
+    this.#rows.replaceChildren(...rows.slice(0, MOST_ROWS).map((row) => make(
+      "li", { "data-rank": String(row.rank) },
+      make("span", { class: "s-rank" }, String(row.rank)), nameOf(row.name, { class: "s-row-name" }),
+      make("span", { class: "s-total" }, row.flown ? number(row.total_s) : "–"),
+    )));
+    this.#rows.hidden = rows.length === 0;
+  }
+}
+
+/** The first three of a round that everybody has flown. */
+export class Podium {
+  #steps = make("ol", { class: "s-steps" });
+  #shown = null;
+
+  constructor() {
+    this.element = make("section", { class: "s-podium", "aria-label": "podium" }, this.#steps);
+  }
+
+  /** @param {object} ranking of the round */
+  show(ranking) {
+    const told = JSON.stringify(ranking);
+    if (told === this.#shown) return;
+    this.#shown = told;
+    this.#steps.replaceChildren(...ranking.rows.slice(0, PLACES).map((row, index) => make(
+      "li", { "data-place": String(index + 1), "data-rank": String(row.rank) },
+      nameOf(row.name, { class: "s-winner" }), make("span", { class: "s-total" }, `${number(row.total_s, 2)} s`),
+      make("span", { class: "s-step" }, String(row.rank)),
+    )));
+  }
+}

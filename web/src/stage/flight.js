@@ -1,0 +1,83 @@
+/** What the audience's page says of a flight: who, how long, how far, and how that compares with the best. */
+import { nameOf } from "../lib/contest/words.js";
+import { make, number, setAttribute, setText } from "../lib/dom.js";
+
+const GOOD = ["clean", "completed"];
+
+/** The line at the top: team, time, and at the end the verdict. */
+export class StageHead {
+  #team = make("p", { class: "s-team" });
+  #where = make("p", { class: "s-where" });
+  #clock = make("output", { class: "s-clock", "aria-live": "off" }, "–");
+  #verdict = make("p", { class: "s-verdict", role: "status" });
+  #penalty = make("p", { class: "s-penalty" });
+
+  constructor() {
+    const who = make("div", { class: "s-who" }, this.#team, this.#where);
+    const time = make("div", { class: "s-time" }, make("p", {}, this.#clock, make("small", {}, " s")), this.#penalty);
+    this.element = make("header", { class: "s-head" }, who, this.#verdict, time);
+  }
+
+  /** @param {{team: string, scenario: string, figures: object|null, isOver: boolean, rank: number|null}} told */
+  show({ team, scenario, figures, isOver, rank }) {
+    if (this.#team.dataset.shown !== team) {
+      this.#team.dataset.shown = team;
+      this.#team.replaceChildren(team ? nameOf(team) : "");
+    }
+    setText(this.#where, scenario);
+    setText(this.#clock, number((isOver ? figures?.total_time_s : figures?.try_time_s) ?? null));
+    const penalty = figures?.penalty_s > 0 ? `${isOver ? "with" : "and"} ${number(figures.penalty_s)} s penalty` : "";
+    const late = figures?.time_over && !isOver ? "time over" : "";
+    setText(this.#penalty, late || penalty);
+    const verdict = isOver ? figures?.verdict || "ended" : "";
+    setText(this.#verdict, rank === null ? verdict : `${verdict} · rank ${rank}`);
+    setAttribute(this.#verdict, "data-look", verdict ? (GOOD.includes(verdict) ? "good" : "bad") : null);
+  }
+}
+
+/** The frames and the landing: time of each, and how much before or behind the best. */
+export class Splits {
+  #list = make("ol", { class: "s-tiles" });
+  #against = make("p", { class: "s-against" });
+  #shown = "";
+
+  constructor() {
+    this.element = make("section", { class: "s-splits", "aria-label": "split times" }, this.#list, this.#against);
+  }
+
+  /**
+   * @param {object|null} figures as in the live channel's status
+   * @param {string[]} frames colours to cross, in order
+   * @param {object|null} best try, as `/api/competition/stage` has it
+   */
+  show(figures, frames, best) {
+    const isDone = Boolean(figures?.over) && GOOD.includes(figures.verdict);
+    const times = (figures?.crossed ?? []).map((colour, index) => [colour, figures.crossing_times_s?.[index] ?? null]);
+    const own = Object.fromEntries(times);
+    const told = JSON.stringify([own, frames, best, figures?.next_colour, figures?.over, isDone]);
+    if (told === this.#shown) return;
+    this.#shown = told;
+    const tiles = frames.map((colour) => {
+      const state = colour in own ? "crossed" : figures?.next_colour === colour && !figures.over ? "next" : "open";
+      return tile(colour, colour, state, own[colour] ?? null, best?.splits[colour] ?? null);
+    });
+    const isLanding = figures !== null && figures.next_colour === null && !figures.over;
+    const end = isDone ? figures.total_time_s : null;
+    tiles.push(tile("landed", "", isDone ? "crossed" : isLanding ? "next" : "open", end, best?.completed ? best.total_s : null));
+    this.#list.replaceChildren(...tiles);
+    const name = best ? nameOf(best.team_name || "without a team") : null;
+    this.#against.replaceChildren(...(best ? ["best: ", name, best.completed ? `, ${number(best.total_s)} s` : ", not completed"] : []));
+  }
+}
+
+function tile(name, colour, state, time, best) {
+  const gap = time !== null && best !== null ? time - best : null;
+  const look = gap === null ? null : gap <= 0 ? "ahead" : "behind";
+  const words = gap === null ? (best === null ? "" : `best ${number(best)}`) : `${gap <= 0 ? "▲ −" : "▼ +"}${number(Math.abs(gap))}`;
+  return make(
+    "li", { "data-colour": colour || null, "data-state": state, "data-split": name },
+    make("span", { class: "s-name" }, name),
+    make("span", { class: "s-split" }, time === null ? (state === "crossed" ? "✓" : state === "next" ? "…" : "–") : number(time)),
+    make("span", { class: "s-gap", "data-look": look }, words),
+  );
+}
