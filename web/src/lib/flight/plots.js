@@ -1,12 +1,27 @@
+import uPlot from "uplot";
+import "uplot/dist/uPlot.min.css";
 import { onBeat } from "../beat.js";
 import { make, number, onTheme, setText, themeColour } from "../dom.js";
 
 const WINDOW_S = 60;
+const LINES_S = 15;
 const REDRAW_MS = 220;
 const MOST = 40000; // samples kept: half an hour at 20 a second
 const PI = Math.PI;
 
+/**
+ * @typedef {object} Plot
+ * @property {string} title
+ * @property {string} unit
+ * @property {number} measured index into a sample
+ * @property {number} [commanded] likewise
+ * @property {number} [span] the least range of values that is shown
+ * @property {[number, number]} [range] that is always shown
+ * @property {boolean} [wraps] an angle
+ */
+
 // What is plotted: index into a sample [t, x, y, z, yaw, vx, vy, vz, r, cx, cy, cz, cr].
+/** @type {Plot[]} */
 const PLOTS = [
   { title: "x", unit: "m", measured: 1, span: 1 },
   { title: "velX", unit: "m/s", measured: 5, commanded: 9, span: 0.4 },
@@ -22,23 +37,26 @@ const PLOTS = [
 export class Plots {
   #element;
   #plots;
+  /** @type {number[][]} */
   #samples = [];
+  /** @type {number|null} */
   #until = null;
   #dirty = true;
-  #colours = null;
+  /** @type {Object<string, string>} */
+  #colours = {};
 
   /** @param {HTMLElement} element an empty box; its width is followed */
   constructor(element) {
     this.#element = element;
     const key = (look, words) => make("span", { class: "m-key", "data-look": look }, words);
-    const reach = make("span", { class: "m-reach" }, `the last ${WINDOW_S} s, lines every 15 s`);
+    const reach = make("span", { class: "m-reach" }, `the last ${WINDOW_S} s, lines every ${LINES_S} s`);
     const legend = make("p", { class: "m-legend" }, key("measured", "measured"), key("commanded", "commanded"), reach);
     const grid = make("div", { class: "m-plots" });
-    this.#plots = PLOTS.map((plot) => this.#add(grid, plot));
     element.append(legend, grid);
-    const redraw = () => { this.#dirty = true; this.#colours = null; };
-    new ResizeObserver(redraw).observe(grid);
-    onTheme(redraw);
+    this.#readColours();
+    this.#plots = PLOTS.map((plot) => this.#add(grid, plot));
+    new ResizeObserver(() => this.#fit()).observe(grid);
+    onTheme(() => this.#readColours());
     setInterval(() => onBeat(this, () => this.#tick()), REDRAW_MS);
   }
 
@@ -72,32 +90,72 @@ export class Plots {
     this.#dirty = true;
   }
 
+  #readColours() {
+    const names = ["measured", "commanded", "line", "faint"];
+    this.#colours = Object.fromEntries(names.map((name) => [name, themeColour(this.#element, `--${name}`)]));
+    this.#dirty = true;
+  }
+
+  /** @param {HTMLElement} grid @param {Plot} plot */
   #add(grid, plot) {
     const value = make("output", { "aria-live": "off" });
     const aim = plot.commanded ? make("output", { class: "m-aim", "aria-live": "off", title: "commanded" }) : null;
-    const canvas = make("canvas", { role: "img", "aria-label": `${plot.title} over the last minute, ${plot.unit}` });
+    const box = make("div", { class: "m-plot", role: "img", "aria-label": `${plot.title} over the last minute, ${plot.unit}` });
     const title = make("span", {}, make("b", {}, plot.title), ` ${plot.unit}`);
-    grid.append(make("figure", {}, make("figcaption", {}, title, make("span", {}, aim, " ", value)), canvas));
-    return { ...plot, canvas, value, aim };
+    grid.append(make("figure", {}, make("figcaption", {}, title, make("span", {}, aim, " ", value)), box));
+    return { ...plot, box, value, aim, chart: new uPlot(this.#options(plot), [[], [], []], box) };
+  }
+
+  /** @param {Plot} plot @returns {import("uplot").Options} */
+  #options(plot) {
+    const line = (look, width, dash) => (
+      { stroke: () => this.#colours[look], width, dash, points: { show: false }, spanGaps: false }
+    );
+    const grid = { stroke: () => this.#colours.line, width: 1 };
+    return {
+      width: 100, height: 50, padding: [5, 3, 5, 0],
+      cursor: { show: false }, legend: { show: false },
+      scales: { x: { time: false }, y: { range: (_, low, top) => plot.range ?? rangeOf(low, top, plot) } },
+      axes: [
+        { size: 0, grid, ticks: { show: false }, values: () => [], splits: (_u, _axis, low, top) => everyLine(low, top) },
+        {
+          size: 38, gap: 4, grid, ticks: { show: false }, font: "11px system-ui, sans-serif",
+          stroke: () => this.#colours.faint,
+          splits: (_u, _axis, low, top) => [low, (low + top) / 2, top],
+          values: (_u, [low, , top]) => [low, null, top].map((each) => (each === null ? "" : number(each, top - low >= 4 ? 0 : 1))),
+        },
+      ],
+      series: [{}, line("commanded", 1.6, [4, 3]), line("measured", 1.8, undefined)],
+    };
+  }
+
+  #fit() {
+    for (const { box, chart } of this.#plots) {
+      if (box.clientWidth > 0) chart.setSize({ width: box.clientWidth, height: box.clientHeight });
+    }
+    this.#dirty = true;
   }
 
   #tick() {
     if (!this.#dirty || document.hidden) return;
     this.#dirty = false;
-    this.#colours ??= {
-      measured: themeColour(this.#element, "--measured"),
-      commanded: themeColour(this.#element, "--commanded"),
-      line: themeColour(this.#element, "--line"),
-      faint: themeColour(this.#element, "--faint"),
-    };
     const end = this.#until ?? this.#samples.at(-1)?.[0] ?? 0;
     const first = this.#index(end - WINDOW_S);
     const last = this.#until === null ? this.#samples.length : this.#index(end + 1e-9);
     const shown = this.#samples.slice(Math.max(0, first - 1), last);
-    for (const plot of this.#plots) this.#draw(plot, shown, end);
+    const newest = shown.at(-1);
+    for (const { chart, value, aim, ...plot } of this.#plots) {
+      chart.batch(() => {
+        chart.setData(columns(shown, plot), false);
+        chart.setScale("x", { min: end - WINDOW_S, max: end });
+      });
+      setText(value, number(newest?.[plot.measured] ?? null, 2));
+      const aimed = plot.commanded ? newest?.[plot.commanded] : NaN;
+      if (aim) setText(aim, Number.isFinite(aimed) ? number(aimed, 2) : "");
+    }
   }
 
-  /** How many samples come before a time. */
+  /** How many samples come before a time. @param {number} t */
   #index(t) {
     let [low, high] = [0, this.#samples.length];
     while (low < high) {
@@ -107,90 +165,45 @@ export class Plots {
     }
     return low;
   }
-
-  #draw(plot, shown, end) {
-    const { canvas } = plot;
-    const { clientWidth: width, clientHeight: height } = canvas;
-    if (width === 0) return;
-    const ratio = Math.min(2, devicePixelRatio || 1);
-    const [wide, high] = [Math.round(width * ratio), Math.round(height * ratio)];
-    if (canvas.width !== wide || canvas.height !== high) [canvas.width, canvas.height] = [wide, high];
-    const pen = canvas.getContext("2d", { willReadFrequently: true });
-    pen.setTransform(ratio, 0, 0, ratio, 0, 0);
-    pen.clearRect(0, 0, width, height);
-    const [low, top] = plot.range ?? rangeOf(shown, plot);
-    const [left, upper, lower] = [38, 5, height - 5];
-    const toX = (t) => left + ((t - end + WINDOW_S) / WINDOW_S) * (width - left - 3);
-    const toY = (value) => lower - ((value - low) / (top - low)) * (lower - upper);
-    this.#drawGrid(pen, { low, top, width, left, upper, lower, toY });
-    if (plot.commanded) this.#drawLine(pen, shown, plot.commanded, toX, toY, "commanded", left, false);
-    this.#drawLine(pen, shown, plot.measured, toX, toY, "measured", left, plot.wraps);
-    const newest = shown.at(-1);
-    setText(plot.value, number(newest?.[plot.measured] ?? null, 2));
-    if (plot.aim) setText(plot.aim, newest && Number.isFinite(newest[plot.commanded]) ? number(newest[plot.commanded], 2) : "");
-  }
-
-  #drawGrid(pen, { low, top, width, left, upper, lower, toY }) {
-    pen.strokeStyle = this.#colours.line;
-    pen.lineWidth = 1;
-    pen.setLineDash([]);
-    pen.beginPath();
-    for (const value of [low, (low + top) / 2, top]) {
-      const y = Math.round(toY(value)) + 0.5;
-      pen.moveTo(left, y);
-      pen.lineTo(width, y);
-    }
-    for (let share = 0; share <= 4; share += 1) {
-      const x = Math.round(left + (share / 4) * (width - left - 3)) + 0.5;
-      pen.moveTo(x, upper);
-      pen.lineTo(x, lower);
-    }
-    pen.stroke();
-    pen.fillStyle = this.#colours.faint;
-    pen.font = "11px system-ui, sans-serif";
-    pen.textAlign = "right";
-    pen.textBaseline = "middle";
-    const decimals = top - low >= 4 ? 0 : 1;
-    pen.fillText(number(top, decimals), left - 5, upper + 4);
-    pen.fillText(number(low, decimals), left - 5, lower - 4);
-  }
-
-  #drawLine(pen, shown, index, toX, toY, look, left, wraps) {
-    pen.save();
-    pen.beginPath();
-    pen.rect(left, 0, 1e4, 1e4);
-    pen.clip();
-    pen.beginPath();
-    let before = NaN;
-    for (const sample of shown) {
-      const value = sample[index];
-      if (Number.isFinite(value)) {
-        const isBroken = !Number.isFinite(before) || (wraps && Math.abs(value - before) > PI);
-        if (isBroken) pen.moveTo(toX(sample[0]), toY(value));
-        else pen.lineTo(toX(sample[0]), toY(value));
-      }
-      before = value;
-    }
-    pen.strokeStyle = this.#colours[look];
-    pen.lineWidth = look === "measured" ? 1.8 : 1.6;
-    pen.setLineDash(look === "measured" ? [] : [4, 3]);
-    pen.lineJoin = "round";
-    pen.stroke();
-    pen.restore();
-  }
 }
 
-/** The least round range that holds all values. */
-function rangeOf(shown, { measured, commanded, span }) {
-  let [low, top] = [Infinity, -Infinity];
-  for (const sample of shown) {
-    for (const index of commanded ? [measured, commanded] : [measured]) {
-      const value = sample[index];
-      if (value < low) low = value;
-      if (value > top) top = value;
+/**
+ * A plot's times, commanded and measured values; null breaks a line, also where an angle wraps.
+ * @param {number[][]} samples
+ * @param {Plot} plot
+ * @returns {[number[], (number|null)[], (number|null)[]]}
+ */
+function columns(samples, { measured, commanded, wraps }) {
+  const [times, aims, values] = [[], [], []];
+  const known = (value) => (Number.isFinite(value) ? value : null);
+  for (const sample of samples) {
+    const value = known(sample[measured]);
+    if (wraps && value !== null && Math.abs(value - (values.at(-1) ?? value)) > PI) {
+      times.push(sample[0]);
+      aims.push(null);
+      values.push(null);
     }
+    times.push(sample[0]);
+    aims.push(commanded ? known(sample[commanded]) : null);
+    values.push(value);
   }
-  if (low > top) [low, top] = [0, 0];
+  return [times, aims, values];
+}
+
+/** Where the lines of time stand. @param {number} begin @param {number} end */
+function everyLine(begin, end) {
+  return Array.from({ length: 1 + Math.floor((end - begin) / LINES_S) }, (_, index) => begin + index * LINES_S);
+}
+
+/**
+ * The least round range that holds all values.
+ * @param {number|null} lowest
+ * @param {number|null} highest
+ * @param {Plot} plot
+ * @returns {[number, number]}
+ */
+function rangeOf(lowest, highest, { commanded, span = 1 }) {
+  let [low, top] = [lowest ?? 0, highest ?? 0];
   if (commanded) [low, top] = [Math.min(low, 0), Math.max(top, 0)];
   const missing = Math.max(0, span - (top - low));
   [low, top] = [low - missing / 2, top + missing / 2];
