@@ -1,0 +1,400 @@
+/** The diagram: states as boxes and transitions as lines, drawn in SVG, moved and joined with the mouse. */
+import { contains, line } from "./geometry.js";
+import { layOut, placeWithin } from "./layout.js";
+
+/**
+ * @typedef {import("./session.js").Diagram} Diagram
+ * @typedef {import("./session.js").Finding} Finding
+ * @typedef {import("./session.js").Point} Point
+ * @typedef {import("./layout.js").Box} Box
+ * @typedef {{kind: "mission"|"state"|"transition", id: string}} Selection id: path of a state, id of a transition
+ */
+
+const SVG = "http://www.w3.org/2000/svg";
+const LONGEST_LABEL = 34;
+const CLICK_PX = 4;
+const ZOOM = { least: 0.15, most: 3, step: 1.0015 };
+
+/** @param {string} tag @param {Object<string, string|number>} [attributes] @returns {any} */
+function svg(tag, attributes = {}, ...children) {
+  const element = document.createElementNS(SVG, tag);
+  for (const [name, value] of Object.entries(attributes)) element.setAttribute(name, String(value));
+  element.append(...children);
+  return element;
+}
+
+const shorten = (text) => (text.length > LONGEST_LABEL ? `${text.slice(0, LONGEST_LABEL - 1)}…` : text);
+
+export class DiagramView {
+  #listener;
+  #svg;
+  #world;
+  #lines;
+  #states;
+  #labels;
+  #draft;
+  /** @type {Diagram} */
+  #diagram = { states: [], transitions: [], mission: {}, variables: {} };
+  /** @type {Map<string, Box>} */
+  #boxes = new Map();
+  /** @type {Map<string, SVGGElement>} */
+  #stateElements = new Map();
+  /** @type {Map<string, {group: SVGGElement, path: SVGPathElement, hit: SVGPathElement, label: SVGTextElement, lane: number}>} */
+  #transitionElements = new Map();
+  /** @type {Map<string, string[]>} transitions at each state */
+  #touching = new Map();
+  /** @type {Map<string, string[]>} */
+  #children = new Map();
+  #parents = new Map();
+  /** @type {Selection} */
+  #selection = { kind: "mission", id: "" };
+  #view = { x: 0, y: 0, scale: 1 };
+  #isFresh = true;
+
+  /**
+   * @param {HTMLElement} parent
+   * @param {{selected: (selection: Selection) => void, placed: (places: Object<string, Point>) => void,
+   *   joined: (from: string, to: string) => void, moved: (state: string, parent: string) => void,
+   *   opened: (selection: Selection) => void}} listener told what the mouse has done
+   */
+  constructor(parent, listener) {
+    this.#listener = listener;
+    const arrow = svg("marker", {
+      id: "e-arrow", viewBox: "0 0 10 10", refX: 9, refY: 5, markerWidth: 8, markerHeight: 8, orient: "auto-start-reverse",
+    }, svg("path", { d: "M0,0L10,5L0,10z", class: "e-arrow" }));
+    this.#states = svg("g");
+    this.#lines = svg("g");
+    this.#labels = svg("g");
+    this.#draft = svg("path", { class: "e-draft", visibility: "hidden" });
+    this.#world = svg("g", {}, this.#states, this.#lines, this.#labels, this.#draft);
+    this.#svg = svg("svg", { class: "e-diagram", role: "group", "aria-label": "diagram" }, svg("defs", {}, arrow), this.#world);
+    parent.append(this.#svg);
+    this.#svg.addEventListener("pointerdown", (event) => this.#press(event));
+    this.#svg.addEventListener("dblclick", (event) => this.#open(event));
+    this.#svg.addEventListener("wheel", (event) => this.#zoom(event), { passive: false });
+    this.#svg.addEventListener("keydown", (event) => {
+      if (event.key !== "Enter" && event.key !== " ") return;
+      const found = this.#at(event.target);
+      if (found.kind !== "mission") {
+        event.preventDefault();
+        this.#listener.selected(found);
+      }
+    });
+  }
+
+  get selection() {
+    return this.#selection;
+  }
+
+  /**
+   * Draw a diagram.
+   * @param {Diagram} diagram
+   * @param {Object<string, Point>} kept places, by path
+   * @param {Finding[]} findings
+   */
+  draw(diagram, kept, findings) {
+    this.#diagram = diagram;
+    this.#boxes = layOut(diagram, kept);
+    this.#index();
+    this.#stateElements.clear();
+    this.#transitionElements.clear();
+    this.#states.replaceChildren(...diagram.states.map((state) => this.#state(state)));
+    this.#makeTransitions();
+    for (const id of this.#transitionElements.keys()) this.#drawLine(id);
+    this.#mark(findings);
+    this.select(this.#selection);
+    if (this.#isFresh && diagram.states.length > 0) {
+      this.#isFresh = false;
+      this.fit();
+    }
+  }
+
+  #index() {
+    this.#children.clear();
+    this.#parents.clear();
+    for (const { path, parent } of this.#diagram.states) {
+      this.#parents.set(path, parent);
+      this.#children.set(parent, [...(this.#children.get(parent) ?? []), path]);
+    }
+  }
+
+  /** @param {import("./session.js").StateNode} state @returns {SVGGElement} */
+  #state(state) {
+    const box = this.#boxes.get(state.path);
+    const isSuper = this.#children.has(state.path);
+    const kinds = ["e-state", isSuper && "e-super", state.final && "e-final", state.kind === "template" && "e-template"];
+    const title = state.use ? `${state.name} : ${state.use}` : state.name;
+    const group = svg("g", {
+      class: kinds.filter(Boolean).join(" "), "data-state": state.path, tabindex: 0, role: "button", "aria-label": `state ${state.path}`,
+    },
+    svg("rect", { width: box.width, height: box.height, rx: 8 }),
+    svg("text", { x: isSuper ? 12 : box.width / 2, y: isSuper ? 20 : 27, class: isSuper ? "e-name e-left" : "e-name" }, title));
+    if (state.initial) group.append(svg("circle", { cx: 0, cy: isSuper ? 15 : box.height / 2, r: 5, class: "e-initial" }));
+    if (state.final) group.append(svg("rect", { x: 3, y: 3, width: box.width - 6, height: box.height - 6, rx: 6, class: "e-inner" }));
+    if (state.kind !== "template") {
+      group.append(svg("circle", {
+        cx: box.width, cy: isSuper ? 15 : box.height / 2, r: 6, class: "e-handle", "data-handle": state.path,
+      }, svg("title", {}, "drag to another state: a new transition")));
+    }
+    this.#stateElements.set(state.path, group);
+    this.#place(state.path);
+    return group;
+  }
+
+  #makeTransitions() {
+    this.#touching.clear();
+    const lanes = new Map();
+    const lines = [], labels = [];
+    for (const transition of this.#diagram.transitions) {
+      const { id, state, to } = transition;
+      if (to === null || !this.#boxes.has(state) || !this.#boxes.has(to)) continue;
+      const pair = [state, to].sort().join(" ");
+      const count = lanes.get(pair) ?? 0;
+      lanes.set(pair, count + 1);
+      const bent = Math.ceil(count / 2) * (count % 2 === 1 ? 1 : -1) + 0.5;
+      const lane = state < to ? bent : -bent;
+      const kind = transition.event === "tick" ? "" : ` e-${transition.event}`;
+      const path = svg("path", { class: "e-line", "marker-end": "url(#e-arrow)" });
+      const hit = svg("path", { class: "e-hit" });
+      const group = svg("g", { class: `e-transition${kind}`, "data-transition": id, tabindex: 0, role: "button",
+        "aria-label": `transition from ${state} to ${to}${transition.when ? ` when ${transition.when}` : ""}` }, hit, path);
+      const words = transition.event === "tick"
+        ? `${transition.index + 1}${transition.when ? `: ${shorten(transition.when)}` : ""}`
+        : { done: "when finished", resume: "after a pause" }[transition.event];
+      const label = svg("text", { class: "e-label", "data-transition": id }, words);
+      lines.push(group);
+      labels.push(label);
+      this.#transitionElements.set(id, { group, path, hit, label, lane });
+      for (const end of new Set([state, to])) this.#touching.set(end, [...(this.#touching.get(end) ?? []), id]);
+    }
+    this.#lines.replaceChildren(...lines);
+    this.#labels.replaceChildren(...labels);
+  }
+
+  /** @param {string} path */
+  #place(path) {
+    const { x, y } = this.#boxes.get(path);
+    this.#stateElements.get(path).setAttribute("transform", `translate(${x},${y})`);
+  }
+
+  /** @param {string} id */
+  #drawLine(id) {
+    const elements = this.#transitionElements.get(id);
+    const { state, to } = this.#diagram.transitions.find((each) => each.id === id);
+    const drawn = line(this.#boxes.get(state), this.#boxes.get(to), elements.lane);
+    elements.path.setAttribute("d", drawn.path);
+    elements.hit.setAttribute("d", drawn.path);
+    elements.label.setAttribute("x", drawn.label.x.toFixed(1));
+    elements.label.setAttribute("y", drawn.label.y.toFixed(1));
+  }
+
+  /** @param {Finding[]} findings */
+  #mark(findings) {
+    const worst = { advice: 1, warning: 2, error: 3 };
+    const found = new Map();
+    for (const { path, transition, severity } of findings) {
+      const key = transition ? `t ${transition}` : `s ${path}`;
+      if ((worst[found.get(key)] ?? 0) < worst[severity]) found.set(key, severity);
+    }
+    for (const [path, group] of this.#stateElements) group.dataset.finding = found.get(`s ${path}`) ?? "";
+    for (const [id, { group }] of this.#transitionElements) group.dataset.finding = found.get(`t ${id}`) ?? "";
+  }
+
+  /** Show what is selected. @param {Selection} selection */
+  select(selection) {
+    this.#selection = selection;
+    for (const [path, group] of this.#stateElements) {
+      group.classList.toggle("e-selected", selection.kind === "state" && selection.id === path);
+    }
+    for (const [id, { group, label }] of this.#transitionElements) {
+      const isSelected = selection.kind === "transition" && selection.id === id;
+      group.classList.toggle("e-selected", isSelected);
+      label.classList.toggle("e-selected", isSelected);
+    }
+  }
+
+  /** Light the active states. @param {Set<string>} paths */
+  light(paths) {
+    for (const [path, group] of this.#stateElements) group.classList.toggle("e-active", paths.has(path));
+  }
+
+  /** Show all of it. */
+  fit() {
+    const { width, height } = this.#svg.getBoundingClientRect();
+    let right = 1, bottom = 1;
+    for (const box of this.#boxes.values()) {
+      right = Math.max(right, box.x + box.width + 40);
+      bottom = Math.max(bottom, box.y + box.height + 24);
+    }
+    const scale = Math.min(1.2, Math.max(ZOOM.least, Math.min(width / right, height / bottom)));
+    this.#view = { x: Math.max(0, (width - right * scale) / 2), y: 0, scale };
+    this.#showView();
+  }
+
+  #showView() {
+    const { x, y, scale } = this.#view;
+    this.#world.setAttribute("transform", `translate(${x},${y}) scale(${scale})`);
+  }
+
+  /** @param {WheelEvent} event */
+  #zoom(event) {
+    event.preventDefault();
+    const { x, y, scale } = this.#view;
+    const next = Math.min(ZOOM.most, Math.max(ZOOM.least, scale * ZOOM.step ** -event.deltaY));
+    const frame = this.#svg.getBoundingClientRect();
+    const at = { x: event.clientX - frame.x, y: event.clientY - frame.y };
+    this.#view = { x: at.x - (at.x - x) * next / scale, y: at.y - (at.y - y) * next / scale, scale: next };
+    this.#showView();
+  }
+
+  /** @param {PointerEvent} event @returns {Point} in the drawing's units */
+  #point(event) {
+    const frame = this.#svg.getBoundingClientRect();
+    const { x, y, scale } = this.#view;
+    return { x: (event.clientX - frame.x - x) / scale, y: (event.clientY - frame.y - y) / scale };
+  }
+
+  /** @param {EventTarget|null} target @returns {Selection} */
+  #at(target) {
+    const element = target instanceof Element ? target.closest("[data-state], [data-transition]") : null;
+    if (!(element instanceof SVGElement)) return { kind: "mission", id: "" };
+    const { state, transition } = element.dataset;
+    return state !== undefined ? { kind: "state", id: state } : { kind: "transition", id: transition ?? "" };
+  }
+
+  /** The innermost state at a point, but none of some. @param {Point} point @param {Set<string>} [except] */
+  #stateAt(point, except = new Set()) {
+    let found = null;
+    for (const { path } of this.#diagram.states) {
+      if (!except.has(path) && contains(this.#boxes.get(path), point)) found = path; // inner ones come later
+    }
+    return found;
+  }
+
+  /** @param {string} path @returns {string[]} it and all states in it */
+  #family(path) {
+    return [path, ...(this.#children.get(path) ?? []).flatMap((child) => this.#family(child))];
+  }
+
+  /** @param {MouseEvent} event */
+  #open(event) {
+    const found = this.#at(event.target);
+    if (found.kind !== "mission") this.#listener.opened(found);
+  }
+
+  /** @param {PointerEvent} event */
+  #press(event) {
+    if (event.button !== 0) return;
+    const target = event.target instanceof Element ? event.target : null;
+    const handle = target instanceof SVGElement ? target.dataset.handle : undefined;
+    if (handle !== undefined) this.#drag(event, this.#joining(handle));
+    else {
+      const found = this.#at(target);
+      this.#listener.selected(found);
+      if (found.kind === "state") this.#drag(event, this.#moving(found.id, this.#point(event)));
+      else if (found.kind === "mission") this.#drag(event, this.#panning(event));
+    }
+  }
+
+  /**
+   * Follow the mouse until its button is released.
+   * @param {PointerEvent} pressed
+   * @param {{move: (event: PointerEvent) => void, end: (event: PointerEvent, wasMoved: boolean) => void}} action
+   */
+  #drag(pressed, action) {
+    let isMoved = false;
+    /** @type {PointerEvent|null} */
+    let latest = null;
+    let frame = 0;
+    const move = (event) => {
+      isMoved ||= Math.hypot(event.clientX - pressed.clientX, event.clientY - pressed.clientY) > CLICK_PX;
+      if (!isMoved) return;
+      latest = event;
+      frame ||= requestAnimationFrame(() => {
+        frame = 0;
+        if (latest) action.move(latest);
+      });
+    };
+    const end = (event) => {
+      this.#svg.removeEventListener("pointermove", move);
+      this.#svg.removeEventListener("pointerup", end);
+      this.#svg.removeEventListener("pointercancel", end);
+      cancelAnimationFrame(frame);
+      if (isMoved) action.move(event);
+      action.end(event, isMoved && event.type === "pointerup");
+    };
+    this.#svg.setPointerCapture(pressed.pointerId);
+    this.#svg.addEventListener("pointermove", move);
+    this.#svg.addEventListener("pointerup", end);
+    this.#svg.addEventListener("pointercancel", end);
+  }
+
+  #panning(pressed) {
+    const before = { ...this.#view };
+    return {
+      move: (event) => {
+        this.#view = { ...before, x: before.x + event.clientX - pressed.clientX, y: before.y + event.clientY - pressed.clientY };
+        this.#showView();
+      },
+      end: () => {},
+    };
+  }
+
+  /** @param {string} path @param {Point} start */
+  #moving(path, start) {
+    const family = this.#family(path);
+    const before = new Map(family.map((each) => [each, { ...this.#boxes.get(each) }]));
+    const lines = new Set(family.flatMap((each) => this.#touching.get(each) ?? []));
+    const moveBy = (dx, dy) => {
+      for (const each of family) {
+        const box = before.get(each);
+        Object.assign(this.#boxes.get(each), { x: box.x + dx, y: box.y + dy });
+        this.#place(each);
+      }
+      for (const id of lines) this.#drawLine(id);
+    };
+    return {
+      move: (event) => {
+        const { x, y } = this.#point(event);
+        moveBy(x - start.x, y - start.y);
+      },
+      end: (event, wasMoved) => {
+        if (!wasMoved) return;
+        const parent = this.#parents.get(path);
+        const over = this.#stateAt(this.#point(event), new Set(family)) ?? "";
+        const around = over === "" || this.#children.has(over) ? over : this.#parents.get(over);
+        const mayLeave = !path.startsWith("@") || path.includes(".");
+        if (event.shiftKey && around !== parent && mayLeave) {
+          this.#listener.moved(path, around);
+          return;
+        }
+        const siblings = this.#children.get(parent) ?? [];
+        const outer = parent ? this.#boxes.get(parent) : null;
+        // All states of the level are kept, so that none of them jumps when this one has a place of its own.
+        this.#listener.placed(Object.fromEntries(
+          siblings.map((each) => [each, placeWithin(this.#boxes.get(each), outer)])));
+      },
+    };
+  }
+
+  /** @param {string} from */
+  #joining(from) {
+    const box = this.#boxes.get(from);
+    const target = (event) => this.#stateAt(this.#point(event));
+    return {
+      move: (event) => {
+        const { x, y } = this.#point(event);
+        this.#draft.setAttribute("visibility", "visible");
+        this.#draft.setAttribute("d", `M${box.x + box.width},${box.y + Math.min(box.height / 2, 22)}L${x},${y}`);
+        const over = target(event);
+        for (const [path, group] of this.#stateElements) group.classList.toggle("e-target", path === over);
+      },
+      end: (event, wasMoved) => {
+        this.#draft.setAttribute("visibility", "hidden");
+        for (const group of this.#stateElements.values()) group.classList.remove("e-target");
+        const to = wasMoved ? target(event) : null;
+        if (to !== null) this.#listener.joined(from, to);
+      },
+    };
+  }
+}

@@ -1,0 +1,117 @@
+/** Where the diagram's states are drawn: kept places, and automatic ones for the rest, level by level. */
+import dagre from "@dagrejs/dagre";
+
+/**
+ * @typedef {import("./session.js").Diagram} Diagram
+ * @typedef {import("./session.js").Point} Point
+ * @typedef {{x: number, y: number, width: number, height: number}} Box in the drawing's units, from its upper left
+ */
+
+const LETTER = 7.2; // mean width of a letter
+const LEAF = { width: 110, height: 44 };
+const HEADER = 30; // of a superstate, with its name
+const PADDING = 18;
+const GAP = { nodesep: 36, ranksep: 56, edgesep: 16 };
+
+/** The width of a state's name. @param {string} text */
+const textWidth = (text) => Math.max(LEAF.width, Math.ceil(text.length * LETTER) + 34);
+
+/**
+ * Place all states.
+ * @param {Diagram} diagram
+ * @param {Object<string, Point>} kept places within the parent, by path
+ * @returns {Map<string, Box>} by path
+ */
+export function layOut(diagram, kept) {
+  /** @type {Map<string, string[]>} */
+  const children = new Map();
+  const parents = new Map();
+  const names = new Map();
+  for (const { path, name, parent, use } of diagram.states) {
+    parents.set(path, parent);
+    names.set(path, use ? `${name} : ${use}` : name);
+    const siblings = children.get(parent);
+    if (siblings) siblings.push(path);
+    else children.set(parent, [path]);
+  }
+  const chain = (path) => {
+    const found = [];
+    for (let at = path; at; at = parents.get(at)) found.unshift(at);
+    return found;
+  };
+  /** @type {Map<string, [string, string][]>} the transitions of each level, between its states */
+  const levels = new Map();
+  for (const { state, to } of diagram.transitions) {
+    if (to === null || state === to || !parents.has(state) || !parents.has(to)) continue;
+    const from = chain(state), into = chain(to);
+    let depth = 0;
+    while (depth < from.length - 1 && depth < into.length - 1 && from[depth] === into[depth]) depth += 1;
+    if (from[depth] === into[depth]) continue;
+    const level = depth === 0 ? "" : from[depth - 1];
+    const pairs = levels.get(level);
+    if (pairs) pairs.push([from[depth], into[depth]]);
+    else levels.set(level, [[from[depth], into[depth]]]);
+  }
+  /** @type {Map<string, Box>} */
+  const boxes = new Map();
+  const measure = (path) => {
+    const inner = children.get(path) ?? [];
+    for (const child of inner) measure(child);
+    const size = inner.length > 0 ? arrange(inner, levels.get(path) ?? [], boxes, kept) : null;
+    if (path === "") return;
+    const width = textWidth(names.get(path));
+    boxes.set(path, size === null ? { x: 0, y: 0, width, height: LEAF.height } : {
+      x: 0, y: 0, width: Math.max(width, size.width + 2 * PADDING), height: size.height + HEADER + PADDING,
+    });
+  };
+  measure("");
+  const shift = (path, x, y) => {
+    const box = boxes.get(path);
+    if (box) {
+      box.x += x;
+      box.y += y;
+      [x, y] = [box.x + PADDING, box.y + HEADER];
+    }
+    for (const child of children.get(path) ?? []) shift(child, x, y);
+  };
+  shift("", PADDING, PADDING);
+  return boxes;
+}
+
+/**
+ * Place the states of one level.
+ * @param {string[]} paths
+ * @param {[string, string][]} pairs transitions
+ * @param {Map<string, Box>} boxes with the states' sizes; their places are set
+ * @param {Object<string, Point>} kept
+ * @returns {{width: number, height: number}} what they need
+ */
+function arrange(paths, pairs, boxes, kept) {
+  const isPlaced = (path) => kept[path] !== undefined;
+  if (!paths.every(isPlaced)) {
+    const graph = new dagre.graphlib.Graph();
+    graph.setGraph({ rankdir: "TB", ranker: paths.length > 60 ? "longest-path" : "network-simplex", ...GAP });
+    graph.setDefaultEdgeLabel(() => ({}));
+    for (const path of paths) graph.setNode(path, { ...boxes.get(path) });
+    for (const [from, to] of pairs) graph.setEdge(from, to);
+    dagre.layout(graph);
+    for (const path of paths) {
+      const { x, y, width, height } = graph.node(path);
+      Object.assign(boxes.get(path), { x: x - width / 2, y: y - height / 2 });
+    }
+  }
+  let width = 0, height = 0;
+  for (const path of paths) {
+    const box = boxes.get(path);
+    if (isPlaced(path)) Object.assign(box, { x: kept[path].x, y: kept[path].y });
+    width = Math.max(width, box.x + box.width);
+    height = Math.max(height, box.y + box.height);
+  }
+  return { width, height };
+}
+
+/** The place of a state within its parent, as it is kept. @param {Box} box @param {Box|null} parent @returns {Point} */
+export function placeWithin(box, parent) {
+  const origin = parent ? { x: parent.x + PADDING, y: parent.y + HEADER } : { x: PADDING, y: PADDING };
+  return { x: Math.max(0, Math.round(box.x - origin.x)), y: Math.max(0, Math.round(box.y - origin.y)) };
+}
