@@ -5,6 +5,7 @@ PYTHON ?= python3
 VENV := .venv
 MAVPROXY_VENV := .venv-mavproxy
 BENCH_VENV := .venv-bench
+NODE_MODULES := web/node_modules/.package-lock.json
 BIN := $(VENV)/bin
 ROOMS := errors wire geometry scenarios firmware_py sitl vision offboard monitor framerunner
 LOCK := uv pip compile --universal --python-version 3.11 --generate-hashes --quiet --custom-compile-command 'make lock'
@@ -32,10 +33,10 @@ fly: $(VENV)/installed ## set up and fly test case 1; the result is left in runs
 setup: $(VENV)/installed-dev $(MAVPROXY_VENV)/installed ## set up for development, without running anything
 
 .PHONY: test
-test: setup lint test-fast test-realtime ## set up, then run all checks and all tests
+test: setup lint web-check test-fast test-realtime ## set up, then run all checks and all tests
 
-.PHONY: lint lint-code lint-format lint-types lint-rooms
-lint: lint-code lint-format lint-types lint-rooms ## ruff, mypy and the rules between the rooms
+.PHONY: lint lint-code lint-format lint-types lint-rooms lint-web
+lint: lint-code lint-format lint-types lint-rooms lint-web ## ruff, mypy, the rules between the rooms; eslint and tsc
 
 lint-code: $(VENV)/installed-dev
 	$(BIN)/ruff check .
@@ -48,6 +49,21 @@ lint-types: $(VENV)/installed-dev
 
 lint-rooms: $(VENV)/installed-dev
 	$(BIN)/lint-imports
+
+# The pages' scripts are checked and bundled by Node.js, which only those need who change them.
+IF_NODE = command -v npm >/dev/null || { echo "Node.js is not installed; skipped: $@"; exit 0; };
+NPM_CI = npm ci --ignore-scripts --no-audit --no-fund
+
+lint-web:
+	@$(IF_NODE) $(MAKE) --silent $(NODE_MODULES) && cd web && npm run --silent lint && npm run --silent types
+
+.PHONY: web web-check
+web: $(NODE_MODULES) ## bundle the monitor's pages, web/, into monitor/static/ (needs Node.js 20)
+	cd web && npm run --silent build
+
+web-check: ## bundle them with packages installed anew; the result must be what is committed
+	@$(IF_NODE) cd web && $(NPM_CI) && npm run --silent build -- ../build/web-check \
+		&& { diff -r ../build/web-check ../monitor/static || { echo "monitor/static/ is not what web/ gives; run: make web"; exit 1; }; }
 
 .PHONY: test-fast
 test-fast: $(VENV)/installed-dev ## the tests that need no real time, in parallel
@@ -105,7 +121,7 @@ lock: ## choose newer versions of everything installed (needs uv)
 
 .PHONY: clean
 clean: ## remove what was installed and built; runs/ is kept
-	rm -rf $(VENV) $(MAVPROXY_VENV) $(BENCH_VENV) build dist *.egg-info
+	rm -rf $(VENV) $(MAVPROXY_VENV) $(BENCH_VENV) web/node_modules build dist *.egg-info
 	rm -rf .mypy_cache .ruff_cache .pytest_cache .import_linter_cache .hypothesis
 	find $(ROOMS) benchmarks tests -name __pycache__ -type d -prune -exec rm -rf {} +
 
@@ -128,6 +144,10 @@ $(VENV)/installed-dev: $(BIN)/python pyproject.toml locks/dev.txt
 	$(INSTALL_LOCKED) locks/dev.txt
 	$(INSTALL_PROJECT)
 	@touch $@ $(VENV)/installed
+
+$(NODE_MODULES): web/package.json web/package-lock.json
+	cd web && $(NPM_CI)
+	@touch $@
 
 $(MAVPROXY_VENV)/installed: $(BIN)/python locks/mavproxy.txt
 	$(BIN)/python -m venv $(MAVPROXY_VENV)

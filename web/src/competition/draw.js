@@ -15,7 +15,7 @@ export class Draw {
   #flown = false;
   #known = null;
 
-  /** @param {{judge: boolean, attempt: function(function(): Promise<void>): Promise<boolean>}} desk */
+  /** @param {{judge: boolean, say: function(string): void, attempt: function(function(): Promise<void>): Promise<boolean>}} desk */
   constructor(desk) {
     this.#desk = desk;
     this.element = make("section", { class: "panel", "aria-labelledby": "draw-title" },
@@ -61,7 +61,7 @@ export class Draw {
   }
 
   #draw() {
-    const ticked = [...this.#pool.querySelectorAll("input:checked")].map((box) => box.value);
+    const ticked = [.../** @type {NodeListOf<HTMLInputElement>} */ (this.#pool.querySelectorAll("input:checked"))].map((box) => box.value);
     const question = "Tries were flown in this round. Draw for the next round? The tries stay in theirs.";
     if (this.#flown && !confirm(question)) return;
     this.#desk.attempt(() => send("draw", { pool: ticked, count: Number(this.#count.value) }));
@@ -97,7 +97,7 @@ export class Rule {
   #fields = {};
   #shown = "";
 
-  /** @param {{judge: boolean, attempt: function(function(): Promise<void>): Promise<boolean>}} desk */
+  /** @param {{judge: boolean, say: function(string): void, attempt: function(function(): Promise<void>): Promise<boolean>}} desk */
   constructor(desk) {
     this.#desk = desk;
     this.element = make("section", { class: "panel", "aria-labelledby": "rule-title" },

@@ -68,7 +68,7 @@ class Desk {
 
   async #load() {
     const state = await ask("state");
-    const key = document.activeElement?.dataset?.key;
+    const key = document.activeElement instanceof HTMLElement ? document.activeElement.dataset.key : undefined;
     this.#board = state.board;
     this.say(state.problem);
     this.calls.show(state.board);
@@ -78,7 +78,8 @@ class Desk {
     this.rule.show(state.board);
     this.#showTries(state.board.tries);
     this.#run(state.running);
-    if (key) document.querySelector(`[data-key="${CSS.escape(key)}"]`)?.focus();
+    if (!key) return;
+    /** @type {HTMLElement|null} */ (document.querySelector(`[data-key="${CSS.escape(key)}"]`))?.focus();
   }
 
   #showTries(tries) {

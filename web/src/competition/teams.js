@@ -18,7 +18,7 @@ export class Teams {
   #edited = null;
 
   /**
-   * @param {{judge: boolean, queue: Queue, attempt: function(function(): Promise<void>): Promise<boolean>}} desk
+   * @param {{judge: boolean, queue: import("./queue.js").Queue, attempt: function(function(): Promise<void>): Promise<boolean>}} desk
    */
   constructor(desk) {
     this.#desk = desk;

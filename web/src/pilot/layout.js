@@ -26,9 +26,10 @@ const HELP = [
 /**
  * Fill the page.
  * @param {HTMLElement} root
- * @returns {Object<string, HTMLElement>} the parts, by name
+ * @returns {Object<string, any>} the parts, which are elements, by name
  */
 export function layOut(root) {
+  /** @type {Object<string, any>} */
   const parts = {};
   const keep = (name, element) => {
     parts[name] = element;

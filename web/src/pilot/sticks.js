@@ -33,7 +33,7 @@ export class ScreenStick {
     element.append(this.#knob);
     element.addEventListener("pointerdown", (event) => this.#down(event));
     element.addEventListener("pointermove", (event) => this.#move(event));
-    for (const name of ["pointerup", "pointercancel", "lostpointercapture"]) {
+    for (const name of /** @type {const} */ (["pointerup", "pointercancel", "lostpointercapture"])) {
       element.addEventListener(name, (event) => {
         if (event.pointerId === this.#pointer) this.release();
       });

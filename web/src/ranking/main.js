@@ -24,7 +24,6 @@ class Ranking {
   #wanted = "";
   #linked = true;
   #problem = "";
-  #running = [];
   #heard_ms = 0;
   #clocks = [];
   called = null;
@@ -169,7 +168,6 @@ class Ranking {
   }
 
   #run(tries) {
-    this.#running = tries;
     this.#heard_ms = performance.now();
     const { lines, clocks } = nowLines({ running: tries, called: this.called, queue: this.queue });
     this.#clocks = clocks;

@@ -43,12 +43,17 @@ async function list() {
 /** Keep the address a link to what is seen now. */
 function keepAddress(clock, names) {
   let last = "";
+  let soon = 0;
   const write = () => {
     const address = `${pageOf(...names)}&t=${clock.t.toFixed(1)}`;
     if (address !== last) history.replaceState(null, "", address);
     last = address;
   };
-  clock.listen(() => { if (!clock.isPlaying) { clearTimeout(keepAddress.soon); keepAddress.soon = setTimeout(write, 400); } });
+  clock.listen(() => {
+    if (clock.isPlaying) return;
+    clearTimeout(soon);
+    soon = setTimeout(write, 400);
+  });
 }
 
 async function show() {

@@ -5,7 +5,7 @@ import { LiveChannel } from "../lib/live_channel.js";
 
 /**
  * How the link is, in words.
- * @param {{link: {state: string}}[]} drones of the message "status"
+ * @param {{link?: {state: string}, over?: boolean}[]} drones of the message "status"
  * @returns {[string, string]} state and words
  */
 export function linkWords(drones) {

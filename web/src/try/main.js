@@ -64,8 +64,8 @@ class TryPage {
       make("div", { class: "save" }, this.#counts, make("div", { class: "buttons" }, this.#save, back)));
     this.#form.addEventListener("submit", (event) => {
       event.preventDefault();
-      const wrong = this.#form.querySelector(":invalid");
-      if (wrong && wrong.reportValidity && !wrong.reportValidity()) return;
+      const wrong = /** @type {HTMLInputElement|null} */ (this.#form.querySelector("input:invalid, select:invalid, textarea:invalid"));
+      if (wrong && !wrong.reportValidity()) return;
       this.#attempt(
         () => send(`tries/${attempt}/judgement`, { seen: this.#detail.try.judgements, ...this.#fields.said }), false);
     });

@@ -8,10 +8,15 @@ import { TopView } from "./topview.js";
  * @property {number} t seconds
  * @property {number[]} p x, y, z, metres, arena axes
  * @property {number[]} q w, x, y, z, body forward-left-up to arena
+ * @property {number[]|null} [v] forward, left, up, m/s
+ * @property {number|null} [r] rad/s to the left
+ * @property {(number|null)[]|null} [c] the four commanded, as v and r; null: none
  * @property {boolean} on motors
  * @property {number} s index into the states of its mission; -1 if none
  * @property {boolean} [fresh] true if there is none
  */
+
+/** @typedef {"orbit"|"follow"|"onboard"} View */
 
 const VIEWS = { orbit: "Orbit", follow: "Follow", onboard: "Onboard" };
 const NO_STATE = "#5c6773";
@@ -93,7 +98,7 @@ export class Arena {
     this.#showMap();
   }
 
-  /** @param {"orbit"|"follow"|"onboard"} view */
+  /** @param {View} view */
   setView(view) {
     setAttribute(this.#box, "data-view", view);
     for (const [name, button] of Object.entries(this.#buttons)) setAttribute(button, "aria-pressed", String(name === view));
@@ -174,7 +179,7 @@ export class Arena {
     const bar = make("div", { class: "m-views", role: "toolbar", "aria-label": "views" });
     // What turns the arena would capture the pointer, and the click would never reach the button.
     bar.addEventListener("pointerdown", (event) => event.stopPropagation());
-    Object.entries(VIEWS).forEach(([view, words], index) => {
+    /** @type {[View, string][]} */ (Object.entries(VIEWS)).forEach(([view, words], index) => {
       const key = String(index + 1);
       const pressed = String(view === "orbit");
       const attributes = { type: "button", "aria-pressed": pressed, "data-view": view, "aria-keyshortcuts": key };
@@ -199,7 +204,7 @@ export class Arena {
     this.#goal = make("p", { class: "m-arena-goal", hidden: true });
     bar.append(this.#mapButton, this.#sizeButton, this.#goal);
     document.addEventListener("keydown", (event) => {
-      const view = Object.keys(VIEWS)[Number(event.key) - 1];
+      const view = /** @type {View[]} */ (Object.keys(VIEWS))[Number(event.key) - 1];
       if (view && !event.ctrlKey && !event.metaKey && !event.altKey && !isTyping(event)) this.setView(view);
     });
     return bar;

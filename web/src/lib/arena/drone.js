@@ -33,7 +33,7 @@ export class DroneModel {
   aim(pose, now, isExact = false) {
     this.pose = pose;
     const [w, x, y, z] = pose.q;
-    this.to.p.set(...pose.p);
+    this.to.p.fromArray(pose.p);
     this.to.q.set(x, y, z, w).normalize();
     const isFar = isExact || this.began < 0 || this.group.position.distanceTo(this.to.p) > 1.5;
     this.from.p.copy(isFar ? this.to.p : this.group.position);
@@ -64,7 +64,7 @@ export class DroneModel {
   setFresh(fresh) {
     if (this.isFresh === fresh) return;
     this.isFresh = fresh;
-    this.body.traverse((part) => {
+    this.body.traverse((/** @type {any} */ part) => {
       if (part.material) part.material.opacity = fresh ? part.material.userData.opacity : 0.3;
       if (part.material) part.material.transparent = !fresh || part.material.userData.opacity < 1;
       if (part.material) part.material.needsUpdate = true;
@@ -77,7 +77,7 @@ export class DroneModel {
 
   discard() {
     for (const part of [this.group, this.shadow, this.thread, this.trail.mesh]) {
-      part.traverse((each) => { each.geometry?.dispose(); each.material?.dispose(); });
+      part.traverse((/** @type {any} */ each) => { each.geometry?.dispose(); each.material?.dispose(); });
       part.removeFromParent();
     }
   }
@@ -112,7 +112,7 @@ export class DroneModel {
       rotor.userData.sense = x * y;
       rotor.add(new THREE.Mesh(new THREE.BoxGeometry(0.094, 0.009, 0.002), blade));
       rotor.add(new THREE.Mesh(new THREE.CircleGeometry(0.05, 24), x > 0 ? disc.front : disc.rear));
-      for (const part of rotor.children) part.material.side = THREE.DoubleSide;
+      for (const part of /** @type {any[]} */ (rotor.children)) part.material.side = THREE.DoubleSide;
       this.rotors.push(rotor);
       this.body.add(rotor);
     }

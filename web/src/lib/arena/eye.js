@@ -15,7 +15,6 @@ export class ArenaEye {
   #ask;
   #controls;
   #size = [1, 1];
-  #drone = null;
   #arena = { length_x_m: 10, width_y_m: 10, height_m: 4 };
   #onboard = { width_px: 320, height_px: 240, horizontal_fov_rad: 1.57, position_flu_m: [0.08, 0, 0] };
   #isTouched = false;
@@ -80,7 +79,6 @@ export class ArenaEye {
    * @returns {boolean} whether the view moves on by itself
    */
   look(drone, passed_s, still) {
-    this.#drone = drone;
     if (this.view === "orbit" || !drone) return false;
     if (this.view === "onboard") {
       this.#lookOut(drone);
@@ -155,7 +153,7 @@ export class ArenaEye {
     const turn = new Quaternion().setFromRotationMatrix(
       new Matrix4().makeBasis(new Vector3(0, -1, 0), new Vector3(0, 0, 1), new Vector3(-1, 0, 0)));
     const camera = this.#otherCamera;
-    camera.position.set(...this.#onboard.position_flu_m).applyQuaternion(drone.quaternion).add(drone.position);
+    camera.position.fromArray(this.#onboard.position_flu_m).applyQuaternion(drone.quaternion).add(drone.position);
     camera.quaternion.copy(drone.quaternion).multiply(turn);
     camera.updateMatrixWorld();
   }

@@ -76,8 +76,8 @@ export class MapModel {
   #addBall(frame, axes) {
     const paint = { color: colourOf(frame.colour), transparent: true, opacity: 0.3, depthWrite: false };
     const ball = new THREE.Mesh(this.#ball, new THREE.MeshBasicMaterial(paint));
-    ball.position.set(...frame.p);
-    ball.scale.set(...axes);
+    ball.position.fromArray(frame.p);
+    ball.scale.fromArray(axes);
     this.#balls.push(ball);
     this.group.add(ball);
   }

@@ -212,8 +212,9 @@ export class ArenaScene {
     this.#dressWorld();
     for (const [id, drone] of this.#drones) this.#dress(id, drone, chosen);
     const began = performance.now();
-    this.#renderer.setViewport(...this.#eye.rectangle);
-    this.#renderer.setScissor(...this.#eye.rectangle);
+    const [x, y, width, height] = this.#eye.rectangle;
+    this.#renderer.setViewport(x, y, width, height);
+    this.#renderer.setScissor(x, y, width, height);
     this.#renderer.render(this.#scene, this.#eye.camera);
     this.#frames += 1;
     this.#box.dataset.frames = String(this.#frames);

@@ -79,7 +79,7 @@ export function buildCone(camera) {
   const pale = { color: "#ffffff", transparent: true, opacity: 0.13, side: THREE.DoubleSide, depthWrite: false };
   const cone = new THREE.Group();
   cone.add(lines, new THREE.Mesh(new THREE.BufferGeometry().setFromPoints(faces), new THREE.MeshBasicMaterial(pale)));
-  cone.position.set(...camera.position_flu_m);
+  cone.position.fromArray(camera.position_flu_m);
   return cone;
 }
 
@@ -210,9 +210,13 @@ class Painter {
     const sun = this.#sun;
     if (sun[2] >= -1e-3) return;
     const cast = [];
-    for (const a of [-1, 1]) for (const b of [-1, 1]) for (const c of [-1, 1]) {
-      const [x, y, z] = placed(box, [a, b, c]);
-      cast.push([x - (z / sun[2]) * sun[0], y - (z / sun[2]) * sun[1], 0.003]);
+    for (const a of [-1, 1]) {
+      for (const b of [-1, 1]) {
+        for (const c of [-1, 1]) {
+          const [x, y, z] = placed(box, [a, b, c]);
+          cast.push([x - (z / sun[2]) * sun[0], y - (z / sun[2]) * sun[1], 0.003]);
+        }
+      }
     }
     this.polygon(hull(cast), [0, 0, 1], [0, 0, 0]);
   }

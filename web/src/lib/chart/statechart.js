@@ -113,7 +113,7 @@ export class Statechart {
     this.#picture.replaceChildren(svg);
     // Mermaid names a state's node SVG-state-ID-NUMBER and a superstate's carries its id as data-id.
     const head = `${svg.id}-state-`;
-    for (const node of svg.querySelectorAll("g.statediagram-state")) {
+    for (const node of /** @type {NodeListOf<SVGGElement>} */ (svg.querySelectorAll("g.statediagram-state"))) {
       const isSuper = node.classList.contains("statediagram-cluster");
       const id = isSuper ? node.dataset.id : node.id.replace(head, "").replace(/-\d+$/, "");
       if (id) this.#nodes.set(id, node);

@@ -41,9 +41,8 @@ async function reach(fetching) {
 async function answer(response) {
   if (response.ok) return response.json();
   const text = await response.text();
-  const error = new Error(detailOf(text) ?? `the monitor answers ${response.status}`);
-  error.status = response.status;
-  throw error;
+  const words = detailOf(text) ?? `the monitor answers ${response.status}`;
+  throw Object.assign(new Error(words), { status: response.status });
 }
 
 function detailOf(text) {

@@ -75,7 +75,7 @@ export class CameraView {
     this.#bitmap = bitmap;
     this.#message = frame.detections;
     this.#box.style.setProperty("--shape", `${bitmap.width} / ${bitmap.height}`);
-    this.#box.dataset.time = frame.t ?? "";
+    this.#box.dataset.time = String(frame.t ?? "");
     this.#box.dataset.boxesTime = frame.detections?.t ?? "";
     this.#words.hidden = true;
     this.#draw();

@@ -28,7 +28,7 @@ export class Fleet {
     tabs.setAttribute("aria-label", "drones");
     tabs.hidden = true;
     this.#tabs.addEventListener("click", ({ target }) => {
-      const id = target.closest("button")?.dataset.drone;
+      const id = /** @type {Element} */ (target).closest("button")?.dataset.drone;
       if (id) this.choose(Number(id));
     });
   }
@@ -79,10 +79,14 @@ export class Fleet {
     return Object.fromEntries([...this.#drones].map(([id, { chart }]) => [id, chart?.states ?? []]));
   }
 
+  get #buttons() {
+    return [...this.#tabs.querySelectorAll("button")];
+  }
+
   #show() {
     this.#tabs.hidden = this.#drones.size < 2;
     const ids = [...this.#drones.keys()].sort((a, b) => a - b);
-    const old = [...this.#tabs.children].map((button) => Number(button.dataset.drone));
+    const old = this.#buttons.map((button) => Number(button.dataset.drone));
     if (ids.join() !== old.join()) {
       this.#tabs.replaceChildren(...ids.map((id) => {
         const button = document.createElement("button");
@@ -91,7 +95,7 @@ export class Fleet {
         return button;
       }));
     }
-    for (const button of this.#tabs.children) {
+    for (const button of this.#buttons) {
       const id = Number(button.dataset.drone);
       const { status } = this.#drones.get(id);
       const link = status?.link?.state;

@@ -70,7 +70,7 @@ export class Flight {
     return [...poses]; // the arena may draw its own later
   }
 
-  #show({ poses, passed, chosen, image }) {
+  #show({ poses, passed, image }) {
     for (const pose of passed) this.#hear.passed(pose);
     // A drone whose flight is over stands where it ended; it is not drawn as one that is missed.
     const isOver = (pose) => pose.id === this.#chosen && this.#status?.over;
