@@ -22,7 +22,9 @@ from offboard.chart.messages import Message
 from offboard.chart.problems import cut
 from offboard.chart.vocabulary import UnknownNameError, Vocabulary, choices_of, path_of
 
-MAX_ALTERNATIVES = 200
+MAX_ALTERNATIVES = 64
+MAX_TESTS = 30_000
+"""That are looked at for one mission; then no more is found out, so that a hostile file costs no time."""
 _COMPARE: Mapping[type[ast.cmpop], Callable[[Any, Any], bool]] = {
     ast.Lt: operator.lt,
     ast.LtE: operator.le,
@@ -90,7 +92,8 @@ class Conditions:
     def __init__(self, vocabulary: Vocabulary, constants: Mapping[str, object]) -> None:
         self._vocabulary = vocabulary
         self._constants = constants
-        self._alternatives = cache(self._alternatives_of)
+        self._tests_left = MAX_TESTS
+        self._cached = cache(self._alternatives_of)
 
     def why_never(self, when: str) -> Message | None:
         """Why a guard never holds; None if it may."""
@@ -98,34 +101,51 @@ class Conditions:
             alternatives = self._alternatives(when, True)
             if not alternatives:
                 return Message("guard.constant")
-            if not _possible(alternatives):
+            if not self._possible(alternatives):
                 return _reason(alternatives[0])
         return None
 
     def holds_always(self, when: str) -> bool:
         """Whether a guard holds for all values."""
         with suppress(_TooManyError):
-            return not _possible(self._alternatives(when, False))
+            return not self._possible(self._alternatives(when, False))
         return False
 
     def hides(self, elders: Iterable[str], younger: str) -> bool:
         """Whether one of some guards holds whenever another one does; an empty one always holds."""
         with suppress(_TooManyError):
-            left = _possible(self._alternatives(younger, True) if younger else _ALWAYS)
+            left = self._possible(self._alternatives(younger, True) if younger else _ALWAYS)
             for elder in elders:
-                left = _possible(_both(left, self._alternatives(elder, False) if elder else ()))
+                left = self._possible(_both(left, self._alternatives(elder, False) if elder else ()))
                 if not left:
                     return True
         return False
 
-    def _alternatives_of(self, when: str, wanted: bool) -> _Alternatives:
+    def _possible(self, alternatives: _Alternatives) -> _Alternatives:
+        """Those that some values fulfil."""
+        self._tests_left -= 1 + sum(map(len, alternatives))
+        if self._tests_left < 0:
+            raise _TooManyError
+        return tuple(each for each in alternatives if _impossible_term(each) is None)
+
+    def _alternatives(self, when: str, wanted: bool) -> _Alternatives:
+        found = self._cached(when, wanted)
+        if found is None:
+            raise _TooManyError
+        return found
+
+    def _alternatives_of(self, when: str, wanted: bool) -> _Alternatives | None:
+        """None if there are too many."""
         try:
             return self._of(ast.parse(when.strip(), mode="eval").body, wanted)
-        except (SyntaxError, ValueError, RecursionError):
-            raise _TooManyError from None
+        except (SyntaxError, ValueError, RecursionError, _TooManyError):
+            return None
 
     def _of(self, node: ast.expr, wanted: bool) -> _Alternatives:
         """The alternatives in which an expression is true or, with `wanted` false, false."""
+        self._tests_left -= 1
+        if self._tests_left < 0:
+            raise _TooManyError
         match node:
             case ast.UnaryOp(op=ast.Not()):
                 return self._of(node.operand, not wanted)
@@ -218,11 +238,6 @@ def _both(one: _Alternatives, other: _Alternatives) -> _Alternatives:
     if len(one) * len(other) > MAX_ALTERNATIVES:
         raise _TooManyError
     return tuple(dict.fromkeys(first | second for first in one for second in other))
-
-
-def _possible(alternatives: _Alternatives) -> _Alternatives:
-    """Those that some values fulfil."""
-    return tuple(each for each in alternatives if _impossible_term(each) is None)
 
 
 def _impossible_term(tests: frozenset[_Test], *, ranges: bool = True) -> _Term | None:

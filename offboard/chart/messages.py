@@ -122,6 +122,7 @@ ENGLISH: Mapping[str, str] = {
     "template.both": "state '{state}' has 'use' and states of its own; choose one",
     "chart.too_many": "has {count} states; {limit} are the limit",
     "chart.too_many_parts": "has {count} transitions and actions; {limit} are the limit",
+    "chart.too_much_text": "has {count} characters of expressions; {limit} are the limit",
     "target.unknown": "{what} '{name}' of state '{state}' is not a state; {advice}",
     "target.what": "target",
     "target.beside": "there are {names}",

@@ -24,6 +24,8 @@ MAX_EXTENDS = 5
 MAX_STATES = 1000
 MAX_PARTS = 20_000
 """Transitions and actions of all states, each with those of the superstates around it."""
+MAX_CHARACTERS = 100_000
+"""Of the expressions of all states, counted likewise."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -177,25 +179,36 @@ def expand(mission: MissionFile, problems: ProblemList) -> MissionFile:
 
 def _refuse_too_large(mission: MissionFile) -> None:
     """Count what the expansion would make, before it is made."""
-    states = parts = 0
+    states = parts = characters = 0
 
-    def count(state: State, around: int, *, in_template: bool) -> None:
-        nonlocal states, parts
+    def count(state: State, around: tuple[int, int], *, in_template: bool) -> None:
+        nonlocal states, parts, characters
         template = None if in_template else mission.templates.get(state.use)
         written = (state,) if template is None else (state, template)
-        own = around + sum(len(each.transitions) + len(each.during) for each in written)
         inner = [(child, each is template) for each in written for child in each.states]
+        inherited = [size(each.transitions, each.during) for each in written]
+        own = (around[0] + sum(one for one, _ in inherited), around[1] + sum(two for _, two in inherited))
+        once = [size((), each.enter + each.exit) for each in written]
         states += 1
-        parts += sum(len(each.enter) + len(each.exit) for each in written) + (0 if inner else own)
+        parts += sum(one for one, _ in once) + (0 if inner else own[0])
+        characters += sum(two for _, two in once) + (0 if inner else own[1])
         for child, of_template in inner if states <= MAX_STATES else ():
             count(child, own, in_template=in_template or of_template)
 
+    def size(transitions: tuple[Transition, ...], actions: tuple[Action, ...]) -> tuple[int, int]:
+        all_actions = [*actions, *(action for each in transitions for action in each.actions)]
+        texts = [*(each.when for each in transitions), *(each.expression for each in all_actions)]
+        return len(transitions) + len(all_actions), sum(map(len, texts))
+
     for state in mission.states:
-        count(state, 0, in_template=False)
+        count(state, (0, 0), in_template=False)
     if states > MAX_STATES:
         raise mission_error(mission.place, Message("chart.too_many", count=states, limit=MAX_STATES))
     if parts > MAX_PARTS:
         raise mission_error(mission.place, Message("chart.too_many_parts", count=parts, limit=MAX_PARTS))
+    if characters > MAX_CHARACTERS:
+        message = Message("chart.too_much_text", count=characters, limit=MAX_CHARACTERS)
+        raise mission_error(mission.place, message)
 
 
 def _instance(state: State, templates: dict[str, State], used: set[str], problems: ProblemList) -> State:
