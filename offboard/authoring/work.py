@@ -8,7 +8,7 @@ from offboard.authoring.blocks import Blocks, Owner, Patch, Value
 from offboard.authoring.document import Document
 from offboard.authoring.edit_error import EditError
 from offboard.authoring.edits import TransitionPath
-from offboard.authoring.outline import TEMPLATE, Event, StateOutline, TransitionOutline
+from offboard.authoring.outline import TEMPLATE, StateOutline, TransitionOutline
 from offboard.authoring.references import Reference, chart_ids, instances, references, relative, shortest_text
 from offboard.authoring.text import Change
 from offboard.chart.problems import cut

@@ -9,6 +9,7 @@ annotation, the ending of a name such as `speed_m_s` tells it.
 from __future__ import annotations
 
 import inspect
+import re
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import lru_cache
@@ -45,16 +46,23 @@ class ValueDescription:
 NOT_DESCRIBED = ValueDescription()
 
 
-@lru_cache(maxsize=64)
 def descriptions(owner: type) -> Mapping[str, ValueDescription]:
     """The public values of a class by name: annotated attributes, class variables and properties."""
+    return _descriptions(owner)
+
+
+@lru_cache(maxsize=64)
+def _descriptions(owner: type) -> Mapping[str, ValueDescription]:
     if owner.__module__ == "builtins":
         return {}
     plain = (bool, int, float, str, tuple)
     untyped = inspect.getmembers(owner, lambda member: isinstance(member, plain))
     found = {name: _described(name, type(value), "") for name, value in untyped if name[0] != "_"}
     hints = get_type_hints(owner, include_extras=True)
-    found |= {name: _described(name, hint, "") for name, hint in hints.items() if name[0] != "_"}
+    texts = _attribute_texts(owner)
+    found |= {
+        name: _described(name, hint, texts.get(name, "")) for name, hint in hints.items() if name[0] != "_"
+    }
     for name, member in inspect.getmembers(owner, lambda member: isinstance(member, property)):
         if name[0] != "_":
             hint = get_type_hints(member.fget, include_extras=True).get("return", object)
@@ -62,12 +70,19 @@ def descriptions(owner: type) -> Mapping[str, ValueDescription]:
     return found
 
 
+def _attribute_texts(owner: type) -> dict[str, str]:
+    """The section "Attributes" of a class's docstring."""
+    section = (inspect.getdoc(owner) or "").partition("Attributes:\n")[2].partition("\n\n")[0]
+    found = re.findall(r"^ {4}(\w+): (.*(?:\n {5,}.*)*)", section, re.MULTILINE)
+    return {name: " ".join(text.split()) for name, text in found}
+
+
 def _described(name: str, hint: object, text: str) -> ValueDescription:
     kind = get_args(hint)[0] if get_origin(hint) is Annotated else hint
     fields = [part for part in get_args(hint)[1:] if isinstance(part, FieldInfo)] if kind is not hint else []
     unit, low, high = "", -inf, inf
     for field in fields:
-        text = text or field.description or ""
+        text = field.description or text
         extra = field.json_schema_extra
         unit = str(extra.get("unit", unit)) if isinstance(extra, Mapping) else unit
         for bound in field.metadata:

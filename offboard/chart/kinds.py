@@ -74,9 +74,9 @@ class Kinds:
         kind = Kind.ANY
         match node:
             case ast.Constant(value=value):
-                kind = _kind_of_type(type(value))
+                kind = kind_of_type(type(value))
             case ast.Name() | ast.Attribute():
-                kind = _kind_of_type(self._type_of(node))
+                kind = kind_of_type(self._type_of(node))
             case ast.Tuple():
                 kind = self._of_tuple(node)
             case ast.BoolOp():
@@ -121,7 +121,7 @@ class Kinds:
     def require_assignable(self, path: tuple[str, ...], node: ast.expr) -> None:
         """Refuse a value that cannot be assigned to a dotted name. Raises `KindError`."""
         target = self._vocabulary.type_of(path)
-        name, wanted = ".".join(path), _kind_of_type(target)
+        name, wanted = ".".join(path), kind_of_type(target)
         if isinstance(node, ast.Tuple) and wanted is Kind.PLACE and len(node.elts) != 3:
             raise self._not_three(node, name)
         if path[0] == "memory":
@@ -251,7 +251,7 @@ def decimal_comma(text: str) -> tuple[int, Message] | None:
     return found.start(), Message("kind.decimal_comma", whole=whole, part=part)
 
 
-def _kind_of_type(kind: object) -> Kind:
+def kind_of_type(kind: object) -> Kind:
     """The kind of a declared type; ANY if that is not certain."""
     if kind is bool:
         return Kind.CONDITION

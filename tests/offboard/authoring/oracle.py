@@ -94,7 +94,7 @@ def check_meaning(before: Document, edit: edits.Edit, after: Document) -> None:
                         if copy(each) != each:
                             assert new[copy(each)].without_targets() == meaning.without_targets()
                         if copy(each) != each and before.outline.get(each) and not state.text("use"):
-                            assert new[copy(each)] == meaning.moved(copy)
+                            assert new[copy(each)].unresolved(meaning) == meaning.moved(copy)
         case edits.DeleteState():
             state = before.outline.get(edit.state)
             gone = instances(before, state)
