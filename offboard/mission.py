@@ -11,8 +11,9 @@ import yaml
 from statemachine import StateChart
 
 from offboard.chart.check import check, is_finish
+from offboard.chart.messages import Message
 from offboard.chart.native import load_chart, native_document
-from offboard.chart.problems import MissionError, Place, ProblemList, did_you_mean, mission_error
+from offboard.chart.problems import MissionError, Place, Problem, ProblemList, did_you_mean, mission_error
 from offboard.chart.read import read_mission_file
 from offboard.chart.spec import Leaf, MissionFile, State, all_states, expand, leaves, merge_extended
 from offboard.pilot import Pilot
@@ -36,6 +37,7 @@ class Mission:
         pilot: what the mission was checked against: a contestant's file or a class.
         mission_class: by which limits it flies.
         vision: how it sees frames.
+        remarks: the checker's warnings and advice.
     """
 
     name: str
@@ -45,6 +47,7 @@ class Mission:
     pilot: PilotFile | type[Pilot] = field(repr=False)
     mission_class: MissionClass = "contest"
     vision: Vision = "boxes"
+    remarks: tuple[Problem, ...] = field(default=(), repr=False)
 
     def __getstate__(self) -> dict[str, object]:
         """Only the fields: the chart's class cannot be pickled."""
@@ -101,10 +104,9 @@ def load_mission(name_or_path: str | Path, pilot: PilotFile | type[Pilot] | None
     """
     pilot = Pilot if pilot is None else pilot
     path = _find(str(name_or_path), Path.cwd(), Place(str(name_or_path)))
-    written = read_mission_file(_read_text(path), path)
     problems = ProblemList()
-    spec = expand(merge_extended(written, _read_base), problems)
-    check(spec, pilot.pilot_class() if isinstance(pilot, PilotFile) else pilot, problems)
+    pilot_class = pilot.pilot_class() if isinstance(pilot, PilotFile) else pilot
+    spec = expand_and_check(read_mission_file(_read_text(path), path), pilot_class, problems)
     problems.raise_if_any()
     mission = Mission(
         spec.name,
@@ -114,15 +116,29 @@ def load_mission(name_or_path: str | Path, pilot: PilotFile | type[Pilot] | None
         pilot,
         mission_class=spec.mission_class or "contest",
         vision=spec.vision or "boxes",
+        remarks=problems.all,
     )
     mission.new_pilot()  # now, so that an error in the pilot or the chart is raised now
     mission.chart  # noqa: B018
     return mission
 
 
-def _read_base(mission: MissionFile) -> MissionFile:
+def expand_and_check(written: MissionFile, pilot_class: type[Pilot], problems: ProblemList) -> MissionFile:
+    """Merge a mission file with what it extends, expand it and check it; `problems` takes what is found.
+
+    Raises:
+        MissionError: what it extends cannot be read, or it is too large.
+    """
+    spec = expand(merge_extended(written, read_base), problems)
+    check(spec, pilot_class, problems)
+    return spec
+
+
+def read_base(mission: MissionFile) -> MissionFile:
+    """Read the mission that one extends. Raises `MissionError`."""
     path = _find(mission.extends, mission.path.parent, mission.place)
-    return read_mission_file(_read_text(path), path)
+    label = path.name if path.name != mission.path.name else str(path)
+    return read_mission_file(_read_text(path), path, label)
 
 
 def _find(name: str, folder: Path, place: Place) -> Path:
@@ -131,13 +147,13 @@ def _find(name: str, folder: Path, place: Place) -> Path:
         path = (folder / name).resolve()
         if path.is_file():
             return path
-        problem = "is not a regular file" if path.exists() else "does not exist"
-        raise mission_error(place, f"mission file '{name}' {problem}")
+        code = "file.irregular" if path.exists() else "file.missing"
+        raise mission_error(place, Message(code, name=name))
     known = list_missions()
     if name in known:
         return MISSIONS / f"{name}.yaml"
-    advice = did_you_mean(name, known, f"known: {', '.join(known)}; a file ends in .yaml")
-    raise mission_error(place, f"unknown mission '{name}'; {advice}")
+    advice = did_you_mean(name, known, Message("file.known", names=", ".join(known)))
+    raise mission_error(place, Message("file.unknown", name=name, advice=advice))
 
 
 def _read_text(path: Path) -> str:
@@ -145,11 +161,12 @@ def _read_text(path: Path) -> str:
         with path.open("rb") as file:  # a file may grow, or have no size, such as a device
             data = file.read(MAX_FILE_BYTES + 1)
         if len(data) > MAX_FILE_BYTES:
-            raise mission_error(Place(path.name), "is larger than 1 MB; a mission is a page or two")
+            raise mission_error(Place(path.name), Message("file.too_large"))
         return data.decode("utf-8").replace("\r\n", "\n").replace("\r", "\n")
     except (OSError, UnicodeDecodeError) as error:
-        reason = getattr(error, "strerror", None) or "is not UTF-8 text"
-        raise mission_error(Place(path.name), f"cannot be read: {reason}") from None
+        reason = getattr(error, "strerror", None)
+        message = Message("file.unreadable", reason=reason) if reason else Message("file.not_utf8")
+        raise mission_error(Place(path.name), message) from None
 
 
 def mermaid(mission: Mission, active: str | None = None) -> str:

@@ -11,7 +11,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 from math import cos, isfinite, isnan, sin, sqrt
 from types import SimpleNamespace
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Annotated
+
+from pydantic import Field
+from pydantic.config import JsonDict
 
 from errors import UserError
 from geometry.vectors import Vec3
@@ -26,7 +29,11 @@ if TYPE_CHECKING:  # it imports filterpy, which takes a second and which not eve
 
 LOOK_TURN_PX = 80.0  # horizontal offset that gives 1 rad/s: the paper's gains, for its image of 320 x 240
 LOOK_CLIMB_PX = 120.0  # vertical offset that gives 1 m/s
-
+M: JsonDict = {"unit": "m"}
+S: JsonDict = {"unit": "s"}
+M_S: JsonDict = {"unit": "m/s"}
+RAD: JsonDict = {"unit": "rad"}
+RAD_S: JsonDict = {"unit": "rad/s"}
 
 NAMES_ON_MAP = frozenset(
     {
@@ -45,22 +52,24 @@ class PilotError(UserError):
 class Imu:
     """Where the drone is in the arena."""
 
-    x: float = 0.0  # metres
-    y: float = 0.0  # metres
-    z: float = 0.0  # height above the floor, metres
-    yaw: float = 0.0  # heading, radians, counter-clockwise from x
+    x: Annotated[float, Field(description="forward of the floor's centre", json_schema_extra=M)] = 0.0
+    y: Annotated[float, Field(description="to the left of the floor's centre", json_schema_extra=M)] = 0.0
+    z: Annotated[float, Field(description="height above the floor", json_schema_extra=M)] = 0.0
+    yaw: Annotated[float, Field(description="heading, counter-clockwise from x", json_schema_extra=RAD)] = 0.0
 
 
 @dataclass(slots=True)
 class Command:
     """What the mission commands (the paper's on, velX, velY, velZ, rotZ)."""
 
-    on: bool = False  # motors on
-    vel_x: float = 0.0  # forward, m/s
-    vel_y: float = 0.0  # to the left, m/s
-    vel_z: float = 0.0  # up, m/s
-    rot_z: float = 0.0  # yaw rate to the left, rad/s
-    land: bool = False  # with `on` false: land by the vehicle's own means, do not stop the motors at once
+    on: Annotated[bool, Field(description="motors on")] = False
+    vel_x: Annotated[float, Field(description="speed forward", json_schema_extra=M_S)] = 0.0
+    vel_y: Annotated[float, Field(description="speed to the left", json_schema_extra=M_S)] = 0.0
+    vel_z: Annotated[float, Field(description="speed up", json_schema_extra=M_S)] = 0.0
+    rot_z: Annotated[float, Field(description="yaw rate to the left", json_schema_extra=RAD_S)] = 0.0
+    land: Annotated[
+        bool, Field(description="with `on` false: land by the vehicle's own means, motors off on the ground")
+    ] = False
 
 
 class Memory(SimpleNamespace):
@@ -70,16 +79,27 @@ class Memory(SimpleNamespace):
 class Pilot:
     """The paper's interface to missions. All times are vehicle time."""
 
-    imu: Imu  # position and heading
-    cam: Detections  # what the camera sees: `red`, `green`, `blue`, each with n, s, e, w, d, a
-    cmd: Command  # it stays as it is until changed
-    colour: Colour  # of the frame to find: red, green or blue; assign it, then read `frame`
-    goal_m: Vec3  # where `fly_to_goal` flies, (x, y, z) in the arena
-    memory: Memory  # the mission's own variables
-    limits: CommandLimits  # of its commands, by its class
-    seconds_in_state: float  # since the present state was entered
-    seconds_in_mission: float  # since the mission started
-    seconds_unseen: float  # since `frame` was last wholly in view, or the mission started or continued
+    imu: Annotated[Imu, Field(description="position and heading")]
+    cam: Annotated[Detections, Field(description="what the camera sees of the frame of each colour")]
+    cmd: Annotated[Command, Field(description="the command; it stays as it is until changed")]
+    colour: Annotated[Colour, Field(description="of the frame to find; assign it, then read `frame`")]
+    goal_m: Annotated[Vec3, Field(description="where `fly_to_goal` flies, (x, y, z) in the arena")]
+    memory: Annotated[Memory, Field(description="the mission's own variables")]
+    limits: Annotated[CommandLimits, Field(description="of its commands, by its class")]
+    seconds_in_state: Annotated[
+        float, Field(description="since the present state was entered", ge=0, json_schema_extra=S)
+    ]
+    seconds_in_mission: Annotated[
+        float, Field(description="since the mission started", ge=0, json_schema_extra=S)
+    ]
+    seconds_unseen: Annotated[
+        float,
+        Field(
+            description="since `frame` was last wholly in view, or the mission started or continued",
+            ge=0,
+            json_schema_extra=S,
+        ),
+    ]
 
     def __init__(self, variables: dict[str, object] | None = None) -> None:
         """Start with motors off, and with the first values of the mission's own variables."""
@@ -107,8 +127,8 @@ class Pilot:
         return isfinite(self.frame.d)
 
     @property
-    def distance_to_goal_m(self) -> float:
-        """From the present position to the goal, metres."""
+    def distance_to_goal_m(self) -> Annotated[float, Field(ge=0, json_schema_extra=M)]:
+        """From the present position to the goal."""
         x, y, z = self.goal_m
         imu = self.imu
         return sqrt((x - imu.x) ** 2 + (y - imu.y) ** 2 + (z - imu.z) ** 2)

@@ -5,11 +5,13 @@ from __future__ import annotations
 from collections.abc import AsyncIterator
 from dataclasses import dataclass, field
 from math import inf
-from typing import Literal, Protocol, Self
+from typing import Annotated, Literal, Protocol, Self
 from urllib.parse import urlsplit
 
 import numpy as np
 import numpy.typing as npt
+from pydantic import Field
+from pydantic.config import JsonDict
 
 from errors import UserError
 from geometry.vectors import Vec3
@@ -17,19 +19,42 @@ from geometry.vectors import Vec3
 Image = npt.NDArray[np.uint8]
 Vision = Literal["boxes", "frames"]
 """How frames are detected: the paper's box of each colour, or by contour and shape."""
+M: JsonDict = {"unit": "m"}
+PX: JsonDict = {"unit": "px"}
+DEG: JsonDict = {"unit": "deg"}
 
 
 @dataclass(frozen=True, slots=True)
 class Detection:
     """The paper's six numbers of one colour; the defaults mean "not seen"."""
 
-    n: float = -inf  # upper edge of its bounding box, pixels above the image centre
-    s: float = inf  # lower edge, pixels above the centre
-    e: float = -inf  # right edge, pixels right of the centre
-    w: float = inf  # left edge, pixels right of the centre
-    d: float = inf  # distance, metres; +inf unless the whole frame is in view
-    a: float = inf  # unsigned angle of line of sight to the frame's normal, degrees; +inf unless whole
-    signed_a: float = inf  # that angle, positive if flying left makes it smaller; +inf if not known
+    n: Annotated[
+        float,
+        Field(description="upper edge of its bounding box, above the image's centre", json_schema_extra=PX),
+    ] = -inf
+    s: Annotated[float, Field(description="lower edge, above the centre", json_schema_extra=PX)] = inf
+    e: Annotated[float, Field(description="right edge, right of the centre", json_schema_extra=PX)] = -inf
+    w: Annotated[float, Field(description="left edge, right of the centre", json_schema_extra=PX)] = inf
+    d: Annotated[
+        float,
+        Field(description="distance; infinite unless the whole frame is in view", ge=0, json_schema_extra=M),
+    ] = inf
+    a: Annotated[
+        float,
+        Field(
+            description="angle between line of sight and the frame's normal, without a sign; "
+            "infinite unless the whole frame is in view",
+            ge=0,
+            json_schema_extra=DEG,
+        ),
+    ] = inf
+    signed_a: Annotated[
+        float,
+        Field(
+            description="that angle, positive if flying left makes it smaller; infinite if not known",
+            json_schema_extra=DEG,
+        ),
+    ] = inf
 
     @property
     def seen(self) -> bool:
@@ -93,10 +118,13 @@ class ObstacleEdge:
 class Detections:
     """What one image showed."""
 
-    red: Detection = NOT_SEEN
-    green: Detection = NOT_SEEN
-    blue: Detection = NOT_SEEN
-    time_us: int | None = None  # vehicle time of the image; None if the source does not send it
+    red: Annotated[Detection, Field(description="the red frame")] = NOT_SEEN
+    green: Annotated[Detection, Field(description="the green frame")] = NOT_SEEN
+    blue: Annotated[Detection, Field(description="the blue frame")] = NOT_SEEN
+    time_us: Annotated[
+        int | None,
+        Field(description="vehicle time of the image; None if not known", json_schema_extra={"unit": "µs"}),
+    ] = None
     frames: tuple[FrameSighting, ...] = ()  # by shape; only from the frame finder
     obstacle_edges: tuple[ObstacleEdge, ...] = ()  # from left to right; only from the frame finder
 

@@ -11,6 +11,8 @@ from offboard.chart.expressions import (
     check_guard,
     names_in,
 )
+from offboard.chart.guards import actions_of, check_guards
+from offboard.chart.messages import Message
 from offboard.chart.problems import Place, ProblemList, cut, did_you_mean
 from offboard.chart.spec import Action, Leaf, MissionFile, State, Transition, all_states, leaves
 from offboard.chart.vocabulary import UnknownNameError, Vocabulary
@@ -21,49 +23,53 @@ def check(mission: MissionFile, pilot_class: type[Pilot], problems: ProblemList)
     """Check an expanded mission, and its names against a pilot class; `problems` takes what is found."""
     vocabulary = Vocabulary(pilot_class, mission.variables, contest=mission.mission_class != "open")
     if not mission.states:
-        problems.add(mission.place, "has no 'states'; write 'states:' and below it the states, indented")
+        problems.add(mission.place, Message("mission.no_states"))
         return
-    expanded_without_problems = not problems.found
+    whole = not problems.found
     for state in all_states(mission.states):
         _check_names(state, vocabulary, problems)
-    if not expanded_without_problems:
+    if not whole:
         return  # what follows would report the same faults again
-    _check_initial(mission.place, "the mission", mission, problems)
+    shape = ProblemList()
+    _check_initial(mission.place, Message("what.mission"), mission, shape)
     for state in all_states(mission.states):
-        _check_shape(state, problems)
-    if not problems.found:
+        _check_shape(state, shape)
+    if not shape.found:
+        _check_paths(mission, shape)
+    if not problems.found and not shape.found:
         _check_vision(mission, pilot_class, problems)
-    if not problems.found:
-        _check_paths(mission, problems)
+    if not problems.found and not shape.found:
+        check_guards(mission, vocabulary, problems)
+    problems.add_all(shape)
 
 
-def _check_initial(place: Place, what: str, around: MissionFile | State, problems: ProblemList) -> None:
+def _check_initial(place: Place, what: Message, around: MissionFile | State, problems: ProblemList) -> None:
     names, initial = [state.name for state in around.states], around.initial
     if not initial:
-        problems.add(place, f"{what} has no 'initial'; name the state it starts in, such as '{names[0]}'")
+        problems.add(place, Message("initial.missing", what=what, first=names[0]))
     elif initial not in names:
-        advice = did_you_mean(initial, names, f"it has the states {cut(', '.join(names), 100)}")
-        problems.add(around.initial_place, f"'initial' of {what} is '{cut(initial, 40)}'; {advice}")
+        known = Message("initial.known", names=cut(", ".join(names), 100))
+        advice = did_you_mean(initial, names, known)
+        message = Message("initial.unknown", what=what, name=cut(initial, 40), advice=advice)
+        problems.add(around.initial_place, message)
 
 
 def _check_shape(state: State, problems: ProblemList) -> None:
     place = state.place
     if state.states:
-        _check_initial(place, f"state '{state.id}'", state, problems)
+        _check_initial(place, Message("what.state", state=state.id), state, problems)
         if state.final:
-            problems.add(place, f"state '{state.id}' is final and has states; only one of both is possible")
+            problems.add(place, Message("state.final_with_states", state=state.id))
         ends = any(child.final for child in state.states)
         if state.then and not ends:
-            text = f"none of the states of '{state.id}' has 'final: true', so its 'then' is never reached"
-            problems.add(state.states[-1].place, text)
+            problems.add(state.states[-1].place, Message("state.then_unreached", state=state.id))
         return
     if state.then or state.initial:
-        problems.add(place, f"state '{state.id}' has 'then' or 'initial' but no states of its own")
+        problems.add(place, Message("state.no_superstate", state=state.id))
     if state.final and state.resume:
-        text = f"state '{state.id}' is final; there is nothing to continue, remove 'resume'"
-        problems.add(state.resume.place, text)
+        problems.add(state.resume.place, Message("state.final_resume", state=state.id))
     if state.final and (state.transitions or state.during):
-        problems.add(place, f"state '{state.id}' is final; nothing happens after its 'enter'")
+        problems.add(place, Message("state.final_more", state=state.id))
     _check_transitions(state, problems)
 
 
@@ -72,27 +78,27 @@ def _check_transitions(state: State, problems: ProblemList) -> None:
     seen: dict[str, Transition] = {}
     for transition in state.transitions:
         if "" in seen:
-            text = f"this transition of '{state.id}' is never reached: the one above always holds"
-            problems.add(transition.when_place, text)
+            problems.add(transition.when_place, Message("transition.after_always", state=state.id))
             return
         guard = " ".join(transition.when.split())
         if guard in seen:
             line = seen[guard].when_place.line
-            text = f"this transition of '{state.id}' is never reached: line {line} has the same 'when'"
-            problems.add(transition.when_place, text)
+            message = Message("transition.same_guard", state=state.id, line=line)
+            problems.add(transition.when_place, message)
         seen.setdefault(guard, transition)
 
 
 def _check_names(state: State, vocabulary: Vocabulary, problems: ProblemList) -> None:
     for transition in state.transitions:
-        if transition.when:
+        if transition.when and not problems.full:
             try:
                 check_guard(transition.when, vocabulary)
             except ExpressionError as error:
                 place = transition.when_place.moved(error.offset)
-                problems.add(place, f"when '{cut(transition.when)}': {error}")
-    for action in (*state.enter, *state.during, *state.exit):
-        _check_action(action, vocabulary, problems)
+                problems.add(place, Message("when", when=cut(transition.when), reason=error.message))
+    for action in actions_of(state):
+        if not problems.full:
+            _check_action(action, vocabulary, problems)
 
 
 def _check_action(action: Action, vocabulary: Vocabulary, problems: ProblemList) -> None:
@@ -102,11 +108,11 @@ def _check_action(action: Action, vocabulary: Vocabulary, problems: ProblemList)
         else:
             check_assignment(action.location, action.expression, vocabulary)
     except UnknownNameError as error:
-        problems.add(action.place, str(error))
+        problems.add(action.place, error.message)
     except ExpressionError as error:
         in_location = error.offset == IN_LOCATION
         place = action.place if in_location else action.expression_place.moved(error.offset)
-        problems.add(place, f"'{cut(str(action))}': {error}")
+        problems.add(place, Message("action", action=cut(str(action)), reason=error.message))
 
 
 def _check_vision(mission: MissionFile, pilot_class: type[Pilot], problems: ProblemList) -> None:
@@ -116,14 +122,13 @@ def _check_vision(mission: MissionFile, pilot_class: type[Pilot], problems: Prob
     for state in all_states(mission.states):
         for place, name in _names_used(state):
             if name in NAMES_ON_MAP and getattr(pilot_class, name) is getattr(Pilot, name):
-                advice = f"add the line 'vision: frames' at the top of {mission.path.name}"
-                problems.add(place, f"'{name}' needs the map of frames; {advice}")
+                problems.add(place, Message("vision.needed", name=name, file=mission.path.name))
                 return
 
 
 def _names_used(state: State) -> Iterator[tuple[Place, str]]:
     """Primitives and values of the pilot that a state uses, and where."""
-    for action in (*state.enter, *state.during, *state.exit):
+    for action in actions_of(state):
         if action.name:
             yield action.place, action.name
         for name in names_in(action.expression):
@@ -148,22 +153,18 @@ def _check_paths(mission: MissionFile, problems: ProblemList) -> None:
     stuck = [leaf_id for leaf_id in by_leaf if leaf_id in unpaused and leaf_id not in ending]
     ends = [leaf_id for leaf_id in stuck if not set(successors[leaf_id]) - {leaf_id}]
     for leaf_id in ends:
-        text = f"state '{leaf_id}' has no way out; add 'transitions:', or 'final: true' if it is the end"
-        problems.add(states[leaf_id].place, text)
+        problems.add(states[leaf_id].place, Message("state.no_way_out", state=leaf_id))
     if ends:
         return  # that other states are not reached may follow from it
     if stuck:
-        text = f"never finishes: no way from state '{stuck[0]}' to a final state"
-        advice = "add a transition to one, or mark a state with 'final: true'"
-        problems.add(states[stuck[0]].place, f"{text}; {advice}")
+        problems.add(states[stuck[0]].place, Message("state.never_finishes", state=stuck[0]))
         return
     entered = _reached(start, _successors(states, by_leaf, pauses=True))
     for state_id in _never_entered(mission.states, entered):
         if _entry(states, state_id) in entered:
             continue  # it follows one that was reported
         entered |= _reached([_entry(states, state_id)], successors)
-        place = states[state_id].place
-        problems.add(place, f"state '{state_id}' is never reached; add a transition to it, or remove it")
+        problems.add(states[state_id].place, Message("state.unreachable", state=state_id))
 
 
 def _never_entered(around: tuple[State, ...], entered: set[str]) -> list[str]:

@@ -15,6 +15,7 @@ from contextlib import contextmanager, suppress
 from statemachine.spec_parser import parse_expr
 
 from offboard.chart.kinds import KindError, Kinds, masked
+from offboard.chart.messages import Message, as_message
 from offboard.chart.vocabulary import UnknownNameError, Vocabulary, path_of
 from offboard.pilot import Pilot
 
@@ -31,60 +32,59 @@ _ALLOWED = (
 )  # fmt: skip
 
 _REASONS = {
-    ast.Call: "calls are not possible; name a value of the pilot, or set goal_m and read distance_to_goal_m",
-    ast.Subscript: "[...] is not possible; name the part, such as imu.x",
-    ast.List: "[...] is not possible; write a place in parentheses: (x, y, z)",
-    ast.Pow: "** is not possible; write a product",
-    ast.Mod: "% is not possible here",
-    ast.BitAnd: "write 'and' instead of '&'",
-    ast.BitOr: "write 'or' instead of '|'",
-    ast.Invert: "write 'not' instead of '~'",
-    ast.Is: "write '==' instead of 'is'",
-    ast.IsNot: "write '!=' instead of 'is not'",
-    ast.In: "'in' is not possible; compare with each: colour == 'red' or colour == 'blue'",
-    ast.NotIn: "'not in' is not possible; compare with each: colour != 'red' and colour != 'blue'",
-    ast.IfExp: "'if' is not possible here; write a transition for each case",
-    ast.NamedExpr: ":= is not possible; assign under 'enter' or 'during'",
+    ast.Call: "expression.call",
+    ast.Subscript: "expression.subscript",
+    ast.List: "expression.list",
+    ast.Pow: "expression.power",
+    ast.Mod: "expression.modulo",
+    ast.BitAnd: "expression.bit_and",
+    ast.BitOr: "expression.bit_or",
+    ast.Invert: "expression.invert",
+    ast.Is: "expression.is",
+    ast.IsNot: "expression.is_not",
+    ast.In: "expression.in",
+    ast.NotIn: "expression.not_in",
+    ast.IfExp: "expression.if",
+    ast.NamedExpr: "expression.walrus",
 }
 
 _MISTAKES = (
-    (r"&&|&", "write 'and' instead of '{}'"),
-    (r"\|\||\|", "write 'or' instead of '{}'"),
-    (r"!(?!=)", "write 'not' instead of '{}'"),
-    (r"<>|≠|=!", "write '!=' instead of '{}'"),
-    (r"=<|≤", "write '<=' instead of '{}'"),
-    (r"=>|≥", "write '>=' instead of '{}'"),
-    (r"===", "write '==' instead of '{}'"),
-    (r"(?<![<>=!:+\-*/])=(?!=)", "'=' sets a value; to compare write '=='"),
-    (r":=|\+=|-=|\*=|/=", "'{}' is not possible here; a guard only compares"),
-    (r"[‘’“”„‚«»´`]", "write a straight quotation mark ' instead of {}"),
-    (r"[×·]", "write '*' instead of '{}'"),
-    (r"[−–—]", "write '-' instead of '{}'"),
-    (r"÷", "write '/' instead of '{}'"),
-    (r"%", "'{}' is not possible; write 0.3 for 30 %"),
-    (r"\b(?:AND|OR|NOT|And|Or|Not)\b", "write '{lower}' in small letters"),
-    (r"(?:^|(?<=\s))(?:if|when|while)\b", "leave '{}' out; 'when:' means it already"),
-    (r"\b(?:then|goto|else)\b", "leave '{}' out; write the next state under 'to:'"),
-    (
-        r"(?<![\w.])\d[\d.]*\s*(?:ms|s|sec|m|cm|mm|rad|deg|px|°)(?!\w)",
-        "write the number without a unit: {number} instead of {}",
-    ),
-    (r"\b(?:and|or)\s*(?:<=?|>=?|==|!=)", "name the value again after '{first}': a < 2 and a > 1"),
-    (r"\b(?:and|or|not)\s*$", "something must follow '{}'"),
-    (r"(?:<=?|>=?|==|!=|[-+*/])\s*$", "a value must follow '{}'"),
+    (r"&&|&", "expression.and"),
+    (r"\|\||\|", "expression.or"),
+    (r"!(?!=)", "expression.not"),
+    (r"<>|≠|=!", "expression.unequal"),
+    (r"=<|≤", "expression.at_most"),
+    (r"=>|≥", "expression.at_least"),
+    (r"===", "expression.equal"),
+    (r"(?<![<>=!:+\-*/])=(?!=)", "expression.assignment"),
+    (r":=|\+=|-=|\*=|/=", "expression.change"),
+    (r"[‘’“”„‚«»´`]", "expression.quotes"),
+    (r"[×·]", "expression.times"),
+    (r"[−–—]", "expression.minus"),
+    (r"÷", "expression.divide"),
+    (r"%", "expression.percent"),
+    (r"\b(?:AND|OR|NOT|And|Or|Not)\b", "expression.small"),
+    (r"(?:^|(?<=\s))(?:if|when|while)\b", "expression.leave_out_if"),
+    (r"\b(?:then|goto|else)\b", "expression.leave_out_then"),
+    (r"(?<![\w.])\d[\d.]*\s*(?:ms|s|sec|m|cm|mm|rad|deg|px|°)(?!\w)", "expression.unit"),
+    (r"\b(?:and|or)\s*(?:<=?|>=?|==|!=)", "expression.value_again"),
+    (r"\b(?:and|or|not)\s*$", "expression.something_after"),
+    (r"(?:<=?|>=?|==|!=|[-+*/])\s*$", "expression.value_after"),
 )
-_MISTAKE_PATTERNS = tuple((re.compile(pattern), text) for pattern, text in _MISTAKES)
+_MISTAKE_PATTERNS = tuple((re.compile(pattern), code) for pattern, code in _MISTAKES)
 
 
 class ExpressionError(Exception):
     """An expression that is not allowed, has unknown names or mixes kinds; the message is one line.
 
     Attributes:
+        message: the same with its code.
         offset: of the fault, characters from the beginning of the expression.
     """
 
-    def __init__(self, text: str, offset: int = 0) -> None:
-        super().__init__(text)
+    def __init__(self, message: Message, offset: int = 0) -> None:
+        super().__init__(str(message))
+        self.message = message
         self.offset = offset
 
 
@@ -104,7 +104,7 @@ def check_assignment(location: str, text: str, vocabulary: Vocabulary) -> None:
     try:
         vocabulary.check_assignable(path)
     except UnknownNameError as error:
-        raise ExpressionError(str(error), IN_LOCATION) from None
+        raise ExpressionError(error.message, IN_LOCATION) from None
     with _as_expression_errors(text):
         Kinds(text.strip(), vocabulary).require_assignable(path, _checked(text, vocabulary).body)
 
@@ -117,21 +117,22 @@ def _checked(text: str, vocabulary: Vocabulary) -> ast.Expression:
             with suppress(UnknownNameError):
                 vocabulary.type_of(path_of(node.func))
                 name = ".".join(path_of(node.func))
-                raise ExpressionError(f"write it without parentheses: {name}", _offset(text, node))
+                raise ExpressionError(Message("expression.parentheses", name=name), _offset(text, node))
         if not isinstance(node, _ALLOWED):
-            reason = _REASONS.get(type(node), f"{type(node).__name__} is not possible here")
-            raise ExpressionError(reason, _offset(text, _around(tree, node)))
+            code = _REASONS.get(type(node), "expression.kind")
+            message = Message(code, kind=type(node).__name__)
+            raise ExpressionError(message, _offset(text, _around(tree, node)))
         if isinstance(node, ast.Constant) and not isinstance(node.value, (bool, int, float, str)):
-            raise ExpressionError(f"{node.value!r} is not possible here", _offset(text, node))
+            raise ExpressionError(Message("expression.constant", value=node.value), _offset(text, node))
     for node in _name_nodes(tree):
         try:
             vocabulary.type_of(path_of(node))
         except UnknownNameError as error:
-            raise ExpressionError(str(error), _offset(text, node)) from None
+            raise ExpressionError(error.message, _offset(text, node)) from None
     try:
         parse_expr(text, _name_of_pilot)
     except (ValueError, SyntaxError) as error:
-        raise ExpressionError(str(error)) from None
+        raise ExpressionError(as_message(str(error))) from None
     return tree
 
 
@@ -140,9 +141,9 @@ def _as_expression_errors(text: str) -> Iterator[None]:
     try:
         yield
     except KindError as error:
-        raise ExpressionError(str(error), _offset(text, error.node)) from None
+        raise ExpressionError(error.message, _offset(text, error.node)) from None
     except RecursionError:
-        raise ExpressionError("is nested too deep; write it simpler") from None
+        raise ExpressionError(Message("expression.deep")) from None
 
 
 def _around(tree: ast.AST, inner: ast.AST) -> ast.AST:
@@ -182,44 +183,43 @@ def _name_of_pilot(name: str) -> Evaluate:
 
 def _parsed(text: str) -> ast.Expression:
     if not text.strip():
-        raise ExpressionError("nothing is written here; write an expression (what follows a # is not read)")
+        raise ExpressionError(Message("expression.empty"))
     if len(text) > MAX_EXPRESSION_CHARACTERS:
-        raise ExpressionError(f"is longer than {MAX_EXPRESSION_CHARACTERS} characters; split it")
+        raise ExpressionError(Message("expression.long", limit=MAX_EXPRESSION_CHARACTERS))
     try:
         return ast.parse(text.strip(), mode="eval")
     except SyntaxError as error:
         raise _syntax_error(text, (error.offset or 1) - 1) from None
     except (ValueError, RecursionError, MemoryError):
-        raise ExpressionError("cannot be understood: too deep") from None
+        raise ExpressionError(Message("expression.too_deep")) from None
 
 
 def _syntax_error(text: str, error_at: int) -> ExpressionError:
     """What is wrong with a text that is no expression; Python's parser stopped at `error_at`."""
     plain = masked(text)
-    for pattern, advice in _MISTAKE_PATTERNS:
+    for pattern, code in _MISTAKE_PATTERNS:
         found = pattern.search(plain)
         if found:
             sign = found.group().strip()
             first, number = (re.match(pattern, sign) for pattern in (r"\w+", r"[\d.]+"))
             words = {
+                "sign": sign,
                 "lower": sign.lower(),
                 "first": first.group() if first else sign,
                 "number": number.group() if number else sign,
             }
-            return ExpressionError(advice.format(sign, **words), found.start())
+            return ExpressionError(Message(code, **words), found.start())
     if plain.count("'") % 2 or plain.count('"') % 2:
         at = max(plain.rfind("'"), plain.rfind('"'))
-        return ExpressionError(f"a text begins here and is never closed; write {plain[at]} after it", at)
+        return ExpressionError(Message("expression.open_text", sign=plain[at]), at)
     opened, closed = plain.count("("), plain.count(")")
     if opened > closed:
-        return ExpressionError("a ')' is missing", plain.find("("))
+        return ExpressionError(Message("expression.no_closing"), plain.find("("))
     if closed > opened:
-        return ExpressionError("a '(' is missing", plain.rfind(")"))
+        return ExpressionError(Message("expression.no_opening"), plain.rfind(")"))
     at = min(max(error_at, 0), len(text) - 1)
     rest = text[at:].strip()
-    return ExpressionError(
-        f"cannot be understood from '{rest[:30]}' on; write a comparison such as imu.z > 1", at
-    )
+    return ExpressionError(Message("expression.not_understood", rest=rest[:30]), at)
 
 
 def _name_nodes(tree: ast.AST) -> list[ast.expr]:
@@ -234,7 +234,7 @@ def _name_nodes(tree: ast.AST) -> list[ast.expr]:
         if isinstance(inner, ast.Name) and isinstance(node, ast.expr):
             found.append(node)
         elif isinstance(node, ast.Attribute):
-            raise ExpressionError(f"'.{path_of(node)[-1]}' must follow a name")
+            raise ExpressionError(Message("expression.after_name", name=path_of(node)[-1]))
         else:
             pending.extend(ast.iter_child_nodes(node))
     return found

@@ -10,6 +10,7 @@ from enum import Enum
 from typing import get_args, get_origin
 
 from geometry.vectors import Vec3
+from offboard.chart.messages import Message
 from offboard.chart.problems import cut
 from offboard.chart.vocabulary import Vocabulary, choices_of, path_of
 from offboard.limits import CONTEST
@@ -27,25 +28,32 @@ _DECIMAL_COMMA = re.compile(r"(?<![\w.])(\d+),(\d+)(?![\w.])")
 
 
 class Kind(Enum):
-    """What a value is, in words."""
+    """What a value is: the code of its words."""
 
-    CONDITION = "true or false"
-    NUMBER = "a number"
-    TEXT = "a text"
-    PLACE = "a place (x, y, z)"
-    PARTS = "several values"
-    ANY = "anything"
+    CONDITION = "kind.condition"
+    NUMBER = "kind.number"
+    TEXT = "kind.text"
+    PLACE = "kind.place"
+    PARTS = "kind.parts"
+    ANY = "kind.any"
+
+    @property
+    def words(self) -> Message:
+        """The kind in words."""
+        return Message(self.value)
 
 
 class KindError(Exception):
     """Values that do not fit together; the message is one line.
 
     Attributes:
+        message: the same with its code.
         node: the part of the expression with the fault.
     """
 
-    def __init__(self, node: ast.AST, text: str) -> None:
-        super().__init__(text)
+    def __init__(self, node: ast.AST, message: Message) -> None:
+        super().__init__(str(message))
+        self.message = message
         self.node = node
 
 
@@ -66,9 +74,9 @@ class Kinds:
         kind = Kind.ANY
         match node:
             case ast.Constant(value=value):
-                kind = _kind_of_type(type(value))
+                kind = kind_of_type(type(value))
             case ast.Name() | ast.Attribute():
-                kind = _kind_of_type(self._type_of(node))
+                kind = kind_of_type(self._type_of(node))
             case ast.Tuple():
                 kind = self._of_tuple(node)
             case ast.BoolOp():
@@ -100,38 +108,41 @@ class Kinds:
         if kind is Kind.PLACE and isinstance(node, ast.Tuple):
             raise self._comma(node)
         if kind is Kind.TEXT and isinstance(node, ast.Constant):
-            text = f"{shown} alone is no condition; write the whole comparison: colour == {shown}"
-            raise KindError(node, text)
+            raise KindError(node, Message("kind.text_alone", shown=shown))
         example = "imu.z > 1" if isinstance(node, ast.Constant) else f"{shown} > 1"
         advice = {
-            Kind.NUMBER: f"compare it, such as {example}",
-            Kind.TEXT: f"compare it, such as {shown} == 'red'",
-            Kind.PLACE: "compare a number, such as distance_to_goal_m < 0.2",
+            Kind.NUMBER: Message("kind.compare", example=example),
+            Kind.TEXT: Message("kind.compare", example=f"{shown} == 'red'"),
+            Kind.PLACE: Message("kind.compare_number"),
             Kind.PARTS: self._name_a_part(node),
         }[kind]
-        raise KindError(node, f"{shown} is {kind.value}, no condition; {advice}")
+        raise KindError(node, Message("kind.no_condition", shown=shown, kind=kind.words, advice=advice))
 
     def require_assignable(self, path: tuple[str, ...], node: ast.expr) -> None:
         """Refuse a value that cannot be assigned to a dotted name. Raises `KindError`."""
         target = self._vocabulary.type_of(path)
-        name, wanted = ".".join(path), _kind_of_type(target)
+        name, wanted = ".".join(path), kind_of_type(target)
         if isinstance(node, ast.Tuple) and wanted is Kind.PLACE and len(node.elts) != 3:
             raise self._not_three(node, name)
         if path[0] == "memory":
             wanted = Kind.ANY  # a variable may change its kind
         given = self.of(node)
         if given is Kind.PARTS:
-            raise KindError(node, f"{self._shown(node)} is several values; {self._name_a_part(node)}")
+            raise self._several(node)
         if wanted is not Kind.ANY and given not in (wanted, Kind.ANY):
             raise self._not_assignable(name, wanted, given, node)
         choices = choices_of(target)
         if choices and isinstance(node, ast.Constant) and node.value not in choices:
             listed = ", ".join(map(repr, choices))
-            raise KindError(node, f"{name} cannot be {node.value!r}; it is one of {listed}")
+            raise KindError(node, Message("kind.not_one_of", name=name, value=node.value, choices=listed))
         limit, value = LIMITS.get(path) if self._vocabulary.contest else None, _number(node)
         if limit is not None and value is not None and abs(value) > limit[0]:
-            text = f"{name} = {value:g} is too fast; at most {limit[0]:g} {limit[1]} is flown"
-            raise KindError(node, f"{text}: write a number from -{limit[0]:g} to {limit[0]:g}")
+            most, unit = limit
+            raise KindError(node, Message("kind.too_fast", name=name, value=value, limit=most, unit=unit))
+
+    def _several(self, node: ast.expr) -> KindError:
+        advice = self._name_a_part(node)
+        return KindError(node, Message("kind.several", shown=self._shown(node), advice=advice))
 
     def _not_assignable(self, name: str, wanted: Kind, given: Kind, node: ast.expr) -> KindError:
         if isinstance(node, ast.Tuple) and decimal_comma(self._text):
@@ -142,8 +153,11 @@ class Kinds:
             Kind.CONDITION: f"{name} = True",
             Kind.TEXT: f"{name} = 'red'",
         }.get(wanted, name)
-        shown = f"{self._shown(node)} is {given.value}"
-        return KindError(node, f"{name} is {wanted.value}, {shown}; write {example}")
+        kinds = {"wanted": wanted.words, "given": given.words}
+        shown = self._shown(node)
+        return KindError(
+            node, Message("kind.not_assignable", name=name, shown=shown, example=example, **kinds)
+        )
 
     def _type_of(self, node: ast.expr) -> object:
         """Declared type of a name; `object` if there is none, or if it may change as a variable's does."""
@@ -155,7 +169,7 @@ class Kinds:
             if self.of(part) not in (Kind.NUMBER, Kind.ANY):
                 if decimal_comma(self._text):
                     raise self._comma(node)
-                raise KindError(part, f"{self._shown(part)} is no number; a place is three numbers (x, y, z)")
+                raise KindError(part, Message("kind.no_number", shown=self._shown(part)))
         if len(node.elts) != 3:
             raise self._comma(node)
         return Kind.PLACE
@@ -166,14 +180,15 @@ class Kinds:
             return Kind.NUMBER
         if isinstance(node, ast.Tuple):
             raise self._comma(node)
-        advice = "take a number"
+        advice = Message("kind.take_number")
         if kind is Kind.PARTS:
             advice = self._name_a_part(node)
         elif kind is Kind.PLACE:
-            advice = "read distance_to_goal_m, or imu.x"
+            advice = Message("kind.read_number")
         elif kind is Kind.TEXT and isinstance(node, ast.Constant):
-            advice = "write a number without quotes"
-        raise KindError(node, f"{self._shown(node)} is {kind.value}, not a number; {advice}")
+            advice = Message("kind.no_quotes")
+        shown = self._shown(node)
+        raise KindError(node, Message("kind.not_a_number", shown=shown, kind=kind.words, advice=advice))
 
     def _compare(self, left: ast.expr, operator: ast.cmpop, right: ast.expr) -> None:
         if isinstance(operator, _ORDER):
@@ -183,43 +198,43 @@ class Kinds:
         kinds = self.of(left), self.of(right)
         for node, kind in zip((left, right), kinds, strict=True):
             if kind is Kind.PARTS:
-                raise KindError(node, f"{self._shown(node)} is several values; {self._name_a_part(node)}")
+                raise self._several(node)
         for name, constant in ((left, right), (right, left)):
             choices = choices_of(self._type_of(name))
             if choices and isinstance(constant, ast.Constant) and constant.value not in choices:
                 listed = ", ".join(map(repr, choices))
-                text = f"{self._shown(name)} is never {self._shown(constant)}; it is one of {listed}"
-                raise KindError(constant, text)
+                shown, value = self._shown(name), self._shown(constant)
+                raise KindError(constant, Message("kind.never", shown=shown, value=value, choices=listed))
         alike = {Kind.CONDITION: Kind.NUMBER}  # True is 1
         first, second = (alike.get(kind, kind) for kind in kinds)
         if Kind.ANY not in kinds and first is not second:
             one, other = self._shown(left), self._shown(right)
-            text = f"{one} is {kinds[0].value}, {other} is {kinds[1].value}; they are never equal"
-            raise KindError(left, text)
+            words = {"first": kinds[0].words, "second": kinds[1].words}
+            raise KindError(left, Message("kind.never_equal", one=one, other=other, **words))
 
     def _comma(self, node: ast.Tuple) -> KindError:
         """The error for a comma where a number is required."""
         hint = decimal_comma(self._text)
         if hint is not None:
             return KindError(node, hint[1])
-        return KindError(node, f"{self._shown(node)} is {len(node.elts)} values; take the comma away")
+        return KindError(node, Message("kind.comma", shown=self._shown(node), count=len(node.elts)))
 
     def _not_three(self, node: ast.Tuple, name: str) -> KindError:
         count = len(node.elts)
-        text = f"{name} needs three numbers (x, y, z), here are {count}"
         hint = decimal_comma(self._text) if count > 3 else None
         if hint is not None:
-            return KindError(node, f"{text}; {hint[1]}")
-        return KindError(node, f"{text}; the third is the height" if count == 2 else text)
+            return KindError(node, Message("kind.not_three_comma", name=name, count=count, hint=hint[1]))
+        code = "kind.no_height" if count == 2 else "kind.not_three"
+        return KindError(node, Message(code, name=name, count=count))
 
     def _shown(self, node: ast.expr) -> str:
         return cut(ast.get_source_segment(self._text, node) or "this", 40)
 
-    def _name_a_part(self, node: ast.expr) -> str:
+    def _name_a_part(self, node: ast.expr) -> Message:
         named = isinstance(node, (ast.Name, ast.Attribute))
         parts = self._vocabulary.parts_of(path_of(node)) if named else []
         example = f"{self._shown(node)}.{'d' if 'd' in parts else parts[0]}" if parts else "imu.x"
-        return f"name one of its parts, such as {example}"
+        return Message("kind.part", example=example)
 
 
 def masked(text: str) -> str:
@@ -227,16 +242,16 @@ def masked(text: str) -> str:
     return _QUOTED.sub(lambda found: "_" * len(found.group()), text)
 
 
-def decimal_comma(text: str) -> tuple[int, str] | None:
+def decimal_comma(text: str) -> tuple[int, Message] | None:
     """Where a number is written with a comma, and how to write it; None if there is none."""
     found = _DECIMAL_COMMA.search(masked(text))
     if found is None:
         return None
     whole, part = found.groups()
-    return found.start(), f"write decimals with a point: {whole}.{part} instead of {whole},{part}"
+    return found.start(), Message("kind.decimal_comma", whole=whole, part=part)
 
 
-def _kind_of_type(kind: object) -> Kind:
+def kind_of_type(kind: object) -> Kind:
     """The kind of a declared type; ANY if that is not certain."""
     if kind is bool:
         return Kind.CONDITION

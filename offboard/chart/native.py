@@ -74,7 +74,8 @@ def _transitions(leaf: Leaf) -> list[dict[str, Any]]:
     found: list[dict[str, Any]] = []
     for transition in leaf.transitions:
         guard = {"cond": transition.when} if transition.when else {}
-        found.append({"event": TICK, "target": transition.to, **guard})
+        actions = {"on": _actions(transition.actions)} if transition.actions else {}
+        found.append({"event": TICK, "target": transition.to, **guard, **actions})
     if leaf.during:
         found.append({"event": TICK, "on": _actions(leaf.during)})  # without a target no state is left
     if leaf.resume:

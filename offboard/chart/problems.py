@@ -5,10 +5,17 @@ from __future__ import annotations
 from collections.abc import Iterable
 from dataclasses import dataclass, field, replace
 from difflib import get_close_matches
+from typing import Literal
 
 from errors import UserError
+from offboard.chart.messages import Message, as_message
 
 MAX_REPORTED = 50
+MAX_COMPARED = 200
+"""Names that are compared with an unknown one to find the most similar; comparing is slow."""
+
+Severity = Literal["error", "warning", "advice"]
+"""An error: the mission is not flown. A warning: a part of it does nothing. Advice: what may go wrong."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -31,20 +38,40 @@ class Place:
 NOWHERE = Place("")
 
 
+@dataclass(frozen=True, slots=True)
+class Problem:
+    """One finding of the checker."""
+
+    place: Place
+    message: Message
+    severity: Severity = "error"
+
+    def __str__(self) -> str:
+        kind = "" if self.severity == "error" else f"{self.severity}: "
+        line = f"{self.place}: {kind}{self.message}"
+        # A file may hold anything; printed text of it must not move the terminal's cursor.
+        return "".join(c if c.isprintable() else c.encode("unicode_escape").decode() for c in line)
+
+
 class MissionError(UserError):
-    """A mission file cannot be flown; the message has one line for each problem."""
+    """A mission file cannot be flown; the message has one line for each problem.
+
+    Attributes:
+        problems: the same with codes and places, all of them.
+    """
+
+    def __init__(self, text: str, problems: tuple[Problem, ...] = ()) -> None:
+        super().__init__(text)
+        self.problems = problems
+
+    def __reduce__(self) -> tuple[type[MissionError], tuple[str, tuple[Problem, ...]]]:
+        return MissionError, (str(self), self.problems)
 
 
-def problem(place: Place, text: str) -> str:
-    """A problem as one line."""
-    line = f"{place}: {text}"
-    # A file may hold anything; printed text of it must not move the terminal's cursor.
-    return "".join(c if c.isprintable() else c.encode("unicode_escape").decode() for c in line)
-
-
-def mission_error(place: Place, text: str) -> MissionError:
+def mission_error(place: Place, text: Message | str) -> MissionError:
     """The error for a single problem."""
-    return MissionError(problem(place, text))
+    found = Problem(place, as_message(text))
+    return MissionError(str(found), (found,))
 
 
 @dataclass(slots=True)
@@ -55,30 +82,48 @@ class ProblemList:
     the same word mostly follows from the first.
     """
 
-    _by_place: dict[Place, str] = field(default_factory=dict)
+    _by_place: dict[Place, Problem] = field(default_factory=dict)
 
     @property
     def found(self) -> bool:
-        """Whether there is any."""
-        return bool(self._by_place)
+        """Whether there is an error."""
+        return any(each.severity == "error" for each in self._by_place.values())
 
-    def add(self, place: Place, text: str) -> None:
-        """Note a problem."""
-        self._by_place.setdefault(place, text)
+    @property
+    def full(self) -> bool:
+        """Whether no more would be reported."""
+        return len(self._by_place) > MAX_REPORTED
+
+    @property
+    def all(self) -> tuple[Problem, ...]:
+        """In order of file, line and column."""
+        order = sorted(self._by_place, key=lambda place: (place.file, place.line, place.column))
+        return tuple(self._by_place[place] for place in order)
+
+    def add(self, place: Place, message: Message, severity: Severity = "error") -> None:
+        """Note a problem; an error replaces a warning of the same place."""
+        known = self._by_place.get(place)
+        if known is None or (known.severity != "error" and severity == "error"):
+            self._by_place[place] = Problem(place, message, severity)
+
+    def add_all(self, other: ProblemList) -> None:
+        """Note all problems of another list."""
+        for each in other.all:
+            self.add(each.place, each.message, each.severity)
 
     def remove(self, place: Place) -> None:
         """Forget the problem at a place, because there is a better message."""
         self._by_place.pop(place, None)
 
     def raise_if_any(self) -> None:
-        """Raise a `MissionError` with all problems, in order of file, line and column."""
+        """Raise a `MissionError` with all errors, in order of file, line and column."""
         if self.found:
-            order = sorted(self._by_place, key=lambda place: (place.file, place.line, place.column))
-            lines = [problem(place, self._by_place[place]) for place in order[:MAX_REPORTED]]
-            if len(order) > MAX_REPORTED:
-                more = f"and {len(order) - MAX_REPORTED} more mistakes"
-                lines.append(problem(Place(order[0].file), more))
-            raise MissionError("\n".join(lines))
+            errors = tuple(each for each in self.all if each.severity == "error")
+            lines = [str(each) for each in errors[:MAX_REPORTED]]
+            if len(errors) > MAX_REPORTED:
+                more = f"and {len(errors) - MAX_REPORTED} more mistakes"
+                lines.append(str(Problem(Place(errors[0].place.file), as_message(more))))
+            raise MissionError("\n".join(lines), errors)
 
 
 def cut(text: str, max_characters: int = 60) -> str:
@@ -86,7 +131,8 @@ def cut(text: str, max_characters: int = 60) -> str:
     return text if len(text) <= max_characters else f"{text[: max_characters - 3]}..."
 
 
-def did_you_mean(name: str, known: Iterable[str], otherwise: str, owner: str = "") -> str:
+def did_you_mean(name: str, known: Iterable[str], otherwise: Message | str, owner: str = "") -> Message:
     """Suggest the known name that is most similar, after its `owner` such as "cmd."; or `otherwise`."""
-    similar = get_close_matches(name, known, 1)
-    return f"did you mean '{owner}{similar[0]}'?" if similar else otherwise
+    names = list(known)
+    similar = get_close_matches(name, names, 1) if len(names) <= MAX_COMPARED and len(name) < 100 else []
+    return Message("did_you_mean", name=f"{owner}{similar[0]}") if similar else as_message(otherwise)

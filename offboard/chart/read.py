@@ -7,6 +7,7 @@ import re
 from pathlib import Path
 from typing import TypeVar, get_args
 
+from offboard.chart.messages import Message
 from offboard.chart.problems import Place, ProblemList, cut, did_you_mean
 from offboard.chart.spec import Action, MissionFile, State, Transition
 from offboard.chart.yaml_nodes import ListNode, MapNode, Node, Scalar, parse_yaml
@@ -26,7 +27,7 @@ _STATE_KEYS = (
     *("enter", "during", "exit", "transitions", "states"),
 )
 _TEMPLATE_KEYS = ("initial", "states", "resume", "transitions", "enter", "during", "exit")
-_TRANSITION_KEYS = ("when", "to")
+_TRANSITION_KEYS = ("when", "to", "do")
 _SYNONYMS = {
     **dict.fromkeys(("while", "loop", "do", "tick", "always"), "during"),
     **dict.fromkeys(("on_enter", "entry", "begin", "on_start"), "enter"),
@@ -37,23 +38,38 @@ _SYNONYMS = {
     **dict.fromkeys(("template", "extends"), "use"),
     **dict.fromkeys(("first", "start"), "initial"),
 }
+MAX_CONSTANT_CHARACTERS = 500
 _NAME = re.compile(r"[a-z][a-z0-9_]*\Z")
 _MISSION_NAME = re.compile(r"[a-z0-9][a-z0-9_-]{0,79}\Z")  # as a scenario's: folders are named by it
 _SETTING = re.compile(r"[a-z][\w.]*\Z")
 _ASSIGNMENT = re.compile(r"\s*([A-Za-z_][\w.]*)\s*=(?!=)\s*(.*)\Z", re.DOTALL)
 
 
-def read_mission_file(text: str, path: Path) -> MissionFile:
+def read_mission_file(text: str, path: Path, label: str = "") -> MissionFile:
     """Read the text of one mission file, without what it extends.
+
+    Args:
+        text: its content, lines ended by a line feed.
+        path: where it is.
+        label: its name in problems; by default that of the path.
 
     Raises:
         MissionError: with every problem of its structure.
     """
-    root = parse_yaml(text, path.name, _MISSION_KEYS)
     problems = ProblemList()
-    mission = _Reader(problems).mission(root, path)
+    mission = read_nodes(parse_mission_yaml(text, label or path.name), path, problems)
     problems.raise_if_any()
     return mission
+
+
+def parse_mission_yaml(text: str, label: str) -> MapNode:
+    """The nodes of a mission's text. Raises `MissionError` if it is not YAML."""
+    return parse_yaml(text, label, _MISSION_KEYS)
+
+
+def read_nodes(root: MapNode, path: Path, problems: ProblemList) -> MissionFile:
+    """Convert nodes to a mission; what cannot be understood is left out and noted in `problems`."""
+    return _Reader(problems).mission(root, path)
 
 
 class _Reader:
@@ -63,7 +79,7 @@ class _Reader:
         self._problems = problems
 
     def mission(self, root: MapNode, path: Path) -> MissionFile:
-        self._check_keys(root, _MISSION_KEYS, "a mission")
+        self._check_keys(root, _MISSION_KEYS, Message("what.a_mission"))
         variables = self._variables(root)
         return MissionFile(
             place=Place(root.place.file, root.place.line),
@@ -86,9 +102,10 @@ class _Reader:
         names = list(children)
         for number, (name, node) in enumerate(children.items()):
             if name in _STATE_KEYS and (name == "states" or not isinstance(node, MapNode)):
-                under = f", under '{names[number - 1]}:'" if number else ""
-                place = self._key_place(parent.items[key], name)
-                self._problems.add(place, f"'{name}' stands beside the {key}; indent it more{under}")
+                message = Message("key.beside", name=name, key=key)
+                if number:
+                    message = Message("key.beside_under", name=name, key=key, under=names[number - 1])
+                self._problems.add(self._key_place(parent.items[key], name), message)
                 return {}
         return {name: self._state(name, node, allowed, parent.items[key]) for name, node in children.items()}
 
@@ -97,10 +114,9 @@ class _Reader:
         if isinstance(node, Scalar) and not node.text:  # "end:" with nothing below
             node = MapNode(node.place, {}, {})
         if not isinstance(node, MapNode):
-            text = f"state '{name}' needs lines below it, such as 'enter:' and 'transitions:'"
-            self._problems.add(node.place, text)
+            self._problems.add(node.place, Message("state.no_lines", state=name))
             return State(place, name)
-        self._check_keys(node, keys, f"state '{name}'")
+        self._check_keys(node, keys, Message("what.state", state=name))
         return State(
             place=place,
             id=name,
@@ -123,8 +139,7 @@ class _Reader:
             return None
         place, to = _value_place(state, "resume"), self._text(state, "resume")
         if not to and isinstance(state.items["resume"], Scalar):
-            text = "'resume' is empty; name the state to go on in after a pause"
-            self._problems.add(state.keys["resume"], text)
+            self._problems.add(state.keys["resume"], Message("state.resume_empty"))
         return Transition(place, to)
 
     def _transitions(self, state: MapNode) -> tuple[Transition, ...]:
@@ -132,12 +147,11 @@ class _Reader:
         incomplete: Place | None = None  # where the one before begins, if it has no target
         for node in self._list(state, "transitions"):
             if not isinstance(node, MapNode):
-                self._problems.add(node.place, "a transition has 'when: ...' and, under it, 'to: ...'")
+                self._problems.add(node.place, Message("transition.form"))
                 continue
             if incomplete is not None and set(node.keys) == {"to"}:
-                text = "take the '-' before 'to' away, and put 'to' under the 'when' above it"
                 self._problems.remove(incomplete)
-                self._problems.add(node.place, text)
+                self._problems.add(node.place, Message("transition.dash"))
                 incomplete = None
                 continue
             transition = self._transition(node)
@@ -146,15 +160,14 @@ class _Reader:
         return tuple(found)
 
     def _transition(self, node: MapNode) -> Transition:
-        known = self._check_keys(node, _TRANSITION_KEYS, "a transition")
+        known = self._check_keys(node, _TRANSITION_KEYS, Message("what.a_transition"))
         to, when = self._text(node, "to"), self._text(node, "when")
         if not to and known:
-            self._problems.add(node.place, "transition without 'to'; name the state it leads to")
+            self._problems.add(node.place, Message("transition.no_target"))
         if "when" in node.items and not when:
-            text = "'when' is empty; leave it out for a transition at the next tick"
-            self._problems.add(node.keys["when"], text)
+            self._problems.add(node.keys["when"], Message("transition.when_empty"))
         when_place = _value_place(node, "when") if "when" in node.items else node.place
-        return Transition(_value_place(node, "to"), to, when, when_place)
+        return Transition(_value_place(node, "to"), to, when, when_place, self._actions(node, "do"))
 
     def _actions(self, state: MapNode, key: str) -> tuple[Action, ...]:
         return tuple(filter(None, (self._action(key, node) for node in self._list(state, key))))
@@ -163,14 +176,13 @@ class _Reader:
         if isinstance(node, MapNode) and len(node.items) == 1:
             (name, value), place = next(iter(node.items.items())), next(iter(node.keys.values()))
             if name in _TRANSITION_KEYS:
-                self._problems.add(place, f"'{name}' does not belong here; write it under 'transitions:'")
+                self._problems.add(place, Message("action.misplaced", name=name))
                 return None
             if isinstance(value, Scalar) and _SETTING.match(name):
-                self._problems.add(place, f"to set a value write '=': {name} = {cut(value.text, 30)}")
+                self._problems.add(place, Message("action.colon", name=name, value=cut(value.text, 30)))
                 return None
         if not isinstance(node, Scalar) or not node.text.strip():
-            text = f"'{key}' lists primitives and assignments, such as '- hover' and '- cmd.vel_x = 0.3'"
-            self._problems.add(node.place, text)
+            self._problems.add(node.place, Message("action.form", key=key))
             return None
         assignment = _ASSIGNMENT.match(node.text)
         if not assignment:
@@ -187,25 +199,27 @@ class _Reader:
         variables = self._children(root, "variables")
         for name, node in variables.items():
             if isinstance(node, MapNode):
-                text = f"'{name}' looks like a state, but stands under 'variables:'; put 'states:' above it"
-                self._problems.add(self._key_place(root.items["variables"], name), text)
+                place = self._key_place(root.items["variables"], name)
+                self._problems.add(place, Message("variable.state", name=name))
                 return {}
         return variables
 
     def _constant(self, name: str, node: Node) -> object:
         text = node.text.strip() if isinstance(node, Scalar) else ""
         try:
-            value: object = ast.literal_eval(text)
+            value: object = ast.literal_eval(text) if len(text) <= MAX_CONSTANT_CHARACTERS else None
         except (ValueError, SyntaxError, MemoryError, RecursionError):
             value = text if isinstance(node, Scalar) and node.quoted else None
         is_place = isinstance(value, tuple) and len(value) == 3 and all(map(_is_number, value))
         if not is_place and not isinstance(value, (bool, int, float, str)):
-            what = f"variable '{name}' needs a number, a (x, y, z), True, False or 'text'"
+            what = Message("variable.value", name=name)
             if re.fullmatch(r"[+-]?\d+,\d+", text):
-                what = f"{text} is two numbers; write it with a point: {text.replace(',', '.')}"
+                what = Message("variable.comma", text=text, point=text.replace(",", "."))
             elif re.fullmatch(r"[A-Za-z_]\w*", text):
                 word = text.capitalize()
-                what = f"write {word}" if word in ("True", "False") else f"write a text in quotes: '{text}'"
+                what = Message("variable.text", text=cut(text))
+                if word in ("True", "False"):
+                    what = Message("variable.word", word=word)
             self._problems.add(node.place, what)
         return value
 
@@ -216,9 +230,8 @@ class _Reader:
             words = re.sub(r"[^a-z0-9_-]+", "-", path.stem.lower()).strip("-_")
             return words[:80] or "mission"
         if not _MISSION_NAME.match(name):
-            text = f"name '{cut(name, 40)}': use small letters, digits, - and _, a letter or digit first"
-            limit = "; at most 80" if len(name) > 80 else ""
-            self._problems.add(_value_place(root, "name"), text + limit)
+            code = "mission.name_long" if len(name) > 80 else "mission.name"
+            self._problems.add(_value_place(root, "name"), Message(code, name=cut(name, 40)))
         return name
 
     def _children(self, node: MapNode, key: str) -> dict[str, Node]:
@@ -227,13 +240,12 @@ class _Reader:
             return {}
         if not isinstance(child, MapNode):
             if not (isinstance(child, Scalar) and not child.text):
-                example = "such as '  start_x: 0'" if key == "variables" else f"such as '  {key[:-1]}_1:'"
-                self._problems.add(node.keys[key], f"'{key}' needs names below it, {example}")
+                example = "  start_x: 0" if key == "variables" else f"  {key[:-1]}_1:"
+                self._problems.add(node.keys[key], Message("key.names_below", key=key, example=example))
             return {}
         for name, place in child.keys.items():
             if not _NAME.match(name):
-                text = f"'{name}' is not a name; use small letters, digits and _, a letter first"
-                self._problems.add(place, text)
+                self._problems.add(place, Message("key.name", name=cut(name)))
         return child.items
 
     def _list(self, node: MapNode, key: str) -> tuple[Node, ...]:
@@ -245,8 +257,7 @@ class _Reader:
         if isinstance(child, Scalar) and not child.text:
             return ()
         example = "- when: ..." if key == "transitions" else "- hover"
-        text = f"'{key}' must be a list; start its lines with '- ', such as '{example}'"
-        self._problems.add(child.place, text)
+        self._problems.add(child.place, Message("key.list", key=key, example=example))
         return ()
 
     @staticmethod
@@ -259,7 +270,7 @@ class _Reader:
             return ""
         if isinstance(child, Scalar):
             return child.text.strip()
-        self._problems.add(node.keys[key], f"'{key}' must be one line of text")
+        self._problems.add(node.keys[key], Message("key.one_line", key=key))
         return ""
 
     def _choice(self, node: MapNode, key: str, choices: tuple[Choice, ...]) -> Choice | None:
@@ -271,17 +282,19 @@ class _Reader:
             if text == choice:
                 return choice
         if isinstance(node.items[key], Scalar):
-            advice = did_you_mean(text.lower(), choices, f"it is {' or '.join(choices)}")
-            self._problems.add(node.items[key].place, f"unknown {key} '{cut(text, 40)}'; {advice}")
+            known = Message("key.choices", choices=" or ".join(choices))
+            advice = did_you_mean(text.lower(), choices, known)
+            message = Message("key.choice", key=key, text=cut(text, 40), advice=advice)
+            self._problems.add(node.items[key].place, message)
         return None
 
     def _flag(self, node: MapNode, key: str) -> bool:
         text = self._text(node, key).lower()
         if text not in ("", "true", "false"):
-            self._problems.add(node.items[key].place, f"'{key}' is true or false, not '{cut(text, 30)}'")
+            self._problems.add(node.items[key].place, Message("key.flag", key=key, text=cut(text, 30)))
         return text == "true"
 
-    def _check_keys(self, node: MapNode, allowed: tuple[str, ...], what: str) -> bool:
+    def _check_keys(self, node: MapNode, allowed: tuple[str, ...], what: Message) -> bool:
         """Whether all keys are known."""
         unknown = [key for key in node.keys if key not in allowed]
         if "when" in unknown and "to" in unknown:
@@ -292,18 +305,20 @@ class _Reader:
             self._unknown_key(node, key, allowed, what)
         return not unknown
 
-    def _unknown_key(self, node: MapNode, key: str, allowed: tuple[str, ...], what: str) -> None:
+    def _unknown_key(self, node: MapNode, key: str, allowed: tuple[str, ...], what: Message) -> None:
         synonym = _SYNONYMS.get(key.lower(), "")
-        advice = f"did you mean '{synonym}'?" if synonym in allowed else ""
+        nothing = Message("plain", text="")
+        advice = Message("did_you_mean", name=synonym) if synonym in allowed else nothing
         advice = did_you_mean(key.lower(), allowed, advice)
-        if not advice and allowed == _MISSION_KEYS and isinstance(node.items[key], MapNode):
-            advice = "if it is a state, indent it to stand under 'states:'"
+        if advice is nothing and allowed == _MISSION_KEYS and isinstance(node.items[key], MapNode):
+            advice = Message("key.indent_state")
         elif key in _TRANSITION_KEYS:
-            advice = f"write it into a list under 'transitions:', such as '- {key}: ...'"
+            advice = Message("key.of_transition", key=key)
         elif key in _MISSION_KEYS and key not in (*allowed, *_STATE_KEYS):
-            advice = "it belongs to the mission; write it at the beginning of a line"
-        advice = advice or f"it has {', '.join(allowed)}"
-        self._problems.add(node.keys[key], f"{what} has no '{cut(key, 30)}'; {advice}")
+            advice = Message("key.of_mission")
+        if advice is nothing:
+            advice = Message("key.listed", names=", ".join(allowed))
+        self._problems.add(node.keys[key], Message("key.unknown", what=what, key=cut(key, 30), advice=advice))
 
 
 def _value_place(node: MapNode, key: str) -> Place:

@@ -15,12 +15,17 @@ from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
+from offboard.chart.messages import Message
 from offboard.chart.problems import NOWHERE, Place, ProblemList, cut, did_you_mean, mission_error
 from scenarios.models import MissionClass
 from vision.types import Vision
 
 MAX_EXTENDS = 5
 MAX_STATES = 1000
+MAX_PARTS = 20_000
+"""Transitions and actions of all states, each with those of the superstates around it."""
+MAX_CHARACTERS = 100_000
+"""Of the expressions of all states, counted likewise."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -45,6 +50,7 @@ class Transition:
     to: str  # the target as written; after expansion, a full state id
     when: str = ""  # the guard; empty for "always"
     when_place: Place = NOWHERE  # of the guard; without one, of the transition
+    actions: tuple[Action, ...] = ()  # done after leaving the state and before entering the target
 
 
 @dataclass(frozen=True, slots=True)
@@ -130,8 +136,7 @@ def merge_extended(mission: MissionFile, open_base: Callable[[MissionFile], Miss
     while chain[-1].extends:
         base = open_base(chain[-1])
         if base.path in [known.path for known in chain] or len(chain) > MAX_EXTENDS:
-            text = f"extends '{chain[-1].extends}': runs in a circle or too deep"
-            raise mission_error(chain[-1].place, text)
+            raise mission_error(chain[-1].place, Message("extends.circle", name=chain[-1].extends))
         chain.append(base)
     merged = chain.pop()
     while chain:
@@ -162,16 +167,48 @@ def expand(mission: MissionFile, problems: ProblemList) -> MissionFile:
     Raises:
         MissionError: too many states; all else is added to `problems`.
     """
+    _refuse_too_large(mission)
     used: set[str] = set()
     states = tuple(_instance(state, mission.templates, used, problems) for state in mission.states)
     for name in sorted(set(mission.templates) - used):
-        problems.add(mission.templates[name].place, f"template '{name}' is not used; remove it or 'use' it")
+        problems.add(mission.templates[name].place, Message("template.unused", name=name))
     states = tuple(_with_ids(state, "") for state in states)
-    known = all_states(states)
-    if len(known) > MAX_STATES:
-        raise mission_error(mission.place, f"has {len(known)} states; {MAX_STATES} are the limit")
-    ids = {state.id for state in known}
+    ids = {state.id for state in all_states(states)}
     return replace(mission, states=tuple(_resolved(state, ids, problems) for state in states), templates={})
+
+
+def _refuse_too_large(mission: MissionFile) -> None:
+    """Count what the expansion would make, before it is made."""
+    states = parts = characters = 0
+
+    def count(state: State, around: tuple[int, int], *, in_template: bool) -> None:
+        nonlocal states, parts, characters
+        template = None if in_template else mission.templates.get(state.use)
+        written = (state,) if template is None else (state, template)
+        inner = [(child, each is template) for each in written for child in each.states]
+        inherited = [size(each.transitions, each.during) for each in written]
+        own = (around[0] + sum(one for one, _ in inherited), around[1] + sum(two for _, two in inherited))
+        once = [size((), each.enter + each.exit) for each in written]
+        states += 1
+        parts += sum(one for one, _ in once) + (0 if inner else own[0])
+        characters += sum(two for _, two in once) + (0 if inner else own[1])
+        for child, of_template in inner if states <= MAX_STATES else ():
+            count(child, own, in_template=in_template or of_template)
+
+    def size(transitions: tuple[Transition, ...], actions: tuple[Action, ...]) -> tuple[int, int]:
+        all_actions = [*actions, *(action for each in transitions for action in each.actions)]
+        texts = [*(each.when for each in transitions), *(each.expression for each in all_actions)]
+        return len(transitions) + len(all_actions), sum(map(len, texts))
+
+    for state in mission.states:
+        count(state, (0, 0), in_template=False)
+    if states > MAX_STATES:
+        raise mission_error(mission.place, Message("chart.too_many", count=states, limit=MAX_STATES))
+    if parts > MAX_PARTS:
+        raise mission_error(mission.place, Message("chart.too_many_parts", count=parts, limit=MAX_PARTS))
+    if characters > MAX_CHARACTERS:
+        message = Message("chart.too_much_text", count=characters, limit=MAX_CHARACTERS)
+        raise mission_error(mission.place, message)
 
 
 def _instance(state: State, templates: dict[str, State], used: set[str], problems: ProblemList) -> State:
@@ -183,15 +220,15 @@ def _instance(state: State, templates: dict[str, State], used: set[str], problem
     template = templates.get(state.use)
     if template is None:
         known = ", ".join(templates) or "none"
-        text = f"state '{state.id}' uses the unknown template '{state.use}'; known: {known}"
-        problems.add(state.place, text)
+        message = Message("template.unknown", state=state.id, name=cut(state.use), known=known)
+        problems.add(state.place, message)
         return replace(state, use="")
     used.add(state.use)
     for child in all_states(template.states):
         if child.use:
-            problems.add(child.place, f"state '{child.id}': 'use' is not possible within a template")
+            problems.add(child.place, Message("template.use", state=child.id))
     if state.states or state.initial:
-        problems.add(state.place, f"state '{state.id}' has 'use' and states of its own; choose one")
+        problems.add(state.place, Message("template.both", state=state.id))
     return replace(
         state,
         use="",
@@ -212,14 +249,17 @@ def _with_ids(state: State, outer: str) -> State:
 
 
 def _resolved(state: State, ids: set[str], problems: ProblemList) -> State:
-    def target(name: str, place: Place, what: str) -> str:
-        found = _look_up(name, state.id, ids)
-        if found:
-            return found
+    def target(name: str, place: Place, what: Message | str) -> str:
+        found = look_up(name, state.id, ids)
+        if found or problems.full:
+            return found or name
         beside = [known for known in sorted(ids) if known.rpartition(".")[0] == state.id.rpartition(".")[0]]
         names = sorted({known.rpartition(".")[2] for known in ids} | ids)
-        advice = did_you_mean(name.lower(), names, f"there are {cut(', '.join(beside), 100)}")
-        problems.add(place, f"{what} '{cut(name, 40)}' of state '{state.id}' is not a state; {advice}")
+        advice = did_you_mean(
+            name.lower(), names, Message("target.beside", names=cut(", ".join(beside), 100))
+        )
+        message = Message("target.unknown", what=what, name=cut(name, 40), state=state.id, advice=advice)
+        problems.add(place, message)
         return name
 
     resume = state.resume
@@ -227,12 +267,14 @@ def _resolved(state: State, ids: set[str], problems: ProblemList) -> State:
         state,
         resume=resume and replace(resume, to=target(resume.to, resume.place, "'resume'")),
         then=target(state.then, state.then_place, "'then'") if state.then else "",
-        transitions=tuple(replace(t, to=target(t.to, t.place, "target")) for t in state.transitions),
+        transitions=tuple(
+            replace(t, to=target(t.to, t.place, Message("target.what"))) for t in state.transitions
+        ),
         states=tuple(_resolved(child, ids, problems) for child in state.states),
     )
 
 
-def _look_up(name: str, source: str, ids: set[str]) -> str:
+def look_up(name: str, source: str, ids: set[str]) -> str:
     """Full id of a target as seen from a state: within it, beside it, then outwards; empty if unknown."""
     outer = source
     while outer:

@@ -6,8 +6,10 @@ import ast
 import inspect
 import re
 from collections.abc import Mapping
-from typing import get_args, get_origin, get_type_hints
+from typing import get_args, get_origin
 
+from offboard.chart.described import ValueDescription, descriptions
+from offboard.chart.messages import Message
 from offboard.chart.problems import cut, did_you_mean
 from offboard.pilot import Memory, Pilot
 from scenarios.models import COLOURS
@@ -15,15 +17,19 @@ from scenarios.models import COLOURS
 WRITABLE = ("cmd", "colour", "goal_m", "memory")
 """What a mission may assign to; all else of the pilot is set by the engine."""
 _MISTAKES_IN_ACTIONS = (
-    (":=", "to set a value write '=' instead of ':='"),
-    ("==", "'==' compares; to set a value write one '='"),
-    (r"^[a-z][\w.]*\s*:", "to set a value write '=' instead of ':'"),
-    (r"[,;]|\band\b|\s-\s", "one action a line; begin each line with '- '"),
+    (":=", "action.walrus"),
+    ("==", "action.equal"),
+    (r"^[a-z][\w.]*\s*:", "action.colon_sign"),
+    (r"[,;]|\band\b|\s-\s", "action.one_a_line"),
 )
 
 
 class UnknownNameError(Exception):
     """A name that does not exist or cannot be used so; the message says in one line what to write."""
+
+    def __init__(self, message: Message) -> None:
+        super().__init__(str(message))
+        self.message = message
 
 
 class Vocabulary:
@@ -50,22 +56,19 @@ class Vocabulary:
             for name, member in inspect.getmembers(pilot_class, inspect.isfunction)
             if not name.startswith("_")
         }
-        plain = (bool, int, float, str, tuple)
-        untyped = inspect.getmembers(pilot_class, lambda member: isinstance(member, plain))
-        self.values: dict[str, object] = {name: type(value) for name, value in untyped if name[0] != "_"}
-        self.values |= _typed_names(pilot_class)
+        self.values = _typed_names(pilot_class)
 
     def check_primitive(self, name: str) -> None:
         """Refuse an action that is no method of the pilot. Raises `UnknownNameError`."""
         if name in self.primitives:
             needed = _needed_values(self._pilot_class, name)
             if needed:
-                raise UnknownNameError(f"'{name}' needs {needed}, but an action is called without values")
+                raise UnknownNameError(Message("name.needs_values", name=name, needed=needed))
             return
         if name in self.values:
-            raise UnknownNameError(f"'{name}' is a value, not an action; write 'location = expression'")
+            raise UnknownNameError(Message("name.value_as_action", name=name))
         advice = self._mistake_in(name) or self._similar(name, list(self.primitives))
-        raise UnknownNameError(f"unknown action '{cut(name)}'; {advice}")
+        raise UnknownNameError(Message("name.unknown_action", name=cut(name), advice=advice))
 
     def type_of(self, path: tuple[str, ...]) -> object:
         """Type of a name such as ("cam", "red", "d"), `object` if not declared. Raises `UnknownNameError`."""
@@ -77,6 +80,14 @@ class Vocabulary:
             kind = names[name]
         return kind
 
+    def described(self, path: tuple[str, ...]) -> ValueDescription:
+        """What is known of a name; the least if it is a variable's. Raises `UnknownNameError`."""
+        kind = self.type_of(path)
+        owner = self.type_of(path[:-1]) if len(path) > 1 else self._pilot_class
+        if not isinstance(owner, type) or owner is Memory:
+            return ValueDescription(kind)
+        return descriptions(owner).get(path[-1], ValueDescription(kind))
+
     def parts_of(self, path: tuple[str, ...]) -> list[str]:
         """Names of a value's parts; none of a plain value. Raises `UnknownNameError`."""
         return list(self._names_of(self.type_of(path)))
@@ -85,14 +96,13 @@ class Vocabulary:
         """Refuse an assignment to a name that is unknown or can only be read. Raises `UnknownNameError`."""
         name = ".".join(path)
         if path[0] == "goal_m" and len(path) > 1:
-            raise UnknownNameError("goal_m is set as a whole: goal_m = (x, y, z)")
+            raise UnknownNameError(Message("name.goal_whole"))
         kind = self.type_of(path)
         if path in (("cmd",), ("memory",)):
             parts = " ".join(f"{name}.{part}" for part in self._names_of(kind)) or "its variables"
-            raise UnknownNameError(f"'{name}' cannot be set as a whole; set {parts}")
+            raise UnknownNameError(Message("name.not_whole", name=name, parts=parts))
         if path[0] not in WRITABLE:
-            text = "a mission sets cmd.vel_x and the like, goal_m, colour and memory.<variable>"
-            raise UnknownNameError(f"'{name}' can only be read; {text}")
+            raise UnknownNameError(Message("name.read_only", name=name))
 
     def _names_of(self, kind: object) -> dict[str, object]:
         if kind is self._pilot_class:
@@ -101,52 +111,57 @@ class Vocabulary:
             return {name: type(value) for name, value in self._variables.items()}
         return _typed_names(kind) if isinstance(kind, type) and get_origin(kind) is None else {}
 
-    def _unknown(self, owner: tuple[str, ...], kind: object, name: str, names: list[str]) -> str:
+    def _unknown(self, owner: tuple[str, ...], kind: object, name: str, names: list[str]) -> Message:
         if kind is self._pilot_class:
             if name in self.primitives:
-                return f"'{name}' is an action, not a value"
-            return f"unknown name '{cut(name)}'; {self._likely(name) or self._similar(name, names)}"
+                return Message("name.action_as_value", name=name)
+            advice = self._likely(name) or self._similar(name, names)
+            return Message("name.unknown", name=cut(name), advice=advice)
         if kind is Memory:
-            declared = f"declared under 'variables': {' '.join(names) or 'none'}"
-            return f"no variable '{cut(name)}'; {did_you_mean(name, names, declared, 'memory.')}"
+            declared = Message("name.declared", names=" ".join(names) or "none")
+            advice = did_you_mean(name, names, declared, "memory.")
+            return Message("name.no_variable", name=cut(name), advice=advice)
         shown = ".".join(owner)
-        advice = "it is a plain value"
+        advice = Message("name.plain")
         if names:
-            advice = did_you_mean(name.lower(), names, f"it has {' '.join(names)}", f"{shown}.")
-        return f"'{shown}' has no '{name}'; {advice}"
+            parts = Message("name.parts", names=" ".join(names))
+            advice = did_you_mean(name.lower(), names, parts, f"{shown}.")
+        return Message("name.no_part", owner=cut(shown), name=cut(name), advice=advice)
 
-    def _mistake_in(self, action: str) -> str:
-        """What to write instead of an action that does not exist; empty if that cannot be seen."""
+    def _mistake_in(self, action: str) -> Message | None:
+        """What to write instead of an action that does not exist; None if that cannot be seen."""
         changed = re.match(r"([a-z][\w.]*)\s*([-+*/])=\s*(.+)", action)
         if changed:
             name, sign, value = changed.groups()
-            return f"write it in full: {name} = {name} {sign} {value}"
+            return Message("action.in_full", name=name, sign=sign, value=cut(value))
         called = re.match(r"(\w+)\s*\((.*)\)?\s*$", action)
         if called and called.group(1) in self.primitives:
             if not called.group(2).strip(" )"):
-                return f"write it without parentheses: {called.group(1)}"
-            before = "; set goal_m in a line before it" if called.group(1) == "fly_to_goal" else ""
-            return f"'{called.group(1)}' takes no values{before}"
-        return next((advice for pattern, advice in _MISTAKES_IN_ACTIONS if re.search(pattern, action)), "")
+                return Message("action.parentheses", name=called.group(1))
+            goal = "_goal" if called.group(1) == "fly_to_goal" else ""
+            return Message(f"action.no_values{goal}", name=called.group(1))
+        codes = (code for pattern, code in _MISTAKES_IN_ACTIONS if re.search(pattern, action))
+        code = next(codes, None)
+        return None if code is None else Message(code)
 
-    def _likely(self, name: str) -> str:
+    def _likely(self, name: str) -> Message | None:
         """What to write instead of an unknown name of another language, of a colour or without its owner."""
         if name.lower() in ("true", "false"):
-            return f"write {name.capitalize()}"
+            return Message("name.capital", name=name.capitalize())
         if name.lower() in COLOURS:
-            return f"write a text in quotes: '{name.lower()}'"
+            return Message("name.quotes", name=name.lower())
         if name in self._variables:
-            return f"write memory.{name}"
+            return Message("name.memory", name=name)
         whole = [
             f"{owner}.{name}"
             for owner in ("cmd", "imu", "frame")
             if owner in self.values and name in self._names_of(self.values[owner])
         ]
-        return f"did you mean {' or '.join(map(repr, whole))}?" if whole else ""
+        return Message("did_you_mean_one_of", names=" or ".join(map(repr, whole))) if whole else None
 
-    def _similar(self, name: str, names: list[str]) -> str:
-        adds = "; what a Python file adds needs --pilot FILE.py" if self._pilot_class is Pilot else ""
-        otherwise = did_you_mean(name, names, f"there are {' '.join(names)}{adds}")
+    def _similar(self, name: str, names: list[str]) -> Message:
+        code = "name.known_pilot" if self._pilot_class is Pilot else "name.known"
+        otherwise = did_you_mean(name, names, Message(code, names=" ".join(names)))
         return did_you_mean(re.sub(r"[^a-z0-9]+", "_", name.lower()), names, otherwise)
 
 
@@ -177,10 +192,4 @@ def _needed_values(pilot_class: type[Pilot], name: str) -> str:
 
 def _typed_names(kind: type) -> dict[str, object]:
     """Public attributes and properties of a class with their declared types, attributes first."""
-    if kind.__module__ == "builtins":
-        return {}
-    names = {name: hint for name, hint in get_type_hints(kind).items() if not name.startswith("_")}
-    for name, member in inspect.getmembers(kind, lambda member: isinstance(member, property)):
-        if not name.startswith("_"):
-            names[name] = get_type_hints(member.fget).get("return", object)
-    return names
+    return {name: value.type for name, value in descriptions(kind).items()}

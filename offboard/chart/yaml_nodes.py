@@ -7,19 +7,25 @@ The text mostly shows what was meant, so the messages are made from the text.
 from __future__ import annotations
 
 import re
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
+from typing import cast
 
 import yaml
+from yaml.error import MarkedYAMLError
 
+from offboard.chart.messages import Message
 from offboard.chart.problems import Place, ProblemList, mission_error
 
 MAX_DEPTH = 40
+MAX_NODES = 40_000
+MAX_EXPLAINED_CHARACTERS = 100_000
+_FAST_LOADER: type[yaml.SafeLoader] = getattr(yaml, "CSafeLoader", yaml.SafeLoader)
 _KEY = re.compile(r"\s*(?:-\s+)?([\w.]+)\s*:(?:\s|$)")
 _TWO_COLONS = re.compile(r"\s*(?:-\s+)?[\w.]+\s*:\s+[^\s'\"#][^'\"#]*:(?:\s|$)")
 _NO_SPACE = re.compile(r"\s*(?:-\s+)?(\w+):([^\s:]+)\s*(?:#.*)?$")
 _SPECIAL_SPACE = re.compile(r"[ ]*[\u00a0\u2000-\u200b\u202f\u3000]")
 
-Fault = tuple[int, int, str]
+Fault = tuple[int, int, Message]
 """Line and column, counted from 1 (0 if not known), and what to do."""
 
 
@@ -30,28 +36,40 @@ class Scalar:
     Attributes:
         place: of its first character.
         quoted: it stands in quotation marks, which are not part of the text.
+        start, end: offsets in the document, quotation marks included.
+        block: it is written with `|` or `>`.
     """
 
     place: Place
     text: str
     quoted: bool = False
+    start: int = 0
+    end: int = 0
+    block: bool = False
 
 
 @dataclass(frozen=True, slots=True)
 class ListNode:
-    """A YAML list."""
+    """A YAML list; `end` is that of its last item or, of a list in brackets, after the bracket."""
 
     place: Place
     items: tuple[Node, ...]
+    start: int = 0
+    end: int = 0
+    flow: bool = False
 
 
 @dataclass(frozen=True, slots=True)
 class MapNode:
-    """A YAML mapping; `keys` has the place of each key."""
+    """A YAML mapping; `keys` has the place of each key, `key_nodes` the key itself."""
 
     place: Place
     items: dict[str, Node]
     keys: dict[str, Place]
+    key_nodes: dict[str, Scalar] = field(default_factory=dict)
+    start: int = 0
+    end: int = 0
+    flow: bool = False
 
 
 Node = Scalar | ListNode | MapNode
@@ -61,74 +79,143 @@ def parse_yaml(text: str, file: str, keys: tuple[str, ...]) -> MapNode:
     """Read YAML text whose outermost node is a mapping.
 
     Args:
-        text: the document.
+        text: the document, its lines ended by a line feed.
         file: the name for problems.
         keys: that the outermost mapping may have.
 
     Raises:
         MissionError: bad syntax, an alias, a key written twice, too deep, not a mapping.
     """
-    try:
-        _refuse_aliases_and_depth(text, file)
-        root = yaml.compose(text, Loader=yaml.SafeLoader)
-    except yaml.YAMLError as error:
-        line, column, what = _syntax_fault(text, error, keys)
-        raise mission_error(Place(file, line, column), what) from None
-    if root is None:
-        raise mission_error(Place(file, 1), "is empty; `framerunner mission new NAME` writes a first one")
-    if not isinstance(root, yaml.MappingNode):
-        advice = "a mission begins with 'name: ...', then 'initial: ...' and 'states:'"
-        raise mission_error(Place(file, 1), advice)
     problems = ProblemList()
-    tree = _convert(root, file, problems)
+    try:
+        tree = _Composer(text, file, problems, _loader_for(text)).document()
+    except yaml.YAMLError as error:
+        line, column, what = _syntax_fault(text, _explained(text, error), keys)
+        raise mission_error(Place(file, line, column), what) from None
+    if tree is None:
+        raise mission_error(Place(file, 1), Message("yaml.empty"))
+    if not isinstance(tree, MapNode):
+        raise mission_error(Place(file, 1), Message("yaml.no_mapping"))
     problems.raise_if_any()
-    assert isinstance(tree, MapNode)
     return tree
 
 
-def _refuse_aliases_and_depth(text: str, file: str) -> None:
-    depth = 0
-    for event in yaml.parse(text, Loader=yaml.SafeLoader):
-        place = _place(event, file)
+def _loader_for(text: str) -> type[yaml.SafeLoader]:
+    """Libyaml's parser, which is ten times faster; it takes a tab for a space, where PyYAML's refuses it."""
+    return yaml.SafeLoader if "\t" in text and len(text) <= MAX_EXPLAINED_CHARACTERS else _FAST_LOADER
+
+
+def _explained(text: str, error: yaml.YAMLError) -> yaml.YAMLError:
+    """The error of the parser written in Python, which says more; it is too slow for a long text."""
+    if len(text) <= MAX_EXPLAINED_CHARACTERS:
+        try:
+            for _ in yaml.parse(text, Loader=yaml.SafeLoader):
+                pass
+        except yaml.YAMLError as explained:
+            return explained
+    return error
+
+
+class _Composer:
+    """Makes nodes from the parser's events; it stops at the first alias and at the first node too deep."""
+
+    def __init__(self, text: str, file: str, problems: ProblemList, loader: type[yaml.SafeLoader]) -> None:
+        self._text = text
+        self._file = file
+        self._problems = problems
+        self._events = yaml.parse(text, Loader=loader)
+        self._depth = 0
+        self._nodes = 0
+
+    def document(self) -> Node | None:
+        """The outermost node; None if the text has none."""
+        root: Node | None = None
+        for event in self._events:
+            if isinstance(event, yaml.DocumentStartEvent):
+                if root is not None:
+                    mark = cast("yaml.Mark", event.start_mark)
+                    raise MarkedYAMLError(problem="but found another document", problem_mark=mark)
+                root = self._node(next(self._events))
+        empty = isinstance(root, Scalar) and not root.text and not root.quoted
+        return None if empty else root
+
+    def _node(self, event: yaml.Event) -> Node:
+        place = self._place(event)
+        self._nodes += 1
+        if self._nodes > MAX_NODES:
+            raise mission_error(Place(self._file), Message("yaml.too_many", limit=MAX_NODES))
         if isinstance(event, yaml.AliasEvent):
-            raise mission_error(place, f"alias '*{event.anchor}' is not allowed; use a template instead")
-        if isinstance(event, yaml.CollectionStartEvent):
-            depth += 1
-            if depth > MAX_DEPTH:
-                raise mission_error(place, f"nested deeper than {MAX_DEPTH} levels")
-        elif isinstance(event, yaml.CollectionEndEvent):
-            depth -= 1
+            raise mission_error(place, Message("yaml.alias", name=event.anchor))
+        if isinstance(event, yaml.ScalarEvent):
+            return self._scalar(event, place)
+        self._depth += 1
+        if self._depth > MAX_DEPTH:
+            raise mission_error(place, Message("yaml.depth", limit=MAX_DEPTH))
+        is_list = isinstance(event, yaml.SequenceStartEvent)
+        node = self._list(event, place) if is_list else self._map(event, place)
+        self._depth -= 1
+        return node
 
-
-def _convert(node: yaml.Node, file: str, problems: ProblemList) -> Node:
-    place = _place(node, file)
-    if isinstance(node, yaml.ScalarNode):
-        if node.tag.startswith("!"):  # YAML takes the word after a '!' for a type; it is meant as written
-            return Scalar(place, f"{node.tag} {node.value}".strip())
-        quoted = node.style in ("'", '"')
-        if node.start_mark.line != node.end_mark.line:
+    def _scalar(self, event: yaml.ScalarEvent, place: Place) -> Scalar:
+        start, end, text = _start(event), _end(event), event.value
+        block, quoted = event.style in ("|", ">"), event.style in ("'", '"')
+        if block:
+            end = start + len(self._text[start:end].rstrip())
+        if event.tag and event.tag.startswith("!"):  # a word after a '!' is a type in YAML; here it is text
+            return Scalar(place, f"{event.tag} {text}".strip(), start=start, end=end, block=block)
+        if "\n" in self._text[start:end]:
             place = replace(place, column=0)  # characters cannot be counted over several lines
-        return Scalar(place.moved(quoted), node.value, quoted)
-    if isinstance(node, yaml.SequenceNode):
-        return ListNode(place, tuple(_convert(item, file, problems) for item in node.value))
-    items: dict[str, Node] = {}
-    keys: dict[str, Place] = {}
-    for key_node, value_node in node.value:
-        key_place = _place(key_node, file)
-        if not isinstance(key_node, yaml.ScalarNode):
-            problems.add(key_place, "a key must be a plain word")
-            continue
-        key = key_node.value
-        if key in items:
-            problems.add(key_place, f"'{key}' is written twice (first in line {keys[key].line}); rename one")
-        items[key] = _convert(value_node, file, problems)
-        keys[key] = key_place
-    return MapNode(place, items, keys)
+        return Scalar(place.moved(quoted), text, quoted, start, end, block)
+
+    def _list(self, event: yaml.Event, place: Place) -> ListNode:
+        items: list[Node] = []
+        start = end = _start(event)
+        while not isinstance(inner := next(self._events), yaml.SequenceEndEvent):
+            items.append(self._node(inner))
+            end = items[-1].end
+        flow = _is_flow(event)
+        return ListNode(place, tuple(items), start, _end(inner) if flow else end, flow)
+
+    def _map(self, event: yaml.Event, place: Place) -> MapNode:
+        items: dict[str, Node] = {}
+        keys: dict[str, Scalar] = {}
+        start = end = _start(event)
+        while not isinstance(inner := next(self._events), yaml.MappingEndEvent):
+            key_place = self._place(inner)
+            key_node, value = self._node(inner), self._node(next(self._events))
+            if isinstance(value, Scalar) and value.start == value.end:
+                after_colon = self._text.find(":", key_node.end, value.start + 1) + 1
+                value = replace(value, start=after_colon or key_node.end, end=after_colon or key_node.end)
+            end = max(end, key_node.end, value.end)
+            if not isinstance(key_node, Scalar):
+                self._problems.add(key_place, Message("yaml.key_no_word"))
+                continue
+            key = key_node.text
+            if self._problems.full:
+                self._problems.raise_if_any()
+            if key in items:
+                self._problems.add(key_place, Message("yaml.key_twice", key=key, line=keys[key].place.line))
+            items[key], keys[key] = value, replace(key_node, place=key_place)
+        flow = _is_flow(event)
+        end = _end(inner) if flow else end
+        return MapNode(place, items, {key: node.place for key, node in keys.items()}, keys, start, end, flow)
+
+    def _place(self, event: yaml.Event) -> Place:
+        mark = event.start_mark
+        return Place(self._file, mark.line + 1, mark.column + 1) if mark else Place(self._file)
 
 
-def _place(part: yaml.Node | yaml.Event, file: str) -> Place:
-    mark = part.start_mark
-    return Place(file, mark.line + 1, mark.column + 1) if mark else Place(file)
+def _start(event: yaml.Event) -> int:
+    return cast("yaml.Mark", event.start_mark).index
+
+
+def _end(event: yaml.Event) -> int:
+    return cast("yaml.Mark", event.end_mark).index
+
+
+def _is_flow(event: yaml.Event) -> bool:
+    """Whether a list or mapping is written in brackets."""
+    return bool(getattr(event, "flow_style", False))
 
 
 def _syntax_fault(text: str, error: yaml.YAMLError, top_keys: tuple[str, ...]) -> Fault:
@@ -138,23 +225,22 @@ def _syntax_fault(text: str, error: yaml.YAMLError, top_keys: tuple[str, ...]) -
     context = getattr(error, "context_mark", None)
     what = getattr(error, "problem", None) or getattr(error, "reason", None) or "cannot be read"
     if mark is None:
-        return 0, 0, f"YAML syntax: {what}"
+        return 0, 0, Message("yaml.syntax", what=what)
     spaces = _wrong_space(lines, mark)
     if spaces is not None:
         return spaces
     if "mapping values" in what and _TWO_COLONS.match(_line(lines, mark.line)):
-        advice = "a second ':' in this line; write what follows it in the next line"
-        return mark.line + 1, mark.column + 1, advice
+        return mark.line + 1, mark.column + 1, Message("yaml.second_colon")
     if "mapping values" in what or "expected <block end>" in what:
         return _wrong_indentation(lines, mark.line, top_keys)
     if what == "could not find expected ':'" and context is not None:
         return _missing_colon(lines, context.line)
-    place, advice = mark, f"YAML syntax: {what}"
+    place, advice = mark, Message("yaml.syntax", what=what)
     if "found unexpected end of stream" in what and context is not None:
-        place, advice = context, "this quotation mark is never closed; write another at the end"
+        place, advice = context, Message("yaml.open_quote")
     elif "cannot start any token" in what:
         sign = _line(lines, mark.line)[mark.column : mark.column + 1]
-        advice = f"'{sign}' cannot stand here; put the text in \"quotation marks\""
+        advice = Message("yaml.sign", sign=sign)
     return place.line + 1, place.column + 1, advice
 
 
@@ -162,11 +248,10 @@ def _wrong_space(lines: list[str], mark: yaml.Mark) -> Fault | None:
     """A tab, or a character that only looks like a space."""
     line = _line(lines, mark.line)
     if line[mark.column : mark.column + 1] == "\t" or "\t" in line[: _indent_of(line) + 1]:
-        return mark.line + 1, line.index("\t") + 1, "there is a tab; write spaces instead"
+        return mark.line + 1, line.index("\t") + 1, Message("yaml.tab")
     for number, each in enumerate(lines[: mark.line + 1]):
         if _SPECIAL_SPACE.match(each):
-            text = "this line begins with special spaces, as copied from a web page; write plain ones"
-            return number + 1, 1, text
+            return number + 1, 1, Message("yaml.special_space")
     return None
 
 
@@ -175,10 +260,10 @@ def _missing_colon(lines: list[str], index: int) -> Fault:
     found = _NO_SPACE.match(line)
     if found:
         key, value = found.groups()
-        return index + 1, found.start(2) + 1, f"a space is missing after ':'; write '{key}: {value}'"
+        return index + 1, found.start(2) + 1, Message("yaml.no_space", key=key, value=value)
     if line.lstrip().startswith("-"):
-        return index + 1, _indent_of(line) + 1, "begin each line of a list with '- ', under the line above it"
-    return index + 1, len(line.rstrip()) + 1, f"a ':' is missing; write '{line.strip()[:40]}:'"
+        return index + 1, _indent_of(line) + 1, Message("yaml.no_dash")
+    return index + 1, len(line.rstrip()) + 1, Message("yaml.no_colon", line=line.strip()[:40])
 
 
 def _wrong_indentation(lines: list[str], index: int, top_keys: tuple[str, ...]) -> Fault:
@@ -186,18 +271,17 @@ def _wrong_indentation(lines: list[str], index: int, top_keys: tuple[str, ...]) 
     for number, line in enumerate(lines[: index + 1]):  # the fault may be far above, where a block was ended
         found = re.match(r"([\w.]+)\s*:", line)
         if found and found.group(1) not in top_keys and number > 0:
-            text = f"'{found.group(1)}' must be indented, to stand under the line it belongs to"
-            return number + 1, 1, text
+            return number + 1, 1, Message("yaml.not_indented", key=found.group(1))
     line = _line(lines, index)
     own, fitting = _indent_of(line), _open_indents(lines[:index])
     if own in fitting and _KEY.match(line):
-        return index + 1, own + 1, "lines with and without '- ' are mixed here; write all of them alike"
+        return index + 1, own + 1, Message("yaml.mixed")
     if own in fitting:
-        return index + 1, own + 1, "this line does not fit under the one above; is a ':' or a '- ' missing?"
+        return index + 1, own + 1, Message("yaml.does_not_fit")
     *others, last = map(str, fitting or [0])
     known = f"{', '.join(others)} or {last}" if others else last
     spaces = "no space" if own == 0 else "1 space" if own == 1 else f"{own} spaces"
-    return index + 1, own + 1, f"wrong indentation: {spaces}; the lines above have {known}"
+    return index + 1, own + 1, Message("yaml.indentation", spaces=spaces, known=known)
 
 
 def _open_indents(lines: list[str]) -> list[int]:

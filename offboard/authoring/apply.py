@@ -1,0 +1,138 @@
+"""Applies edits to documents, and takes them back."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import Any
+
+from offboard.authoring import edits, state_edits, transition_edits
+from offboard.authoring.document import Document
+from offboard.authoring.edit_error import EditError
+from offboard.authoring.text import Change
+from offboard.authoring.work import Work
+from offboard.mission import MAX_FILE_BYTES
+
+_STEPS: Mapping[type, Callable[[Work, Any], None]] = {
+    edits.AddState: state_edits.add_state,
+    edits.AddTemplate: state_edits.add_template,
+    edits.RenameState: state_edits.rename_state,
+    edits.MoveState: state_edits.move_state,
+    edits.DuplicateState: state_edits.duplicate_state,
+    edits.DeleteState: state_edits.delete_state,
+    edits.SetActions: state_edits.set_actions,
+    edits.SetInitial: state_edits.set_initial,
+    edits.SetFinal: state_edits.set_final,
+    edits.SetUse: state_edits.set_use,
+    edits.SetParameter: state_edits.set_parameter,
+    edits.AddTransition: transition_edits.add_transition,
+    edits.DeleteTransition: transition_edits.delete_transition,
+    edits.RedirectTransition: transition_edits.redirect_transition,
+    edits.MoveTransition: transition_edits.move_transition,
+    edits.SetGuard: transition_edits.set_guard,
+    edits.SetEvent: transition_edits.set_event,
+    edits.SetTransitionActions: transition_edits.set_transition_actions,
+    edits.SetVariable: transition_edits.set_variable,
+    edits.SetMission: transition_edits.set_mission,
+}
+
+
+@dataclass(frozen=True, slots=True)
+class Edited:
+    """A document after an edit.
+
+    Attributes:
+        changes: of the text, in order; each is made for the text after those before it.
+    """
+
+    document: Document
+    changes: tuple[Change, ...]
+
+
+def apply(document: Document, edit: edits.Edit) -> Edited:
+    """Apply an edit. Raises `EditError` if it cannot be applied; the document is never changed."""
+    if isinstance(edit, edits.ReplaceText):
+        return _replace_text(document, edit)
+    work = Work(document)
+    _STEPS[type(edit)](work, edit)
+    if work.document.unreadable is not None:
+        raise EditError("the text is written in a way that this edit would break; edit the text instead")
+    _refuse_too_long(work.document)
+    return Edited(work.document, tuple(work.changes))
+
+
+def _replace_text(document: Document, edit: edits.ReplaceText) -> Edited:
+    length = len(document.text)
+    if not edit.start <= edit.end <= length:
+        raise EditError(f"start {edit.start}, end {edit.end}: the text has {length} characters")
+    try:
+        edit.text.encode("utf-8")
+    except UnicodeEncodeError:
+        raise EditError("text: half of a surrogate pair cannot be saved; send whole characters") from None
+    change = document.content.change(edit.start, edit.end, edit.text)
+    changed = Document(document.content.changed(change), document.path)
+    _refuse_too_long(changed)
+    return Edited(changed, (change,) if change.removed != change.inserted else ())
+
+
+def _refuse_too_long(document: Document) -> None:
+    if len(document.data) > MAX_FILE_BYTES:
+        raise EditError("the mission would be larger than 1 MB; a mission is a page or two")
+
+
+class EditSession:
+    """A document with its edits, which can be undone and done again.
+
+    Args:
+        document: as opened.
+
+    Attributes:
+        document: as it is now.
+    """
+
+    def __init__(self, document: Document) -> None:
+        self.document = document
+        self._done: list[tuple[Change, ...]] = []
+        self._undone: list[tuple[Change, ...]] = []
+
+    @property
+    def can_undo(self) -> bool:
+        """Whether there is an edit to take back."""
+        return bool(self._done)
+
+    @property
+    def can_redo(self) -> bool:
+        """Whether there is an edit that was taken back."""
+        return bool(self._undone)
+
+    def apply(self, edit: edits.Edit) -> tuple[Change, ...]:
+        """Apply an edit and return the changes of the text. Raises `EditError`; nothing is changed then."""
+        edited = apply(self.document, edit)
+        self.document = edited.document
+        if edited.changes:
+            self._done.append(edited.changes)
+            self._undone.clear()
+        return edited.changes
+
+    def undo(self) -> tuple[Change, ...]:
+        """Take the last edit back and return the changes of the text. Raises `EditError` if there is none."""
+        if not self._done:
+            raise EditError("there is nothing to undo")
+        changes = self._done.pop()
+        self._undone.append(changes)
+        return self._change(tuple(change.inverse for change in reversed(changes)))
+
+    def redo(self) -> tuple[Change, ...]:
+        """Do again what was undone last. Raises `EditError` if nothing was."""
+        if not self._undone:
+            raise EditError("there is nothing to do again")
+        changes = self._undone.pop()
+        self._done.append(changes)
+        return self._change(changes)
+
+    def _change(self, changes: tuple[Change, ...]) -> tuple[Change, ...]:
+        content = self.document.content
+        for change in changes:
+            content = content.changed(change)
+        self.document = Document(content, self.document.path)
+        return changes

@@ -1,0 +1,127 @@
+"""A mission's document: its text, what the text says, and what is wrong with it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+
+from offboard.authoring.outline import Outline
+from offboard.authoring.text import MissionText, Positions
+from offboard.chart.messages import Message
+from offboard.chart.problems import MissionError, Place, ProblemList, mission_error
+from offboard.chart.read import parse_mission_yaml, read_nodes
+from offboard.chart.spec import MissionFile, expand, merge_extended
+from offboard.chart.yaml_nodes import MapNode
+from offboard.mission import MAX_FILE_BYTES, read_base
+
+
+@dataclass(frozen=True)
+class Document:
+    """A mission file in an editor. Any text is a document, also one that is no mission.
+
+    Attributes:
+        content: the text, with the file's line ends.
+        path: of the file, which need not exist; what it extends is looked for beside it.
+    """
+
+    content: MissionText
+    path: Path
+
+    @classmethod
+    def from_text(cls, text: str, path: str | Path = "mission.yaml") -> Document:
+        """A document with a text, such as that of a new file."""
+        return cls(MissionText.of(text), Path(path))
+
+    @classmethod
+    def from_bytes(cls, data: bytes, path: str | Path) -> Document:
+        """A document with a file's content. Raises `MissionError` if it is too large or not UTF-8."""
+        if len(data) > MAX_FILE_BYTES:
+            raise mission_error(Place(Path(path).name), Message("file.too_large"))
+        try:
+            return cls(MissionText.of(data.decode("utf-8")), Path(path))
+        except UnicodeDecodeError:
+            raise mission_error(Place(Path(path).name), Message("file.not_utf8")) from None
+
+    @classmethod
+    def open(cls, path: str | Path) -> Document:
+        """Read a file. Raises `MissionError` if it cannot be read, is too large or is not UTF-8."""
+        try:
+            with Path(path).open("rb") as file:  # a file may have no end, such as a device
+                return cls.from_bytes(file.read(MAX_FILE_BYTES + 1), path)
+        except OSError as error:
+            message = Message("file.unreadable", reason=error.strerror or str(error))
+            raise mission_error(Place(Path(path).name), message) from None
+
+    @property
+    def data(self) -> bytes:
+        """What is written to the file: of an opened document that was not changed, the same bytes."""
+        return self.content.written.encode("utf-8")
+
+    @property
+    def text(self) -> str:
+        """The text, its lines ended by a line feed; all offsets count its characters."""
+        return self.content.text
+
+    @property
+    def label(self) -> str:
+        """The file's name, as findings have it."""
+        return self.path.name
+
+    @cached_property
+    def positions(self) -> Positions:
+        """Converts offsets to lines and columns."""
+        return Positions(self.text)
+
+    @cached_property
+    def _nodes(self) -> tuple[MapNode | None, MissionError | None]:
+        try:
+            return parse_mission_yaml(self.text, self.label), None
+        except MissionError as error:
+            empty = error.problems[0].message.code == "yaml.empty"
+            return None, None if empty else error
+
+    @property
+    def nodes(self) -> MapNode | None:
+        """The nodes of its YAML; None if it is empty or cannot be read."""
+        return self._nodes[0]
+
+    @property
+    def unreadable(self) -> MissionError | None:
+        """Why it is not YAML; None if it is, or is empty. Only its text can be edited then."""
+        return self._nodes[1]
+
+    @cached_property
+    def outline(self) -> Outline:
+        """Where its states are; an empty one if it cannot be read."""
+        return Outline(self.nodes)
+
+    @cached_property
+    def base(self) -> MissionFile | None:
+        """The mission that it extends, with those that this one extends; None if there is none to read."""
+        if not self.outline.text("extends"):
+            return None
+        try:
+            return merge_extended(read_base(self._written()), read_base)
+        except MissionError:
+            return None
+
+    @cached_property
+    def chart(self) -> MissionFile | None:
+        """The expanded chart, as far as it can be understood; None if it cannot."""
+        if self.nodes is None:
+            return None
+        try:
+            problems = ProblemList()
+            written = self._written()
+            try:
+                merged = merge_extended(written, read_base)
+            except MissionError:
+                merged = written
+            return expand(merged, problems)
+        except MissionError:
+            return None
+
+    def _written(self) -> MissionFile:
+        assert self.nodes is not None
+        return read_nodes(self.nodes, self.path, ProblemList())

@@ -1,0 +1,256 @@
+"""Edits of a mission as data, as they come from a page: one pydantic model for each, told apart by `kind`.
+
+    edit = parse_edit({"kind": "add_transition", "state": "red", "to": "green", "when": "frame_seen"})
+
+States are named by their path in the text (`red`, `landing.stop`, `@cross_frame.turning`), see `outline`.
+"""
+
+from __future__ import annotations
+
+from typing import Annotated, Literal
+
+from pydantic import BaseModel, ConfigDict, Field, TypeAdapter, ValidationError
+
+from offboard.authoring.edit_error import EditError
+from offboard.authoring.outline import Event, Section
+
+Name = Annotated[str, Field(pattern=r"^[a-z][a-z0-9_]*$", max_length=60, description="small letters")]
+StatePath = Annotated[str, Field(max_length=1000, description="as written, such as landing.stop")]
+Line = Annotated[str, Field(max_length=500, pattern=r"^[^\r\n]*$", description="one line")]
+Actions = Annotated[tuple[Line, ...], Field(max_length=200, description="primitives and assignments")]
+Index = Annotated[int, Field(ge=0, le=10_000)]
+
+
+class _Edit(BaseModel):
+    model_config = ConfigDict(frozen=True, extra="forbid")
+
+
+class TransitionPath(_Edit):
+    """Which transition: a state's `index`-th of the event "tick", or its only one of another event."""
+
+    state: StatePath
+    event: Event = "tick"
+    index: Index = 0
+
+
+class AddState(_Edit):
+    """A new state at the top, in a state or in a template; with `states` it starts in the first of them."""
+
+    kind: Literal["add_state"] = "add_state"
+    name: Name
+    parent: StatePath = ""
+    index: Index | None = None  # among its siblings; None: after the last
+    final: bool = False
+    use: Name | None = None  # the template whose states it takes
+    states: Annotated[tuple[Name, ...], Field(max_length=100)] = ()
+
+
+class AddTemplate(_Edit):
+    """A new template with states, starting in the first."""
+
+    kind: Literal["add_template"] = "add_template"
+    name: Name
+    states: Annotated[tuple[Name, ...], Field(min_length=1, max_length=100)]
+
+
+class RenameState(_Edit):
+    """Another name for a state or template, also in all that names it in this document."""
+
+    kind: Literal["rename_state"] = "rename_state"
+    state: StatePath
+    name: Name
+
+
+class MoveState(_Edit):
+    """A state to another place among its siblings, or into or out of a superstate."""
+
+    kind: Literal["move_state"] = "move_state"
+    state: StatePath
+    parent: StatePath = ""
+    index: Index | None = None
+
+
+class DuplicateState(_Edit):
+    """A copy of a state beside it, with all its states, and with some of its parameters changed."""
+
+    kind: Literal["duplicate_state"] = "duplicate_state"
+    state: StatePath
+    name: Name
+    parameters: Annotated[dict[Line, Line], Field(max_length=50)] = Field(default_factory=dict)
+
+
+class DeleteState(_Edit):
+    """A state less; transitions to it are kept, which the checker then reports, or deleted, too."""
+
+    kind: Literal["delete_state"] = "delete_state"
+    state: StatePath
+    references: Literal["keep", "delete"] = "keep"
+
+
+class AddTransition(_Edit):
+    """A new transition; only one of the event "tick" has a guard, actions and an order of priority."""
+
+    kind: Literal["add_transition"] = "add_transition"
+    state: StatePath
+    to: StatePath  # of the target, as written, or its full id in the chart
+    when: Line = ""
+    actions: Actions = ()
+    event: Event = "tick"
+    index: Index | None = None  # its order of priority; None: the last
+
+
+class DeleteTransition(_Edit):
+    """A transition less."""
+
+    kind: Literal["delete_transition"] = "delete_transition"
+    transition: TransitionPath
+
+
+class RedirectTransition(_Edit):
+    """Another target for a transition."""
+
+    kind: Literal["redirect_transition"] = "redirect_transition"
+    transition: TransitionPath
+    to: StatePath
+
+
+class MoveTransition(_Edit):
+    """Another order of priority for a transition."""
+
+    kind: Literal["move_transition"] = "move_transition"
+    transition: TransitionPath
+    index: Index
+
+
+class SetGuard(_Edit):
+    """The guard of a transition; empty for "always"."""
+
+    kind: Literal["set_guard"] = "set_guard"
+    transition: TransitionPath
+    when: Line
+
+
+class SetEvent(_Edit):
+    """The event of a transition; one with a guard or actions stays one of the event "tick"."""
+
+    kind: Literal["set_event"] = "set_event"
+    transition: TransitionPath
+    event: Event
+
+
+class SetTransitionActions(_Edit):
+    """What is done when a transition is taken."""
+
+    kind: Literal["set_transition_actions"] = "set_transition_actions"
+    transition: TransitionPath
+    actions: Actions
+
+
+class SetActions(_Edit):
+    """What a state does on entry, during or on exit."""
+
+    kind: Literal["set_actions"] = "set_actions"
+    state: StatePath
+    section: Section
+    actions: Actions
+
+
+class SetInitial(_Edit):
+    """The state in which a superstate, a template or, with an empty `state`, the mission starts."""
+
+    kind: Literal["set_initial"] = "set_initial"
+    state: StatePath = ""
+    name: Name
+
+
+class SetFinal(_Edit):
+    """Whether a state is final."""
+
+    kind: Literal["set_final"] = "set_final"
+    state: StatePath
+    final: bool
+
+
+class SetUse(_Edit):
+    """The template whose states a state takes; empty for none."""
+
+    kind: Literal["set_use"] = "set_use"
+    state: StatePath
+    template: Annotated[str, Field(pattern=r"^([a-z][a-z0-9_]*)?$", max_length=60)]
+
+
+class SetParameter(_Edit):
+    """What a superstate assigns to a name on entry, such as `'green'` to `colour`."""
+
+    kind: Literal["set_parameter"] = "set_parameter"
+    state: StatePath
+    name: Line
+    value: Line
+
+
+class SetVariable(_Edit):
+    """A variable of the mission with its first value; None removes it."""
+
+    kind: Literal["set_variable"] = "set_variable"
+    name: Name
+    value: Line | None
+
+
+class SetMission(_Edit):
+    """A key of the mission itself; an empty value removes it."""
+
+    kind: Literal["set_mission"] = "set_mission"
+    key: Literal["name", "description", "class", "vision", "extends"]
+    value: Line
+
+
+class ReplaceText(_Edit):
+    """Typed text; offsets count the characters of the document's text, whose lines end with a line feed."""
+
+    kind: Literal["replace_text"] = "replace_text"
+    start: Annotated[int, Field(ge=0)]
+    end: Annotated[int, Field(ge=0)]
+    text: Annotated[str, Field(max_length=1_000_000)]
+
+
+Edit = Annotated[
+    AddState
+    | AddTemplate
+    | RenameState
+    | MoveState
+    | DuplicateState
+    | DeleteState
+    | AddTransition
+    | DeleteTransition
+    | RedirectTransition
+    | MoveTransition
+    | SetGuard
+    | SetEvent
+    | SetTransitionActions
+    | SetActions
+    | SetInitial
+    | SetFinal
+    | SetUse
+    | SetParameter
+    | SetVariable
+    | SetMission
+    | ReplaceText,
+    Field(discriminator="kind"),
+]
+_ADAPTER: TypeAdapter[Edit] = TypeAdapter(Edit)
+
+
+def parse_edit(data: object) -> Edit:
+    """An edit from what JSON holds. Raises `EditError` with one line."""
+    try:
+        return _ADAPTER.validate_python(data)
+    except ValidationError as error:
+        first = error.errors(include_url=False)[0]
+        where = ".".join(str(part) for part in first["loc"]) or "edit"
+        given = repr(first["input"])[:60]
+        raise EditError(f"{where} {given}: {first['msg'][:200]}; correct the edit") from None
+
+
+def edit_schema() -> dict[str, object]:
+    """The JSON Schema of all edits."""
+    return _ADAPTER.json_schema()

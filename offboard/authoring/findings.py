@@ -1,0 +1,156 @@
+"""What the checker says of a document, each finding at its place in text and diagram.
+
+It is the checker of `framerunner mission check`; nothing is checked here.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+from offboard.authoring.document import Document
+from offboard.authoring.outline import SECTIONS, Event, Section, Span, StateOutline
+from offboard.authoring.references import instances
+from offboard.chart.messages import ENGLISH, Message
+from offboard.chart.problems import MissionError, Problem, ProblemList, Severity
+from offboard.chart.read import read_mission_file
+from offboard.chart.yaml_nodes import ListNode, MapNode, Node, Scalar
+from offboard.mission import expand_and_check
+from offboard.pilot import Pilot
+
+_WORD = re.compile(r"[\w.]+|\S")
+_WITH_REASON = ("when", "action")
+
+
+@dataclass(frozen=True, slots=True)
+class Finding:
+    """Something wrong with a mission, or that may go wrong.
+
+    Attributes:
+        severity: "error": not flown; "warning": a part does nothing; "advice": it may wait for ever.
+        code: of the kind of fault, such as "name.unknown"; it does not change with the language.
+        message: one line for people: what is wrong and what to write.
+        file: another file's name if the fault is in what the mission extends; its places are then lines only.
+        line, column: counted from 1; 0 if it concerns the whole file, or the whole line.
+        start, end: offsets in the text; both 0 if it concerns the whole file.
+        state: path of the state as written; empty if it concerns none.
+        event, index: the transition of that state; None if it concerns none.
+        section: of the actions of that state: "enter", "during", "exit"; empty if it concerns none.
+        nodes: full ids of that state in the diagram: of a template's state one for each use.
+    """
+
+    severity: Severity
+    code: str
+    message: str
+    file: str
+    line: int
+    column: int
+    start: int = 0
+    end: int = 0
+    state: str = ""
+    event: Event | None = None
+    index: int | None = None
+    section: Section | str = ""
+    nodes: tuple[str, ...] = ()
+
+
+def check_document(
+    document: Document, pilot_class: type[Pilot] = Pilot, texts: Mapping[str, str] = ENGLISH
+) -> tuple[Finding, ...]:
+    """All findings of a document, in the order of the text.
+
+    Args:
+        document: any; also one that is no mission.
+        pilot_class: whose names the mission uses.
+        texts: in which language; see `offboard.chart.messages`.
+    """
+    return tuple(_finding(document, each, texts) for each in problems_of(document, pilot_class))
+
+
+def problems_of(document: Document, pilot_class: type[Pilot] = Pilot) -> tuple[Problem, ...]:
+    """What the checker notes of a document."""
+    problems = ProblemList()
+    try:
+        if document.unreadable is not None:
+            raise document.unreadable
+        written = read_mission_file(document.text, document.path)
+        expand_and_check(written, pilot_class, problems)
+    except MissionError as error:
+        return (*problems.all, *error.problems)
+    return problems.all
+
+
+def _code(message: Message) -> str:
+    reason = message.values.get("reason")
+    return reason.code if message.code in _WITH_REASON and isinstance(reason, Message) else message.code
+
+
+def _finding(document: Document, found: Problem, texts: Mapping[str, str]) -> Finding:
+    place, message = found.place, found.message
+    plain = Finding(found.severity, _code(message), message.text(texts), place.file, place.line, place.column)
+    if place.file != document.label or not place.line:
+        return plain
+    positions = document.positions
+    offset = positions.offset_of_yaml(place.line, place.column)
+    span = _span(document, offset, whole_line=not place.column)
+    line, column = positions.line_column(span.start)
+    state = document.outline.at(span.start)
+    where: tuple[Event | None, int | None, str] = (None, None, "")
+    if state is not None:
+        where = _part(state, span.start)
+    return Finding(
+        found.severity,
+        plain.code,
+        plain.message,
+        place.file,
+        line,
+        column if place.column else 0,
+        span.start,
+        span.end,
+        "" if state is None else state.path,
+        *where,
+        nodes=() if state is None else instances(document, state),
+    )
+
+
+def _part(state: StateOutline, offset: int) -> tuple[Event | None, int | None, str]:
+    """Which transition or which actions of a state are at an offset."""
+    for transition in state.transitions:
+        if transition.node.start <= offset <= transition.node.end:
+            return transition.event, transition.index, ""
+    for section in SECTIONS:
+        node = state.entry(section)
+        if node is not None and node.start <= offset <= node.end:
+            return None, None, section
+    return None, None, ""
+
+
+def _span(document: Document, offset: int, *, whole_line: bool) -> Span:
+    """The text that a fault at an offset concerns: a whole value, a word in it, or the line."""
+    positions, text = document.positions, document.text
+    node = None if document.nodes is None else _scalar_at(document.nodes, offset)
+    if node is not None and offset - node.start <= int(node.quoted):
+        return Span(node.start, node.end)
+    start, end = positions.line_start(offset), positions.line_end(offset)
+    if not whole_line:
+        word = _WORD.match(text, offset, end)
+        return Span(offset, word.end() if word else min(offset + 1, end))
+    line = text[start:end]
+    return Span(start + len(line) - len(line.lstrip()), start + len(line.rstrip()))
+
+
+def _scalar_at(node: Node, offset: int) -> Scalar | None:
+    """The innermost text around an offset."""
+    pending: list[Node] = [node]
+    while pending:
+        present = pending.pop()
+        if isinstance(present, Scalar):
+            if present.start <= offset < present.end:
+                return present
+            continue
+        if isinstance(present, ListNode):
+            pending.extend(present.items)
+        elif isinstance(present, MapNode):
+            pending.extend((*present.key_nodes.values(), *present.items.values()))
+    return None

@@ -1,0 +1,130 @@
+"""Where a page has put the states of a diagram: a side file `NAME.layout.json` next to the mission.
+
+The mission itself has no positions. A state without a place in the file is placed by the page.
+"""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Annotated, Literal
+
+from pydantic import BaseModel, ConfigDict, Field, ValidationError
+
+from errors import UserError
+from offboard.authoring.document import Document
+from offboard.authoring.edits import DeleteState, Edit, MoveState, RenameState
+from offboard.authoring.references import chart_ids, instances, prefix_change
+
+MAX_LAYOUT_BYTES = 1_000_000
+Coordinate = Annotated[float, Field(ge=-1e6, le=1e6, allow_inf_nan=False)]
+Size = Annotated[float, Field(gt=0, le=1e6, allow_inf_nan=False)]
+
+
+class LayoutError(UserError):
+    """A layout file cannot be used; the message is one line."""
+
+
+class Box(BaseModel):
+    """Where a state is drawn, in pixels of the page; with a width and height of its own if they were set."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid")
+
+    x: Coordinate
+    y: Coordinate
+    width: Size | None = None
+    height: Size | None = None
+
+
+class Layout(BaseModel):
+    """Places by full id of the state, and the corners of edges by the edge's id."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid")
+
+    version: Literal[1] = 1
+    states: dict[str, Box] = Field(default_factory=dict, max_length=5000)
+    corners: dict[str, tuple[tuple[Coordinate, Coordinate], ...]] = Field(
+        default_factory=dict, max_length=20_000
+    )
+
+
+def layout_path(mission: str | Path) -> Path:
+    """The side file of a mission file."""
+    return Path(mission).with_suffix(".layout.json")
+
+
+def parse_layout(text: str | bytes, name: str = "layout") -> Layout:
+    """A layout from its file's content. Raises `LayoutError`."""
+    if len(text) > MAX_LAYOUT_BYTES:
+        raise LayoutError(f"{name}: is larger than 1 MB; delete it, and the states are placed anew")
+    try:
+        return Layout.model_validate_json(text)
+    except ValidationError as error:
+        first = error.errors(include_url=False)[0]
+        where = ".".join(str(part) for part in first["loc"]) or "file"
+        advice = "correct it, or delete the file and the states are placed anew"
+        raise LayoutError(f"{name}: {where}: {first['msg'][:200]}; {advice}") from None
+
+
+def read_layout(mission: str | Path) -> Layout:
+    """The layout of a mission file; an empty one if it has none. Raises `LayoutError`."""
+    path = layout_path(mission)
+    try:
+        with path.open("rb") as file:
+            return parse_layout(file.read(MAX_LAYOUT_BYTES + 1), path.name)
+    except FileNotFoundError:
+        return Layout()
+    except OSError as error:
+        raise LayoutError(f"{path.name}: cannot be read: {error.strerror}") from None
+
+
+def layout_text(layout: Layout) -> str:
+    """The content of a layout's file: one state a line, in order of their ids, so that a diff is small."""
+    data = layout.model_dump(mode="json", exclude_none=True)
+    parts = []
+    for key in ("states", "corners"):
+        lines = [f"    {json.dumps(name)}: {json.dumps(data[key][name])}" for name in sorted(data[key])]
+        parts.append(f'  "{key}": {{' + ("\n" + ",\n".join(lines) + "\n  }" if lines else "}"))
+    return '{\n  "version": 1,\n' + ",\n".join(parts) + "\n}\n"
+
+
+def write_layout(mission: str | Path, layout: Layout) -> Path:
+    """Write the side file of a mission file. Raises `LayoutError` if it cannot be written."""
+    path = layout_path(mission)
+    try:
+        path.write_text(layout_text(layout), encoding="utf-8", newline="\n")
+    except OSError as error:
+        raise LayoutError(f"{path.name}: cannot be written: {error.strerror}") from None
+    return path
+
+
+def follow(layout: Layout, before: Document, edit: Edit, after: Document) -> Layout:
+    """The layout after an edit: states that were renamed or moved keep their places, deleted ones lose them.
+
+    After typed text nothing is known of what became of a state, so all places are kept.
+    """
+    if not isinstance(edit, (RenameState, MoveState, DeleteState)):
+        return layout
+    state = before.outline.get(edit.state)
+    if state is None:
+        return layout
+    pairs = []
+    if isinstance(edit, RenameState) and not state.is_template:
+        pairs = [(i, f"{i.rpartition('.')[0]}.{edit.name}".lstrip(".")) for i in instances(before, state)]
+    elif isinstance(edit, MoveState):
+        prefix = f"{edit.parent}." if edit.parent else ""
+        moved = after.outline.get(prefix + state.name)
+        new = () if moved is None else instances(after, moved)
+        pairs = list(zip(instances(before, state), new, strict=False))
+    change = prefix_change(pairs)
+    known = chart_ids(after)
+    return Layout(
+        states={change(name): box for name, box in layout.states.items() if change(name) in known},
+        corners={_edge_id(name, change): points for name, points in layout.corners.items()},
+    )
+
+
+def _edge_id(name: str, change: object) -> str:
+    assert callable(change)
+    state, _, rest = name.partition("/")
+    return f"{change(state)}/{rest}"

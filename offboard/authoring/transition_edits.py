@@ -1,0 +1,160 @@
+"""How edits of transitions change the text, and those of the mission itself."""
+
+from __future__ import annotations
+
+from offboard.authoring.blocks import Owner, Value
+from offboard.authoring.edit_error import EditError
+from offboard.authoring.edits import (
+    AddTransition,
+    DeleteTransition,
+    MoveTransition,
+    RedirectTransition,
+    SetEvent,
+    SetGuard,
+    SetMission,
+    SetTransitionActions,
+    SetVariable,
+)
+from offboard.authoring.outline import Event, StateOutline
+from offboard.authoring.state_edits import delete_reference
+from offboard.authoring.work import MISSION_ORDER, STATE_ORDER, TRANSITION_ORDER, Work, keys_before
+from offboard.chart.yaml_nodes import ListNode, MapNode, Scalar
+
+_KEYS: dict[Event, str] = {"done": "then", "resume": "resume"}
+
+
+def add_transition(work: Work, edit: AddTransition) -> None:
+    """Add a transition to a state."""
+    state = work.state(edit.state)
+    to = work.target_text(edit.state, edit.to)
+    if edit.event != "tick":
+        _add_single(work, state, edit, to)
+        return
+    if state.text("final").lower() == "true":
+        raise EditError(f"state '{state.path}' is final; no transition leaves it")
+    value: dict[str, Value] = {"when": edit.when.strip()} if edit.when.strip() else {}
+    value["to"] = to
+    if edit.actions:
+        value["do"] = [each.strip() for each in edit.actions]
+    node = state.entry("transitions")
+    if isinstance(node, ListNode) and (node.items or node.flow):
+        index = len(node.items) if edit.index is None else min(edit.index, len(node.items))
+        work.patch(work.blocks.add_item(node, index, value))
+    else:
+        order = keys_before(STATE_ORDER, "transitions")
+        work.patch(*work.blocks.set_list(work.owner(state), "transitions", [value], order))
+
+
+def _add_single(work: Work, state: StateOutline, edit: AddTransition, to: str) -> None:
+    key = _KEYS[edit.event]
+    if edit.when.strip() or edit.actions:
+        raise EditError(f"a transition of '{edit.event}' has no guard and no actions")
+    if state.text(key):
+        raise EditError(f"state '{state.path}' has a transition of '{edit.event}' already; redirect it")
+    if state.is_template and edit.event == "done":
+        raise EditError("'then' is written at the state that uses the template")
+    work.set_text(state, key, to)
+
+
+def delete_transition(work: Work, edit: DeleteTransition) -> None:
+    """Delete a transition."""
+    state, transition = work.transition(edit.transition)
+    delete_reference(work, state.path, transition.event, transition.index)
+
+
+def redirect_transition(work: Work, edit: RedirectTransition) -> None:
+    """Set the target of a transition."""
+    state, transition = work.transition(edit.transition)
+    to = work.target_text(state.path, edit.to)
+    if transition.event != "tick":
+        work.set_text(state, _KEYS[transition.event], to)
+    else:
+        work.set_key(Owner(None, transition.node), "to", to, TRANSITION_ORDER)
+
+
+def move_transition(work: Work, edit: MoveTransition) -> None:
+    """Set the order of priority of a transition."""
+    state, transition = work.transition(edit.transition)
+    if transition.event != "tick":
+        raise EditError(f"a transition of '{transition.event}' has no order")
+    node = state.entry("transitions")
+    assert isinstance(node, ListNode)
+    to = min(edit.index, len(node.items) - 1)
+    if to == transition.index:
+        return
+    blocks = work.blocks
+    last_has_no_end = not work.document.text.endswith("\n")
+    patches = blocks.move_item(node, transition.index, to)
+    if last_has_no_end and not node.flow and len(node.items) - 1 in (to, transition.index):
+        work.patch((len(work.document.text), len(work.document.text), "\n"))
+        move_transition(work, edit)
+        end = len(work.document.text)
+        work.patch((end - 1, end, ""))
+        return
+    work.patch(*patches)
+
+
+def set_guard(work: Work, edit: SetGuard) -> None:
+    """Set the guard of a transition."""
+    _, transition = work.transition(edit.transition)
+    if transition.event != "tick":
+        raise EditError(f"a transition of '{transition.event}' has no guard")
+    work.set_key(Owner(None, transition.node), "when", edit.when.strip(), TRANSITION_ORDER)
+
+
+def set_transition_actions(work: Work, edit: SetTransitionActions) -> None:
+    """Set the actions of a transition."""
+    _, transition = work.transition(edit.transition)
+    if transition.event != "tick":
+        raise EditError(f"a transition of '{transition.event}' has no actions")
+    owner, order = Owner(None, transition.node), keys_before(TRANSITION_ORDER, "do")
+    work.patch(*work.blocks.set_list(owner, "do", [each.strip() for each in edit.actions], order))
+
+
+def set_event(work: Work, edit: SetEvent) -> None:
+    """Let a transition be looked at on another event."""
+    state, transition = work.transition(edit.transition)
+    if transition.event == edit.event:
+        return
+    if transition.when is not None or transition.actions:
+        raise EditError("a transition with a guard or actions is one of 'tick'; remove them first")
+    if transition.to is None:
+        raise EditError("the transition leads nowhere; set its target first")
+    to = transition.to.text.strip()
+    if edit.event != "tick" and state.text(_KEYS[edit.event]):
+        raise EditError(f"state '{state.path}' has a transition of '{edit.event}' already; redirect it")
+    delete_reference(work, state.path, transition.event, transition.index)
+    state = work.state(state.path)
+    if edit.event != "tick":
+        work.set_text(state, _KEYS[edit.event], to)
+        return
+    node = state.entry("transitions")
+    if isinstance(node, ListNode) and node.items:
+        work.patch(work.blocks.add_item(node, len(node.items), {"to": to}))
+    else:
+        order = keys_before(STATE_ORDER, "transitions")
+        work.patch(*work.blocks.set_list(work.owner(state), "transitions", [{"to": to}], order))
+
+
+def set_variable(work: Work, edit: SetVariable) -> None:
+    """Set, add or remove a variable."""
+    root = work.document.outline.root
+    node = root.items.get("variables")
+    if isinstance(node, MapNode) and node.items:
+        if edit.value is None and edit.name in node.items and len(node.items) == 1:
+            work.patch(work.blocks.remove_entry(root, "variables"))
+        elif edit.name in node.items or edit.value:
+            value, order = edit.value or "", (*node.items, edit.name)
+            work.set_key(Owner(root.key_nodes["variables"], node), edit.name, value, order)
+    elif edit.value and (node is None or (isinstance(node, MapNode) and node.flow)):
+        if node is not None:
+            work.patch(work.blocks.remove_entry(root, "variables"))
+        work.add(work.root, "variables", {edit.name: edit.value}, MISSION_ORDER)
+    elif edit.value and isinstance(node, Scalar) and not node.text:
+        owner = Owner(root.key_nodes["variables"], node, root.flow)
+        work.patch(work.blocks.add_entry(owner, edit.name, edit.value))
+
+
+def set_mission(work: Work, edit: SetMission) -> None:
+    """Set a key of the mission."""
+    work.set_key(work.root, edit.key, edit.value.strip(), MISSION_ORDER)
