@@ -30,6 +30,7 @@ def build_app() -> App:
         camera,
         course,
         doctor,
+        edit,
         evaluate,
         film,
         fly,
@@ -62,6 +63,7 @@ def build_app() -> App:
     app.command(replay.replay)
     app.command(film.film)
     app.command(mission.app)
+    app.command(edit.edit)
     app.command(course.app)
     app.command(scenario.app)
     app.command(vision.app)

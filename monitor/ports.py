@@ -4,12 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any, Protocol
+from typing import TYPE_CHECKING, Any, Protocol
 
 from errors import UserError
 from scenarios.models import Scenario, TrueState
 from scenarios.result import RefereeReport, RefereeSnapshot
 from wire.transports.vehicle_link import VehicleLink
+
+if TYPE_CHECKING:
+    from monitor.server import Monitor
 
 
 class Referee(Protocol):
@@ -85,6 +88,7 @@ class Equipment:
             a drone without a referee of its own cannot be judged.
         camera_hosts: HOST or HOST:PORT from which video and referee may be fetched although a drone's packets
             come from elsewhere.
+        parts: further parts of the web application; each adds its pages and routes, and may add jobs.
     """
 
     open_link: Callable[[], VehicleLink]
@@ -95,3 +99,4 @@ class Equipment:
     runs: RunLibrary | None
     start_pose: Callable[[Scenario], tuple[float, float, float, float]] | None = None
     camera_hosts: tuple[str, ...] = ()
+    parts: tuple[Callable[[Monitor], None], ...] = ()

@@ -119,6 +119,8 @@ def assemble(
     web.mount("/static", StaticBundles())
     for name in MODULES:
         import_module(name).register(monitor)
+    for part in equipment.parts:
+        part(monitor)
     return monitor
 
 

@@ -6,6 +6,7 @@ import asyncio
 import os
 import resource
 import sys
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -14,7 +15,9 @@ from cyclopts import Parameter
 from framerunner.commands import WholeNumber, check_range, say
 
 if TYPE_CHECKING:
+    from framerunner.editing.desk import EditorDesk
     from monitor.ports import Equipment
+    from monitor.server import Monitor
     from scenarios.models import Scenario
 
 PASSWORD_VARIABLE = "FRAMERUNNER_JUDGE_PASSWORD"
@@ -40,6 +43,9 @@ def monitor(
     port: Annotated[WholeNumber, Parameter(help="TCP port of the pages; 0 lets the system choose")] = 8080,
     database: Annotated[str, Parameter(help="of teams and tries; SQLAlchemy URL")] = DATABASE,
     runs: Annotated[Path, Parameter(help="folder of recorded flights")] = Path("runs"),
+    missions: Annotated[Path, Parameter(help="folder of the missions that the editor shows")] = Path(
+        "missions"
+    ),
     camera_host: Annotated[
         tuple[str, ...],
         Parameter(
@@ -74,7 +80,9 @@ def monitor(
     from wire.transports.urls import parse_url
 
     parse_url(drone)
-    given = equipment(drone, None if scenario is None else load_scenario(scenario), runs, camera_host)
+    given = equipment(
+        drone, None if scenario is None else load_scenario(scenario), runs, missions, camera_host
+    )
     password, qr_codes = os.environ.get(PASSWORD_VARIABLE) or None, _shows_qr_codes()
     settings = MonitorSettings(bind, port, database, password, trusted_proxy, qr_codes=qr_codes)
     _allow_many_files()
@@ -86,12 +94,19 @@ def monitor(
 
 
 def equipment(
-    drone_url: str, scenario: Scenario | None, runs: Path, camera_hosts: tuple[str, ...] = ()
+    drone_url: str,
+    scenario: Scenario | None,
+    runs: Path,
+    missions: Path,
+    camera_hosts: tuple[str, ...] = (),
 ) -> Equipment:
     """What the monitor, which may not import other rooms' functions, is given of them."""
+    from framerunner.editing.desk import EditorDesk
     from framerunner.flying.plan import FlightPlan
     from framerunner.monitoring.run_library import RunFolders
+    from framerunner.editing.desk import EditorDesk
     from monitor.ports import Equipment
+    from monitor.server import Monitor
     from scenarios.loader import list_scenarios, load_scenario
     from wire.transports.vehicle_link import VehicleLink
 
@@ -104,7 +119,15 @@ def equipment(
         runs=RunFolders(runs),
         start_pose=lambda flown: FlightPlan(flown).start_pose,
         camera_hosts=camera_hosts,
+        parts=(partial(_add_editor, desk=EditorDesk(missions)),),
     )
+
+
+def _add_editor(monitor: Monitor, desk: EditorDesk) -> None:
+    """Add the editor; its libraries are imported with the monitor's, in a thread."""
+    from framerunner.editing.api import register
+
+    register(monitor, desk)
 
 
 def _allow_many_files() -> None:

@@ -15,6 +15,7 @@ if TYPE_CHECKING:
 _NAVIGATION = (
     ("Live", "/"),
     ("Statechart", "/chart"),
+    ("Editor", "/edit"),
     ("Pilot", "/pilot"),
     ("Competition", "/competition"),
     ("Ranking", "/ranking"),

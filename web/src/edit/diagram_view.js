@@ -7,7 +7,7 @@ import { layOut, placeWithin } from "./layout.js";
  * @typedef {import("./session.js").Finding} Finding
  * @typedef {import("./session.js").Point} Point
  * @typedef {import("./layout.js").Box} Box
- * @typedef {{kind: "mission"|"state"|"transition", id: string}} Selection id: path of a state, id of a transition
+ * @typedef {{kind: "mission"|"state"|"transition", id: string}} Selection id: of a state or transition of the diagram
  */
 
 const SVG = "http://www.w3.org/2000/svg";
@@ -27,6 +27,7 @@ const shorten = (text) => (text.length > LONGEST_LABEL ? `${text.slice(0, LONGES
 
 export class DiagramView {
   #listener;
+  #words;
   #svg;
   #world;
   #lines;
@@ -34,7 +35,7 @@ export class DiagramView {
   #labels;
   #draft;
   /** @type {Diagram} */
-  #diagram = { states: [], transitions: [], mission: {}, variables: {} };
+  #diagram = { initial: "", readable: true, nodes: [], edges: [] };
   /** @type {Map<string, Box>} */
   #boxes = new Map();
   /** @type {Map<string, SVGGElement>} */
@@ -46,6 +47,9 @@ export class DiagramView {
   /** @type {Map<string, string[]>} */
   #children = new Map();
   #parents = new Map();
+  #initials = new Map();
+  /** @type {Map<string, import("./session.js").Edge>} */
+  #edges = new Map();
   /** @type {Selection} */
   #selection = { kind: "mission", id: "" };
   #view = { x: 0, y: 0, scale: 1 };
@@ -56,9 +60,11 @@ export class DiagramView {
    * @param {{selected: (selection: Selection) => void, placed: (places: Object<string, Point>) => void,
    *   joined: (from: string, to: string) => void, moved: (state: string, parent: string) => void,
    *   opened: (selection: Selection) => void}} listener told what the mouse has done
+   * @param {{done: string, resume: string}} words for transitions of these events
    */
-  constructor(parent, listener) {
+  constructor(parent, listener, words) {
     this.#listener = listener;
+    this.#words = words;
     const arrow = svg("marker", {
       id: "e-arrow", viewBox: "0 0 10 10", refX: 9, refY: 5, markerWidth: 8, markerHeight: 8, orient: "auto-start-reverse",
     }, svg("path", { d: "M0,0L10,5L0,10z", class: "e-arrow" }));
@@ -98,12 +104,12 @@ export class DiagramView {
     this.#index();
     this.#stateElements.clear();
     this.#transitionElements.clear();
-    this.#states.replaceChildren(...diagram.states.map((state) => this.#state(state)));
+    this.#states.replaceChildren(...diagram.nodes.map((state) => this.#state(state)));
     this.#makeTransitions();
     for (const id of this.#transitionElements.keys()) this.#drawLine(id);
     this.#mark(findings);
     this.select(this.#selection);
-    if (this.#isFresh && diagram.states.length > 0) {
+    if (this.#isFresh && diagram.nodes.length > 0) {
       this.#isFresh = false;
       this.fit();
     }
@@ -112,32 +118,33 @@ export class DiagramView {
   #index() {
     this.#children.clear();
     this.#parents.clear();
-    for (const { path, parent } of this.#diagram.states) {
+    this.#initials = new Map(this.#diagram.nodes.map(({ id, initial }) => [id, initial]));
+    this.#edges = new Map(this.#diagram.edges.map((edge) => [edge.id, edge]));
+    for (const { id: path, parent } of this.#diagram.nodes) {
       this.#parents.set(path, parent);
       this.#children.set(parent, [...(this.#children.get(parent) ?? []), path]);
     }
   }
 
   /** @param {import("./session.js").StateNode} state @returns {SVGGElement} */
-  #state(state) {
-    const box = this.#boxes.get(state.path);
-    const isSuper = this.#children.has(state.path);
-    const kinds = ["e-state", isSuper && "e-super", state.final && "e-final", state.kind === "template" && "e-template"];
-    const title = state.use ? `${state.name} : ${state.use}` : state.name;
+  #state({ id, name, parent, template, final, source }) {
+    const box = this.#boxes.get(id);
+    const isSuper = this.#children.has(id);
+    const initial = parent === "" ? this.#diagram.initial : this.#initials.get(parent);
+    const kinds = ["e-state", isSuper && "e-super", final && "e-final", !source && "e-foreign"];
     const group = svg("g", {
-      class: kinds.filter(Boolean).join(" "), "data-state": state.path, tabindex: 0, role: "button", "aria-label": `state ${state.path}`,
+      class: kinds.filter(Boolean).join(" "), "data-state": id, tabindex: 0, role: "button", "aria-label": `state ${id}`,
     },
     svg("rect", { width: box.width, height: box.height, rx: 8 }),
-    svg("text", { x: isSuper ? 12 : box.width / 2, y: isSuper ? 20 : 27, class: isSuper ? "e-name e-left" : "e-name" }, title));
-    if (state.initial) group.append(svg("circle", { cx: 0, cy: isSuper ? 15 : box.height / 2, r: 5, class: "e-initial" }));
-    if (state.final) group.append(svg("rect", { x: 3, y: 3, width: box.width - 6, height: box.height - 6, rx: 6, class: "e-inner" }));
-    if (state.kind !== "template") {
-      group.append(svg("circle", {
-        cx: box.width, cy: isSuper ? 15 : box.height / 2, r: 6, class: "e-handle", "data-handle": state.path,
-      }, svg("title", {}, "drag to another state: a new transition")));
-    }
-    this.#stateElements.set(state.path, group);
-    this.#place(state.path);
+    svg("text", { x: isSuper ? 12 : box.width / 2, y: isSuper ? 20 : 27, class: isSuper ? "e-name e-left" : "e-name" },
+      template ? `${name} : ${template}` : name));
+    if (initial === id) group.append(svg("circle", { cx: 0, cy: isSuper ? 15 : box.height / 2, r: 5, class: "e-initial" }));
+    if (final) group.append(svg("rect", { x: 3, y: 3, width: box.width - 6, height: box.height - 6, rx: 6, class: "e-inner" }));
+    group.append(svg("circle", {
+      cx: box.width, cy: isSuper ? 15 : box.height / 2, r: 6, class: "e-handle", "data-handle": id,
+    }, svg("title", {}, "drag to another state: a new transition")));
+    this.#stateElements.set(id, group);
+    this.#place(id);
     return group;
   }
 
@@ -145,22 +152,19 @@ export class DiagramView {
     this.#touching.clear();
     const lanes = new Map();
     const lines = [], labels = [];
-    for (const transition of this.#diagram.transitions) {
-      const { id, state, to } = transition;
-      if (to === null || !this.#boxes.has(state) || !this.#boxes.has(to)) continue;
+    for (const { id, source: state, target: to, event, order, when } of this.#diagram.edges) {
+      if (!this.#boxes.has(state) || !this.#boxes.has(to)) continue;
       const pair = [state, to].sort().join(" ");
       const count = lanes.get(pair) ?? 0;
       lanes.set(pair, count + 1);
       const bent = Math.ceil(count / 2) * (count % 2 === 1 ? 1 : -1) + 0.5;
       const lane = state < to ? bent : -bent;
-      const kind = transition.event === "tick" ? "" : ` e-${transition.event}`;
+      const kind = event === "tick" ? "" : ` e-${event}`;
       const path = svg("path", { class: "e-line", "marker-end": "url(#e-arrow)" });
       const hit = svg("path", { class: "e-hit" });
       const group = svg("g", { class: `e-transition${kind}`, "data-transition": id, tabindex: 0, role: "button",
-        "aria-label": `transition from ${state} to ${to}${transition.when ? ` when ${transition.when}` : ""}` }, hit, path);
-      const words = transition.event === "tick"
-        ? `${transition.index + 1}${transition.when ? `: ${shorten(transition.when)}` : ""}`
-        : { done: "when finished", resume: "after a pause" }[transition.event];
+        "aria-label": `transition from ${state} to ${to}${when ? ` when ${when}` : ""}` }, hit, path);
+      const words = event === "tick" ? `${order + 1}${when ? `: ${shorten(when)}` : ""}` : this.#words[event];
       const label = svg("text", { class: "e-label", "data-transition": id }, words);
       lines.push(group);
       labels.push(label);
@@ -180,8 +184,8 @@ export class DiagramView {
   /** @param {string} id */
   #drawLine(id) {
     const elements = this.#transitionElements.get(id);
-    const { state, to } = this.#diagram.transitions.find((each) => each.id === id);
-    const drawn = line(this.#boxes.get(state), this.#boxes.get(to), elements.lane);
+    const { source, target } = this.#edges.get(id);
+    const drawn = line(this.#boxes.get(source), this.#boxes.get(target), elements.lane);
     elements.path.setAttribute("d", drawn.path);
     elements.hit.setAttribute("d", drawn.path);
     elements.label.setAttribute("x", drawn.label.x.toFixed(1));
@@ -192,9 +196,11 @@ export class DiagramView {
   #mark(findings) {
     const worst = { advice: 1, warning: 2, error: 3 };
     const found = new Map();
-    for (const { path, transition, severity } of findings) {
-      const key = transition ? `t ${transition}` : `s ${path}`;
+    const note = (key, severity) => {
       if ((worst[found.get(key)] ?? 0) < worst[severity]) found.set(key, severity);
+    };
+    for (const { nodes, event, index, severity } of findings) {
+      for (const node of nodes) note(event === null ? `s ${node}` : `t ${node}/${event}/${index}`, severity);
     }
     for (const [path, group] of this.#stateElements) group.dataset.finding = found.get(`s ${path}`) ?? "";
     for (const [id, { group }] of this.#transitionElements) group.dataset.finding = found.get(`t ${id}`) ?? "";
@@ -265,7 +271,7 @@ export class DiagramView {
   /** The innermost state at a point, but none of some. @param {Point} point @param {Set<string>} [except] */
   #stateAt(point, except = new Set()) {
     let found = null;
-    for (const { path } of this.#diagram.states) {
+    for (const { id: path } of this.#diagram.nodes) {
       if (!except.has(path) && contains(this.#boxes.get(path), point)) found = path; // inner ones come later
     }
     return found;
@@ -363,8 +369,7 @@ export class DiagramView {
         const parent = this.#parents.get(path);
         const over = this.#stateAt(this.#point(event), new Set(family)) ?? "";
         const around = over === "" || this.#children.has(over) ? over : this.#parents.get(over);
-        const mayLeave = !path.startsWith("@") || path.includes(".");
-        if (event.shiftKey && around !== parent && mayLeave) {
+        if (event.shiftKey && around !== parent) {
           this.#listener.moved(path, around);
           return;
         }

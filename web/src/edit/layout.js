@@ -19,17 +19,17 @@ const textWidth = (text) => Math.max(LEAF.width, Math.ceil(text.length * LETTER)
 /**
  * Place all states.
  * @param {Diagram} diagram
- * @param {Object<string, Point>} kept places within the parent, by path
- * @returns {Map<string, Box>} by path
+ * @param {Object<string, Point>} kept places within the parent, by id of the state
+ * @returns {Map<string, Box>} by id
  */
 export function layOut(diagram, kept) {
   /** @type {Map<string, string[]>} */
   const children = new Map();
   const parents = new Map();
   const names = new Map();
-  for (const { path, name, parent, use } of diagram.states) {
+  for (const { id: path, name, parent, template } of diagram.nodes) {
     parents.set(path, parent);
-    names.set(path, use ? `${name} : ${use}` : name);
+    names.set(path, template ? `${name} : ${template}` : name);
     const siblings = children.get(parent);
     if (siblings) siblings.push(path);
     else children.set(parent, [path]);
@@ -41,9 +41,9 @@ export function layOut(diagram, kept) {
   };
   /** @type {Map<string, [string, string][]>} the transitions of each level, between its states */
   const levels = new Map();
-  for (const { state, to } of diagram.transitions) {
-    if (to === null || state === to || !parents.has(state) || !parents.has(to)) continue;
-    const from = chain(state), into = chain(to);
+  for (const { source, target } of diagram.edges) {
+    if (source === target) continue;
+    const from = chain(source), into = chain(target);
     let depth = 0;
     while (depth < from.length - 1 && depth < into.length - 1 && from[depth] === into[depth]) depth += 1;
     if (from[depth] === into[depth]) continue;

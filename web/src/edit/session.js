@@ -5,15 +5,18 @@ const TYPING_PAUSE_MS = 150; // after which typed text is sent
 
 /**
  * @typedef {{start: number, removed: number, inserted: string}} TextChange offsets in UTF-16 code units
- * @typedef {{line: number, column: number, start: number, end: number, severity: "error"|"warning"|"advice",
- *   code: string, message: string, path: string, transition: string|null}} Finding
- * @typedef {{path: string, name: string, parent: string, kind: "state"|"template", initial: boolean, final: boolean,
- *   use: string, states: number, enter: string[], during: string[], exit: string[], start: number, end: number}} StateNode
- * @typedef {{id: string, state: string, to: string|null, written: string, event: "tick"|"done"|"resume",
- *   index: number, when: string, actions: string[], start: number, end: number}} TransitionEdge
- * @typedef {{states: StateNode[], transitions: TransitionEdge[], mission: Object<string, string>,
- *   variables: Object<string, string>}} Diagram
+ * @typedef {[number, number]|null} Span offsets of the first character and of the one after the last
+ * @typedef {{severity: "error"|"warning"|"advice", code: string, message: string, line: number, span: Span,
+ *   state: string, event: string|null, index: number|null, nodes: string[]}} Finding
+ * @typedef {{id: string, name: string, parent: string, initial: string, final: boolean, finish: boolean, enter: string[],
+ *   during: string[], exit: string[], parameters: [string, string][], template: string, source: string, span: Span}} StateNode
+ * @typedef {{id: string, source: string, target: string, event: "tick"|"done"|"resume", order: number, when: string,
+ *   actions: string[], source_state: string, source_index: number, span: Span}} Edge
+ * @typedef {{initial: string, readable: boolean, nodes: StateNode[], edges: Edge[]}} Diagram the chart as it is flown
  * @typedef {{x: number, y: number}} Point
+ * @typedef {{name: string, type: string, text: string, unit: string, low: number|null, high: number|null,
+ *   assignable: boolean, needs_map: boolean}} ValueEntry
+ * @typedef {{name: string, text: string, help: string, needs_map: boolean}} PrimitiveEntry
  */
 
 export class EditSession {
@@ -25,16 +28,25 @@ export class EditSession {
   /** @type {(() => TextChange[])|null} */
   #typed = null;
   #timer = 0;
+  #sending = Promise.resolve();
 
-  text = "";
-  revision = -1;
+  revision = 0;
   /** @type {Diagram} */
-  diagram = { states: [], transitions: [], mission: {}, variables: {} };
+  diagram = { initial: "", readable: true, nodes: [], edges: [] };
+  /** @type {Object<string, string>} */
+  mission = {};
+  /** @type {Object<string, string>} */
+  variables = {};
+  /** @type {string[]} */
+  templates = [];
+  /** @type {{values: ValueEntry[], primitives: PrimitiveEntry[]}} */
+  catalogue = { values: [], primitives: [] };
   /** @type {Finding[]} */
   findings = [];
   /** @type {Object<string, Point>} */
   layout = {};
   name = "";
+  isReadable = true;
   isSaved = true;
   canUndo = false;
   canRedo = false;
@@ -42,9 +54,10 @@ export class EditSession {
 
   /**
    * @param {string} address of the document's WebSocket
-   * @param {{changed: (changes: TextChange[]|null) => void, connected: (state: string, reason: string) => void,
-   *   refused: (reason: string) => void, status: () => void}} listener changed: told after each change of the
-   *   document; null: all of its text is new
+   * @param {{changed: (changes: TextChange[], text: string|null) => void,
+   *   connected: (state: string, reason: string) => void, refused: (reason: string) => void, status: () => void,
+   *   note: (text: string) => void}} listener changed: told after each change of the document; with a text that is
+   *   not null, all of it is new
    */
   constructor(address, listener) {
     this.#listener = listener;
@@ -78,9 +91,9 @@ export class EditSession {
     return this.#ask({ type: "redo" });
   }
 
-  async save() {
+  async save(force = false) {
     await this.flush();
-    return this.#ask({ type: "save" });
+    return this.#ask({ type: "save", force });
   }
 
   /** Keep where states are drawn. @param {Object<string, Point|null>} places null forgets one */
@@ -100,12 +113,17 @@ export class EditSession {
     this.#timer = setTimeout(() => this.flush(), TYPING_PAUSE_MS);
   }
 
-  /** Send what was typed now. */
+  /** Send what was typed now; resolves when the server has it. */
   async flush() {
     clearTimeout(this.#timer);
-    const changes = this.#typed?.() ?? [];
-    this.#typed = null;
-    if (changes.length > 0) await this.#ask({ type: "type", changes });
+    const before = this.#sending;
+    this.#sending = (async () => {
+      await before; // its answer has the revision for which the next changes are made
+      const changes = this.#typed?.() ?? [];
+      this.#typed = null;
+      if (changes.length > 0) await this.#ask({ type: "type", revision: this.revision, changes });
+    })();
+    return this.#sending;
   }
 
   /** @param {object} message @returns {Promise<boolean>} */
@@ -128,17 +146,16 @@ export class EditSession {
   #receive(message) {
     if (message.type === "document" || message.type === "changed") {
       this.revision = message.revision;
-      if (message.text !== undefined) this.text = message.text;
-      else for (const { start, removed, inserted } of message.changes) {
-        this.text = this.text.slice(0, start) + inserted + this.text.slice(start + removed);
-      }
-      Object.assign(this, {
-        diagram: message.diagram, findings: message.findings, layout: message.layout ?? this.layout,
-        name: message.name ?? this.name,
-      });
+      for (const key of ["findings", "layout", "mission", "variables", "templates", "name"]) this[key] = message[key];
+      this.catalogue = message.catalogue ?? this.catalogue;
+      // While the text cannot be read, the last diagram stays.
+      if (message.diagram.readable) this.diagram = message.diagram;
+      this.isReadable = message.diagram.readable;
       this.#setStatus(message);
-      this.#listener.changed(message.text === undefined ? message.changes : null);
-    } else if (message.type === "status") {
+      this.#listener.changed(message.changes ?? [], message.text ?? null);
+      if (message.text !== undefined && message.restored) this.#listener.note("restored");
+      if (message.text !== undefined && message.problem) this.#listener.refused(message.problem);
+    } else {
       this.#setStatus(message);
     }
     const answer = this.#waiting.get(message.answers);

@@ -2,7 +2,7 @@
 import { basicSetup } from "codemirror";
 import { yaml } from "@codemirror/lang-yaml";
 import { setDiagnostics } from "@codemirror/lint";
-import { Annotation, ChangeSet, EditorSelection } from "@codemirror/state";
+import { Annotation, EditorSelection } from "@codemirror/state";
 import { EditorView } from "@codemirror/view";
 
 /** @typedef {import("./session.js").TextChange} TextChange */
@@ -13,7 +13,7 @@ const SEVERITY = { error: "error", warning: "warning", advice: "info" };
 export class TextView {
   #view;
   #shadow;
-  /** @type {ChangeSet|null} what was typed since it was last taken */
+  /** @type {import("@codemirror/state").ChangeSet|null} what was typed since it was last taken */
   #typed = null;
   #isMoving = false;
 
@@ -78,8 +78,8 @@ export class TextView {
   /** Mark findings. @param {import("./session.js").Finding[]} findings */
   setFindings(findings) {
     const { length } = this.#view.state.doc;
-    const diagnostics = findings.map(({ start, end, severity, message }) => ({
-      from: Math.min(start, length), to: Math.min(Math.max(end, start), length), severity: SEVERITY[severity], message,
+    const diagnostics = findings.map(({ span, severity, message }) => ({
+      from: Math.min(span?.[0] ?? 0, length), to: Math.min(span?.[1] ?? 0, length), severity: SEVERITY[severity], message,
     }));
     this.#view.dispatch(setDiagnostics(this.#view.state, /** @type {any} */ (diagnostics)));
   }

@@ -1,0 +1,1 @@
+"""The mission editor: open documents, and the page's interface to them."""

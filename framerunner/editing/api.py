@@ -1,0 +1,220 @@
+"""The editor's routes in the monitor: its page, its files, and a WebSocket for each open document."""
+
+from __future__ import annotations
+
+import asyncio
+import json
+import logging
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Annotated
+
+from fastapi import Body, HTTPException, Request
+from starlette.websockets import WebSocket
+
+from errors import UserError
+from framerunner.editing.desk import EditorDesk, SharedDocument
+from framerunner.editing.messages import (
+    EditMessage,
+    LayoutMessage,
+    PageMessage,
+    PageMessageError,
+    SaveMessage,
+    StepMessage,
+    TypeMessage,
+    catalogue_message,
+    changed_message,
+    document_message,
+    read_message,
+    status_message,
+)
+from framerunner.editing.open_document import OpenDocument
+from monitor.access import refuse
+from monitor.pages.table import Page, add_page
+from offboard.authoring.edits import ReplaceText, parse_edit
+from offboard.authoring.text import Change
+from offboard.mission import list_missions
+
+if TYPE_CHECKING:
+    from monitor.server import Monitor
+
+PATH = "/edit"
+_JOURNAL_PERIOD_S = 2.0
+_BAD_MESSAGE_CODE = 4400  # as HTTP's
+_MAX_QUEUE = 200
+_MAX_REASON_BYTES = 120  # WebSockets allow 123
+_CHANGED_ELSEWHERE = (
+    "the text was changed in another window at the same time; what you typed last is left out"
+)
+
+logger = logging.getLogger(__name__)
+
+
+def register(monitor: Monitor, desk: EditorDesk) -> None:
+    """Add the editor to a monitor; whoever may fly may edit."""
+    add_page(
+        monitor,
+        Page(
+            PATH,
+            "Editor",
+            "edit",
+            lambda _monitor, _request, visitor: {"mayEdit": visitor.may_fly, "missions": list_missions()},
+        ),
+    )
+
+    def demand(request: Request) -> None:
+        if not monitor.access.visitor(request).may_fly:
+            raise HTTPException(403, "only those who logged in may edit")
+
+    @monitor.web.get("/api/edit/files")
+    async def files(request: Request) -> dict[str, object]:
+        demand(request)
+        return {"files": await asyncio.to_thread(desk.files), "folder": str(desk.folder)}
+
+    @monitor.web.post("/api/edit/files")
+    async def create(
+        request: Request,
+        name: Annotated[str, Body(max_length=100)],
+        source: Annotated[str, Body(max_length=100)],
+    ) -> dict[str, str]:
+        demand(request)
+        try:
+            return {"file": await asyncio.to_thread(desk.create, name, source)}
+        except UserError as error:
+            raise HTTPException(400, str(error)) from None
+
+    @monitor.web.websocket("/ws/edit")
+    async def edit(websocket: WebSocket, file: str) -> None:
+        if not monitor.access.visitor(websocket).may_fly:
+            await refuse(websocket, "only those who logged in may edit")
+            return
+        try:
+            shared = desk.open(file)
+        except UserError as error:
+            await refuse(websocket, str(error).partition("\n")[0])
+            return
+        await websocket.accept()
+        await _Connection(websocket, desk, file, shared).serve()
+
+    async def journal() -> None:
+        try:
+            while True:
+                await asyncio.sleep(_JOURNAL_PERIOD_S)
+                desk.keep()
+        finally:
+            desk.keep()
+
+    monitor.jobs.append(journal)
+
+
+class _Connection:
+    """One page's WebSocket."""
+
+    def __init__(self, websocket: WebSocket, desk: EditorDesk, file: str, shared: SharedDocument) -> None:
+        self._websocket = websocket
+        self._desk = desk
+        self._file = file
+        self._shared = shared
+        self._outbox: asyncio.Queue[dict[str, object]] = asyncio.Queue(_MAX_QUEUE)
+        self._is_slow = asyncio.Event()
+
+    async def serve(self) -> None:
+        """Receive and send until the page leaves."""
+        self._shared.viewers.append(self._queue)
+        opened = self._shared.opened
+        self._queue({**document_message(opened), "catalogue": catalogue_message(opened)})
+        self._tell_others()
+        tasks = [asyncio.create_task(each) for each in (self._receive(), self._send(), self._is_slow.wait())]
+        try:
+            await asyncio.wait(tasks, return_when=asyncio.FIRST_COMPLETED)
+        finally:
+            self._shared.viewers.remove(self._queue)
+            self._tell_others()
+            self._desk.close(self._file)
+            for task in tasks:
+                task.cancel()
+            for failure in await asyncio.gather(*tasks, return_exceptions=True):
+                if isinstance(failure, Exception):
+                    logger.error("an editor's WebSocket failed", exc_info=failure)
+
+    def _queue(self, message: dict[str, object]) -> None:
+        try:
+            self._outbox.put_nowait(message)
+        except asyncio.QueueFull:
+            self._is_slow.set()
+
+    async def _send(self) -> None:
+        while True:
+            message = await self._outbox.get()
+            await self._websocket.send_text(json.dumps(message, ensure_ascii=False))
+
+    async def _receive(self) -> None:
+        while True:
+            received = await self._websocket.receive()
+            if received["type"] == "websocket.disconnect":
+                return
+            try:
+                message = read_message(received.get("text") or received.get("bytes") or "")
+            except PageMessageError as error:
+                reason = str(error).encode()[:_MAX_REASON_BYTES].decode(errors="ignore")
+                await self._websocket.close(_BAD_MESSAGE_CODE, reason)
+                return
+            self._take(message)
+            await asyncio.sleep(0)
+
+    def _take(self, message: PageMessage) -> None:
+        """Do what a page asks for, tell all pages, and answer."""
+        opened = self._shared.opened
+        before = opened.document.text
+        answer: dict[str, object] = {"answers": message.number}
+        try:
+            changes = _carry_out(opened, message)
+        except UserError as error:
+            answer["refused"] = str(error).partition("\n")[0]
+            if isinstance(message, TypeMessage):  # the page has the typed text: it gets the right one
+                answer = {**document_message(opened), **answer}
+            self._queue({**status_message(opened), **answer})
+            return
+        if changes:
+            told = changed_message(opened, before, changes)
+            told["type"] = "changed"
+            for viewer in self._shared.viewers:
+                if viewer != self._queue:
+                    viewer(told)
+            own = {**told, "changes": []} if isinstance(message, TypeMessage) else told
+            self._queue({**own, **answer, "catalogue": catalogue_message(opened)})
+            return
+        for viewer in self._shared.viewers:
+            status = status_message(opened)
+            viewer({**status, **answer} if viewer == self._queue else status)
+
+    def _tell_others(self) -> None:
+        others = len(self._shared.viewers) - 1
+        for viewer in self._shared.viewers:
+            viewer({"type": "status", "others": others})
+
+
+def _carry_out(opened: OpenDocument, message: PageMessage) -> Sequence[Change]:
+    """Do what a message asks for; return the changes of the text. Raises `UserError`."""
+    if isinstance(message, EditMessage):
+        return opened.apply(parse_edit(message.edit))
+    if isinstance(message, TypeMessage):
+        return _type(opened, message)
+    if isinstance(message, StepMessage):
+        return opened.undo() if message.type == "undo" else opened.redo()
+    if isinstance(message, SaveMessage):
+        opened.save(force=message.force)
+    elif isinstance(message, LayoutMessage):
+        opened.place(dict(message.places))
+    return ()
+
+
+def _type(opened: OpenDocument, message: TypeMessage) -> Sequence[Change]:
+    if message.revision != opened.revision:
+        raise PageMessageError(_CHANGED_ELSEWHERE)
+    changes: list[Change] = []
+    for typed in message.changes:
+        positions = opened.document.positions
+        start = positions.from_utf16(typed.start)
+        end = positions.from_utf16(typed.start + typed.removed)
+        changes += opened.apply(ReplaceText(start=start, end=end, text=typed.inserted))
+    return changes

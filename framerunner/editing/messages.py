@@ -1,0 +1,170 @@
+"""What is said between the editor's page and its program: JSON, offsets counted as JavaScript does.
+
+From a page, each with a `number` that the answer repeats as `answers`:
+
+    {"type": "edit", "edit": {...}}            an edit of `offboard.authoring.edits`
+    {"type": "type", "revision": 3, "changes": [{"start", "removed", "inserted"}]}     typed text
+    {"type": "undo"}, {"type": "redo"}, {"type": "save", "force": false}
+    {"type": "layout", "places": {"red": {"x": 1, "y": 2}, "green": null}}
+
+To a page: `document` with the whole text, `changed` with the changes of it, each made for the text after
+those before it, `status`, and `{"refused": reason}` in an answer.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import asdict
+from typing import Annotated, Any, Literal
+
+from pydantic import BaseModel, ConfigDict, Field, TypeAdapter, ValidationError
+
+from errors import UserError
+from framerunner.editing.open_document import OpenDocument
+from offboard.authoring.catalogue import catalogue
+from offboard.authoring.diagram import diagram
+from offboard.authoring.findings import check_document
+from offboard.authoring.layout import Box
+from offboard.authoring.outline import Span
+from offboard.authoring.text import Change, Positions
+
+_Number = Annotated[int, Field(ge=0, le=2**53)]
+
+
+class PageMessageError(UserError):
+    """A message that the editor's page does not send; its text is one line."""
+
+
+class _FromPage(BaseModel):
+    model_config = ConfigDict(frozen=True, extra="forbid")
+
+    number: _Number
+
+
+class TypedChange(BaseModel):
+    """Some characters replaced by typed ones; offsets count UTF-16 code units."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid")
+
+    start: _Number
+    removed: _Number
+    inserted: Annotated[str, Field(max_length=1_000_000)]
+
+
+class EditMessage(_FromPage):
+    """An edit of the diagram."""
+
+    type: Literal["edit"]
+    edit: dict[str, Any]
+
+
+class TypeMessage(_FromPage):
+    """Typed text."""
+
+    type: Literal["type"]
+    revision: _Number
+    changes: Annotated[tuple[TypedChange, ...], Field(max_length=10_000)]
+
+
+class StepMessage(_FromPage):
+    """One step back, or forward again."""
+
+    type: Literal["undo", "redo"]
+
+
+class SaveMessage(_FromPage):
+    """Write the file."""
+
+    type: Literal["save"]
+    force: bool = False
+
+
+class LayoutMessage(_FromPage):
+    """Where states are drawn."""
+
+    type: Literal["layout"]
+    places: Annotated[dict[str, Box | None], Field(max_length=5000)]
+
+
+PageMessage = EditMessage | TypeMessage | StepMessage | SaveMessage | LayoutMessage
+_ADAPTER: TypeAdapter[PageMessage] = TypeAdapter(Annotated[PageMessage, Field(discriminator="type")])
+
+
+def read_message(text: str | bytes) -> PageMessage:
+    """A page's message. Raises `PageMessageError`."""
+    try:
+        return _ADAPTER.validate_json(text)
+    except ValidationError as error:
+        first = error.errors(include_url=False)[0]
+        where = ".".join(str(part) for part in first["loc"]) or "message"
+        raise PageMessageError(f"{where}: {first['msg'][:200]}") from None
+
+
+def document_message(opened: OpenDocument) -> dict[str, object]:
+    """The whole document."""
+    return {"type": "document", "text": opened.document.text, **_state(opened)}
+
+
+def changed_message(opened: OpenDocument, before: str, changes: Sequence[Change]) -> dict[str, object]:
+    """The document after changes of a text."""
+    written = []
+    for change in changes:
+        start = Positions(before).to_utf16(change.start)
+        removed = len(change.removed.encode("utf-16-le")) // 2
+        written.append({"start": start, "removed": removed, "inserted": change.inserted})
+        before = before[: change.start] + change.inserted + before[change.start + len(change.removed) :]
+    return {"type": "changed", "changes": written, **_state(opened)}
+
+
+def status_message(opened: OpenDocument) -> dict[str, object]:
+    """What a page shows beside the document."""
+    return {
+        "type": "status",
+        "saved": opened.is_saved,
+        "can_undo": opened.session.can_undo,
+        "can_redo": opened.session.can_redo,
+    }
+
+
+def _state(opened: OpenDocument) -> dict[str, object]:
+    document = opened.document
+    positions = document.positions
+    wide = not document.text.isascii()
+
+    def at(span: Span | None) -> list[int] | None:
+        if span is None:
+            return None
+        return [positions.to_utf16(each) if wide else each for each in (span.start, span.end)]
+
+    drawn = diagram(document)
+    found = []
+    for each in check_document(document):
+        found.append({**asdict(each), "span": at(Span(each.start, each.end))})
+    nodes = [{**asdict(node), "span": at(node.span), "name_span": at(node.name_span)} for node in drawn.nodes]
+    edges = [
+        {**asdict(edge), "span": at(edge.span), "when_span": at(edge.when_span), "to_span": at(edge.to_span)}
+        for edge in drawn.edges
+    ]
+    outline = document.outline
+    keys = ("name", "description", "class", "vision", "extends", "initial")
+    return {
+        **status_message(opened),
+        "type": "document",
+        "name": opened.path.name,
+        "revision": opened.revision,
+        "restored": opened.restored,
+        "problem": opened.problem,
+        "diagram": {"initial": drawn.initial, "readable": drawn.readable, "nodes": nodes, "edges": edges},
+        "mission": {key: outline.text(key) for key in keys},
+        "variables": {name: value.text for name, value in outline.variables.items()},
+        "templates": [state.name for state in outline.templates],
+        "findings": found,
+        "layout": {name: {"x": box.x, "y": box.y} for name, box in opened.layout.states.items()},
+    }
+
+
+def catalogue_message(opened: OpenDocument) -> dict[str, object]:
+    """The names that the mission can use."""
+    outline = opened.document.outline
+    variables = dict.fromkeys(outline.variables, 0.0)
+    return asdict(catalogue(variables=variables, contest=outline.text("class") != "open"))

@@ -1,0 +1,153 @@
+"""A mission file that is being edited: its document, its layout, and a journal of what is not saved yet."""
+
+from __future__ import annotations
+
+import os
+from dataclasses import dataclass
+from pathlib import Path
+
+from errors import UserError
+from offboard.authoring.apply import EditSession
+from offboard.authoring.document import Document
+from offboard.authoring.edits import Edit, ReplaceText
+from offboard.authoring.layout import Box, Layout, LayoutError, follow, layout_path, read_layout, write_layout
+from offboard.authoring.text import Change
+
+_JOURNAL_SUFFIX = ".unsaved"
+
+
+class SaveRefusedError(UserError):
+    """The file was not saved; the message is one line for people."""
+
+
+@dataclass(slots=True)
+class OpenDocument:
+    """A mission file in the editor.
+
+    Attributes:
+        path: of the file.
+        session: the document with its edits.
+        layout: where its states are drawn.
+        revision: counts the document's changes.
+        restored: what a killed program had not saved was found and is shown.
+        problem: what else went wrong at opening, in one line; empty: nothing.
+    """
+
+    path: Path
+    session: EditSession
+    layout: Layout
+    revision: int = 0
+    restored: bool = False
+    problem: str = ""
+    _saved: bytes = b""
+    _is_kept: bool = True  # the journal has the present text
+
+    @classmethod
+    def open(cls, path: Path) -> OpenDocument:
+        """Open a file. Raises `MissionError` if it cannot be read."""
+        document = Document.open(path)
+        try:
+            layout, problem = read_layout(path), ""
+        except LayoutError as error:
+            layout, problem = Layout(), str(error)
+        opened = cls(path, EditSession(document), layout, problem=problem, _saved=document.data)
+        opened._restore()
+        return opened
+
+    def _restore(self) -> None:
+        try:
+            kept = self.journal.read_bytes()
+            text = Document.from_bytes(kept, self.path).text
+        except (OSError, UserError):
+            return
+        if kept != self._saved:
+            self.session.apply(ReplaceText(start=0, end=len(self.session.document.text), text=text))
+            self.restored = True
+
+    @property
+    def document(self) -> Document:
+        """As it is now."""
+        return self.session.document
+
+    @property
+    def is_saved(self) -> bool:
+        """Whether the file has the document's text."""
+        return self.document.data == self._saved
+
+    @property
+    def journal(self) -> Path:
+        """The file beside the mission that has what is not saved."""
+        return self.path.with_name(f".{self.path.name}{_JOURNAL_SUFFIX}")
+
+    def apply(self, edit: Edit) -> tuple[Change, ...]:
+        """Apply an edit; see `EditSession.apply`."""
+        before = self.document
+        changes = self.session.apply(edit)
+        if changes:
+            self.layout = follow(self.layout, before, edit, self.document)
+        return self._changed(changes)
+
+    def undo(self) -> tuple[Change, ...]:
+        """Take the last edit back; see `EditSession.undo`."""
+        return self._changed(self.session.undo())
+
+    def redo(self) -> tuple[Change, ...]:
+        """Do again what was undone last; see `EditSession.redo`."""
+        return self._changed(self.session.redo())
+
+    def _changed(self, changes: tuple[Change, ...]) -> tuple[Change, ...]:
+        if changes:
+            self.revision += 1
+            self._is_kept = False
+        return changes
+
+    def place(self, places: dict[str, Box | None]) -> None:
+        """Keep where states are drawn, by their full ids; None forgets one. Raises `LayoutError`."""
+        states = {**self.layout.states, **{name: box for name, box in places.items() if box is not None}}
+        for name, box in places.items():
+            if box is None:
+                states.pop(name, None)
+        self.layout = Layout(states=states, corners=self.layout.corners)
+        write_layout(self.path, self.layout)
+
+    def keep(self) -> None:
+        """Write the journal, if the text has changed since; a disk that refuses it is no reason to stop."""
+        if self._is_kept:
+            return
+        self._is_kept = True
+        if self.is_saved:
+            self.journal.unlink(missing_ok=True)
+            return
+        part = self.journal.with_suffix(".part")
+        try:
+            part.write_bytes(self.document.data)
+            os.replace(part, self.journal)
+        except OSError:
+            part.unlink(missing_ok=True)
+
+    def save(self, *, force: bool = False) -> None:
+        """Write the file.
+
+        Args:
+            force: also if another program has changed it meanwhile.
+
+        Raises:
+            SaveRefusedError: it cannot be written, or another program has changed it.
+        """
+        name = self.path.name
+        part = self.path.with_name(f".{name}.part")
+        try:
+            if not force and self.path.exists() and self.path.read_bytes() != self._saved:
+                raise SaveRefusedError(f"{name} was changed by another program since it was opened")
+            part.write_bytes(self.document.data)
+            if self.path.exists():
+                part.chmod(self.path.stat().st_mode & 0o777)
+            os.replace(part, self.path)
+            if layout_path(self.path).exists() or self.layout.states:
+                write_layout(self.path, self.layout)
+        except OSError as error:
+            part.unlink(missing_ok=True)
+            raise SaveRefusedError(f"{name}: cannot be written ({error.strerror})") from None
+        self._saved = self.document.data
+        self._is_kept = True
+        self.journal.unlink(missing_ok=True)

@@ -1,0 +1,210 @@
+/** The mission editor: diagram and text of one mission, each following the other. */
+import "./edit.css";
+import { isTyping, make, setText } from "../lib/dom.js";
+import { pageData, pageRoot } from "../lib/page_data.js";
+import { DiagramView } from "./diagram_view.js";
+import { button, choice, textField } from "./fields.js";
+import { Inspector } from "./inspector.js";
+import { EditSession } from "./session.js";
+import { TextView } from "./text_view.js";
+import { language, setLanguage, word } from "./words.js";
+
+/** @typedef {import("./diagram_view.js").Selection} Selection */
+
+const root = pageRoot("edit");
+const file = new URLSearchParams(location.search).get("file");
+document.documentElement.lang = language();
+
+if (file) edit(file);
+else chooseFile();
+
+/** The list of missions, and a form for a new one. */
+async function chooseFile() {
+  const { mayEdit, missions } = pageData();
+  const problem = make("p", { class: "problem", role: "alert", hidden: true });
+  const list = make("ul", { class: "e-files" });
+  root.append(make("h1", {}, word("open")), problem, list);
+  const answer = await fetch("/api/edit/files");
+  const told = await answer.json();
+  if (!answer.ok) {
+    problem.hidden = false;
+    problem.textContent = told.detail;
+    return;
+  }
+  const link = (name) => make("li", {}, make("a", { href: `/edit?file=${encodeURIComponent(name)}` }, name));
+  list.replaceChildren(...told.files.map(link));
+  if (told.files.length === 0) list.append(make("li", { class: "hint" }, word("no_files")));
+  if (!mayEdit) return;
+  let name = "my_mission", source = "empty";
+  const sources = [["empty", word("empty")], ["example", word("example")], ...missions.map((each) => [each, word("a_copy", { name: each })])];
+  root.append(make("form", { class: "panel e-new" },
+    textField(word("name"), name, (value) => { name = value; }),
+    choice(word("from"), /** @type {[string, string][]} */ (sources), source, (value) => { source = value; }),
+    button(word("create"), async () => {
+      const made = await fetch("/api/edit/files", {
+        method: "POST", headers: { "Content-Type": "application/json" }, body: JSON.stringify({ name, source }),
+      });
+      const { file: created, detail } = await made.json();
+      if (made.ok) location.href = `/edit?file=${encodeURIComponent(created)}`;
+      problem.hidden = made.ok;
+      problem.textContent = typeof detail === "string" ? detail : made.statusText;
+    })));
+}
+
+/** @param {string} name of the file */
+function edit(name) {
+  /** @type {Selection} */
+  let selection = { kind: "mission", id: "" };
+  const line = make("p", { class: "e-message", role: "status", hidden: true });
+  const state = make("span", { class: "e-saved", role: "status" });
+  const drawing = make("section", { class: "e-drawing", "aria-label": word("diagram") });
+  const writing = make("section", { class: "e-writing", "aria-label": word("text") });
+  const form = make("section", { class: "e-form panel", "aria-label": word("state") });
+  const findings = make("section", { class: "e-findings panel", "aria-label": word("findings") });
+  const undo = button(word("undo"), () => session.undo(), { "aria-keyshortcuts": "Control+Z" });
+  const redo = button(word("redo"), () => session.redo(), { "aria-keyshortcuts": "Control+Y" });
+  const save = button(word("save"), store, { class: "e-first", "aria-keyshortcuts": "Control+S" });
+  const tools = make("div", { class: "e-tools", role: "toolbar" },
+    make("a", { href: "/edit" }, word("files")), make("strong", {}, name), state, save, undo, redo,
+    button(word("new_state"), () => inspector.add(false)),
+    button(word("new_superstate"), () => inspector.add(true)),
+    button(word("fit"), () => diagram.fit()),
+    button(word("arrange"), arrange),
+    button(word("language"), () => {
+      setLanguage(language() === "en" ? "es" : "en");
+      location.reload();
+    }));
+  root.replaceChildren(tools, line, make("div", { class: "e-panes" }, drawing, form, writing, findings));
+
+  const session = new EditSession(`/ws/edit?file=${encodeURIComponent(name)}`, {
+    changed(changes, all) {
+      if (all !== null) text.setText(all);
+      else text.change(changes);
+      refresh();
+    },
+    connected(connection, reason) {
+      if (connection === "open") tell("");
+      else tell(connection === "refused" ? reason : word("away"));
+    },
+    refused: tell,
+    note: (note) => tell(word(/** @type {any} */ (note))),
+    status: showStatus,
+  });
+  const text = new TextView(writing, {
+    typed: (take) => session.type(take),
+    moved: (offset) => {
+      const around = session.diagram.nodes.filter(({ span }) => span && span[0] <= offset && offset <= span[1]);
+      const at = session.diagram.edges.find(({ span }) => span && span[0] <= offset && offset <= span[1]);
+      if (at) select({ kind: "transition", id: at.id }, false);
+      else if (around.length > 0) select({ kind: "state", id: innermost(around).id }, false);
+      else select({ kind: "mission", id: "" }, false);
+    },
+  });
+  const diagram = new DiagramView(drawing, {
+    selected: (chosen) => select(chosen, true),
+    placed: (places) => session.place(places),
+    joined: (from, to) => join(from, to),
+    moved: (moved, parent) => move(moved, parent),
+    opened: (chosen) => {
+      select(chosen, true);
+      inspector.focus();
+    },
+  }, { done: word("done"), resume: word("resume") });
+  const inspector = new Inspector(form, session, (chosen) => select(chosen, true));
+
+  function innermost(nodes) {
+    return nodes.reduce((best, each) => (each.span[0] >= best.span[0] && each.span[1] <= best.span[1] ? each : best));
+  }
+
+  function tell(words) {
+    setText(line, words);
+    line.hidden = words === "";
+  }
+
+  function showStatus() {
+    setText(state, [session.isSaved ? word("saved") : word("unsaved"), session.others > 0 ? word("others") : ""].filter(Boolean).join(" – "));
+    undo.toggleAttribute("disabled", !session.canUndo);
+    redo.toggleAttribute("disabled", !session.canRedo);
+  }
+
+  /** @param {Selection} chosen @param {boolean} showText */
+  function select(chosen, showText) {
+    selection = chosen;
+    diagram.select(chosen);
+    inspector.show(chosen);
+    const { nodes, edges } = session.diagram;
+    const { span } = (chosen.kind === "state" ? nodes : edges).find(({ id }) => id === chosen.id) ?? {};
+    if (showText && span && !text.hasFocus) text.show(span[0], span[1]);
+  }
+
+  function refresh() {
+    diagram.draw(session.diagram, session.layout, session.findings);
+    text.setFindings(session.findings);
+    inspector.show(selection);
+    showFindings();
+    root.classList.toggle("e-unreadable", !session.isReadable);
+    if (!session.isReadable) tell(word("unreadable"));
+    else if (line.textContent === word("unreadable")) tell("");
+  }
+
+  function showFindings() {
+    const rows = session.findings.map((finding) => make("li", { "data-severity": finding.severity },
+      button(`${finding.line ? `${finding.line}: ` : ""}${finding.message}`, () => {
+        const [node] = finding.nodes;
+        if (node) select(finding.event === null ? { kind: "state", id: node } : { kind: "transition", id: `${node}/${finding.event}/${finding.index}` }, false);
+        if (finding.span) text.show(finding.span[0], finding.span[1]);
+      }, { class: "e-link" })));
+    findings.replaceChildren(make("h2", {}, word("findings")),
+      rows.length > 0 ? make("ul", {}, ...rows) : make("p", { class: "e-good" }, word("none")));
+  }
+
+  /** @param {string} from @param {string} to */
+  async function join(from, to) {
+    const node = session.diagram.nodes.find(({ id }) => id === from);
+    if (!node?.source) return tell(word("foreign_note"));
+    const count = session.diagram.edges.filter(({ source, event }) => source === from && event === "tick").length;
+    if (await session.edit({ kind: "add_transition", state: node.source, to })) {
+      select({ kind: "transition", id: `${from}/tick/${count}` }, true);
+      inspector.focus();
+    }
+    return undefined;
+  }
+
+  /** @param {string} moved @param {string} parent */
+  async function move(moved, parent) {
+    const { nodes } = session.diagram;
+    const source = (id) => nodes.find((node) => node.id === id)?.source ?? "";
+    if (await session.edit({ kind: "move_state", state: source(moved), parent: source(parent) })) {
+      select({ kind: "state", id: [parent, moved.split(".").at(-1)].filter(Boolean).join(".") }, true);
+    } else refresh();
+  }
+
+  function arrange() {
+    session.place(Object.fromEntries(Object.keys(session.layout).map((id) => [id, null])));
+    refresh();
+    diagram.fit();
+  }
+
+  async function store() {
+    if (await session.save()) tell("");
+    else if (line.textContent?.includes("another program") && confirm(word("overwrite"))) await session.save(true);
+  }
+
+  addEventListener("beforeunload", (event) => {
+    if (!session.isSaved) event.preventDefault();
+  });
+  addEventListener("keydown", (event) => {
+    const isCommand = event.ctrlKey || event.metaKey;
+    const key = event.key.toLowerCase();
+    if (isCommand && key === "s") {
+      event.preventDefault();
+      store();
+    } else if (isCommand && (key === "z" || key === "y") && !isTyping(event)) {
+      event.preventDefault();
+      if (key === "y" || event.shiftKey) session.redo();
+      else session.undo();
+    } else if (event.key === "Delete" && !isTyping(event) && !text.hasFocus) {
+      inspector.delete(selection);
+    } else if (event.key === "F2" && !isTyping(event)) inspector.focus();
+  });
+}

@@ -1,0 +1,56 @@
+/** The editor's texts in English and Spanish. */
+
+const WORDS = {
+  en: {
+    undo: "Undo", redo: "Redo", save: "Save", saved: "saved", unsaved: "not saved", fit: "Show all", arrange: "Arrange",
+    new_state: "New state", new_superstate: "New superstate", language: "Español", files: "Missions",
+    state: "State", transition: "Transition", mission: "Mission", name: "Name", description: "Description",
+    class: "Class", vision: "Vision", initial: "Starts in", final: "final: the end", starts_here: "starts here", uses: "Uses the states of",
+    enter: "On entry", during: "During", exit: "On exit", add_action: "Add an action", remove: "Remove", up: "Up", down: "Down",
+    transitions: "Transitions, in order", guard: "When (empty: always)", to: "To", event: "Event", priority: "Order",
+    actions: "Actions", duplicate: "Duplicate", delete: "Delete", inner: "New state in it", parameters: "Its parameters",
+    tick: "at every tick", done: "when finished", resume: "after a pause", variables: "Variables", add_variable: "Add a variable",
+    value: "First value", findings: "What the checker says", none: "Nothing to complain about: the mission can fly.",
+    unreadable: "The text cannot be read at the moment; the diagram shows what was there before.",
+    away: "no connection to the editor's program; trying again", restored: "What was not saved last time is here again.",
+    others: "also open in another window", names: "Names to use", template_note: "A state of the template {name}: a change applies to all its uses.",
+    foreign_note: "Written in the mission that this one extends; it can be changed there.", create: "Create", from: "Start from",
+    empty: "an empty chart", example: "an example with comments", a_copy: "a copy of {name}", open: "Open a mission", no_files: "There are no missions in this folder yet.",
+    overwrite: "Another program has changed the file. Save anyway?", text: "Text", diagram: "Diagram", add_transition: "Add a transition", new_name: "name",
+  },
+  es: {
+    undo: "Deshacer", redo: "Rehacer", save: "Guardar", saved: "guardado", unsaved: "sin guardar", fit: "Ver todo", arrange: "Ordenar",
+    new_state: "Estado nuevo", new_superstate: "Superestado nuevo", language: "English", files: "Misiones",
+    state: "Estado", transition: "Transición", mission: "Misión", name: "Nombre", description: "Descripción",
+    class: "Clase", vision: "Visión", initial: "Empieza en", final: "final: el fin", starts_here: "empieza aquí", uses: "Usa los estados de",
+    enter: "Al entrar", during: "Durante", exit: "Al salir", add_action: "Añadir una acción", remove: "Quitar", up: "Subir", down: "Bajar",
+    transitions: "Transiciones, por orden", guard: "Cuando (vacío: siempre)", to: "Hacia", event: "Suceso", priority: "Orden",
+    actions: "Acciones", duplicate: "Duplicar", delete: "Borrar", inner: "Estado nuevo dentro", parameters: "Sus parámetros",
+    tick: "en cada paso", done: "al terminar", resume: "tras una pausa", variables: "Variables", add_variable: "Añadir una variable",
+    value: "Primer valor", findings: "Lo que dice el revisor", none: "Nada que objetar: la misión puede volar.",
+    unreadable: "Ahora no se puede leer el texto; el diagrama muestra lo que había antes.",
+    away: "sin conexión con el programa del editor; se intenta de nuevo", restored: "Lo que no se guardó la última vez está aquí de nuevo.",
+    others: "abierto también en otra ventana", names: "Nombres que se pueden usar", template_note: "Un estado de la plantilla {name}: un cambio vale para todos sus usos.",
+    foreign_note: "Escrito en la misión que esta amplía; se puede cambiar allí.", create: "Crear", from: "Empezar con",
+    empty: "un diagrama vacío", example: "un ejemplo con comentarios", a_copy: "una copia de {name}", open: "Abrir una misión", no_files: "Aún no hay misiones en esta carpeta.",
+    overwrite: "Otro programa ha cambiado el archivo. ¿Guardar de todos modos?", text: "Texto", diagram: "Diagrama", add_transition: "Añadir una transición", new_name: "nombre",
+  },
+};
+const KEPT = "framerunner-language";
+
+/** @returns {"en"|"es"} the language that was chosen last, or the browser's */
+export function language() {
+  const kept = localStorage.getItem(KEPT);
+  if (kept === "en" || kept === "es") return kept;
+  return navigator.language.startsWith("es") ? "es" : "en";
+}
+
+/** @param {"en"|"es"} chosen */
+export function setLanguage(chosen) {
+  localStorage.setItem(KEPT, chosen);
+}
+
+/** A text. @param {keyof typeof WORDS.en} key @param {Object<string, string>} [values] @returns {string} */
+export function word(key, values = {}) {
+  return WORDS[language()][key].replace(/\{(\w+)\}/g, (_, name) => values[name] ?? "");
+}
