@@ -104,9 +104,7 @@ def equipment(
     from framerunner.editing.desk import EditorDesk
     from framerunner.flying.plan import FlightPlan
     from framerunner.monitoring.run_library import RunFolders
-    from framerunner.editing.desk import EditorDesk
     from monitor.ports import Equipment
-    from monitor.server import Monitor
     from scenarios.loader import list_scenarios, load_scenario
     from wire.transports.vehicle_link import VehicleLink
 

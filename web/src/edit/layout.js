@@ -90,7 +90,9 @@ function arrange(paths, pairs, boxes, kept) {
   const isPlaced = (path) => kept[path] !== undefined;
   if (!paths.every(isPlaced)) {
     const graph = new dagre.graphlib.Graph();
-    graph.setGraph({ rankdir: "TB", ranker: paths.length > 60 ? "longest-path" : "network-simplex", ...GAP });
+    // Superstates follow each other to the right, so that a wide page is used.
+    const hasSuper = paths.some((path) => boxes.get(path).height > LEAF.height);
+    graph.setGraph({ rankdir: hasSuper ? "LR" : "TB", ranker: paths.length > 60 ? "longest-path" : "network-simplex", ...GAP });
     graph.setDefaultEdgeLabel(() => ({}));
     for (const path of paths) graph.setNode(path, { ...boxes.get(path) });
     for (const [from, to] of pairs) graph.setEdge(from, to);
