@@ -178,8 +178,13 @@ def mermaid(mission: Mission, active: str | None = None) -> str:
         mission: what to draw.
         active: full id of the state to highlight, such as "red.turning".
     """
-    lines = ["stateDiagram-v2", f"    [*] --> {mission.spec.initial}"]
-    for state in mission.spec.states:
+    return mermaid_of(mission.spec, active)
+
+
+def mermaid_of(chart: MissionFile, active: str | None = None) -> str:
+    """The same of an expanded chart."""
+    lines = ["stateDiagram-v2", f"    [*] --> {chart.initial}"]
+    for state in chart.states:
         _draw(state, "    ", lines)
     if active:
         lines += ["    classDef active fill:#ffd166,stroke:#333", f"    class {active} active"]
@@ -208,7 +213,8 @@ def _draw(state: State, indent: str, lines: list[str]) -> None:
     for number, transition in enumerate(state.transitions, 1):
         order = f"{number} " if several else ""
         guard = f"[{transition.when}]" if transition.when else ""
-        label = f" : {order}{guard}" if order or guard else ""
+        done = f" / {', '.join(map(str, transition.actions))}" if transition.actions else ""
+        label = f" : {order}{guard}{done}" if order or guard or done else ""
         lines.append(f"{indent}{state.id} --> {transition.to}{label}")
     if state.then:
         lines.append(f"{indent}{state.id} --> {state.then}")

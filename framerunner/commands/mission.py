@@ -4,18 +4,19 @@ from __future__ import annotations
 
 import re
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Literal
 
 from cyclopts import App, Parameter
 
 from errors import SettingError
-from framerunner.commands import load_mission_with
+from framerunner.commands import load_mission_with, say
 
 if TYPE_CHECKING:
     from offboard.mission import NewMission
 
-app = App(name="mission", help="List, show, check and create missions.")
+app = App(name="mission", help="List, show, check, create, export and import missions.")
 
+MAX_IMPORT_BYTES = 1_000_000
 _NAME = re.compile(r"[a-z][a-z0-9_]{0,59}")
 PilotOption = Annotated[
     Path | None, Parameter(help="Python file with a subclass of Pilot that the mission uses; it is executed")
@@ -58,7 +59,10 @@ def show(mission: Annotated[str, Parameter(help="name or file")], *, pilot: Pilo
 
 @app.command
 def check(file: Annotated[Path, Parameter(help="YAML file")], *, pilot: PilotOption = None) -> int:
-    """Say whether a mission file is good, or every fault with its line.
+    """Say whether a mission file is good, or every fault with its line; then what may go wrong with it.
+
+    A warning names a part that does nothing, such as a transition that is never taken; advice, a state that
+    may wait for ever. Missions with warnings and advice are flown.
 
     **Examples**
 
@@ -74,7 +78,88 @@ def check(file: Annotated[Path, Parameter(help="YAML file")], *, pilot: PilotOpt
     print(
         f"{file}{with_pilot}: good, mission '{loaded.name}' with {len(loaded.leaves)} states, {loaded.rules}"
     )
+    for remark in loaded.remarks:
+        if remark.place.file == loaded.path.name:
+            print(remark)
     return 0
+
+
+@app.command
+def export(
+    mission: Annotated[str, Parameter(help="name or file")],
+    *,
+    format: Annotated[  # noqa: A002 - the option's name
+        Literal["scxml", "mermaid"], Parameter(help="W3C State Chart XML, or Mermaid's language")
+    ] = "scxml",
+    pilot: PilotOption = None,
+    out: Annotated[Path | None, Parameter(help="file to write; it must not exist")] = None,
+) -> int:
+    """Print or write a mission for other programs: as SCXML for statechart editors, or as a Mermaid diagram.
+
+    **Examples**
+
+        framerunner mission export frame_challenge --format scxml --out frame_challenge.scxml
+
+        framerunner mission export my_mission.yaml --format mermaid
+    """
+    from offboard.authoring import export_scxml
+    from offboard.mission import mermaid
+
+    loaded = load_mission_with(mission, pilot)
+    text = export_scxml(loaded.spec) if format == "scxml" else mermaid(loaded)
+    _print_or_write(text, out)
+    return 0
+
+
+@app.command(name="import")
+def import_(
+    file: Annotated[Path, Parameter(help="SCXML file")],
+    *,
+    pilot: PilotOption = None,
+    out: Annotated[Path | None, Parameter(help="mission file to write; it must not exist")] = None,
+) -> int:
+    """Print or write the mission that an SCXML file describes, and say what the checker finds in it.
+
+    What a mission cannot express is refused, one line for each.
+
+    **Examples**
+
+        framerunner mission import chart.scxml
+
+        framerunner mission import chart.scxml --out my_mission.yaml
+    """
+    from offboard.authoring import Document, check_document, import_scxml
+    from offboard.pilot import Pilot
+    from offboard.pilot_file import read_pilot
+
+    pilot_class = Pilot if pilot is None else read_pilot(pilot).pilot_class()
+    text = import_scxml(_read(file), file.stem)
+    _print_or_write(text, out)
+    for found in check_document(Document.from_text(text, out or file.with_suffix(".yaml")), pilot_class):
+        say(f"{found.file}:{found.line}: {found.severity}: {found.message}")
+    return 0
+
+
+def _read(path: Path) -> bytes:
+    try:
+        with path.open("rb") as file:
+            return file.read(MAX_IMPORT_BYTES + 1)
+    except OSError as error:
+        raise SettingError(f"{path}: cannot be read ({error.strerror}); name an SCXML file") from None
+
+
+def _print_or_write(text: str, out: Path | None) -> None:
+    if out is None:
+        print(text, end="")
+        return
+    try:
+        with out.open("x", encoding="utf-8", newline="\n") as file:
+            file.write(text)
+    except FileExistsError:
+        raise SettingError(f"{out} is there already and is left as it is; choose another --out") from None
+    except OSError as error:
+        raise SettingError(f"{out}: cannot be written ({error.strerror}); choose another --out") from None
+    print(f"written: {out}")
 
 
 @app.command

@@ -1,0 +1,141 @@
+"""Missions as an editor needs them: documents, edits, findings, a catalogue, a diagram, and exchange.
+
+Everything here is pure: it reads files where that is said, and uses no clock, socket or task. A page or
+another program uses the names of this package only:
+
+    session = EditSession(Document.open("my_mission.yaml"))
+    session.apply(parse_edit({"kind": "rename_state", "state": "red", "name": "first"}))
+    session.document.text, check_document(session.document), diagram(session.document)
+    session.undo()
+    Path("my_mission.yaml").write_bytes(session.document.data)
+
+**Document** (immutable): `open(path)`, `from_bytes`, `from_text`; `text` (lines end with a line feed),
+`data` (the file's bytes, with its own line ends), `path`, `unreadable` (why it is not YAML, or None),
+`outline`, `chart`, `positions`. Any text is a document. Offsets count characters of `text`; lines and
+columns count from 1. JavaScript counts UTF-16 units: `positions.to_utf16(offset)` and `from_utf16`
+convert, which matters only for characters beyond U+FFFF.
+
+**Paths.** Edits name a state by where it is written: `red`, `landing.stop`, and `@cross_frame.turning`
+for the state of a template (`@cross_frame` is the template). The diagram names states by the full id
+that the engine reports, `red.turning`; each node's `source` is its path, empty if it is written in
+another file (`extends`).
+
+**Edits**: pydantic models in `offboard.authoring.edits`; `parse_edit(data)` makes one of what JSON
+holds, `edit_schema()` is their JSON Schema. `kind` is one of
+
+    add_state {name, parent?, index?, final?, use?, states?}    add_template {name, states}
+    rename_state {state, name}                                  move_state {state, parent, index?}
+    duplicate_state {state, name, parameters?: {name: value}}   delete_state {state, references?}
+    add_transition {state, to, when?, actions?, event?, index?} delete_transition {transition}
+    redirect_transition {transition, to}                        move_transition {transition, index}
+    set_guard {transition, when}                                set_event {transition, event}
+    set_transition_actions {transition, actions}                set_actions {state, section, actions}
+    set_initial {state?, name}                                  set_final {state, final}
+    set_use {state, template}                                   set_parameter {state, name, value}
+    set_variable {name, value | null}                           set_mission {key, value}
+    replace_text {start, end, text}
+
+with `transition` = {state, event?: tick | done | resume, index?} and `section` = enter | during | exit, `references` = keep | delete.
+The event `tick` is an entry of `transitions`, `done` is `then`, `resume` is `resume`. `to` is a path or
+a full id.
+
+`apply(document, edit)` returns `Edited(document, changes)`; `EditSession` does so with `undo()` and
+`redo()`. A `Change` is {start, removed, inserted}; the changes of one edit follow each other, each made
+for the text after those before it. What cannot be applied raises `EditError` with one line, and nothing
+is changed.
+
+**Findings**: `check_document(document, pilot_class)` returns `Finding`s: severity (error | warning |
+advice), code, message, file, line, column, start, end, state, event, index, section, nodes.
+`problems_of` has them before they are put into words; other languages are tables of
+`offboard.chart.messages`.
+
+**Catalogue**: `catalogue(pilot_class, variables, contest=...)`: `values` (name, type, text, unit, low,
+high, choices, assignable, needs_map, own) and `primitives` (name, text, help, needs_map, own).
+
+**Diagram**: `diagram(document)`: `nodes` and `edges` with ids, places in the text and what edits need.
+
+**Layout**: `read_layout`, `write_layout`, `parse_layout`, `follow` after an edit; the side file
+`NAME.layout.json` is {version: 1, states: {id: {x, y, width?, height?}}, corners: {edge id: [[x, y],
+...]}}.
+
+**Exchange**: `export_scxml(chart)`, `import_scxml(data, name)` (raises `XmlError`), `mermaid_of(chart,
+active)`; a `chart` is `Document.chart` or `Mission.spec`.
+
+`as_json(value)` turns findings, catalogues, diagrams and changes into what `json.dumps` takes.
+"""
+
+from __future__ import annotations
+
+from dataclasses import asdict
+from typing import TYPE_CHECKING, Any
+
+from offboard.authoring.apply import Edited, EditSession, apply
+from offboard.authoring.catalogue import Catalogue, PrimitiveEntry, ValueEntry, catalogue
+from offboard.authoring.diagram import Diagram, Edge, Node, diagram
+from offboard.authoring.document import Document
+from offboard.authoring.edit_error import EditError
+from offboard.authoring.edits import Edit, TransitionPath, edit_schema, parse_edit
+from offboard.authoring.findings import Finding, check_document, problems_of
+from offboard.authoring.layout import (
+    Box,
+    Layout,
+    LayoutError,
+    follow,
+    layout_path,
+    parse_layout,
+    read_layout,
+    write_layout,
+)
+from offboard.authoring.outline import Span
+from offboard.authoring.scxml_export import export_scxml
+from offboard.authoring.scxml_import import import_scxml
+from offboard.authoring.text import Change, Positions
+from offboard.authoring.xml_tree import XmlError
+from offboard.mission import mermaid_of
+
+if TYPE_CHECKING:
+    from _typeshed import DataclassInstance
+
+__all__ = [
+    "Box",
+    "Catalogue",
+    "Change",
+    "Diagram",
+    "Document",
+    "Edge",
+    "Edit",
+    "EditError",
+    "EditSession",
+    "Edited",
+    "Finding",
+    "Layout",
+    "LayoutError",
+    "Node",
+    "Positions",
+    "PrimitiveEntry",
+    "Span",
+    "TransitionPath",
+    "ValueEntry",
+    "XmlError",
+    "apply",
+    "as_json",
+    "catalogue",
+    "check_document",
+    "diagram",
+    "edit_schema",
+    "export_scxml",
+    "follow",
+    "import_scxml",
+    "layout_path",
+    "mermaid_of",
+    "parse_edit",
+    "parse_layout",
+    "problems_of",
+    "read_layout",
+    "write_layout",
+]
+
+
+def as_json(value: DataclassInstance) -> dict[str, Any]:
+    """A finding, catalogue, diagram or change as dictionaries and lists of JSON's types."""
+    return asdict(value)
