@@ -41,7 +41,7 @@ def edit(
     """
     check_range("--port", port, 0, 65535)
     from framerunner.commands.monitor import DATABASE, equipment
-    from framerunner.editing.desk import EditorDesk
+    from framerunner.editing.documents.desk import EditorDesk
     from monitor.run import serve
     from monitor.settings import MonitorSettings
     from wire.transports.urls import parse_url

@@ -15,7 +15,7 @@ from cyclopts import Parameter
 from framerunner.commands import WholeNumber, check_range, say
 
 if TYPE_CHECKING:
-    from framerunner.editing.desk import EditorDesk
+    from framerunner.editing.documents.desk import EditorDesk
     from monitor.ports import Equipment
     from monitor.server import Monitor
     from scenarios.models import Scenario
@@ -101,7 +101,7 @@ def equipment(
     camera_hosts: tuple[str, ...] = (),
 ) -> Equipment:
     """What the monitor, which may not import other rooms' functions, is given of them."""
-    from framerunner.editing.desk import EditorDesk
+    from framerunner.editing.documents.desk import EditorDesk
     from framerunner.flying.plan import FlightPlan
     from framerunner.monitoring.run_library import RunFolders
     from monitor.ports import Equipment
@@ -123,7 +123,7 @@ def equipment(
 
 def _add_editor(monitor: Monitor, desk: EditorDesk) -> None:
     """Add the editor; its libraries are imported with the monitor's, in a thread."""
-    from framerunner.editing.api import register
+    from framerunner.editing.documents.api import register
 
     register(monitor, desk)
 

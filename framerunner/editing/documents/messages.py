@@ -20,7 +20,7 @@ from typing import Annotated, Any, Literal
 from pydantic import BaseModel, ConfigDict, Field, TypeAdapter, ValidationError
 
 from errors import UserError
-from framerunner.editing.open_document import OpenDocument
+from framerunner.editing.documents.open_document import OpenDocument
 from offboard.authoring.catalogue import catalogue
 from offboard.authoring.diagram import diagram
 from offboard.authoring.findings import check_document

@@ -12,8 +12,8 @@ from fastapi import Body, HTTPException, Request
 from starlette.websockets import WebSocket
 
 from errors import UserError
-from framerunner.editing.desk import EditorDesk, SharedDocument
-from framerunner.editing.messages import (
+from framerunner.editing.documents.desk import EditorDesk, SharedDocument
+from framerunner.editing.documents.messages import (
     EditMessage,
     LayoutMessage,
     PageMessage,
@@ -27,7 +27,7 @@ from framerunner.editing.messages import (
     read_message,
     status_message,
 )
-from framerunner.editing.open_document import OpenDocument
+from framerunner.editing.documents.open_document import OpenDocument
 from monitor.access import refuse
 from monitor.pages.table import Page, add_page
 from offboard.authoring.edits import ReplaceText, parse_edit

@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from errors import UserError
-from framerunner.editing.open_document import OpenDocument
+from framerunner.editing.documents.open_document import OpenDocument
 from offboard.mission import MISSIONS, list_missions, new_mission
 
 _FILE = re.compile(r"[A-Za-z0-9_][A-Za-z0-9_.-]{0,80}\.ya?ml")
