@@ -66,6 +66,11 @@ class Mission:
         return f"class {self.mission_class}, vision {self.vision}"
 
     @cached_property
+    def states(self) -> dict[str, State]:
+        """All states, superstates too, by full id, in document order."""
+        return {state.id: state for state in all_states(self.spec.states)}
+
+    @cached_property
     def leaves(self) -> dict[str, Leaf]:
         """States without states of their own, by full id."""
         return {leaf.state.id: leaf for leaf in leaves(self.spec.states)}
@@ -73,8 +78,7 @@ class Mission:
     @cached_property
     def finishes(self) -> frozenset[str]:
         """States in which the mission is over."""
-        states = {state.id: state for state in all_states(self.spec.states)}
-        return frozenset(leaf_id for leaf_id in self.leaves if is_finish(states, leaf_id))
+        return frozenset(leaf_id for leaf_id in self.leaves if is_finish(self.states, leaf_id))
 
     def new_pilot(self) -> Pilot:
         """A pilot with the mission's own variables; `MissionError` if a contestant's class fails."""
