@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING, Any
 from errors import UserError
 from offboard.chart.expressions import compile_value, names_in
 from offboard.chart.native import RESUME, TICK
-from offboard.chart.spec import Action, Leaf, finished_by, state_path
+from offboard.chart.spec import Action, Leaf, enter_state, state_path
 from offboard.drone import DroneState, VelocityCommand
 from offboard.limits import CONTEST, CommandLimits
 from offboard.mission import Mission
@@ -271,7 +271,7 @@ class MissionEngine:
         resume = present.leaf.resume
         if resume is None:
             return False
-        ids = (present.leaf.resume_id, *finished_by(self.mission.states, resume.to))
+        ids = (present.leaf.resume_id, *enter_state(self.mission.states, resume.to)[1])
         source, seconds = self.state, (time_us - self._entered_us) / 1e6
         self.pilot.seconds_in_mission = (time_us - self._started_us) / 1e6
         cmd = self.pilot.cmd
@@ -292,7 +292,7 @@ class MissionEngine:
         self._settle(time_us)
         arrived = self.state == transition.to or self.state.startswith(f"{transition.to}.")
         when = transition.when if arrived else DONE
-        ids = (leaf.transition_ids[number], *finished_by(self.mission.states, transition.to))
+        ids = (leaf.transition_ids[number], *enter_state(self.mission.states, transition.to)[1])
         self.transition = TransitionTaken(source, self.state, when, values, time_us, seconds, ids)
 
     def _seconds_in_state(self) -> float:

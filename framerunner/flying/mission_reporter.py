@@ -27,6 +27,7 @@ from wire.mission_tunnel import (
 STATE_TICKS = 2  # 10 Hz of vehicle time
 HISTORY = 10
 _TEXT_CHARACTERS = 80  # of a guard's value that is not a number
+_DIGITS = 6  # of a guard's value: more would take more pieces, and so longer to arrive
 _EXACT = 2**53  # larger integers lose digits in some JSON readers
 
 logger = logging.getLogger(__name__)
@@ -180,7 +181,8 @@ def _transition_json(taken: TransitionTaken) -> dict[str, object]:
         "time_us": taken.time_us,
         "when": taken.when,
         "values": [[name, _plain(value)] for name, value in taken.values],
-        "seconds": taken.seconds_in_source,
+        "seconds": round(taken.seconds_in_source, 3),
+        "ids": list(taken.ids),
     }
 
 
@@ -192,7 +194,7 @@ def _plain(value: object) -> object:
         return int(value)
     try:
         if not isinstance(value, str) and hasattr(value, "__float__"):
-            return float(value)
+            return float(f"{float(value):.{_DIGITS}g}")
         return str(value)[:_TEXT_CHARACTERS]
     except Exception:  # any that a contestant's conversion raises
         return type(value).__name__

@@ -136,23 +136,22 @@ def leaves(states: tuple[State, ...], outer: tuple[State, ...] = ()) -> list[Lea
     return found
 
 
-def finished_by(states: Mapping[str, State], target: str) -> tuple[str, ...]:
-    """Ids of the `then`s that are followed at once when a state is entered, in their order.
+def enter_state(states: Mapping[str, State], target: str) -> tuple[str, tuple[str, ...]]:
+    """Which leaf is active after a state is entered, and the ids of the `then`s that were followed at once.
 
     Args:
         states: all of the expanded chart, by full id.
         target: full id of the state that is entered.
     """
-    found: list[str] = []
-    while target and len(found) < len(states):
+    followed: list[str] = []
+    while True:
         while states[target].states:
             target = f"{target}.{states[target].initial}"
         outer = states.get(target.rpartition(".")[0])
-        if not states[target].final or outer is None or not outer.then:
-            break
-        found.append(transition_id(outer.id, THEN))
+        if not states[target].final or outer is None or not outer.then or len(followed) == len(states):
+            return target, tuple(followed)
+        followed.append(transition_id(outer.id, THEN))
         target = outer.then
-    return tuple(found)
 
 
 def state_path(state: str) -> tuple[str, ...]:
