@@ -12,7 +12,7 @@ from statemachine import StateChart
 
 from offboard.chart.check import check, is_finish
 from offboard.chart.native import load_chart, native_document
-from offboard.chart.problems import MissionError, Place, ProblemList, did_you_mean, mission_error
+from offboard.chart.problems import MissionError, Place, ProblemList, cut, did_you_mean, mission_error
 from offboard.chart.read import read_mission_file
 from offboard.chart.spec import Leaf, MissionFile, State, all_states, expand, leaves, merge_extended
 from offboard.pilot import Pilot
@@ -20,7 +20,15 @@ from offboard.pilot_file import PilotFile
 from scenarios.models import MissionClass
 from vision.types import Vision
 
-__all__ = ["Mission", "MissionError", "list_missions", "load_mission", "mermaid", "new_mission"]
+__all__ = [
+    "Mission",
+    "MissionError",
+    "list_missions",
+    "load_mission",
+    "mermaid",
+    "mission_from_text",
+    "new_mission",
+]
 
 MAX_FILE_BYTES = 1_000_000
 MISSIONS = Path(__file__).parent / "missions"
@@ -103,9 +111,36 @@ def load_mission(name_or_path: str | Path, pilot: PilotFile | type[Pilot] | None
     Raises:
         MissionError: every problem, one a line, as `file:line: text`.
     """
-    pilot = Pilot if pilot is None else pilot
     path = _find(str(name_or_path), Path.cwd(), Place(str(name_or_path)))
-    written = read_mission_file(_read_text(path), path)
+    return _checked(read_mission_file(_read_text(path), path), path, pilot)
+
+
+def mission_from_text(
+    text: str, pilot: PilotFile | type[Pilot] | None = None, *, file: str = "mission.yaml"
+) -> Mission:
+    """Load a mission that is not in a file, as `load_mission`; it may extend missions of the package only.
+
+    Args:
+        text: as a mission file has it.
+        pilot: see `load_mission`.
+        file: its name in messages; nothing is read there.
+
+    Raises:
+        MissionError: every problem, one a line, as `file:line: text`.
+    """
+    path = Path(file)
+    if len(text) > MAX_FILE_BYTES:
+        raise mission_error(Place(path.name), "is larger than 1 MB; a mission is a page or two")
+    written = read_mission_file(text.replace("\r\n", "\n").replace("\r", "\n"), path)
+    if written.extends and written.extends not in list_missions():
+        known = ", ".join(list_missions())
+        text = f"extends '{cut(written.extends)}': here a mission extends one of the package; known: {known}"
+        raise mission_error(written.place, text)
+    return _checked(written, path, pilot)
+
+
+def _checked(written: MissionFile, path: Path, pilot: PilotFile | type[Pilot] | None) -> Mission:
+    pilot = Pilot if pilot is None else pilot
     problems = ProblemList()
     spec = expand(merge_extended(written, _read_base), problems)
     check(spec, pilot.pilot_class() if isinstance(pilot, PilotFile) else pilot, problems)

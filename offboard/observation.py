@@ -156,10 +156,12 @@ def _carried(old: State, new: State) -> dict[str, str]:
         if (match := next((n for n in near if free[n].to == each.to), None)) is not None:
             numbers[number] = match
             del free[match]
-    same_name = {transition_id(old.id, which): transition_id(new.id, which) for which in (THEN, RESUME)}
-    return same_name | {
-        transition_id(old.id, number): transition_id(new.id, match) for number, match in numbers.items()
-    }
+    found = {transition_id(old.id, number): transition_id(new.id, match) for number, match in numbers.items()}
+    if old.then and new.then:
+        found[transition_id(old.id, THEN)] = transition_id(new.id, THEN)
+    if old.resume and new.resume:
+        found[transition_id(old.id, RESUME)] = transition_id(new.id, RESUME)
+    return found
 
 
 def _truth(guard: Evaluate, pilot: Pilot) -> bool | None:

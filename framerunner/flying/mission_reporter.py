@@ -180,13 +180,13 @@ def _transition_json(taken: TransitionTaken) -> dict[str, object]:
         "to": taken.target,
         "time_us": taken.time_us,
         "when": taken.when,
-        "values": [[name, _plain(value)] for name, value in taken.values],
+        "values": [[name, plain_value(value)] for name, value in taken.values],
         "seconds": round(taken.seconds_in_source, 3),
         "ids": list(taken.ids),
     }
 
 
-def _plain(value: object) -> object:
+def plain_value(value: object) -> object:
     """A value of a guard as JSON; a contestant's pilot may hold any type."""
     if value is None or isinstance(value, bool):
         return value

@@ -128,6 +128,10 @@ class RunControl:
 
         self._order(change)
 
+    def tell(self) -> None:
+        """Have the listener called, in a pause too."""
+        self._order(lambda _: None)
+
     def stop(self) -> None:
         """End the flight, as Ctrl-C does."""
 

@@ -10,7 +10,6 @@ from __future__ import annotations
 import contextlib
 import json
 import os
-import resource
 import shutil
 import sys
 from collections.abc import Callable, Mapping, Sequence
@@ -20,7 +19,7 @@ from typing import Any
 
 import cv2
 
-from framerunner.child_process import end_with_standard_input
+from framerunner.child_process import end_with_standard_input, limit_resources
 from framerunner.flying.navigation_reporter import navigation_json
 from framerunner.recording.collected import CollectedFlight, ImageFile, collect
 from framerunner.recording.events import RecordingError
@@ -68,20 +67,6 @@ def main() -> int:
         print(" ".join(str(error).split()), file=sys.stderr)
         return 2
     return 0
-
-
-def limit_resources(memory_bytes: int, processor_s: int) -> None:
-    """Have this process fail with MemoryError, or be killed, above so much more memory or processor time."""
-    with open("/proc/self/statm", encoding="ascii") as file:
-        held_bytes = int(file.read().split()[5]) * resource.getpagesize()  # data and stacks
-    for what, limit in (
-        (resource.RLIMIT_DATA, held_bytes + memory_bytes),
-        (resource.RLIMIT_CPU, processor_s),
-        (resource.RLIMIT_CORE, 0),
-    ):
-        hard = resource.getrlimit(what)[1]
-        wanted = limit if hard == resource.RLIM_INFINITY else min(limit, hard)
-        resource.setrlimit(what, (wanted, wanted))
 
 
 def read_run(folder: Path, target: Path) -> None:

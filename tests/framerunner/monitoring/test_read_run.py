@@ -26,7 +26,7 @@ from scenarios.loader import load_scenario
 from vision.types import Detections
 
 GREEDY = """
-from framerunner.monitoring.read_run import limit_resources
+from framerunner.child_process import limit_resources
 limit_resources({memory}, 100)
 try:
     held = bytearray(200_000_000)
