@@ -39,6 +39,7 @@ MODULES = (
     "monitor.video_proxy",
     "monitor.pilot_channel",
     "monitor.replay_api",
+    "monitor.extensions",
     "monitor.competition.api",
     "monitor.competition.stage",
     "monitor.pages.login",
@@ -52,7 +53,7 @@ _LIBRARIES = {"three": "scene", "echart": "echart", "mermaid": "mermaid"}
 _HASHED = re.compile(r"-[\w-]{8}\.js$")  # the bundler names a file by its content
 _RECONNECT_S = 10.0
 _END_S = 1
-_MAX_MESSAGE_BYTES = 1 << 17  # of a WebSocket; pages send some hundred bytes
+_MAX_MESSAGE_BYTES = 1 << 18  # of a WebSocket: a mission being edited; other pages send some hundred bytes
 
 
 @dataclass

@@ -89,6 +89,7 @@ def equipment(
     drone_url: str, scenario: Scenario | None, runs: Path, camera_hosts: tuple[str, ...] = ()
 ) -> Equipment:
     """What the monitor, which may not import other rooms' functions, is given of them."""
+    from framerunner.editing.web import EditingDoor
     from framerunner.flying.plan import FlightPlan
     from framerunner.monitoring.run_library import RunFolders
     from monitor.ports import Equipment
@@ -104,6 +105,7 @@ def equipment(
         runs=RunFolders(runs),
         start_pose=lambda flown: FlightPlan(flown).start_pose,
         camera_hosts=camera_hosts,
+        extensions=(EditingDoor(),),
     )
 
 

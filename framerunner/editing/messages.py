@@ -352,4 +352,11 @@ class BatchTask(_Task):
 TASK: TypeAdapter[RunTask | BatchTask] = TypeAdapter(
     Annotated[RunTask | BatchTask, Field(discriminator="kind")]
 )
+
+
+class _Tagged(BaseModel):
+    tag: int
+
+
+TAGGED = TypeAdapter(_Tagged)
 ORDER: TypeAdapter[Order] = TypeAdapter(Annotated[Order, Field(discriminator="do")])

@@ -14,6 +14,7 @@ from pydantic import BaseModel
 
 MAX_LINE_BYTES = 8_000_000
 _MAX_STDERR_BYTES = 20_000
+_GRACE_S = 2.0  # from the end of its output to its own
 
 
 class WorkerProcess:
@@ -63,7 +64,10 @@ class WorkerProcess:
         process, errors = self._process, self._errors
         assert process is not None
         assert errors is not None
-        self.kill()  # what is left of its group, or a process that closed its output
+        with contextlib.suppress(TimeoutError):
+            async with asyncio.timeout(_GRACE_S):
+                await process.wait()
+        self.kill()  # what is left of its group, or a process that only closed its output
         code = await process.wait()
         lines = (await errors).decode(errors="replace").strip().splitlines()
         if code == 0:
